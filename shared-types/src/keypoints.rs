@@ -1,0 +1,178 @@
+//! Rope keypoints: pixels along the rope's centreline, frame by frame.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
+
+/// Most keypoints of one frame.
+pub const MAX_KEYPOINTS: usize = 32;
+
+/// Keypoints of one frame as published in shared memory. RT-safe to copy.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[repr(C)]
+pub struct KeypointFrame {
+    /// Sequence number of the camera frame.
+    pub sequence: u64,
+    /// Start of exposure of row 0 (CLOCK_MONOTONIC, ns).
+    pub stamp_ns: u64,
+    /// Number of keypoints used.
+    pub count: u32,
+    /// 1 when the rope was lost in this frame.
+    pub lost: u32,
+    /// Raw left-eye pixels `[u, v]`, clamp first, lead centre last.
+    pub points_px: [[f32; 2]; MAX_KEYPOINTS],
+    /// Confidence of each point, 0 to 1.
+    pub confidence: [f32; MAX_KEYPOINTS],
+}
+
+/// One frame of a [`KeypointTrack`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrackedFrame {
+    /// Start of exposure of row 0 relative to the first frame's (s).
+    pub t_s: f64,
+    /// Raw left-eye pixels `[u, v]`, uniform in arc length, clamp first.
+    pub points: Vec<[f64; 2]>,
+    /// Confidence of each point, 0 to 1.
+    pub confidence: Vec<f64>,
+    /// Whether the rope was lost in this frame.
+    pub lost: bool,
+}
+
+/// Keypoints of a whole recording. JSON form: `keypoints.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KeypointTrack {
+    /// Keypoints per frame.
+    pub keypoints: usize,
+    /// The frames in order of time.
+    pub frames: Vec<TrackedFrame>,
+}
+
+/// Why a keypoint track is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum KeypointError {
+    /// Fewer frames or keypoints than identification needs.
+    #[error("keypoints: {what} is {found}, but at least {min} are needed")]
+    TooFew {
+        /// `keypoints` or `frames`.
+        what: &'static str,
+        /// Number found.
+        found: usize,
+        /// Number needed.
+        min: usize,
+    },
+    /// A frame has another number of points or confidences than `keypoints` says.
+    #[error(
+        "keypoints: frame {frame} has {found} points or confidences, `keypoints` says {expected}"
+    )]
+    FrameSize {
+        /// Index of the frame.
+        frame: usize,
+        /// Number found.
+        found: usize,
+        /// Number announced.
+        expected: usize,
+    },
+    /// A number is not finite or times do not increase.
+    #[error(
+        "keypoints: frame {frame} has a number that is not finite, or its `t_s` does not increase"
+    )]
+    BadNumber {
+        /// Index of the frame.
+        frame: usize,
+    },
+}
+
+impl KeypointTrack {
+    /// Checks sizes, numbers and order of time.
+    ///
+    /// # Errors
+    /// The first frame that breaks a rule.
+    pub fn validate(&self) -> Result<(), KeypointError> {
+        let need = |what, found, min| {
+            if found < min {
+                Err(KeypointError::TooFew { what, found, min })
+            } else {
+                Ok(())
+            }
+        };
+        need("keypoints", self.keypoints, 2)?;
+        need("frames", self.frames.len(), 2)?;
+        let mut before = f64::NEG_INFINITY;
+        for (frame, f) in self.frames.iter().enumerate() {
+            for found in [f.points.len(), f.confidence.len()] {
+                if found != self.keypoints {
+                    return Err(KeypointError::FrameSize {
+                        frame,
+                        found,
+                        expected: self.keypoints,
+                    });
+                }
+            }
+            let finite = f
+                .points
+                .iter()
+                .flatten()
+                .chain(&f.confidence)
+                .all(|v| v.is_finite());
+            if !finite || !f.t_s.is_finite() || f.t_s <= before {
+                return Err(KeypointError::BadNumber { frame });
+            }
+            before = f.t_s;
+        }
+        Ok(())
+    }
+
+    /// Part of the frames in which the rope was lost (0 to 1).
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
+    pub fn lost_part(&self) -> f64 {
+        let lost = self.frames.iter().filter(|f| f.lost).count();
+        lost as f64 / self.frames.len().max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn track() -> KeypointTrack {
+        let frame = |t_s| TrackedFrame {
+            t_s,
+            points: vec![[1.0, 2.0]; 3],
+            confidence: vec![1.0; 3],
+            lost: false,
+        };
+        KeypointTrack {
+            keypoints: 3,
+            frames: vec![frame(0.0), frame(0.5)],
+        }
+    }
+
+    #[test]
+    fn rules_are_checked() {
+        assert_eq!(track().validate(), Ok(()));
+        let mut t = track();
+        t.frames[1].points.pop();
+        assert!(matches!(
+            t.validate(),
+            Err(KeypointError::FrameSize { frame: 1, .. })
+        ));
+        let mut t = track();
+        t.frames[1].t_s = 0.0;
+        assert_eq!(t.validate(), Err(KeypointError::BadNumber { frame: 1 }));
+        let mut t = track();
+        t.frames[0].points[0][1] = f64::NAN;
+        assert_eq!(t.validate(), Err(KeypointError::BadNumber { frame: 0 }));
+    }
+
+    #[test]
+    fn json_form_is_the_contract() {
+        let json = serde_json::to_value(track()).unwrap();
+        assert_eq!(json["keypoints"], 3);
+        assert_eq!(json["frames"][1]["t_s"], 0.5);
+        assert_eq!(
+            json["frames"][1]["points"][2],
+            serde_json::json!([1.0, 2.0])
+        );
+        assert_eq!(json["frames"][1]["lost"], false);
+    }
+}

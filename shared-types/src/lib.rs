@@ -1,0 +1,49 @@
+//! The words every process of the system agrees on.
+//!
+//! Data flows one way through the house: camera -> keypoints -> parameters ->
+//! plan -> setpoints -> record. This crate holds the types that cross a door
+//! between two of those rooms, the arm's kinematics and limits that three rooms
+//! share, and the shared-memory services ([`ipc`]) through which processes meet.
+//!
+//! It is *not* a place for algorithms of one room only, for files, or for
+//! sockets.
+//!
+//! Conventions: SI units and radians everywhere; the unit comes last in the
+//! name of a raw number (`timeout_ms`); the world frame `w` is the arm base
+//! (x forward, z up, REP-103); `p_w_tip` is the tip's position expressed in `w`.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        reason = "tests may fail loudly"
+    )
+)]
+
+pub mod camera;
+pub mod fault;
+pub mod ipc;
+pub mod joint;
+pub mod keypoints;
+pub mod kinematics;
+pub mod limits;
+pub mod plan;
+pub mod rope;
+pub mod time;
+pub mod trajectory;
+
+pub use camera::{Intrinsics, Shutter, StereoCamera};
+pub use fault::FaultCode;
+pub use joint::{JOINTS, JointState, JointVector};
+pub use keypoints::{KeypointFrame, KeypointTrack};
+pub use limits::{Limits, LimitsSpec};
+pub use plan::{Plan, Task};
+pub use rope::{RopeEstimate, RopeParams};
+pub use time::MonotonicNs;
+pub use trajectory::{JointTrajectory, TrajectoryError};
+
+/// Version of this build, written into every result file.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,0 +1,381 @@
+//! The one type that says what the arm may do.
+//!
+//! Planner, preflight, controller and simulated arm check against the same
+//! [`Limits`], so that they cannot disagree. Values come from a file under
+//! `configs/robot/`, where each number names its source.
+
+use crate::joint::{JOINTS, JointVector};
+use crate::kinematics;
+use crate::trajectory::JointTrajectory;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Limits as written in a file; unchecked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsSpec {
+    /// Smallest joint positions (rad).
+    pub position_min_rad: JointVector,
+    /// Largest joint positions (rad).
+    pub position_max_rad: JointVector,
+    /// Largest joint speeds (rad/s).
+    pub velocity_max_rad_s: JointVector,
+    /// Largest joint accelerations (rad/s²).
+    pub acceleration_max_rad_s2: JointVector,
+    /// Largest joint jerks of motions the controller makes itself: moves to a
+    /// start pose and stops (rad/s³).
+    pub jerk_max_rad_s3: JointVector,
+    /// Largest speed of the tool centre point (m/s). In servo mode the arm
+    /// itself stops with C60 above 1 m/s times its factor.
+    pub tcp_speed_max_m_s: f64,
+    /// Tool centre point in the flange frame, as configured in the arm (m).
+    pub tcp_offset_m: [f64; 3],
+    /// Setpoints per second on the wire (Hz).
+    pub rate_hz: f64,
+}
+
+/// Why limits are refused.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum LimitsError {
+    /// A value is NaN, infinite, zero or negative where it must be positive.
+    #[error("limit `{key}` must be finite and above zero for every joint")]
+    NotPositive {
+        /// Key in the file.
+        key: &'static str,
+    },
+    /// Minimum above maximum.
+    #[error("`position_min_rad` is not below `position_max_rad` for joint {joint}")]
+    EmptyRange {
+        /// Joint, 1-based.
+        joint: usize,
+    },
+    /// Rate outside what the wire takes.
+    #[error("`rate_hz` is {rate_hz}, but the arm takes 30 to 250 setpoints a second")]
+    Rate {
+        /// Value found (Hz).
+        rate_hz: f64,
+    },
+}
+
+/// Checked limits. RT-safe to use.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "LimitsSpec", into = "LimitsSpec")]
+pub struct Limits(LimitsSpec);
+
+impl TryFrom<LimitsSpec> for Limits {
+    type Error = LimitsError;
+    fn try_from(spec: LimitsSpec) -> Result<Self, LimitsError> {
+        let positive = |key, v: &JointVector| {
+            if v.iter().all(|x| x.is_finite() && *x > 0.0) {
+                Ok(())
+            } else {
+                Err(LimitsError::NotPositive { key })
+            }
+        };
+        positive("velocity_max_rad_s", &spec.velocity_max_rad_s)?;
+        positive("acceleration_max_rad_s2", &spec.acceleration_max_rad_s2)?;
+        positive("jerk_max_rad_s3", &spec.jerk_max_rad_s3)?;
+        positive(
+            "tcp_speed_max_m_s",
+            &JointVector::splat(spec.tcp_speed_max_m_s),
+        )?;
+        if spec.tcp_offset_m.iter().any(|v| !v.is_finite()) {
+            return Err(LimitsError::NotPositive {
+                key: "tcp_offset_m",
+            });
+        }
+        for j in 0..JOINTS {
+            let (lo, hi) = (spec.position_min_rad[j], spec.position_max_rad[j]);
+            if !(lo.is_finite() && hi.is_finite() && lo < hi) {
+                return Err(LimitsError::EmptyRange { joint: j + 1 });
+            }
+        }
+        if !(30.0..=250.0).contains(&spec.rate_hz) {
+            return Err(LimitsError::Rate {
+                rate_hz: spec.rate_hz,
+            });
+        }
+        Ok(Self(spec))
+    }
+}
+
+impl From<Limits> for LimitsSpec {
+    fn from(limits: Limits) -> Self {
+        limits.0
+    }
+}
+
+impl core::ops::Deref for Limits {
+    type Target = LimitsSpec;
+    fn deref(&self) -> &LimitsSpec {
+        &self.0
+    }
+}
+
+/// What a limit is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitKind {
+    /// Lower end of a joint's range.
+    PositionMin,
+    /// Upper end of a joint's range.
+    PositionMax,
+    /// Joint speed.
+    Velocity,
+    /// Joint acceleration.
+    Acceleration,
+    /// Speed of the tool centre point.
+    TcpSpeed,
+}
+
+/// How close a trajectory comes to one limit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Margin {
+    /// Which limit.
+    pub kind: LimitKind,
+    /// Joint 1..=7; 0 for the tool.
+    pub joint: u8,
+    /// Extreme value along the trajectory (SI).
+    pub value: f64,
+    /// The limit (SI).
+    pub limit: f64,
+    /// When the extreme occurs (s).
+    pub time_s: f64,
+    /// Part of the limit left, negative when broken. For positions: distance to
+    /// the end of the range as a part of the range.
+    pub left: f64,
+}
+
+impl Limits {
+    /// Duration of one cycle (s).
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.0.rate_hz
+    }
+
+    /// Joint (0-based) whose position is outside its range, if any. RT-safe.
+    #[must_use]
+    pub fn position_violation(&self, q: &JointVector) -> Option<usize> {
+        (0..JOINTS)
+            .find(|&j| !(q[j] >= self.0.position_min_rad[j] && q[j] <= self.0.position_max_rad[j]))
+    }
+
+    /// Tool centre point in the flange frame (m).
+    #[must_use]
+    pub fn tcp_offset(&self) -> Vector3<f64> {
+        Vector3::from(self.0.tcp_offset_m)
+    }
+
+    /// Margins to the joint limits, from the exact extrema of the spline.
+    #[must_use]
+    pub fn joint_margins(&self, trajectory: &JointTrajectory) -> Vec<Margin> {
+        let mut out = Vec::with_capacity(4 * JOINTS + 1);
+        for j in 0..JOINTS {
+            let e = trajectory.extrema(j);
+            let (lo, hi) = (self.0.position_min_rad[j], self.0.position_max_rad[j]);
+            let joint = u8::try_from(j + 1).unwrap_or(u8::MAX);
+            let mut push = |kind, value: f64, limit: f64, time_s, left| {
+                out.push(Margin {
+                    kind,
+                    joint,
+                    value,
+                    limit,
+                    time_s,
+                    left,
+                });
+            };
+            let span = hi - lo;
+            push(
+                LimitKind::PositionMin,
+                e.q_min.value,
+                lo,
+                e.q_min.time_s,
+                (e.q_min.value - lo) / span,
+            );
+            push(
+                LimitKind::PositionMax,
+                e.q_max.value,
+                hi,
+                e.q_max.time_s,
+                (hi - e.q_max.value) / span,
+            );
+            let (v, a) = (
+                self.0.velocity_max_rad_s[j],
+                self.0.acceleration_max_rad_s2[j],
+            );
+            push(
+                LimitKind::Velocity,
+                e.qd.value,
+                v,
+                e.qd.time_s,
+                1.0 - e.qd.value.abs() / v,
+            );
+            push(
+                LimitKind::Acceleration,
+                e.qdd.value,
+                a,
+                e.qdd.time_s,
+                1.0 - e.qdd.value.abs() / a,
+            );
+        }
+        out
+    }
+
+    /// Margin to the tool speed limit. The speed is no polynomial: it is
+    /// sampled four times per cycle and its peak refined by a parabola.
+    #[must_use]
+    pub fn tcp_margin(&self, trajectory: &JointTrajectory) -> Margin {
+        let offset = self.tcp_offset();
+        let speed = |t: f64| {
+            let s = trajectory.state_at(t);
+            kinematics::tool_speed_m_s(&s.q, &s.qd, &offset)
+        };
+        let step = self.period_s() / 4.0;
+        let mut best = (0.0, 0.0);
+        let mut t = 0.0;
+        while t <= trajectory.duration_s() {
+            let v = speed(t);
+            if v > best.0 {
+                best = (v, t);
+            }
+            t += step;
+        }
+        let (before, after) = (speed(best.1 - step), speed(best.1 + step));
+        let bend = before - 2.0 * best.0 + after;
+        if bend < 0.0 {
+            let t = best.1 + 0.5 * step * (before - after) / bend;
+            let v = speed(t);
+            if v > best.0 {
+                best = (v, t);
+            }
+        }
+        Margin {
+            kind: LimitKind::TcpSpeed,
+            joint: 0,
+            value: best.0,
+            limit: self.0.tcp_speed_max_m_s,
+            time_s: best.1,
+            left: 1.0 - best.0 / self.0.tcp_speed_max_m_s,
+        }
+    }
+
+    /// All margins of a trajectory, joints first, tool speed last.
+    #[must_use]
+    pub fn margins(&self, trajectory: &JointTrajectory) -> Vec<Margin> {
+        let mut out = self.joint_margins(trajectory);
+        out.push(self.tcp_margin(trajectory));
+        out
+    }
+
+    /// The limit a trajectory breaks most, if it breaks any.
+    #[must_use]
+    pub fn worst_violation(&self, trajectory: &JointTrajectory) -> Option<Margin> {
+        self.margins(trajectory)
+            .into_iter()
+            .filter(|m| !(m.left >= 0.0))
+            .min_by(|a, b| a.left.total_cmp(&b.left))
+    }
+}
+
+impl Margin {
+    /// One line for people: what, value, limit and when.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let (what, unit) = match self.kind {
+            LimitKind::PositionMin | LimitKind::PositionMax => ("position", "rad"),
+            LimitKind::Velocity => ("speed", "rad/s"),
+            LimitKind::Acceleration => ("acceleration", "rad/s²"),
+            LimitKind::TcpSpeed => ("speed", "m/s"),
+        };
+        let who = if self.joint == 0 {
+            "tool".to_owned()
+        } else {
+            format!("joint {}", self.joint)
+        };
+        format!(
+            "{who} {what} {:.3} {unit} against a limit of {:.3} {unit} at {:.3} s",
+            self.value, self.limit, self.time_s
+        )
+    }
+}
+
+impl Default for Limits {
+    /// xArm 7, the narrower ranges of the 1305 model (vendor manual and SDK):
+    /// 180 deg/s, 1146 deg/s², 28647 deg/s³, tool speed 1.2 m/s in servo mode.
+    fn default() -> Self {
+        let full = core::f64::consts::TAU;
+        Self(LimitsSpec {
+            position_min_rad: JointVector([
+                -full, -2.042_035, -full, -0.104_72, -full, -1.692_969, -full,
+            ]),
+            position_max_rad: JointVector([
+                full,
+                2.024_581,
+                full,
+                3.926_99,
+                full,
+                core::f64::consts::PI,
+                full,
+            ]),
+            velocity_max_rad_s: JointVector::splat(core::f64::consts::PI),
+            acceleration_max_rad_s2: JointVector::splat(20.0),
+            jerk_max_rad_s3: JointVector::splat(500.0),
+            tcp_speed_max_m_s: 1.2,
+            tcp_offset_m: [0.0; 3],
+            rate_hz: 250.0,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_point(joint: usize, by_rad: f64, in_s: f64) -> JointTrajectory {
+        let start = JointVector([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+        let mut end = start;
+        end[joint] += by_rad;
+        JointTrajectory::new(&[0.0, in_s], &[start, end]).unwrap()
+    }
+
+    #[test]
+    fn reports_the_broken_limit_with_joint_and_time() {
+        let limits = Limits::default();
+        assert!(limits.worst_violation(&two_point(0, 0.2, 1.0)).is_none());
+        // A single clamped segment peaks at 1.5 times its mean speed, half way.
+        let m = limits.worst_violation(&two_point(6, 2.5, 1.0)).unwrap();
+        assert_eq!((m.kind, m.joint), (LimitKind::Velocity, 7));
+        assert!((m.value - 3.75).abs() < 1e-9 && (m.time_s - 0.5).abs() < 1e-9);
+        let m = limits.worst_violation(&two_point(3, -1.2, 4.0)).unwrap();
+        assert_eq!((m.kind, m.joint), (LimitKind::PositionMin, 4));
+    }
+
+    #[test]
+    fn tool_speed_is_flange_speed_for_zero_offset() {
+        let start = JointVector([0.0, 0.5, 0.0, 0.3, 0.0, 0.0, 0.0]);
+        let mut end = start;
+        end[0] += 1.0;
+        let t = JointTrajectory::new(&[0.0, 1.0], &[start, end]).unwrap();
+        let p = kinematics::flange_pose(&start).0;
+        let m = Limits::default().tcp_margin(&t);
+        assert!((m.value - 1.5 * p.xy().norm()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        let mut spec = LimitsSpec::from(Limits::default());
+        spec.velocity_max_rad_s[3] = f64::NAN;
+        assert_eq!(
+            Limits::try_from(spec.clone()),
+            Err(LimitsError::NotPositive {
+                key: "velocity_max_rad_s"
+            })
+        );
+        spec = LimitsSpec::from(Limits::default());
+        spec.rate_hz = 1000.0;
+        assert!(matches!(
+            Limits::try_from(spec),
+            Err(LimitsError::Rate { .. })
+        ));
+    }
+}

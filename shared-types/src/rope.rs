@@ -1,0 +1,265 @@
+//! The nine rope parameters (the paper's ξ) with their ranges.
+
+use serde::{Deserialize, Serialize};
+
+/// Number of rope parameters.
+pub const ROPE_PARAMETERS: usize = 9;
+
+/// Rope parameters, the paper's ξ. TOML form: `rope.toml`, keys as the fields.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RopeParams {
+    /// Number of rigid links N.
+    pub links: u32,
+    /// Rope length L, attach point to lead centre (m).
+    pub length_m: f64,
+    /// Damping c of each ball joint (N m s/rad).
+    pub joint_damping_nms_per_rad: f64,
+    /// Stiffness k of each ball joint (N m/rad).
+    pub joint_stiffness_nm_per_rad: f64,
+    /// Rope radius, also its collision radius (m).
+    pub radius_m: f64,
+    /// Mass per length µ (kg/m).
+    pub mass_per_length_kg_per_m: f64,
+    /// Mass of the lead at the free end (kg).
+    pub lead_mass_kg: f64,
+    /// Radius of the lead (m).
+    pub lead_radius_m: f64,
+    /// Scale e of the link's inertia radius, `R_I = max(e s/2, r)` (1).
+    pub link_extra_scale: f64,
+}
+
+/// Key, smallest and largest value of one parameter over which networks are
+/// trained and fits search (paper, table of in-domain results).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterRange {
+    /// Key in `rope.toml`.
+    pub key: &'static str,
+    /// Short name for tables.
+    pub label: &'static str,
+    /// Unit for tables.
+    pub unit: &'static str,
+    /// Lower end of the range.
+    pub min: f64,
+    /// Upper end of the range.
+    pub max: f64,
+}
+
+const fn range(
+    key: &'static str,
+    label: &'static str,
+    unit: &'static str,
+    min: f64,
+    max: f64,
+) -> ParameterRange {
+    ParameterRange {
+        key,
+        label,
+        unit,
+        min,
+        max,
+    }
+}
+
+/// Ranges in the order of [`RopeParams::to_array`].
+pub const RANGES: [ParameterRange; ROPE_PARAMETERS] = [
+    range("links", "links", "", 20.0, 26.0),
+    range("length_m", "length", "m", 0.45, 0.65),
+    range(
+        "joint_damping_nms_per_rad",
+        "joint damping",
+        "N m s/rad",
+        0.001,
+        0.05,
+    ),
+    range(
+        "joint_stiffness_nm_per_rad",
+        "joint stiffness",
+        "N m/rad",
+        0.05,
+        1.0,
+    ),
+    range("radius_m", "rope radius", "m", 0.003, 0.015),
+    range(
+        "mass_per_length_kg_per_m",
+        "mass per length",
+        "kg/m",
+        0.02,
+        0.12,
+    ),
+    range("lead_mass_kg", "lead mass", "kg", 0.02, 0.12),
+    range("lead_radius_m", "lead radius", "m", 0.015, 0.045),
+    range("link_extra_scale", "link extra scale", "", 0.5, 1.2),
+];
+
+/// Why a rope description is refused.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RopeError {
+    /// A value is NaN, infinite, or not physical.
+    #[error("rope parameter `{key}` is {value}, but must be a finite number from {min} to {max}")]
+    OutOfBounds {
+        /// Key in `rope.toml`.
+        key: &'static str,
+        /// Value found.
+        value: f64,
+        /// Smallest value the simulator accepts.
+        min: f64,
+        /// Largest value the simulator accepts.
+        max: f64,
+    },
+}
+
+/// Most links a rope may have anywhere in the system.
+pub const MAX_LINKS: u32 = 200;
+
+/// Physical bounds the simulator accepts, wider than [`RANGES`].
+const PHYSICAL: [(f64, f64); ROPE_PARAMETERS] = [
+    (1.0, MAX_LINKS as f64),
+    (0.01, 10.0),
+    (0.0, 10.0),
+    (0.0, 100.0),
+    (1e-5, 0.1),
+    (1e-4, 10.0),
+    (0.0, 10.0),
+    (1e-4, 0.5),
+    (0.05, 10.0),
+];
+
+impl RopeParams {
+    /// The nine values in the order of [`RANGES`].
+    #[must_use]
+    pub fn to_array(&self) -> [f64; ROPE_PARAMETERS] {
+        [
+            f64::from(self.links),
+            self.length_m,
+            self.joint_damping_nms_per_rad,
+            self.joint_stiffness_nm_per_rad,
+            self.radius_m,
+            self.mass_per_length_kg_per_m,
+            self.lead_mass_kg,
+            self.lead_radius_m,
+            self.link_extra_scale,
+        ]
+    }
+
+    /// From nine values in the order of [`RANGES`]; links are rounded.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturating; validate() refuses what is not physical"
+    )]
+    pub fn from_array(v: [f64; ROPE_PARAMETERS]) -> Self {
+        Self {
+            links: v[0].round() as u32,
+            length_m: v[1],
+            joint_damping_nms_per_rad: v[2],
+            joint_stiffness_nm_per_rad: v[3],
+            radius_m: v[4],
+            mass_per_length_kg_per_m: v[5],
+            lead_mass_kg: v[6],
+            lead_radius_m: v[7],
+            link_extra_scale: v[8],
+        }
+    }
+
+    /// Checks that every value is finite and physical.
+    ///
+    /// # Errors
+    /// The first parameter that is not, with its limits.
+    pub fn validate(&self) -> Result<(), RopeError> {
+        for ((value, (min, max)), range) in self.to_array().into_iter().zip(PHYSICAL).zip(RANGES) {
+            if !(value >= min && value <= max) {
+                return Err(RopeError::OutOfBounds {
+                    key: range.key,
+                    value,
+                    min,
+                    max,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Keys of parameters outside the trained ranges [`RANGES`].
+    pub fn outside_ranges(&self) -> impl Iterator<Item = &'static str> {
+        self.to_array()
+            .into_iter()
+            .zip(RANGES)
+            .filter(|(v, r)| !(*v >= r.min && *v <= r.max))
+            .map(|(_, r)| r.key)
+    }
+
+    /// Length of one link (m).
+    #[must_use]
+    pub fn link_length_m(&self) -> f64 {
+        self.length_m / f64::from(self.links)
+    }
+
+    /// Mass of one link (kg).
+    #[must_use]
+    pub fn link_mass_kg(&self) -> f64 {
+        self.mass_per_length_kg_per_m * self.link_length_m()
+    }
+
+    /// Moment of inertia of one link about its centre, isotropic (kg m²).
+    #[must_use]
+    pub fn link_inertia_kg_m2(&self) -> f64 {
+        let radius = (self.link_extra_scale * self.link_length_m() / 2.0).max(self.radius_m);
+        0.4 * self.link_mass_kg() * radius * radius
+    }
+
+    /// Moment of inertia of the lead about its centre (kg m²).
+    #[must_use]
+    pub fn lead_inertia_kg_m2(&self) -> f64 {
+        0.4 * self.lead_mass_kg * self.lead_radius_m * self.lead_radius_m
+    }
+}
+
+/// An identified rope with its uncertainty. TOML form: the nine keys of
+/// [`RopeParams`] at the top, then `[uncertainty]` and `[fit]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RopeEstimate {
+    /// Best parameters.
+    #[serde(flatten)]
+    pub params: RopeParams,
+    /// One standard deviation per parameter, order of [`RANGES`]; NaN-free.
+    /// `None` where the observation says nothing about it.
+    pub std_dev: [Option<f64>; ROPE_PARAMETERS],
+    /// Root mean square distance between observed and simulated keypoints (px).
+    pub residual_px: f64,
+    /// Method that made it: `cmaes`.
+    pub method: heapless::String<16>,
+    /// Simulations used.
+    pub simulations: u32,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Offset added to the joint motion's clock to match the camera's (s).
+    pub time_offset_s: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn array_form_keeps_every_field() {
+        let v = [23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0];
+        assert_eq!(RopeParams::from_array(v).to_array(), v);
+        assert!(RopeParams::from_array(v).validate().is_ok());
+        assert_eq!(RopeParams::from_array(v).outside_ranges().count(), 0);
+    }
+
+    #[test]
+    fn every_field_is_checked_by_name() {
+        for (i, range) in RANGES.iter().enumerate() {
+            for bad in [f64::NAN, -1.0, 1e9] {
+                let mut v = [23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0];
+                v[i] = bad;
+                let rope = RopeParams::from_array(v);
+                let RopeError::OutOfBounds { key, .. } = rope.validate().unwrap_err();
+                assert_eq!(key, range.key);
+            }
+        }
+    }
+}
