@@ -1,1 +1,21 @@
-//! placeholder
+//! Identifies rope parameters from one filmed wiggle and plans throws.
+//!
+//! Two searches share one strategy, [`cmaes`]: [`sysid`] fits the rope's
+//! parameters to keypoints (the paper's Φ-CMA-ES), and [`tasks`] finds the joint
+//! waypoints of a throw (CMA-ES-traj) with the pieces of [`trajopt`] and
+//! [`collide`]. [`wiggle`] makes the motion that is filmed. The physics is that
+//! of `rope-sim`.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        clippy::cast_precision_loss,
+        reason = "tests may fail loudly"
+    )
+)]
+
+pub mod cmaes;
