@@ -272,7 +272,7 @@ impl Limits {
     pub fn worst_violation(&self, trajectory: &JointTrajectory) -> Option<Margin> {
         self.margins(trajectory)
             .into_iter()
-            .filter(|m| !(m.left >= 0.0))
+            .filter(|m| m.left.is_nan() || m.left < 0.0)
             .min_by(|a, b| a.left.total_cmp(&b.left))
     }
 }

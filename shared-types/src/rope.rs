@@ -216,15 +216,13 @@ impl RopeParams {
     }
 }
 
-/// An identified rope with its uncertainty. TOML form: the nine keys of
-/// [`RopeParams`] at the top, then `[uncertainty]` and `[fit]`.
+/// An identified rope with its uncertainty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RopeEstimate {
     /// Best parameters.
-    #[serde(flatten)]
     pub params: RopeParams,
-    /// One standard deviation per parameter, order of [`RANGES`]; NaN-free.
-    /// `None` where the observation says nothing about it.
+    /// One standard deviation per parameter, order of [`RANGES`]; `None` where
+    /// the observation says nothing about it.
     pub std_dev: [Option<f64>; ROPE_PARAMETERS],
     /// Root mean square distance between observed and simulated keypoints (px).
     pub residual_px: f64,

@@ -1,1 +1,97 @@
-//! Shared-memory services.
+//! Shared memory: where processes meet.
+//!
+//! Every service is opened here, once, with its exact sizes, so that both ends
+//! always agree. Patterns (pub-sub, request-response, blackboard) follow what
+//! was measured of iceoryx2: publishing allocates and does file work when a
+//! subscriber attaches, the blackboard does neither, so the real-time thread
+//! only ever touches blackboards.
+//!
+//! | service | from -> to | pattern |
+//! |---|---|---|
+//! | [`Bus::frame_publisher`] | camera -> tracker, recorder | pub-sub of bytes, [`FrameHeader`] |
+//! | [`Bus::keypoint_publisher`] | tracker -> planner, recorder | pub-sub |
+//! | [`Bus::cycle_publisher`] | controller's relay -> recorder | pub-sub |
+//! | [`Bus::joint_publisher`] | controller's relay -> recorder | pub-sub |
+//! | [`ControllerBoards`] | controller state out, operator's heartbeat in | blackboard |
+//! | [`rpc`] | `wag` <-> camera, planner, controller, rig | request-response, streamed answers |
+//!
+//! All processes of one installation run as one user and name the same domain;
+//! two domains never see each other.
+
+mod boards;
+mod bus;
+pub mod message;
+mod payload;
+pub mod rpc;
+
+pub use boards::{ControllerBoards, OperatorEnd, StateReader};
+pub use bus::{
+    Bus, CyclePublisher, CycleSubscriber, FramePublisher, FrameSubscriber, JointPublisher,
+    JointSubscriber, KeypointPublisher, KeypointSubscriber,
+};
+pub use payload::{
+    ControllerMode, ControllerState, CycleRecord, FrameHeader, JointReport, OperatorBeat,
+    PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
+};
+
+/// Why shared memory could not be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum IpcError {
+    /// The domain name cannot be part of a file name.
+    #[error("shared-memory domain `{domain}` must be 1 to 40 letters, digits, `-` or `_`")]
+    Domain {
+        /// Name given.
+        domain: String,
+    },
+    /// The process could not join shared memory at all.
+    #[error(
+        "cannot join shared memory (domain `{domain}`): {reason}; all processes must run as the same user, \
+         and /dev/shm must be writable with some 100 MB free"
+    )]
+    Join {
+        /// Domain name.
+        domain: String,
+        /// What the library said.
+        reason: String,
+    },
+    /// A service could not be opened.
+    #[error(
+        "cannot open shared-memory service `{service}`: {reason}; all processes must run as the same user and be of the same version"
+    )]
+    Open {
+        /// Service name.
+        service: &'static str,
+        /// What the library said.
+        reason: String,
+    },
+    /// A message could not be sent or received.
+    #[error("shared-memory service `{service}` failed: {reason}")]
+    Transfer {
+        /// Service name.
+        service: &'static str,
+        /// What the library said.
+        reason: String,
+    },
+    /// A message could not be understood.
+    #[error("a message on `{service}` is damaged or of another version: {reason}")]
+    Message {
+        /// Service name.
+        service: &'static str,
+        /// What was wrong.
+        reason: String,
+    },
+    /// The other end is gone.
+    #[error("the process behind `{service}` is not there any more")]
+    Gone {
+        /// Service name.
+        service: &'static str,
+    },
+    /// Nobody answered in time.
+    #[error("the process behind `{service}` did not answer within {timeout_s} s")]
+    TimedOut {
+        /// Service name.
+        service: &'static str,
+        /// How long was waited (s).
+        timeout_s: u64,
+    },
+}

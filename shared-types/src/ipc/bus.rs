@@ -1,0 +1,235 @@
+//! One process's connection to shared memory, and the pub-sub services.
+
+use super::IpcError;
+use super::payload::{CycleRecord, FrameHeader, JointReport};
+use crate::keypoints::KeypointFrame;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::publish_subscribe;
+
+pub(super) type Transport = ipc::Service;
+
+/// Publishes side-by-side frames.
+pub type FramePublisher = Publisher<Transport, [u8], FrameHeader>;
+/// Receives side-by-side frames.
+pub type FrameSubscriber = Subscriber<Transport, [u8], FrameHeader>;
+/// Publishes keypoints.
+pub type KeypointPublisher = Publisher<Transport, KeypointFrame, ()>;
+/// Receives keypoints.
+pub type KeypointSubscriber = Subscriber<Transport, KeypointFrame, ()>;
+/// Publishes cycle records.
+pub type CyclePublisher = Publisher<Transport, CycleRecord, ()>;
+/// Receives cycle records.
+pub type CycleSubscriber = Subscriber<Transport, CycleRecord, ()>;
+/// Publishes joint reports.
+pub type JointPublisher = Publisher<Transport, JointReport, ()>;
+/// Receives joint reports.
+pub type JointSubscriber = Subscriber<Transport, JointReport, ()>;
+
+const FRAMES: &str = "wag/v1/camera/frames";
+const KEYPOINTS: &str = "wag/v1/camera/keypoints";
+const CYCLES: &str = "wag/v1/controller/cycles";
+const JOINTS: &str = "wag/v1/controller/joints";
+
+/// Frames a slow subscriber may lag behind before it loses the oldest.
+const FRAME_BUFFER: usize = 16;
+/// Keypoint frames kept for a subscriber: a whole wiggle and more.
+const KEYPOINT_BUFFER: usize = 1024;
+/// Cycle records and joint reports kept for a subscriber: four seconds.
+const RECORD_BUFFER: usize = 1024;
+
+/// One process's connection to a shared-memory domain.
+///
+/// Not `Send`: each thread opens its own, before its loop begins. Not RT-safe.
+#[derive(Debug)]
+pub struct Bus {
+    node: Node<Transport>,
+}
+
+pub(super) fn open_error<E: core::fmt::Debug>(service: &'static str) -> impl Fn(E) -> IpcError {
+    move |e| IpcError::Open {
+        service,
+        reason: format!("{e:?}"),
+    }
+}
+
+impl Bus {
+    /// Joins `domain`. Files left by killed processes of the same user are
+    /// removed on the way.
+    ///
+    /// # Errors
+    /// [`IpcError::Domain`] for a bad name, [`IpcError::Join`] otherwise.
+    pub fn join(domain: &str) -> Result<Self, IpcError> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if domain.is_empty() || domain.len() > 40 || !domain.chars().all(plain) {
+            return Err(IpcError::Domain {
+                domain: domain.to_owned(),
+            });
+        }
+        let fail = |reason: String| IpcError::Join {
+            domain: domain.to_owned(),
+            reason,
+        };
+        let mut config = Config::default();
+        config.global.prefix = FileName::new(format!("wag_{domain}_").as_bytes())
+            .map_err(|e| fail(format!("{e:?}")))?;
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Transport>()
+            .map_err(|e| fail(format!("{e:?}")))?;
+        Ok(Self { node })
+    }
+
+    /// Removes what killed processes of this domain left behind.
+    pub fn remove_leftovers(&self) {
+        let _ = self.node.try_cleanup_dead_nodes();
+    }
+
+    fn name(service: &'static str) -> Result<ServiceName, IpcError> {
+        service.try_into().map_err(open_error(service))
+    }
+
+    pub(super) fn service(
+        &self,
+        name: &'static str,
+    ) -> Result<iceoryx2::service::builder::Builder<Transport>, IpcError> {
+        Ok(self.node.service_builder(&Self::name(name)?))
+    }
+
+    fn frames(
+        &self,
+    ) -> Result<publish_subscribe::PortFactory<Transport, [u8], FrameHeader>, IpcError> {
+        self.service(FRAMES)?
+            .publish_subscribe::<[u8]>()
+            .user_header::<FrameHeader>()
+            .max_publishers(1)
+            .max_subscribers(4)
+            .max_nodes(8)
+            .subscriber_max_buffer_size(FRAME_BUFFER)
+            .subscriber_max_borrowed_samples(2)
+            .history_size(0)
+            .enable_safe_overflow(true)
+            .open_or_create()
+            .map_err(open_error(FRAMES))
+    }
+
+    /// Publishes frames of at most `frame_bytes` bytes. One per domain.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn frame_publisher(&self, frame_bytes: usize) -> Result<FramePublisher, IpcError> {
+        self.frames()?
+            .publisher_builder()
+            .initial_max_slice_len(frame_bytes)
+            .max_loaned_samples(1)
+            .create()
+            .map_err(open_error(FRAMES))
+    }
+
+    /// Receives frames; a slow reader loses the oldest, never slows the camera.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn frame_subscriber(&self) -> Result<FrameSubscriber, IpcError> {
+        self.frames()?
+            .subscriber_builder()
+            .buffer_size(FRAME_BUFFER)
+            .create()
+            .map_err(open_error(FRAMES))
+    }
+
+    fn records<T: core::fmt::Debug + ZeroCopySend + Sized + 'static>(
+        &self,
+        name: &'static str,
+        buffer: usize,
+    ) -> Result<publish_subscribe::PortFactory<Transport, T, ()>, IpcError> {
+        self.service(name)?
+            .publish_subscribe::<T>()
+            .max_publishers(1)
+            .max_subscribers(4)
+            .max_nodes(8)
+            .subscriber_max_buffer_size(buffer)
+            .subscriber_max_borrowed_samples(2)
+            .history_size(0)
+            .enable_safe_overflow(true)
+            .open_or_create()
+            .map_err(open_error(name))
+    }
+
+    /// Publishes keypoints. One per domain.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn keypoint_publisher(&self) -> Result<KeypointPublisher, IpcError> {
+        let service = self.records::<KeypointFrame>(KEYPOINTS, KEYPOINT_BUFFER)?;
+        service
+            .publisher_builder()
+            .create()
+            .map_err(open_error(KEYPOINTS))
+    }
+
+    /// Receives keypoints.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn keypoint_subscriber(&self) -> Result<KeypointSubscriber, IpcError> {
+        let service = self.records::<KeypointFrame>(KEYPOINTS, KEYPOINT_BUFFER)?;
+        service
+            .subscriber_builder()
+            .buffer_size(KEYPOINT_BUFFER)
+            .create()
+            .map_err(open_error(KEYPOINTS))
+    }
+
+    /// Publishes cycle records. One per domain; the relay thread's.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn cycle_publisher(&self) -> Result<CyclePublisher, IpcError> {
+        let service = self.records::<CycleRecord>(CYCLES, RECORD_BUFFER)?;
+        service
+            .publisher_builder()
+            .create()
+            .map_err(open_error(CYCLES))
+    }
+
+    /// Receives cycle records.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn cycle_subscriber(&self) -> Result<CycleSubscriber, IpcError> {
+        let service = self.records::<CycleRecord>(CYCLES, RECORD_BUFFER)?;
+        service
+            .subscriber_builder()
+            .buffer_size(RECORD_BUFFER)
+            .create()
+            .map_err(open_error(CYCLES))
+    }
+
+    /// Publishes joint reports. One per domain; the relay thread's.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn joint_publisher(&self) -> Result<JointPublisher, IpcError> {
+        let service = self.records::<JointReport>(JOINTS, RECORD_BUFFER)?;
+        service
+            .publisher_builder()
+            .create()
+            .map_err(open_error(JOINTS))
+    }
+
+    /// Receives joint reports.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn joint_subscriber(&self) -> Result<JointSubscriber, IpcError> {
+        let service = self.records::<JointReport>(JOINTS, RECORD_BUFFER)?;
+        service
+            .subscriber_builder()
+            .buffer_size(RECORD_BUFFER)
+            .create()
+            .map_err(open_error(JOINTS))
+    }
+}

@@ -1,0 +1,422 @@
+//! What processes ask each other, and what they answer.
+
+use super::payload::ControllerMode;
+use super::rpc::Rpc;
+use crate::camera::StereoCamera;
+use crate::fault::FaultCode;
+use crate::joint::JointVector;
+use crate::limits::Limits;
+use crate::plan::Plan;
+use crate::rope::{RopeEstimate, RopeParams};
+use crate::trajectory::JointTrajectory;
+use serde::{Deserialize, Serialize};
+
+/// Apparent sizes and colours of rope and lead in a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RopeAppearance {
+    /// Radius of the rope (m), when it could be measured.
+    pub rope_radius_m: Option<f64>,
+    /// Radius of the lead (m), when it could be measured.
+    pub lead_radius_m: Option<f64>,
+    /// Mean colour of the rope.
+    pub rope_rgb: [u8; 3],
+    /// Mean colour of the lead.
+    pub lead_rgb: [u8; 3],
+}
+
+/// Tip-target distance measured from stereo video.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ScoreResult {
+    /// Closest approach of tip centre and target centre (m).
+    pub closest_m: f64,
+    /// Interval that should hold the true value (m).
+    pub interval_m: [f64; 2],
+    /// When it happened, relative to the first frame scored (s).
+    pub time_s: f64,
+    /// Target position in the world (m).
+    pub target_m: [f64; 3],
+}
+
+/// Progress of a long piece of work.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    /// Steps done.
+    pub done: u32,
+    /// Steps in all.
+    pub total: u32,
+    /// A figure of merit, its meaning is in `label`.
+    pub value: f64,
+    /// What is being done, with the unit of `value`.
+    pub label: String,
+}
+
+/// Asks of the camera process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum CameraRequest {
+    /// Are you there?
+    Ping,
+    /// Wait until nothing moves in the picture, at most `timeout_s`.
+    WaitStill {
+        /// Longest wait (s).
+        timeout_s: f64,
+    },
+    /// Keep the next `frames` frames, replacing those kept before. Answers
+    /// `Recording` when the first one is kept and `Recorded` at the end.
+    Record {
+        /// Number of frames.
+        frames: u32,
+    },
+    /// Track the rope through the kept frames and publish its keypoints.
+    Track {
+        /// Calibrated camera.
+        camera: Box<StereoCamera>,
+        /// Clamp position over time: CLOCK_MONOTONIC ns and world position (m).
+        clamp: Vec<(u64, [f64; 3])>,
+        /// Keypoints per frame.
+        keypoints: u32,
+        /// Where to write a contact sheet of overlays (PNG), if anywhere.
+        overlay: Option<String>,
+    },
+    /// Measure the closest approach of tip and target in the kept frames.
+    Score {
+        /// Calibrated camera.
+        camera: Box<StereoCamera>,
+        /// Colour of the tip.
+        tip_rgb: [u8; 3],
+        /// Colour of the target.
+        target_rgb: [u8; 3],
+        /// Where to write a multiple-exposure picture of the throw (PNG), if anywhere.
+        strobe: Option<String>,
+    },
+}
+
+/// Answers of the camera process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum CameraEvent {
+    /// Here I am.
+    Pong,
+    /// The picture is still, or the wait ran out (`still` false).
+    Still {
+        /// Whether it is still.
+        still: bool,
+        /// Motion energy seen last (grey levels).
+        energy: f64,
+    },
+    /// The first frame is kept.
+    Recording {
+        /// Its start of exposure (CLOCK_MONOTONIC, ns).
+        first_stamp_ns: u64,
+    },
+    /// Work goes on.
+    Progress(Progress),
+    /// All frames are kept.
+    Recorded {
+        /// Start of exposure of the first (CLOCK_MONOTONIC, ns).
+        first_stamp_ns: u64,
+        /// Frames kept.
+        frames: u32,
+        /// Frames the camera dropped in between.
+        dropped: u32,
+    },
+    /// Keypoints of all frames are published.
+    Tracked {
+        /// Start of exposure of the first frame (CLOCK_MONOTONIC, ns).
+        first_stamp_ns: u64,
+        /// Frames published.
+        frames: u32,
+        /// Part of the frames in which the rope was lost (0 to 1).
+        lost_part: f64,
+        /// Sizes and colours.
+        appearance: RopeAppearance,
+        /// Processing time per frame (ms).
+        ms_per_frame: f64,
+    },
+    /// The throw is measured.
+    Scored(ScoreResult),
+    /// It did not work.
+    Failed {
+        /// One sentence: what happened and what to do.
+        message: String,
+    },
+}
+
+/// The camera process's service.
+#[derive(Debug)]
+pub struct CameraRpc;
+
+impl Rpc for CameraRpc {
+    const NAME: &'static str = "wag/v1/camera/control";
+    type Request = CameraRequest;
+    type Event = CameraEvent;
+    fn is_last(event: &CameraEvent) -> bool {
+        !matches!(
+            event,
+            CameraEvent::Progress(_) | CameraEvent::Recording { .. }
+        )
+    }
+}
+
+/// Options of an identification.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IdentifyRequest {
+    /// Start of exposure of the first keypoint frame to use (CLOCK_MONOTONIC, ns).
+    pub first_stamp_ns: u64,
+    /// Keypoint frames to use; they come from the keypoint service.
+    pub frames: u32,
+    /// Calibrated camera.
+    pub camera: Box<StereoCamera>,
+    /// Measured joints: CLOCK_MONOTONIC ns and position (rad).
+    pub joints: Vec<(u64, JointVector)>,
+    /// Sizes seen in the picture.
+    pub appearance: Option<RopeAppearance>,
+    /// Lead mass if somebody weighed it (kg).
+    pub lead_mass_kg: Option<f64>,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+/// Options of a strike plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StrikeOrder {
+    /// Rope to plan for.
+    pub rope: RopeParams,
+    /// Target in the world (m).
+    pub target_m: [f64; 3],
+    /// Limits of the arm.
+    pub limits: Limits,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+/// Asks of the planner.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum PlannerRequest {
+    /// Are you there?
+    Ping,
+    /// Fit the nine rope parameters to published keypoints.
+    Identify(Box<IdentifyRequest>),
+    /// Plan a strike.
+    Strike(Box<StrikeOrder>),
+}
+
+/// Answers of the planner.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum PlannerEvent {
+    /// Here I am.
+    Pong,
+    /// Work goes on.
+    Progress(Progress),
+    /// The rope is identified.
+    Identified(Box<RopeEstimate>),
+    /// The throw is planned.
+    Planned(Box<Plan>),
+    /// It did not work.
+    Failed {
+        /// One sentence: what happened and what to do.
+        message: String,
+    },
+}
+
+/// The planner's service.
+#[derive(Debug)]
+pub struct PlannerRpc;
+
+impl Rpc for PlannerRpc {
+    const NAME: &'static str = "wag/v1/planner/control";
+    type Request = PlannerRequest;
+    type Event = PlannerEvent;
+    fn is_last(event: &PlannerEvent) -> bool {
+        !matches!(event, PlannerEvent::Progress(_))
+    }
+}
+
+/// Asks of the controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ControllerRequest {
+    /// What are you doing?
+    Status,
+    /// Connect to the arm, enable it and enter servo mode.
+    Bringup,
+    /// Move jerk-limited to a pose and hold it.
+    MoveTo {
+        /// Pose (rad).
+        q: JointVector,
+        /// Part of the limits' speed to use (0 to 1).
+        speed_part: f64,
+    },
+    /// Check a trajectory and stream it. The arm must stand at its start.
+    Execute {
+        /// The trajectory.
+        trajectory: Box<JointTrajectory>,
+        /// [`crate::plan::trajectory_hash`] of it.
+        sha256: [u8; 32],
+    },
+    /// Brake and latch.
+    Stop,
+    /// Accept a fault, so that the arm may move again.
+    Acknowledge,
+    /// Latency histograms since the last call of this kind.
+    Latency,
+}
+
+/// Percentiles of one latency (µs).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Percentiles {
+    /// Number of samples.
+    pub count: u64,
+    /// Median.
+    pub p50_us: f64,
+    /// 99th percentile.
+    pub p99_us: f64,
+    /// 99.9th percentile.
+    pub p999_us: f64,
+    /// Largest.
+    pub max_us: f64,
+}
+
+/// Latencies of the control loop.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LatencyReport {
+    /// Lateness of wake-ups.
+    pub wake: Percentiles,
+    /// Computing a setpoint.
+    pub compute: Percentiles,
+    /// From wake-up until the setpoint is sent.
+    pub send: Percentiles,
+    /// Round trip of a setpoint and its reply.
+    pub reply: Percentiles,
+    /// Cycles.
+    pub cycles: u64,
+    /// Cycles missed.
+    pub missed: u64,
+}
+
+/// Answers of the controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ControllerEvent {
+    /// Present state.
+    Status {
+        /// Mode.
+        mode: ControllerMode,
+        /// Latched fault.
+        fault: FaultCode,
+        /// Error code of the arm, 0 if none.
+        arm_error: u8,
+        /// Commanded joints (rad).
+        q_c: JointVector,
+        /// Real-time set-up steps that failed, in words; empty when all is well.
+        warnings: Vec<String>,
+    },
+    /// The motion began.
+    Started {
+        /// Deadline of the first setpoint (CLOCK_MONOTONIC, ns).
+        start_ns: u64,
+    },
+    /// The motion ended as planned.
+    Finished {
+        /// Deadline of the first setpoint (CLOCK_MONOTONIC, ns).
+        start_ns: u64,
+        /// Deadline of the last setpoint (CLOCK_MONOTONIC, ns).
+        end_ns: u64,
+    },
+    /// Done.
+    Done,
+    /// Histograms.
+    Latency(Box<LatencyReport>),
+    /// Refused before anything moved.
+    Refused {
+        /// Cause.
+        fault: FaultCode,
+        /// One sentence: what happened and what to do.
+        message: String,
+    },
+    /// Stopped on the way.
+    Stopped {
+        /// Cause.
+        fault: FaultCode,
+        /// Cycle in which it was noticed.
+        cycle: u64,
+        /// Error code of the arm, 0 if none.
+        arm_error: u8,
+        /// One sentence: what happened and what to do.
+        message: String,
+    },
+}
+
+/// The controller's service.
+#[derive(Debug)]
+pub struct ControllerRpc;
+
+impl Rpc for ControllerRpc {
+    const NAME: &'static str = "wag/v1/controller/control";
+    type Request = ControllerRequest;
+    type Event = ControllerEvent;
+    fn is_last(event: &ControllerEvent) -> bool {
+        !matches!(event, ControllerEvent::Started { .. })
+    }
+}
+
+/// Asks of the simulated rig. Only the summary at the end of a demo asks for
+/// the truth; nothing that identifies or plans does.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum RigRequest {
+    /// Which ports does the arm listen on?
+    Ports,
+    /// Put the target ball there.
+    PlaceTarget {
+        /// Centre in the world (m).
+        target_m: [f64; 3],
+    },
+    /// What really happened between two instants?
+    Truth {
+        /// From (CLOCK_MONOTONIC, ns).
+        from_ns: u64,
+        /// To (CLOCK_MONOTONIC, ns).
+        to_ns: u64,
+    },
+}
+
+/// Answers of the simulated rig.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum RigEvent {
+    /// Ports in use.
+    Ports {
+        /// Command port.
+        command: u16,
+        /// Report ports 30000, 30001, 30002, 30003 or their replacements.
+        reports: [u16; 4],
+    },
+    /// Done.
+    Done,
+    /// The truth.
+    Truth {
+        /// The hidden rope.
+        rope: RopeParams,
+        /// Smallest distance of tip and target centre in that time (m).
+        closest_m: f64,
+        /// When (CLOCK_MONOTONIC, ns).
+        closest_ns: u64,
+        /// Fastest tip speed in that time (m/s).
+        peak_tip_speed_m_s: f64,
+        /// Whether the rope touched arm or column in that time.
+        touched: bool,
+    },
+    /// It did not work.
+    Failed {
+        /// One sentence: what happened and what to do.
+        message: String,
+    },
+}
+
+/// The simulated rig's service.
+#[derive(Debug)]
+pub struct RigRpc;
+
+impl Rpc for RigRpc {
+    const NAME: &'static str = "wag/v1/rig/control";
+    type Request = RigRequest;
+    type Event = RigEvent;
+    fn is_last(_event: &RigEvent) -> bool {
+        true
+    }
+}

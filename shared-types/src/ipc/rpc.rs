@@ -1,0 +1,377 @@
+//! Typed request-response over shared memory: one request, a stream of events.
+//!
+//! Requests and events vary in size, so they travel as postcard bytes behind a
+//! small header (magic, version, length, CRC-32). Not RT-safe.
+
+use super::bus::{Transport, open_error};
+use super::{Bus, IpcError};
+use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::pending_response::PendingResponse;
+use iceoryx2::port::client::Client;
+use iceoryx2::port::server::Server;
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::request_response::PortFactory;
+use serde::{Serialize, de::DeserializeOwned};
+use std::marker::PhantomData;
+use std::time::{Duration, Instant};
+
+/// A service that processes ask each other.
+pub trait Rpc {
+    /// Service name.
+    const NAME: &'static str;
+    /// What is asked.
+    type Request: Serialize + DeserializeOwned;
+    /// What is answered, possibly many times; see [`Rpc::is_last`].
+    type Event: Serialize + DeserializeOwned;
+    /// Whether no event follows this one.
+    fn is_last(event: &Self::Event) -> bool;
+}
+
+const MAGIC: [u8; 4] = *b"WAG1";
+const HEADER: usize = 12;
+/// Events a caller may leave unread before the server has to wait.
+const EVENT_BUFFER: usize = 256;
+const MAX_CLIENTS: usize = 8;
+
+/// Wraps `value` as magic, length, CRC-32 and postcard bytes.
+///
+/// # Errors
+/// [`IpcError::Message`] when the value cannot be written.
+pub fn encode<T: Serialize>(service: &'static str, value: &T) -> Result<Vec<u8>, IpcError> {
+    let fail = |reason: String| IpcError::Message { service, reason };
+    let body = postcard::to_allocvec(value).map_err(|e| fail(e.to_string()))?;
+    let length = u32::try_from(body.len()).map_err(|e| fail(e.to_string()))?;
+    let mut out = Vec::with_capacity(HEADER + body.len());
+    out.extend_from_slice(&MAGIC);
+    out.extend_from_slice(&length.to_le_bytes());
+    out.extend_from_slice(&crc32fast::hash(&body).to_le_bytes());
+    out.extend_from_slice(&body);
+    Ok(out)
+}
+
+/// Undoes [`encode`].
+///
+/// # Errors
+/// [`IpcError::Message`] for wrong magic, length, checksum or content.
+pub fn decode<T: DeserializeOwned>(service: &'static str, bytes: &[u8]) -> Result<T, IpcError> {
+    let fail = |reason: &str| IpcError::Message {
+        service,
+        reason: reason.to_owned(),
+    };
+    let word = |at: usize| {
+        bytes
+            .get(at..at + 4)
+            .and_then(|b| <[u8; 4]>::try_from(b).ok())
+            .ok_or_else(|| fail("too short"))
+    };
+    if word(0)? != MAGIC {
+        return Err(fail("unknown magic number"));
+    }
+    let length = u32::from_le_bytes(word(4)?) as usize;
+    let body = bytes
+        .get(HEADER..)
+        .filter(|b| b.len() == length)
+        .ok_or_else(|| fail("wrong length"))?;
+    if crc32fast::hash(body) != u32::from_le_bytes(word(8)?) {
+        return Err(fail("wrong checksum"));
+    }
+    postcard::from_bytes(body).map_err(|e| fail(&e.to_string()))
+}
+
+type BytesService = PortFactory<Transport, [u8], (), [u8], ()>;
+
+fn open<R: Rpc>(bus: &Bus) -> Result<BytesService, IpcError> {
+    bus.service(R::NAME)?
+        .request_response::<[u8], [u8]>()
+        .max_clients(MAX_CLIENTS)
+        .max_servers(1)
+        .max_nodes(MAX_CLIENTS + 1)
+        .max_active_requests_per_client(4)
+        .max_response_buffer_size(EVENT_BUFFER)
+        .enable_safe_overflow_for_responses(false)
+        .open_or_create()
+        .map_err(open_error(R::NAME))
+}
+
+/// The answering end.
+#[derive(Debug)]
+pub struct RpcServer<R: Rpc> {
+    server: Server<Transport, [u8], (), [u8], ()>,
+    service: PhantomData<R>,
+}
+
+impl<R: Rpc> RpcServer<R> {
+    /// Opens the service. There is one server per domain.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`], for instance when another process serves already.
+    pub fn open(bus: &Bus) -> Result<Self, IpcError> {
+        let server = open::<R>(bus)?
+            .server_builder()
+            .initial_max_slice_len(4096)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
+            .create()
+            .map_err(open_error(R::NAME))?;
+        Ok(Self {
+            server,
+            service: PhantomData,
+        })
+    }
+
+    /// The next request, if one waits.
+    ///
+    /// # Errors
+    /// [`IpcError::Transfer`]; [`IpcError::Message`] for one that cannot be
+    /// understood (it is dropped, the caller sees its answer end).
+    pub fn receive(&self) -> Result<Option<Call<R>>, IpcError> {
+        let active = self.server.receive().map_err(|e| IpcError::Transfer {
+            service: R::NAME,
+            reason: format!("{e:?}"),
+        })?;
+        active
+            .map(|active| {
+                let request = decode(R::NAME, active.payload())?;
+                Ok(Call { request, active })
+            })
+            .transpose()
+    }
+}
+
+/// One request being answered.
+#[derive(Debug)]
+pub struct Call<R: Rpc> {
+    /// What was asked.
+    pub request: R::Request,
+    active: ActiveRequest<Transport, [u8], (), [u8], ()>,
+}
+
+impl<R: Rpc> Call<R> {
+    /// Sends one event.
+    ///
+    /// # Errors
+    /// [`IpcError::Transfer`] or [`IpcError::Message`].
+    pub fn send(&self, event: &R::Event) -> Result<(), IpcError> {
+        let fail = |reason: String| IpcError::Transfer {
+            service: R::NAME,
+            reason,
+        };
+        let bytes = encode(R::NAME, event)?;
+        let response = self
+            .active
+            .loan_slice_uninit(bytes.len())
+            .map_err(|e| fail(format!("{e:?}")))?;
+        response
+            .write_from_slice(&bytes)
+            .send()
+            .map_err(|e| fail(format!("{e:?}")))?;
+        Ok(())
+    }
+
+    /// Whether the caller still listens.
+    #[must_use]
+    pub fn is_wanted(&self) -> bool {
+        self.active.is_connected()
+    }
+}
+
+/// The asking end.
+#[derive(Debug)]
+pub struct RpcClient<R: Rpc> {
+    client: Client<Transport, [u8], (), [u8], ()>,
+    service: PhantomData<R>,
+}
+
+impl<R: Rpc> RpcClient<R> {
+    /// Opens the service; the server may come later.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn open(bus: &Bus) -> Result<Self, IpcError> {
+        let client = open::<R>(bus)?
+            .client_builder()
+            .initial_max_slice_len(4096)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .create()
+            .map_err(open_error(R::NAME))?;
+        Ok(Self {
+            client,
+            service: PhantomData,
+        })
+    }
+
+    /// Sends a request.
+    ///
+    /// # Errors
+    /// [`IpcError::Gone`] when nobody serves, else transfer errors.
+    pub fn call(&self, request: &R::Request) -> Result<Pending<R>, IpcError> {
+        let fail = |reason: String| IpcError::Transfer {
+            service: R::NAME,
+            reason,
+        };
+        let bytes = encode(R::NAME, request)?;
+        let loan = self
+            .client
+            .loan_slice_uninit(bytes.len())
+            .map_err(|e| fail(format!("{e:?}")))?;
+        let pending = loan
+            .write_from_slice(&bytes)
+            .send()
+            .map_err(|e| fail(format!("{e:?}")))?;
+        if pending.number_of_server_connections() == 0 {
+            return Err(IpcError::Gone { service: R::NAME });
+        }
+        Ok(Pending {
+            pending,
+            service: PhantomData,
+        })
+    }
+}
+
+/// A request on its way; events come out.
+#[derive(Debug)]
+pub struct Pending<R: Rpc> {
+    pending: PendingResponse<Transport, [u8], (), [u8], ()>,
+    service: PhantomData<R>,
+}
+
+impl<R: Rpc> Pending<R> {
+    /// The next event, if one has come.
+    ///
+    /// # Errors
+    /// [`IpcError::Gone`] when the server ended before its last event.
+    pub fn try_next(&self) -> Result<Option<R::Event>, IpcError> {
+        let fail = |reason: String| IpcError::Transfer {
+            service: R::NAME,
+            reason,
+        };
+        let connected = self.pending.is_connected();
+        match self.pending.receive().map_err(|e| fail(format!("{e:?}")))? {
+            Some(response) => decode(R::NAME, response.payload()).map(Some),
+            None if !connected => Err(IpcError::Gone { service: R::NAME }),
+            None => Ok(None),
+        }
+    }
+
+    /// Waits for the last event and returns it; earlier ones go to `each`.
+    /// `keep_waiting` is asked every few milliseconds.
+    ///
+    /// # Errors
+    /// [`IpcError::TimedOut`], [`IpcError::Gone`], or what `keep_waiting` says.
+    pub fn finish<E: From<IpcError>>(
+        &self,
+        timeout: Duration,
+        mut keep_waiting: impl FnMut() -> Result<(), E>,
+        mut each: impl FnMut(&R::Event),
+    ) -> Result<R::Event, E> {
+        let began = Instant::now();
+        loop {
+            if let Some(event) = self.try_next()? {
+                if R::is_last(&event) {
+                    return Ok(event);
+                }
+                each(&event);
+                continue;
+            }
+            keep_waiting()?;
+            if began.elapsed() > timeout {
+                return Err(IpcError::TimedOut {
+                    service: R::NAME,
+                    timeout_s: timeout.as_secs(),
+                }
+                .into());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    struct Counting;
+    impl Rpc for Counting {
+        const NAME: &'static str = "wag/v1/test/counting";
+        type Request = (u32, Vec<u8>);
+        type Event = Option<u32>;
+        fn is_last(event: &Self::Event) -> bool {
+            event.is_none()
+        }
+    }
+
+    fn domain(tag: &str) -> String {
+        format!("test_{tag}_{}", std::process::id())
+    }
+
+    #[test]
+    fn a_request_is_answered_by_a_stream_of_events() {
+        let name = domain("stream");
+        let bus = Bus::join(&name).unwrap();
+        let server = RpcServer::<Counting>::open(&bus).unwrap();
+        let client = RpcClient::<Counting>::open(&Bus::join(&name).unwrap()).unwrap();
+        let pending = client.call(&(3, vec![7; 50_000])).unwrap();
+        let call = server.receive().unwrap().unwrap();
+        assert_eq!(call.request.1.len(), 50_000);
+        for i in 0..call.request.0 {
+            call.send(&Some(i)).unwrap();
+        }
+        call.send(&None).unwrap();
+        drop(call);
+        let mut seen = Vec::new();
+        let last = pending.finish::<IpcError>(Duration::from_secs(1), || Ok(()), |e| seen.push(*e));
+        assert_eq!(last, Ok(None));
+        assert_eq!(seen, [Some(0), Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn a_server_that_ends_early_is_noticed() {
+        let name = domain("gone");
+        let bus = Bus::join(&name).unwrap();
+        let client = RpcClient::<Counting>::open(&bus).unwrap();
+        assert_eq!(
+            client.call(&(0, vec![])).err(),
+            Some(IpcError::Gone {
+                service: Counting::NAME
+            })
+        );
+        let server = RpcServer::<Counting>::open(&bus).unwrap();
+        let pending = client.call(&(1, vec![])).unwrap();
+        drop(server.receive().unwrap().unwrap());
+        let end = pending.finish::<IpcError>(Duration::from_secs(1), || Ok(()), |_| ());
+        assert_eq!(
+            end,
+            Err(IpcError::Gone {
+                service: Counting::NAME
+            })
+        );
+    }
+
+    #[test]
+    fn domains_do_not_see_each_other() {
+        let server = RpcServer::<Counting>::open(&Bus::join(&domain("one")).unwrap()).unwrap();
+        let client = RpcClient::<Counting>::open(&Bus::join(&domain("two")).unwrap()).unwrap();
+        assert!(client.call(&(0, vec![])).is_err());
+        assert!(server.receive().unwrap().is_none());
+        assert!(matches!(
+            Bus::join("no/slash"),
+            Err(IpcError::Domain { .. })
+        ));
+    }
+
+    proptest! {
+        #[test]
+        fn damaged_messages_are_refused(at in 0usize..40, flip in 1u8..=255) {
+            let mut bytes = encode("t", &vec![1u32, 70_000, 3_000_000_000, 7]).unwrap();
+            let at = at % bytes.len();
+            bytes[at] ^= flip;
+            prop_assert!(decode::<Vec<u32>>("t", &bytes).is_err());
+        }
+
+        #[test]
+        fn any_bytes_are_refused_or_read(bytes in prop::collection::vec(any::<u8>(), 0..64)) {
+            let _ = decode::<Vec<(u64, String)>>("t", &bytes);
+        }
+    }
+}
