@@ -1,1 +1,34 @@
-//! placeholder
+//! From camera frames to rope keypoints and to the score of a throw.
+//!
+//! Reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
+//! in the left eye ([`track`]), measures tip and target in stereo ([`score`]),
+//! draws what it found ([`overlay`]) and says when a rope hangs still
+//! ([`still`]).
+//!
+//! It is *not* the place for rope physics, identification or planning: it
+//! knows pixels, cameras and colours only.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        reason = "tests may fail loudly"
+    )
+)]
+
+pub mod calib;
+pub mod frame;
+pub mod overlay;
+//S pub mod score;
+pub mod source;
+//S pub mod still;
+//S pub mod track;
+
+pub use calib::{CalibError, load_camera};
+pub use frame::{EyeFrame, StereoFrame};
+//S pub use score::{Score, ScoreError, ScoreOptions, score};
+pub use source::{FrameSource, SourceError, open_video};
+//S pub use track::{ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track};

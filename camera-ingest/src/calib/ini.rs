@@ -1,0 +1,80 @@
+//! The INI dialect of the factory files: sections and keys without case, `.` as
+//! the decimal point whatever the locale, comments after `#` or `;`.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::CalibError;
+
+/// Parsed file: text by lower-case section and key.
+pub(super) struct Ini {
+    path: PathBuf,
+    values: HashMap<(String, String), String>,
+}
+
+impl Ini {
+    pub(super) fn parse(path: &Path, text: &str) -> Result<Self, CalibError> {
+        let mut values = HashMap::new();
+        let mut section = String::new();
+        for (index, raw) in text.lines().enumerate() {
+            let line = raw.split(['#', ';']).next().unwrap_or("").trim();
+            if line.is_empty() {
+                continue;
+            }
+            if let Some(name) = line.strip_prefix('[').and_then(|l| l.strip_suffix(']')) {
+                section = name.trim().to_ascii_lowercase();
+            } else if let Some((key, value)) = line.split_once('=') {
+                let key = key.trim().to_ascii_lowercase();
+                values.insert((section.clone(), key), value.trim().to_owned());
+            } else {
+                return Err(CalibError::Line {
+                    path: path.to_owned(),
+                    line: index + 1,
+                    text: raw.to_owned(),
+                });
+            }
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            values,
+        })
+    }
+
+    /// A finite number, `None` if the key is absent.
+    pub(super) fn number(&self, section: &str, key: &str) -> Result<Option<f64>, CalibError> {
+        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
+        let Some(text) = self.values.get(&at) else {
+            return Ok(None);
+        };
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(Some(value)),
+            _ => Err(self.bad(
+                section,
+                key,
+                "is not a finite number (use '.' as decimal point)",
+            )),
+        }
+    }
+
+    /// Error about a value that is present.
+    pub(super) fn bad(&self, section: &str, key: &str, problem: &'static str) -> CalibError {
+        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
+        CalibError::Value {
+            path: self.path.clone(),
+            section: section.to_owned(),
+            key: key.to_owned(),
+            text: self.values.get(&at).cloned().unwrap_or_default(),
+            problem,
+        }
+    }
+
+    /// Error about a value that is absent.
+    pub(super) fn missing(&self, section: &str, key: &str, mode: &'static str) -> CalibError {
+        CalibError::Missing {
+            path: self.path.clone(),
+            section: section.to_owned(),
+            key: key.to_owned(),
+            mode,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! `camera.toml`: which calibration and mode, the shutter, and where the left
+//! eye stands in the world.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use shared_types::{Shutter, StereoCamera};
+
+use super::factory::{Eyes, VideoMode};
+use super::{CalibError, read_text, write_text};
+
+/// The file's fields.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraSettings {
+    pub(super) calibration: PathBuf,
+    pub(super) mode: VideoMode,
+    shutter: Shutter,
+    exposure_s: f64,
+    #[serde(default)]
+    line_time_s: f64,
+    extrinsics: Extrinsics,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Extrinsics {
+    position_m: [f64; 3],
+    /// Rows of the rotation camera to world.
+    rotation: [[f64; 3]; 3],
+}
+
+pub(super) fn read(path: &Path) -> Result<CameraSettings, CalibError> {
+    let settings: CameraSettings =
+        toml::from_str(&read_text(path)?).map_err(|e| CalibError::Settings {
+            path: path.to_owned(),
+            reason: e.to_string(),
+        })?;
+    settings.check().map_err(|reason| CalibError::Settings {
+        path: path.to_owned(),
+        reason,
+    })?;
+    Ok(settings)
+}
+
+impl CameraSettings {
+    fn check(&self) -> Result<(), String> {
+        // 0.2 s is longer than any frame of any mode.
+        for (name, value) in [
+            ("exposure_s", self.exposure_s),
+            ("line_time_s", self.line_time_s),
+        ] {
+            if !(0.0..=0.2).contains(&value) {
+                return Err(format!("{name} = {value} must lie in 0 to 0.2 s"));
+            }
+        }
+        let r = self.rotation();
+        let off = (r * r.transpose() - Matrix3::identity()).norm();
+        if !(off < 1e-3 && r.determinant() > 0.0) {
+            return Err(format!(
+                "extrinsics.rotation is no rotation matrix (R R^T differs from 1 by {off:.2e}, \
+                 determinant {:.3}); give the 3x3 rows of camera to world",
+                r.determinant()
+            ));
+        }
+        if self.extrinsics.position_m.iter().any(|v| !v.is_finite()) {
+            return Err("extrinsics.position_m must be finite (m)".to_owned());
+        }
+        Ok(())
+    }
+
+    fn rotation(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| self.extrinsics.rotation[row][column])
+    }
+
+    pub(super) fn camera(&self, eyes: Eyes) -> StereoCamera {
+        let (width_px, height_px) = self.mode.size_px();
+        StereoCamera {
+            width_px,
+            height_px,
+            left: eyes.left,
+            right: eyes.right,
+            r_right_left: eyes.r_right_left,
+            t_right_left_m: eyes.t_right_left_m,
+            r_w_cam: self.rotation(),
+            p_w_cam_m: Vector3::from(self.extrinsics.position_m),
+            shutter: self.shutter,
+            exposure_s: self.exposure_s,
+            line_time_s: match self.shutter {
+                Shutter::Global => 0.0,
+                Shutter::Rolling => self.line_time_s,
+            },
+        }
+    }
+}
+
+/// Writes `camera.toml` for a camera; `calibration` is taken relative to `path`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_camera_toml(
+    path: &Path,
+    camera: &StereoCamera,
+    mode: VideoMode,
+    calibration: &Path,
+) -> Result<(), CalibError> {
+    let r = &camera.r_w_cam;
+    let settings = CameraSettings {
+        calibration: calibration.to_owned(),
+        mode,
+        shutter: camera.shutter,
+        exposure_s: camera.exposure_s,
+        line_time_s: camera.line_time_s,
+        extrinsics: Extrinsics {
+            position_m: camera.p_w_cam_m.into(),
+            rotation: core::array::from_fn(|row| core::array::from_fn(|col| r[(row, col)])),
+        },
+    };
+    let text = toml::to_string(&settings).map_err(|e| CalibError::Settings {
+        path: path.to_owned(),
+        reason: e.to_string(),
+    })?;
+    write_text(path, &text)
+}

@@ -1,0 +1,272 @@
+//! Frames as luma and chroma planes.
+//!
+//! A frame keeps the camera's own 4:2:2 form: one luma value a pixel, one pair
+//! of chroma values for two pixels of a row. Full-range BT.601 throughout, for
+//! YUYV and JPEG alike.
+
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+/// Why bytes are no frame.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FrameError {
+    /// Number of bytes does not fit the size.
+    #[error("{found} bytes where {width_px}x{height_px} YUYV needs {expected}")]
+    Length {
+        /// Pixels per row, both eyes.
+        width_px: usize,
+        /// Rows.
+        height_px: usize,
+        /// Bytes needed.
+        expected: usize,
+        /// Bytes found.
+        found: usize,
+    },
+    /// The JPEG cannot be decoded.
+    #[error("JPEG does not decode: {0}")]
+    Jpeg(String),
+    /// Not two eyes side by side.
+    #[error("a width of {0} px is no side-by-side pair with 4:2:2 chroma (must divide by 4)")]
+    Width(usize),
+}
+
+/// Planes of one image: luma `width * height`, chroma `width / 2 * height`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EyeFrame {
+    /// Start of exposure of row 0 (CLOCK_MONOTONIC, ns).
+    pub stamp_ns: u64,
+    /// The camera's sequence number.
+    pub sequence: u64,
+    /// Pixels per row.
+    pub width_px: usize,
+    /// Rows.
+    pub height_px: usize,
+    /// Luma.
+    pub luma: Vec<u8>,
+    /// Blue chroma, 128 = none.
+    pub cb: Vec<u8>,
+    /// Red chroma, 128 = none.
+    pub cr: Vec<u8>,
+}
+
+/// Both eyes side by side, the left eye in the left half.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StereoFrame(pub EyeFrame);
+
+impl EyeFrame {
+    /// `[Y, Cb, Cr]` of the nearest pixel inside the image.
+    #[must_use]
+    pub fn ycc(&self, u: usize, v: usize) -> [u8; 3] {
+        let (u, v) = (u.min(self.width_px - 1), v.min(self.height_px - 1));
+        let c = v * (self.width_px / 2) + u / 2;
+        [self.luma[v * self.width_px + u], self.cb[c], self.cr[c]]
+    }
+
+    /// Copy of the columns `from..from + width` (both even).
+    fn columns(&self, from: usize, width: usize) -> Self {
+        let cut = |plane: &[u8], stride: usize, from: usize, width: usize| -> Vec<u8> {
+            plane
+                .chunks_exact(stride)
+                .flat_map(|row| &row[from..from + width])
+                .copied()
+                .collect()
+        };
+        let half = self.width_px / 2;
+        Self {
+            width_px: width,
+            luma: cut(&self.luma, self.width_px, from, width),
+            cb: cut(&self.cb, half, from / 2, width / 2),
+            cr: cut(&self.cr, half, from / 2, width / 2),
+            ..*self
+        }
+    }
+
+    /// Packed RGB, 3 bytes a pixel.
+    #[must_use]
+    pub fn to_rgb(&self) -> Vec<u8> {
+        (0..self.height_px)
+            .flat_map(|v| (0..self.width_px).map(move |u| (u, v)))
+            .flat_map(|(u, v)| rgb_from_ycc(self.ycc(u, v).map(f32::from)))
+            .collect()
+    }
+}
+
+impl StereoFrame {
+    /// Left eye.
+    #[must_use]
+    pub fn left(&self) -> EyeFrame {
+        self.0.columns(0, self.0.width_px / 2)
+    }
+
+    /// Right eye.
+    #[must_use]
+    pub fn right(&self) -> EyeFrame {
+        let half = self.0.width_px / 2;
+        self.0.columns(half, half)
+    }
+
+    /// From V4L2 `YUYV` (Y0 Cb Y1 Cr), rows without padding.
+    ///
+    /// # Errors
+    /// The number of bytes or the width does not fit.
+    pub fn from_yuyv(
+        bytes: &[u8],
+        [width_px, height_px]: [usize; 2],
+        stamp_ns: u64,
+        sequence: u64,
+    ) -> Result<Self, FrameError> {
+        check_width(width_px)?;
+        let expected = width_px * height_px * 2;
+        if bytes.len() != expected || expected == 0 {
+            return Err(FrameError::Length {
+                width_px,
+                height_px,
+                expected,
+                found: bytes.len(),
+            });
+        }
+        let mut frame = blank(width_px, height_px, stamp_ns, sequence);
+        for (quad, (pair, (cb, cr))) in bytes.chunks_exact(4).zip(
+            frame
+                .luma
+                .chunks_exact_mut(2)
+                .zip(frame.cb.iter_mut().zip(&mut frame.cr)),
+        ) {
+            (pair[0], *cb, pair[1], *cr) = (quad[0], quad[1], quad[2], quad[3]);
+        }
+        Ok(Self(frame))
+    }
+
+    /// From one baseline JPEG. Chroma is kept as the mean of two neighbours.
+    ///
+    /// # Errors
+    /// The JPEG is damaged or its width is no side-by-side pair.
+    pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
+        // Asking for YCbCr spares a colour conversion we would only undo;
+        // strictness makes a truncated picture an error instead of grey rows.
+        let options = DecoderOptions::new_fast()
+            .jpeg_set_out_colorspace(ColorSpace::YCbCr)
+            .set_strict_mode(true);
+        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+        let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::Jpeg(format!("{e:?}"));
+        let packed = decoder.decode().map_err(jpeg)?;
+        let (width_px, height_px) = decoder
+            .dimensions()
+            .ok_or_else(|| FrameError::Jpeg("no dimensions".to_owned()))?;
+        check_width(width_px)?;
+        if packed.len() != width_px * height_px * 3 {
+            return Err(FrameError::Jpeg("not a colour picture".to_owned()));
+        }
+        let mut frame = blank(width_px, height_px, stamp_ns, sequence);
+        for (six, (pair, (cb, cr))) in packed.chunks_exact(6).zip(
+            frame
+                .luma
+                .chunks_exact_mut(2)
+                .zip(frame.cb.iter_mut().zip(&mut frame.cr)),
+        ) {
+            (pair[0], pair[1]) = (six[0], six[3]);
+            *cb = six[1].midpoint(six[4]);
+            *cr = six[2].midpoint(six[5]);
+        }
+        Ok(Self(frame))
+    }
+}
+
+fn check_width(width_px: usize) -> Result<(), FrameError> {
+    if width_px.is_multiple_of(4) && width_px > 0 {
+        Ok(())
+    } else {
+        Err(FrameError::Width(width_px))
+    }
+}
+
+fn blank(width_px: usize, height_px: usize, stamp_ns: u64, sequence: u64) -> EyeFrame {
+    EyeFrame {
+        stamp_ns,
+        sequence,
+        width_px,
+        height_px,
+        luma: vec![0; width_px * height_px],
+        cb: vec![128; width_px * height_px / 2],
+        cr: vec![128; width_px * height_px / 2],
+    }
+}
+
+/// RGB of a full-range BT.601 colour.
+#[must_use]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to 0..255 first"
+)]
+pub fn rgb_from_ycc([y, cb, cr]: [f32; 3]) -> [u8; 3] {
+    let (b, r) = (cb - 128.0, cr - 128.0);
+    [
+        y + 1.402 * r,
+        y - 0.344_136 * b - 0.714_136 * r,
+        y + 1.772 * b,
+    ]
+    .map(|c| c.round().clamp(0.0, 255.0) as u8)
+}
+
+/// Full-range BT.601 `[Y, Cb, Cr]` of an RGB colour.
+#[must_use]
+pub fn ycc_from_rgb(rgb: [u8; 3]) -> [f32; 3] {
+    let [r, g, b] = rgb.map(f32::from);
+    let y = 0.299 * r + 0.587 * g + 0.114 * b;
+    [y, 128.0 + (b - y) / 1.772, 128.0 + (r - y) / 1.402]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn yuyv_planes_and_halves() {
+        // Two rows, two eyes of two pixels each.
+        let bytes: Vec<u8> = (0..16).collect();
+        let frame = StereoFrame::from_yuyv(&bytes, [4, 2], 7, 3).unwrap();
+        assert_eq!(frame.left().luma, [0, 2, 8, 10]);
+        assert_eq!(frame.right().luma, [4, 6, 12, 14]);
+        assert_eq!(
+            (frame.left().cb, frame.right().cr),
+            (vec![1, 9], vec![7, 15])
+        );
+        assert_eq!(frame.0.ycc(3, 1), [14, 13, 15]);
+        assert_eq!((frame.0.stamp_ns, frame.0.sequence), (7, 3));
+    }
+
+    #[test]
+    fn wrong_sizes_are_refused() {
+        assert!(matches!(
+            StereoFrame::from_yuyv(&[0; 15], [4, 2], 0, 0),
+            Err(FrameError::Length {
+                expected: 16,
+                found: 15,
+                ..
+            })
+        ));
+        assert_eq!(
+            StereoFrame::from_yuyv(&[0; 24], [6, 2], 0, 0),
+            Err(FrameError::Width(6))
+        );
+        assert!(matches!(
+            StereoFrame::from_jpeg(&[0xff, 0xd8, 0, 1], 0, 0),
+            Err(FrameError::Jpeg(_))
+        ));
+    }
+
+    #[test]
+    fn colours_follow_bt601() {
+        // ITU-R BT.601, full range: pure red is Y 76.245, Cb 84.97, Cr 255.5.
+        let [y, cb, cr] = ycc_from_rgb([255, 0, 0]);
+        assert!(
+            (y - 76.245).abs() < 1e-3 && (cb - 84.97).abs() < 0.01 && (cr - 255.5).abs() < 0.01
+        );
+        for rgb in [[12, 200, 99], [255, 255, 255], [0, 0, 0], [214, 96, 22]] {
+            assert_eq!(rgb_from_ycc(ycc_from_rgb(rgb)), rgb);
+        }
+    }
+}

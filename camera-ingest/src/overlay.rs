@@ -1,0 +1,277 @@
+//! Pictures for people: keypoints over frames, and the strobe picture of a throw.
+
+use std::path::{Path, PathBuf};
+
+use crate::frame::EyeFrame;
+
+/// Why a picture cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OverlayError {
+    /// The file cannot be written.
+    #[error("picture {path}: {reason}")]
+    Write {
+        /// File concerned.
+        path: PathBuf,
+        /// What failed.
+        reason: String,
+    },
+    /// Nothing to draw, or frames of different sizes.
+    #[error("picture: {0}")]
+    Input(&'static str),
+}
+
+/// A colour picture, 3 bytes a pixel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Pixels per row.
+    pub width_px: usize,
+    /// Rows.
+    pub height_px: usize,
+    /// Packed RGB.
+    pub rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// Picture of one eye.
+    #[must_use]
+    pub fn of(frame: &EyeFrame) -> Self {
+        Self {
+            width_px: frame.width_px,
+            height_px: frame.height_px,
+            rgb: frame.to_rgb(),
+        }
+    }
+
+    /// Black picture.
+    #[must_use]
+    pub fn black(width_px: usize, height_px: usize) -> Self {
+        Self {
+            width_px,
+            height_px,
+            rgb: vec![0; width_px * height_px * 3],
+        }
+    }
+
+    fn set(&mut self, u: i64, v: i64, colour: [u8; 3]) {
+        let (Ok(u), Ok(v)) = (usize::try_from(u), usize::try_from(v)) else {
+            return;
+        };
+        if u < self.width_px && v < self.height_px {
+            let at = (v * self.width_px + u) * 3;
+            self.rgb[at..at + 3].copy_from_slice(&colour);
+        }
+    }
+
+    /// Draws a cross of the given arm length.
+    #[allow(clippy::cast_possible_truncation, reason = "pixels of an image")]
+    pub fn cross(&mut self, [u, v]: [f64; 2], arm_px: i64, colour: [u8; 3]) {
+        let (u, v) = (u.round() as i64, v.round() as i64);
+        for d in -arm_px..=arm_px {
+            self.set(u + d, v, colour);
+            self.set(u, v + d, colour);
+        }
+    }
+
+    /// Draws a line one pixel wide.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        reason = "pixels of an image"
+    )]
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], colour: [u8; 3]) {
+        let span = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
+        if !span.is_finite() || span > 1e5 {
+            return;
+        }
+        let steps = span.ceil().max(1.0) as i64;
+        for i in 0..=steps {
+            let a = i as f64 / steps as f64;
+            let at = |k: usize| (from[k] + a * (to[k] - from[k])).round() as i64;
+            self.set(at(0), at(1), colour);
+        }
+    }
+
+    /// Draws a polyline with a dot on every corner.
+    pub fn polyline(&mut self, points: &[[f64; 2]], line: [u8; 3], dot: [u8; 3]) {
+        for pair in points.windows(2) {
+            self.line(pair[0], pair[1], line);
+        }
+        for &p in points {
+            self.cross(p, 1, dot);
+        }
+    }
+
+    /// Copies another picture to `(left, top)`; what sticks out is cut off.
+    fn paste(&mut self, other: &Self, left: usize, top: usize) {
+        let width = other.width_px.min(self.width_px.saturating_sub(left));
+        for v in 0..other.height_px.min(self.height_px.saturating_sub(top)) {
+            let from = v * other.width_px * 3;
+            let to = ((top + v) * self.width_px + left) * 3;
+            self.rgb[to..to + width * 3].copy_from_slice(&other.rgb[from..from + width * 3]);
+        }
+    }
+
+    /// Writes a PNG file.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_png(&self, path: &Path) -> Result<(), OverlayError> {
+        let fail = |reason: String| OverlayError::Write {
+            path: path.to_owned(),
+            reason,
+        };
+        let file = std::fs::File::create(path).map_err(|e| fail(e.to_string()))?;
+        let (Ok(width), Ok(height)) = (u32::try_from(self.width_px), u32::try_from(self.height_px))
+        else {
+            return Err(OverlayError::Input("the picture is too large for a PNG"));
+        };
+        let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().map_err(|e| fail(e.to_string()))?;
+        writer
+            .write_image_data(&self.rgb)
+            .map_err(|e| fail(e.to_string()))
+    }
+}
+
+/// Contact sheet: `columns` pictures a row, all of the first one's size.
+///
+/// # Errors
+/// No pictures.
+pub fn contact_sheet(pictures: &[Picture], columns: usize) -> Result<Picture, OverlayError> {
+    let first = pictures
+        .first()
+        .ok_or(OverlayError::Input("no pictures for a contact sheet"))?;
+    let columns = columns.clamp(1, pictures.len());
+    let rows = pictures.len().div_ceil(columns);
+    let mut sheet = Picture::black(first.width_px * columns, first.height_px * rows);
+    for (i, picture) in pictures.iter().enumerate() {
+        let (column, row) = (i % columns, i / columns);
+        sheet.paste(picture, column * first.width_px, row * first.height_px);
+    }
+    Ok(sheet)
+}
+
+/// Contact sheet of chosen frames with their keypoints drawn.
+///
+/// # Errors
+/// No frame chosen.
+pub fn keypoint_sheet(
+    frames: &[EyeFrame],
+    track: &shared_types::KeypointTrack,
+    chosen: &[usize],
+    columns: usize,
+) -> Result<Picture, OverlayError> {
+    let pictures: Vec<Picture> = chosen
+        .iter()
+        .filter_map(|&i| Some((frames.get(i)?, track.frames.get(i)?)))
+        .map(|(frame, tracked)| {
+            let mut picture = Picture::of(frame);
+            let line = if tracked.lost {
+                [255, 0, 0]
+            } else {
+                [0, 255, 255]
+            };
+            picture.polyline(&tracked.points, line, [255, 0, 255]);
+            picture
+        })
+        .collect();
+    contact_sheet(&pictures, columns)
+}
+
+/// Strobe picture: over the first frame, every pixel shows the chosen frame
+/// that differs most from `background` there.
+///
+/// # Errors
+/// No frames, or sizes differ.
+pub fn strobe(background: &EyeFrame, frames: &[&EyeFrame]) -> Result<Picture, OverlayError> {
+    if frames.is_empty() {
+        return Err(OverlayError::Input("no frames for a strobe picture"));
+    }
+    if frames
+        .iter()
+        .any(|f| f.luma.len() != background.luma.len() || f.width_px != background.width_px)
+    {
+        return Err(OverlayError::Input("the frames differ in size"));
+    }
+    let mut picture = Picture::of(background);
+    for v in 0..background.height_px {
+        for u in 0..background.width_px {
+            let empty = background.ycc(u, v);
+            let far = |f: &&&EyeFrame| -> u32 {
+                let c = f.ycc(u, v);
+                (0..3).map(|k| u32::from(c[k].abs_diff(empty[k]))).sum()
+            };
+            // A threshold keeps the noise of many frames out of still places.
+            if let Some(best) = frames.iter().max_by_key(far)
+                && far(&best) > 30
+            {
+                let rgb = crate::frame::rgb_from_ycc(best.ycc(u, v).map(f32::from));
+                let at = (v * background.width_px + u) * 3;
+                picture.rgb[at..at + 3].copy_from_slice(&rgb);
+            }
+        }
+    }
+    Ok(picture)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(level: u8) -> EyeFrame {
+        EyeFrame {
+            stamp_ns: 0,
+            sequence: 0,
+            width_px: 8,
+            height_px: 4,
+            luma: vec![level; 32],
+            cb: vec![128; 16],
+            cr: vec![128; 16],
+        }
+    }
+
+    #[test]
+    fn strobe_keeps_the_pixel_that_differs_most() {
+        let (background, mut a, mut b) = (grey(100), grey(100), grey(100));
+        a.luma[9] = 200;
+        b.luma[9] = 150;
+        b.luma[20] = 10;
+        let picture = strobe(&background, &[&a, &b]).unwrap();
+        assert_eq!(picture.rgb[27], 200);
+        assert_eq!(picture.rgb[60], 10);
+        assert_eq!(picture.rgb[0], 100);
+        assert!(strobe(&background, &[]).is_err());
+    }
+
+    #[test]
+    fn drawing_stays_inside() {
+        let mut picture = Picture::of(&grey(0));
+        picture.line([-20.0, 1.0], [20.0, 1.0], [255, 0, 0]);
+        picture.cross([7.0, 3.0], 3, [0, 255, 0]);
+        let red = picture.rgb.chunks(3).filter(|p| p[0] == 255).count();
+        assert_eq!(red, 7, "a row of eight, one under the cross");
+    }
+
+    #[test]
+    fn sheets_tile_and_png_reads_back() {
+        let sheet = contact_sheet(
+            &[
+                Picture::of(&grey(1)),
+                Picture::of(&grey(2)),
+                Picture::of(&grey(3)),
+            ],
+            2,
+        )
+        .unwrap();
+        assert_eq!((sheet.width_px, sheet.height_px), (16, 8));
+        assert_eq!((sheet.rgb[8 * 3], sheet.rgb[16 * 4 * 3]), (2, 3));
+        let path = std::env::temp_dir().join(format!("sheet-{}.png", std::process::id()));
+        sheet.write_png(&path).unwrap();
+        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let info = png::Decoder::new(file).read_info().unwrap().info().size();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(info, (16, 8));
+    }
+}

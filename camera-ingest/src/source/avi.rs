@@ -1,0 +1,192 @@
+//! Side-by-side Motion-JPEG in a RIFF AVI.
+//!
+//! `RIFF 'AVI ' { LIST 'hdrl' { 'avih' ... }, LIST 'movi' { '00dc' ... } }`; every
+//! `00dc` (or `00db`) chunk is one complete JPEG, chunks are padded to even
+//! length. The index at the end is not needed and not read.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::{FrameSource, SourceError, read_bytes};
+use crate::frame::StereoFrame;
+
+const REMEDY: &str = "record side-by-side Motion-JPEG into an AVI, or convert to it";
+const TRUNCATED: &str = "the file is truncated: copy it again or record again";
+
+/// An AVI file held in memory in its compressed form.
+#[derive(Debug)]
+pub struct AviSource {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    chunks: Vec<Range<usize>>,
+    stamps: Vec<Stamp>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Stamp {
+    sequence: u64,
+    stamp_ns: u64,
+}
+
+impl AviSource {
+    /// Opens a file; times come from `timestamps` or else from the header's
+    /// frame rate.
+    ///
+    /// # Errors
+    /// No such file, no AVI, truncated, or timestamps that do not fit.
+    pub fn open(path: &Path, timestamps: Option<&Path>) -> Result<Self, SourceError> {
+        let bytes = read_bytes(path)?;
+        let (frame_us, chunks) = walk(path, &bytes)?;
+        let stamps = match timestamps {
+            Some(csv) => read_stamps(csv, chunks.len())?,
+            None => (0..chunks.len() as u64)
+                .map(|i| Stamp {
+                    sequence: i,
+                    stamp_ns: i * u64::from(frame_us) * 1000,
+                })
+                .collect(),
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            bytes,
+            chunks,
+            stamps,
+        })
+    }
+}
+
+impl FrameSource for AviSource {
+    fn len(&self) -> usize {
+        self.chunks.len()
+    }
+
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        let (Some(range), Some(stamp)) = (self.chunks.get(index), self.stamps.get(index)) else {
+            return Err(SourceError::OutOfRange {
+                path: self.path.clone(),
+                frame: index,
+                len: self.chunks.len(),
+            });
+        };
+        let jpeg = &self.bytes[range.clone()];
+        StereoFrame::from_jpeg(jpeg, stamp.stamp_ns, stamp.sequence).map_err(|source| {
+            SourceError::Frame {
+                path: self.path.clone(),
+                frame: index,
+                source,
+            }
+        })
+    }
+}
+
+/// Header of the chunk at `at`: four-character code and its body's range.
+fn chunk(bytes: &[u8], at: usize) -> Option<([u8; 4], Range<usize>)> {
+    let head = bytes.get(at..at + 8)?;
+    let code = [head[0], head[1], head[2], head[3]];
+    let size = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+    Some((code, at + 8..(at + 8).saturating_add(size)))
+}
+
+/// Frame time (us) and the ranges of the frames.
+fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceError> {
+    let fail = |reason: String, remedy| SourceError::Container {
+        path: path.to_owned(),
+        reason,
+        remedy,
+    };
+    if bytes.get(..4) != Some(b"RIFF") || bytes.get(8..12) != Some(b"AVI ") {
+        return Err(fail("not a RIFF AVI file".to_owned(), REMEDY));
+    }
+    let mut frame_us = None;
+    let mut frames = Vec::new();
+    let mut at = 12;
+    while let Some((code, body)) = chunk(bytes, at) {
+        let list = bytes.get(body.start..body.start + 4);
+        if &code == b"LIST" && (list == Some(b"movi") || list == Some(b"hdrl")) {
+            // Go inside: the next chunk starts after the list's name.
+            if list == Some(b"movi") && body.end > bytes.len() {
+                let read = frames.len();
+                return Err(fail(
+                    format!(
+                        "the frame list ends {} bytes early (after frame {read})",
+                        body.end - bytes.len()
+                    ),
+                    TRUNCATED,
+                ));
+            }
+            at = body.start + 4;
+            continue;
+        }
+        if body.end > bytes.len() {
+            return Err(fail(
+                format!("chunk after frame {} ends beyond the file", frames.len()),
+                TRUNCATED,
+            ));
+        }
+        match &code {
+            b"avih" => {
+                frame_us = bytes
+                    .get(body.start..body.start + 4)
+                    .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+            }
+            b"00dc" | b"00db" if !body.is_empty() => frames.push(body.clone()),
+            _ => {}
+        }
+        at = body.end + body.len() % 2;
+    }
+    match (frame_us, frames.is_empty()) {
+        (Some(us), false) if us > 0 => Ok((us, frames)),
+        (_, true) => Err(fail("no video frames in it".to_owned(), REMEDY)),
+        _ => Err(fail("the header has no frame rate".to_owned(), REMEDY)),
+    }
+}
+
+/// Rows `frame,sequence,monotonic_ns`, one a frame.
+fn read_stamps(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SourceError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    let fail = |line: usize, reason: String| SourceError::Timestamps {
+        path: path.to_owned(),
+        line,
+        reason,
+    };
+    let mut stamps: Vec<Stamp> = Vec::new();
+    for (index, row) in text.lines().enumerate().skip(1) {
+        if row.trim().is_empty() {
+            continue;
+        }
+        let numbers: Vec<u64> = row
+            .split(',')
+            .map(|c| c.trim().parse())
+            .collect::<Result<_, _>>()
+            .map_err(|e| {
+                fail(
+                    index + 1,
+                    format!("{row:?} is not three whole numbers ({e})"),
+                )
+            })?;
+        let [frame, sequence, stamp_ns] = numbers[..] else {
+            return Err(fail(index + 1, format!("{} columns", numbers.len())));
+        };
+        if frame != stamps.len() as u64 {
+            return Err(fail(
+                index + 1,
+                format!("frame {frame} where {} is due", stamps.len()),
+            ));
+        }
+        if stamps.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
+            return Err(fail(index + 1, "times do not increase".to_owned()));
+        }
+        stamps.push(Stamp { sequence, stamp_ns });
+    }
+    if stamps.len() == frames {
+        Ok(stamps)
+    } else {
+        Err(fail(
+            stamps.len() + 1,
+            format!("{} rows, but the video has {frames} frames", stamps.len()),
+        ))
+    }
+}
