@@ -1,0 +1,350 @@
+//! Typed data of replies, in SI units.
+
+use super::bytes::{ByteReader, ByteWriter, EmitError};
+use super::command::{Command, JointQuery};
+use super::frame::{self, Reply};
+use super::pose::TcpPose;
+use super::status::ArmState;
+use shared_types::JointVector;
+
+/// Bytes of a version or serial number text on the wire.
+pub const TEXT_LEN: usize = 40;
+
+/// NUL-padded text of at most 39 characters, as versions are sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Text([u8; TEXT_LEN]);
+
+impl Text {
+    /// From `text`; what does not fit in 39 bytes is cut off.
+    #[must_use]
+    pub fn new(text: &str) -> Self {
+        let mut bytes = [0; TEXT_LEN];
+        for (to, from) in bytes
+            .iter_mut()
+            .take(TEXT_LEN.saturating_sub(1))
+            .zip(text.bytes())
+        {
+            *to = from;
+        }
+        Self(bytes)
+    }
+
+    /// The text before the first NUL; empty when it is not UTF-8.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        self.0
+            .split(|b| *b == 0)
+            .next()
+            .and_then(|text| core::str::from_utf8(text).ok())
+            .unwrap_or_default()
+    }
+}
+
+/// Data of a reply.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReplyData {
+    /// Nothing beyond the status byte.
+    None,
+    /// Version text, or the raw 40 bytes of the serial numbers.
+    Text(Text),
+    /// State of the arm.
+    State(ArmState),
+    /// Commands in the buffer.
+    Buffered(u16),
+    /// Error and warning code; 0 is none.
+    Fault {
+        /// See [`super::ErrorCode`].
+        error: u8,
+        /// Warning code.
+        warning: u8,
+    },
+    /// TCP pose.
+    Pose(TcpPose),
+    /// Joint angles (rad).
+    Joints(JointVector),
+    /// Joint position (rad), velocity (rad/s) and effort (Nm); those not asked
+    /// for are zero.
+    JointMotion {
+        /// How many of the three the reply holds.
+        quantities: u8,
+        /// Position (rad).
+        position: JointVector,
+        /// Velocity (rad/s).
+        velocity: JointVector,
+        /// Effort (Nm).
+        effort: JointVector,
+    },
+    /// Whether joint angles are outside the range.
+    OutsideLimits(bool),
+    /// Linear speed limit in servo mode as a factor of 1 m/s.
+    SpeedLimitFactor(f64),
+    /// Answer to a checked move: buffer count and the check's result.
+    CheckedMove {
+        /// Commands in the buffer.
+        buffered: u16,
+        /// 0 when the move is possible.
+        result: u8,
+    },
+}
+
+/// Why a reply is not the answer to a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ReplyError {
+    /// Another register than asked for.
+    #[error("reply is for register {got:#04x}, asked was {asked:#04x}")]
+    Register {
+        /// Register in the reply.
+        got: u8,
+        /// Register of the request.
+        asked: u8,
+    },
+    /// The controller says that the result means nothing.
+    #[error("the controller could not answer register {register:#04x}")]
+    Invalid {
+        /// Register of the request.
+        register: u8,
+    },
+    /// Fewer data than the register has.
+    #[error("reply to register {register:#04x} has {given} data bytes: too few")]
+    TooShort {
+        /// Register of the request.
+        register: u8,
+        /// Data bytes found.
+        given: usize,
+    },
+}
+
+impl ReplyData {
+    /// Types the data of the reply to `command`. RT-safe.
+    ///
+    /// # Errors
+    /// [`ReplyError`]; never panics, whatever the bytes.
+    pub fn parse(command: &Command, reply: &Reply<'_>) -> Result<Self, ReplyError> {
+        let asked = command.register().code();
+        if reply.register != asked {
+            return Err(ReplyError::Register {
+                got: reply.register,
+                asked,
+            });
+        }
+        if reply.status.is_invalid() {
+            return Err(ReplyError::Invalid { register: asked });
+        }
+        Self::parse_data(command, reply.data).ok_or(ReplyError::TooShort {
+            register: asked,
+            given: reply.data.len(),
+        })
+    }
+
+    fn parse_data(command: &Command, data: &[u8]) -> Option<Self> {
+        let mut bytes = ByteReader::new(data);
+        Some(match command {
+            Command::Version | Command::SerialNumbers => Self::Text(Text(bytes.array()?)),
+            Command::GetState => Self::State(ArmState::from_code(bytes.u8()?)),
+            Command::GetFault => Self::Fault {
+                error: bytes.u8()?,
+                warning: bytes.u8()?,
+            },
+            Command::MoveJoint {
+                checked: Some(_), ..
+            }
+            | Command::MoveHome {
+                checked: Some(_), ..
+            } => Self::CheckedMove {
+                buffered: bytes.u16_be()?,
+                result: bytes.u8()?,
+            },
+            Command::Buffered
+            | Command::MoveJoint { .. }
+            | Command::MoveHome { .. }
+            | Command::JointJerk(_)
+            | Command::JointAcceleration(_) => Self::Buffered(bytes.u16_be()?),
+            Command::TcpPose | Command::ForwardKinematics(_) => {
+                Self::Pose(TcpPose::parse(&mut bytes)?)
+            }
+            Command::JointPosition(JointQuery::Commanded) => Self::Joints(bytes.joints()?),
+            Command::JointPosition(JointQuery::Quantities { quantities, .. }) => {
+                let mut next = |index| {
+                    if *quantities > index {
+                        bytes.joints()
+                    } else {
+                        Some(JointVector::ZERO)
+                    }
+                };
+                Self::JointMotion {
+                    quantities: *quantities,
+                    position: next(0)?,
+                    velocity: next(1)?,
+                    effort: next(2)?,
+                }
+            }
+            Command::JointLimitTest(_) => Self::OutsideLimits(bytes.u8()? != 0),
+            Command::GetSpeedLimitFactor => Self::SpeedLimitFactor(bytes.f32_le()?),
+            _ => Self::None,
+        })
+    }
+
+    fn emit_data(&self, out: &mut ByteWriter<'_>) -> Result<(), EmitError> {
+        match self {
+            Self::None => Ok(()),
+            Self::Text(text) => out.bytes(&text.0),
+            Self::State(state) => out.u8(state.code()),
+            Self::Buffered(count) => out.u16_be(*count),
+            Self::Fault { error, warning } => out.bytes(&[*error, *warning]),
+            Self::Pose(pose) => pose.emit(out),
+            Self::Joints(q) => out.joints(q),
+            Self::JointMotion {
+                quantities,
+                position,
+                velocity,
+                effort,
+            } => [position, velocity, effort]
+                .into_iter()
+                .take(usize::from(*quantities))
+                .try_for_each(|v| out.joints(v)),
+            Self::OutsideLimits(outside) => out.u8(u8::from(*outside)),
+            Self::SpeedLimitFactor(factor) => out.f32_le(*factor),
+            Self::CheckedMove { buffered, result } => {
+                out.u16_be(*buffered)?;
+                out.u8(*result)
+            }
+        }
+    }
+
+    /// Writes the whole reply frame to the front of `out` and returns its
+    /// length; [`frame::MAX_FRAME_LEN`] bytes are always enough.
+    ///
+    /// # Errors
+    /// [`EmitError::BufferTooSmall`].
+    pub fn emit(
+        &self,
+        out: &mut [u8],
+        request: &frame::Request<'_>,
+        status: super::Status,
+    ) -> Result<usize, EmitError> {
+        let mut data = [0; frame::MAX_BODY_LEN];
+        let mut writer = ByteWriter::new(&mut data);
+        self.emit_data(&mut writer)?;
+        let len = writer.len();
+        Reply {
+            transaction: request.transaction,
+            protocol: request.protocol,
+            register: request.register,
+            status,
+            data: data.get(..len).unwrap_or_default(),
+        }
+        .emit(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::xarm::frame::{MAX_FRAME_LEN, Protocol, Request};
+    use crate::xarm::status::Status;
+    use crate::xarm::stream::FrameReader;
+    use proptest::prelude::*;
+
+    fn through_the_wire(command: &Command, data: ReplyData) -> Result<ReplyData, ReplyError> {
+        let request = Request {
+            transaction: 9,
+            protocol: Protocol::Private,
+            register: command.register().code(),
+            parameters: &[],
+        };
+        let mut out = [0; MAX_FRAME_LEN];
+        let n = data.emit(&mut out, &request, Status(0)).unwrap();
+        let mut reader = FrameReader::new();
+        reader.feed(&out[..n]);
+        let reply = reader.next_frame().unwrap().unwrap().as_reply().unwrap();
+        assert_eq!(reply.transaction, 9);
+        ReplyData::parse(command, &reply)
+    }
+
+    #[test]
+    fn what_is_emitted_is_parsed_back() {
+        let q = JointVector([0.5, -0.25, 0.125, 1.0, 2.0, -3.0, 0.75]);
+        let motion = |quantities, velocity, effort| ReplyData::JointMotion {
+            quantities,
+            position: q,
+            velocity,
+            effort,
+        };
+        let query = |quantities| {
+            Command::JointPosition(JointQuery::Quantities {
+                quantities,
+                targets: false,
+            })
+        };
+        let zero = JointVector::ZERO;
+        let cases = [
+            (
+                Command::Version,
+                ReplyData::Text(Text::new("7,7,XS1305,AC1304,v2.7.1")),
+            ),
+            (Command::GetState, ReplyData::State(ArmState::NeedsReset)),
+            (Command::Buffered, ReplyData::Buffered(300)),
+            (
+                Command::GetFault,
+                ReplyData::Fault {
+                    error: 23,
+                    warning: 11,
+                },
+            ),
+            (
+                Command::JointPosition(JointQuery::Commanded),
+                ReplyData::Joints(q),
+            ),
+            (query(1), motion(1, zero, zero)),
+            (query(2), motion(2, q, zero)),
+            (query(3), motion(3, q, q)),
+            (Command::JointLimitTest(q), ReplyData::OutsideLimits(true)),
+            (
+                Command::GetSpeedLimitFactor,
+                ReplyData::SpeedLimitFactor(1.25),
+            ),
+            (Command::ServoJoint(q), ReplyData::None),
+        ];
+        for (command, data) in cases {
+            assert_eq!(through_the_wire(&command, data), Ok(data), "{command:?}");
+        }
+    }
+
+    #[test]
+    fn a_reply_that_lacks_data_is_refused() {
+        assert_eq!(
+            through_the_wire(&Command::GetFault, ReplyData::State(ArmState::Ready)),
+            Err(ReplyError::TooShort {
+                register: 15,
+                given: 1
+            })
+        );
+    }
+
+    #[test]
+    fn text_is_cut_and_terminated() {
+        let long = "x".repeat(60);
+        assert_eq!(Text::new(&long).as_str().len(), TEXT_LEN - 1);
+    }
+
+    proptest! {
+        #[test]
+        fn arbitrary_data_never_panic(
+            register in any::<u8>(),
+            parameters in prop::collection::vec(any::<u8>(), 0..60),
+            data in prop::collection::vec(any::<u8>(), 0..120),
+            status in any::<u8>(),
+        ) {
+            if let Ok(command) = Command::parse(register, &parameters) {
+                let reply = Reply {
+                    transaction: 1,
+                    protocol: Protocol::Private,
+                    register,
+                    status: Status(status),
+                    data: &data,
+                };
+                let _ = ReplyData::parse(&command, &reply);
+            }
+        }
+    }
+}

@@ -1,0 +1,353 @@
+//! Reassembles frames from a TCP stream: split frames are joined, merged ones
+//! split.
+//!
+//! The protocol has no start mark, so a stream that shows an impossible header
+//! has lost its place for good: the reader reports [`BrokenStream`] and stays
+//! broken until [`FrameReader::reset`]; the owner drops the connection.
+
+use super::bytes::ByteReader;
+use super::frame::{Frame, HEADER_LEN, MAX_BODY_LEN, Protocol};
+
+/// Bytes a reader holds; several frames of any kind.
+pub const STREAM_CAPACITY: usize = 2048;
+
+/// A header that no peer sends: the place in the stream is lost, close the
+/// connection and open a new one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum BrokenStream {
+    /// Protocol id outside 0 to 3.
+    #[error("frame with protocol id {0}, known are 0 to 3; drop the connection")]
+    Protocol(u16),
+    /// Body length zero or above [`MAX_BODY_LEN`].
+    #[error(
+        "frame with a body of {0} bytes, possible are 1 to {MAX_BODY_LEN}; drop the connection"
+    )]
+    Length(u16),
+    /// Report size outside what the controller sends.
+    #[error("report of {0} bytes, possible are 87 to 1024; drop the connection")]
+    ReportSize(u32),
+}
+
+/// Fixed buffer between a socket and a frame parser. RT-safe.
+#[derive(Debug, Clone)]
+struct StreamBuffer {
+    bytes: [u8; STREAM_CAPACITY],
+    start: usize,
+    end: usize,
+}
+
+impl StreamBuffer {
+    const fn new() -> Self {
+        Self {
+            bytes: [0; STREAM_CAPACITY],
+            start: 0,
+            end: 0,
+        }
+    }
+
+    fn pending(&self) -> &[u8] {
+        self.bytes.get(self.start..self.end).unwrap_or_default()
+    }
+
+    /// Free room behind the pending bytes, which move to the front first.
+    fn space(&mut self) -> &mut [u8] {
+        if self.start > 0 {
+            self.bytes.copy_within(self.start..self.end, 0);
+            self.end = self.end.saturating_sub(self.start);
+            self.start = 0;
+        }
+        self.bytes.get_mut(self.end..).unwrap_or_default()
+    }
+
+    fn commit(&mut self, received: usize) {
+        self.end = self.end.saturating_add(received).min(STREAM_CAPACITY);
+    }
+
+    fn feed(&mut self, bytes: &[u8]) -> usize {
+        let taken = self
+            .space()
+            .iter_mut()
+            .zip(bytes)
+            .map(|(to, from)| *to = *from)
+            .count();
+        self.commit(taken);
+        taken
+    }
+
+    /// Takes the first `len` pending bytes, `None` if there are fewer.
+    fn take(&mut self, len: usize) -> Option<&[u8]> {
+        let from = self.start;
+        let to = from.saturating_add(len);
+        if to > self.end {
+            return None;
+        }
+        self.start = to;
+        self.bytes.get(from..to)
+    }
+}
+
+/// Reads command frames, requests and replies alike, from a stream. RT-safe.
+///
+/// Receive into [`space`](Self::space), [`commit`](Self::commit) the count,
+/// then call [`next_frame`](Self::next_frame) until it returns `None`.
+#[derive(Debug, Clone)]
+pub struct FrameReader {
+    buffer: StreamBuffer,
+    broken: Option<BrokenStream>,
+}
+
+impl Default for FrameReader {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl FrameReader {
+    /// Empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            buffer: StreamBuffer::new(),
+            broken: None,
+        }
+    }
+
+    /// Room for received bytes. Never empty once all whole frames were taken,
+    /// since the longest frame is shorter than the buffer.
+    pub fn space(&mut self) -> &mut [u8] {
+        self.buffer.space()
+    }
+
+    /// Says how many bytes were received into [`space`](Self::space).
+    pub fn commit(&mut self, received: usize) {
+        self.buffer.commit(received);
+    }
+
+    /// Copies `bytes` in and returns how many fitted.
+    pub fn feed(&mut self, bytes: &[u8]) -> usize {
+        self.buffer.feed(bytes)
+    }
+
+    /// Forgets everything, for a new connection.
+    pub fn reset(&mut self) {
+        self.buffer.start = 0;
+        self.buffer.end = 0;
+        self.broken = None;
+    }
+
+    /// The next whole frame, `None` if more bytes are needed.
+    ///
+    /// # Errors
+    /// [`BrokenStream`] on an impossible header, and from then on always.
+    pub fn next_frame(&mut self) -> Result<Option<Frame<'_>>, BrokenStream> {
+        if let Some(broken) = self.broken {
+            return Err(broken);
+        }
+        let Some(header) = Header::parse(self.buffer.pending()) else {
+            return Ok(None);
+        };
+        let (protocol, body_len) = match header.check() {
+            Ok(checked) => checked,
+            Err(broken) => {
+                self.broken = Some(broken);
+                return Err(broken);
+            }
+        };
+        let Some(frame) = self.buffer.take(HEADER_LEN.saturating_add(body_len)) else {
+            return Ok(None);
+        };
+        Ok(Some(Frame {
+            transaction: header.transaction,
+            protocol,
+            body: frame.get(HEADER_LEN..).unwrap_or_default(),
+        }))
+    }
+}
+
+struct Header {
+    transaction: u16,
+    protocol: u16,
+    length: u16,
+}
+
+impl Header {
+    fn parse(bytes: &[u8]) -> Option<Self> {
+        let mut bytes = ByteReader::new(bytes);
+        Some(Self {
+            transaction: bytes.u16_be()?,
+            protocol: bytes.u16_be()?,
+            length: bytes.u16_be()?,
+        })
+    }
+
+    fn check(&self) -> Result<(Protocol, usize), BrokenStream> {
+        let protocol =
+            Protocol::from_code(self.protocol).ok_or(BrokenStream::Protocol(self.protocol))?;
+        let length = usize::from(self.length);
+        if (1..=MAX_BODY_LEN).contains(&length) {
+            Ok((protocol, length))
+        } else {
+            Err(BrokenStream::Length(self.length))
+        }
+    }
+}
+
+/// Reads report frames, which begin with their own size, from a stream. RT-safe.
+#[derive(Debug, Clone)]
+pub struct ReportReader {
+    buffer: StreamBuffer,
+    broken: Option<BrokenStream>,
+}
+
+impl Default for ReportReader {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ReportReader {
+    /// Empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            buffer: StreamBuffer::new(),
+            broken: None,
+        }
+    }
+
+    /// Room for received bytes; see [`FrameReader::space`].
+    pub fn space(&mut self) -> &mut [u8] {
+        self.buffer.space()
+    }
+
+    /// Says how many bytes were received into [`space`](Self::space).
+    pub fn commit(&mut self, received: usize) {
+        self.buffer.commit(received);
+    }
+
+    /// Copies `bytes` in and returns how many fitted.
+    pub fn feed(&mut self, bytes: &[u8]) -> usize {
+        self.buffer.feed(bytes)
+    }
+
+    /// Forgets everything, for a new connection.
+    pub fn reset(&mut self) {
+        self.buffer.start = 0;
+        self.buffer.end = 0;
+        self.broken = None;
+    }
+
+    /// The next whole report with its size field, `None` if more bytes are
+    /// needed.
+    ///
+    /// # Errors
+    /// [`BrokenStream::ReportSize`], and from then on always.
+    pub fn next_report(&mut self) -> Result<Option<&[u8]>, BrokenStream> {
+        if let Some(broken) = self.broken {
+            return Err(broken);
+        }
+        let Some(size) = ByteReader::new(self.buffer.pending()).u32_be() else {
+            return Ok(None);
+        };
+        match usize::try_from(size) {
+            Ok(len @ 87..=1024) => Ok(self.buffer.take(len)),
+            _ => {
+                let broken = BrokenStream::ReportSize(size);
+                self.broken = Some(broken);
+                Err(broken)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::xarm::frame::Request;
+    use proptest::prelude::*;
+
+    type Owned = (u16, u8, Vec<u8>);
+
+    fn encode(frames: &[Owned]) -> Vec<u8> {
+        let mut stream = Vec::new();
+        for (transaction, register, parameters) in frames {
+            let mut out = [0; 512];
+            let n = Request {
+                transaction: *transaction,
+                protocol: Protocol::Private,
+                register: *register,
+                parameters,
+            }
+            .emit(&mut out)
+            .unwrap();
+            stream.extend_from_slice(&out[..n]);
+        }
+        stream
+    }
+
+    proptest! {
+        #[test]
+        fn any_cut_of_the_stream_gives_the_same_frames(
+            frames in prop::collection::vec((any::<u16>(), any::<u8>(), prop::collection::vec(any::<u8>(), 0..90)), 1..12),
+            cuts in prop::collection::vec(1_usize..64, 1..40),
+        ) {
+            let stream = encode(&frames);
+            let mut reader = FrameReader::new();
+            let mut got: Vec<Owned> = Vec::new();
+            let mut at = 0;
+            for cut in cuts.iter().cycle() {
+                let end = (at + cut).min(stream.len());
+                prop_assert_eq!(reader.feed(&stream[at..end]), end - at);
+                at = end;
+                while let Some(frame) = reader.next_frame().unwrap() {
+                    let r = frame.as_request().unwrap();
+                    got.push((r.transaction, r.register, r.parameters.to_vec()));
+                }
+                if at == stream.len() {
+                    break;
+                }
+            }
+            prop_assert_eq!(got, frames);
+        }
+
+        #[test]
+        fn arbitrary_bytes_never_panic_and_never_fill_the_buffer(
+            bytes in prop::collection::vec(any::<u8>(), 0..6000),
+        ) {
+            let mut frames = FrameReader::new();
+            let mut reports = ReportReader::new();
+            for chunk in bytes.chunks(700) {
+                frames.feed(chunk);
+                reports.feed(chunk);
+                while let Ok(Some(frame)) = frames.next_frame() {
+                    let _ = (frame.as_request(), frame.as_reply());
+                }
+                while let Ok(Some(_)) = reports.next_report() {}
+                prop_assert!(frames.next_frame().is_err() || !frames.space().is_empty());
+                prop_assert!(reports.next_report().is_err() || !reports.space().is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn heartbeat_of_the_sdk_is_a_frame_of_its_own() {
+        let mut reader = FrameReader::new();
+        reader.feed(&[0, 0, 0, 1, 0, 2, 0, 0, 0, 5, 0, 2, 0, 1, 13]);
+        let heartbeat = reader.next_frame().unwrap().unwrap();
+        assert_eq!(heartbeat.protocol, Protocol::Heartbeat);
+        let request = reader.next_frame().unwrap().unwrap().as_request().unwrap();
+        assert_eq!((request.transaction, request.register), (5, 13));
+    }
+
+    #[test]
+    fn an_impossible_header_breaks_the_stream_until_reset() {
+        let mut reader = FrameReader::new();
+        reader.feed(&[0, 1, 0, 9, 0, 1, 13]);
+        assert_eq!(reader.next_frame(), Err(BrokenStream::Protocol(9)));
+        reader.feed(&[0, 1, 0, 2, 0, 1, 13]);
+        assert_eq!(reader.next_frame(), Err(BrokenStream::Protocol(9)));
+        reader.reset();
+        reader.feed(&[0, 1, 0, 2, 0, 0]);
+        assert_eq!(reader.next_frame(), Err(BrokenStream::Length(0)));
+    }
+}
