@@ -25,10 +25,10 @@ pub mod overlay;
 //S pub mod score;
 pub mod source;
 //S pub mod still;
-//S pub mod track;
+pub mod track;
 
 pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
 //S pub use score::{Score, ScoreError, ScoreOptions, score};
 pub use source::{FrameSource, SourceError, open_video};
-//S pub use track::{ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track};
+pub use track::{ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track};

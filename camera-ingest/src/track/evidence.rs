@@ -1,0 +1,187 @@
+//! How much of a pixel is covered by something of a known colour.
+//!
+//! A pixel half covered by the rope (an edge, or motion blur) is a mixture
+//! `I = B + a (R - B)` of background B and rope R. The coverage `a` is linear in
+//! the mixture, so a centroid weighted with it is right under blur, too. What
+//! does not lie on the line between B and R (a shadow, the arm) is held down
+//! by its distance from it.
+
+use super::background::Background;
+use crate::frame::EyeFrame;
+
+/// Colour in full-range BT.601 `[Y, Cb, Cr]`.
+pub(super) type Colour = [f32; 3];
+
+/// A rectangle of pixels, upper bounds exclusive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    pub(super) u0: usize,
+    pub(super) v0: usize,
+    pub(super) u1: usize,
+    pub(super) v1: usize,
+}
+
+impl Window {
+    /// Smallest window around pixels with a margin, inside the image.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "clamped to the image first"
+    )]
+    pub(super) fn around(
+        pixels: impl Iterator<Item = [f64; 2]>,
+        margin_px: f64,
+        image: &EyeFrame,
+    ) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for p in pixels {
+            for k in 0..2 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
+        }
+        let size = [image.width_px, image.height_px];
+        let bound = |x: f64, k: usize| x.clamp(0.0, size[k] as f64) as usize;
+        Self {
+            u0: bound(low[0] - margin_px, 0),
+            v0: bound(low[1] - margin_px, 1),
+            u1: bound(high[0] + margin_px + 2.0, 0),
+            v1: bound(high[1] + margin_px + 2.0, 1),
+        }
+    }
+}
+
+/// Coverage of the pixels of a window, 0 to about 1.
+#[derive(Debug, Clone)]
+pub(super) struct Coverage {
+    pub(super) window: Window,
+    width: usize,
+    values: Vec<f32>,
+}
+
+/// What is looked for, against what, in which light.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Matter<'a> {
+    pub(super) background: &'a Background,
+    /// Colour looked for.
+    pub(super) colour: Colour,
+    /// How far that colour scatters (shading, texture).
+    pub(super) scatter: f32,
+    /// Brightness of the frame relative to the background.
+    pub(super) gain: f32,
+}
+
+impl Matter<'_> {
+    /// Coverage of one pixel from its colour and its background's.
+    fn of_pixel(
+        &self,
+        seen: [u8; 3],
+        empty: [u8; 3],
+        inverse_gain: f32,
+        noise2: f32,
+        off2: f32,
+    ) -> f32 {
+        let b = empty.map(f32::from);
+        let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
+        let i = [
+            f32::from(seen[0]) * inverse_gain,
+            light(seen[1]),
+            light(seen[2]),
+        ];
+        let (mut dot, mut rr, mut dd) = (0.0, 0.0, 0.0);
+        for k in 0..3 {
+            let (d, r) = (i[k] - b[k], self.colour[k] - b[k]);
+            dot += d * r;
+            rr += r * r;
+            dd += d * d;
+        }
+        // Where the background has the rope's own colour, `a` is unknown: the
+        // noise in the denominator lets it fade to 0 instead of exploding.
+        let a = (dot / (rr + noise2)).clamp(0.0, 1.2);
+        let off = (dd - 2.0 * a * dot + a * a * rr).max(0.0);
+        a * off2 / (off2 + off)
+    }
+
+    /// Coverage of a window of a frame.
+    pub(super) fn coverage(&self, frame: &EyeFrame, window: Window) -> Coverage {
+        let noise2 = (4.0 * self.background.noise).powi(2);
+        let off2 = (4.0 * self.background.noise)
+            .powi(2)
+            .max(4.0 * self.scatter * self.scatter);
+        let inverse_gain = 1.0 / self.gain;
+        let empty = &self.background.image;
+        let mut values = Vec::with_capacity((window.u1 - window.u0) * (window.v1 - window.v0));
+        for v in window.v0..window.v1 {
+            let row = v * frame.width_px;
+            let half = v * (frame.width_px / 2);
+            for u in window.u0..window.u1 {
+                let (y, c) = (row + u, half + u / 2);
+                values.push(self.of_pixel(
+                    [frame.luma[y], frame.cb[c], frame.cr[c]],
+                    [empty.luma[y], empty.cb[c], empty.cr[c]],
+                    inverse_gain,
+                    noise2,
+                    off2,
+                ));
+            }
+        }
+        Coverage {
+            window,
+            width: window.u1 - window.u0,
+            values,
+        }
+    }
+}
+
+impl Coverage {
+    /// Value at a raw pixel, bilinear; 0 outside the window.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "checked against the window first"
+    )]
+    pub(super) fn at(&self, [u, v]: [f64; 2]) -> f32 {
+        let (x, y) = (u - self.window.u0 as f64, v - self.window.v0 as f64);
+        let rows = self.window.v1 - self.window.v0;
+        if !(x >= 0.0 && y >= 0.0) {
+            return 0.0;
+        }
+        let (i, j) = (x as usize, y as usize);
+        if i + 1 >= self.width || j + 1 >= rows {
+            return 0.0;
+        }
+        let (a, b) = ((x - i as f64) as f32, (y - j as f64) as f32);
+        let at = j * self.width + i;
+        let (top, bottom) = (
+            &self.values[at..at + 2],
+            &self.values[at + self.width..at + self.width + 2],
+        );
+        (1.0 - b) * ((1.0 - a) * top[0] + a * top[1]) + b * ((1.0 - a) * bottom[0] + a * bottom[1])
+    }
+
+    /// Sum and centroid within `radius_px` of a raw pixel.
+    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
+    pub(super) fn centroid(&self, centre: [f64; 2], radius_px: f64) -> (f64, [f64; 2]) {
+        let (mut sum, mut u_sum, mut v_sum) = (0.0, 0.0, 0.0);
+        for (index, &value) in self.values.iter().enumerate() {
+            let u = (self.window.u0 + index % self.width) as f64;
+            let v = (self.window.v0 + index / self.width) as f64;
+            // A soft edge of one pixel keeps the centroid a smooth function
+            // of the window's place.
+            let inside = radius_px + 0.5 - (u - centre[0]).hypot(v - centre[1]);
+            if inside > 0.0 {
+                let w = f64::from(value) * inside.min(1.0);
+                sum += w;
+                u_sum += w * u;
+                v_sum += w * v;
+            }
+        }
+        if sum > 1e-6 {
+            (sum, [u_sum / sum, v_sum / sum])
+        } else {
+            (0.0, centre)
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Finding the rope where nothing is known yet.
+//!
+//! What differs from the background and hangs on the clamp is rope, lead and
+//! perhaps a shadow of theirs. The lead is its fattest place; what lies beyond
+//! the lead is not rope.
+
+use shared_types::StereoCamera;
+
+use super::background::Background;
+use super::clamp::ClampSample;
+use super::evidence::{Colour, Matter, Window};
+use super::geodesic::{Geodesic, Ground, depth_px};
+use super::plane::{Point, RopePlane};
+use crate::frame::EyeFrame;
+
+/// Gaps in the rope's image that are bridged (px at VGA; scaled with the image).
+const GAP_PX: f64 = 15.0;
+/// Gap allowed right at the clamp, where the rope hardly moves (m).
+const FIRST_GAP_M: f64 = 0.15;
+/// The lead hangs at least this far from the clamp (m).
+const LEAST_ROPE_M: f64 = 0.12;
+/// The pole and what holds it: blocked out to this distance behind the clamp (m).
+const POLE_LENGTH_M: f64 = 0.35;
+/// Half-width of what is blocked around the pole (m).
+const POLE_HALF_WIDTH_M: f64 = 0.035;
+/// Threshold of the moving mask in units of the image noise.
+const MASK_NOISE: f32 = 4.5;
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub(super) struct FirstLook {
+    /// Way from clamp to lead over the plane (m), not smoothed.
+    pub(super) path: Vec<Point>,
+    /// Centre of the lead, raw pixel.
+    pub(super) lead_px: [f64; 2],
+    /// Rough radius of the lead (px).
+    pub(super) lead_radius_px: f64,
+    /// Colours and how much they scatter.
+    pub(super) rope: (Colour, f32),
+    pub(super) lead: (Colour, f32),
+}
+
+/// Why nothing was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum NotFound {
+    /// The clamp's pixel lies outside the image.
+    ClampOutside([f64; 2]),
+    /// Nothing long enough hangs on the clamp; longest way (m).
+    NothingHangs(f64),
+}
+
+/// Finds rope and lead in a frame in which they hang still.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixels inside the image"
+)]
+pub(super) fn find(
+    frame: &EyeFrame,
+    background: &Background,
+    camera: &StereoCamera,
+    plane: &RopePlane,
+    clamp: &ClampSample,
+) -> Result<FirstLook, NotFound> {
+    let gain = background.gain(frame);
+    let width = frame.width_px;
+    let clamp_px = camera
+        .project_left(&clamp.p_w_m)
+        .filter(|p| camera.contains(*p))
+        .ok_or(NotFound::ClampOutside(
+            camera.project_left(&clamp.p_w_m).unwrap_or([f64::NAN; 2]),
+        ))?;
+    let mask = moving(frame, background, gain);
+    let depth = depth_px(&mask, width);
+    let ground = ground(&mask, width, camera, plane, clamp);
+    let image_scale = width as f64 / 672.0;
+    let start = clamp_px[1].round() as usize * width + clamp_px[0].round() as usize;
+    let ways = Geodesic::from(
+        start,
+        &ground,
+        width,
+        (GAP_PX * image_scale) as u32,
+        (FIRST_GAP_M * plane.px_per_m) as u32,
+    );
+    let long_enough = LEAST_ROPE_M * plane.px_per_m;
+    let (mut fattest, mut longest) = (None::<usize>, 0.0_f64);
+    for at in (0..mask.len()).filter(|&at| mask[at]) {
+        let Some(length) = ways.length_px(at) else {
+            continue;
+        };
+        longest = longest.max(length);
+        if length >= long_enough && fattest.is_none_or(|f| depth[at] > depth[f]) {
+            fattest = Some(at);
+        }
+    }
+    let fattest = fattest.ok_or(NotFound::NothingHangs(longest / plane.px_per_m))?;
+    let lead_radius_px = f64::from(depth[fattest]);
+    let pixels = ways.path_to(fattest);
+    // Colour of the rope: its middle part, away from clamp and lead.
+    let middle = &pixels[pixels.len() / 6..pixels.len() * 3 / 4];
+    let rope = colour_of(
+        frame,
+        gain,
+        middle.iter().map(|p| [p[0] as usize, p[1] as usize]),
+    );
+    let centre = [(fattest % width) as f64, (fattest / width) as f64];
+    let (lead, lead_px) = lead_place(frame, background, gain, centre, lead_radius_px);
+    let mut path: Vec<Point> = pixels.iter().map(|p| plane.from_pixel(*p)).collect();
+    // The way over pixels enters the lead anywhere; end it at the centre.
+    let inside = lead_radius_px / plane.px_per_m;
+    let end = plane.from_pixel(lead_px);
+    while path.len() > 2
+        && path
+            .last()
+            .is_some_and(|p| (p[0] - end[0]).hypot(p[1] - end[1]) < inside)
+    {
+        path.pop();
+    }
+    path.push(end);
+    Ok(FirstLook {
+        path,
+        lead_px,
+        lead_radius_px,
+        rope,
+        lead,
+    })
+}
+
+/// Lead colour around a first guess, and the centre refined with it.
+fn lead_place(
+    frame: &EyeFrame,
+    background: &Background,
+    gain: f32,
+    mut centre: [f64; 2],
+    radius_px: f64,
+) -> ((Colour, f32), [f64; 2]) {
+    let window = Window::around(std::iter::once(centre), 3.0 * radius_px, frame);
+    let mut lead = ([0.0; 3], 0.0);
+    for _ in 0..4 {
+        lead = colour_of(frame, gain, disc(centre, 0.6 * radius_px, window));
+        let matter = Matter {
+            background,
+            colour: lead.0,
+            scatter: lead.1,
+            gain,
+        };
+        centre = matter
+            .coverage(frame, window)
+            .centroid(centre, radius_px + 2.0)
+            .1;
+    }
+    (lead, centre)
+}
+
+#[allow(clippy::cast_precision_loss, reason = "pixel indices")]
+fn disc(centre: [f64; 2], radius_px: f64, window: Window) -> impl Iterator<Item = [usize; 2]> {
+    (window.v0..window.v1).flat_map(move |v| {
+        (window.u0..window.u1)
+            .filter(move |&u| {
+                (u as f64 - centre[0]).hypot(v as f64 - centre[1]) <= radius_px.max(1.0)
+            })
+            .map(move |u| [u, v])
+    })
+}
+
+/// Median colour of some pixels in the background's light, and the median
+/// distance from it.
+pub(super) fn colour_of(
+    frame: &EyeFrame,
+    gain: f32,
+    pixels: impl Iterator<Item = [usize; 2]>,
+) -> (Colour, f32) {
+    let colours: Vec<Colour> = pixels
+        .map(|[u, v]| {
+            let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
+            [
+                y / gain,
+                128.0 + (cb - 128.0) / gain,
+                128.0 + (cr - 128.0) / gain,
+            ]
+        })
+        .collect();
+    if colours.is_empty() {
+        return ([128.0; 3], 0.0);
+    }
+    let median = |mut values: Vec<f32>| -> f32 {
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
+    let centre: Colour = core::array::from_fn(|k| median(colours.iter().map(|c| c[k]).collect()));
+    let spread = median(
+        colours
+            .iter()
+            .map(|c| {
+                (0..3)
+                    .map(|k| (c[k] - centre[k]).powi(2))
+                    .sum::<f32>()
+                    .sqrt()
+            })
+            .collect(),
+    );
+    (centre, spread)
+}
+
+/// Pixels that differ from the background, smoothed over 3x3 pixels.
+fn moving(frame: &EyeFrame, background: &Background, gain: f32) -> Vec<bool> {
+    let (width, height) = (frame.width_px, frame.height_px);
+    let square: Vec<f32> = (0..width * height)
+        .map(|at| {
+            let (u, v) = (at % width, at / width);
+            let (i, b) = (frame.ycc(u, v), background.image.ycc(u, v));
+            let mut sum = (f32::from(i[0]) / gain - f32::from(b[0])).powi(2);
+            for k in 1..3 {
+                sum += ((f32::from(i[k]) - 128.0) / gain + 128.0 - f32::from(b[k])).powi(2);
+            }
+            sum
+        })
+        .collect();
+    let threshold = 9.0 * (MASK_NOISE * background.noise).powi(2);
+    (0..width * height)
+        .map(|at| {
+            let (u, v) = (at % width, at / width);
+            if u == 0 || v == 0 || u + 1 == width || v + 1 == height {
+                return false;
+            }
+            let sum: f32 = (v - 1..=v + 1)
+                .map(|y| {
+                    square[y * width + u - 1..=y * width + u + 1]
+                        .iter()
+                        .sum::<f32>()
+                })
+                .sum();
+            sum > threshold
+        })
+        .collect()
+}
+
+/// Mask with the pole and what holds it taken out of reach.
+#[allow(clippy::cast_precision_loss, reason = "pixel indices")]
+fn ground(
+    mask: &[bool],
+    width: usize,
+    camera: &StereoCamera,
+    plane: &RopePlane,
+    clamp: &ClampSample,
+) -> Vec<Ground> {
+    let behind = |d: f64| camera.project_left(&(clamp.p_w_m + clamp.pole_w * d));
+    let reach = POLE_HALF_WIDTH_M * plane.px_per_m;
+    // Begin where the half-circle around the pole's start ends at the clamp.
+    let ends = behind(POLE_HALF_WIDTH_M + 0.004).zip(behind(POLE_LENGTH_M));
+    mask.iter()
+        .enumerate()
+        .map(|(at, &on)| {
+            let p = [(at % width) as f64, (at / width) as f64];
+            if ends.is_some_and(|(a, b)| distance_to_segment(p, a, b) < reach) {
+                Ground::Blocked
+            } else if on {
+                Ground::On
+            } else {
+                Ground::Off
+            }
+        })
+        .collect()
+}
+
+fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (d, e) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let long = d[0] * d[0] + d[1] * d[1];
+    let part = ((d[0] * e[0] + d[1] * e[1]) / long.max(1e-9)).clamp(0.0, 1.0);
+    (e[0] - part * d[0]).hypot(e[1] - part * d[1])
+}

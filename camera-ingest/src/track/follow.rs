@@ -1,0 +1,286 @@
+//! One step of the tracker: from the curve in one frame to the next.
+
+use shared_types::StereoCamera;
+
+use super::background::Background;
+use super::clamp::ClampPath;
+use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
+use super::evidence::{Colour, Matter, Window};
+use super::lateral::{Search, measure};
+use super::plane::{Point, RopePlane};
+use crate::frame::EyeFrame;
+
+/// Nodes of the tracked curve.
+pub(super) const NODES: usize = 64;
+/// Search range across the curve (px).
+const RANGE_PX: f64 = 12.0;
+/// Search range after the rope was lost (px).
+const WIDE_RANGE_PX: f64 = 32.0;
+/// Strength of smoothing against weights of at most 1: features longer than
+/// about a sixth of the rope pass.
+const SMOOTHING: f64 = 10.0;
+/// Length may differ from the first frame's by this part.
+const LENGTH_TOLERANCE: f64 = 0.04;
+/// The clamp hides the rope's first part (m).
+const HIDDEN_BY_CLAMP_M: f64 = 0.007;
+/// Coverage below which a node counts as not seen.
+const LEAST_COVERAGE: f64 = 0.2;
+/// Part of the lead's area that must be seen.
+const LEAST_LEAD: f64 = 0.35;
+/// Mean coverage below which the rope is lost.
+const LOST_BELOW: f64 = 0.3;
+/// Weight of clamp and lead against a node's.
+const ANCHOR: f64 = 50.0;
+
+/// What the rope looks like, learnt from the first frame.
+#[derive(Debug, Clone)]
+pub(super) struct RopeModel {
+    pub(super) rope: (Colour, f32),
+    pub(super) lead: (Colour, f32),
+    pub(super) rope_radius_m: f64,
+    pub(super) lead_radius_m: f64,
+    pub(super) length_m: f64,
+}
+
+/// The rope in one frame.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub(super) t_s: f64,
+    /// Uniform in arc length, clamp first, lead centre last (m).
+    pub(super) curve: Vec<Point>,
+    /// Velocity of the nodes (m/s).
+    pub(super) velocity: Vec<Point>,
+    /// Coverage found at each node, 0 to 1.
+    pub(super) confidence: Vec<f64>,
+    /// Part of the lead's area found, 0 to 1.
+    pub(super) lead_seen: f64,
+    pub(super) lost: bool,
+}
+
+impl State {
+    /// Mean coverage along the curve.
+    pub(super) fn score(&self) -> f64 {
+        mean(&self.confidence)
+    }
+}
+
+/// Everything that stays the same from frame to frame.
+pub(super) struct Follower<'a> {
+    pub(super) camera: &'a StereoCamera,
+    pub(super) clamp: &'a ClampPath,
+    pub(super) plane: &'a RopePlane,
+    pub(super) background: &'a Background,
+    pub(super) model: RopeModel,
+}
+
+impl Follower<'_> {
+    /// The clamp on the plane in the frame that starts at `t_s`: the row it
+    /// is seen in decides when.
+    pub(super) fn clamp_at(&self, t_s: f64) -> Point {
+        let mut row = f64::from(self.camera.height_px) / 2.0;
+        let mut pixel = None;
+        for _ in 0..2 {
+            let p = self.clamp.at(t_s + self.camera.row_time_s(row)).p_w_m;
+            pixel = self.camera.project_left(&p);
+            row = pixel.map_or(row, |[_, v]| v);
+        }
+        pixel.map_or([0.0, 0.0], |p| self.plane.from_pixel(p))
+    }
+
+    /// Finds the rope in a frame from its state in a neighbouring one (earlier
+    /// or later).
+    pub(super) fn step(&self, frame: &EyeFrame, t_s: f64, before: &State) -> State {
+        let dt = t_s - before.t_s;
+        let mut predicted: Vec<Point> = before
+            .curve
+            .iter()
+            .zip(&before.velocity)
+            .map(|(p, v)| add(*p, scale(*v, dt)))
+            .collect();
+        // The clamp is known: pull the curve onto it, less and less along the rope.
+        let miss = sub(self.clamp_at(t_s), predicted[0]);
+        blend(&mut predicted, miss, |part| (1.0 - 2.0 * part).max(0.0));
+        let gain = self.background.gain(frame);
+        let state = self.locate(frame, gain, t_s, &predicted, before, RANGE_PX);
+        if state.score() >= LOST_BELOW {
+            return state;
+        }
+        let wide = self.locate(frame, gain, t_s, &predicted, before, WIDE_RANGE_PX);
+        if wide.score() > state.score() {
+            wide
+        } else {
+            state
+        }
+    }
+
+    fn locate(
+        &self,
+        frame: &EyeFrame,
+        gain: f32,
+        t_s: f64,
+        predicted: &[Point],
+        before: &State,
+        range_px: f64,
+    ) -> State {
+        let dt = t_s - before.t_s;
+        let mut curve = predicted.to_vec();
+        let window = Window::around(
+            curve.iter().map(|p| self.plane.to_pixel(*p)),
+            range_px + self.model.lead_radius_m * self.plane.px_per_m + 4.0,
+            frame,
+        );
+        let tip_speed = before.velocity[NODES - 1];
+        let (lead, lead_seen) =
+            self.find_lead(frame, gain, curve[NODES - 1], norm(tip_speed), range_px);
+        if let Some(lead) = lead {
+            let miss = sub(lead, curve[NODES - 1]);
+            blend(&mut curve, miss, |part| part * part);
+        }
+        let across = normals(&curve);
+        let exposure = self.camera.exposure_s * self.plane.px_per_m;
+        let blur: Vec<f64> = before
+            .velocity
+            .iter()
+            .zip(&across)
+            .map(|(v, n)| (v[0] * n[0] + v[1] * n[1]).abs() * exposure)
+            .collect();
+        let coverage = self.rope_matter(gain).coverage(frame, window);
+        let found = measure(
+            &curve,
+            self.plane,
+            &coverage,
+            &Search {
+                range_px,
+                rope_radius_px: self.model.rope_radius_m * self.plane.px_per_m,
+                blur_px: &blur,
+            },
+        );
+        let spacing = self.model.length_m / (NODES - 1) as f64;
+        let hidden_first = (HIDDEN_BY_CLAMP_M / spacing).ceil() as usize;
+        let hidden_last = NODES - 1 - (self.model.lead_radius_m * 1.1 / spacing).ceil() as usize;
+        let visible = |i: usize| (hidden_first..=hidden_last).contains(&i);
+        let mut weights = vec![0.0; NODES];
+        let mut places = curve.clone();
+        let mut confidence = vec![0.0; NODES];
+        for (i, node) in found.iter().enumerate() {
+            confidence[i] = node.confidence;
+            places[i] = node.point;
+            if visible(i) && node.confidence > LEAST_COVERAGE {
+                weights[i] = node.confidence * node.confidence;
+            }
+        }
+        // A little weight on the prediction keeps unseen stretches in place.
+        for (i, w) in weights.iter_mut().enumerate() {
+            if *w == 0.0 {
+                places[i] = curve[i];
+                *w = 1e-3;
+            }
+        }
+        places[0] = self.clamp_at(t_s);
+        weights[0] = ANCHOR;
+        if let Some(lead) = lead {
+            places[NODES - 1] = lead;
+            weights[NODES - 1] = ANCHOR * lead_seen;
+        }
+        let seen_first = confidence[hidden_first];
+        let seen_last = confidence[hidden_last];
+        confidence[..hidden_first].fill(seen_first);
+        confidence[hidden_last + 1..].fill(if lead.is_some() {
+            lead_seen
+        } else {
+            seen_last * 0.5
+        });
+        let fitted = smooth(&places, &weights, SMOOTHING);
+        let curve = resample(
+            &fitted,
+            self.plausible_length(length(&fitted), lead.is_some()),
+            NODES,
+        );
+        let velocity = curve
+            .iter()
+            .zip(&before.curve)
+            .map(|(now, then)| scale(sub(*now, *then), 1.0 / dt))
+            .collect();
+        let lost = mean(&confidence) < LOST_BELOW;
+        State {
+            t_s,
+            velocity: if lost {
+                // Do not extrapolate what was not seen.
+                before.velocity.iter().map(|v| scale(*v, 0.7)).collect()
+            } else {
+                velocity
+            },
+            curve,
+            confidence,
+            lead_seen,
+            lost,
+        }
+    }
+
+    /// Length to be used where `measured` was found.
+    fn plausible_length(&self, measured: f64, lead_found: bool) -> f64 {
+        let tolerance = if lead_found { LENGTH_TOLERANCE } else { 0.0 };
+        measured.clamp(
+            self.model.length_m * (1.0 - tolerance),
+            self.model.length_m * (1.0 + tolerance),
+        )
+    }
+
+    pub(super) fn rope_matter(&self, gain: f32) -> Matter<'_> {
+        Matter {
+            background: self.background,
+            colour: self.model.rope.0,
+            scatter: self.model.rope.1,
+            gain,
+        }
+    }
+
+    pub(super) fn lead_matter(&self, gain: f32) -> Matter<'_> {
+        Matter {
+            background: self.background,
+            colour: self.model.lead.0,
+            scatter: self.model.lead.1,
+            gain,
+        }
+    }
+
+    /// Centre of the lead near a predicted place, and the part of its area seen.
+    /// A centroid over a shrinking window (mean shift).
+    fn find_lead(
+        &self,
+        frame: &EyeFrame,
+        gain: f32,
+        predicted: Point,
+        speed_m_s: f64,
+        range_px: f64,
+    ) -> (Option<Point>, f64) {
+        let radius = self.model.lead_radius_m * self.plane.px_per_m;
+        let blur = speed_m_s * self.camera.exposure_s * self.plane.px_per_m;
+        let mut centre = self.plane.to_pixel(predicted);
+        let reach = radius + range_px;
+        let window = Window::around(std::iter::once(centre), 2.0 * reach, frame);
+        let coverage = self.lead_matter(gain).coverage(frame, window);
+        let tight = radius + blur / 2.0 + 1.5;
+        let mut area = 0.0;
+        for part in [1.0, 0.6, 0.3, 0.0, 0.0, 0.0] {
+            (area, centre) = coverage.centroid(centre, tight + part * range_px);
+        }
+        let seen = (area / (std::f64::consts::PI * radius * radius)).min(1.0);
+        (
+            (seen > LEAST_LEAD).then(|| self.plane.from_pixel(centre)),
+            seen,
+        )
+    }
+}
+
+/// Adds `shift` to every node times a factor of its place (0 clamp, 1 lead).
+fn blend(curve: &mut [Point], shift: Point, factor: impl Fn(f64) -> f64) {
+    let last = (curve.len() - 1) as f64;
+    for (i, p) in curve.iter_mut().enumerate() {
+        *p = add(*p, scale(shift, factor(i as f64 / last)));
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}

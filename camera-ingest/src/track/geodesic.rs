@@ -1,0 +1,206 @@
+//! Shortest ways over a mask, and how deep inside it a pixel lies.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// What a pixel is to a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ground {
+    /// Part of what moves.
+    On,
+    /// Passable for short gaps.
+    Off,
+    /// Not passable (the pole and the arm).
+    Blocked,
+}
+
+/// Costs are tenths of a pixel; a gap costs this much more than firm ground.
+const GAP_FACTOR: u32 = 6;
+/// Straight and diagonal step in tenths of a pixel.
+const STEP: [u32; 2] = [10, 14];
+
+/// Shortest paths from one pixel to all reachable ones.
+pub(super) struct Geodesic {
+    width: usize,
+    /// Cost of the best path; `u32::MAX` where unreachable.
+    cost: Vec<u32>,
+    /// Length of the best path (tenths of a pixel).
+    length: Vec<u32>,
+    before: Vec<u32>,
+}
+
+impl Geodesic {
+    /// Dijkstra over the 8-neighbourhood. Gaps in the mask may be `gap_px` long,
+    /// the first one, at the start, `first_gap_px`.
+    pub(super) fn from(
+        start: usize,
+        ground: &[Ground],
+        width: usize,
+        gap_px: u32,
+        first_gap_px: u32,
+    ) -> Self {
+        let n = ground.len();
+        let mut out = Self {
+            width,
+            cost: vec![u32::MAX; n],
+            length: vec![0; n],
+            before: vec![u32::MAX; n],
+        };
+        // Length of the gap a path is in; `first` while it has met no mask yet.
+        let mut gap = vec![0_u32; n];
+        let mut first = vec![false; n];
+        let mut heap = BinaryHeap::new();
+        out.cost[start] = 0;
+        first[start] = true;
+        heap.push(Reverse((0_u32, start)));
+        while let Some(Reverse((cost, at))) = heap.pop() {
+            if cost > out.cost[at] {
+                continue;
+            }
+            for (next, diagonal) in neighbours(at, width, n / width) {
+                let step = STEP[usize::from(diagonal)];
+                let (price, open, is_first) = match ground[next] {
+                    Ground::Blocked => continue,
+                    Ground::On => (step, 0, false),
+                    Ground::Off => (step * GAP_FACTOR, gap[at] + step, first[at]),
+                };
+                let limit = if is_first { first_gap_px } else { gap_px } * STEP[0];
+                if open > limit || cost + price >= out.cost[next] {
+                    continue;
+                }
+                out.cost[next] = cost + price;
+                out.length[next] = out.length[at] + step;
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    reason = "an image has < 2^32 pixels"
+                )]
+                {
+                    out.before[next] = at as u32;
+                }
+                gap[next] = open;
+                first[next] = is_first;
+                heap.push(Reverse((cost + price, next)));
+            }
+        }
+        out
+    }
+
+    /// Length of the way to a pixel (px), `None` if there is none.
+    pub(super) fn length_px(&self, at: usize) -> Option<f64> {
+        (self.cost[at] != u32::MAX).then(|| f64::from(self.length[at]) / 10.0)
+    }
+
+    /// Pixels from the start to `at` as `[u, v]`.
+    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
+    pub(super) fn path_to(&self, mut at: usize) -> Vec<[f64; 2]> {
+        let mut path = Vec::new();
+        loop {
+            path.push([(at % self.width) as f64, (at / self.width) as f64]);
+            match self.before[at] {
+                u32::MAX => break,
+                before => at = before as usize,
+            }
+        }
+        path.reverse();
+        path
+    }
+}
+
+fn neighbours(at: usize, width: usize, height: usize) -> impl Iterator<Item = (usize, bool)> {
+    let (u, v) = (at % width, at / width);
+    (v.saturating_sub(1)..=(v + 1).min(height - 1)).flat_map(move |y| {
+        (u.saturating_sub(1)..=(u + 1).min(width - 1)).filter_map(move |x| {
+            let next = y * width + x;
+            (next != at).then_some((next, x != u && y != v))
+        })
+    })
+}
+
+/// Distance of every mask pixel to the nearest pixel off the mask (px), by the
+/// two-pass 5-7-11 chamfer (within 2 % of the Euclidean distance).
+pub(super) fn depth_px(mask: &[bool], width: usize) -> Vec<f32> {
+    const FAR: i32 = 1 << 28;
+    const BACK: [(i32, i32, i32); 8] = [
+        (-1, 0, 5),
+        (0, -1, 5),
+        (-1, -1, 7),
+        (1, -1, 7),
+        (-2, -1, 11),
+        (2, -1, 11),
+        (-1, -2, 11),
+        (1, -2, 11),
+    ];
+    let height = mask.len() / width;
+    let mut d: Vec<i32> = mask.iter().map(|&on| if on { FAR } else { 0 }).collect();
+    let mut sweep = |order: &mut dyn Iterator<Item = usize>, sign: i32| {
+        for at in order {
+            if d[at] == 0 {
+                continue;
+            }
+            for (dx, dy, step) in BACK {
+                let (x, y) = (
+                    (at % width).checked_add_signed((dx * sign) as isize),
+                    (at / width).checked_add_signed((dy * sign) as isize),
+                );
+                // What lies beyond the image is not mask.
+                let beyond = match (x, y) {
+                    (Some(x), Some(y)) if x < width && y < height => d[y * width + x],
+                    _ => 0,
+                };
+                d[at] = d[at].min(beyond + step);
+            }
+        }
+    };
+    sweep(&mut (0..mask.len()), 1);
+    sweep(&mut (0..mask.len()).rev(), -1);
+    #[allow(clippy::cast_precision_loss, reason = "distances are small")]
+    d.into_iter().map(|x| x as f32 / 5.0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_bridge_small_gaps_only_and_respect_walls() {
+        // A bar of 40 px with a gap of 5 px at 20..25, in a strip 3 rows high.
+        let width = 40;
+        let mut ground = vec![Ground::Off; 3 * width];
+        for u in (0..20).chain(25..40) {
+            ground[width + u] = Ground::On;
+        }
+        let end = width + 39;
+        let open = Geodesic::from(width, &ground, width, 6, 0);
+        assert_eq!(open.length_px(end), Some(39.0));
+        assert_eq!(open.path_to(end).len(), 40);
+        assert_eq!(
+            Geodesic::from(width, &ground, width, 4, 0).length_px(end),
+            None
+        );
+        for row in 0..3 {
+            ground[row * width + 10] = Ground::Blocked;
+        }
+        assert_eq!(
+            Geodesic::from(width, &ground, width, 6, 0).length_px(end),
+            None
+        );
+    }
+
+    #[test]
+    fn depth_of_a_disc_is_its_radius() {
+        let width = 41;
+        let mask: Vec<bool> = (0..width * width)
+            .map(|i| {
+                let (x, y) = ((i % width) as f64 - 20.0, (i / width) as f64 - 20.0);
+                x.hypot(y) <= 12.0
+            })
+            .collect();
+        let depth = depth_px(&mask, width);
+        assert!(
+            (depth[20 * width + 20] - 13.0).abs() < 0.5,
+            "{}",
+            depth[20 * width + 20]
+        );
+        assert_eq!(depth[0], 0.0);
+    }
+}

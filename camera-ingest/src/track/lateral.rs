@@ -1,0 +1,191 @@
+//! Where the rope lies across a predicted curve.
+//!
+//! Coverage is sampled along the curve's normals; a Viterbi search over all
+//! nodes together finds the offsets that see most rope without jumping; a
+//! centroid then gives sub-pixel places.
+
+use super::curve::{add, normals, scale};
+use super::evidence::Coverage;
+use super::plane::{Point, RopePlane};
+
+/// Distance of samples along a normal (px).
+const STEP_PX: f64 = 0.5;
+/// Price of a jump of one sample between neighbouring nodes.
+const JUMP_PRICE: f64 = 0.02;
+/// Largest jump between neighbouring nodes (samples).
+const JUMP_MAX: usize = 4;
+/// Price of an offset as large as the search range.
+const OFFSET_PRICE: f64 = 0.15;
+
+/// How to search.
+#[derive(Debug, Clone)]
+pub(super) struct Search<'a> {
+    /// Search range to either side (px).
+    pub(super) range_px: f64,
+    /// Apparent radius of the rope (px).
+    pub(super) rope_radius_px: f64,
+    /// Motion blur across the curve, per node (px).
+    pub(super) blur_px: &'a [f64],
+}
+
+/// Result for one node.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Across {
+    /// Place measured on the normal.
+    pub(super) point: Point,
+    /// Coverage there relative to a fully visible rope, 0 to 1.
+    pub(super) confidence: f64,
+}
+
+/// Measures every node of `curve` along its normal. The first node (the clamp)
+/// is known; the range opens with the distance from it.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "sample counts are small and positive"
+)]
+pub(super) fn measure(
+    curve: &[Point],
+    plane: &RopePlane,
+    coverage: &Coverage,
+    search: &Search<'_>,
+) -> Vec<Across> {
+    let half = (search.range_px / STEP_PX).round() as usize;
+    let lanes = 2 * half + 1;
+    let step_m = STEP_PX / plane.px_per_m;
+    let across = normals(curve);
+    let offset = |lane: f64| (lane - half as f64) * step_m;
+    let spacing_px = super::curve::length(curve) / (curve.len() - 1) as f64 * plane.px_per_m;
+
+    // Raw samples, and their sums over the rope's blurred width.
+    let mut samples = vec![0.0; curve.len() * lanes];
+    let mut seen = vec![0.0; curve.len() * lanes];
+    for (node, (p, n)) in curve.iter().zip(&across).enumerate() {
+        let row = &mut samples[node * lanes..(node + 1) * lanes];
+        for (lane, sample) in row.iter_mut().enumerate() {
+            let at = add(*p, scale(*n, offset(lane as f64)));
+            *sample = f64::from(coverage.at(plane.to_pixel(at)));
+        }
+        let reach = (search.rope_radius_px + search.blur_px[node] / 2.0) / STEP_PX;
+        box_sums(row, reach, &mut seen[node * lanes..(node + 1) * lanes]);
+        let full = 2.0 * search.rope_radius_px / STEP_PX;
+        for value in &mut seen[node * lanes..(node + 1) * lanes] {
+            *value = (*value / full).min(1.0);
+        }
+    }
+    let price = |node: usize, lane: usize| -> f64 {
+        let away = (lane as f64 - half as f64) / half as f64;
+        // Nothing can lie further off than the distance from the clamp allows.
+        let room = (2.0 + 0.7 * node as f64 * spacing_px) / search.range_px;
+        let outside = if away.abs() > room { 4.0 } else { 0.0 };
+        1.0 - seen[node * lanes + lane] + OFFSET_PRICE * away * away + outside
+    };
+    let best = viterbi(curve.len(), lanes, price);
+    (0..curve.len())
+        .map(|node| {
+            let lane = best[node];
+            let row = &samples[node * lanes..(node + 1) * lanes];
+            let reach = (search.rope_radius_px + search.blur_px[node] / 2.0 + 1.0) / STEP_PX;
+            let centre = row_centroid(row, row_centroid(row, lane as f64, reach), reach);
+            Across {
+                point: add(curve[node], scale(across[node], offset(centre))),
+                confidence: seen[node * lanes + lane],
+            }
+        })
+        .collect()
+}
+
+/// Sums over `centre - reach ..= centre + reach`, ends counted in part.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "sample counts are small and positive"
+)]
+fn box_sums(row: &[f64], reach: f64, out: &mut [f64]) {
+    let whole = reach.floor() as usize;
+    let rest = reach - reach.floor();
+    for (centre, sum) in out.iter_mut().enumerate() {
+        let from = centre.saturating_sub(whole);
+        let to = (centre + whole + 1).min(row.len());
+        *sum = row[from..to].iter().sum::<f64>();
+        if let Some(before) = from.checked_sub(1)
+            && centre > whole
+        {
+            *sum += rest * row[before];
+        }
+        *sum += rest * row.get(centre + whole + 1).copied().unwrap_or(0.0);
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "sample counts are small")]
+fn row_centroid(row: &[f64], centre: f64, reach: f64) -> f64 {
+    let (mut sum, mut moment) = (0.0, 0.0);
+    for (lane, value) in row.iter().enumerate() {
+        let inside = reach + 0.5 - (lane as f64 - centre).abs();
+        if inside > 0.0 {
+            let w = value * inside.min(1.0);
+            sum += w;
+            moment += w * lane as f64;
+        }
+    }
+    if sum > 1e-6 { moment / sum } else { centre }
+}
+
+/// Cheapest lane per node under a quadratic price on jumps.
+#[allow(clippy::cast_precision_loss, reason = "sample counts are small")]
+fn viterbi(nodes: usize, lanes: usize, price: impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    let mut cost: Vec<f64> = (0..lanes).map(|lane| price(0, lane)).collect();
+    let mut from = vec![0_usize; nodes * lanes];
+    let mut next = vec![0.0; lanes];
+    for node in 1..nodes {
+        for lane in 0..lanes {
+            let low = lane.saturating_sub(JUMP_MAX);
+            let high = (lane + JUMP_MAX).min(lanes - 1);
+            let (mut least, mut origin) = (f64::INFINITY, lane);
+            for (before, c) in cost.iter().enumerate().take(high + 1).skip(low) {
+                let jump = before as f64 - lane as f64;
+                let total = c + JUMP_PRICE * jump * jump;
+                if total < least {
+                    (least, origin) = (total, before);
+                }
+            }
+            next[lane] = least + price(node, lane);
+            from[node * lanes + lane] = origin;
+        }
+        std::mem::swap(&mut cost, &mut next);
+    }
+    let mut lane = (0..lanes)
+        .min_by(|&a, &b| cost[a].total_cmp(&cost[b]))
+        .unwrap_or(lanes / 2);
+    let mut best = vec![lane; nodes];
+    for node in (1..nodes).rev() {
+        lane = from[node * lanes + lane];
+        best[node - 1] = lane;
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn viterbi_prefers_the_connected_track() {
+        // Lane 2 is good everywhere but at node 3, where lane 9 is a decoy.
+        let price = |node: usize, lane: usize| {
+            f64::from(u8::from(
+                !(lane == 2 && node != 3 || lane == 9 && node == 3),
+            ))
+        };
+        assert_eq!(viterbi(7, 11, price), [2; 7]);
+    }
+
+    #[test]
+    fn box_sums_count_ends_in_part() {
+        let mut out = [0.0; 5];
+        box_sums(&[1.0, 1.0, 1.0, 1.0, 1.0], 1.5, &mut out);
+        assert_eq!(out, [2.5, 3.5, 4.0, 3.5, 2.5]);
+        assert!((row_centroid(&[0.0, 1.0, 1.0, 0.0, 0.0], 1.5, 1.5) - 1.5).abs() < 1e-12);
+    }
+}
