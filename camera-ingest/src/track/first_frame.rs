@@ -24,7 +24,9 @@ const POLE_LENGTH_M: f64 = 0.35;
 /// Half-width of what is blocked around the pole (m).
 const POLE_HALF_WIDTH_M: f64 = 0.035;
 /// Threshold of the moving mask in units of the image noise.
-const MASK_NOISE: f32 = 4.5;
+const MASK_NOISE: f32 = 2.5;
+/// Least threshold (grey levels): reflected light and compression stay below.
+const MASK_LEAST: f32 = 6.0;
 
 /// What was found.
 #[derive(Debug, Clone)]
@@ -217,7 +219,7 @@ fn moving(frame: &EyeFrame, background: &Background, gain: f32) -> Vec<bool> {
             sum
         })
         .collect();
-    let threshold = 9.0 * (MASK_NOISE * background.noise).powi(2);
+    let threshold = 9.0 * (MASK_NOISE * background.noise).max(MASK_LEAST).powi(2);
     (0..width * height)
         .map(|at| {
             let (u, v) = (at % width, at / width);
