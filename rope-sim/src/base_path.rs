@@ -1,0 +1,224 @@
+//! The attach motion as the integrator reads it: steps, restarts and a quintic per
+//! few milliseconds.
+//!
+//! Evaluating an arm's kinematics at every step would cost as much as the rope.
+//! Instead pose, velocity and acceleration are taken exactly at knots a few
+//! milliseconds apart and joined by quintics in position and quaternion components,
+//! whose own second derivatives match the accelerations at the knots. Coefficients
+//! are made in double precision.
+
+use crate::motion::AttachMotion;
+use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
+use shared_types::kinematics::FrameMotion;
+
+/// Longest time between exact evaluations of the attach motion (s).
+const KNOT_S: f64 = 0.004;
+/// Jumps closer together than this are one (s).
+const SAME_TIME_S: f64 = 1e-6;
+/// How far beside a jump its two sides are looked at (s).
+const BESIDE_S: f64 = 1e-11;
+
+/// Position, then quaternion scalar first.
+pub(crate) const CHANNELS: usize = 7;
+
+/// A few equal steps with one quintic per channel over them.
+#[derive(Debug, Clone)]
+pub(crate) struct Interval {
+    pub(crate) start_s: f64,
+    pub(crate) step_s: f64,
+    pub(crate) steps: usize,
+    /// Whether the first step is a restart.
+    pub(crate) restart: bool,
+    /// Powers of the fraction of the interval, lowest first.
+    pub(crate) quintic: [[f64; 6]; CHANNELS],
+}
+
+impl Interval {
+    /// Length (s).
+    pub(crate) fn length_s(&self) -> f64 {
+        self.step_s * self.steps as f64
+    }
+
+    /// Attach point (m) at time `t_s`.
+    pub(crate) fn position_m(&self, t_s: f64) -> [f64; 3] {
+        let u = (t_s - self.start_s) / self.length_s();
+        core::array::from_fn(|c| {
+            self.quintic[c]
+                .iter()
+                .rev()
+                .fold(0.0, |sum: f64, a| sum.mul_add(u, *a))
+        })
+    }
+}
+
+/// The whole motion from 0 to the horizon.
+#[derive(Debug, Clone)]
+pub(crate) struct BasePath {
+    pub(crate) intervals: Vec<Interval>,
+    pub(crate) start: FrameMotion,
+}
+
+/// The motion gave a number that is not finite.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NotFinite {
+    pub(crate) time_s: f64,
+}
+
+impl BasePath {
+    /// Cuts `[0, horizon_s]` at the motion's acceleration jumps into steps of at most
+    /// `step_s`.
+    pub(crate) fn new(
+        motion: &dyn AttachMotion,
+        step_s: f64,
+        horizon_s: f64,
+    ) -> Result<Self, NotFinite> {
+        let mut path = Self {
+            intervals: Vec::new(),
+            start: evaluate(motion, 0.0)?,
+        };
+        let mut from_s = 0.0;
+        for to_s in breaks(motion, horizon_s) {
+            path.push_smooth_piece(motion, step_s, from_s, to_s)?;
+            from_s = to_s;
+        }
+        Ok(path)
+    }
+
+    fn push_smooth_piece(
+        &mut self,
+        motion: &dyn AttachMotion,
+        max_step_s: f64,
+        from_s: f64,
+        to_s: f64,
+    ) -> Result<(), NotFinite> {
+        let steps = ((to_s - from_s) / max_step_s - 1e-9).ceil().max(1.0) as usize;
+        let step_s = (to_s - from_s) / steps as f64;
+        let per_interval = ((KNOT_S / step_s + 1e-9).floor() as usize).max(1);
+        let mut knot = Knot::new(&evaluate(motion, from_s + BESIDE_S)?, None);
+        let mut done = 0;
+        while done < steps {
+            let now = per_interval.min(steps - done);
+            let start_s = from_s + step_s * done as f64;
+            done += now;
+            let end_s = if done == steps {
+                to_s - BESIDE_S
+            } else {
+                from_s + step_s * done as f64
+            };
+            let next = Knot::new(&evaluate(motion, end_s)?, Some(&knot));
+            self.intervals.push(Interval {
+                start_s,
+                step_s,
+                steps: now,
+                restart: done == now,
+                quintic: quintics(&knot, &next, step_s * now as f64),
+            });
+            knot = next;
+        }
+        Ok(())
+    }
+
+    /// Time at the end of step `count`, counted from 1 over the whole path, and the
+    /// length of that step (s).
+    pub(crate) fn end_of_step_s(&self, count: usize) -> (f64, f64) {
+        let mut left = count;
+        for interval in &self.intervals {
+            if left <= interval.steps {
+                return (
+                    interval.start_s + interval.step_s * left as f64,
+                    interval.step_s,
+                );
+            }
+            left -= interval.steps;
+        }
+        self.intervals
+            .last()
+            .map_or((0.0, 0.0), |i| (i.start_s + i.length_s(), i.step_s))
+    }
+}
+
+/// Jumps inside the horizon, then the horizon.
+fn breaks(motion: &dyn AttachMotion, horizon_s: f64) -> Vec<f64> {
+    let mut times: Vec<f64> = motion
+        .acceleration_jumps_s()
+        .into_iter()
+        .filter(|t| *t > SAME_TIME_S && *t < horizon_s - SAME_TIME_S)
+        .collect();
+    times.push(horizon_s);
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|later, earlier| *later - *earlier < SAME_TIME_S);
+    times
+}
+
+fn evaluate(motion: &dyn AttachMotion, time_s: f64) -> Result<FrameMotion, NotFinite> {
+    let m = motion.at(time_s);
+    let sum = m.p_m.sum()
+        + m.r.sum()
+        + m.v_m_s.sum()
+        + m.w_rad_s.sum()
+        + m.a_m_s2.sum()
+        + m.alpha_rad_s2.sum();
+    if sum.is_finite() {
+        Ok(m)
+    } else {
+        Err(NotFinite { time_s })
+    }
+}
+
+/// Attitude of a frame as a quaternion, scalar first.
+pub(crate) fn attitude(frame: &FrameMotion) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame.r))
+}
+
+/// Channels and their first two derivatives at one time.
+struct Knot {
+    value: [f64; CHANNELS],
+    rate: [f64; CHANNELS],
+    acceleration: [f64; CHANNELS],
+}
+
+impl Knot {
+    /// From a frame's motion; the quaternion on the side of the knot before.
+    fn new(m: &FrameMotion, before: Option<&Self>) -> Self {
+        let mut q = attitude(m).into_inner();
+        if let Some(b) = before {
+            let b = Quaternion::new(b.value[3], b.value[4], b.value[5], b.value[6]);
+            if q.dot(&b) < 0.0 {
+                q = -q;
+            }
+        }
+        let w = Quaternion::from_imag(m.w_rad_s * 0.5);
+        let q_rate = w * q;
+        let q_acceleration = Quaternion::from_imag(m.alpha_rad_s2 * 0.5) * q + w * q_rate;
+        let join =
+            |p: &nalgebra::Vector3<f64>, q: &Quaternion<f64>| [p.x, p.y, p.z, q.w, q.i, q.j, q.k];
+        Self {
+            value: join(&m.p_m, &q),
+            rate: join(&m.v_m_s, &q_rate),
+            acceleration: join(&m.a_m_s2, &q_acceleration),
+        }
+    }
+}
+
+/// Quintics matching value, rate and acceleration at both ends.
+fn quintics(a: &Knot, b: &Knot, length_s: f64) -> [[f64; 6]; CHANNELS] {
+    core::array::from_fn(|c| {
+        let (v0, v1) = (a.rate[c] * length_s, b.rate[c] * length_s);
+        let (a0, a1) = (
+            a.acceleration[c] * length_s * length_s,
+            b.acceleration[c] * length_s * length_s,
+        );
+        // What is left for the cubic and higher powers to do at the far end.
+        let d = (b.value[c] - a.value[c]) - v0 - 0.5 * a0;
+        let e = v1 - v0 - a0;
+        let f = a1 - a0;
+        [
+            a.value[c],
+            v0,
+            0.5 * a0,
+            10.0 * d - 4.0 * e + 0.5 * f,
+            -15.0 * d + 7.0 * e - f,
+            6.0 * d - 3.0 * e + 0.5 * f,
+        ]
+    })
+}

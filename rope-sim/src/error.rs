@@ -1,0 +1,61 @@
+//! Why a simulation is refused.
+
+use shared_types::rope::RopeError;
+
+/// Why [`crate::roll_out`] gave nothing.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// An option has an unusable value.
+    #[error("simulation option `{field}` is {value}: {need}")]
+    Option {
+        /// Field of [`crate::SimOptions`].
+        field: &'static str,
+        /// Value found.
+        value: f64,
+        /// What is wrong with it.
+        need: &'static str,
+    },
+    /// A frame lies outside the simulated time.
+    #[error(
+        "frames from {first_s} s to {last_s} s do not fit into the simulated 0 s to {horizon_s} s"
+    )]
+    FramesOutsideHorizon {
+        /// Time of the first frame (s).
+        first_s: f64,
+        /// Time of the last frame (s).
+        last_s: f64,
+        /// End of the simulation (s).
+        horizon_s: f64,
+    },
+    /// A rope is not physical.
+    #[error("candidate {candidate}: {source}")]
+    Rope {
+        /// Index of the candidate, from 0.
+        candidate: usize,
+        /// Which parameter, and its limits.
+        source: RopeError,
+    },
+    /// A motion ends before the simulation does and is not known to hold.
+    #[error(
+        "candidate {candidate}: its motion ends at {ends_s} s, before the horizon of {horizon_s} s"
+    )]
+    MotionTooShort {
+        /// Index of the candidate, from 0.
+        candidate: usize,
+        /// End of the motion (s).
+        ends_s: f64,
+        /// End of the simulation (s).
+        horizon_s: f64,
+    },
+    /// A motion gave NaN or infinity.
+    #[error("candidate {candidate}: its attach motion is not finite at {time_s} s")]
+    MotionNotFinite {
+        /// Index of the candidate, from 0.
+        candidate: usize,
+        /// When (s).
+        time_s: f64,
+    },
+    /// A worker thread ended without a result: a fault of this program.
+    #[error("a simulation thread ended without a result; this is a fault of the program")]
+    WorkerPanicked,
+}

@@ -1,0 +1,246 @@
+//! Node positions at frame times, from the steps around them.
+
+use crate::algebra::Vec3;
+use crate::clock::Clock;
+use crate::kernel::Link;
+use crate::lanes::Lanes;
+use nalgebra::Vector3;
+
+/// Times at which node positions are recorded: `first_s + i period_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameTimes {
+    /// Time of the first frame (s).
+    pub first_s: f64,
+    /// Time between frames (s).
+    pub period_s: f64,
+    /// Number of frames; 0 records nothing.
+    pub count: usize,
+}
+
+impl FrameTimes {
+    /// No frames.
+    pub const NONE: Self = Self {
+        first_s: 0.0,
+        period_s: 1.0,
+        count: 0,
+    };
+
+    /// Time of frame `index` (s).
+    #[must_use]
+    pub fn time_s(&self, index: usize) -> f64 {
+        self.first_s + self.period_s * index as f64
+    }
+}
+
+/// Positions of all nodes in all frames, shape (frames, N + 1, 3), world frame, m.
+/// Node 0 is the attach point, node N the lead's centre.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeTrack {
+    nodes: usize,
+    numbers: Numbers,
+}
+
+/// Stored in the precision they were computed in.
+#[derive(Debug, Clone, PartialEq)]
+enum Numbers {
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+}
+
+impl NodeTrack {
+    pub(crate) fn zeros(frames: usize, nodes: usize, single: bool) -> Self {
+        let count = frames * nodes * 3;
+        let numbers = if single {
+            Numbers::F32(vec![0.0; count])
+        } else {
+            Numbers::F64(vec![0.0; count])
+        };
+        Self { nodes, numbers }
+    }
+
+    /// Number of frames.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        let count = match &self.numbers {
+            Numbers::F32(v) => v.len(),
+            Numbers::F64(v) => v.len(),
+        };
+        count / (self.nodes * 3)
+    }
+
+    /// Nodes per frame, N + 1.
+    #[must_use]
+    pub fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// Position of a node (m, world).
+    ///
+    /// # Panics
+    /// If `frame` or `node` is out of range, as indexing does.
+    #[must_use]
+    pub fn position(&self, frame: usize, node: usize) -> Vector3<f64> {
+        assert!(node < self.nodes, "node {node} of {}", self.nodes);
+        let at = (frame * self.nodes + node) * 3;
+        match &self.numbers {
+            Numbers::F32(v) => Vector3::new(v[at].into(), v[at + 1].into(), v[at + 2].into()),
+            Numbers::F64(v) => Vector3::new(v[at], v[at + 1], v[at + 2]),
+        }
+    }
+
+    /// All numbers in C order.
+    #[must_use]
+    pub fn to_f64(&self) -> Vec<f64> {
+        match &self.numbers {
+            Numbers::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
+            Numbers::F64(v) => v.clone(),
+        }
+    }
+
+    /// Shape as (frames, nodes, 3).
+    #[must_use]
+    pub fn shape(&self) -> [usize; 3] {
+        [self.frames(), self.nodes, 3]
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "the precision of the run")]
+    pub(crate) fn set(&mut self, frame: usize, node: usize, position_m: [f64; 3]) {
+        let at = (frame * self.nodes + node) * 3;
+        for (axis, x) in position_m.into_iter().enumerate() {
+            match &mut self.numbers {
+                Numbers::F32(v) => v[at + axis] = x as f32,
+                Numbers::F64(v) => v[at + axis] = x,
+            }
+        }
+    }
+
+    /// Repeats the last frame that is finite over all later ones, so that a failed
+    /// rollout never hands out NaN. Without any finite frame all become zero.
+    pub(crate) fn hold_last_finite(&mut self) {
+        let frames = self.frames();
+        let is_finite = |track: &Self, f: usize| {
+            (0..track.nodes).all(|n| track.position(f, n).iter().all(|x| x.is_finite()))
+        };
+        let good = (0..frames).take_while(|f| is_finite(self, *f)).count();
+        for frame in good..frames {
+            for node in 0..self.nodes {
+                let held = if good == 0 {
+                    Vector3::zeros()
+                } else {
+                    self.position(good - 1, node)
+                };
+                self.set(frame, node, held.into());
+            }
+        }
+    }
+}
+
+/// Positions and velocities of all nodes relative to node 0.
+type Snapshot<V> = Vec<[Vec3<V>; 2]>;
+
+/// Records frames of every lane while the group advances.
+pub(crate) struct FrameRecorder<V> {
+    times: FrameTimes,
+    /// Next frame of each lane.
+    next: Vec<usize>,
+    pub(crate) tracks: Vec<NodeTrack>,
+    before: Snapshot<V>,
+    after: Snapshot<V>,
+    wanted: bool,
+}
+
+impl<V: Lanes> FrameRecorder<V> {
+    #[inline(always)]
+    pub(crate) fn new(times: FrameTimes, lanes: usize, links: usize, single: bool) -> Self {
+        let track = NodeTrack::zeros(times.count, links + 1, single);
+        let empty = vec![[Vec3::zero(); 2]; links + 1];
+        Self {
+            times,
+            next: vec![0; lanes],
+            tracks: vec![track; lanes],
+            before: empty.clone(),
+            after: empty,
+            wanted: false,
+        }
+    }
+
+    /// Call before a step: keeps the state if a frame falls into it.
+    #[inline(always)]
+    pub(crate) fn before_step(&mut self, clock: &Clock<V>, links: &[Link<V>], link_length: V) {
+        self.wanted = (0..self.next.len()).any(|lane| self.due(clock, lane));
+        if self.wanted {
+            take(&mut self.before, links, link_length);
+        }
+    }
+
+    /// Call after the step.
+    #[inline(always)]
+    pub(crate) fn after_step(&mut self, clock: &Clock<V>, links: &[Link<V>], link_length: V) {
+        if !self.wanted {
+            return;
+        }
+        take(&mut self.after, links, link_length);
+        for lane in 0..self.next.len() {
+            while self.due(clock, lane) {
+                let frame = self.next[lane];
+                self.write(clock, lane, frame);
+                self.next[lane] = frame + 1;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn due(&self, clock: &Clock<V>, lane: usize) -> bool {
+        let frame = self.next[lane];
+        frame < self.times.count
+            && !clock.finished(lane)
+            && self.times.time_s(frame) <= clock.span_s(lane).1 + 1e-9
+    }
+
+    /// Cubic Hermite between the states around the frame time.
+    #[inline(always)]
+    fn write(&mut self, clock: &Clock<V>, lane: usize, frame: usize) {
+        let (start_s, end_s) = clock.span_s(lane);
+        let t_s = self.times.time_s(frame).clamp(start_s, end_s);
+        let h = end_s - start_s;
+        let weights = hermite((t_s - start_s) / h, h);
+        let attach = clock.attach_point_m(lane, t_s);
+        for (node, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
+            let [x0, v0] = [before[0].get(lane), before[1].get(lane)];
+            let [x1, v1] = [after[0].get(lane), after[1].get(lane)];
+            let mut position = attach;
+            for axis in 0..3 {
+                position[axis] += weights[0] * x0[axis]
+                    + weights[1] * v0[axis]
+                    + weights[2] * x1[axis]
+                    + weights[3] * v1[axis];
+            }
+            self.tracks[lane].set(frame, node, position);
+        }
+    }
+}
+
+/// Weights of value and rate at the start, value and rate at the end, at the fraction
+/// `u` of a step of length `h`.
+pub(crate) fn hermite(u: f64, h: f64) -> [f64; 4] {
+    let (u2, u3) = (u * u, u * u * u);
+    [
+        1.0 - 3.0 * u2 + 2.0 * u3,
+        h * (u - 2.0 * u2 + u3),
+        3.0 * u2 - 2.0 * u3,
+        h * (u3 - u2),
+    ]
+}
+
+/// Positions and velocities of all nodes relative to node 0.
+#[inline(always)]
+fn take<V: Lanes>(out: &mut Snapshot<V>, links: &[Link<V>], link_length: V) {
+    let mut x = Vec3::zero();
+    let mut v = Vec3::zero();
+    for (link, node) in links.iter().zip(out.iter_mut().skip(1)) {
+        let span = link.q.down(link_length);
+        x = x.add(span);
+        v = link.w.cross_add(span, v);
+        *node = [x, v];
+    }
+}

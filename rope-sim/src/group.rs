@@ -1,0 +1,204 @@
+//! One group of ropes with equal link counts, advanced from start to horizon.
+
+use crate::algebra::{Quat, Vec3};
+use crate::approach::{ApproachRecorder, ClosestApproach};
+use crate::base_path::BasePath;
+use crate::clock::Clock;
+use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
+use crate::kernel::{Elimination, Link, RopeLanes, step};
+use crate::lanes::{LaneTask, Lanes};
+use shared_types::RopeParams;
+
+/// Steps between health checks.
+const HEALTH_PERIOD: usize = 32;
+/// Largest sane rotation of the whole rope per step (rad, root of the sum of squares
+/// over the links); beyond it the velocity terms, which are explicit, have blown up.
+const MAX_TURN_PER_STEP_RAD: f64 = 1.5;
+/// Largest sane angular velocity, by the same measure (rad/s).
+const MAX_SPIN_RAD_S: f64 = 2e4;
+
+/// One rope of a group.
+pub(crate) struct Member<'a> {
+    pub(crate) rope: &'a RopeParams,
+    pub(crate) path: &'a BasePath,
+    /// Attitudes of the links at the start, scalar first.
+    pub(crate) links: Vec<[f64; 4]>,
+}
+
+/// What a rope of a group did.
+pub(crate) struct MemberResult {
+    pub(crate) nodes: NodeTrack,
+    pub(crate) closest: Option<ClosestApproach>,
+    pub(crate) peak_tip_speed_m_s: f64,
+    pub(crate) max_joint_angle_rad: f64,
+    pub(crate) survived: bool,
+}
+
+/// The work of one group; at most as many members as the kernel has lanes, all with
+/// the same number of links.
+pub(crate) struct GroupTask<'a> {
+    pub(crate) members: &'a [Member<'a>],
+    pub(crate) frames: FrameTimes,
+    pub(crate) closest_to_m: Option<[f64; 3]>,
+    pub(crate) single_precision: bool,
+}
+
+impl LaneTask for GroupTask<'_> {
+    type Output = Vec<MemberResult>;
+
+    #[inline(always)]
+    fn run<V: Lanes>(self) -> Self::Output {
+        let count = self.members.len();
+        let Some(first) = self.members.first() else {
+            return Vec::new();
+        };
+        let n = first.links.len();
+        let mut rope = rope_lanes::<V>(self.members);
+        let mut links = start_links::<V>(self.members);
+        let mut scratch = vec![Elimination::empty(); n];
+        let paths: Vec<&BasePath> = self.members.iter().map(|m| m.path).collect();
+        let joints: Vec<(f64, f64)> = self
+            .members
+            .iter()
+            .map(|m| {
+                (
+                    m.rope.joint_stiffness_nm_per_rad,
+                    m.rope.joint_damping_nms_per_rad,
+                )
+            })
+            .collect();
+        let target = self.closest_to_m.unwrap_or([0.0; 3]);
+        let mut clock = Clock::new(&paths, &joints, target);
+        let mut recorder = FrameRecorder::new(self.frames, count, n, self.single_precision);
+        let start = clock.base();
+        let mut approach = ApproachRecorder::new(
+            start.position.add(hanging_tip(&links, rope.link_length)),
+            start.velocity,
+        );
+        let mut health = Health::<V>::new(count);
+        let mut min_half_cos = V::splat(1.0);
+        let mut restarts = Vec::with_capacity(count);
+        let mut steps = 0_usize;
+
+        while clock.next_step(&mut rope, &mut restarts) {
+            for lane in &restarts {
+                links.iter_mut().for_each(|link| link.clear_memory(*lane));
+            }
+            recorder.before_step(&clock, &links, rope.link_length);
+            let base = clock.base();
+            let report = step(
+                &mut links,
+                &mut scratch,
+                &rope,
+                &base.dynamics,
+                &clock.scheme,
+            );
+            recorder.after_step(&clock, &links, rope.link_length);
+            health.mark_finished(&clock);
+            approach.after_step(
+                base.position.add(report.tip),
+                base.velocity.add(report.tip_velocity),
+                clock.scheme.h,
+                health.running,
+            );
+            min_half_cos = min_half_cos.min(report.min_half_cos);
+            steps += 1;
+            if steps.is_multiple_of(HEALTH_PERIOD) && !health.check(&links, clock.scheme.h) {
+                break;
+            }
+        }
+        health.check(&links, clock.scheme.h);
+
+        let mut tracks = recorder.tracks.into_iter();
+        (0..count)
+            .map(|lane| MemberResult {
+                nodes: tracks
+                    .next()
+                    .unwrap_or_else(|| NodeTrack::zeros(0, n + 1, false)),
+                closest: self
+                    .closest_to_m
+                    .map(|_| approach.closest(lane, |step| paths[lane].end_of_step_s(step))),
+                peak_tip_speed_m_s: approach.peak_speed_m_s(lane),
+                max_joint_angle_rad: 2.0 * min_half_cos.get(lane).clamp(0.0, 1.0).acos(),
+                survived: health.alive[lane],
+            })
+            .collect()
+    }
+}
+
+/// Which lanes run, and which have blown up.
+struct Health<V> {
+    /// 1 in lanes that are still advancing, else 0.
+    running: V,
+    alive: Vec<bool>,
+}
+
+impl<V: Lanes> Health<V> {
+    #[inline(always)]
+    fn new(count: usize) -> Self {
+        Self {
+            running: V::splat(1.0),
+            alive: vec![true; count],
+        }
+    }
+
+    #[inline(always)]
+    fn mark_finished(&mut self, clock: &Clock<V>) {
+        for lane in 0..self.alive.len() {
+            if clock.finished(lane) {
+                self.running.set(lane, 0.0);
+            }
+        }
+    }
+
+    /// Marks lanes dead whose state is not finite or spins absurdly; false when none
+    /// is left. Finished lanes are not judged: they idle beyond their horizon.
+    #[inline(always)]
+    fn check(&mut self, links: &[Link<V>], h: V) -> bool {
+        let mut spin = V::splat(0.0);
+        for link in links {
+            spin = spin + link.w.dot(link.w) + link.a.dot(link.a) * V::splat(0.0);
+        }
+        for lane in 0..self.alive.len() {
+            if self.running.get(lane) > 0.0 {
+                let spin = spin.get(lane).sqrt();
+                let sane = spin < MAX_SPIN_RAD_S && spin * h.get(lane) < MAX_TURN_PER_STEP_RAD;
+                self.alive[lane] &= sane;
+            }
+        }
+        self.alive.contains(&true)
+    }
+}
+
+/// Parameters by lane; lanes without a member repeat the last one.
+#[inline(always)]
+fn rope_lanes<V: Lanes>(members: &[Member]) -> RopeLanes<V> {
+    let mut out = RopeLanes::of(members[0].rope);
+    for lane in 1..V::COUNT {
+        out.set(lane, members[lane.min(members.len() - 1)].rope);
+    }
+    out
+}
+
+#[inline(always)]
+fn start_links<V: Lanes>(members: &[Member]) -> Vec<Link<V>> {
+    let mut links = vec![Link::at_rest(); members[0].links.len()];
+    for lane in 0..V::COUNT {
+        let member = &members[lane.min(members.len() - 1)];
+        for (link, q) in links.iter_mut().zip(&member.links) {
+            link.q.set(lane, *q);
+        }
+    }
+    links
+}
+
+/// Lead relative to node 0.
+#[inline(always)]
+fn hanging_tip<V: Lanes>(links: &[Link<V>], link_length: V) -> Vec3<V> {
+    let mut tip = Vec3::zero();
+    for link in links {
+        let q: Quat<V> = link.q;
+        tip = tip.add(q.down(link_length));
+    }
+    tip
+}

@@ -1,0 +1,291 @@
+//! Vectors of ropes: the number type the whole simulator is written in.
+//!
+//! One lane is one rope. Every operation acts on each lane alone and each value
+//! rounds once (multiply-adds are fused), so a lane's bits do not depend on its
+//! position or its neighbours. This is the only module with `unsafe` code: the
+//! wrappers over `core::arch` in [`x86`] and the call into code compiled for the
+//! processor found at run time.
+#![allow(
+    unsafe_code,
+    reason = "vector instructions and calls into code compiled for them need it"
+)]
+
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use core::ops::{Add, Mul, Neg, Sub};
+use portable::Array;
+
+/// Coefficients, lowest power first, of `2 acos(1 - x) / sqrt(1 - (1 - x)²)` on
+/// [0, 1]: interpolation at the Chebyshev nodes, relative error 8e-8.
+pub(crate) const ANGLE_POLYNOMIAL_F32: &[f64] = &[
+    2.000_000_125_906_461_7,
+    0.666_646_330_464_011_7,
+    0.267_200_787_517_227_4,
+    0.108_958_763_073_457_88,
+    0.076_946_958_060_587_75,
+    -0.047_283_462_133_373_456,
+    0.117_565_466_461_353_52,
+    -0.082_813_297_530_591_81,
+    0.034_370_738_358_798_94,
+];
+
+/// As [`ANGLE_POLYNOMIAL_F32`], relative error 6e-11.
+pub(crate) const ANGLE_POLYNOMIAL_F64: &[f64] = &[
+    2.000_000_000_091_278,
+    0.666_666_635_859_139,
+    0.266_668_379_374_027_3,
+    0.114_248_538_742_672_73,
+    0.051_209_942_330_329_73,
+    0.020_336_857_916_148_42,
+    0.022_206_002_082_012_12,
+    -0.027_080_664_336_550_51,
+    0.062_088_326_438_917_825,
+    -0.073_231_056_485_662_25,
+    0.060_146_663_465_240_73,
+    -0.027_965_434_745_319_44,
+    0.006_298_462_679_425_562,
+];
+
+/// A number per rope, `COUNT` ropes side by side.
+pub(crate) trait Lanes:
+    Copy
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+{
+    /// Number of lanes.
+    const COUNT: usize;
+    /// Joint angle over sine of the half angle, as a polynomial this type can resolve.
+    const ANGLE_POLYNOMIAL: &'static [f64];
+
+    /// The same number in every lane.
+    fn splat(value: f64) -> Self;
+    /// The number in `lane`; lanes beyond the last one read the last.
+    fn get(&self, lane: usize) -> f64;
+    /// Replaces the number in `lane`.
+    fn set(&mut self, lane: usize, value: f64);
+    /// `self * b + c`, rounded once.
+    fn fma(self, b: Self, c: Self) -> Self;
+    /// `c - self * b`, rounded once.
+    fn fnma(self, b: Self, c: Self) -> Self;
+    /// `1 / self`.
+    fn recip(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// `self` where `sign` is positive, `-self` where it is negative.
+    fn flip_by(self, sign: Self) -> Self;
+    /// Smaller of the two; `other` where one is NaN.
+    fn min(self, other: Self) -> Self;
+    /// Larger of the two; `other` where one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// Lane by lane `then` where `a < b`, else `otherwise`.
+    fn select_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
+}
+
+/// Work written once for any [`Lanes`] type. `run` and everything it calls with
+/// lanes must be `#[inline(always)]`: only then is it compiled for the
+/// instruction set of the function it ends up in.
+pub(crate) trait LaneTask {
+    /// What the work gives back.
+    type Output;
+    /// Does the work.
+    fn run<V: Lanes>(self) -> Self::Output;
+}
+
+/// One compiled form of the simulator: instruction set, number type, lanes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kernel {
+    /// 16 single precision lanes, AVX-512.
+    Avx512F32,
+    /// 8 single precision lanes, AVX2 and FMA.
+    Avx2F32,
+    /// 8 single precision lanes, any processor.
+    PortableF32,
+    /// 8 double precision lanes, AVX-512.
+    Avx512F64,
+    /// 4 double precision lanes, AVX2 and FMA.
+    Avx2F64,
+    /// 4 double precision lanes, any processor.
+    PortableF64,
+    /// One rope in double precision; uses FMA where the processor has it.
+    ScalarF64,
+}
+
+impl Kernel {
+    /// All forms, fastest first within a precision.
+    pub const ALL: [Self; 7] = [
+        Self::Avx512F32,
+        Self::Avx2F32,
+        Self::PortableF32,
+        Self::Avx512F64,
+        Self::Avx2F64,
+        Self::PortableF64,
+        Self::ScalarF64,
+    ];
+
+    /// Ropes advanced side by side.
+    #[must_use]
+    pub const fn lanes(self) -> usize {
+        match self {
+            Self::Avx512F32 => 16,
+            Self::Avx2F32 | Self::PortableF32 | Self::Avx512F64 => 8,
+            Self::Avx2F64 | Self::PortableF64 => 4,
+            Self::ScalarF64 => 1,
+        }
+    }
+
+    /// Whether it computes in single precision.
+    #[must_use]
+    pub const fn is_single_precision(self) -> bool {
+        matches!(self, Self::Avx512F32 | Self::Avx2F32 | Self::PortableF32)
+    }
+
+    /// Whether this processor can run it.
+    #[must_use]
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Avx512F32 | Self::Avx512F64 => has_avx512(),
+            Self::Avx2F32 | Self::Avx2F64 => has_avx2(),
+            Self::PortableF32 | Self::PortableF64 | Self::ScalarF64 => true,
+        }
+    }
+
+    /// Runs `task` in this form; a form this processor lacks falls back to the
+    /// portable one of the same precision.
+    pub(crate) fn run<T: LaneTask>(self, task: T) -> T::Output {
+        #[cfg(target_arch = "x86_64")]
+        {
+            match self {
+                // SAFETY: the processor has AVX-512 F, DQ, VL, AVX2 and FMA, checked just before.
+                Self::Avx512F32 if has_avx512() => return unsafe { x86::run_avx512_f32(task) },
+                // SAFETY: as above.
+                Self::Avx512F64 if has_avx512() => return unsafe { x86::run_avx512_f64(task) },
+                // SAFETY: the processor has AVX2 and FMA, checked just before.
+                Self::Avx2F32 if has_avx2() => return unsafe { x86::run_avx2_f32(task) },
+                // SAFETY: as above.
+                Self::Avx2F64 if has_avx2() => return unsafe { x86::run_avx2_f64(task) },
+                // SAFETY: as above.
+                Self::ScalarF64 if has_avx2() => return unsafe { x86::run_fma_scalar(task) },
+                _ => {}
+            }
+        }
+        match self {
+            Self::ScalarF64 => task.run::<f64>(),
+            single if single.is_single_precision() => task.run::<Array<f32, 8>>(),
+            _ => task.run::<Array<f64, 4>>(),
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx512() -> bool {
+    is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+        && has_avx2()
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn has_avx512() -> bool {
+    false
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn has_avx2() -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polynomial(coefficients: &[f64], x: f64) -> f64 {
+        coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
+    }
+
+    #[test]
+    fn angle_polynomials_match_the_arc_cosine() {
+        for i in 1..=1000 {
+            let w = 1.0 - f64::from(i) / 1000.0;
+            let want = 2.0 * w.acos() / (1.0 - w * w).sqrt();
+            for (coefficients, bound) in
+                [(ANGLE_POLYNOMIAL_F32, 1e-7), (ANGLE_POLYNOMIAL_F64, 1e-10)]
+            {
+                let got = polynomial(coefficients, 1.0 - w);
+                assert!(
+                    (got / want - 1.0).abs() < bound,
+                    "w {w}: {got} against {want}"
+                );
+            }
+        }
+    }
+
+    struct EveryOperation;
+
+    impl LaneTask for EveryOperation {
+        type Output = Vec<[f64; 10]>;
+        #[inline(always)]
+        fn run<V: Lanes>(self) -> Self::Output {
+            let (mut a, mut b) = (V::splat(1.5), V::splat(-2.25));
+            for lane in 0..V::COUNT {
+                a.set(lane, 1.5 + 0.25 * lane as f64);
+                b.set(lane, if lane % 2 == 0 { -2.25 } else { 1.75 });
+            }
+            let results = [
+                a + b,
+                a - b,
+                a * b,
+                -a,
+                a.fma(b, a),
+                a.fnma(b, a),
+                b.recip().abs(),
+                a.flip_by(b),
+                a.min(b) + a.max(b) * V::splat(8.0),
+                V::select_less(a, b, V::splat(1.0), V::splat(2.0)),
+            ];
+            (0..V::COUNT)
+                .map(|lane| core::array::from_fn(|i| results[i].get(lane)))
+                .collect()
+        }
+    }
+
+    #[test]
+    fn every_lane_type_does_the_same_arithmetic() {
+        for kernel in Kernel::ALL.into_iter().filter(|k| k.is_available()) {
+            let lanes = kernel.run(EveryOperation);
+            assert_eq!(lanes.len(), kernel.lanes());
+            for (lane, got) in lanes.into_iter().enumerate() {
+                let a = 1.5 + 0.25 * lane as f64;
+                let b = if lane % 2 == 0 { -2.25_f64 } else { 1.75 };
+                let want = [
+                    a + b,
+                    a - b,
+                    a * b,
+                    -a,
+                    a * b + a,
+                    a - a * b,
+                    (1.0 / b).abs(),
+                    if b < 0.0 { -a } else { a },
+                    a.min(b) + 8.0 * a.max(b),
+                    if a < b { 1.0 } else { 2.0 },
+                ];
+                for (g, w) in got.into_iter().zip(want) {
+                    assert!(
+                        (g - w).abs() < 1e-6,
+                        "{kernel:?} lane {lane}: {g} against {w}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Deterministic, lane-parallel simulation of a rope on a moving attach frame.
+//!
+//! A rope is a chain of rigid links with three-axis ball joints, each with a spring
+//! (torque along the rotation vector) and a damper, and a heavy lead at the free end.
+//! The attach frame's motion is prescribed; the rope does not push back. One source
+//! runs one rope in double precision or up to sixteen side by side in vector
+//! registers ([`Kernel`]), chosen at run time.
+//!
+//! [`roll_out`] simulates batches, [`LiveRope`] one rope as its world unfolds.
+//! Optimisers, file formats of plans and the arm's own dynamics are not here.
+//!
+//! Errors at the default step of 0.5 ms are below 0.3 mm at the tip in ordinary
+//! motions and grow in violent whips of stiff, hardly damped ropes.
+#![deny(unsafe_op_in_unsafe_fn)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        reason = "tests may fail loudly"
+    )
+)]
+
+mod algebra;
+mod approach;
+mod base_path;
+mod clock;
+mod equilibrium;
+mod error;
+mod frames;
+mod group;
+mod kernel;
+mod lanes;
+mod live;
+mod motion;
+pub mod npy;
+mod rollout;
+mod scheme;
+
+pub use approach::ClosestApproach;
+pub use error::SimulateError;
+pub use frames::{FrameTimes, NodeTrack};
+pub use lanes::Kernel;
+pub use live::LiveRope;
+pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
+pub use rollout::{
+    Candidate, Outcome, Precision, Rollout, SimOptions, Start, roll_out, roll_out_with,
+};
