@@ -19,3 +19,10 @@
 )]
 
 pub mod cmaes;
+pub mod collide;
+pub mod ropes;
+pub mod sysid;
+pub mod tasks;
+pub mod trajopt;
+pub mod wiggle;
+mod workers;

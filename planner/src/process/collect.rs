@@ -1,0 +1,74 @@
+//! Keypoint frames as they are published, kept until asked for.
+
+use super::PlannerProcessError;
+use shared_types::ipc::{Bus, IpcError, KeypointSubscriber};
+use shared_types::keypoints::{KeypointFrame, KeypointTrack, TrackedFrame};
+use shared_types::MonotonicNs;
+use std::collections::VecDeque;
+
+/// Most frames kept; older ones are forgotten.
+const KEEP: usize = 4096;
+
+pub(super) struct Collector {
+    subscriber: KeypointSubscriber,
+    frames: VecDeque<KeypointFrame>,
+}
+
+impl Collector {
+    pub(super) fn open(bus: &Bus) -> Result<Self, IpcError> {
+        Ok(Self {
+            subscriber: bus.keypoint_subscriber()?,
+            frames: VecDeque::new(),
+        })
+    }
+
+    /// Takes in what was published.
+    pub(super) fn drain(&mut self) -> Result<(), IpcError> {
+        loop {
+            let sample = self.subscriber.receive().map_err(|e| IpcError::Transfer {
+                service: "wag/v1/camera/keypoints",
+                reason: format!("{e:?}"),
+            })?;
+            let Some(sample) = sample else { return Ok(()) };
+            if self.frames.len() == KEEP {
+                self.frames.pop_front();
+            }
+            self.frames.push_back(*sample);
+        }
+    }
+
+    /// The `wanted` frames from the last one stamped `first_stamp_ns` on, time 0
+    /// at that one.
+    pub(super) fn track(
+        &self,
+        first_stamp_ns: u64,
+        wanted: u32,
+    ) -> Result<KeypointTrack, PlannerProcessError> {
+        let wanted = wanted as usize;
+        let start = self
+            .frames
+            .iter()
+            .rposition(|f| f.stamp_ns == first_stamp_ns)
+            .unwrap_or(self.frames.len());
+        let found = (self.frames.len() - start).min(wanted);
+        let missing = PlannerProcessError::MissingKeypoints {
+            found,
+            wanted,
+            first_stamp_ns,
+        };
+        if found < wanted || wanted == 0 {
+            return Err(missing);
+        }
+        let keypoints = self.frames.get(start).map_or(0, |f| f.count as usize);
+        let frame = |k: &KeypointFrame| TrackedFrame {
+            t_s: MonotonicNs(k.stamp_ns).since_s(MonotonicNs(first_stamp_ns)),
+            points: k.points_px.iter().take(keypoints).map(|p| p.map(f64::from)).collect(),
+            confidence: k.confidence.iter().take(keypoints).map(|c| f64::from(*c)).collect(),
+            lost: k.lost != 0,
+        };
+        Ok(KeypointTrack {
+            keypoints,
+            frames: self.frames.iter().skip(start).take(wanted).map(frame).collect(),
+        })
+    }
+}

@@ -1,0 +1,190 @@
+//! Gauss-Newton polish of the fit and its uncertainty.
+//!
+//! Iteratively reweighted least squares with a weak Gaussian prior per
+//! coordinate, finite differences from one batch of simulations in double
+//! precision. The link count stays: with bending stiffness per length as the
+//! coordinate it hardly acts on the motion.
+
+use super::coordinates::{COORDINATES, Coordinates, LINKS};
+use super::observe::{Film, INVISIBLE_PX};
+use super::{IdentifyError, IdentifyOptions};
+use nalgebra::{SMatrix, SVector};
+use rope_sim::{Outcome, Precision, Rollout};
+use shared_types::RopeEstimate;
+
+/// Coordinates that are polished: all but the link count.
+const FREE: usize = COORDINATES - 1;
+const _: () = assert!(LINKS == FREE, "the link count is the last coordinate");
+/// Steps of the finite differences: length (m), three logarithms, lead radius
+/// (m), clock (s).
+const STEPS: [f64; FREE] = [2e-4, 5e-3, 5e-3, 5e-3, 5e-4, 5e-4];
+/// Most iterations.
+const ITERATIONS: usize = 8;
+/// A coordinate whose deviation keeps more than this part of the prior's was
+/// not seen.
+const UNSEEN_PART: f64 = 0.7;
+
+type Point = [f64; COORDINATES];
+type Normal = SMatrix<f64, FREE, FREE>;
+type Gradient = SVector<f64, FREE>;
+
+/// Normal equations at a point.
+struct Linearised {
+    normal: Normal,
+    gradient: Gradient,
+    /// Robust cost: half the weighted sum of Huber losses (px²).
+    cost: f64,
+    /// Weighted mean of the squared distances (px²).
+    mean_square: f64,
+}
+
+/// Refines `start` and measures how well each coordinate is known.
+pub(super) fn polish(
+    film: &Film<'_>,
+    coordinates: &Coordinates,
+    options: &IdentifyOptions,
+    start: &Point,
+    searched: usize,
+) -> Result<RopeEstimate, IdentifyError> {
+    let prior_std: Gradient =
+        SVector::from_fn(|i, _| (coordinates.upper[i] - coordinates.lower[i]) / 12.0_f64.sqrt());
+    let prior = |x: &Point| -> Gradient {
+        SVector::from_fn(|i, _| (x[i] - coordinates.middle[i]) / prior_std[i].powi(2))
+    };
+    let prior_normal = Normal::from_diagonal(&prior_std.map(|s| 1.0 / (s * s)));
+    let mut simulations = searched;
+    let mut evaluate = |x: &Point| {
+        simulations += 2 * FREE + 1;
+        linearise(film, coordinates, x)
+    };
+    let mut x = *start;
+    let mut at = evaluate(&x)?;
+    let mut damping = 1e-3;
+    for _ in 0..ITERATIONS {
+        let weight = information_per_px2(film, &at);
+        let normal = at.normal * weight + prior_normal;
+        let gradient = at.gradient * weight + prior(&x);
+        let damped = normal + Normal::from_diagonal(&(normal.diagonal() * damping));
+        let Some(step) = damped.cholesky().map(|c| c.solve(&gradient)) else {
+            break;
+        };
+        let mut tried = x;
+        for i in 0..FREE {
+            tried[i] = (x[i] - step[i]).clamp(coordinates.lower[i], coordinates.upper[i]);
+        }
+        let there = evaluate(&tried)?;
+        if there.cost < at.cost {
+            let settled = at.cost - there.cost < 1e-5 * at.cost;
+            (x, at) = (tried, there);
+            damping = (damping / 10.0_f64).max(1e-9);
+            if settled {
+                break;
+            }
+        } else {
+            damping = damping.max(1e-6) * 30.0;
+            if damping > 1e4 {
+                break;
+            }
+        }
+    }
+    let normal = at.normal * information_per_px2(film, &at) + prior_normal;
+    let covariance = normal.try_inverse().unwrap_or_else(Normal::zeros);
+    let mut std_dev = [None; COORDINATES];
+    for i in 0..FREE {
+        let deviation = covariance[(i, i)].max(0.0).sqrt();
+        std_dev[i] =
+            (deviation > 0.0 && deviation < UNSEEN_PART * prior_std[i]).then_some(deviation);
+    }
+    if at.mean_square >= INVISIBLE_PX {
+        return Err(IdentifyError::NothingVisible);
+    }
+    Ok(RopeEstimate {
+        params: coordinates.rope(&x),
+        std_dev: coordinates.rope_std_dev(&x, &std_dev),
+        residual_px: at.mean_square.sqrt(),
+        method: "cmaes".try_into().unwrap_or_default(),
+        simulations: u32::try_from(simulations).unwrap_or(u32::MAX),
+        seed: options.seed,
+        time_offset_s: x[super::coordinates::CLOCK],
+    })
+}
+
+/// Inverse variance of one squared pixel of cost. Keypoints of one frame come
+/// from one curve and err together, so a frame counts as one measurement.
+#[allow(clippy::cast_precision_loss, reason = "counts are small")]
+fn information_per_px2(film: &Film<'_>, at: &Linearised) -> f64 {
+    let together = film.all.len() as f64 / film.frames.max(1) as f64;
+    // Half of the squared distance per image axis; never better than 0.05 px.
+    let variance = (at.mean_square / 2.0).max(2.5e-3);
+    1.0 / (variance * together.max(1.0))
+}
+
+fn linearise(
+    film: &Film<'_>,
+    coordinates: &Coordinates,
+    x: &Point,
+) -> Result<Linearised, IdentifyError> {
+    let mut points = vec![*x];
+    let mut spans = [0.0; FREE];
+    for i in 0..FREE {
+        let mut span = 0.0;
+        for sign in [1.0, -1.0] {
+            let mut p = *x;
+            p[i] = (x[i] + sign * STEPS[i]).clamp(coordinates.lower[i], coordinates.upper[i]);
+            span += sign * p[i];
+            points.push(p);
+        }
+        spans[i] = span;
+    }
+    let ropes: Vec<_> = points.iter().map(|p| coordinates.rope(p)).collect();
+    let rollouts = film.simulate(&ropes, Precision::F64)?;
+    Ok(accumulate(film, &points, &rollouts, &spans))
+}
+
+fn accumulate(
+    film: &Film<'_>,
+    points: &[Point],
+    rollouts: &[Rollout],
+    spans: &[f64; FREE],
+) -> Linearised {
+    let clock = super::coordinates::CLOCK;
+    let mut out = Linearised {
+        normal: Normal::zeros(),
+        gradient: Gradient::zeros(),
+        cost: f64::INFINITY,
+        mean_square: INVISIBLE_PX,
+    };
+    if rollouts
+        .iter()
+        .any(|r| matches!(r.outcome, Outcome::Diverged))
+    {
+        return out;
+    }
+    let (mut cost, mut squares, mut weights) = (0.0, 0.0, 0.0);
+    for sighting in &film.all {
+        let mut residual = [[0.0; 2]; 2 * FREE + 1];
+        for ((slot, rollout), point) in residual.iter_mut().zip(rollouts).zip(points) {
+            match film.residual_px(&rollout.nodes, sighting, point[clock]) {
+                Some(r) => *slot = r,
+                None => return out,
+            }
+        }
+        let distance = residual[0][0].hypot(residual[0][1]);
+        let influence = film.influence(distance);
+        let weight = sighting.weight * influence;
+        for axis in 0..2 {
+            let slope: Gradient = SVector::from_fn(|i, _| {
+                (residual[2 * i + 1][axis] - residual[2 * i + 2][axis]) / spans[i]
+            });
+            out.normal.ger(weight, &slope, &slope, 1.0);
+            out.gradient += slope * (weight * residual[0][axis]);
+        }
+        // Huber's loss is d² (2 - w) w with w the influence.
+        cost += sighting.weight * distance * distance * influence * (2.0 - influence);
+        squares += sighting.weight * distance * distance;
+        weights += sighting.weight;
+    }
+    out.cost = cost;
+    out.mean_square = squares / f64::max(weights, 1e-9);
+    out
+}

@@ -1,0 +1,124 @@
+//! Start pose of a throw and the bounds of what a tip can reach.
+
+use super::PlanError;
+use shared_types::JointVector;
+use shared_types::plan::START_POSE;
+
+/// Height of the shoulder, the common point of joints 1 to 3 (m).
+const SHOULDER_Z_M: f64 = 0.267;
+/// Largest distance from the shoulder to the pole's end: upper arm, forearm, and
+/// wrist with pole in one line (m).
+const POLE_END_REACH_M: f64 = 0.955;
+/// Distance from the base axis that no tip of a thrown rope was seen to exceed,
+/// less the rope's length (m). Measured over limit-keeping throws.
+const THROW_REACH_M: f64 = 0.85;
+/// Height of the floor (m).
+const FLOOR_Z_M: f64 = -0.75;
+
+/// [`START_POSE`] with joint 1 turned to the target's bearing, so that joints 2,
+/// 4 and 6 move in the vertical plane through base axis and target.
+#[must_use]
+pub fn start_pose_for(target_m: [f64; 3]) -> JointVector {
+    let mut pose = START_POSE;
+    pose[0] = target_m[1].atan2(target_m[0]);
+    pose
+}
+
+/// Refuses targets that no throw reaches.
+///
+/// # Errors
+/// A target that is not finite, below the floor, or too far; the latter two with
+/// a nearby point that can be reached.
+pub fn check_reach(target_m: [f64; 3], rope_length_m: f64) -> Result<(), PlanError> {
+    if target_m.iter().any(|v| !v.is_finite()) {
+        return Err(PlanError::TargetNotFinite { target_m });
+    }
+    let [x, y, z] = target_m;
+    let rho = x.hypot(y);
+    let rho_max = THROW_REACH_M + rope_length_m;
+    let radius_max = POLE_END_REACH_M + rope_length_m;
+    let radius = rho.hypot(z - SHOULDER_Z_M);
+    let reason = if rho > rho_max {
+        format!(
+            "{rho:.2} m from the base axis, but a rope of {rope_length_m:.2} m gets to {rho_max:.2} m"
+        )
+    } else if radius > radius_max {
+        format!(
+            "{radius:.2} m from the shoulder, but arm, pole and a rope of {rope_length_m:.2} m together reach {radius_max:.2} m"
+        )
+    } else if z < FLOOR_Z_M {
+        format!("below the floor at {FLOOR_Z_M} m")
+    } else {
+        return Ok(());
+    };
+    Err(PlanError::Unreachable {
+        target_m,
+        nearest_m: nearest(rho, target_m, rho_max, radius_max),
+        reason,
+    })
+}
+
+/// A point in reach, on the target's bearing.
+fn nearest(rho: f64, [x, y, z]: [f64; 3], rho_max: f64, radius_max: f64) -> [f64; 3] {
+    // A little inside each bound, so that the suggestion is accepted itself.
+    const INSIDE: f64 = 0.98;
+    let mut rho_in = rho.min(rho_max * INSIDE);
+    let mut up = z.max(FLOOR_Z_M * INSIDE) - SHOULDER_Z_M;
+    let radius = rho_in.hypot(up);
+    let part = (radius_max * INSIDE / radius.max(1e-9)).min(1.0);
+    rho_in *= part;
+    up *= part;
+    let scale = rho_in / rho.max(1e-9);
+    [x * scale, y * scale, SHOULDER_Z_M + up]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_types::kinematics;
+
+    #[test]
+    fn the_start_pose_turns_the_plane_to_the_target() {
+        let target = [0.8, -0.5, 0.3];
+        let (p, _) = kinematics::attach_pose(&start_pose_for(target));
+        assert!((p.y.atan2(p.x) - target[1].atan2(target[0])).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_pose_stretches_further_than_the_stated_reach() {
+        let mut longest: f64 = 0.0;
+        for a in 0..200 {
+            for b in 0..200 {
+                let q4 = -0.1 + 4.0 * f64::from(a) / 199.0;
+                let q6 = -1.69 + 4.83 * f64::from(b) / 199.0;
+                let q = JointVector([0.0, 0.0, 0.0, q4, 0.0, q6, 0.0]);
+                let p = kinematics::attach_pose(&q).0;
+                longest = longest.max(p.x.hypot(p.z - SHOULDER_Z_M));
+            }
+        }
+        assert!((longest - POLE_END_REACH_M).abs() < 2e-3, "{longest}");
+    }
+
+    #[test]
+    fn far_targets_are_refused_with_an_acceptable_alternative() {
+        for far in [
+            [2.0, 1.0, 0.3],
+            [0.3, 0.1, 2.5],
+            [0.8, 0.0, -0.9],
+            [1.6, 0.0, 1.2],
+        ] {
+            let Err(PlanError::Unreachable { nearest_m, .. }) = check_reach(far, 0.55) else {
+                panic!("{far:?} was accepted");
+            };
+            assert!(
+                check_reach(nearest_m, 0.55).is_ok(),
+                "{far:?} -> {nearest_m:?}"
+            );
+        }
+        assert!(check_reach([1.1, 0.0, 0.45], 0.45).is_ok());
+        assert!(matches!(
+            check_reach([f64::NAN, 0.0, 0.0], 0.5),
+            Err(PlanError::TargetNotFinite { .. })
+        ));
+    }
+}

@@ -1,0 +1,304 @@
+//! The wiggle: a windowed sine of joint 6 about the start pose.
+//!
+//! Paper, "Observation Collection with Safe Action": a planar oscillation of
+//! joint 6 that excites the rope while it stays in view, filmed for 400 frames
+//! at 60 frames a second, the last part of them at rest.
+
+use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m};
+use nalgebra::Vector3;
+use rope_sim::{
+    Candidate, FrameTimes, Outcome, PlannedArm, Precision, SimOptions, SimulateError, Start,
+    roll_out,
+};
+use serde::{Deserialize, Serialize};
+use shared_types::plan::START_POSE;
+use shared_types::{JointTrajectory, JointVector, Limits, RopeParams, TrajectoryError};
+
+/// Joint that oscillates, 0-based: joint 6.
+const JOINT: usize = 5;
+/// Time between knots of the spline (s).
+const KNOT_S: f64 = 0.04;
+
+/// Shape of the wiggle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WiggleConfig {
+    /// Pose about which joint 6 oscillates (rad).
+    pub pose_rad: JointVector,
+    /// Amplitude (rad).
+    pub amplitude_rad: f64,
+    /// Frequency (Hz).
+    pub frequency_hz: f64,
+    /// Duration of the oscillation (s).
+    pub duration_s: f64,
+    /// Time over which it fades in and out (s).
+    pub ramp_s: f64,
+    /// Duration of the whole filmed motion, still end included (s).
+    pub filmed_s: f64,
+}
+
+impl Default for WiggleConfig {
+    fn default() -> Self {
+        Self {
+            pose_rad: START_POSE,
+            amplitude_rad: 25.0_f64.to_radians(),
+            frequency_hz: 0.75,
+            duration_s: 5.2,
+            ramp_s: 0.4,
+            filmed_s: 6.7,
+        }
+    }
+}
+
+/// Why there is no wiggle.
+#[derive(Debug, thiserror::Error)]
+pub enum WiggleError {
+    /// A value is out of range.
+    #[error("wiggle: `{key}` is {value}, but must be {expected}")]
+    Value {
+        /// Key in the configuration.
+        key: &'static str,
+        /// Value found.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// The spline cannot be made.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// The motion breaks a limit of the arm.
+    #[error("wiggle breaks a limit: {what}; use a smaller amplitude or frequency")]
+    BreaksLimit {
+        /// The limit, with value and time.
+        what: String,
+    },
+    /// The rope simulator refused or failed.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+}
+
+impl WiggleConfig {
+    fn check(&self) -> Result<(), WiggleError> {
+        let rules = [
+            (
+                "amplitude_rad",
+                self.amplitude_rad,
+                self.amplitude_rad > 0.0 && self.amplitude_rad < 1.5,
+                "above 0 and below 1.5 rad",
+            ),
+            (
+                "frequency_hz",
+                self.frequency_hz,
+                self.frequency_hz > 0.0 && self.frequency_hz <= 3.0,
+                "above 0 and at most 3 Hz",
+            ),
+            (
+                "ramp_s",
+                self.ramp_s,
+                self.ramp_s > 0.0 && 2.0 * self.ramp_s <= self.duration_s,
+                "above 0 and at most half of `duration_s`",
+            ),
+            (
+                "filmed_s",
+                self.filmed_s,
+                self.filmed_s >= self.duration_s && self.filmed_s <= 10.0,
+                "at least `duration_s` and at most 10 s",
+            ),
+        ];
+        for (key, value, holds, expected) in rules {
+            if !holds {
+                return Err(WiggleError::Value {
+                    key,
+                    value,
+                    expected,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Deflection of joint 6 at `t_s` (rad): `A sin(2π f t)` faded in and out by
+    /// quintic steps.
+    #[must_use]
+    pub fn deflection_rad(&self, t_s: f64) -> f64 {
+        let fade =
+            smooth_step(t_s / self.ramp_s) * smooth_step((self.duration_s - t_s) / self.ramp_s);
+        self.amplitude_rad * (core::f64::consts::TAU * self.frequency_hz * t_s).sin() * fade
+    }
+}
+
+/// Quintic step from 0 to 1 with zero speed and acceleration at both ends.
+fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * x * (10.0 + x * (6.0 * x - 15.0))
+}
+
+/// The wiggle as a joint trajectory of `filmed_s`.
+///
+/// # Errors
+/// Values out of range, or a motion the arm may not execute.
+pub fn wiggle(config: &WiggleConfig, limits: &Limits) -> Result<JointTrajectory, WiggleError> {
+    config.check()?;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked above: a few hundred at most"
+    )]
+    let segments = (config.filmed_s / KNOT_S).round() as u32;
+    let (times, poses): (Vec<f64>, Vec<JointVector>) = (0..=segments)
+        .map(|i| {
+            let t = config.filmed_s * f64::from(i) / f64::from(segments);
+            let mut q = config.pose_rad;
+            q[JOINT] += config.deflection_rad(t);
+            (t, q)
+        })
+        .unzip();
+    let trajectory = JointTrajectory::new(&times, &poses)?;
+    match limits.worst_violation(&trajectory) {
+        Some(margin) => Err(WiggleError::BreaksLimit {
+            what: margin.describe(),
+        }),
+        None => Ok(trajectory),
+    }
+}
+
+/// Nearest approach of one rope to arm or column during a wiggle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WiggleClearance {
+    /// Smallest gap between the rope's surface and column or arm (m).
+    pub gap_m: f64,
+    /// Largest distance of the tip from the vertical through the clamp (m).
+    pub swing_m: f64,
+    /// Whether the simulation stayed finite.
+    pub finite: bool,
+}
+
+/// Clearance of each of `ropes` during the wiggle and one second after it.
+///
+/// # Errors
+/// What the rope simulator refuses.
+pub fn clearance(
+    trajectory: &JointTrajectory,
+    ropes: &[RopeParams],
+    scene: &Scene,
+    threads: usize,
+) -> Result<Vec<WiggleClearance>, WiggleError> {
+    const PERIOD_S: f64 = 0.02;
+    let arm = PlannedArm::new(*trajectory);
+    let candidates: Vec<Candidate<'_>> = ropes
+        .iter()
+        .map(|rope| Candidate { rope, motion: &arm })
+        .collect();
+    let horizon_s = trajectory.duration_s() + 1.0;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive count of a few hundred"
+    )]
+    let count = (horizon_s / PERIOD_S).floor() as usize;
+    let rollouts = roll_out(
+        &candidates,
+        &SimOptions {
+            step_s: 1e-3,
+            precision: Precision::F32,
+            start: Start::Equilibrium,
+            frames: FrameTimes {
+                first_s: 0.0,
+                period_s: PERIOD_S,
+                count,
+            },
+            closest_to_m: None,
+            horizon_s,
+            threads,
+        },
+    )?;
+    Ok(ropes
+        .iter()
+        .zip(&rollouts)
+        .map(|(rope, rollout)| {
+            let shape = RopeShape::from(rope);
+            let mut out = WiggleClearance {
+                gap_m: f64::INFINITY,
+                swing_m: 0.0,
+                finite: !matches!(rollout.outcome, Outcome::Diverged),
+            };
+            let mut time_s = 0.0;
+            for frame in 0..rollout.nodes.frames() {
+                let pose = ArmShape::at(&trajectory.state_at(time_s).q);
+                let nodes: Vec<Vector3<f64>> = (0..rollout.nodes.nodes())
+                    .map(|node| rollout.nodes.position(frame, node))
+                    .collect();
+                out.gap_m = out
+                    .gap_m
+                    .min(rope_clearance_m(&pose, scene, &shape, &nodes));
+                if let (Some(clamp), Some(tip)) = (nodes.first(), nodes.last()) {
+                    out.swing_m = out.swing_m.max((tip - clamp).xy().norm());
+                }
+                time_s += PERIOD_S;
+            }
+            out
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ropes::random_rope;
+
+    #[test]
+    fn the_wiggle_is_a_faded_sine_of_joint_6_alone() {
+        let config = WiggleConfig::default();
+        let t = wiggle(&config, &Limits::default()).unwrap();
+        assert!(t.duration_s() >= 400.0 / 60.0 && t.waypoint_count() <= 256);
+        for j in 0..7 {
+            let e = t.extrema(j);
+            let amplitude = (e.q_max.value - START_POSE[j]).max(START_POSE[j] - e.q_min.value);
+            let expected = if j == JOINT {
+                config.amplitude_rad
+            } else {
+                0.0
+            };
+            assert!((amplitude - expected).abs() < 0.02, "joint {}", j + 1);
+        }
+        assert_eq!(
+            t.state_at(6.0).qd,
+            JointVector::ZERO.map(|_| t.state_at(6.0).qd[0])
+        );
+        for k in 0..600 {
+            let s = f64::from(k) * 0.01;
+            let want = START_POSE[JOINT] + config.deflection_rad(s);
+            assert!((t.state_at(s).q[JOINT] - want).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_wiggle_beyond_the_limits_is_refused() {
+        let wild = WiggleConfig {
+            amplitude_rad: 0.9,
+            frequency_hz: 2.0,
+            ..WiggleConfig::default()
+        };
+        assert!(matches!(
+            wiggle(&wild, &Limits::default()),
+            Err(WiggleError::BreaksLimit { .. })
+        ));
+        let wrong = WiggleConfig {
+            ramp_s: 3.0,
+            ..WiggleConfig::default()
+        };
+        assert!(matches!(
+            wiggle(&wrong, &Limits::default()),
+            Err(WiggleError::Value { key: "ramp_s", .. })
+        ));
+    }
+
+    #[test]
+    fn ropes_of_the_ranges_stay_clear_of_column_and_arm() {
+        let t = wiggle(&WiggleConfig::default(), &Limits::default()).unwrap();
+        let ropes: Vec<_> = (0..64).map(random_rope).collect();
+        let all = clearance(&t, &ropes, &Scene::default(), 2).unwrap();
+        let worst = all.iter().map(|c| c.gap_m).fold(f64::INFINITY, f64::min);
+        assert!(all.iter().all(|c| c.finite) && worst > 0.03, "{worst}");
+    }
+}
