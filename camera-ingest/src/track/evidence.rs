@@ -70,46 +70,63 @@ pub(super) struct Matter<'a> {
     pub(super) scatter: f32,
     /// Brightness of the frame relative to the background.
     pub(super) gain: f32,
+    /// Coverage that counts as full: 1 for a thin rope, whose coverage is
+    /// measured; less for a fat, shaded lead, of which only the outline counts.
+    pub(super) full: f32,
+    /// Brightness of the shades to look for relative to `colour`: the dark side
+    /// of a lead counts as much as its lit side.
+    pub(super) shades: &'static [f32],
+}
+
+/// Squares of the grey levels at which evidence fades.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// Contrast between rope and background.
+    noise2: f32,
+    /// Distance from the line between them.
+    off2: f32,
 }
 
 impl Matter<'_> {
-    /// Coverage of one pixel from its colour and its background's.
-    fn of_pixel(
-        &self,
-        seen: [u8; 3],
-        empty: [u8; 3],
-        inverse_gain: f32,
-        noise2: f32,
-        off2: f32,
-    ) -> f32 {
-        let b = empty.map(f32::from);
-        let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
-        let i = [
-            f32::from(seen[0]) * inverse_gain,
-            light(seen[1]),
-            light(seen[2]),
-        ];
-        let (mut dot, mut rr, mut dd) = (0.0, 0.0, 0.0);
-        for k in 0..3 {
-            let (d, r) = (i[k] - b[k], self.colour[k] - b[k]);
-            dot += d * r;
-            rr += r * r;
-            dd += d * d;
+    /// Coverage of one pixel: the best over the shades looked for.
+    fn of_pixel(&self, seen: Colour, empty: Colour, shades: &[Colour], limits: Limits) -> f32 {
+        let difference: Colour = core::array::from_fn(|k| seen[k] - empty[k]);
+        let dd: f32 = difference.iter().map(|d| d * d).sum();
+        let mut best = 0.0_f32;
+        for shade in shades {
+            let (mut dot, mut rr) = (0.0, 0.0);
+            for k in 0..3 {
+                let r = shade[k] - empty[k];
+                dot += difference[k] * r;
+                rr += r * r;
+            }
+            // Where the background has the rope's own colour, `a` is unknown:
+            // the noise in the denominator lets it fade to 0 instead of
+            // exploding.
+            let a = (dot / (rr + limits.noise2)).clamp(0.0, 1.2);
+            let off = (dd - 2.0 * a * dot + a * a * rr).max(0.0);
+            best = best.max((a / self.full).min(1.2) * limits.off2 / (limits.off2 + off));
         }
-        // Where the background has the rope's own colour, `a` is unknown: the
-        // noise in the denominator lets it fade to 0 instead of exploding.
-        let a = (dot / (rr + noise2)).clamp(0.0, 1.2);
-        let off = (dd - 2.0 * a * dot + a * a * rr).max(0.0);
-        a * off2 / (off2 + off)
+        best
     }
 
     /// Coverage of a window of a frame.
     pub(super) fn coverage(&self, frame: &EyeFrame, window: Window) -> Coverage {
         let noise2 = (4.0 * self.background.noise).powi(2);
-        let off2 = (4.0 * self.background.noise)
-            .powi(2)
-            .max(4.0 * self.scatter * self.scatter);
+        let limits = Limits {
+            noise2,
+            off2: noise2.max(4.0 * self.scatter * self.scatter),
+        };
+        let shades: Vec<Colour> = self
+            .shades
+            .iter()
+            .map(|s| {
+                let [y, cb, cr] = self.colour;
+                [y * s, 128.0 + (cb - 128.0) * s, 128.0 + (cr - 128.0) * s]
+            })
+            .collect();
         let inverse_gain = 1.0 / self.gain;
+        let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
         let empty = &self.background.image;
         let mut values = Vec::with_capacity((window.u1 - window.u0) * (window.v1 - window.v0));
         for v in window.v0..window.v1 {
@@ -117,13 +134,13 @@ impl Matter<'_> {
             let half = v * (frame.width_px / 2);
             for u in window.u0..window.u1 {
                 let (y, c) = (row + u, half + u / 2);
-                values.push(self.of_pixel(
-                    [frame.luma[y], frame.cb[c], frame.cr[c]],
-                    [empty.luma[y], empty.cb[c], empty.cr[c]],
-                    inverse_gain,
-                    noise2,
-                    off2,
-                ));
+                let seen = [
+                    f32::from(frame.luma[y]) * inverse_gain,
+                    light(frame.cb[c]),
+                    light(frame.cr[c]),
+                ];
+                let behind = [empty.luma[y], empty.cb[c], empty.cr[c]].map(f32::from);
+                values.push(self.of_pixel(seen, behind, &shades, limits));
             }
         }
         Coverage {

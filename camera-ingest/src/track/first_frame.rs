@@ -23,6 +23,10 @@ const LEAST_ROPE_M: f64 = 0.12;
 const POLE_LENGTH_M: f64 = 0.35;
 /// Half-width of what is blocked around the pole (m).
 const POLE_HALF_WIDTH_M: f64 = 0.035;
+/// Coverage at which a pixel counts as lead (see [`Matter::full`]).
+pub(super) const LEAD_FULL: f32 = 0.6;
+/// Shades of the lead (see [`Matter::shades`]).
+pub(super) const LEAD_SHADES: [f32; 3] = [1.0, 0.65, 0.4];
 /// Threshold of the moving mask in units of the image noise.
 const MASK_NOISE: f32 = 2.5;
 /// Least threshold (grey levels): reflected light and compression stay below.
@@ -140,12 +144,14 @@ fn lead_place(
     let window = Window::around(std::iter::once(centre), 3.0 * radius_px, frame);
     let mut lead = ([0.0; 3], 0.0);
     for _ in 0..4 {
-        lead = colour_of(frame, gain, disc(centre, 0.6 * radius_px, window));
+        lead = colour_of(frame, gain, disc(centre, 0.7 * radius_px, window));
         let matter = Matter {
             background,
             colour: lead.0,
             scatter: lead.1,
             gain,
+            full: LEAD_FULL,
+            shades: &LEAD_SHADES,
         };
         centre = matter
             .coverage(frame, window)

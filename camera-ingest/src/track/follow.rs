@@ -6,7 +6,9 @@ use super::background::Background;
 use super::clamp::ClampPath;
 use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
 use super::evidence::{Colour, Matter, Window};
+use super::first_frame::{LEAD_FULL, LEAD_SHADES};
 use super::lateral::{Search, measure};
+use super::outline::{Circle, Contrast};
 use super::plane::{Point, RopePlane};
 use crate::frame::EyeFrame;
 
@@ -40,6 +42,9 @@ pub(super) struct RopeModel {
     pub(super) rope_radius_m: f64,
     pub(super) lead_radius_m: f64,
     pub(super) length_m: f64,
+    /// Coverage found along a fully visible rope: shaded edges and poor contrast
+    /// leave it below 1.
+    pub(super) usual_coverage: f64,
 }
 
 /// The rope in one frame.
@@ -152,6 +157,7 @@ impl Follower<'_> {
             &Search {
                 range_px,
                 rope_radius_px: self.model.rope_radius_m * self.plane.px_per_m,
+                usual_coverage: self.model.usual_coverage,
                 blur_px: &blur,
             },
         );
@@ -232,6 +238,8 @@ impl Follower<'_> {
             colour: self.model.rope.0,
             scatter: self.model.rope.1,
             gain,
+            full: 1.0,
+            shades: &[1.0],
         }
     }
 
@@ -241,6 +249,8 @@ impl Follower<'_> {
             colour: self.model.lead.0,
             scatter: self.model.lead.1,
             gain,
+            full: LEAD_FULL,
+            shades: &LEAD_SHADES,
         }
     }
 
@@ -266,6 +276,18 @@ impl Follower<'_> {
             (area, centre) = coverage.centroid(centre, tight + part * range_px);
         }
         let seen = (area / (std::f64::consts::PI * radius * radius)).min(1.0);
+        let contrast = Contrast {
+            frame,
+            background: self.background,
+            gain,
+        };
+        let guess = Circle {
+            centre,
+            radius_px: radius,
+        };
+        if let Some(circle) = contrast.circle(guess, blur) {
+            centre = circle.centre;
+        }
         (
             (seen > LEAST_LEAD).then(|| self.plane.from_pixel(centre)),
             seen,

@@ -24,6 +24,8 @@ pub(super) struct Search<'a> {
     pub(super) range_px: f64,
     /// Apparent radius of the rope (px).
     pub(super) rope_radius_px: f64,
+    /// Coverage of a fully visible rope, relative to its whole width.
+    pub(super) usual_coverage: f64,
     /// Motion blur across the curve, per node (px).
     pub(super) blur_px: &'a [f64],
 }
@@ -69,7 +71,7 @@ pub(super) fn measure(
         }
         let reach = (search.rope_radius_px + search.blur_px[node] / 2.0) / STEP_PX;
         box_sums(row, reach, &mut seen[node * lanes..(node + 1) * lanes]);
-        let full = 2.0 * search.rope_radius_px / STEP_PX;
+        let full = 2.0 * search.rope_radius_px / STEP_PX * search.usual_coverage;
         for value in &mut seen[node * lanes..(node + 1) * lanes] {
             *value = (*value / full).min(1.0);
         }

@@ -16,6 +16,7 @@ mod first_frame;
 mod follow;
 mod geodesic;
 mod lateral;
+mod outline;
 mod plane;
 
 use std::time::{Duration, Instant};
@@ -23,9 +24,9 @@ use std::time::{Duration, Instant};
 pub use appearance::RopeAppearance;
 use background::Background;
 pub use clamp::{ClampError, ClampPath, ClampSample};
-use evidence::Window;
 use first_frame::{FirstLook, NotFound};
 use follow::{Follower, NODES, RopeModel, State};
+use outline::{Circle, Contrast};
 use plane::RopePlane;
 use shared_types::keypoints::{MAX_KEYPOINTS, TrackedFrame};
 use shared_types::{KeypointTrack, StereoCamera};
@@ -265,6 +266,7 @@ fn learn<'a>(
             rope_radius_m: 2.0 / plane.px_per_m,
             lead_radius_m: look.lead_radius_px / plane.px_per_m,
             length_m: curve::length(&look.path),
+            usual_coverage: 1.0,
         },
     };
     let smooth = curve::smooth(&look.path, &vec![0.05; look.path.len()], 20.0);
@@ -276,31 +278,35 @@ fn learn<'a>(
         lead_seen: 1.0,
         lost: false,
     };
+    let contrast = Contrast {
+        frame,
+        background,
+        gain,
+    };
     // Each round sees the rope with the colours and widths of the one before.
     for _ in 0..3 {
         state = follower.step(frame, 0.0, &state);
         state.velocity.fill([0.0; 2]);
         state.t_s = -1e-3;
         let pixels: Vec<[f64; 2]> = state.curve.iter().map(|p| plane.to_pixel(*p)).collect();
-        let lead_px = pixels[NODES - 1];
         let middle = pixels[NODES / 6..NODES * 5 / 6].iter();
         let near = middle.map(|p| [p[0].round() as usize, p[1].round() as usize]);
         follower.model.rope = first_frame::colour_of(frame, gain, near);
-        let window = Window::around(pixels.iter().copied(), 12.0, frame);
-        let coverage = follower.rope_matter(gain).coverage(frame, window);
-        if let Some(radius) = appearance::rope_radius_m(&state.curve, plane, &coverage) {
+        if let Some(radius) = appearance::rope_radius_m(&state.curve, plane, &contrast) {
             follower.model.rope_radius_m = radius;
         }
-        follower.model.lead_radius_m = appearance::lead_radius_m(
-            frame,
-            &follower.lead_matter(gain),
-            lead_px,
-            look.lead_radius_px,
-            plane,
-        );
+        let guess = Circle {
+            centre: pixels[NODES - 1],
+            radius_px: look.lead_radius_px,
+        };
+        if let Some(circle) = contrast.circle(guess, 0.0) {
+            follower.model.lead_radius_m = circle.radius_px / plane.px_per_m;
+        }
         follower.model.length_m = curve::length(&state.curve);
     }
+    follower.model.usual_coverage = state.score().clamp(0.2, 1.0);
     state.t_s = 0.0;
+    state.confidence.fill(1.0);
     (follower, state)
 }
 

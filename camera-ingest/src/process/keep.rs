@@ -1,0 +1,166 @@
+//! Frames kept in memory for tracking or scoring.
+
+use crate::frame::{EyeFrame, StereoFrame};
+use crate::source::{FrameSource, SourceError};
+use shared_types::ipc::message::CameraEvent;
+use std::path::PathBuf;
+
+/// Most frames one recording may keep.
+const MAX_FRAMES: u32 = 3600;
+
+#[derive(Debug)]
+enum Frames {
+    Left(Vec<EyeFrame>),
+    Both(Vec<StereoFrame>),
+}
+
+/// A recording in memory.
+#[derive(Debug)]
+pub(super) struct Recording {
+    wanted: u32,
+    frames: Frames,
+    first_sequence: u64,
+    last_sequence: u64,
+    first_stamp_ns: u64,
+}
+
+impl Default for Recording {
+    fn default() -> Self {
+        Self::begin(0, false)
+    }
+}
+
+impl Recording {
+    pub(super) fn begin(frames: u32, both_eyes: bool) -> Self {
+        Self {
+            wanted: frames.min(MAX_FRAMES),
+            frames: if both_eyes {
+                Frames::Both(Vec::new())
+            } else {
+                Frames::Left(Vec::new())
+            },
+            first_sequence: 0,
+            last_sequence: 0,
+            first_stamp_ns: 0,
+        }
+    }
+
+    pub(super) fn wanted(&self) -> u32 {
+        self.wanted
+    }
+
+    fn count(&self) -> usize {
+        match &self.frames {
+            Frames::Left(v) => v.len(),
+            Frames::Both(v) => v.len(),
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.count() == 0
+    }
+
+    /// Frames the camera counted but that never arrived here.
+    pub(super) fn dropped(&self) -> u32 {
+        let span = self.last_sequence.saturating_sub(self.first_sequence) + 1;
+        u32::try_from(span.saturating_sub(self.count() as u64)).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn first_stamp_ns(&self) -> u64 {
+        self.first_stamp_ns
+    }
+
+    /// Keeps one frame; returns how many there are.
+    pub(super) fn keep(&mut self, frame: StereoFrame) -> u32 {
+        if self.is_empty() {
+            self.first_sequence = frame.0.sequence;
+            self.first_stamp_ns = frame.0.stamp_ns;
+        }
+        self.last_sequence = frame.0.sequence;
+        match &mut self.frames {
+            Frames::Left(v) => v.push(frame.left()),
+            Frames::Both(v) => v.push(frame),
+        }
+        u32::try_from(self.count()).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn finished(&self) -> Option<CameraEvent> {
+        let frames = u32::try_from(self.count()).unwrap_or(u32::MAX);
+        (frames >= self.wanted).then(|| CameraEvent::Recorded {
+            first_stamp_ns: self.first_stamp_ns,
+            frames,
+            dropped: self.dropped(),
+        })
+    }
+
+    /// The left-eye frames, if that is what was kept.
+    pub(super) fn left(&self) -> Option<&[EyeFrame]> {
+        match &self.frames {
+            Frames::Left(v) if !v.is_empty() => Some(v),
+            Frames::Left(_) | Frames::Both(_) => None,
+        }
+    }
+
+    /// Whether both eyes were kept.
+    pub(super) fn has_both(&self) -> bool {
+        matches!(&self.frames, Frames::Both(v) if !v.is_empty())
+    }
+}
+
+/// A recording of both eyes is a source like any file.
+impl FrameSource for Recording {
+    fn len(&self) -> usize {
+        self.count()
+    }
+
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        let frame = match &self.frames {
+            Frames::Both(v) => v.get(index),
+            Frames::Left(_) => None,
+        };
+        frame.cloned().ok_or_else(|| SourceError::OutOfRange {
+            path: PathBuf::from("recording in memory"),
+            frame: index,
+            len: self.count(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(sequence: u64) -> StereoFrame {
+        let bytes = vec![128u8; 8 * 4 * 2];
+        StereoFrame::from_yuyv(&bytes, [8, 4], 1000 + sequence, sequence).unwrap()
+    }
+
+    #[test]
+    fn counts_kept_and_dropped_frames() {
+        let mut r = Recording::begin(3, false);
+        assert!(r.finished().is_none() && r.left().is_none());
+        r.keep(frame(10));
+        r.keep(frame(11));
+        assert_eq!(r.keep(frame(14)), 3);
+        assert_eq!(
+            r.finished(),
+            Some(CameraEvent::Recorded {
+                first_stamp_ns: 1010,
+                frames: 3,
+                dropped: 2
+            })
+        );
+        assert_eq!(r.left().map(<[_]>::len), Some(3));
+        assert!(r.read(0).is_err(), "the right eye was not kept");
+    }
+
+    #[test]
+    fn both_eyes_can_be_read_back() {
+        let mut r = Recording::begin(2, true);
+        r.keep(frame(1));
+        r.keep(frame(2));
+        assert!(r.has_both() && r.left().is_none());
+        assert_eq!(r.read(1).unwrap(), frame(2));
+        assert!(r.read(2).is_err());
+    }
+}

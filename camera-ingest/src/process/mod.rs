@@ -1,0 +1,261 @@
+//! The camera-ingest process: takes frames out of shared memory, answers
+//! `CameraRpc`, publishes keypoints.
+//!
+//! One thread. While nothing is asked it only keeps up with the camera; a long
+//! piece of work (tracking) lets frames pass by, which slows nobody.
+
+mod keep;
+mod work;
+
+use crate::frame::{EyeFrame, StereoFrame};
+use crate::still::StillMeter;
+use keep::Recording;
+use serde::{Deserialize, Serialize};
+use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress};
+use shared_types::ipc::rpc::{Call, RpcServer};
+use shared_types::ipc::{
+    Bus, FrameHeader, FrameSubscriber, IpcError, KeypointPublisher, PIXEL_FORMAT_YUYV,
+};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Configuration of the process. TOML form: keys as the fields.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraConfig {
+    /// Shared-memory domain.
+    pub domain: String,
+}
+
+/// Motion energy below which a picture counts as still (grey levels).
+const STILL_BELOW: f64 = 1.0;
+/// How long it must stay below (s).
+const STILL_FOR_S: f64 = 0.5;
+/// How long the camera may be silent before a recording fails (s).
+const CAMERA_SILENT_S: f64 = 2.0;
+
+/// Runs until `stop` is set.
+///
+/// # Errors
+/// When shared memory cannot be used.
+pub fn run(config: &CameraConfig, stop: &AtomicBool) -> Result<(), IpcError> {
+    let bus = Bus::join(&config.domain)?;
+    let frames = bus.frame_subscriber()?;
+    let keypoints = bus.keypoint_publisher()?;
+    let server = RpcServer::<CameraRpc>::open(&bus)?;
+    let mut process = Process {
+        frames,
+        keypoints,
+        recording: Recording::default(),
+        job: None,
+    };
+    tracing::info!(domain = config.domain, "camera-ingest is ready");
+    while !stop.load(Ordering::Relaxed) {
+        match server.receive() {
+            Ok(Some(call)) => process.accept(call),
+            Ok(None) => {}
+            Err(e @ IpcError::Message { .. }) => tracing::warn!("{e}"),
+            Err(e) => return Err(e),
+        }
+        if !process.take_frames()? {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+    Ok(())
+}
+
+/// A request that needs frames to come in.
+#[derive(Debug)]
+enum Waiting {
+    Still {
+        meter: StillMeter,
+        until: Instant,
+        quiet_since: Option<Instant>,
+    },
+    Record,
+}
+
+#[derive(Debug)]
+struct Job {
+    call: Call<CameraRpc>,
+    waiting: Waiting,
+    last_frame: Instant,
+}
+
+struct Process {
+    frames: FrameSubscriber,
+    keypoints: KeypointPublisher,
+    recording: Recording,
+    job: Option<Job>,
+}
+
+fn failed(message: impl ToString) -> CameraEvent {
+    CameraEvent::Failed {
+        message: message.to_string(),
+    }
+}
+
+/// Answers; a caller that is gone is no failure of this process.
+fn answer(call: &Call<CameraRpc>, event: &CameraEvent) {
+    if let Err(e) = call.send(event) {
+        tracing::warn!("an answer was not delivered: {e}");
+    }
+}
+
+impl Process {
+    fn accept(&mut self, call: Call<CameraRpc>) {
+        let now = Instant::now();
+        if self.job.is_some() && !matches!(call.request, CameraRequest::Ping) {
+            answer(
+                &call,
+                &failed("camera-ingest is busy with another request; wait for its end"),
+            );
+            return;
+        }
+        let waiting = match &call.request {
+            CameraRequest::Ping => {
+                answer(&call, &CameraEvent::Pong);
+                return;
+            }
+            CameraRequest::Track { .. } => {
+                let event = work::track(&self.recording, &call, &self.keypoints);
+                answer(&call, &event);
+                return;
+            }
+            CameraRequest::Score { .. } => {
+                let event = work::score(&mut self.recording, &call);
+                answer(&call, &event);
+                return;
+            }
+            CameraRequest::WaitStill { timeout_s } => Waiting::Still {
+                meter: StillMeter::default(),
+                until: now + Duration::from_secs_f64(timeout_s.clamp(0.0, 600.0)),
+                quiet_since: None,
+            },
+            CameraRequest::Record { frames, both_eyes } => {
+                self.recording = Recording::begin(*frames, *both_eyes);
+                Waiting::Record
+            }
+        };
+        self.job = Some(Job {
+            call,
+            waiting,
+            last_frame: now,
+        });
+    }
+
+    /// Takes in what the camera has published; false when there was nothing.
+    fn take_frames(&mut self) -> Result<bool, IpcError> {
+        let mut any = false;
+        loop {
+            let sample = self.frames.receive().map_err(|e| IpcError::Transfer {
+                service: "wag/v1/camera/frames",
+                reason: format!("{e:?}"),
+            })?;
+            let Some(sample) = sample else { break };
+            any = true;
+            if self.job.is_some() {
+                let header = *sample.user_header();
+                self.one_frame(&header, sample.payload());
+            }
+        }
+        if let Some(job) = &self.job
+            && job.last_frame.elapsed().as_secs_f64() > CAMERA_SILENT_S
+        {
+            answer(
+                &job.call,
+                &failed("no camera frame arrived for 2 s; check that the camera (or the rig) runs in this domain"),
+            );
+            self.job = None;
+        }
+        Ok(any)
+    }
+
+    fn one_frame(&mut self, header: &FrameHeader, bytes: &[u8]) {
+        let Some(job) = &mut self.job else { return };
+        job.last_frame = Instant::now();
+        let frame = match decode(header, bytes) {
+            Ok(frame) => frame,
+            Err(message) => {
+                answer(&job.call, &failed(message));
+                self.job = None;
+                return;
+            }
+        };
+        let done = match &mut job.waiting {
+            Waiting::Still {
+                meter,
+                until,
+                quiet_since,
+            } => wait_still(meter, *until, quiet_since, &frame.left()),
+            Waiting::Record => {
+                if self.recording.is_empty() {
+                    answer(
+                        &job.call,
+                        &CameraEvent::Recording {
+                            first_stamp_ns: header.stamp_ns,
+                        },
+                    );
+                }
+                let kept = self.recording.keep(frame);
+                if kept.is_multiple_of(30) {
+                    let progress = Progress {
+                        done: kept,
+                        total: self.recording.wanted(),
+                        value: f64::from(self.recording.dropped()),
+                        label: "frames, dropped".to_owned(),
+                    };
+                    answer(&job.call, &CameraEvent::Progress(progress));
+                }
+                self.recording.finished()
+            }
+        };
+        if let Some(event) = done {
+            answer(&job.call, &event);
+            self.job = None;
+        }
+    }
+}
+
+fn decode(header: &FrameHeader, bytes: &[u8]) -> Result<StereoFrame, String> {
+    if header.pixel_format != PIXEL_FORMAT_YUYV {
+        return Err(format!(
+            "the camera sends pixel format {}, but only packed YUYV ({PIXEL_FORMAT_YUYV}) is understood",
+            header.pixel_format
+        ));
+    }
+    StereoFrame::from_yuyv(
+        bytes,
+        [header.width_px as usize, header.height_px as usize],
+        header.stamp_ns,
+        header.sequence,
+    )
+    .map_err(|e| e.to_string())
+}
+
+fn wait_still(
+    meter: &mut StillMeter,
+    until: Instant,
+    quiet_since: &mut Option<Instant>,
+    left: &EyeFrame,
+) -> Option<CameraEvent> {
+    let now = Instant::now();
+    let energy = meter.add(left);
+    match energy {
+        Some(e) if e < STILL_BELOW => {
+            let since = *quiet_since.get_or_insert(now);
+            if (now - since).as_secs_f64() >= STILL_FOR_S {
+                return Some(CameraEvent::Still {
+                    still: true,
+                    energy: e,
+                });
+            }
+        }
+        Some(_) => *quiet_since = None,
+        None => {}
+    }
+    (now >= until).then(|| CameraEvent::Still {
+        still: false,
+        energy: energy.unwrap_or(f64::INFINITY),
+    })
+}

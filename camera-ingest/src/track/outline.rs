@@ -1,0 +1,181 @@
+//! The lead's outline: a circle through the places where contrast falls to half.
+//!
+//! Colour weights pull a centroid to the lit side of a shaded ball; its outline
+//! does not move with the light. Motion blur widens it evenly.
+
+use super::background::Background;
+use crate::frame::EyeFrame;
+
+/// Rays from the centre.
+const RAYS: usize = 40;
+/// Distance of samples on a ray (px).
+const STEP_PX: f64 = 0.5;
+/// Part of the rays that must agree on the circle.
+const LEAST_RAYS: f64 = 0.5;
+
+/// A circle in raw pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Circle {
+    pub(super) centre: [f64; 2],
+    pub(super) radius_px: f64,
+}
+
+/// Contrast of single pixels against the background.
+pub(super) struct Contrast<'a> {
+    pub(super) frame: &'a EyeFrame,
+    pub(super) background: &'a Background,
+    pub(super) gain: f32,
+}
+
+impl Contrast<'_> {
+    fn pixel(&self, u: usize, v: usize) -> f64 {
+        let (seen, empty) = (self.frame.ycc(u, v), self.background.image.ycc(u, v));
+        let luma = f32::from(seen[0]) / self.gain - f32::from(empty[0]);
+        let chroma =
+            |k: usize| (f32::from(seen[k]) - 128.0) / self.gain - (f32::from(empty[k]) - 128.0);
+        f64::from((luma * luma + chroma(1).powi(2) + chroma(2).powi(2)).sqrt())
+    }
+
+    /// Contrast at a raw pixel, bilinear; the border's value outside the image.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "clamped to the image first"
+    )]
+    pub(super) fn at(&self, [u, v]: [f64; 2]) -> f64 {
+        let u = u.clamp(0.0, (self.frame.width_px - 1) as f64);
+        let v = v.clamp(0.0, (self.frame.height_px - 1) as f64);
+        let (i, j) = (u as usize, v as usize);
+        let (a, b) = (u - i as f64, v - j as f64);
+        let row = |y: usize| (1.0 - a) * self.pixel(i, y) + a * self.pixel(i + 1, y);
+        (1.0 - b) * row(j) + b * row(j + 1)
+    }
+
+    /// Circle near a guess. `None` when too few rays find an edge, or the edges
+    /// form no circle within `0.7..1.4` of the guessed radius (grown by half
+    /// the blur).
+    pub(super) fn circle(&self, guess: Circle, blur_px: f64) -> Option<Circle> {
+        let mut circle = guess;
+        for _ in 0..3 {
+            let edges = self.edges(circle.centre, guess.radius_px, blur_px);
+            circle = robust_circle(&edges)?;
+            let least = 0.7 * guess.radius_px;
+            let most = 1.4 * guess.radius_px + blur_px / 2.0;
+            let moved =
+                (circle.centre[0] - guess.centre[0]).hypot(circle.centre[1] - guess.centre[1]);
+            if !(least..=most).contains(&circle.radius_px)
+                || moved > 0.6 * guess.radius_px + blur_px / 2.0
+            {
+                return None;
+            }
+        }
+        Some(circle)
+    }
+
+    /// Places on rays where the contrast falls below half of the inside's.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "sample counts are small and positive"
+    )]
+    fn edges(&self, centre: [f64; 2], radius_px: f64, blur_px: f64) -> Vec<[f64; 2]> {
+        let floor = 3.0 * f64::from(self.background.noise);
+        let samples = ((1.7 * radius_px + blur_px) / STEP_PX) as usize;
+        let inside = (0.3 * radius_px / STEP_PX) as usize..=(0.75 * radius_px / STEP_PX) as usize;
+        (0..RAYS)
+            .filter_map(|ray| {
+                let angle = ray as f64 * std::f64::consts::TAU / RAYS as f64;
+                let (sin, cos) = angle.sin_cos();
+                let place = |k: f64| [centre[0] + k * STEP_PX * cos, centre[1] + k * STEP_PX * sin];
+                let profile: Vec<f64> = (0..=samples).map(|k| self.at(place(k as f64))).collect();
+                let inner = profile.get(inside.clone())?;
+                let level = inner.iter().sum::<f64>() / inner.len() as f64;
+                if level < 2.0 * floor {
+                    return None;
+                }
+                let half = level / 2.0;
+                let first = (*inside.end()..samples).find(|&k| profile[k + 1] < half)?;
+                let fall = profile[first] - profile[first + 1];
+                let part = if fall > 1e-9 {
+                    (profile[first] - half) / fall
+                } else {
+                    0.5
+                };
+                Some(place(first as f64 + part.clamp(0.0, 1.0)))
+            })
+            .collect()
+    }
+}
+
+/// Circle through most of the points: fit, drop what lies off, fit again.
+fn robust_circle(points: &[[f64; 2]]) -> Option<Circle> {
+    let enough = LEAST_RAYS * RAYS as f64;
+    let mut kept = points.to_vec();
+    let mut circle = None;
+    for _ in 0..4 {
+        if (kept.len() as f64) < enough {
+            return None;
+        }
+        let fit = fit_circle(&kept)?;
+        let off = |p: &[f64; 2]| {
+            ((p[0] - fit.centre[0]).hypot(p[1] - fit.centre[1]) - fit.radius_px).abs()
+        };
+        let mut sorted: Vec<f64> = points.iter().map(off).collect();
+        sorted.sort_by(f64::total_cmp);
+        let limit = (2.5 * sorted[sorted.len() / 2]).max(0.5);
+        kept = points.iter().copied().filter(|p| off(p) <= limit).collect();
+        circle = Some(fit);
+    }
+    circle
+}
+
+/// Least-squares circle (Kasa): `u^2 + v^2 = 2 a u + 2 b v + c`.
+fn fit_circle(points: &[[f64; 2]]) -> Option<Circle> {
+    let count = points.len() as f64;
+    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / count;
+    let (u0, v0) = (mean(0), mean(1));
+    let (mut uu, mut uv, mut vv, mut uz, mut vz, mut z) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for p in points {
+        let (u, v) = (p[0] - u0, p[1] - v0);
+        let square = u * u + v * v;
+        uu += u * u;
+        uv += u * v;
+        vv += v * v;
+        uz += u * square;
+        vz += v * square;
+        z += square;
+    }
+    let det = 2.0 * (uu * vv - uv * uv);
+    if det.abs() < 1e-9 {
+        return None;
+    }
+    let (a, b) = ((uz * vv - vz * uv) / det, (vz * uu - uz * uv) / det);
+    Some(Circle {
+        centre: [u0 + a, v0 + b],
+        radius_px: (a * a + b * b + z / count).sqrt(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_is_found_among_strays() {
+        let mut points: Vec<[f64; 2]> = (0..RAYS)
+            .map(|i| {
+                let angle = i as f64 * std::f64::consts::TAU / RAYS as f64;
+                [12.5 + 7.0 * angle.cos(), -3.0 + 7.0 * angle.sin()]
+            })
+            .collect();
+        for p in &mut points[..6] {
+            p[1] += 5.0;
+        }
+        let circle = robust_circle(&points).unwrap();
+        assert!((circle.centre[0] - 12.5).abs() < 1e-6 && (circle.centre[1] + 3.0).abs() < 1e-6);
+        assert!((circle.radius_px - 7.0).abs() < 1e-6);
+        assert_eq!(robust_circle(&points[..10]), None);
+    }
+}
