@@ -46,14 +46,6 @@ impl<V: Lanes> Vec3<V> {
     pub(crate) fn dot(self, o: Self) -> V {
         self.0.fma(o.0, self.1.fma(o.1, self.2 * o.2))
     }
-    #[inline(always)]
-    pub(crate) fn cross(self, o: Self) -> Self {
-        Self(
-            self.1.fma(o.2, -(self.2 * o.1)),
-            self.2.fma(o.0, -(self.0 * o.2)),
-            self.0.fma(o.1, -(self.1 * o.0)),
-        )
-    }
     /// `c + self x o`.
     #[inline(always)]
     pub(crate) fn cross_add(self, o: Self, c: Self) -> Self {
@@ -164,11 +156,6 @@ impl<V: Lanes> Quat<V> {
             w,
             v: phi.scale(sinc),
         }
-    }
-    #[inline(always)]
-    pub(crate) fn get(&self, lane: usize) -> [f64; 4] {
-        let [x, y, z] = self.v.get(lane);
-        [self.w.get(lane), x, y, z]
     }
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, q: [f64; 4]) {

@@ -94,14 +94,16 @@ impl LaneTask for GroupTask<'_> {
                 &clock.scheme,
             );
             recorder.after_step(&clock, &links, rope.link_length);
-            health.mark_finished(&clock);
+            health.mark_finished(&clock, &links);
             approach.after_step(
                 base.position.add(report.tip),
                 base.velocity.add(report.tip_velocity),
                 clock.scheme.h,
                 health.running,
             );
-            min_half_cos = min_half_cos.min(report.min_half_cos);
+            let zero = V::splat(0.0);
+            let half_cos = V::select_less(zero, health.running, report.min_half_cos, V::splat(1.0));
+            min_half_cos = min_half_cos.min(half_cos);
             steps += 1;
             if steps.is_multiple_of(HEALTH_PERIOD) && !health.check(&links, clock.scheme.h) {
                 break;
@@ -142,22 +144,25 @@ impl<V: Lanes> Health<V> {
         }
     }
 
+    /// Notes which lanes have passed their end; a last look at them comes first. They
+    /// idle on while others advance, and nothing they do then counts.
     #[inline(always)]
-    fn mark_finished(&mut self, clock: &Clock<V>) {
+    fn mark_finished(&mut self, clock: &Clock<V>, links: &[Link<V>]) {
         for lane in 0..self.alive.len() {
-            if clock.finished(lane) {
+            if clock.finished(lane) && self.running.get(lane) > 0.0 {
+                self.check(links, clock.scheme.h);
                 self.running.set(lane, 0.0);
             }
         }
     }
 
     /// Marks lanes dead whose state is not finite or spins absurdly; false when none
-    /// is left. Finished lanes are not judged: they idle beyond their horizon.
+    /// is left.
     #[inline(always)]
     fn check(&mut self, links: &[Link<V>], h: V) -> bool {
         let mut spin = V::splat(0.0);
         for link in links {
-            spin = spin + link.w.dot(link.w) + link.a.dot(link.a) * V::splat(0.0);
+            spin = spin + link.w.dot(link.w);
         }
         for lane in 0..self.alive.len() {
             if self.running.get(lane) > 0.0 {

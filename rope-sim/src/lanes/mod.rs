@@ -1,8 +1,8 @@
 //! Vectors of ropes: the number type the whole simulator is written in.
 //!
-//! One lane is one rope. Every operation acts on each lane alone and each value
-//! rounds once (multiply-adds are fused), so a lane's bits do not depend on its
-//! position or its neighbours. This is the only module with `unsafe` code: the
+//! One lane is one rope. Every operation acts on each lane alone, so a lane's bits
+//! do not depend on its position or its neighbours; vector kernels fuse multiply-adds,
+//! so those of one precision agree bit by bit. This is the only module with `unsafe` code: the
 //! wrappers over `core::arch` in [`x86`] and the call into code compiled for the
 //! processor found at run time.
 #![allow(
@@ -69,9 +69,9 @@ pub(crate) trait Lanes:
     fn get(&self, lane: usize) -> f64;
     /// Replaces the number in `lane`.
     fn set(&mut self, lane: usize, value: f64);
-    /// `self * b + c`, rounded once.
+    /// `self * b + c`, fused where the processor can.
     fn fma(self, b: Self, c: Self) -> Self;
-    /// `c - self * b`, rounded once.
+    /// `c - self * b`, fused where the processor can.
     fn fnma(self, b: Self, c: Self) -> Self;
     /// `1 / self`.
     fn recip(self) -> Self;

@@ -54,7 +54,12 @@ impl Lanes for f64 {
     }
 }
 
-/// `N` numbers of type `S` side by side.
+/// Whether the target multiplies and adds in one instruction. Where it does not, a
+/// fused operation is a library call some fifty times slower than two instructions.
+const HAS_FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
+
+/// `N` numbers of type `S` side by side. Multiply-adds round twice on targets that
+/// cannot fuse them.
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
 pub(crate) struct Array<S, const N: usize>([S; N]);
@@ -111,7 +116,13 @@ macro_rules! array_lanes {
             }
             #[inline(always)]
             fn fma(self, b: Self, c: Self) -> Self {
-                Self(core::array::from_fn(|i| self.0[i].mul_add(b.0[i], c.0[i])))
+                Self(core::array::from_fn(|i| {
+                    if HAS_FUSED {
+                        self.0[i].mul_add(b.0[i], c.0[i])
+                    } else {
+                        self.0[i] * b.0[i] + c.0[i]
+                    }
+                }))
             }
             #[inline(always)]
             fn fnma(self, b: Self, c: Self) -> Self {

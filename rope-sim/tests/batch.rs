@@ -1,0 +1,334 @@
+//! Batches: a rope's result is its own, whatever runs beside it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::float_cmp,
+    missing_docs,
+    reason = "tests may fail loudly"
+)]
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use rope_sim::{
+    AttachMotion, Candidate, FrameTimes, Kernel, Outcome, Precision, Rollout, SimOptions,
+    SimulateError, Start, roll_out, roll_out_with,
+};
+use shared_types::RopeParams;
+use shared_types::kinematics::FrameMotion;
+use shared_types::rope::{RANGES, RopeError};
+
+/// Shakes along x with a constant acceleration that flips at every `period_s / 2`.
+#[derive(Debug, Clone)]
+struct Shake {
+    acceleration_m_s2: f64,
+    period_s: f64,
+}
+
+impl AttachMotion for Shake {
+    fn at(&self, t_s: f64) -> FrameMotion {
+        let half = self.period_s / 2.0;
+        let (whole, part) = ((t_s / half).floor(), t_s.rem_euclid(half));
+        let falling = whole.rem_euclid(2.0) > 0.5;
+        let a = self.acceleration_m_s2;
+        let sign = if falling { -1.0 } else { 1.0 };
+        let done = 0.5 * a * half * half * whole;
+        let x = if falling {
+            a * half * part - 0.5 * a * part * part
+        } else {
+            0.5 * a * part * part
+        };
+        let v = if falling { a * (half - part) } else { a * part };
+        FrameMotion {
+            p_m: Vector3::new(done + x, 0.0, 1.0),
+            v_m_s: Vector3::new(v, 0.0, 0.0),
+            a_m_s2: Vector3::new(sign * a, 0.0, 0.0),
+            ..FrameMotion::world()
+        }
+    }
+    fn duration_s(&self) -> f64 {
+        10.0
+    }
+    fn acceleration_jumps_s(&self) -> Vec<f64> {
+        (0..200)
+            .map(|i| f64::from(i) * self.period_s / 2.0)
+            .collect()
+    }
+}
+
+fn options(threads: usize) -> SimOptions {
+    SimOptions {
+        step_s: 1e-3,
+        precision: Precision::F32,
+        start: Start::Equilibrium,
+        frames: FrameTimes {
+            first_s: 0.003,
+            period_s: 0.0171,
+            count: 4,
+        },
+        closest_to_m: Some([0.3, 0.1, 0.6]),
+        horizon_s: 0.07,
+        threads,
+    }
+}
+
+fn arbitrary_rope() -> impl Strategy<Value = RopeParams> {
+    prop::array::uniform9(0.0f64..1.0).prop_map(|unit| {
+        let mut v: [f64; 9] =
+            core::array::from_fn(|i| RANGES[i].min + unit[i] * (RANGES[i].max - RANGES[i].min));
+        v[0] = if unit[0] < 0.5 { 20.0 } else { 21.0 };
+        RopeParams::from_array(v)
+    })
+}
+
+fn arbitrary_shake() -> impl Strategy<Value = Shake> {
+    (1.0f64..40.0, 0.02f64..0.3).prop_map(|(acceleration_m_s2, period_s)| Shake {
+        acceleration_m_s2,
+        period_s,
+    })
+}
+
+fn run(kernel: Kernel, ropes: &[(RopeParams, Shake)], threads: usize) -> Vec<Rollout> {
+    let candidates: Vec<Candidate> = ropes
+        .iter()
+        .map(|(rope, motion)| Candidate { rope, motion })
+        .collect();
+    roll_out_with(kernel, &candidates, &options(threads)).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn neighbours_lanes_and_threads_do_not_change_a_bit(
+        ropes in prop::collection::vec((arbitrary_rope(), arbitrary_shake()), 1..40),
+        threads in 1usize..4,
+    ) {
+        let double = Precision::F64.fastest_kernel();
+        for kernel in [Precision::F32.fastest_kernel(), double, Kernel::PortableF32] {
+            let together = run(kernel, &ropes, threads);
+            for (index, (rope, result)) in ropes.iter().zip(&together).enumerate() {
+                let alone = run(kernel, core::slice::from_ref(rope), 1);
+                prop_assert_eq!(result, &alone[0], "{:?} candidate {}", kernel, index);
+            }
+        }
+    }
+
+    #[test]
+    fn vector_kernels_of_one_precision_agree_bit_by_bit(
+        ropes in prop::collection::vec((arbitrary_rope(), arbitrary_shake()), 1..20),
+    ) {
+        let fused = [
+            [Kernel::Avx512F32, Kernel::Avx2F32],
+            [Kernel::Avx512F64, Kernel::Avx2F64],
+            [Kernel::Avx2F64, Kernel::ScalarF64],
+        ];
+        for [a, b] in fused {
+            if a.is_available() && b.is_available() && Kernel::Avx2F32.is_available() {
+                prop_assert_eq!(run(a, &ropes, 1), run(b, &ropes, 1), "{:?} {:?}", a, b);
+            }
+        }
+    }
+}
+
+fn rope() -> RopeParams {
+    RopeParams::from_array([20.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0])
+}
+
+#[test]
+fn a_rope_that_blows_up_is_flagged_and_harms_nobody() {
+    let gentle = (
+        rope(),
+        Shake {
+            acceleration_m_s2: 3.0,
+            period_s: 0.1,
+        },
+    );
+    let absurd = (
+        rope(),
+        Shake {
+            acceleration_m_s2: 1e7,
+            period_s: 0.1,
+        },
+    );
+    let together = run(
+        Precision::F32.fastest_kernel(),
+        &[gentle.clone(), absurd, gentle.clone()],
+        2,
+    );
+    let alone = run(Precision::F32.fastest_kernel(), &[gentle], 1);
+    assert_eq!(together[0], alone[0]);
+    assert_eq!(together[2], alone[0]);
+    assert_eq!(together[0].outcome, Outcome::Clean);
+    assert_eq!(together[1].outcome, Outcome::Diverged);
+    assert!(together[1].closest.is_none());
+    assert!(together[1].nodes.to_f64().iter().all(|x| x.is_finite()));
+}
+
+#[test]
+fn sharing_a_motion_changes_nothing() {
+    let shake = Shake {
+        acceleration_m_s2: 12.0,
+        period_s: 0.06,
+    };
+    let copy = shake.clone();
+    let rope = rope();
+    let shared = [
+        Candidate {
+            rope: &rope,
+            motion: &shake,
+        },
+        Candidate {
+            rope: &rope,
+            motion: &shake,
+        },
+    ];
+    let separate = [
+        Candidate {
+            rope: &rope,
+            motion: &shake,
+        },
+        Candidate {
+            rope: &rope,
+            motion: &copy,
+        },
+    ];
+    assert_eq!(
+        roll_out(&shared, &options(1)).unwrap(),
+        roll_out(&separate, &options(2)).unwrap()
+    );
+}
+
+struct Broken;
+
+impl AttachMotion for Broken {
+    fn at(&self, t_s: f64) -> FrameMotion {
+        let x = if t_s > 0.03 { f64::NAN } else { 0.0 };
+        FrameMotion {
+            v_m_s: Vector3::new(x, 0.0, 0.0),
+            ..FrameMotion::world()
+        }
+    }
+    fn duration_s(&self) -> f64 {
+        0.05
+    }
+    fn acceleration_jumps_s(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn holds_after_end(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_is_named() {
+    let shake = Shake {
+        acceleration_m_s2: 1.0,
+        period_s: 0.1,
+    };
+    let good = rope();
+    let with = |rope: &RopeParams, motion: &dyn AttachMotion, options: &SimOptions| {
+        let first = Candidate {
+            rope: &good,
+            motion: &shake,
+        };
+        roll_out(&[first, Candidate { rope, motion }], options).unwrap_err()
+    };
+    let base = options(1);
+    for (rope, key) in [
+        (RopeParams { links: 0, ..good }, "links"),
+        (
+            RopeParams {
+                lead_mass_kg: -0.1,
+                ..good
+            },
+            "lead_mass_kg",
+        ),
+        (
+            RopeParams {
+                length_m: f64::NAN,
+                ..good
+            },
+            "length_m",
+        ),
+    ] {
+        let error = with(&rope, &shake, &base);
+        let SimulateError::Rope {
+            candidate: 1,
+            source,
+        } = error
+        else {
+            panic!("{error}")
+        };
+        let RopeError::OutOfBounds { key: found, .. } = source;
+        assert_eq!(found, key);
+    }
+    assert!(matches!(
+        with(&good, &Broken, &base),
+        SimulateError::MotionTooShort { candidate: 1, .. }
+    ));
+    assert!(matches!(
+        with(
+            &good,
+            &Broken,
+            &SimOptions {
+                horizon_s: 0.05,
+                frames: FrameTimes::NONE,
+                ..base
+            }
+        ),
+        SimulateError::MotionNotFinite { candidate: 1, .. }
+    ));
+    for (options, field) in [
+        (
+            SimOptions {
+                step_s: 0.0,
+                ..base
+            },
+            "step_s",
+        ),
+        (
+            SimOptions {
+                step_s: 1e-12,
+                ..base
+            },
+            "step_s",
+        ),
+        (
+            SimOptions {
+                horizon_s: f64::NAN,
+                ..base
+            },
+            "horizon_s",
+        ),
+        (
+            SimOptions {
+                closest_to_m: Some([0.0, f64::INFINITY, 0.0]),
+                ..base
+            },
+            "closest_to_m",
+        ),
+    ] {
+        let error = with(&good, &shake, &options);
+        assert!(
+            matches!(error, SimulateError::Option { field: f, .. } if f == field),
+            "{error}"
+        );
+    }
+    let late = FrameTimes {
+        first_s: 0.0,
+        period_s: 0.1,
+        count: 2,
+    };
+    assert!(matches!(
+        with(
+            &good,
+            &shake,
+            &SimOptions {
+                frames: late,
+                ..base
+            }
+        ),
+        SimulateError::FramesOutsideHorizon { .. }
+    ));
+}
