@@ -1,0 +1,200 @@
+//! How a simulated arm is set up, and why it may fail to start.
+
+use super::joint::JointDynamics;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rt_controller::xarm::{COMMAND_PORT, REPORT_PORTS};
+use serde::{Deserialize, Serialize};
+use shared_types::{JOINTS, JointVector, Limits};
+use std::net::{IpAddr, Ipv4Addr};
+
+/// How a joint follows its setpoint: silence, then a second-order lag.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointLag {
+    /// Time before a setpoint has any effect (s).
+    pub dead_time_s: f64,
+    /// Natural frequency of the lag (rad/s).
+    pub natural_frequency_rad_s: f64,
+    /// Damping ratio of the lag; 1 is critical.
+    pub damping_ratio: f64,
+}
+
+impl Default for JointLag {
+    /// No tracking delay of the real arm is published; these are plausible for
+    /// a harmonic drive with a 1 kHz loop behind a 250 Hz command cycle.
+    fn default() -> Self {
+        Self {
+            dead_time_s: 0.008,
+            natural_frequency_rad_s: core::f64::consts::TAU * 25.0,
+            damping_ratio: 0.9,
+        }
+    }
+}
+
+/// Set-up of a simulated arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArmConfig {
+    /// Address to listen on.
+    pub bind: IpAddr,
+    /// Port for commands; 0 takes any free one.
+    pub command_port: u16,
+    /// Ports of the real-time, normal, rich and real report; 0 takes any free
+    /// one.
+    pub report_ports: [u16; 4],
+    /// Seed of everything random in this arm.
+    pub seed: u64,
+    /// Nominal lag of the joints.
+    pub lag: JointLag,
+    /// Largest relative deviation of a joint's lag from the nominal one.
+    pub lag_spread: f64,
+    /// Ranges, speeds and accelerations of the joints.
+    pub limits: Limits,
+    /// Pose at the start (rad).
+    pub initial_q: JointVector,
+    /// Step of the joint encoders (rad).
+    pub encoder_resolution_rad: f64,
+    /// Linear speed limit in servo mode at the start, as a factor of 1 m/s.
+    pub speed_limit_factor: f64,
+}
+
+impl Default for ArmConfig {
+    fn default() -> Self {
+        Self {
+            bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
+            command_port: COMMAND_PORT,
+            report_ports: REPORT_PORTS,
+            seed: 0,
+            lag: JointLag::default(),
+            lag_spread: 0.1,
+            limits: Limits::default(),
+            initial_q: JointVector::ZERO,
+            encoder_resolution_rad: 1e-5,
+            speed_limit_factor: 1.2,
+        }
+    }
+}
+
+/// Why a simulated arm did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum ArmStartError {
+    /// A port below 1024 without the right to use it.
+    #[error(
+        "no permission to listen on port {port} of {bind}: run as root, set \
+         net.ipv4.ip_unprivileged_port_start to {port} or less, or choose another port"
+    )]
+    Permission {
+        /// Address.
+        bind: IpAddr,
+        /// Port.
+        port: u16,
+    },
+    /// Somebody listens there already.
+    #[error(
+        "port {port} of {bind} is in use: stop the other program, choose another port, or \
+         another address such as 127.0.0.2"
+    )]
+    PortInUse {
+        /// Address.
+        bind: IpAddr,
+        /// Port.
+        port: u16,
+    },
+    /// Any other failure to listen.
+    #[error("cannot listen on port {port} of {bind}; is this an address of this machine?")]
+    Listen {
+        /// Address.
+        bind: IpAddr,
+        /// Port.
+        port: u16,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A thread could not be started.
+    #[error("cannot start a thread for the simulated arm")]
+    Thread(#[from] std::io::Error),
+    /// A number of the set-up makes no arm.
+    #[error("`{key}` of the simulated arm {why}")]
+    Config {
+        /// Key.
+        key: &'static str,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+}
+
+impl ArmConfig {
+    /// Refuses a set-up that the model cannot run.
+    ///
+    /// # Errors
+    /// [`ArmStartError::Config`] with the key.
+    pub fn check(&self) -> Result<(), ArmStartError> {
+        let refuse = |key, why| Err(ArmStartError::Config { key, why });
+        let lag = &self.lag;
+        if !(lag.dead_time_s >= 0.0 && lag.dead_time_s <= 1.0) {
+            return refuse("lag.dead_time_s", "must lie between 0 and 1 s");
+        }
+        // The joint model integrates in steps of 1 ms.
+        if !(lag.natural_frequency_rad_s > 0.0 && lag.natural_frequency_rad_s <= 1000.0) {
+            return refuse(
+                "lag.natural_frequency_rad_s",
+                "must lie above 0 and up to 1000 rad/s",
+            );
+        }
+        if !(lag.damping_ratio >= 0.1 && lag.damping_ratio <= 2.0) {
+            return refuse("lag.damping_ratio", "must lie between 0.1 and 2");
+        }
+        if !(self.lag_spread >= 0.0 && self.lag_spread < 1.0) {
+            return refuse("lag_spread", "must be at least 0 and below 1");
+        }
+        if self.limits.position_violation(&self.initial_q).is_some() {
+            return refuse("initial_q", "lies outside the joint ranges");
+        }
+        if !(self.encoder_resolution_rad > 0.0 && self.encoder_resolution_rad < 0.1) {
+            return refuse("encoder_resolution_rad", "must lie between 0 and 0.1 rad");
+        }
+        if !(self.speed_limit_factor > 0.0 && self.speed_limit_factor.is_finite()) {
+            return refuse("speed_limit_factor", "must be above 0");
+        }
+        Ok(())
+    }
+
+    /// The seven joints at rest in the initial pose, each with its own lag.
+    pub(super) fn joints(&self) -> [JointDynamics; JOINTS] {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut vary =
+            |nominal: f64| nominal * (1.0 + self.lag_spread * rng.random_range(-1.0..=1.0));
+        core::array::from_fn(|i| {
+            let lag = JointLag {
+                dead_time_s: vary(self.lag.dead_time_s),
+                natural_frequency_rad_s: vary(self.lag.natural_frequency_rad_s),
+                damping_ratio: vary(self.lag.damping_ratio),
+            };
+            JointDynamics::new(lag, self.initial_q[i], self.limits.velocity_max_rad_s[i])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn default_is_accepted_and_nonsense_refused_by_key() {
+        assert!(ArmConfig::default().check().is_ok());
+        let outside = ArmConfig {
+            initial_q: JointVector::splat(6.0),
+            ..ArmConfig::default()
+        };
+        let said = outside.check().unwrap_err().to_string();
+        assert!(said.contains("initial_q"), "{said}");
+    }
+
+    #[test]
+    fn a_file_may_name_only_what_differs() {
+        let config: ArmConfig = toml::from_str("seed = 5\ncommand_port = 0").unwrap();
+        assert_eq!((config.seed, config.command_port), (5, 0));
+        assert_eq!(config.lag, JointLag::default());
+    }
+}
