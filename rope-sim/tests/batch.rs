@@ -220,21 +220,29 @@ impl AttachMotion for Broken {
     }
 }
 
+/// The error of a batch whose second candidate is this one.
+fn refusal(rope: &RopeParams, motion: &dyn AttachMotion, options: &SimOptions) -> SimulateError {
+    let (good, shake) = (
+        self::rope(),
+        Shake {
+            acceleration_m_s2: 1.0,
+            period_s: 0.1,
+        },
+    );
+    let first = Candidate {
+        rope: &good,
+        motion: &shake,
+    };
+    roll_out(&[first, Candidate { rope, motion }], options).unwrap_err()
+}
+
 #[test]
-fn what_cannot_be_simulated_is_named() {
+fn candidates_that_cannot_be_simulated_are_named() {
+    let (good, base) = (rope(), options(1));
     let shake = Shake {
         acceleration_m_s2: 1.0,
         period_s: 0.1,
     };
-    let good = rope();
-    let with = |rope: &RopeParams, motion: &dyn AttachMotion, options: &SimOptions| {
-        let first = Candidate {
-            rope: &good,
-            motion: &shake,
-        };
-        roll_out(&[first, Candidate { rope, motion }], options).unwrap_err()
-    };
-    let base = options(1);
     for (rope, key) in [
         (RopeParams { links: 0, ..good }, "links"),
         (
@@ -252,7 +260,7 @@ fn what_cannot_be_simulated_is_named() {
             "length_m",
         ),
     ] {
-        let error = with(&rope, &shake, &base);
+        let error = refusal(&rope, &shake, &base);
         let SimulateError::Rope {
             candidate: 1,
             source,
@@ -264,20 +272,42 @@ fn what_cannot_be_simulated_is_named() {
         assert_eq!(found, key);
     }
     assert!(matches!(
-        with(&good, &Broken, &base),
+        refusal(&good, &Broken, &base),
         SimulateError::MotionTooShort { candidate: 1, .. }
     ));
+    let short = SimOptions {
+        horizon_s: 0.05,
+        frames: FrameTimes::NONE,
+        ..base
+    };
     assert!(matches!(
-        with(
+        refusal(&good, &Broken, &short),
+        SimulateError::MotionNotFinite { candidate: 1, .. }
+    ));
+}
+
+#[test]
+fn options_that_make_no_sense_are_named() {
+    let (good, base) = (rope(), options(1));
+    let shake = Shake {
+        acceleration_m_s2: 1.0,
+        period_s: 0.1,
+    };
+    let late = FrameTimes {
+        first_s: 0.0,
+        period_s: 0.1,
+        count: 2,
+    };
+    assert!(matches!(
+        refusal(
             &good,
-            &Broken,
+            &shake,
             &SimOptions {
-                horizon_s: 0.05,
-                frames: FrameTimes::NONE,
+                frames: late,
                 ..base
             }
         ),
-        SimulateError::MotionNotFinite { candidate: 1, .. }
+        SimulateError::FramesOutsideHorizon { .. }
     ));
     for (options, field) in [
         (
@@ -309,26 +339,10 @@ fn what_cannot_be_simulated_is_named() {
             "closest_to_m",
         ),
     ] {
-        let error = with(&good, &shake, &options);
+        let error = refusal(&good, &shake, &options);
         assert!(
             matches!(error, SimulateError::Option { field: f, .. } if f == field),
             "{error}"
         );
     }
-    let late = FrameTimes {
-        first_s: 0.0,
-        period_s: 0.1,
-        count: 2,
-    };
-    assert!(matches!(
-        with(
-            &good,
-            &shake,
-            &SimOptions {
-                frames: late,
-                ..base
-            }
-        ),
-        SimulateError::FramesOutsideHorizon { .. }
-    ));
 }

@@ -15,7 +15,7 @@ mod portable;
 mod x86;
 
 use core::ops::{Add, Mul, Neg, Sub};
-use portable::Array;
+use portable::Plain;
 
 /// Coefficients, lowest power first, of `2 acos(1 - x) / sqrt(1 - (1 - x)²)` on
 /// [0, 1]: interpolation at the Chebyshev nodes, relative error 8e-8.
@@ -104,15 +104,16 @@ pub enum Kernel {
     Avx512F32,
     /// 8 single precision lanes, AVX2 and FMA.
     Avx2F32,
-    /// 8 single precision lanes, any processor.
+    /// One rope in single precision, any processor.
     PortableF32,
     /// 8 double precision lanes, AVX-512.
     Avx512F64,
     /// 4 double precision lanes, AVX2 and FMA.
     Avx2F64,
-    /// 4 double precision lanes, any processor.
+    /// One rope in double precision, any processor.
     PortableF64,
-    /// One rope in double precision; uses FMA where the processor has it.
+    /// One rope in double precision with fused multiply-adds, rounding as the vector
+    /// kernels do; slow where the processor has no such instruction.
     ScalarF64,
 }
 
@@ -133,9 +134,9 @@ impl Kernel {
     pub const fn lanes(self) -> usize {
         match self {
             Self::Avx512F32 => 16,
-            Self::Avx2F32 | Self::PortableF32 | Self::Avx512F64 => 8,
-            Self::Avx2F64 | Self::PortableF64 => 4,
-            Self::ScalarF64 => 1,
+            Self::Avx2F32 | Self::Avx512F64 => 8,
+            Self::Avx2F64 => 4,
+            Self::PortableF32 | Self::PortableF64 | Self::ScalarF64 => 1,
         }
     }
 
@@ -176,8 +177,8 @@ impl Kernel {
         }
         match self {
             Self::ScalarF64 => task.run::<f64>(),
-            single if single.is_single_precision() => task.run::<Array<f32, 8>>(),
-            _ => task.run::<Array<f64, 4>>(),
+            single if single.is_single_precision() => task.run::<Plain<f32>>(),
+            _ => task.run::<Plain<f64>>(),
         }
     }
 }

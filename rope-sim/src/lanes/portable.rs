@@ -1,5 +1,8 @@
-//! Lanes without vector instructions: one `f64`, and plain arrays that the
-//! compiler may vectorise with whatever the target has.
+//! One rope in ordinary floating point: [`f64`] where fused multiply-adds are
+//! instructions, [`Plain`] for any processor.
+//!
+//! Arrays of numbers, left to the compiler to vectorise, were three times slower per
+//! rope than this: whole arrays travel through memory.
 
 use super::{ANGLE_POLYNOMIAL_F32, ANGLE_POLYNOMIAL_F64, Lanes};
 use core::ops::{Add, Mul, Neg, Sub};
@@ -54,121 +57,109 @@ impl Lanes for f64 {
     }
 }
 
-/// Whether the target multiplies and adds in one instruction. Where it does not, a
-/// fused operation is a library call some fifty times slower than two instructions.
+/// A number whose multiply-adds round twice, unless the target always fuses them: as
+/// library calls they would be fifty times slower.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(crate) struct Plain<S>(S);
+
+/// Whether every processor of the target multiplies and adds in one instruction.
 const HAS_FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
-/// `N` numbers of type `S` side by side. Multiply-adds round twice on targets that
-/// cannot fuse them.
-#[derive(Clone, Copy)]
-#[repr(C, align(32))]
-pub(crate) struct Array<S, const N: usize>([S; N]);
-
-macro_rules! array_lanes {
+macro_rules! plain_lanes {
     ($scalar:ty, $polynomial:ident) => {
-        impl<const N: usize> Add for Array<$scalar, N> {
+        impl Add for Plain<$scalar> {
             type Output = Self;
             #[inline(always)]
             fn add(self, other: Self) -> Self {
-                Self(core::array::from_fn(|i| self.0[i] + other.0[i]))
+                Self(self.0 + other.0)
             }
         }
-        impl<const N: usize> Sub for Array<$scalar, N> {
+        impl Sub for Plain<$scalar> {
             type Output = Self;
             #[inline(always)]
             fn sub(self, other: Self) -> Self {
-                Self(core::array::from_fn(|i| self.0[i] - other.0[i]))
+                Self(self.0 - other.0)
             }
         }
-        impl<const N: usize> Mul for Array<$scalar, N> {
+        impl Mul for Plain<$scalar> {
             type Output = Self;
             #[inline(always)]
             fn mul(self, other: Self) -> Self {
-                Self(core::array::from_fn(|i| self.0[i] * other.0[i]))
+                Self(self.0 * other.0)
             }
         }
-        impl<const N: usize> Neg for Array<$scalar, N> {
+        impl Neg for Plain<$scalar> {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
-                Self(self.0.map(|v| -v))
+                Self(-self.0)
             }
         }
-        impl<const N: usize> Lanes for Array<$scalar, N> {
-            const COUNT: usize = N;
+        impl Lanes for Plain<$scalar> {
+            const COUNT: usize = 1;
             const ANGLE_POLYNOMIAL: &'static [f64] = $polynomial;
 
             #[inline(always)]
             #[allow(clippy::cast_possible_truncation, reason = "the lanes' precision")]
-            #[allow(trivial_numeric_casts, reason = "one of the two types is f64")]
             fn splat(value: f64) -> Self {
-                Self([value as $scalar; N])
+                Self(value as $scalar)
             }
             #[inline(always)]
-            fn get(&self, lane: usize) -> f64 {
-                self.0[lane.min(N - 1)].into()
+            fn get(&self, _lane: usize) -> f64 {
+                self.0.into()
             }
             #[inline(always)]
-            #[allow(clippy::cast_possible_truncation, reason = "the lanes' precision")]
-            #[allow(trivial_numeric_casts, reason = "one of the two types is f64")]
-            fn set(&mut self, lane: usize, value: f64) {
-                self.0[lane.min(N - 1)] = value as $scalar;
+            fn set(&mut self, _lane: usize, value: f64) {
+                *self = Self::splat(value);
             }
             #[inline(always)]
             fn fma(self, b: Self, c: Self) -> Self {
-                Self(core::array::from_fn(|i| {
-                    if HAS_FUSED {
-                        self.0[i].mul_add(b.0[i], c.0[i])
-                    } else {
-                        self.0[i] * b.0[i] + c.0[i]
-                    }
-                }))
+                if HAS_FUSED {
+                    Self(self.0.mul_add(b.0, c.0))
+                } else {
+                    self * b + c
+                }
             }
             #[inline(always)]
             fn fnma(self, b: Self, c: Self) -> Self {
-                Self(core::array::from_fn(|i| {
-                    (-self.0[i]).mul_add(b.0[i], c.0[i])
-                }))
+                if HAS_FUSED {
+                    Self((-self.0).mul_add(b.0, c.0))
+                } else {
+                    c - self * b
+                }
             }
             #[inline(always)]
             fn recip(self) -> Self {
-                Self(self.0.map(|v| 1.0 / v))
+                Self(1.0 / self.0)
             }
             #[inline(always)]
             fn abs(self) -> Self {
-                Self(self.0.map(|v| v.abs()))
+                Self(self.0.abs())
             }
             #[inline(always)]
             fn flip_by(self, sign: Self) -> Self {
-                Self(core::array::from_fn(|i| {
-                    if sign.0[i].is_sign_negative() {
-                        -self.0[i]
-                    } else {
-                        self.0[i]
-                    }
-                }))
+                if sign.0.is_sign_negative() {
+                    -self
+                } else {
+                    self
+                }
             }
             #[inline(always)]
             fn min(self, other: Self) -> Self {
-                Self::select_less(self, other, self, other)
+                if self.0 < other.0 { self } else { other }
             }
             #[inline(always)]
             fn max(self, other: Self) -> Self {
-                Self::select_less(other, self, self, other)
+                if self.0 > other.0 { self } else { other }
             }
             #[inline(always)]
             fn select_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
-                Self(core::array::from_fn(|i| {
-                    if a.0[i] < b.0[i] {
-                        then.0[i]
-                    } else {
-                        otherwise.0[i]
-                    }
-                }))
+                if a.0 < b.0 { then } else { otherwise }
             }
         }
     };
 }
 
-array_lanes!(f32, ANGLE_POLYNOMIAL_F32);
-array_lanes!(f64, ANGLE_POLYNOMIAL_F64);
+plain_lanes!(f32, ANGLE_POLYNOMIAL_F32);
+plain_lanes!(f64, ANGLE_POLYNOMIAL_F64);
