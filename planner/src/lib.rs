@@ -21,6 +21,7 @@
 pub mod cmaes;
 pub mod collide;
 pub mod ropes;
+pub mod synthetic;
 pub mod sysid;
 pub mod tasks;
 pub mod trajopt;

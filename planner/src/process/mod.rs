@@ -174,7 +174,7 @@ fn strike(
             Progress {
                 done: count(p.generation),
                 total: count(p.generations),
-                value: 100.0 * p.best_m,
+                value: 100.0 * p.error_m,
                 label: "best cm".to_owned(),
             },
         )
