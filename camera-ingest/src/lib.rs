@@ -22,13 +22,13 @@
 pub mod calib;
 pub mod frame;
 pub mod overlay;
-//S pub mod score;
+pub mod score;
 pub mod source;
 //S pub mod still;
 pub mod track;
 
 pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
-//S pub use score::{Score, ScoreError, ScoreOptions, score};
+pub use score::{Score, ScoreError, ScoreOptions, score};
 pub use source::{FrameSource, SourceError, open_video};
 pub use track::{ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track};

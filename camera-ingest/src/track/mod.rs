@@ -240,7 +240,7 @@ fn check(
 }
 
 /// `count` indices spread over `0..len`.
-fn spread(len: usize, count: usize) -> Vec<usize> {
+pub(crate) fn spread(len: usize, count: usize) -> Vec<usize> {
     let count = count.min(len);
     (0..count).map(|i| i * (len - 1) / (count - 1)).collect()
 }
@@ -324,4 +324,10 @@ fn keypoints(state: &State, plane: &RopePlane, count: usize) -> TrackedFrame {
             .collect(),
         lost: state.lost,
     }
+}
+
+/// Per-pixel median of some frames.
+pub(crate) fn median_frame(frames: &[EyeFrame]) -> EyeFrame {
+    let all: Vec<usize> = (0..frames.len()).collect();
+    Background::median(frames, &all).image
 }
