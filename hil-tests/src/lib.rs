@@ -12,3 +12,6 @@
 )]
 
 pub mod arm;
+pub mod hidden;
+pub mod render;
+pub mod rig;

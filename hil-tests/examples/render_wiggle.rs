@@ -1,0 +1,169 @@
+//! Renders a wiggle without robot and without threads, into a folder a tracker
+//! can be tested on:
+//!
+//! ```text
+//! render_wiggle OUT [SEED] [FRAMES]
+//! ```
+//!
+//! Writes `video.yuyv` (side-by-side frames, one after the other),
+//! `timestamps.csv`, `pose.csv` (attach frame at 1 kHz), `camera.toml` with
+//! `camera.conf`, `truth.json` (rope, colours, nodes per frame in metres and
+//! left-eye pixels) and some frames as PNG.
+
+use camera_ingest::StereoFrame;
+use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
+use hil_tests::hidden::hidden_rope;
+use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
+use hil_tests::rig::CameraConfig;
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use rope_sim::LiveRope;
+use shared_types::kinematics::{FrameMotion, attach_motion};
+use shared_types::plan::START_POSE;
+use shared_types::{JointState, JointVector, StereoCamera};
+use std::error::Error;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+const RATE_HZ: f64 = 60.0;
+const AMPLITUDE_RAD: f64 = 0.26;
+const FREQUENCY_HZ: f64 = 0.75;
+const STILL_S: f64 = 0.5;
+const RAMP_S: f64 = 1.0;
+const PHYSICS_STEP_S: f64 = 1e-4;
+/// Frames written as PNG.
+const PICTURES: usize = 8;
+
+/// Joints of the wiggle: joint 6 swings under a window that opens smoothly.
+fn joints(t_s: f64) -> JointVector {
+    let t = (t_s - STILL_S).max(0.0);
+    let u = (t / RAMP_S).min(1.0);
+    let window = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    let mut q = START_POSE;
+    q[5] += AMPLITUDE_RAD * window * (core::f64::consts::TAU * FREQUENCY_HZ * t).sin();
+    q
+}
+
+/// The attach frame with velocities and accelerations by central differences.
+fn attach(t_s: f64) -> FrameMotion {
+    const H: f64 = 1e-3;
+    let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
+    attach_motion(&JointState {
+        q: now,
+        qd: (after - before).map(|d| d / (2.0 * H)),
+        qdd: (after + before - now - now).map(|d| d / (H * H)),
+    })
+}
+
+struct Arguments {
+    out: PathBuf,
+    seed: u64,
+    frames: usize,
+}
+
+fn arguments() -> Result<Arguments, Box<dyn Error>> {
+    let mut given = std::env::args().skip(1);
+    let out = given
+        .next()
+        .ok_or("usage: render_wiggle OUT [SEED] [FRAMES]")?;
+    Ok(Arguments {
+        out: out.into(),
+        seed: given.next().map_or(Ok(1), |s| s.parse())?,
+        frames: given.next().map_or(Ok(400), |s| s.parse())?,
+    })
+}
+
+fn save_png(path: &Path, yuyv: &[u8], camera: &StereoCamera) -> Result<(), Box<dyn Error>> {
+    let size = [camera.width_px as usize * 2, camera.height_px as usize];
+    let eye = StereoFrame::from_yuyv(yuyv, size, 0, 0)?.left();
+    let file = BufWriter::new(File::create(path)?);
+    let mut encoder = png::Encoder::new(file, camera.width_px, camera.height_px);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header()?.write_image_data(&eye.to_rgb())?;
+    Ok(())
+}
+
+fn write_pose(path: &Path, duration_s: f64) -> std::io::Result<()> {
+    let mut text = String::from("t,x,y,z,qw,qx,qy,qz\n");
+    let mut t_s = 0.0;
+    while t_s <= duration_s {
+        let pose = attach(t_s);
+        let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.r));
+        let p = pose.p_m;
+        let _ = writeln!(
+            text,
+            "{t_s:.4},{:.9},{:.9},{:.9},{:.12},{:.12},{:.12},{:.12}",
+            p.x, p.y, p.z, q.w, q.i, q.j, q.k
+        );
+        t_s += 1e-3;
+    }
+    fs::write(path, text)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let Arguments { out, seed, frames } = arguments()?;
+    fs::create_dir_all(&out)?;
+    let camera = CameraConfig::default().stereo_camera();
+    write_factory_conf(&out.join("camera.conf"), &camera, VideoMode::Vga)?;
+    let toml = out.join("camera.toml");
+    write_camera_toml(&toml, &camera, VideoMode::Vga, Path::new("camera.conf"))?;
+    write_pose(&out.join("pose.csv"), frames as f64 / RATE_HZ + 0.1)?;
+
+    let (rope, colours) = (hidden_rope(seed), Appearance::from_seed(seed));
+    let mut renderer = Renderer::new(&camera, RopeShape::from(&rope), colours, 1.6, seed);
+    renderer.place_target(Some(Vector3::new(1.10, 0.0, 0.45)));
+    let mut live = LiveRope::new(&rope, &attach(0.0), PHYSICS_STEP_S)?;
+    let mut pose_at = |t_s: f64| {
+        live.advance(&attach, t_s);
+        ScenePose {
+            q: joints(t_s),
+            nodes: live.nodes().to_vec(),
+        }
+    };
+
+    let mut video = BufWriter::new(File::create(out.join("video.yuyv"))?);
+    let mut stamps = String::from("frame,sequence,monotonic_ns\n");
+    let (mut nodes_px, mut nodes_m) = (Vec::new(), Vec::new());
+    let mut pixels = vec![0; renderer.frame_bytes()];
+    let mut drawing = std::time::Duration::ZERO;
+    for frame in 0..frames {
+        let start_s = frame as f64 / RATE_HZ;
+        let eighth = |i: usize| start_s + camera.exposure_s * (i as f64 + 0.5) / 8.0;
+        let all: Vec<_> = (0..8).map(|i| pose_at(eighth(i))).collect();
+        // Enough of the eight poses for the motion in this frame.
+        let every = (8 / renderer.sub_frames(&all[0], &all[7]).min(8)).max(1);
+        let poses: Vec<_> = all.iter().skip(every / 2).step_by(every).cloned().collect();
+        let began = std::time::Instant::now();
+        renderer.render(&poses, frame as u64, &mut pixels);
+        drawing += began.elapsed();
+        video.write_all(&pixels)?;
+        let _ = writeln!(stamps, "{frame},{frame},{}", (start_s * 1e9).round());
+        let middle: Vec<_> = (0..all[0].nodes.len())
+            .map(|i| (all[3].nodes[i] + all[4].nodes[i]) / 2.0)
+            .collect();
+        nodes_px.push(
+            middle
+                .iter()
+                .map(|p| camera.project_left(p))
+                .collect::<Vec<_>>(),
+        );
+        nodes_m.push(middle.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
+        if frame % (frames / PICTURES).max(1) == 0 {
+            save_png(&out.join(format!("frame_{frame:04}.png")), &pixels, &camera)?;
+        }
+    }
+    video.flush()?;
+    fs::write(out.join("timestamps.csv"), stamps)?;
+    let truth = serde_json::json!({
+        "seed": seed, "rope": rope, "appearance": colours,
+        "nodes_left_px": nodes_px, "nodes_world_m": nodes_m,
+    });
+    fs::write(out.join("truth.json"), serde_json::to_string(&truth)?)?;
+    let per_frame_ms = drawing.as_secs_f64() * 1e3 / frames as f64;
+    println!(
+        "{frames} frames in {}, {per_frame_ms:.2} ms each to draw",
+        out.display()
+    );
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! A capsule in the picture: two ends with radii and depths, shaded like a
+//! rounded solid under one soft light.
+
+use super::colour::{Ycc, lit};
+use super::eye::Eye;
+use super::layer::{Cell, RowLayer};
+use nalgebra::Vector3;
+
+/// How a surface answers the light.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Material {
+    /// Colour when lit squarely.
+    pub(super) colour: Ycc,
+    /// Luma of the highlight.
+    pub(super) gloss: f32,
+}
+
+/// Towards the light, in the picture: right, down, towards the camera.
+const LIGHT: [f32; 3] = [-0.42, -0.70, 0.58];
+/// Light from everywhere and from the lamp, relative to a surface's colour.
+const AMBIENT: f32 = 0.50;
+const LAMP: f32 = 0.58;
+
+/// A capsule projected into one eye.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stroke {
+    a_px: [f32; 2],
+    along_px: [f32; 2],
+    per_length2: f32,
+    radius_px: [f32; 2],
+    depth_m: [f32; 2],
+    radius_m: f32,
+    material: Material,
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "pixel coordinates; float to integer casts saturate"
+)]
+impl Stroke {
+    /// The capsule around the segment from `a_m` to `b_m` (world), if in front
+    /// of the eye.
+    pub(super) fn new(
+        eye: &Eye,
+        a_m: &Vector3<f64>,
+        b_m: &Vector3<f64>,
+        radius_m: f64,
+        material: Material,
+    ) -> Option<Self> {
+        let (a, b) = (eye.see(a_m)?, eye.see(b_m)?);
+        let along_px = [
+            (b.pixel[0] - a.pixel[0]) as f32,
+            (b.pixel[1] - a.pixel[1]) as f32,
+        ];
+        let length2 = along_px[0] * along_px[0] + along_px[1] * along_px[1];
+        Some(Self {
+            a_px: a.pixel.map(|v| v as f32),
+            along_px,
+            per_length2: if length2 > 1e-9 { 1.0 / length2 } else { 0.0 },
+            radius_px: [a, b].map(|end| (end.px_per_m * radius_m) as f32),
+            depth_m: [a.depth_m as f32, b.depth_m as f32],
+            radius_m: radius_m as f32,
+            material,
+        })
+    }
+
+    fn reach_px(&self) -> f32 {
+        self.radius_px[0].max(self.radius_px[1]).max(0.5) + 0.5
+    }
+
+    /// First and one past the last row touched, within a picture of `height` rows.
+    pub(super) fn rows(&self, height: usize) -> (usize, usize) {
+        let (v0, v1) = (self.a_px[1], self.a_px[1] + self.along_px[1]);
+        let low = (v0.min(v1) - self.reach_px()).ceil().max(0.0) as usize;
+        let high = (v0.max(v1) + self.reach_px()).floor() + 1.0;
+        (low, (high.max(0.0) as usize).min(height))
+    }
+
+    /// First and one past the last column touched in row `v`.
+    fn columns(&self, v: f32, width: usize) -> (usize, usize) {
+        let reach = self.reach_px();
+        let (u0, u1) = (self.a_px[0], self.a_px[0] + self.along_px[0]);
+        let (mut low, mut high) = (u0.min(u1) - reach, u0.max(u1) + reach);
+        let rise = self.along_px[1];
+        if rise.abs() > 1e-3 {
+            // Where the row crosses the band around the infinite axis.
+            let middle = self.a_px[0] + (v - self.a_px[1]) * self.along_px[0] / rise;
+            let half = reach / (rise.abs() * self.per_length2.sqrt());
+            low = low.max(middle - half);
+            high = high.min(middle + half);
+        }
+        let from = low.ceil().max(0.0) as usize;
+        (from, ((high.floor() + 1.0).max(0.0) as usize).min(width))
+    }
+
+    /// Draws the part in row `v` of a picture `width` pixels wide.
+    pub(super) fn draw_row(&self, v: usize, width: usize, layer: &mut RowLayer) {
+        let dv = v as f32 - self.a_px[1];
+        let (from, to) = self.columns(v as f32, width);
+        for u in from..to {
+            let du = u as f32 - self.a_px[0];
+            let dot = du * self.along_px[0] + dv * self.along_px[1];
+            let t = (dot * self.per_length2).clamp(0.0, 1.0);
+            let (ou, ov) = (du - t * self.along_px[0], dv - t * self.along_px[1]);
+            let radius = self.radius_px[0] + t * (self.radius_px[1] - self.radius_px[0]);
+            let distance = (ou * ou + ov * ov).sqrt();
+            // Narrower than a pixel: the same light, spread over one pixel.
+            let thin = (2.0 * radius).min(1.0);
+            let cover = (radius.max(0.5) - distance + 0.5).clamp(0.0, 1.0) * thin;
+            if cover <= 0.0 {
+                continue;
+            }
+            let (nu, nv) = (ou / radius, ov / radius);
+            let facing = (1.0 - nu * nu - nv * nv).max(0.0).sqrt();
+            let depth = self.depth_m[0] + t * (self.depth_m[1] - self.depth_m[0]);
+            layer.put(
+                u,
+                Cell {
+                    cover,
+                    depth_m: depth - facing * self.radius_m,
+                    colour: self.shade([nu, nv, facing]),
+                },
+            );
+        }
+    }
+
+    /// Lambert's law with a highlight halfway between lamp and camera.
+    fn shade(&self, normal: [f32; 3]) -> Ycc {
+        const HALFWAY: [f32; 3] = [-0.236, -0.394, 0.888];
+        let dot =
+            |l: [f32; 3]| (l[0] * normal[0] + l[1] * normal[1] + l[2] * normal[2]).clamp(0.0, 1.0);
+        let mirror = dot(HALFWAY);
+        let mirror = mirror * mirror * mirror * mirror;
+        let mirror = mirror * mirror * mirror;
+        lit(
+            self.material.colour,
+            AMBIENT + LAMP * dot(LIGHT),
+            self.material.gloss * mirror * mirror,
+        )
+    }
+}
