@@ -22,9 +22,10 @@
 pub mod calib;
 pub mod frame;
 pub mod overlay;
+pub mod process;
 pub mod score;
 pub mod source;
-//S pub mod still;
+pub mod still;
 pub mod track;
 
 pub use calib::{CalibError, load_camera};

@@ -8,7 +8,7 @@ mod keep;
 mod work;
 
 use crate::frame::{EyeFrame, StereoFrame};
-use crate::still::StillMeter;
+use crate::still::{Region, StillDetector};
 use keep::Recording;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress};
@@ -27,10 +27,10 @@ pub struct CameraConfig {
     pub domain: String,
 }
 
-/// Motion energy below which a picture counts as still (grey levels).
-const STILL_BELOW: f64 = 1.0;
-/// How long it must stay below (s).
-const STILL_FOR_S: f64 = 0.5;
+/// Frames that are compared to see motion: a tenth of a second apart at 60 Hz.
+const STILL_LAG_FRAMES: usize = 6;
+/// Still frames in a row that count as hanging still.
+const STILL_FRAMES: usize = 30;
 /// How long the camera may be silent before a recording fails (s).
 const CAMERA_SILENT_S: f64 = 2.0;
 
@@ -68,9 +68,8 @@ pub fn run(config: &CameraConfig, stop: &AtomicBool) -> Result<(), IpcError> {
 #[derive(Debug)]
 enum Waiting {
     Still {
-        meter: StillMeter,
+        detector: Option<StillDetector>,
         until: Instant,
-        quiet_since: Option<Instant>,
     },
     Record,
 }
@@ -128,9 +127,8 @@ impl Process {
                 return;
             }
             CameraRequest::WaitStill { timeout_s } => Waiting::Still {
-                meter: StillMeter::default(),
+                detector: None,
                 until: now + Duration::from_secs_f64(timeout_s.clamp(0.0, 600.0)),
-                quiet_since: None,
             },
             CameraRequest::Record { frames, both_eyes } => {
                 self.recording = Recording::begin(*frames, *both_eyes);
@@ -164,7 +162,9 @@ impl Process {
         {
             answer(
                 &job.call,
-                &failed("no camera frame arrived for 2 s; check that the camera (or the rig) runs in this domain"),
+                &failed(
+                    "no camera frame arrived for 2 s; check that the camera (or the rig) runs in this domain",
+                ),
             );
             self.job = None;
         }
@@ -183,11 +183,7 @@ impl Process {
             }
         };
         let done = match &mut job.waiting {
-            Waiting::Still {
-                meter,
-                until,
-                quiet_since,
-            } => wait_still(meter, *until, quiet_since, &frame.left()),
+            Waiting::Still { detector, until } => wait_still(detector, *until, frame.left()),
             Waiting::Record => {
                 if self.recording.is_empty() {
                     answer(
@@ -234,28 +230,19 @@ fn decode(header: &FrameHeader, bytes: &[u8]) -> Result<StereoFrame, String> {
 }
 
 fn wait_still(
-    meter: &mut StillMeter,
+    detector: &mut Option<StillDetector>,
     until: Instant,
-    quiet_since: &mut Option<Instant>,
-    left: &EyeFrame,
+    left: EyeFrame,
 ) -> Option<CameraEvent> {
-    let now = Instant::now();
-    let energy = meter.add(left);
-    match energy {
-        Some(e) if e < STILL_BELOW => {
-            let since = *quiet_since.get_or_insert(now);
-            if (now - since).as_secs_f64() >= STILL_FOR_S {
-                return Some(CameraEvent::Still {
-                    still: true,
-                    energy: e,
-                });
-            }
-        }
-        Some(_) => *quiet_since = None,
-        None => {}
-    }
-    (now >= until).then(|| CameraEvent::Still {
-        still: false,
-        energy: energy.unwrap_or(f64::INFINITY),
-    })
+    // The whole picture: an arm or a person that moves is not still either.
+    let whole = Region {
+        u0: 0,
+        v0: 0,
+        u1: left.width_px,
+        v1: left.height_px,
+    };
+    let still = detector
+        .get_or_insert_with(|| StillDetector::new(whole, STILL_LAG_FRAMES, STILL_FRAMES))
+        .push(left);
+    (still || Instant::now() >= until).then_some(CameraEvent::Still { still })
 }

@@ -37,8 +37,6 @@ const MASK_LEAST: f32 = 6.0;
 pub(super) struct FirstLook {
     /// Way from clamp to lead over the plane (m), not smoothed.
     pub(super) path: Vec<Point>,
-    /// Centre of the lead, raw pixel.
-    pub(super) lead_px: [f64; 2],
     /// Rough radius of the lead (px).
     pub(super) lead_radius_px: f64,
     /// Colours and how much they scatter.
@@ -112,10 +110,10 @@ pub(super) fn find(
     );
     let centre = [(fattest % width) as f64, (fattest / width) as f64];
     let (lead, lead_px) = lead_place(frame, background, gain, centre, lead_radius_px);
-    let mut path: Vec<Point> = pixels.iter().map(|p| plane.from_pixel(*p)).collect();
+    let mut path: Vec<Point> = pixels.iter().map(|p| plane.point_at(*p)).collect();
     // The way over pixels enters the lead anywhere; end it at the centre.
     let inside = lead_radius_px / plane.px_per_m;
-    let end = plane.from_pixel(lead_px);
+    let end = plane.point_at(lead_px);
     while path.len() > 2
         && path
             .last()
@@ -126,7 +124,6 @@ pub(super) fn find(
     path.push(end);
     Ok(FirstLook {
         path,
-        lead_px,
         lead_radius_px,
         rope,
         lead,

@@ -57,8 +57,6 @@ pub(super) struct State {
     pub(super) velocity: Vec<Point>,
     /// Coverage found at each node, 0 to 1.
     pub(super) confidence: Vec<f64>,
-    /// Part of the lead's area found, 0 to 1.
-    pub(super) lead_seen: f64,
     pub(super) lost: bool,
 }
 
@@ -89,7 +87,7 @@ impl Follower<'_> {
             pixel = self.camera.project_left(&p);
             row = pixel.map_or(row, |[_, v]| v);
         }
-        pixel.map_or([0.0, 0.0], |p| self.plane.from_pixel(p))
+        pixel.map_or([0.0, 0.0], |p| self.plane.point_at(p))
     }
 
     /// Finds the rope in a frame from its state in a neighbouring one (earlier
@@ -218,7 +216,6 @@ impl Follower<'_> {
             },
             curve,
             confidence,
-            lead_seen,
             lost,
         }
     }
@@ -289,7 +286,7 @@ impl Follower<'_> {
             centre = circle.centre;
         }
         (
-            (seen > LEAST_LEAD).then(|| self.plane.from_pixel(centre)),
+            (seen > LEAST_LEAD).then(|| self.plane.point_at(centre)),
             seen,
         )
     }

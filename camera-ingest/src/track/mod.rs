@@ -275,7 +275,6 @@ fn learn<'a>(
         curve: curve::resample(&smooth, curve::length(&smooth), NODES),
         velocity: vec![[0.0; 2]; NODES],
         confidence: vec![1.0; NODES],
-        lead_seen: 1.0,
         lost: false,
     };
     let contrast = Contrast {

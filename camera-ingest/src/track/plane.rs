@@ -67,7 +67,7 @@ impl RopePlane {
     }
 
     /// Point of the plane seen at a raw pixel.
-    pub(super) fn from_pixel(&self, pixel: [f64; 2]) -> Point {
+    pub(super) fn point_at(&self, pixel: [f64; 2]) -> Point {
         let [x, y] = self.eye.undistort(pixel);
         let ray = Vector3::new(x, y, 1.0);
         let along = self.normal_c.dot(&ray);

@@ -1,0 +1,209 @@
+//! Work on a kept recording: tracking with publication, scoring.
+
+use super::keep::Recording;
+use super::{answer, failed};
+use crate::frame::EyeFrame;
+use crate::overlay::{OverlayError, keypoint_sheet, strobe};
+use crate::score::{ScoreOptions, score as score_frames};
+use crate::source::FrameSource;
+use crate::track::{ClampPath, TrackOptions, TrackResult, track as track_frames};
+use shared_types::ipc::KeypointPublisher;
+use shared_types::ipc::message::{
+    CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
+};
+use shared_types::ipc::rpc::Call;
+use shared_types::keypoints::{KeypointFrame, MAX_KEYPOINTS, TrackedFrame};
+use shared_types::{JointVector, MonotonicNs, StereoCamera};
+use std::path::Path;
+use std::time::Instant;
+
+/// Pictures in a contact sheet, and how many stand in a row.
+const SHEET: (usize, usize) = (20, 4);
+/// Exposures in a picture of a throw.
+const STROBES: usize = 14;
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Tracks the rope and publishes its keypoints.
+pub(super) fn track(
+    recording: &Recording,
+    call: &Call<CameraRpc>,
+    publisher: &KeypointPublisher,
+) -> CameraEvent {
+    try_track(recording, call, publisher).unwrap_or_else(failed)
+}
+
+fn try_track(
+    recording: &Recording,
+    call: &Call<CameraRpc>,
+    publisher: &KeypointPublisher,
+) -> Result<CameraEvent, Failure> {
+    let CameraRequest::Track {
+        camera,
+        joints,
+        keypoints,
+        overlay,
+    } = &call.request
+    else {
+        return Err("not a request to track".into());
+    };
+    let frames = recording
+        .left()
+        .ok_or("nothing is recorded for tracking; record first, left eye only")?;
+    let progress = Progress {
+        done: 0,
+        total: 1,
+        value: frames.len() as f64,
+        label: "frames".to_owned(),
+    };
+    answer(call, &CameraEvent::Progress(progress));
+    let began = Instant::now();
+    let clamp = clamp_path(joints, recording.first_stamp_ns())?;
+    let options = TrackOptions {
+        keypoints: *keypoints as usize,
+        ..TrackOptions::default()
+    };
+    let result = track_frames(frames, camera, &clamp, &options)?;
+    let ms_per_frame = began.elapsed().as_secs_f64() * 1e3 / frames.len() as f64;
+    publish(frames, &result, publisher)?;
+    if let Some(path) = overlay {
+        write_sheet(frames, &result, Path::new(path))?;
+    }
+    let appearance = RopeAppearance {
+        rope_radius_m: Some(result.appearance.rope_radius_m),
+        lead_radius_m: Some(result.appearance.lead_radius_m),
+        rope_rgb: result.appearance.rope_rgb,
+        lead_rgb: result.appearance.lead_rgb,
+    };
+    Ok(CameraEvent::Tracked {
+        first_stamp_ns: recording.first_stamp_ns(),
+        frames: u32::try_from(frames.len())?,
+        lost_part: result.track.lost_part(),
+        appearance,
+        ms_per_frame,
+    })
+}
+
+/// The clamp's motion, time 0 at the first frame.
+fn clamp_path(joints: &[(u64, JointVector)], first_stamp_ns: u64) -> Result<ClampPath, Failure> {
+    let samples: Vec<(f64, JointVector)> = joints
+        .iter()
+        .map(|(t, q)| (MonotonicNs(*t).since_s(MonotonicNs(first_stamp_ns)), *q))
+        .collect();
+    Ok(ClampPath::from_joints(&samples)?)
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "pixels and confidences need no more than single precision"
+)]
+fn payload(frame: &EyeFrame, tracked: &TrackedFrame) -> KeypointFrame {
+    let mut out = KeypointFrame {
+        sequence: frame.sequence,
+        stamp_ns: frame.stamp_ns,
+        count: 0,
+        lost: u32::from(tracked.lost),
+        points_px: [[0.0; 2]; MAX_KEYPOINTS],
+        confidence: [0.0; MAX_KEYPOINTS],
+    };
+    let slots = out.points_px.iter_mut().zip(&mut out.confidence);
+    for ((slot, confidence), (p, c)) in slots.zip(tracked.points.iter().zip(&tracked.confidence)) {
+        *slot = p.map(|v| v as f32);
+        *confidence = *c as f32;
+        out.count += 1;
+    }
+    out
+}
+
+fn publish(
+    frames: &[EyeFrame],
+    result: &TrackResult,
+    publisher: &KeypointPublisher,
+) -> Result<(), Failure> {
+    for (frame, tracked) in frames.iter().zip(&result.track.frames) {
+        let sample = publisher.loan_uninit().map_err(|e| format!("{e:?}"))?;
+        let sample = sample.write_payload(payload(frame, tracked));
+        sample.send().map_err(|e| format!("{e:?}"))?;
+    }
+    Ok(())
+}
+
+fn write_sheet(frames: &[EyeFrame], result: &TrackResult, path: &Path) -> Result<(), OverlayError> {
+    let step = frames.len().div_ceil(SHEET.0).max(1);
+    let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
+    keypoint_sheet(frames, &result.track, &chosen, SHEET.1)?.write_png(path)
+}
+
+/// Measures the closest approach in a throw.
+pub(super) fn score(recording: &mut Recording, call: &Call<CameraRpc>) -> CameraEvent {
+    try_score(recording, call).unwrap_or_else(failed)
+}
+
+fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<CameraEvent, Failure> {
+    let CameraRequest::Score {
+        camera,
+        tip_rgb,
+        target_rgb,
+        strobe: picture,
+    } = &call.request
+    else {
+        return Err("not a request to score".into());
+    };
+    if !recording.has_both() {
+        return Err("nothing is recorded for scoring; record first, both eyes".into());
+    }
+    // The picture is worth having even when the score fails.
+    let found = measure(recording, camera, *tip_rgb, *target_rgb);
+    if let Some(path) = picture {
+        write_strobe(
+            recording,
+            found.as_ref().ok().map(|s| s.time_s),
+            Path::new(path),
+        )?;
+    }
+    Ok(CameraEvent::Scored(found?))
+}
+
+fn measure(
+    recording: &mut Recording,
+    camera: &StereoCamera,
+    tip_rgb: [u8; 3],
+    target_rgb: [u8; 3],
+) -> Result<ScoreResult, Failure> {
+    let options = ScoreOptions::default();
+    let s = score_frames(recording, camera, tip_rgb, target_rgb, &options)?;
+    Ok(ScoreResult {
+        closest_m: s.closest_m,
+        interval_m: s.interval_m,
+        time_s: s.time_s,
+        target_m: s.target_m,
+    })
+}
+
+/// A multiple exposure of the throw up to a little after the closest approach.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the number of frames"
+)]
+fn write_strobe(
+    recording: &mut Recording,
+    closest_s: Option<f64>,
+    path: &Path,
+) -> Result<(), Failure> {
+    let first = recording.read(0)?.left();
+    let start = MonotonicNs(first.stamp_ns);
+    let until_s = closest_s.map_or(1.4, |t| t + 0.02);
+    let mut exposures = Vec::new();
+    for i in 0..recording.len() {
+        let left = recording.read(i)?.left();
+        if MonotonicNs(left.stamp_ns).since_s(start) > until_s {
+            break;
+        }
+        exposures.push(left);
+    }
+    let step = exposures.len().div_ceil(STROBES).max(1);
+    let chosen: Vec<&EyeFrame> = exposures.iter().rev().step_by(step).collect();
+    strobe(&first, &chosen)?.write_png(path)?;
+    Ok(())
+}

@@ -1,0 +1,217 @@
+//! The tracker and the scorer against rendered recordings with exact truth.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::cast_precision_loss,
+    reason = "tests may fail loudly"
+)]
+
+use std::path::{Path, PathBuf};
+
+use camera_ingest::source::{FrameSource, YuyvSource, read_left};
+use camera_ingest::track::TrackOptions;
+use camera_ingest::{ClampPath, ScoreOptions, TrackResult, load_camera, open_video, score, track};
+
+fn folder(name: &str) -> Option<PathBuf> {
+    let path = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/data/wiggle"
+    ))
+    .join(name);
+    if path.exists() {
+        Some(path)
+    } else {
+        println!("skipped: {} not found", path.display());
+        None
+    }
+}
+
+/// float32 .npy of shape (frames, nodes, width).
+fn read_npy(path: &Path) -> (Vec<usize>, Vec<f32>) {
+    let bytes = std::fs::read(path).unwrap();
+    let head = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let text = String::from_utf8_lossy(&bytes[10..10 + head]).into_owned();
+    assert!(text.contains("<f4") && text.contains("False"), "{text}");
+    let shape = text.split(['(', ')']).nth(1).unwrap();
+    let shape = shape
+        .split(',')
+        .filter_map(|s| s.trim().parse().ok())
+        .collect();
+    let values = bytes[10 + head..]
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect();
+    (shape, values)
+}
+
+fn truth_json(folder: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(folder.join("truth.json")).unwrap()).unwrap()
+}
+
+/// Tracks a recording; returns the errors (frame-major) and the result.
+fn track_errors(folder: &Path) -> (usize, Vec<f64>, TrackResult) {
+    let camera = load_camera(&folder.join("camera.toml")).unwrap();
+    let clamp = ClampPath::from_pose_csv(&folder.join("pose.csv")).unwrap();
+    let frames = read_left(&mut open_video(folder).unwrap()).unwrap();
+    let (shape, truth) = read_npy(&folder.join("nodes_left_px.npy"));
+    let options = TrackOptions {
+        keypoints: shape[1],
+        ..TrackOptions::default()
+    };
+    let result = track(&frames, &camera, &clamp, &options).unwrap();
+    result.track.validate().unwrap();
+    assert_eq!(result.track.frames.len(), shape[0]);
+    let points = result.track.frames.iter().flat_map(|f| &f.points);
+    let errors = points
+        .zip(truth.chunks_exact(2))
+        .map(|(p, t)| (p[0] - f64::from(t[0])).hypot(p[1] - f64::from(t[1])))
+        .collect();
+    (shape[1], errors, result)
+}
+
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[((sorted.len() - 1) as f64 * q) as usize]
+}
+
+/// The bars of a good tracker on these recordings: median 1.5 px, 95th
+/// percentile 3 px, no node off by more than 8 px, tip 95th percentile 4 px.
+fn assert_tracks(name: &str) {
+    let Some(folder) = folder(name) else { return };
+    let (nodes, errors, result) = track_errors(&folder);
+    let (median, p95, max) = (
+        quantile(&errors, 0.5),
+        quantile(&errors, 0.95),
+        quantile(&errors, 1.0),
+    );
+    println!("{name}: median {median:.2}, p95 {p95:.2}, max {max:.2} px");
+    assert!(
+        median <= 1.5 && p95 <= 3.0 && max <= 8.0,
+        "{median} {p95} {max}"
+    );
+    let tip: Vec<f64> = errors
+        .iter()
+        .skip(nodes - 1)
+        .step_by(nodes)
+        .copied()
+        .collect();
+    assert!(quantile(&tip, 0.95) <= 4.0, "tip {}", quantile(&tip, 0.95));
+    assert!(result.track.lost_part() < 1e-9);
+
+    let rope = &truth_json(&folder)["rope"];
+    let number = |key: &str| rope[key].as_f64().unwrap();
+    let seen = &result.appearance;
+    println!("{seen:?}");
+    // A third of a pixel is 0.9 mm at this distance.
+    assert!(
+        (seen.rope_radius_m - number("radius_m")).abs() < 1e-3,
+        "{seen:?}"
+    );
+    assert!(
+        (seen.lead_radius_m - number("lead_radius_m")).abs() < 1.5e-3,
+        "{seen:?}"
+    );
+    assert!(
+        (seen.length_m / number("length_m") - 1.0).abs() < 0.01,
+        "{seen:?}"
+    );
+}
+
+#[test]
+fn tracks_the_orange_rope_with_blur_and_shadow() {
+    assert_tracks("a1");
+}
+
+#[test]
+fn tracks_the_brown_rope_on_brown_planks() {
+    assert_tracks("a2");
+}
+
+#[test]
+fn scores_the_throw_within_a_centimetre() {
+    let Some(folder) = folder("athrow") else {
+        return;
+    };
+    let truth = truth_json(&folder);
+    let camera = load_camera(&folder.join("camera.toml")).unwrap();
+    let colour =
+        |key: &str| -> [u8; 3] { serde_json::from_value(truth["colours"][key].clone()).unwrap() };
+    let score = score(
+        &mut open_video(&folder).unwrap(),
+        &camera,
+        colour("lead_rgb"),
+        colour("target_rgb"),
+        &ScoreOptions::default(),
+    )
+    .unwrap();
+    let number = |key: &str| truth["throw"][key].as_f64().unwrap();
+    let distance = number("min_tip_target_distance_m");
+    println!(
+        "{:.1} mm, truth {:.1} mm",
+        score.closest_m * 1e3,
+        distance * 1e3
+    );
+    assert!(
+        (score.closest_m - distance).abs() < 0.008,
+        "{}",
+        score.closest_m
+    );
+    assert!((score.interval_m[0]..=score.interval_m[1]).contains(&distance));
+    assert!(
+        (score.time_s - number("t_min_s")).abs() < 0.003,
+        "{}",
+        score.time_s
+    );
+    let target: [f64; 3] = serde_json::from_value(truth["throw"]["target_xyz_m"].clone()).unwrap();
+    let off: f64 = (0..3)
+        .map(|k| (score.target_m[k] - target[k]).powi(2))
+        .sum();
+    assert!(off.sqrt() < 0.015, "{}", off.sqrt());
+}
+
+#[test]
+fn calibration_puts_true_nodes_on_their_pixels() {
+    for name in ["a1", "a2", "athrow"] {
+        let Some(folder) = folder(name) else { return };
+        let camera = load_camera(&folder.join("camera.toml")).unwrap();
+        let (shape, world) = read_npy(&folder.join("nodes_world_m.npy"));
+        let (_, left) = read_npy(&folder.join("nodes_left_px.npy"));
+        let (_, right) = read_npy(&folder.join("nodes_right_px.npy"));
+        // Frame 0: all still, so that the rows' times do not matter.
+        for node in 0..shape[1] {
+            let p: [f64; 3] = core::array::from_fn(|k| f64::from(world[node * 3 + k]));
+            let pixel = |all: &[f32]| [f64::from(all[node * 2]), f64::from(all[node * 2 + 1])];
+            let seen = camera.project_left(&p.into()).unwrap();
+            let off = (seen[0] - pixel(&left)[0]).hypot(seen[1] - pixel(&left)[1]);
+            assert!(off < 0.01, "{name} node {node}: {off} px");
+            let found = camera.triangulate(pixel(&left), pixel(&right)).unwrap();
+            let off = (found.p_w_m - nalgebra::Vector3::from(p)).norm();
+            assert!(off < 5e-5, "{name} node {node}: {off} m");
+        }
+    }
+}
+
+#[test]
+fn the_uncompressed_sample_shows_the_video() {
+    let Some(folder) = folder("a2") else { return };
+    let mut raw = YuyvSource::open(&folder.join("sample_1344x376.yuyv"), [1344, 376], 1).unwrap();
+    let mut video = open_video(&folder).unwrap();
+    assert_eq!((raw.len(), video.len()), (4, 400));
+    for (sample, frame) in [0, 133, 266, 399].into_iter().enumerate() {
+        let (a, b) = (raw.read(sample).unwrap().0, video.read(frame).unwrap().0);
+        let mean = |x: &[u8], y: &[u8]| {
+            let sum: f64 = x
+                .iter()
+                .zip(y)
+                .map(|(x, y)| f64::from(x.abs_diff(*y)))
+                .sum();
+            sum / x.len() as f64
+        };
+        // Quality 28 leaves a few grey levels; swapped planes would leave tens.
+        assert!(mean(&a.luma, &b.luma) < 8.0, "{}", mean(&a.luma, &b.luma));
+        assert!(mean(&a.cb, &b.cb) < 4.0 && mean(&a.cr, &b.cr) < 4.0);
+    }
+}
