@@ -20,6 +20,7 @@
 
 pub mod cmaes;
 pub mod collide;
+pub mod process;
 pub mod ropes;
 pub mod synthetic;
 pub mod sysid;

@@ -121,10 +121,12 @@ fn identify(
         .map(|(t, q)| (MonotonicNs(*t).since_s(epoch), *q))
         .unzip();
     let motion = MeasuredArm::new(&times_s, &q)?;
-    let appearance = request.appearance.map_or_else(Appearance::default, |a| Appearance {
-        rope_radius_m: a.rope_radius_m,
-        lead_radius_m: a.lead_radius_m,
-    });
+    let appearance = request
+        .appearance
+        .map_or_else(Appearance::default, |a| Appearance {
+            rope_radius_m: a.rope_radius_m,
+            lead_radius_m: a.lead_radius_m,
+        });
     let observation = Observation {
         track: &track,
         camera: &request.camera,

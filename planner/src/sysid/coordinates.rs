@@ -3,16 +3,16 @@
 //! Motion depends on bending stiffness and damping per length (`k s`, `c s`),
 //! masses and length, up to one common factor of stiffness, damping and masses.
 //! These are the coordinates: a change of the link count then leaves the motion
-//! nearly alone. Rope radius and link extra scale act only through the tiny link
-//! inertia and are not searched.
+//! nearly alone, so that the count is chosen after the search. Rope radius and
+//! link extra scale act only through the tiny link inertia and are not searched.
 
-use super::IdentifyOptions;
+use super::clock::ClockWindow;
 use super::scale::MassScale;
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
 
 /// Number of coordinates.
-pub(super) const COORDINATES: usize = 7;
+pub(super) const COORDINATES: usize = 6;
 /// Rope length (m).
 pub(super) const LENGTH: usize = 0;
 /// `ln(k s / µ)`.
@@ -25,8 +25,6 @@ pub(super) const LEAD_MASS: usize = 3;
 pub(super) const LEAD_RADIUS: usize = 4;
 /// Clock offset between arm and camera (s).
 pub(super) const CLOCK: usize = 5;
-/// Number of links, rounded.
-pub(super) const LINKS: usize = 6;
 
 /// Indices into [`RANGES`].
 mod parameter {
@@ -56,6 +54,7 @@ pub(super) struct Coordinates {
     pub(super) lower: [f64; COORDINATES],
     pub(super) upper: [f64; COORDINATES],
     pub(super) middle: [f64; COORDINATES],
+    links: u32,
     rope_radius_m: f64,
     link_extra_scale: f64,
     scale: MassScale,
@@ -65,8 +64,23 @@ fn middle_of(parameter: usize) -> f64 {
     (RANGES[parameter].min + RANGES[parameter].max) / 2.0
 }
 
+fn middle_links() -> u32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a range of small positive numbers"
+    )]
+    let links = middle_of(parameter::LINKS).round() as u32;
+    links
+}
+
 impl Coordinates {
-    pub(super) fn new(appearance: Appearance, options: &IdentifyOptions) -> Self {
+    /// The box for a film with this appearance and clock.
+    pub(super) fn new(
+        appearance: Appearance,
+        lead_mass_kg: Option<f64>,
+        clock: ClockWindow,
+    ) -> Self {
         use parameter as p;
         let links = (RANGES[p::LINKS].min, RANGES[p::LINKS].max);
         let length = (RANGES[p::LENGTH].min - 0.05, RANGES[p::LENGTH].max + 0.05);
@@ -91,20 +105,42 @@ impl Coordinates {
             // Leads of real ropes weigh as little as a quarter of the range's end.
             ratio(p::LEAD_MASS, (1.0, 1.0), 0.25),
             lead_radius,
-            (-options.clock_offset_max_s, options.clock_offset_max_s),
-            (links.0 - 0.499, links.1 + 0.499),
+            (
+                clock.offset_s - clock.half_width_s,
+                clock.offset_s + clock.half_width_s,
+            ),
         ];
         Self {
             lower: boxes.map(|b| b.0),
             upper: boxes.map(|b| b.1),
             middle: boxes.map(|b| (b.0 + b.1) / 2.0),
+            links: middle_links(),
             rope_radius_m: appearance
                 .rope_radius_m
                 .unwrap_or_else(|| middle_of(p::RADIUS))
                 .max(1e-4),
             link_extra_scale: middle_of(p::EXTRA_SCALE),
-            scale: MassScale::new(options.lead_mass_kg),
+            scale: MassScale::new(lead_mass_kg),
         }
+    }
+
+    /// The same box for ropes of another link count.
+    pub(super) fn with_links(&self, links: u32) -> Self {
+        Self {
+            links,
+            ..self.clone()
+        }
+    }
+
+    /// Link counts of the ranges.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a range of small positive numbers"
+    )]
+    pub(super) fn link_counts() -> impl Iterator<Item = u32> {
+        let range = RANGES[parameter::LINKS];
+        range.min as u32..=range.max as u32
     }
 
     /// Deviation of the first generation: a quarter of the box.
@@ -114,7 +150,7 @@ impl Coordinates {
 
     /// The rope of a point, its masses at the likeliest scale.
     pub(super) fn rope(&self, x: &[f64; COORDINATES]) -> RopeParams {
-        let links = x[LINKS].round();
+        let links = f64::from(self.links);
         let link_length = x[LENGTH] / links;
         let ratios = [
             x[STIFFNESS].exp() / link_length,
@@ -144,7 +180,7 @@ impl Coordinates {
     ) -> [Option<f64>; shared_types::rope::ROPE_PARAMETERS] {
         use parameter as p;
         let rope = self.rope(x).to_array();
-        let link_length = x[LENGTH] / x[LINKS].round();
+        let link_length = x[LENGTH] / f64::from(self.links);
         let ratios = [
             x[STIFFNESS].exp() / link_length,
             x[DAMPING].exp() / link_length,
@@ -188,7 +224,6 @@ mod tests {
             (rope.lead_mass_kg / mu).ln(),
             rope.lead_radius_m,
             0.0,
-            f64::from(rope.links),
         ]
     }
 
@@ -196,12 +231,13 @@ mod tests {
     fn every_rope_of_the_ranges_lies_in_the_box_and_keeps_its_ratios() {
         for seed in 0..300 {
             let rope = random_rope(seed);
-            let weighed = IdentifyOptions {
-                lead_mass_kg: Some(rope.lead_mass_kg),
-                ..IdentifyOptions::default()
+            let clock = ClockWindow {
+                offset_s: 0.0,
+                half_width_s: 0.01,
             };
-            for options in [IdentifyOptions::default(), weighed] {
-                let c = Coordinates::new(Appearance::default(), &options);
+            for lead_mass_kg in [None, Some(rope.lead_mass_kg)] {
+                let c = Coordinates::new(Appearance::default(), lead_mass_kg, clock)
+                    .with_links(rope.links);
                 let x = point_of(&rope);
                 for i in 0..COORDINATES {
                     assert!(x[i] >= c.lower[i] && x[i] <= c.upper[i], "{i}: {}", x[i]);
@@ -222,7 +258,7 @@ mod tests {
                 ] {
                     assert!((a / b / factor - 1.0).abs() < 1e-9);
                 }
-                if options.lead_mass_kg.is_some() {
+                if lead_mass_kg.is_some() {
                     assert!((factor - 1.0).abs() < 1e-9);
                 }
             }

@@ -7,6 +7,7 @@
 //! over those, and [`scale`] adds the factor that the parameter ranges, or a
 //! weighed lead, make likely. A Gauss-Newton polish gives the uncertainty.
 
+mod clock;
 mod coordinates;
 mod observe;
 mod polish;
@@ -15,9 +16,10 @@ pub mod scale;
 pub use coordinates::Appearance;
 
 use crate::cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
+use clock::clock_window;
 use coordinates::{COORDINATES, Coordinates};
 use observe::Film;
-use rope_sim::{AttachMotion, Precision, SimulateError};
+use rope_sim::{AttachMotion, SimulateError};
 use serde::{Deserialize, Serialize};
 use shared_types::keypoints::KeypointError;
 use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
@@ -59,7 +61,9 @@ pub struct IdentifyOptions {
     pub generations: usize,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Step of the rope simulation (s).
+    /// Step of the rope simulation in the search (s).
+    pub search_step_s: f64,
+    /// Step of the rope simulation in the polish (s).
     pub step_s: f64,
     /// Threads.
     pub threads: usize,
@@ -73,6 +77,11 @@ pub struct IdentifyOptions {
     pub outlier_px: f64,
     /// Keypoints below this confidence are not used.
     pub confidence_min: f64,
+    /// Distance (px) above which a search counts as caught in a side minimum
+    /// and is repeated from other random numbers.
+    pub repeat_above_px: f64,
+    /// Most repeats of the search.
+    pub repeats_max: usize,
     /// Largest part of frames in which the rope may be lost.
     pub lost_part_max: f64,
     /// Fewest frames.
@@ -85,6 +94,7 @@ impl Default for IdentifyOptions {
             population: 60,
             generations: 50,
             seed: 0,
+            search_step_s: 2e-3,
             step_s: 1e-3,
             threads: 2,
             search_frames_max: 140,
@@ -92,6 +102,8 @@ impl Default for IdentifyOptions {
             clock_offset_max_s: 0.06,
             outlier_px: 3.0,
             confidence_min: 0.2,
+            repeat_above_px: 2.5,
+            repeats_max: 2,
             lost_part_max: 0.05,
             frames_min: 60,
         }
@@ -186,10 +198,35 @@ pub fn identify(
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
     check(observation, options)?;
-    let coordinates = Coordinates::new(observation.appearance, options);
     let film = Film::new(observation, options);
-    let (start, searched) = search(&film, &coordinates, options, progress)?;
-    polish::polish(&film, &coordinates, options, &start, searched)
+    let clock = clock_window(
+        &film.clamp(),
+        observation.camera,
+        observation.motion,
+        options.clock_offset_max_s,
+    );
+    let coordinates = Coordinates::new(observation.appearance, options.lead_mass_kg, clock);
+    let mut found = search(&film, &coordinates, options, options.seed, progress)?;
+    for repeat in 1..=options.repeats_max as u64 {
+        if found.distance_px <= options.repeat_above_px {
+            break;
+        }
+        let seed = options.seed.wrapping_add(repeat << 32);
+        let again = search(&film, &coordinates, options, seed, progress)?;
+        let simulations = found.simulations + again.simulations;
+        if again.distance_px < found.distance_px {
+            found = again;
+        }
+        found.simulations = simulations;
+    }
+    polish::polish(&film, &coordinates, options.seed, &found)
+}
+
+/// Result of the global search.
+struct Found {
+    x: [f64; COORDINATES],
+    distance_px: f64,
+    simulations: usize,
 }
 
 fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyError> {
@@ -214,6 +251,12 @@ fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyE
         return Err(IdentifyError::MotionTooShort { motion_s, film_s });
     }
     let rules = [
+        (
+            "search_step_s",
+            options.search_step_s,
+            options.search_step_s > 0.0 && options.search_step_s <= 5e-3,
+            "above 0 and at most 0.005 s",
+        ),
         (
             "step_s",
             options.step_s,
@@ -251,13 +294,14 @@ fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyE
     Ok(())
 }
 
-/// The global search; returns the best point and the simulations used.
+/// The global search.
 fn search(
     film: &Film<'_>,
     coordinates: &Coordinates,
     options: &IdentifyOptions,
+    seed: u64,
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
-) -> Result<([f64; COORDINATES], usize), IdentifyError> {
+) -> Result<Found, IdentifyError> {
     let mut strategy = CmaEs::new(CmaOptions {
         mean: coordinates.middle.to_vec(),
         std_dev: coordinates.spread().to_vec(),
@@ -265,12 +309,12 @@ fn search(
         upper: coordinates.upper.to_vec(),
         population: options.population,
         draws_max: 1,
-        seed: options.seed,
+        seed,
         stop: StopRules {
             generations_max: options.generations,
             // The polish takes over where the search only refines.
-            step_tolerance: 4e-3,
-            fitness_tolerance: 2e-3,
+            step_tolerance: 2e-2,
+            fitness_tolerance: 5e-3,
             ..StopRules::default()
         },
     })?;
@@ -281,7 +325,7 @@ fn search(
             .iter()
             .map(|x| core::array::from_fn(|i| x[i]))
             .collect();
-        let fitness = film.distances_px(coordinates, &points, Precision::F32)?;
+        let fitness = film.distances_px(coordinates, &points)?;
         simulations += points.len();
         strategy.tell(&fitness)?;
         let (residual_px, best) = match strategy.best() {
@@ -303,7 +347,11 @@ fn search(
         }
         if let Some(reason) = strategy.stop() {
             tracing::debug!(?reason, simulations, residual_px, "rope search ended");
-            return Ok((best, simulations));
+            return Ok(Found {
+                x: best,
+                distance_px: residual_px,
+                simulations,
+            });
         }
     }
 }

@@ -31,6 +31,7 @@ pub(super) struct Sighting {
 /// The observation in the form the fit compares.
 pub(super) struct Film<'a> {
     observation: &'a Observation<'a>,
+    search_step_s: f64,
     step_s: f64,
     threads: usize,
     outlier_px: f64,
@@ -76,6 +77,7 @@ impl<'a> Film<'a> {
         };
         let film_s = usable.last().map_or(0.0, |f| f.t_s);
         Self {
+            search_step_s: options.search_step_s,
             step_s: options.step_s,
             threads: options.threads.max(1),
             outlier_px: options.outlier_px,
@@ -97,21 +99,34 @@ impl<'a> Film<'a> {
         &self,
         coordinates: &Coordinates,
         points: &[[f64; COORDINATES]],
-        precision: Precision,
     ) -> Result<Vec<f64>, IdentifyError> {
         let ropes: Vec<RopeParams> = points.iter().map(|x| coordinates.rope(x)).collect();
-        let rollouts = self.simulate(&ropes, precision)?;
+        let rollouts = self.run(&ropes, Precision::F32, self.search_step_s)?;
         let jobs: Vec<_> = points.iter().zip(&rollouts).collect();
         Ok(map_in_order(&jobs, self.threads, |(x, rollout)| {
             self.distance_px(rollout, x[CLOCK])
         }))
     }
 
-    /// Simulates the filmed motion with each rope.
-    pub(super) fn simulate(
+    /// The sightings of the clamp.
+    pub(super) fn clamp(&self) -> Vec<Sighting> {
+        self.all
+            .iter()
+            .filter(|s| s.along == 0.0)
+            .copied()
+            .collect()
+    }
+
+    /// Simulates the filmed motion with each rope, in double precision.
+    pub(super) fn simulate(&self, ropes: &[RopeParams]) -> Result<Vec<Rollout>, IdentifyError> {
+        self.run(ropes, Precision::F64, self.step_s)
+    }
+
+    fn run(
         &self,
         ropes: &[RopeParams],
         precision: Precision,
+        step_s: f64,
     ) -> Result<Vec<Rollout>, IdentifyError> {
         let candidates: Vec<Candidate<'_>> = ropes
             .iter()
@@ -129,7 +144,7 @@ impl<'a> Film<'a> {
         Ok(roll_out(
             &candidates,
             &SimOptions {
-                step_s: self.step_s,
+                step_s,
                 precision,
                 start: Start::Equilibrium,
                 frames: FrameTimes {

@@ -2,29 +2,27 @@
 //!
 //! Iteratively reweighted least squares with a weak Gaussian prior per
 //! coordinate, finite differences from one batch of simulations in double
-//! precision. The link count stays: with bending stiffness per length as the
-//! coordinate it hardly acts on the motion.
+//! precision.
 
-use super::coordinates::{COORDINATES, Coordinates, LINKS};
+use super::coordinates::{CLOCK, COORDINATES as FREE, Coordinates};
 use super::observe::{Film, INVISIBLE_PX};
-use super::{IdentifyError, IdentifyOptions};
+use super::{Found, IdentifyError};
 use nalgebra::{SMatrix, SVector};
-use rope_sim::{Outcome, Precision, Rollout};
+use rope_sim::{Outcome, Rollout};
 use shared_types::RopeEstimate;
 
-/// Coordinates that are polished: all but the link count.
-const FREE: usize = COORDINATES - 1;
-const _: () = assert!(LINKS == FREE, "the link count is the last coordinate");
 /// Steps of the finite differences: length (m), three logarithms, lead radius
 /// (m), clock (s).
 const STEPS: [f64; FREE] = [2e-4, 5e-3, 5e-3, 5e-3, 5e-4, 5e-4];
 /// Most iterations.
 const ITERATIONS: usize = 8;
+/// Most iterations for each other link count.
+const ITERATIONS_PER_COUNT: usize = 1;
 /// A coordinate whose deviation keeps more than this part of the prior's was
 /// not seen.
 const UNSEEN_PART: f64 = 0.7;
 
-type Point = [f64; COORDINATES];
+type Point = [f64; FREE];
 type Normal = SMatrix<f64, FREE, FREE>;
 type Gradient = SVector<f64, FREE>;
 
@@ -38,75 +36,110 @@ struct Linearised {
     mean_square: f64,
 }
 
-/// Refines `start` and measures how well each coordinate is known.
+/// Refines the point of a search, chooses the link count, and measures how
+/// well each coordinate is known.
 pub(super) fn polish(
     film: &Film<'_>,
     coordinates: &Coordinates,
-    options: &IdentifyOptions,
-    start: &Point,
-    searched: usize,
+    seed: u64,
+    found: &Found,
 ) -> Result<RopeEstimate, IdentifyError> {
-    let prior_std: Gradient =
-        SVector::from_fn(|i, _| (coordinates.upper[i] - coordinates.lower[i]) / 12.0_f64.sqrt());
-    let prior = |x: &Point| -> Gradient {
-        SVector::from_fn(|i, _| (x[i] - coordinates.middle[i]) / prior_std[i].powi(2))
+    let mut descent = Descent {
+        film,
+        prior_std: SVector::from_fn(|i, _| {
+            (coordinates.upper[i] - coordinates.lower[i]) / 12.0_f64.sqrt()
+        }),
+        simulations: found.simulations,
     };
-    let prior_normal = Normal::from_diagonal(&prior_std.map(|s| 1.0 / (s * s)));
-    let mut simulations = searched;
-    let mut evaluate = |x: &Point| {
-        simulations += 2 * FREE + 1;
-        linearise(film, coordinates, x)
-    };
-    let mut x = *start;
-    let mut at = evaluate(&x)?;
-    let mut damping = 1e-3;
-    for _ in 0..ITERATIONS {
-        let weight = information_per_px2(film, &at);
-        let normal = at.normal * weight + prior_normal;
-        let gradient = at.gradient * weight + prior(&x);
-        let damped = normal + Normal::from_diagonal(&(normal.diagonal() * damping));
-        let Some(step) = damped.cholesky().map(|c| c.solve(&gradient)) else {
-            break;
-        };
-        let mut tried = x;
-        for i in 0..FREE {
-            tried[i] = (x[i] - step[i]).clamp(coordinates.lower[i], coordinates.upper[i]);
-        }
-        let there = evaluate(&tried)?;
-        if there.cost < at.cost {
-            let settled = at.cost - there.cost < 1e-5 * at.cost;
-            (x, at) = (tried, there);
-            damping = (damping / 10.0_f64).max(1e-9);
-            if settled {
-                break;
-            }
-        } else {
-            damping = damping.max(1e-6) * 30.0;
-            if damping > 1e4 {
-                break;
-            }
+    let (x, _) = descent.run(coordinates, &found.x, ITERATIONS)?;
+    let mut best: Option<(Coordinates, Point, Linearised)> = None;
+    for links in Coordinates::link_counts() {
+        let with_links = coordinates.with_links(links);
+        let (x, at) = descent.run(&with_links, &x, ITERATIONS_PER_COUNT)?;
+        if best.as_ref().is_none_or(|(_, _, b)| at.cost < b.cost) {
+            best = Some((with_links, x, at));
         }
     }
-    let normal = at.normal * information_per_px2(film, &at) + prior_normal;
-    let covariance = normal.try_inverse().unwrap_or_else(Normal::zeros);
-    let mut std_dev = [None; COORDINATES];
-    for i in 0..FREE {
-        let deviation = covariance[(i, i)].max(0.0).sqrt();
-        std_dev[i] =
-            (deviation > 0.0 && deviation < UNSEEN_PART * prior_std[i]).then_some(deviation);
-    }
-    if at.mean_square >= INVISIBLE_PX {
+    let Some((coordinates, x, at)) = best.filter(|(_, _, at)| at.mean_square < INVISIBLE_PX) else {
         return Err(IdentifyError::NothingVisible);
-    }
+    };
     Ok(RopeEstimate {
         params: coordinates.rope(&x),
-        std_dev: coordinates.rope_std_dev(&x, &std_dev),
+        std_dev: coordinates.rope_std_dev(&x, &descent.std_dev(&at)),
         residual_px: at.mean_square.sqrt(),
         method: "cmaes".try_into().unwrap_or_default(),
-        simulations: u32::try_from(simulations).unwrap_or(u32::MAX),
-        seed: options.seed,
-        time_offset_s: x[super::coordinates::CLOCK],
+        simulations: u32::try_from(descent.simulations).unwrap_or(u32::MAX),
+        seed,
+        time_offset_s: x[CLOCK],
     })
+}
+
+/// A damped Gauss-Newton descent.
+struct Descent<'a> {
+    film: &'a Film<'a>,
+    /// Deviations of the prior.
+    prior_std: Gradient,
+    simulations: usize,
+}
+
+impl Descent<'_> {
+    fn prior(&self) -> Normal {
+        Normal::from_diagonal(&self.prior_std.map(|s| 1.0 / (s * s)))
+    }
+
+    fn evaluate(&mut self, c: &Coordinates, x: &Point) -> Result<Linearised, IdentifyError> {
+        self.simulations += 2 * FREE + 1;
+        linearise(self.film, c, x)
+    }
+
+    fn run(
+        &mut self,
+        c: &Coordinates,
+        start: &Point,
+        iterations: usize,
+    ) -> Result<(Point, Linearised), IdentifyError> {
+        let mut x = *start;
+        let mut at = self.evaluate(c, &x)?;
+        let mut damping = 1e-4;
+        for _ in 0..iterations {
+            let information = information_per_px2(self.film, &at);
+            let from_prior: Gradient =
+                SVector::from_fn(|i, _| (x[i] - c.middle[i]) / self.prior_std[i].powi(2));
+            let normal = at.normal * information + self.prior();
+            let gradient = at.gradient * information + from_prior;
+            let damped = normal + Normal::from_diagonal(&(normal.diagonal() * damping));
+            let Some(step) = damped.cholesky().map(|f| f.solve(&gradient)) else {
+                break;
+            };
+            let tried = core::array::from_fn(|i| (x[i] - step[i]).clamp(c.lower[i], c.upper[i]));
+            let there = self.evaluate(c, &tried)?;
+            if there.cost < at.cost {
+                let settled = at.cost - there.cost < 1e-4 * at.cost;
+                (x, at) = (tried, there);
+                damping = (damping / 10.0_f64).max(1e-9);
+                if settled {
+                    break;
+                }
+            } else {
+                damping = damping.max(1e-5) * 30.0;
+                if damping > 1e3 {
+                    break;
+                }
+            }
+        }
+        Ok((x, at))
+    }
+
+    /// Deviation of each coordinate; `None` where the film added little to the
+    /// prior.
+    fn std_dev(&self, at: &Linearised) -> [Option<f64>; FREE] {
+        let normal = at.normal * information_per_px2(self.film, at) + self.prior();
+        let covariance = normal.try_inverse().unwrap_or_else(Normal::zeros);
+        core::array::from_fn(|i| {
+            let deviation = covariance[(i, i)].max(0.0).sqrt();
+            (deviation > 0.0 && deviation < UNSEEN_PART * self.prior_std[i]).then_some(deviation)
+        })
+    }
 }
 
 /// Inverse variance of one squared pixel of cost. Keypoints of one frame come
@@ -137,7 +170,7 @@ fn linearise(
         spans[i] = span;
     }
     let ropes: Vec<_> = points.iter().map(|p| coordinates.rope(p)).collect();
-    let rollouts = film.simulate(&ropes, Precision::F64)?;
+    let rollouts = film.simulate(&ropes)?;
     Ok(accumulate(film, &points, &rollouts, &spans))
 }
 
@@ -147,7 +180,6 @@ fn accumulate(
     rollouts: &[Rollout],
     spans: &[f64; FREE],
 ) -> Linearised {
-    let clock = super::coordinates::CLOCK;
     let mut out = Linearised {
         normal: Normal::zeros(),
         gradient: Gradient::zeros(),
@@ -164,7 +196,7 @@ fn accumulate(
     for sighting in &film.all {
         let mut residual = [[0.0; 2]; 2 * FREE + 1];
         for ((slot, rollout), point) in residual.iter_mut().zip(rollouts).zip(points) {
-            match film.residual_px(&rollout.nodes, sighting, point[clock]) {
+            match film.residual_px(&rollout.nodes, sighting, point[CLOCK]) {
                 Some(r) => *slot = r,
                 None => return out,
             }
