@@ -222,3 +222,64 @@ fn quintics(a: &Knot, b: &Knot, length_s: f64) -> [[f64; 6]; CHANNELS] {
         ]
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PlannedArm;
+    use shared_types::{JointTrajectory, JointVector};
+
+    fn arm() -> PlannedArm {
+        let waypoints = [
+            JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
+            JointVector([0.3, -0.2, 0.4, 0.7, -0.5, 1.1, 0.6]),
+            JointVector([0.1, -0.5, 0.2, 1.0, 0.3, 1.6, -0.4]),
+        ];
+        PlannedArm::new(JointTrajectory::new(&[0.0, 0.31234, 0.70321], &waypoints).unwrap())
+    }
+
+    #[test]
+    fn quintics_follow_the_arm_and_its_acceleration() {
+        let arm = arm();
+        let path = BasePath::new(&arm, 5e-4, 1.0).unwrap();
+        let mut squared = 0.0;
+        for interval in &path.intervals {
+            let u = 0.37_f64;
+            let t_s = interval.start_s + u * interval.length_s();
+            let want = arm.at(t_s);
+            let got = interval.position_m(t_s);
+            for axis in 0..3 {
+                assert!(
+                    (got[axis] - want.p_m[axis]).abs() < 1e-8,
+                    "position at {t_s}"
+                );
+                let [_, _, c2, c3, c4, c5] = interval.quintic[axis];
+                let second = 2.0 * c2 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5));
+                let error = second / interval.length_s().powi(2) - want.a_m_s2[axis];
+                // Within the interval that holds a waypoint the jerk jumps.
+                assert!(error.abs() < 0.3, "acceleration at {t_s}: {error}");
+                squared += error * error;
+            }
+        }
+        let rms = (squared / path.intervals.len() as f64).sqrt();
+        assert!(rms < 0.03, "acceleration error {rms} m/s² of some 10");
+    }
+
+    #[test]
+    fn steps_meet_the_end_of_the_trajectory_and_restart_there() {
+        let path = BasePath::new(&arm(), 5e-4, 1.0).unwrap();
+        let starts: Vec<f64> = path
+            .intervals
+            .iter()
+            .filter(|i| i.restart)
+            .map(|i| i.start_s)
+            .collect();
+        assert_eq!(starts.len(), 2);
+        assert!((starts[1] - 0.70321).abs() < 1e-12);
+        let steps: usize = path.intervals.iter().map(|i| i.steps).sum();
+        let (end_s, step_s) = path.end_of_step_s(steps);
+        assert!((end_s - 1.0).abs() < 1e-12);
+        assert!(step_s <= 5e-4 + 1e-15);
+        assert!(path.intervals.iter().all(|i| i.length_s() <= KNOT_S + 1e-9));
+    }
+}

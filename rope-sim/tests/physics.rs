@@ -10,10 +10,11 @@
 
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Precision, Rollout, SimOptions, Start, roll_out,
+    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start,
+    roll_out,
 };
-use shared_types::RopeParams;
 use shared_types::kinematics::FrameMotion;
+use shared_types::{JointTrajectory, JointVector, RopeParams};
 
 const G: f64 = 9.81;
 
@@ -171,6 +172,79 @@ fn equilibrium_stays_where_it_is_and_links_keep_their_length() {
             let link = rollout.nodes.position(frame, 9) - rollout.nodes.position(frame, 8);
             assert!((link.norm() - rope.link_length_m()).abs() < 1e-6);
         }
+    }
+}
+
+/// An arm that starts and stops with a jump of acceleration, off the grid of steps.
+fn clamped_arm() -> PlannedArm {
+    let waypoints = [
+        JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
+        JointVector([0.2, -0.3, 0.2, 0.8, -0.2, 1.2, 0.3]),
+        JointVector([0.1, -0.5, 0.1, 1.0, 0.1, 1.6, -0.2]),
+    ];
+    PlannedArm::new(JointTrajectory::new(&[0.0, 0.2137, 0.4511], &waypoints).unwrap())
+}
+
+#[test]
+fn acceleration_jumps_do_not_cost_the_order() {
+    let rope = RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8]);
+    let tips = |step_s| {
+        let rollout = simulate(
+            &rope,
+            &clamped_arm(),
+            &SimOptions {
+                step_s,
+                ..options(0.9, 100.0)
+            },
+        );
+        (0..rollout.nodes.frames())
+            .map(|f| rollout.nodes.position(f, 22))
+            .collect::<Vec<_>>()
+    };
+    let truth = tips(3.125e-5);
+    let error = |step_s| {
+        let differences = tips(step_s)
+            .into_iter()
+            .zip(&truth)
+            .map(|(a, b)| (a - b).norm());
+        differences.fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (error(1e-3), error(2.5e-4));
+    assert!(coarse < 5e-4, "{coarse} m at 1 ms");
+    assert!(
+        (coarse / fine).log2() / 2.0 > 1.7,
+        "{coarse} m at 1 ms, {fine} m at 0.25 ms"
+    );
+}
+
+#[test]
+fn closest_approach_is_that_of_the_recorded_path() {
+    let rope = RopeParams::from_array([22.0, 0.55, 0.01, 0.2, 0.008, 0.06, 0.06, 0.03, 0.8]);
+    let target = [0.45, 0.1, 0.05];
+    for precision in [Precision::F32, Precision::F64] {
+        let options = SimOptions {
+            closest_to_m: Some(target),
+            precision,
+            step_s: 5e-4,
+            ..options(0.9, 20_000.0)
+        };
+        let rollout = simulate(&rope, &clamped_arm(), &options);
+        let distance = |f: usize| (rollout.nodes.position(f, 22) - Vector3::from(target)).norm();
+        let (mut best, mut best_frame) = (f64::INFINITY, 0);
+        for frame in 0..rollout.nodes.frames() {
+            if distance(frame) < best {
+                (best, best_frame) = (distance(frame), frame);
+            }
+        }
+        let closest = rollout.closest.unwrap();
+        assert!(
+            (closest.distance_m - best).abs() < 2e-6,
+            "{closest:?} against {best}"
+        );
+        assert!(
+            (closest.time_s - best_frame as f64 / 20_000.0).abs() < 3e-4,
+            "{closest:?}"
+        );
     }
 }
 
