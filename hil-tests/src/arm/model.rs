@@ -331,3 +331,6 @@ impl ArmModel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

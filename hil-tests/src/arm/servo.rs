@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn joint_speed_limit_is_180_degrees_a_second() {
-        assert_eq!(stream(6, 3.14, |_| 0), (None, 200));
+        assert_eq!(stream(6, 3.13, |_| 0), (None, 200));
         assert_eq!(stream(6, 3.15, |_| 0).0, Some(ErrorCode::SPEED_LIMIT));
     }
 

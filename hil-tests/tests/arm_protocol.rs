@@ -1,0 +1,327 @@
+//! The simulated arm over real sockets, as clients see it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::float_cmp,
+    reason = "tests may fail loudly"
+)]
+
+use hil_tests::arm::{ArmConfig, ArmStartError, SimulatedArm, clock};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
+use rt_controller::xarm::report::{ForceReport, NormalReport, RealtimeReport, RichReport};
+use rt_controller::xarm::{
+    ArmState, Command, ErrorCode, FrameReader, JointQuery, Mode, Protocol, ReplyData, ReportReader,
+    StateRequest, Status,
+};
+use shared_types::{JointVector, MonotonicNs};
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, TcpStream};
+use std::time::Duration;
+
+fn start() -> SimulatedArm {
+    start_at(JointVector::ZERO)
+}
+
+fn start_at(initial_q: JointVector) -> SimulatedArm {
+    SimulatedArm::start(ArmConfig {
+        command_port: 0,
+        report_ports: [0; 4],
+        initial_q,
+        ..ArmConfig::default()
+    })
+    .unwrap()
+}
+
+fn connect(port: u16) -> TcpStream {
+    let stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap();
+    stream.set_nodelay(true).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(5)))
+        .unwrap();
+    stream
+}
+
+/// A client of the command port.
+struct Client {
+    stream: TcpStream,
+    reader: FrameReader,
+    transaction: u16,
+}
+
+impl Client {
+    fn new(arm: &SimulatedArm) -> Self {
+        Self {
+            stream: connect(arm.ports().command),
+            reader: FrameReader::new(),
+            transaction: 0,
+        }
+    }
+
+    fn ask(&mut self, command: &Command) -> (Status, ReplyData) {
+        self.transaction += 1;
+        let mut out = [0; MAX_FRAME_LEN];
+        let n = emit_command(&mut out, self.transaction, Protocol::Private, command).unwrap();
+        self.stream.write_all(&out[..n]).unwrap();
+        loop {
+            if let Some(frame) = self.reader.next_frame().unwrap() {
+                let reply = frame.as_reply().unwrap();
+                assert_eq!(reply.transaction, self.transaction);
+                return (reply.status, ReplyData::parse(command, &reply).unwrap());
+            }
+            let n = self.stream.read(self.reader.space()).unwrap();
+            assert!(n > 0, "connection closed");
+            self.reader.commit(n);
+        }
+    }
+
+    fn bring_up(&mut self, mode: Mode) {
+        for command in [
+            Command::CleanError,
+            Command::MotionEnable {
+                joint: Command::ALL_JOINTS,
+                enable: true,
+            },
+            Command::SetMode(mode),
+            Command::SetState(StateRequest::Ready),
+        ] {
+            self.ask(&command);
+        }
+        assert_eq!(self.state(), ArmState::Ready);
+    }
+
+    fn state(&mut self) -> ArmState {
+        match self.ask(&Command::GetState).1 {
+            ReplyData::State(state) => state,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn error(&mut self) -> ErrorCode {
+        match self.ask(&Command::GetFault).1 {
+            ReplyData::Fault { error, .. } => ErrorCode(error),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn q(&mut self) -> JointVector {
+        match self.ask(&Command::JointPosition(JointQuery::MEASURED)).1 {
+            ReplyData::JointMotion { position, .. } => position,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Streams one joint from the present reference at 250 Hz until an error.
+    fn stream_until_error(&mut self, from: JointVector, joint: usize, speed_rad_s: f64) {
+        let mut q = from;
+        let mut due = clock::now();
+        for _ in 0..400 {
+            q[joint] += speed_rad_s * 0.004;
+            if self.ask(&Command::ServoJoint(q)).0.has_error() {
+                return;
+            }
+            due = due.plus_s(0.004);
+            clock::sleep_until(due);
+        }
+        panic!("no error in 400 setpoints");
+    }
+}
+
+fn wait_s(span_s: f64) {
+    std::thread::sleep(Duration::from_secs_f64(span_s));
+}
+
+fn read_reports(port: u16, count: usize) -> Vec<(MonotonicNs, Vec<u8>)> {
+    let mut stream = connect(port);
+    let mut reader = ReportReader::new();
+    let mut reports = Vec::new();
+    while reports.len() < count {
+        let n = stream.read(reader.space()).unwrap();
+        assert!(n > 0, "connection closed");
+        reader.commit(n);
+        while let Some(report) = reader.next_report().unwrap() {
+            reports.push((clock::now(), report.to_vec()));
+        }
+    }
+    reports
+}
+
+#[test]
+fn random_and_broken_frames_never_wedge_it() {
+    let arm = start();
+    let mut good = Client::new(&arm);
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for round in 0..60 {
+        let mut bad = connect(arm.ports().command);
+        let mut bytes = vec![0; rng.random_range(1..600)];
+        rng.fill_bytes(&mut bytes);
+        if round % 2 == 0 {
+            // A good header, so that the body reaches the registers.
+            let body = u8::try_from(bytes.len().saturating_sub(6).clamp(1, 250)).unwrap();
+            let header = [0, 1, 0, 2, 0, body];
+            let n = header.len().min(bytes.len());
+            bytes[..n].copy_from_slice(&header[..n]);
+        }
+        // The arm may have closed a hopeless connection already.
+        let _ = bad.write_all(&bytes);
+        drop(bad);
+        good.ask(&Command::GetState);
+    }
+    assert_eq!(Client::new(&arm).state(), good.state());
+}
+
+#[test]
+fn heartbeats_are_ignored_and_an_unknown_register_is_answered_as_invalid() {
+    let arm = start();
+    let mut stream = connect(arm.ports().command);
+    stream.write_all(&[0, 0, 0, 1, 0, 2, 0, 0]).unwrap();
+    stream.write_all(&[0, 5, 0, 3, 0, 2, 0xEE, 9]).unwrap();
+    let mut reply = [0; 8];
+    stream.read_exact(&mut reply).unwrap();
+    assert_eq!(reply[..7], [0, 5, 0, 3, 0, 2, 0xEE]);
+    assert!(Status(reply[7]).is_invalid() && Status(reply[7]).has_warning());
+}
+
+#[test]
+fn two_clients_share_one_arm() {
+    let arm = start();
+    let (mut a, mut b) = (Client::new(&arm), Client::new(&arm));
+    a.bring_up(Mode::Servo);
+    assert_eq!(b.state(), ArmState::Ready);
+    let mut target = JointVector::ZERO;
+    target[6] = 0.02;
+    a.ask(&Command::ServoJoint(target));
+    wait_s(0.3);
+    assert!((b.q() - target).max_abs() < 1e-4);
+    b.ask(&Command::SetState(StateRequest::Stop));
+    assert!(a.ask(&Command::ServoJoint(target)).0.is_not_ready());
+}
+
+/// A burst of setpoints far above 250 Hz ends at the newest one.
+#[test]
+fn only_the_newest_setpoint_counts() {
+    let arm = start();
+    let mut client = Client::new(&arm);
+    client.bring_up(Mode::Servo);
+    let mut q = JointVector::ZERO;
+    for k in 1..=50 {
+        q[6] = 5e-4 * f64::from(k);
+        assert_eq!(client.ask(&Command::ServoJoint(q)).0, Status(0));
+    }
+    wait_s(0.3);
+    assert!((client.q()[6] - 0.025).abs() < 1e-4);
+    assert_eq!(client.error(), ErrorCode::NONE);
+}
+
+#[test]
+fn limits_raise_their_codes_and_can_be_recovered_from() {
+    let mut stretched = JointVector::ZERO;
+    (stretched[1], stretched[3], stretched[5]) = (0.8, 2.4, 1.6);
+    // Joint, speed, code: joint 6 reaches its range, joint 7 is too fast, and
+    // joint 1 moves the flange, 0.66 m away, at 1.5 m/s.
+    let cases = [
+        (5, 3.0, ErrorCode::JOINT_LIMIT),
+        (6, 3.5, ErrorCode::SPEED_LIMIT),
+        (0, 2.3, ErrorCode::TCP_SPEED_LIMIT),
+    ];
+    for (joint, speed_rad_s, code) in cases {
+        let arm = start_at(stretched);
+        let mut client = Client::new(&arm);
+        client.bring_up(Mode::Servo);
+        client.stream_until_error(stretched, joint, speed_rad_s);
+        assert_eq!(client.error(), code, "joint {}", joint + 1);
+        assert_eq!(client.state(), ArmState::Stopped);
+        wait_s(0.4);
+        client.bring_up(Mode::Servo);
+        let mut q = client.q();
+        q[joint] -= 0.01 * speed_rad_s.signum();
+        assert_eq!(client.ask(&Command::ServoJoint(q)).0, Status(0));
+        wait_s(0.3);
+        assert!((client.q() - q).max_abs() < 1e-3);
+    }
+}
+
+#[test]
+fn reports_come_at_once_and_agree_with_the_commands() {
+    let arm = start();
+    let mut client = Client::new(&arm);
+    client.bring_up(Mode::Servo);
+    let [realtime, normal, rich, real] = arm.ports().reports;
+    let asked = clock::now();
+    let (came, frame) = read_reports(rich, 1).remove(0);
+    // Far less than the 200 ms between two of them.
+    assert!(came.since_s(asked) < 0.15);
+    let rich = RichReport::parse(&frame).unwrap();
+    assert_eq!(rich.normal.basic.mode, Mode::Servo);
+    assert_eq!(
+        (rich.normal.enabled, rich.normal.brakes_released),
+        (0x7F, 0x7F)
+    );
+    let normal = NormalReport::parse(&read_reports(normal, 1)[0].1).unwrap();
+    assert_eq!(normal, rich.normal);
+    let real = ForceReport::parse(&read_reports(real, 2)[1].1).unwrap();
+    assert_eq!(real.basic.state, ArmState::Ready);
+    // The zero pose of the vendor's check values.
+    let [x, y, z] = real.basic.tcp.position_m;
+    assert!((x - 0.206).abs() < 1e-6 && y.abs() < 1e-6 && (z - 0.1205).abs() < 1e-6);
+
+    let frames: Vec<_> = read_reports(realtime, 100)
+        .iter()
+        .map(|(_, frame)| RealtimeReport::parse(frame).unwrap())
+        .collect();
+    assert!(frames.windows(2).all(|w| w[1].time_us > w[0].time_us));
+}
+
+/// Simulated time is monotonic time: reports and history carry its stamps.
+#[test]
+fn history_is_gapless_and_on_the_monotonic_clock() {
+    let arm = start();
+    wait_s(0.3);
+    let now = clock::now();
+    // Any request brings the model up to the present.
+    Client::new(&arm).state();
+    let samples = arm.history().since(MonotonicNs(0));
+    assert!(samples.len() >= 295, "{}", samples.len());
+    assert!(
+        samples
+            .windows(2)
+            .all(|w| w[1].at.0 - w[0].at.0 == 1_000_000)
+    );
+    let last = samples.last().unwrap().at;
+    assert!(last.since_s(now) > -0.001, "{} s behind", now.since_s(last));
+}
+
+/// A client that never reads loses reports; nobody else notices.
+#[test]
+fn a_slow_reader_blocks_nobody() {
+    let arm = start();
+    let [realtime, ..] = arm.ports().reports;
+    let _sleeper = connect(realtime);
+    wait_s(0.5);
+    assert_eq!(read_reports(realtime, 20).len(), 20);
+    assert_eq!(Client::new(&arm).state(), ArmState::Stopped);
+}
+
+#[test]
+fn a_port_in_use_is_named_with_its_remedy() {
+    let arm = start();
+    let taken = arm.ports().command;
+    let error = SimulatedArm::start(ArmConfig {
+        command_port: taken,
+        report_ports: [0; 4],
+        ..ArmConfig::default()
+    })
+    .unwrap_err();
+    assert!(matches!(error, ArmStartError::PortInUse { port, .. } if port == taken));
+    assert!(error.to_string().contains("choose another port"), "{error}");
+    // Stopping frees it.
+    arm.stop();
+    SimulatedArm::start(ArmConfig {
+        command_port: taken,
+        report_ports: [0; 4],
+        ..ArmConfig::default()
+    })
+    .unwrap();
+}
