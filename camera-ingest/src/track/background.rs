@@ -55,6 +55,50 @@ impl Background {
     }
 }
 
+/// `count` frames equally spaced in how much has moved, not in time: while the
+/// rope stands still it must not become part of the median.
+pub(super) fn frames_by_motion(frames: &[EyeFrame], count: usize) -> Vec<usize> {
+    /// Part of the frames spread over time whatever moves.
+    const EVEN: f64 = 0.1;
+    let mut moved = vec![0.0];
+    for pair in frames.windows(2) {
+        moved.push(moved[moved.len() - 1] + changed(&pair[0], &pair[1]));
+    }
+    let last = frames.len() - 1;
+    let total = moved[last].max(1e-9);
+    let place = |i: usize| (1.0 - EVEN) * moved[i] / total + EVEN * i as f64 / last as f64;
+    let count = count.min(frames.len());
+    let top = place(last);
+    let mut next = 0;
+    let mut chosen = Vec::with_capacity(count);
+    for k in 0..count {
+        let wanted = top * k as f64 / (count - 1) as f64;
+        while next < last && place(next) < wanted - 1e-12 {
+            next += 1;
+        }
+        chosen.push(next);
+    }
+    chosen.dedup();
+    chosen
+}
+
+/// Part of the pixels that changed by more than noise, on every fourth row.
+fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
+    /// Grey levels, for the sum of two pixels.
+    const THRESHOLD: u16 = 40;
+    let (mut count, mut all) = (0_u32, 0_u32);
+    let rows = |f: &EyeFrame| f.width_px * 4;
+    for (row_a, row_b) in a.luma.chunks(rows(a)).zip(b.luma.chunks(rows(b))) {
+        let (row_a, row_b) = (&row_a[..a.width_px], &row_b[..b.width_px]);
+        for (p, q) in row_a.chunks_exact(2).zip(row_b.chunks_exact(2)) {
+            let sum = |x: &[u8]| u16::from(x[0]) + u16::from(x[1]);
+            count += u32::from(sum(p).abs_diff(sum(q)) > THRESHOLD);
+            all += 1;
+        }
+    }
+    f64::from(count) / f64::from(all.max(1))
+}
+
 /// Every 97th pixel: prime, so that it meets all columns.
 fn sparse(len: usize) -> impl Iterator<Item = usize> {
     (0..len).step_by(97)

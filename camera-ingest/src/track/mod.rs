@@ -22,7 +22,7 @@ mod plane;
 use std::time::{Duration, Instant};
 
 pub use appearance::RopeAppearance;
-use background::Background;
+use background::{Background, frames_by_motion};
 pub use clamp::{ClampError, ClampPath, ClampSample};
 use first_frame::{FirstLook, NotFound};
 use follow::{Follower, NODES, RopeModel, State};
@@ -152,7 +152,8 @@ pub fn track(
         .map(|f| (f.stamp_ns - frames[0].stamp_ns) as f64 * 1e-9)
         .collect();
     let start = Instant::now();
-    let background = Background::median(frames, &spread(frames.len(), options.background_frames));
+    let background =
+        Background::median(frames, &frames_by_motion(frames, options.background_frames));
     let background_time = start.elapsed();
 
     let start = Instant::now();

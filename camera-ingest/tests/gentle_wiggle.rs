@@ -1,0 +1,262 @@
+//! A gentle wiggle, drawn from formulas: the rope stands still for a good part
+//! of the recording, the clamp moves little, arm and pole move with it.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::cast_precision_loss,
+    reason = "tests may fail loudly"
+)]
+
+use camera_ingest::track::{ClampSample, TrackOptions};
+use camera_ingest::{ClampPath, EyeFrame, frame::ycc_from_rgb, track};
+use nalgebra::{Matrix3, Vector3};
+use shared_types::{Intrinsics, Shutter, StereoCamera};
+
+const LENGTH_M: f64 = 0.5;
+const ROPE_RADIUS_M: f64 = 0.006;
+const LEAD_RADIUS_M: f64 = 0.02;
+const WIDTH: usize = 672;
+const HEIGHT: usize = 376;
+const NODES: usize = 41;
+
+fn camera() -> StereoCamera {
+    let eye = Intrinsics {
+        fx: 350.0,
+        fy: 350.0,
+        cx: 335.5,
+        cy: 187.5,
+        distortion: [-0.17, 0.027, 0.0, 0.0, 0.0],
+    };
+    StereoCamera {
+        width_px: WIDTH as u32,
+        height_px: HEIGHT as u32,
+        left: eye,
+        right: eye,
+        r_right_left: Matrix3::identity(),
+        t_right_left_m: Vector3::new(0.063, 0.0, 0.0),
+        r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
+        p_w_cam_m: Vector3::new(0.0, -0.95, 0.55),
+        shutter: Shutter::Global,
+        exposure_s: 0.004,
+        line_time_s: 0.0,
+    }
+}
+
+/// How a recording moves.
+struct Motion {
+    still_s: f64,
+    clamp_m: f64,
+    tip_rad: f64,
+}
+
+impl Motion {
+    fn swing(&self, t_s: f64, lag: f64) -> f64 {
+        let since = (t_s - self.still_s).max(0.0);
+        (std::f64::consts::TAU * 0.8 * since - lag).sin() * (since / 0.6).min(1.0)
+            + lag.sin() * (since / 0.6).min(1.0) * (-since * 3.0).exp()
+    }
+
+    fn clamp(&self, t_s: f64) -> ClampSample {
+        let x = self.clamp_m * self.swing(t_s, 0.0);
+        ClampSample {
+            t_s,
+            p_w_m: Vector3::new(x, 0.0, 0.85),
+            pole_w: Vector3::new(x, 0.0, 1.0).normalize(),
+        }
+    }
+
+    /// The rope's nodes: its angle grows along it.
+    fn rope(&self, t_s: f64) -> Vec<Vector3<f64>> {
+        let step = LENGTH_M / (NODES - 1) as f64;
+        let mut p = self.clamp(t_s).p_w_m;
+        let mut nodes = vec![p];
+        for i in 1..NODES {
+            let part = (i as f64 - 0.5) / (NODES - 1) as f64;
+            let angle = self.tip_rad * part * self.swing(t_s, 1.1 * part);
+            p += Vector3::new(angle.sin(), 0.0, -angle.cos()) * step;
+            nodes.push(p);
+        }
+        nodes
+    }
+}
+
+fn hash(mut x: u64) -> f64 {
+    x = (x ^ (x >> 31)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    ((x ^ (x >> 32)) & 0xFFFF) as f64 / 65535.0
+}
+
+/// Draws thick polylines over a textured wall and floor, then adds noise.
+struct Canvas {
+    colour: Vec<[f64; 3]>,
+}
+
+impl Canvas {
+    fn wall() -> Self {
+        let colour = (0..WIDTH * HEIGHT)
+            .map(|i| {
+                let (u, v) = (i % WIDTH, i / WIDTH);
+                let blotch = 14.0 * ((u as f64 / 31.0).sin() * (v as f64 / 23.0).cos());
+                let grain = 6.0 * (hash((u / 3 + 977 * (v / 3)) as u64) - 0.5);
+                let floor = if v > 310 { -45.0 } else { 0.0 };
+                let level = 150.0 + blotch + grain + floor;
+                [level, level - floor * 0.2, level - floor * 0.4]
+            })
+            .collect();
+        Self { colour }
+    }
+
+    fn stroke(&mut self, pixels: &[[f64; 2]], radius_px: f64, rgb: [f64; 3]) {
+        for pair in pixels.windows(2) {
+            let reach = radius_px + 2.0;
+            let low = |k: usize| (pair[0][k].min(pair[1][k]) - reach).max(0.0) as usize;
+            let high = |k: usize, n: usize| {
+                ((pair[0][k].max(pair[1][k]) + reach).max(0.0) as usize).min(n - 1)
+            };
+            for v in low(1)..=high(1, HEIGHT) {
+                for u in low(0)..=high(0, WIDTH) {
+                    let d = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+                    let e = [u as f64 - pair[0][0], v as f64 - pair[0][1]];
+                    let part = ((d[0] * e[0] + d[1] * e[1])
+                        / (d[0] * d[0] + d[1] * d[1]).max(1e-9))
+                    .clamp(0.0, 1.0);
+                    let away = (e[0] - part * d[0]).hypot(e[1] - part * d[1]);
+                    let cover = (radius_px + 0.5 - away).clamp(0.0, 1.0);
+                    let pixel = &mut self.colour[v * WIDTH + u];
+                    for k in 0..3 {
+                        // Joints of the polyline must not be covered twice: paint, don't add.
+                        if cover > 0.999 {
+                            pixel[k] = rgb[k];
+                        } else if (pixel[k] - rgb[k]).abs() > 1.0 {
+                            pixel[k] += cover * 0.7 * (rgb[k] - pixel[k]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn frame(&self, index: usize) -> EyeFrame {
+        let (mut luma, mut cb, mut cr) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, c) in self.colour.iter().enumerate() {
+            let noise =
+                |k: u64| 5.0 * (hash((i as u64 * 4 + k) ^ ((index as u64 + 1) << 40)) - 0.5);
+            let noisy =
+                core::array::from_fn(|k| (c[k] + noise(k as u64)).round().clamp(0.0, 255.0) as u8);
+            let [y, b, r] = ycc_from_rgb(noisy).map(|x| x.round().clamp(0.0, 255.0) as u8);
+            luma.push(y);
+            if i % 2 == 0 {
+                cb.push(b);
+                cr.push(r);
+            }
+        }
+        EyeFrame {
+            stamp_ns: 1_000_000_000 + index as u64 * 16_666_667,
+            sequence: index as u64,
+            width_px: WIDTH,
+            height_px: HEIGHT,
+            luma,
+            cb,
+            cr,
+        }
+    }
+}
+
+/// Median, 95th percentile and maximum of the keypoints' error (px).
+fn errors(motion: &Motion, count: usize, rope_rgb: [f64; 3], lead_rgb: [f64; 3]) -> [f64; 3] {
+    let camera = camera();
+    let pixels = |nodes: &[Vector3<f64>]| -> Vec<[f64; 2]> {
+        nodes
+            .iter()
+            .map(|p| camera.project_left(p).unwrap())
+            .collect()
+    };
+    let scale = 350.0 / 0.95;
+    let (mut frames, mut truth, mut clamp) = (Vec::new(), Vec::new(), Vec::new());
+    for index in 0..count {
+        let t_s = index as f64 * 16_666_667e-9;
+        let seen_s = t_s + camera.row_time_s(0.0);
+        let (hold, nodes) = (motion.clamp(seen_s), motion.rope(seen_s));
+        let mut canvas = Canvas::wall();
+        let up = |d: f64| hold.p_w_m + hold.pole_w * d;
+        let arm = pixels(&[up(0.2), up(0.45)]);
+        canvas.stroke(&arm, 0.045 * scale, [225.0, 228.0, 230.0]);
+        canvas.stroke(
+            &pixels(&[up(0.0), up(0.2)]),
+            0.01 * scale,
+            [60.0, 62.0, 66.0],
+        );
+        let rope = pixels(&nodes);
+        canvas.stroke(&rope, ROPE_RADIUS_M * scale, rope_rgb);
+        canvas.stroke(&[rope[NODES - 1]; 2], LEAD_RADIUS_M * scale, lead_rgb);
+        frames.push(canvas.frame(index));
+        truth.push(rope);
+        clamp.push(motion.clamp(t_s));
+    }
+    // A little more of the arm's motion than the video shows.
+    clamp.push(motion.clamp(count as f64 * 16_666_667e-9));
+    let options = TrackOptions {
+        keypoints: 21,
+        ..TrackOptions::default()
+    };
+    let result = track(&frames, &camera, &ClampPath::new(clamp).unwrap(), &options).unwrap();
+    println!("{:?}, {:?}", result.appearance, result.times);
+    if let Ok(sheet) = std::env::var("GENTLE_SHEET") {
+        camera_ingest::overlay::keypoint_sheet(
+            &frames,
+            &result.track,
+            &[0, count / 2, count * 2 / 3, count - 1],
+            2,
+        )
+        .unwrap()
+        .write_png(std::path::Path::new(&sheet))
+        .unwrap();
+    }
+    assert!((result.appearance.length_m - LENGTH_M).abs() < 0.01);
+    let mut all: Vec<f64> = Vec::new();
+    for (frame, nodes) in result.track.frames.iter().zip(&truth) {
+        for (p, t) in frame.points.iter().zip(nodes.iter().step_by(2)) {
+            all.push((p[0] - t[0]).hypot(p[1] - t[1]));
+        }
+    }
+    all.sort_by(f64::total_cmp);
+    [0.5, 0.95, 1.0].map(|q| all[((all.len() - 1) as f64 * q) as usize])
+}
+
+fn assert_small([median, p95, max]: [f64; 3]) {
+    println!("median {median:.2}, p95 {p95:.2}, max {max:.2} px");
+    assert!(
+        median < 1.0 && p95 < 2.0 && max < 6.0,
+        "{median} {p95} {max}"
+    );
+}
+
+#[test]
+fn a_red_rope_that_sways_gently() {
+    let motion = Motion {
+        still_s: 0.5,
+        clamp_m: 0.04,
+        tip_rad: 0.45,
+    };
+    assert_small(errors(
+        &motion,
+        150,
+        [190.0, 60.0, 40.0],
+        [40.0, 60.0, 170.0],
+    ));
+}
+
+#[test]
+fn a_rope_that_is_still_for_most_of_the_recording() {
+    let motion = Motion {
+        still_s: 1.5,
+        clamp_m: 0.03,
+        tip_rad: 0.4,
+    };
+    assert_small(errors(
+        &motion,
+        150,
+        [60.0, 110.0, 60.0],
+        [230.0, 140.0, 30.0],
+    ));
+}
