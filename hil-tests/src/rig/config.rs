@@ -1,0 +1,119 @@
+//! Set-up of the rig, as read from a file or made in code.
+
+use super::camera::CameraConfig;
+use crate::arm::{ArmConfig, JointLag};
+use crate::hidden::hidden_rope;
+use crate::render::Appearance;
+use serde::{Deserialize, Serialize};
+use shared_types::plan::START_POSE;
+use shared_types::{JointVector, Limits, RopeParams, StereoCamera};
+use std::net::IpAddr;
+
+/// Set-up of the simulated rig. Every key has a default; `seed` alone gives a
+/// new rope, new colours and slightly different joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RigConfig {
+    /// Shared-memory domain the rig lives in.
+    pub domain: String,
+    /// Seed of rope, colours, joint lags and sensor noise.
+    pub seed: u64,
+    /// Address the arm listens on.
+    pub bind: IpAddr,
+    /// The arm's command port; 0 takes any free one.
+    pub command_port: u16,
+    /// The arm's report ports 30000, 30001, 30002, 30003; 0 takes any free one.
+    pub report_ports: [u16; 4],
+    /// How the joints follow setpoints.
+    pub lag: JointLag,
+    /// Ranges, speeds and accelerations of the joints.
+    pub limits: Limits,
+    /// Pose at the start (rad).
+    pub initial_q: JointVector,
+    /// The rope; left out, it is drawn from the seed.
+    pub rope: Option<RopeParams>,
+    /// Colours; left out, they are drawn from the seed.
+    pub appearance: Option<Appearance>,
+    /// Centre of the target ball in the world (m); left out, there is none.
+    pub target_m: Option<[f64; 3]>,
+    /// The stereo camera.
+    pub camera: CameraConfig,
+}
+
+impl Default for RigConfig {
+    fn default() -> Self {
+        let arm = ArmConfig::default();
+        // Near the start pose, but not in it: the first thing to do is to move.
+        let mut initial_q = START_POSE;
+        initial_q[0] += 0.10;
+        initial_q[1] -= 0.15;
+        initial_q[5] -= 0.10;
+        Self {
+            domain: "rig".to_owned(),
+            seed: 0,
+            bind: arm.bind,
+            command_port: arm.command_port,
+            report_ports: arm.report_ports,
+            lag: arm.lag,
+            limits: arm.limits,
+            initial_q,
+            rope: None,
+            appearance: None,
+            target_m: None,
+            camera: CameraConfig::default(),
+        }
+    }
+}
+
+impl RigConfig {
+    /// The rope on the pole.
+    #[must_use]
+    pub fn rope(&self) -> RopeParams {
+        self.rope.unwrap_or_else(|| hidden_rope(self.seed))
+    }
+
+    /// Colours of rope, lead, target and wall.
+    #[must_use]
+    pub fn appearance(&self) -> Appearance {
+        self.appearance
+            .unwrap_or_else(|| Appearance::from_seed(self.seed))
+    }
+
+    /// The camera's exact calibration and place.
+    #[must_use]
+    pub fn stereo_camera(&self) -> StereoCamera {
+        self.camera.stereo_camera()
+    }
+
+    /// Set-up of the arm alone.
+    #[must_use]
+    pub fn arm(&self) -> ArmConfig {
+        ArmConfig {
+            bind: self.bind,
+            command_port: self.command_port,
+            report_ports: self.report_ports,
+            seed: self.seed,
+            lag: self.lag,
+            limits: self.limits.clone(),
+            initial_q: self.initial_q,
+            ..ArmConfig::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_names_only_what_differs_and_typos_are_refused() {
+        let text = "seed = 7\ncommand_port = 0\n[camera]\nenabled = false";
+        let config: RigConfig = toml::from_str(text).unwrap();
+        assert_eq!((config.seed, config.camera.enabled), (7, false));
+        assert_eq!(config.initial_q, RigConfig::default().initial_q);
+        assert_eq!(config.rope(), hidden_rope(7));
+        assert!(toml::from_str::<RigConfig>("sed = 7").is_err());
+        let back: RigConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();
+        assert_eq!(back, config);
+    }
+}

@@ -1,0 +1,159 @@
+//! The whole rig in real time: frames flow, and the truth agrees with them.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    missing_docs,
+    reason = "tests may fail loudly"
+)]
+
+use camera_ingest::StereoFrame;
+use hil_tests::rig::{self, RigConfig};
+use nalgebra::Vector3;
+use shared_types::StereoCamera;
+use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
+use shared_types::ipc::rpc::RpcClient;
+use shared_types::ipc::{Bus, FrameHeader, IpcError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+const PATIENCE: Duration = Duration::from_secs(20);
+const FRAMES: usize = 20;
+
+fn config() -> RigConfig {
+    RigConfig {
+        domain: format!("test_rig_{}", std::process::id()),
+        seed: 11,
+        command_port: 0,
+        report_ports: [0; 4],
+        ..RigConfig::default()
+    }
+}
+
+fn ask(client: &RpcClient<RigRpc>, request: &RigRequest) -> RigEvent {
+    let began = Instant::now();
+    loop {
+        let answer = client
+            .call(request)
+            .and_then(|pending| pending.finish::<IpcError>(PATIENCE, || Ok(()), |_| ()));
+        match answer {
+            Ok(event) => return event,
+            // The rig is still starting.
+            Err(IpcError::Gone { .. }) if began.elapsed() < PATIENCE => {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+fn film(bus: &Bus) -> Vec<(FrameHeader, Vec<u8>)> {
+    let subscriber = bus.frame_subscriber().unwrap();
+    let began = Instant::now();
+    let mut frames = Vec::new();
+    while frames.len() < FRAMES {
+        assert!(began.elapsed() < PATIENCE, "only {} frames", frames.len());
+        match subscriber.receive().unwrap() {
+            Some(sample) => frames.push((*sample.user_header(), sample.payload().to_vec())),
+            None => std::thread::sleep(Duration::from_millis(2)),
+        }
+    }
+    frames
+}
+
+/// Where both eyes see the lead: centroid of what has its hue, triangulated.
+fn lead_in(frame: &(FrameHeader, Vec<u8>), config: &RigConfig) -> Vector3<f64> {
+    let camera: StereoCamera = config.stereo_camera();
+    let size = [camera.width_px as usize * 2, camera.height_px as usize];
+    let frame = StereoFrame::from_yuyv(&frame.1, size, 0, 0).unwrap();
+    let hue = camera_ingest::frame::ycc_from_rgb(config.appearance().lead_rgb);
+    let [left, right] = [frame.left(), frame.right()].map(|eye| {
+        let (mut n, mut sum) = (0.0, [0.0, 0.0]);
+        for v in 0..size[1] {
+            for u in 0..size[0] / 2 {
+                let seen = eye.ycc(u, v).map(f32::from);
+                let chroma = |c: [f32; 3]| (c[1] - 128.0, c[2] - 128.0);
+                let ((b, r), (wb, wr)) = (chroma(seen), chroma(hue));
+                // Along the lead's hue, and coloured at all.
+                let (along, length) = (b * wb + r * wr, b.hypot(r));
+                if length > 30.0 && along > 0.97 * length * wb.hypot(wr) {
+                    n += 1.0;
+                    sum = [sum[0] + u as f64, sum[1] + v as f64];
+                }
+            }
+        }
+        assert!(n > 20.0, "lead of {n} px");
+        [sum[0] / n, sum[1] / n]
+    });
+    camera.triangulate(left, right).unwrap().p_w_m
+}
+
+#[test]
+fn frames_and_truth_of_a_rope_at_rest_agree() {
+    let config = config();
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let rig = scope.spawn(|| rig::run(&config, &stop));
+        let bus = Bus::join(&config.domain).unwrap();
+        let client = RpcClient::<RigRpc>::open(&bus).unwrap();
+        let RigEvent::Ports { command, reports } = ask(&client, &RigRequest::Ports) else {
+            panic!("no ports");
+        };
+        assert!(command > 0 && reports.iter().all(|p| *p > 0));
+
+        let frames = film(&bus);
+        let period_ns = 1e9 / config.camera.frame_rate_hz;
+        for pair in frames.windows(2) {
+            let (a, b) = (pair[0].0, pair[1].0);
+            assert!(b.sequence > a.sequence);
+            let want_ns = (b.sequence - a.sequence) as f64 * period_ns;
+            assert!(((b.stamp_ns - a.stamp_ns) as f64 - want_ns).abs() < 100.0);
+        }
+        assert_eq!((frames[0].0.width_px, frames[0].0.height_px), (1344, 376));
+        assert_eq!(frames[0].1.len(), 1344 * 376 * 2);
+        assert!(hil_tests::arm::clock::now().0 > frames[FRAMES - 1].0.stamp_ns);
+
+        let target_m = [0.75, 0.0, -0.2];
+        let (from_ns, to_ns) = (frames[0].0.stamp_ns, frames[FRAMES - 1].0.stamp_ns);
+        let request = RigRequest::Truth { from_ns, to_ns };
+        assert!(matches!(ask(&client, &request), RigEvent::Failed { .. }));
+        assert_eq!(
+            ask(&client, &RigRequest::PlaceTarget { target_m }),
+            RigEvent::Done
+        );
+        let RigEvent::Truth {
+            rope,
+            closest_m,
+            peak_tip_speed_m_s,
+            touched,
+            ..
+        } = ask(&client, &request)
+        else {
+            panic!("no truth");
+        };
+        assert_eq!(rope, config.rope());
+        assert!(peak_tip_speed_m_s < 1e-3, "at rest: {peak_tip_speed_m_s}");
+        assert!(!touched);
+        let seen_m = (lead_in(&frames[FRAMES - 1], &config) - Vector3::from(target_m)).norm();
+        assert!(
+            (seen_m - closest_m).abs() < 0.02,
+            "{seen_m} and {closest_m}"
+        );
+
+        stop.store(true, Ordering::Release);
+        rig.join().unwrap().unwrap();
+    });
+}
+
+#[test]
+fn a_taken_port_is_named() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    let config = RigConfig {
+        domain: format!("test_rig_port_{}", std::process::id()),
+        command_port: port,
+        ..config()
+    };
+    let error = rig::run(&config, &AtomicBool::new(false)).unwrap_err();
+    assert!(error.to_string().contains(&port.to_string()), "{error}");
+}

@@ -1,0 +1,204 @@
+//! Pictures of the rig against the geometry they were drawn from.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    missing_docs,
+    reason = "tests may fail loudly"
+)]
+
+use camera_ingest::StereoFrame;
+use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
+use hil_tests::rig::CameraConfig;
+use nalgebra::Vector3;
+use shared_types::StereoCamera;
+use shared_types::kinematics::attach_pose;
+use shared_types::plan::START_POSE;
+
+const ROPE: RopeShape = RopeShape {
+    radius_m: 0.006,
+    lead_radius_m: 0.025,
+};
+
+const COLOURS: Appearance = Appearance {
+    rope_rgb: [214, 96, 36],
+    lead_rgb: [44, 84, 196],
+    target_rgb: [38, 168, 74],
+    wall_rgb: [186, 187, 184],
+};
+
+fn renderer(camera: &StereoCamera, noise_levels: f32) -> Renderer {
+    Renderer::new(camera, ROPE, COLOURS, noise_levels, 5)
+}
+
+/// A bent rope in front of the wall, moved sideways by `shift_m`.
+fn pose(shift_m: f64) -> ScenePose {
+    let (clamp, _) = attach_pose(&START_POSE);
+    let nodes = (0..=22).map(|i| {
+        let s = f64::from(i) / 22.0;
+        clamp + Vector3::new(0.12 * (s * 4.0).sin() + shift_m, 0.05 * s, -0.55 * s)
+    });
+    ScenePose {
+        q: START_POSE,
+        nodes: nodes.collect(),
+    }
+}
+
+fn without_rope() -> ScenePose {
+    ScenePose {
+        nodes: Vec::new(),
+        ..pose(0.0)
+    }
+}
+
+/// One eye as YCbCr per pixel, row by row.
+struct Picture {
+    width: usize,
+    pixels: Vec<[f64; 3]>,
+}
+
+impl Picture {
+    fn both(renderer: &mut Renderer, camera: &StereoCamera, poses: &[ScenePose]) -> [Self; 2] {
+        let mut bytes = vec![0; renderer.frame_bytes()];
+        renderer.render(poses, 0, &mut bytes);
+        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+        let frame = StereoFrame::from_yuyv(&bytes, [width * 2, height], 0, 0).unwrap();
+        [frame.left(), frame.right()].map(|eye| Self {
+            width,
+            pixels: (0..height)
+                .flat_map(|v| (0..width).map(move |u| (u, v)))
+                .map(|(u, v)| eye.ycc(u, v).map(f64::from))
+                .collect(),
+        })
+    }
+
+    /// How much of the pixel something new covers: full from a difference on
+    /// that every shaded side of the rope has against the wall.
+    fn covered(&self, before: &Self, u: usize, v: usize) -> f64 {
+        let (a, b) = (
+            self.pixels[v * self.width + u],
+            before.pixels[v * self.width + u],
+        );
+        let d: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
+        (d.sqrt() / 60.0).min(1.0)
+    }
+}
+
+fn project(camera: &StereoCamera, side: usize, p: &Vector3<f64>) -> [f64; 2] {
+    if side == 0 {
+        camera.project_left(p).unwrap()
+    } else {
+        camera.project_right(p).unwrap()
+    }
+}
+
+#[test]
+fn rope_and_lead_lie_where_the_camera_model_puts_them() {
+    let camera = CameraConfig::default().stereo_camera();
+    let mut renderer = renderer(&camera, 0.0);
+    let empty = Picture::both(&mut renderer, &camera, &[without_rope()]);
+    let full = Picture::both(&mut renderer, &camera, &[pose(0.0)]);
+    let nodes = pose(0.0).nodes;
+    for side in 0..2 {
+        for link in nodes[2..20].windows(2) {
+            let (a, b) = (
+                project(&camera, side, &link[0]),
+                project(&camera, side, &link[1]),
+            );
+            let v = a[1].ceil();
+            let want = a[0] + (b[0] - a[0]) * (v - a[1]) / (b[1] - a[1]);
+            let (mut weight, mut moment) = (0.0, 0.0);
+            for u in want as usize - 9..want as usize + 10 {
+                let w = full[side].covered(&empty[side], u, v as usize);
+                weight += w;
+                moment += w * u as f64;
+            }
+            let error = moment / weight - want;
+            assert!(
+                error.abs() < 0.35,
+                "eye {side} row {v}: off by {error:.3} px"
+            );
+            // A bend widens the cut through a slanted rope; it never gets thinner.
+            assert!(weight > 2.5 && weight < 7.0, "width {weight:.2} px");
+        }
+        let want = project(&camera, side, nodes.last().unwrap());
+        let [u, v, area] = blob(&full[side], &empty[side], want, 8);
+        let error = (u - want[0]).hypot(v - want[1]);
+        assert!(error < 0.35, "lead in eye {side} off by {error:.3} px");
+        assert!(area > 90.0, "lead of {area} px in eye {side}");
+    }
+}
+
+/// Centroid and area of what is new within `reach` pixels.
+fn blob(full: &Picture, empty: &Picture, near: [f64; 2], reach: usize) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    let (u0, v0) = (near[0].round() as usize, near[1].round() as usize);
+    for v in v0 - reach..=v0 + reach {
+        for u in u0 - reach..=u0 + reach {
+            let w = full.covered(empty, u, v);
+            sums[0] += w * u as f64;
+            sums[1] += w * v as f64;
+            sums[2] += w;
+        }
+    }
+    [sums[0] / sums[2], sums[1] / sums[2], sums[2]]
+}
+
+#[test]
+fn motion_blur_spreads_evenly_about_the_middle_of_the_exposure() {
+    let camera = CameraConfig::default().stereo_camera();
+    let mut renderer = renderer(&camera, 0.0);
+    let (start, end) = (pose(-0.02), pose(0.02));
+    let count = renderer.sub_frames(&start, &end);
+    assert!(count >= 8, "40 mm are some 10 px, drawn in {count} steps");
+    assert_eq!(renderer.sub_frames(&start, &start), 1);
+    let poses: Vec<_> = (0..count)
+        .map(|i| pose(-0.02 + 0.04 * (i as f64 + 0.5) / count as f64))
+        .collect();
+    let empty = Picture::both(&mut renderer, &camera, &[without_rope()]);
+    let blurred = Picture::both(&mut renderer, &camera, &poses);
+    let sharp = Picture::both(&mut renderer, &camera, &[pose(0.0)]);
+    let want = project(&camera, 0, pose(0.0).nodes.last().unwrap());
+    let [u, _, area] = blob(&blurred[0], &empty[0], want, 14);
+    let [_, _, sharp_area] = blob(&sharp[0], &empty[0], want, 14);
+    assert!((u - want[0]).abs() < 0.5, "{u} and {}", want[0]);
+    assert!(area > 1.2 * sharp_area, "{area} against {sharp_area}");
+}
+
+#[test]
+fn what_is_nearer_covers_what_is_behind() {
+    let camera = CameraConfig::default().stereo_camera();
+    let mut renderer = renderer(&camera, 0.0);
+    let lead = *pose(0.0).nodes.last().unwrap();
+    let [u, v] = project(&camera, 0, &lead);
+    let mut seen = |offset_m: f64| {
+        let towards = (camera.p_w_cam_m - lead).normalize();
+        renderer.place_target(Some(lead + towards * offset_m));
+        let [left, _] = Picture::both(&mut renderer, &camera, &[pose(0.0)]);
+        left.pixels[v.round() as usize * left.width + u.round() as usize]
+    };
+    let (ball, lead) = (seen(0.1), seen(-0.1));
+    assert!(
+        ball[1] < 128.0 && ball[2] < 110.0,
+        "green ball in front: {ball:?}"
+    );
+    assert!(lead[1] > 150.0, "blue lead in front: {lead:?}");
+}
+
+#[test]
+fn the_same_seed_and_frame_give_the_same_bytes() {
+    let camera = CameraConfig::default().stereo_camera();
+    let shoot = |renderer: &mut Renderer, sequence| {
+        let mut bytes = vec![0; renderer.frame_bytes()];
+        renderer.render(&[pose(0.0)], sequence, &mut bytes);
+        bytes
+    };
+    let (mut one, mut two) = (renderer(&camera, 1.6), renderer(&camera, 1.6));
+    let first = shoot(&mut one, 0);
+    assert_ne!(
+        shoot(&mut one, 1),
+        first,
+        "noise changes from frame to frame"
+    );
+    assert_eq!(shoot(&mut two, 0), first, "and depends on nothing before");
+}
