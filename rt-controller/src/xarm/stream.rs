@@ -93,7 +93,6 @@ impl StreamBuffer {
 #[derive(Debug, Clone)]
 pub struct FrameReader {
     buffer: StreamBuffer,
-    broken: Option<BrokenStream>,
 }
 
 impl Default for FrameReader {
@@ -108,7 +107,6 @@ impl FrameReader {
     pub const fn new() -> Self {
         Self {
             buffer: StreamBuffer::new(),
-            broken: None,
         }
     }
 
@@ -132,27 +130,18 @@ impl FrameReader {
     pub fn reset(&mut self) {
         self.buffer.start = 0;
         self.buffer.end = 0;
-        self.broken = None;
     }
 
     /// The next whole frame, `None` if more bytes are needed.
     ///
     /// # Errors
-    /// [`BrokenStream`] on an impossible header, and from then on always.
+    /// [`BrokenStream`] on an impossible header, and from then on until `reset`.
     pub fn next_frame(&mut self) -> Result<Option<Frame<'_>>, BrokenStream> {
-        if let Some(broken) = self.broken {
-            return Err(broken);
-        }
         let Some(header) = Header::parse(self.buffer.pending()) else {
             return Ok(None);
         };
-        let (protocol, body_len) = match header.check() {
-            Ok(checked) => checked,
-            Err(broken) => {
-                self.broken = Some(broken);
-                return Err(broken);
-            }
-        };
+        // A bad header stays in front, so that the stream stays broken.
+        let (protocol, body_len) = header.check()?;
         let Some(frame) = self.buffer.take(HEADER_LEN.saturating_add(body_len)) else {
             return Ok(None);
         };
@@ -196,7 +185,6 @@ impl Header {
 #[derive(Debug, Clone)]
 pub struct ReportReader {
     buffer: StreamBuffer,
-    broken: Option<BrokenStream>,
 }
 
 impl Default for ReportReader {
@@ -211,7 +199,6 @@ impl ReportReader {
     pub const fn new() -> Self {
         Self {
             buffer: StreamBuffer::new(),
-            broken: None,
         }
     }
 
@@ -234,28 +221,21 @@ impl ReportReader {
     pub fn reset(&mut self) {
         self.buffer.start = 0;
         self.buffer.end = 0;
-        self.broken = None;
     }
 
     /// The next whole report with its size field, `None` if more bytes are
     /// needed.
     ///
     /// # Errors
-    /// [`BrokenStream::ReportSize`], and from then on always.
+    /// [`BrokenStream::ReportSize`], and from then on until `reset`.
     pub fn next_report(&mut self) -> Result<Option<&[u8]>, BrokenStream> {
-        if let Some(broken) = self.broken {
-            return Err(broken);
-        }
         let Some(size) = ByteReader::new(self.buffer.pending()).u32_be() else {
             return Ok(None);
         };
         match usize::try_from(size) {
             Ok(len @ 87..=1024) => Ok(self.buffer.take(len)),
-            _ => {
-                let broken = BrokenStream::ReportSize(size);
-                self.broken = Some(broken);
-                Err(broken)
-            }
+            // It stays in front, so that the stream stays broken.
+            _ => Err(BrokenStream::ReportSize(size)),
         }
     }
 }
