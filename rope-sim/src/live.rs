@@ -265,37 +265,66 @@ mod tests {
         );
     }
 
+    /// Turns about the vertical by more than a full turn, tilted, softly.
+    struct Turn;
+
+    impl AttachMotion for Turn {
+        fn at(&self, t_s: f64) -> FrameMotion {
+            let w = core::f64::consts::TAU;
+            let (s, c) = (w * t_s).sin_cos();
+            let yaw = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 7.0 * (t_s - s / w));
+            let tilt = nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), 0.4);
+            FrameMotion {
+                r: (yaw * tilt).into_inner(),
+                w_rad_s: Vector3::z() * (7.0 * (1.0 - c)),
+                alpha_rad_s2: Vector3::z() * (7.0 * w * s),
+                ..FrameMotion::world()
+            }
+        }
+        fn duration_s(&self) -> f64 {
+            1.0
+        }
+        fn acceleration_jumps_s(&self) -> Vec<f64> {
+            Vec::new()
+        }
+    }
+
+    /// The batch reads continuous quaternions, the live rope those of matrices, whose
+    /// sign jumps: a full turn must not matter to either.
     #[test]
     fn follows_the_batch_simulation() {
-        let mut live = LiveRope::new(&rope(), &Swing.at(0.0), 5e-4).unwrap();
-        for cycle in 1..=250 {
-            live.advance(&|t| Swing.at(t), f64::from(cycle) * 0.004);
-        }
-        let options = SimOptions {
-            step_s: 5e-4,
-            precision: Precision::F64,
-            start: Start::Equilibrium,
-            frames: FrameTimes {
-                first_s: 1.0,
-                period_s: 1.0,
-                count: 1,
-            },
-            closest_to_m: None,
-            horizon_s: 1.0,
-            threads: 1,
-        };
-        let rope = rope();
-        let batch = roll_out(
-            &[Candidate {
-                rope: &rope,
-                motion: &Swing,
-            }],
-            &options,
-        )
-        .unwrap();
-        for (node, at) in live.nodes().iter().enumerate() {
-            let d = (batch[0].nodes.position(0, node) - at).norm();
-            assert!(d < 1e-7, "node {node} differs by {d} m");
+        let motions: [&dyn AttachMotion; 2] = [&Swing, &Turn];
+        for motion in motions {
+            let mut live = LiveRope::new(&rope(), &motion.at(0.0), 5e-4).unwrap();
+            for cycle in 1..=250 {
+                live.advance(&|t| motion.at(t), f64::from(cycle) * 0.004);
+            }
+            let options = SimOptions {
+                step_s: 5e-4,
+                precision: Precision::F64,
+                start: Start::Equilibrium,
+                frames: FrameTimes {
+                    first_s: 1.0,
+                    period_s: 1.0,
+                    count: 1,
+                },
+                closest_to_m: None,
+                horizon_s: 1.0,
+                threads: 1,
+            };
+            let rope = rope();
+            let batch = roll_out(
+                &[Candidate {
+                    rope: &rope,
+                    motion,
+                }],
+                &options,
+            )
+            .unwrap();
+            for (node, at) in live.nodes().iter().enumerate() {
+                let d = (batch[0].nodes.position(0, node) - at).norm();
+                assert!(d < 1e-7, "node {node} differs by {d} m");
+            }
         }
     }
 
