@@ -1,4 +1,23 @@
 //! Hard real-time controller that streams setpoints to an xArm 7.
+//!
+//! ```text
+//!   other processes            this process                                 arm
+//!                 requests  +-----------+ orders  +--------------+ setpoints, 250 Hz
+//!   wag  <----------------> |   relay   |-------> | control loop | ---------------> command port
+//!        <----------------- |           | <------ |  (real time) | <--------------- replies
+//!         cycle records,    +-----------+ records +--------------+
+//!         joint reports           ^                      ^
+//!                                 |    joint reports     |
+//!                                 +----[ receiver ]------+ <----------------------- report port
+//! ```
+//!
+//! Read in this order: [`rt_loop`] (one cycle, top to bottom), [`control`] (the
+//! pure core it steps), [`transport`] and [`xarm`] (the wire), then [`relay`]
+//! and [`process`] (everything that may wait).
+//!
+//! It plans no throws and knows no rope: it takes finished motions, checks them
+//! against the limits, and streams them on time or stops. It is not a safety
+//! function; the emergency stop and the arm's own limits are.
 #![cfg_attr(
     test,
     allow(
@@ -10,4 +29,22 @@
     )
 )]
 
+pub mod clock_map;
+pub mod config;
+pub mod control;
+pub mod error;
+pub mod os;
+pub mod overrun;
+pub mod point_to_point;
+pub mod ports;
+pub mod process;
+pub mod relay;
+pub mod reports;
+pub mod rt_loop;
+pub mod session;
+pub mod transport;
 pub mod xarm;
+
+pub use config::ControllerConfig;
+pub use error::ControllerError;
+pub use process::run;

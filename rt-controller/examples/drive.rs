@@ -1,0 +1,97 @@
+//! Drives an arm through a running controller and prints what happened:
+//! bring-up, a move to the start pose, a small swing, latencies.
+//!
+//! `drive DOMAIN [REPEATS]`; the operator's heartbeat beats in a thread.
+
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
+use shared_types::ipc::rpc::RpcClient;
+use shared_types::ipc::{Bus, IpcError, OperatorEnd};
+use shared_types::plan::{START_POSE, trajectory_hash};
+use shared_types::{JointTrajectory, JointVector};
+use std::error::Error;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Longest wait for the end of any request.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let domain = arguments.next().unwrap_or_else(|| "wag".to_owned());
+    let repeats: u32 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let bus = Bus::join(&domain)?;
+    let client = RpcClient::<ControllerRpc>::open(&bus)?;
+    let quit = Arc::new(AtomicBool::new(false));
+    let heart = beat(domain, Arc::clone(&quit));
+
+    ask(&client, &ControllerRequest::Status)?;
+    ask(&client, &ControllerRequest::Bringup)?;
+    ask(&client, &ControllerRequest::Acknowledge)?;
+    let to_start = ControllerRequest::MoveTo {
+        q: START_POSE,
+        speed_part: 0.3,
+    };
+    ask(&client, &to_start)?;
+    ask(&client, &ControllerRequest::Latency)?;
+    let trajectory = swing()?;
+    for _ in 0..repeats {
+        let execute = ControllerRequest::Execute {
+            sha256: trajectory_hash(&trajectory),
+            trajectory: Box::new(trajectory),
+        };
+        ask(&client, &execute)?;
+    }
+    ask(&client, &ControllerRequest::Latency)?;
+    ask(&client, &ControllerRequest::Status)?;
+
+    quit.store(true, Ordering::Relaxed);
+    match heart.join() {
+        Ok(result) => Ok(result?),
+        Err(_panic) => Err("the heartbeat thread panicked".into()),
+    }
+}
+
+/// Four seconds of joint 6 swinging by 12 degrees, 0.75 Hz, fading in and out.
+fn swing() -> Result<JointTrajectory, Box<dyn Error>> {
+    let duration_s = 4.0;
+    let (times_s, poses): (Vec<f64>, Vec<JointVector>) = (0..=100)
+        .map(|k| {
+            let t_s = duration_s * f64::from(k) / 100.0;
+            let window = (core::f64::consts::PI * t_s / duration_s).sin().powi(2);
+            let mut q = START_POSE;
+            q[5] += 12_f64.to_radians() * window * (core::f64::consts::TAU * 0.75 * t_s).sin();
+            (t_s, q)
+        })
+        .unzip();
+    Ok(JointTrajectory::new(&times_s, &poses)?)
+}
+
+fn beat(domain: String, quit: Arc<AtomicBool>) -> std::thread::JoinHandle<Result<(), IpcError>> {
+    std::thread::spawn(move || {
+        let bus = Bus::join(&domain)?;
+        let mut operator = OperatorEnd::take(&bus)?;
+        while !quit.load(Ordering::Relaxed) {
+            operator.beat();
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        Ok(())
+    })
+}
+
+fn ask(
+    client: &RpcClient<ControllerRpc>,
+    request: &ControllerRequest,
+) -> Result<ControllerEvent, IpcError> {
+    match request {
+        ControllerRequest::Execute { .. } => println!("> Execute"),
+        other => println!("> {other:?}"),
+    }
+    let pending = client.call(request)?;
+    let last = pending.finish::<IpcError>(TIMEOUT, || Ok(()), |event| println!("  {event:?}"))?;
+    match &last {
+        ControllerEvent::Latency(report) => println!("  {report:#?}"),
+        event => println!("  {event:?}"),
+    }
+    Ok(last)
+}

@@ -1,0 +1,125 @@
+//! The brake: from any commanded state to rest, jerk-limited, in closed form.
+//!
+//! Each joint takes the fastest way to zero velocity and zero acceleration
+//! under its own acceleration and jerk limit: ramp the acceleration to a peak,
+//! hold it, ramp it back. It needs no iteration and no memory, so a brake is
+//! always available; there is nothing that could refuse.
+
+use super::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
+use shared_types::{JOINTS, JointState, Limits};
+
+/// Brake of all joints from `from` to rest. RT-safe.
+#[must_use]
+pub fn brake(from: &JointState, limits: &Limits) -> PhasedMotion {
+    let mut axes = [AxisPhases::default(); JOINTS];
+    for (j, axis) in axes.iter_mut().enumerate() {
+        let start = AxisState {
+            q: from.q[j],
+            qd: from.qd[j],
+            qdd: from.qdd[j],
+        };
+        *axis = brake_axis(
+            start,
+            limits.acceleration_max_rad_s2[j],
+            limits.jerk_max_rad_s3[j],
+        );
+    }
+    PhasedMotion::new(axes)
+}
+
+/// Fastest way to rest of one joint.
+///
+/// Taking the acceleration away at full jerk changes the velocity by
+/// `a|a|/(2J)`; what remains tells which way to push. In that direction, with
+/// `w` the velocity to gain, the triangle of peak `p` gains
+/// `(p² - a²)/(2J) + p²/(2J)`; when its peak passes the limit it becomes a
+/// trapezoid.
+fn brake_axis(start: AxisState, acceleration_max: f64, jerk_max: f64) -> AxisPhases {
+    let remaining = start.qd + start.qdd * start.qdd.abs() / (2.0 * jerk_max);
+    let push = if remaining > 0.0 { -1.0 } else { 1.0 };
+    let (a, gain) = (push * start.qdd, -push * start.qd);
+    let limit = acceleration_max.max(a.abs());
+    let triangle = (jerk_max * gain + a * a / 2.0).max(0.0).sqrt();
+    let peak = triangle.min(limit);
+    let hold_s = if triangle > limit {
+        (gain - (2.0 * limit * limit - a * a) / (2.0 * jerk_max)) / limit
+    } else {
+        0.0
+    };
+    let mut phases = [Phase::default(); MAX_PHASES];
+    let ramps = [
+        ((peak - a) / jerk_max, push * jerk_max),
+        (hold_s, 0.0),
+        (peak / jerk_max, -push * jerk_max),
+    ];
+    for (phase, (duration_s, jerk_rad_s3)) in phases.iter_mut().zip(ramps) {
+        *phase = Phase {
+            duration_s: duration_s.max(0.0),
+            jerk_rad_s3,
+        };
+    }
+    AxisPhases::new(start, phases)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use shared_types::JointVector;
+
+    proptest! {
+        #[test]
+        fn ends_at_rest_within_acceleration_and_jerk(
+            qd in -3.1_f64..3.1, qdd in -20.0_f64..20.0, q in -6.0_f64..6.0,
+        ) {
+            let limits = Limits::default();
+            let from = JointState {
+                q: JointVector::splat(q),
+                qd: JointVector::splat(qd),
+                qdd: JointVector::splat(qdd),
+            };
+            let motion = brake(&from, &limits);
+            prop_assert!((motion.state_at(0.0).q[2] - q).abs() < 1e-12);
+            // Longest possible: turn the acceleration round, then shed the speed.
+            prop_assert!(motion.duration_s() < 0.08 + 3.5 / 20.0 + 0.16);
+            let h = 1e-4;
+            let mut before = motion.state_at(0.0);
+            let mut t = h;
+            while t < motion.duration_s() + 0.01 {
+                let now = motion.state_at(t);
+                prop_assert!(now.qdd.max_abs() <= 20.0 * (1.0 + 1e-9));
+                prop_assert!((now.qdd - before.qdd).max_abs() <= 500.0 * h * (1.0 + 1e-6) + 1e-9);
+                let mean = (now.qd + before.qd) * 0.5;
+                prop_assert!((now.q - before.q - mean * h).max_abs() < 1e-9);
+                before = now;
+                t += h;
+            }
+            // The states just before the end meet those at rest.
+            let last = motion.state_at(motion.duration_s() - 1e-9);
+            prop_assert!(last.qd.max_abs() < 1e-6 && last.qdd.max_abs() < 1e-5);
+            prop_assert!((last.q - motion.state_at(10.0).q).max_abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn a_resting_arm_stays() {
+        let at = JointState::at_rest(JointVector::splat(0.5));
+        let motion = brake(&at, &Limits::default());
+        assert_eq!(motion.duration_s(), 0.0);
+        assert_eq!(motion.state_at(0.004), at);
+    }
+
+    /// From 1 rad/s with 20 rad/s² and 500 rad/s³: 0.04 s to build the
+    /// deceleration up, 0.01 s of it, 0.04 s to let go; symmetric, so half the
+    /// speed on average.
+    #[test]
+    fn known_brake() {
+        let from = JointState {
+            qd: JointVector::splat(1.0),
+            ..JointState::default()
+        };
+        let motion = brake(&from, &Limits::default());
+        assert!((motion.duration_s() - 0.09).abs() < 1e-12);
+        assert!((motion.state_at(1.0).q[0] - 0.045).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,29 @@
+//! The control core: pure, no clock, no I/O, no allocation.
+//!
+//! [`ControlState::step`] turns what one cycle knows into one setpoint at most.
+//! Everything it decides by is here: modes ([`mode`]), motions ([`motion`],
+//! [`phases`], [`brake`]), the limiter that every setpoint passes ([`limiter`])
+//! and the monitors ([`monitor`]). Time is the cycle's planned deadline, so a
+//! recorded run can be stepped again with the same result.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::unreachable
+    )
+)]
+
+pub mod brake;
+pub mod cycle;
+pub mod limiter;
+pub mod mode;
+pub mod monitor;
+pub mod motion;
+pub mod phases;
+
+pub use cycle::{ControlEvent, ControlState, CycleInput, CycleOutput, LinkInput, Order};
+pub use monitor::Thresholds;
+pub use motion::Motion;

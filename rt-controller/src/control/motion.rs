@@ -1,0 +1,69 @@
+//! What the arm is told to follow: an uploaded spline or a planned move.
+
+use super::phases::PhasedMotion;
+use shared_types::ipc::ControllerMode;
+use shared_types::{JointState, JointTrajectory, JointVector};
+
+/// A whole motion, complete before it begins; nothing is computed or fetched
+/// for it on the way except its value at an instant.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "always boxed, made once per motion; one allocation is enough"
+)]
+pub enum Motion {
+    /// An uploaded trajectory.
+    Spline(JointTrajectory),
+    /// A jerk-limited move from pose to pose.
+    Move {
+        /// Phases of every joint.
+        phases: PhasedMotion,
+        /// Where it ends, exactly (rad).
+        end: JointVector,
+    },
+}
+
+impl Motion {
+    /// Joint state at `t_s` after the start. RT-safe.
+    #[must_use]
+    pub fn state_at(&self, t_s: f64) -> JointState {
+        match self {
+            Self::Spline(trajectory) => trajectory.state_at(t_s),
+            Self::Move { phases, end } if t_s >= phases.duration_s() => JointState::at_rest(*end),
+            Self::Move { phases, .. } => phases.state_at(t_s),
+        }
+    }
+
+    /// Duration (s). RT-safe.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        match self {
+            Self::Spline(trajectory) => trajectory.duration_s(),
+            Self::Move { phases, .. } => phases.duration_s(),
+        }
+    }
+
+    /// Pose at the start (rad). RT-safe.
+    #[must_use]
+    pub fn start(&self) -> JointVector {
+        self.state_at(0.0).q
+    }
+
+    /// Pose at the end (rad). RT-safe.
+    #[must_use]
+    pub fn end(&self) -> JointVector {
+        match self {
+            Self::Spline(trajectory) => trajectory.end(),
+            Self::Move { end, .. } => *end,
+        }
+    }
+
+    /// Mode of the controller while it runs. RT-safe.
+    #[must_use]
+    pub const fn mode(&self) -> ControllerMode {
+        match self {
+            Self::Spline(_) => ControllerMode::Streaming,
+            Self::Move { .. } => ControllerMode::Moving,
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Why the controller process ends.
+
+use crate::config::ConfigError;
+use shared_types::ipc::IpcError;
+
+/// Why the controller cannot run, or could not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum ControllerError {
+    /// The configuration is wrong.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Shared memory does not work.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+    /// Real-time properties are required but cannot be had.
+    #[error("real-time set-up is required but incomplete: {}", .0.join("; "))]
+    NotRealTime(Vec<String>),
+    /// The system has no more threads.
+    #[error("cannot start a thread: {0}")]
+    Thread(std::io::Error),
+    /// The control loop ended by itself; the arm was asked to stop.
+    #[error("the control loop ended unexpectedly; the arm was asked to stop. This is a defect")]
+    LoopEnded,
+    /// A histogram could not be made.
+    #[error("cannot make a latency histogram: {0}")]
+    Histogram(#[from] hdrhistogram::CreationError),
+}

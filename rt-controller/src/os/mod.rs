@@ -1,0 +1,9 @@
+//! The operating system: clock, scheduling, memory. The only unsafe code of
+//! the crate, each block with its reason; Linux only.
+#![allow(unsafe_code, reason = "system calls without a safe wrapper")]
+
+pub mod clock;
+pub mod schedule;
+
+pub use clock::{Clock, MonotonicClock, now_ns};
+pub use schedule::{RealTimeSettings, SetupWarning, enter_real_time};

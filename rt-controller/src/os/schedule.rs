@@ -1,0 +1,158 @@
+//! Real-time scheduling, locked memory and a core of its own for the calling
+//! thread. Each thing that cannot be had is reported by itself, in words.
+
+use serde::{Deserialize, Serialize};
+use std::io::Error;
+
+/// What the control thread asks of the machine.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RealTimeSettings {
+    /// `SCHED_FIFO` priority of the control thread, 1 to 99; the report
+    /// receiver runs ten below. Absent: ordinary scheduling.
+    pub priority: Option<u8>,
+    /// Core to run on alone. Absent: any.
+    pub cpu: Option<usize>,
+    /// Lock all memory, so that no page fault can delay a cycle.
+    pub lock_memory: bool,
+    /// Refuse to start when any of these cannot be had. Set it on a real arm.
+    pub require: bool,
+}
+
+impl Default for RealTimeSettings {
+    fn default() -> Self {
+        Self {
+            priority: Some(80),
+            cpu: None,
+            lock_memory: true,
+            require: false,
+        }
+    }
+}
+
+/// A real-time property that could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupWarning {
+    /// Ordinary scheduling.
+    #[error(
+        "no real-time priority {priority} ({reason}): other programs can delay setpoints; \
+         allow it with `ulimit -r {priority}` or run the controller with CAP_SYS_NICE"
+    )]
+    Priority {
+        /// Priority asked for.
+        priority: u8,
+        /// What the system said.
+        reason: Error,
+    },
+    /// Pageable memory.
+    #[error(
+        "memory is not locked ({reason}): a page fault can delay setpoints; \
+         allow it with `ulimit -l unlimited` or run the controller with CAP_IPC_LOCK"
+    )]
+    Memory {
+        /// What the system said.
+        reason: Error,
+    },
+    /// Any core.
+    #[error("cannot run on core {cpu} alone ({reason}): choose a core that exists")]
+    Affinity {
+        /// Core asked for.
+        cpu: usize,
+        /// What the system said.
+        reason: Error,
+    },
+}
+
+/// Applies `settings` to the calling thread (memory: to the process) and
+/// returns what could not be had. Call it before the loop; not RT-safe.
+#[must_use]
+pub fn enter_real_time(settings: &RealTimeSettings) -> Vec<SetupWarning> {
+    let mut warnings = Vec::new();
+    if settings.lock_memory
+        && let Err(reason) = lock_memory()
+    {
+        warnings.push(SetupWarning::Memory { reason });
+    }
+    if let Some(cpu) = settings.cpu
+        && let Err(reason) = pin_to(cpu)
+    {
+        warnings.push(SetupWarning::Affinity { cpu, reason });
+    }
+    if let Some(priority) = settings.priority
+        && let Err(reason) = set_fifo(priority)
+    {
+        warnings.push(SetupWarning::Priority { priority, reason });
+    }
+    touch_stack();
+    warnings
+}
+
+fn lock_memory() -> Result<(), Error> {
+    // SAFETY: takes flags only and changes no memory content.
+    match unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } {
+        0 => Ok(()),
+        _ => Err(Error::last_os_error()),
+    }
+}
+
+/// `SCHED_FIFO` for the calling thread.
+///
+/// # Errors
+/// What the system says, usually a missing privilege.
+pub fn set_fifo(priority: u8) -> Result<(), Error> {
+    let parameters = libc::sched_param {
+        sched_priority: i32::from(priority),
+    };
+    // SAFETY: pid 0 is the calling thread; `parameters` is a valid sched_param
+    // for the duration of the call.
+    match unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } {
+        0 => Ok(()),
+        _ => Err(Error::last_os_error()),
+    }
+}
+
+fn pin_to(cpu: usize) -> Result<(), Error> {
+    if cpu >= usize::try_from(libc::CPU_SETSIZE).unwrap_or_default() {
+        return Err(Error::from(std::io::ErrorKind::InvalidInput));
+    }
+    // SAFETY: an all-zero cpu_set_t is the empty set, by its documentation.
+    let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
+    // SAFETY: `cpu` is below CPU_SETSIZE, checked above.
+    unsafe { libc::CPU_SET(cpu, &mut set) };
+    // SAFETY: pid 0 is the calling thread; the size is that of the set passed.
+    match unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) } {
+        0 => Ok(()),
+        _ => Err(Error::last_os_error()),
+    }
+}
+
+/// Touches the stack the loop will use, so that its pages are there.
+fn touch_stack() {
+    let page = [0_u8; 256 * 1024];
+    core::hint::black_box(&page);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_missing_thing_is_named() {
+        let settings = RealTimeSettings {
+            priority: Some(200),
+            cpu: Some(1_000_000),
+            lock_memory: false,
+            require: false,
+        };
+        let words: Vec<String> = std::thread::spawn(move || {
+            enter_real_time(&settings)
+                .iter()
+                .map(ToString::to_string)
+                .collect()
+        })
+        .join()
+        .unwrap();
+        assert_eq!(words.len(), 2, "{words:?}");
+        assert!(words[0].contains("core 1000000") && words[1].contains("priority 200"));
+    }
+}

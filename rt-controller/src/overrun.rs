@@ -1,0 +1,125 @@
+//! What happens when a cycle comes late: whole missed periods are skipped and
+//! counted, the phase is kept, nothing is caught up.
+//!
+//! A burst of setpoints is worse than a gap: the arm executes only the newest
+//! and derives wrong accelerations from bunched ones.
+
+/// Two setpoints are never closer than this part of a period.
+const MIN_GAP_PART: (u64, u64) = (4, 5);
+
+/// When a cycle runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wake {
+    /// Its planned instant (ns).
+    pub deadline_ns: u64,
+    /// Cycles skipped before it.
+    pub missed: u32,
+}
+
+fn skip(deadline_ns: u64, cycles: u64, period_ns: u64) -> Wake {
+    Wake {
+        deadline_ns: deadline_ns.saturating_add(cycles.saturating_mul(period_ns)),
+        missed: u32::try_from(cycles).unwrap_or(u32::MAX),
+    }
+}
+
+/// The cycle that really runs when a thread due at `deadline_ns` woke at
+/// `woke_ns`: deadlines passed by a whole period or more are skipped. RT-safe.
+#[must_use]
+pub fn after_wake(deadline_ns: u64, woke_ns: u64, period_ns: u64) -> Wake {
+    let late_ns = woke_ns.saturating_sub(deadline_ns);
+    skip(
+        deadline_ns,
+        late_ns.checked_div(period_ns).unwrap_or(0),
+        period_ns,
+    )
+}
+
+/// The next cycle after the one due at `deadline_ns` that woke at `woke_ns` and
+/// ended at `now_ns`: the first deadline that is still ahead and leaves a gap
+/// to the setpoint just sent. RT-safe.
+#[must_use]
+pub fn next_wake(deadline_ns: u64, woke_ns: u64, now_ns: u64, period_ns: u64) -> Wake {
+    let next_ns = deadline_ns.saturating_add(period_ns);
+    let (part, whole) = MIN_GAP_PART;
+    let gap_ns = period_ns
+        .saturating_mul(part)
+        .checked_div(whole)
+        .unwrap_or(0);
+    let earliest_ns = now_ns.max(woke_ns.saturating_add(gap_ns));
+    let behind_ns = earliest_ns.saturating_sub(next_ns);
+    let cycles = if period_ns == 0 {
+        0
+    } else {
+        behind_ns.div_ceil(period_ns)
+    };
+    skip(next_ns, cycles, period_ns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const P: u64 = 4_000_000;
+
+    #[test]
+    fn punctual_cycles_follow_each_other() {
+        let wake = next_wake(10 * P, 10 * P + 50_000, 10 * P + 150_000, P);
+        assert_eq!(
+            wake,
+            Wake {
+                deadline_ns: 11 * P,
+                missed: 0
+            }
+        );
+    }
+
+    #[test]
+    fn a_late_wake_skips_what_would_come_too_close() {
+        // Woke 3.5 ms late: the next deadline is only 0.5 ms away.
+        let wake = next_wake(10 * P, 10 * P + 3_500_000, 10 * P + 3_600_000, P);
+        assert_eq!(
+            wake,
+            Wake {
+                deadline_ns: 12 * P,
+                missed: 1
+            }
+        );
+    }
+
+    #[test]
+    fn a_long_sleep_loses_whole_cycles_and_keeps_the_phase() {
+        let wake = after_wake(10 * P, 13 * P + 700_000, P);
+        assert_eq!(
+            wake,
+            Wake {
+                deadline_ns: 13 * P,
+                missed: 3
+            }
+        );
+        assert_eq!(after_wake(10 * P, 10 * P - 5, P).missed, 0);
+    }
+
+    proptest! {
+        #[test]
+        fn setpoints_keep_their_distance_and_deadlines_their_phase(
+            late in 0_u64..50_000_000, work in 0_u64..20_000_000, base in 1_u64..1_000_000,
+        ) {
+            let due = base + 7 * P;
+            let woke = due + late;
+            let this = after_wake(due, woke, P);
+            prop_assert!(this.deadline_ns <= woke && woke < this.deadline_ns + P);
+            let next = next_wake(this.deadline_ns, woke, woke + work, P);
+            prop_assert_eq!((next.deadline_ns - base) % P, 0);
+            prop_assert_eq!(next.deadline_ns, this.deadline_ns + P * (1 + u64::from(next.missed)));
+            prop_assert!(next.deadline_ns >= woke + work);
+            prop_assert!(next.deadline_ns - woke >= P / 5 * 4);
+        }
+
+        #[test]
+        fn any_numbers_return(a: u64, b: u64, c: u64, d: u64) {
+            let _ = (after_wake(a, b, d), next_wake(a, b, c, d));
+        }
+    }
+}

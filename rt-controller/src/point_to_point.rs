@@ -1,0 +1,221 @@
+//! Moves from pose to pose, planned before they begin.
+//!
+//! A time-optimal jerk-limited profile per joint, synchronised (Ruckig,
+//! arXiv:2105.04830), slowed down until the tool speed holds too, and then
+//! checked point by point with the very limiter that guards the wire. What the
+//! generator says is never trusted: a profile that fails any check is an error
+//! here and never reaches the arm.
+
+use crate::control::Motion;
+use crate::control::limiter::Limiter;
+use crate::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
+use rsruckig::prelude::*;
+use shared_types::{FaultCode, JOINTS, JointVector, Limits};
+
+/// Speed is reduced by this factor until the tool speed holds.
+const SLOWER: f64 = 0.85;
+/// Attempts; the last one is at a hundredth of the speed.
+const ATTEMPTS: u32 = 30;
+
+/// Why a move cannot be planned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MoveError {
+    /// The target is no pose inside the joint ranges.
+    #[error("joint {joint} of the target, {q_rad:.4} rad, is outside its range")]
+    TargetOutsideRange {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Value asked for (rad).
+        q_rad: f64,
+    },
+    /// Part of speed outside (0, 1].
+    #[error("`speed_part` is {found}, it must be above 0 and at most 1")]
+    SpeedPart {
+        /// Value found.
+        found: f64,
+    },
+    /// The generator failed.
+    #[error("no jerk-limited move was found ({reason}); try another pose")]
+    Generator {
+        /// What it said.
+        reason: String,
+    },
+    /// The planned move breaks a limit even when slow.
+    #[error("the move would break a limit: {}", .0.explain())]
+    Limit(FaultCode),
+}
+
+/// Plans a move that rests at `from` and at `to` (rad), using `speed_part` (0
+/// to 1] of the limits.
+///
+/// # Errors
+/// [`MoveError`].
+pub fn plan_move(
+    from: &JointVector,
+    to: &JointVector,
+    speed_part: f64,
+    limits: &Limits,
+) -> Result<Motion, MoveError> {
+    if !(speed_part > 0.0 && speed_part <= 1.0) {
+        return Err(MoveError::SpeedPart { found: speed_part });
+    }
+    if let Some(j) = limits.position_violation(to) {
+        return Err(MoveError::TargetOutsideRange {
+            joint: j + 1,
+            q_rad: to[j],
+        });
+    }
+    let mut part = speed_part;
+    let mut broken = FaultCode::SetpointTcpSpeed;
+    for _ in 0..ATTEMPTS {
+        let motion = generate(from, to, part, limits)?;
+        match verify(&motion, limits) {
+            Ok(()) => return Ok(motion),
+            Err(fault) => broken = fault,
+        }
+        part *= SLOWER;
+    }
+    Err(MoveError::Limit(broken))
+}
+
+/// Runs the motion through the limiter at the wire's rate.
+///
+/// # Errors
+/// The limit it breaks.
+pub fn verify(motion: &Motion, limits: &Limits) -> Result<(), FaultCode> {
+    let period_s = limits.period_s();
+    let mut limiter = Limiter::at_rest(motion.start(), limits);
+    let mut t_s = 0.0;
+    loop {
+        limiter.admit(&motion.state_at(t_s).q, period_s, limits)?;
+        if t_s > motion.duration_s() + period_s {
+            return Ok(());
+        }
+        t_s += period_s;
+    }
+}
+
+fn generate(
+    from: &JointVector,
+    to: &JointVector,
+    part: f64,
+    limits: &Limits,
+) -> Result<Motion, MoveError> {
+    let mut input = InputParameter::<JOINTS>::new(None);
+    for j in 0..JOINTS {
+        input.current_position[j] = from[j];
+        input.target_position[j] = to[j];
+        // A hair below the limits: rounding must not touch them.
+        let slack = part * (1.0 - 1e-9);
+        input.max_velocity[j] = limits.velocity_max_rad_s[j] * slack;
+        input.max_acceleration[j] = limits.acceleration_max_rad_s2[j] * slack;
+        input.max_jerk[j] = limits.jerk_max_rad_s3[j] * slack;
+    }
+    let mut generator = Ruckig::<JOINTS, ThrowErrorHandler>::new(None, limits.period_s());
+    let mut trajectory = Trajectory::<JOINTS>::new(None);
+    let failed = |reason: String| MoveError::Generator { reason };
+    let result = generator
+        .calculate(&input, &mut trajectory)
+        .map_err(|e| failed(e.to_string()))?;
+    if !matches!(result, RuckigResult::Working | RuckigResult::Finished) {
+        return Err(failed(format!("{result:?}")));
+    }
+    let profiles = trajectory
+        .profiles
+        .first()
+        .ok_or_else(|| failed("it is empty".to_owned()))?;
+    let mut axes = [AxisPhases::default(); JOINTS];
+    for (j, (axis, profile)) in axes.iter_mut().zip(profiles.iter()).enumerate() {
+        let mut phases = [Phase::default(); MAX_PHASES];
+        for (phase, (t, jerk)) in phases.iter_mut().zip(profile.t.iter().zip(&profile.j)) {
+            *phase = Phase {
+                duration_s: *t,
+                jerk_rad_s3: *jerk,
+            };
+        }
+        let start = AxisState {
+            q: from[j],
+            ..AxisState::default()
+        };
+        *axis = AxisPhases::new(start, phases);
+    }
+    let phases = PhasedMotion::new(axes);
+    let arrives = phases.state_at(phases.duration_s() + 1.0).q - *to;
+    if !(arrives.is_finite() && arrives.max_abs() < 1e-9) {
+        return Err(failed("it does not arrive at the target".to_owned()));
+    }
+    Ok(Motion::Move { phases, end: *to })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use shared_types::plan::START_POSE;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn any_two_poses_are_joined_within_limits(
+            a in prop::array::uniform7(0.0_f64..1.0),
+            b in prop::array::uniform7(0.0_f64..1.0),
+            part in 0.05_f64..1.0,
+        ) {
+            let limits = Limits::default();
+            let pose = |u: [f64; 7]| JointVector(u).zip_with(limits.position_min_rad, |u, lo| u + lo)
+                .zip_with(limits.position_max_rad, f64::min);
+            let (from, to) = (pose(a), pose(b));
+            let motion = plan_move(&from, &to, part, &limits).unwrap();
+            prop_assert_eq!(motion.start(), from);
+            prop_assert_eq!(motion.state_at(motion.duration_s()).q, to);
+            prop_assert_eq!(verify(&motion, &limits), Ok(()));
+        }
+    }
+
+    #[test]
+    fn staying_is_a_move_of_no_time() {
+        let motion = plan_move(&START_POSE, &START_POSE, 0.5, &Limits::default()).unwrap();
+        assert!(motion.duration_s() < 1e-9);
+        assert_eq!(motion.state_at(0.0).q, START_POSE);
+    }
+
+    /// Joint 7 by 1 rad at full speed: v = π is not reached; four jerk phases
+    /// of 0.04 s and two of constant 20 rad/s²: from `x = a(T/2)(T/2 - tj)`,
+    /// with tj = 0.04, T/2 = tj/2 + sqrt(tj²/4 + x/a).
+    #[test]
+    fn known_duration() {
+        let mut to = START_POSE;
+        to[6] += 1.0;
+        let motion = plan_move(&START_POSE, &to, 1.0, &Limits::default()).unwrap();
+        let half = 0.02 + (0.0004_f64 + 1.0 / 20.0).sqrt();
+        assert!(
+            (motion.duration_s() - 2.0 * half).abs() < 1e-6,
+            "{}",
+            motion.duration_s()
+        );
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let limits = Limits::default();
+        let plan = |to, part| plan_move(&START_POSE, &to, part, &limits);
+        assert!(matches!(
+            plan(START_POSE, 0.0),
+            Err(MoveError::SpeedPart { .. })
+        ));
+        assert!(matches!(
+            plan(START_POSE, f64::NAN),
+            Err(MoveError::SpeedPart { .. })
+        ));
+        let bad = JointVector([0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(matches!(
+            plan(bad, 0.5),
+            Err(MoveError::TargetOutsideRange { joint: 2, .. })
+        ));
+        let nan = JointVector::splat(f64::NAN);
+        assert!(matches!(
+            plan(nan, 0.5),
+            Err(MoveError::TargetOutsideRange { joint: 1, .. })
+        ));
+    }
+}

@@ -1,0 +1,105 @@
+//! The in-process rings between the control loop and the other threads:
+//! single-producer single-consumer, lock-free, sized once.
+
+use crate::control::{ControlEvent, Motion, Order};
+use rtrb::{Consumer, Producer, RingBuffer};
+use shared_types::ipc::{CycleRecord, JointReport};
+
+/// Cycle records kept while the relay is busy: sixteen seconds at 250 Hz.
+const RECORDS: usize = 4096;
+/// Joint reports kept for the relay: the same time.
+const REPORTS: usize = 4096;
+/// Joint reports kept for the loop; it takes them all every cycle.
+const NEWEST_REPORTS: usize = 16;
+/// Orders, events and retired things are few.
+const FEW: usize = 64;
+
+/// An order for the loop, with the command link that comes with an adoption.
+#[derive(Debug)]
+pub struct Mail<T> {
+    /// What to do.
+    pub order: Order,
+    /// A fresh link, which replaces the present one.
+    pub link: Option<Box<T>>,
+}
+
+/// Something the loop is done with, to be dropped by the relay.
+#[derive(Debug)]
+pub enum Retired<T> {
+    /// A motion that ended or was refused.
+    Motion(Box<Motion>),
+    /// A link that broke or was replaced.
+    Link(Box<T>),
+}
+
+/// The loop's ends. A full ring loses what is pushed.
+#[derive(Debug)]
+pub struct RtPorts<T> {
+    /// Orders in, one taken per cycle.
+    pub orders: Consumer<Mail<T>>,
+    /// Joint reports in; the newest counts.
+    pub reports: Consumer<JointReport>,
+    /// Events out.
+    pub events: Producer<ControlEvent>,
+    /// Cycle records out.
+    pub records: Producer<CycleRecord>,
+    /// What is to be dropped, out.
+    pub retired: Producer<Retired<T>>,
+}
+
+/// The relay's ends.
+#[derive(Debug)]
+pub struct RelayPorts<T> {
+    /// Orders out.
+    pub orders: Producer<Mail<T>>,
+    /// Joint reports in, every one.
+    pub reports: Consumer<JointReport>,
+    /// Events in.
+    pub events: Consumer<ControlEvent>,
+    /// Cycle records in.
+    pub records: Consumer<CycleRecord>,
+    /// What is to be dropped, in.
+    pub retired: Consumer<Retired<T>>,
+}
+
+/// All rings of a controller.
+#[derive(Debug)]
+pub struct Rings<T> {
+    /// The loop's ends.
+    pub rt: RtPorts<T>,
+    /// The relay's ends.
+    pub relay: RelayPorts<T>,
+    /// The report receiver's way to the loop.
+    pub reports_to_rt: Producer<JointReport>,
+    /// The report receiver's way to the relay.
+    pub reports_to_relay: Producer<JointReport>,
+}
+
+/// Makes all rings. Not RT-safe.
+#[must_use]
+pub fn rings<T>() -> Rings<T> {
+    let (orders_in, orders) = RingBuffer::new(FEW);
+    let (events, events_out) = RingBuffer::new(FEW);
+    let (records, records_out) = RingBuffer::new(RECORDS);
+    let (retired, retired_out) = RingBuffer::new(FEW);
+    let (reports_to_rt, newest) = RingBuffer::new(NEWEST_REPORTS);
+    let (reports_to_relay, reports) = RingBuffer::new(REPORTS);
+    Rings {
+        rt: RtPorts {
+            orders,
+            reports: newest,
+            events,
+            records,
+            retired,
+        },
+        relay: RelayPorts {
+            orders: orders_in,
+            reports,
+            events: events_out,
+            records: records_out,
+            retired: retired_out,
+        },
+        reports_to_rt,
+        reports_to_relay,
+    }
+}

@@ -1,0 +1,162 @@
+//! The controller process: three threads, their rings, and how they end.
+//!
+//! | thread | owns | scheduling |
+//! |---|---|---|
+//! | control loop | command link, blackboards, control state | FIFO, absolute deadlines |
+//! | arm reports | report connection | FIFO, ten below |
+//! | relay (the caller's) | services, histograms, set-up connection | ordinary |
+
+use crate::config::ControllerConfig;
+use crate::control::ControlState;
+use crate::error::ControllerError;
+use crate::os::{MonotonicClock, enter_real_time};
+use crate::ports::{RtPorts, rings};
+use crate::relay::Relay;
+use crate::reports::{self, ReportSource};
+use crate::rt_loop::RtLoop;
+use crate::transport::tcp::TcpLink;
+use shared_types::ipc::{Bus, ControllerBoards};
+use std::net::SocketAddr;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Pause between two turns of the relay.
+const TURN: Duration = Duration::from_millis(2);
+/// Longest wait for the brake when the process is asked to end.
+const BRAKE_WAIT: Duration = Duration::from_secs(3);
+
+/// Runs the controller until `stop` is set. A moving arm is braked first; it
+/// then holds its last setpoint by itself. Blocks the calling thread.
+///
+/// # Errors
+/// [`ControllerError`]: wrong configuration, no shared memory, or missing
+/// real-time properties where they are required.
+pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), ControllerError> {
+    config.check()?;
+    let limits = config.resolve_limits()?;
+    let thresholds = config.thresholds.checked()?;
+    let bus = Bus::join(&config.domain)?;
+    bus.remove_leftovers();
+    let rings = rings();
+    let mut threads = Threads::default();
+    let control = ControlState::new(limits.clone(), thresholds);
+    let warnings = threads.start_loop(&config, control, rings.rt)?;
+    let source = ReportSource {
+        arm: config.arm,
+        realtime_port: config.report_port,
+        fallback_port: config.fallback_report_port,
+        priority: config.real_time.priority.map(|p| p.saturating_sub(10)),
+    };
+    let quit = Arc::clone(&threads.quit);
+    threads.receiver = Some(
+        reports::spawn(source, rings.reports_to_rt, rings.reports_to_relay, quit)
+            .map_err(ControllerError::Thread)?,
+    );
+    let arm = SocketAddr::new(config.arm, config.command_port);
+    let stale_ns = thresholds.report_stale_ns;
+    let mut relay = Relay::open(&bus, limits, arm, stale_ns, warnings, rings.relay)?;
+    serve(&mut relay, &threads, stop)
+}
+
+/// Turns the relay until `stop`, then until the arm rests.
+fn serve(relay: &mut Relay, threads: &Threads, stop: &AtomicBool) -> Result<(), ControllerError> {
+    let mut stopping: Option<Instant> = None;
+    loop {
+        relay.turn();
+        if !threads.loop_lives() {
+            relay.stop_arm();
+            return Err(ControllerError::LoopEnded);
+        }
+        if stop.load(Ordering::Relaxed) {
+            let since = *stopping.get_or_insert_with(|| {
+                relay.stop();
+                Instant::now()
+            });
+            let settled = since.elapsed() > 10 * TURN && !relay.mode().is_moving();
+            if settled || since.elapsed() > BRAKE_WAIT {
+                return Ok(());
+            }
+        }
+        std::thread::sleep(TURN);
+    }
+}
+
+/// The threads beside the relay. Dropping it ends and joins them.
+#[derive(Debug, Default)]
+struct Threads {
+    quit: Arc<AtomicBool>,
+    control_loop: Option<JoinHandle<()>>,
+    receiver: Option<JoinHandle<()>>,
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        self.quit.store(true, Ordering::Relaxed);
+        for thread in [self.control_loop.take(), self.receiver.take()]
+            .into_iter()
+            .flatten()
+        {
+            if thread.join().is_err() {
+                tracing::error!("a thread of the controller panicked");
+            }
+        }
+    }
+}
+
+impl Threads {
+    fn loop_lives(&self) -> bool {
+        self.control_loop
+            .as_ref()
+            .is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Starts the control loop and waits until it is set up; what could not be
+    /// had is returned in words.
+    fn start_loop(
+        &mut self,
+        config: &ControllerConfig,
+        control: ControlState,
+        ports: RtPorts<TcpLink>,
+    ) -> Result<Vec<String>, ControllerError> {
+        let (domain, settings) = (config.domain.clone(), config.real_time.clone());
+        let quit = Arc::clone(&self.quit);
+        let (ready, wait) = mpsc::channel();
+        let body = move || {
+            // Blackboard handles stay in the thread that made them.
+            let boards = match Bus::join(&domain).and_then(|bus| ControllerBoards::create(&bus)) {
+                Ok(boards) => boards,
+                Err(error) => {
+                    let _ = ready.send(Err(error));
+                    return;
+                }
+            };
+            let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
+            let warnings = enter_real_time(&settings);
+            rt.real_time =
+                warnings.is_empty() && settings.priority.is_some() && settings.lock_memory;
+            let words: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+            let _ = ready.send(Ok(words));
+            // A panic is a defect; caught here, the relay can still stop the arm.
+            if catch_unwind(AssertUnwindSafe(|| rt.run(&quit))).is_err() {
+                tracing::error!("the control loop panicked");
+            }
+        };
+        let thread = std::thread::Builder::new()
+            .name("control loop".to_owned())
+            .spawn(body)
+            .map_err(ControllerError::Thread)?;
+        self.control_loop = Some(thread);
+        let warnings = wait.recv().map_err(|_gone| ControllerError::LoopEnded)??;
+        for warning in &warnings {
+            tracing::warn!("{warning}");
+        }
+        if config.real_time.require && !warnings.is_empty() {
+            return Err(ControllerError::NotRealTime(warnings));
+        }
+        Ok(warnings)
+    }
+}

@@ -1,0 +1,112 @@
+//! Latency histograms, filled from cycle records outside the real-time thread.
+
+use hdrhistogram::Histogram;
+use shared_types::ipc::CycleRecord;
+use shared_types::ipc::message::{LatencyReport, Percentiles};
+
+/// Largest latency told apart (ns): ten seconds.
+const MAX_NS: u64 = 10_000_000_000;
+
+/// Histograms since they were last taken.
+#[derive(Debug)]
+pub(super) struct Latencies {
+    wake: Histogram<u64>,
+    compute: Histogram<u64>,
+    send: Histogram<u64>,
+    reply: Histogram<u64>,
+    cycles: u64,
+    missed: u64,
+}
+
+impl Latencies {
+    /// Empty.
+    pub(super) fn new() -> Result<Self, hdrhistogram::CreationError> {
+        let empty = || Histogram::new_with_bounds(1, MAX_NS, 3);
+        Ok(Self {
+            wake: empty()?,
+            compute: empty()?,
+            send: empty()?,
+            reply: empty()?,
+            cycles: 0,
+            missed: 0,
+        })
+    }
+
+    /// Adds one cycle.
+    pub(super) fn record(&mut self, r: &CycleRecord) {
+        self.cycles += 1;
+        self.missed += u64::from(r.missed);
+        self.wake.saturating_record(u64::from(r.wake_late_ns));
+        self.compute.saturating_record(u64::from(r.compute_ns));
+        if r.sent != 0 {
+            self.send.saturating_record(u64::from(r.send_ns));
+        }
+        if r.reply_ns != 0 {
+            self.reply.saturating_record(u64::from(r.reply_ns));
+        }
+    }
+
+    /// The report, after which everything starts from zero.
+    pub(super) fn take(&mut self) -> LatencyReport {
+        let report = LatencyReport {
+            wake: percentiles(&self.wake),
+            compute: percentiles(&self.compute),
+            send: percentiles(&self.send),
+            reply: percentiles(&self.reply),
+            cycles: self.cycles,
+            missed: self.missed,
+        };
+        for histogram in [
+            &mut self.wake,
+            &mut self.compute,
+            &mut self.send,
+            &mut self.reply,
+        ] {
+            histogram.reset();
+        }
+        (self.cycles, self.missed) = (0, 0);
+        report
+    }
+}
+
+fn percentiles(histogram: &Histogram<u64>) -> Percentiles {
+    #[allow(clippy::cast_precision_loss, reason = "at most 1e10")]
+    let us = |ns: u64| ns as f64 / 1e3;
+    Percentiles {
+        count: histogram.len(),
+        p50_us: us(histogram.value_at_quantile(0.5)),
+        p99_us: us(histogram.value_at_quantile(0.99)),
+        p999_us: us(histogram.value_at_quantile(0.999)),
+        max_us: us(histogram.max()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_of_a_known_set_and_a_fresh_start() {
+        let mut latencies = Latencies::new().unwrap();
+        for k in 1..=1000 {
+            latencies.record(&CycleRecord {
+                wake_late_ns: k * 1000,
+                missed: u32::from(k == 7),
+                ..CycleRecord::default()
+            });
+        }
+        let report = latencies.take();
+        assert_eq!(
+            (report.cycles, report.missed, report.reply.count),
+            (1000, 1, 0)
+        );
+        for (found, expected) in [
+            (report.wake.p50_us, 500.0),
+            (report.wake.p99_us, 990.0),
+            (report.wake.max_us, 1000.0),
+        ] {
+            assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
+        }
+        assert_eq!(latencies.take().cycles, 0);
+    }
+}

@@ -1,0 +1,314 @@
+//! The relay: the controller's door to the other processes, outside the
+//! real-time thread.
+//!
+//! It publishes what the loop and the report receiver put into their rings,
+//! answers [`ControllerRpc`], plans and checks every motion before the loop
+//! gets it, and sets the arm up. It may allocate, wait and log; the loop never
+//! waits for it.
+
+mod answers;
+mod latency;
+mod requests;
+
+use crate::control::{ControlEvent, Motion, Order};
+use crate::error::ControllerError;
+use crate::os::now_ns;
+use crate::ports::{Mail, RelayPorts, Retired};
+use crate::session::ArmSession;
+use crate::transport::tcp::TcpLink;
+use crate::xarm::ErrorCode;
+use answers::{ControllerCall, answer, refuse, stopped};
+use latency::Latencies;
+use shared_types::ipc::message::{ControllerEvent, ControllerRpc};
+use shared_types::ipc::rpc::RpcServer;
+use shared_types::ipc::{
+    Bus, ControllerMode, CyclePublisher, CycleRecord, JointPublisher, JointReport,
+};
+use shared_types::{FaultCode, Limits};
+use std::collections::VecDeque;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+/// Longest wait for one answer of the arm while it is set up.
+const SET_UP_TIMEOUT: Duration = Duration::from_secs(2);
+/// The same for a question about an error, when callers wait.
+const QUESTION_TIMEOUT: Duration = Duration::from_millis(200);
+/// Longest wait of a bring-up for the first joint report.
+const REPORT_WAIT: Duration = Duration::from_secs(3);
+
+/// A call that is answered later.
+enum Open {
+    /// Motions in order; the last one is what was asked for.
+    Motion {
+        call: ControllerCall,
+        id: u64,
+        next: VecDeque<Box<Motion>>,
+    },
+    /// Answered when the arm is latched.
+    Stop { call: ControllerCall },
+    /// Answered when the loop holds the arm and joint reports come.
+    Adoption {
+        call: ControllerCall,
+        adopted: bool,
+        until: Instant,
+    },
+}
+
+/// The relay and all it owns. Lives in the thread that opened it.
+pub struct Relay {
+    limits: Limits,
+    arm: SocketAddr,
+    report_stale_ns: u64,
+    warnings: Vec<String>,
+    ports: RelayPorts<TcpLink>,
+    server: RpcServer<ControllerRpc>,
+    cycles: CyclePublisher,
+    joints: JointPublisher,
+    latencies: Latencies,
+    newest: CycleRecord,
+    newest_report: Option<JointReport>,
+    arm_error: ErrorCode,
+    open: Vec<Open>,
+    last_id: u64,
+}
+
+impl core::fmt::Debug for Relay {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Relay")
+            .field("arm", &self.arm)
+            .field("open", &self.open.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Relay {
+    /// Opens all services. `warnings` are the real-time properties that could
+    /// not be had, in words.
+    ///
+    /// # Errors
+    /// [`ControllerError`].
+    pub fn open(
+        bus: &Bus,
+        limits: Limits,
+        arm: SocketAddr,
+        report_stale_ns: u64,
+        warnings: Vec<String>,
+        ports: RelayPorts<TcpLink>,
+    ) -> Result<Self, ControllerError> {
+        Ok(Self {
+            limits,
+            arm,
+            report_stale_ns,
+            warnings,
+            ports,
+            server: RpcServer::open(bus)?,
+            cycles: bus.cycle_publisher()?,
+            joints: bus.joint_publisher()?,
+            latencies: Latencies::new()?,
+            newest: CycleRecord::default(),
+            newest_report: None,
+            arm_error: ErrorCode::NONE,
+            open: Vec::new(),
+            last_id: 0,
+        })
+    }
+
+    /// Mode of the loop, as of its newest record.
+    #[must_use]
+    pub fn mode(&self) -> ControllerMode {
+        ControllerMode::from_raw(self.newest.mode)
+    }
+
+    /// Does all that has come up since the last turn. Call it every few
+    /// milliseconds.
+    pub fn turn(&mut self) {
+        self.publish();
+        while let Ok(retired) = self.ports.retired.pop() {
+            match retired {
+                Retired::Motion(motion) => drop(motion),
+                Retired::Link(link) => drop(link),
+            }
+        }
+        while let Ok(event) = self.ports.events.pop() {
+            self.on_event(event);
+        }
+        self.settle_adoptions();
+        loop {
+            match self.server.receive() {
+                Ok(Some(call)) => self.serve(call),
+                Ok(None) => break,
+                Err(reason) => {
+                    tracing::warn!(%reason, "a request was dropped");
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Asks the loop to brake and latch.
+    pub fn stop(&mut self) {
+        let _ = self.order(Order::Stop, None);
+    }
+
+    /// Asks the arm itself to stop, when there is no loop any more.
+    pub fn stop_arm(&mut self) {
+        let asked = ArmSession::connect(self.arm, QUESTION_TIMEOUT).and_then(|mut s| s.stop_arm());
+        if let Err(reason) = asked {
+            tracing::error!(%reason, "the arm could not be asked to stop");
+        }
+    }
+
+    fn publish(&mut self) {
+        let mut failed = None;
+        while let Ok(record) = self.ports.records.pop() {
+            self.latencies.record(&record);
+            self.newest = record;
+            failed = self.cycles.send_copy(record).err().or(failed);
+        }
+        while let Ok(report) = self.ports.reports.pop() {
+            self.newest_report = Some(report);
+            let sent = self.joints.send_copy(report);
+            failed = sent.err().or(failed);
+        }
+        if let Some(reason) = failed {
+            tracing::warn!(?reason, "records could not be published");
+        }
+    }
+
+    /// Hands an order to the loop.
+    fn order(&mut self, order: Order, link: Option<Box<TcpLink>>) -> Result<(), FaultCode> {
+        self.ports
+            .orders
+            .push(Mail { order, link })
+            .map_err(|_full| FaultCode::WrongMode)
+    }
+
+    fn on_event(&mut self, event: ControlEvent) {
+        match event {
+            ControlEvent::Adopted => {
+                self.arm_error = ErrorCode::NONE;
+                for open in &mut self.open {
+                    if let Open::Adoption { adopted, .. } = open {
+                        *adopted = true;
+                    }
+                }
+            }
+            ControlEvent::Started { id, start_ns } => {
+                if let Some(Open::Motion { call, next, .. }) = self.motion(id)
+                    && next.is_empty()
+                {
+                    answer(call, &ControllerEvent::Started { start_ns });
+                }
+            }
+            ControlEvent::Finished {
+                id,
+                start_ns,
+                end_ns,
+            } => self.on_finished(id, start_ns, end_ns),
+            ControlEvent::Refused { id, fault } => self.on_refused(id, fault),
+            ControlEvent::Latched { fault, cycle } => self.on_latched(fault, cycle),
+        }
+    }
+
+    fn motion(&mut self, motion: u64) -> Option<&mut Open> {
+        self.open
+            .iter_mut()
+            .find(|open| matches!(open, Open::Motion { id, .. } if *id == motion))
+    }
+
+    /// Takes the call of a motion, if it is still open.
+    fn take_motion(&mut self, motion: u64) -> Option<Open> {
+        let at = self
+            .open
+            .iter()
+            .position(|open| matches!(open, Open::Motion { id, .. } if *id == motion))?;
+        Some(self.open.swap_remove(at))
+    }
+
+    fn on_finished(&mut self, id: u64, start_ns: u64, end_ns: u64) {
+        let Some(Open::Motion { call, mut next, .. }) = self.take_motion(id) else {
+            return;
+        };
+        match next.pop_front() {
+            None => answer(&call, &ControllerEvent::Finished { start_ns, end_ns }),
+            Some(motion) => self.begin(call, motion, next),
+        }
+    }
+
+    fn on_refused(&mut self, id: Option<u64>, fault: FaultCode) {
+        match id {
+            Some(id) => {
+                if let Some(Open::Motion { call, .. }) = self.take_motion(id) {
+                    refuse(&call, fault, "");
+                }
+            }
+            None => self.open.retain(|open| {
+                let Open::Adoption { call, .. } = open else {
+                    return true;
+                };
+                refuse(call, fault, "");
+                false
+            }),
+        }
+    }
+
+    fn on_latched(&mut self, fault: FaultCode, cycle: u64) {
+        let mut fault = fault;
+        self.arm_error = match fault {
+            FaultCode::ArmError | FaultCode::ArmModeChanged | FaultCode::ArmNotReady => {
+                self.ask_error()
+            }
+            _ => ErrorCode::NONE,
+        };
+        if !self.arm_error.is_none() {
+            fault = FaultCode::ArmError;
+        }
+        tracing::warn!(?fault, cycle, arm_error = %self.arm_error, "stopped");
+        for open in self.open.drain(..) {
+            match open {
+                Open::Motion { call, .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
+                Open::Stop { call } => answer(&call, &ControllerEvent::Done),
+                Open::Adoption { call, .. } => refuse(&call, fault, ""),
+            }
+        }
+    }
+
+    fn ask_error(&self) -> ErrorCode {
+        ArmSession::connect(self.arm, QUESTION_TIMEOUT)
+            .and_then(|mut session| session.error_code())
+            .unwrap_or(ErrorCode::NONE)
+    }
+
+    /// Begins a motion for `call`; `next` follow it.
+    fn begin(&mut self, call: ControllerCall, motion: Box<Motion>, next: VecDeque<Box<Motion>>) {
+        self.last_id += 1;
+        let id = self.last_id;
+        match self.order(Order::Run { id, motion }, None) {
+            Ok(()) => self.open.push(Open::Motion { call, id, next }),
+            Err(fault) => refuse(&call, fault, ""),
+        }
+    }
+
+    /// Answers bring-ups whose arm is held and reports its joints.
+    fn settle_adoptions(&mut self) {
+        let stale_ns = self.report_stale_ns;
+        let fresh = self
+            .newest_report
+            .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
+        self.open.retain(|open| match open {
+            Open::Adoption {
+                call,
+                adopted: true,
+                ..
+            } if fresh => {
+                answer(call, &ControllerEvent::Done);
+                false
+            }
+            Open::Adoption { call, until, .. } if Instant::now() > *until => {
+                refuse(call, FaultCode::ReportStale, "");
+                false
+            }
+            Open::Adoption { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
+        });
+    }
+}

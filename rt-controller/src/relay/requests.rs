@@ -1,0 +1,220 @@
+//! What each request of the controller's service leads to.
+
+use super::answers::{ControllerCall, answer, refuse};
+use super::{Open, REPORT_WAIT, Relay, SET_UP_TIMEOUT};
+use crate::control::{Motion, Order};
+use crate::point_to_point::{MoveError, plan_move, verify};
+use crate::session::{ArmSession, SessionError};
+use crate::transport::tcp::TcpLink;
+use shared_types::ipc::ControllerMode;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
+use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, JointTrajectory, JointVector};
+use std::collections::VecDeque;
+use std::time::Instant;
+
+/// Largest distance of the held pose from the start of a plan (rad): 0.5 deg.
+const START_DISTANCE_MAX_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
+/// Smaller distances need no move to the start (rad).
+const START_EQUAL_RAD: f64 = 1e-9;
+/// Part of the limits used for that move.
+const TO_START_SPEED_PART: f64 = 0.05;
+
+impl Relay {
+    pub(super) fn serve(&mut self, call: ControllerCall) {
+        match &call.request {
+            ControllerRequest::Status => self.status(&call),
+            ControllerRequest::Latency => {
+                let report = Box::new(self.latencies.take());
+                answer(&call, &ControllerEvent::Latency(report));
+            }
+            ControllerRequest::Stop => self.serve_stop(call),
+            ControllerRequest::Bringup => match self.mode() {
+                ControllerMode::Idle => answer(&call, &ControllerEvent::Done),
+                ControllerMode::Offline => self.set_up(call),
+                _ => self.wrong_mode(&call, "a stopped controller wants an acknowledgement"),
+            },
+            ControllerRequest::Acknowledge => match self.mode() {
+                ControllerMode::Idle => answer(&call, &ControllerEvent::Done),
+                ControllerMode::Faulted => self.set_up(call),
+                _ => self.wrong_mode(&call, "there is no fault to acknowledge"),
+            },
+            ControllerRequest::MoveTo { q, speed_part } => {
+                let (q, speed_part) = (*q, *speed_part);
+                self.serve_move(call, q, speed_part);
+            }
+            ControllerRequest::Execute { trajectory, sha256 } => {
+                let (trajectory, sha256) = (trajectory.clone(), *sha256);
+                self.serve_execute(call, &trajectory, &sha256);
+            }
+        }
+    }
+
+    fn status(&self, call: &ControllerCall) {
+        answer(
+            call,
+            &ControllerEvent::Status {
+                mode: self.mode(),
+                fault: FaultCode::from_raw(self.newest.fault).unwrap_or_default(),
+                arm_error: self.arm_error.0,
+                q_c: self.newest.q_c,
+                warnings: self.warnings.clone(),
+            },
+        );
+    }
+
+    fn wrong_mode(&self, call: &ControllerCall, why: &str) {
+        let message = format!("the controller is {:?}: {why}", self.mode());
+        refuse(call, FaultCode::WrongMode, &message);
+    }
+
+    fn serve_stop(&mut self, call: ControllerCall) {
+        match self.mode() {
+            ControllerMode::Offline | ControllerMode::Faulted => {
+                answer(&call, &ControllerEvent::Done);
+            }
+            ControllerMode::Idle
+            | ControllerMode::Moving
+            | ControllerMode::Streaming
+            | ControllerMode::Braking => match self.order(Order::Stop, None) {
+                Ok(()) => self.open.push(Open::Stop { call }),
+                Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+            },
+        }
+    }
+
+    /// Sets the arm up on a connection of its own and hands a fresh command
+    /// link to the loop. Nothing moves meanwhile, so waiting is harmless.
+    fn set_up(&mut self, call: ControllerCall) {
+        let session = ArmSession::connect(self.arm, SET_UP_TIMEOUT);
+        let done = session.and_then(|mut session| {
+            let hold = session.bring_up(&self.limits)?;
+            let link = TcpLink::connect(self.arm, SET_UP_TIMEOUT).map_err(|reason| {
+                SessionError::Connect {
+                    address: self.arm,
+                    reason,
+                }
+            })?;
+            Ok((hold, link))
+        });
+        match done {
+            Ok((hold, link)) => match self.order(Order::Adopt { hold }, Some(Box::new(link))) {
+                Ok(()) => self.open.push(Open::Adoption {
+                    call,
+                    adopted: false,
+                    until: Instant::now() + REPORT_WAIT,
+                }),
+                Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+            },
+            Err(error) => refuse(&call, fault_of(&error), &error.to_string()),
+        }
+    }
+
+    /// Whether a motion may be asked for; refuses the call otherwise.
+    fn may_move(&self, call: &ControllerCall) -> bool {
+        let busy = self
+            .open
+            .iter()
+            .any(|open| matches!(open, Open::Motion { .. }));
+        if self.mode() != ControllerMode::Idle {
+            self.wrong_mode(call, "motions begin when it is Idle");
+        } else if busy {
+            refuse(call, FaultCode::WrongMode, "another motion is under way");
+        } else {
+            return true;
+        }
+        false
+    }
+
+    fn serve_move(&mut self, call: ControllerCall, q: JointVector, speed_part: f64) {
+        if !self.may_move(&call) {
+            return;
+        }
+        match plan_move(&self.newest.q_c, &q, speed_part, &self.limits) {
+            Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
+            Err(error) => {
+                let fault = match error {
+                    MoveError::TargetOutsideRange { .. } => FaultCode::SetpointPosition,
+                    MoveError::Limit(fault) => fault,
+                    MoveError::SpeedPart { .. } | MoveError::Generator { .. } => {
+                        FaultCode::PlanOutOfLimits
+                    }
+                };
+                refuse(&call, fault, &error.to_string());
+            }
+        }
+    }
+
+    fn serve_execute(
+        &mut self,
+        call: ControllerCall,
+        trajectory: &JointTrajectory,
+        sha256: &[u8; 32],
+    ) {
+        if !self.may_move(&call) {
+            return;
+        }
+        match self.admit_plan(trajectory, sha256) {
+            Ok(mut motions) => match motions.pop_front() {
+                Some(first) => self.begin(call, first, motions),
+                None => refuse(&call, FaultCode::PlanOutOfLimits, ""),
+            },
+            Err((fault, detail)) => refuse(&call, fault, &detail),
+        }
+    }
+
+    /// Checks a plan; the motions it takes, a small move to its start included.
+    fn admit_plan(
+        &self,
+        trajectory: &JointTrajectory,
+        sha256: &[u8; 32],
+    ) -> Result<VecDeque<Box<Motion>>, (FaultCode, String)> {
+        if trajectory_hash(trajectory) != *sha256 {
+            return Err((FaultCode::PlanHashMismatch, String::new()));
+        }
+        if let Some(margin) = self.limits.worst_violation(trajectory) {
+            let detail = format!("the plan breaks a limit: {}", margin.describe());
+            return Err((FaultCode::PlanOutOfLimits, detail));
+        }
+        let motion = Motion::Spline(*trajectory);
+        if let Err(fault) = verify(&motion, &self.limits) {
+            return Err((FaultCode::PlanOutOfLimits, fault.explain().to_owned()));
+        }
+        let held = self.newest.q_c;
+        let off_rad = (trajectory.start() - held).max_abs();
+        if off_rad > START_DISTANCE_MAX_RAD {
+            let detail = format!(
+                "the arm stands {:.2} deg from the start of the plan, allowed are {:.1}; move it there first",
+                off_rad.to_degrees(),
+                START_DISTANCE_MAX_RAD.to_degrees()
+            );
+            return Err((FaultCode::StartPoseMismatch, detail));
+        }
+        let mut motions = VecDeque::new();
+        if off_rad > START_EQUAL_RAD {
+            let to_start = plan_move(
+                &held,
+                &trajectory.start(),
+                TO_START_SPEED_PART,
+                &self.limits,
+            )
+            .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
+            motions.push_back(Box::new(to_start));
+        }
+        motions.push_back(Box::new(motion));
+        Ok(motions)
+    }
+}
+
+/// The fault code nearest to what went wrong while the arm was set up.
+fn fault_of(error: &SessionError) -> FaultCode {
+    match error {
+        SessionError::Connect { .. }
+        | SessionError::Transfer { .. }
+        | SessionError::Broken(_)
+        | SessionError::Reply(_) => FaultCode::LinkLost,
+        SessionError::Error(_) => FaultCode::ArmError,
+        SessionError::NotReady { .. } | SessionError::Restless => FaultCode::ArmNotReady,
+        SessionError::OutsideRange { .. } => FaultCode::SetpointPosition,
+    }
+}

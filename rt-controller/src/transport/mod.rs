@@ -1,0 +1,49 @@
+//! How setpoints reach an arm and replies come back, without ever waiting.
+//!
+//! The loop sees [`ArmTransport`] only. [`tcp`] is the real wire; [`sim`] is an
+//! ideal arm in memory, for tests in virtual time.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::unreachable
+    )
+)]
+
+pub mod sim;
+pub mod tcp;
+
+use crate::control::LinkInput;
+use crate::xarm::Command;
+
+/// The connection is gone for good; open a new one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the connection to the arm is gone")]
+pub struct LinkGone;
+
+/// What became of a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sent {
+    /// Handed to the network.
+    Whole,
+    /// Not sent: the network or the arm has not taken the ones before.
+    /// Nothing is queued, so nothing bursts out later.
+    Skipped,
+}
+
+/// A command link to an arm. Both calls are RT-safe: bounded, no allocation,
+/// no waiting.
+pub trait ArmTransport {
+    /// Sends one command at `now_ns` (CLOCK_MONOTONIC).
+    ///
+    /// # Errors
+    /// [`LinkGone`].
+    fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone>;
+
+    /// Takes in the replies that have come until `now_ns`; `lost` in the
+    /// result says that the connection is gone.
+    fn poll(&mut self, now_ns: u64) -> LinkInput;
+}

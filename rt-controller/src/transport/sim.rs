@@ -1,0 +1,59 @@
+//! An ideal arm in memory: it takes every setpoint at once and answers it at
+//! the next poll. Faults are set by hand.
+
+use super::{ArmTransport, LinkGone, Sent};
+use crate::control::LinkInput;
+use crate::xarm::{Command, Status};
+use shared_types::JointVector;
+
+/// An arm that is always where it was told to be.
+#[derive(Debug, Default)]
+pub struct IdealArm {
+    /// Last setpoint (rad).
+    pub q: Option<JointVector>,
+    /// Setpoints taken.
+    pub setpoints: u64,
+    /// Other commands taken.
+    pub requests: u64,
+    /// Status byte of every reply.
+    pub status: Status,
+    /// No replies come while this is set.
+    pub stalled: bool,
+    /// The connection is gone.
+    pub gone: bool,
+    oldest_ns: Option<u64>,
+}
+
+impl ArmTransport for IdealArm {
+    fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone> {
+        if self.gone {
+            return Err(LinkGone);
+        }
+        match command {
+            Command::ServoJoint(q) => {
+                self.q = Some(*q);
+                self.setpoints = self.setpoints.wrapping_add(1);
+            }
+            _ => self.requests = self.requests.wrapping_add(1),
+        }
+        self.oldest_ns = self.oldest_ns.or(Some(now_ns));
+        Ok(Sent::Whole)
+    }
+
+    fn poll(&mut self, now_ns: u64) -> LinkInput {
+        let waited_ns = self.oldest_ns.map_or(0, |t| now_ns.saturating_sub(t));
+        if self.gone || self.stalled || self.oldest_ns.is_none() {
+            return LinkInput {
+                lost: self.gone,
+                unanswered_ns: waited_ns,
+                ..LinkInput::default()
+            };
+        }
+        self.oldest_ns = None;
+        LinkInput {
+            status: Some(self.status),
+            reply_ns: u32::try_from(waited_ns).unwrap_or(u32::MAX),
+            ..LinkInput::default()
+        }
+    }
+}
