@@ -5,9 +5,9 @@
 
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::{BasePath, CHANNELS, Interval};
-use crate::kernel::{BaseLanes, RopeLanes};
 use crate::lanes::Lanes;
 use crate::scheme::{Phase, Scheme, joint_resistance};
+use crate::state::{BaseLanes, RopeLanes};
 
 /// One lane's place on its path.
 struct Cursor<'a> {

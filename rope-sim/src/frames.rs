@@ -2,8 +2,8 @@
 
 use crate::algebra::Vec3;
 use crate::clock::Clock;
-use crate::kernel::Link;
 use crate::lanes::Lanes;
+use crate::state::Link;
 use nalgebra::Vector3;
 
 /// Times at which node positions are recorded: `first_s + i period_s`.

@@ -5,8 +5,9 @@ use crate::approach::{ApproachRecorder, ClosestApproach};
 use crate::base_path::BasePath;
 use crate::clock::Clock;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
-use crate::kernel::{Elimination, Link, RopeLanes, step};
+use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
+use crate::state::{Link, RopeLanes};
 use shared_types::RopeParams;
 
 /// Steps between health checks.

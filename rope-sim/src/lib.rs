@@ -26,6 +26,7 @@
 mod algebra;
 mod approach;
 mod base_path;
+mod batch;
 mod clock;
 mod equilibrium;
 mod error;
@@ -38,13 +39,13 @@ mod motion;
 pub mod npy;
 mod rollout;
 mod scheme;
+mod state;
 
 pub use approach::ClosestApproach;
+pub use batch::{roll_out, roll_out_with};
 pub use error::SimulateError;
 pub use frames::{FrameTimes, NodeTrack};
 pub use lanes::Kernel;
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
-pub use rollout::{
-    Candidate, Outcome, Precision, Rollout, SimOptions, Start, roll_out, roll_out_with,
-};
+pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};

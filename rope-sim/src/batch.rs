@@ -1,0 +1,220 @@
+//! Batches of simulations: grouping into lanes, threads, repeats of what blew up.
+
+use crate::base_path::{BasePath, NotFinite, attitude};
+use crate::equilibrium::hanging_links;
+use crate::error::SimulateError;
+use crate::group::{GroupTask, Member, MemberResult};
+use crate::lanes::Kernel;
+use crate::motion::AttachMotion;
+use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check};
+use nalgebra::{UnitQuaternion, Vector3};
+use shared_types::RopeParams;
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+/// How much smaller the steps of a repeated rollout are.
+const REPEAT_DIVISOR: f64 = 4.0;
+/// Simulates all candidates; results in their order. Candidates are grouped by link
+/// count into lanes and lane groups are spread over threads; a candidate's result does
+/// not depend on its neighbours, its lane, or the number of threads.
+///
+/// # Errors
+/// The first option or candidate that cannot be simulated, by name.
+pub fn roll_out(
+    candidates: &[Candidate],
+    options: &SimOptions,
+) -> Result<Vec<Rollout>, SimulateError> {
+    roll_out_with(options.precision.fastest_kernel(), candidates, options)
+}
+
+/// [`roll_out`] with a chosen kernel, whose number type overrides
+/// [`SimOptions::precision`].
+///
+/// # Errors
+/// As [`roll_out`].
+pub fn roll_out_with(
+    kernel: Kernel,
+    candidates: &[Candidate],
+    options: &SimOptions,
+) -> Result<Vec<Rollout>, SimulateError> {
+    check(candidates, options)?;
+    let all: Vec<usize> = (0..candidates.len()).collect();
+    let batch = Batch {
+        kernel,
+        candidates,
+        options,
+        step_s: options.step_s,
+    };
+    let mut results = batch.run(&all)?;
+    let failed: Vec<usize> = all.into_iter().filter(|i| !results[*i].survived).collect();
+    let mut rollouts: Vec<Rollout> = results
+        .drain(..)
+        .map(|r| rollout(r, Outcome::Clean))
+        .collect();
+    if !failed.is_empty() {
+        let batch = Batch {
+            step_s: options.step_s / REPEAT_DIVISOR,
+            ..batch
+        };
+        for (index, result) in failed.iter().zip(batch.run(&failed)?) {
+            rollouts[*index] = rollout(result, Outcome::RerunAtQuarterStep);
+        }
+    }
+    Ok(rollouts)
+}
+
+fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
+    if !result.survived {
+        result.nodes.hold_last_finite();
+        return Rollout {
+            nodes: result.nodes,
+            closest: None,
+            peak_tip_speed_m_s: 0.0,
+            outcome: Outcome::Diverged,
+            max_joint_angle_rad: result.max_joint_angle_rad,
+        };
+    }
+    Rollout {
+        nodes: result.nodes,
+        closest: result.closest,
+        peak_tip_speed_m_s: result.peak_tip_speed_m_s,
+        outcome: success,
+        max_joint_angle_rad: result.max_joint_angle_rad,
+    }
+}
+
+/// Candidates to run with one kernel and step.
+struct Batch<'a> {
+    kernel: Kernel,
+    candidates: &'a [Candidate<'a>],
+    options: &'a SimOptions,
+    step_s: f64,
+}
+
+/// A motion several candidates share, evaluated by whoever comes first.
+type SharedPath = OnceLock<Result<BasePath, NotFinite>>;
+
+impl Batch<'_> {
+    /// Runs the candidates with these indices; results in the same order.
+    fn run(&self, indices: &[usize]) -> Result<Vec<MemberResult>, SimulateError> {
+        let groups = self.groups(indices);
+        let shared = self.shared_paths(indices);
+        let threads = self.options.threads.clamp(1, groups.len().max(1));
+        let mut results: Vec<Option<MemberResult>> = Vec::new();
+        results.resize_with(self.candidates.len(), || None);
+        let work = |first: usize| -> Result<Vec<(usize, MemberResult)>, SimulateError> {
+            let mut out = Vec::new();
+            for group in groups.iter().skip(first).step_by(threads) {
+                out.extend(group.iter().copied().zip(self.run_group(group, &shared)?));
+            }
+            Ok(out)
+        };
+        let mut finished = Vec::with_capacity(threads);
+        std::thread::scope(|scope| {
+            let handles: Vec<_> = (1..threads)
+                .map(|first| scope.spawn(move || work(first)))
+                .collect();
+            finished.push(work(0));
+            for handle in handles {
+                finished.push(handle.join().unwrap_or(Err(SimulateError::WorkerPanicked)));
+            }
+        });
+        for part in finished {
+            for (index, result) in part? {
+                results[index] = Some(result);
+            }
+        }
+        indices
+            .iter()
+            .map(|i| results[*i].take().ok_or(SimulateError::WorkerPanicked))
+            .collect()
+    }
+
+    /// Indices by link count, cut into lane groups.
+    fn groups(&self, indices: &[usize]) -> Vec<Vec<usize>> {
+        let mut buckets: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for index in indices {
+            buckets
+                .entry(self.candidates[*index].rope.links)
+                .or_default()
+                .push(*index);
+        }
+        buckets
+            .values()
+            .flat_map(|bucket| bucket.chunks(self.kernel.lanes()))
+            .map(<[usize]>::to_vec)
+            .collect()
+    }
+
+    /// A slot for every motion that more than one candidate has.
+    fn shared_paths(&self, indices: &[usize]) -> BTreeMap<usize, SharedPath> {
+        let mut users: BTreeMap<usize, usize> = BTreeMap::new();
+        for index in indices {
+            *users
+                .entry(address(self.candidates[*index].motion))
+                .or_default() += 1;
+        }
+        users
+            .into_iter()
+            .filter(|(_, count)| *count > 1)
+            .map(|(address, _)| (address, SharedPath::new()))
+            .collect()
+    }
+
+    fn run_group(
+        &self,
+        group: &[usize],
+        shared: &BTreeMap<usize, SharedPath>,
+    ) -> Result<Vec<MemberResult>, SimulateError> {
+        let build = |motion| BasePath::new(motion, self.step_s, self.options.horizon_s);
+        let mut own = Vec::with_capacity(group.len());
+        for index in group {
+            let motion = self.candidates[*index].motion;
+            let is_own = !shared.contains_key(&address(motion));
+            own.push(is_own.then(|| build(motion)));
+        }
+        let mut members = Vec::with_capacity(group.len());
+        for (index, own) in group.iter().zip(&own) {
+            let candidate = &self.candidates[*index];
+            let path = match (own, shared.get(&address(candidate.motion))) {
+                (Some(path), _) => path,
+                (None, Some(slot)) => slot.get_or_init(|| build(candidate.motion)),
+                (None, None) => continue,
+            };
+            let path = path
+                .as_ref()
+                .map_err(|bad| SimulateError::MotionNotFinite {
+                    candidate: *index,
+                    time_s: bad.time_s,
+                })?;
+            let links = start_attitudes(candidate.rope, path, self.options.start);
+            members.push(Member {
+                rope: candidate.rope,
+                path,
+                links,
+            });
+        }
+        Ok(self.kernel.run(GroupTask {
+            members: &members,
+            frames: self.options.frames,
+            closest_to_m: self.options.closest_to_m,
+            single_precision: self.kernel.is_single_precision(),
+        }))
+    }
+}
+
+/// Identity of a motion: the address of its data.
+fn address(motion: &dyn AttachMotion) -> usize {
+    core::ptr::from_ref(motion).cast::<()>().addr()
+}
+
+fn start_attitudes(rope: &RopeParams, path: &BasePath, start: Start) -> Vec<[f64; 4]> {
+    match start {
+        Start::Straight { joint0_rotvec } => {
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::from(joint0_rotvec));
+            let q = attitude(&path.start) * turn;
+            vec![[q.w, q.i, q.j, q.k]; rope.links as usize]
+        }
+        Start::Equilibrium => hanging_links(rope, &path.start.r),
+    }
+}

@@ -1,0 +1,129 @@
+//! What a group of ropes carries from step to step, one rope per lane.
+
+use crate::algebra::{Quat, Vec3};
+use crate::lanes::Lanes;
+use crate::scheme::Scheme;
+use shared_types::RopeParams;
+
+/// Parameters of the ropes in a group, one rope per lane.
+#[derive(Clone, Copy)]
+pub(crate) struct RopeLanes<V> {
+    pub(crate) stiffness: V,
+    pub(crate) damping: V,
+    pub(crate) link_length: V,
+    pub(crate) link_mass: V,
+    pub(crate) link_inertia: V,
+    pub(crate) lead_mass: V,
+    pub(crate) lead_inertia: V,
+    /// Joint resistance of the current step and phase.
+    pub(crate) kappa: V,
+}
+
+impl<V: Lanes> RopeLanes<V> {
+    /// The same rope in every lane.
+    #[inline(always)]
+    pub(crate) fn of(rope: &RopeParams) -> Self {
+        let zero = V::splat(0.0);
+        let mut out = Self {
+            stiffness: zero,
+            damping: zero,
+            link_length: zero,
+            link_mass: zero,
+            link_inertia: zero,
+            lead_mass: zero,
+            lead_inertia: zero,
+            kappa: zero,
+        };
+        for lane in 0..V::COUNT {
+            out.set(lane, rope);
+        }
+        out
+    }
+
+    /// Puts a rope into a lane; the joint resistance is the clock's to set.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, lane: usize, rope: &RopeParams) {
+        self.stiffness.set(lane, rope.joint_stiffness_nm_per_rad);
+        self.damping.set(lane, rope.joint_damping_nms_per_rad);
+        self.link_length.set(lane, rope.link_length_m());
+        self.link_mass.set(lane, rope.link_mass_kg());
+        self.link_inertia.set(lane, rope.link_inertia_kg_m2());
+        self.lead_mass.set(lane, rope.lead_mass_kg);
+        self.lead_inertia.set(lane, rope.lead_inertia_kg_m2());
+    }
+}
+
+/// Motion of the attach frame at the end of the step.
+#[derive(Clone, Copy)]
+pub(crate) struct BaseLanes<V> {
+    pub(crate) q: Quat<V>,
+    pub(crate) w: Vec3<V>,
+    pub(crate) alpha: Vec3<V>,
+    /// Acceleration of node 0.
+    pub(crate) a: Vec3<V>,
+}
+
+/// State of one link.
+#[derive(Clone, Copy)]
+pub(crate) struct Link<V> {
+    pub(crate) q: Quat<V>,
+    pub(crate) w: Vec3<V>,
+    /// Algorithmic angular acceleration of the scheme.
+    pub(crate) a: Vec3<V>,
+    /// Exact angular acceleration of the last step.
+    pub(crate) al: Vec3<V>,
+    /// Exact angular acceleration of the step before.
+    pub(crate) al_before: Vec3<V>,
+}
+
+impl<V: Lanes> Link<V> {
+    /// A link at rest, hanging straight down.
+    #[inline(always)]
+    pub(crate) fn at_rest() -> Self {
+        let zero = Vec3::zero();
+        Self {
+            q: Quat::identity(),
+            w: zero,
+            a: zero,
+            al: zero,
+            al_before: zero,
+        }
+    }
+
+    /// Forgets the past accelerations of one lane.
+    #[inline(always)]
+    pub(crate) fn clear_memory(&mut self, lane: usize) {
+        self.a.set(lane, [0.0; 3]);
+        self.al.set(lane, [0.0; 3]);
+        self.al_before.set(lane, [0.0; 3]);
+    }
+
+    /// Moves the attitude, velocity and algorithmic acceleration to their
+    /// predictions; the exact accelerations stay.
+    #[inline(always)]
+    pub(crate) fn predict(&mut self, s: &Scheme<V>) {
+        let next = self.al.scale_add(s.al_to_a, self.a.scale(s.a_to_a));
+        let phi = self
+            .w
+            .scale_add(s.h, self.a.scale_add(s.a_to_phi, next.scale(s.next_to_phi)));
+        self.w = self
+            .a
+            .scale_add(s.a_to_w, next.scale_add(s.next_to_w, self.w));
+        self.q = Quat::exp(phi).times(self.q);
+        self.a = next;
+    }
+
+    /// Corrects the predictions once the exact acceleration is known.
+    #[inline(always)]
+    pub(crate) fn correct(&mut self, s: &Scheme<V>, alpha: Vec3<V>) {
+        let change = alpha.sub(self.al);
+        self.w = change.scale_add(s.correct_w, self.w);
+        self.q = self
+            .q
+            .nudged(change.scale(s.correct_half_phi))
+            .renormalised();
+        self.a = change.scale_add(s.correct_a, self.a);
+        self.al_before = self.al;
+        self.al = alpha;
+    }
+}
