@@ -129,13 +129,15 @@ fn rope_and_lead_lie_where_the_camera_model_puts_them() {
     }
 }
 
-/// Centroid and area of what is new within `reach` pixels.
+/// Centroid and area of what has turned blue within `reach` pixels: the lead,
+/// not the orange rope above it.
 fn blob(full: &Picture, empty: &Picture, near: [f64; 2], reach: usize) -> [f64; 3] {
     let mut sums = [0.0; 3];
     let (u0, v0) = (near[0].round() as usize, near[1].round() as usize);
     for v in v0 - reach..=v0 + reach {
         for u in u0 - reach..=u0 + reach {
-            let w = full.covered(empty, u, v);
+            let i = v * full.width + u;
+            let w = ((full.pixels[i][1] - empty.pixels[i][1]) / 25.0).clamp(0.0, 1.0);
             sums[0] += w * u as f64;
             sums[1] += w * v as f64;
             sums[2] += w;

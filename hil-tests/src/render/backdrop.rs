@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 /// Distance of the wall behind the arm's base (m).
 const WALL_Y_M: f64 = 0.95;
 /// Rays per pixel along u and v.
-const RAYS: u32 = 3;
+const RAYS: u32 = 2;
 
 /// Colour in video levels while light is still being added up.
 type Rgb = Vector3<f64>;
