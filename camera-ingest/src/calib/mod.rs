@@ -114,3 +114,122 @@ fn write_text(path: &Path, text: &str) -> Result<(), CalibError> {
         source,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Rotation3, Vector3};
+    use shared_types::{Intrinsics, Shutter};
+
+    const CONF: &str = "\
+        [left_cam_vga]\nfx=350.94\nfy=350.94\ncx=332.1\ncy=190.2\nk1=-0.175\nk2=0.028\n\
+        [RIGHT_CAM_VGA]\nfx=350.1\nfy=350.1\ncx=331.5\ncy=184.4\nk1=0\nk2=0\n\
+        [STEREO]\nBaseline=62.97\nTY=0.5\nTZ=-0.25\nCV_VGA=0.006\nRX_VGA=-0.0009\nRZ_VGA=0.001\n";
+    const SETTINGS: &str = "\
+        calibration = \"camera.conf\"\nmode = \"VGA\"\nshutter = \"global\"\n\
+        exposure_s = 0.008\nline_time_s = 2e-5\n[extrinsics]\nposition_m = [1, 2.5, 3]\n\
+        rotation = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]\n";
+
+    fn folder(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("calib-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        path
+    }
+
+    fn load(name: &str, conf: &str, settings: &str) -> Result<StereoCamera, CalibError> {
+        let folder = folder(name);
+        std::fs::write(folder.join("camera.conf"), conf).unwrap();
+        std::fs::write(folder.join("camera.toml"), settings).unwrap();
+        let camera = load_camera(&folder.join("camera.toml"));
+        std::fs::remove_dir_all(&folder).unwrap();
+        camera
+    }
+
+    #[test]
+    fn lengths_are_metres_and_ty_counts_without_mode() {
+        let camera = load("plain", CONF, SETTINGS).unwrap();
+        assert!((camera.t_right_left_m - Vector3::new(0.06297, 5e-4, -2.5e-4)).norm() < 1e-12);
+        let turn = Rotation3::from_matrix_unchecked(camera.r_right_left).scaled_axis();
+        assert!((turn - Vector3::new(-9e-4, 6e-3, 1e-3)).norm() < 1e-12);
+        assert_eq!((camera.width_px, camera.height_px), (672, 376));
+        assert_eq!(camera.left.distortion, [-0.175, 0.028, 0.0, 0.0, 0.0]);
+        // A rectified eye is not corrupt; a global shutter has no line time.
+        assert_eq!(camera.right.distortion, [0.0; 5]);
+        assert_eq!(camera.line_time_s, 0.0);
+        let by_mode = CONF.replace("TY=0.5", "TY_VGA=0.7");
+        let camera = load("mode", &by_mode, SETTINGS).unwrap();
+        assert!((camera.t_right_left_m.y - 7e-4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let message = |name: &str, conf: &str, settings: &str| -> String {
+            load(name, conf, settings).unwrap_err().to_string()
+        };
+        let none = message("none", &CONF.replace("cx=332.1", ""), SETTINGS);
+        assert!(
+            none.contains("LEFT_CAM_VGA") && none.contains("cx"),
+            "{none}"
+        );
+        let comma = message("comma", &CONF.replace("350.94", "350,94"), SETTINGS);
+        assert!(
+            comma.contains("350,94") && comma.contains("decimal point"),
+            "{comma}"
+        );
+        let line = message("line", &CONF.replace("k2=0.028", "garbage"), SETTINGS);
+        assert!(
+            line.contains("line 7") && line.contains("garbage"),
+            "{line}"
+        );
+        let mode = message("hd", CONF, &SETTINGS.replace("VGA", "HD"));
+        assert!(mode.contains("LEFT_CAM_HD"), "{mode}");
+        let scaled = message("scaled", CONF, &SETTINGS.replace("[1, 0, 0]", "[2, 0, 0]"));
+        assert!(scaled.contains("rotation"), "{scaled}");
+        let yaml = message("yaml", CONF, &SETTINGS.replace("camera.conf", "info.yaml"));
+        assert!(yaml.contains("not supported"), "{yaml}");
+        let absent = load_camera(Path::new("/nowhere/camera.toml")).unwrap_err();
+        assert!(absent.to_string().contains("/nowhere/camera.toml"));
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let eye = Intrinsics {
+            fx: 700.1,
+            fy: 700.2,
+            cx: 640.5,
+            cy: 360.25,
+            distortion: [-0.17, 0.03, 1e-4, -2e-4, 1e-3],
+        };
+        let camera = StereoCamera {
+            width_px: 1280,
+            height_px: 720,
+            left: eye,
+            right: Intrinsics { cx: 633.0, ..eye },
+            r_right_left: *Rotation3::new(Vector3::new(-9e-4, 6e-3, 1e-3)).matrix(),
+            t_right_left_m: Vector3::new(0.063, 1e-4, -2e-4),
+            r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
+            p_w_cam_m: Vector3::new(0.6, -1.2, 0.2),
+            shutter: Shutter::Rolling,
+            exposure_s: 0.003,
+            line_time_s: 15.7e-6,
+        };
+        let folder = folder("written");
+        let (toml, conf) = (folder.join("camera.toml"), folder.join("sn.conf"));
+        write_factory_conf(&conf, &camera, VideoMode::Hd).unwrap();
+        write_camera_toml(&toml, &camera, VideoMode::Hd, Path::new("sn.conf")).unwrap();
+        let back = load_camera(&toml).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!((back.r_right_left - camera.r_right_left).norm() < 1e-12);
+        assert!((back.t_right_left_m - camera.t_right_left_m).norm() < 1e-12);
+        assert_eq!((back.left, back.right), (camera.left, camera.right));
+        assert_eq!(
+            (back.r_w_cam, back.p_w_cam_m),
+            (camera.r_w_cam, camera.p_w_cam_m)
+        );
+        assert_eq!(
+            (back.shutter, back.exposure_s),
+            (camera.shutter, camera.exposure_s)
+        );
+        assert_eq!(back.line_time_s, camera.line_time_s);
+    }
+}

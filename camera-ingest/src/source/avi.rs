@@ -190,3 +190,96 @@ fn read_stamps(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError> {
         ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chunk_bytes(code: &[u8; 4], body: &[u8]) -> Vec<u8> {
+        let size = u32::try_from(body.len()).unwrap();
+        let mut out = [&code[..], &size.to_le_bytes(), body].concat();
+        out.resize(out.len() + body.len() % 2, 0);
+        out
+    }
+
+    /// AVI with the given chunks as frames.
+    fn avi(frames: &[&[u8]]) -> Vec<u8> {
+        let avih = chunk_bytes(b"avih", &[&16_667_u32.to_le_bytes()[..], &[0; 52]].concat());
+        let hdrl = chunk_bytes(b"LIST", &[&b"hdrl"[..], &avih].concat());
+        let movi: Vec<u8> = frames
+            .iter()
+            .flat_map(|f| chunk_bytes(b"00dc", f))
+            .collect();
+        let movi = chunk_bytes(b"LIST", &[&b"movi"[..], &movi].concat());
+        chunk_bytes(b"RIFF", &[&b"AVI "[..], &hdrl, &movi].concat())
+    }
+
+    fn open(name: &str, bytes: &[u8], csv: Option<&str>) -> Result<AviSource, SourceError> {
+        let stem = std::env::temp_dir().join(format!("avi-{}-{name}", std::process::id()));
+        let (video, stamps) = (stem.with_extension("avi"), stem.with_extension("csv"));
+        std::fs::write(&video, bytes).unwrap();
+        if let Some(csv) = csv {
+            std::fs::write(&stamps, csv).unwrap();
+        }
+        let source = AviSource::open(&video, csv.map(|_| stamps.as_path()));
+        std::fs::remove_file(&video).unwrap();
+        let _ = std::fs::remove_file(&stamps);
+        source
+    }
+
+    #[test]
+    fn frames_are_found_and_damage_is_named() {
+        let mut source = open("walk", &avi(&[b"abc", b"defg"]), None).unwrap();
+        assert_eq!(source.len(), 2);
+        assert_eq!(&source.bytes[source.chunks[1].clone()], b"defg");
+        assert_eq!(source.stamps[1].stamp_ns, 16_667_000);
+        let damaged = source.read(1).unwrap_err().to_string();
+        assert!(
+            damaged.contains("frame 1") && damaged.contains("record again"),
+            "{damaged}"
+        );
+        assert!(matches!(
+            source.read(2),
+            Err(SourceError::OutOfRange { len: 2, .. })
+        ));
+    }
+
+    #[test]
+    fn truncation_and_other_files_are_refused() {
+        let whole = avi(&[b"abc", b"defg"]);
+        let cut = open("cut", &whole[..whole.len() - 3], None)
+            .unwrap_err()
+            .to_string();
+        assert!(cut.contains("truncated"), "{cut}");
+        let other = open("other", b"RIFF....WAVEfmt ", None)
+            .unwrap_err()
+            .to_string();
+        assert!(other.contains("not a RIFF AVI"), "{other}");
+        let empty = open("empty", &avi(&[]), None).unwrap_err().to_string();
+        assert!(empty.contains("no video frames"), "{empty}");
+        // Whatever is cut off, there is an answer and no panic.
+        for end in 0..whole.len() {
+            let _ = open("any", &whole[..end], None);
+        }
+    }
+
+    #[test]
+    fn timestamps_must_fit() {
+        let video = avi(&[b"abc", b"defg"]);
+        let csv = "frame,sequence,monotonic_ns\n0,5,100\n1,7,250\n";
+        let source = open("fit", &video, Some(csv)).unwrap();
+        assert_eq!(
+            (source.stamps[1].sequence, source.stamps[1].stamp_ns),
+            (7, 250)
+        );
+        for (name, csv, what) in [
+            ("few", "h\n0,5,100\n", "1 rows, but the video has 2"),
+            ("back", "h\n0,5,100\n1,6,100\n", "do not increase"),
+            ("word", "h\n0,x,100\n1,6,200\n", "line 2"),
+            ("skip", "h\n0,5,100\n2,6,200\n", "frame 2 where 1 is due"),
+        ] {
+            let message = open(name, &video, Some(csv)).unwrap_err().to_string();
+            assert!(message.contains(what), "{message}");
+        }
+    }
+}

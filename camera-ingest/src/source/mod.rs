@@ -88,6 +88,23 @@ pub trait FrameSource {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError>;
 }
 
+/// Frames that are in memory already.
+impl FrameSource for Vec<StereoFrame> {
+    fn len(&self) -> usize {
+        Vec::len(self)
+    }
+
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        self.get(index)
+            .cloned()
+            .ok_or_else(|| SourceError::OutOfRange {
+                path: PathBuf::from("(memory)"),
+                frame: index,
+                len: Vec::len(self),
+            })
+    }
+}
+
 /// Opens an AVI file, or a folder with `video.avi` and perhaps
 /// `timestamps.csv`.
 ///
