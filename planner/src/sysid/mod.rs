@@ -97,7 +97,7 @@ impl Default for IdentifyOptions {
             search_step_s: 2e-3,
             step_s: 1e-3,
             threads: 2,
-            search_frames_max: 140,
+            search_frames_max: 100,
             lead_mass_kg: None,
             clock_offset_max_s: 0.06,
             outlier_px: 3.0,
@@ -312,13 +312,11 @@ fn search(
         seed,
         stop: StopRules {
             generations_max: options.generations,
-            // The polish takes over where the search only refines.
-            step_tolerance: 2e-2,
-            fitness_tolerance: 5e-3,
             ..StopRules::default()
         },
     })?;
     let mut simulations = 0;
+    let mut history = Vec::new();
     loop {
         let points: Vec<[f64; COORDINATES]> = strategy
             .ask(&mut |_| true)?
@@ -345,8 +343,9 @@ fn search(
                 generation: report.generation,
             });
         }
-        if let Some(reason) = strategy.stop() {
-            tracing::debug!(?reason, simulations, residual_px, "rope search ended");
+        history.push(residual_px);
+        if strategy.stop().is_some() || stalled(&history) {
+            tracing::debug!(simulations, residual_px, "rope search ended");
             return Ok(Found {
                 x: best,
                 distance_px: residual_px,
@@ -354,4 +353,13 @@ fn search(
             });
         }
     }
+}
+
+/// Whether the best distance has all but ceased to fall: from there the polish
+/// goes on faster.
+fn stalled(history: &[f64]) -> bool {
+    const WINDOW: usize = 6;
+    const PART: f64 = 0.02;
+    let now = history.len();
+    now > 2 * WINDOW && history[now - 1] > (1.0 - PART) * history[now - 1 - WINDOW]
 }

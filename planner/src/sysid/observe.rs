@@ -4,16 +4,29 @@ use super::coordinates::{CLOCK, COORDINATES, Coordinates};
 use super::{IdentifyError, IdentifyOptions, Observation};
 use crate::workers::map_in_order;
 use nalgebra::Vector3;
-use rope_sim::{
-    Candidate, FrameTimes, NodeTrack, Outcome, Precision, Rollout, SimOptions, Start, roll_out,
-};
+use rope_sim::{Candidate, FrameTimes, Outcome, Precision, Rollout, SimOptions, Start, roll_out};
 use shared_types::{RopeParams, StereoCamera};
 
 /// Distance given to a candidate that cannot be compared (px).
 pub(super) const INVISIBLE_PX: f64 = 1e4;
-/// Period at which simulated nodes are kept; between, they are interpolated by
-/// cubics, good to far below a pixel for motion up to 10 Hz (s).
-const SAMPLE_S: f64 = 0.008;
+/// Periods at which simulated nodes are kept in the search and in the polish (s).
+/// Between, they are interpolated by cubics: at 16 ms good to 0.02 px for the
+/// third harmonic of a wiggle, at 8 ms far better.
+const SEARCH_SAMPLE_S: f64 = 0.016;
+const POLISH_SAMPLE_S: f64 = 0.008;
+
+/// Simulated nodes with their sampling period.
+pub(super) struct Swing {
+    pub(super) rollout: Rollout,
+    period_s: f64,
+}
+
+impl Swing {
+    /// Whether the simulation stayed finite.
+    pub(super) fn is_finite(&self) -> bool {
+        !matches!(self.rollout.outcome, Outcome::Diverged)
+    }
+}
 
 /// One keypoint of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,10 +114,10 @@ impl<'a> Film<'a> {
         points: &[[f64; COORDINATES]],
     ) -> Result<Vec<f64>, IdentifyError> {
         let ropes: Vec<RopeParams> = points.iter().map(|x| coordinates.rope(x)).collect();
-        let rollouts = self.run(&ropes, Precision::F32, self.search_step_s)?;
-        let jobs: Vec<_> = points.iter().zip(&rollouts).collect();
-        Ok(map_in_order(&jobs, self.threads, |(x, rollout)| {
-            self.distance_px(rollout, x[CLOCK])
+        let swings = self.run(&ropes, Precision::F32, self.search_step_s, SEARCH_SAMPLE_S)?;
+        let jobs: Vec<_> = points.iter().zip(&swings).collect();
+        Ok(map_in_order(&jobs, self.threads, |(x, swing)| {
+            self.distance_px(swing, x[CLOCK])
         }))
     }
 
@@ -118,8 +131,8 @@ impl<'a> Film<'a> {
     }
 
     /// Simulates the filmed motion with each rope, in double precision.
-    pub(super) fn simulate(&self, ropes: &[RopeParams]) -> Result<Vec<Rollout>, IdentifyError> {
-        self.run(ropes, Precision::F64, self.step_s)
+    pub(super) fn simulate(&self, ropes: &[RopeParams]) -> Result<Vec<Swing>, IdentifyError> {
+        self.run(ropes, Precision::F64, self.step_s, POLISH_SAMPLE_S)
     }
 
     fn run(
@@ -127,7 +140,8 @@ impl<'a> Film<'a> {
         ropes: &[RopeParams],
         precision: Precision,
         step_s: f64,
-    ) -> Result<Vec<Rollout>, IdentifyError> {
+        period_s: f64,
+    ) -> Result<Vec<Swing>, IdentifyError> {
         let candidates: Vec<Candidate<'_>> = ropes
             .iter()
             .map(|rope| Candidate {
@@ -140,8 +154,8 @@ impl<'a> Film<'a> {
             clippy::cast_sign_loss,
             reason = "a positive count of about a thousand"
         )]
-        let count = (self.horizon_s / SAMPLE_S).floor() as usize + 1;
-        Ok(roll_out(
+        let count = (self.horizon_s / period_s).floor() as usize + 1;
+        let rollouts = roll_out(
             &candidates,
             &SimOptions {
                 step_s,
@@ -149,23 +163,27 @@ impl<'a> Film<'a> {
                 start: Start::Equilibrium,
                 frames: FrameTimes {
                     first_s: 0.0,
-                    period_s: SAMPLE_S,
+                    period_s,
                     count,
                 },
                 closest_to_m: None,
                 horizon_s: self.horizon_s,
                 threads: self.threads,
             },
-        )?)
+        )?;
+        Ok(rollouts
+            .into_iter()
+            .map(|rollout| Swing { rollout, period_s })
+            .collect())
     }
 
-    fn distance_px(&self, rollout: &Rollout, clock_offset_s: f64) -> f64 {
-        if matches!(rollout.outcome, Outcome::Diverged) {
+    fn distance_px(&self, swing: &Swing, clock_offset_s: f64) -> f64 {
+        if !swing.is_finite() {
             return INVISIBLE_PX;
         }
         let (mut sum, mut weights) = (0.0, 0.0);
         for sighting in &self.chosen {
-            let Some([du, dv]) = self.residual_px(&rollout.nodes, sighting, clock_offset_s) else {
+            let Some([du, dv]) = self.residual_px(swing, sighting, clock_offset_s) else {
                 return INVISIBLE_PX;
             };
             sum += sighting.weight * huber(du.hypot(dv), self.outlier_px);
@@ -180,16 +198,37 @@ impl<'a> Film<'a> {
     }
 
     /// Simulated minus observed pixel of one sighting; `None` behind the camera.
-    pub(super) fn residual_px(
+    fn residual_px(
         &self,
-        nodes: &NodeTrack,
+        swing: &Swing,
         sighting: &Sighting,
         clock_offset_s: f64,
     ) -> Option<[f64; 2]> {
         let camera: &StereoCamera = self.observation.camera;
-        let p = position(nodes, sighting.time_s - clock_offset_s, sighting.along);
+        let p = position(swing, sighting.time_s - clock_offset_s, sighting.along);
         let [u, v] = camera.project_left(&p)?;
         Some([u - sighting.pixel[0], v - sighting.pixel[1]])
+    }
+
+    /// Simulated minus observed pixels of every sighting, for each swing with its
+    /// clock offset; `None` if a simulation failed or a point is behind the camera.
+    pub(super) fn residuals_px(
+        &self,
+        swings: &[Swing],
+        clock_offsets_s: &[f64],
+    ) -> Option<Vec<Vec<[f64; 2]>>> {
+        let jobs: Vec<_> = swings.iter().zip(clock_offsets_s).collect();
+        map_in_order(&jobs, self.threads, |(swing, offset_s)| {
+            let all = || {
+                self.all
+                    .iter()
+                    .map(|s| self.residual_px(swing, s, **offset_s))
+                    .collect()
+            };
+            swing.is_finite().then(all).flatten()
+        })
+        .into_iter()
+        .collect()
     }
 
     /// Weight of a residual of `distance_px` in an iteratively reweighted fit.
@@ -216,7 +255,8 @@ fn huber(d: f64, limit: f64) -> f64 {
     clippy::cast_precision_loss,
     reason = "clamped to the sample and node counts"
 )]
-fn position(nodes: &NodeTrack, time_s: f64, along: f64) -> Vector3<f64> {
+fn position(swing: &Swing, time_s: f64, along: f64) -> Vector3<f64> {
+    let nodes = &swing.rollout.nodes;
     let last_frame = nodes.frames() - 1;
     let last_node = nodes.nodes() - 1;
     let place = along * last_node as f64;
@@ -229,7 +269,7 @@ fn position(nodes: &NodeTrack, time_s: f64, along: f64) -> Vector3<f64> {
         );
         a + (b - a) * part
     };
-    let u = (time_s / SAMPLE_S).clamp(0.0, last_frame as f64);
+    let u = (time_s / swing.period_s).clamp(0.0, last_frame as f64);
     let i = (u as usize).min(last_frame.saturating_sub(1));
     let t = u - i as f64;
     let next = (i + 1).min(last_frame);

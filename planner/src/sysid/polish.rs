@@ -5,10 +5,9 @@
 //! precision.
 
 use super::coordinates::{CLOCK, COORDINATES as FREE, Coordinates};
-use super::observe::{Film, INVISIBLE_PX};
+use super::observe::{Film, INVISIBLE_PX, Swing};
 use super::{Found, IdentifyError};
 use nalgebra::{SMatrix, SVector};
-use rope_sim::{Outcome, Rollout};
 use shared_types::RopeEstimate;
 
 /// Steps of the finite differences: length (m), three logarithms, lead radius
@@ -170,14 +169,14 @@ fn linearise(
         spans[i] = span;
     }
     let ropes: Vec<_> = points.iter().map(|p| coordinates.rope(p)).collect();
-    let rollouts = film.simulate(&ropes)?;
-    Ok(accumulate(film, &points, &rollouts, &spans))
+    let swings = film.simulate(&ropes)?;
+    Ok(accumulate(film, &points, &swings, &spans))
 }
 
 fn accumulate(
     film: &Film<'_>,
     points: &[Point],
-    rollouts: &[Rollout],
+    swings: &[Swing],
     spans: &[f64; FREE],
 ) -> Linearised {
     let mut out = Linearised {
@@ -186,21 +185,13 @@ fn accumulate(
         cost: f64::INFINITY,
         mean_square: INVISIBLE_PX,
     };
-    if rollouts
-        .iter()
-        .any(|r| matches!(r.outcome, Outcome::Diverged))
-    {
+    let clocks: Vec<f64> = points.iter().map(|p| p[CLOCK]).collect();
+    let Some(residuals) = film.residuals_px(swings, &clocks) else {
         return out;
-    }
+    };
     let (mut cost, mut squares, mut weights) = (0.0, 0.0, 0.0);
-    for sighting in &film.all {
-        let mut residual = [[0.0; 2]; 2 * FREE + 1];
-        for ((slot, rollout), point) in residual.iter_mut().zip(rollouts).zip(points) {
-            match film.residual_px(&rollout.nodes, sighting, point[CLOCK]) {
-                Some(r) => *slot = r,
-                None => return out,
-            }
-        }
+    for (index, sighting) in film.all.iter().enumerate() {
+        let residual: [[f64; 2]; 2 * FREE + 1] = core::array::from_fn(|i| residuals[i][index]);
         let distance = residual[0][0].hypot(residual[0][1]);
         let influence = film.influence(distance);
         let weight = sighting.weight * influence;

@@ -1,0 +1,270 @@
+//! Identification against planted parameters and against a recording whose
+//! keypoints were made by another simulator (MuJoCo).
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    missing_docs,
+    reason = "tests may fail loudly"
+)]
+
+use planner::ropes::random_rope;
+use planner::synthetic::{FilmOptions, film, side_camera};
+use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Observation, identify};
+use planner::wiggle::{WiggleConfig, wiggle};
+use rope_sim::{PlannedArm, PoseRow, PoseTrack};
+use shared_types::keypoints::TrackedFrame;
+use shared_types::{
+    Intrinsics, JointTrajectory, KeypointTrack, Limits, RopeParams, Shutter, StereoCamera,
+};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+fn wiggling_arm() -> PlannedArm {
+    PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
+}
+
+fn quick(seed: u64, threads: usize) -> IdentifyOptions {
+    IdentifyOptions {
+        population: 32,
+        generations: 25,
+        seed,
+        threads,
+        ..IdentifyOptions::default()
+    }
+}
+
+fn per_mass(rope: &RopeParams) -> [f64; 3] {
+    let mu = rope.mass_per_length_kg_per_m;
+    [
+        rope.joint_stiffness_nm_per_rad * rope.link_length_m() / mu,
+        rope.joint_damping_nms_per_rad * rope.link_length_m() / mu,
+        rope.lead_mass_kg / mu,
+    ]
+}
+
+#[test]
+fn planted_parameters_are_found_in_noise() {
+    let arm = wiggling_arm();
+    let camera = side_camera();
+    for seed in [21, 22] {
+        let rope = random_rope(seed);
+        let options = FilmOptions {
+            clock_offset_s: 0.017,
+            seed,
+            ..FilmOptions::default()
+        };
+        let track = film(&rope, &arm, &camera, &options).unwrap();
+        let observation = Observation {
+            track: &track,
+            camera: &camera,
+            motion: &arm,
+            appearance: Appearance {
+                rope_radius_m: None,
+                lead_radius_m: Some(rope.lead_radius_m * 0.95),
+            },
+        };
+        let mut last = 0;
+        let found = identify(&observation, &quick(seed, 2), &mut |p| {
+            last = p.generation;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert!(last > 0);
+        assert!(
+            (found.params.length_m - rope.length_m).abs() < 2e-3,
+            "{found:?}"
+        );
+        assert!((found.time_offset_s - 0.017).abs() < 1e-3, "{found:?}");
+        for (a, b) in per_mass(&found.params).into_iter().zip(per_mass(&rope)) {
+            assert!((a / b - 1.0).abs() < 0.12, "{found:?} against {rope:?}");
+        }
+        // One pixel of noise on both axes is 1.41 px of distance.
+        assert!((found.residual_px - 2.0_f64.sqrt()).abs() < 0.05);
+        let deviation = found.std_dev[1].unwrap();
+        assert!((found.params.length_m - rope.length_m).abs() < 4.0 * deviation);
+        assert!(found.std_dev[4].is_none() && found.std_dev[8].is_none());
+    }
+}
+
+#[test]
+fn the_estimate_does_not_depend_on_threads() {
+    let arm = wiggling_arm();
+    let camera = side_camera();
+    let track = film(&random_rope(5), &arm, &camera, &FilmOptions::default()).unwrap();
+    let observation = Observation {
+        track: &track,
+        camera: &camera,
+        motion: &arm,
+        appearance: Appearance::default(),
+    };
+    let run = |threads| {
+        let options = IdentifyOptions {
+            generations: 3,
+            population: 16,
+            repeats_max: 0,
+            ..quick(1, threads)
+        };
+        identify(&observation, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+    };
+    assert_eq!(run(1), run(2));
+}
+
+#[test]
+fn useless_films_are_refused_with_the_reason() {
+    let camera = side_camera();
+    let arm = wiggling_arm();
+    let short =
+        PlannedArm::new(JointTrajectory::hold(shared_types::plan::START_POSE, 2.0).unwrap());
+    let options = FilmOptions {
+        frames: 200,
+        ..FilmOptions::default()
+    };
+    let track = film(&random_rope(1), &arm, &camera, &options).unwrap();
+    let refuse = |track: &KeypointTrack, motion: &PlannedArm| {
+        let observation = Observation {
+            track,
+            camera: &camera,
+            motion,
+            appearance: Appearance::default(),
+        };
+        identify(&observation, &quick(0, 2), &mut |_| {
+            panic!("the film must be refused before any simulation")
+        })
+        .unwrap_err()
+    };
+    assert!(matches!(
+        refuse(&track, &short),
+        IdentifyError::MotionTooShort { .. }
+    ));
+    let mut lost = track.clone();
+    lost.frames
+        .iter_mut()
+        .step_by(5)
+        .for_each(|f| f.lost = true);
+    assert!(matches!(
+        refuse(&lost, &arm),
+        IdentifyError::TooManyLost { .. }
+    ));
+    let mut few = track.clone();
+    few.frames.truncate(30);
+    assert!(matches!(
+        refuse(&few, &arm),
+        IdentifyError::TooFewFrames { found: 30, .. }
+    ));
+    let mut bad = track;
+    bad.frames[7].points[3][0] = f64::NAN;
+    assert!(matches!(refuse(&bad, &arm), IdentifyError::Keypoints(_)));
+}
+
+/// The camera of recording `a1`: no distortion, so that the left eye's four
+/// numbers and the extrinsics are all there is to it.
+fn camera_of_a1(folder: &Path) -> StereoCamera {
+    let text = std::fs::read_to_string(folder.join("camera.toml")).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    let extrinsics = table["extrinsics"].as_table().unwrap();
+    let numbers = |value: &toml::Value| -> Vec<f64> {
+        let list = value.as_array().unwrap();
+        list.iter().map(|v| v.as_float().unwrap()).collect()
+    };
+    let rows: Vec<f64> = extrinsics["rotation"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(numbers)
+        .collect();
+    let eye = Intrinsics {
+        fx: 350.0,
+        fy: 350.0,
+        cx: 335.5,
+        cy: 187.5,
+        distortion: [0.0; 5],
+    };
+    StereoCamera {
+        width_px: 672,
+        height_px: 376,
+        left: eye,
+        right: eye,
+        r_right_left: nalgebra::Matrix3::identity(),
+        t_right_left_m: nalgebra::Vector3::new(0.063, 0.0, 0.0),
+        r_w_cam: nalgebra::Matrix3::from_row_slice(&rows),
+        p_w_cam_m: nalgebra::Vector3::from_vec(numbers(&extrinsics["position_m"])),
+        shutter: Shutter::Global,
+        exposure_s: table["exposure_s"].as_float().unwrap(),
+        line_time_s: 0.0,
+    }
+}
+
+fn pose_of(folder: &Path) -> PoseTrack {
+    let text = std::fs::read_to_string(folder.join("pose.csv")).unwrap();
+    let rows: Vec<PoseRow> = text
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let v: Vec<f64> = line.split(',').map(|x| x.trim().parse().unwrap()).collect();
+            PoseRow {
+                t_s: v[0],
+                p_m: [v[1], v[2], v[3]],
+                q_wxyz: [v[4], v[5], v[6], v[7]],
+            }
+        })
+        .collect();
+    PoseTrack::new(&rows).unwrap()
+}
+
+fn true_keypoints_of(folder: &Path) -> KeypointTrack {
+    let file = std::fs::File::open(folder.join("nodes_left_px.npy")).unwrap();
+    let array = rope_sim::npy::read(std::io::BufReader::new(file)).unwrap();
+    let keypoints = array.shape[1];
+    let frames = array
+        .values
+        .chunks(2 * keypoints)
+        .enumerate()
+        .map(|(i, values)| TrackedFrame {
+            t_s: i as f64 / 60.0,
+            points: values.chunks(2).map(|p| [p[0], p[1]]).collect(),
+            confidence: vec![1.0; keypoints],
+            lost: false,
+        })
+        .collect();
+    KeypointTrack { keypoints, frames }
+}
+
+/// MuJoCo's rope has links of solid cylinders, so its true radius counts for
+/// little and `link_extra_scale` means nothing there.
+#[test]
+fn the_recorded_rope_is_identified_from_its_true_keypoints() {
+    let folder = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/data/wiggle/a1"
+    ));
+    if !folder.exists() {
+        println!("skipped: recording a1 not found");
+        return;
+    }
+    let camera = camera_of_a1(folder);
+    let motion = pose_of(folder);
+    let track = true_keypoints_of(folder);
+    let observation = Observation {
+        track: &track,
+        camera: &camera,
+        motion: &motion,
+        appearance: Appearance {
+            rope_radius_m: Some(0.0055),
+            lead_radius_m: Some(0.02),
+        },
+    };
+    let found = identify(&observation, &IdentifyOptions::default(), &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    println!("{found:?}");
+    assert!((found.params.length_m - 0.55).abs() < 3e-3, "{found:?}");
+    assert!(found.residual_px < 1.0, "{found:?}");
+    let truth = [0.15 * 0.55 / 23.0 / 0.05, 0.006 * 0.55 / 23.0 / 0.05, 1.0];
+    for (a, b) in per_mass(&found.params).into_iter().zip(truth) {
+        assert!((a / b - 1.0).abs() < 0.1, "{found:?}");
+    }
+}
