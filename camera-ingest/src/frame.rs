@@ -144,11 +144,17 @@ impl StereoFrame {
     /// # Errors
     /// The JPEG is damaged or its width is no side-by-side pair.
     pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        // Asking for YCbCr spares a colour conversion we would only undo;
-        // strictness makes a truncated picture an error instead of grey rows.
+        // Asking for YCbCr spares a colour conversion we would only undo.
         let options = DecoderOptions::new_fast()
             .jpeg_set_out_colorspace(ColorSpace::YCbCr)
             .set_strict_mode(true);
+        // The decoder fills what is missing with grey; the end marker tells.
+        let end = bytes.iter().rposition(|&b| b != 0).unwrap_or(0);
+        if end == 0 || bytes[end - 1..=end] != [0xff, 0xd9] {
+            return Err(FrameError::Jpeg(
+                "it has no end marker, so a part is missing".to_owned(),
+            ));
+        }
         let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
         let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::Jpeg(format!("{e:?}"));
         let packed = decoder.decode().map_err(jpeg)?;
@@ -253,9 +259,13 @@ mod tests {
             Err(FrameError::Width(6))
         );
         assert!(matches!(
-            StereoFrame::from_jpeg(&[0xff, 0xd8, 0, 1], 0, 0),
+            StereoFrame::from_jpeg(&[0xff, 0xd8, 0, 1, 0xff, 0xd9], 0, 0),
             Err(FrameError::Jpeg(_))
         ));
+        for short in [&[][..], &[0], &[0xd9], &[0xff, 0xd8, 0xff, 0xe0]] {
+            let error = StereoFrame::from_jpeg(short, 0, 0).unwrap_err();
+            assert!(error.to_string().contains("end marker"), "{error}");
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::clamp::ClampPath;
 use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
 use super::evidence::{Colour, Matter, Window};
 use super::first_frame::{LEAD_FULL, LEAD_SHADES};
-use super::lateral::{Search, measure};
+use super::lateral::{Across, Search, measure};
 use super::outline::{Circle, Contrast};
 use super::plane::{Point, RopePlane};
 use crate::frame::EyeFrame;
@@ -27,6 +27,8 @@ const LENGTH_TOLERANCE: f64 = 0.04;
 const HIDDEN_BY_CLAMP_M: f64 = 0.007;
 /// Coverage below which a node counts as not seen.
 const LEAST_COVERAGE: f64 = 0.2;
+/// Weight that keeps an unseen node near its prediction.
+const UNSEEN_WEIGHT: f64 = 1e-3;
 /// Part of the lead's area that must be seen.
 const LEAST_LEAD: f64 = 0.35;
 /// Mean coverage below which the rope is lost.
@@ -116,6 +118,7 @@ impl Follower<'_> {
         }
     }
 
+    /// Finds the rope near a predicted curve.
     fn locate(
         &self,
         frame: &EyeFrame,
@@ -127,57 +130,23 @@ impl Follower<'_> {
     ) -> State {
         let dt = t_s - before.t_s;
         let mut curve = predicted.to_vec();
-        let window = Window::around(
-            curve.iter().map(|p| self.plane.to_pixel(*p)),
-            range_px + self.model.lead_radius_m * self.plane.px_per_m + 4.0,
-            frame,
-        );
-        let tip_speed = before.velocity[NODES - 1];
-        let (lead, lead_seen) =
-            self.find_lead(frame, gain, curve[NODES - 1], norm(tip_speed), range_px);
+        let tip_speed = norm(before.velocity[NODES - 1]);
+        let (lead, lead_seen) = self.find_lead(frame, gain, curve[NODES - 1], tip_speed, range_px);
         if let Some(lead) = lead {
             let miss = sub(lead, curve[NODES - 1]);
             blend(&mut curve, miss, |part| part * part);
         }
-        let across = normals(&curve);
-        let exposure = self.camera.exposure_s * self.plane.px_per_m;
-        let blur: Vec<f64> = before
-            .velocity
-            .iter()
-            .zip(&across)
-            .map(|(v, n)| (v[0] * n[0] + v[1] * n[1]).abs() * exposure)
-            .collect();
-        let coverage = self.rope_matter(gain).coverage(frame, window);
-        let found = measure(
-            &curve,
-            self.plane,
-            &coverage,
-            &Search {
-                range_px,
-                rope_radius_px: self.model.rope_radius_m * self.plane.px_per_m,
-                usual_coverage: self.model.usual_coverage,
-                blur_px: &blur,
-            },
-        );
+        let found = self.find_rope(frame, gain, &curve, &before.velocity, range_px);
         let spacing = self.model.length_m / (NODES - 1) as f64;
-        let hidden_first = (HIDDEN_BY_CLAMP_M / spacing).ceil() as usize;
-        let hidden_last = NODES - 1 - (self.model.lead_radius_m * 1.1 / spacing).ceil() as usize;
-        let visible = |i: usize| (hidden_first..=hidden_last).contains(&i);
-        let mut weights = vec![0.0; NODES];
+        let first = (HIDDEN_BY_CLAMP_M / spacing).ceil() as usize;
+        let last = NODES - 1 - (self.model.lead_radius_m * 1.1 / spacing).ceil() as usize;
+        // Hidden or unseen nodes stay near where they were expected.
         let mut places = curve.clone();
-        let mut confidence = vec![0.0; NODES];
-        for (i, node) in found.iter().enumerate() {
-            confidence[i] = node.confidence;
-            places[i] = node.point;
-            if visible(i) && node.confidence > LEAST_COVERAGE {
+        let mut weights = vec![UNSEEN_WEIGHT; NODES];
+        for (i, node) in found.iter().enumerate().take(last + 1).skip(first) {
+            if node.confidence > LEAST_COVERAGE {
+                places[i] = node.point;
                 weights[i] = node.confidence * node.confidence;
-            }
-        }
-        // A little weight on the prediction keeps unseen stretches in place.
-        for (i, w) in weights.iter_mut().enumerate() {
-            if *w == 0.0 {
-                places[i] = curve[i];
-                *w = 1e-3;
             }
         }
         places[0] = self.clamp_at(t_s);
@@ -186,38 +155,63 @@ impl Follower<'_> {
             places[NODES - 1] = lead;
             weights[NODES - 1] = ANCHOR * lead_seen;
         }
-        let seen_first = confidence[hidden_first];
-        let seen_last = confidence[hidden_last];
-        confidence[..hidden_first].fill(seen_first);
-        confidence[hidden_last + 1..].fill(if lead.is_some() {
+        let fitted = smooth(&places, &weights, SMOOTHING);
+        let long = self.plausible_length(length(&fitted), lead.is_some());
+        let curve = resample(&fitted, long, NODES);
+
+        let mut confidence: Vec<f64> = found.iter().map(|node| node.confidence).collect();
+        let at_end = if lead.is_some() {
             lead_seen
         } else {
-            seen_last * 0.5
-        });
-        let fitted = smooth(&places, &weights, SMOOTHING);
-        let curve = resample(
-            &fitted,
-            self.plausible_length(length(&fitted), lead.is_some()),
-            NODES,
-        );
-        let velocity = curve
-            .iter()
-            .zip(&before.curve)
-            .map(|(now, then)| scale(sub(*now, *then), 1.0 / dt))
-            .collect();
+            confidence[last] / 2.0
+        };
+        let at_start = confidence[first];
+        confidence[..first].fill(at_start);
+        confidence[last + 1..].fill(at_end);
         let lost = mean(&confidence) < LOST_BELOW;
+        let velocity = if lost {
+            // Do not extrapolate what was not seen.
+            before.velocity.iter().map(|v| scale(*v, 0.7)).collect()
+        } else {
+            let moved = curve.iter().zip(&before.curve);
+            moved
+                .map(|(now, then)| scale(sub(*now, *then), 1.0 / dt))
+                .collect()
+        };
         State {
             t_s,
-            velocity: if lost {
-                // Do not extrapolate what was not seen.
-                before.velocity.iter().map(|v| scale(*v, 0.7)).collect()
-            } else {
-                velocity
-            },
+            velocity,
             curve,
             confidence,
             lost,
         }
+    }
+
+    /// Measures the rope across a curve that moves with the given velocity.
+    fn find_rope(
+        &self,
+        frame: &EyeFrame,
+        gain: f32,
+        curve: &[Point],
+        velocity: &[Point],
+        range_px: f64,
+    ) -> Vec<Across> {
+        let exposure = self.camera.exposure_s * self.plane.px_per_m;
+        let blur: Vec<f64> = velocity
+            .iter()
+            .zip(normals(curve))
+            .map(|(v, n)| (v[0] * n[0] + v[1] * n[1]).abs() * exposure)
+            .collect();
+        let pixels = curve.iter().map(|p| self.plane.to_pixel(*p));
+        let window = Window::around(pixels, range_px + 4.0, frame);
+        let coverage = self.rope_matter(gain).coverage(frame, window);
+        let search = Search {
+            range_px,
+            rope_radius_px: self.model.rope_radius_m * self.plane.px_per_m,
+            usual_coverage: self.model.usual_coverage,
+            blur_px: &blur,
+        };
+        measure(curve, self.plane, &coverage, &search)
     }
 
     /// Length to be used where `measured` was found.
