@@ -65,13 +65,15 @@ pub enum CameraRequest {
     Record {
         /// Number of frames.
         frames: u32,
+        /// Keep the right eye too; tracking needs the left one only.
+        both_eyes: bool,
     },
     /// Track the rope through the kept frames and publish its keypoints.
     Track {
         /// Calibrated camera.
         camera: Box<StereoCamera>,
-        /// Clamp position over time: CLOCK_MONOTONIC ns and world position (m).
-        clamp: Vec<(u64, [f64; 3])>,
+        /// Measured joints: CLOCK_MONOTONIC ns and position (rad).
+        joints: Vec<(u64, JointVector)>,
         /// Keypoints per frame.
         keypoints: u32,
         /// Where to write a contact sheet of overlays (PNG), if anywhere.
@@ -99,8 +101,6 @@ pub enum CameraEvent {
     Still {
         /// Whether it is still.
         still: bool,
-        /// Motion energy seen last (grey levels).
-        energy: f64,
     },
     /// The first frame is kept.
     Recording {

@@ -1,0 +1,468 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Identify a rope from one wiggle, plan a throw, execute it.
+#[derive(Debug, Parser)]
+#[command(
+    name = "wag",
+    version,
+    about = "Wiggle and Go: identify a rope from one wiggle, plan a throw, execute it",
+    after_help = "EXAMPLES:\n  \
+        wag demo                                   everything, on a simulated robot\n  \
+        wag rig                                    a simulated xArm 7 for your own client\n  \
+        wag plan strike --rope rope.toml --target 1.0,0,0.4 --out plan.json\n  \
+        wag check plan.json\n\n\
+        Exit codes: 0 done, 1 ran and failed, 2 bad usage or input."
+)]
+pub struct Cli {
+    /// Print one JSON object on standard output and nothing else there.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Log more to standard error (-v info, -vv debug).
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The whole pipeline on a simulated rig with a hidden random rope.
+    Demo(DemoArgs),
+    /// Run the simulated xArm 7 as a server, with a rope and a camera if asked.
+    Rig(RigArgs),
+    /// Simulate a rope.
+    #[command(subcommand)]
+    Sim(SimCommand),
+    /// Write the wiggle as joint positions, or execute it on an arm.
+    Wiggle(WiggleArgs),
+    /// Follow the rope through a video.
+    Track(TrackArgs),
+    /// Find the rope parameters from a video or from keypoints.
+    Identify(IdentifyArgs),
+    /// Plan a throw.
+    #[command(subcommand)]
+    Plan(PlanCommand),
+    /// Check a plan against the arm's limits: every margin, where and when.
+    Check(CheckArgs),
+    /// Execute a plan on an arm, record it, measure latencies.
+    Throw(ThrowArgs),
+    /// Measure the closest approach of tip and target in a stereo video.
+    Score(ScoreArgs),
+    /// Run one of the processes in the foreground (what `wag` itself starts).
+    #[command(hide = true)]
+    Process(ProcessArgs),
+}
+
+/// Arguments of `wag demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// What the throw is for.
+    #[arg(long, value_enum, default_value_t = TaskName::Strike)]
+    pub task: TaskName,
+    /// Seed of the hidden rope, the target, the noise and every search.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the run; it must not exist. Default: runs/<time>-demo-<seed>.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Target x,y,z in the arm's base frame (m); default: random from the seed.
+    #[arg(long, allow_hyphen_values = true)]
+    pub target: Option<Point>,
+    /// Keep the raw video frames in the run folder (400 MB).
+    #[arg(long, hide = true)]
+    pub keep_frames: bool,
+}
+
+/// Tasks known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TaskName {
+    /// The tip passes through the target.
+    Strike,
+    /// The tip lands on a board and stays.
+    Lob,
+    /// The rope comes to hang over a wall.
+    Drape,
+}
+
+/// Arguments of `wag rig`.
+#[derive(Debug, Args)]
+pub struct RigArgs {
+    /// Address to listen on. Anything but loopback lets others drive the simulated arm.
+    #[arg(long, default_value = "127.0.0.1")]
+    pub bind: IpAddr,
+    /// Command port; 0 takes any free one.
+    #[arg(long, default_value_t = 502)]
+    pub command_port: u16,
+    /// Report ports in the place of 30000,30001,30002,30003; 0 takes any free one.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 1,
+        default_value = "30000,30001,30002,30003"
+    )]
+    pub report_ports: Vec<u16>,
+    /// Script of faults to inject.
+    #[arg(long)]
+    pub faults: Option<PathBuf>,
+    /// Rope on the pole; `random` draws one from the seed. Default: no rope.
+    #[arg(long, value_name = "FILE|random")]
+    pub rope: Option<String>,
+    /// Publish the simulated camera in this shared-memory domain (needs --rope).
+    #[arg(long, value_name = "DOMAIN")]
+    pub camera: Option<String>,
+    /// Seed of the hidden rope and the noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// `wag sim ...`
+#[derive(Debug, Subcommand)]
+pub enum SimCommand {
+    /// Free simulation of a rope under a prescribed motion of its attach frame.
+    Rope(SimRopeArgs),
+    /// Arm, pole and rope driven by a joint trajectory.
+    Throw(SimThrowArgs),
+}
+
+/// Arithmetic of the simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PrecisionName {
+    /// Single precision, vector lanes.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// Arguments of `wag sim rope`.
+#[derive(Debug, Args)]
+pub struct SimRopeArgs {
+    /// Rope parameters.
+    #[arg(long)]
+    pub rope: PathBuf,
+    /// Attach-frame pose: CSV with columns t,x,y,z,qw,qx,qy,qz.
+    #[arg(long)]
+    pub pose: PathBuf,
+    /// Frames per second of the output.
+    #[arg(long)]
+    pub fps: f64,
+    /// Integration step (s).
+    #[arg(long, default_value_t = 5e-4)]
+    pub dt: f64,
+    /// Arithmetic.
+    #[arg(long, value_enum, default_value_t = PrecisionName::F64)]
+    pub precision: PrecisionName,
+    /// Rotation vector of joint 0 at the start (rad), x,y,z.
+    #[arg(long, allow_hyphen_values = true, default_value = "0,0,0")]
+    pub initial_joint0: Point,
+    /// Node positions, float64 .npy of shape (frames, links+1, 3).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// Arguments of `wag sim throw`.
+#[derive(Debug, Args)]
+pub struct SimThrowArgs {
+    /// Rope parameters.
+    #[arg(long)]
+    pub rope: PathBuf,
+    /// Joint trajectory: CSV with columns t,q1..q7 (s, rad).
+    #[arg(long)]
+    pub joints: PathBuf,
+    /// Integration step (s).
+    #[arg(long, default_value_t = 5e-4)]
+    pub dt: f64,
+    /// Tip positions: CSV with columns t,x,y,z at 240 Hz.
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// How to reach an arm.
+#[derive(Debug, Args)]
+pub struct ArmArgs {
+    /// Address of the arm's controller.
+    #[arg(long = "arm", value_name = "ADDR")]
+    pub address: Option<IpAddr>,
+    /// Command port.
+    #[arg(long, default_value_t = 502)]
+    pub command_port: u16,
+    /// Report port with joint states (250 Hz).
+    #[arg(long, default_value_t = 30000)]
+    pub report_port: u16,
+    /// The area is clear and the emergency stop is in reach. Needed for any
+    /// address that is not this machine.
+    #[arg(long)]
+    pub confirm: bool,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Check everything and show what would happen, without moving.
+    #[arg(long)]
+    pub dry_run: bool,
+}
+
+/// Arguments of `wag wiggle`.
+#[derive(Debug, Args)]
+pub struct WiggleArgs {
+    /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+    /// Arm to execute it on.
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder for the run; it must not exist. Default: runs/<time>-wiggle.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// How the rope's clamp moved.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct MotionArgs {
+    /// Measured joints: CSV with columns t,q1..q7 (s, rad); t = 0 is the first frame.
+    #[arg(long)]
+    pub joints: Option<PathBuf>,
+    /// Attach-frame pose: CSV with columns t,x,y,z,qw,qx,qy,qz; t = 0 is the first frame.
+    #[arg(long)]
+    pub pose: Option<PathBuf>,
+}
+
+/// Arguments of `wag track`.
+#[derive(Debug, Args)]
+pub struct TrackArgs {
+    /// AVI file, or folder with video.avi and timestamps.csv.
+    #[arg(long)]
+    pub video: PathBuf,
+    /// Camera calibration and place.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Motion of the clamp.
+    #[command(flatten)]
+    pub motion: MotionArgs,
+    /// Keypoints per frame.
+    #[arg(long, default_value_t = 20)]
+    pub keypoints: usize,
+    /// Contact sheet with the keypoints drawn in (PNG).
+    #[arg(long)]
+    pub overlay: Option<PathBuf>,
+    /// Keypoints (JSON).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// Where the observation of a wiggle comes from.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub struct ObservationArgs {
+    /// AVI file, or folder with video.avi and timestamps.csv.
+    #[arg(long)]
+    pub video: Option<PathBuf>,
+    /// Keypoints as written by `wag track`.
+    #[arg(long)]
+    pub keypoints: Option<PathBuf>,
+}
+
+/// How to identify.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    /// A trained network.
+    Nn,
+    /// A fit of the simulator to the pixels.
+    Cmaes,
+    /// Network first, then a fit.
+    Hybrid,
+}
+
+/// Arguments of `wag identify`.
+#[derive(Debug, Args)]
+pub struct IdentifyArgs {
+    /// Observation.
+    #[command(flatten)]
+    pub observation: ObservationArgs,
+    /// Camera calibration and place.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Motion of the clamp.
+    #[command(flatten)]
+    pub motion: MotionArgs,
+    /// Method.
+    #[arg(long, value_enum, default_value_t = MethodName::Cmaes)]
+    pub method: MethodName,
+    /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
+    #[arg(long)]
+    pub lead_mass: Option<f64>,
+    /// Seed of the search.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Rope parameters with their uncertainty (TOML).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// `wag plan ...`
+#[derive(Debug, Subcommand)]
+pub enum PlanCommand {
+    /// The tip passes through the target.
+    Strike(PlanArgs),
+    /// The tip lands on a board and stays.
+    Lob(PlanArgs),
+    /// The rope comes to hang over a wall.
+    Drape(PlanArgs),
+}
+
+/// Arguments of `wag plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// Rope parameters.
+    #[arg(long)]
+    pub rope: PathBuf,
+    /// Target x,y,z in the arm's base frame (m).
+    #[arg(long, allow_hyphen_values = true)]
+    pub target: Point,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Tuned values of the planner (TOML); default: the built-in ones.
+    #[arg(long)]
+    pub config: Option<PathBuf>,
+    /// Seed of the search.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The plan (JSON).
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+}
+
+/// Arguments of `wag check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The plan.
+    pub plan: PathBuf,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+}
+
+/// Arguments of `wag throw`.
+#[derive(Debug, Args)]
+pub struct ThrowArgs {
+    /// The plan.
+    pub plan: PathBuf,
+    /// Arm to execute it on.
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder for the run; it must not exist. Default: runs/<time>-throw.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `wag score`.
+#[derive(Debug, Args)]
+pub struct ScoreArgs {
+    /// AVI file, or folder with video.avi and timestamps.csv.
+    #[arg(long)]
+    pub video: PathBuf,
+    /// Camera calibration and place.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Colour of the tip, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub tip_rgb: Colour,
+    /// Colour of the target, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub target_rgb: Colour,
+}
+
+/// Arguments of `wag process`.
+#[derive(Debug, Args)]
+pub struct ProcessArgs {
+    /// Which process.
+    #[arg(value_enum)]
+    pub name: ProcessName,
+    /// Its configuration file.
+    #[arg(long)]
+    pub config: PathBuf,
+    /// End when the parent is not this process any more.
+    #[arg(long)]
+    pub parent: Option<u32>,
+}
+
+/// Processes known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProcessName {
+    /// Simulated rig.
+    Rig,
+    /// Real-time controller.
+    RtController,
+    /// Camera frames to keypoints.
+    CameraIngest,
+    /// Identification and planning.
+    Planner,
+}
+
+/// Three finite numbers `x,y,z`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point(pub [f64; 3]);
+
+impl FromStr for Point {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` must be three finite numbers x,y,z");
+        let numbers: Vec<f64> = text
+            .split(',')
+            .map(|t| t.trim().parse().map_err(|_e| wrong()))
+            .collect::<Result<_, _>>()?;
+        let point: [f64; 3] = numbers.try_into().map_err(|_e| wrong())?;
+        if point.iter().all(|v| v.is_finite()) {
+            Ok(Self(point))
+        } else {
+            Err(wrong())
+        }
+    }
+}
+
+/// A colour `R,G,B`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Colour(pub [u8; 3]);
+
+impl FromStr for Colour {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` must be three whole numbers R,G,B from 0 to 255");
+        let numbers: Vec<u8> = text
+            .split(',')
+            .map(|t| t.trim().parse().map_err(|_e| wrong()))
+            .collect::<Result<_, _>>()?;
+        numbers.try_into().map(Self).map_err(|_e| wrong())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn points_and_colours_are_checked() {
+        assert_eq!("1, -0.5,0".parse(), Ok(Point([1.0, -0.5, 0.0])));
+        for bad in ["1,2", "1,2,x", "1,2,nan", "", "1,2,3,4"] {
+            assert!(bad.parse::<Point>().is_err(), "{bad}");
+        }
+        assert_eq!("0,128,255".parse(), Ok(Colour([0, 128, 255])));
+        assert!("0,128,256".parse::<Colour>().is_err());
+    }
+}

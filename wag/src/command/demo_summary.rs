@@ -1,0 +1,317 @@
+//! What a demo keeps and shows: every stage's figures, and the truth apart.
+
+use crate::pipeline::{Film, RunFolder, Tracked};
+use crate::table;
+use anyhow::bail;
+use comfy_table::Table;
+use serde::Serialize;
+use shared_types::ipc::message::{LatencyReport, Percentiles, RigEvent, ScoreResult};
+use shared_types::rope::{RANGES, ROPE_PARAMETERS};
+use shared_types::{Plan, RopeEstimate, RopeParams};
+
+/// Wall time of each stage (s).
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct StageTimes {
+    /// Starting the processes.
+    pub start_s: f64,
+    /// Enabling the arm, moving to the start pose, waiting for the rope.
+    pub bringup_s: f64,
+    /// Wiggling and filming.
+    pub wiggle_s: f64,
+    /// Tracking the rope.
+    pub track_s: f64,
+    /// Identifying it.
+    pub identify_s: f64,
+    /// Planning the throw.
+    pub plan_s: f64,
+    /// Throwing and filming.
+    pub throw_s: f64,
+    /// Scoring.
+    pub score_s: f64,
+}
+
+/// Figures of the wiggle's film.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct WiggleFigures {
+    frames: u32,
+    dropped: u32,
+    first_stamp_ns: u64,
+}
+
+/// Figures of the tracker.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct TrackFigures {
+    lost_part: f64,
+    ms_per_frame: f64,
+    rope_radius_m: Option<f64>,
+    lead_radius_m: Option<f64>,
+}
+
+/// Figures of the plan.
+#[derive(Debug, Clone, Serialize)]
+pub struct PlanFigures {
+    predicted_error_m: f64,
+    predicted_time_s: f64,
+    simulations: u32,
+    resampled: u32,
+    trajectory_sha256: String,
+}
+
+/// What really happened; known only because the rig is simulated.
+#[derive(Debug, Clone, Serialize)]
+pub struct TruthFigures {
+    rope: RopeParams,
+    closest_m: f64,
+    peak_tip_speed_m_s: f64,
+    rope_touched_robot: bool,
+}
+
+/// Everything a demo reports; `summary.json` and `--json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct DemoRecord {
+    /// Whether the throw went through.
+    pub ok: bool,
+    command: &'static str,
+    version: &'static str,
+    /// Seed of everything random.
+    pub seed: u64,
+    run: String,
+    task: &'static str,
+    /// Target (m).
+    pub target_m: [f64; 3],
+    /// What went wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// Distance of tip and target by the rig's truth (m).
+    true_tip_target_distance_m: Option<f64>,
+    /// Distance the planner predicted (m).
+    planned_tip_target_distance_m: Option<f64>,
+    /// Distance measured by the stereo camera (m).
+    stereo_tip_target_distance_m: Option<f64>,
+    /// Wall time of the whole demo (s).
+    pub wall_s: f64,
+    /// Wall time of the stages (s).
+    pub stages: StageTimes,
+    wiggle: Option<WiggleFigures>,
+    track: Option<TrackFigures>,
+    identified: Option<RopeEstimate>,
+    plan: Option<PlanFigures>,
+    score: Option<ScoreResult>,
+    score_failed: Option<String>,
+    latency: Option<LatencyReport>,
+    /// What the real-time set-up could not get.
+    pub warnings: Vec<String>,
+    truth: Option<TruthFigures>,
+}
+
+impl DemoRecord {
+    /// An empty record.
+    pub fn new(seed: u64, target_m: [f64; 3], folder: &RunFolder) -> Self {
+        Self {
+            ok: false,
+            command: "demo",
+            version: shared_types::VERSION,
+            seed,
+            run: folder.path().display().to_string(),
+            task: "strike",
+            target_m,
+            error: None,
+            true_tip_target_distance_m: None,
+            planned_tip_target_distance_m: None,
+            stereo_tip_target_distance_m: None,
+            wall_s: 0.0,
+            stages: StageTimes::default(),
+            wiggle: None,
+            track: None,
+            identified: None,
+            plan: None,
+            score: None,
+            score_failed: None,
+            latency: None,
+            warnings: Vec::new(),
+            truth: None,
+        }
+    }
+
+    /// Instant that times in recorded files count from (CLOCK_MONOTONIC, ns):
+    /// the wiggle's first frame.
+    pub fn epoch_ns(&self) -> u64 {
+        self.wiggle.map_or(0, |w| w.first_stamp_ns)
+    }
+
+    /// Keeps the wiggle's figures.
+    pub fn set_wiggle(&mut self, film: &Film) {
+        self.wiggle = Some(WiggleFigures {
+            frames: film.frames,
+            dropped: film.dropped,
+            first_stamp_ns: film.first_stamp_ns,
+        });
+    }
+
+    /// Keeps the tracker's figures.
+    pub fn set_track(&mut self, tracked: &Tracked) {
+        self.track = Some(TrackFigures {
+            lost_part: tracked.lost_part,
+            ms_per_frame: tracked.ms_per_frame,
+            rope_radius_m: tracked.appearance.rope_radius_m,
+            lead_radius_m: tracked.appearance.lead_radius_m,
+        });
+    }
+
+    /// Keeps the identified rope.
+    pub fn set_identified(&mut self, estimate: &RopeEstimate) {
+        self.identified = Some(estimate.clone());
+    }
+
+    /// Keeps the plan's figures.
+    pub fn set_plan(&mut self, plan: &Plan) {
+        self.planned_tip_target_distance_m = Some(plan.predicted_error_m);
+        self.plan = Some(PlanFigures {
+            predicted_error_m: plan.predicted_error_m,
+            predicted_time_s: plan.predicted_time_s,
+            simulations: plan.simulations,
+            resampled: plan.resampled,
+            trajectory_sha256: plan.trajectory_sha256.clone(),
+        });
+    }
+
+    /// Keeps the loop's latencies during the throw.
+    pub fn set_latency(&mut self, report: &LatencyReport) {
+        self.latency = Some(*report);
+    }
+
+    /// Keeps the camera's score. That the camera could not see the throw does
+    /// not undo the throw; it is reported.
+    pub fn set_score(&mut self, score: anyhow::Result<ScoreResult>) {
+        match score {
+            Ok(score) => {
+                self.stereo_tip_target_distance_m = Some(score.closest_m);
+                self.score = Some(score);
+            }
+            Err(e) => self.score_failed = Some(format!("{e:#}")),
+        }
+    }
+
+    /// Keeps the truth; the throw is complete with it.
+    pub fn set_truth(&mut self, truth: &RigEvent) -> anyhow::Result<()> {
+        let RigEvent::Truth {
+            rope,
+            closest_m,
+            peak_tip_speed_m_s,
+            touched,
+            ..
+        } = truth
+        else {
+            bail!("the rig answered with {truth:?}");
+        };
+        self.true_tip_target_distance_m = Some(*closest_m);
+        self.truth = Some(TruthFigures {
+            rope: *rope,
+            closest_m: *closest_m,
+            peak_tip_speed_m_s: *peak_tip_speed_m_s,
+            rope_touched_robot: *touched,
+        });
+        self.ok = true;
+        Ok(())
+    }
+
+    /// One line: what was achieved.
+    pub fn score_line(&self) -> String {
+        let cm = |v: Option<f64>| {
+            v.map_or_else(|| "unknown".to_owned(), |m| format!("{:.1} cm", 100.0 * m))
+        };
+        format!(
+            "tip-target distance {} (camera says {})",
+            cm(self.true_tip_target_distance_m),
+            cm(self.stereo_tip_target_distance_m)
+        )
+    }
+}
+
+fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
+    let (found, real) = (estimate.params.to_array(), truth.to_array());
+    let rows = (0..ROPE_PARAMETERS).map(|i| {
+        [
+            RANGES[i].label.to_owned(),
+            format!("{:.4}", found[i]),
+            table::std_dev(estimate.std_dev[i]),
+            format!("{:.4}", real[i]),
+            RANGES[i].unit.to_owned(),
+        ]
+    });
+    let header = ["parameter", "identified", "± std", "hidden truth", "unit"];
+    table::numbers(header, 1, rows)
+}
+
+fn latency_table(report: &LatencyReport) -> Table {
+    let row = |name: &str, p: &Percentiles| {
+        [
+            name.to_owned(),
+            format!("{:.0}", p.p50_us),
+            format!("{:.0}", p.p99_us),
+            format!("{:.0}", p.p999_us),
+            format!("{:.0}", p.max_us),
+        ]
+    };
+    let rows = [
+        row("late wake-up", &report.wake),
+        row("compute", &report.compute),
+        row("wake-up to sent", &report.send),
+        row("reply", &report.reply),
+    ];
+    table::numbers(["control loop (µs)", "p50", "p99", "p99.9", "max"], 0, rows)
+}
+
+/// Prints the summary of a demo.
+pub fn show(record: &DemoRecord) {
+    if let (Some(estimate), Some(truth)) = (&record.identified, &record.truth) {
+        println!("{}", rope_table(estimate, &truth.rope));
+        println!(
+            "Only ratios of stiffness, damping and masses show in a film, so their common scale is a guess.\n"
+        );
+    }
+    if let Some(latency) = &record.latency {
+        println!("{}", latency_table(latency));
+        println!("{} cycles, {} missed\n", latency.cycles, latency.missed);
+    }
+    let s = &record.stages;
+    println!(
+        "time: start {:.1}, bring-up {:.1}, wiggle {:.1}, track {:.1}, identify {:.1}, plan {:.1}, throw {:.1}, \
+         score {:.1}, in all {:.1} s\n",
+        s.start_s,
+        s.bringup_s,
+        s.wiggle_s,
+        s.track_s,
+        s.identify_s,
+        s.plan_s,
+        s.throw_s,
+        s.score_s,
+        record.wall_s
+    );
+    for warning in &record.warnings {
+        println!("real-time set-up: {warning}");
+    }
+    let cm =
+        |v: Option<f64>| v.map_or_else(|| "unknown".to_owned(), |m| format!("{:.1} cm", 100.0 * m));
+    let [x, y, z] = record.target_m;
+    println!("target ({x:.3}, {y:.3}, {z:.3}) m, closest approach of the tip:");
+    println!(
+        "  planned      {}",
+        cm(record.planned_tip_target_distance_m)
+    );
+    println!(
+        "  achieved     {}   (the simulator's truth)",
+        cm(record.true_tip_target_distance_m)
+    );
+    match (&record.score, &record.score_failed) {
+        (Some(score), _) => println!(
+            "  by camera    {}   ({:.1} to {:.1} cm)",
+            cm(Some(score.closest_m)),
+            100.0 * score.interval_m[0],
+            100.0 * score.interval_m[1]
+        ),
+        (None, Some(why)) => println!("  by camera    not measured: {why}"),
+        (None, None) => {}
+    }
+    println!("run folder: {}", record.run);
+}

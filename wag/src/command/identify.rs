@@ -1,0 +1,156 @@
+//! `wag identify`: rope parameters from a video or from keypoints.
+
+use super::plan::planner_config;
+use super::track::track_video;
+use crate::cli::{IdentifyArgs, MethodName, MotionArgs};
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::files;
+use crate::progress::Stage;
+use crate::session::interrupted;
+use crate::table;
+use anyhow::{Context, anyhow};
+use camera_ingest::load_camera;
+use comfy_table::Table;
+use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Observation, identify};
+use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
+use serde_json::{Value, json};
+use shared_types::ipc::message::Progress;
+use shared_types::rope::RANGES;
+use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+
+/// Keypoints per frame when a video is given.
+const KEYPOINTS: usize = 24;
+
+/// The attach frame's motion from joints or from its pose.
+fn attach_motion(motion: &MotionArgs) -> anyhow::Result<Box<dyn AttachMotion>> {
+    match (&motion.joints, &motion.pose) {
+        (Some(path), _) => {
+            let csv = files::read_joints(path)?;
+            let arm = MeasuredArm::new(&csv.times_s, &csv.q)
+                .with_context(|| format!("`{}`", path.display()))?;
+            Ok(Box::new(arm))
+        }
+        (None, Some(path)) => {
+            let track = PoseTrack::new(&files::read_pose(path)?)
+                .with_context(|| format!("`{}`", path.display()))?;
+            Ok(Box::new(track))
+        }
+        (None, None) => Err(anyhow!("name the clamp's motion with --joints or --pose")),
+    }
+}
+
+/// Keypoints and what the picture says of sizes.
+fn observe(
+    args: &IdentifyArgs,
+    camera: &StereoCamera,
+    quiet: bool,
+) -> Outcome<(KeypointTrack, Appearance)> {
+    if let Some(path) = &args.observation.keypoints {
+        let fail = || format!("keypoints `{}`", path.display());
+        let track: KeypointTrack = serde_json::from_str(&files::read_text(path).or_input()?)
+            .with_context(fail)
+            .or_input()?;
+        track.validate().with_context(fail).or_input()?;
+        return Ok((track, Appearance::default()));
+    }
+    let Some(video) = &args.observation.video else {
+        return Err(Failure::input(anyhow!(
+            "name the observation with --video or --keypoints"
+        )));
+    };
+    let stage = Stage::begin("track", quiet);
+    let tracked = track_video(video, camera, &args.motion, KEYPOINTS, &stage)?.result;
+    stage.done(&format!("{} frames", tracked.track.frames.len()));
+    let appearance = Appearance {
+        rope_radius_m: Some(tracked.appearance.rope_radius_m),
+        lead_radius_m: Some(tracked.appearance.lead_radius_m),
+    };
+    Ok((tracked.track, appearance))
+}
+
+fn classify(error: IdentifyError) -> Failure {
+    match &error {
+        IdentifyError::Keypoints(_)
+        | IdentifyError::TooManyLost { .. }
+        | IdentifyError::TooFewFrames { .. }
+        | IdentifyError::MotionTooShort { .. }
+        | IdentifyError::Option { .. } => Failure::input(error),
+        _ => Failure::failed(error),
+    }
+}
+
+/// Identified parameters as a table.
+fn parameter_table(estimate: &RopeEstimate) -> Table {
+    let values = RANGES
+        .iter()
+        .zip(estimate.params.to_array())
+        .zip(estimate.std_dev);
+    let rows = values.map(|((range, value), std_dev)| {
+        [
+            range.label.to_owned(),
+            format!("{value:.4}"),
+            table::std_dev(std_dev),
+            range.unit.to_owned(),
+        ]
+    });
+    table::numbers(["parameter", "identified", "± std", "unit"], 1, rows)
+}
+
+pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
+    if args.method != MethodName::Cmaes {
+        return Err(Failure::failed(anyhow!(
+            "the network methods are not implemented in this version; use --method cmaes"
+        )));
+    }
+    let camera = load_camera(&args.camera).or_input()?;
+    let motion = attach_motion(&args.motion).or_input()?;
+    let config = planner_config(None).or_failed()?;
+    crate::session::watch_interrupts().or_failed()?;
+    let (track, appearance) = observe(args, &camera, quiet)?;
+    let stage = Stage::begin("identify", quiet);
+    let observation = Observation {
+        track: &track,
+        camera: &camera,
+        motion: motion.as_ref(),
+        appearance,
+    };
+    let options = IdentifyOptions {
+        seed: args.seed,
+        lead_mass_kg: args.lead_mass,
+        ..config.identify
+    };
+    let estimate = identify(&observation, &options, &mut |p| {
+        stage.progress(&Progress {
+            done: u32::try_from(p.generation).unwrap_or(u32::MAX),
+            total: u32::try_from(p.generations).unwrap_or(u32::MAX),
+            value: p.residual_px,
+            label: "residual px".to_owned(),
+        });
+        if interrupted().load(Ordering::SeqCst) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .map_err(classify)?;
+    let seconds = stage.done(&format!(
+        "residual {:.2} px, {} simulations",
+        estimate.residual_px, estimate.simulations
+    ));
+    files::write_rope_estimate(&args.out, &estimate).or_failed()?;
+    if !quiet {
+        println!(
+            "{}\nresidual {:.2} px -> `{}`",
+            parameter_table(&estimate),
+            estimate.residual_px,
+            args.out.display()
+        );
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "identify", "out": args.out, "seconds": seconds,
+        "rope": estimate.params, "std_dev": estimate.std_dev, "residual_px": estimate.residual_px,
+        "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
+    })))
+}

@@ -1,0 +1,59 @@
+//! `wag process`: one of the processes in the foreground.
+//!
+//! `wag` starts its processes this way, so that one installed file is enough.
+//! A process ends in order on SIGTERM, SIGINT, or when its parent is gone.
+
+use crate::cli::{ProcessArgs, ProcessName};
+use crate::failure::{OrInput, Outcome};
+use crate::files;
+use crate::session::{interrupted, watch_interrupts};
+use anyhow::Context;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// How often the parent is looked for.
+const PARENT_EVERY: Duration = Duration::from_millis(100);
+/// How long an orderly end may take before the process simply exits.
+const END_WITHIN: Duration = Duration::from_millis(1200);
+
+/// Sets the stop flag when the parent is gone, and ends the process if it does
+/// not manage to end itself.
+fn watch_parent(parent: Option<u32>) -> anyhow::Result<()> {
+    std::thread::Builder::new()
+        .name("parent-watch".to_owned())
+        .spawn(move || {
+            loop {
+                std::thread::sleep(PARENT_EVERY);
+                if parent.is_some_and(|p| std::os::unix::process::parent_id() != p) {
+                    tracing::warn!("the parent process is gone, ending");
+                    interrupted().store(true, Ordering::SeqCst);
+                }
+                if interrupted().load(Ordering::SeqCst) {
+                    std::thread::sleep(END_WITHIN);
+                    tracing::warn!("not ended in time, exiting");
+                    std::process::exit(1);
+                }
+            }
+        })
+        .context("cannot start the parent watch")?;
+    Ok(())
+}
+
+fn read<T: serde::de::DeserializeOwned>(args: &ProcessArgs) -> anyhow::Result<T> {
+    toml::from_str(&files::read_text(&args.config)?)
+        .with_context(|| format!("configuration `{}`", args.config.display()))
+}
+
+pub fn run(args: &ProcessArgs) -> Outcome {
+    watch_interrupts().or_failed()?;
+    watch_parent(args.parent).or_failed()?;
+    let stop = interrupted();
+    match args.name {
+        ProcessName::Rig => hil_tests::rig::run(&read(args).or_input()?, stop).or_failed(),
+        ProcessName::RtController => rt_controller::run(read(args).or_input()?, stop).or_failed(),
+        ProcessName::CameraIngest => {
+            camera_ingest::process::run(&read(args).or_input()?, stop).or_failed()
+        }
+        ProcessName::Planner => planner::process::run(&read(args).or_input()?, stop).or_failed(),
+    }
+}

@@ -1,0 +1,38 @@
+//! `wag score`: closest approach of tip and target from stereo video.
+
+use crate::cli::ScoreArgs;
+use crate::failure::{OrInput, Outcome};
+use crate::progress::Stage;
+use anyhow::Context;
+use camera_ingest::{ScoreOptions, load_camera, open_video, score};
+use serde_json::{Value, json};
+
+pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let camera = load_camera(&args.camera).or_input()?;
+    let mut video = open_video(&args.video).or_input()?;
+    let stage = Stage::begin("score", quiet);
+    let found = score(
+        &mut video,
+        &camera,
+        args.tip_rgb.0,
+        args.target_rgb.0,
+        &ScoreOptions::default(),
+    )
+    .with_context(|| format!("video `{}`", args.video.display()))
+    .or_failed()?;
+    let line = format!(
+        "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s",
+        1e3 * found.closest_m,
+        1e3 * found.interval_m[0],
+        1e3 * found.interval_m[1],
+        found.time_s
+    );
+    stage.done(&line);
+    if !quiet {
+        println!("{line}");
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "score", "closest_m": found.closest_m, "interval_m": found.interval_m,
+        "time_s": found.time_s, "target_m": found.target_m,
+    })))
+}

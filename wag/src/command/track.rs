@@ -1,0 +1,95 @@
+//! `wag track`: keypoints of the rope from a video file.
+
+use crate::cli::{MotionArgs, TrackArgs};
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::files;
+use crate::progress::Stage;
+use anyhow::{Context, anyhow};
+use camera_ingest::overlay::keypoint_sheet;
+use camera_ingest::source::read_left;
+use camera_ingest::{
+    ClampPath, EyeFrame, TrackOptions, TrackResult, load_camera, open_video, track,
+};
+use serde_json::{Value, json};
+use shared_types::StereoCamera;
+use std::path::Path;
+
+/// Pictures in a contact sheet, and how many stand in a row.
+const SHEET: (usize, usize) = (20, 4);
+
+/// The clamp's motion from joints or from the attach frame's pose.
+pub fn clamp_path(motion: &MotionArgs) -> anyhow::Result<ClampPath> {
+    match (&motion.joints, &motion.pose) {
+        (Some(path), _) => {
+            let csv = files::read_joints(path)?;
+            let samples: Vec<_> = csv.times_s.into_iter().zip(csv.q).collect();
+            ClampPath::from_joints(&samples).with_context(|| format!("`{}`", path.display()))
+        }
+        (None, Some(path)) => Ok(ClampPath::from_pose_csv(path)?),
+        (None, None) => Err(anyhow!("name the clamp's motion with --joints or --pose")),
+    }
+}
+
+/// A tracked video with its frames.
+pub struct TrackedVideo {
+    /// Left-eye frames.
+    pub frames: Vec<EyeFrame>,
+    /// Keypoints and what else was seen.
+    pub result: TrackResult,
+}
+
+/// Tracks the rope through a video.
+pub fn track_video(
+    video: &Path,
+    camera: &StereoCamera,
+    motion: &MotionArgs,
+    keypoints: usize,
+    stage: &Stage,
+) -> Outcome<TrackedVideo> {
+    let clamp = clamp_path(motion).or_input()?;
+    stage.say("reading frames");
+    let frames = read_left(&mut open_video(video).or_input()?).or_input()?;
+    stage.say(format!("tracking through {} frames", frames.len()));
+    let options = TrackOptions {
+        keypoints,
+        ..TrackOptions::default()
+    };
+    let result = track(&frames, camera, &clamp, &options)
+        .with_context(|| format!("video `{}`", video.display()))
+        .or_failed()?;
+    Ok(TrackedVideo { frames, result })
+}
+
+pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
+    if !(2..=shared_types::keypoints::MAX_KEYPOINTS).contains(&args.keypoints) {
+        return Err(Failure::input(anyhow!(
+            "--keypoints is {}, but must be from 2 to {}",
+            args.keypoints,
+            shared_types::keypoints::MAX_KEYPOINTS
+        )));
+    }
+    let camera = load_camera(&args.camera).or_input()?;
+    let stage = Stage::begin("track", quiet);
+    let tracked = track_video(&args.video, &camera, &args.motion, args.keypoints, &stage)?;
+    let (frames, result) = (&tracked.frames, &tracked.result);
+    files::write_json(&args.out, &result.track).or_failed()?;
+    if let Some(path) = &args.overlay {
+        let step = frames.len().div_ceil(SHEET.0).max(1);
+        let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
+        keypoint_sheet(frames, &result.track, &chosen, SHEET.1)
+            .and_then(|sheet| sheet.write_png(path))
+            .or_failed()?;
+    }
+    let lost = result.track.frames.iter().filter(|f| f.lost).count();
+    let line = format!("{} frames, rope lost in {lost}", result.track.frames.len());
+    let seconds = stage.done(&line);
+    if !quiet {
+        println!("{line} -> `{}`", args.out.display());
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "track", "out": args.out, "frames": result.track.frames.len(),
+        "lost": lost, "seconds": seconds,
+        "rope_radius_m": result.appearance.rope_radius_m,
+        "lead_radius_m": result.appearance.lead_radius_m,
+    })))
+}

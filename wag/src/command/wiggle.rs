@@ -1,0 +1,46 @@
+//! `wag wiggle`: the probing motion, written to a file or executed.
+
+use super::plan::{planner_config, write_trajectory_csv};
+use super::throw::{drive, require_confirmation};
+use crate::cli::WiggleArgs;
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::files;
+use anyhow::anyhow;
+use planner::wiggle::wiggle;
+use serde_json::{Value, json};
+
+pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
+    if args.csv.is_none() && args.arm.address.is_none() {
+        return Err(Failure::input(anyhow!(
+            "say what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it"
+        )));
+    }
+    require_confirmation(&args.arm)?;
+    let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
+    let config = planner_config(None).or_failed()?.wiggle;
+    let trajectory = wiggle(&config, &limits).or_failed()?;
+    if let Some(path) = &args.csv {
+        write_trajectory_csv(path, &trajectory, &limits).or_failed()?;
+        if !quiet {
+            println!(
+                "{:.2} s of joint positions in `{}`",
+                trajectory.duration_s(),
+                path.display()
+            );
+        }
+    }
+    let run = match args.arm.address {
+        Some(_) => drive(
+            &args.arm,
+            &limits,
+            &trajectory,
+            args.out.as_deref(),
+            "wiggle",
+            quiet,
+        )?,
+        None => None,
+    };
+    Ok(Some(json!({
+        "ok": true, "command": "wiggle", "csv": args.csv, "duration_s": trajectory.duration_s(), "run": run,
+    })))
+}

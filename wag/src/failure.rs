@@ -1,0 +1,98 @@
+//! How a command fails: its exit code and its one sentence.
+
+use std::fmt;
+
+/// A failed command.
+#[derive(Debug)]
+pub struct Failure {
+    class: Class,
+    error: anyhow::Error,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Class {
+    /// The command ran and did not succeed: exit code 1.
+    Failed,
+    /// Usage or input is wrong: exit code 2.
+    BadInput,
+}
+
+/// What every command returns.
+pub type Outcome<T = ()> = Result<T, Failure>;
+
+impl Failure {
+    /// Usage or input is wrong.
+    pub fn input(error: impl Into<anyhow::Error>) -> Self {
+        Self {
+            class: Class::BadInput,
+            error: error.into(),
+        }
+    }
+
+    /// The command ran and did not succeed.
+    pub fn failed(error: impl Into<anyhow::Error>) -> Self {
+        Self {
+            class: Class::Failed,
+            error: error.into(),
+        }
+    }
+
+    /// Process exit code.
+    pub fn exit_code(&self) -> u8 {
+        match self.class {
+            Class::Failed => 1,
+            Class::BadInput => 2,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The whole chain on one line: outer context first, cause last.
+        let mut said = String::new();
+        for (i, cause) in self.error.chain().enumerate() {
+            let text = cause.to_string().replace('\n', " ");
+            // Many libraries repeat their source in their own message.
+            if i == 0 || !said.contains(&text) {
+                if i > 0 {
+                    said.push_str(": ");
+                }
+                said.push_str(&text);
+            }
+        }
+        f.write_str(&said)
+    }
+}
+
+/// Errors that are the caller's input by default.
+pub trait OrInput<T> {
+    /// Marks the error as bad input.
+    fn or_input(self) -> Outcome<T>;
+    /// Marks the error as a failure of the work itself.
+    fn or_failed(self) -> Outcome<T>;
+}
+
+impl<T, E: Into<anyhow::Error>> OrInput<T> for Result<T, E> {
+    fn or_input(self) -> Outcome<T> {
+        self.map_err(Failure::input)
+    }
+    fn or_failed(self) -> Outcome<T> {
+        self.map_err(Failure::failed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn the_chain_is_one_line_without_repeats() {
+        let error = Err::<(), _>(anyhow::anyhow!("root\ncause"))
+            .context("while reading x")
+            .unwrap_err();
+        let failure = Failure::input(error);
+        assert_eq!(failure.to_string(), "while reading x: root cause");
+        assert_eq!(failure.exit_code(), 2);
+    }
+}

@@ -1,0 +1,25 @@
+//! Files of people and runs: reading with errors that name file and field,
+//! writing so that nothing is ever half there.
+
+mod atomic;
+mod limits;
+mod motion;
+mod rope;
+
+pub use atomic::{write_atomic, write_json};
+pub use limits::{default_limits, read_limits};
+pub use motion::{read_joints, read_pose, write_joints};
+pub use rope::{read_rope, write_rope_estimate};
+
+use anyhow::Context;
+use std::path::Path;
+
+/// Reads a text file; the error names it and says what to do.
+pub fn read_text(path: &Path) -> anyhow::Result<String> {
+    std::fs::read_to_string(path).with_context(|| {
+        format!(
+            "cannot read `{}`; check the path and its permissions",
+            path.display()
+        )
+    })
+}

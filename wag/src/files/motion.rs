@@ -1,0 +1,151 @@
+//! Joint and pose motion as CSV files.
+
+use anyhow::{Context, bail, ensure};
+use rope_sim::PoseRow;
+use shared_types::{JOINTS, JointVector};
+use std::path::Path;
+
+/// Joint samples: times (s) and positions (rad).
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointsCsv {
+    /// Times (s), increasing.
+    pub times_s: Vec<f64>,
+    /// Positions (rad).
+    pub q: Vec<JointVector>,
+}
+
+/// Reads a CSV whose first columns are those of `header`, all numbers finite
+/// and the first one increasing.
+fn read_table(path: &Path, header: &[&str]) -> anyhow::Result<Vec<Vec<f64>>> {
+    let name = path.display();
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .with_context(|| format!("cannot read `{name}`; check the path and its permissions"))?;
+    let found = reader
+        .headers()
+        .with_context(|| format!("`{name}` is not a CSV file"))?
+        .clone();
+    let matches = found.len() >= header.len() && header.iter().zip(&found).all(|(a, b)| *a == b);
+    ensure!(
+        matches,
+        "`{name}`: the first line must name the columns {}, found {}",
+        header.join(","),
+        found.iter().collect::<Vec<_>>().join(",")
+    );
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for (i, record) in reader.records().enumerate() {
+        let line = i + 2;
+        let record = record.with_context(|| format!("`{name}` line {line}"))?;
+        let mut row = Vec::with_capacity(header.len());
+        for (column, text) in header.iter().zip(&record) {
+            match text.parse::<f64>() {
+                Ok(v) if v.is_finite() => row.push(v),
+                _ => bail!(
+                    "`{name}` line {line}, column `{column}`: `{text}` is not a finite number"
+                ),
+            }
+        }
+        if let Some(before) = rows.last() {
+            ensure!(
+                row[0] > before[0],
+                "`{name}` line {line}: time {} s does not come after {} s",
+                row[0],
+                before[0]
+            );
+        }
+        rows.push(row);
+    }
+    ensure!(
+        rows.len() >= 2,
+        "`{name}` needs at least two rows of numbers, found {}",
+        rows.len()
+    );
+    Ok(rows)
+}
+
+/// Reads `t,q1..q7` (s, rad).
+pub fn read_joints(path: &Path) -> anyhow::Result<JointsCsv> {
+    let rows = read_table(path, &["t", "q1", "q2", "q3", "q4", "q5", "q6", "q7"])?;
+    Ok(JointsCsv {
+        times_s: rows.iter().map(|r| r[0]).collect(),
+        q: rows
+            .iter()
+            .map(|r| JointVector(std::array::from_fn(|j| r[j + 1])))
+            .collect(),
+    })
+}
+
+/// Writes `t,q1..q7` (s, rad).
+pub fn write_joints(
+    path: &Path,
+    samples: impl Iterator<Item = (f64, JointVector)>,
+) -> anyhow::Result<()> {
+    let mut text = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
+    for (t, q) in samples {
+        text.push_str(&format!("{t:.6}"));
+        for j in 0..JOINTS {
+            text.push_str(&format!(",{:.9}", q[j]));
+        }
+        text.push('\n');
+    }
+    super::write_atomic(path, text.as_bytes())
+}
+
+/// Reads `t,x,y,z,qw,qx,qy,qz` (s, m, unit quaternion of the attach frame).
+pub fn read_pose(path: &Path) -> anyhow::Result<Vec<PoseRow>> {
+    let rows = read_table(path, &["t", "x", "y", "z", "qw", "qx", "qy", "qz"])?;
+    for (i, r) in rows.iter().enumerate() {
+        let norm = r[4..8].iter().map(|v| v * v).sum::<f64>().sqrt();
+        ensure!(
+            (norm - 1.0).abs() < 1e-3,
+            "`{}` line {}: quaternion qw,qx,qy,qz has length {norm:.4}, but must have length 1",
+            path.display(),
+            i + 2
+        );
+    }
+    Ok(rows
+        .iter()
+        .map(|r| PoseRow {
+            t_s: r[0],
+            p_m: [r[1], r[2], r[3]],
+            q_wxyz: [r[4], r[5], r[6], r[7]],
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("j.csv");
+        std::fs::write(&path, text).unwrap();
+        format!("{:#}", read_joints(&path).unwrap_err())
+    }
+
+    #[test]
+    fn joints_come_back_as_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("j.csv");
+        let q = JointVector([0.1, -0.2, 0.3, 1.0, 0.0, 1.5, -3.0]);
+        write_joints(&path, [(0.0, q), (0.004, q * 2.0)].into_iter()).unwrap();
+        let back = read_joints(&path).unwrap();
+        assert_eq!(back.times_s, [0.0, 0.004]);
+        assert!((back.q[1] - q * 2.0).max_abs() < 1e-9);
+    }
+
+    #[test]
+    fn bad_files_are_named_with_line_and_column() {
+        let head = "t,q1,q2,q3,q4,q5,q6,q7\n";
+        assert!(refused("t,q1\n0,1\n").contains("must name the columns"));
+        let nan = refused(&format!("{head}0,0,0,0,0,0,0,0\n1,0,NaN,0,0,0,0,0\n"));
+        assert!(nan.contains("line 3") && nan.contains("`q2`"), "{nan}");
+        let order = refused(&format!("{head}1,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n"));
+        assert!(order.contains("does not come after"), "{order}");
+        assert!(refused(head).contains("at least two rows"));
+        let short = refused(&format!("{head}0,0,0\n"));
+        assert!(short.contains("line 2"), "{short}");
+    }
+}

@@ -1,0 +1,24 @@
+//! The stages of a throw, in the order data flows through them:
+//! start -> wiggle -> track -> identify -> plan -> throw -> score.
+//!
+//! Each stage asks one process and returns what the next one needs.
+
+mod arm;
+mod observe;
+mod processes;
+mod run_folder;
+mod stages;
+
+pub use arm::{ArmLink, acquire, execute, latency, move_to};
+pub use observe::{Film, film_during};
+pub use processes::{
+    rig_config, start_camera, start_controller, start_controller_at, start_planner, start_rig,
+    write_calibration,
+};
+pub use run_folder::RunFolder;
+pub use stages::{Tracked, identify, plan_strike, score, track, wait_still};
+
+use std::time::Duration;
+
+/// How long a process may take to come up.
+pub const STARTUP: Duration = Duration::from_secs(15);

@@ -1,0 +1,63 @@
+//! Filming a motion: the camera records while the arm streams.
+
+use super::arm::{ArmLink, MotionSpan, execute};
+use crate::progress::Stage;
+use crate::session::Session;
+use anyhow::{anyhow, bail};
+use shared_types::JointTrajectory;
+use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc};
+use shared_types::ipc::rpc::RpcClient;
+use std::time::Duration;
+
+/// A filmed motion.
+#[derive(Debug, Clone, Copy)]
+pub struct Film {
+    /// Start of exposure of the first frame (CLOCK_MONOTONIC, ns).
+    pub first_stamp_ns: u64,
+    /// Frames kept.
+    pub frames: u32,
+    /// Frames the camera dropped.
+    pub dropped: u32,
+    /// When the motion ran.
+    pub motion: MotionSpan,
+}
+
+/// Records `frames` frames; as soon as the first is kept, streams `trajectory`.
+pub fn film_during(
+    session: &mut Session,
+    camera: &RpcClient<CameraRpc>,
+    arm: &ArmLink,
+    trajectory: &JointTrajectory,
+    frames: u32,
+    both_eyes: bool,
+    stage: &Stage,
+) -> anyhow::Result<Film> {
+    let recording = camera.call(&CameraRequest::Record { frames, both_eyes })?;
+    let first_stamp_ns = match session.next(&recording, Duration::from_secs(5))? {
+        CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
+        CameraEvent::Failed { message } => bail!(message),
+        other => bail!("the camera process answered a recording with {other:?}"),
+    };
+    let streaming = execute(arm, trajectory)?;
+    let motion = streaming.finish(session)?;
+    let timeout = Duration::from_secs_f64(f64::from(frames) / 15.0 + 5.0);
+    let event = session.finish(&recording, timeout, |event| {
+        if let CameraEvent::Progress(p) = event {
+            stage.progress(p);
+        }
+    })?;
+    match event {
+        CameraEvent::Recorded {
+            frames, dropped, ..
+        } => Ok(Film {
+            first_stamp_ns,
+            frames,
+            dropped,
+            motion,
+        }),
+        CameraEvent::Failed { message } => Err(anyhow!(message)),
+        other => Err(anyhow!(
+            "the camera process answered a recording with {other:?}"
+        )),
+    }
+}

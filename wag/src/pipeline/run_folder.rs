@@ -1,0 +1,71 @@
+//! The folder of one run: results, configurations as used, logs.
+
+use crate::failure::{Failure, OrInput, Outcome};
+use anyhow::{Context, anyhow};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// An existing run folder.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    /// Shared-memory domain of this run's processes.
+    pub domain: String,
+}
+
+impl RunFolder {
+    /// Creates `out`, or `runs/<time>-<name>`, with folders `config` and `log`.
+    pub fn create(out: Option<&Path>, name: &str) -> Outcome<Self> {
+        let path = match out {
+            Some(path) => path.to_owned(),
+            None => {
+                let now = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+                let stamp: String = now.chars().filter(|c| !matches!(c, ':' | '-')).collect();
+                PathBuf::from("runs").join(format!("{stamp}-{name}-{}", std::process::id()))
+            }
+        };
+        if path.exists() {
+            return Err(Failure::input(anyhow!(
+                "run folder `{}` exists already; name another one with --out",
+                path.display()
+            )));
+        }
+        for folder in ["config", "log"] {
+            std::fs::create_dir_all(path.join(folder))
+                .with_context(|| {
+                    format!(
+                        "cannot create run folder `{}`; name a writable one with --out",
+                        path.display()
+                    )
+                })
+                .or_input()?;
+        }
+        Ok(Self {
+            path,
+            domain: format!("run-{}", std::process::id()),
+        })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file in it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Where processes log.
+    pub fn log(&self) -> PathBuf {
+        self.path.join("log")
+    }
+
+    /// Writes the configuration a process runs with; returns its path.
+    pub fn config<T: serde::Serialize>(&self, name: &str, config: &T) -> anyhow::Result<PathBuf> {
+        let path = self.path.join("config").join(format!("{name}.toml"));
+        let text = toml::to_string(config).with_context(|| format!("configuration of {name}"))?;
+        crate::files::write_atomic(&path, text.as_bytes())?;
+        Ok(path)
+    }
+}

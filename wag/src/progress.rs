@@ -1,0 +1,79 @@
+//! What people see while they wait: one line per stage, on standard error, and
+//! only on a terminal does it move.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// One stage of a command.
+#[derive(Debug)]
+pub struct Stage {
+    bar: ProgressBar,
+    name: &'static str,
+    began: Instant,
+    plain: bool,
+}
+
+impl Stage {
+    /// Begins a stage. `quiet` hides it altogether.
+    pub fn begin(name: &'static str, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = ProgressBar::new(0);
+        bar.set_draw_target(if quiet || !terminal {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        });
+        let style = ProgressStyle::with_template("{spinner:.cyan} {prefix:<12} {wide_msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_spinner());
+        bar.set_style(style);
+        bar.set_prefix(name);
+        bar.enable_steady_tick(Duration::from_millis(100));
+        Self {
+            bar,
+            name,
+            began: Instant::now(),
+            plain: !quiet && !terminal,
+        }
+    }
+
+    /// Shows a short message.
+    pub fn say(&self, message: impl Into<String>) {
+        self.bar.set_message(message.into());
+    }
+
+    /// Shows how far along a long piece of work is.
+    pub fn progress(&self, p: &shared_types::ipc::message::Progress) {
+        if p.total > 0 {
+            let width = 24usize;
+            let filled = (width * p.done.min(p.total) as usize) / p.total as usize;
+            self.say(format!(
+                "{}{} {}/{}  {} {:.3}",
+                "█".repeat(filled),
+                "░".repeat(width - filled),
+                p.done,
+                p.total,
+                p.label,
+                p.value
+            ));
+        }
+    }
+
+    /// Ends the stage with its result; returns its duration (s).
+    pub fn done(&self, result: &str) -> f64 {
+        let seconds = self.began.elapsed().as_secs_f64();
+        let line = format!("✔ {:<12} {result} ({seconds:.1} s)", self.name);
+        if self.plain {
+            eprintln!("{line}");
+        }
+        self.bar.println(&line);
+        self.bar.finish_and_clear();
+        seconds
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

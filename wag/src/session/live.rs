@@ -1,0 +1,215 @@
+//! The session a command works in: shared memory, supervised processes, the
+//! operator's heartbeat, the recorder, and what to show meanwhile.
+
+use super::{ProcessSpec, Recorder, Supervisor};
+use crate::progress::Stage;
+use anyhow::{Context, anyhow, bail};
+use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
+use shared_types::ipc::{Bus, IpcError, OperatorEnd};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Lets Ctrl-C and SIGTERM end the command in order instead of at once.
+pub fn watch_interrupts() -> anyhow::Result<()> {
+    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst))
+        .context("cannot watch for Ctrl-C")
+}
+
+/// The flag that Ctrl-C and SIGTERM set.
+pub fn interrupted() -> &'static AtomicBool {
+    &INTERRUPTED
+}
+
+/// Errors of a wait: either the transport's or what the session noticed.
+#[derive(Debug)]
+pub struct SessionError(pub anyhow::Error);
+
+impl From<IpcError> for SessionError {
+    fn from(error: IpcError) -> Self {
+        Self(error.into())
+    }
+}
+
+/// Processes, shared memory and records of one command.
+#[derive(Debug)]
+pub struct Session {
+    // Order matters: the heartbeat ends before the processes, the processes
+    // before the connection to shared memory.
+    operator: Option<OperatorEnd>,
+    /// Child processes.
+    supervisor: Supervisor,
+    /// Everything received.
+    pub recorder: Recorder,
+    bus: Bus,
+    log_folder: PathBuf,
+    last_beat: Instant,
+}
+
+/// How often the operator's heartbeat is written.
+const BEAT_EVERY: Duration = Duration::from_millis(20);
+
+impl Session {
+    /// Joins shared memory under `domain`; children log into `log_folder`.
+    pub fn new(domain: &str, log_folder: &Path) -> anyhow::Result<Self> {
+        let bus = Bus::join(domain)?;
+        Ok(Self {
+            operator: None,
+            supervisor: Supervisor::default(),
+            recorder: Recorder::open(&bus)?,
+            bus,
+            log_folder: log_folder.to_owned(),
+            last_beat: Instant::now(),
+        })
+    }
+
+    /// Starts a process.
+    pub fn start(&mut self, spec: &ProcessSpec) -> anyhow::Result<()> {
+        self.supervisor.start(spec, &self.log_folder)
+    }
+
+    /// One turn of everything that must go on while something else is waited
+    /// for. Fails when a process died or the user pressed Ctrl-C.
+    pub fn tick(&mut self) -> anyhow::Result<()> {
+        if let Some(operator) = &mut self.operator
+            && self.last_beat.elapsed() >= BEAT_EVERY
+        {
+            operator.beat();
+            self.last_beat = Instant::now();
+        }
+        self.recorder.drain()?;
+        self.supervisor.check()?;
+        if INTERRUPTED.load(Ordering::SeqCst) {
+            bail!("interrupted; the arm was told to stop and all processes were ended");
+        }
+        Ok(())
+    }
+
+    /// Keeps turning for `duration`.
+    pub fn idle(&mut self, duration: Duration) -> anyhow::Result<()> {
+        let began = Instant::now();
+        while began.elapsed() < duration {
+            self.tick()?;
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(())
+    }
+
+    /// Connects to a service and waits until its process answers `ping`.
+    pub fn connect<R: Rpc>(
+        &mut self,
+        ping: &R::Request,
+        timeout: Duration,
+    ) -> anyhow::Result<RpcClient<R>> {
+        let client = RpcClient::<R>::open(&self.bus)?;
+        let began = Instant::now();
+        loop {
+            match client.call(ping) {
+                Ok(pending) => {
+                    self.finish(&pending, timeout, |_| ())?;
+                    return Ok(client);
+                }
+                Err(IpcError::Gone { .. }) if began.elapsed() < timeout => {
+                    self.idle(Duration::from_millis(10))?;
+                }
+                Err(IpcError::Gone { service }) => {
+                    bail!("nobody serves `{service}` after {} s", timeout.as_secs());
+                }
+                Err(e) => return Err(e.into()),
+            }
+        }
+    }
+
+    /// Takes the operator's place at a running controller.
+    pub fn take_operator(&mut self) -> anyhow::Result<()> {
+        self.operator = Some(OperatorEnd::take(&self.bus)?);
+        Ok(())
+    }
+
+    /// Sends a request and waits for its last event while everything else goes
+    /// on; earlier events go to `each`.
+    pub fn ask<R: Rpc>(
+        &mut self,
+        client: &RpcClient<R>,
+        request: &R::Request,
+        timeout: Duration,
+        each: impl FnMut(&R::Event),
+    ) -> anyhow::Result<R::Event> {
+        let pending = client.call(request)?;
+        self.finish(&pending, timeout, each)
+    }
+
+    /// Waits for the last event of a request under way.
+    pub fn finish<R: Rpc>(
+        &mut self,
+        pending: &Pending<R>,
+        timeout: Duration,
+        each: impl FnMut(&R::Event),
+    ) -> anyhow::Result<R::Event> {
+        let result = pending.finish(timeout, || self.tick().map_err(SessionError), each);
+        self.explain(result)
+    }
+
+    /// Waits for the next event of a request under way.
+    pub fn next<R: Rpc>(
+        &mut self,
+        pending: &Pending<R>,
+        timeout: Duration,
+    ) -> anyhow::Result<R::Event> {
+        let began = Instant::now();
+        loop {
+            self.tick()?;
+            match pending.try_next() {
+                Ok(Some(event)) => return Ok(event),
+                Ok(None) if began.elapsed() < timeout => {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                Ok(None) => {
+                    return Err(anyhow!(
+                        "`{}` did not answer within {} s",
+                        R::NAME,
+                        timeout.as_secs()
+                    ));
+                }
+                Err(e) => return self.explain(Err(e.into())),
+            }
+        }
+    }
+
+    /// A vanished server is explained by the process that died, if one did.
+    fn explain<T>(&mut self, result: Result<T, SessionError>) -> anyhow::Result<T> {
+        result.map_err(|SessionError(error)| {
+            for _ in 0..40 {
+                if let Err(death) = self.supervisor.check() {
+                    return death;
+                }
+                if !matches!(error.downcast_ref(), Some(IpcError::Gone { .. })) {
+                    break;
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            error
+        })
+    }
+
+    /// Ends the session: operator first, then all processes.
+    pub fn stop(&mut self, stage: Option<&Stage>) {
+        if let Some(mut operator) = self.operator.take() {
+            operator.stop();
+        }
+        let _ = self.recorder.drain();
+        self.supervisor.stop();
+        if let Some(stage) = stage {
+            stage.done("all processes ended");
+        }
+        self.bus.remove_leftovers();
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.stop(None);
+    }
+}

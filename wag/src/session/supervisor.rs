@@ -1,0 +1,140 @@
+//! Child processes: started with a log file each, watched, ended without
+//! leaving any behind.
+//!
+//! Each child runs in a process group of its own, so that Ctrl-C reaches only
+//! the supervisor, which then ends the children in order. A child whose parent
+//! is gone ends itself (see `command::process`).
+
+use anyhow::{Context, anyhow};
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs::File;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// How long a child may take to end itself after it was asked.
+const GRACE: Duration = Duration::from_millis(1500);
+
+/// One process to start.
+#[derive(Debug)]
+pub struct ProcessSpec {
+    /// Name, as `wag process NAME` knows it.
+    pub name: &'static str,
+    /// Its configuration file.
+    pub config: PathBuf,
+}
+
+#[derive(Debug)]
+struct Running {
+    name: &'static str,
+    child: Child,
+    log: PathBuf,
+}
+
+/// Owns child processes; ends them when dropped.
+#[derive(Debug, Default)]
+pub struct Supervisor {
+    children: Vec<Running>,
+}
+
+fn describe(status: ExitStatus) -> String {
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("ended with exit code {code}"),
+        (None, Some(signal)) => format!("was killed by signal {signal}"),
+        (None, None) => "ended".to_owned(),
+    }
+}
+
+/// The last line a process logged, for its epitaph.
+fn last_words(log: &Path) -> String {
+    let text = std::fs::read_to_string(log).unwrap_or_default();
+    match text.lines().rev().find(|l| !l.trim().is_empty()) {
+        Some(line) => format!("; its last words: {}", line.trim()),
+        None => String::new(),
+    }
+}
+
+impl Supervisor {
+    /// Starts a process of this very program, logging to `log_folder/NAME.log`.
+    pub fn start(&mut self, spec: &ProcessSpec, log_folder: &Path) -> anyhow::Result<()> {
+        let program = std::env::current_exe().context("cannot find this program's own file")?;
+        let log = log_folder.join(format!("{}.log", spec.name));
+        let file =
+            File::create(&log).with_context(|| format!("cannot write `{}`", log.display()))?;
+        let child = Command::new(program)
+            .args(["process", spec.name, "--config"])
+            .arg(&spec.config)
+            .arg("--parent")
+            .arg(std::process::id().to_string())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(file)
+            .process_group(0)
+            .spawn()
+            .with_context(|| format!("cannot start the {} process", spec.name))?;
+        tracing::debug!(name = spec.name, pid = child.id(), "started");
+        self.children.push(Running {
+            name: spec.name,
+            child,
+            log,
+        });
+        Ok(())
+    }
+
+    /// Fails when any child has ended on its own.
+    pub fn check(&mut self) -> anyhow::Result<()> {
+        for running in &mut self.children {
+            if let Some(status) = running
+                .child
+                .try_wait()
+                .context("cannot watch a child process")?
+            {
+                return Err(anyhow!(
+                    "the {} process {}{} (log: `{}`)",
+                    running.name,
+                    describe(status),
+                    last_words(&running.log),
+                    running.log.display()
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks every child to end, last started first, and kills what does not.
+    pub fn stop(&mut self) {
+        for running in self.children.iter_mut().rev() {
+            if matches!(running.child.try_wait(), Ok(None))
+                && let Some(pid) = i32::try_from(running.child.id())
+                    .ok()
+                    .and_then(Pid::from_raw)
+            {
+                let _ = kill_process(pid, Signal::TERM);
+            }
+        }
+        let asked = Instant::now();
+        for mut running in self.children.drain(..).rev() {
+            loop {
+                match running.child.try_wait() {
+                    Ok(None) if asked.elapsed() < GRACE => {
+                        std::thread::sleep(Duration::from_millis(5));
+                    }
+                    Ok(None) => {
+                        tracing::warn!(name = running.name, "did not end in time and is killed");
+                        let _ = running.child.kill();
+                        let _ = running.child.wait();
+                        break;
+                    }
+                    Ok(Some(_)) | Err(_) => break,
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Supervisor {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
