@@ -7,10 +7,12 @@
     reason = "tests may fail loudly"
 )]
 
+use camera_ingest::frame::ycc_from_rgb;
 use camera_ingest::track::{ClampSample, TrackOptions};
-use camera_ingest::{ClampPath, EyeFrame, frame::ycc_from_rgb, track};
+use camera_ingest::{ClampPath, EyeFrame, TrackResult, track};
 use nalgebra::{Matrix3, Vector3};
 use shared_types::{Intrinsics, Shutter, StereoCamera};
+use std::ops::Range;
 
 const LENGTH_M: f64 = 0.5;
 const ROPE_RADIUS_M: f64 = 0.006;
@@ -162,49 +164,74 @@ impl Canvas {
     }
 }
 
-/// Median, 95th percentile and maximum of the keypoints' error (px).
-fn errors(motion: &Motion, count: usize, rope_rgb: [f64; 3], lead_rgb: [f64; 3]) -> [f64; 3] {
+/// A drawn recording with its truth.
+struct Recording {
+    frames: Vec<EyeFrame>,
+    /// Node pixels per frame.
+    truth: Vec<Vec<[f64; 2]>>,
+    clamp: ClampPath,
+}
+
+/// Draws `count` frames; the rope is hidden in those of `hidden`.
+fn record(
+    motion: &Motion,
+    count: usize,
+    rope_lead: [[f64; 3]; 2],
+    hidden: Range<usize>,
+) -> Recording {
     let camera = camera();
     let pixels = |nodes: &[Vector3<f64>]| -> Vec<[f64; 2]> {
-        nodes
-            .iter()
-            .map(|p| camera.project_left(p).unwrap())
-            .collect()
+        let project = |p| camera.project_left(p).unwrap();
+        nodes.iter().map(project).collect()
     };
-    let scale = 350.0 / 0.95;
+    let px_per_m = 350.0 / 0.95;
     let (mut frames, mut truth, mut clamp) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..count {
         let t_s = index as f64 * 16_666_667e-9;
         let seen_s = t_s + camera.row_time_s(0.0);
         let (hold, nodes) = (motion.clamp(seen_s), motion.rope(seen_s));
-        let mut canvas = Canvas::wall();
         let up = |d: f64| hold.p_w_m + hold.pole_w * d;
+        let mut canvas = Canvas::wall();
         let arm = pixels(&[up(0.2), up(0.45)]);
-        canvas.stroke(&arm, 0.045 * scale, [225.0, 228.0, 230.0]);
-        canvas.stroke(
-            &pixels(&[up(0.0), up(0.2)]),
-            0.01 * scale,
-            [60.0, 62.0, 66.0],
-        );
+        canvas.stroke(&arm, 0.045 * px_per_m, [225.0, 228.0, 230.0]);
+        let pole = pixels(&[up(0.0), up(0.2)]);
+        canvas.stroke(&pole, 0.01 * px_per_m, [60.0, 62.0, 66.0]);
         let rope = pixels(&nodes);
-        canvas.stroke(&rope, ROPE_RADIUS_M * scale, rope_rgb);
-        canvas.stroke(&[rope[NODES - 1]; 2], LEAD_RADIUS_M * scale, lead_rgb);
+        if !hidden.contains(&index) {
+            canvas.stroke(&rope, ROPE_RADIUS_M * px_per_m, rope_lead[0]);
+            canvas.stroke(
+                &[rope[NODES - 1]; 2],
+                LEAD_RADIUS_M * px_per_m,
+                rope_lead[1],
+            );
+        }
         frames.push(canvas.frame(index));
         truth.push(rope);
         clamp.push(motion.clamp(t_s));
     }
     // A little more of the arm's motion than the video shows.
     clamp.push(motion.clamp(count as f64 * 16_666_667e-9));
+    Recording {
+        frames,
+        truth,
+        clamp: ClampPath::new(clamp).unwrap(),
+    }
+}
+
+fn follow(recording: &Recording) -> TrackResult {
     let options = TrackOptions {
         keypoints: 21,
         ..TrackOptions::default()
     };
-    let result = track(&frames, &camera, &ClampPath::new(clamp).unwrap(), &options).unwrap();
-    println!("{:?}, {:?}", result.appearance, result.times);
-    assert!((result.appearance.length_m - LENGTH_M).abs() < 0.01);
+    track(&recording.frames, &camera(), &recording.clamp, &options).unwrap()
+}
+
+/// Median, 95th percentile and maximum of the keypoints' error over some frames (px).
+fn errors(recording: &Recording, result: &TrackResult, frames: Range<usize>) -> [f64; 3] {
     let mut all: Vec<f64> = Vec::new();
-    for (frame, nodes) in result.track.frames.iter().zip(&truth) {
-        for (p, t) in frame.points.iter().zip(nodes.iter().step_by(2)) {
+    for index in frames {
+        let nodes = recording.truth[index].iter().step_by(2);
+        for (p, t) in result.track.frames[index].points.iter().zip(nodes) {
             all.push((p[0] - t[0]).hypot(p[1] - t[1]));
         }
     }
@@ -220,19 +247,36 @@ fn assert_small([median, p95, max]: [f64; 3]) {
     );
 }
 
+fn assert_looks(result: &TrackResult) {
+    let seen = &result.appearance;
+    assert!((seen.length_m - LENGTH_M).abs() < 0.005, "{seen:?}");
+    assert!(
+        (seen.rope_radius_m - ROPE_RADIUS_M).abs() < 1e-3,
+        "{seen:?}"
+    );
+    assert!(
+        (seen.lead_radius_m - LEAD_RADIUS_M).abs() < 1e-3,
+        "{seen:?}"
+    );
+}
+
 #[test]
-fn a_red_rope_that_sways_gently() {
+fn a_red_rope_that_sways_gently_and_is_hidden_for_a_while() {
     let motion = Motion {
         still_s: 0.5,
         clamp_m: 0.012,
         tip_rad: 0.35,
     };
-    assert_small(errors(
-        &motion,
-        150,
-        [190.0, 60.0, 40.0],
-        [40.0, 60.0, 170.0],
-    ));
+    let colours = [[190.0, 60.0, 40.0], [40.0, 60.0, 170.0]];
+    let hidden = 80..86;
+    let recording = record(&motion, 150, colours, hidden.clone());
+    let result = follow(&recording);
+    assert_looks(&result);
+    assert_small(errors(&recording, &result, 0..hidden.start));
+    assert_small(errors(&recording, &result, hidden.end + 2..150));
+    for (index, frame) in result.track.frames.iter().enumerate() {
+        assert_eq!(frame.lost, hidden.contains(&index), "frame {index}");
+    }
 }
 
 #[test]
@@ -242,10 +286,25 @@ fn a_rope_that_is_still_for_most_of_the_recording() {
         clamp_m: 0.006,
         tip_rad: 0.4,
     };
-    assert_small(errors(
-        &motion,
-        150,
-        [60.0, 110.0, 60.0],
-        [230.0, 140.0, 30.0],
-    ));
+    let colours = [[60.0, 110.0, 60.0], [230.0, 140.0, 30.0]];
+    let recording = record(&motion, 150, colours, 0..0);
+    let result = follow(&recording);
+    assert_looks(&result);
+    assert_small(errors(&recording, &result, 0..150));
+}
+
+#[test]
+fn no_rope_is_an_error_that_says_so() {
+    let motion = Motion {
+        still_s: 0.1,
+        clamp_m: 0.03,
+        tip_rad: 0.4,
+    };
+    let recording = record(&motion, 30, [[0.0; 3]; 2], 0..30);
+    let options = TrackOptions::default();
+    let error = track(&recording.frames, &camera(), &recording.clamp, &options).unwrap_err();
+    assert!(
+        error.to_string().contains("nothing long enough hangs"),
+        "{error}"
+    );
 }
