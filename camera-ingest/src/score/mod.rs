@@ -7,14 +7,17 @@
 
 mod blob;
 mod path;
+mod scene;
+#[cfg(test)]
+mod tests;
 
-use blob::{Behind, Blob, BlobMap, chroma_of_rgb};
+use blob::chroma_of_rgb;
 use nalgebra::Vector3;
 use path::{LocalPath, Sighting};
+use scene::{Scene, Target};
 use serde::Serialize;
 use shared_types::StereoCamera;
 
-use crate::frame::EyeFrame;
 use crate::source::{FrameSource, SourceError};
 
 /// What a caller may choose.
@@ -160,150 +163,6 @@ pub fn score(
         });
     }
     Ok(closest(&sightings, &target, camera))
-}
-
-/// The still scene of both eyes.
-struct Scene<'a> {
-    camera: &'a StereoCamera,
-    options: &'a ScoreOptions,
-    eyes: [EyeFrame; 2],
-}
-
-/// A pair of blobs that can be one thing.
-#[derive(Debug, Clone, Copy)]
-struct Pair {
-    left: Blob,
-    right: Blob,
-    /// Point in the left optical frame (m).
-    point_c: Vector3<f64>,
-}
-
-/// The target: place in the left optical frame and standard error of its depth (m).
-struct Target {
-    point_c: Vector3<f64>,
-    depth_error_m: f64,
-}
-
-impl<'a> Scene<'a> {
-    fn learn(
-        source: &mut dyn FrameSource,
-        camera: &'a StereoCamera,
-        options: &'a ScoreOptions,
-    ) -> Result<Self, ScoreError> {
-        let chosen = crate::track::spread(source.len(), options.background_frames.max(3));
-        let (mut left, mut right) = (Vec::new(), Vec::new());
-        for &index in &chosen {
-            let frame = source.read(index)?;
-            left.push(frame.left());
-            right.push(frame.right());
-        }
-        let found = [left[0].width_px, left[0].height_px];
-        let expected = [camera.width_px as usize, camera.height_px as usize];
-        if found != expected {
-            return Err(ScoreError::Size { found, expected });
-        }
-        let median = |frames: &[EyeFrame]| crate::track::median_frame(frames);
-        Ok(Self {
-            camera,
-            options,
-            eyes: [median(&left), median(&right)],
-        })
-    }
-
-    /// All pairs of blobs that pass the epipolar, size and depth checks.
-    fn pairs(&self, left: &[Blob], right: &[Blob]) -> Vec<Pair> {
-        let mut pairs = Vec::new();
-        for &l in left {
-            for &r in right {
-                let ratio = (l.area_px / r.area_px).max(r.area_px / l.area_px);
-                let Some(found) = self.camera.triangulate(l.centre, r.centre) else {
-                    continue;
-                };
-                let point_c = self.camera.to_left(&found.p_w_m);
-                let gap_px = found.gap_m * self.camera.left.fx / point_c.z.max(0.1);
-                if ratio <= self.options.area_ratio
-                    && gap_px <= self.options.epipolar_px
-                    && (self.options.depth_m[0]..=self.options.depth_m[1]).contains(&point_c.z)
-                {
-                    pairs.push(Pair {
-                        left: l,
-                        right: r,
-                        point_c,
-                    });
-                }
-            }
-        }
-        pairs
-    }
-
-    /// The target in the still scene: the largest round blob of its colour.
-    fn target(&self, rgb: [u8; 3]) -> Result<Target, ScoreError> {
-        let blobs = |eye: &EyeFrame| -> Vec<Blob> {
-            let behind = Behind::Flat(middle_chroma(eye));
-            let mut blobs = BlobMap::new(eye, chroma_of_rgb(rgb), behind).blobs();
-            blobs.retain(|b| b.stretch < 1.5);
-            blobs
-        };
-        let (left, right) = (blobs(&self.eyes[0]), blobs(&self.eyes[1]));
-        let best = self
-            .pairs(&left, &right)
-            .into_iter()
-            .max_by(|a, b| a.left.area_px.total_cmp(&b.left.area_px));
-        let pair = best.ok_or(ScoreError::NotSeen {
-            what: "target",
-            seen: 0,
-            least: 1,
-        })?;
-        let z = pair.point_c.z;
-        // A still blob's centre is good to a tenth of a pixel in each eye.
-        let disparity_error_px = 0.1 * std::f64::consts::SQRT_2;
-        let px_m = self.camera.left.fx * self.camera.t_right_left_m.x.abs();
-        Ok(Target {
-            point_c: pair.point_c,
-            depth_error_m: z * z / px_m * disparity_error_px,
-        })
-    }
-
-    /// The tip in one frame, nearest to where it was if there is a choice.
-    fn tip(
-        &self,
-        eyes: [&EyeFrame; 2],
-        rgb: [u8; 3],
-        before: Option<Sighting>,
-        since_s: f64,
-    ) -> Option<Sighting> {
-        let blobs = |k: usize| {
-            BlobMap::new(eyes[k], chroma_of_rgb(rgb), Behind::Scene(&self.eyes[k])).blobs()
-        };
-        let pairs = self.pairs(&blobs(0), &blobs(1));
-        let away = |p: &Pair| match before {
-            // Large and near: a stray pixel far off must not win.
-            Some(b) => {
-                let ray = [p.point_c.x / p.point_c.z, p.point_c.y / p.point_c.z];
-                (ray[0] - b.ray[0]).hypot(ray[1] - b.ray[1]) - 1e-3 * p.left.area_px
-            }
-            None => -p.left.area_px,
-        };
-        let pair = pairs
-            .into_iter()
-            .min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let row = f64::midpoint(pair.left.centre[1], pair.right.centre[1]);
-        Some(Sighting {
-            t_s: since_s + self.camera.row_time_s(row),
-            ray: self.camera.left.undistort(pair.left.centre),
-            inverse_depth: 1.0 / pair.point_c.z,
-        })
-    }
-}
-
-/// Median chroma of an image: what most of the scene looks like.
-fn middle_chroma(eye: &EyeFrame) -> [f64; 2] {
-    let median = |plane: &[u8]| -> f64 {
-        let mut values: Vec<u8> = plane.iter().step_by(31).copied().collect();
-        let middle = values.len() / 2;
-        f64::from(*values.select_nth_unstable(middle).1) - 128.0
-    };
-    [median(&eye.cb), median(&eye.cr)]
 }
 
 /// Minimises the distance over continuous time.
