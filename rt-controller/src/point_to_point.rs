@@ -45,8 +45,8 @@ pub enum MoveError {
     Limit(FaultCode),
 }
 
-/// Plans a move that rests at `from` and at `to` (rad), using `speed_part` (0
-/// to 1] of the limits.
+/// Plans a move that rests at `from` and at `to` (rad), `speed_part` (0 to 1] as
+/// fast as the limits allow.
 ///
 /// # Errors
 /// [`MoveError`].
@@ -105,11 +105,13 @@ fn generate(
     for j in 0..JOINTS {
         input.current_position[j] = from[j];
         input.target_position[j] = to[j];
-        // A hair below the limits: rounding must not touch them.
-        let slack = part * (1.0 - 1e-9);
-        input.max_velocity[j] = limits.velocity_max_rad_s[j] * slack;
-        input.max_acceleration[j] = limits.acceleration_max_rad_s2[j] * slack;
-        input.max_jerk[j] = limits.jerk_max_rad_s3[j] * slack;
+        // A hair below the limits: rounding must not touch them. Scaling the n-th
+        // derivative by the n-th power slows the whole move down uniformly, so
+        // that a gentle move is gentle from its first cycle on.
+        let slack = 1.0 - 1e-9;
+        input.max_velocity[j] = limits.velocity_max_rad_s[j] * slack * part;
+        input.max_acceleration[j] = limits.acceleration_max_rad_s2[j] * slack * part.powi(2);
+        input.max_jerk[j] = limits.jerk_max_rad_s3[j] * slack * part.powi(3);
     }
     let mut generator = Ruckig::<JOINTS, ThrowErrorHandler>::new(None, limits.period_s());
     let mut trajectory = Trajectory::<JOINTS>::new(None);
@@ -179,15 +181,15 @@ mod tests {
         assert_eq!(motion.state_at(0.0).q, START_POSE);
     }
 
-    /// Joint 7 by 1 rad at full speed: v = π is not reached; four jerk phases
-    /// of 0.04 s and two of constant 20 rad/s²: from `x = a(T/2)(T/2 - tj)`,
-    /// with tj = 0.04, T/2 = tj/2 + sqrt(tj²/4 + x/a).
+    /// Joint 7 by 0.3 rad: its full speed is not reached, so four jerk phases of
+    /// tj = 0.04 s and two of constant a = 20 rad/s² remain, and from
+    /// `x = a (T/2) (T/2 - tj)` follows `T/2 = tj/2 + sqrt(tj²/4 + x/a)`.
     #[test]
     fn known_duration() {
         let mut to = START_POSE;
-        to[6] += 1.0;
+        to[6] += 0.3;
         let motion = plan_move(&START_POSE, &to, 1.0, &Limits::default()).unwrap();
-        let half = 0.02 + (0.0004_f64 + 1.0 / 20.0).sqrt();
+        let half = 0.02 + (0.0004_f64 + 0.3 / 20.0).sqrt();
         assert!(
             (motion.duration_s() - 2.0 * half).abs() < 1e-6,
             "{}",

@@ -1,7 +1,7 @@
 //! The in-process rings between the control loop and the other threads:
 //! single-producer single-consumer, lock-free, sized once.
 
-use crate::control::{ControlEvent, Motion, Order};
+use crate::control::{ControlEvent, CycleOutput, Motion, Order};
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{CycleRecord, JointReport};
 
@@ -45,6 +45,41 @@ pub struct RtPorts<T> {
     pub records: Producer<CycleRecord>,
     /// What is to be dropped, out.
     pub retired: Producer<Retired<T>>,
+    /// Records lost so far because the relay was too slow.
+    pub dropped: u32,
+}
+
+impl<T> RtPorts<T> {
+    /// The newest joint report that came since the last call; bounded. RT-safe.
+    pub fn newest_report(&mut self) -> Option<JointReport> {
+        (0..NEWEST_REPORTS)
+            .map_while(|_| self.reports.pop().ok())
+            .last()
+    }
+
+    /// Hands a link back to be dropped. RT-safe.
+    pub fn retire_link(&mut self, link: Option<Box<T>>) {
+        if let Some(link) = link {
+            let _ = self.retired.push(Retired::Link(link));
+        }
+    }
+
+    /// Passes on what a cycle produced, its record first. RT-safe.
+    pub fn put_out(&mut self, out: CycleOutput) {
+        let record = CycleRecord {
+            dropped: self.dropped,
+            ..out.record
+        };
+        if self.records.push(record).is_err() {
+            self.dropped = self.dropped.saturating_add(1);
+        }
+        for event in out.events {
+            let _ = self.events.push(event);
+        }
+        for motion in out.retired {
+            let _ = self.retired.push(Retired::Motion(motion));
+        }
+    }
 }
 
 /// The relay's ends.
@@ -91,6 +126,7 @@ pub fn rings<T>() -> Rings<T> {
             events,
             records,
             retired,
+            dropped: 0,
         },
         relay: RelayPorts {
             orders: orders_in,

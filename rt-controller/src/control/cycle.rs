@@ -493,3 +493,7 @@ fn emit(out: &mut CycleOutput, event: ControlEvent) {
 fn give_back(out: &mut CycleOutput, motion: Box<Motion>) {
     let _ = out.retired.push(motion);
 }
+
+#[cfg(test)]
+#[path = "cycle_tests.rs"]
+mod tests;

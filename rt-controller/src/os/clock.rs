@@ -17,13 +17,23 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// Now (CLOCK_MONOTONIC, ns). RT-safe: a read of shared kernel memory.
 #[must_use]
 pub fn now_ns() -> u64 {
+    read_ns(libc::CLOCK_MONOTONIC)
+}
+
+/// Now (CLOCK_REALTIME, ns). RT-safe. Only to translate the kernel's stamps:
+/// this clock may be stepped.
+pub(super) fn realtime_ns() -> u64 {
+    read_ns(libc::CLOCK_REALTIME)
+}
+
+fn read_ns(clock: libc::clockid_t) -> u64 {
     let mut now = libc::timespec {
         tv_sec: 0,
         tv_nsec: 0,
     };
-    // SAFETY: `now` is a valid, writable timespec; the clock id exists on every
-    // Linux, so the call cannot fail.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut now) };
+    // SAFETY: `now` is a valid, writable timespec; both clock ids in use exist
+    // on every Linux, so the call cannot fail.
+    unsafe { libc::clock_gettime(clock, &raw mut now) };
     let seconds = u64::try_from(now.tv_sec).unwrap_or_default();
     let nanoseconds = u64::try_from(now.tv_nsec).unwrap_or_default();
     seconds.saturating_mul(NS_PER_S).saturating_add(nanoseconds)

@@ -3,6 +3,7 @@
 #![allow(unsafe_code, reason = "system calls without a safe wrapper")]
 
 pub mod clock;
+pub mod receive;
 pub mod schedule;
 
 pub use clock::{Clock, MonotonicClock, now_ns};

@@ -14,6 +14,7 @@
 )]
 
 pub mod sim;
+pub mod slot;
 pub mod tcp;
 
 use crate::control::LinkInput;

@@ -3,9 +3,10 @@
 
 use super::{ArmTransport, LinkGone, Sent};
 use crate::control::LinkInput;
+use crate::os::receive::{receive, stamp_arrivals};
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
 use crate::xarm::{Command, FrameReader, Protocol, Status};
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
@@ -40,6 +41,8 @@ impl TcpLink {
         socket.set_tcp_quickack(true)?;
         socket.set_tcp_user_timeout(Some(USER_TIMEOUT))?;
         stream.set_nonblocking(true)?;
+        // Without stamps a round trip is rounded up to the next look, no more.
+        let _ = stamp_arrivals(&stream);
         Ok(Self {
             stream,
             reader: FrameReader::new(),
@@ -63,8 +66,8 @@ impl TcpLink {
         Ok(true)
     }
 
-    /// Takes whole replies out of the reader.
-    fn take_replies(&mut self, now_ns: u64, seen: &mut LinkInput) -> Result<(), LinkGone> {
+    /// Takes whole replies out of the reader; they came at `came_ns`.
+    fn take_replies(&mut self, came_ns: u64, seen: &mut LinkInput) -> Result<(), LinkGone> {
         loop {
             let frame = match self.reader.next_frame() {
                 Ok(Some(frame)) => frame,
@@ -84,7 +87,7 @@ impl TcpLink {
             // The arm answers in order: commands before this one got no reply.
             while let Some((id, sent_ns)) = self.unanswered.pop_front() {
                 if id == reply.transaction {
-                    let trip_ns = now_ns.saturating_sub(sent_ns);
+                    let trip_ns = came_ns.saturating_sub(sent_ns);
                     seen.reply_ns = u32::try_from(trip_ns).unwrap_or(u32::MAX);
                     break;
                 }
@@ -96,11 +99,12 @@ impl TcpLink {
 
     fn receive(&mut self, now_ns: u64, seen: &mut LinkInput) -> Result<(), LinkGone> {
         for _ in 0..MAX_READS {
-            match self.stream.read(self.reader.space()) {
-                Ok(0) => return Err(LinkGone),
-                Ok(n) => {
+            match receive(&self.stream, self.reader.space()) {
+                Ok((0, _)) => return Err(LinkGone),
+                Ok((n, arrival_ns)) => {
                     self.reader.commit(n);
-                    self.take_replies(now_ns, seen)?;
+                    let came_ns = arrival_ns.map_or(now_ns, |arrival_ns| arrival_ns.min(now_ns));
+                    self.take_replies(came_ns, seen)?;
                 }
                 Err(e) if e.kind() == ErrorKind::WouldBlock => return Ok(()),
                 Err(e) if e.kind() == ErrorKind::Interrupted => {}
@@ -158,6 +162,7 @@ mod tests {
     use super::*;
     use crate::xarm::{ReplyData, StateRequest};
     use shared_types::JointVector;
+    use std::io::Read;
     use std::net::TcpListener;
 
     fn pair() -> (TcpLink, TcpStream) {
