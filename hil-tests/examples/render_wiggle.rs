@@ -2,7 +2,7 @@
 //! can be tested on:
 //!
 //! ```text
-//! render_wiggle OUT [SEED] [FRAMES]
+//! render_wiggle OUT [SEED] [FRAMES] [VGA|HD]
 //! ```
 //!
 //! Writes `video.yuyv` (side-by-side frames, one after the other),
@@ -14,7 +14,7 @@ use camera_ingest::StereoFrame;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use hil_tests::hidden::hidden_rope;
 use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
-use hil_tests::rig::CameraConfig;
+use hil_tests::rig::{CameraConfig, Resolution};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use rope_sim::LiveRope;
 use shared_types::kinematics::{FrameMotion, attach_motion};
@@ -60,17 +60,23 @@ struct Arguments {
     out: PathBuf,
     seed: u64,
     frames: usize,
+    mode: VideoMode,
 }
 
 fn arguments() -> Result<Arguments, Box<dyn Error>> {
     let mut given = std::env::args().skip(1);
     let out = given
         .next()
-        .ok_or("usage: render_wiggle OUT [SEED] [FRAMES]")?;
+        .ok_or("usage: render_wiggle OUT [SEED] [FRAMES] [VGA|HD]")?;
     Ok(Arguments {
         out: out.into(),
         seed: given.next().map_or(Ok(1), |s| s.parse())?,
         frames: given.next().map_or(Ok(400), |s| s.parse())?,
+        mode: match given.next().as_deref() {
+            None | Some("VGA") => VideoMode::Vga,
+            Some("HD") => VideoMode::Hd,
+            Some(other) => return Err(format!("there is no mode {other}; use VGA or HD").into()),
+        },
     })
 }
 
@@ -102,12 +108,24 @@ fn write_pose(path: &Path, duration_s: f64) -> std::io::Result<()> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let Arguments { out, seed, frames } = arguments()?;
+    let Arguments {
+        out,
+        seed,
+        frames,
+        mode,
+    } = arguments()?;
     fs::create_dir_all(&out)?;
-    let camera = CameraConfig::default().stereo_camera();
-    write_factory_conf(&out.join("camera.conf"), &camera, VideoMode::Vga)?;
+    let settings = CameraConfig {
+        resolution: match mode {
+            VideoMode::Hd => Resolution::Hd,
+            _ => Resolution::Vga,
+        },
+        ..CameraConfig::default()
+    };
+    let camera = settings.stereo_camera();
+    write_factory_conf(&out.join("camera.conf"), &camera, mode)?;
     let toml = out.join("camera.toml");
-    write_camera_toml(&toml, &camera, VideoMode::Vga, Path::new("camera.conf"))?;
+    write_camera_toml(&toml, &camera, mode, Path::new("camera.conf"))?;
     write_pose(&out.join("pose.csv"), frames as f64 / RATE_HZ + 0.1)?;
 
     let (rope, colours) = (hidden_rope(seed), Appearance::from_seed(seed));

@@ -8,12 +8,18 @@
 )]
 
 use camera_ingest::StereoFrame;
+use hil_tests::arm::clock;
 use hil_tests::rig::{self, RigConfig};
 use nalgebra::Vector3;
+use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
+use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, FrameHeader, IpcError};
+use shared_types::plan::START_POSE;
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -111,7 +117,7 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
         }
         assert_eq!((frames[0].0.width_px, frames[0].0.height_px), (1344, 376));
         assert_eq!(frames[0].1.len(), 1344 * 376 * 2);
-        assert!(hil_tests::arm::clock::now().0 > frames[FRAMES - 1].0.stamp_ns);
+        assert!(clock::now().0 > frames[FRAMES - 1].0.stamp_ns);
 
         let target_m = [0.75, 0.0, -0.2];
         let (from_ns, to_ns) = (frames[0].0.stamp_ns, frames[FRAMES - 1].0.stamp_ns);
@@ -140,6 +146,69 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
             "{seen_m} and {closest_m}"
         );
 
+        stop.store(true, Ordering::Release);
+        rig.join().unwrap().unwrap();
+    });
+}
+
+/// Sends one command and waits for its reply.
+fn command(stream: &mut TcpStream, transaction: u16, command: &Command) {
+    let mut bytes = [0; MAX_FRAME_LEN];
+    let n = emit_command(&mut bytes, transaction, Protocol::Private, command).unwrap();
+    stream.write_all(&bytes[..n]).unwrap();
+    assert!(stream.read(&mut bytes).unwrap() > 0);
+}
+
+#[test]
+fn the_rope_swings_when_the_arm_moves() {
+    let mut config = RigConfig {
+        domain: format!("test_rig_move_{}", std::process::id()),
+        target_m: Some([1.10, 0.0, 0.45]),
+        ..config()
+    };
+    config.camera.enabled = false;
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let rig = scope.spawn(|| rig::run(&config, &stop));
+        let client = RpcClient::<RigRpc>::open(&Bus::join(&config.domain).unwrap()).unwrap();
+        let RigEvent::Ports { command: port, .. } = ask(&client, &RigRequest::Ports) else {
+            panic!("no ports");
+        };
+        let mut arm = TcpStream::connect((config.bind, port)).unwrap();
+        arm.set_nodelay(true).unwrap();
+        let from_ns = clock::now().0;
+        for (transaction, request) in (1..).zip([
+            Command::MotionEnable {
+                joint: Command::ALL_JOINTS,
+                enable: true,
+            },
+            Command::SetMode(Mode::Position),
+            Command::SetState(StateRequest::Ready),
+            Command::MoveJoint {
+                target: START_POSE,
+                speed_rad_s: 1.0,
+                acceleration_rad_s2: 10.0,
+                checked: None,
+            },
+        ]) {
+            command(&mut arm, transaction, &request);
+        }
+        std::thread::sleep(Duration::from_millis(800));
+        let to_ns = clock::now().0;
+        let RigEvent::Truth {
+            peak_tip_speed_m_s,
+            touched,
+            ..
+        } = ask(&client, &RigRequest::Truth { from_ns, to_ns })
+        else {
+            panic!("no truth");
+        };
+        // Joint 1 alone sweeps a tip some 0.6 m away.
+        assert!(
+            peak_tip_speed_m_s > 0.1 && peak_tip_speed_m_s < 5.0,
+            "{peak_tip_speed_m_s} m/s"
+        );
+        assert!(!touched);
         stop.store(true, Ordering::Release);
         rig.join().unwrap().unwrap();
     });

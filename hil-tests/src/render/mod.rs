@@ -1,6 +1,6 @@
 //! What a stereo camera sees of the rig: a small software renderer.
 //!
-//! The room that never moves ([`backdrop`]) is drawn once per eye by casting
+//! The room that never moves (`backdrop`) is drawn once per eye by casting
 //! rays through the distorted pixels. Arm, rope and target are drawn anew in
 //! each frame as shaded capsules whose ends go through the full camera model,
 //! so no picture is ever warped. Edges have the exact coverage of a straight
@@ -12,6 +12,7 @@
 
 mod appearance;
 mod backdrop;
+mod bodies;
 mod colour;
 mod eye;
 mod layer;
@@ -21,5 +22,6 @@ mod stroke;
 mod texture;
 
 pub use appearance::Appearance;
+pub use bodies::{RopeShape, ScenePose};
 pub use eye::Eye;
-pub use scene::{Renderer, RopeShape, ScenePose};
+pub use scene::Renderer;

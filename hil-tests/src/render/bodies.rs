@@ -1,0 +1,190 @@
+//! The moving things as strokes: arm and pole, rope and lead, target ball.
+
+use super::appearance::Appearance;
+use super::colour::ycc;
+use super::eye::Eye;
+use super::stroke::{Material, Stroke};
+use crate::rig::body::{ArmBody, FLOOR_Z_M};
+use nalgebra::Vector3;
+use shared_types::{JointVector, RopeParams};
+
+/// Radius of the target ball (m).
+const TARGET_RADIUS_M: f64 = 0.02;
+/// Radius of the rod under it (m).
+const STAND_RADIUS_M: f64 = 0.003;
+/// Pieces of centreline drawn per link.
+const PIECES_PER_LINK: usize = 3;
+/// Layers a pixel may be covered by: arm, rope, target.
+pub(super) const LAYERS: usize = 3;
+
+/// Sizes of the rope as the camera sees them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RopeShape {
+    /// Radius of the rope (m).
+    pub radius_m: f64,
+    /// Radius of the lead (m).
+    pub lead_radius_m: f64,
+}
+
+impl From<&RopeParams> for RopeShape {
+    fn from(rope: &RopeParams) -> Self {
+        Self {
+            radius_m: rope.radius_m,
+            lead_radius_m: rope.lead_radius_m,
+        }
+    }
+}
+
+/// Arm and rope at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenePose {
+    /// Joints (rad).
+    pub q: JointVector,
+    /// Rope nodes in the world (m), clamp first, centre of the lead last.
+    pub nodes: Vec<Vector3<f64>>,
+}
+
+/// What one eye has to draw in one sub-frame, layer by layer.
+pub(super) type SubFrame = [Vec<Stroke>; LAYERS];
+
+/// Arm, rope and target in one eye at one instant.
+pub(super) fn strokes(
+    eye: &Eye,
+    pose: &ScenePose,
+    rope: RopeShape,
+    appearance: &Appearance,
+    target_m: Option<Vector3<f64>>,
+) -> SubFrame {
+    [
+        arm_strokes(eye, &pose.q),
+        rope_strokes(eye, &pose.nodes, rope, appearance),
+        target_m.map_or_else(Vec::new, |at| target_strokes(eye, &at, appearance)),
+    ]
+}
+
+fn material(rgb: [u8; 3], gloss: f32) -> Material {
+    Material {
+        colour: ycc(rgb.map(f32::from)),
+        gloss,
+    }
+}
+
+/// Links in white with grey joints, a black flange, a carbon pole.
+fn arm_strokes(eye: &Eye, q: &JointVector) -> Vec<Stroke> {
+    const WHITE: [u8; 3] = [226, 228, 230];
+    const GREY: [u8; 3] = [148, 151, 156];
+    const DARK: [u8; 3] = [58, 60, 64];
+    const BASE: [u8; 3] = [66, 68, 72];
+    const PAINT: [[u8; 3]; 12] = [
+        BASE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, GREY, DARK,
+    ];
+    let body = ArmBody::at(q);
+    let links = body.links.iter().zip(PAINT);
+    let pole = body.pole;
+    let collar = pole.b_m + (pole.a_m - pole.b_m).normalize() * 0.012;
+    let foot = |x: f64| Vector3::new(x, 0.0, 0.012);
+    links
+        .filter_map(|(c, rgb)| {
+            // The base's capsule reaches into the column it stands on.
+            let sunk = Vector3::z() * (c.radius_m - c.a_m.z).max(0.0);
+            let a = if rgb == BASE { c.a_m + sunk } else { c.a_m };
+            Stroke::new(eye, &a, &c.b_m, c.radius_m, material(rgb, 46.0))
+        })
+        .chain(Stroke::new(
+            eye,
+            &foot(-0.07),
+            &foot(0.07),
+            0.012,
+            material(GREY, 46.0),
+        ))
+        .chain(Stroke::new(
+            eye,
+            &pole.a_m,
+            &pole.b_m,
+            pole.radius_m,
+            material(DARK, 60.0),
+        ))
+        .chain(Stroke::new(
+            eye,
+            &collar,
+            &pole.b_m,
+            0.011,
+            material(GREY, 70.0),
+        ))
+        .collect()
+}
+
+/// The rope along a smooth curve through its nodes, and the lead at its end.
+fn rope_strokes(
+    eye: &Eye,
+    nodes: &[Vector3<f64>],
+    rope: RopeShape,
+    appearance: &Appearance,
+) -> Vec<Stroke> {
+    let Some(lead_at) = nodes.last() else {
+        return Vec::new();
+    };
+    let cord = material(appearance.rope_rgb, 10.0);
+    let lead = material(appearance.lead_rgb, 55.0);
+    let line = centreline(nodes);
+    line.windows(2)
+        .filter_map(|p| Stroke::new(eye, &p[0], &p[1], rope.radius_m, cord))
+        .chain(Stroke::new(eye, lead_at, lead_at, rope.lead_radius_m, lead))
+        .collect()
+}
+
+/// Catmull-Rom curve through the nodes, sampled finely.
+#[allow(clippy::cast_precision_loss, reason = "piece counts are small")]
+fn centreline(nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let n = nodes.len();
+    let mut line = Vec::with_capacity(n * PIECES_PER_LINK);
+    for i in 1..n {
+        let (p1, p2) = (nodes[i - 1], nodes[i]);
+        let p0 = if i >= 2 { nodes[i - 2] } else { p1 * 2.0 - p2 };
+        let p3 = if i + 1 < n {
+            nodes[i + 1]
+        } else {
+            p2 * 2.0 - p1
+        };
+        for piece in 0..PIECES_PER_LINK {
+            let t = piece as f64 / PIECES_PER_LINK as f64;
+            let (m1, m2) = ((p2 - p0) / 2.0, (p3 - p1) / 2.0);
+            let (t2, t3) = (t * t, t * t * t);
+            line.push(
+                p1 * (2.0 * t3 - 3.0 * t2 + 1.0)
+                    + m1 * (t3 - 2.0 * t2 + t)
+                    + p2 * (3.0 * t2 - 2.0 * t3)
+                    + m2 * (t3 - t2),
+            );
+        }
+    }
+    line.extend(nodes.last());
+    line
+}
+
+/// The ball, its rod down to the floor, and a foot.
+fn target_strokes(eye: &Eye, at: &Vector3<f64>, appearance: &Appearance) -> Vec<Stroke> {
+    /// The lens bends long straight things; short pieces follow it.
+    const ROD_PIECES: i32 = 12;
+    let rod = material([96, 98, 102], 40.0);
+    let foot = Vector3::new(at.x, at.y, FLOOR_Z_M + 0.01);
+    let point = |i: i32| at + (foot - at) * (f64::from(i) / f64::from(ROD_PIECES));
+    let foot_end = |dx: f64| foot + Vector3::new(dx, 0.0, 0.0);
+    (0..ROD_PIECES)
+        .filter_map(|i| Stroke::new(eye, &point(i), &point(i + 1), STAND_RADIUS_M, rod))
+        .chain(Stroke::new(
+            eye,
+            &foot_end(-0.06),
+            &foot_end(0.06),
+            0.010,
+            rod,
+        ))
+        .chain(Stroke::new(
+            eye,
+            at,
+            at,
+            TARGET_RADIUS_M,
+            material(appearance.target_rgb, 55.0),
+        ))
+        .collect()
+}
