@@ -180,6 +180,21 @@ pub fn keypoint_sheet(
     contact_sheet(&pictures, columns)
 }
 
+/// The still scene behind what moves: median of some frames of one size.
+///
+/// # Errors
+/// No frames, or sizes differ.
+pub fn still_scene(frames: &[EyeFrame]) -> Result<EyeFrame, OverlayError> {
+    let first = frames
+        .first()
+        .ok_or(OverlayError::Input("no frames for a still scene"))?;
+    let size = |f: &EyeFrame| (f.width_px, f.height_px);
+    if frames.iter().any(|f| size(f) != size(first)) {
+        return Err(OverlayError::Input("the frames differ in size"));
+    }
+    Ok(crate::track::median_frame(frames))
+}
+
 /// Strobe picture: over the first frame, every pixel shows the chosen frame
 /// that differs most from `background` there.
 ///
@@ -243,6 +258,11 @@ mod tests {
         assert_eq!(picture.rgb[60], 10);
         assert_eq!(picture.rgb[0], 100);
         assert!(strobe(&background, &[]).is_err());
+        assert_eq!(
+            still_scene(&[a, b, background.clone()]).unwrap().luma[20],
+            100
+        );
+        assert!(still_scene(&[]).is_err());
     }
 
     #[test]
