@@ -1,0 +1,161 @@
+//! What is tuned about striking, and the size of its search.
+
+use crate::trajopt::{Clearance, Dimensions, WAYPOINTS};
+use serde::{Deserialize, Serialize};
+use shared_types::{JOINTS, RopeParams};
+
+/// Weights of the fitness terms. The paper gives the terms, not the weights.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StrikeWeights {
+    /// Of the distance `d_min` (1/m).
+    pub distance_per_m: f64,
+    /// Of the proximity reward `R_prox`.
+    pub proximity: f64,
+    /// Of the motion regulariser `M` (1/rad). Small enough that giving up 1 mm
+    /// never pays for less than a radian of motion.
+    pub motion_per_rad: f64,
+    /// Of joint speed above the limit, `P_vel` (s/rad).
+    pub speed_excess_per_rad_s: f64,
+    /// Of one contact of the rope with the robot at one sampled instant.
+    pub rope_contact: f64,
+    /// Of one contact of the tool side with the robot at one sampled instant.
+    pub pole_contact: f64,
+    /// Of one contact in the base region at one sampled instant.
+    pub base_contact: f64,
+}
+
+impl Default for StrikeWeights {
+    fn default() -> Self {
+        Self {
+            distance_per_m: 1.0,
+            proximity: 1.0,
+            motion_per_rad: 0.001,
+            speed_excess_per_rad_s: 1.0,
+            rope_contact: 0.02,
+            pole_contact: 0.1,
+            base_contact: 0.2,
+        }
+    }
+}
+
+/// Relative changes of the rope under which the finalists are compared: about
+/// what identification leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Robustness {
+    /// Finalists compared; 1 switches the comparison off.
+    pub finalists: usize,
+    /// Change of the length (1).
+    pub length: f64,
+    /// Change of stiffness over mass (1).
+    pub stiffness: f64,
+    /// Change of damping over mass (1).
+    pub damping: f64,
+    /// Change of lead mass over rope mass (1).
+    pub lead_mass: f64,
+}
+
+impl Default for Robustness {
+    fn default() -> Self {
+        Self {
+            finalists: 12,
+            length: 0.003,
+            stiffness: 0.03,
+            damping: 0.03,
+            lead_mass: 0.02,
+        }
+    }
+}
+
+impl Robustness {
+    /// The rope itself and two variants per parameter.
+    #[must_use]
+    pub fn variants(&self, rope: &RopeParams) -> Vec<RopeParams> {
+        let mut out = vec![*rope];
+        for sign in [-1.0, 1.0] {
+            let mut change = |edit: &dyn Fn(&mut RopeParams)| {
+                let mut r = *rope;
+                edit(&mut r);
+                out.push(r);
+            };
+            change(&|r| r.length_m *= 1.0 + sign * self.length);
+            change(&|r| r.joint_stiffness_nm_per_rad *= 1.0 + sign * self.stiffness);
+            change(&|r| r.joint_damping_nms_per_rad *= 1.0 + sign * self.damping);
+            change(&|r| r.lead_mass_kg *= 1.0 + sign * self.lead_mass);
+        }
+        out
+    }
+}
+
+/// Everything about striking that is tuned rather than asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StrikeConfig {
+    /// Times of the three waypoints (s).
+    pub waypoint_times_s: [f64; WAYPOINTS],
+    /// Deviation of the first generation for each joint (rad). The mean is the
+    /// start pose: for striking the paper starts unbiased.
+    pub std_dev_rad: [f64; JOINTS],
+    /// Time simulated after the motion's end (s).
+    pub tail_s: f64,
+    /// Period at which contacts are looked for (s).
+    pub contact_period_s: f64,
+    /// Draws of one candidate before it is pulled towards the mean.
+    pub draws_max: usize,
+    /// Weights of the fitness terms.
+    pub weights: StrikeWeights,
+    /// Distances the tool keeps from the scene.
+    pub clearance: Clearance,
+    /// Comparison of the finalists.
+    pub robustness: Robustness,
+}
+
+impl Default for StrikeConfig {
+    fn default() -> Self {
+        Self {
+            waypoint_times_s: [0.45, 0.80, 1.15],
+            std_dev_rad: [0.15, 0.35, 0.25, 0.35, 0.25, 0.5, 0.25],
+            tail_s: 0.35,
+            contact_period_s: 0.015,
+            draws_max: 40,
+            weights: StrikeWeights::default(),
+            clearance: Clearance::default(),
+            robustness: Robustness::default(),
+        }
+    }
+}
+
+/// Size of the search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StrikeOptions {
+    /// Which joints move.
+    pub dimensions: Dimensions,
+    /// Candidates per generation (paper: 60).
+    pub population: usize,
+    /// Most generations (paper: 25).
+    pub generations: usize,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Step of the rope simulation (s).
+    pub step_s: f64,
+    /// Threads.
+    pub threads: usize,
+    /// Error that is good enough to stop (m).
+    pub stop_below_m: Option<f64>,
+}
+
+impl Default for StrikeOptions {
+    fn default() -> Self {
+        Self {
+            dimensions: Dimensions::Planar,
+            population: 60,
+            generations: 25,
+            seed: 0,
+            step_s: 5e-4,
+            threads: 2,
+            stop_below_m: None,
+        }
+    }
+}
