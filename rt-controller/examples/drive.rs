@@ -70,6 +70,8 @@ fn swing() -> Result<JointTrajectory, Box<dyn Error>> {
 fn beat(domain: String, quit: Arc<AtomicBool>) -> std::thread::JoinHandle<Result<(), IpcError>> {
     std::thread::spawn(move || {
         let bus = Bus::join(&domain)?;
+        // A killed operator leaves its place taken until it is cleaned up.
+        bus.remove_leftovers();
         let mut operator = OperatorEnd::take(&bus)?;
         while !quit.load(Ordering::Relaxed) {
             operator.beat();

@@ -78,6 +78,9 @@ fn serve(relay: &mut Relay, threads: &Threads, stop: &AtomicBool) -> Result<(), 
             });
             let settled = since.elapsed() > 10 * TURN && !relay.mode().is_moving();
             if settled || since.elapsed() > BRAKE_WAIT {
+                // Once more, for callers whose answer the last cycle brought.
+                std::thread::sleep(TURN);
+                relay.turn();
                 return Ok(());
             }
         }

@@ -7,6 +7,7 @@ use crate::point_to_point::plan_move;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use shared_types::JointTrajectory;
+use shared_types::ipc::{JointReport, OperatorBeat};
 use shared_types::plan::START_POSE;
 
 const PERIOD_NS: u64 = 4_000_000;

@@ -18,12 +18,14 @@
 
 pub mod brake;
 pub mod cycle;
+pub mod exchange;
 pub mod limiter;
 pub mod mode;
 pub mod monitor;
 pub mod motion;
 pub mod phases;
 
-pub use cycle::{ControlEvent, ControlState, CycleInput, CycleOutput, LinkInput, Order};
+pub use cycle::ControlState;
+pub use exchange::{ControlEvent, CycleInput, CycleOutput, LinkInput, Order};
 pub use monitor::Thresholds;
 pub use motion::Motion;

@@ -2,7 +2,7 @@
 //!
 //! Pure: time is the cycle's planned deadline; nothing here reads a clock.
 
-use super::cycle::{CycleInput, LinkInput};
+use super::exchange::{CycleInput, LinkInput};
 use shared_types::ipc::{ControllerMode, JointReport};
 use shared_types::{FaultCode, JOINTS, JointVector};
 
