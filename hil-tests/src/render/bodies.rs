@@ -3,9 +3,10 @@
 use super::appearance::Appearance;
 use super::colour::ycc;
 use super::eye::Eye;
-use super::stroke::{Material, Stroke};
+use super::stroke::{Material, Stroke, Strokes};
 use crate::rig::body::{ArmBody, FLOOR_Z_M};
 use nalgebra::Vector3;
+use shared_types::kinematics::attach_pose;
 use shared_types::{JointVector, RopeParams};
 
 /// Radius of the target ball (m).
@@ -14,8 +15,6 @@ const TARGET_RADIUS_M: f64 = 0.02;
 const STAND_RADIUS_M: f64 = 0.003;
 /// Pieces of centreline drawn per link.
 const PIECES_PER_LINK: usize = 3;
-/// Layers a pixel may be covered by: arm, rope, target.
-pub(super) const LAYERS: usize = 3;
 
 /// Sizes of the rope as the camera sees them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,22 +43,51 @@ pub struct ScenePose {
     pub nodes: Vec<Vector3<f64>>,
 }
 
-/// What one eye has to draw in one sub-frame, layer by layer.
-pub(super) type SubFrame = [Vec<Stroke>; LAYERS];
+/// Motion of the pole's end in the picture during which the arm is drawn once (px).
+const ARM_STEP_PX: f64 = 1.0;
 
-/// Arm, rope and target in one eye at one instant.
-pub(super) fn strokes(
+/// Part of an exposure in which the arm as good as stands still, and the rope's
+/// sub-frames in it.
+#[derive(Debug)]
+pub(super) struct Spell {
+    pub(super) arm: Strokes,
+    pub(super) target: Strokes,
+    pub(super) ropes: Vec<Strokes>,
+}
+
+/// What one eye has to draw for the sub-frames `poses`, in order.
+pub(super) fn spells(
     eye: &Eye,
-    pose: &ScenePose,
+    poses: &[ScenePose],
     rope: RopeShape,
     appearance: &Appearance,
     target_m: Option<Vector3<f64>>,
-) -> SubFrame {
-    [
-        arm_strokes(eye, &pose.q),
-        rope_strokes(eye, &pose.nodes, rope, appearance),
-        target_m.map_or_else(Vec::new, |at| target_strokes(eye, &at, appearance)),
-    ]
+) -> Vec<Spell> {
+    // A pole's end out of view does not move in the picture.
+    let pole_end = |pose: &ScenePose| eye.project(&attach_pose(&pose.q).0).unwrap_or_default();
+    let mut began = poses.first().map(pole_end).unwrap_or_default();
+    let together = |_: &ScenePose, next: &ScenePose| {
+        let now = pole_end(next);
+        let near = (now[0] - began[0]).hypot(now[1] - began[1]) < ARM_STEP_PX;
+        if !near {
+            began = now;
+        }
+        near
+    };
+    poses
+        .chunk_by(together)
+        .map(|spell| Spell {
+            arm: arm_strokes(eye, &spell[spell.len() / 2].q),
+            target: target_m
+                .into_iter()
+                .flat_map(|at| target_strokes(eye, &at, appearance))
+                .collect(),
+            ropes: spell
+                .iter()
+                .map(|pose| rope_strokes(eye, &pose.nodes, rope, appearance))
+                .collect(),
+        })
+        .collect()
 }
 
 fn material(rgb: [u8; 3], gloss: f32) -> Material {
@@ -70,7 +98,7 @@ fn material(rgb: [u8; 3], gloss: f32) -> Material {
 }
 
 /// Links in white with grey joints, a black flange, a carbon pole.
-fn arm_strokes(eye: &Eye, q: &JointVector) -> Vec<Stroke> {
+fn arm_strokes(eye: &Eye, q: &JointVector) -> Strokes {
     const WHITE: [u8; 3] = [226, 228, 230];
     const GREY: [u8; 3] = [148, 151, 156];
     const DARK: [u8; 3] = [58, 60, 64];
@@ -120,9 +148,9 @@ fn rope_strokes(
     nodes: &[Vector3<f64>],
     rope: RopeShape,
     appearance: &Appearance,
-) -> Vec<Stroke> {
+) -> Strokes {
     let Some(lead_at) = nodes.last() else {
-        return Vec::new();
+        return Strokes::from_iter([]);
     };
     let cord = material(appearance.rope_rgb, 10.0);
     let lead = material(appearance.lead_rgb, 55.0);

@@ -36,6 +36,10 @@ impl RowLayer {
         }
     }
 
+    pub(super) fn width(&self) -> usize {
+        self.cells.len()
+    }
+
     pub(super) fn clear(&mut self) {
         let (from, to) = self.used;
         if from < to {
@@ -73,8 +77,8 @@ impl RowLayer {
 }
 
 /// Colour of one pixel: the layers over `behind`, nearest last.
-pub(super) fn composite<const N: usize>(layers: &[RowLayer; N], u: usize, behind: Ycc) -> Ycc {
-    let mut order: [&Cell; N] = core::array::from_fn(|i| layers[i].cell(u));
+pub(super) fn composite<const N: usize>(layers: [&RowLayer; N], u: usize, behind: Ycc) -> Ycc {
+    let mut order: [&Cell; N] = layers.map(|layer| layer.cell(u));
     order.sort_unstable_by(|a, b| b.depth_m.total_cmp(&a.depth_m));
     order
         .iter()
@@ -99,6 +103,7 @@ mod tests {
         layers[0].put(1, cell(1.0, 1.0, 50.0));
         layers[1].put(1, cell(1.0, 2.0, 90.0));
         layers[1].put(2, cell(0.25, 2.0, 90.0));
+        let composite = |l: &[RowLayer; 2], u, behind| super::composite([&l[0], &l[1]], u, behind);
         assert_eq!(composite(&layers, 1, [10.0, 0.0, 0.0])[0], 50.0);
         assert_eq!(composite(&layers, 2, [10.0, 0.0, 0.0])[0], 30.0);
         assert_eq!(composite(&layers, 3, [10.0, 0.0, 0.0])[0], 10.0);
@@ -111,6 +116,6 @@ mod tests {
         let mut layers = [RowLayer::new(1)];
         layers[0].put(0, cell(0.5, 1.0, 100.0));
         layers[0].put(0, cell(0.5, 1.1, 100.0));
-        assert_eq!(composite(&layers, 0, [0.0; 3])[0], 50.0);
+        assert_eq!(composite([&layers[0]], 0, [0.0; 3])[0], 50.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::appearance::Appearance;
 use super::backdrop::Room;
-use super::bodies::{LAYERS, RopeShape, ScenePose, SubFrame, strokes};
+use super::bodies::{RopeShape, ScenePose, Spell, spells};
 use super::colour::Ycc;
 use super::eye::{Eye, Vignette};
 use super::layer::{RowLayer, composite};
@@ -33,7 +33,9 @@ struct EyeCanvas {
     vignette: Vignette,
     room: Vec<Ycc>,
     room_yuyv: Vec<u8>,
-    layers: [RowLayer; LAYERS],
+    arm: RowLayer,
+    target: RowLayer,
+    rope: RowLayer,
     sum: Vec<Ycc>,
 }
 
@@ -98,23 +100,18 @@ impl Renderer {
         let (width, height) = self.size_px;
         let row_bytes = width * 4;
         for (side, canvas) in self.eyes.iter_mut().enumerate() {
-            let frames: Vec<_> = poses
-                .iter()
-                .map(|pose| {
-                    strokes(
-                        &canvas.eye,
-                        pose,
-                        self.rope,
-                        &self.appearance,
-                        self.target_m,
-                    )
-                })
-                .collect();
+            let spells = spells(
+                &canvas.eye,
+                poses,
+                self.rope,
+                &self.appearance,
+                self.target_m,
+            );
             let rows = out.chunks_exact_mut(row_bytes).take(height).enumerate();
             for (v, row) in rows {
                 canvas.draw_row(
                     v,
-                    &frames,
+                    &spells,
                     &mut row[side * width * 2..(side + 1) * width * 2],
                 );
             }
@@ -135,55 +132,97 @@ impl EyeCanvas {
             vignette,
             room,
             room_yuyv,
-            layers: core::array::from_fn(|_| RowLayer::new(width)),
+            arm: RowLayer::new(width),
+            target: RowLayer::new(width),
+            rope: RowLayer::new(width),
             sum: vec![[0.0; 3]; width],
         }
     }
 
-    /// Draws row `v` of this eye: the room, and over it the mean of the
+    /// Draws row `v` of this eye: the room, and over it the mean of all
     /// sub-frames where any of them has something.
     #[allow(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn draw_row(&mut self, v: usize, frames: &[SubFrame], out: &mut [u8]) {
-        let (width, height) = self.eye.size_px();
-        let room = &self.room[v * width..(v + 1) * width];
+    fn draw_row(&mut self, v: usize, spells: &[Spell], out: &mut [u8]) {
+        let width = self.eye.size_px().0;
         out.copy_from_slice(&self.room_yuyv[v * width * 2..(v + 1) * width * 2]);
         let (mut from, mut to) = (width, 0);
-        for frame in frames {
-            for (layer, strokes) in self.layers.iter_mut().zip(frame) {
-                layer.clear();
-                for stroke in strokes {
-                    let (top, bottom) = stroke.rows(height);
-                    if (top..bottom).contains(&v) {
-                        stroke.draw_row(v, width, layer);
-                    }
-                }
+        let mut count = 0;
+        for spell in spells {
+            spell.arm.draw_row(v, &mut self.arm);
+            spell.target.draw_row(v, &mut self.target);
+            // What stands still counts once, with the weight of the whole spell;
+            let weight = spell.ropes.len();
+            for (low, high) in apart(self.arm.used(), self.target.used()) {
+                self.add_still(v, (low, high), weight as f32);
+                (from, to) = (from.min(low), to.max(high));
             }
-            let used = self.layers.iter().map(RowLayer::used);
-            let (low, high) = used.fold((width, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-            for u in low..high {
-                // The room has its vignetting already; what is laid over it has not.
-                let dim = self.vignette.at(u as f32, v as f32);
-                let behind = room[u].map(|c| c / dim);
-                let seen = composite(&self.layers, u, behind);
-                for i in 0..3 {
-                    // Sums are kept as differences from the room.
-                    self.sum[u][i] += seen[i] * dim - room[u][i];
-                }
+            // each rope adds only what it changes.
+            for rope in &spell.ropes {
+                rope.draw_row(v, &mut self.rope);
+                let (low, high) = self.rope.used();
+                self.add_rope(v, (low, high));
+                (from, to) = (from.min(low), to.max(high));
             }
-            (from, to) = (from.min(low), to.max(high));
+            count += weight;
         }
         if from >= to {
             return;
         }
         // Chroma belongs to pairs of pixels.
         let (from, to) = (from & !1, ((to + 1) & !1).min(width));
-        let share = 1.0 / frames.len() as f32;
+        let room = &self.room[v * width..(v + 1) * width];
+        let share = 1.0 / count as f32;
         for u in from..to {
+            // Light was gathered before the lens dims it; the room's is dimmed.
+            let dim = self.vignette.at(u as f32, v as f32) * share;
             for i in 0..3 {
-                self.sum[u][i] = room[u][i] + self.sum[u][i] * share;
+                self.sum[u][i] = room[u][i] + self.sum[u][i] * dim;
             }
         }
         pack_yuyv(&self.sum[from..to], &mut out[from * 2..to * 2]);
         self.sum[from..to].fill([0.0; 3]);
     }
+
+    /// The room's colour at a pixel before the lens dims it.
+    #[allow(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    fn behind(&self, u: usize, v: usize) -> Ycc {
+        let dim = self.vignette.at(u as f32, v as f32);
+        self.room[v * self.arm.width() + u].map(|c| c / dim)
+    }
+
+    /// Adds what arm and target change against the room, `weight` times.
+    fn add_still(&mut self, v: usize, (low, high): (usize, usize), weight: f32) {
+        for u in low..high {
+            let behind = self.behind(u, v);
+            let seen = composite([&self.arm, &self.target], u, behind);
+            for i in 0..3 {
+                self.sum[u][i] += (seen[i] - behind[i]) * weight;
+            }
+        }
+    }
+
+    /// Adds what the rope changes against arm, target and room.
+    fn add_rope(&mut self, v: usize, (low, high): (usize, usize)) {
+        for u in low..high {
+            if self.rope.cell(u).cover > 0.0 {
+                let behind = self.behind(u, v);
+                let without = composite([&self.arm, &self.target], u, behind);
+                let with = composite([&self.arm, &self.target, &self.rope], u, behind);
+                for i in 0..3 {
+                    self.sum[u][i] += with[i] - without[i];
+                }
+            }
+        }
+    }
+}
+
+/// Two spans as spans that do not overlap, empty ones left out.
+fn apart(a: (usize, usize), b: (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+    let overlap = a.0 < b.1 && b.0 < a.1;
+    let spans = if overlap {
+        [(a.0.min(b.0), a.1.max(b.1)), (0, 0)]
+    } else {
+        [a, b]
+    };
+    spans.into_iter().filter(|(low, high)| low < high)
 }

@@ -31,6 +31,37 @@ pub(super) struct Stroke {
     depth_m: [f32; 2],
     radius_m: f32,
     material: Material,
+    rows: (usize, usize),
+}
+
+/// Strokes of one body, and the rows they touch together.
+#[derive(Debug)]
+pub(super) struct Strokes {
+    all: Vec<Stroke>,
+    rows: (usize, usize),
+}
+
+impl Strokes {
+    /// Draws row `v` into a layer that is cleared first.
+    pub(super) fn draw_row(&self, v: usize, layer: &mut RowLayer) {
+        layer.clear();
+        let touches = |(top, bottom): (usize, usize)| top <= v && v < bottom;
+        if touches(self.rows) {
+            for stroke in self.all.iter().filter(|s| touches(s.rows)) {
+                stroke.draw_row(v, layer);
+            }
+        }
+    }
+}
+
+impl FromIterator<Stroke> for Strokes {
+    fn from_iter<I: IntoIterator<Item = Stroke>>(strokes: I) -> Self {
+        let all: Vec<_> = strokes.into_iter().collect();
+        let rows = all.iter().fold((usize::MAX, 0), |(top, bottom), s| {
+            (top.min(s.rows.0), bottom.max(s.rows.1))
+        });
+        Self { all, rows }
+    }
 }
 
 #[allow(
@@ -55,7 +86,7 @@ impl Stroke {
             (b.pixel[1] - a.pixel[1]) as f32,
         ];
         let length2 = along_px[0] * along_px[0] + along_px[1] * along_px[1];
-        Some(Self {
+        let mut stroke = Self {
             a_px: a.pixel.map(|v| v as f32),
             along_px,
             per_length2: if length2 > 1e-9 { 1.0 / length2 } else { 0.0 },
@@ -63,7 +94,10 @@ impl Stroke {
             depth_m: [a.depth_m as f32, b.depth_m as f32],
             radius_m: radius_m as f32,
             material,
-        })
+            rows: (0, 0),
+        };
+        stroke.rows = stroke.find_rows(eye.size_px().1);
+        Some(stroke)
     }
 
     fn reach_px(&self) -> f32 {
@@ -71,7 +105,7 @@ impl Stroke {
     }
 
     /// First and one past the last row touched, within a picture of `height` rows.
-    pub(super) fn rows(&self, height: usize) -> (usize, usize) {
+    fn find_rows(&self, height: usize) -> (usize, usize) {
         let (v0, v1) = (self.a_px[1], self.a_px[1] + self.along_px[1]);
         let low = (v0.min(v1) - self.reach_px()).ceil().max(0.0) as usize;
         let high = (v0.max(v1) + self.reach_px()).floor() + 1.0;
@@ -95,10 +129,9 @@ impl Stroke {
         (from, ((high.floor() + 1.0).max(0.0) as usize).min(width))
     }
 
-    /// Draws the part in row `v` of a picture `width` pixels wide.
-    pub(super) fn draw_row(&self, v: usize, width: usize, layer: &mut RowLayer) {
+    fn draw_row(&self, v: usize, layer: &mut RowLayer) {
         let dv = v as f32 - self.a_px[1];
-        let (from, to) = self.columns(v as f32, width);
+        let (from, to) = self.columns(v as f32, layer.width());
         for u in from..to {
             let du = u as f32 - self.a_px[0];
             let dot = du * self.along_px[0] + dv * self.along_px[1];
