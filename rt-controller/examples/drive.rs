@@ -1,7 +1,8 @@
 //! Drives an arm through a running controller and prints what happened:
-//! bring-up, a move to the start pose, a small swing, latencies.
+//! bring-up, a move to the start pose, a small swing, a throw, latencies.
 //!
-//! `drive DOMAIN [REPEATS]`; the operator's heartbeat beats in a thread.
+//! `drive DOMAIN [REPEATS]`; the operator's heartbeat beats in a thread. The
+//! last motion is a fast throw that takes 97 % of the tool's speed limit.
 
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcClient;
@@ -19,7 +20,7 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let domain = arguments.next().unwrap_or_else(|| "wag".to_owned());
-    let repeats: u32 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let repeats: usize = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let bus = Bus::join(&domain)?;
     let client = RpcClient::<ControllerRpc>::open(&bus)?;
     let quit = Arc::new(AtomicBool::new(false));
@@ -34,8 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     ask(&client, &to_start)?;
     ask(&client, &ControllerRequest::Latency)?;
-    let trajectory = swing()?;
-    for _ in 0..repeats {
+    let motions = core::iter::repeat_n(swing()?, repeats).chain([throw()?]);
+    for trajectory in motions {
         let execute = ControllerRequest::Execute {
             sha256: trajectory_hash(&trajectory),
             trajectory: Box::new(trajectory),
@@ -65,6 +66,26 @@ fn swing() -> Result<JointTrajectory, Box<dyn Error>> {
         })
         .unzip();
     Ok(JointTrajectory::new(&times_s, &poses)?)
+}
+
+/// Joints 2, 4 and 6 back and forth, as fast as the tool may go.
+fn throw() -> Result<JointTrajectory, Box<dyn Error>> {
+    let (mut back, mut forth) = (START_POSE, START_POSE);
+    (back[1], back[3], back[5]) = (0.6, 2.6, 1.8);
+    (forth[1], forth[3], forth[5]) = (1.0, 1.9, 1.1);
+    let poses = [START_POSE, back, forth, START_POSE];
+    for hundredths in 20..200 {
+        let step_s = f64::from(hundredths) / 100.0;
+        let times_s = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
+        let throw = JointTrajectory::new(&times_s, &poses)?;
+        let limits = shared_types::Limits::default();
+        let within = limits.worst_violation(&throw).is_none();
+        if within && limits.tcp_margin(&throw).left > 0.03 {
+            println!("throw: {}", limits.tcp_margin(&throw).describe());
+            return Ok(throw);
+        }
+    }
+    Err("no throw is slow enough".into())
 }
 
 fn beat(domain: String, quit: Arc<AtomicBool>) -> std::thread::JoinHandle<Result<(), IpcError>> {
