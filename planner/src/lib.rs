@@ -18,6 +18,7 @@
     )
 )]
 
+pub mod calm;
 pub mod cmaes;
 pub mod collide;
 pub mod process;

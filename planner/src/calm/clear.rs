@@ -1,0 +1,42 @@
+//! Room around rope and tool during a move.
+
+use super::sway::{Sway, SwaySimulator};
+use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m, tool_contacts};
+use nalgebra::Vector3;
+use shared_types::{JointTrajectory, RopeParams};
+
+/// Nearest approaches during a move and the sway after it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    /// Smallest gap between rope and arm or column (m).
+    pub(super) rope_gap_m: f64,
+    /// Whether the tool side of the arm touches anything.
+    pub(super) tool_touches: bool,
+}
+
+/// Looks at every frame of the simulated rope.
+pub(super) fn room(
+    rope: &RopeParams,
+    simulator: &SwaySimulator<'_>,
+    trajectory: &JointTrajectory,
+    sway: &Sway,
+) -> Room {
+    let scene = Scene::default();
+    let shape = RopeShape::from(rope);
+    let mut out = Room {
+        rope_gap_m: f64::INFINITY,
+        tool_touches: false,
+    };
+    for frame in 0..sway.nodes.frames() {
+        let q = trajectory.state_at(Sway::time_s(frame)).q + simulator.prelude.standing_error;
+        let arm = ArmShape::at(&q);
+        let nodes: Vec<Vector3<f64>> = (0..sway.nodes.nodes())
+            .map(|n| sway.nodes.position(frame, n))
+            .collect();
+        out.rope_gap_m = out
+            .rope_gap_m
+            .min(rope_clearance_m(&arm, &scene, &shape, &nodes));
+        out.tool_touches |= !tool_contacts(&arm, &scene).none();
+    }
+    out
+}
