@@ -105,7 +105,7 @@ impl ControlState {
         self.watch(&input, &mut out);
         let deadline_ns = input.deadline_ns;
         if let Some(order) = input.order {
-            self.obey(order, deadline_ns, &mut out);
+            self.obey(order, deadline_ns, input.link.lost, &mut out);
         }
         let trajectory_s = self.trajectory_s(deadline_ns);
         self.command(deadline_ns, &mut out);
@@ -176,8 +176,13 @@ impl ControlState {
         }
     }
 
-    fn obey(&mut self, order: Order, deadline_ns: u64, out: &mut CycleOutput) {
+    fn obey(&mut self, order: Order, deadline_ns: u64, lost: bool, out: &mut CycleOutput) {
         match order {
+            // A link that broke on its way here.
+            Order::Adopt { .. } if lost => {
+                let fault = FaultCode::LinkLost;
+                emit(out, ControlEvent::Refused { id: None, fault });
+            }
             Order::Adopt { hold } => match self.adopt(hold, deadline_ns) {
                 Ok(()) => emit(out, ControlEvent::Adopted),
                 Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),

@@ -21,7 +21,8 @@ pub struct IdealArm {
     pub stalled: bool,
     /// The connection is gone.
     pub gone: bool,
-    oldest_ns: Option<u64>,
+    /// When the oldest unanswered command was sent (ns).
+    pub oldest_ns: Option<u64>,
 }
 
 impl ArmTransport for IdealArm {

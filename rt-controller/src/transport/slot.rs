@@ -28,13 +28,14 @@ impl<T: ArmTransport> LinkSlot<T> {
         core::mem::replace(&mut self.link, fresh)
     }
 
-    /// What the link showed since the last call, a failed send included.
+    /// What the link showed since the last call, a failed send included; no
+    /// link at all is a lost one.
     pub fn poll(&mut self, now_ns: u64) -> LinkInput {
-        let mut seen = self
-            .link
-            .as_mut()
-            .map(|link| link.poll(now_ns))
-            .unwrap_or_default();
+        let none = LinkInput {
+            lost: true,
+            ..LinkInput::default()
+        };
+        let mut seen = self.link.as_mut().map_or(none, |link| link.poll(now_ns));
         seen.lost |= core::mem::take(&mut self.lost);
         seen
     }

@@ -1,0 +1,128 @@
+//! The real loop in virtual time, on an ideal arm: pacing when the machine is
+//! late, and a link that stalls or goes away.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use rt_controller::control::{ControlEvent, ControlState, Order, Thresholds};
+use rt_controller::os::Clock;
+use rt_controller::ports::{Mail, RelayPorts, rings};
+use rt_controller::rt_loop::RtLoop;
+use rt_controller::transport::sim::IdealArm;
+use shared_types::ipc::{Bus, ControllerBoards, CycleRecord};
+use shared_types::plan::START_POSE;
+use shared_types::{FaultCode, Limits};
+use std::cell::Cell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const PERIOD_NS: u64 = 4_000_000;
+const BEGIN_NS: u64 = 1_000_000_000_000;
+
+/// Time that passes while the loop sleeps; every so often it oversleeps, by the
+/// next of `late_ns`. Sets `quit` after `sleeps`.
+struct LateClock {
+    now_ns: Rc<Cell<u64>>,
+    late_ns: Vec<u64>,
+    sleeps: usize,
+    quit: Arc<AtomicBool>,
+}
+
+impl Clock for LateClock {
+    fn now_ns(&self) -> u64 {
+        self.now_ns.get()
+    }
+
+    fn sleep_until(&mut self, deadline_ns: u64) {
+        let late_ns = self.late_ns.get(self.sleeps).copied().unwrap_or_default();
+        self.now_ns
+            .set(self.now_ns.get().max(deadline_ns) + late_ns);
+        self.sleeps = self.sleeps.saturating_sub(1);
+        self.quit.store(self.sleeps == 0, Ordering::Relaxed);
+    }
+}
+
+/// Runs the loop with an arm for as many cycles as `late_ns` has entries.
+fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
+    let bus = Bus::join(&format!("test_{name}_{}", std::process::id())).unwrap();
+    let boards = ControllerBoards::create(&bus).unwrap();
+    let thresholds = Thresholds {
+        operator_timeout_ns: 500_000_000,
+        reply_stall_ns: 20_000_000,
+        report_stale_ns: 100_000_000,
+        tracking_error_max_rad: 0.05,
+        tracking_window_ns: 100_000_000,
+        missed_cycles_max: 5,
+    };
+    let rings = rings();
+    let mut relay = rings.relay;
+    let hold = Order::Adopt { hold: START_POSE };
+    let link = Some(Box::new(arm));
+    relay.orders.push(Mail { order: hold, link }).unwrap();
+    let quit = Arc::new(AtomicBool::new(false));
+    let clock = LateClock {
+        now_ns: Rc::new(Cell::new(BEGIN_NS)),
+        sleeps: late_ns.len(),
+        late_ns,
+        quit: Arc::clone(&quit),
+    };
+    let control = ControlState::new(Limits::default(), thresholds);
+    RtLoop::new(control, clock, boards, rings.rt).run(&quit);
+    let records = std::iter::from_fn(|| relay.records.pop().ok()).collect();
+    (records, relay)
+}
+
+fn latched(relay: &mut RelayPorts<IdealArm>) -> Option<FaultCode> {
+    std::iter::from_fn(|| relay.events.pop().ok()).find_map(|event| match event {
+        ControlEvent::Latched { fault, .. } => Some(fault),
+        _ => None,
+    })
+}
+
+#[test]
+fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
+    // Microseconds late, entries consumed from the back.
+    let late_us = [0, 30, 3900, 0, 0, 9_500, 200, 0, 1200, 0, 799, 801, 0, 0];
+    let late_ns = late_us.map(|us: u64| us * 1000).to_vec();
+    let (records, mut relay) = run("late", IdealArm::default(), late_ns);
+    assert_eq!(records.len(), late_us.len());
+    let mut cycles = 0;
+    for pair in records.windows(2) {
+        let (a, b) = (&pair[0], &pair[1]);
+        let span_ns = b.deadline_ns - a.deadline_ns;
+        assert_eq!(span_ns, PERIOD_NS * (1 + u64::from(b.missed)));
+        let woke = |r: &CycleRecord| r.deadline_ns + u64::from(r.wake_late_ns);
+        assert!(woke(b) - woke(a) >= PERIOD_NS / 5 * 4, "{a:?} {b:?}");
+        cycles += u64::from(b.missed);
+    }
+    // 9.5 ms passes two deadlines and its wake-up is too close to the next
+    // one; 3.9, 1.2 and 0.801 ms are too close to theirs.
+    assert_eq!(cycles, 6);
+    assert_eq!(latched(&mut relay), None);
+    assert!(records.iter().all(|r| r.sent == 1));
+}
+
+#[test]
+fn a_stalled_link_is_latched_and_a_broken_one_never_adopted() {
+    let stalled = IdealArm {
+        stalled: true,
+        ..IdealArm::default()
+    };
+    let (records, mut relay) = run("stalled", stalled, vec![0; 20]);
+    assert_eq!(latched(&mut relay), Some(FaultCode::ReplyStalled));
+    // 20 ms without a reply: noticed in the sixth cycle after the first setpoint.
+    assert_eq!(records.iter().filter(|r| r.sent == 1).count(), 6);
+    let gone = IdealArm {
+        gone: true,
+        ..IdealArm::default()
+    };
+    let (records, mut relay) = run("gone", gone, vec![0; 20]);
+    let (id, fault) = (None, FaultCode::LinkLost);
+    assert_eq!(relay.events.pop(), Ok(ControlEvent::Refused { id, fault }));
+    assert!(records.iter().all(|r| r.sent == 0));
+    assert!(relay.retired.pop().is_ok(), "the broken link comes back");
+}
