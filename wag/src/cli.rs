@@ -75,9 +75,6 @@ pub struct DemoArgs {
     /// Target x,y,z in the arm's base frame (m); default: random from the seed.
     #[arg(long, allow_hyphen_values = true)]
     pub target: Option<Point>,
-    /// Keep the raw video frames in the run folder (400 MB).
-    #[arg(long, hide = true)]
-    pub keep_frames: bool,
 }
 
 /// Tasks known by name.

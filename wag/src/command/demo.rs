@@ -6,11 +6,11 @@ use super::plan::{describe, planner_config, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::pipeline::{self, RunFolder};
+use crate::pipeline::{self, CalmInput, RunFolder};
 use crate::progress::Stage;
 use crate::session::{Session, watch_interrupts};
 use anyhow::{Context, anyhow, bail};
-use planner::tasks::{check_reach, start_pose_for};
+use planner::tasks::check_reach;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -19,14 +19,17 @@ use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
 use std::time::{Duration, Instant};
 
-/// Part of the arm's speed limits used for moves between poses.
-const MOVE_SPEED: f64 = 0.15;
+/// Speed of moves between poses, as a part of the fastest move.
+///
+/// Slow enough that the move lasts several periods of the rope's pendulum and
+/// leaves it with millimetres of sway.
+const MOVE_SPEED: f64 = 0.04;
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a throw: two and a half seconds.
 const THROW_FRAMES: u32 = 150;
 /// Longest wait for the rope to hang still (s).
-const STILL_S: f64 = 8.0;
+const STILL_S: f64 = 3.0;
 
 /// A target drawn from the seed where ropes of every length can strike
 /// (distance from the base axis, height, bearing).
@@ -122,9 +125,7 @@ fn throw_once(
     record.stages.wiggle_s =
         stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
 
-    // Track and identify, while the arm turns towards the target and the rope settles.
-    let start_pose = start_pose_for(record.target_m);
-    pipeline::move_to(session, &arm, start_pose, MOVE_SPEED)?;
+    // Track and identify.
     let stage = Stage::begin("track", quiet);
     let overlay = folder.file("wiggle.png");
     let tracked = pipeline::track(session, &camera, &calibration, &film, &overlay, &stage)?;
@@ -166,10 +167,29 @@ fn throw_once(
     record.stages.plan_s = stage.done(&describe(&plan));
     record.set_plan(&plan);
 
-    // Throw once, open loop, filmed.
-    let stage = Stage::begin("throw", quiet);
+    // Calm: turn towards the target so that the rope comes to rest.
+    let stage = Stage::begin("calm", quiet);
+    let arm_lag_s = pipeline::joint_lag_s(&session.recorder.cycles, &session.recorder.joints, 5);
+    let input = CalmInput {
+        rope: estimate.params,
+        film: &film,
+        start_q: wiggle.end(),
+        end_q: plan.trajectory.start(),
+        limits: &limits,
+        arm_lag_s: arm_lag_s.unwrap_or_default(),
+    };
+    let calmed = pipeline::calm(session, &planner, &arm, &input, &stage)?;
     stage.say("waiting for the rope to hang still");
     pipeline::wait_still(session, &camera, STILL_S)?;
+    record.set_calm(&calmed, arm_lag_s);
+    record.stages.calm_s = stage.done(&format!(
+        "sway {:.1} cm -> {:.1} cm",
+        100.0 * calmed.plain_sway_m,
+        100.0 * calmed.calm_sway_m
+    ));
+
+    // Throw once, open loop, filmed.
+    let stage = Stage::begin("throw", quiet);
     pipeline::latency(session, &arm)?;
     let throw = pipeline::film_during(
         session,

@@ -1,6 +1,6 @@
 //! What a demo keeps and shows: every stage's figures, and the truth apart.
 
-use crate::pipeline::{Film, RunFolder, Tracked};
+use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
 use crate::table;
 use anyhow::bail;
 use comfy_table::Table;
@@ -24,6 +24,8 @@ pub struct StageTimes {
     pub identify_s: f64,
     /// Planning the throw.
     pub plan_s: f64,
+    /// Taking the sway out of the rope.
+    pub calm_s: f64,
     /// Throwing and filming.
     pub throw_s: f64,
     /// Scoring.
@@ -96,6 +98,9 @@ pub struct DemoRecord {
     track: Option<TrackFigures>,
     identified: Option<RopeEstimate>,
     plan: Option<PlanFigures>,
+    calm: Option<Calmed>,
+    /// How late the arm follows its setpoints, from the wiggle (s).
+    arm_lag_s: Option<f64>,
     score: Option<ScoreResult>,
     score_failed: Option<String>,
     latency: Option<LatencyReport>,
@@ -125,6 +130,8 @@ impl DemoRecord {
             track: None,
             identified: None,
             plan: None,
+            calm: None,
+            arm_lag_s: None,
             score: None,
             score_failed: None,
             latency: None,
@@ -173,6 +180,12 @@ impl DemoRecord {
             resampled: plan.resampled,
             trajectory_sha256: plan.trajectory_sha256.clone(),
         });
+    }
+
+    /// Keeps what calming did.
+    pub fn set_calm(&mut self, calmed: &Calmed, arm_lag_s: Option<f64>) {
+        self.calm = Some(*calmed);
+        self.arm_lag_s = arm_lag_s;
     }
 
     /// Keeps the loop's latencies during the throw.
@@ -276,14 +289,15 @@ pub fn show(record: &DemoRecord) {
     }
     let s = &record.stages;
     println!(
-        "time: start {:.1}, bring-up {:.1}, wiggle {:.1}, track {:.1}, identify {:.1}, plan {:.1}, throw {:.1}, \
-         score {:.1}, in all {:.1} s\n",
+        "time: start {:.1}, bring-up {:.1}, wiggle {:.1}, track {:.1}, identify {:.1}, plan {:.1}, calm {:.1}, \
+         throw {:.1}, score {:.1}, in all {:.1} s\n",
         s.start_s,
         s.bringup_s,
         s.wiggle_s,
         s.track_s,
         s.identify_s,
         s.plan_s,
+        s.calm_s,
         s.throw_s,
         s.score_s,
         record.wall_s

@@ -1,15 +1,19 @@
 //! The stages of a throw, in the order data flows through them:
-//! start -> wiggle -> track -> identify -> plan -> throw -> score.
+//! start -> wiggle -> track -> identify -> plan -> calm -> throw -> score.
 //!
 //! Each stage asks one process and returns what the next one needs.
 
 mod arm;
+mod calm;
+mod lag;
 mod observe;
 mod processes;
 mod run_folder;
 mod stages;
 
 pub use arm::{ArmLink, acquire, execute, latency, move_to};
+pub use calm::{CalmInput, Calmed, calm};
+pub use lag::joint_lag_s;
 pub use observe::{Film, film_during};
 pub use processes::{
     rig_config, start_camera, start_controller, start_controller_at, start_planner, start_rig,

@@ -11,6 +11,9 @@ use shared_types::{FaultCode, JointVector, MonotonicNs};
 use std::fmt::Write;
 use std::path::Path;
 
+/// Reports closer than this are one and the same (the fastest come every 4 ms).
+const SAME_REPORT_NS: u64 = 1_000_000;
+
 /// Collects records; drain it at least every second.
 #[derive(Debug)]
 pub struct Recorder {
@@ -63,7 +66,8 @@ impl Recorder {
             .map(|r| (r.stamp_ns, r.q))
             .collect();
         out.sort_by_key(|(t, _)| *t);
-        out.dedup_by_key(|(t, _)| *t);
+        // A report is sent at once to a new listener and may repeat the last one.
+        out.dedup_by(|next, kept| next.0 - kept.0 < SAME_REPORT_NS);
         out
     }
 
