@@ -9,12 +9,16 @@ use nalgebra::{DMatrix, DVector};
 /// Step of the finite differences (rad): moves the rope by millimetres, far
 /// above single precision, well within the linear range.
 const STEP_RAD: f64 = 4e-3;
-/// Damping at first, relative to the diagonal.
-const DAMPING: f64 = 1e-4;
-/// Damping at which no better step is expected.
-const DAMPING_MAX: f64 = 1e2;
+/// Damping of the first step (m/rad): far above the price of an offset, so that
+/// the first steps take the small offsets and leave the large ones that promise
+/// little; these lead into regions where the slopes mean nothing.
+const DAMPING_M_PER_RAD: f64 = 0.05;
+/// Damping at which no better step is expected (m/rad).
+const DAMPING_MAX_M_PER_RAD: f64 = 2.0;
+/// Change of the damping after a good or a bad step.
+const DAMPING_FACTOR: f64 = 4.0;
 /// Part of the cost that a step must save for another one to be worth it.
-const WORTHWHILE: f64 = 0.02;
+const WORTHWHILE: f64 = 0.05;
 
 /// Sway and its slopes at one point.
 struct Linearised {
@@ -22,46 +26,58 @@ struct Linearised {
     cost: f64,
     /// Mean square sway alone (m²).
     sway_m2: f64,
+    sway: Sway,
     normal: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
-/// Offsets (rad) after which the rope sways least.
+/// What the descent ends with.
+#[derive(Debug)]
+pub(super) struct Calmest {
+    /// Offsets of least sway (rad).
+    pub(super) offsets_rad: Vec<f64>,
+    /// Sway with these.
+    pub(super) sway: Sway,
+    /// Largest sway of the tip after the plain move (m).
+    pub(super) plain_sway_m: f64,
+}
+
+/// Finds the offsets after which the rope sways least.
 pub(super) fn least_sway(
     shape: &MoveShape,
     simulator: &SwaySimulator<'_>,
     config: &CalmConfig,
-) -> Result<Vec<f64>, CalmError> {
+) -> Result<Calmest, CalmError> {
     let mut x = DVector::from_vec(shape.no_offsets());
     let mut at = linearise(shape, simulator, config, &x)?.ok_or(CalmError::Diverged)?;
-    let mut damping = DAMPING;
+    let plain_sway_m = at.sway.largest_m;
+    let mut damping = DAMPING_M_PER_RAD;
     for _ in 0..config.iterations {
-        if at.sway_m2.sqrt() < config.content_m {
+        if at.sway_m2.sqrt() < config.content_m || damping > DAMPING_MAX_M_PER_RAD {
             break;
         }
-        let damped = &at.normal + DMatrix::from_diagonal(&(at.normal.diagonal() * damping));
-        let Some(step) = damped.cholesky().map(|f| f.solve(&at.gradient)) else {
+        let ridge = DMatrix::from_diagonal_element(x.len(), x.len(), damping.powi(2));
+        let Some(factor) = (&at.normal + ridge).cholesky() else {
             break;
         };
-        let tried = &x - step;
+        let tried = &x - factor.solve(&at.gradient);
         match linearise(shape, simulator, config, &tried)? {
             Some(there) if there.cost < at.cost => {
                 let saved = (at.cost - there.cost) / at.cost;
                 (x, at) = (tried, there);
-                damping /= 10.0;
+                damping /= DAMPING_FACTOR;
                 if saved < WORTHWHILE {
                     break;
                 }
             }
-            _ => {
-                damping = damping.max(DAMPING) * 30.0;
-                if damping > DAMPING_MAX {
-                    break;
-                }
-            }
+            _ => damping *= DAMPING_FACTOR,
         }
     }
-    Ok(x.as_slice().to_vec())
+    Ok(Calmest {
+        offsets_rad: x.as_slice().to_vec(),
+        sway: at.sway,
+        plain_sway_m,
+    })
 }
 
 /// Simulates `x` and its neighbours; `None` where the rope diverges.
@@ -78,8 +94,12 @@ fn linearise(
         beside[i] += STEP_RAD;
         moves.push(shape.trajectory(beside.as_slice())?);
     }
-    let sways = simulator.run(&moves)?;
-    let Some((here, beside)) = sways.split_first().filter(|_| all_finite(&sways)) else {
+    let mut sways = simulator.run(&moves)?;
+    if sways.iter().any(|s| !s.finite) {
+        return Ok(None);
+    }
+    let beside = sways.split_off(1);
+    let Some(here) = sways.pop() else {
         return Ok(None);
     };
     let residuals = DVector::from_column_slice(&here.displacements_m);
@@ -93,12 +113,9 @@ fn linearise(
     Ok(Some(Linearised {
         cost: sway_m2 + price * x.norm_squared(),
         sway_m2,
+        sway: here,
         normal: slopes.tr_mul(&slopes) * per_frame
             + DMatrix::from_diagonal_element(x.len(), x.len(), price),
         gradient: slopes.tr_mul(&residuals) * per_frame + x * price,
     }))
-}
-
-fn all_finite(sways: &[Sway]) -> bool {
-    sways.iter().all(|s| s.finite)
 }

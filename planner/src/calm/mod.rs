@@ -17,17 +17,18 @@ mod sway;
 mod tests;
 
 use chain::Prelude;
+use descent::Calmest;
 use rope_sim::{MotionError, SimulateError};
 use serde::{Deserialize, Serialize};
 use shape::MoveShape;
 use shared_types::rope::RopeError;
 use shared_types::{JointTrajectory, JointVector, Limits, RopeParams, TrajectoryError};
-use sway::SwaySimulator;
+use sway::{Sway, SwaySimulator};
 
 /// Parts of the offsets found that are tried, largest first: where limits or
 /// surroundings forbid the whole, a smaller part still takes out that part of
 /// the sway.
-const PARTS: [f64; 6] = [1.0, 0.8, 0.6, 0.4, 0.2, 0.0];
+const PARTS: [f64; 5] = [0.8, 0.6, 0.4, 0.2, 0.0];
 
 /// What a calming move starts from and ends in.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,11 +72,11 @@ pub struct CalmConfig {
 impl Default for CalmConfig {
     fn default() -> Self {
         Self {
-            duration_s: 5.0,
+            duration_s: 4.0,
             knots: 7,
-            offset_cost_m_per_rad: 1e-3,
+            offset_cost_m_per_rad: 3e-3,
             iterations: 6,
-            content_m: 2e-4,
+            content_m: 5e-4,
             clearance_m: 0.03,
             threads: 2,
         }
@@ -215,8 +216,8 @@ pub fn calm(request: &CalmRequest, config: &CalmConfig) -> Result<CalmMove, Calm
         });
     }
     let simulator = SwaySimulator::new(&request.rope, &prelude, &plain, config.threads)?;
-    let offsets = descent::least_sway(&shape, &simulator, config)?;
-    choose(request, config, &shape, &simulator, &offsets)
+    let found = descent::least_sway(&shape, &simulator, config)?;
+    choose(request, config, &shape, &simulator, found)
 }
 
 /// Largest distance of the tip from its place at rest (m) when `trajectory` is
@@ -240,36 +241,48 @@ pub fn sway_after(
     }
 }
 
-/// The calmest of the parts of `offsets` that limits and surroundings allow.
+/// The move with all offsets if limits and surroundings allow it, otherwise the
+/// calmest of those with a part of them.
 fn choose(
     request: &CalmRequest,
     config: &CalmConfig,
     shape: &MoveShape,
     simulator: &SwaySimulator<'_>,
-    offsets: &[f64],
+    found: Calmest,
 ) -> Result<CalmMove, CalmError> {
+    let plain_sway_m = found.plain_sway_m;
+    let mut gap_m = f64::NAN;
+    let mut allowed = |trajectory: &JointTrajectory, sway: &Sway| {
+        if !sway.finite || request.limits.worst_violation(trajectory).is_some() {
+            return false;
+        }
+        let room = clear::room(&request.rope, simulator, trajectory, sway);
+        gap_m = room.rope_gap_m;
+        gap_m >= config.clearance_m && !room.tool_touches
+    };
+    let whole = shape.trajectory(&found.offsets_rad)?;
+    if allowed(&whole, &found.sway) {
+        return Ok(CalmMove {
+            trajectory: whole,
+            plain_sway_m,
+            calm_sway_m: found.sway.largest_m,
+        });
+    }
+    let in_part = |part: f64| -> Vec<f64> { found.offsets_rad.iter().map(|o| part * o).collect() };
     let moves = PARTS
-        .iter()
-        .map(|part| shape.trajectory(&offsets.iter().map(|o| part * o).collect::<Vec<_>>()))
+        .into_iter()
+        .map(|part| shape.trajectory(&in_part(part)))
         .collect::<Result<Vec<_>, _>>()?;
     let sways = simulator.run(&moves)?;
-    let plain_sway_m = sways.last().map_or(f64::NAN, |s| s.largest_m);
-    let mut best: Option<CalmMove> = None;
-    let mut gap_m = f64::NAN;
-    for (trajectory, sway) in moves.into_iter().zip(&sways) {
-        if !sway.finite || request.limits.worst_violation(&trajectory).is_some() {
-            continue;
-        }
-        let room = clear::room(&request.rope, simulator, &trajectory, sway);
-        gap_m = room.rope_gap_m;
-        let free = gap_m >= config.clearance_m && !room.tool_touches;
-        if free && best.as_ref().is_none_or(|b| sway.largest_m < b.calm_sway_m) {
-            best = Some(CalmMove {
-                trajectory,
-                plain_sway_m,
-                calm_sway_m: sway.largest_m,
-            });
-        }
-    }
-    best.ok_or(CalmError::TooClose { gap_m })
+    moves
+        .into_iter()
+        .zip(&sways)
+        .filter(|(trajectory, sway)| allowed(trajectory, sway))
+        .min_by(|(_, a), (_, b)| a.largest_m.total_cmp(&b.largest_m))
+        .map(|(trajectory, sway)| CalmMove {
+            trajectory,
+            plain_sway_m,
+            calm_sway_m: sway.largest_m,
+        })
+        .ok_or(CalmError::TooClose { gap_m })
 }

@@ -76,7 +76,11 @@ mod tests {
         for i in 1..=offsets.len() / 2 {
             let d = moved.waypoints()[i] - plain.waypoints()[i];
             for j in 0..7 {
-                let want = if OFFSET_JOINTS.contains(&j) { 0.05 } else { 0.0 };
+                let want = if OFFSET_JOINTS.contains(&j) {
+                    0.05
+                } else {
+                    0.0
+                };
                 assert!((d[j] - want).abs() < 1e-12);
             }
         }

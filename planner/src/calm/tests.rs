@@ -1,1 +1,246 @@
-//! placeholder
+use super::*;
+use crate::ropes::random_rope;
+use crate::wiggle::{WiggleConfig, wiggle};
+use nalgebra::Vector3;
+use rope_sim::{
+    AttachMotion, Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, roll_out,
+};
+use shared_types::kinematics::attach_pose;
+use shared_types::limits::LimitsSpec;
+use shared_types::plan::START_POSE;
+
+/// Damping, stiffness and turn of joint 1 (degrees); the rest is drawn.
+const ROPES: [(f64, f64, f64); 6] = [
+    (0.001, 0.05, 35.0),
+    (0.001, 0.5, -35.0),
+    (0.001, 1.0, 0.0),
+    (0.005, 0.3, 20.0),
+    (0.02, 0.7, -10.0),
+    (0.05, 0.1, 35.0),
+];
+
+fn samples(duration_s: f64, at: impl Fn(f64) -> JointVector) -> (Vec<f64>, Vec<JointVector>) {
+    (0..)
+        .map(|i| f64::from(i) * 0.004)
+        .take_while(|t| *t <= duration_s)
+        .map(|t| (t, at(t)))
+        .unzip()
+}
+
+fn wiggled() -> JointTrajectory {
+    wiggle(&WiggleConfig::default(), &Limits::default()).unwrap()
+}
+
+fn turned(turn_deg: f64) -> JointVector {
+    let mut q = START_POSE;
+    q[0] += turn_deg.to_radians();
+    q
+}
+
+/// A move 1.5 s after the default wiggle.
+fn request(rope: RopeParams, turn_deg: f64) -> CalmRequest {
+    let before = wiggled();
+    let (times_s, q) = samples(before.duration_s(), |t| before.state_at(t).q);
+    CalmRequest {
+        rope,
+        times_s,
+        q,
+        start_s: before.duration_s() + 1.5,
+        start_q: START_POSE,
+        end_q: turned(turn_deg),
+        limits: Limits::default(),
+    }
+}
+
+fn rope(seed: usize) -> (RopeParams, f64) {
+    let (c, k, turn_deg) = ROPES[seed];
+    let rope = RopeParams {
+        joint_damping_nms_per_rad: c,
+        joint_stiffness_nm_per_rad: k,
+        ..random_rope(seed as u64)
+    };
+    (rope, turn_deg)
+}
+
+/// Largest distance of the tip from the point a rope length below the pole's
+/// end, over two seconds after the move: wiggle, wait and move as one measured
+/// motion, in double precision and half the step.
+fn settled_sway_m(request: &CalmRequest, trajectory: &JointTrajectory) -> f64 {
+    let before = wiggled();
+    let end_s = request.start_s + trajectory.duration_s();
+    let (times_s, q) = samples(end_s + 0.1, |t| {
+        if t < request.start_s {
+            before.state_at(t).q
+        } else {
+            trajectory.state_at(t - request.start_s).q
+        }
+    });
+    let arm = MeasuredArm::new(&times_s, &q).unwrap();
+    let rollouts = roll_out(
+        &[Candidate {
+            rope: &request.rope,
+            motion: &arm,
+        }],
+        &SimOptions {
+            step_s: 5e-4,
+            precision: Precision::F64,
+            start: Start::Equilibrium,
+            frames: FrameTimes {
+                first_s: end_s,
+                period_s: 0.02,
+                count: 100,
+            },
+            closest_to_m: None,
+            horizon_s: end_s + 2.0,
+            threads: 1,
+        },
+    )
+    .unwrap();
+    let below = attach_pose(&request.end_q).0 - Vector3::z() * request.rope.length_m;
+    let nodes = &rollouts[0].nodes;
+    (0..nodes.frames())
+        .map(|f| (nodes.position(f, nodes.nodes() - 1) - below).norm())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn ropes_from_soft_to_stiff_hang_still_after_the_move() {
+    for seed in 0..ROPES.len() {
+        let (rope, turn_deg) = rope(seed);
+        let request = request(rope, turn_deg);
+        let found = calm(&request, &CalmConfig::default()).unwrap();
+        let true_m = settled_sway_m(&request, &found.trajectory);
+        assert!(
+            found.calm_sway_m < 5e-3 && true_m < 6e-3,
+            "{seed}: {true_m}"
+        );
+        assert!(request.limits.worst_violation(&found.trajectory).is_none());
+        assert_eq!(found.trajectory.start(), request.start_q);
+        assert_eq!(found.trajectory.end(), request.end_q);
+        let plain = MoveShape::new(request.start_q, request.end_q, &CalmConfig::default());
+        let plain = plain.trajectory(&plain.no_offsets()).unwrap();
+        let plain_m = settled_sway_m(&request, &plain);
+        // Judged at 30 Hz over a little less than here.
+        assert!((plain_m / found.plain_sway_m - 1.0).abs() < 0.1, "{seed}");
+    }
+}
+
+#[test]
+fn a_rope_identified_half_a_percent_wrong_still_loses_most_of_its_sway() {
+    for seed in [1, 2] {
+        let (rope, turn_deg) = rope(seed);
+        let request = request(rope, turn_deg);
+        let found = calm(&request, &CalmConfig::default()).unwrap();
+        assert!(found.plain_sway_m > 0.05, "{seed}: nothing to take out");
+        for part in [0.995, 1.005] {
+            let mut truth = request.clone();
+            truth.rope.length_m *= part;
+            truth.rope.joint_stiffness_nm_per_rad *= part;
+            let left_m = sway_after(&truth, &found.trajectory, 2).unwrap();
+            assert!(left_m < 0.15 * found.plain_sway_m, "{seed}: {left_m}");
+        }
+    }
+}
+
+#[test]
+fn threads_do_not_change_the_move() {
+    let (rope, turn_deg) = rope(3);
+    let with = |threads| {
+        let config = CalmConfig {
+            threads,
+            ..CalmConfig::default()
+        };
+        calm(&request(rope, turn_deg), &config).unwrap()
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn tight_limits_are_kept_by_taking_out_less() {
+    let (rope, _) = rope(2);
+    let mut request = request(rope, 0.0);
+    let free = calm(&request, &CalmConfig::default()).unwrap();
+    let used = free.trajectory.extrema(5).qdd.value.abs();
+    let mut spec = LimitsSpec::from(Limits::default());
+    spec.acceleration_max_rad_s2[5] = 0.7 * used;
+    request.limits = Limits::try_from(spec.clone()).unwrap();
+    let tight = calm(&request, &CalmConfig::default()).unwrap();
+    assert!(request.limits.worst_violation(&tight.trajectory).is_none());
+    assert!(tight.calm_sway_m < 0.6 * tight.plain_sway_m);
+    assert!(tight.calm_sway_m > 2.0 * free.calm_sway_m);
+    // The turn itself is too fast for this tool speed.
+    spec.tcp_speed_max_m_s = 0.05;
+    request.limits = Limits::try_from(spec).unwrap();
+    request.end_q = turned(35.0);
+    assert!(matches!(
+        calm(&request, &CalmConfig::default()),
+        Err(CalmError::BreaksLimit { .. })
+    ));
+}
+
+#[test]
+fn a_rope_that_would_come_too_near_is_refused() {
+    let (rope, _) = rope(1);
+    let config = CalmConfig {
+        clearance_m: 0.9,
+        ..CalmConfig::default()
+    };
+    match calm(&request(rope, 0.0), &config) {
+        Err(CalmError::TooClose { gap_m }) => assert!(gap_m > 0.1 && gap_m < 0.9, "{gap_m}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_wrong_start_is_refused_by_name() {
+    let (rope, _) = rope(4);
+    let good = request(rope, 0.0);
+    let with = |change: &dyn Fn(&mut CalmRequest)| {
+        let mut r = good.clone();
+        change(&mut r);
+        calm(&r, &CalmConfig::default()).unwrap_err()
+    };
+    assert!(matches!(
+        with(&|r| r.start_s = 5.0),
+        CalmError::StartsTooEarly { .. }
+    ));
+    assert!(matches!(
+        with(&|r| r.start_q[3] += 0.05),
+        CalmError::NotAtStart { joint: 4, .. }
+    ));
+    assert!(matches!(
+        with(&|r| r.q[7][2] = f64::NAN),
+        CalmError::Joints(_)
+    ));
+    assert!(matches!(
+        with(&|r| r.rope.length_m = -1.0),
+        CalmError::Rope(_)
+    ));
+    let wrong = CalmConfig {
+        knots: 0,
+        ..CalmConfig::default()
+    };
+    assert!(matches!(
+        calm(&good, &wrong),
+        Err(CalmError::Value { key: "knots", .. })
+    ));
+}
+
+#[test]
+fn the_arm_keeps_its_standing_error_through_the_move() {
+    let (rope, turn_deg) = rope(0);
+    let mut request = request(rope, turn_deg);
+    request.start_q[5] -= 0.004;
+    let prelude = Prelude::new(&request).unwrap();
+    let shape = MoveShape::new(request.start_q, request.end_q, &CalmConfig::default());
+    let trajectory = shape.trajectory(&shape.no_offsets()).unwrap();
+    let arm = prelude.then(&trajectory);
+    let start_s = request.start_s;
+    let (before, after) = (arm.at(start_s - 1e-6), arm.at(start_s + 1e-6));
+    assert!((before.p_m - after.p_m).norm() < 1e-9);
+    let mut end_q = request.end_q;
+    end_q[5] += 0.004;
+    let end = arm.at(arm.duration_s() + 1.0);
+    assert!((end.p_m - attach_pose(&end_q).0).norm() < 1e-6);
+    assert_eq!(end.v_m_s.norm(), 0.0);
+}
