@@ -106,13 +106,13 @@ impl FaultCode {
                 "a setpoint broke the tool's speed limit (the arm would stop with C60); check the plan with `wag check`"
             }
             Self::DeadlineMissed => {
-                "the control thread woke too late too often; give it real-time priority and a core of its own"
+                "the control thread was held up for too many cycles; give it real-time priority and a core of its own"
             }
             Self::ReplyStalled => {
                 "the arm did not answer in time; use a direct cable and nothing else on that network port"
             }
             Self::LinkLost => {
-                "the connection to the arm was lost; check power and cable, then start the controller again"
+                "the connection to the arm was lost; check power and cable, then acknowledge"
             }
             Self::ReportStale => {
                 "joint reports stopped coming; check the arm's report ports, then acknowledge"

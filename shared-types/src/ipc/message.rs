@@ -188,6 +188,24 @@ pub struct StrikeOrder {
     pub seed: u64,
 }
 
+/// A move to the throw's start pose that takes the sway out of the rope.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalmOrder {
+    /// Rope as identified.
+    pub rope: RopeParams,
+    /// Measured joints since the rope hung still: CLOCK_MONOTONIC ns and
+    /// position (rad). After the last one the arm holds.
+    pub joints: Vec<(u64, JointVector)>,
+    /// When the move will begin (CLOCK_MONOTONIC, ns).
+    pub start_ns: u64,
+    /// Commanded pose the arm holds until then (rad).
+    pub start_q: JointVector,
+    /// Pose at the end (rad).
+    pub end_q: JointVector,
+    /// Limits of the arm.
+    pub limits: Limits,
+}
+
 /// Asks of the planner.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum PlannerRequest {
@@ -195,6 +213,8 @@ pub enum PlannerRequest {
     Ping,
     /// Fit the nine rope parameters to published keypoints.
     Identify(Box<IdentifyRequest>),
+    /// Plan a move that takes the sway out of the rope.
+    Calm(Box<CalmOrder>),
     /// Plan a strike.
     Strike(Box<StrikeOrder>),
 }
@@ -208,6 +228,16 @@ pub enum PlannerEvent {
     Progress(Progress),
     /// The rope is identified.
     Identified(Box<RopeEstimate>),
+    /// The calming move is planned.
+    Calmed {
+        /// The move.
+        trajectory: Box<JointTrajectory>,
+        /// Largest distance of the tip from its place at rest after a plain move
+        /// of the same duration, as simulated (m).
+        plain_sway_m: f64,
+        /// The same after this move (m).
+        calm_sway_m: f64,
+    },
     /// The throw is planned.
     Planned(Box<Plan>),
     /// It did not work.
@@ -241,7 +271,7 @@ pub enum ControllerRequest {
     MoveTo {
         /// Pose (rad).
         q: JointVector,
-        /// Part of the limits' speed to use (0 to 1).
+        /// How fast, as a part of the fastest move the limits allow (0 to 1).
         speed_part: f64,
     },
     /// Check a trajectory and stream it. The arm must stand at its start.
