@@ -31,7 +31,7 @@ impl Prelude {
         }
         let standing_error = measured.joints_at(start_s).q - request.start_q;
         let off = |j: usize| standing_error[j];
-        match (0..JOINTS).find(|&j| !(off(j).abs() <= START_TOLERANCE_RAD)) {
+        match (0..JOINTS).find(|&j| off(j).is_nan() || off(j).abs() > START_TOLERANCE_RAD) {
             Some(j) => Err(CalmError::NotAtStart {
                 joint: j + 1,
                 off_rad: off(j),

@@ -50,13 +50,16 @@ pub struct CalmRequest {
 }
 
 /// Size of a calming move and of the search for it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CalmConfig {
-    /// Duration of the move (s).
-    pub duration_s: f64,
-    /// Knots between start and end at which joints 1 and 6 may be offset.
-    pub knots: usize,
+    /// Durations of the move (s), tried in order until one is calm enough.
+    pub durations_s: Vec<f64>,
+    /// Sway of the tip that is calm enough (m).
+    pub wanted_m: f64,
+    /// Time between the knots at which joints 1 and 6 may be offset (s), less
+    /// than half a period of the fastest pendulum of the ranges, 1 Hz.
+    pub knot_s: f64,
     /// Sway that an offset of 1 rad must save to be worth it (m/rad).
     pub offset_cost_m_per_rad: f64,
     /// Most Gauss-Newton steps.
@@ -72,10 +75,11 @@ pub struct CalmConfig {
 impl Default for CalmConfig {
     fn default() -> Self {
         Self {
-            duration_s: 4.0,
-            knots: 7,
+            durations_s: vec![3.5, 5.0],
+            wanted_m: 3e-3,
+            knot_s: 0.44,
             offset_cost_m_per_rad: 3e-3,
-            iterations: 6,
+            iterations: 8,
             content_m: 5e-4,
             clearance_m: 0.03,
             threads: 2,
@@ -108,6 +112,9 @@ pub enum CalmError {
         /// What it must be.
         expected: &'static str,
     },
+    /// The configuration names no duration.
+    #[error("calm: `durations_s` is empty; name at least one duration")]
+    NoDuration,
     /// The rope's parameters are not physical.
     #[error(transparent)]
     Rope(#[from] RopeError),
@@ -138,7 +145,7 @@ pub enum CalmError {
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
     /// Even the plain move breaks a limit of the arm.
-    #[error("a plain move to the end pose breaks a limit: {what}; use a longer `duration_s`")]
+    #[error("a plain move to the end pose breaks a limit: {what}; use longer `durations_s`")]
     BreaksLimit {
         /// The limit, with value and time.
         what: String,
@@ -161,19 +168,34 @@ pub enum CalmError {
 
 impl CalmConfig {
     fn check(&self) -> Result<(), CalmError> {
-        #[allow(clippy::cast_precision_loss, reason = "for a message")]
+        if self.durations_s.is_empty() {
+            return Err(CalmError::NoDuration);
+        }
+        let (shortest_s, longest_s) = self
+            .durations_s
+            .iter()
+            .fold((f64::INFINITY, 0.0_f64), |(lo, hi), d| {
+                (lo.min(*d), hi.max(*d))
+            });
+        let outside_s = if shortest_s < 1.0 {
+            shortest_s
+        } else {
+            longest_s
+        };
         let rules = [
             (
-                "duration_s",
-                self.duration_s,
-                self.duration_s >= 1.0 && self.duration_s <= 60.0,
-                "from 1 to 60 s",
+                "durations_s",
+                outside_s,
+                shortest_s >= 1.0
+                    && longest_s <= 30.0
+                    && self.durations_s.iter().all(|d| d.is_finite()),
+                "from 1 to 30 s",
             ),
             (
-                "knots",
-                self.knots as f64,
-                (2..=32).contains(&self.knots),
-                "from 2 to 32",
+                "knot_s",
+                self.knot_s,
+                self.knot_s >= 0.1 && 3.0 * self.knot_s <= shortest_s,
+                "from 0.1 s to a third of the shortest duration",
             ),
             (
                 "offset_cost_m_per_rad",
@@ -208,14 +230,46 @@ pub fn calm(request: &CalmRequest, config: &CalmConfig) -> Result<CalmMove, Calm
     config.check()?;
     request.rope.validate()?;
     let prelude = Prelude::new(request)?;
-    let shape = MoveShape::new(request.start_q, request.end_q, config);
+    let mut best: Option<CalmMove> = None;
+    let mut refused = CalmError::NoDuration;
+    for duration_s in &config.durations_s {
+        match calm_within(request, config, &prelude, *duration_s) {
+            Ok(found) => {
+                let calmest = best.as_ref().map_or(f64::INFINITY, |b| b.calm_sway_m);
+                if found.calm_sway_m < calmest {
+                    best = Some(found);
+                }
+            }
+            Err(error @ (CalmError::BreaksLimit { .. } | CalmError::TooClose { .. })) => {
+                refused = error;
+            }
+            Err(error) => return Err(error),
+        }
+        if best
+            .as_ref()
+            .is_some_and(|b| b.calm_sway_m <= config.wanted_m)
+        {
+            break;
+        }
+    }
+    best.ok_or(refused)
+}
+
+/// The calmest move of one duration.
+fn calm_within(
+    request: &CalmRequest,
+    config: &CalmConfig,
+    prelude: &Prelude,
+    duration_s: f64,
+) -> Result<CalmMove, CalmError> {
+    let shape = MoveShape::new(request.start_q, request.end_q, duration_s, config.knot_s);
     let plain = shape.trajectory(&shape.no_offsets())?;
     if let Some(margin) = request.limits.worst_violation(&plain) {
         return Err(CalmError::BreaksLimit {
             what: margin.describe(),
         });
     }
-    let simulator = SwaySimulator::new(&request.rope, &prelude, &plain, config.threads)?;
+    let simulator = SwaySimulator::new(&request.rope, prelude, &plain, config.threads)?;
     let found = descent::least_sway(&shape, &simulator, config)?;
     choose(request, config, &shape, &simulator, found)
 }

@@ -1,6 +1,5 @@
 //! Shape of the move: a smooth step from start to end with offsets on its knots.
 
-use super::CalmConfig;
 use shared_types::{JointTrajectory, JointVector, TrajectoryError};
 
 /// Joints that are offset, 0-based. With the pole down, joint 1 moves the rope's
@@ -18,14 +17,18 @@ pub(super) struct MoveShape {
 }
 
 impl MoveShape {
-    #[allow(clippy::cast_precision_loss, reason = "a few dozen knots")]
-    pub(super) fn new(start: JointVector, end: JointVector, config: &CalmConfig) -> Self {
-        let segments = config.knots + 1;
+    /// Knots about `knot_s` apart.
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few dozen knots"
+    )]
+    pub(super) fn new(start: JointVector, end: JointVector, duration_s: f64, knot_s: f64) -> Self {
+        let segments = ((duration_s / knot_s).round() as usize).max(2);
         let part = |i: usize| i as f64 / segments as f64;
         Self {
-            times_s: (0..=segments)
-                .map(|i| config.duration_s * part(i))
-                .collect(),
+            times_s: (0..=segments).map(|i| duration_s * part(i)).collect(),
             plain: (0..=segments)
                 .map(|i| start.zip_with(end, |a, b| a + (b - a) * quintic_step(part(i))))
                 .collect(),
@@ -64,7 +67,7 @@ mod tests {
     #[test]
     fn ends_are_kept_and_only_two_joints_are_offset() {
         let (a, b) = (JointVector::splat(0.1), JointVector::splat(0.4));
-        let shape = MoveShape::new(a, b, &CalmConfig::default());
+        let shape = MoveShape::new(a, b, 3.5, 0.44);
         let mut offsets = shape.no_offsets();
         offsets.fill(0.05);
         let (plain, moved) = (
@@ -72,6 +75,7 @@ mod tests {
             shape.trajectory(&offsets).unwrap(),
         );
         assert_eq!((moved.start(), moved.end()), (a, b));
+        assert_eq!(moved.waypoint_count(), 9);
         assert_eq!(moved.waypoint_count(), offsets.len() / 2 + 2);
         for i in 1..=offsets.len() / 2 {
             let d = moved.waypoints()[i] - plain.waypoints()[i];

@@ -117,7 +117,8 @@ fn ropes_from_soft_to_stiff_hang_still_after_the_move() {
         assert!(request.limits.worst_violation(&found.trajectory).is_none());
         assert_eq!(found.trajectory.start(), request.start_q);
         assert_eq!(found.trajectory.end(), request.end_q);
-        let plain = MoveShape::new(request.start_q, request.end_q, &CalmConfig::default());
+        let duration_s = found.trajectory.duration_s();
+        let plain = MoveShape::new(request.start_q, request.end_q, duration_s, 0.44);
         let plain = plain.trajectory(&plain.no_offsets()).unwrap();
         let plain_m = settled_sway_m(&request, &plain);
         // Judged at 30 Hz over a little less than here.
@@ -159,21 +160,26 @@ fn threads_do_not_change_the_move() {
 fn tight_limits_are_kept_by_taking_out_less() {
     let (rope, _) = rope(2);
     let mut request = request(rope, 0.0);
-    let free = calm(&request, &CalmConfig::default()).unwrap();
+    let config = CalmConfig {
+        durations_s: vec![3.5],
+        ..CalmConfig::default()
+    };
+    let free = calm(&request, &config).unwrap();
     let used = free.trajectory.extrema(5).qdd.value.abs();
     let mut spec = LimitsSpec::from(Limits::default());
     spec.acceleration_max_rad_s2[5] = 0.7 * used;
     request.limits = Limits::try_from(spec.clone()).unwrap();
-    let tight = calm(&request, &CalmConfig::default()).unwrap();
+    let tight = calm(&request, &config).unwrap();
     assert!(request.limits.worst_violation(&tight.trajectory).is_none());
     assert!(tight.calm_sway_m < 0.6 * tight.plain_sway_m);
     assert!(tight.calm_sway_m > 2.0 * free.calm_sway_m);
+    assert_eq!(tight.plain_sway_m, free.plain_sway_m);
     // The turn itself is too fast for this tool speed.
     spec.tcp_speed_max_m_s = 0.05;
     request.limits = Limits::try_from(spec).unwrap();
     request.end_q = turned(35.0);
     assert!(matches!(
-        calm(&request, &CalmConfig::default()),
+        calm(&request, &config),
         Err(CalmError::BreaksLimit { .. })
     ));
 }
@@ -217,12 +223,12 @@ fn a_wrong_start_is_refused_by_name() {
         CalmError::Rope(_)
     ));
     let wrong = CalmConfig {
-        knots: 0,
+        knot_s: 0.0,
         ..CalmConfig::default()
     };
     assert!(matches!(
         calm(&good, &wrong),
-        Err(CalmError::Value { key: "knots", .. })
+        Err(CalmError::Value { key: "knot_s", .. })
     ));
 }
 
@@ -232,7 +238,7 @@ fn the_arm_keeps_its_standing_error_through_the_move() {
     let mut request = request(rope, turn_deg);
     request.start_q[5] -= 0.004;
     let prelude = Prelude::new(&request).unwrap();
-    let shape = MoveShape::new(request.start_q, request.end_q, &CalmConfig::default());
+    let shape = MoveShape::new(request.start_q, request.end_q, 3.5, 0.44);
     let trajectory = shape.trajectory(&shape.no_offsets()).unwrap();
     let arm = prelude.then(&trajectory);
     let start_s = request.start_s;

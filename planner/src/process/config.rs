@@ -1,5 +1,6 @@
 //! Configuration of the planner process.
 
+use crate::calm::CalmConfig;
 use crate::sysid::IdentifyOptions;
 use crate::tasks::{StrikeConfig, StrikeOptions};
 use crate::wiggle::WiggleConfig;
@@ -25,6 +26,9 @@ pub struct PlannerConfig {
     /// The wiggle.
     #[serde(default)]
     pub wiggle: WiggleConfig,
+    /// Moves that take the sway out of the rope.
+    #[serde(default)]
+    pub calm: CalmConfig,
 }
 
 fn default_domain() -> String {
@@ -39,6 +43,7 @@ impl Default for PlannerConfig {
             search: StrikeOptions::default(),
             strike: StrikeConfig::default(),
             wiggle: WiggleConfig::default(),
+            calm: CalmConfig::default(),
         }
     }
 }

@@ -7,13 +7,14 @@
 mod collect;
 mod config;
 
+use crate::calm::{CalmError, CalmRequest, calm};
 use crate::sysid::{self, Appearance, IdentifyOptions, Observation};
 use crate::tasks::{StrikeOptions, StrikeRequest, plan_strike};
 use collect::Collector;
 pub use config::PlannerConfig;
 use rope_sim::MeasuredArm;
 use shared_types::ipc::message::{
-    IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc, Progress, StrikeOrder,
+    CalmOrder, IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc, Progress, StrikeOrder,
 };
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{Bus, IpcError};
@@ -46,7 +47,10 @@ pub enum PlannerProcessError {
     /// Identification failed.
     #[error(transparent)]
     Identify(#[from] sysid::IdentifyError),
-    /// Planning failed.
+    /// Planning a calming move failed.
+    #[error(transparent)]
+    Calm(#[from] CalmError),
+    /// Planning a throw failed.
     #[error(transparent)]
     Plan(#[from] crate::tasks::PlanError),
 }
@@ -81,6 +85,7 @@ fn serve(
     let result = match &call.request {
         PlannerRequest::Ping => Ok(PlannerEvent::Pong),
         PlannerRequest::Identify(request) => identify(config, collector, request, call, stop),
+        PlannerRequest::Calm(order) => take_out_sway(config, order),
         PlannerRequest::Strike(order) => strike(config, order, call, stop),
     };
     let event = result.unwrap_or_else(|e| PlannerEvent::Failed {
@@ -151,6 +156,34 @@ fn identify(
         )
     })?;
     Ok(PlannerEvent::Identified(Box::new(estimate)))
+}
+
+/// Times count from the first joint sample, at which the rope hangs still.
+fn take_out_sway(
+    config: &PlannerConfig,
+    order: &CalmOrder,
+) -> Result<PlannerEvent, PlannerProcessError> {
+    let epoch = MonotonicNs(order.joints.first().map_or(order.start_ns, |(t, _)| *t));
+    let (times_s, q) = order
+        .joints
+        .iter()
+        .map(|(t, q)| (MonotonicNs(*t).since_s(epoch), *q))
+        .unzip();
+    let request = CalmRequest {
+        rope: order.rope,
+        times_s,
+        q,
+        start_s: MonotonicNs(order.start_ns).since_s(epoch),
+        start_q: order.start_q,
+        end_q: order.end_q,
+        limits: order.limits.clone(),
+    };
+    let found = calm(&request, &config.calm)?;
+    Ok(PlannerEvent::Calmed {
+        trajectory: Box::new(found.trajectory),
+        plain_sway_m: found.plain_sway_m,
+        calm_sway_m: found.calm_sway_m,
+    })
 }
 
 fn strike(
