@@ -27,8 +27,17 @@ fn samples(duration_s: f64, at: impl Fn(f64) -> JointVector) -> (Vec<f64>, Vec<J
         .unzip()
 }
 
+/// A wiggle near the pendulum frequencies that ends abruptly: it leaves up to
+/// 0.24 m of sway.
 fn wiggled() -> JointTrajectory {
-    wiggle(&WiggleConfig::default(), &Limits::default()).unwrap()
+    let config = WiggleConfig {
+        amplitude_rad: 18.0_f64.to_radians(),
+        frequency_hz: 1.1,
+        duration_s: 5.2,
+        ramp_s: 0.8,
+        ..WiggleConfig::default()
+    };
+    wiggle(&config, &Limits::default()).unwrap()
 }
 
 fn turned(turn_deg: f64) -> JointVector {
@@ -37,7 +46,7 @@ fn turned(turn_deg: f64) -> JointVector {
     q
 }
 
-/// A move 1.5 s after the default wiggle.
+/// A move 1.5 s after the wiggle.
 fn request(rope: RopeParams, turn_deg: f64) -> CalmRequest {
     let before = wiggled();
     let (times_s, q) = samples(before.duration_s(), |t| before.state_at(t).q);
