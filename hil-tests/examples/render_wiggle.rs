@@ -2,8 +2,10 @@
 //! can be tested on:
 //!
 //! ```text
-//! render_wiggle OUT [SEED] [FRAMES] [VGA|HD]
+//! render_wiggle OUT [SEED] [FRAMES] [VGA|HD] [ROPE_MM LEAD_MM]
 //! ```
+//!
+//! The rope is the seed's; two more numbers replace its radius and its lead's.
 //!
 //! Writes `video.yuyv` (side-by-side frames, one after the other),
 //! `timestamps.csv`, `pose.csv` (attach frame at 1 kHz), `camera.toml` with
@@ -27,21 +29,27 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 const RATE_HZ: f64 = 60.0;
-const AMPLITUDE_RAD: f64 = 0.26;
-const FREQUENCY_HZ: f64 = 0.75;
-const STILL_S: f64 = 0.5;
-const RAMP_S: f64 = 1.0;
+const AMPLITUDE_DEG: f64 = 18.0;
+const FREQUENCY_HZ: f64 = 1.1;
+const DURATION_S: f64 = 5.2;
+const RAMP_S: f64 = 0.8;
 const PHYSICS_STEP_S: f64 = 1e-4;
 /// Frames written as PNG.
 const PICTURES: usize = 8;
 
-/// Joints of the wiggle: joint 6 swings under a window that opens smoothly.
+/// Quintic step from 0 to 1, flat at both ends.
+fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * x * (10.0 + x * (6.0 * x - 15.0))
+}
+
+/// Joints of the shipped wiggle: a sine of joint 6, faded in and out, from
+/// t = 0 with the rope hanging still.
 fn joints(t_s: f64) -> JointVector {
-    let t = (t_s - STILL_S).max(0.0);
-    let u = (t / RAMP_S).min(1.0);
-    let window = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    let fade = smooth_step(t_s / RAMP_S) * smooth_step((DURATION_S - t_s) / RAMP_S);
+    let swing = (core::f64::consts::TAU * FREQUENCY_HZ * t_s).sin();
     let mut q = START_POSE;
-    q[5] += AMPLITUDE_RAD * window * (core::f64::consts::TAU * FREQUENCY_HZ * t).sin();
+    q[5] += AMPLITUDE_DEG.to_radians() * swing * fade;
     q
 }
 
@@ -61,13 +69,15 @@ struct Arguments {
     seed: u64,
     frames: usize,
     mode: VideoMode,
+    /// Radii of rope and lead (m).
+    radii_m: Option<[f64; 2]>,
 }
 
 fn arguments() -> Result<Arguments, Box<dyn Error>> {
     let mut given = std::env::args().skip(1);
     let out = given
         .next()
-        .ok_or("usage: render_wiggle OUT [SEED] [FRAMES] [VGA|HD]")?;
+        .ok_or("usage: render_wiggle OUT [SEED] [FRAMES] [VGA|HD] [ROPE_MM LEAD_MM]")?;
     Ok(Arguments {
         out: out.into(),
         seed: given.next().map_or(Ok(1), |s| s.parse())?,
@@ -76,6 +86,12 @@ fn arguments() -> Result<Arguments, Box<dyn Error>> {
             None | Some("VGA") => VideoMode::Vga,
             Some("HD") => VideoMode::Hd,
             Some(other) => return Err(format!("there is no mode {other}; use VGA or HD").into()),
+        },
+        radii_m: match (given.next(), given.next()) {
+            (Some(rope), Some(lead)) => {
+                Some([rope.parse::<f64>()? * 1e-3, lead.parse::<f64>()? * 1e-3])
+            }
+            _ => None,
         },
     })
 }
@@ -113,6 +129,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         seed,
         frames,
         mode,
+        radii_m,
     } = arguments()?;
     fs::create_dir_all(&out)?;
     let settings = CameraConfig {
@@ -128,7 +145,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_camera_toml(&toml, &camera, mode, Path::new("camera.conf"))?;
     write_pose(&out.join("pose.csv"), frames as f64 / RATE_HZ + 0.1)?;
 
-    let (rope, colours) = (hidden_rope(seed), Appearance::from_seed(seed));
+    let (mut rope, colours) = (hidden_rope(seed), Appearance::from_seed(seed));
+    if let Some([radius_m, lead_radius_m]) = radii_m {
+        (rope.radius_m, rope.lead_radius_m) = (radius_m, lead_radius_m);
+    }
     let mut renderer = Renderer::new(&camera, RopeShape::from(&rope), colours, 1.6, seed);
     renderer.place_target(Some(Vector3::new(1.10, 0.0, 0.45)));
     let mut live = LiveRope::new(&rope, &attach(0.0), PHYSICS_STEP_S)?;

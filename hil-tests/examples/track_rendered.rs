@@ -1,33 +1,51 @@
 //! Tracks what `render_wiggle` wrote and prints the error against its truth:
-//! `track_rendered FOLDER`.
+//! `track_rendered FOLDER...`, one line per folder.
 
 use camera_ingest::source::{YuyvSource, read_left};
 use camera_ingest::track::{ClampPath, TrackOptions};
 use camera_ingest::{load_camera, track};
 use serde::Deserialize;
+use shared_types::{KeypointTrack, RopeParams};
 use std::error::Error;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::PathBuf;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 #[derive(Deserialize)]
 struct Truth {
-    rope: shared_types::RopeParams,
+    seed: u64,
+    rope: RopeParams,
     nodes_left_px: Vec<Vec<[f64; 2]>>,
 }
 
-fn quantiles(mut px: Vec<f64>) -> String {
+/// Median, 95th percentile and maximum.
+fn quantiles(mut px: Vec<f64>) -> [f64; 3] {
     px.sort_by(f64::total_cmp);
-    let at = |percent: usize| px[(px.len() - 1) * percent / 100];
-    let (median, p95, max) = (at(50), at(95), at(100));
-    format!("median {median:.2}  p95 {p95:.2}  max {max:.2} px")
+    [50, 95, 100].map(|percent: usize| px[(px.len() - 1) * percent / 100])
+}
+
+/// Distance of a tracked node from the true one (px), for the chosen nodes of all frames.
+fn errors(track: &KeypointTrack, truth: &[Vec<[f64; 2]>], nodes: Range<usize>) -> Vec<f64> {
+    let frames = track.frames.iter().zip(truth);
+    let pairs = frames.flat_map(|(found, truth)| found.points.iter().zip(truth).enumerate());
+    pairs
+        .filter(|(node, _)| nodes.contains(node))
+        .map(|(_, (a, b))| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .collect()
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder: PathBuf = std::env::args()
-        .nth(1)
-        .ok_or("usage: track_rendered FOLDER")?
-        .into();
+    for folder in std::env::args().skip(1).map(PathBuf::from) {
+        if let Err(error) = report(&folder) {
+            println!("{}: {error}", folder.display());
+        }
+    }
+    Ok(())
+}
+
+/// Tracks one folder and prints its line.
+fn report(folder: &Path) -> Result<(), Box<dyn Error>> {
     let truth: Truth =
         serde_json::from_reader(BufReader::new(File::open(folder.join("truth.json"))?))?;
     let camera = load_camera(&folder.join("camera.toml"))?;
@@ -40,23 +58,25 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..TrackOptions::default()
     };
     let found = track(&frames, &camera, &clamp, &options)?;
-    let error = |frame: usize, node: usize| {
-        let (a, b) = (
-            found.track.frames[frame].points[node],
-            truth.nodes_left_px[frame][node],
-        );
-        (a[0] - b[0]).hypot(a[1] - b[1])
-    };
     let nodes = options.keypoints;
-    let all = (0..frames.len()).flat_map(|f| (0..nodes).map(move |n| (f, n)));
+    let [median, p95, max] = quantiles(errors(&found.track, &truth.nodes_left_px, 0..nodes));
+    let [_, tip_p95, _] = quantiles(errors(&found.track, &truth.nodes_left_px, nodes - 1..nodes));
+    let (seen, rope) = (&found.appearance, &truth.rope);
+    let off = |seen: f64, truth: f64| 100.0 * (seen / truth - 1.0);
     println!(
-        "all nodes: {}",
-        quantiles(all.map(|(f, n)| error(f, n)).collect())
+        "seed {:2}: median {median:.2}  p95 {p95:.2}  max {max:5.2}  tip p95 {tip_p95:.2} px;  \
+         rope {:4.1} of {:4.1} mm ({:+3.0} %)  lead {:4.1} of {:4.1} mm ({:+3.0} %)  length {:+.2} %;  \
+         lost {:.1} %  {:.2} ms a frame",
+        truth.seed,
+        seen.rope_radius_m * 1e3,
+        rope.radius_m * 1e3,
+        off(seen.rope_radius_m, rope.radius_m),
+        seen.lead_radius_m * 1e3,
+        rope.lead_radius_m * 1e3,
+        off(seen.lead_radius_m, rope.lead_radius_m),
+        off(seen.length_m, rope.length_m),
+        100.0 * found.track.lost_part(),
+        found.times.follow.as_secs_f64() * 1e3 / frames.len() as f64,
     );
-    let tips = (0..frames.len()).map(|f| error(f, nodes - 1));
-    println!("tip:       {}", quantiles(tips.collect()));
-    println!("lost {:.1} %", 100.0 * found.track.lost_part());
-    println!("rope {:?}", truth.rope);
-    println!("seen {:?}", found.appearance);
     Ok(())
 }

@@ -76,6 +76,9 @@ pub(super) struct Matter<'a> {
     /// Brightness of the shades to look for relative to `colour`: the dark side
     /// of a lead counts as much as its lit side.
     pub(super) shades: &'static [f32],
+    /// Colour of what touches it and must not be taken for it: the rope where
+    /// the lead is looked for.
+    pub(super) rival: Option<Colour>,
 }
 
 /// Squares of the grey levels at which evidence fades.
@@ -92,11 +95,12 @@ impl Matter<'_> {
     fn of_pixel(&self, seen: Colour, empty: Colour, shades: &[Colour], limits: Limits) -> f32 {
         let difference: Colour = core::array::from_fn(|k| seen[k] - empty[k]);
         let dd: f32 = difference.iter().map(|d| d * d).sum();
-        let mut best = 0.0_f32;
-        for shade in shades {
+        // Part of a mixture with `pure`, and the squared distance from the
+        // nearest such mixture.
+        let mixture = |pure: &Colour| -> (f32, f32) {
             let (mut dot, mut rr) = (0.0, 0.0);
             for k in 0..3 {
-                let r = shade[k] - empty[k];
+                let r = pure[k] - empty[k];
                 dot += difference[k] * r;
                 rr += r * r;
             }
@@ -104,10 +108,20 @@ impl Matter<'_> {
             // the noise in the denominator lets it fade to 0 instead of
             // exploding.
             let a = (dot / (rr + limits.noise2)).clamp(0.0, 1.2);
-            let off = (dd - 2.0 * a * dot + a * a * rr).max(0.0);
+            (a, (dd - 2.0 * a * dot + a * a * rr).max(0.0))
+        };
+        let (mut best, mut least_off) = (0.0_f32, f32::INFINITY);
+        for shade in shades {
+            let (a, off) = mixture(shade);
             best = best.max((a / self.full).min(1.2) * limits.off2 / (limits.off2 + off));
+            least_off = least_off.min(off);
         }
-        best
+        // Against a rival of the same colour this does nothing.
+        self.rival.map_or(best, |rival| {
+            let off = mixture(&rival).1;
+            let n = limits.noise2;
+            best * ((2.0 * off + n) / (off + least_off + n)).min(1.0)
+        })
     }
 
     /// Coverage of a window of a frame.

@@ -1,8 +1,7 @@
 //! Finding the rope where nothing is known yet.
 //!
 //! What differs from the background and hangs on the clamp is rope, lead and
-//! perhaps a shadow of theirs. The lead is its fattest place; what lies beyond
-//! the lead is not rope.
+//! perhaps a shadow of theirs. What lies beyond the lead is not rope.
 
 use shared_types::StereoCamera;
 
@@ -10,6 +9,7 @@ use super::background::Background;
 use super::clamp::ClampSample;
 use super::evidence::{Colour, Matter, Window};
 use super::geodesic::{Geodesic, Ground, depth_px};
+use super::lead::{self, TooShort};
 use super::plane::{Point, RopePlane};
 use crate::frame::EyeFrame;
 
@@ -17,8 +17,8 @@ use crate::frame::EyeFrame;
 const GAP_PX: f64 = 15.0;
 /// Gap allowed right at the clamp, where the rope hardly moves (m).
 const FIRST_GAP_M: f64 = 0.15;
-/// The lead hangs at least this far from the clamp (m).
-const LEAST_ROPE_M: f64 = 0.12;
+/// Smoothing makes the mask this much wider than what is seen (px).
+const MASK_GROWS_PX: f64 = 1.0;
 /// The pole and what holds it: blocked out to this distance behind the clamp (m).
 const POLE_LENGTH_M: f64 = 0.35;
 /// Half-width of what is blocked around the pole (m).
@@ -87,20 +87,19 @@ pub(super) fn find(
         (GAP_PX * image_scale) as u32,
         (FIRST_GAP_M * plane.px_per_m) as u32,
     );
-    let long_enough = LEAST_ROPE_M * plane.px_per_m;
-    let (mut fattest, mut longest) = (None::<usize>, 0.0_f64);
-    for at in (0..mask.len()).filter(|&at| mask[at]) {
-        let Some(length) = ways.length_px(at) else {
-            continue;
-        };
-        longest = longest.max(length);
-        if length >= long_enough && fattest.is_none_or(|f| depth[at] > depth[f]) {
-            fattest = Some(at);
-        }
+    let at = lead::Search {
+        frame,
+        background,
+        gain,
+        mask: &mask,
+        depth_px: &depth,
+        ways: &ways,
+        px_per_m: plane.px_per_m,
     }
-    let fattest = fattest.ok_or(NotFound::NothingHangs(longest / plane.px_per_m))?;
-    let lead_radius_px = f64::from(depth[fattest]);
-    let pixels = ways.path_to(fattest);
+    .best()
+    .map_err(|TooShort(longest_m)| NotFound::NothingHangs(longest_m))?;
+    let lead_radius_px = f64::from(depth[at]);
+    let pixels = ways.path_to(at);
     // Colour of the rope: its middle part, away from clamp and lead.
     let middle = &pixels[pixels.len() / 6..pixels.len() * 3 / 4];
     let rope = colour_of(
@@ -108,8 +107,8 @@ pub(super) fn find(
         gain,
         middle.iter().map(|p| [p[0] as usize, p[1] as usize]),
     );
-    let centre = [(fattest % width) as f64, (fattest / width) as f64];
-    let (lead, lead_px) = lead_place(frame, background, gain, centre, lead_radius_px);
+    let centre = [(at % width) as f64, (at / width) as f64];
+    let (lead, lead_px) = lead_place(frame, background, gain, rope, centre, lead_radius_px);
     let mut path: Vec<Point> = pixels.iter().map(|p| plane.point_at(*p)).collect();
     // The way over pixels enters the lead anywhere; end it at the centre.
     let inside = lead_radius_px / plane.px_per_m;
@@ -135,13 +134,15 @@ fn lead_place(
     frame: &EyeFrame,
     background: &Background,
     gain: f32,
+    rope: (Colour, f32),
     mut centre: [f64; 2],
     radius_px: f64,
 ) -> ((Colour, f32), [f64; 2]) {
-    let window = Window::around(std::iter::once(centre), 3.0 * radius_px, frame);
+    let window = Window::around(std::iter::once(centre), 3.0 * radius_px + 3.0, frame);
+    let core_px = 0.6 * (radius_px - MASK_GROWS_PX);
     let mut lead = ([0.0; 3], 0.0);
     for _ in 0..4 {
-        lead = colour_of(frame, gain, disc(centre, 0.7 * radius_px, window));
+        lead = colour_of(frame, gain, disc(centre, core_px, window));
         let matter = Matter {
             background,
             colour: lead.0,
@@ -149,6 +150,7 @@ fn lead_place(
             gain,
             full: LEAD_FULL,
             shades: &LEAD_SHADES,
+            rival: Some(rope.0),
         };
         centre = matter
             .coverage(frame, window)

@@ -8,7 +8,7 @@ use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
 use super::evidence::{Colour, Matter, Window};
 use super::first_frame::{LEAD_FULL, LEAD_SHADES};
 use super::lateral::{Across, Search, measure};
-use super::outline::{Circle, Contrast};
+use super::outline::{Circle, Contrast, RopeEnd};
 use super::plane::{Point, RopePlane};
 use crate::frame::EyeFrame;
 
@@ -33,6 +33,8 @@ const UNSEEN_WEIGHT: f64 = 1e-3;
 const LEAST_LEAD: f64 = 0.35;
 /// Mean coverage below which the rope is lost.
 const LOST_BELOW: f64 = 0.3;
+/// Ropes of a larger radius show a lit and a dark side (px).
+const FAT_ROPE_PX: f64 = 2.2;
 /// Weight of clamp and lead against a node's.
 const ANCHOR: f64 = 50.0;
 
@@ -131,7 +133,7 @@ impl Follower<'_> {
         let dt = t_s - before.t_s;
         let mut curve = predicted.to_vec();
         let tip_speed = norm(before.velocity[NODES - 1]);
-        let (lead, lead_seen) = self.find_lead(frame, gain, curve[NODES - 1], tip_speed, range_px);
+        let (lead, lead_seen) = self.find_lead(frame, gain, &curve, tip_speed, range_px);
         if let Some(lead) = lead {
             let miss = sub(lead, curve[NODES - 1]);
             blend(&mut curve, miss, |part| part * part);
@@ -223,14 +225,23 @@ impl Follower<'_> {
         )
     }
 
+    /// A thin rope's coverage is measured; a fat one is shaded like the lead,
+    /// and only its outline counts.
     pub(super) fn rope_matter(&self, gain: f32) -> Matter<'_> {
+        let fat = self.model.rope_radius_m * self.plane.px_per_m > FAT_ROPE_PX;
+        let (full, shades) = if fat {
+            (LEAD_FULL, &LEAD_SHADES[..])
+        } else {
+            (1.0, &[1.0][..])
+        };
         Matter {
             background: self.background,
             colour: self.model.rope.0,
             scatter: self.model.rope.1,
             gain,
-            full: 1.0,
-            shades: &[1.0],
+            full,
+            shades,
+            rival: None,
         }
     }
 
@@ -242,6 +253,19 @@ impl Follower<'_> {
             gain,
             full: LEAD_FULL,
             shades: &LEAD_SHADES,
+            rival: Some(self.model.rope.0),
+        }
+    }
+
+    /// Where the rope of a curve hides the lead's outline.
+    pub(super) fn rope_at_lead(&self, curve: &[Point]) -> RopeEnd {
+        let spacing = self.model.length_m / (NODES - 1) as f64;
+        let nodes = (1.5 * self.model.lead_radius_m / spacing).ceil() as usize;
+        let [a, b] = [NODES - 1, NODES - 1 - nodes.clamp(1, NODES / 4)]
+            .map(|node| self.plane.to_pixel(curve[node]));
+        RopeEnd {
+            angle_rad: (b[1] - a[1]).atan2(b[0] - a[0]),
+            radius_px: self.model.rope_radius_m * self.plane.px_per_m,
         }
     }
 
@@ -251,15 +275,16 @@ impl Follower<'_> {
         &self,
         frame: &EyeFrame,
         gain: f32,
-        predicted: Point,
+        predicted: &[Point],
         speed_m_s: f64,
         range_px: f64,
     ) -> (Option<Point>, f64) {
         let radius = self.model.lead_radius_m * self.plane.px_per_m;
         let blur = speed_m_s * self.camera.exposure_s * self.plane.px_per_m;
-        let mut centre = self.plane.to_pixel(predicted);
-        let reach = radius + range_px;
-        let window = Window::around(std::iter::once(centre), 2.0 * reach, frame);
+        let mut centre = self.plane.to_pixel(predicted[NODES - 1]);
+        // The widest look, and room for the centre to move.
+        let margin = radius + 2.0 * range_px + blur / 2.0 + 2.0;
+        let window = Window::around(std::iter::once(centre), margin, frame);
         let coverage = self.lead_matter(gain).coverage(frame, window);
         let tight = radius + blur / 2.0 + 1.5;
         let mut area = 0.0;
@@ -276,7 +301,7 @@ impl Follower<'_> {
             centre,
             radius_px: radius,
         };
-        if let Some(circle) = contrast.circle(guess, blur) {
+        if let Some(circle) = contrast.circle(guess, blur, self.rope_at_lead(predicted)) {
             centre = circle.centre;
         }
         (

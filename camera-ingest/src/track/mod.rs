@@ -16,6 +16,7 @@ mod first_frame;
 mod follow;
 mod geodesic;
 mod lateral;
+mod lead;
 mod outline;
 mod plane;
 
@@ -299,7 +300,8 @@ fn learn<'a>(
             centre: pixels[NODES - 1],
             radius_px: look.lead_radius_px,
         };
-        if let Some(circle) = contrast.circle(guess, 0.0) {
+        let rope = follower.rope_at_lead(&state.curve);
+        if let Some(circle) = contrast.circle(guess, 0.0, rope) {
             follower.model.lead_radius_m = circle.radius_px / plane.px_per_m;
         }
         follower.model.length_m = curve::length(&state.curve);

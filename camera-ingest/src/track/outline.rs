@@ -10,7 +10,9 @@ use crate::frame::EyeFrame;
 const RAYS: usize = 40;
 /// Distance of samples on a ray (px).
 const STEP_PX: f64 = 0.5;
-/// Part of the rays that must agree on the circle.
+/// Edges of the rope are smeared this far into the outline beside it (px).
+const MARGIN_PX: f64 = 0.7;
+/// Part of the free rays that must agree on the circle.
 const LEAST_RAYS: f64 = 0.5;
 
 /// A circle in raw pixels.
@@ -18,6 +20,26 @@ const LEAST_RAYS: f64 = 0.5;
 pub(super) struct Circle {
     pub(super) centre: [f64; 2],
     pub(super) radius_px: f64,
+}
+
+/// The rope where it enters the lead.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RopeEnd {
+    /// Direction from the lead's centre into the rope (rad, from +u towards +v).
+    pub(super) angle_rad: f64,
+    /// Half the rope's width.
+    pub(super) radius_px: f64,
+}
+
+impl RopeEnd {
+    /// The rope hides the outline of a circle on a ray: half a circle for a
+    /// lead no fatter than its rope.
+    fn hides(self, ray_rad: f64, lead_radius_px: f64) -> bool {
+        let half = ((self.radius_px + MARGIN_PX) / lead_radius_px)
+            .min(1.0)
+            .asin();
+        (ray_rad - self.angle_rad).cos() > half.cos()
+    }
 }
 
 /// Contrast of single pixels against the background.
@@ -53,14 +75,19 @@ impl Contrast<'_> {
     }
 
     /// Circle near a guess. `None` when too few rays find an edge, or the edges
-    /// form no circle within `0.7..1.4` of the guessed radius (grown by half
+    /// form no circle within `0.65..1.4` of the guessed radius (grown by half
     /// the blur).
-    pub(super) fn circle(&self, guess: Circle, blur_px: f64) -> Option<Circle> {
+    pub(super) fn circle(&self, guess: Circle, blur_px: f64, rope: RopeEnd) -> Option<Circle> {
+        let free: Vec<f64> = (0..RAYS)
+            .map(|ray| ray as f64 * std::f64::consts::TAU / RAYS as f64)
+            .filter(|&ray_rad| !rope.hides(ray_rad, guess.radius_px))
+            .collect();
+        let enough = LEAST_RAYS * free.len() as f64;
         let mut circle = guess;
         for _ in 0..3 {
-            let edges = self.edges(circle.centre, guess.radius_px, blur_px);
-            circle = robust_circle(&edges)?;
-            let least = 0.7 * guess.radius_px;
+            let edges = self.edges(&free, circle.centre, guess.radius_px, blur_px);
+            circle = robust_circle(&edges, enough)?;
+            let least = 0.65 * guess.radius_px;
             let most = 1.4 * guess.radius_px + blur_px / 2.0;
             let moved =
                 (circle.centre[0] - guess.centre[0]).hypot(circle.centre[1] - guess.centre[1]);
@@ -80,14 +107,20 @@ impl Contrast<'_> {
         clippy::cast_precision_loss,
         reason = "sample counts are small and positive"
     )]
-    fn edges(&self, centre: [f64; 2], radius_px: f64, blur_px: f64) -> Vec<[f64; 2]> {
+    fn edges(
+        &self,
+        rays_rad: &[f64],
+        centre: [f64; 2],
+        radius_px: f64,
+        blur_px: f64,
+    ) -> Vec<[f64; 2]> {
         let floor = 3.0 * f64::from(self.background.noise);
         let samples = ((1.7 * radius_px + blur_px) / STEP_PX) as usize;
         let inside = (0.3 * radius_px / STEP_PX) as usize..=(0.75 * radius_px / STEP_PX) as usize;
-        (0..RAYS)
-            .filter_map(|ray| {
-                let angle = ray as f64 * std::f64::consts::TAU / RAYS as f64;
-                let (sin, cos) = angle.sin_cos();
+        rays_rad
+            .iter()
+            .filter_map(|ray_rad| {
+                let (sin, cos) = ray_rad.sin_cos();
                 let place = |k: f64| [centre[0] + k * STEP_PX * cos, centre[1] + k * STEP_PX * sin];
                 let profile: Vec<f64> = (0..=samples).map(|k| self.at(place(k as f64))).collect();
                 let inner = profile.get(inside.clone())?;
@@ -110,8 +143,7 @@ impl Contrast<'_> {
 }
 
 /// Circle through most of the points: fit, drop what lies off, fit again.
-fn robust_circle(points: &[[f64; 2]]) -> Option<Circle> {
-    let enough = LEAST_RAYS * RAYS as f64;
+fn robust_circle(points: &[[f64; 2]], enough: f64) -> Option<Circle> {
     let mut kept = points.to_vec();
     let mut circle = None;
     for _ in 0..4 {
@@ -173,9 +205,9 @@ mod tests {
         for p in &mut points[..6] {
             p[1] += 5.0;
         }
-        let circle = robust_circle(&points).unwrap();
+        let circle = robust_circle(&points, 20.0).unwrap();
         assert!((circle.centre[0] - 12.5).abs() < 1e-6 && (circle.centre[1] + 3.0).abs() < 1e-6);
         assert!((circle.radius_px - 7.0).abs() < 1e-6);
-        assert_eq!(robust_circle(&points[..10]), None);
+        assert_eq!(robust_circle(&points[..10], 20.0), None);
     }
 }
