@@ -1,4 +1,5 @@
-//! Tables for people: thin lines, numbers to the right.
+//! Tables for people, numbers to the right; they paste into a notebook as
+//! Markdown.
 
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -10,7 +11,7 @@ pub fn numbers<const N: usize>(
     rows: impl IntoIterator<Item = [String; N]>,
 ) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(presets::ASCII_MARKDOWN);
     table.set_header(header);
     for row in rows {
         table.add_row(row);

@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 /// Slow enough that the move lasts several periods of the rope's pendulum and
 /// leaves it with millimetres of sway.
 const MOVE_SPEED: f64 = 0.04;
+/// The joint that wiggles (0-based).
+const WIGGLE_JOINT: usize = 5;
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a throw: two and a half seconds.
@@ -169,7 +171,7 @@ fn throw_once(
 
     // Calm: turn towards the target so that the rope comes to rest.
     let stage = Stage::begin("calm", quiet);
-    let arm_lag_s = pipeline::joint_lag_s(&session.recorder.cycles, &session.recorder.joints, 5);
+    let arm_lag_s = pipeline::joint_lag_s(&session.recorder, &film.motion, WIGGLE_JOINT);
     let input = CalmInput {
         rope: estimate.params,
         film: &film,

@@ -64,7 +64,7 @@ mod tests {
                 None,
             ],
             residual_px: 1.25,
-            method: heapless::String::try_from("cmaes").unwrap(),
+            method: "cmaes".parse().unwrap(),
             simulations: 3000,
             seed: 7,
             time_offset_s: -0.0012,

@@ -1,15 +1,30 @@
 //! How late the arm follows its setpoints, from commanded and measured joints
 //! on one clock.
 
+use super::arm::MotionSpan;
+use crate::session::Recorder;
 use shared_types::ipc::{CycleRecord, JointReport};
 
 /// Largest lag looked for (ms).
 const LAG_MAX_MS: u32 = 120;
 
-/// Delay (s) between commanded and measured position of `joint` (0-based) that
-/// explains the recording best, to a millisecond; `None` when the joint did not
-/// move enough to tell.
-pub fn joint_lag_s(cycles: &[CycleRecord], reports: &[JointReport], joint: usize) -> Option<f64> {
+/// Delay (s) between commanded and measured position of `joint` (0-based) over a
+/// motion, see [`lag_s`].
+pub fn joint_lag_s(recorder: &Recorder, motion: &MotionSpan, joint: usize) -> Option<f64> {
+    // Before the arm was taken over there is no command to follow.
+    let during = |ns: u64| (motion.start_ns..=motion.end_ns).contains(&ns);
+    let cycles: Vec<CycleRecord> = recorder
+        .cycles
+        .iter()
+        .filter(|c| during(c.deadline_ns))
+        .copied()
+        .collect();
+    lag_s(&cycles, &recorder.joints, joint)
+}
+
+/// Delay (s) that explains a recording best, to a millisecond; `None` when the
+/// joint did not move enough to tell.
+fn lag_s(cycles: &[CycleRecord], reports: &[JointReport], joint: usize) -> Option<f64> {
     let (first, last) = (cycles.first()?, cycles.last()?);
     let moved = cycles
         .iter()
@@ -76,7 +91,7 @@ mod tests {
                 r
             })
             .collect();
-        assert_eq!(joint_lag_s(&cycles, &reports, 5), Some(0.023));
+        assert_eq!(lag_s(&cycles, &reports, 5), Some(0.023));
         assert_eq!(
             joint_lag_s(&cycles, &reports, 2),
             None,
