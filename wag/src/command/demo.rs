@@ -6,17 +6,24 @@ use super::plan::{describe, planner_config, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::pipeline::{self, CalmInput, RunFolder};
+use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder};
 use crate::progress::Stage;
 use crate::session::{Session, watch_interrupts};
 use anyhow::{Context, anyhow, bail};
+use hil_tests::render::Appearance;
+use hil_tests::rig::RigConfig;
+use planner::process::PlannerConfig;
 use planner::tasks::check_reach;
+use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc, StrikeOrder};
+use shared_types::ipc::message::{
+    CameraRpc, PlannerRpc, RigEvent, RigRequest, RigRpc, ScoreResult, StrikeOrder,
+};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
+use shared_types::{JointTrajectory, Limits, Plan, RopeEstimate, StereoCamera};
 use std::time::{Duration, Instant};
 
 /// Speed of moves between poses, as a part of the fastest move.
@@ -30,6 +37,8 @@ const WIGGLE_JOINT: usize = 5;
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a throw: two and a half seconds.
 const THROW_FRAMES: u32 = 150;
+/// Time after the last setpoint that still belongs to the throw (ns).
+const AFTER_THROW_NS: u64 = 600_000_000;
 /// Longest wait for the rope to hang still (s).
 const STILL_S: f64 = 3.0;
 
@@ -60,8 +69,8 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let began = Instant::now();
     let mut record = DemoRecord::new(args.seed, target_m, &folder);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    let result = throw_once(args, &folder, &mut session, &mut record, quiet);
-    session.stop(None);
+    let result = throw_once(&folder, &mut session, &mut record, quiet);
+    session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let kept = session.recorder.write(folder.path(), record.epoch_ns());
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
@@ -76,159 +85,259 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(serde_json::to_value(&record).or_failed()?))
 }
 
+/// The whole throw; each line hands the next what it found.
 fn throw_once(
-    args: &DemoArgs,
     folder: &RunFolder,
     session: &mut Session,
     record: &mut DemoRecord,
     quiet: bool,
 ) -> anyhow::Result<()> {
-    let limits = files::default_limits()?;
-    let planner_settings = planner_config(None)?;
+    let settings = planner_config(None)?;
+    let rig_config = pipeline::rig_config(folder, record.seed, record.target_m)?;
+    let mut demo = Demo::start(folder, session, record, quiet, settings, &rig_config)?;
+    let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
+    demo.bring_up(&motion)?;
+    let film = demo.wiggle(&motion)?;
+    let rope = demo.identify(&film)?;
+    let plan = demo.plan(&rope)?;
+    demo.calm(&rope, &film, &motion, &plan)?;
+    let throw = demo.throw(&plan)?;
+    let score = demo.score(&rig_config.appearance());
+    demo.compare_with_truth(&throw, score)
+}
 
-    // Start: rig first, because the others find the arm's ports there.
-    let stage = Stage::begin("start", quiet);
-    let rig_config = pipeline::rig_config(folder, args.seed, record.target_m)?;
-    let calibration = rig_config.stereo_camera();
-    let colours = rig_config.appearance();
-    pipeline::write_calibration(folder, &calibration)?;
-    let rig = pipeline::start_rig(session, folder, &rig_config)?;
-    let ports = arm_ports(session, &rig)?;
-    let camera = pipeline::start_camera(session, folder)?;
-    let planner = pipeline::start_planner(session, folder, &planner_settings)?;
-    let arm = pipeline::start_controller(session, folder, &limits, ports)?;
-    record.stages.start_s = stage.done("rig, controller, camera and planner are up");
+/// The running processes and what all stages need.
+struct Demo<'a> {
+    folder: &'a RunFolder,
+    session: &'a mut Session,
+    record: &'a mut DemoRecord,
+    quiet: bool,
+    limits: Limits,
+    settings: PlannerConfig,
+    calibration: StereoCamera,
+    rig: RpcClient<RigRpc>,
+    camera: RpcClient<CameraRpc>,
+    planner: RpcClient<PlannerRpc>,
+    arm: ArmLink,
+}
 
-    // Bring-up: enable the arm, move to the start pose, wait for the rope.
-    let stage = Stage::begin("bring-up", quiet);
-    record.warnings = pipeline::acquire(session, &arm)?;
-    let wiggle = planner::wiggle::wiggle(&planner_settings.wiggle, &limits)?;
-    pipeline::move_to(session, &arm, wiggle.start(), MOVE_SPEED)?;
-    stage.say("waiting for the rope to hang still");
-    let still = pipeline::wait_still(session, &camera, STILL_S)?;
-    record.stages.bringup_s = stage.done(if still {
-        "arm enabled, rope hangs still"
-    } else {
-        "arm enabled, rope still sways a little"
-    });
+impl<'a> Demo<'a> {
+    /// Starts all processes; the rig first, because the arm's ports are found
+    /// there.
+    fn start(
+        folder: &'a RunFolder,
+        session: &'a mut Session,
+        record: &'a mut DemoRecord,
+        quiet: bool,
+        settings: PlannerConfig,
+        rig_config: &RigConfig,
+    ) -> anyhow::Result<Self> {
+        let stage = Stage::begin("start", quiet);
+        let limits = files::default_limits()?;
+        let calibration = rig_config.stereo_camera();
+        pipeline::write_calibration(folder, &calibration)?;
+        let rig = pipeline::start_rig(session, folder, rig_config)?;
+        let ports = arm_ports(session, &rig)?;
+        let camera = pipeline::start_camera(session, folder)?;
+        let planner = pipeline::start_planner(session, folder, &settings)?;
+        let arm = pipeline::start_controller(session, folder, &limits, ports)?;
+        record.stages.start_s = stage.done("rig, controller, camera and planner are up");
+        Ok(Self {
+            folder,
+            session,
+            record,
+            quiet,
+            limits,
+            settings,
+            calibration,
+            rig,
+            camera,
+            planner,
+            arm,
+        })
+    }
 
-    // Wiggle: stream it and film it.
-    let stage = Stage::begin("wiggle", quiet);
-    let film = pipeline::film_during(
-        session,
-        &camera,
-        &arm,
-        &wiggle,
-        WIGGLE_FRAMES,
-        false,
-        &stage,
-    )?;
-    record.set_wiggle(&film);
-    record.stages.wiggle_s =
-        stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
+    /// Enables the arm, moves to the start pose, waits for the rope.
+    fn bring_up(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<()> {
+        let stage = Stage::begin("bring-up", self.quiet);
+        self.record.warnings = pipeline::acquire(self.session, &self.arm)?;
+        pipeline::move_to(self.session, &self.arm, wiggle.start(), MOVE_SPEED)?;
+        stage.say("waiting for the rope to hang still");
+        let still = pipeline::wait_still(self.session, &self.camera, STILL_S)?;
+        self.record.stages.bringup_s = stage.done(if still {
+            "arm enabled, rope hangs still"
+        } else {
+            "arm enabled, rope still sways a little"
+        });
+        Ok(())
+    }
 
-    // Track and identify.
-    let stage = Stage::begin("track", quiet);
-    let overlay = folder.file("wiggle.png");
-    let tracked = pipeline::track(session, &camera, &calibration, &film, &overlay, &stage)?;
-    record.set_track(&tracked);
-    record.stages.track_s = stage.done(&format!(
-        "{:.1} ms a frame, rope lost in {:.1} %",
-        tracked.ms_per_frame,
-        100.0 * tracked.lost_part
-    ));
-    let stage = Stage::begin("identify", quiet);
-    let appearance = tracked.appearance;
-    let estimate = pipeline::identify(
-        session,
-        &planner,
-        &calibration,
-        &film,
-        appearance,
-        args.seed,
-        &stage,
-    )?;
-    files::write_rope_estimate(&folder.file("params.toml"), &estimate)?;
-    record.stages.identify_s = stage.done(&format!(
-        "length {:.3} m, residual {:.2} px, {} simulations",
-        estimate.params.length_m, estimate.residual_px, estimate.simulations
-    ));
-    record.set_identified(&estimate);
+    /// Streams the wiggle and films it.
+    fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
+        let stage = Stage::begin("wiggle", self.quiet);
+        let film = pipeline::film_during(
+            self.session,
+            &self.camera,
+            &self.arm,
+            wiggle,
+            WIGGLE_FRAMES,
+            false,
+            &stage,
+        )?;
+        self.record.set_wiggle(&film);
+        self.record.stages.wiggle_s =
+            stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
+        Ok(film)
+    }
 
-    // Plan with what was identified.
-    let stage = Stage::begin("plan", quiet);
-    let order = StrikeOrder {
-        rope: estimate.params,
-        target_m: record.target_m,
-        limits: limits.clone(),
-        seed: args.seed,
-    };
-    let plan = pipeline::plan_strike(session, &planner, order, &stage)?;
-    files::write_json(&folder.file("plan.json"), &plan)?;
-    write_trajectory_csv(&folder.file("plan.csv"), &plan.trajectory, &limits)?;
-    record.stages.plan_s = stage.done(&describe(&plan));
-    record.set_plan(&plan);
+    /// Tracks the rope through the film and fits its parameters.
+    fn identify(&mut self, film: &Film) -> anyhow::Result<RopeEstimate> {
+        let stage = Stage::begin("track", self.quiet);
+        let overlay = self.folder.file("wiggle.png");
+        let tracked = pipeline::track(
+            self.session,
+            &self.camera,
+            &self.calibration,
+            film,
+            &overlay,
+            &stage,
+        )?;
+        self.record.set_track(&tracked);
+        self.record.stages.track_s = stage.done(&format!(
+            "{:.1} ms a frame, rope lost in {:.1} %",
+            tracked.ms_per_frame,
+            100.0 * tracked.lost_part
+        ));
+        let stage = Stage::begin("identify", self.quiet);
+        let rope = pipeline::identify(
+            self.session,
+            &self.planner,
+            &self.calibration,
+            film,
+            tracked.appearance,
+            self.record.seed,
+            &stage,
+        )?;
+        files::write_rope_estimate(&self.folder.file("params.toml"), &rope)?;
+        self.record.stages.identify_s = stage.done(&format!(
+            "length {:.3} m, residual {:.2} px, {} simulations",
+            rope.params.length_m, rope.residual_px, rope.simulations
+        ));
+        self.record.set_identified(&rope);
+        Ok(rope)
+    }
 
-    // Calm: turn towards the target so that the rope comes to rest.
-    let stage = Stage::begin("calm", quiet);
-    let arm_lag_s = pipeline::joint_lag_s(&session.recorder, &film.motion, WIGGLE_JOINT);
-    let input = CalmInput {
-        rope: estimate.params,
-        film: &film,
-        start_q: wiggle.end(),
-        end_q: plan.trajectory.start(),
-        limits: &limits,
-        arm_lag_s: arm_lag_s.unwrap_or_default(),
-    };
-    let calmed = pipeline::calm(session, &planner, &arm, &input, &stage)?;
-    stage.say("waiting for the rope to hang still");
-    pipeline::wait_still(session, &camera, STILL_S)?;
-    record.set_calm(&calmed, arm_lag_s);
-    record.stages.calm_s = stage.done(&format!(
-        "sway {:.1} cm -> {:.1} cm",
-        100.0 * calmed.plain_sway_m,
-        100.0 * calmed.calm_sway_m
-    ));
+    /// Plans the throw with what was identified.
+    fn plan(&mut self, rope: &RopeEstimate) -> anyhow::Result<Plan> {
+        let stage = Stage::begin("plan", self.quiet);
+        let order = StrikeOrder {
+            rope: rope.params,
+            target_m: self.record.target_m,
+            limits: self.limits.clone(),
+            seed: self.record.seed,
+        };
+        let plan = pipeline::plan_strike(self.session, &self.planner, order, &stage)?;
+        files::write_json(&self.folder.file("plan.json"), &plan)?;
+        write_trajectory_csv(
+            &self.folder.file("plan.csv"),
+            &plan.trajectory,
+            &self.limits,
+        )?;
+        self.record.stages.plan_s = stage.done(&describe(&plan));
+        self.record.set_plan(&plan);
+        Ok(plan)
+    }
 
-    // Throw once, open loop, filmed.
-    let stage = Stage::begin("throw", quiet);
-    pipeline::latency(session, &arm)?;
-    let throw = pipeline::film_during(
-        session,
-        &camera,
-        &arm,
-        &plan.trajectory,
-        THROW_FRAMES,
-        true,
-        &stage,
-    )?;
-    record.set_latency(&pipeline::latency(session, &arm)?);
-    record.stages.throw_s = stage.done(&format!(
-        "{} frames, {} dropped",
-        throw.frames, throw.dropped
-    ));
+    /// Turns towards the target so that the rope comes to rest.
+    fn calm(
+        &mut self,
+        rope: &RopeEstimate,
+        film: &Film,
+        wiggle: &JointTrajectory,
+        plan: &Plan,
+    ) -> anyhow::Result<()> {
+        let stage = Stage::begin("calm", self.quiet);
+        let arm_lag_s = pipeline::joint_lag_s(&self.session.recorder, &film.motion, WIGGLE_JOINT);
+        let input = CalmInput {
+            rope: rope.params,
+            film,
+            start_q: wiggle.end(),
+            end_q: plan.trajectory.start(),
+            limits: &self.limits,
+            arm_lag_s: arm_lag_s.unwrap_or_default(),
+        };
+        let calmed = pipeline::calm(self.session, &self.planner, &self.arm, &input, &stage)?;
+        stage.say("waiting for the rope to hang still");
+        pipeline::wait_still(self.session, &self.camera, STILL_S)?;
+        self.record.set_calm(&calmed, arm_lag_s);
+        self.record.stages.calm_s = stage.done(&format!(
+            "sway {:.1} cm -> {:.1} cm",
+            100.0 * calmed.plain_sway_m,
+            100.0 * calmed.calm_sway_m
+        ));
+        Ok(())
+    }
 
-    // Score by the camera; then, apart, what really happened.
-    let stage = Stage::begin("score", quiet);
-    let strobe = folder.file("throw.png");
-    let score = pipeline::score(
-        session,
-        &camera,
-        &calibration,
-        colours.lead_rgb,
-        colours.target_rgb,
-        &strobe,
-    );
-    record.set_score(score);
-    let truth = rig_truth(
-        session,
-        &rig,
-        throw.motion.start_ns,
-        throw.motion.end_ns + 600_000_000,
-    )?;
-    record.set_truth(&truth)?;
-    record.stages.score_s = stage.done(&record.score_line());
-    Ok(())
+    /// Throws once, open loop, filmed.
+    fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
+        let stage = Stage::begin("throw", self.quiet);
+        // Empties the histograms, so that they hold this throw alone.
+        pipeline::latency(self.session, &self.arm)?;
+        let film = pipeline::film_during(
+            self.session,
+            &self.camera,
+            &self.arm,
+            &plan.trajectory,
+            THROW_FRAMES,
+            true,
+            &stage,
+        )?;
+        self.record
+            .set_latency(&pipeline::latency(self.session, &self.arm)?);
+        self.record.stages.throw_s =
+            stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
+        Ok(film)
+    }
+
+    /// Scores the throw by the camera.
+    fn score(&mut self, colours: &Appearance) -> anyhow::Result<ScoreResult> {
+        let stage = Stage::begin("score", self.quiet);
+        let strobe = self.folder.file("throw.png");
+        let score = pipeline::score(
+            self.session,
+            &self.camera,
+            &self.calibration,
+            colours.lead_rgb,
+            colours.target_rgb,
+            &strobe,
+        );
+        self.record.stages.score_s = stage.done(&match &score {
+            Ok(s) => format!("by camera {:.1} cm", 100.0 * s.closest_m),
+            Err(_) => "the camera could not measure the throw".to_owned(),
+        });
+        score
+    }
+
+    /// Only now the rig is asked what really happened. That the camera could
+    /// not see the throw does not undo the throw; it is reported.
+    fn compare_with_truth(
+        &mut self,
+        throw: &Film,
+        score: anyhow::Result<ScoreResult>,
+    ) -> anyhow::Result<()> {
+        self.record.set_score(score);
+        let request = RigRequest::Truth {
+            from_ns: throw.motion.start_ns,
+            to_ns: throw.motion.end_ns + AFTER_THROW_NS,
+        };
+        match self
+            .session
+            .ask(&self.rig, &request, Duration::from_secs(10), |_| ())?
+        {
+            RigEvent::Failed { message } => Err(anyhow!(message)),
+            truth => self.record.set_truth(&truth),
+        }
+    }
 }
 
 fn arm_ports(session: &mut Session, rig: &RpcClient<RigRpc>) -> anyhow::Result<(u16, u16)> {
@@ -236,18 +345,5 @@ fn arm_ports(session: &mut Session, rig: &RpcClient<RigRpc>) -> anyhow::Result<(
         RigEvent::Ports { command, reports } => Ok((command, reports[0])),
         RigEvent::Failed { message } => Err(anyhow!(message)),
         other => bail!("the rig answered with {other:?}"),
-    }
-}
-
-fn rig_truth(
-    session: &mut Session,
-    rig: &RpcClient<RigRpc>,
-    from_ns: u64,
-    to_ns: u64,
-) -> anyhow::Result<RigEvent> {
-    let request = RigRequest::Truth { from_ns, to_ns };
-    match session.ask(rig, &request, Duration::from_secs(10), |_| ())? {
-        RigEvent::Failed { message } => Err(anyhow!(message)),
-        truth => Ok(truth),
     }
 }

@@ -227,18 +227,6 @@ impl DemoRecord {
         self.ok = true;
         Ok(())
     }
-
-    /// One line: what was achieved.
-    pub fn score_line(&self) -> String {
-        let cm = |v: Option<f64>| {
-            v.map_or_else(|| "unknown".to_owned(), |m| format!("{:.1} cm", 100.0 * m))
-        };
-        format!(
-            "tip-target distance {} (camera says {})",
-            cm(self.true_tip_target_distance_m),
-            cm(self.stereo_tip_target_distance_m)
-        )
-    }
 }
 
 fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {

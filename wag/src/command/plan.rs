@@ -120,3 +120,13 @@ pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         "resampled": plan.resampled, "trajectory_sha256": plan.trajectory_sha256,
     })))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_file_says_what_the_defaults_are() {
+        assert_eq!(planner_config(None).unwrap(), PlannerConfig::default());
+    }
+}

@@ -59,7 +59,7 @@ pub fn drive(
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
     let result = stream(&mut session, &folder, arm, limits, trajectory, quiet);
-    session.stop(None);
+    session.end(result.is_ok());
     let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
     let kept = session.recorder.write(folder.path(), epoch_ns);
     let summary = match &result {

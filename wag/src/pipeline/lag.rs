@@ -92,10 +92,6 @@ mod tests {
             })
             .collect();
         assert_eq!(lag_s(&cycles, &reports, 5), Some(0.023));
-        assert_eq!(
-            joint_lag_s(&cycles, &reports, 2),
-            None,
-            "joint 3 did not move"
-        );
+        assert_eq!(lag_s(&cycles, &reports, 2), None, "joint 3 did not move");
     }
 }

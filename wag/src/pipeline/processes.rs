@@ -145,3 +145,20 @@ pub fn start_controller_at(
     })?;
     session.connect(&ControllerRequest::Status, STARTUP)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_files_say_what_the_defaults_are() {
+        let controller: ControllerConfig = toml::from_str(CONTROLLER).unwrap();
+        assert_eq!(controller, ControllerConfig::default());
+        let rig: RigConfig = toml::from_str(RIG).unwrap();
+        let default = RigConfig::default();
+        assert_eq!(rig.camera, default.camera);
+        assert!(
+            (rig.lag.natural_frequency_rad_s - default.lag.natural_frequency_rad_s).abs() < 1e-2
+        );
+    }
+}

@@ -2,7 +2,6 @@
 //! operator's heartbeat, the recorder, and what to show meanwhile.
 
 use super::{ProcessSpec, Recorder, Supervisor};
-use crate::progress::Stage;
 use anyhow::{Context, anyhow, bail};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, IpcError, OperatorEnd};
@@ -194,22 +193,22 @@ impl Session {
         })
     }
 
-    /// Ends the session: operator first, then all processes.
-    pub fn stop(&mut self, stage: Option<&Stage>) {
-        if let Some(mut operator) = self.operator.take() {
+    /// Ends the session. When its work is done the arm rests and the operator
+    /// just leaves; otherwise the arm is told to stop. Then the processes end.
+    pub fn end(&mut self, done: bool) {
+        if let Some(mut operator) = self.operator.take()
+            && !done
+        {
             operator.stop();
         }
         let _ = self.recorder.drain();
         self.supervisor.stop();
-        if let Some(stage) = stage {
-            stage.done("all processes ended");
-        }
         self.bus.remove_leftovers();
     }
 }
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.stop(None);
+        self.end(false);
     }
 }
