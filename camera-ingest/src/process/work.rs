@@ -3,7 +3,7 @@
 use super::keep::Recording;
 use super::{answer, failed};
 use crate::frame::EyeFrame;
-use crate::overlay::{OverlayError, keypoint_sheet, strobe};
+use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::FrameSource;
 use crate::track::{ClampPath, TrackOptions, TrackResult, track as track_frames};
@@ -180,30 +180,26 @@ fn measure(
     })
 }
 
-/// A multiple exposure of the throw up to a little after the closest approach.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the number of frames"
-)]
+/// A multiple exposure of the throw up to a little after the closest approach,
+/// on the scene behind what moves.
 fn write_strobe(
     recording: &mut Recording,
     closest_s: Option<f64>,
     path: &Path,
 ) -> Result<(), Failure> {
-    let first = recording.read(0)?.left();
-    let start = MonotonicNs(first.stamp_ns);
+    let start = MonotonicNs(recording.first_stamp_ns());
     let until_s = closest_s.map_or(1.4, |t| t + 0.02);
-    let mut exposures = Vec::new();
+    let mut moving = Vec::new();
     for i in 0..recording.len() {
         let left = recording.read(i)?.left();
         if MonotonicNs(left.stamp_ns).since_s(start) > until_s {
             break;
         }
-        exposures.push(left);
+        moving.push(left);
     }
-    let step = exposures.len().div_ceil(STROBES).max(1);
-    let chosen: Vec<&EyeFrame> = exposures.iter().rev().step_by(step).collect();
-    strobe(&first, &chosen)?.write_png(path)?;
+    let scene = still_scene(&moving)?;
+    let step = moving.len().div_ceil(STROBES).max(1);
+    let chosen: Vec<&EyeFrame> = moving.iter().rev().step_by(step).collect();
+    strobe(&scene, &chosen)?.write_png(path)?;
     Ok(())
 }
