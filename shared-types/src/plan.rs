@@ -91,6 +91,16 @@ mod tests {
         assert_eq!(trajectory_hash_hex(&make(0.1)).len(), 64);
     }
 
+    proptest::proptest! {
+        #[test]
+        fn the_hash_survives_json(q in proptest::array::uniform7(-3.0f64..3.0), t in 0.01f64..2.0) {
+            let one = JointTrajectory::new(&[0.0, t], &[START_POSE, JointVector(q)]).unwrap();
+            let back: JointTrajectory =
+                serde_json::from_str(&serde_json::to_string_pretty(&one).unwrap()).unwrap();
+            proptest::prop_assert_eq!(trajectory_hash(&back), trajectory_hash(&one));
+        }
+    }
+
     #[test]
     fn trajectory_survives_json() {
         let t = JointTrajectory::new(&[0.0, 0.7], &[START_POSE, JointVector::splat(0.3)]).unwrap();
