@@ -69,7 +69,7 @@ pub struct DemoArgs {
     /// Seed of the hidden rope, the target, the noise and every search.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Folder for the run; it must not exist. Default: runs/<time>-demo-<seed>.
+    /// Folder for the run; it must not exist. Default: runs/TIME-demo-SEED.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Target x,y,z in the arm's base frame (m); default: random from the seed.
@@ -213,7 +213,7 @@ pub struct WiggleArgs {
     /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,
-    /// Folder for the run; it must not exist. Default: runs/<time>-wiggle.
+    /// Folder for the run; it must not exist. Default: runs/TIME-wiggle.
     #[arg(long)]
     pub out: Option<PathBuf>,
 }
@@ -357,7 +357,7 @@ pub struct ThrowArgs {
     /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,
-    /// Folder for the run; it must not exist. Default: runs/<time>-throw.
+    /// Folder for the run; it must not exist. Default: runs/TIME-throw.
     #[arg(long)]
     pub out: Option<PathBuf>,
 }
