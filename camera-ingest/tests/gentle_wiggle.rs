@@ -15,8 +15,8 @@ use shared_types::{Intrinsics, Shutter, StereoCamera};
 use std::ops::Range;
 
 const LENGTH_M: f64 = 0.5;
-const ROPE_RADIUS_M: f64 = 0.006;
-const LEAD_RADIUS_M: f64 = 0.02;
+/// Radii of rope and lead (m) where a test does not choose others.
+const RADII_M: [f64; 2] = [0.006, 0.02];
 const WIDTH: usize = 672;
 const HEIGHT: usize = 376;
 const NODES: usize = 41;
@@ -172,11 +172,22 @@ struct Recording {
     clamp: ClampPath,
 }
 
-/// Draws `count` frames; the rope is hidden in those of `hidden`.
+/// Draws `count` frames with a rope of radii [`RADII_M`].
 fn record(
     motion: &Motion,
     count: usize,
     rope_lead: [[f64; 3]; 2],
+    hidden: Range<usize>,
+) -> Recording {
+    record_sizes(motion, count, rope_lead, RADII_M, hidden)
+}
+
+/// Draws `count` frames; the rope is hidden in those of `hidden`.
+fn record_sizes(
+    motion: &Motion,
+    count: usize,
+    rope_lead: [[f64; 3]; 2],
+    radii_m: [f64; 2],
     hidden: Range<usize>,
 ) -> Recording {
     let camera = camera();
@@ -198,12 +209,8 @@ fn record(
         canvas.stroke(&pole, 0.01 * px_per_m, [60.0, 62.0, 66.0]);
         let rope = pixels(&nodes);
         if !hidden.contains(&index) {
-            canvas.stroke(&rope, ROPE_RADIUS_M * px_per_m, rope_lead[0]);
-            canvas.stroke(
-                &[rope[NODES - 1]; 2],
-                LEAD_RADIUS_M * px_per_m,
-                rope_lead[1],
-            );
+            canvas.stroke(&rope, radii_m[0] * px_per_m, rope_lead[0]);
+            canvas.stroke(&[rope[NODES - 1]; 2], radii_m[1] * px_per_m, rope_lead[1]);
         }
         frames.push(canvas.frame(index));
         truth.push(rope);
@@ -247,17 +254,13 @@ fn assert_small([median, p95, max]: [f64; 3]) {
     );
 }
 
-fn assert_looks(result: &TrackResult) {
+fn assert_looks(result: &TrackResult, radii_m: [f64; 2]) {
     let seen = &result.appearance;
     assert!((seen.length_m - LENGTH_M).abs() < 0.005, "{seen:?}");
-    assert!(
-        (seen.rope_radius_m - ROPE_RADIUS_M).abs() < 1e-3,
-        "{seen:?}"
-    );
-    assert!(
-        (seen.lead_radius_m - LEAD_RADIUS_M).abs() < 1e-3,
-        "{seen:?}"
-    );
+    let found = [seen.rope_radius_m, seen.lead_radius_m];
+    for (found, truth) in found.into_iter().zip(radii_m) {
+        assert!((found - truth).abs() < 1e-3, "{truth}: {seen:?}");
+    }
 }
 
 #[test]
@@ -271,7 +274,7 @@ fn a_red_rope_that_sways_gently_and_is_hidden_for_a_while() {
     let hidden = 80..86;
     let recording = record(&motion, 150, colours, hidden.clone());
     let result = follow(&recording);
-    assert_looks(&result);
+    assert_looks(&result, RADII_M);
     assert_small(errors(&recording, &result, 0..hidden.start));
     assert_small(errors(&recording, &result, hidden.end + 2..150));
     for (index, frame) in result.track.frames.iter().enumerate() {
@@ -289,8 +292,43 @@ fn a_rope_that_is_still_for_most_of_the_recording() {
     let colours = [[60.0, 110.0, 60.0], [230.0, 140.0, 30.0]];
     let recording = record(&motion, 150, colours, 0..0);
     let result = follow(&recording);
-    assert_looks(&result);
+    assert_looks(&result, RADII_M);
     assert_small(errors(&recording, &result, 0..150));
+}
+
+/// Moves a fat rope by more than its width, too.
+const SWAY: Motion = Motion {
+    still_s: 0.3,
+    clamp_m: 0.035,
+    tip_rad: 0.5,
+};
+
+#[test]
+fn a_lead_hardly_fatter_than_the_rope_is_told_by_its_colour() {
+    let colours = [[44.0, 82.0, 160.0], [240.0, 150.0, 30.0]];
+    let radii_m = [0.011, 0.0125];
+    let recording = record_sizes(&SWAY, 100, colours, radii_m, 0..0);
+    let result = follow(&recording);
+    assert_looks(&result, radii_m);
+    assert_small(errors(&recording, &result, 0..100));
+}
+
+#[test]
+fn a_lead_of_the_ropes_colour_is_told_by_its_width() {
+    let radii_m = [0.006, 0.017];
+    let recording = record_sizes(&SWAY, 100, [[60.0, 110.0, 60.0]; 2], radii_m, 0..0);
+    let result = follow(&recording);
+    assert_looks(&result, radii_m);
+    assert_small(errors(&recording, &result, 0..100));
+}
+
+#[test]
+fn without_width_or_colour_to_go_by_the_lead_is_the_free_end() {
+    let radii_m = [0.011, 0.011];
+    let recording = record_sizes(&SWAY, 100, [[60.0, 110.0, 60.0]; 2], radii_m, 0..0);
+    let result = follow(&recording);
+    assert_looks(&result, radii_m);
+    assert_small(errors(&recording, &result, 0..100));
 }
 
 #[test]

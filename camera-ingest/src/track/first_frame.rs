@@ -108,7 +108,12 @@ pub(super) fn find(
         middle.iter().map(|p| [p[0] as usize, p[1] as usize]),
     );
     let centre = [(at % width) as f64, (at / width) as f64];
-    let (lead, lead_px) = lead_place(frame, background, gain, rope, centre, lead_radius_px);
+    let (lead, mut lead_px) = lead_place(frame, background, gain, rope, centre, lead_radius_px);
+    let on_way = pixels.len() / 2;
+    let rope_px = f64::from(depth[pixels[on_way][1] as usize * width + pixels[on_way][0] as usize]);
+    if lead::blends_in(lead.0, rope, lead_radius_px / rope_px.max(1.0)) {
+        lead_px = centre;
+    }
     let mut path: Vec<Point> = pixels.iter().map(|p| plane.point_at(*p)).collect();
     // The way over pixels enters the lead anywhere; end it at the centre.
     let inside = lead_radius_px / plane.px_per_m;

@@ -8,6 +8,7 @@ use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
 use super::evidence::{Colour, Matter, Window};
 use super::first_frame::{LEAD_FULL, LEAD_SHADES};
 use super::lateral::{Across, Search, measure};
+use super::lead;
 use super::outline::{Circle, Contrast, RopeEnd};
 use super::plane::{Point, RopePlane};
 use crate::frame::EyeFrame;
@@ -49,6 +50,17 @@ pub(super) struct RopeModel {
     /// Coverage found along a fully visible rope: shaded edges and poor contrast
     /// leave it below 1.
     pub(super) usual_coverage: f64,
+}
+
+impl RopeModel {
+    /// Neither colour nor width sets the lead apart from the rope.
+    pub(super) fn lead_blends_in(&self) -> bool {
+        lead::blends_in(
+            self.lead.0,
+            self.rope,
+            self.lead_radius_m / self.rope_radius_m,
+        )
+    }
 }
 
 /// The rope in one frame.
@@ -132,6 +144,17 @@ impl Follower<'_> {
     ) -> State {
         let dt = t_s - before.t_s;
         let mut curve = predicted.to_vec();
+        if self.model.lead_blends_in() {
+            // Only along the rope itself can its end be found.
+            let found = self.find_rope(frame, gain, &curve, &before.velocity, range_px);
+            let places: Vec<Point> = found.iter().map(|node| node.point).collect();
+            let weights: Vec<f64> = found.iter().map(|node| node.confidence + 1e-3).collect();
+            curve = resample(
+                &smooth(&places, &weights, SMOOTHING),
+                self.model.length_m,
+                NODES,
+            );
+        }
         let tip_speed = norm(before.velocity[NODES - 1]);
         let (lead, lead_seen) = self.find_lead(frame, gain, &curve, tip_speed, range_px);
         if let Some(lead) = lead {
@@ -282,6 +305,10 @@ impl Follower<'_> {
         let radius = self.model.lead_radius_m * self.plane.px_per_m;
         let blur = speed_m_s * self.camera.exposure_s * self.plane.px_per_m;
         let mut centre = self.plane.to_pixel(predicted[NODES - 1]);
+        let expected = Circle {
+            centre,
+            radius_px: radius,
+        };
         // The widest look, and room for the centre to move.
         let margin = radius + 2.0 * range_px + blur / 2.0 + 2.0;
         let window = Window::around(std::iter::once(centre), margin, frame);
@@ -297,11 +324,13 @@ impl Follower<'_> {
             background: self.background,
             gain,
         };
-        let guess = Circle {
-            centre,
-            radius_px: radius,
-        };
-        if let Some(circle) = contrast.circle(guess, blur, self.rope_at_lead(predicted)) {
+        let rope = self.rope_at_lead(predicted);
+        if self.model.lead_blends_in() {
+            // A centroid would creep up the rope.
+            centre = contrast
+                .free_end(expected, rope, range_px)
+                .unwrap_or(expected.centre);
+        } else if let Some(circle) = contrast.circle(Circle { centre, ..expected }, blur, rope) {
             centre = circle.centre;
         }
         (

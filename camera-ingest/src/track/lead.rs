@@ -19,6 +19,8 @@ const SURELY_ROPE_M: [f64; 2] = [0.03, 0.25];
 const LEAST_ROPE_M: f64 = 0.12;
 /// Colour distance that is as good as certain (grey levels).
 const CLEAR_COLOUR: f32 = 50.0;
+/// Colour distance that says nothing: noise and compression (grey levels).
+const UNCLEAR_COLOUR: f32 = 10.0;
 /// Colours nearer than this to the rope's are the rope's (grey levels), plus
 /// twice the rope's own scatter.
 const ROPE_COLOUR: f32 = 25.0;
@@ -121,7 +123,7 @@ impl Search<'_> {
         let inside = inside.filter(|&i| self.mask.get(i) == Some(&true));
         let colour = self.colour(inside).0;
         let away = distance(colour, rope.colour) - 2.0 * rope.scatter;
-        let away = away.min(self.unlike_shadow(at, colour));
+        let away = away.min(self.unlike_shadow(at, colour)) - UNCLEAR_COLOUR;
         f64::from((away / CLEAR_COLOUR).clamp(0.0, 1.0))
     }
 
@@ -161,6 +163,14 @@ impl Search<'_> {
 fn share_within(sorted_lengths_m: &[f64], length_m: f64) -> f64 {
     let within = sorted_lengths_m.partition_point(|l| *l <= length_m);
     within as f64 / sorted_lengths_m.len().max(1) as f64
+}
+
+/// A lead with the rope's colour and about its width: no centroid can tell it
+/// from the rope, only the outline of its free end can.
+pub(super) fn blends_in(lead: Colour, (rope, scatter): (Colour, f32), widths: f64) -> bool {
+    /// Widths of the rope that make a lead stand out whatever its colour.
+    const STANDS_OUT: f64 = 1.4;
+    distance(lead, rope) < ROPE_COLOUR + 2.0 * scatter && widths < STANDS_OUT
 }
 
 fn distance(a: Colour, b: Colour) -> f32 {

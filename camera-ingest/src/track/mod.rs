@@ -301,7 +301,9 @@ fn learn<'a>(
             radius_px: look.lead_radius_px,
         };
         let rope = follower.rope_at_lead(&state.curve);
-        if let Some(circle) = contrast.circle(guess, 0.0, rope) {
+        if follower.model.lead_blends_in() {
+            follower.model.lead_radius_m = follower.model.rope_radius_m;
+        } else if let Some(circle) = contrast.circle(guess, 0.0, rope) {
             follower.model.lead_radius_m = circle.radius_px / plane.px_per_m;
         }
         follower.model.length_m = curve::length(&state.curve);

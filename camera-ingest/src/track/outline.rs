@@ -100,6 +100,40 @@ impl Contrast<'_> {
         Some(circle)
     }
 
+    /// Centre of a lead that looks like the rope's own end: `radius_px` before
+    /// the place where the contrast, followed out of the rope, falls to half.
+    /// `None` when there is no rope before the expected centre or no end within
+    /// `reach_px`.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "sample counts are small and positive"
+    )]
+    pub(super) fn free_end(
+        &self,
+        expected: Circle,
+        rope: RopeEnd,
+        reach_px: f64,
+    ) -> Option<[f64; 2]> {
+        let (sin, cos) = rope.angle_rad.sin_cos();
+        let inward = |px: f64| [expected.centre[0] + px * cos, expected.centre[1] + px * sin];
+        // Begin up the rope: the end may lie before the expected place.
+        let start = reach_px / 2.0 + expected.radius_px;
+        let samples = ((1.5 * reach_px + 2.0 * expected.radius_px) / STEP_PX) as usize;
+        let at = |k: usize| self.at(inward(start - k as f64 * STEP_PX));
+        let level = at(0);
+        if level < 6.0 * f64::from(self.background.noise) {
+            return None;
+        }
+        let last = (0..samples).find(|&k| at(k + 1) < level / 2.0)?;
+        let (here, next) = (at(last), at(last + 1));
+        let part = ((here - level / 2.0) / (here - next).max(1e-9)).clamp(0.0, 1.0);
+        Some(inward(
+            start - (last as f64 + part) * STEP_PX + expected.radius_px,
+        ))
+    }
+
     /// Places on rays where the contrast falls below half of the inside's.
     #[allow(
         clippy::cast_possible_truncation,
