@@ -1,7 +1,7 @@
 //! From camera frames to rope keypoints and to the score of a throw.
 //!
 //! Reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
-//! in the left eye ([`track`]), measures tip and target in stereo ([`score`]),
+//! in the left eye ([`mod@track`]), measures tip and target in stereo ([`mod@score`]),
 //! draws what it found ([`overlay`]) and says when a rope hangs still
 //! ([`still`]).
 //!
