@@ -108,7 +108,8 @@ pub(super) fn find(
         middle.iter().map(|p| [p[0] as usize, p[1] as usize]),
     );
     let centre = [(at % width) as f64, (at / width) as f64];
-    let (lead, mut lead_px) = lead_place(frame, background, gain, rope, centre, lead_radius_px);
+    let seen_radius_px = (lead_radius_px - MASK_GROWS_PX).max(1.0);
+    let (lead, mut lead_px) = lead_place(frame, background, gain, rope, centre, seen_radius_px);
     let on_way = pixels.len() / 2;
     let rope_px = f64::from(depth[pixels[on_way][1] as usize * width + pixels[on_way][0] as usize]);
     if lead::blends_in(lead.0, rope, lead_radius_px / rope_px.max(1.0)) {
@@ -144,7 +145,7 @@ fn lead_place(
     radius_px: f64,
 ) -> ((Colour, f32), [f64; 2]) {
     let window = Window::around(std::iter::once(centre), 3.0 * radius_px + 3.0, frame);
-    let core_px = 0.6 * (radius_px - MASK_GROWS_PX);
+    let core_px = 0.6 * radius_px;
     let mut lead = ([0.0; 3], 0.0);
     for _ in 0..4 {
         lead = colour_of(frame, gain, disc(centre, core_px, window));
