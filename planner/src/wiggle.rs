@@ -267,10 +267,8 @@ mod tests {
             };
             assert!((amplitude - expected).abs() < 0.02, "joint {}", j + 1);
         }
-        assert_eq!(
-            t.state_at(6.0).qd,
-            JointVector::ZERO.map(|_| t.state_at(6.0).qd[0])
-        );
+        // Still after the oscillation, but for what a spline rings at its knots.
+        assert!(t.state_at(6.0).qd.max_abs() < 1e-9);
         for k in 0..600 {
             let s = f64::from(k) * 0.01;
             let want = START_POSE[JOINT] + config.deflection_rad(s);
