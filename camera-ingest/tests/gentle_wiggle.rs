@@ -179,15 +179,17 @@ fn record(
     rope_lead: [[f64; 3]; 2],
     hidden: Range<usize>,
 ) -> Recording {
-    record_sizes(motion, count, rope_lead, RADII_M, hidden)
+    record_sizes(motion, count, rope_lead, RADII_M, RADII_M[0], hidden)
 }
 
-/// Draws `count` frames; the rope is hidden in those of `hidden`.
+/// Draws `count` frames; the rope is hidden in those of `hidden`. A knot of
+/// radius `knot_m` sits a third down the rope.
 fn record_sizes(
     motion: &Motion,
     count: usize,
     rope_lead: [[f64; 3]; 2],
     radii_m: [f64; 2],
+    knot_m: f64,
     hidden: Range<usize>,
 ) -> Recording {
     let camera = camera();
@@ -210,6 +212,7 @@ fn record_sizes(
         let rope = pixels(&nodes);
         if !hidden.contains(&index) {
             canvas.stroke(&rope, radii_m[0] * px_per_m, rope_lead[0]);
+            canvas.stroke(&[rope[NODES / 3]; 2], knot_m * px_per_m, rope_lead[0]);
             canvas.stroke(&[rope[NODES - 1]; 2], radii_m[1] * px_per_m, rope_lead[1]);
         }
         frames.push(canvas.frame(index));
@@ -305,9 +308,10 @@ const SWAY: Motion = Motion {
 
 #[test]
 fn a_lead_hardly_fatter_than_the_rope_is_told_by_its_colour() {
+    // A knot near the clamp is the fattest place.
     let colours = [[44.0, 82.0, 160.0], [240.0, 150.0, 30.0]];
     let radii_m = [0.011, 0.0125];
-    let recording = record_sizes(&SWAY, 100, colours, radii_m, 0..0);
+    let recording = record_sizes(&SWAY, 100, colours, radii_m, 0.0145, 0..0);
     let result = follow(&recording);
     assert_looks(&result, radii_m);
     assert_small(errors(&recording, &result, 0..100));
@@ -316,7 +320,14 @@ fn a_lead_hardly_fatter_than_the_rope_is_told_by_its_colour() {
 #[test]
 fn a_lead_of_the_ropes_colour_is_told_by_its_width() {
     let radii_m = [0.006, 0.017];
-    let recording = record_sizes(&SWAY, 100, [[60.0, 110.0, 60.0]; 2], radii_m, 0..0);
+    let recording = record_sizes(
+        &SWAY,
+        100,
+        [[60.0, 110.0, 60.0]; 2],
+        radii_m,
+        radii_m[0],
+        0..0,
+    );
     let result = follow(&recording);
     assert_looks(&result, radii_m);
     assert_small(errors(&recording, &result, 0..100));
@@ -325,7 +336,14 @@ fn a_lead_of_the_ropes_colour_is_told_by_its_width() {
 #[test]
 fn without_width_or_colour_to_go_by_the_lead_is_the_free_end() {
     let radii_m = [0.011, 0.011];
-    let recording = record_sizes(&SWAY, 100, [[60.0, 110.0, 60.0]; 2], radii_m, 0..0);
+    let recording = record_sizes(
+        &SWAY,
+        100,
+        [[60.0, 110.0, 60.0]; 2],
+        radii_m,
+        radii_m[0],
+        0..0,
+    );
     let result = follow(&recording);
     assert_looks(&result, radii_m);
     assert_small(errors(&recording, &result, 0..100));
