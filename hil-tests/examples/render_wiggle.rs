@@ -29,10 +29,10 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 const RATE_HZ: f64 = 60.0;
-const AMPLITUDE_DEG: f64 = 18.0;
-const FREQUENCY_HZ: f64 = 1.1;
-const DURATION_S: f64 = 5.2;
-const RAMP_S: f64 = 0.8;
+const AMPLITUDE_DEG: f64 = 16.5;
+const FREQUENCY_HZ: f64 = 1.3;
+const DURATION_S: f64 = 5.6;
+const RAMP_S: f64 = 2.8;
 const PHYSICS_STEP_S: f64 = 1e-4;
 /// Frames written as PNG.
 const PICTURES: usize = 8;
