@@ -21,11 +21,13 @@ use crate::state::{BaseLanes, Link, RopeLanes};
 /// Standard gravity of the model (m/s²), along -z.
 pub(crate) const GRAVITY_M_S2: f64 = 9.81;
 
-/// A push along +x and +y (m/s²), seven orders of magnitude below gravity: it
-/// moves a tip by less than a tenth of a micrometre, and keeps the components
-/// out of a planar motion's plane from decaying into denormal numbers, which
-/// would halve the speed of single precision.
-const SIDE_PUSH_M_S2: f64 = 1e-6;
+/// A push along +x and +y (m/s²), in single precision only. Seven orders of
+/// magnitude below gravity, it moves a tip by less than a tenth of a micrometre,
+/// and keeps the components out of a planar motion's plane from decaying into
+/// denormal numbers, which would halve the speed.
+const fn side_push_m_s2<V: Lanes>() -> f64 {
+    if V::IS_SINGLE { 1e-6 } else { 0.0 }
+}
 
 /// What the first sweep leaves for the second, per link.
 #[derive(Clone, Copy)]
@@ -117,8 +119,8 @@ fn eliminate<V: Lanes>(
         vw: Mat3::zero(),
         ww: Sym3::diagonal(rope.lead_inertia),
         bv: Vec3(
-            rope.lead_mass * V::splat(-SIDE_PUSH_M_S2),
-            rope.lead_mass * V::splat(-SIDE_PUSH_M_S2),
+            rope.lead_mass * V::splat(-side_push_m_s2::<V>()),
+            rope.lead_mass * V::splat(-side_push_m_s2::<V>()),
             rope.lead_mass * V::splat(GRAVITY_M_S2),
         ),
         bw: Vec3::zero(),
@@ -185,8 +187,8 @@ impl<V: Lanes> Beyond<V> {
         // Bias forces: what is beyond, and the link's own weight and centripetal pull.
         let u = self.vv.times_add(centripetal, self.bv);
         let lift = Vec3(
-            centripetal.0.fma(half, V::splat(-SIDE_PUSH_M_S2)),
-            centripetal.1.fma(half, V::splat(-SIDE_PUSH_M_S2)),
+            centripetal.0.fma(half, V::splat(-side_push_m_s2::<V>())),
+            centripetal.1.fma(half, V::splat(-side_push_m_s2::<V>())),
             centripetal.2.fma(half, V::splat(GRAVITY_M_S2)),
         );
         let own = lift.scale(mass);

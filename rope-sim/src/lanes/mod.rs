@@ -60,6 +60,8 @@ pub(crate) trait Lanes:
 {
     /// Number of lanes.
     const COUNT: usize;
+    /// Whether a lane holds a single-precision number.
+    const IS_SINGLE: bool = size_of::<Self>() == 4 * Self::COUNT;
     /// Joint angle over sine of the half angle, as a polynomial this type can resolve.
     const ANGLE_POLYNOMIAL: &'static [f64];
 
