@@ -5,6 +5,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tracing::Level;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::prelude::*;
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
@@ -12,12 +15,13 @@ fn main() -> ExitCode {
         eprintln!("usage: rt-controller CONFIG.toml");
         return ExitCode::from(2);
     };
-    tracing_subscriber::fmt()
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_unset| tracing_subscriber::EnvFilter::new("info,iceoryx2=warn")),
+    tracing_subscriber::registry()
+        .with(
+            Targets::new()
+                .with_default(Level::INFO)
+                .with_target("iceoryx2", Level::WARN),
         )
-        .with_writer(std::io::stderr)
+        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr))
         .init();
     let config = match ControllerConfig::load(Path::new(&path)) {
         Ok(config) => config,
