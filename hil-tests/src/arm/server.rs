@@ -10,6 +10,7 @@ use super::config::{ArmConfig, ArmStartError};
 use super::history::MotionHistory;
 use super::model::{ArmModel, STEP_S};
 use super::reports::ReportKind;
+use rt_controller::os::{RealTimeSettings, enter_real_time};
 use rt_controller::xarm::ErrorCode;
 use shared_types::MonotonicNs;
 use socket2::{Domain, SockRef, Socket, Type};
@@ -63,6 +64,7 @@ impl Plant {
 
     /// Steps the model every millisecond until told to stop.
     fn run(&self) {
+        stand_for_another_machine();
         let mut deadline = clock::now();
         while !self.is_stopping() {
             let now = self.with_model(|_, now| now);
@@ -70,6 +72,25 @@ impl Plant {
             deadline = deadline.plus_s(STEP_S).max(now);
             clock::sleep_until(deadline);
         }
+    }
+}
+
+/// `SCHED_FIFO` priority of the arm's threads, below that of a controller.
+const ARM_PRIORITY: u8 = 40;
+
+/// Puts the calling thread ahead of ordinary ones: a real arm has a computer of
+/// its own and takes setpoints in time whatever the client's machine does.
+/// Without the right to do so the arm works all the same, but under heavy load
+/// it may see setpoints late and stop with C24.
+fn stand_for_another_machine() {
+    let settings = RealTimeSettings {
+        priority: Some(ARM_PRIORITY),
+        cpu: None,
+        lock_memory: false,
+        require: false,
+    };
+    for warning in enter_real_time(&settings) {
+        tracing::debug!(%warning, "simulated arm");
     }
 }
 
@@ -250,6 +271,7 @@ impl Connection {
         let thread = thread::Builder::new()
             .name("arm-client".to_owned())
             .spawn(move || {
+                stand_for_another_machine();
                 match service {
                     Service::Commands => commands::serve(&served, &plant),
                     Service::Reports(kind) => publish::serve(&served, kind, &plant),
