@@ -75,10 +75,7 @@ fn lagging_arm_cm(request: &StrikeRequest, command: &JointTrajectory) -> f64 {
         .unzip();
     let arm = MeasuredArm::new(&times, &joints).expect("even samples");
     let rollouts = roll_out(
-        &[Candidate {
-            rope: &request.rope,
-            motion: &arm,
-        }],
+        &[Candidate::new(&request.rope, &arm)],
         &SimOptions {
             step_s: 5e-4,
             precision: Precision::F64,

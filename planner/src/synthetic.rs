@@ -94,7 +94,7 @@ pub fn film(
     )]
     let count = (horizon_s / SAMPLE_S) as usize;
     let rollouts = roll_out(
-        &[Candidate { rope, motion }],
+        &[Candidate::new(rope, motion)],
         &SimOptions {
             step_s: 5e-4,
             precision: Precision::F64,

@@ -193,7 +193,7 @@ pub fn clearance(
     let arm = PlannedArm::new(*trajectory);
     let candidates: Vec<Candidate<'_>> = ropes
         .iter()
-        .map(|rope| Candidate { rope, motion: &arm })
+        .map(|rope| Candidate::new(rope, &arm))
         .collect();
     let horizon_s = trajectory.duration_s() + 1.0;
     #[allow(

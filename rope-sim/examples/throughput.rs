@@ -10,8 +10,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Kernel, Outcome, PlannedArm, Precision, SimOptions, Start,
-    roll_out_with,
+    Candidate, FrameTimes, Kernel, Outcome, PlannedArm, Precision, SimOptions, Start, roll_out_with,
 };
 use shared_types::{JointTrajectory, JointVector, RopeParams};
 
@@ -112,19 +111,13 @@ fn main() {
         let throwing: Vec<Candidate> = throws
             .iter()
             .take(1500 / share)
-            .map(|motion| Candidate {
-                rope: &ropes[0],
-                motion: motion as &dyn AttachMotion,
-            })
+            .map(|motion| Candidate::new(&ropes[0], motion))
             .collect();
         measure("throws", kernel, &throwing, &options);
         let wiggling: Vec<Candidate> = ropes
             .iter()
             .take(3000 / share)
-            .map(|rope| Candidate {
-                rope,
-                motion: &wiggle,
-            })
+            .map(|rope| Candidate::new(rope, &wiggle))
             .collect();
         let frames = FrameTimes {
             first_s: 0.0,

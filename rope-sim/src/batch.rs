@@ -6,7 +6,8 @@ use crate::error::SimulateError;
 use crate::group::{GroupTask, Member, MemberResult};
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
-use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check};
+use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check, check_scene};
+use crate::scene::Scene;
 use nalgebra::{UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 use std::collections::BTreeMap;
@@ -24,7 +25,20 @@ pub fn roll_out(
     candidates: &[Candidate],
     options: &SimOptions,
 ) -> Result<Vec<Rollout>, SimulateError> {
-    roll_out_with(options.precision.fastest_kernel(), candidates, options)
+    roll_out_in(&Scene::EMPTY, candidates, options)
+}
+
+/// [`roll_out`] among obstacles and a domino. Use steps of at most 0.5 ms.
+///
+/// # Errors
+/// As [`roll_out`], and what is wrong with the scene.
+pub fn roll_out_in(
+    scene: &Scene,
+    candidates: &[Candidate],
+    options: &SimOptions,
+) -> Result<Vec<Rollout>, SimulateError> {
+    let kernel = options.precision.fastest_kernel();
+    roll_out_in_with(kernel, scene, candidates, options)
 }
 
 /// [`roll_out`] with a chosen kernel, whose number type overrides
@@ -37,7 +51,29 @@ pub fn roll_out_with(
     candidates: &[Candidate],
     options: &SimOptions,
 ) -> Result<Vec<Rollout>, SimulateError> {
+    roll_out_in_with(kernel, &Scene::EMPTY, candidates, options)
+}
+
+/// [`roll_out_in`] with a chosen kernel, as [`roll_out_with`].
+///
+/// # Errors
+/// As [`roll_out_in`].
+pub fn roll_out_in_with(
+    kernel: Kernel,
+    scene: &Scene,
+    candidates: &[Candidate],
+    options: &SimOptions,
+) -> Result<Vec<Rollout>, SimulateError> {
     check(candidates, options)?;
+    check_scene(scene, candidates)?;
+    if !scene.is_empty() || candidates.iter().any(|c| !c.extras.is_none()) {
+        let need = "contacts, drag and rest curvature are not simulated by this version";
+        return Err(SimulateError::Option {
+            field: "scene",
+            value: f64::NAN,
+            need,
+        });
+    }
     let all: Vec<usize> = (0..candidates.len()).collect();
     let batch = Batch {
         kernel,
@@ -72,6 +108,8 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
             peak_tip_speed_m_s: 0.0,
             outcome: Outcome::Diverged,
             max_joint_angle_rad: result.max_joint_angle_rad,
+            contacts: result.contacts,
+            domino: result.domino,
         };
     }
     Rollout {
@@ -80,6 +118,8 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
         peak_tip_speed_m_s: result.peak_tip_speed_m_s,
         outcome: success,
         max_joint_angle_rad: result.max_joint_angle_rad,
+        contacts: result.contacts,
+        domino: result.domino,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Why a simulation is refused.
 
+use crate::scene::SceneError;
 use shared_types::rope::RopeError;
 
 /// Why [`crate::roll_out`] gave nothing.
@@ -35,6 +36,21 @@ pub enum SimulateError {
         /// Which parameter, and its limits.
         source: RopeError,
     },
+    /// A rope's drag or rest curvature is unusable.
+    #[error("candidate {candidate}: `{field}` is {value}: {need}")]
+    Extras {
+        /// Index of the candidate, from 0.
+        candidate: usize,
+        /// Field of [`crate::RopeExtras`] or [`crate::AirDrag`].
+        field: &'static str,
+        /// Value found.
+        value: f64,
+        /// What is wrong with it.
+        need: &'static str,
+    },
+    /// The scene cannot be simulated.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// A motion ends before the simulation does and is not known to hold.
     #[error(
         "candidate {candidate}: its motion ends at {ends_s} s, before the horizon of {horizon_s} s"

@@ -7,6 +7,7 @@ use crate::clock::Clock;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
+use crate::scene::{ContactSummary, DominoOutcome};
 use crate::state::{Link, RopeLanes};
 use shared_types::RopeParams;
 
@@ -33,6 +34,8 @@ pub(crate) struct MemberResult {
     pub(crate) peak_tip_speed_m_s: f64,
     pub(crate) max_joint_angle_rad: f64,
     pub(crate) survived: bool,
+    pub(crate) contacts: Vec<ContactSummary>,
+    pub(crate) domino: Option<DominoOutcome>,
 }
 
 /// The work of one group; at most as many members as the kernel has lanes, all with
@@ -124,6 +127,8 @@ impl LaneTask for GroupTask<'_> {
                 peak_tip_speed_m_s: approach.peak_speed_m_s(lane),
                 max_joint_angle_rad: 2.0 * min_half_cos.get(lane).clamp(0.0, 1.0).acos(),
                 survived: health.alive[lane],
+                contacts: Vec::new(),
+                domino: None,
             })
             .collect()
     }

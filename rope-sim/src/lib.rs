@@ -30,6 +30,7 @@ mod batch;
 mod clock;
 mod equilibrium;
 mod error;
+mod extras;
 mod frames;
 mod group;
 mod kernel;
@@ -38,14 +39,19 @@ mod live;
 mod motion;
 pub mod npy;
 mod rollout;
+mod scene;
 mod scheme;
 mod state;
 
 pub use approach::ClosestApproach;
-pub use batch::{roll_out, roll_out_with};
+pub use batch::{roll_out, roll_out_in, roll_out_in_with, roll_out_with};
 pub use error::SimulateError;
+pub use extras::{AirDrag, RopeExtras};
 pub use frames::{FrameTimes, NodeTrack};
 pub use lanes::Kernel;
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
 pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};
+pub use scene::{
+    ContactSummary, Domino, DominoOutcome, Obstacle, Placement, RopePart, Scene, SceneError, Shape,
+};

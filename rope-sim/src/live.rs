@@ -314,14 +314,7 @@ mod tests {
                 threads: 1,
             };
             let rope = rope();
-            let batch = roll_out(
-                &[Candidate {
-                    rope: &rope,
-                    motion,
-                }],
-                &options,
-            )
-            .unwrap();
+            let batch = roll_out(&[Candidate::new(&rope, motion)], &options).unwrap();
             for (node, at) in live.nodes().iter().enumerate() {
                 let d = (batch[0].nodes.position(0, node) - at).norm();
                 assert!(d < 1e-7, "node {node} differs by {d} m");

@@ -2,9 +2,11 @@
 
 use crate::approach::ClosestApproach;
 use crate::error::SimulateError;
+use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
+use crate::scene::{ContactSummary, DominoOutcome, Placement, Scene, SceneError};
 use shared_types::RopeParams;
 
 /// Most steps of one rollout; more is a mistake in step or horizon.
@@ -76,12 +78,33 @@ pub struct Candidate<'a> {
     /// Motion of its attach frame. Candidates with the very same motion (the same
     /// reference) share its evaluation.
     pub motion: &'a dyn AttachMotion,
+    /// Physics beyond the nine parameters.
+    pub extras: RopeExtras,
+}
+
+impl<'a> Candidate<'a> {
+    /// A plain rope on a motion.
+    #[must_use]
+    pub fn new(rope: &'a RopeParams, motion: &'a dyn AttachMotion) -> Self {
+        Self {
+            rope,
+            motion,
+            extras: RopeExtras::NONE,
+        }
+    }
+
+    /// The same with physics beyond the nine parameters.
+    #[must_use]
+    pub fn with_extras(self, extras: RopeExtras) -> Self {
+        Self { extras, ..self }
+    }
 }
 
 impl core::fmt::Debug for Candidate<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Candidate")
             .field("rope", self.rope)
+            .field("extras", &self.extras)
             .finish_non_exhaustive()
     }
 }
@@ -113,6 +136,29 @@ pub struct Rollout {
     /// Largest joint angle (rad). Beyond about 2.6 the model's own law (torque flips
     /// at pi) makes the motion ill-posed.
     pub max_joint_angle_rad: f64,
+    /// What it did with each obstacle of the scene, in their order.
+    pub contacts: Vec<ContactSummary>,
+    /// What became of the scene's domino.
+    pub domino: Option<DominoOutcome>,
+}
+
+/// Checks the scene's numbers, and that every motion knows the arm it is on.
+pub(crate) fn check_scene(scene: &Scene, candidates: &[Candidate]) -> Result<(), SimulateError> {
+    scene.check()?;
+    for (index, obstacle) in scene.obstacles.iter().enumerate() {
+        let Placement::ArmLink { link, .. } = obstacle.placement else {
+            continue;
+        };
+        let is_armless = |c: &Candidate| c.motion.arm_links(0.0).is_none();
+        if let Some(candidate) = candidates.iter().position(is_armless) {
+            return Err(SimulateError::Scene(SceneError::NoArm {
+                candidate,
+                obstacle: index,
+                link,
+            }));
+        }
+    }
+    Ok(())
 }
 
 /// Checks options and candidates, by name.
@@ -172,6 +218,14 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
                 candidate: index,
                 source,
             })?;
+        if let Some((field, value, need)) = candidate.extras.fault() {
+            return Err(SimulateError::Extras {
+                candidate: index,
+                field,
+                value,
+                need,
+            });
+        }
         let ends_s = candidate.motion.duration_s();
         let long_enough = candidate.motion.holds_after_end() || ends_s >= options.horizon_s - 1e-9;
         if !long_enough {

@@ -91,7 +91,7 @@ fn arbitrary_shake() -> impl Strategy<Value = Shake> {
 fn run(kernel: Kernel, ropes: &[(RopeParams, Shake)], threads: usize) -> Vec<Rollout> {
     let candidates: Vec<Candidate> = ropes
         .iter()
-        .map(|(rope, motion)| Candidate { rope, motion })
+        .map(|(rope, motion)| Candidate::new(rope, motion))
         .collect();
     roll_out_with(kernel, &candidates, &options(threads)).unwrap()
 }
@@ -173,26 +173,8 @@ fn sharing_a_motion_changes_nothing() {
     };
     let copy = shake.clone();
     let rope = rope();
-    let shared = [
-        Candidate {
-            rope: &rope,
-            motion: &shake,
-        },
-        Candidate {
-            rope: &rope,
-            motion: &shake,
-        },
-    ];
-    let separate = [
-        Candidate {
-            rope: &rope,
-            motion: &shake,
-        },
-        Candidate {
-            rope: &rope,
-            motion: &copy,
-        },
-    ];
+    let shared = [Candidate::new(&rope, &shake), Candidate::new(&rope, &shake)];
+    let separate = [Candidate::new(&rope, &shake), Candidate::new(&rope, &copy)];
     assert_eq!(
         roll_out(&shared, &options(1)).unwrap(),
         roll_out(&separate, &options(2)).unwrap()
@@ -229,11 +211,8 @@ fn refusal(rope: &RopeParams, motion: &dyn AttachMotion, options: &SimOptions) -
             period_s: 0.1,
         },
     );
-    let first = Candidate {
-        rope: &good,
-        motion: &shake,
-    };
-    roll_out(&[first, Candidate { rope, motion }], options).unwrap_err()
+    let first = Candidate::new(&good, &shake);
+    roll_out(&[first, Candidate::new(rope, motion)], options).unwrap_err()
 }
 
 #[test]

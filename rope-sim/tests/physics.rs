@@ -34,7 +34,7 @@ impl AttachMotion for Fixed {
 }
 
 fn simulate(rope: &RopeParams, motion: &dyn AttachMotion, options: &SimOptions) -> Rollout {
-    roll_out(&[Candidate { rope, motion }], options)
+    roll_out(&[Candidate::new(rope, motion)], options)
         .unwrap()
         .remove(0)
 }

@@ -3,8 +3,8 @@
 
 use super::{CalmError, CalmRequest};
 use rope_sim::{AttachMotion, MeasuredArm};
-use shared_types::kinematics::{FrameMotion, attach_motion};
-use shared_types::{JOINTS, JointTrajectory, JointVector};
+use shared_types::kinematics::{FrameMotion, attach_motion, link_motions};
+use shared_types::{JOINTS, JointState, JointTrajectory, JointVector};
 
 /// Largest distance of a joint from the commanded start pose (rad): above what
 /// gravity and encoders leave, below what matters to the rope.
@@ -61,15 +61,25 @@ pub(super) struct ChainedArm<'a> {
     trajectory: &'a JointTrajectory,
 }
 
-impl AttachMotion for ChainedArm<'_> {
-    fn at(&self, t_s: f64) -> FrameMotion {
+impl ChainedArm<'_> {
+    fn joints_at(&self, t_s: f64) -> JointState {
         let since_start_s = t_s - self.prelude.start_s;
         if since_start_s <= 0.0 {
-            return self.prelude.measured.at(t_s);
+            return self.prelude.measured.joints_at(t_s);
         }
         let mut state = self.trajectory.state_at(since_start_s);
         state.q = state.q + self.prelude.standing_error;
-        attach_motion(&state)
+        state
+    }
+}
+
+impl AttachMotion for ChainedArm<'_> {
+    fn at(&self, t_s: f64) -> FrameMotion {
+        attach_motion(&self.joints_at(t_s))
+    }
+
+    fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
+        Some(link_motions(&self.joints_at(t_s)))
     }
 
     fn duration_s(&self) -> f64 {

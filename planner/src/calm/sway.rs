@@ -4,8 +4,7 @@ use super::CalmError;
 use super::chain::Prelude;
 use nalgebra::Vector3;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions,
-    Start, roll_out,
+    Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, roll_out,
 };
 use shared_types::{JointTrajectory, RopeParams};
 
@@ -91,10 +90,7 @@ impl<'a> SwaySimulator<'a> {
         let arms: Vec<_> = moves.iter().map(|t| self.prelude.then(t)).collect();
         let candidates: Vec<Candidate<'_>> = arms
             .iter()
-            .map(|arm| Candidate {
-                rope: self.rope,
-                motion: arm,
-            })
+            .map(|arm| Candidate::new(self.rope, arm))
             .collect();
         let rollouts = roll_out(&candidates, &self.options)?;
         Ok(rollouts
@@ -131,10 +127,7 @@ fn rest(
         1.0,
     )?);
     let rollouts = roll_out(
-        &[Candidate {
-            rope,
-            motion: &held as &dyn AttachMotion,
-        }],
+        &[Candidate::new(rope, &held)],
         &SimOptions {
             step_s: STEP_S,
             precision: Precision::F64,

@@ -86,10 +86,7 @@ fn settled_sway_m(request: &CalmRequest, trajectory: &JointTrajectory) -> f64 {
     });
     let arm = MeasuredArm::new(&times_s, &q).unwrap();
     let rollouts = roll_out(
-        &[Candidate {
-            rope: &request.rope,
-            motion: &arm,
-        }],
+        &[Candidate::new(&request.rope, &arm)],
         &SimOptions {
             step_s: 5e-4,
             precision: Precision::F64,

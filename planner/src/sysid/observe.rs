@@ -144,10 +144,7 @@ impl<'a> Film<'a> {
     ) -> Result<Vec<Swing>, IdentifyError> {
         let candidates: Vec<Candidate<'_>> = ropes
             .iter()
-            .map(|rope| Candidate {
-                rope,
-                motion: self.observation.motion,
-            })
+            .map(|rope| Candidate::new(rope, self.observation.motion))
             .collect();
         #[allow(
             clippy::cast_possible_truncation,

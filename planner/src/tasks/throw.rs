@@ -61,7 +61,7 @@ impl ThrowSimulator {
         let candidates: Vec<Candidate<'_>> = throws
             .iter()
             .zip(&arms)
-            .map(|((rope, _), arm)| Candidate { rope, motion: arm })
+            .map(|((rope, _), arm)| Candidate::new(rope, arm))
             .collect();
         #[allow(
             clippy::cast_possible_truncation,

@@ -1,7 +1,7 @@
 //! The arm as its joint encoders reported it.
 
 use super::{AttachMotion, MotionError, check_times};
-use shared_types::kinematics::{FrameMotion, attach_motion};
+use shared_types::kinematics::{FrameMotion, attach_motion, link_motions};
 use shared_types::{JOINTS, JointState, JointVector};
 
 /// Knot spacing of the fitted spline (s): short enough for the arm's bandwidth,
@@ -96,6 +96,10 @@ impl MeasuredArm {
 impl AttachMotion for MeasuredArm {
     fn at(&self, t_s: f64) -> FrameMotion {
         attach_motion(&self.joints_at(t_s))
+    }
+
+    fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
+        Some(link_motions(&self.joints_at(t_s)))
     }
 
     fn duration_s(&self) -> f64 {

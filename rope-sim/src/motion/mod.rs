@@ -13,6 +13,7 @@ pub use measured::MeasuredArm;
 pub use planned::PlannedArm;
 pub use pose_track::{PoseRow, PoseTrack};
 
+use shared_types::JOINTS;
 use shared_types::kinematics::FrameMotion;
 
 /// Motion of the attach frame A in the world: pose and its exact first two
@@ -32,6 +33,12 @@ pub trait AttachMotion: Sync {
     /// Where it is not, simulating beyond that time is refused.
     fn holds_after_end(&self) -> bool {
         true
+    }
+
+    /// Motions of the arm's links 1 to 7 that go with [`AttachMotion::at`], where
+    /// there is an arm; obstacles can be placed on them.
+    fn arm_links(&self, _t_s: f64) -> Option<[FrameMotion; JOINTS]> {
+        None
     }
 }
 

@@ -113,10 +113,7 @@ pub fn simulate(case: &Case, kernel: Kernel, step_s: f64) -> Rollout {
         horizon_s: last_s,
         threads: 1,
     };
-    let candidate = Candidate {
-        rope: &case.rope,
-        motion: &case.motion,
-    };
+    let candidate = Candidate::new(&case.rope, &case.motion);
     roll_out_with(kernel, &[candidate], &options)
         .unwrap()
         .remove(0)

@@ -20,7 +20,7 @@ fn simulate(
     motion: &dyn AttachMotion,
     options: &SimOptions,
 ) -> anyhow::Result<Rollout> {
-    let mut rollouts = roll_out(&[Candidate { rope, motion }], options)?;
+    let mut rollouts = roll_out(&[Candidate::new(rope, motion)], options)?;
     let rollout = rollouts.pop().context("the simulator returned nothing")?;
     ensure!(
         rollout.outcome != SimOutcome::Diverged,

@@ -1,0 +1,72 @@
+//! What a rope may have beyond the paper's nine parameters: air drag and a rest
+//! curvature. Off by default.
+
+/// Drag of still air on the links and the lead, quadratic in the speed.
+///
+/// A link of length s and radius r feels `1/2 rho 2 r s (c_n |v_n| v_n + c_t |v_t| v_t)`
+/// against its centre's velocity, split into parts across and along the link; the
+/// lead `1/2 rho pi r_L² c_L |v| v`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AirDrag {
+    /// Density of the air (kg/m³), about 1.2.
+    pub air_density_kg_m3: f64,
+    /// Coefficient across a link, on its diameter times length (1), about 1.1.
+    pub normal_coefficient: f64,
+    /// Coefficient along a link, on the same area (1), about 0.02.
+    pub tangential_coefficient: f64,
+    /// Coefficient of the lead, on its cross section (1), about 0.5.
+    pub lead_coefficient: f64,
+}
+
+/// Physics of a rope beyond its nine parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RopeExtras {
+    /// Drag of still air; `None` is vacuum, as in the paper.
+    pub air_drag: Option<AirDrag>,
+    /// Curvature of the unloaded rope (rad/m), a rotation vector per length in the
+    /// link's frame, the same all along: every joint, the first included, rests
+    /// turned by `exp(curvature s)`. Zero is a straight rope.
+    pub rest_curvature_per_m: [f64; 3],
+}
+
+impl RopeExtras {
+    /// The plain rope of nine parameters.
+    pub const NONE: Self = Self {
+        air_drag: None,
+        rest_curvature_per_m: [0.0; 3],
+    };
+
+    /// Whether this is the plain rope of nine parameters.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    /// First unusable number: its field, value, and what it must be.
+    pub(crate) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
+        let curvature = self.rest_curvature_per_m.into_iter();
+        if let Some(value) = curvature.into_iter().find(|v| v.abs() > 1e3 || v.is_nan()) {
+            return Some((
+                "rest_curvature_per_m",
+                value,
+                "must be a number of at most 1000 rad/m",
+            ));
+        }
+        let drag = self.air_drag?;
+        [
+            ("air_density_kg_m3", drag.air_density_kg_m3),
+            ("normal_coefficient", drag.normal_coefficient),
+            ("tangential_coefficient", drag.tangential_coefficient),
+            ("lead_coefficient", drag.lead_coefficient),
+        ]
+        .into_iter()
+        .find(|(_, value)| !(0.0..=1e4).contains(value))
+        .map(|(field, value)| (field, value, "must be from 0 to 10 000"))
+    }
+}
+
+impl Default for RopeExtras {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
