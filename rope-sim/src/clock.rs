@@ -8,12 +8,12 @@ use crate::base_path::{BasePath, CHANNELS, Interval};
 use crate::lanes::Lanes;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{BaseLanes, RopeLanes};
+use shared_types::RopeParams;
 
 /// One lane's place on its path.
 struct Cursor<'a> {
     path: &'a BasePath,
-    /// Stiffness and damping of the rope in this lane.
-    joint: (f64, f64),
+    rope: &'a RopeParams,
     interval: usize,
     /// Steps done within the interval.
     step: usize,
@@ -45,15 +45,15 @@ pub(crate) struct BaseState<V> {
 }
 
 impl<'a, V: Lanes> Clock<'a, V> {
-    /// Lane i follows `paths[i]` with joint (stiffness, damping) `joints[i]`.
+    /// Lane i follows `paths[i]` with rope `ropes[i]`.
     #[inline(always)]
-    pub(crate) fn new(paths: &[&'a BasePath], joints: &[(f64, f64)], origin_m: [f64; 3]) -> Self {
+    pub(crate) fn new(paths: &[&'a BasePath], ropes: &[&'a RopeParams], origin_m: [f64; 3]) -> Self {
         let cursors = paths
             .iter()
-            .zip(joints)
-            .map(|(path, joint)| Cursor {
+            .zip(ropes)
+            .map(|(path, rope)| Cursor {
                 path,
-                joint: *joint,
+                rope,
                 interval: 0,
                 step: 0,
                 phase: Phase::Regular,
@@ -122,11 +122,8 @@ impl<'a, V: Lanes> Clock<'a, V> {
             .set(lane, cursor.step as f64 / interval.steps as f64);
         if phase != cursor.phase || (interval.step_s - cursor.step_s).abs() > 0.0 {
             self.scheme.set(lane, interval.step_s, phase);
-            let (stiffness, damping) = cursor.joint;
-            rope.kappa.set(
-                lane,
-                joint_resistance(interval.step_s, phase, stiffness, damping),
-            );
+            let resistance = joint_resistance(interval.step_s, phase, cursor.rope);
+            rope.set(lane, cursor.rope, resistance);
             (cursor.phase, cursor.step_s) = (phase, interval.step_s);
         }
         if phase == Phase::Restart {

@@ -61,18 +61,9 @@ impl LaneTask for GroupTask<'_> {
         let mut links = start_links::<V>(self.members);
         let mut scratch = vec![Elimination::empty(); n];
         let paths: Vec<&BasePath> = self.members.iter().map(|m| m.path).collect();
-        let joints: Vec<(f64, f64)> = self
-            .members
-            .iter()
-            .map(|m| {
-                (
-                    m.rope.joint_stiffness_nm_per_rad,
-                    m.rope.joint_damping_nms_per_rad,
-                )
-            })
-            .collect();
+        let ropes: Vec<&RopeParams> = self.members.iter().map(|m| m.rope).collect();
         let target = self.closest_to_m.unwrap_or([0.0; 3]);
-        let mut clock = Clock::new(&paths, &joints, target);
+        let mut clock = Clock::new(&paths, &ropes, target);
         let mut recorder = FrameRecorder::new(self.frames, count, n, self.single_precision);
         let start = clock.base();
         let mut approach = ApproachRecorder::new(
@@ -186,7 +177,7 @@ impl<V: Lanes> Health<V> {
 fn rope_lanes<V: Lanes>(members: &[Member]) -> RopeLanes<V> {
     let mut out = RopeLanes::of(members[0].rope);
     for lane in 1..V::COUNT {
-        out.set(lane, members[lane.min(members.len() - 1)].rope);
+        out.set(lane, members[lane.min(members.len() - 1)].rope, 1.0);
     }
     out
 }

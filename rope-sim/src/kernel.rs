@@ -8,10 +8,15 @@
 //! three degrees of freedom: twist is part of the model.
 //!
 //! Per link the unknown is its exact angular acceleration `alpha`; the joint's
-//! spring and damper are implicit (linearised once) through `kappa`, see
-//! [`crate::scheme`]. Everything beyond node i acts on link i as
-//! `force = vv a + vw alpha + bv`, `torque = vw^T a + ww alpha + bw` for an
-//! acceleration `a` of node i.
+//! spring and damper are implicit (linearised once) through the joint resistance,
+//! see [`crate::scheme`]. Only ratios of stiffness, damping and masses act on the
+//! motion, so masses, torques and forces are in units of the joint resistance
+//! ([`RopeLanes::set`]), which is then 1 and drops out.
+//!
+//! The elimination is one long chain of dependent operations from link to link. What
+//! does not hang on it (prediction and joint torque of the next link) is written
+//! between the halves of the elimination of a link, where the processor would
+//! otherwise wait for a division.
 
 use crate::algebra::{Mat3, Quat, Sym3, Vec3};
 use crate::lanes::Lanes;
@@ -29,10 +34,12 @@ const fn side_push_m_s2<V: Lanes>() -> f64 {
     if V::IS_SINGLE { 1e-6 } else { 0.0 }
 }
 
-/// What the first sweep leaves for the second, per link.
+/// What the first sweep leaves for the second, per link:
+/// `alpha = s_inv alpha_parent + y - x^T a_parent`.
 #[derive(Clone, Copy)]
 pub(crate) struct Elimination<V> {
     s_inv: Sym3<V>,
+    /// Holds the joint torque until the link is eliminated.
     y: Vec3<V>,
     x: Mat3<V>,
     span: Vec3<V>,
@@ -51,15 +58,6 @@ impl<V: Lanes> Elimination<V> {
             centripetal: Vec3::zero(),
         }
     }
-}
-
-/// Reaction of everything beyond a node.
-struct Beyond<V> {
-    vv: Sym3<V>,
-    vw: Mat3<V>,
-    ww: Sym3<V>,
-    bv: Vec3<V>,
-    bw: Vec3<V>,
 }
 
 /// What a step tells about itself.
@@ -83,18 +81,17 @@ pub(crate) fn step<V: Lanes>(
 ) -> StepReport<V> {
     let min_half_cos = eliminate(links, scratch, rope, base, scheme);
     let mut acceleration = base.a;
-    let mut alpha_parent = base.alpha;
+    let mut alpha = base.alpha;
     let mut tip = Vec3::zero();
     let mut tip_velocity = Vec3::zero();
     for (link, e) in links.iter_mut().zip(scratch.iter()) {
-        let driven = e.s_inv.times_add(alpha_parent.scale(rope.kappa), e.y);
-        let alpha = driven.sub(e.x.transpose_times_add(acceleration, Vec3::zero()));
+        let free = e.s_inv.times_add(alpha, e.y);
+        alpha = e.x.transpose_times_sub(acceleration, free);
         acceleration = alpha.cross_add(e.span, acceleration.add(e.centripetal));
         link.correct(scheme, alpha);
         let span = link.q.down(rope.link_length);
         tip = tip.add(span);
         tip_velocity = link.w.cross_add(span, tip_velocity);
-        alpha_parent = alpha;
     }
     StepReport {
         tip,
@@ -113,127 +110,228 @@ fn eliminate<V: Lanes>(
     base: &BaseLanes<V>,
     scheme: &Scheme<V>,
 ) -> V {
-    let mut min_half_cos = V::splat(1.0);
-    let mut beyond = Beyond {
-        vv: Sym3::diagonal(rope.lead_mass),
-        vw: Mat3::zero(),
-        ww: Sym3::diagonal(rope.lead_inertia),
-        bv: Vec3(
-            rope.lead_mass * V::splat(-side_push_m_s2::<V>()),
-            rope.lead_mass * V::splat(-side_push_m_s2::<V>()),
-            rope.lead_mass * V::splat(GRAVITY_M_S2),
-        ),
-        bw: Vec3::zero(),
-    };
-    let mut rest = links;
-    let mut spaces = scratch;
-    if let Some(last) = rest.last_mut() {
+    let mut beyond = Beyond::lead(rope);
+    let mut joints = Joints::new(base, rope);
+    if let Some(last) = links.last_mut() {
         last.predict(scheme);
+        joints.child = Ends::of(last, rope);
     }
-    while let (Some((link, nearer)), Some((space, spaces_nearer))) =
-        (rest.split_last_mut(), spaces.split_last_mut())
+    joints.prepare(links, scratch, rope, scheme);
+    let mut nearer = links;
+    let mut spaces = scratch;
+    while let (Some((_, links_nearer)), Some((space, spaces_nearer))) =
+        (nearer.split_last_mut(), spaces.split_last_mut())
     {
-        let (parent_q, parent_w, parent_al) = match nearer.last_mut() {
-            Some(parent) => {
-                parent.predict(scheme);
-                (parent.q, parent.w, parent.al)
-            }
-            None => (base.q, base.w, base.alpha),
-        };
-        let turn = link.q.times_conj(parent_q);
-        min_half_cos = min_half_cos.min(turn.w.abs());
-        let torque = joint_torque(rope, turn, link.w.sub(parent_w));
-        let torque = link.al.sub(parent_al).scale_add(rope.kappa, torque);
-        beyond.absorb(link, torque, rope, scheme, space);
-        rest = nearer;
+        let half = beyond.open(rope, space);
+        joints.prepare(links_nearer, spaces_nearer, rope, scheme);
+        beyond.close(rope, space, &half);
+        nearer = links_nearer;
         spaces = spaces_nearer;
     }
-    min_half_cos
+    joints.min_half_cos
 }
 
-/// Spring and damper of a joint: `-k phi - c w`, with the rotation vector `phi` of
-/// `turn`. The angle over the sine of the half angle is a polynomial in
-/// `1 - |cos|`; the sign flip picks the rotation of at most half a turn.
+/// What a joint feels of one of the bodies it joins.
+#[derive(Clone, Copy)]
+struct Ends<V> {
+    q: Quat<V>,
+    /// `al - c w`: acceleration guess and damping, whose difference over the joint
+    /// is a part of its torque.
+    pull: Vec3<V>,
+}
+
+impl<V: Lanes> Ends<V> {
+    #[inline(always)]
+    fn of(link: &Link<V>, rope: &RopeLanes<V>) -> Self {
+        Self {
+            q: link.q,
+            pull: link.w.scale_sub(rope.damping, link.al),
+        }
+    }
+}
+
+/// Joint by joint towards the attach point: predictions and torques.
+struct Joints<V> {
+    base: Ends<V>,
+    /// Of the link whose joint comes next.
+    child: Ends<V>,
+    min_half_cos: V,
+}
+
+impl<V: Lanes> Joints<V> {
+    #[inline(always)]
+    fn new(base: &BaseLanes<V>, rope: &RopeLanes<V>) -> Self {
+        let base = Ends {
+            q: base.q,
+            pull: base.w.scale_sub(rope.damping, base.alpha),
+        };
+        Self {
+            base,
+            child: base,
+            min_half_cos: V::splat(1.0),
+        }
+    }
+
+    /// Fills in what the elimination of the last of `links`, already predicted, needs,
+    /// and predicts the link before it.
+    #[inline(always)]
+    fn prepare(
+        &mut self,
+        links: &mut [Link<V>],
+        scratch: &mut [Elimination<V>],
+        rope: &RopeLanes<V>,
+        scheme: &Scheme<V>,
+    ) {
+        let (Some((link, nearer)), Some(space)) = (links.split_last_mut(), scratch.last_mut())
+        else {
+            return;
+        };
+        space.span = link.q.down(rope.link_length);
+        space.centripetal = centripetal(link, space.span, scheme);
+        let parent = match nearer.last_mut() {
+            Some(parent) => {
+                parent.predict(scheme);
+                Ends::of(parent, rope)
+            }
+            None => self.base,
+        };
+        let turn = self.child.q.times_conj(parent.q);
+        self.min_half_cos = self.min_half_cos.min(turn.w.abs());
+        let pull = self.child.pull.sub(parent.pull);
+        space.y = turn.v.scale_sub(spring(rope, turn.w), pull);
+        self.child = parent;
+    }
+}
+
+/// Stiffness times joint angle over the sine of the half angle: a polynomial in
+/// `1 - |cos|` of the half angle; the sign picks the rotation of at most half a turn.
 #[inline(always)]
-fn joint_torque<V: Lanes>(rope: &RopeLanes<V>, turn: Quat<V>, w: Vec3<V>) -> Vec3<V> {
-    let x = V::splat(1.0) - turn.w.abs();
+fn spring<V: Lanes>(rope: &RopeLanes<V>, half_cos: V) -> V {
+    let x = V::splat(1.0) - half_cos.abs();
     let mut f = V::splat(0.0);
+    let mut first = true;
     let mut power = V::ANGLE_POLYNOMIAL.len();
     while power > 0 {
         power -= 1;
-        f = f.fma(x, V::splat(V::ANGLE_POLYNOMIAL[power]));
+        let coefficient = V::splat(V::ANGLE_POLYNOMIAL[power]);
+        f = if first {
+            coefficient
+        } else {
+            f.fma(x, coefficient)
+        };
+        first = false;
     }
-    let spring = (f * rope.stiffness).flip_by(turn.w);
-    w.scale_sub(rope.damping, turn.v.scale(-spring))
+    (f * rope.stiffness).flip_by(half_cos)
+}
+
+/// `w x (w x span)` at the extrapolated velocity: the predicted one carries the
+/// dominant error of the single linear solve.
+#[inline(always)]
+fn centripetal<V: Lanes>(link: &Link<V>, span: Vec3<V>, scheme: &Scheme<V>) -> Vec3<V> {
+    let w = link.al_change.scale_add(scheme.centripetal, link.w);
+    span.scale_sub(w.dot(w), w.scale(w.dot(span)))
+}
+
+/// Reaction of everything beyond node i on link i, for an acceleration `a` of the
+/// node and the angular acceleration `alpha` of the link: `force = vv a + vw alpha +
+/// bv`, `torque = vw^T a + ww alpha + bw`.
+struct Beyond<V> {
+    /// `vv` and half the mass of the link.
+    vv_link: Sym3<V>,
+    vw: Mat3<V>,
+    /// Identity minus `ww`.
+    one_less_ww: Sym3<V>,
+    /// `bv` and half the weight of the link.
+    bv_link: Vec3<V>,
+    bw: Vec3<V>,
+}
+
+/// A link's elimination up to the division.
+struct HalfEliminated<V> {
+    v: Mat3<V>,
+    /// Cofactors of the matrix to invert, and the inverse of its determinant.
+    cofactors: Sym3<V>,
+    per_determinant: V,
+    /// `vv cent + bv` with half the link's own share, and its torque.
+    force: Vec3<V>,
+    bw: Vec3<V>,
 }
 
 impl<V: Lanes> Beyond<V> {
-    /// Eliminates one link: afterwards `self` is seen from its nearer node.
     #[inline(always)]
-    fn absorb(
-        &mut self,
-        link: &Link<V>,
-        torque: Vec3<V>,
-        rope: &RopeLanes<V>,
-        scheme: &Scheme<V>,
-        out: &mut Elimination<V>,
-    ) {
+    fn lead(rope: &RopeLanes<V>) -> Self {
         let half = V::splat(0.5);
-        let mass = rope.link_mass;
-        let kappa = rope.kappa;
-        let span = link.q.down(rope.link_length);
-        let centripetal = centripetal(link, span, scheme);
+        Self {
+            vv_link: Sym3::diagonal(rope.link_mass.fma(half, rope.lead_mass)),
+            vw: Mat3::zero(),
+            one_less_ww: Sym3::diagonal(V::splat(1.0) - rope.lead_inertia),
+            bv_link: up().scale(rope.link_mass.fma(half, rope.lead_mass)),
+            bw: Vec3::zero(),
+        }
+    }
 
-        // Bias forces: what is beyond, and the link's own weight and centripetal pull.
-        let u = self.vv.times_add(centripetal, self.bv);
-        let lift = Vec3(
-            centripetal.0.fma(half, V::splat(-side_push_m_s2::<V>())),
-            centripetal.1.fma(half, V::splat(-side_push_m_s2::<V>())),
-            centripetal.2.fma(half, V::splat(GRAVITY_M_S2)),
-        );
-        let own = lift.scale(mass);
-        let bv = u.add(own);
-        let bw = span.cross_add(
-            own.scale_add(half, u),
-            self.vw.transpose_times_add(centripetal, self.bw),
-        );
-
+    /// First half of the elimination of the link of `space`.
+    #[inline(always)]
+    fn open(&self, rope: &RopeLanes<V>, space: &Elimination<V>) -> HalfEliminated<V> {
+        let Elimination {
+            span, centripetal, ..
+        } = *space;
+        let quarter_mass = rope.link_mass * V::splat(0.25);
         // Coupling of the nearer node's acceleration with this link's rotation.
-        let p = self.vv.plus_diagonal(mass * half).rows();
+        let p = self.vv_link.rows();
         let v = Mat3([
             span.cross_add(p[0], self.vw.0[0]),
             span.cross_add(p[1], self.vw.0[1]),
             span.cross_add(p[2], self.vw.0[2]),
         ]);
-        let quarter_mass = mass * V::splat(0.25);
-        let s_inv = self.rotation_matrix(span, &v, rope, quarter_mass).inverse();
+        let s = self.rotation_matrix(span, &v, rope, quarter_mass);
+        let (cofactors, determinant) = s.cofactors();
+        let per_determinant = determinant.recip();
 
-        let y = s_inv.times(torque.sub(bw));
+        let force = self.vv_link.times_add(centripetal, self.bv_link);
+        let at_centre = centripetal.scale_sub(quarter_mass, force);
+        let bw = span.cross_add(
+            at_centre,
+            self.vw.transpose_times_add(centripetal, self.bw),
+        );
+        HalfEliminated {
+            v,
+            cofactors,
+            per_determinant,
+            force,
+            bw,
+        }
+    }
+
+    /// Second half: afterwards `self` is seen from the link's nearer node.
+    #[inline(always)]
+    fn close(
+        &mut self,
+        rope: &RopeLanes<V>,
+        space: &mut Elimination<V>,
+        half: &HalfEliminated<V>,
+    ) {
+        let v = &half.v;
+        let s_inv = half.cofactors.scale(half.per_determinant);
         let x = Mat3([
             s_inv.times(v.0[0]),
             s_inv.times(v.0[1]),
             s_inv.times(v.0[2]),
         ]);
-        self.vv = self.vv.plus_diagonal(mass).minus_product_transposed(&x, &v);
-        self.vw = x.scale(kappa);
-        let k2 = kappa * kappa;
-        self.ww = Sym3 {
-            xx: s_inv.xx.fnma(k2, kappa),
-            xy: -(s_inv.xy * k2),
-            xz: -(s_inv.xz * k2),
-            yy: s_inv.yy.fnma(k2, kappa),
-            yz: -(s_inv.yz * k2),
-            zz: s_inv.zz.fnma(k2, kappa),
-        };
-        self.bv = v.times_add(y, bv);
-        self.bw = y.scale_sub(kappa, torque);
-        *out = Elimination {
-            s_inv,
-            y,
-            x,
-            span,
-            centripetal,
-        };
+        self.vv_link = self
+            .vv_link
+            .plus_diagonal(rope.link_mass)
+            .minus_product_transposed(&x, v);
+        let torque = space.y;
+        let y = s_inv.times(torque.sub(half.bw));
+        self.vw = x;
+        self.one_less_ww = s_inv;
+        let weight = up().scale(rope.link_mass);
+        self.bv_link = v.times_add(y, half.force.add(weight));
+        self.bw = torque.sub(y);
+        space.s_inv = s_inv;
+        space.y = y;
+        space.x = x;
     }
 
     /// Torque per angular acceleration of the link about its nearer node; symmetric
@@ -246,34 +344,35 @@ impl<V: Lanes> Beyond<V> {
         rope: &RopeLanes<V>,
         quarter_mass: V,
     ) -> Sym3<V> {
-        let own = rope.link_inertia + rope.kappa;
+        // The joint's resistance on both sides, itself 1, the link's own inertia.
+        let own = rope.link_inertia + V::splat(2.0);
         let diagonal = (quarter_mass * rope.link_length).fnma(rope.link_length, own);
-        let s = self
-            .ww
-            .plus_diagonal(diagonal)
-            .plus_outer(quarter_mass, span);
+        let n = &self.one_less_ww;
         let Vec3(x, y, z) = span;
+        let Vec3(mx, my, mz) = span.scale(quarter_mass);
         let [v0, v1, v2] = v.0;
         let [a0, a1, a2] = self.vw.0;
+        let xx = mx.fma(x, diagonal - n.xx);
+        let xy = mx.fma(y, -n.xy);
+        let xz = mx.fma(z, -n.xz);
+        let yy = my.fma(y, diagonal - n.yy);
+        let yz = my.fma(z, -n.yz);
+        let zz = mz.fma(z, diagonal - n.zz);
         // [span]x V + ([span]x vw)^T, upper half.
         Sym3 {
-            xx: y.fma(v2.0 + a2.0, z.fnma(v1.0 + a1.0, s.xx)),
-            xy: y.fma(v2.1, z.fnma(v1.1, z.fma(a0.0, x.fnma(a2.0, s.xy)))),
-            xz: y.fma(v2.2, z.fnma(v1.2, x.fma(a1.0, y.fnma(a0.0, s.xz)))),
-            yy: z.fma(v0.1 + a0.1, x.fnma(v2.1 + a2.1, s.yy)),
-            yz: z.fma(v0.2, x.fnma(v2.2, x.fma(a1.1, y.fnma(a0.1, s.yz)))),
-            zz: x.fma(v1.2 + a1.2, y.fnma(v0.2 + a0.2, s.zz)),
+            xx: y.fma(v2.0 + a2.0, z.fnma(v1.0 + a1.0, xx)),
+            xy: y.fma(v2.1, z.fnma(v1.1, z.fma(a0.0, x.fnma(a2.0, xy)))),
+            xz: y.fma(v2.2, z.fnma(v1.2, x.fma(a1.0, y.fnma(a0.0, xz)))),
+            yy: z.fma(v0.1 + a0.1, x.fnma(v2.1 + a2.1, yy)),
+            yz: z.fma(v0.2, x.fnma(v2.2, x.fma(a1.1, y.fnma(a0.1, yz)))),
+            zz: x.fma(v1.2 + a1.2, y.fnma(v0.2 + a0.2, zz)),
         }
     }
 }
 
-/// `w x (w x span)` at the extrapolated velocity: the predicted one carries the
-/// dominant error of the single linear solve.
+/// Acceleration that holds up against gravity and the side push (m/s²).
 #[inline(always)]
-fn centripetal<V: Lanes>(link: &Link<V>, span: Vec3<V>, scheme: &Scheme<V>) -> Vec3<V> {
-    let w = link
-        .al
-        .sub(link.al_before)
-        .scale_add(scheme.centripetal, link.w);
-    w.scale(w.dot(span)).sub(span.scale(w.dot(w)))
+fn up<V: Lanes>() -> Vec3<V> {
+    let push = -side_push_m_s2::<V>();
+    Vec3::splat(push, push, GRAVITY_M_S2)
 }

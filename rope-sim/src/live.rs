@@ -15,8 +15,8 @@ use shared_types::kinematics::FrameMotion;
 /// A rope in double precision that follows its attach frame step by step. Advancing
 /// it does not allocate.
 pub struct LiveRope {
+    params: RopeParams,
     rope: RopeLanes<f64>,
-    joint: (f64, f64),
     max_step_s: f64,
     links: Vec<Link<f64>>,
     scratch: Vec<Elimination<f64>>,
@@ -75,10 +75,7 @@ impl LiveRope {
         let n = links.len();
         let mut live = Self {
             rope: RopeLanes::of(rope),
-            joint: (
-                rope.joint_stiffness_nm_per_rad,
-                rope.joint_damping_nms_per_rad,
-            ),
+            params: rope.clone(),
             max_step_s: step_s,
             links,
             scratch: vec![Elimination::empty(); n],
@@ -162,7 +159,8 @@ impl LiveRope {
         self.restart = false;
         if phase != self.phase || (step_s - self.step_s).abs() > 0.0 {
             self.scheme.set(0, step_s, phase);
-            self.rope.kappa = joint_resistance(step_s, phase, self.joint.0, self.joint.1);
+            let resistance = joint_resistance(step_s, phase, &self.params);
+            self.rope.set(0, &self.params, resistance);
             (self.phase, self.step_s) = (phase, step_s);
         }
     }

@@ -7,6 +7,7 @@
 //! the order and the second excites the stiff modes.
 
 use crate::lanes::Lanes;
+use shared_types::RopeParams;
 
 /// Spectral radius at infinite frequency.
 const RHO: f64 = 0.6;
@@ -99,9 +100,10 @@ impl<V: Lanes> Scheme<V> {
 
 /// `kappa = h gamma' c + h^2 beta' k`: how much torque a joint resists per
 /// relative angular acceleration within the step (N m s²/rad).
-pub(crate) fn joint_resistance(h_s: f64, phase: Phase, stiffness: f64, damping: f64) -> f64 {
+pub(crate) fn joint_resistance(h_s: f64, phase: Phase, rope: &RopeParams) -> f64 {
     let s = Factors::of(phase);
-    s.correct_w(h_s) * damping + s.correct_phi(h_s) * stiffness
+    s.correct_w(h_s) * rope.joint_damping_nms_per_rad
+        + s.correct_phi(h_s) * rope.joint_stiffness_nm_per_rad
 }
 
 /// The scheme's four numbers.

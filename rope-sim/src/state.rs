@@ -5,22 +5,26 @@ use crate::lanes::Lanes;
 use crate::scheme::Scheme;
 use shared_types::RopeParams;
 
-/// Parameters of the ropes in a group, one rope per lane.
+/// Parameters of the ropes in a group, one rope per lane. Masses, inertias,
+/// stiffness and damping are in units of the joint resistance.
 #[derive(Clone, Copy)]
 pub(crate) struct RopeLanes<V> {
     pub(crate) stiffness: V,
     pub(crate) damping: V,
+    /// Link length (m).
     pub(crate) link_length: V,
     pub(crate) link_mass: V,
     pub(crate) link_inertia: V,
     pub(crate) lead_mass: V,
     pub(crate) lead_inertia: V,
-    /// Joint resistance of the current step and phase.
-    pub(crate) kappa: V,
 }
 
+/// Least joint resistance (N m s²/rad), for ropes without springs and dampers: a
+/// hundred thousandth of a link's inertia.
+const LEAST_RESISTANCE: f64 = 1e-13;
+
 impl<V: Lanes> RopeLanes<V> {
-    /// The same rope in every lane.
+    /// The same rope in every lane, with a joint resistance of 1 N m s²/rad.
     #[inline(always)]
     pub(crate) fn of(rope: &RopeParams) -> Self {
         let zero = V::splat(0.0);
@@ -32,24 +36,29 @@ impl<V: Lanes> RopeLanes<V> {
             link_inertia: zero,
             lead_mass: zero,
             lead_inertia: zero,
-            kappa: zero,
         };
         for lane in 0..V::COUNT {
-            out.set(lane, rope);
+            out.set(lane, rope, 1.0);
         }
         out
     }
 
-    /// Puts a rope into a lane; the joint resistance is the clock's to set.
+    /// Puts a rope into a lane. `joint_resistance` (N m s²/rad) is that of the step
+    /// ahead, see [`crate::scheme::joint_resistance`].
     #[inline(always)]
-    pub(crate) fn set(&mut self, lane: usize, rope: &RopeParams) {
-        self.stiffness.set(lane, rope.joint_stiffness_nm_per_rad);
-        self.damping.set(lane, rope.joint_damping_nms_per_rad);
+    pub(crate) fn set(&mut self, lane: usize, rope: &RopeParams, joint_resistance: f64) {
+        let unit = 1.0 / joint_resistance.max(LEAST_RESISTANCE);
+        self.stiffness
+            .set(lane, rope.joint_stiffness_nm_per_rad * unit);
+        self.damping
+            .set(lane, rope.joint_damping_nms_per_rad * unit);
         self.link_length.set(lane, rope.link_length_m());
-        self.link_mass.set(lane, rope.link_mass_kg());
-        self.link_inertia.set(lane, rope.link_inertia_kg_m2());
-        self.lead_mass.set(lane, rope.lead_mass_kg);
-        self.lead_inertia.set(lane, rope.lead_inertia_kg_m2());
+        self.link_mass.set(lane, rope.link_mass_kg() * unit);
+        self.link_inertia
+            .set(lane, rope.link_inertia_kg_m2() * unit);
+        self.lead_mass.set(lane, rope.lead_mass_kg * unit);
+        self.lead_inertia
+            .set(lane, rope.lead_inertia_kg_m2() * unit);
     }
 }
 
@@ -72,8 +81,8 @@ pub(crate) struct Link<V> {
     pub(crate) a: Vec3<V>,
     /// Exact angular acceleration of the last step.
     pub(crate) al: Vec3<V>,
-    /// Exact angular acceleration of the step before.
-    pub(crate) al_before: Vec3<V>,
+    /// How much it changed in the last step.
+    pub(crate) al_change: Vec3<V>,
 }
 
 impl<V: Lanes> Link<V> {
@@ -86,7 +95,7 @@ impl<V: Lanes> Link<V> {
             w: zero,
             a: zero,
             al: zero,
-            al_before: zero,
+            al_change: zero,
         }
     }
 
@@ -95,7 +104,7 @@ impl<V: Lanes> Link<V> {
     pub(crate) fn clear_memory(&mut self, lane: usize) {
         self.a.set(lane, [0.0; 3]);
         self.al.set(lane, [0.0; 3]);
-        self.al_before.set(lane, [0.0; 3]);
+        self.al_change.set(lane, [0.0; 3]);
     }
 
     /// Moves the attitude, velocity and algorithmic acceleration to their
@@ -123,7 +132,7 @@ impl<V: Lanes> Link<V> {
             .nudged(change.scale(s.correct_half_phi))
             .renormalised();
         self.a = change.scale_add(s.correct_a, self.a);
-        self.al_before = self.al;
+        self.al_change = change;
         self.al = alpha;
     }
 }
