@@ -47,7 +47,11 @@ pub(crate) struct BaseState<V> {
 impl<'a, V: Lanes> Clock<'a, V> {
     /// Lane i follows `paths[i]` with rope `ropes[i]`.
     #[inline(always)]
-    pub(crate) fn new(paths: &[&'a BasePath], ropes: &[&'a RopeParams], origin_m: [f64; 3]) -> Self {
+    pub(crate) fn new(
+        paths: &[&'a BasePath],
+        ropes: &[&'a RopeParams],
+        origin_m: [f64; 3],
+    ) -> Self {
         let cursors = paths
             .iter()
             .zip(ropes)

@@ -42,8 +42,6 @@ pub(crate) struct Elimination<V> {
     /// Holds the joint torque until the link is eliminated.
     y: Vec3<V>,
     x: Mat3<V>,
-    span: Vec3<V>,
-    centripetal: Vec3<V>,
 }
 
 impl<V: Lanes> Elimination<V> {
@@ -54,8 +52,6 @@ impl<V: Lanes> Elimination<V> {
             s_inv: Sym3::diagonal(V::splat(0.0)),
             y: Vec3::zero(),
             x: Mat3::zero(),
-            span: Vec3::zero(),
-            centripetal: Vec3::zero(),
         }
     }
 }
@@ -87,7 +83,9 @@ pub(crate) fn step<V: Lanes>(
     for (link, e) in links.iter_mut().zip(scratch.iter()) {
         let free = e.s_inv.times_add(alpha, e.y);
         alpha = e.x.transpose_times_sub(acceleration, free);
-        acceleration = alpha.cross_add(e.span, acceleration.add(e.centripetal));
+        let predicted_span = link.q.down(rope.link_length);
+        let centripetal = link.al_change;
+        acceleration = alpha.cross_add(predicted_span, acceleration.add(centripetal));
         link.correct(scheme, alpha);
         let span = link.q.down(rope.link_length);
         tip = tip.add(span);
@@ -119,10 +117,10 @@ fn eliminate<V: Lanes>(
     joints.prepare(links, scratch, rope, scheme);
     let mut nearer = links;
     let mut spaces = scratch;
-    while let (Some((_, links_nearer)), Some((space, spaces_nearer))) =
+    while let (Some((link, links_nearer)), Some((space, spaces_nearer))) =
         (nearer.split_last_mut(), spaces.split_last_mut())
     {
-        let half = beyond.open(rope, space);
+        let half = beyond.open(rope, joints.span, link.al_change);
         joints.prepare(links_nearer, spaces_nearer, rope, scheme);
         beyond.close(rope, space, &half);
         nearer = links_nearer;
@@ -155,6 +153,8 @@ struct Joints<V> {
     base: Ends<V>,
     /// Of the link whose joint comes next.
     child: Ends<V>,
+    /// Of the link prepared last (m).
+    span: Vec3<V>,
     min_half_cos: V,
 }
 
@@ -168,12 +168,15 @@ impl<V: Lanes> Joints<V> {
         Self {
             base,
             child: base,
+            span: Vec3::zero(),
             min_half_cos: V::splat(1.0),
         }
     }
 
     /// Fills in what the elimination of the last of `links`, already predicted, needs,
-    /// and predicts the link before it.
+    /// and predicts the link before it. The centripetal acceleration takes the place
+    /// of the acceleration change, which nothing needs any more: with a vector less
+    /// each, the links of a rope stay in the fastest cache.
     #[inline(always)]
     fn prepare(
         &mut self,
@@ -186,8 +189,8 @@ impl<V: Lanes> Joints<V> {
         else {
             return;
         };
-        space.span = link.q.down(rope.link_length);
-        space.centripetal = centripetal(link, space.span, scheme);
+        self.span = link.q.down(rope.link_length);
+        link.al_change = centripetal(link, self.span, scheme);
         let parent = match nearer.last_mut() {
             Some(parent) => {
                 parent.predict(scheme);
@@ -224,7 +227,7 @@ fn spring<V: Lanes>(rope: &RopeLanes<V>, half_cos: V) -> V {
     (f * rope.stiffness).flip_by(half_cos)
 }
 
-/// `w x (w x span)` at the extrapolated velocity: the predicted one carries the
+/// `w x (w x span)` (m/s²) at the extrapolated velocity: the predicted one carries the
 /// dominant error of the single linear solve.
 #[inline(always)]
 fn centripetal<V: Lanes>(link: &Link<V>, span: Vec3<V>, scheme: &Scheme<V>) -> Vec3<V> {
@@ -270,12 +273,9 @@ impl<V: Lanes> Beyond<V> {
         }
     }
 
-    /// First half of the elimination of the link of `space`.
+    /// First half of the elimination of a predicted link.
     #[inline(always)]
-    fn open(&self, rope: &RopeLanes<V>, space: &Elimination<V>) -> HalfEliminated<V> {
-        let Elimination {
-            span, centripetal, ..
-        } = *space;
+    fn open(&self, rope: &RopeLanes<V>, span: Vec3<V>, centripetal: Vec3<V>) -> HalfEliminated<V> {
         let quarter_mass = rope.link_mass * V::splat(0.25);
         // Coupling of the nearer node's acceleration with this link's rotation.
         let p = self.vv_link.rows();
@@ -290,10 +290,7 @@ impl<V: Lanes> Beyond<V> {
 
         let force = self.vv_link.times_add(centripetal, self.bv_link);
         let at_centre = centripetal.scale_sub(quarter_mass, force);
-        let bw = span.cross_add(
-            at_centre,
-            self.vw.transpose_times_add(centripetal, self.bw),
-        );
+        let bw = span.cross_add(at_centre, self.vw.transpose_times_add(centripetal, self.bw));
         HalfEliminated {
             v,
             cofactors,
@@ -305,12 +302,7 @@ impl<V: Lanes> Beyond<V> {
 
     /// Second half: afterwards `self` is seen from the link's nearer node.
     #[inline(always)]
-    fn close(
-        &mut self,
-        rope: &RopeLanes<V>,
-        space: &mut Elimination<V>,
-        half: &HalfEliminated<V>,
-    ) {
+    fn close(&mut self, rope: &RopeLanes<V>, space: &mut Elimination<V>, half: &HalfEliminated<V>) {
         let v = &half.v;
         let s_inv = half.cofactors.scale(half.per_determinant);
         let x = Mat3([
