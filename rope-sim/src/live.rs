@@ -75,7 +75,7 @@ impl LiveRope {
         let n = links.len();
         let mut live = Self {
             rope: RopeLanes::of(rope),
-            params: rope.clone(),
+            params: *rope,
             max_step_s: step_s,
             links,
             scratch: vec![Elimination::empty(); n],
