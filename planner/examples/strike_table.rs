@@ -18,7 +18,7 @@ use planner::ropes::{random_rope, random_strike_target};
 use planner::tasks::strike::Robustness;
 use planner::tasks::{StrikeConfig, StrikeOptions, StrikeRequest, ThrowSimulator, plan_strike};
 use planner::trajopt::Dimensions;
-use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, roll_out};
+use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
 use shared_types::limits::LimitsSpec;
 use shared_types::{JointTrajectory, JointVector, Limits};
 use std::ops::ControlFlow;
@@ -81,14 +81,15 @@ fn lagging_arm_cm(request: &StrikeRequest, command: &JointTrajectory) -> f64 {
             precision: Precision::F64,
             start: Start::Equilibrium,
             frames: FrameTimes::NONE,
-            closest_to_m: Some(request.target_m),
+            watch: Watch::point(request.target_m),
             horizon_s: command.duration_s() + 0.5,
             threads: 1,
         },
     )
     .expect("a planned throw simulates");
     rollouts[0]
-        .closest
+        .watched
+        .to_point
         .map_or(f64::INFINITY, |c| c.distance_m * 100.0)
 }
 

@@ -6,7 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Precision, SimOptions, SimulateError, Start, roll_out,
+    AttachMotion, Candidate, FrameTimes, Precision, SimOptions, SimulateError, Start, Watch,
+    roll_out,
 };
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{Intrinsics, KeypointTrack, RopeParams, Shutter, StereoCamera};
@@ -104,7 +105,7 @@ pub fn film(
                 period_s: SAMPLE_S,
                 count,
             },
-            closest_to_m: None,
+            watch: Watch::NOTHING,
             horizon_s,
             threads: 1,
         },

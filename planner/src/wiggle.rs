@@ -7,7 +7,7 @@
 use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m};
 use nalgebra::Vector3;
 use rope_sim::{
-    Candidate, FrameTimes, Outcome, PlannedArm, Precision, SimOptions, SimulateError, Start,
+    Candidate, FrameTimes, Outcome, PlannedArm, Precision, SimOptions, SimulateError, Start, Watch,
     roll_out,
 };
 use serde::{Deserialize, Serialize};
@@ -213,7 +213,7 @@ pub fn clearance(
                 period_s: PERIOD_S,
                 count,
             },
-            closest_to_m: None,
+            watch: Watch::NOTHING,
             horizon_s,
             threads,
         },

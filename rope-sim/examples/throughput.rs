@@ -10,7 +10,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    Candidate, FrameTimes, Kernel, Outcome, PlannedArm, Precision, SimOptions, Start, roll_out_with,
+    Candidate, FrameTimes, Kernel, Outcome, PlannedArm, Precision, SimOptions, Start, Watch,
+    roll_out_with,
 };
 use shared_types::{JointTrajectory, JointVector, RopeParams};
 
@@ -104,7 +105,7 @@ fn main() {
             precision: Precision::F32,
             start: Start::Equilibrium,
             frames: FrameTimes::NONE,
-            closest_to_m: Some([1.2, 0.0, 0.6]),
+            watch: Watch::point([1.2, 0.0, 0.6]),
             horizon_s: 1.5,
             threads: 1,
         };
@@ -127,7 +128,7 @@ fn main() {
         let options = SimOptions {
             step_s: 1e-3,
             frames,
-            closest_to_m: None,
+            watch: Watch::NOTHING,
             horizon_s: 6.67,
             ..options
         };

@@ -8,6 +8,7 @@ use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
 use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check, check_scene};
 use crate::scene::Scene;
+use crate::watch::Watched;
 use nalgebra::{UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 use std::collections::BTreeMap;
@@ -104,7 +105,7 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
         result.nodes.hold_last_finite();
         return Rollout {
             nodes: result.nodes,
-            closest: None,
+            watched: Watched::default(),
             peak_tip_speed_m_s: 0.0,
             outcome: Outcome::Diverged,
             max_joint_angle_rad: result.max_joint_angle_rad,
@@ -114,7 +115,7 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
     }
     Rollout {
         nodes: result.nodes,
-        closest: result.closest,
+        watched: result.watched,
         peak_tip_speed_m_s: result.peak_tip_speed_m_s,
         outcome: success,
         max_joint_angle_rad: result.max_joint_angle_rad,
@@ -237,7 +238,8 @@ impl Batch<'_> {
         Ok(self.kernel.run(GroupTask {
             members: &members,
             frames: self.options.frames,
-            closest_to_m: self.options.closest_to_m,
+            watch: self.options.watch,
+            horizon_s: self.options.horizon_s,
             single_precision: self.kernel.is_single_precision(),
         }))
     }

@@ -1,7 +1,6 @@
 //! One group of ropes with equal link counts, advanced from start to horizon.
 
 use crate::algebra::{Quat, Vec3};
-use crate::approach::{ApproachRecorder, ClosestApproach};
 use crate::base_path::BasePath;
 use crate::clock::Clock;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
@@ -9,6 +8,7 @@ use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
 use crate::scene::{ContactSummary, DominoOutcome};
 use crate::state::{Link, RopeLanes};
+use crate::watch::{Watch, Watched, Watcher};
 use shared_types::RopeParams;
 
 /// Steps between health checks.
@@ -30,7 +30,7 @@ pub(crate) struct Member<'a> {
 /// What a rope of a group did.
 pub(crate) struct MemberResult {
     pub(crate) nodes: NodeTrack,
-    pub(crate) closest: Option<ClosestApproach>,
+    pub(crate) watched: Watched,
     pub(crate) peak_tip_speed_m_s: f64,
     pub(crate) max_joint_angle_rad: f64,
     pub(crate) survived: bool,
@@ -43,7 +43,8 @@ pub(crate) struct MemberResult {
 pub(crate) struct GroupTask<'a> {
     pub(crate) members: &'a [Member<'a>],
     pub(crate) frames: FrameTimes,
-    pub(crate) closest_to_m: Option<[f64; 3]>,
+    pub(crate) watch: Watch,
+    pub(crate) horizon_s: f64,
     pub(crate) single_precision: bool,
 }
 
@@ -62,13 +63,15 @@ impl LaneTask for GroupTask<'_> {
         let mut scratch = vec![Elimination::empty(); n];
         let paths: Vec<&BasePath> = self.members.iter().map(|m| m.path).collect();
         let ropes: Vec<&RopeParams> = self.members.iter().map(|m| m.rope).collect();
-        let target = self.closest_to_m.unwrap_or([0.0; 3]);
-        let mut clock = Clock::new(&paths, &ropes, target);
+        let mut clock = Clock::new(&paths, &ropes, self.watch.origin_m());
         let mut recorder = FrameRecorder::new(self.frames, count, n, self.single_precision);
         let start = clock.base();
-        let mut approach = ApproachRecorder::new(
-            start.position.add(hanging_tip(&links, rope.link_length)),
-            start.velocity,
+        let hanging = start.position.add(hanging_tip(&links, rope.link_length));
+        let mut watcher = Watcher::new(
+            &self.watch,
+            [hanging, start.velocity],
+            count,
+            self.horizon_s,
         );
         let mut health = Health::<V>::new(count);
         let mut min_half_cos = V::splat(1.0);
@@ -80,6 +83,7 @@ impl LaneTask for GroupTask<'_> {
                 links.iter_mut().for_each(|link| link.clear_memory(*lane));
             }
             recorder.before_step(&clock, &links, rope.link_length);
+            watcher.before_step(&clock, &links);
             let base = clock.base();
             let report = step(
                 &mut links,
@@ -90,10 +94,15 @@ impl LaneTask for GroupTask<'_> {
             );
             recorder.after_step(&clock, &links, rope.link_length);
             health.mark_finished(&clock, &links);
-            approach.after_step(
-                base.position.add(report.tip),
-                base.velocity.add(report.tip_velocity),
-                clock.scheme.h,
+            watcher.after_step(
+                [base.position, base.velocity],
+                [
+                    base.position.add(report.tip),
+                    base.velocity.add(report.tip_velocity),
+                ],
+                &clock,
+                &links,
+                rope.link_length,
                 health.running,
             );
             let zero = V::splat(0.0);
@@ -112,10 +121,8 @@ impl LaneTask for GroupTask<'_> {
                 nodes: tracks
                     .next()
                     .unwrap_or_else(|| NodeTrack::zeros(0, n + 1, false)),
-                closest: self
-                    .closest_to_m
-                    .map(|_| approach.closest(lane, |step| paths[lane].end_of_step_s(step))),
-                peak_tip_speed_m_s: approach.peak_speed_m_s(lane),
+                watched: watcher.watched(lane, paths[lane], &links),
+                peak_tip_speed_m_s: watcher.peak_speed_m_s(lane),
                 max_joint_angle_rad: 2.0 * min_half_cos.get(lane).clamp(0.0, 1.0).acos(),
                 survived: health.alive[lane],
                 contacts: Vec::new(),

@@ -24,7 +24,6 @@
 )]
 
 mod algebra;
-mod approach;
 mod base_path;
 mod batch;
 mod clock;
@@ -42,8 +41,8 @@ mod rollout;
 mod scene;
 mod scheme;
 mod state;
+mod watch;
 
-pub use approach::ClosestApproach;
 pub use batch::{roll_out, roll_out_in, roll_out_in_with, roll_out_with};
 pub use error::SimulateError;
 pub use extras::{AirDrag, RopeExtras};
@@ -54,4 +53,8 @@ pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, Po
 pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};
 pub use scene::{
     ContactSummary, Domino, DominoOutcome, Obstacle, Placement, RopePart, Scene, SceneError, Shape,
+};
+pub use watch::{
+    BoxRegion, ClosestApproach, Dwell, HeightRange, LinkState, RestMeasures, SegmentApproach,
+    Watch, Watched,
 };

@@ -219,7 +219,9 @@ fn base_of(m: &FrameMotion) -> BaseLanes<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AttachMotion, Candidate, FrameTimes, Precision, SimOptions, Start, roll_out};
+    use crate::{
+        AttachMotion, Candidate, FrameTimes, Precision, SimOptions, Start, Watch, roll_out,
+    };
 
     fn rope() -> RopeParams {
         RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
@@ -307,7 +309,7 @@ mod tests {
                     period_s: 1.0,
                     count: 1,
                 },
-                closest_to_m: None,
+                watch: Watch::NOTHING,
                 horizon_s: 1.0,
                 threads: 1,
             };

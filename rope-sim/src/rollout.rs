@@ -1,12 +1,12 @@
 //! What is simulated, how, and what comes back.
 
-use crate::approach::ClosestApproach;
 use crate::error::SimulateError;
 use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
 use crate::scene::{ContactSummary, DominoOutcome, Placement, Scene, SceneError};
+use crate::watch::{Watch, Watched};
 use shared_types::RopeParams;
 
 /// Most steps of one rollout; more is a mistake in step or horizon.
@@ -62,8 +62,8 @@ pub struct SimOptions {
     pub start: Start,
     /// When to record node positions.
     pub frames: FrameTimes,
-    /// Point (m, world) whose distance to the lead is watched.
-    pub closest_to_m: Option<[f64; 3]>,
+    /// What to measure on the way.
+    pub watch: Watch,
     /// End of the simulation (s), from t = 0.
     pub horizon_s: f64,
     /// Worker threads; results do not depend on it.
@@ -126,9 +126,8 @@ pub struct Rollout {
     /// Node positions at the frame times. After [`Outcome::Diverged`] the last finite
     /// frame is repeated.
     pub nodes: NodeTrack,
-    /// Closest approach of the lead to [`SimOptions::closest_to_m`], in continuous
-    /// time; `None` if not asked for or [`Outcome::Diverged`].
-    pub closest: Option<ClosestApproach>,
+    /// What [`SimOptions::watch`] asked for; nothing after [`Outcome::Diverged`].
+    pub watched: Watched,
     /// Highest speed of the lead at step ends (m/s); 0 after [`Outcome::Diverged`].
     pub peak_tip_speed_m_s: f64,
     /// How it went.
@@ -196,19 +195,17 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
             });
         }
     }
-    let watched = options.closest_to_m.unwrap_or([0.0; 3]);
+    options.watch.check(options.horizon_s)?;
     let turned = match options.start {
         Start::Straight { joint0_rotvec } => joint0_rotvec,
         Start::Equilibrium => [0.0; 3],
     };
-    for (field, vector) in [("closest_to_m", watched), ("start.joint0_rotvec", turned)] {
-        if let Some(value) = vector.into_iter().find(|v| !v.is_finite()) {
-            return Err(SimulateError::Option {
-                field,
-                value,
-                need: "must be finite",
-            });
-        }
+    if let Some(value) = turned.into_iter().find(|v| !v.is_finite()) {
+        return Err(SimulateError::Option {
+            field: "start.joint0_rotvec",
+            value,
+            need: "must be finite",
+        });
     }
     for (index, candidate) in candidates.iter().enumerate() {
         candidate

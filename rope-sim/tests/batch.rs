@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, Kernel, Outcome, Precision, Rollout, SimOptions,
-    SimulateError, Start, roll_out, roll_out_with,
+    SimulateError, Start, Watch, roll_out, roll_out_with,
 };
 use shared_types::RopeParams;
 use shared_types::kinematics::FrameMotion;
@@ -66,7 +66,7 @@ fn options(threads: usize) -> SimOptions {
             period_s: 0.0171,
             count: 4,
         },
-        closest_to_m: Some([0.3, 0.1, 0.6]),
+        watch: Watch::point([0.3, 0.1, 0.6]),
         horizon_s: 0.07,
         threads,
     }
@@ -161,7 +161,7 @@ fn a_rope_that_blows_up_is_flagged_and_harms_nobody() {
     assert_eq!(together[2], alone[0]);
     assert_eq!(together[0].outcome, Outcome::Clean);
     assert_eq!(together[1].outcome, Outcome::Diverged);
-    assert!(together[1].closest.is_none());
+    assert!(together[1].watched.to_point.is_none());
     assert!(together[1].nodes.to_f64().iter().all(|x| x.is_finite()));
 }
 
@@ -312,10 +312,10 @@ fn options_that_make_no_sense_are_named() {
         ),
         (
             SimOptions {
-                closest_to_m: Some([0.0, f64::INFINITY, 0.0]),
+                watch: Watch::point([0.0, f64::INFINITY, 0.0]),
                 ..base
             },
-            "closest_to_m",
+            "watch.point_m",
         ),
     ] {
         let error = refusal(&good, &shake, &options);

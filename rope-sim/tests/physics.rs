@@ -10,7 +10,7 @@
 
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start,
+    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start, Watch,
     roll_out,
 };
 use shared_types::kinematics::FrameMotion;
@@ -49,7 +49,7 @@ fn options(horizon_s: f64, rate_hz: f64) -> SimOptions {
             period_s: 1.0 / rate_hz,
             count: (horizon_s * rate_hz).round() as usize + 1,
         },
-        closest_to_m: None,
+        watch: Watch::NOTHING,
         horizon_s,
         threads: 1,
     }
@@ -223,7 +223,7 @@ fn closest_approach_is_that_of_the_recorded_path() {
     let target = [0.45, 0.1, 0.05];
     for precision in [Precision::F32, Precision::F64] {
         let options = SimOptions {
-            closest_to_m: Some(target),
+            watch: Watch::point(target),
             precision,
             step_s: 5e-4,
             ..options(0.9, 20_000.0)
@@ -236,7 +236,7 @@ fn closest_approach_is_that_of_the_recorded_path() {
                 (best, best_frame) = (distance(frame), frame);
             }
         }
-        let closest = rollout.closest.unwrap();
+        let closest = rollout.watched.to_point.unwrap();
         assert!(
             (closest.distance_m - best).abs() < 2e-6,
             "{closest:?} against {best}"

@@ -4,7 +4,8 @@ use super::CalmError;
 use super::chain::Prelude;
 use nalgebra::Vector3;
 use rope_sim::{
-    Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, roll_out,
+    Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, Watch,
+    roll_out,
 };
 use shared_types::{JointTrajectory, RopeParams};
 
@@ -77,7 +78,7 @@ impl<'a> SwaySimulator<'a> {
                     period_s: PERIOD_S,
                     count: (shown_s / PERIOD_S).floor() as usize + 1,
                 },
-                closest_to_m: None,
+                watch: Watch::NOTHING,
                 horizon_s: prelude.start_s + shown_s,
                 threads,
             },
@@ -137,7 +138,7 @@ fn rest(
                 period_s: PERIOD_S,
                 count: 1,
             },
-            closest_to_m: None,
+            watch: Watch::NOTHING,
             horizon_s: PERIOD_S,
             threads: 1,
         },

@@ -3,7 +3,7 @@ use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
 use nalgebra::Vector3;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, roll_out,
+    AttachMotion, Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out,
 };
 use shared_types::kinematics::attach_pose;
 use shared_types::limits::LimitsSpec;
@@ -96,7 +96,7 @@ fn settled_sway_m(request: &CalmRequest, trajectory: &JointTrajectory) -> f64 {
                 period_s: 0.02,
                 count: 100,
             },
-            closest_to_m: None,
+            watch: Watch::NOTHING,
             horizon_s: end_s + 2.0,
             threads: 1,
         },

@@ -4,7 +4,9 @@ use super::coordinates::{CLOCK, COORDINATES, Coordinates};
 use super::{IdentifyError, IdentifyOptions, Observation};
 use crate::workers::map_in_order;
 use nalgebra::Vector3;
-use rope_sim::{Candidate, FrameTimes, Outcome, Precision, Rollout, SimOptions, Start, roll_out};
+use rope_sim::{
+    Candidate, FrameTimes, Outcome, Precision, Rollout, SimOptions, Start, Watch, roll_out,
+};
 use shared_types::{RopeParams, StereoCamera};
 
 /// Distance given to a candidate that cannot be compared (px).
@@ -163,7 +165,7 @@ impl<'a> Film<'a> {
                     period_s,
                     count,
                 },
-                closest_to_m: None,
+                watch: Watch::NOTHING,
                 horizon_s: self.horizon_s,
                 threads: self.threads,
             },

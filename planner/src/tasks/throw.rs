@@ -5,7 +5,8 @@ use crate::collide::{ArmShape, ContactCounts, RopeShape, Scene, rope_contacts, t
 use crate::workers::map_in_order;
 use nalgebra::Vector3;
 use rope_sim::{
-    Candidate, FrameTimes, Outcome, PlannedArm, Precision, Rollout, SimOptions, Start, roll_out,
+    Candidate, FrameTimes, Outcome, PlannedArm, Precision, Rollout, SimOptions, Start, Watch,
+    roll_out,
 };
 use shared_types::{JointTrajectory, RopeParams};
 
@@ -80,7 +81,7 @@ impl ThrowSimulator {
                     period_s: self.contact_period_s,
                     count,
                 },
-                closest_to_m: Some(self.target_m),
+                watch: Watch::point(self.target_m),
                 horizon_s,
                 threads: self.threads,
             },
@@ -113,7 +114,8 @@ impl ThrowSimulator {
             time_s += self.contact_period_s;
         }
         let closest = rollout
-            .closest
+            .watched
+            .to_point
             .filter(|c| c.distance_m.is_finite() && !matches!(rollout.outcome, Outcome::Diverged));
         ThrowOutcome {
             closest_m: closest.map_or(f64::INFINITY, |c| c.distance_m),

@@ -1,7 +1,7 @@
 //! The reference trajectories of `shared/reference/rope-truth`.
 
 use rope_sim::{
-    Candidate, FrameTimes, Kernel, PoseRow, PoseTrack, Rollout, SimOptions, Start, npy,
+    Candidate, FrameTimes, Kernel, PoseRow, PoseTrack, Rollout, SimOptions, Start, Watch, npy,
     roll_out_with,
 };
 use shared_types::RopeParams;
@@ -109,7 +109,7 @@ pub fn simulate(case: &Case, kernel: Kernel, step_s: f64) -> Rollout {
             period_s: 1.0 / case.rate_hz,
             count: frames,
         },
-        closest_to_m: None,
+        watch: Watch::NOTHING,
         horizon_s: last_s,
         threads: 1,
     };

@@ -6,7 +6,7 @@ use crate::files;
 use anyhow::{Context, anyhow, ensure};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome as SimOutcome, PoseTrack, Precision,
-    Rollout, SimOptions, Start, roll_out,
+    Rollout, SimOptions, Start, Watch, roll_out,
 };
 use serde_json::{Value, json};
 use shared_types::RopeParams;
@@ -91,7 +91,7 @@ pub fn rope(args: &SimRopeArgs, quiet: bool) -> Outcome<Option<Value>> {
             period_s: 1.0 / args.fps,
             count,
         },
-        closest_to_m: None,
+        watch: Watch::NOTHING,
         horizon_s: last_s,
         threads: 1,
     };
@@ -140,7 +140,7 @@ pub fn throw(args: &SimThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
             period_s: 1.0 / TIP_RATE_HZ,
             count,
         },
-        closest_to_m: None,
+        watch: Watch::NOTHING,
         horizon_s: duration_s,
         threads: 1,
     };

@@ -1,0 +1,258 @@
+//! What is measured while a rope moves, so that no trajectory need be stored.
+//!
+//! One file per reduction. Between step ends the lead follows the cubic through its
+//! positions and velocities, and distances, crossings and heights are those of that
+//! curve. What is not asked for costs nothing.
+
+mod approach;
+mod cubic;
+mod dwell;
+mod final_state;
+mod height;
+mod rest;
+
+pub use approach::{ClosestApproach, SegmentApproach};
+pub use dwell::{BoxRegion, Dwell};
+pub use final_state::LinkState;
+pub use height::HeightRange;
+pub use rest::RestMeasures;
+
+use crate::algebra::Vec3;
+use crate::base_path::BasePath;
+use crate::clock::Clock;
+use crate::error::SimulateError;
+use crate::lanes::Lanes;
+use crate::state::Link;
+use approach::{PointRecorder, SegmentRecorder};
+use cubic::TipStep;
+use dwell::DwellRecorder;
+use final_state::FinalStates;
+use height::HeightRecorder;
+use rest::RestRecorder;
+
+/// What to measure in every rollout of a batch; nothing by default.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Watch {
+    /// Closest approach of the lead to this point (m, world).
+    pub point_m: Option<[f64; 3]>,
+    /// Closest approach of the lead to the segment between these points (m, world).
+    pub segment_m: Option<[[f64; 3]; 2]>,
+    /// Time the lead spends in this box.
+    pub dwell_in: Option<BoxRegion>,
+    /// Highest and lowest place of the lead.
+    pub height: bool,
+    /// Movement of tip and middle within this time before the end (s).
+    pub rest_window_s: Option<f64>,
+    /// State of every link at the end.
+    pub final_state: bool,
+}
+
+/// What was measured; each is `None` if it was not asked for or the simulation
+/// diverged.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Watched {
+    /// See [`Watch::point_m`].
+    pub to_point: Option<ClosestApproach>,
+    /// See [`Watch::segment_m`].
+    pub to_segment: Option<SegmentApproach>,
+    /// See [`Watch::dwell_in`].
+    pub dwell: Option<Dwell>,
+    /// See [`Watch::height`].
+    pub height: Option<HeightRange>,
+    /// See [`Watch::rest_window_s`].
+    pub rest: Option<RestMeasures>,
+    /// See [`Watch::final_state`]; from the attach point to the lead.
+    pub final_state: Option<Vec<LinkState>>,
+}
+
+impl Watch {
+    /// Nothing.
+    pub const NOTHING: Self = Self {
+        point_m: None,
+        segment_m: None,
+        dwell_in: None,
+        height: false,
+        rest_window_s: None,
+        final_state: false,
+    };
+
+    /// Only the closest approach to a point (m, world).
+    #[must_use]
+    pub const fn point(point_m: [f64; 3]) -> Self {
+        Self {
+            point_m: Some(point_m),
+            ..Self::NOTHING
+        }
+    }
+
+    /// Point near which positions are resolved best: the origin of the lanes' numbers.
+    pub(crate) fn origin_m(&self) -> [f64; 3] {
+        self.point_m
+            .or(self.segment_m.map(|[a, _]| a))
+            .or(self.dwell_in.map(|region| region.center_m))
+            .unwrap_or([0.0; 3])
+    }
+
+    /// Refuses what cannot be measured within `horizon_s`, by name.
+    pub(crate) fn check(&self, horizon_s: f64) -> Result<(), SimulateError> {
+        let refuse = |field, value, need| Err(SimulateError::Option { field, value, need });
+        let [a, b] = self.segment_m.unwrap_or_default();
+        let region = self.dwell_in.unwrap_or(BoxRegion {
+            center_m: [0.0; 3],
+            half_m: [1.0; 3],
+            yaw_rad: 0.0,
+        });
+        let points = [
+            ("watch.point_m", self.point_m.unwrap_or_default()),
+            ("watch.segment_m", a),
+            ("watch.segment_m", b),
+            ("watch.dwell_in.center_m", region.center_m),
+            ("watch.dwell_in.yaw_rad", [region.yaw_rad; 3]),
+        ];
+        for (field, point) in points {
+            if let Some(value) = point.into_iter().find(|x| !x.is_finite()) {
+                return refuse(field, value, "must be finite");
+            }
+        }
+        for value in region.half_m {
+            if value.is_nan() || value <= 0.0 {
+                return refuse("watch.dwell_in.half_m", value, "must be above 0");
+            }
+        }
+        match self.rest_window_s {
+            Some(value) if !(value > 0.0 && value <= horizon_s) => refuse(
+                "watch.rest_window_s",
+                value,
+                "must be above 0 and at most the horizon",
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Takes every measurement of a group's lanes.
+pub(crate) struct Watcher<V> {
+    origin_m: [f64; 3],
+    lanes: usize,
+    /// Steps so far.
+    count: f64,
+    tip: [Vec3<V>; 2],
+    peak_speed_squared: V,
+    to_point: Option<PointRecorder<V>>,
+    to_segment: Option<SegmentRecorder<V>>,
+    dwell: Option<DwellRecorder>,
+    height: Option<HeightRecorder<V>>,
+    rest: Option<RestRecorder<V>>,
+    final_states: Option<FinalStates>,
+}
+
+impl<V: Lanes> Watcher<V> {
+    /// For `lanes` leads with these positions, relative to the clock's origin
+    /// [`Watch::origin_m`], and velocities at the start.
+    #[inline(always)]
+    pub(crate) fn new(watch: &Watch, tip: [Vec3<V>; 2], lanes: usize, horizon_s: f64) -> Self {
+        let origin_m = watch.origin_m();
+        let relative = |x: [f64; 3]| core::array::from_fn(|i| x[i] - origin_m[i]);
+        Self {
+            origin_m,
+            lanes,
+            count: 0.0,
+            tip,
+            peak_speed_squared: tip[1].dot(tip[1]),
+            to_point: watch
+                .point_m
+                .map(|point| PointRecorder::new(relative(point), tip)),
+            to_segment: watch
+                .segment_m
+                .map(|ends| SegmentRecorder::new(ends.map(relative), tip)),
+            dwell: watch
+                .dwell_in
+                .map(|region| DwellRecorder::new(&region, origin_m, tip[0], lanes)),
+            height: watch.height.then(|| HeightRecorder::new(tip)),
+            rest: watch
+                .rest_window_s
+                .map(|window_s| RestRecorder::new(horizon_s - window_s, lanes)),
+            final_states: watch.final_state.then(|| FinalStates::new(lanes)),
+        }
+    }
+
+    /// Call once the clock has begun a step, before it is taken.
+    #[inline(always)]
+    pub(crate) fn before_step(&mut self, clock: &Clock<V>, links: &[Link<V>]) {
+        if let Some(states) = &mut self.final_states {
+            states.before_step(clock, links);
+        }
+    }
+
+    /// Takes in the state after a step: attach point and lead, each with its velocity;
+    /// lanes where `running` is not positive are left alone.
+    #[inline(always)]
+    pub(crate) fn after_step(
+        &mut self,
+        attach: [Vec3<V>; 2],
+        tip: [Vec3<V>; 2],
+        clock: &Clock<V>,
+        links: &[Link<V>],
+        link_length: V,
+        running: V,
+    ) {
+        self.count += 1.0;
+        let zero = V::splat(0.0);
+        let faster = V::select_less(zero, running, tip[1].dot(tip[1]), zero);
+        self.peak_speed_squared = self.peak_speed_squared.max(faster);
+        let step = TipStep {
+            before: self.tip,
+            after: tip,
+            h: clock.scheme.h,
+            running,
+        };
+        self.tip = tip;
+        if let Some(point) = &mut self.to_point {
+            point.after_step(self.count, &step);
+        }
+        if let Some(segment) = &mut self.to_segment {
+            segment.after_step(self.count, &step);
+        }
+        if let Some(dwell) = &mut self.dwell {
+            dwell.after_step(&step, |lane| clock.span_s(lane));
+        }
+        if let Some(height) = &mut self.height {
+            height.after_step(self.count, &step);
+        }
+        if let Some(rest) = &mut self.rest {
+            rest.after_step(&step, attach, links, link_length, self.lanes, |lane| {
+                clock.span_s(lane)
+            });
+        }
+    }
+
+    /// Highest speed of the lead at step ends (m/s).
+    #[inline(always)]
+    pub(crate) fn peak_speed_m_s(&self, lane: usize) -> f64 {
+        self.peak_speed_squared.get(lane).sqrt()
+    }
+
+    /// Everything measured in one lane; `links` is the state after the last step.
+    #[inline(always)]
+    pub(crate) fn watched(&mut self, lane: usize, path: &BasePath, links: &[Link<V>]) -> Watched {
+        let origin_m = self.origin_m;
+        let time_of_step = |step| path.end_of_step_s(step);
+        Watched {
+            to_point: self
+                .to_point
+                .as_ref()
+                .map(|r| r.closest(lane, origin_m, time_of_step)),
+            to_segment: self
+                .to_segment
+                .as_ref()
+                .map(|r| r.closest(lane, origin_m, time_of_step)),
+            dwell: self.dwell.as_ref().map(|r| r.dwell(lane)),
+            height: self
+                .height
+                .as_ref()
+                .map(|r| r.range(lane, origin_m, time_of_step)),
+            rest: self.rest.as_ref().map(|r| r.measures(lane, origin_m)),
+            final_state: self.final_states.as_mut().map(|r| r.take(lane, links)),
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Whether the rope lies still at the end: how much tip and middle moved lately.
+
+use super::cubic::TipStep;
+use super::height::span;
+use crate::algebra::Vec3;
+use crate::lanes::Lanes;
+use crate::state::Link;
+
+/// Largest rounding of a step's end against the start of the window (s).
+const SAME_TIME_S: f64 = 1e-9;
+
+/// Movement of the rope within the window before the end of the simulation, and its
+/// state at the end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RestMeasures {
+    /// Highest minus lowest place of the lead within the window (m).
+    pub tip_height_spread_m: f64,
+    /// Diagonal of the smallest upright box around the way of the rope's middle (half
+    /// its arc length) within the window (m); no two of its places are further apart.
+    pub middle_movement_m: f64,
+    /// Lead's centre at the end (m, world).
+    pub tip_m: [f64; 3],
+    /// Its velocity (m/s).
+    pub tip_velocity_m_s: [f64; 3],
+    /// Middle of the rope at the end (m, world).
+    pub middle_m: [f64; 3],
+    /// Its velocity (m/s).
+    pub middle_velocity_m_s: [f64; 3],
+}
+
+/// Extremes within the window and the latest states. The window begins with the first
+/// step that ends in it.
+pub(super) struct RestRecorder<V> {
+    from_s: f64,
+    /// 1 in lanes within the window, else 0.
+    begun: V,
+    waiting: usize,
+    height: [V; 2],
+    low: Vec3<V>,
+    high: Vec3<V>,
+    tip: [Vec3<V>; 2],
+    middle: [Vec3<V>; 2],
+}
+
+impl<V: Lanes> RestRecorder<V> {
+    /// For a window from `from_s` to the end, in `lanes` lanes.
+    #[inline(always)]
+    pub(super) fn new(from_s: f64, lanes: usize) -> Self {
+        let most = f64::from(f32::MAX);
+        Self {
+            from_s,
+            begun: V::splat(0.0),
+            waiting: lanes,
+            height: [V::splat(most), V::splat(-most)],
+            low: Vec3::splat(most, most, most),
+            high: Vec3::splat(-most, -most, -most),
+            tip: [Vec3::zero(); 2],
+            middle: [Vec3::zero(); 2],
+        }
+    }
+
+    /// Takes in a step; `attach` is the attach point with its velocity at the step's
+    /// end, `span_s` gives start and end of the step in a lane (s).
+    #[inline(always)]
+    pub(super) fn after_step(
+        &mut self,
+        tip: &TipStep<V>,
+        attach: [Vec3<V>; 2],
+        links: &[Link<V>],
+        link_length: V,
+        lanes: usize,
+        span_s: impl Fn(usize) -> (f64, f64),
+    ) {
+        let zero = V::splat(0.0);
+        let before = self.begun;
+        if self.waiting > 0 {
+            for lane in 0..lanes {
+                if self.begun.get(lane) <= 0.0 && span_s(lane).1 >= self.from_s - SAME_TIME_S {
+                    self.begun.set(lane, 1.0);
+                    self.waiting -= 1;
+                }
+            }
+            if self.waiting == lanes {
+                return;
+            }
+        }
+        let counts = V::select_less(zero, self.begun, tip.running, zero);
+        let keep = |new: V, old: V| V::select_less(zero, counts, new, old);
+        let keep3 = |new: Vec3<V>, old: Vec3<V>| {
+            Vec3(keep(new.0, old.0), keep(new.1, old.1), keep(new.2, old.2))
+        };
+        let (low, high) = span(tip);
+        // Of the first step only the end lies in the window for sure.
+        let end = tip.after[0].2;
+        let low = V::select_less(zero, before, low, end);
+        let high = V::select_less(zero, before, high, end);
+        self.height = [
+            keep(low.min(self.height[0]), self.height[0]),
+            keep(high.max(self.height[1]), self.height[1]),
+        ];
+        let [x, v] = middle(links, link_length);
+        let middle = [attach[0].add(x), attach[1].add(v)];
+        let m = middle[0];
+        let (l, h) = (self.low, self.high);
+        self.low = keep3(Vec3(m.0.min(l.0), m.1.min(l.1), m.2.min(l.2)), l);
+        self.high = keep3(Vec3(m.0.max(h.0), m.1.max(h.1), m.2.max(h.2)), h);
+        self.middle = [keep3(m, self.middle[0]), keep3(middle[1], self.middle[1])];
+        self.tip = [
+            keep3(tip.after[0], self.tip[0]),
+            keep3(tip.after[1], self.tip[1]),
+        ];
+    }
+
+    /// Measures of one lane; `origin_m` is the clock's origin.
+    #[inline(always)]
+    pub(super) fn measures(&self, lane: usize, origin_m: [f64; 3]) -> RestMeasures {
+        let (low, high) = (self.low.get(lane), self.high.get(lane));
+        let squared: f64 = (0..3).map(|i| (high[i] - low[i]).powi(2)).sum();
+        let world = |x: Vec3<V>| {
+            let x = x.get(lane);
+            core::array::from_fn(|i| x[i] + origin_m[i])
+        };
+        RestMeasures {
+            tip_height_spread_m: self.height[1].get(lane) - self.height[0].get(lane),
+            middle_movement_m: squared.sqrt(),
+            tip_m: world(self.tip[0]),
+            tip_velocity_m_s: self.tip[1].get(lane),
+            middle_m: world(self.middle[0]),
+            middle_velocity_m_s: self.middle[1].get(lane),
+        }
+    }
+}
+
+/// Middle of the rope and its velocity, relative to node 0: a node, or with an odd
+/// number of links the middle of a link.
+#[inline(always)]
+fn middle<V: Lanes>(links: &[Link<V>], link_length: V) -> [Vec3<V>; 2] {
+    let (mut x, mut v) = (Vec3::zero(), Vec3::zero());
+    let whole = links.len() / 2;
+    let half = links.len() % 2;
+    for (index, link) in links.iter().take(whole + half).enumerate() {
+        let length = if index == whole {
+            link_length * V::splat(0.5)
+        } else {
+            link_length
+        };
+        let span = link.q.down(length);
+        x = x.add(span);
+        v = link.w.cross_add(span, v);
+    }
+    [x, v]
+}
