@@ -11,8 +11,8 @@
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Kernel, Outcome, Precision, Rollout, SimOptions,
-    SimulateError, Start, Watch, roll_out, roll_out_with,
+    AttachMotion, BoxRegion, Candidate, FrameTimes, Kernel, Outcome, Precision, Rollout,
+    SimOptions, SimulateError, Start, Watch, roll_out, roll_out_with,
 };
 use shared_types::RopeParams;
 use shared_types::kinematics::FrameMotion;
@@ -66,7 +66,18 @@ fn options(threads: usize) -> SimOptions {
             period_s: 0.0171,
             count: 4,
         },
-        watch: Watch::point([0.3, 0.1, 0.6]),
+        watch: Watch {
+            point_m: Some([0.3, 0.1, 0.6]),
+            segment_m: Some([[0.0, 0.1, 0.5], [0.1, -0.1, 0.5]]),
+            dwell_in: Some(BoxRegion {
+                center_m: [0.0, 0.0, 0.5],
+                half_m: [0.01, 0.01, 0.1],
+                yaw_rad: 0.4,
+            }),
+            height: true,
+            rest_window_s: Some(0.03),
+            final_state: true,
+        },
         horizon_s: 0.07,
         threads,
     }
