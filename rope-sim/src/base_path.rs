@@ -91,7 +91,7 @@ impl BasePath {
         from_s: f64,
         to_s: f64,
     ) -> Result<(), NotFinite> {
-        let steps = ((to_s - from_s) / max_step_s - 1e-9).ceil().max(1.0) as usize;
+        let steps = steps_within(to_s - from_s, max_step_s);
         let step_s = (to_s - from_s) / steps as f64;
         let per_interval = ((KNOT_S / step_s + 1e-9).floor() as usize).max(1);
         let mut knot = Knot::new(&evaluate(motion, from_s + BESIDE_S)?, None);
@@ -135,6 +135,25 @@ impl BasePath {
             .last()
             .map_or((0.0, 0.0), |i| (i.start_s + i.length_s(), i.step_s))
     }
+}
+
+/// Equal steps of at most `max_step_s` that a smooth piece is cut into.
+fn steps_within(length_s: f64, max_step_s: f64) -> usize {
+    (length_s / max_step_s - 1e-9).ceil().max(1.0) as usize
+}
+
+/// Steps of at most `step_s` from jump to jump, up to the horizon: motions with equal
+/// counts are integrated alike.
+pub(crate) fn steps_between_jumps(
+    motion: &dyn AttachMotion,
+    step_s: f64,
+    horizon_s: f64,
+) -> Vec<usize> {
+    let mut from_s = 0.0;
+    breaks(motion, horizon_s)
+        .into_iter()
+        .map(|to_s| steps_within(to_s - core::mem::replace(&mut from_s, to_s), step_s))
+        .collect()
 }
 
 /// Jumps inside the horizon, then the horizon.

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// How much smaller the steps of a repeated rollout are.
-const REPEAT_DIVISOR: f64 = 4.0;
+pub(crate) const REPEAT_DIVISOR: f64 = 4.0;
 /// Simulates all candidates; results in their order. Candidates are grouped by link
 /// count into lanes and lane groups are spread over threads; a candidate's result does
 /// not depend on its neighbours, its lane, or the number of threads.

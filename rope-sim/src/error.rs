@@ -75,3 +75,29 @@ pub enum SimulateError {
     #[error("a simulation thread ended without a result; this is a fault of the program")]
     WorkerPanicked,
 }
+
+impl SimulateError {
+    /// Index of the candidate at fault, if one is.
+    #[must_use]
+    pub fn candidate(&self) -> Option<usize> {
+        match *self {
+            Self::Rope { candidate, .. }
+            | Self::Extras { candidate, .. }
+            | Self::MotionTooShort { candidate, .. }
+            | Self::MotionNotFinite { candidate, .. } => Some(candidate),
+            _ => None,
+        }
+    }
+
+    /// The same with another index for the candidate at fault.
+    pub(crate) fn of_candidate(mut self, index: usize) -> Self {
+        match &mut self {
+            Self::Rope { candidate, .. }
+            | Self::Extras { candidate, .. }
+            | Self::MotionTooShort { candidate, .. }
+            | Self::MotionNotFinite { candidate, .. } => *candidate = index,
+            _ => {}
+        }
+        self
+    }
+}

@@ -40,6 +40,7 @@ pub mod npy;
 mod rollout;
 mod scene;
 mod scheme;
+pub mod sensitivity;
 mod state;
 mod watch;
 
