@@ -88,23 +88,21 @@ fn linearise(
     config: &CalmConfig,
     x: &DVector<f64>,
 ) -> Result<Option<Linearised>, CalmError> {
-    let mut moves = vec![shape.trajectory(x.as_slice())?];
-    for i in 0..x.len() {
-        let mut beside = x.clone();
-        beside[i] += STEP_RAD;
-        moves.push(shape.trajectory(beside.as_slice())?);
-    }
-    let mut sways = simulator.run(&moves)?;
-    if sways.iter().any(|s| !s.finite) {
-        return Ok(None);
-    }
-    let beside = sways.split_off(1);
-    let Some(here) = sways.pop() else {
+    let here = shape.trajectory(x.as_slice())?;
+    let beside = (0..x.len())
+        .map(|i| {
+            let mut beside = x.clone();
+            beside[i] += STEP_RAD;
+            shape.trajectory(beside.as_slice())
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let Some(found) = simulator.slopes(&here, &beside, STEP_RAD)? else {
         return Ok(None);
     };
+    let here = found.sway;
     let residuals = DVector::from_column_slice(&here.displacements_m);
     let slopes = DMatrix::from_fn(residuals.len(), x.len(), |row, column| {
-        (beside[column].displacements_m[row] - residuals[row]) / STEP_RAD
+        found.slopes[column][row]
     });
     // Six numbers per frame: tip and middle in three axes.
     let per_frame = 6.0 / residuals.len().max(1) as f64;

@@ -18,6 +18,7 @@ mod tests;
 
 use chain::Prelude;
 use descent::Calmest;
+use rope_sim::sensitivity::SensitivityError;
 use rope_sim::{MotionError, SimulateError};
 use serde::{Deserialize, Serialize};
 use shape::MoveShape;
@@ -161,6 +162,9 @@ pub enum CalmError {
     /// The rope simulator refused.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// Slopes of the rope's sway could not be taken.
+    #[error(transparent)]
+    Sensitivity(#[from] SensitivityError),
     /// The simulated rope blew up.
     #[error("the simulation of the rope diverged; identify the rope again")]
     Diverged,

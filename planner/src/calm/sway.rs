@@ -3,6 +3,7 @@
 use super::CalmError;
 use super::chain::Prelude;
 use nalgebra::Vector3;
+use rope_sim::sensitivity::{Beside, Difference, Direction, sensitivity};
 use rope_sim::{
     Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, Watch,
     roll_out,
@@ -28,6 +29,15 @@ pub(super) struct Sway {
     pub(super) nodes: NodeTrack,
     /// Whether the simulation stayed finite; nothing else means anything if not.
     pub(super) finite: bool,
+}
+
+/// Sway after one move and how neighbouring moves change it.
+#[derive(Debug)]
+pub(super) struct SwaySlopes {
+    /// Sway after the move.
+    pub(super) sway: Sway,
+    /// Slopes of [`Sway::displacements_m`] towards each neighbour (m per unit).
+    pub(super) slopes: Vec<Vec<f64>>,
 }
 
 impl Sway {
@@ -100,20 +110,56 @@ impl<'a> SwaySimulator<'a> {
             .collect())
     }
 
+    /// Sway after `plan` and, per unit of `distance`, how its displacements change
+    /// towards each plan of `beside`; `None` where the rope diverges.
+    pub(super) fn slopes(
+        &self,
+        plan: &JointTrajectory,
+        beside: &[JointTrajectory],
+        distance: f64,
+    ) -> Result<Option<SwaySlopes>, CalmError> {
+        let here = self.prelude.then(plan);
+        let arms: Vec<_> = beside.iter().map(|t| self.prelude.then(t)).collect();
+        let directions: Vec<Direction<'_>> = arms
+            .iter()
+            .map(|arm| Direction::Motion {
+                plus: Beside { at: arm, distance },
+                minus: None,
+            })
+            .collect();
+        let base = Candidate::new(self.rope, &here);
+        let found = sensitivity(base, &directions, Difference::Forward, &self.options)?;
+        let slopes = found.slopes(|rollout| self.displacements_m(&rollout.nodes));
+        let slopes: Option<Vec<_>> = slopes.into_iter().collect();
+        let finite = found.base.outcome != Outcome::Diverged;
+        Ok(slopes.filter(|_| finite).map(|slopes| SwaySlopes {
+            sway: self.sway(found.base.nodes, finite),
+            slopes,
+        }))
+    }
+
     fn sway(&self, nodes: NodeTrack, finite: bool) -> Sway {
-        let mut displacements_m = Vec::new();
-        let mut largest_m = 0.0_f64;
-        for frame in self.settled_frame..nodes.frames() {
-            let [tip, middle] = self.rest.map(|(n, rest)| nodes.position(frame, n) - rest);
-            largest_m = largest_m.max(tip.norm());
-            displacements_m.extend(tip.iter().chain(middle.iter()));
-        }
+        let displacements_m = self.displacements_m(&nodes);
+        // Tip, then middle, per frame.
+        let tips = displacements_m
+            .chunks(6)
+            .map(|d| Vector3::new(d[0], d[1], d[2]));
         Sway {
+            largest_m: tips.map(|tip| tip.norm()).fold(0.0, f64::max),
             displacements_m,
-            largest_m,
             nodes,
             finite,
         }
+    }
+
+    /// Displacements of tip and middle from rest after the move, frame by frame (m).
+    fn displacements_m(&self, nodes: &NodeTrack) -> Vec<f64> {
+        (self.settled_frame..nodes.frames())
+            .flat_map(|frame| {
+                let [tip, middle] = self.rest.map(|(n, rest)| nodes.position(frame, n) - rest);
+                [tip.x, tip.y, tip.z, middle.x, middle.y, middle.z]
+            })
+            .collect()
     }
 }
 
