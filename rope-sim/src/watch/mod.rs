@@ -256,3 +256,56 @@ impl<V: Lanes> Watcher<V> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_watched_is_named() {
+        let region = BoxRegion {
+            center_m: [0.0; 3],
+            half_m: [0.1, f64::INFINITY, 0.1],
+            yaw_rad: 0.5,
+        };
+        let within = |region| Watch {
+            dwell_in: Some(region),
+            ..Watch::NOTHING
+        };
+        let along = |end| Watch {
+            segment_m: Some([[0.0; 3], end]),
+            ..Watch::NOTHING
+        };
+        let lately = |window_s| Watch {
+            rest_window_s: Some(window_s),
+            ..Watch::NOTHING
+        };
+        for good in [within(region), along([0.0; 3]), lately(2.0)] {
+            assert_eq!(good.check(2.0), Ok(()));
+        }
+        let (nan, half_m) = (f64::NAN, [0.1, 0.0, 0.1]);
+        let wrong = [
+            ("watch.point_m", Watch::point([0.0, nan, 0.0])),
+            ("watch.segment_m", along([f64::INFINITY, 0.0, 0.0])),
+            (
+                "watch.dwell_in.half_m",
+                within(BoxRegion { half_m, ..region }),
+            ),
+            (
+                "watch.dwell_in.yaw_rad",
+                within(BoxRegion {
+                    yaw_rad: nan,
+                    ..region
+                }),
+            ),
+            ("watch.rest_window_s", lately(2.1)),
+            ("watch.rest_window_s", lately(nan)),
+        ];
+        for (name, watch) in wrong {
+            let Err(SimulateError::Option { field, .. }) = watch.check(2.0) else {
+                panic!("{name} was accepted");
+            };
+            assert_eq!(field, name);
+        }
+    }
+}
