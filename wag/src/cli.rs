@@ -55,6 +55,8 @@ pub enum Command {
     Throw(ThrowArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
+    /// Measure how fast this machine runs a part of the system.
+    Bench(BenchArgs),
     /// Run one of the processes in the foreground (what `wag` itself starts).
     #[command(hide = true)]
     Process(ProcessArgs),
@@ -377,6 +379,27 @@ pub struct ScoreArgs {
     /// Colour of the target, R,G,B from 0 to 255.
     #[arg(long)]
     pub target_rgb: Colour,
+}
+
+/// Arguments of `wag bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// What to measure.
+    #[arg(value_enum)]
+    pub name: BenchName,
+    /// Few candidates, once each: seconds instead of a minute, rough figures.
+    #[arg(long)]
+    pub quick: bool,
+    /// Seed of the ropes and motions.
+    #[arg(long, default_value_t = 5)]
+    pub seed: u64,
+}
+
+/// Benchmarks known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BenchName {
+    /// The rope simulator: kernels, jobs, scaling.
+    Rope,
 }
 
 /// Arguments of `wag process`.

@@ -73,6 +73,12 @@ const CASES: &[Case] = &[
     (&[], 2, &["Usage"]),
     (&["fling"], 2, &["fling"]),
     (&["demo", "--seed", "x"], 2, &["--seed"]),
+    (&["bench"], 2, &["rope"]),
+    (
+        &["bench", "wibble"],
+        2,
+        &["wibble", "possible values", "rope"],
+    ),
     (&["demo", "--target", "1,2"], 2, &["x,y,z"]),
     (&["demo", "--target", "3,0,0.4"], 2, &["reach"]),
     (&["demo", "--target", "nan,0,0.4"], 2, &["finite"]),

@@ -1,5 +1,6 @@
 //! One file per command.
 
+mod bench;
 mod check;
 mod demo;
 mod demo_summary;
@@ -34,6 +35,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Check(args) => check::run(args, quiet),
         Command::Throw(args) => throw::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
+        Command::Bench(args) => bench::run(args, quiet),
         Command::Process(args) => process::run(args).map(|()| None),
     }
 }

@@ -1,0 +1,19 @@
+//! `wag bench NAME`: how fast this machine runs a part of the system.
+//!
+//! A benchmark measures and compares with limits; it does not judge: the exit code
+//! is 0 whatever the figures are.
+
+mod machine;
+mod rope;
+mod spent;
+
+use crate::cli::{BenchArgs, BenchName};
+use crate::failure::Outcome;
+use serde_json::Value;
+
+/// Runs a benchmark. The value is what `--json` prints.
+pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+    match args.name {
+        BenchName::Rope => rope::run(args, quiet),
+    }
+}

@@ -1,0 +1,140 @@
+//! The ropes and motions that are simulated, all drawn from one seed.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rope_sim::{
+    AttachMotion, Candidate, FrameTimes, Kernel, PlannedArm, Precision, Rollout, SimOptions,
+    SimulateError, Start, roll_out_with,
+};
+use shared_types::rope::RANGES;
+use shared_types::trajectory::TrajectoryError;
+use shared_types::{JointTrajectory, JointVector, RopeParams};
+
+/// Links of a typical rope.
+pub const LINKS: u32 = 22;
+/// Ropes drawn: the wiggle job needs most of them.
+const ROPES: usize = 3000;
+/// Throws drawn: the largest batch needs most of them.
+const THROWS: usize = 4096;
+/// Pose the motions start from (rad).
+const POSE: [f64; 7] = [0.0, -0.5, 0.0, 1.0, 0.0, 1.6, 0.0];
+/// Point whose distance to the lead is watched (m).
+const TARGET_M: [f64; 3] = [1.2, 0.0, 0.6];
+
+/// Ropes and motions.
+#[derive(Debug)]
+pub struct Workload {
+    /// Uniform in the parameter ranges, all with [`LINKS`] links.
+    pub ropes: Vec<RopeParams>,
+    /// A spline of its own for every candidate: seven waypoints 0.15 s apart, joints 2,
+    /// 4 and 6 walking at random by up to 0.15 rad, then held.
+    pub throws: Vec<PlannedArm>,
+    /// Joint 6 swinging by 25 degrees at 0.75 Hz for 4.9 s, then held.
+    pub wiggle: PlannedArm,
+    /// An arm that stands still.
+    pub still: PlannedArm,
+}
+
+impl Workload {
+    /// Draws everything from `seed`.
+    ///
+    /// # Errors
+    /// A spline that cannot be made, which would be a fault of this program.
+    pub fn new(seed: u64) -> Result<Self, TrajectoryError> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let ropes = (0..ROPES).map(|_| rope(&mut random)).collect();
+        let throws = (0..THROWS)
+            .map(|_| throw(&mut random))
+            .collect::<Result<_, _>>()?;
+        let still = JointTrajectory::hold(JointVector(POSE), 1.0)?;
+        Ok(Self {
+            ropes,
+            throws,
+            wiggle: wiggle()?,
+            still: PlannedArm::new(still),
+        })
+    }
+
+    /// The first `count` throws, each with a rope of its own.
+    pub fn throwing(&self, count: usize) -> Vec<Candidate<'_>> {
+        self.throws
+            .iter()
+            .zip(self.ropes.iter().cycle())
+            .take(count)
+            .map(|(motion, rope)| Candidate::new(rope, motion))
+            .collect()
+    }
+
+    /// The first `count` ropes on one motion.
+    pub fn on<'a>(&'a self, motion: &'a dyn AttachMotion, count: usize) -> Vec<Candidate<'a>> {
+        self.ropes
+            .iter()
+            .take(count)
+            .map(|rope| Candidate::new(rope, motion))
+            .collect()
+    }
+}
+
+/// Throws: steps of 0.5 ms, closest approach watched, nothing recorded.
+pub fn throw_options(horizon_s: f64, threads: usize) -> SimOptions {
+    SimOptions {
+        step_s: 5e-4,
+        precision: Precision::F32,
+        start: Start::Equilibrium,
+        frames: FrameTimes::NONE,
+        closest_to_m: Some(TARGET_M),
+        horizon_s,
+        threads,
+    }
+}
+
+/// Simulates and returns how many rope-steps that were, repeats not counted.
+///
+/// # Errors
+/// What the simulator refuses.
+pub fn roll_out(
+    kernel: Kernel,
+    candidates: &[Candidate],
+    options: &SimOptions,
+) -> Result<(f64, Vec<Rollout>), SimulateError> {
+    let rollouts = roll_out_with(kernel, candidates, options)?;
+    #[allow(clippy::cast_precision_loss, reason = "some thousands")]
+    let rope_steps = options.horizon_s / options.step_s * rollouts.len() as f64;
+    Ok((rope_steps, rollouts))
+}
+
+fn rope(random: &mut ChaCha8Rng) -> RopeParams {
+    let numbers = RANGES.map(|r| random.random_range(r.min..r.max));
+    RopeParams {
+        links: LINKS,
+        ..RopeParams::from_array(numbers)
+    }
+}
+
+fn throw(random: &mut ChaCha8Rng) -> Result<PlannedArm, TrajectoryError> {
+    let times_s: Vec<f64> = (0..7).map(|i| 0.15 * f64::from(i)).collect();
+    let mut q = POSE;
+    let waypoints: Vec<JointVector> = times_s
+        .iter()
+        .map(|_| {
+            for joint in [1, 3, 5] {
+                q[joint] += random.random_range(-0.15..0.15);
+            }
+            JointVector(q)
+        })
+        .collect();
+    JointTrajectory::new(&times_s, &waypoints).map(PlannedArm::new)
+}
+
+fn wiggle() -> Result<PlannedArm, TrajectoryError> {
+    let times_s: Vec<f64> = (0..50).map(|i| 0.1 * f64::from(i)).collect();
+    let waypoints: Vec<JointVector> = times_s
+        .iter()
+        .map(|t| {
+            let mut q = POSE;
+            q[5] += 25_f64.to_radians() * (core::f64::consts::TAU * 0.75 * t).sin();
+            JointVector(q)
+        })
+        .collect();
+    JointTrajectory::new(&times_s, &waypoints).map(PlannedArm::new)
+}
