@@ -42,6 +42,8 @@ mod scene;
 mod scheme;
 pub mod sensitivity;
 mod state;
+#[cfg(test)]
+mod verification;
 mod watch;
 
 pub use batch::{roll_out, roll_out_in, roll_out_in_with, roll_out_with};

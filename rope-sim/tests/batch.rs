@@ -11,12 +11,13 @@
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rope_sim::{
-    AttachMotion, BoxRegion, Candidate, FrameTimes, Kernel, Outcome, Precision, Rollout,
-    SimOptions, SimulateError, Start, Watch, roll_out, roll_out_with,
+    AttachMotion, BoxRegion, Candidate, FrameTimes, Kernel, MeasuredArm, MotionError, Outcome,
+    PoseRow, PoseTrack, Precision, Rollout, SimOptions, SimulateError, Start, Watch, roll_out,
+    roll_out_with,
 };
-use shared_types::RopeParams;
 use shared_types::kinematics::FrameMotion;
 use shared_types::rope::{RANGES, RopeError};
+use shared_types::{JointVector, RopeParams};
 
 /// Shakes along x with a constant acceleration that flips at every `period_s / 2`.
 #[derive(Debug, Clone)]
@@ -274,6 +275,72 @@ fn candidates_that_cannot_be_simulated_are_named() {
         refusal(&good, &Broken, &short),
         SimulateError::MotionNotFinite { candidate: 1, .. }
     ));
+}
+
+/// What a person reads: the candidate, the field, the value, what is allowed.
+#[test]
+fn refusals_read_as_sentences_that_name_candidate_and_field() {
+    let (good, base) = (rope(), options(1));
+    let shake = Shake {
+        acceleration_m_s2: 1.0,
+        period_s: 0.1,
+    };
+    let heavy = RopeParams {
+        mass_per_length_kg_per_m: -0.05,
+        ..good
+    };
+    let late = SimOptions {
+        horizon_s: 0.05,
+        frames: FrameTimes::NONE,
+        ..base
+    };
+    for (error, words) in [
+        (
+            refusal(&heavy, &shake, &base),
+            ["candidate 1", "mass_per_length_kg_per_m", "-0.05"],
+        ),
+        (
+            refusal(&RopeParams { links: 201, ..good }, &shake, &base),
+            ["candidate 1", "links", "200"],
+        ),
+        (
+            refusal(&good, &Broken, &base),
+            ["candidate 1", "ends at 0.05 s", "horizon of 0.07 s"],
+        ),
+        (
+            refusal(&good, &Broken, &late),
+            ["candidate 1", "motion is not finite", " s"],
+        ),
+    ] {
+        let sentence = error.to_string();
+        for word in words {
+            assert!(sentence.contains(word), "`{sentence}` lacks `{word}`");
+        }
+    }
+}
+
+/// Motions are refused when they are made, before they meet a rope.
+#[test]
+fn times_that_do_not_increase_name_the_sample() {
+    let row = |t_s: f64| PoseRow {
+        t_s,
+        p_m: [0.0, 0.0, 1.0],
+        q_wxyz: [1.0, 0.0, 0.0, 0.0],
+    };
+    for times_s in [[0.0, 0.1, 0.1, 0.2], [0.0, 0.2, 0.1, 0.3]] {
+        let error = PoseTrack::new(&times_s.map(row)).unwrap_err();
+        assert!(
+            matches!(error, MotionError::TimeOrder { index: 2, .. }),
+            "{error}"
+        );
+        assert!(error.to_string().contains("sample 2"), "{error}");
+    }
+    let times_s = [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.04, 0.07];
+    let error = MeasuredArm::new(&times_s, &[JointVector::ZERO; 8]).unwrap_err();
+    assert!(
+        matches!(error, MotionError::TimeOrder { index: 6, .. }),
+        "{error}"
+    );
 }
 
 #[test]

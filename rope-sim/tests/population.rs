@@ -16,7 +16,8 @@ use fling::Fling;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Outcome, Precision, Rollout, SimOptions, Start, roll_out,
+    AttachMotion, Candidate, FrameTimes, Outcome, Precision, Rollout, SimOptions, Start, Watch,
+    roll_out,
 };
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
@@ -52,7 +53,7 @@ fn simulate(population: &[(RopeParams, Fling)], precision: Precision, step_s: f6
             period_s: 0.01,
             count: 151,
         },
-        closest_to_m: None,
+        watch: Watch::NOTHING,
         horizon_s: HORIZON_S,
         threads: 2,
     };

@@ -45,10 +45,16 @@ fn bound_mm(id: &str, single: bool) -> Option<f64> {
     }
 }
 
-fn check_half_millisecond(kernel: Kernel) {
+/// Whether a case stays in one plane; the others twist the rope by up to 50 degrees
+/// at a joint.
+fn is_planar(id: &str) -> bool {
+    id.ends_with("M1") || id.ends_with("M2")
+}
+
+fn check_half_millisecond(kernel: Kernel, planar: bool) {
     let Some(folder) = truth_folder() else { return };
     let mut count = 0;
-    for case in cases(&folder, |_| true) {
+    for case in cases(&folder, |id| is_planar(id) == planar) {
         let rollout = simulate(&case, kernel, 5e-4);
         let error = max_tip_error_mm(&case, &rollout);
         count += 1;
@@ -64,30 +70,63 @@ fn check_half_millisecond(kernel: Kernel) {
             assert!(error < 15.0, "{}: {error} mm", case.id);
         }
     }
-    assert_eq!(count, 24);
+    assert_eq!(count, 12);
 }
 
 #[test]
-fn double_precision_at_half_a_millisecond() {
-    check_half_millisecond(Precision::F64.fastest_kernel());
+fn half_a_millisecond_in_double_precision_planar() {
+    check_half_millisecond(Precision::F64.fastest_kernel(), true);
 }
 
 #[test]
-fn single_precision_at_half_a_millisecond() {
-    check_half_millisecond(Precision::F32.fastest_kernel());
+fn half_a_millisecond_in_double_precision_in_space_with_twist() {
+    check_half_millisecond(Precision::F64.fastest_kernel(), false);
 }
 
 #[test]
-fn equations_are_right_where_time_steps_do_not_matter() {
-    let Some(folder) = truth_folder() else { return };
-    let wanted = [
-        "A5-M1", "A2-M3", "A4-M3", "A1-M4", "A3-M4", "A5-M4", "A6-M4",
-    ];
-    for case in cases(&folder, |id| wanted.contains(&id)) {
-        let rollout = simulate(&case, Precision::F64.fastest_kernel(), 25e-6);
-        let error = max_tip_error_mm(&case, &rollout);
-        assert!(error <= 0.02, "{}: {error} mm", case.id);
+fn half_a_millisecond_in_single_precision_planar() {
+    check_half_millisecond(Precision::F32.fastest_kernel(), true);
+}
+
+#[test]
+fn half_a_millisecond_in_single_precision_in_space_with_twist() {
+    check_half_millisecond(Precision::F32.fastest_kernel(), false);
+}
+
+/// The kernel with the least time for one rope; all with fused operations agree bit
+/// by bit.
+fn kernel_for_one() -> Kernel {
+    if Kernel::Avx2F64.is_available() {
+        Kernel::ScalarF64
+    } else {
+        Kernel::PortableF64
     }
+}
+
+/// At 25 us the error of the time steps is gone and that of the equations is left.
+/// The start of A3-M1 is not smooth (a torque of 1 N m let go within nothing).
+fn check_equations(planar: bool) {
+    let Some(folder) = truth_folder() else { return };
+    let mut count = 0;
+    for case in cases(&folder, |id| is_planar(id) == planar) {
+        let rollout = simulate(&case, kernel_for_one(), 25e-6);
+        let error = max_tip_error_mm(&case, &rollout);
+        let bound = if case.id == "A3-M1" { 0.1 } else { 0.02 };
+        assert!(error <= bound, "{}: {error} mm, bound {bound} mm", case.id);
+        assert_eq!(rollout.outcome, Outcome::Clean, "{}", case.id);
+        count += 1;
+    }
+    assert_eq!(count, 12);
+}
+
+#[test]
+fn equations_are_right_in_the_plane() {
+    check_equations(true);
+}
+
+#[test]
+fn equations_are_right_in_space_with_twist() {
+    check_equations(false);
 }
 
 #[test]
@@ -100,10 +139,14 @@ fn every_kernel_follows_the_truth() {
     }
 }
 
+/// Planar and spatial cases whose error between 1 and 0.25 ms is that of the steps
+/// alone: smooth, and neither at the floor nor in the explicit terms' regime.
+const SMOOTH: [&str; 6] = ["A1-M2", "A3-M2", "A4-M2", "A4-M3", "A6-M3", "A1-M4"];
+
 #[test]
 fn convergence_is_of_second_order() {
     let Some(folder) = truth_folder() else { return };
-    for case in cases(&folder, |id| ["A1-M2", "A3-M2", "A4-M2"].contains(&id)) {
+    for case in cases(&folder, |id| SMOOTH.contains(&id)) {
         let error = |step_s| {
             max_tip_error_mm(
                 &case,
@@ -111,6 +154,7 @@ fn convergence_is_of_second_order() {
             )
         };
         let order = (error(1e-3) / error(2.5e-4)).log2() / 2.0;
+        println!("{}: order {order:.2}", case.id);
         assert!(order >= 1.9, "{}: order {order}", case.id);
     }
 }

@@ -3,7 +3,9 @@
 use super::Extent;
 use super::workload::{Workload, roll_out, throw_options};
 use crate::command::bench::spent::least;
-use rope_sim::{Candidate, FrameTimes, Kernel, Outcome, Precision, SimOptions, SimulateError};
+use rope_sim::{
+    Candidate, FrameTimes, Kernel, Outcome, Precision, SimOptions, SimulateError, Watch,
+};
 use serde::Serialize;
 
 /// AVX2 kernels, with half the lanes, may take this much longer.
@@ -103,7 +105,7 @@ fn wiggle_job(workload: &Workload, extent: Extent) -> Job<'_> {
             period_s: 1.0 / 60.0,
             count: 400,
         },
-        closest_to_m: None,
+        watch: Watch::NOTHING,
         ..throw_options(6.67, threads())
     };
     Job {

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, Kernel, PlannedArm, Precision, Rollout, SimOptions,
-    SimulateError, Start, roll_out_with,
+    SimulateError, Start, Watch, roll_out_with,
 };
 use shared_types::rope::RANGES;
 use shared_types::trajectory::TrajectoryError;
@@ -82,7 +82,7 @@ pub fn throw_options(horizon_s: f64, threads: usize) -> SimOptions {
         precision: Precision::F32,
         start: Start::Equilibrium,
         frames: FrameTimes::NONE,
-        closest_to_m: Some(TARGET_M),
+        watch: Watch::point(TARGET_M),
         horizon_s,
         threads,
     }

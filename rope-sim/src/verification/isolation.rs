@@ -1,0 +1,114 @@
+//! What is wrong with one rope of a group stays in its lane. The public interface
+//! refuses such ropes, so they are put into a group directly.
+
+use crate::PlannedArm;
+use crate::base_path::BasePath;
+use crate::frames::FrameTimes;
+use crate::group::{GroupTask, Member, MemberResult};
+use crate::lanes::Kernel;
+use shared_types::{JointTrajectory, JointVector, RopeParams};
+
+fn ropes(count: usize) -> Vec<RopeParams> {
+    let base = RopeParams::from_array([20.0, 0.55, 0.01, 0.2, 0.006, 0.06, 0.06, 0.03, 1.0]);
+    (0..count)
+        .map(|i| RopeParams {
+            length_m: 0.45 + 0.01 * i as f64,
+            ..base
+        })
+        .collect()
+}
+
+/// End of the simulation (s).
+const HORIZON_S: f64 = 0.3;
+
+fn path() -> BasePath {
+    let waypoints = [
+        JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
+        JointVector([0.1, -0.3, 0.1, 0.8, -0.1, 1.2, 0.2]),
+    ];
+    let arm = PlannedArm::new(JointTrajectory::new(&[0.0, 0.2], &waypoints).unwrap());
+    BasePath::new(&arm, 1e-3, HORIZON_S).unwrap()
+}
+
+fn run(kernel: Kernel, ropes: &[RopeParams], path: &BasePath) -> Vec<MemberResult> {
+    let members: Vec<Member> = ropes
+        .iter()
+        .map(|rope| Member {
+            rope,
+            path,
+            links: vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize],
+        })
+        .collect();
+    kernel.run(GroupTask {
+        members: &members,
+        frames: FrameTimes {
+            first_s: 0.0,
+            period_s: 0.01,
+            count: 30,
+        },
+        watch: crate::Watch::point([0.4, 0.0, 0.3]),
+        horizon_s: HORIZON_S,
+        single_precision: kernel.is_single_precision(),
+    })
+}
+
+/// All that a caller sees of a result.
+fn seen(result: &MemberResult) -> (Vec<u64>, crate::watch::Watched, [u64; 2], bool) {
+    (
+        result
+            .nodes
+            .to_f64()
+            .into_iter()
+            .map(f64::to_bits)
+            .collect(),
+        result.watched.clone(),
+        [
+            result.peak_tip_speed_m_s.to_bits(),
+            result.max_joint_angle_rad.to_bits(),
+        ],
+        result.survived,
+    )
+}
+
+#[test]
+fn nan_in_one_lane_changes_no_bit_of_the_others() {
+    let path = path();
+    let poisons: [fn(&mut RopeParams); 4] = [
+        |rope| rope.joint_stiffness_nm_per_rad = f64::NAN,
+        |rope| rope.lead_mass_kg = f64::NAN,
+        |rope| rope.length_m = f64::INFINITY,
+        |rope| rope.mass_per_length_kg_per_m = 0.0,
+    ];
+    for kernel in Kernel::ALL
+        .into_iter()
+        .filter(|k| k.is_available() && k.lanes() > 1)
+    {
+        let healthy = ropes(kernel.lanes());
+        let want: Vec<_> = run(kernel, &healthy, &path).iter().map(seen).collect();
+        assert!(want.iter().all(|w| w.3), "{kernel:?}");
+        for (index, poison) in poisons.into_iter().enumerate() {
+            let sick = (3 * index + 1) % kernel.lanes();
+            let mut ropes = healthy.clone();
+            poison(&mut ropes[sick]);
+            for (lane, result) in run(kernel, &ropes, &path).iter().enumerate() {
+                if lane == sick {
+                    continue;
+                }
+                assert!(
+                    seen(result) == want[lane],
+                    "{kernel:?}: poison {index} in lane {sick} reached lane {lane}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rope_that_is_not_a_number_does_not_survive() {
+    let path = path();
+    for kernel in Kernel::ALL.into_iter().filter(|k| k.is_available()) {
+        let mut ropes = ropes(1);
+        ropes[0].joint_damping_nms_per_rad = f64::NAN;
+        assert!(!run(kernel, &ropes, &path)[0].survived, "{kernel:?}");
+    }
+}
