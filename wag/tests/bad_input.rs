@@ -73,7 +73,7 @@ const CASES: &[Case] = &[
     (&[], 2, &["Usage"]),
     (&["fling"], 2, &["fling"]),
     (&["demo", "--seed", "x"], 2, &["--seed"]),
-    (&["bench"], 2, &["rope"]),
+    (&["bench"], 2, &["NAME"]),
     (
         &["bench", "wibble"],
         2,
