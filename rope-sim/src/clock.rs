@@ -15,22 +15,39 @@ struct Cursor<'a> {
     path: &'a BasePath,
     rope: &'a RopeParams,
     interval: usize,
-    /// Steps done within the interval.
-    step: usize,
+    /// Steps of the group that were over when the interval began.
+    began: u64,
+    /// The step at whose start something changes in this lane.
+    event: u64,
     phase: Phase,
     step_s: f64,
-    /// Step now being taken: start and end (s).
-    span_s: (f64, f64),
     finished: bool,
 }
 
-/// Time axes, scheme factors and attach motion of all lanes.
+impl Cursor<'_> {
+    /// Start and end (s) of the lane's step that is step `count` of the group.
+    fn span_s(&self, count: u64) -> (f64, f64) {
+        let interval = &self.path.intervals[self.interval];
+        let end_s = interval.start_s + interval.step_s * (count - self.began) as f64;
+        (end_s - interval.step_s, end_s)
+    }
+}
+
+/// Time axes, scheme factors and attach motion of all lanes. Most steps only count;
+/// lanes are looked at one by one where an interval or a phase of the scheme ends.
 pub(crate) struct Clock<'a, V> {
     cursors: Vec<Cursor<'a>>,
+    /// Steps begun.
+    count: u64,
+    /// First event of any lane.
+    next_event: u64,
+    running: usize,
     pub(crate) scheme: Scheme<V>,
     quintic: [[V; 6]; CHANNELS],
     per_length: V,
-    fraction: V,
+    /// Steps within the interval, and the inverse of the interval's number of steps.
+    step: V,
+    per_steps: V,
     /// Origin the positions are relative to, per lane (m).
     origin_m: [f64; 3],
 }
@@ -59,19 +76,23 @@ impl<'a, V: Lanes> Clock<'a, V> {
                 path,
                 rope,
                 interval: 0,
-                step: 0,
+                began: 0,
+                event: 1,
                 phase: Phase::Regular,
                 step_s: 0.0,
-                span_s: (0.0, 0.0),
                 finished: path.intervals.is_empty(),
             })
-            .collect();
+            .collect::<Vec<_>>();
         let mut clock = Self {
+            running: cursors.iter().filter(|c| !c.finished).count(),
             cursors,
+            count: 0,
+            next_event: 1,
             scheme: Scheme::new(),
             quintic: [[V::splat(0.0); 6]; CHANNELS],
             per_length: V::splat(1.0),
-            fraction: V::splat(0.0),
+            step: V::splat(0.0),
+            per_steps: V::splat(1.0),
             origin_m,
         };
         for lane in 0..clock.cursors.len() {
@@ -85,55 +106,63 @@ impl<'a, V: Lanes> Clock<'a, V> {
     #[inline(always)]
     pub(crate) fn next_step(&mut self, rope: &mut RopeLanes<V>, restarts: &mut Vec<usize>) -> bool {
         restarts.clear();
-        let mut running = false;
-        for lane in 0..self.cursors.len() {
-            running |= self.next_step_of(lane, rope, restarts);
+        self.count += 1;
+        self.step = self.step + V::splat(1.0);
+        if self.count == self.next_event {
+            let mut next_event = u64::MAX;
+            for lane in 0..self.cursors.len() {
+                if self.cursors[lane].event == self.count && !self.cursors[lane].finished {
+                    self.begin_step_of(lane, rope, restarts);
+                }
+                if !self.cursors[lane].finished {
+                    next_event = next_event.min(self.cursors[lane].event);
+                }
+            }
+            self.next_event = next_event;
         }
-        running
+        self.running > 0
     }
 
     #[inline(always)]
-    fn next_step_of(
+    fn begin_step_of(
         &mut self,
         lane: usize,
         rope: &mut RopeLanes<V>,
         restarts: &mut Vec<usize>,
-    ) -> bool {
+    ) {
         let cursor = &mut self.cursors[lane];
-        if cursor.finished {
-            return false;
-        }
-        if cursor.step == cursor.path.intervals[cursor.interval].steps {
+        if self.count - cursor.began > cursor.path.intervals[cursor.interval].steps as u64 {
             if cursor.interval + 1 == cursor.path.intervals.len() {
                 cursor.finished = true;
-                return false;
+                self.running -= 1;
+                return;
             }
             cursor.interval += 1;
-            cursor.step = 0;
+            cursor.began = self.count - 1;
+            self.step.set(lane, 1.0);
             self.load(lane);
         }
         let cursor = &mut self.cursors[lane];
         let interval: &Interval = &cursor.path.intervals[cursor.interval];
         let phase = match cursor.phase {
-            _ if interval.restart && cursor.step == 0 => Phase::Restart,
+            _ if interval.restart && cursor.began + 1 == self.count => Phase::Restart,
             Phase::Restart => Phase::AfterRestart,
             _ => Phase::Regular,
         };
-        cursor.step += 1;
-        let end_s = interval.start_s + interval.step_s * cursor.step as f64;
-        cursor.span_s = (end_s - interval.step_s, end_s);
-        self.fraction
-            .set(lane, cursor.step as f64 / interval.steps as f64);
         if phase != cursor.phase || (interval.step_s - cursor.step_s).abs() > 0.0 {
             self.scheme.set(lane, interval.step_s, phase);
             let resistance = joint_resistance(interval.step_s, phase, cursor.rope);
             rope.set(lane, cursor.rope, resistance);
             (cursor.phase, cursor.step_s) = (phase, interval.step_s);
         }
+        cursor.event = if phase == Phase::Regular {
+            cursor.began + interval.steps as u64 + 1
+        } else {
+            self.count + 1
+        };
         if phase == Phase::Restart {
             restarts.push(lane);
         }
-        true
     }
 
     /// Copies the current interval's quintics of one lane.
@@ -152,18 +181,20 @@ impl<'a, V: Lanes> Clock<'a, V> {
             self.quintic[axis][0].set(lane, interval.quintic[axis][0] - self.origin_m[axis]);
         }
         self.per_length.set(lane, 1.0 / interval.length_s());
+        self.per_steps.set(lane, 1.0 / interval.steps as f64);
     }
 
     /// Attach frame at the end of the current step (before the first: at time 0).
     #[inline(always)]
     pub(crate) fn base(&self) -> BaseState<V> {
-        let (x, xd, xdd) = self.channel(0);
-        let (y, yd, ydd) = self.channel(1);
-        let (z, zd, zdd) = self.channel(2);
-        let (qw, qwd, qwdd) = self.channel(3);
-        let (qx, qxd, qxdd) = self.channel(4);
-        let (qy, qyd, qydd) = self.channel(5);
-        let (qz, qzd, qzdd) = self.channel(6);
+        let u = (self.step * self.per_steps).min(V::splat(1.0));
+        let (x, xd, xdd) = self.channel(0, u);
+        let (y, yd, ydd) = self.channel(1, u);
+        let (z, zd, zdd) = self.channel(2, u);
+        let (qw, qwd, qwdd) = self.channel(3, u);
+        let (qx, qxd, qxdd) = self.channel(4, u);
+        let (qy, qyd, qydd) = self.channel(5, u);
+        let (qz, qzd, qzdd) = self.channel(6, u);
         let two = V::splat(2.0);
         let q = Quat {
             w: qw,
@@ -190,11 +221,10 @@ impl<'a, V: Lanes> Clock<'a, V> {
         }
     }
 
-    /// Value, rate and acceleration of one channel.
+    /// Value, rate and acceleration of one channel at the fraction `u` of the interval.
     #[inline(always)]
-    fn channel(&self, channel: usize) -> (V, V, V) {
+    fn channel(&self, channel: usize, u: V) -> (V, V, V) {
         let [c0, c1, c2, c3, c4, c5] = self.quintic[channel];
-        let u = self.fraction;
         let n = V::splat;
         let value = u.fma(u.fma(u.fma(u.fma(u.fma(c5, c4), c3), c2), c1), c0);
         let rate = u.fma(
@@ -222,10 +252,30 @@ impl<'a, V: Lanes> Clock<'a, V> {
         self.cursors[lane].finished
     }
 
+    /// Number of lanes that have not.
+    #[inline(always)]
+    pub(crate) fn running(&self) -> usize {
+        self.running
+    }
+
     /// Start and end of a lane's current step (s).
     #[inline(always)]
     pub(crate) fn span_s(&self, lane: usize) -> (f64, f64) {
-        self.cursors[lane].span_s
+        self.cursors[lane].span_s(self.count)
+    }
+
+    /// Steps begun by the group.
+    #[inline(always)]
+    pub(crate) fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Longest step of any lane (s).
+    pub(crate) fn longest_step_s(&self) -> f64 {
+        self.cursors
+            .iter()
+            .flat_map(|cursor| &cursor.path.intervals)
+            .fold(0.0, |longest: f64, interval| longest.max(interval.step_s))
     }
 
     /// Attach point of a lane at a time within its current step (m, world).

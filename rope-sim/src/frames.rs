@@ -103,6 +103,25 @@ impl NodeTrack {
         [self.frames(), self.nodes, 3]
     }
 
+    /// Writes one frame: the numbers of `lane`, node by node.
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "the precision of the run")]
+    fn put<V: Lanes>(&mut self, frame: usize, lane: usize, positions: &[Vec3<V>]) {
+        let range = frame * self.nodes * 3..(frame + 1) * self.nodes * 3;
+        match &mut self.numbers {
+            Numbers::F32(v) => {
+                for (out, x) in v[range].chunks_exact_mut(3).zip(positions) {
+                    out.copy_from_slice(&x.get(lane).map(|x| x as f32));
+                }
+            }
+            Numbers::F64(v) => {
+                for (out, x) in v[range].chunks_exact_mut(3).zip(positions) {
+                    out.copy_from_slice(&x.get(lane));
+                }
+            }
+        }
+    }
+
     #[allow(clippy::cast_possible_truncation, reason = "the precision of the run")]
     pub(crate) fn set(&mut self, frame: usize, node: usize, position_m: [f64; 3]) {
         let at = (frame * self.nodes + node) * 3;
@@ -146,30 +165,48 @@ pub(crate) struct FrameRecorder<V> {
     pub(crate) tracks: Vec<NodeTrack>,
     before: Snapshot<V>,
     after: Snapshot<V>,
+    /// Node positions of a frame (m, world).
+    positions: Vec<Vec3<V>>,
     wanted: bool,
+    longest_step_s: f64,
+    /// No lane has a frame before this step of the group.
+    asleep_until: u64,
 }
 
 impl<V: Lanes> FrameRecorder<V> {
     #[inline(always)]
-    pub(crate) fn new(times: FrameTimes, lanes: usize, links: usize, single: bool) -> Self {
-        let track = NodeTrack::zeros(times.count, links + 1, single);
+    pub(crate) fn new(times: FrameTimes, clock: &Clock<V>, links: usize, single: bool) -> Self {
+        let lanes = clock.running();
         let empty = vec![[Vec3::zero(); 2]; links + 1];
+        let track = || NodeTrack::zeros(times.count, links + 1, single);
         Self {
             times,
             next: vec![0; lanes],
-            tracks: vec![track; lanes],
+            tracks: (0..lanes).map(|_| track()).collect(),
             before: empty.clone(),
             after: empty,
+            positions: vec![Vec3::zero(); links + 1],
             wanted: false,
+            longest_step_s: clock.longest_step_s(),
+            asleep_until: if times.count == 0 { u64::MAX } else { 0 },
         }
     }
 
     /// Call before a step: keeps the state if a frame falls into it.
     #[inline(always)]
     pub(crate) fn before_step(&mut self, clock: &Clock<V>, links: &[Link<V>], link_length: V) {
-        self.wanted = (0..self.next.len()).any(|lane| self.due(clock, lane));
+        self.wanted = false;
+        if clock.count() < self.asleep_until {
+            return;
+        }
+        let wait_s = (0..self.next.len())
+            .map(|lane| self.wait_s(clock, lane))
+            .fold(f64::INFINITY, f64::min);
+        self.wanted = wait_s <= 0.0;
         if self.wanted {
             take(&mut self.before, links, link_length);
+        } else {
+            self.asleep_until = clock.count() + 1 + whole_steps(wait_s, self.longest_step_s);
         }
     }
 
@@ -180,44 +217,67 @@ impl<V: Lanes> FrameRecorder<V> {
             return;
         }
         take(&mut self.after, links, link_length);
-        for lane in 0..self.next.len() {
-            while self.due(clock, lane) {
-                let frame = self.next[lane];
-                self.write(clock, lane, frame);
-                self.next[lane] = frame + 1;
+        loop {
+            let due: Vec<usize> = (0..self.next.len())
+                .filter(|lane| self.wait_s(clock, *lane) <= 0.0)
+                .collect();
+            if due.is_empty() {
+                break;
             }
+            self.write(clock, &due);
         }
     }
 
+    /// Time from the end of a lane's step to its next frame (s); not above zero where
+    /// that falls into the step, infinite where there is none.
     #[inline(always)]
-    fn due(&self, clock: &Clock<V>, lane: usize) -> bool {
+    fn wait_s(&self, clock: &Clock<V>, lane: usize) -> f64 {
         let frame = self.next[lane];
-        frame < self.times.count
-            && !clock.finished(lane)
-            && self.times.time_s(frame) <= clock.span_s(lane).1 + 1e-9
-    }
-
-    /// Cubic Hermite between the states around the frame time.
-    #[inline(always)]
-    fn write(&mut self, clock: &Clock<V>, lane: usize, frame: usize) {
-        let (start_s, end_s) = clock.span_s(lane);
-        let t_s = self.times.time_s(frame).clamp(start_s, end_s);
-        let h = end_s - start_s;
-        let weights = hermite((t_s - start_s) / h, h);
-        let attach = clock.attach_point_m(lane, t_s);
-        for (node, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
-            let [x0, v0] = [before[0].get(lane), before[1].get(lane)];
-            let [x1, v1] = [after[0].get(lane), after[1].get(lane)];
-            let mut position = attach;
-            for axis in 0..3 {
-                position[axis] += weights[0] * x0[axis]
-                    + weights[1] * v0[axis]
-                    + weights[2] * x1[axis]
-                    + weights[3] * v1[axis];
-            }
-            self.tracks[lane].set(frame, node, position);
+        if frame < self.times.count && !clock.finished(lane) {
+            self.times.time_s(frame) - clock.span_s(lane).1 - 1e-9
+        } else {
+            f64::INFINITY
         }
     }
+
+    /// Cubic Hermite between the states around the frame time, in the lanes `due`.
+    #[inline(always)]
+    fn write(&mut self, clock: &Clock<V>, due: &[usize]) {
+        let mut weights = [V::splat(0.0); 4];
+        let mut attach = Vec3::zero();
+        for lane in due {
+            let (start_s, end_s) = clock.span_s(*lane);
+            let t_s = self
+                .times
+                .time_s(self.next[*lane])
+                .clamp(start_s, end_s);
+            let h = end_s - start_s;
+            for (weight, number) in weights.iter_mut().zip(hermite((t_s - start_s) / h, h)) {
+                weight.set(*lane, number);
+            }
+            attach.set(*lane, clock.attach_point_m(*lane, t_s));
+        }
+        let states = self.before.iter().zip(&self.after);
+        for (position, (before, after)) in self.positions.iter_mut().zip(states) {
+            let moved = after[0].scale_add(weights[2], after[1].scale(weights[3]));
+            let moved = before[0].scale_add(weights[0], before[1].scale_add(weights[1], moved));
+            *position = attach.add(moved);
+        }
+        for lane in due {
+            self.tracks[*lane].put(self.next[*lane], *lane, &self.positions);
+            self.next[*lane] += 1;
+        }
+    }
+}
+
+/// Steps of at most `step_s` that surely end before `wait_s` is over.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "rounds down; saturates where there is no end"
+)]
+fn whole_steps(wait_s: f64, step_s: f64) -> u64 {
+    ((wait_s / step_s - 1e-6).max(0.0) as u64).min(u64::from(u32::MAX))
 }
 
 /// Weights of value and rate at the start, value and rate at the end, at the fraction

@@ -64,7 +64,7 @@ impl LaneTask for GroupTask<'_> {
         let paths: Vec<&BasePath> = self.members.iter().map(|m| m.path).collect();
         let ropes: Vec<&RopeParams> = self.members.iter().map(|m| m.rope).collect();
         let mut clock = Clock::new(&paths, &ropes, self.watch.origin_m());
-        let mut recorder = FrameRecorder::new(self.frames, count, n, self.single_precision);
+        let mut recorder = FrameRecorder::new(self.frames, &clock, n, self.single_precision);
         let start = clock.base();
         let hanging = start.position.add(hanging_tip(&links, rope.link_length));
         let mut watcher = Watcher::new(
@@ -136,6 +136,8 @@ impl LaneTask for GroupTask<'_> {
 struct Health<V> {
     /// 1 in lanes that are still advancing, else 0.
     running: V,
+    /// How many they were when last counted.
+    clock_running: usize,
     alive: Vec<bool>,
 }
 
@@ -143,6 +145,7 @@ impl<V: Lanes> Health<V> {
     #[inline(always)]
     fn new(count: usize) -> Self {
         Self {
+            clock_running: count,
             running: V::splat(1.0),
             alive: vec![true; count],
         }
@@ -152,6 +155,10 @@ impl<V: Lanes> Health<V> {
     /// idle on while others advance, and nothing they do then counts.
     #[inline(always)]
     fn mark_finished(&mut self, clock: &Clock<V>, links: &[Link<V>]) {
+        if clock.running() == self.clock_running {
+            return;
+        }
+        self.clock_running = clock.running();
         for lane in 0..self.alive.len() {
             if clock.finished(lane) && self.running.get(lane) > 0.0 {
                 self.check(links, clock.scheme.h);
