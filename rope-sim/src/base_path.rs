@@ -7,12 +7,17 @@
 //! whose own second derivatives match the accelerations at the knots. Coefficients
 //! are made in double precision.
 
+use crate::arm_knots::ArmKnots;
 use crate::motion::AttachMotion;
+use crate::rollout::Precision;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
+use shared_types::JointState;
 use shared_types::kinematics::FrameMotion;
 
 /// Longest time between exact evaluations of the attach motion (s).
 const KNOT_S: f64 = 0.004;
+/// Knots evaluated at a time; few enough to stay in the cache.
+const AT_ONCE: usize = 32;
 /// Jumps closer together than this are one (s).
 const SAME_TIME_S: f64 = 1e-6;
 /// How far beside a jump its two sides are looked at (s).
@@ -72,8 +77,20 @@ impl BasePath {
         step_s: f64,
         horizon_s: f64,
     ) -> Result<Self, NotFinite> {
+        Self::new_in(Vec::new(), motion, step_s, horizon_s)
+    }
+
+    /// As [`BasePath::new`], in the memory of a path that is no longer needed: asking
+    /// the system for it anew for every candidate takes as long as filling it.
+    pub(crate) fn new_in(
+        mut memory: Vec<Interval>,
+        motion: &dyn AttachMotion,
+        step_s: f64,
+        horizon_s: f64,
+    ) -> Result<Self, NotFinite> {
+        memory.clear();
         let mut path = Self {
-            intervals: Vec::new(),
+            intervals: memory,
             start: evaluate(motion, 0.0)?,
         };
         let mut from_s = 0.0;
@@ -94,26 +111,34 @@ impl BasePath {
         let steps = steps_within(to_s - from_s, max_step_s);
         let step_s = (to_s - from_s) / steps as f64;
         let per_interval = ((KNOT_S / step_s + 1e-9).floor() as usize).max(1);
-        let mut knot = Knot::new(&evaluate(motion, from_s + BESIDE_S)?, None);
-        let mut done = 0;
-        while done < steps {
-            let now = per_interval.min(steps - done);
-            let start_s = from_s + step_s * done as f64;
-            done += now;
-            let end_s = if done == steps {
-                to_s - BESIDE_S
-            } else {
-                from_s + step_s * done as f64
-            };
-            let next = Knot::new(&evaluate(motion, end_s)?, Some(&knot));
-            self.intervals.push(Interval {
-                start_s,
-                step_s,
-                steps: now,
-                restart: done == now,
-                quintic: quintics(&knot, &next, step_s * now as f64),
-            });
-            knot = next;
+        let count = steps.div_ceil(per_interval);
+        let at_s = |knot: usize| from_s + step_s * (knot * per_interval) as f64;
+        let times_s: Vec<f64> = (0..=count)
+            .map(|knot| match knot {
+                0 => from_s + BESIDE_S,
+                last if last == count => to_s - BESIDE_S,
+                inner => at_s(inner),
+            })
+            .collect();
+        self.intervals.reserve(count);
+        let mut before: Option<Knot> = None;
+        let mut index = 0;
+        for times_s in times_s.chunks(AT_ONCE) {
+            for mut after in knots(motion, times_s)? {
+                if let Some(before) = &before {
+                    after.on_the_side_of(before);
+                    let now = per_interval.min(steps - index * per_interval);
+                    self.intervals.push(Interval {
+                        start_s: at_s(index),
+                        step_s,
+                        steps: now,
+                        restart: index == 0,
+                        quintic: quintics(before, &after, step_s * now as f64),
+                    });
+                    index += 1;
+                }
+                before = Some(after);
+            }
         }
         Ok(())
     }
@@ -189,23 +214,35 @@ pub(crate) fn attitude(frame: &FrameMotion) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame.r))
 }
 
+/// Exact motion at each of the times.
+fn knots(motion: &dyn AttachMotion, times_s: &[f64]) -> Result<Vec<Knot>, NotFinite> {
+    let joints: Option<Vec<JointState>> = times_s.iter().map(|t| motion.joints_at(*t)).collect();
+    let knots = match joints {
+        Some(states) => {
+            let kernel = Precision::F64.fastest_kernel();
+            kernel.run(ArmKnots { states: &states })
+        }
+        None => times_s.iter().map(|t| Knot::new(&motion.at(*t))).collect(),
+    };
+    match knots.iter().position(|knot| !knot.is_finite()) {
+        Some(index) => Err(NotFinite {
+            time_s: times_s[index],
+        }),
+        None => Ok(knots),
+    }
+}
+
 /// Channels and their first two derivatives at one time.
-struct Knot {
-    value: [f64; CHANNELS],
-    rate: [f64; CHANNELS],
-    acceleration: [f64; CHANNELS],
+pub(crate) struct Knot {
+    pub(crate) value: [f64; CHANNELS],
+    pub(crate) rate: [f64; CHANNELS],
+    pub(crate) acceleration: [f64; CHANNELS],
 }
 
 impl Knot {
-    /// From a frame's motion; the quaternion on the side of the knot before.
-    fn new(m: &FrameMotion, before: Option<&Self>) -> Self {
-        let mut q = attitude(m).into_inner();
-        if let Some(b) = before {
-            let b = Quaternion::new(b.value[3], b.value[4], b.value[5], b.value[6]);
-            if q.dot(&b) < 0.0 {
-                q = -q;
-            }
-        }
+    /// From a frame's motion.
+    pub(crate) fn new(m: &FrameMotion) -> Self {
+        let q = attitude(m).into_inner();
         let w = Quaternion::from_imag(m.w_rad_s * 0.5);
         let q_rate = w * q;
         let q_acceleration = Quaternion::from_imag(m.alpha_rad_s2 * 0.5) * q + w * q_rate;
@@ -216,6 +253,21 @@ impl Knot {
             rate: join(&m.v_m_s, &q_rate),
             acceleration: join(&m.a_m_s2, &q_acceleration),
         }
+    }
+
+    /// Turns the quaternion's sign towards that of another knot.
+    pub(crate) fn on_the_side_of(&mut self, other: &Self) {
+        let dot: f64 = (3..CHANNELS).map(|c| self.value[c] * other.value[c]).sum();
+        if dot < 0.0 {
+            for numbers in [&mut self.value, &mut self.rate, &mut self.acceleration] {
+                numbers[3..].iter_mut().for_each(|x| *x = -*x);
+            }
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        let sum = |numbers: &[f64; CHANNELS]| numbers.iter().sum::<f64>();
+        (sum(&self.value) + sum(&self.rate) + sum(&self.acceleration)).is_finite()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Batches of simulations: grouping into lanes, threads, repeats of what blew up.
 
-use crate::base_path::{BasePath, NotFinite, attitude};
+use crate::base_path::{BasePath, Interval, NotFinite, attitude};
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member, MemberResult};
@@ -13,6 +13,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How much smaller the steps of a repeated rollout are.
 pub(crate) const REPEAT_DIVISOR: f64 = 4.0;
@@ -143,19 +144,20 @@ impl Batch<'_> {
         let threads = self.options.threads.clamp(1, groups.len().max(1));
         let mut results: Vec<Option<MemberResult>> = Vec::new();
         results.resize_with(self.candidates.len(), || None);
-        let work = |first: usize| -> Result<Vec<(usize, MemberResult)>, SimulateError> {
+        let next = AtomicUsize::new(0);
+        let work = || -> Result<Vec<(usize, MemberResult)>, SimulateError> {
             let mut out = Vec::new();
-            for group in groups.iter().skip(first).step_by(threads) {
-                out.extend(group.iter().copied().zip(self.run_group(group, &shared)?));
+            let mut memory = Vec::new();
+            while let Some(group) = groups.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let results = self.run_group(group, &shared, &mut memory)?;
+                out.extend(group.iter().copied().zip(results));
             }
             Ok(out)
         };
         let mut finished = Vec::with_capacity(threads);
         std::thread::scope(|scope| {
-            let handles: Vec<_> = (1..threads)
-                .map(|first| scope.spawn(move || work(first)))
-                .collect();
-            finished.push(work(0));
+            let handles: Vec<_> = (1..threads).map(|_| scope.spawn(&work)).collect();
+            finished.push(work());
             for handle in handles {
                 finished.push(handle.join().unwrap_or(Err(SimulateError::WorkerPanicked)));
             }
@@ -202,24 +204,28 @@ impl Batch<'_> {
             .collect()
     }
 
+/// `memory` is that of paths of earlier groups, to be used again.
     fn run_group(
         &self,
         group: &[usize],
         shared: &BTreeMap<usize, SharedPath>,
+        memory: &mut Vec<Vec<Interval>>,
     ) -> Result<Vec<MemberResult>, SimulateError> {
-        let build = |motion| BasePath::new(motion, self.step_s, self.options.horizon_s);
+        let build = |motion, memory| {
+            BasePath::new_in(memory, motion, self.step_s, self.options.horizon_s)
+        };
         let mut own = Vec::with_capacity(group.len());
         for index in group {
             let motion = self.candidates[*index].motion;
             let is_own = !shared.contains_key(&address(motion));
-            own.push(is_own.then(|| build(motion)));
+            own.push(is_own.then(|| build(motion, memory.pop().unwrap_or_default())));
         }
         let mut members = Vec::with_capacity(group.len());
         for (index, own) in group.iter().zip(&own) {
             let candidate = &self.candidates[*index];
             let path = match (own, shared.get(&address(candidate.motion))) {
                 (Some(path), _) => path,
-                (None, Some(slot)) => slot.get_or_init(|| build(candidate.motion)),
+                (None, Some(slot)) => slot.get_or_init(|| build(candidate.motion, Vec::new())),
                 (None, None) => continue,
             };
             let path = path
@@ -235,13 +241,17 @@ impl Batch<'_> {
                 links,
             });
         }
-        Ok(self.kernel.run(GroupTask {
+        let results = self.kernel.run(GroupTask {
             members: &members,
             frames: self.options.frames,
             watch: self.options.watch,
             horizon_s: self.options.horizon_s,
             single_precision: self.kernel.is_single_precision(),
-        }))
+        });
+        drop(members);
+        let finished = own.into_iter().flatten().flatten();
+        memory.extend(finished.map(|path| path.intervals));
+        Ok(results)
     }
 }
 

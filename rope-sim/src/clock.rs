@@ -25,10 +25,12 @@ struct Cursor<'a> {
 }
 
 impl Cursor<'_> {
-    /// Start and end (s) of the lane's step that is step `count` of the group.
+    /// Start and end (s) of the lane's step that is step `count` of the group, its last
+    /// where it has finished.
     fn span_s(&self, count: u64) -> (f64, f64) {
         let interval = &self.path.intervals[self.interval];
-        let end_s = interval.start_s + interval.step_s * (count - self.began) as f64;
+        let step = (count - self.began).min(interval.steps as u64);
+        let end_s = interval.start_s + interval.step_s * step as f64;
         (end_s - interval.step_s, end_s)
     }
 }

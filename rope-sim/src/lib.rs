@@ -24,6 +24,8 @@
 )]
 
 mod algebra;
+mod approach;
+mod arm_knots;
 mod base_path;
 mod batch;
 mod clock;

@@ -98,6 +98,10 @@ impl AttachMotion for MeasuredArm {
         attach_motion(&self.joints_at(t_s))
     }
 
+    fn joints_at(&self, t_s: f64) -> Option<JointState> {
+        Some(self.joints_at(t_s))
+    }
+
     fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
         Some(link_motions(&self.joints_at(t_s)))
     }

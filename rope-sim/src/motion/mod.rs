@@ -13,8 +13,8 @@ pub use measured::MeasuredArm;
 pub use planned::PlannedArm;
 pub use pose_track::{PoseRow, PoseTrack};
 
-use shared_types::JOINTS;
 use shared_types::kinematics::FrameMotion;
+use shared_types::{JOINTS, JointState};
 
 /// Motion of the attach frame A in the world: pose and its exact first two
 /// derivatives. The rope at rest leaves A along its -z axis.
@@ -33,6 +33,13 @@ pub trait AttachMotion: Sync {
     /// Where it is not, simulating beyond that time is refused.
     fn holds_after_end(&self) -> bool {
         true
+    }
+
+    /// State of the arm's joints that puts the attach frame where
+    /// [`AttachMotion::at`] says, where there is an arm: many instants of it are
+    /// evaluated side by side then.
+    fn joints_at(&self, _t_s: f64) -> Option<JointState> {
+        None
     }
 
     /// Motions of the arm's links 1 to 7 that go with [`AttachMotion::at`], where

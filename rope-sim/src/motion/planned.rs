@@ -2,7 +2,7 @@
 
 use super::AttachMotion;
 use shared_types::kinematics::{FrameMotion, attach_motion, link_motions};
-use shared_types::{JOINTS, JointTrajectory};
+use shared_types::{JOINTS, JointState, JointTrajectory};
 
 /// Attach frame at the pole's end of an arm that follows a trajectory exactly. It
 /// holds still before the start and after the end.
@@ -28,6 +28,10 @@ impl PlannedArm {
 impl AttachMotion for PlannedArm {
     fn at(&self, t_s: f64) -> FrameMotion {
         attach_motion(&self.trajectory.state_at(t_s))
+    }
+
+    fn joints_at(&self, t_s: f64) -> Option<JointState> {
+        Some(self.trajectory.state_at(t_s))
     }
 
     fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
