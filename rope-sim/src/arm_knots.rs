@@ -139,9 +139,7 @@ impl<V: Lanes> Frame<V> {
         let turn = Turn::of(q);
         let [x, y, z] = self.axes;
         let spin = z.scale(qd);
-        self.alpha = self
-            .w
-            .cross_add(spin, z.scale_add(qdd, self.alpha));
+        self.alpha = self.w.cross_add(spin, z.scale_add(qdd, self.alpha));
         self.w = self.w.add(spin);
         self.axes = [
             y.scale_add(turn.sin, x.scale(turn.cos)),
@@ -166,7 +164,10 @@ impl<V: Lanes> Frame<V> {
         };
         let q = self.attitude;
         let rate = imaginary(self.w).times(q);
-        let (a, b) = (imaginary(self.alpha).times(q), imaginary(self.w).times(rate));
+        let (a, b) = (
+            imaginary(self.alpha).times(q),
+            imaginary(self.w).times(rate),
+        );
         let join = |p: Vec3<V>, w: V, v: Vec3<V>| [p.0, p.1, p.2, w, v.0, v.1, v.2];
         (
             join(self.origin, q.w, q.v),
@@ -187,7 +188,10 @@ fn attach_frame<V: Lanes>(joints: &JointLanes<V>) -> Frame<V> {
     }
     frame.offset([0.0, 0.0, POLE_LENGTH_M]);
     // Half a turn about x: the attach frame's -z points along the pole.
-    let Quat { w, v: Vec3(x, y, z) } = frame.attitude;
+    let Quat {
+        w,
+        v: Vec3(x, y, z),
+    } = frame.attitude;
     frame.attitude = Quat {
         w: -x,
         v: Vec3(w, z, -y),

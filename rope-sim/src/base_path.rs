@@ -72,16 +72,9 @@ pub(crate) struct NotFinite {
 impl BasePath {
     /// Cuts `[0, horizon_s]` at the motion's acceleration jumps into steps of at most
     /// `step_s`.
-    pub(crate) fn new(
-        motion: &dyn AttachMotion,
-        step_s: f64,
-        horizon_s: f64,
-    ) -> Result<Self, NotFinite> {
-        Self::new_in(Vec::new(), motion, step_s, horizon_s)
-    }
-
-    /// As [`BasePath::new`], in the memory of a path that is no longer needed: asking
-    /// the system for it anew for every candidate takes as long as filling it.
+    ///
+    /// `memory` is that of a path no longer needed, or empty: asking the system for it
+    /// anew for every candidate takes as long as filling it.
     pub(crate) fn new_in(
         mut memory: Vec<Interval>,
         motion: &dyn AttachMotion,
@@ -312,7 +305,7 @@ mod tests {
     #[test]
     fn quintics_follow_the_arm_and_its_acceleration() {
         let arm = arm();
-        let path = BasePath::new(&arm, 5e-4, 1.0).unwrap();
+        let path = BasePath::new_in(Vec::new(), &arm, 5e-4, 1.0).unwrap();
         let mut squared = 0.0;
         for interval in &path.intervals {
             let u = 0.37_f64;
@@ -338,7 +331,7 @@ mod tests {
 
     #[test]
     fn steps_meet_the_end_of_the_trajectory_and_restart_there() {
-        let path = BasePath::new(&arm(), 5e-4, 1.0).unwrap();
+        let path = BasePath::new_in(Vec::new(), &arm(), 5e-4, 1.0).unwrap();
         let starts: Vec<f64> = path
             .intervals
             .iter()

@@ -156,7 +156,7 @@ impl Batch<'_> {
         };
         let mut finished = Vec::with_capacity(threads);
         std::thread::scope(|scope| {
-            let handles: Vec<_> = (1..threads).map(|_| scope.spawn(&work)).collect();
+            let handles: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
             finished.push(work());
             for handle in handles {
                 finished.push(handle.join().unwrap_or(Err(SimulateError::WorkerPanicked)));
@@ -204,16 +204,15 @@ impl Batch<'_> {
             .collect()
     }
 
-/// `memory` is that of paths of earlier groups, to be used again.
+    /// `memory` is that of paths of earlier groups, to be used again.
     fn run_group(
         &self,
         group: &[usize],
         shared: &BTreeMap<usize, SharedPath>,
         memory: &mut Vec<Vec<Interval>>,
     ) -> Result<Vec<MemberResult>, SimulateError> {
-        let build = |motion, memory| {
-            BasePath::new_in(memory, motion, self.step_s, self.options.horizon_s)
-        };
+        let build =
+            |motion, memory| BasePath::new_in(memory, motion, self.step_s, self.options.horizon_s);
         let mut own = Vec::with_capacity(group.len());
         for index in group {
             let motion = self.candidates[*index].motion;

@@ -126,12 +126,7 @@ impl<'a, V: Lanes> Clock<'a, V> {
     }
 
     #[inline(always)]
-    fn begin_step_of(
-        &mut self,
-        lane: usize,
-        rope: &mut RopeLanes<V>,
-        restarts: &mut Vec<usize>,
-    ) {
+    fn begin_step_of(&mut self, lane: usize, rope: &mut RopeLanes<V>, restarts: &mut Vec<usize>) {
         let cursor = &mut self.cursors[lane];
         if self.count - cursor.began > cursor.path.intervals[cursor.interval].steps as u64 {
             if cursor.interval + 1 == cursor.path.intervals.len() {

@@ -247,10 +247,7 @@ impl<V: Lanes> FrameRecorder<V> {
         let mut attach = Vec3::zero();
         for lane in due {
             let (start_s, end_s) = clock.span_s(*lane);
-            let t_s = self
-                .times
-                .time_s(self.next[*lane])
-                .clamp(start_s, end_s);
+            let t_s = self.times.time_s(self.next[*lane]).clamp(start_s, end_s);
             let h = end_s - start_s;
             for (weight, number) in weights.iter_mut().zip(hermite((t_s - start_s) / h, h)) {
                 weight.set(*lane, number);

@@ -24,7 +24,6 @@
 )]
 
 mod algebra;
-mod approach;
 mod arm_knots;
 mod base_path;
 mod batch;
