@@ -27,7 +27,7 @@ fn path() -> BasePath {
         JointVector([0.1, -0.3, 0.1, 0.8, -0.1, 1.2, 0.2]),
     ];
     let arm = PlannedArm::new(JointTrajectory::new(&[0.0, 0.2], &waypoints).unwrap());
-    BasePath::new(&arm, 1e-3, HORIZON_S).unwrap()
+    BasePath::new_in(Vec::new(), &arm, 1e-3, HORIZON_S).unwrap()
 }
 
 fn run(kernel: Kernel, ropes: &[RopeParams], path: &BasePath) -> Vec<MemberResult> {
