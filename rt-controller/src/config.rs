@@ -159,6 +159,7 @@ impl ThresholdSettings {
             tracking_error_max_rad: error,
             tracking_window_ns: span("tracking_window_ms", self.tracking_window_ms)?,
             missed_cycles_max: self.missed_cycles_max,
+            ..Thresholds::relaxed()
         })
     }
 }

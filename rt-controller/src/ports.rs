@@ -3,7 +3,7 @@
 
 use crate::control::{ControlEvent, CycleOutput, Motion, Order};
 use rtrb::{Consumer, Producer, RingBuffer};
-use shared_types::ipc::{CycleRecord, JointReport};
+use shared_types::ipc::{CycleRecord, JointReport, Reports};
 
 /// Cycle records kept while the relay is busy: sixteen seconds at 250 Hz.
 const RECORDS: usize = 4096;
@@ -50,11 +50,13 @@ pub struct RtPorts<T> {
 }
 
 impl<T> RtPorts<T> {
-    /// The newest joint report that came since the last call; bounded. RT-safe.
-    pub fn newest_report(&mut self) -> Option<JointReport> {
-        (0..NEWEST_REPORTS)
-            .map_while(|_| self.reports.pop().ok())
-            .last()
+    /// The joint reports that came since the last call; bounded. RT-safe.
+    pub fn new_reports(&mut self) -> Reports {
+        let mut reports = Reports::default();
+        for report in (0..NEWEST_REPORTS).map_while(|_| self.reports.pop().ok()) {
+            reports.push(report);
+        }
+        reports
     }
 
     /// Hands a link back to be dropped. RT-safe.

@@ -91,7 +91,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
 
         out.record.wake_late_ns = span_ns(deadline_ns, woke_ns);
         out.record.compute_ns = span_ns(woke_ns, computed_ns);
-        out.record.send_ns = out.setpoint.map_or(0, |_| span_ns(woke_ns, sent_ns));
+        out.record.send_ns = out.command.map_or(0, |_| span_ns(woke_ns, sent_ns));
         self.boards.publish(ControllerState {
             stamp_ns: woke_ns,
             real_time: u8::from(self.real_time),
@@ -117,7 +117,8 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
             order: mail.map(|m| m.order),
             operator: self.boards.operator(),
             link,
-            report: self.ports.newest_report(),
+            reports: self.ports.new_reports(),
+            ..CycleInput::default()
         }
     }
 }

@@ -57,6 +57,7 @@ fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, Relay
         tracking_error_max_rad: 0.05,
         tracking_window_ns: 100_000_000,
         missed_cycles_max: 5,
+        ..Thresholds::relaxed()
     };
     let rings = rings();
     let mut relay = rings.relay;
@@ -78,7 +79,7 @@ fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, Relay
 
 fn latched(relay: &mut RelayPorts<IdealArm>) -> Option<FaultCode> {
     std::iter::from_fn(|| relay.events.pop().ok()).find_map(|event| match event {
-        ControlEvent::Latched { fault, .. } => Some(fault),
+        ControlEvent::Latched(cause) => Some(cause.fault()),
         _ => None,
     })
 }

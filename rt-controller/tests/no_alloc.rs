@@ -186,6 +186,7 @@ fn no_cycle_touches_the_heap() {
         tracking_error_max_rad: 0.05,
         tracking_window_ns: 100_000_000,
         missed_cycles_max: 5,
+        ..Thresholds::relaxed()
     };
     let mut rings = rings();
     let rt_ports = std::mem::replace(&mut rings.rt, self::rings::<TcpLink>().rt);

@@ -32,8 +32,10 @@ pub mod kinematics;
 pub mod limits;
 pub mod plan;
 pub mod rope;
+pub mod tier;
 pub mod time;
 pub mod trajectory;
+pub mod wire;
 
 pub use camera::{Intrinsics, Shutter, StereoCamera};
 pub use fault::FaultCode;
@@ -42,8 +44,10 @@ pub use keypoints::{KeypointFrame, KeypointTrack};
 pub use limits::{Limits, LimitsSpec};
 pub use plan::{Plan, Task};
 pub use rope::{RopeEstimate, RopeParams};
+pub use tier::{Arming, MotionTier};
 pub use time::MonotonicNs;
 pub use trajectory::{JointTrajectory, TrajectoryError};
+pub use wire::WireMode;
 
 /// Version of this build, written into every result file.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,16 +1,21 @@
 //! One control cycle: [`ControlState::step`], a pure function of its input and
 //! its own state.
 
+use super::arming::ArmingState;
 use super::brake::brake;
-use super::exchange::{ControlEvent, CycleInput, CycleOutput, Order};
+use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput, Order};
 use super::limiter::Limiter;
-use super::mode::{Trigger, next_mode, reaction};
-use super::monitor::{Monitor, Thresholds};
+use super::mode::{Trigger, next_mode};
+use super::monitor::Monitor;
 use super::motion::Motion;
 use super::phases::PhasedMotion;
+use super::reaction::{Path, Reaction, reaction};
+use super::settings::ControlSettings;
 use crate::xarm::{StateRequest, Status};
-use shared_types::ipc::{ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION};
-use shared_types::{FaultCode, JointState, JointVector, Limits, MonotonicNs};
+use shared_types::ipc::{
+    CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION,
+};
+use shared_types::{Arming, FaultCode, JointState, JointVector, Limits, MonotonicNs, MotionTier};
 
 /// Starts closer than this are equal (rad); a larger difference would be a jump.
 const START_TOLERANCE_RAD: f64 = 1e-9;
@@ -32,9 +37,11 @@ struct Brake {
 #[derive(Debug)]
 pub struct ControlState {
     limits: Limits,
+    settings: ControlSettings,
     mode: ControllerMode,
     fault: FaultCode,
-    fault_cycle: u64,
+    cause: CauseRecord,
+    arming: ArmingState,
     cycle: u64,
     motions_done: u64,
     commanded: JointState,
@@ -48,19 +55,22 @@ pub struct ControlState {
 impl ControlState {
     /// Offline, nothing known.
     #[must_use]
-    pub fn new(limits: Limits, thresholds: Thresholds) -> Self {
+    pub fn new(limits: Limits, settings: impl Into<ControlSettings>) -> Self {
         let q = JointVector::ZERO;
+        let settings = settings.into();
         Self {
             limiter: Limiter::at_rest(q, &limits),
             limits,
+            settings,
             mode: ControllerMode::Offline,
             fault: FaultCode::None,
-            fault_cycle: 0,
+            cause: CauseRecord::default(),
+            arming: ArmingState::Disarmed,
             cycle: 0,
             motions_done: 0,
             commanded: JointState::at_rest(q),
             sent_ns: 0,
-            monitor: Monitor::new(thresholds),
+            monitor: Monitor::new(settings.thresholds),
             running: None,
             brake: None,
         }
@@ -91,7 +101,16 @@ impl ControlState {
             motions_done: self.motions_done,
             q_c: self.commanded.q,
             q: self.monitor.report().map_or(JointVector::ZERO, |r| r.q),
+            tier: self.arming.raw_tier(),
+            wire: self.settings.wire as u8,
+            reserved: [0; 6],
         }
+    }
+
+    /// Number of the newest cycle.
+    #[must_use]
+    pub const fn cycle(&self) -> u64 {
+        self.cycle
     }
 
     /// One cycle: observe, watch, obey, command. RT-safe; returns for any input.
@@ -138,7 +157,7 @@ impl ControlState {
         CycleRecord {
             version: PAYLOAD_VERSION,
             mode: self.mode as u8,
-            sent: u8::from(out.setpoint.is_some()),
+            sent: u8::from(out.command.is_some()),
             fault: self.fault as u16,
             cycle: self.cycle,
             deadline_ns,
@@ -170,7 +189,7 @@ impl ControlState {
             | ControllerMode::Streaming
             | ControllerMode::Braking => {
                 if let Some(fault) = self.monitor.fault(input, self.mode) {
-                    self.react(fault, out);
+                    self.react(fault, input.deadline_ns, out);
                 }
             }
         }
@@ -188,8 +207,14 @@ impl ControlState {
                 Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),
             },
             Order::Run { id, motion } => match self.admit(&motion, deadline_ns) {
-                Ok(mode) => {
+                Ok((mode, tier)) => {
                     self.mode = mode;
+                    if self.settings.arming_required
+                        && mode == ControllerMode::Streaming
+                        && tier == MotionTier::Throw
+                    {
+                        self.arming = ArmingState::Spent;
+                    }
                     self.monitor.motion_begins(deadline_ns);
                     self.running = Some(Running {
                         id,
@@ -210,7 +235,36 @@ impl ControlState {
                     give_back(out, motion);
                 }
             },
-            Order::Stop => self.react(FaultCode::OperatorStop, out),
+            Order::Stop => self.react(FaultCode::OperatorStop, deadline_ns, out),
+            Order::Arm(arming) => self.arm(arming, deadline_ns, out),
+            Order::Disarm => {
+                if self.mode.is_moving() {
+                    self.react(FaultCode::Disarmed, deadline_ns, out);
+                } else {
+                    self.disarm(FaultCode::None, out);
+                }
+            }
+        }
+    }
+
+    fn arm(&mut self, arming: Arming, deadline_ns: u64, out: &mut CycleOutput) {
+        let taken = if self.mode == ControllerMode::Idle {
+            self.arming.arm(arming, deadline_ns)
+        } else {
+            Err(FaultCode::WrongMode)
+        };
+        emit(
+            out,
+            match taken {
+                Ok(arming) => ControlEvent::Armed(arming),
+                Err(fault) => ControlEvent::Refused { id: None, fault },
+            },
+        );
+    }
+
+    fn disarm(&mut self, fault: FaultCode, out: &mut CycleOutput) {
+        if core::mem::take(&mut self.arming) != ArmingState::Disarmed {
+            emit(out, ControlEvent::Disarmed { fault });
         }
     }
 
@@ -232,7 +286,11 @@ impl ControlState {
     }
 
     /// Whether a motion may begin now, and the mode it runs in.
-    fn admit(&self, motion: &Motion, deadline_ns: u64) -> Result<ControllerMode, FaultCode> {
+    fn admit(
+        &self,
+        motion: &Motion,
+        deadline_ns: u64,
+    ) -> Result<(ControllerMode, MotionTier), FaultCode> {
         let trigger = match motion {
             Motion::Spline(_) => Trigger::StreamBegun,
             Motion::Move { .. } => Trigger::MoveBegun,
@@ -245,23 +303,28 @@ impl ControlState {
         if self.monitor.report_is_stale(deadline_ns) {
             return Err(FaultCode::ReportStale);
         }
-        Ok(mode)
+        let tier = if self.settings.arming_required {
+            self.arming.admit(deadline_ns)?
+        } else {
+            MotionTier::Throw
+        };
+        Ok((mode, tier))
     }
 
     /// Meets a fault by the table in [`reaction`]; the first cause is kept.
-    fn react(&mut self, fault: FaultCode, out: &mut CycleOutput) {
+    fn react(&mut self, fault: FaultCode, deadline_ns: u64, out: &mut CycleOutput) {
         let how = reaction(fault);
-        let trigger = if how.brake {
-            Trigger::BrakeFault
-        } else {
+        let trigger = if how.path == Path::Silence {
             Trigger::LatchFault
+        } else {
+            Trigger::BrakeFault
         };
         let Some(mode) = next_mode(self.mode, trigger) else {
             return;
         };
         if self.mode != ControllerMode::Braking {
             self.fault = fault;
-            self.fault_cycle = self.cycle;
+            self.cause = self.cause_of(fault, how, deadline_ns);
         }
         self.mode = mode;
         if mode == ControllerMode::Braking {
@@ -274,6 +337,23 @@ impl ControlState {
         }
     }
 
+    /// The record of a cause that was just noticed.
+    fn cause_of(&self, fault: FaultCode, how: Reaction, deadline_ns: u64) -> CauseRecord {
+        CauseRecord {
+            version: PAYLOAD_VERSION,
+            code: fault as u16,
+            mode: self.mode as u8,
+            path: how.path as u8,
+            stop_arm: u8::from(how.stop_arm),
+            tier: self.arming.raw_tier(),
+            cycle: self.cycle,
+            stamp_ns: deadline_ns,
+            motion_id: self.running.as_ref().map_or(0, |r| r.id),
+            trajectory_s: self.trajectory_s(deadline_ns),
+            ..CauseRecord::default()
+        }
+    }
+
     /// The end of every stop: no setpoints any more, the arm rests.
     fn latch(&mut self, stop_arm: bool, out: &mut CycleOutput) {
         self.commanded = JointState::at_rest(self.commanded.q);
@@ -281,13 +361,9 @@ impl ControlState {
         if stop_arm {
             out.request = Some(StateRequest::Stop);
         }
-        emit(
-            out,
-            ControlEvent::Latched {
-                fault: self.fault,
-                cycle: self.fault_cycle,
-            },
-        );
+        self.disarm(self.fault, out);
+        self.cause.rest_cycle = self.cycle;
+        emit(out, ControlEvent::Latched(self.cause));
     }
 
     /// Computes, checks and commands this cycle's setpoint.
@@ -295,7 +371,7 @@ impl ControlState {
         if self.mode == ControllerMode::Idle {
             let hold = JointState::at_rest(self.commanded.q);
             if let Err(fault) = self.try_send(hold, deadline_ns, out) {
-                self.react(fault, out);
+                self.react(fault, deadline_ns, out);
             }
             return;
         }
@@ -305,7 +381,7 @@ impl ControlState {
         ) {
             match self.follow(deadline_ns, out) {
                 Ok(()) => return,
-                Err(fault) => self.react(fault, out),
+                Err(fault) => self.react(fault, deadline_ns, out),
             }
         }
         if self.mode == ControllerMode::Braking {
@@ -326,6 +402,9 @@ impl ControlState {
             self.mode = mode;
             self.commanded = JointState::at_rest(self.commanded.q);
             self.motions_done = self.motions_done.wrapping_add(1);
+            if self.arming == ArmingState::Spent {
+                self.disarm(FaultCode::None, out);
+            }
             let end_ns = deadline_ns;
             emit(
                 out,
@@ -376,7 +455,7 @@ impl ControlState {
         self.commanded = target;
         self.sent_ns = deadline_ns;
         self.monitor.sent(deadline_ns, target.q);
-        out.setpoint = Some(target.q);
+        out.command = Some(ArmCommand::Position(target.q));
         Ok(())
     }
 
@@ -387,7 +466,7 @@ impl ControlState {
     }
 }
 
-/// A cycle has at most three events (one order, one end, one latch): they fit.
+/// A cycle has at most four events (an order's, an end, a disarming, a latch): they fit.
 fn emit(out: &mut CycleOutput, event: ControlEvent) {
     let _ = out.events.push(event);
 }

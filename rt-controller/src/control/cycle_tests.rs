@@ -1,27 +1,16 @@
 //! Tests of whole cycles, in virtual time.
 
 use super::*;
-use crate::control::LinkInput;
 use crate::control::limiter::Limiter;
+use crate::control::{LinkInput, Thresholds};
 use crate::point_to_point::plan_move;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use shared_types::JointTrajectory;
-use shared_types::ipc::{JointReport, OperatorBeat};
+use shared_types::ipc::{JointReport, OperatorBeat, Reports};
 use shared_types::plan::START_POSE;
 
 const PERIOD_NS: u64 = 4_000_000;
-
-fn thresholds() -> Thresholds {
-    Thresholds {
-        operator_timeout_ns: 500_000_000,
-        reply_stall_ns: 100_000_000,
-        report_stale_ns: 100_000_000,
-        tracking_error_max_rad: 0.05,
-        tracking_window_ns: 100_000_000,
-        missed_cycles_max: 5,
-    }
-}
 
 /// A controller with an arm that follows two cycles late.
 struct Bench {
@@ -41,7 +30,7 @@ impl Bench {
         let limits = Limits::default();
         Self {
             judge: Limiter::at_rest(START_POSE, &limits),
-            state: ControlState::new(limits, thresholds()),
+            state: ControlState::new(limits, Thresholds::relaxed()),
             now_ns: 1_000_000_000_000,
             beat: 0,
             commanded: [START_POSE; 3],
@@ -78,21 +67,23 @@ impl Bench {
                 reply_ns: 1000,
                 ..LinkInput::default()
             },
-            report: Some(JointReport {
+            reports: Some(JointReport {
                 arm_state: 1,
                 arm_mode: 1,
                 stamp_ns: self.now_ns - 1_000_000,
                 arrival_ns: self.now_ns - 500_000,
                 q: self.commanded[2],
                 ..JointReport::default()
-            }),
+            })
+            .into(),
+            ..CycleInput::default()
         }
     }
 
     fn step(&mut self, input: CycleInput) {
         let step_s = f64::from(input.missed + 1) * 0.004;
         let out = self.state.step(input);
-        if let Some(q) = out.setpoint {
+        if let Some(q) = out.setpoint() {
             let limits = Limits::default();
             self.judge.admit(&q, step_s, &limits).unwrap();
             self.sent.push(q);
@@ -129,7 +120,7 @@ impl Bench {
 
     fn latched(&self) -> Option<FaultCode> {
         self.events.iter().find_map(|event| match event {
-            ControlEvent::Latched { fault, .. } => Some(*fault),
+            ControlEvent::Latched(cause) => Some(cause.fault()),
             _ => None,
         })
     }
@@ -209,9 +200,9 @@ fn every_fault_ends_as_its_table_says() {
         (FaultCode::ReplyStalled, |i| {
             i.link.unanswered_ns = 100_000_001;
         }),
-        (FaultCode::ReportStale, |i| i.report = None),
+        (FaultCode::ReportStale, |i| i.reports = Reports::default()),
         (FaultCode::TrackingError, |i| {
-            if let Some(report) = &mut i.report {
+            for report in i.reports.as_mut_slice() {
                 report.q[2] += 0.051;
             }
         }),
@@ -220,7 +211,7 @@ fn every_fault_ends_as_its_table_says() {
             i.link.status = Some(Status(0x10));
         }),
         (FaultCode::ArmModeChanged, |i| {
-            if let Some(report) = &mut i.report {
+            for report in i.reports.as_mut_slice() {
                 report.arm_mode = 0;
             }
         }),
@@ -242,7 +233,11 @@ fn every_fault_ends_as_its_table_says() {
             let braked = bench.sent.len() - before;
             assert_eq!(bench.latched(), Some(fault));
             assert_eq!(bench.state.mode(), ControllerMode::Faulted, "{fault:?}");
-            assert_eq!(braked > 5, reaction(fault).brake, "{fault:?} {braked}");
+            assert_eq!(
+                braked > 5,
+                reaction(fault).path < Path::Silence,
+                "{fault:?} {braked}"
+            );
             let stops = usize::from(reaction(fault).stop_arm);
             assert_eq!(bench.requests.len(), stops, "{fault:?}");
             // Nothing but an adoption wakes it.
@@ -364,14 +359,14 @@ proptest! {
                 1 => input.missed = numbers[1] as u32,
                 2 => input.order = Some(Order::Adopt { hold: q }),
                 3 => input.order = Some(Order::Stop),
-                4 => input.report = Some(JointReport {
+                4 => input.reports = Some(JointReport {
                     q, qd: q, q_target: q, stamp_ns: numbers[2], arrival_ns: numbers[3],
                     arm_state: words[0] as u8, arm_mode: words[1] as u8,
                     ..JointReport::default()
-                }),
+                }).into(),
                 5 => input.link.unanswered_ns = numbers[0],
                 6 => input.link.status = Some(Status(numbers[0] as u8)),
-                7 => input.operator = OperatorBeat { version: 0, stop: 0, count: numbers[0] },
+                7 => input.operator = OperatorBeat { count: numbers[0], ..OperatorBeat::default() },
                 8 => if let Ok(t) = JointTrajectory::new(&[0.0, 0.5], &[START_POSE, q]) {
                     input.order = Some(Order::Run { id: 1, motion: Box::new(Motion::Spline(t)) });
                 },
@@ -379,7 +374,7 @@ proptest! {
                 _ => input.order = Some(Order::Run { id: 2, motion: Box::new(swing()) }),
             }
             let out = bench.state.step(input);
-            if let Some(q) = out.setpoint {
+            if let Some(q) = out.setpoint() {
                 prop_assert!(q.is_finite() && limits.position_violation(&q).is_none());
             }
         }

@@ -2,13 +2,14 @@
 
 use super::motion::Motion;
 use crate::xarm::{StateRequest, Status};
-use shared_types::ipc::{CycleRecord, JointReport, OperatorBeat};
-use shared_types::{FaultCode, JointVector};
+use shared_types::ipc::{CauseRecord, CycleRecord, GuardianBeat, OperatorBeat, Reports};
+use shared_types::{Arming, FaultCode, JointVector};
 
 /// What the relay asks of the cycle.
-#[derive(Debug)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// The arm is enabled and in servo mode; hold this pose (rad).
+    /// The arm is enabled and in its streaming mode; hold this pose (rad).
+    /// Everything known about the run before is forgotten.
     Adopt {
         /// Pose to hold (rad).
         hold: JointVector,
@@ -22,10 +23,14 @@ pub enum Order {
     },
     /// Brake and latch.
     Stop,
+    /// Allow motions of a tier.
+    Arm(Arming),
+    /// Allow no motion any more; one that runs is braked.
+    Disarm,
 }
 
 /// What the command link showed since the last cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkInput {
     /// Status bits of the replies that came, or-ed; `None` if none came.
     pub status: Option<Status>,
@@ -33,12 +38,39 @@ pub struct LinkInput {
     pub reply_ns: u32,
     /// Age of the oldest setpoint without a reply, 0 if all are answered (ns).
     pub unanswered_ns: u64,
+    /// Setpoints without a reply, overtaken ones left out.
+    pub unanswered: u16,
+    /// Replies that came a second time since the last cycle.
+    pub duplicates: u16,
+    /// Replies that came out of order since the last cycle.
+    pub out_of_order: u16,
+    /// Replies to commands never sent here since the last cycle: somebody else
+    /// uses this connection's number space.
+    pub foreign: u16,
+    /// Commands since the last cycle that were not sent, because too many were
+    /// unanswered, the network took none, or the last one was too recent.
+    pub skipped: u16,
     /// Whether the connection is gone.
     pub lost: bool,
 }
 
+/// What the arm says about itself five times a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ArmCodes {
+    /// Error code, 0 for none.
+    pub error: u8,
+    /// Warning code, 0 for none.
+    pub warning: u8,
+    /// State, as in [`crate::xarm::ArmState`].
+    pub state: u8,
+    /// Mode, as in [`crate::xarm::Mode`].
+    pub mode: u8,
+    /// When it arrived (CLOCK_MONOTONIC, ns).
+    pub arrival_ns: u64,
+}
+
 /// Everything a cycle may know.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct CycleInput {
     /// Planned wake-up (CLOCK_MONOTONIC, ns).
     pub deadline_ns: u64,
@@ -46,19 +78,47 @@ pub struct CycleInput {
     pub missed: u32,
     /// At most one order.
     pub order: Option<Order>,
-    /// Newest heartbeat.
+    /// Newest heartbeat of the operator, with the dead-man switch.
     pub operator: OperatorBeat,
+    /// Newest heartbeat of the guardian.
+    pub guardian: GuardianBeat,
     /// Command link.
     pub link: LinkInput,
-    /// Newest joint report, if one came since the last cycle.
-    pub report: Option<JointReport>,
+    /// The arm's own codes, if they came since the last cycle.
+    pub codes: Option<ArmCodes>,
+    /// Joint reports since the last cycle, oldest first.
+    pub reports: Reports,
+    /// Joint reports dropped as broken since the last cycle.
+    pub broken_reports: u32,
+}
+
+/// What the arm is to be told in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ArmCommand {
+    /// Be there (rad); servo-position mode.
+    Position(JointVector),
+    /// Move like this; joint-velocity mode.
+    Velocity {
+        /// Joint velocities (rad/s).
+        qd: JointVector,
+        /// The arm stops by itself this long after the command (s).
+        duration_s: f64,
+    },
 }
 
 /// What happened, for the relay.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControlEvent {
     /// The arm is held.
     Adopted,
+    /// The controller is armed.
+    Armed(Arming),
+    /// The controller is not armed any more; `fault` says why, `None` when it
+    /// was ordered or the one shot is over.
+    Disarmed {
+        /// Why.
+        fault: FaultCode,
+    },
     /// A motion's first setpoint is due at `start_ns`.
     Started {
         /// Number of the motion.
@@ -77,31 +137,42 @@ pub enum ControlEvent {
     },
     /// An order was refused; nothing moved for it.
     Refused {
-        /// Number of the motion, `None` for an adoption.
+        /// Number of the motion, `None` for an adoption or an arming.
         id: Option<u64>,
         /// Why.
         fault: FaultCode,
     },
-    /// A fault is latched and no setpoints are sent any more.
-    Latched {
-        /// Cause.
-        fault: FaultCode,
-        /// Cycle in which it was noticed.
-        cycle: u64,
-    },
+    /// A fault is latched and no setpoints are sent any more. Exactly one comes
+    /// per stop.
+    Latched(CauseRecord),
 }
 
+/// Events of one cycle at most: an order's, a motion's end, an end of arming, a
+/// latch.
+pub const EVENTS_PER_CYCLE: usize = 6;
+
 /// What a cycle wants done.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub struct CycleOutput {
-    /// Setpoint to send (rad).
-    pub setpoint: Option<JointVector>,
+    /// What to tell the arm; at most once per cycle.
+    pub command: Option<ArmCommand>,
     /// State to ask of the arm.
     pub request: Option<StateRequest>,
     /// What happened.
-    pub events: heapless::Vec<ControlEvent, 4>,
+    pub events: heapless::Vec<ControlEvent, EVENTS_PER_CYCLE>,
     /// Motions that are over, to be dropped outside the real-time thread.
     pub retired: heapless::Vec<Box<Motion>, 2>,
     /// The cycle's record; timing fields are the caller's.
     pub record: CycleRecord,
+}
+
+impl CycleOutput {
+    /// Position commanded in servo-position mode, if one is (rad).
+    #[must_use]
+    pub const fn setpoint(&self) -> Option<JointVector> {
+        match self.command {
+            Some(ArmCommand::Position(q)) => Some(q),
+            Some(ArmCommand::Velocity { .. }) | None => None,
+        }
+    }
 }

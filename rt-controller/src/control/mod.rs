@@ -16,6 +16,7 @@
     )
 )]
 
+pub mod arming;
 pub mod brake;
 pub mod cycle;
 pub mod exchange;
@@ -24,8 +25,11 @@ pub mod mode;
 pub mod monitor;
 pub mod motion;
 pub mod phases;
+pub mod reaction;
+pub mod record;
+pub mod settings;
 
 pub use cycle::ControlState;
-pub use exchange::{ControlEvent, CycleInput, CycleOutput, LinkInput, Order};
-pub use monitor::Thresholds;
+pub use exchange::{ArmCodes, ArmCommand, ControlEvent, CycleInput, CycleOutput, LinkInput, Order};
 pub use motion::Motion;
+pub use settings::{ControlSettings, Thresholds, TierSpeeds};

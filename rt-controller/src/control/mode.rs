@@ -1,4 +1,4 @@
-//! Modes, what leads from one to another, and how each fault is met.
+//! Modes and what leads from one to another.
 //!
 //! ```text
 //!             Adopt              MoveBegun / StreamBegun
@@ -11,7 +11,6 @@
 //!                              ^       LatchFault (from any mode)
 //! ```
 
-use shared_types::FaultCode;
 use shared_types::ipc::ControllerMode;
 
 /// What may change the mode.
@@ -73,46 +72,6 @@ pub const fn next_mode(mode: ControllerMode, trigger: Trigger) -> Option<Control
     }
 }
 
-/// How a fault is met.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reaction {
-    /// Brake through setpoints; otherwise no setpoint is sent any more.
-    pub brake: bool,
-    /// Ask the arm to stop (set state 4) once the setpoints end.
-    pub stop_arm: bool,
-}
-
-/// The reaction to each fault. RT-safe.
-///
-/// | faults | setpoints | arm |
-/// |---|---|---|
-/// | operator, limiter | brake | left ready |
-/// | reports, tracking, replies | brake | asked to stop |
-/// | missed deadlines | none: the silence has already held the arm at the last setpoint, and any brake from there would begin with a jump | asked to stop |
-/// | arm error, mode, not ready, link | none: they would not be followed, or come in a wrong mode | left alone |
-#[must_use]
-pub const fn reaction(fault: FaultCode) -> Reaction {
-    use FaultCode as F;
-    let (brake, stop_arm) = match fault {
-        F::None
-        | F::OperatorStop
-        | F::OperatorLost
-        | F::SetpointNotFinite
-        | F::SetpointPosition
-        | F::SetpointVelocity
-        | F::SetpointAcceleration
-        | F::SetpointTcpSpeed
-        | F::StartPoseMismatch
-        | F::PlanOutOfLimits
-        | F::PlanHashMismatch
-        | F::WrongMode => (true, false),
-        F::ReplyStalled | F::ReportStale | F::TrackingError => (true, true),
-        F::DeadlineMissed => (false, true),
-        F::LinkLost | F::ArmError | F::ArmModeChanged | F::ArmNotReady => (false, false),
-    };
-    Reaction { brake, stop_arm }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,19 +109,5 @@ mod tests {
         }
         assert_eq!(next_mode(M::Braking, Trigger::BrakeDone), Some(M::Faulted));
         assert_eq!(next_mode(M::Braking, Trigger::BrakeFault), None);
-    }
-
-    #[test]
-    fn a_silent_or_stopped_arm_gets_no_setpoints() {
-        for fault in [
-            FaultCode::LinkLost,
-            FaultCode::ArmError,
-            FaultCode::ArmModeChanged,
-            FaultCode::ArmNotReady,
-            FaultCode::DeadlineMissed,
-        ] {
-            assert!(!reaction(fault).brake, "{fault:?}");
-        }
-        assert!(reaction(FaultCode::OperatorStop).brake);
     }
 }

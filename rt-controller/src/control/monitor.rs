@@ -3,26 +3,9 @@
 //! Pure: time is the cycle's planned deadline; nothing here reads a clock.
 
 use super::exchange::{CycleInput, LinkInput};
+use super::settings::Thresholds;
 use shared_types::ipc::{ControllerMode, JointReport};
 use shared_types::{FaultCode, JOINTS, JointVector};
-
-/// When the monitors give up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Thresholds {
-    /// Longest silence of the operator's heartbeat while moving (ns).
-    pub operator_timeout_ns: u64,
-    /// Longest wait for the reply to a setpoint (ns).
-    pub reply_stall_ns: u64,
-    /// Largest age of the newest joint report while moving (ns).
-    pub report_stale_ns: u64,
-    /// Distance of a measured joint from what it was told within
-    /// `tracking_window_ns` (rad).
-    pub tracking_error_max_rad: f64,
-    /// Longest lag of the arm that is normal (ns).
-    pub tracking_window_ns: u64,
-    /// Most cycles missed at once while moving.
-    pub missed_cycles_max: u32,
-}
 
 /// Reports lag behind a change of mode by up to 0.2 s (field experience with
 /// the vendor's SDK), so state and mode count only this long after bring-up.
@@ -137,8 +120,10 @@ impl Monitor {
             self.beat = input.operator.count;
             self.beat_changed_ns = input.deadline_ns;
         }
-        if let Some(report) = input.report.filter(|r| r.q.is_finite()) {
-            self.report = Some(report);
+        for report in input.reports.as_slice() {
+            if report.q.is_finite() {
+                self.report = Some(*report);
+            }
         }
     }
 

@@ -1,12 +1,13 @@
 //! What the arm is told to follow: an uploaded spline or a planned move.
 
 use super::phases::PhasedMotion;
+use serde::{Deserialize, Serialize};
 use shared_types::ipc::ControllerMode;
 use shared_types::{JointState, JointTrajectory, JointVector};
 
 /// A whole motion, complete before it begins; nothing is computed or fetched
 /// for it on the way except its value at an instant.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[allow(
     clippy::large_enum_variant,
     reason = "always boxed, made once per motion; one allocation is enough"
@@ -58,12 +59,49 @@ impl Motion {
         }
     }
 
+    /// Number that tells motions apart: FNV-1a over every bit that decides what
+    /// they do. RT-safe.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        let mut hash = Fingerprint::default();
+        match self {
+            Self::Spline(trajectory) => {
+                for (time_s, q) in trajectory.times_s().iter().zip(trajectory.waypoints()) {
+                    hash.add(*time_s);
+                    q.iter().for_each(|v| hash.add(*v));
+                }
+            }
+            Self::Move { phases, end } => {
+                phases.each_number(|v| hash.add(v));
+                end.iter().for_each(|v| hash.add(*v));
+            }
+        }
+        hash.0
+    }
+
     /// Mode of the controller while it runs. RT-safe.
     #[must_use]
     pub const fn mode(&self) -> ControllerMode {
         match self {
             Self::Spline(_) => ControllerMode::Streaming,
             Self::Move { .. } => ControllerMode::Moving,
+        }
+    }
+}
+
+/// FNV-1a, 64 bits.
+struct Fingerprint(u64);
+
+impl Default for Fingerprint {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Fingerprint {
+    fn add(&mut self, value: f64) {
+        for byte in value.to_bits().to_le_bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
         }
     }
 }

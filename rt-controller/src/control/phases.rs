@@ -4,13 +4,14 @@
 //! before it is needed, copied without allocation and evaluated in bounded
 //! time at any instant.
 
+use serde::{Deserialize, Serialize};
 use shared_types::{JOINTS, JointState, JointVector};
 
 /// Most phases of one joint: seven of a point-to-point profile.
 pub const MAX_PHASES: usize = 7;
 
 /// A phase of constant jerk of one joint.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Phase {
     /// Duration (s).
     pub duration_s: f64,
@@ -19,7 +20,7 @@ pub struct Phase {
 }
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one joint.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct AxisState {
     /// Position (rad).
     pub q: f64,
@@ -41,7 +42,7 @@ impl AxisState {
 }
 
 /// Phases of one joint that end at rest.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct AxisPhases {
     start: AxisState,
     phases: [Phase; MAX_PHASES],
@@ -81,7 +82,7 @@ impl AxisPhases {
 }
 
 /// Phases of all joints. RT-safe to copy and evaluate.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PhasedMotion {
     axes: [AxisPhases; JOINTS],
 }
@@ -91,6 +92,19 @@ impl PhasedMotion {
     #[must_use]
     pub const fn new(axes: [AxisPhases; JOINTS]) -> Self {
         Self { axes }
+    }
+
+    /// Calls `each` with every number that decides the motion. RT-safe.
+    pub fn each_number(&self, mut each: impl FnMut(f64)) {
+        for axis in &self.axes {
+            [axis.start.q, axis.start.qd, axis.start.qdd]
+                .into_iter()
+                .for_each(&mut each);
+            for phase in &axis.phases {
+                each(phase.duration_s);
+                each(phase.jerk_rad_s3);
+            }
+        }
     }
 
     /// Time until every joint rests (s).

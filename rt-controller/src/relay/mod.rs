@@ -206,7 +206,9 @@ impl Relay {
                 end_ns,
             } => self.on_finished(id, start_ns, end_ns),
             ControlEvent::Refused { id, fault } => self.on_refused(id, fault),
-            ControlEvent::Latched { fault, cycle } => self.on_latched(fault, cycle),
+            ControlEvent::Latched(cause) => self.on_latched(cause.fault(), cause.cycle),
+            ControlEvent::Armed(arming) => tracing::info!(?arming, "armed"),
+            ControlEvent::Disarmed { fault } => tracing::info!(?fault, "disarmed"),
         }
     }
 

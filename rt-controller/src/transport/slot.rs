@@ -1,7 +1,7 @@
 //! The place of the loop's command link: empty, connected, or just broken.
 
 use super::ArmTransport;
-use crate::control::{CycleOutput, LinkInput};
+use crate::control::{ArmCommand, CycleOutput, LinkInput};
 use crate::xarm::Command;
 
 /// Holds at most one link. RT-safe; links are made and dropped elsewhere.
@@ -40,15 +40,29 @@ impl<T: ArmTransport> LinkSlot<T> {
         seen
     }
 
-    /// Sends a cycle's setpoint and request, in this order.
+    /// Sends a cycle's command and request, in this order.
     pub fn send(&mut self, out: &CycleOutput, now_ns: u64) {
         let Some(link) = self.link.as_mut() else {
             return;
         };
-        let setpoint = out.setpoint.map(Command::ServoJoint);
+        let setpoint = out.command.map(on_the_wire);
         let request = out.request.map(Command::SetState);
         for command in [setpoint, request].into_iter().flatten() {
             self.lost |= link.send(&command, now_ns).is_err();
         }
+    }
+}
+
+/// The request that carries a command.
+fn on_the_wire(command: ArmCommand) -> Command {
+    match command {
+        ArmCommand::Position(q) => Command::ServoJoint(q),
+        ArmCommand::Velocity { qd, duration_s } => Command::JointVelocity {
+            velocity: qd,
+            // Each joint takes its own velocity at once; waiting for the slowest
+            // would bend the path.
+            synchronised: false,
+            duration_s: Some(duration_s),
+        },
     }
 }

@@ -20,6 +20,8 @@
 
 mod boards;
 mod bus;
+mod cause;
+mod input;
 pub mod message;
 mod payload;
 pub mod rpc;
@@ -29,9 +31,13 @@ pub use bus::{
     Bus, CyclePublisher, CycleSubscriber, FramePublisher, FrameSubscriber, JointPublisher,
     JointSubscriber, KeypointPublisher, KeypointSubscriber,
 };
+pub use cause::{CauseRecord, LimitBroken, RunCounts};
+pub use input::{
+    ArmCodesRecord, InputRecord, LinkRecord, OrderKind, OrderRecord, REPORTS_PER_CYCLE, Reports,
+};
 pub use payload::{
-    ControllerMode, ControllerState, CycleRecord, FrameHeader, JointReport, OperatorBeat,
-    PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
+    ControllerMode, ControllerState, CycleRecord, FrameHeader, GuardianBeat, JointReport,
+    OperatorBeat, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
 
 /// Why shared memory could not be used.

@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 /// Version of all payload layouts in this file.
-pub const PAYLOAD_VERSION: u32 = 1;
+pub const PAYLOAD_VERSION: u32 = 2;
 
 /// Packed 4:2:2, `Y0 U Y1 V`, full-range BT.601, as V4L2 `YUYV`.
 pub const PIXEL_FORMAT_YUYV: u32 = 1;
@@ -43,7 +43,7 @@ pub enum ControllerMode {
     Moving = 2,
     /// Streaming an uploaded trajectory.
     Streaming = 3,
-    /// Braking jerk-limited to standstill.
+    /// Coming to rest after a fault: along the path or by a joint-space brake.
     Braking = 4,
     /// Stopped by a fault; waits for the operator to acknowledge.
     Faulted = 5,
@@ -93,10 +93,16 @@ pub struct ControllerState {
     pub q_c: JointVector,
     /// Measured joints (rad).
     pub q: JointVector,
+    /// Armed tier, raw [`crate::MotionTier`]; 0 when not armed.
+    pub tier: u8,
+    /// Raw [`crate::WireMode`].
+    pub wire: u8,
+    /// Zero.
+    pub reserved: [u8; 6],
 }
 
 /// The operator's sign of life, on a blackboard. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
 #[repr(C)]
 pub struct OperatorBeat {
     /// [`PAYLOAD_VERSION`].
@@ -105,11 +111,34 @@ pub struct OperatorBeat {
     pub stop: u32,
     /// Grows with every beat.
     pub count: u64,
+    /// 1: the dead-man switch is let go; the arm may not move.
+    pub released: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// The guardian's sign of life, on a blackboard. RT-safe to copy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[repr(C)]
+pub struct GuardianBeat {
+    /// [`PAYLOAD_VERSION`].
+    pub version: u32,
+    /// What it is doing: 0 waiting, 1 watching, 2 stopping, 3 stopped the arm,
+    /// 4 could not see the arm stop.
+    pub phase: u8,
+    /// 1 while it has a connection of its own to the arm.
+    pub connected: u8,
+    /// Zero.
+    pub reserved: u16,
+    /// Grows with every beat.
+    pub count: u64,
+    /// When it was written (CLOCK_MONOTONIC, ns).
+    pub stamp_ns: u64,
 }
 
 /// One control cycle. Written by the real-time thread into a ring, published by
 /// the relay. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
 #[repr(C)]
 pub struct CycleRecord {
     /// [`PAYLOAD_VERSION`].
@@ -144,10 +173,14 @@ pub struct CycleRecord {
     pub q: JointVector,
     /// When they were measured (CLOCK_MONOTONIC, ns).
     pub q_stamp_ns: u64,
+    /// How fast the path is followed: 1 as planned, 0 at rest or off the path.
+    pub path_rate: f64,
+    /// Joint velocity on the wire in joint-velocity mode (rad/s), else zero.
+    pub qd_wire: JointVector,
 }
 
 /// One joint report of the arm, as received. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
 #[repr(C)]
 pub struct JointReport {
     /// [`PAYLOAD_VERSION`].

@@ -1,0 +1,109 @@
+//! How each fault is met: the table of reactions.
+//!
+//! | faults | setpoints | arm |
+//! |---|---|---|
+//! | refusals: plan, arming, mode, firmware | go on | left alone |
+//! | late cycles, reports stale, frozen, broken or without a clock, guardian lost | slowed along the path | left ready |
+//! | operator, dead-man switch, arming withdrawn, limiter | braked in joint space | left ready |
+//! | tracking, stuck joint, encoder | braked in joint space | asked to stop |
+//! | missed deadlines, silent link, second commander | none: the silence has already held the arm at the last setpoint, and any brake from there would begin with a jump | asked to stop |
+//! | arm error, mode, not ready, link gone | none: they would not be followed, or come in a wrong mode | left alone: it has stopped, or cannot hear |
+
+use shared_types::FaultCode;
+
+/// What becomes of the setpoints, the softest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[repr(u8)]
+pub enum Path {
+    /// They go on; the fault is a refusal or is counted.
+    #[default]
+    Continue = 0,
+    /// The path clock is slowed to rest: the planned path is not left.
+    Slow = 1,
+    /// Every joint is braked, jerk-limited, from where it was commanded last.
+    Brake = 2,
+    /// There are none any more.
+    Silence = 3,
+}
+
+/// How a fault is met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reaction {
+    /// What becomes of the setpoints.
+    pub path: Path,
+    /// Ask the arm to stop (set state 4) once the setpoints end.
+    pub stop_arm: bool,
+}
+
+/// The reaction to each fault. RT-safe.
+#[must_use]
+pub const fn reaction(fault: FaultCode) -> Reaction {
+    use FaultCode as F;
+    let (path, stop_arm) = match fault {
+        F::None
+        | F::StartPoseMismatch
+        | F::PlanOutOfLimits
+        | F::PlanHashMismatch
+        | F::WrongMode
+        | F::NotArmed
+        | F::ArmingExpired
+        | F::UploadTimedOut
+        | F::UnsupportedFirmware
+        | F::ArmDiffers => (Path::Continue, false),
+        F::LateCycles
+        | F::ReportStale
+        | F::ReportFrozen
+        | F::ReportClock
+        | F::ReportBroken
+        | F::GuardianLost => (Path::Slow, false),
+        F::OperatorStop
+        | F::OperatorLost
+        | F::DeadManReleased
+        | F::Disarmed
+        | F::SetpointNotFinite
+        | F::SetpointPosition
+        | F::SetpointVelocity
+        | F::SetpointAcceleration
+        | F::SetpointTcpSpeed
+        | F::SetpointJerk
+        | F::SetpointStep
+        | F::SetpointUnstoppable
+        | F::TierExceeded => (Path::Brake, false),
+        F::TrackingError | F::JointStuck | F::EncoderJump => (Path::Brake, true),
+        F::DeadlineMissed | F::ReplyStalled | F::SecondCommander => (Path::Silence, true),
+        F::LinkLost | F::ArmError | F::ArmModeChanged | F::ArmNotReady => (Path::Silence, false),
+    };
+    Reaction { path, stop_arm }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_silent_or_stopped_arm_gets_no_setpoints() {
+        for fault in [
+            FaultCode::LinkLost,
+            FaultCode::ArmError,
+            FaultCode::ArmModeChanged,
+            FaultCode::ArmNotReady,
+            FaultCode::DeadlineMissed,
+            FaultCode::ReplyStalled,
+            FaultCode::SecondCommander,
+        ] {
+            assert_eq!(reaction(fault).path, Path::Silence, "{fault:?}");
+        }
+    }
+
+    #[test]
+    fn what_the_operator_withdraws_is_braked_and_the_arm_stays_ready() {
+        for fault in [
+            FaultCode::OperatorStop,
+            FaultCode::DeadManReleased,
+            FaultCode::Disarmed,
+        ] {
+            let how = reaction(fault);
+            assert_eq!((how.path, how.stop_arm), (Path::Brake, false), "{fault:?}");
+        }
+    }
+}

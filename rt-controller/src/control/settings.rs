@@ -1,0 +1,138 @@
+//! What the core is configured to do, and when its monitors give up.
+
+use serde::{Deserialize, Serialize};
+use shared_types::{MotionTier, WireMode};
+
+const MS: u64 = 1_000_000;
+
+/// When the monitors give up.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Thresholds {
+    /// Longest silence of the operator's heartbeat while moving (ns).
+    pub operator_timeout_ns: u64,
+    /// Longest silence of the guardian's heartbeat (ns).
+    pub guardian_timeout_ns: u64,
+    /// Longest wait for the reply to a setpoint (ns).
+    pub reply_stall_ns: u64,
+    /// Most setpoints that may wait for their reply; no more are sent meanwhile.
+    pub unanswered_max: u16,
+    /// Largest age of the newest joint report while moving (ns).
+    pub report_stale_ns: u64,
+    /// Longest time in which joint reports may repeat one value while the arm is
+    /// told to move (ns).
+    pub report_frozen_ns: u64,
+    /// Most broken joint reports in a row.
+    pub report_broken_max: u32,
+    /// Most times the arm's clock may be followed anew during a motion.
+    pub clock_resyncs_max: u32,
+    /// Distance of a measured joint from what it was told within
+    /// `tracking_window_ns` (rad).
+    pub tracking_error_max_rad: f64,
+    /// Longest lag of the arm that is normal (ns).
+    pub tracking_window_ns: u64,
+    /// Most cycles missed at once while moving without slowing down.
+    pub late_cycles_max: u32,
+    /// Most cycles missed at once while moving; beyond, the arm has already
+    /// stood still in the gap.
+    pub missed_cycles_max: u32,
+}
+
+impl Thresholds {
+    /// For a real arm on a direct cable and a real-time machine: a stall is
+    /// noticed after two cycles of 4 ms.
+    #[must_use]
+    pub const fn strict() -> Self {
+        Self {
+            operator_timeout_ns: 300 * MS,
+            guardian_timeout_ns: 50 * MS,
+            reply_stall_ns: 8 * MS,
+            unanswered_max: 3,
+            report_stale_ns: 80 * MS,
+            report_frozen_ns: 60 * MS,
+            report_broken_max: 5,
+            clock_resyncs_max: 3,
+            tracking_error_max_rad: 0.05,
+            tracking_window_ns: 80 * MS,
+            late_cycles_max: 2,
+            missed_cycles_max: 5,
+        }
+    }
+
+    /// For a simulated arm on a machine shared with others, where the scheduler
+    /// alone may hold a thread up for tens of milliseconds.
+    #[must_use]
+    pub const fn relaxed() -> Self {
+        Self {
+            operator_timeout_ns: 500 * MS,
+            guardian_timeout_ns: 500 * MS,
+            reply_stall_ns: 100 * MS,
+            unanswered_max: 25,
+            report_stale_ns: 100 * MS,
+            report_frozen_ns: 100 * MS,
+            report_broken_max: 5,
+            clock_resyncs_max: 10,
+            tracking_error_max_rad: 0.05,
+            tracking_window_ns: 100 * MS,
+            late_cycles_max: 5,
+            missed_cycles_max: 5,
+        }
+    }
+}
+
+/// Largest tool speed of each tier (m/s); a throw's is that of the limits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TierSpeeds {
+    /// Setting up.
+    pub set_up_m_s: f64,
+    /// Wiggles.
+    pub wiggle_m_s: f64,
+}
+
+impl Default for TierSpeeds {
+    fn default() -> Self {
+        Self {
+            set_up_m_s: 0.25,
+            wiggle_m_s: 0.5,
+        }
+    }
+}
+
+impl TierSpeeds {
+    /// Largest tool speed of a tier (m/s), `limit_m_s` at most. RT-safe.
+    #[must_use]
+    pub const fn of(&self, tier: MotionTier, limit_m_s: f64) -> f64 {
+        match tier {
+            MotionTier::SetUp => self.set_up_m_s.min(limit_m_s),
+            MotionTier::Wiggle => self.wiggle_m_s.min(limit_m_s),
+            MotionTier::Throw => limit_m_s,
+        }
+    }
+}
+
+/// What the core is configured to do.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ControlSettings {
+    /// When the monitors give up.
+    pub thresholds: Thresholds,
+    /// How setpoints reach the arm.
+    pub wire: WireMode,
+    /// Motions need an arming; without this, every motion runs as a throw would.
+    pub arming_required: bool,
+    /// Motions need a living guardian.
+    pub guardian_required: bool,
+    /// Tool speeds of the tiers.
+    pub tiers: TierSpeeds,
+}
+
+impl From<Thresholds> for ControlSettings {
+    /// Servo positions, neither arming nor guardian needed.
+    fn from(thresholds: Thresholds) -> Self {
+        Self {
+            thresholds,
+            wire: WireMode::ServoPosition,
+            arming_required: false,
+            guardian_required: false,
+            tiers: TierSpeeds::default(),
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! How fast and how often an armed controller may move the arm.
+//!
+//! In the spirit of ISO 10218 and TS 15066, but **not a safety function**: the
+//! emergency stop, the arm's own limits and distance are.
+
+use serde::{Deserialize, Serialize};
+
+/// What the operator armed the controller for. Numbers are part of the shared
+/// layout; 0 stands for not armed.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+#[repr(u8)]
+pub enum MotionTier {
+    /// Setting up and teaching: at most 250 mm/s at the tool.
+    #[default]
+    SetUp = 1,
+    /// Wiggles: at most 500 mm/s at the tool unless configured otherwise.
+    Wiggle = 2,
+    /// One throw at the full limits, begun within ten seconds of arming by an
+    /// operator who declared the area clear.
+    Throw = 3,
+}
+
+impl MotionTier {
+    /// The tier of a raw number, `None` for 0 (not armed) and unknown ones. RT-safe.
+    #[must_use]
+    pub const fn from_raw(raw: u8) -> Option<Self> {
+        match raw {
+            1 => Some(Self::SetUp),
+            2 => Some(Self::Wiggle),
+            3 => Some(Self::Throw),
+            _ => None,
+        }
+    }
+}
+
+/// An arming, as ordered. Nothing renews it: it ends with its shot (throw), its
+/// expiry, a disarming, a released dead-man switch, or any stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Arming {
+    /// What for.
+    pub tier: MotionTier,
+    /// Motions must begin before this instant (CLOCK_MONOTONIC, ns). For throws
+    /// the controller allows ten seconds at most.
+    pub expires_ns: u64,
+    /// The operator declared that nobody is within reach of arm and rope;
+    /// throws need it.
+    pub area_clear: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_and_zero_is_not_armed() {
+        for tier in [MotionTier::SetUp, MotionTier::Wiggle, MotionTier::Throw] {
+            assert_eq!(MotionTier::from_raw(tier as u8), Some(tier));
+        }
+        assert_eq!(MotionTier::from_raw(0), None);
+    }
+}
