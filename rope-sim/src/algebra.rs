@@ -46,6 +46,21 @@ impl<V: Lanes> Vec3<V> {
     pub(crate) fn dot(self, o: Self) -> V {
         self.0.fma(o.0, self.1.fma(o.1, self.2 * o.2))
     }
+    /// Length.
+    #[inline(always)]
+    pub(crate) fn norm(self) -> V {
+        self.dot(self).sqrt()
+    }
+    /// Lane by lane `then` where `a < b`, else `otherwise`.
+    #[inline(always)]
+    pub(crate) fn select_less(a: V, b: V, then: Self, otherwise: Self) -> Self {
+        let pick = |t, o| V::select_less(a, b, t, o);
+        Self(
+            pick(then.0, otherwise.0),
+            pick(then.1, otherwise.1),
+            pick(then.2, otherwise.2),
+        )
+    }
     /// `c + self x o`.
     #[inline(always)]
     pub(crate) fn cross_add(self, o: Self, c: Self) -> Self {
@@ -152,6 +167,13 @@ impl<V: Lanes> Quat<V> {
             v: phi.scale(sinc),
         }
     }
+    /// A vector of the body, in the world.
+    #[inline(always)]
+    pub(crate) fn turn(self, body: Vec3<V>) -> Vec3<V> {
+        let across = self.v.cross_add(body, body.scale(self.w));
+        let twice = across.add(across);
+        self.v.cross_add(twice, body)
+    }
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, q: [f64; 4]) {
         self.w.set(lane, q[0]);
@@ -192,6 +214,19 @@ impl<V: Lanes> Mat3<V> {
     }
 }
 
+impl<V: Lanes> Mat3<V> {
+    #[inline(always)]
+    pub(crate) fn scale(&self, f: V) -> Self {
+        Self(self.0.map(|row| row.scale(f)))
+    }
+    /// `self + o`.
+    #[inline(always)]
+    pub(crate) fn add(&self, o: &Self) -> Self {
+        let ([a0, a1, a2], [b0, b1, b2]) = (self.0, o.0);
+        Self([a0.add(b0), a1.add(b1), a2.add(b2)])
+    }
+}
+
 /// A symmetric 3x3 matrix.
 #[derive(Clone, Copy)]
 pub(crate) struct Sym3<V> {
@@ -223,6 +258,31 @@ impl<V: Lanes> Sym3<V> {
             yy: self.yy + d,
             zz: self.zz + d,
             ..self
+        }
+    }
+    /// `self + f v v^T`.
+    #[inline(always)]
+    pub(crate) fn plus_outer(self, f: V, v: Vec3<V>) -> Self {
+        let u = v.scale(f);
+        Self {
+            xx: u.0.fma(v.0, self.xx),
+            xy: u.0.fma(v.1, self.xy),
+            xz: u.0.fma(v.2, self.xz),
+            yy: u.1.fma(v.1, self.yy),
+            yz: u.1.fma(v.2, self.yz),
+            zz: u.2.fma(v.2, self.zz),
+        }
+    }
+    /// `self + o`.
+    #[inline(always)]
+    pub(crate) fn add(self, o: Self) -> Self {
+        Self {
+            xx: self.xx + o.xx,
+            xy: self.xy + o.xy,
+            xz: self.xz + o.xz,
+            yy: self.yy + o.yy,
+            yz: self.yz + o.yz,
+            zz: self.zz + o.zz,
         }
     }
     #[inline(always)]

@@ -5,7 +5,7 @@ use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member, MemberResult};
 use crate::lanes::Kernel;
-use crate::motion::AttachMotion;
+use crate::motion::{AttachMotion, LinkMotion};
 use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check, check_scene};
 use crate::scene::Scene;
 use crate::watch::Watched;
@@ -68,17 +68,10 @@ pub fn roll_out_in_with(
 ) -> Result<Vec<Rollout>, SimulateError> {
     check(candidates, options)?;
     check_scene(scene, candidates)?;
-    if !scene.is_empty() || candidates.iter().any(|c| !c.extras.is_none()) {
-        let need = "contacts, drag and rest curvature are not simulated by this version";
-        return Err(SimulateError::Option {
-            field: "scene",
-            value: f64::NAN,
-            need,
-        });
-    }
     let all: Vec<usize> = (0..candidates.len()).collect();
     let batch = Batch {
         kernel,
+        scene,
         candidates,
         options,
         step_s: options.step_s,
@@ -128,6 +121,7 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
 /// Candidates to run with one kernel and step.
 struct Batch<'a> {
     kernel: Kernel,
+    scene: &'a Scene,
     candidates: &'a [Candidate<'a>],
     options: &'a SimOptions,
     step_s: f64,
@@ -237,20 +231,49 @@ impl Batch<'_> {
             members.push(Member {
                 rope: candidate.rope,
                 path,
+                extras: candidate.extras,
+                arm: self.arm_paths(*index)?,
                 links,
             });
         }
-        let results = self.kernel.run(GroupTask {
-            members: &members,
-            frames: self.options.frames,
-            watch: self.options.watch,
-            horizon_s: self.options.horizon_s,
-            single_precision: self.kernel.is_single_precision(),
-        });
+        let is_alone = self.scene.is_empty() && members.iter().all(|m| m.extras.is_none());
+        let results = if is_alone {
+            self.kernel.run(self.task::<true>(&members))
+        } else {
+            self.kernel.run(self.task::<false>(&members))
+        };
         drop(members);
         let finished = own.into_iter().flatten().flatten();
         memory.extend(finished.map(|path| path.intervals));
         Ok(results)
+    }
+
+    fn task<'m, const ALONE: bool>(&'m self, members: &'m [Member<'m>]) -> GroupTask<'m, ALONE> {
+        GroupTask {
+            members,
+            scene: self.scene,
+            max_step_s: self.step_s,
+            frames: self.options.frames,
+            watch: self.options.watch,
+            horizon_s: self.options.horizon_s,
+            single_precision: self.kernel.is_single_precision(),
+        }
+    }
+
+    /// Paths of the arm links that carry obstacles.
+    fn arm_paths(&self, candidate: usize) -> Result<Vec<BasePath>, SimulateError> {
+        let motion = self.candidates[candidate].motion;
+        let links = self.scene.arm_links().into_iter();
+        links
+            .map(|link| {
+                let link = LinkMotion { motion, link };
+                BasePath::new_in(Vec::new(), &link, self.step_s, self.options.horizon_s)
+            })
+            .collect::<Result<_, _>>()
+            .map_err(|bad| SimulateError::MotionNotFinite {
+                candidate,
+                time_s: bad.time_s,
+            })
     }
 }
 

@@ -20,6 +20,8 @@ struct Cursor<'a> {
     /// The step at whose start something changes in this lane.
     event: u64,
     phase: Phase,
+    /// Whether to restart at every step, as a rope in contact must.
+    restarting: bool,
     step_s: f64,
     finished: bool,
 }
@@ -81,6 +83,7 @@ impl<'a, V: Lanes> Clock<'a, V> {
                 began: 0,
                 event: 1,
                 phase: Phase::Regular,
+                restarting: false,
                 step_s: 0.0,
                 finished: path.intervals.is_empty(),
             })
@@ -142,6 +145,7 @@ impl<'a, V: Lanes> Clock<'a, V> {
         let cursor = &mut self.cursors[lane];
         let interval: &Interval = &cursor.path.intervals[cursor.interval];
         let phase = match cursor.phase {
+            _ if cursor.restarting => Phase::Restart,
             _ if interval.restart && cursor.began + 1 == self.count => Phase::Restart,
             Phase::Restart => Phase::AfterRestart,
             _ => Phase::Regular,
@@ -241,6 +245,24 @@ impl<'a, V: Lanes> Clock<'a, V> {
             rate * per_length,
             acceleration * per_length * per_length,
         )
+    }
+
+    /// Makes every coming step of a lane a restart, or lets it have its memory again.
+    #[inline(always)]
+    pub(crate) fn keep_restarting(&mut self, lane: usize, restarting: bool) {
+        let Some(cursor) = self.cursors.get_mut(lane) else {
+            return;
+        };
+        if restarting && !cursor.restarting && !cursor.finished {
+            cursor.event = self.count + 1;
+            self.next_event = self.next_event.min(cursor.event);
+        }
+        cursor.restarting = restarting;
+    }
+
+    /// Lanes in use.
+    pub(crate) fn lanes(&self) -> usize {
+        self.cursors.len()
     }
 
     /// Whether a lane has reached its end.

@@ -3,11 +3,14 @@
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::BasePath;
 use crate::clock::Clock;
+use crate::extras::RopeExtras;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
-use crate::scene::{ContactSummary, DominoOutcome};
+use crate::load::Unloaded;
+use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::state::{Link, RopeLanes};
+use crate::surroundings::Surroundings;
 use crate::watch::{Watch, Watched, Watcher};
 use shared_types::RopeParams;
 
@@ -23,6 +26,9 @@ const MAX_SPIN_RAD_S: f64 = 2e4;
 pub(crate) struct Member<'a> {
     pub(crate) rope: &'a RopeParams,
     pub(crate) path: &'a BasePath,
+    pub(crate) extras: RopeExtras,
+    /// Paths of the arm links that carry obstacles.
+    pub(crate) arm: Vec<BasePath>,
     /// Attitudes of the links at the start, scalar first.
     pub(crate) links: Vec<[f64; 4]>,
 }
@@ -40,15 +46,19 @@ pub(crate) struct MemberResult {
 
 /// The work of one group; at most as many members as the kernel has lanes, all with
 /// the same number of links.
-pub(crate) struct GroupTask<'a> {
+/// With `ALONE` there is nothing but the rope: the loop is compiled without a trace of
+/// its surroundings.
+pub(crate) struct GroupTask<'a, const ALONE: bool> {
     pub(crate) members: &'a [Member<'a>],
+    pub(crate) scene: &'a Scene,
+    pub(crate) max_step_s: f64,
     pub(crate) frames: FrameTimes,
     pub(crate) watch: Watch,
     pub(crate) horizon_s: f64,
     pub(crate) single_precision: bool,
 }
 
-impl LaneTask for GroupTask<'_> {
+impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
     type Output = Vec<MemberResult>;
 
     #[inline(always)]
@@ -77,6 +87,10 @@ impl LaneTask for GroupTask<'_> {
         let mut min_half_cos = V::splat(1.0);
         let mut restarts = Vec::with_capacity(count);
         let mut steps = 0_usize;
+        let mut around = (!ALONE).then(|| Surroundings::new(&self, &ropes));
+        if let Some(around) = &mut around {
+            around.begin(&links, &rope, &start);
+        }
 
         while clock.next_step(&mut rope, &mut restarts) {
             for lane in &restarts {
@@ -85,13 +99,17 @@ impl LaneTask for GroupTask<'_> {
             recorder.before_step(&clock, &links, rope.link_length);
             watcher.before_step(&clock, &links);
             let base = clock.base();
-            let report = step(
-                &mut links,
-                &mut scratch,
-                &rope,
-                &base.dynamics,
-                &clock.scheme,
-            );
+            let report = match &mut around {
+                Some(around) => around.step(&mut links, &mut scratch, &rope, &base, &mut clock),
+                None => step(
+                    &mut links,
+                    &mut scratch,
+                    &rope,
+                    &base.dynamics,
+                    &clock.scheme,
+                    &Unloaded::new(),
+                ),
+            };
             recorder.after_step(&clock, &links, rope.link_length);
             health.mark_finished(&clock, &links);
             watcher.after_step(
@@ -125,8 +143,10 @@ impl LaneTask for GroupTask<'_> {
                 peak_tip_speed_m_s: watcher.peak_speed_m_s(lane),
                 max_joint_angle_rad: 2.0 * min_half_cos.get(lane).clamp(0.0, 1.0).acos(),
                 survived: health.alive[lane],
-                contacts: Vec::new(),
-                domino: None,
+                contacts: around
+                    .as_ref()
+                    .map_or_else(Vec::new, |a| a.summaries_of(lane)),
+                domino: around.as_ref().and_then(|a| a.domino_of(lane)),
             })
             .collect()
     }

@@ -20,6 +20,7 @@
 
 use crate::algebra::{Mat3, Quat, Sym3, Vec3};
 use crate::lanes::Lanes;
+use crate::load::{Load, Loads};
 use crate::scheme::Scheme;
 use crate::state::{BaseLanes, Link, RopeLanes};
 
@@ -68,14 +69,15 @@ pub(crate) struct StepReport<V> {
 
 /// Advances every lane by one step.
 #[inline(always)]
-pub(crate) fn step<V: Lanes>(
+pub(crate) fn step<V: Lanes, L: Loads<V>>(
     links: &mut [Link<V>],
     scratch: &mut [Elimination<V>],
     rope: &RopeLanes<V>,
     base: &BaseLanes<V>,
     scheme: &Scheme<V>,
+    loads: &L,
 ) -> StepReport<V> {
-    let min_half_cos = eliminate(links, scratch, rope, base, scheme);
+    let min_half_cos = eliminate(links, scratch, rope, base, scheme, loads);
     let mut acceleration = base.a;
     let mut alpha = base.alpha;
     let mut tip = Vec3::zero();
@@ -101,27 +103,33 @@ pub(crate) fn step<V: Lanes>(
 /// Sweep from the lead to the attach point; returns the smallest |cos| of half a
 /// joint angle.
 #[inline(always)]
-fn eliminate<V: Lanes>(
+fn eliminate<V: Lanes, L: Loads<V>>(
     links: &mut [Link<V>],
     scratch: &mut [Elimination<V>],
     rope: &RopeLanes<V>,
     base: &BaseLanes<V>,
     scheme: &Scheme<V>,
+    loads: &L,
 ) -> V {
     let mut beyond = Beyond::lead(rope);
     let mut joints = Joints::new(base, rope);
     if let Some(last) = links.last_mut() {
-        last.predict(scheme);
+        if !L::PRESENT {
+            last.predict(scheme);
+        }
         joints.child = Ends::of(last, rope);
     }
-    joints.prepare(links, scratch, rope, scheme);
+    joints.prepare(links, scratch, rope, scheme, loads);
     let mut nearer = links;
     let mut spaces = scratch;
     while let (Some((link, links_nearer)), Some((space, spaces_nearer))) =
         (nearer.split_last_mut(), spaces.split_last_mut())
     {
+        if L::PRESENT {
+            beyond.add(loads.on_link(links_nearer.len()), rope.per_resistance);
+        }
         let half = beyond.open(rope, joints.span, link.al_change);
-        joints.prepare(links_nearer, spaces_nearer, rope, scheme);
+        joints.prepare(links_nearer, spaces_nearer, rope, scheme, loads);
         beyond.close(rope, space, &half);
         nearer = links_nearer;
         spaces = spaces_nearer;
@@ -178,12 +186,13 @@ impl<V: Lanes> Joints<V> {
     /// of the acceleration change, which nothing needs any more: with a vector less
     /// each, the links of a rope stay in the fastest cache.
     #[inline(always)]
-    fn prepare(
+    fn prepare<L: Loads<V>>(
         &mut self,
         links: &mut [Link<V>],
         scratch: &mut [Elimination<V>],
         rope: &RopeLanes<V>,
         scheme: &Scheme<V>,
+        loads: &L,
     ) {
         let (Some((link, nearer)), Some(space)) = (links.split_last_mut(), scratch.last_mut())
         else {
@@ -193,12 +202,18 @@ impl<V: Lanes> Joints<V> {
         link.al_change = centripetal(link, self.span, scheme);
         let parent = match nearer.last_mut() {
             Some(parent) => {
-                parent.predict(scheme);
+                if !L::PRESENT {
+                    parent.predict(scheme);
+                }
                 Ends::of(parent, rope)
             }
             None => self.base,
         };
-        let turn = self.child.q.times_conj(parent.q);
+        let turn = if L::PRESENT {
+            self.child.q.times_conj(parent.q.times(loads.rest_turn()))
+        } else {
+            self.child.q.times_conj(parent.q)
+        };
         self.min_half_cos = self.min_half_cos.min(turn.w.abs());
         let pull = self.child.pull.sub(parent.pull);
         space.y = turn.v.scale_sub(spring(rope, turn.w), pull);
@@ -230,7 +245,7 @@ fn spring<V: Lanes>(rope: &RopeLanes<V>, half_cos: V) -> V {
 /// `w x (w x span)` (m/s²) at the extrapolated velocity: the predicted one carries the
 /// dominant error of the single linear solve.
 #[inline(always)]
-fn centripetal<V: Lanes>(link: &Link<V>, span: Vec3<V>, scheme: &Scheme<V>) -> Vec3<V> {
+pub(crate) fn centripetal<V: Lanes>(link: &Link<V>, span: Vec3<V>, scheme: &Scheme<V>) -> Vec3<V> {
     let w = link.al_change.scale_add(scheme.centripetal, link.w);
     span.scale_sub(w.dot(w), w.scale(w.dot(span)))
 }
@@ -261,6 +276,17 @@ struct HalfEliminated<V> {
 }
 
 impl<V: Lanes> Beyond<V> {
+    /// Adds what touches the link, in units of the joint resistance.
+    #[inline(always)]
+    fn add(&mut self, load: &Load<V>, per_resistance: V) {
+        let u = per_resistance;
+        self.vv_link = load.vv.scale(u).add(self.vv_link);
+        self.vw = load.vw.scale(u).add(&self.vw);
+        self.one_less_ww = load.ww.scale(-u).add(self.one_less_ww);
+        self.bv_link = load.bv.scale_add(u, self.bv_link);
+        self.bw = load.bw.scale_add(u, self.bw);
+    }
+
     #[inline(always)]
     fn lead(rope: &RopeLanes<V>) -> Self {
         let half = V::splat(0.5);

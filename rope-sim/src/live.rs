@@ -6,6 +6,7 @@ use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::kernel::{Elimination, step};
 use crate::lanes::{Kernel, LaneTask, Lanes};
+use crate::load::Unloaded;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{BaseLanes, Link, RopeLanes};
 use nalgebra::Vector3;
@@ -197,6 +198,7 @@ impl LaneTask for Advance<'_> {
                 &live.rope,
                 &base,
                 &live.scheme,
+                &Unloaded::new(),
             );
         }
     }

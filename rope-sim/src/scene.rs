@@ -151,6 +151,21 @@ impl Scene {
         self.obstacles.is_empty() && self.domino.is_none()
     }
 
+    /// The arm links its obstacles are on, each once.
+    pub(crate) fn arm_links(&self) -> Vec<usize> {
+        let mut links: Vec<usize> = self
+            .obstacles
+            .iter()
+            .filter_map(|o| match o.placement {
+                Placement::ArmLink { link, .. } => Some(link),
+                _ => None,
+            })
+            .collect();
+        links.sort_unstable();
+        links.dedup();
+        links
+    }
+
     /// # Errors
     /// The first obstacle, or the domino, with an unusable number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {

@@ -17,6 +17,8 @@ pub(crate) struct RopeLanes<V> {
     pub(crate) link_inertia: V,
     pub(crate) lead_mass: V,
     pub(crate) lead_inertia: V,
+    /// Inverse of the joint resistance (rad/N m s²).
+    pub(crate) per_resistance: V,
 }
 
 /// Least joint resistance (N m s²/rad), for ropes without springs and dampers: a
@@ -36,6 +38,7 @@ impl<V: Lanes> RopeLanes<V> {
             link_inertia: zero,
             lead_mass: zero,
             lead_inertia: zero,
+            per_resistance: zero,
         };
         for lane in 0..V::COUNT {
             out.set(lane, rope, 1.0);
@@ -48,6 +51,7 @@ impl<V: Lanes> RopeLanes<V> {
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, rope: &RopeParams, joint_resistance: f64) {
         let unit = 1.0 / joint_resistance.max(LEAST_RESISTANCE);
+        self.per_resistance.set(lane, unit);
         self.stiffness
             .set(lane, rope.joint_stiffness_nm_per_rad * unit);
         self.damping

@@ -77,6 +77,8 @@ pub(crate) trait Lanes:
     fn fnma(self, b: Self, c: Self) -> Self;
     /// `1 / self`.
     fn recip(self) -> Self;
+    /// Square root; NaN below zero.
+    fn sqrt(self) -> Self;
     /// Magnitude.
     fn abs(self) -> Self;
     /// `self` where `sign` is positive, `-self` where it is negative.
@@ -87,6 +89,12 @@ pub(crate) trait Lanes:
     fn max(self, other: Self) -> Self;
     /// Lane by lane `then` where `a < b`, else `otherwise`.
     fn select_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
+    /// Whether `a < b` in any lane. Only for skipping work that would change nothing:
+    /// a lane's bits must not depend on its neighbours.
+    #[inline(always)]
+    fn any_less(a: Self, b: Self) -> bool {
+        (0..Self::COUNT).any(|lane| a.get(lane) < b.get(lane))
+    }
 }
 
 /// Work written once for any [`Lanes`] type. `run` and everything it calls with
@@ -236,7 +244,7 @@ mod tests {
     struct EveryOperation;
 
     impl LaneTask for EveryOperation {
-        type Output = Vec<[f64; 10]>;
+        type Output = Vec<[f64; 11]>;
         #[inline(always)]
         fn run<V: Lanes>(self) -> Self::Output {
             let (mut a, mut b) = (V::splat(1.5), V::splat(-2.25));
@@ -255,6 +263,7 @@ mod tests {
                 a.flip_by(b),
                 a.min(b) + a.max(b) * V::splat(8.0),
                 V::select_less(a, b, V::splat(1.0), V::splat(2.0)),
+                a.sqrt(),
             ];
             (0..V::COUNT)
                 .map(|lane| core::array::from_fn(|i| results[i].get(lane)))
@@ -281,6 +290,7 @@ mod tests {
                     if b < 0.0 { -a } else { a },
                     a.min(b) + 8.0 * a.max(b),
                     if a < b { 1.0 } else { 2.0 },
+                    a.sqrt(),
                 ];
                 for (g, w) in got.into_iter().zip(want) {
                     assert!(

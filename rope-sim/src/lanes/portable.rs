@@ -36,6 +36,10 @@ impl Lanes for f64 {
         1.0 / self
     }
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
     }
@@ -132,6 +136,10 @@ macro_rules! plain_lanes {
             #[inline(always)]
             fn recip(self) -> Self {
                 Self(1.0 / self.0)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(self.0.sqrt())
             }
             #[inline(always)]
             fn abs(self) -> Self {

@@ -11,7 +11,8 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 macro_rules! vector_lanes {
     ($(#[$doc:meta])* $name:ident: $vector:ty, $scalar:ty, $count:literal, $polynomial:ident,
-     $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $fma:ident, $fnma:ident,
+     $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident,
+     $fnma:ident,
      $min:ident, $max:ident, $and:ident, $andnot:ident, $xor:ident,
      |$a:ident, $b:ident, $then:ident, $otherwise:ident| $select:expr) => {
         $(#[$doc])*
@@ -92,6 +93,11 @@ macro_rules! vector_lanes {
                 Self(unsafe { $div($splat(1.0), self.0) })
             }
             #[inline(always)]
+            fn sqrt(self) -> Self {
+                // SAFETY: only reached inside `run_*`, see the module's text.
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
             fn abs(self) -> Self {
                 // SAFETY: only reached inside `run_*`, see the module's text.
                 Self(unsafe { $andnot($splat(-0.0), self.0) })
@@ -124,7 +130,7 @@ macro_rules! vector_lanes {
 vector_lanes!(
     /// Sixteen `f32` in one AVX-512 register.
     F32x16: __m512, f32, 16, ANGLE_POLYNOMIAL_F32,
-    _mm512_set1_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps,
+    _mm512_set1_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_sqrt_ps,
     _mm512_fmadd_ps, _mm512_fnmadd_ps, _mm512_min_ps, _mm512_max_ps,
     _mm512_and_ps, _mm512_andnot_ps, _mm512_xor_ps,
     |a, b, then, otherwise|
@@ -133,7 +139,7 @@ vector_lanes!(
 vector_lanes!(
     /// Eight `f64` in one AVX-512 register.
     F64x8: __m512d, f64, 8, ANGLE_POLYNOMIAL_F64,
-    _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
+    _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_sqrt_pd,
     _mm512_fmadd_pd, _mm512_fnmadd_pd, _mm512_min_pd, _mm512_max_pd,
     _mm512_and_pd, _mm512_andnot_pd, _mm512_xor_pd,
     |a, b, then, otherwise|
@@ -142,7 +148,7 @@ vector_lanes!(
 vector_lanes!(
     /// Eight `f32` in one AVX register.
     F32x8: __m256, f32, 8, ANGLE_POLYNOMIAL_F32,
-    _mm256_set1_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps,
+    _mm256_set1_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_sqrt_ps,
     _mm256_fmadd_ps, _mm256_fnmadd_ps, _mm256_min_ps, _mm256_max_ps,
     _mm256_and_ps, _mm256_andnot_ps, _mm256_xor_ps,
     |a, b, then, otherwise|
@@ -151,7 +157,7 @@ vector_lanes!(
 vector_lanes!(
     /// Four `f64` in one AVX register.
     F64x4: __m256d, f64, 4, ANGLE_POLYNOMIAL_F64,
-    _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
+    _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_sqrt_pd,
     _mm256_fmadd_pd, _mm256_fnmadd_pd, _mm256_min_pd, _mm256_max_pd,
     _mm256_and_pd, _mm256_andnot_pd, _mm256_xor_pd,
     |a, b, then, otherwise|

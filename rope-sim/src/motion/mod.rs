@@ -13,6 +13,7 @@ pub use measured::MeasuredArm;
 pub use planned::PlannedArm;
 pub use pose_track::{PoseRow, PoseTrack};
 
+use nalgebra::Vector3;
 use shared_types::kinematics::FrameMotion;
 use shared_types::{JOINTS, JointState};
 
@@ -46,6 +47,34 @@ pub trait AttachMotion: Sync {
     /// there is an arm; obstacles can be placed on them.
     fn arm_links(&self, _t_s: f64) -> Option<[FrameMotion; JOINTS]> {
         None
+    }
+}
+
+/// One link of the arm behind a motion, as a motion of its own.
+pub(crate) struct LinkMotion<'a> {
+    pub(crate) motion: &'a dyn AttachMotion,
+    /// 1 to 7.
+    pub(crate) link: usize,
+}
+
+impl AttachMotion for LinkMotion<'_> {
+    /// NaN where there is no arm, which building a path reports.
+    fn at(&self, t_s: f64) -> FrameMotion {
+        let nowhere = FrameMotion {
+            p_m: Vector3::repeat(f64::NAN),
+            ..FrameMotion::world()
+        };
+        let arm = self.motion.arm_links(t_s);
+        arm.and_then(|links| links.get(self.link - 1).copied())
+            .unwrap_or(nowhere)
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.motion.duration_s()
+    }
+
+    fn acceleration_jumps_s(&self) -> Vec<f64> {
+        self.motion.acceleration_jumps_s()
     }
 }
 

@@ -70,7 +70,14 @@ fn rates(rope: &RopeLanes<f64>, state: &[Pose]) -> Vec<Rate> {
     // The second pass starts from the first one's accelerations, whereupon the tiny
     // resistance has nothing left to resist.
     for _ in 0..2 {
-        step(&mut links, &mut scratch, rope, &base, &scheme);
+        step(
+            &mut links,
+            &mut scratch,
+            rope,
+            &base,
+            &scheme,
+            &crate::load::Unloaded::new(),
+        );
     }
     links
         .iter()

@@ -34,12 +34,16 @@ fn run(kernel: Kernel, ropes: &[RopeParams], path: &BasePath) -> Vec<MemberResul
     let members: Vec<Member> = ropes
         .iter()
         .map(|rope| Member {
+            extras: crate::RopeExtras::NONE,
+            arm: Vec::new(),
             rope,
             path,
             links: vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize],
         })
         .collect();
-    kernel.run(GroupTask {
+    kernel.run(GroupTask::<true> {
+        scene: &crate::Scene::EMPTY,
+        max_step_s: 1e-3,
         members: &members,
         frames: FrameTimes {
             first_s: 0.0,

@@ -1,0 +1,106 @@
+//! What acts on a rope besides gravity and its joints' springs and dampers.
+
+use crate::algebra::{Mat3, Quat, Sym3, Vec3};
+use crate::lanes::Lanes;
+
+/// Reaction of what touches a link, at its farther node: for an acceleration `a` of
+/// the node and `alpha` of the link, `force = vv a + vw alpha + bv`, `torque = vw^T a +
+/// ww alpha + bw` (N, N m).
+#[derive(Clone, Copy)]
+pub(crate) struct Load<V> {
+    pub(crate) vv: Sym3<V>,
+    pub(crate) vw: Mat3<V>,
+    pub(crate) ww: Sym3<V>,
+    pub(crate) bv: Vec3<V>,
+    pub(crate) bw: Vec3<V>,
+}
+
+impl<V: Lanes> Load<V> {
+    #[inline(always)]
+    pub(crate) fn none() -> Self {
+        let none = Sym3::diagonal(V::splat(0.0));
+        Self {
+            vv: none,
+            vw: Mat3::zero(),
+            ww: none,
+            bv: Vec3::zero(),
+            bw: Vec3::zero(),
+        }
+    }
+
+    /// Both.
+    #[inline(always)]
+    pub(crate) fn plus(&self, o: &Self) -> Self {
+        Self {
+            vv: self.vv.add(o.vv),
+            vw: self.vw.add(&o.vw),
+            ww: self.ww.add(o.ww),
+            bv: self.bv.add(o.bv),
+            bw: self.bw.add(o.bw),
+        }
+    }
+
+    /// A force on the link at `arm` from the node: `force` while the point moves as
+    /// predicted, with acceleration `predicted` apart from the centripetal part, less
+    /// `resistance` (symmetric, not negative) times any acceleration beyond.
+    #[inline(always)]
+    pub(crate) fn push(
+        force: Vec3<V>,
+        resistance: Sym3<V>,
+        arm: Vec3<V>,
+        predicted: Vec3<V>,
+    ) -> Self {
+        let none = Vec3::zero();
+        let vw = resistance.rows().map(|row| arm.cross_add(row, none));
+        let Vec3(x, y, z) = arm;
+        let ww = Sym3 {
+            xx: y.fma(vw[2].0, -(z * vw[1].0)),
+            xy: y.fma(vw[2].1, -(z * vw[1].1)),
+            xz: y.fma(vw[2].2, -(z * vw[1].2)),
+            yy: z.fma(vw[0].1, -(x * vw[2].1)),
+            yz: z.fma(vw[0].2, -(x * vw[2].2)),
+            zz: x.fma(vw[1].2, -(y * vw[0].2)),
+        };
+        let bv = none.sub(resistance.times_add(predicted, force));
+        Self {
+            vv: resistance,
+            vw: Mat3(vw),
+            ww,
+            bv,
+            bw: arm.cross_add(bv, none),
+        }
+    }
+}
+
+/// The loads of one step.
+pub(crate) trait Loads<V> {
+    /// Whether there are any. If so, the links are predicted before the step, because
+    /// loads depend on where the rope is going to be.
+    const PRESENT: bool;
+    /// Load on one link, counted from the attach point.
+    fn on_link(&self, link: usize) -> &Load<V>;
+    /// Turn of a link against the one before in an unloaded rope.
+    fn rest_turn(&self) -> Quat<V>;
+}
+
+/// Nothing acts; the compiler leaves no trace of it.
+pub(crate) struct Unloaded<V>(Load<V>);
+
+impl<V: Lanes> Unloaded<V> {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self(Load::none())
+    }
+}
+
+impl<V: Lanes> Loads<V> for Unloaded<V> {
+    const PRESENT: bool = false;
+    #[inline(always)]
+    fn on_link(&self, _link: usize) -> &Load<V> {
+        &self.0
+    }
+    #[inline(always)]
+    fn rest_turn(&self) -> Quat<V> {
+        Quat::identity()
+    }
+}

@@ -1,0 +1,233 @@
+//! What a group of ropes meets besides gravity: obstacles, air, its own rest shape.
+
+use crate::algebra::Quat;
+use crate::base_path::BasePath;
+use crate::clock::{BaseState, Clock};
+use crate::contact::{Contacts, LOOK_PERIOD, Node, StepEnd, corrected, predicted};
+use crate::drag::DragLanes;
+use crate::extras::RopeExtras;
+use crate::group::{GroupTask, Member};
+use crate::kernel::{Elimination, StepReport, step};
+use crate::lanes::Lanes;
+use crate::load::{Load, Loads, Unloaded};
+use crate::scene::{ContactSummary, DominoOutcome};
+use crate::scheme::Scheme;
+use crate::state::{Link, RopeLanes};
+use nalgebra::{UnitQuaternion, Vector3};
+use shared_types::RopeParams;
+
+/// Obstacles, air and rest shape of a group, with the loads of the current step.
+pub(crate) struct Around<V> {
+    pub(crate) contacts: Contacts<V>,
+    drag: Option<DragLanes<V>>,
+    rest_turn: Quat<V>,
+    is_curved: bool,
+    nodes: Vec<Node<V>>,
+    loads: Vec<Load<V>>,
+    steps: usize,
+}
+
+impl<V: Lanes> Loads<V> for Around<V> {
+    const PRESENT: bool = true;
+    #[inline(always)]
+    fn on_link(&self, link: usize) -> &Load<V> {
+        &self.loads[link]
+    }
+    #[inline(always)]
+    fn rest_turn(&self) -> Quat<V> {
+        self.rest_turn
+    }
+}
+
+impl<V: Lanes> Around<V> {
+    /// Air and rest shape of `ropes`, one per lane, among `contacts`.
+    #[inline(always)]
+    pub(crate) fn new(contacts: Contacts<V>, ropes: &[(&RopeParams, RopeExtras)]) -> Self {
+        let mut drag = DragLanes::none();
+        let mut rest_turn = Quat::identity();
+        for lane in 0..V::COUNT {
+            let Some((rope, extras)) = ropes.get(lane).or_else(|| ropes.last()) else {
+                continue;
+            };
+            drag.set(lane, rope, extras);
+            let curvature = Vector3::from(extras.rest_curvature_per_m);
+            let q = UnitQuaternion::from_scaled_axis(curvature * rope.link_length_m());
+            rest_turn.set(lane, [q.w, q.i, q.j, q.k]);
+        }
+        let links = ropes.first().map_or(0, |(r, _)| r.links as usize);
+        let any_drag = ropes.iter().any(|(_, e)| e.air_drag.is_some());
+        let bends = |c: &f64| c.abs() > 0.0;
+        Self {
+            contacts,
+            drag: any_drag.then_some(drag),
+            rest_turn,
+            is_curved: ropes
+                .iter()
+                .any(|(_, e)| e.rest_curvature_per_m.iter().any(bends)),
+            nodes: vec![Node::zero(); links],
+            loads: vec![Load::none(); links],
+            steps: 0,
+        }
+    }
+
+    /// Looks around from where the rope is.
+    #[inline(always)]
+    pub(crate) fn look(
+        &mut self,
+        links: &[Link<V>],
+        rope: &RopeLanes<V>,
+        attach: &BaseState<V>,
+        arm: &[BaseState<V>],
+    ) {
+        corrected(&mut self.nodes, links, rope, attach);
+        self.contacts.look(&self.nodes, rope, attach, arm);
+    }
+
+    /// Advances every lane by one step.
+    #[inline(always)]
+    pub(crate) fn step(
+        &mut self,
+        links: &mut [Link<V>],
+        scratch: &mut [Elimination<V>],
+        rope: &RopeLanes<V>,
+        scheme: &Scheme<V>,
+        (attach, arm): (&BaseState<V>, &[BaseState<V>]),
+        ends: &[StepEnd],
+    ) -> StepReport<V> {
+        let in_contact = self.contacts.is_engaged();
+        self.steps += 1;
+        let look = self.steps.is_multiple_of(LOOK_PERIOD);
+        if !(in_contact || self.is_curved || self.drag.is_some()) {
+            let unloaded = Unloaded::new();
+            let report = step(links, scratch, rope, &attach.dynamics, scheme, &unloaded);
+            if look {
+                self.look(links, rope, attach, arm);
+            }
+            return report;
+        }
+        links.iter_mut().for_each(|link| link.predict(scheme));
+        predicted(&mut self.nodes, links, rope, attach, scheme);
+        self.loads.fill(Load::none());
+        self.add_drag(links, rope, scheme);
+        if in_contact {
+            let loads = &mut self.loads;
+            self.contacts
+                .load(loads, links, &self.nodes, scheme, attach, arm);
+        }
+        let report = step(links, scratch, rope, &attach.dynamics, scheme, &*self);
+        if in_contact {
+            corrected(&mut self.nodes, links, rope, attach);
+            self.contacts.settle(links, &self.nodes, scheme, ends);
+        }
+        if look {
+            self.look(links, rope, attach, arm);
+        }
+        report
+    }
+
+    #[inline(always)]
+    fn add_drag(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, scheme: &Scheme<V>) {
+        let Some(drag) = &self.drag else { return };
+        let per_length = rope.link_length.recip();
+        for ((load, link), node) in self.loads.iter_mut().zip(links).zip(&self.nodes) {
+            *load = drag.on_link(link, node, per_length, scheme);
+        }
+        if let (Some(load), Some(node)) = (self.loads.last_mut(), self.nodes.last()) {
+            *load = load.plus(&drag.on_lead(node, scheme));
+        }
+    }
+}
+
+/// [`Around`] on the clock of a group.
+pub(crate) struct Surroundings<'a, V> {
+    around: Around<V>,
+    /// One clock per arm link that carries obstacles, in step with the group's.
+    arm: Vec<Clock<'a, V>>,
+    arm_states: Vec<BaseState<V>>,
+    arm_rope: RopeLanes<V>,
+    ends: Vec<StepEnd>,
+}
+
+impl<'a, V: Lanes> Surroundings<'a, V> {
+    #[inline(always)]
+    pub(crate) fn new<const ALONE: bool>(
+        task: &GroupTask<'a, ALONE>,
+        plain: &[&'a RopeParams],
+    ) -> Self {
+        let origin_m = task.watch.origin_m();
+        let members: &'a [Member<'a>] = task.members;
+        let ropes: Vec<_> = members.iter().map(|m| (m.rope, m.extras)).collect();
+        let contacts = Contacts::new(task.scene, plain, task.max_step_s, origin_m);
+        let carriers = members.first().map_or(0, |m| m.arm.len());
+        let arm = (0..carriers)
+            .map(|carrier| {
+                let paths: Vec<&'a BasePath> = members.iter().map(|m| &m.arm[carrier]).collect();
+                Clock::new(&paths, plain, origin_m)
+            })
+            .collect();
+        Self {
+            around: Around::new(contacts, &ropes),
+            arm,
+            arm_states: Vec::with_capacity(carriers),
+            arm_rope: RopeLanes::of(plain[0]),
+            ends: Vec::with_capacity(members.len()),
+        }
+    }
+
+    /// First look, before the first step.
+    #[inline(always)]
+    pub(crate) fn begin(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, attach: &BaseState<V>) {
+        self.read_arm();
+        self.around.look(links, rope, attach, &self.arm_states);
+    }
+
+    /// Advances every lane by one step of `clock`, and tells it which lanes must
+    /// restart.
+    #[inline(always)]
+    pub(crate) fn step(
+        &mut self,
+        links: &mut [Link<V>],
+        scratch: &mut [Elimination<V>],
+        rope: &RopeLanes<V>,
+        attach: &BaseState<V>,
+        clock: &mut Clock<V>,
+    ) -> StepReport<V> {
+        let mut restarts = Vec::new();
+        for arm in &mut self.arm {
+            arm.next_step(&mut self.arm_rope, &mut restarts);
+        }
+        self.read_arm();
+        let lanes = clock.lanes();
+        self.ends.clear();
+        self.ends.extend((0..lanes).map(|lane| {
+            let (start_s, time_s) = clock.span_s(lane);
+            StepEnd {
+                time_s,
+                step_s: time_s - start_s,
+                running: !clock.finished(lane),
+            }
+        }));
+        let carriers = (attach, self.arm_states.as_slice());
+        let report = self
+            .around
+            .step(links, scratch, rope, &clock.scheme, carriers, &self.ends);
+        for lane in 0..lanes {
+            clock.keep_restarting(lane, self.around.contacts.imminent.get(lane) > 0.0);
+        }
+        report
+    }
+
+    #[inline(always)]
+    fn read_arm(&mut self) {
+        self.arm_states.clear();
+        self.arm_states.extend(self.arm.iter().map(Clock::base));
+    }
+
+    pub(crate) fn summaries_of(&self, lane: usize) -> Vec<ContactSummary> {
+        self.around.contacts.summaries_of(lane)
+    }
+
+    pub(crate) fn domino_of(&self, lane: usize) -> Option<DominoOutcome> {
+        self.around.contacts.domino_of(lane)
+    }
+}
