@@ -219,6 +219,30 @@ struct Whip {
     r: Rotation3<f64>,
 }
 
+impl Whip {
+    /// One whose frame stays clear of the wall; the rope does not push it back.
+    fn random(rng: &mut ChaCha8Rng) -> Self {
+        loop {
+            let push_s = rng.random_range(0.1..0.25);
+            let mut speed = |max: f64| rng.random_range(-max..max);
+            let velocity = Vector3::new(3.0 + speed(2.0), speed(1.0), speed(1.0));
+            let whip = Self {
+                from_m: Vector3::new(-0.25 + speed(0.15), speed(0.2), 0.42 + speed(0.17)),
+                acceleration_m_s2: velocity / push_s,
+                push_s,
+                r: Rotation3::from_axis_angle(&Vector3::y_axis(), 1.0 + speed(1.0)),
+            };
+            let is_clear = (0..=100).all(|i| {
+                let p = whip.at(whip.duration_s() * f64::from(i) / 100.0).p_m;
+                (0..3).any(|axis| p[axis].abs() > WALL_HALF_M[axis] + 0.03)
+            });
+            if is_clear {
+                return whip;
+            }
+        }
+    }
+}
+
 impl AttachMotion for Whip {
     fn at(&self, t_s: f64) -> FrameMotion {
         // Forth, then braked.
@@ -278,26 +302,7 @@ fn random_throws(count: usize, seed: u64) -> (usize, usize, f64, f64) {
             RopeParams::from_array(v)
         })
         .collect();
-    let whips: Vec<Whip> = (0..count)
-        .map(|_| {
-            let push_s = rng.random_range(0.1..0.25);
-            let a = rng.random_range(1.0..5.0) / push_s;
-            Whip {
-                from_m: Vector3::new(
-                    -rng.random_range(0.1..0.4),
-                    rng.random_range(-0.2..0.2),
-                    rng.random_range(0.25..0.6),
-                ),
-                acceleration_m_s2: Vector3::new(
-                    a,
-                    rng.random_range(-10.0..10.0),
-                    rng.random_range(-10.0..10.0),
-                ),
-                push_s,
-                r: Rotation3::from_axis_angle(&Vector3::y_axis(), rng.random_range(0.0..2.0)),
-            }
-        })
-        .collect();
+    let whips: Vec<Whip> = (0..count).map(|_| Whip::random(&mut rng)).collect();
     let wall = alone(Obstacle::fixed(
         Shape::Box {
             half_m: WALL_HALF_M,
@@ -326,37 +331,6 @@ fn random_throws(count: usize, seed: u64) -> (usize, usize, f64, f64) {
             .fold(0.0, f64::max);
         deepest = deepest.max(depth);
         through += usize::from(depth > 0.0);
-        if depth > 0.0 {
-            let f = (0..run.nodes.frames())
-                .find(|f| depth_in_wall_m(run, *f, 22) > 0.0)
-                .unwrap();
-            let l = (0..22)
-                .max_by(|a, b| {
-                    let d = |l: usize| {
-                        let [p, q] = [l, l + 1].map(|n| run.nodes.position(f, n));
-                        (0..=8)
-                            .map(|k| {
-                                let x = p.lerp(&q, k as f64 / 8.0);
-                                (0..3)
-                                    .map(|i| WALL_HALF_M[i] - x[i].abs())
-                                    .fold(f64::INFINITY, f64::min)
-                            })
-                            .fold(f64::NEG_INFINITY, f64::max)
-                    };
-                    d(*a).total_cmp(&d(*b))
-                })
-                .unwrap();
-            println!(
-                "depth {depth:.4} frame {f} link {l} {:?} {:?} before {:?} {:?} v {:.1} {:?} r {:?}",
-                run.nodes.position(f, l).as_slice(),
-                run.nodes.position(f, l + 1).as_slice(),
-                run.nodes.position(f - 1, l).as_slice(),
-                run.nodes.position(f - 1, l + 1).as_slice(),
-                run.peak_tip_speed_m_s,
-                run.outcome,
-                run.contacts[0]
-            );
-        }
     }
     (through, touched, deepest, fastest)
 }
