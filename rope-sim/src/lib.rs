@@ -57,7 +57,7 @@ pub use error::SimulateError;
 pub use extras::{AirDrag, RopeExtras};
 pub use frames::{FrameTimes, NodeTrack};
 pub use lanes::Kernel;
-pub use live::LiveRope;
+pub use live::{LiveRope, MovingFrames};
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
 pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};
 pub use scene::{

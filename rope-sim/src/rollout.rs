@@ -5,7 +5,7 @@ use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
-use crate::scene::{ContactSummary, DominoOutcome, Placement, Scene, SceneError};
+use crate::scene::{ContactSummary, DominoOutcome, Scene, SceneError};
 use crate::watch::{Watch, Watched};
 use shared_types::RopeParams;
 
@@ -144,18 +144,16 @@ pub struct Rollout {
 /// Checks the scene's numbers, and that every motion knows the arm it is on.
 pub(crate) fn check_scene(scene: &Scene, candidates: &[Candidate]) -> Result<(), SimulateError> {
     scene.check()?;
-    for (index, obstacle) in scene.obstacles.iter().enumerate() {
-        let Placement::ArmLink { link, .. } = obstacle.placement else {
-            continue;
-        };
-        let is_armless = |c: &Candidate| c.motion.arm_links(0.0).is_none();
-        if let Some(candidate) = candidates.iter().position(is_armless) {
-            return Err(SimulateError::Scene(SceneError::NoArm {
-                candidate,
-                obstacle: index,
-                link,
-            }));
-        }
+    if let Some((obstacle, link)) = scene.first_on_arm()
+        && let Some(candidate) = candidates
+            .iter()
+            .position(|c| c.motion.arm_links(0.0).is_none())
+    {
+        return Err(SimulateError::Scene(SceneError::NoArm {
+            candidate,
+            obstacle,
+            link,
+        }));
     }
     Ok(())
 }

@@ -151,6 +151,17 @@ impl Scene {
         self.obstacles.is_empty() && self.domino.is_none()
     }
 
+    /// First obstacle on an arm link: its index and the link, 1 to 7.
+    pub(crate) fn first_on_arm(&self) -> Option<(usize, usize)> {
+        let carriers = self.obstacles.iter().enumerate();
+        carriers
+            .filter_map(|(index, o)| match o.placement {
+                Placement::ArmLink { link, .. } => Some((index, link)),
+                _ => None,
+            })
+            .next()
+    }
+
     /// The arm links its obstacles are on, each once.
     pub(crate) fn arm_links(&self) -> Vec<usize> {
         let mut links: Vec<usize> = self

@@ -8,17 +8,18 @@
     reason = "tests may fail loudly"
 )]
 
+mod scenes;
+
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Obstacle, Outcome, Placement, Precision, Rollout, Scene,
-    Shape, SimOptions, Start, roll_out_in,
+    AttachMotion, Candidate, Obstacle, Outcome, Placement, Precision, Rollout, Shape, Start,
+    roll_out_in,
 };
+use scenes::{G_M_S2, Still, WALL_HALF_M, Whip, alone, options, random_rope, simulate};
 use shared_types::RopeParams;
 use shared_types::kinematics::FrameMotion;
-
-const G_M_S2: f64 = 9.81;
 
 fn rope() -> RopeParams {
     RopeParams::from_array([22.0, 0.55, 0.02, 0.1, 0.005, 0.06, 0.12, 0.03, 0.8])
@@ -65,46 +66,6 @@ impl AttachMotion for Drop {
     }
 }
 
-fn options(precision: Precision, horizon_s: f64, rate_hz: f64) -> SimOptions {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "small"
-    )]
-    let count = (horizon_s * rate_hz + 1e-6) as usize + 1;
-    SimOptions {
-        step_s: 5e-4,
-        precision,
-        start: Start::Equilibrium,
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / rate_hz,
-            count,
-        },
-        closest_to_m: None,
-        horizon_s,
-        threads: 2,
-    }
-}
-
-fn alone(obstacle: Obstacle) -> Scene {
-    Scene {
-        obstacles: vec![obstacle],
-        domino: None,
-    }
-}
-
-fn simulate(
-    scene: &Scene,
-    rope: &RopeParams,
-    motion: &dyn AttachMotion,
-    options: &SimOptions,
-) -> Rollout {
-    roll_out_in(scene, &[Candidate::new(rope, motion)], options)
-        .unwrap()
-        .remove(0)
-}
-
 #[test]
 fn a_dropped_lead_sinks_less_than_a_millimetre_and_settles() {
     let rope = rope();
@@ -129,28 +90,6 @@ fn a_dropped_lead_sinks_less_than_a_millimetre_and_settles() {
         println!("{} {}", tip(last), tip(last - 10));
         assert!((tip(last) - tip(last - 10)).norm() < 1e-4);
         assert!((tip(last).z - rope.lead_radius_m).abs() < 3e-4);
-    }
-}
-
-/// A frame that stands still.
-struct Still {
-    p_m: Vector3<f64>,
-    r: Rotation3<f64>,
-}
-
-impl AttachMotion for Still {
-    fn at(&self, _t_s: f64) -> FrameMotion {
-        FrameMotion {
-            p_m: self.p_m,
-            r: self.r.into_inner(),
-            ..FrameMotion::world()
-        }
-    }
-    fn duration_s(&self) -> f64 {
-        0.0
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        Vec::new()
     }
 }
 
@@ -210,69 +149,6 @@ fn friction_holds_up_to_its_angle_and_no_further() {
     }
 }
 
-/// Throws a rope across a thin wall: the frame jerks sideways with a constant
-/// acceleration for a moment, faster than any arm.
-struct Whip {
-    from_m: Vector3<f64>,
-    acceleration_m_s2: Vector3<f64>,
-    push_s: f64,
-    r: Rotation3<f64>,
-}
-
-impl Whip {
-    /// One whose frame stays clear of the wall; the rope does not push it back.
-    fn random(rng: &mut ChaCha8Rng) -> Self {
-        loop {
-            let push_s = rng.random_range(0.1..0.25);
-            let mut speed = |max: f64| rng.random_range(-max..max);
-            let velocity = Vector3::new(3.0 + speed(2.0), speed(1.0), speed(1.0));
-            let whip = Self {
-                from_m: Vector3::new(-0.25 + speed(0.15), speed(0.2), 0.42 + speed(0.17)),
-                acceleration_m_s2: velocity / push_s,
-                push_s,
-                r: Rotation3::from_axis_angle(&Vector3::y_axis(), 1.0 + speed(1.0)),
-            };
-            let is_clear = (0..=100).all(|i| {
-                let p = whip.at(whip.duration_s() * f64::from(i) / 100.0).p_m;
-                (0..3).any(|axis| p[axis].abs() > WALL_HALF_M[axis] + 0.03)
-            });
-            if is_clear {
-                return whip;
-            }
-        }
-    }
-}
-
-impl AttachMotion for Whip {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        // Forth, then braked.
-        let forth = t_s.clamp(0.0, self.push_s);
-        let back = (t_s - self.push_s).clamp(0.0, self.push_s);
-        let v = forth - back;
-        let sign = match t_s {
-            t if t < self.push_s => 1.0,
-            t if t < 2.0 * self.push_s => -1.0,
-            _ => 0.0,
-        };
-        let path = 0.5 * forth * forth + forth * back - 0.5 * back * back;
-        FrameMotion {
-            p_m: self.from_m + self.acceleration_m_s2 * path,
-            v_m_s: self.acceleration_m_s2 * v,
-            a_m_s2: self.acceleration_m_s2 * sign,
-            r: self.r.into_inner(),
-            ..FrameMotion::world()
-        }
-    }
-    fn duration_s(&self) -> f64 {
-        2.0 * self.push_s
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        vec![self.push_s, 2.0 * self.push_s]
-    }
-}
-
-const WALL_HALF_M: [f64; 3] = [0.005, 0.3, 0.2];
-
 /// How deep the rope's centre line lies in the wall (m), by where it is.
 fn depth_in_wall_m(run: &Rollout, frame: usize, links: usize) -> f64 {
     let mut deepest = 0.0_f64;
@@ -287,21 +163,20 @@ fn depth_in_wall_m(run: &Rollout, frame: usize, links: usize) -> f64 {
     deepest
 }
 
-fn random_throws(count: usize, seed: u64) -> (usize, usize, f64, f64) {
+/// What many throws at the wall did.
+#[derive(Debug, Default)]
+struct Throws {
+    through: usize,
+    touched: usize,
+    diverged: usize,
+    /// Of those that touched.
+    fastest_tip_m_s: f64,
+    deepest_m: f64,
+}
+
+fn random_throws(count: usize, seed: u64) -> Throws {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let ropes: Vec<RopeParams> = (0..count)
-        .map(|_| {
-            let mut v: [f64; 9] = core::array::from_fn(|i| {
-                let range = &shared_types::rope::RANGES[i];
-                rng.random_range(range.min..=range.max)
-            });
-            v[0] = 22.0;
-            if rng.random_bool(0.5) {
-                (v[4], v[7]) = (0.003, 0.003);
-            }
-            RopeParams::from_array(v)
-        })
-        .collect();
+    let ropes: Vec<RopeParams> = (0..count).map(|_| random_rope(&mut rng, 22.0)).collect();
     let whips: Vec<Whip> = (0..count).map(|_| Whip::random(&mut rng)).collect();
     let wall = alone(Obstacle::fixed(
         Shape::Box {
@@ -316,28 +191,82 @@ fn random_throws(count: usize, seed: u64) -> (usize, usize, f64, f64) {
         .map(|(r, w)| Candidate::new(r, w))
         .collect();
     let runs = roll_out_in(&wall, &candidates, &options(Precision::F32, 0.8, 200.0)).unwrap();
-    let (mut through, mut touched, mut deepest, mut fastest) = (0, 0, 0.0_f64, 0.0_f64);
-    for run in &runs {
-        if run.outcome == Outcome::Diverged {
-            println!("diverged");
-            continue;
-        }
-        touched += usize::from(run.contacts[0].touched());
-        if run.contacts[0].touched() {
-            fastest = fastest.max(run.peak_tip_speed_m_s);
-        }
-        let depth = (0..run.nodes.frames())
+    let mut throws = Throws::default();
+    for run in runs.iter().filter(|run| run.contacts[0].touched()) {
+        throws.touched += 1;
+        throws.diverged += usize::from(run.outcome == Outcome::Diverged);
+        throws.fastest_tip_m_s = throws.fastest_tip_m_s.max(run.peak_tip_speed_m_s);
+        let frames = 0..run.nodes.frames();
+        let depth_m = frames
             .map(|f| depth_in_wall_m(run, f, 22))
             .fold(0.0, f64::max);
-        deepest = deepest.max(depth);
-        through += usize::from(depth > 0.0);
+        throws.deepest_m = throws.deepest_m.max(depth_m);
+        throws.through += usize::from(depth_m > 0.0);
     }
-    (through, touched, deepest, fastest)
+    throws
 }
 
 #[test]
 fn nothing_passes_through_a_thin_wall() {
-    let result = random_throws(512, 7);
-    println!("{result:?}");
-    assert_eq!(result.0, 0);
+    let count = if std::env::var_os("WAG_LONG_TESTS").is_some() {
+        10_000
+    } else {
+        512
+    };
+    let throws = random_throws(count, 7);
+    println!("{throws:?}");
+    assert_eq!(throws.through, 0);
+    assert_eq!(throws.diverged, 0);
+    assert!(throws.touched > count / 2);
+    assert!(throws.fastest_tip_m_s > 15.0);
+}
+
+/// Ropes let go over a cylinder come to rest where MuJoCo's do.
+#[test]
+fn rest_shapes_over_a_cylinder_are_mujocos() {
+    let text = include_str!("fixtures/rope-over-cylinder.json");
+    let fixture: serde_json::Value = serde_json::from_str(text).unwrap();
+    for case in fixture["cases"].as_array().unwrap() {
+        let number = |v: &serde_json::Value| v.as_f64().unwrap();
+        let vector = |v: &serde_json::Value| Vector3::from_fn(|i, _| number(&v[i]));
+        let rope = &case["rope"];
+        let keys = ["N", "L", "c", "k", "r", "mu", "m_L", "r_L", "link_extra_scale"];
+        let rope = RopeParams::from_array(keys.map(|k| number(&rope[k])));
+        let q = &case["attach_q_wxyz"];
+        let [w, x, y, z] = [0, 1, 2, 3].map(|i| number(&q[i]));
+        let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        let still = Still {
+            p_m: vector(&case["attach_p_m"]),
+            r: q.to_rotation_matrix(),
+        };
+        let cylinder = &case["cylinder"];
+        let axis = vector(&cylinder["axis"]);
+        let along = UnitQuaternion::rotation_between(&Vector3::z(), &axis).unwrap();
+        let over = alone(Obstacle {
+            shape: Shape::Cylinder {
+                half_length_m: number(&cylinder["half_length_m"]),
+                radius_m: number(&cylinder["radius_m"]),
+            },
+            placement: Placement::World(Isometry3::from_parts(
+                Translation3::from(vector(&cylinder["centre_m"])),
+                along,
+            )),
+            friction: number(&case["friction"]),
+        });
+        for precision in [Precision::F64, Precision::F32] {
+            let mut options = options(precision, 13.0, 1.0);
+            options.start = Start::Straight {
+                joint0_rotvec: vector(&case["initial_joint0_rotvec"]).into(),
+            };
+            let run = simulate(&over, &rope, &still, &options);
+            let rest = case["rest_nodes_m"].as_array().unwrap();
+            let offsets = rest.iter().enumerate().map(|(node, want)| {
+                (run.nodes.position(13, node) - vector(want)).norm()
+            });
+            let largest_m = offsets.fold(0.0, f64::max);
+            let creep_m = (run.nodes.position(13, 22) - run.nodes.position(12, 22)).norm();
+            println!("{} {precision:?}: {largest_m} m, creep {creep_m}", case["name"]);
+            assert!(largest_m < 5e-3, "{}: {largest_m} m", case["name"]);
+        }
+    }
 }

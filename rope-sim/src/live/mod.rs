@@ -2,16 +2,40 @@
 
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::attitude;
+use crate::clock::BaseState;
+use crate::contact::{Contacts, StepEnd};
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
-use crate::kernel::{Elimination, step};
+use crate::extras::RopeExtras;
+use crate::kernel::Elimination;
 use crate::lanes::{Kernel, LaneTask, Lanes};
-use crate::load::Unloaded;
+use crate::scene::{ContactSummary, DominoOutcome, Scene, SceneError};
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{BaseLanes, Link, RopeLanes};
+use crate::surroundings::Around;
 use nalgebra::Vector3;
-use shared_types::RopeParams;
 use shared_types::kinematics::FrameMotion;
+use shared_types::{JOINTS, RopeParams};
+
+/// What moves, at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MovingFrames {
+    /// The attach frame.
+    pub attach: FrameMotion,
+    /// The arm's links 1 to 7, where obstacles are on them.
+    pub arm_links: Option<[FrameMotion; JOINTS]>,
+}
+
+impl MovingFrames {
+    /// An attach frame and no arm.
+    #[must_use]
+    pub fn attach_only(attach: FrameMotion) -> Self {
+        Self {
+            attach,
+            arm_links: None,
+        }
+    }
+}
 
 /// A rope in double precision that follows its attach frame step by step. Advancing
 /// it does not allocate.
@@ -27,6 +51,10 @@ pub struct LiveRope {
     restart: bool,
     time_s: f64,
     nodes: Vec<Vector3<f64>>,
+    around: Around<f64>,
+    /// Arm links that carry obstacles, and their last known motions.
+    carriers: Vec<usize>,
+    carried: Vec<BaseState<f64>>,
 }
 
 impl core::fmt::Debug for LiveRope {
@@ -49,6 +77,25 @@ impl LiveRope {
         attach: &FrameMotion,
         step_s: f64,
     ) -> Result<Self, SimulateError> {
+        let start = MovingFrames::attach_only(*attach);
+        Self::new_in(&Scene::EMPTY, rope, RopeExtras::NONE, &start, step_s)
+    }
+
+    /// [`LiveRope::new`] among obstacles and a domino, with drag or rest curvature. A
+    /// curved rope hangs as a straight one would at first. Use steps of at most 0.5 ms.
+    ///
+    /// # Errors
+    /// As [`LiveRope::new`]; a scene that cannot be simulated, or has obstacles on an
+    /// arm that `start` lacks; extras out of bounds.
+    pub fn new_in(
+        scene: &Scene,
+        rope: &RopeParams,
+        extras: RopeExtras,
+        start: &MovingFrames,
+        step_s: f64,
+    ) -> Result<Self, SimulateError> {
+        check_live(scene, extras, start)?;
+        let attach = &start.attach;
         rope.validate().map_err(|source| SimulateError::Rope {
             candidate: 0,
             source,
@@ -86,7 +133,17 @@ impl LiveRope {
             restart: true,
             time_s: 0.0,
             nodes: vec![Vector3::zeros(); n + 1],
+            around: Around::new(
+                Contacts::new(scene, &[rope], step_s, [0.0; 3]),
+                &[(rope, extras)],
+            ),
+            carriers: scene.arm_links(),
+            carried: Vec::new(),
         };
+        live.carry(start);
+        let base = base_of(attach);
+        live.around
+            .look(&live.links, &live.rope, &base, &live.carried);
         live.place_nodes(&attach.p_m);
         Ok(live)
     }
@@ -94,16 +151,43 @@ impl LiveRope {
     /// Advances to `to_t_s` in equal steps, reading the attach frame's motion at the
     /// end of each. Times that are not later than [`LiveRope::time_s`] do nothing.
     pub fn advance(&mut self, motion: &dyn Fn(f64) -> FrameMotion, to_t_s: f64) {
+        self.advance_in(&|t_s| MovingFrames::attach_only(motion(t_s)), to_t_s);
+    }
+
+    /// [`LiveRope::advance`] with the arm's links, for obstacles on them; where a frame
+    /// lacks them, such obstacles stay where they were.
+    pub fn advance_in(&mut self, frames: &dyn Fn(f64) -> MovingFrames, to_t_s: f64) {
         if !(to_t_s > self.time_s && to_t_s.is_finite()) {
             return;
         }
         Kernel::ScalarF64.run(Advance {
             live: self,
-            motion,
+            frames,
             to_t_s,
         });
         self.time_s = to_t_s;
-        self.place_nodes(&motion(to_t_s).p_m);
+        self.place_nodes(&frames(to_t_s).attach.p_m);
+    }
+
+    /// What the rope has done with each obstacle so far.
+    #[must_use]
+    pub fn contacts(&self) -> Vec<ContactSummary> {
+        self.around.contacts.summaries_of(0)
+    }
+
+    /// What has become of the domino so far.
+    #[must_use]
+    pub fn domino(&self) -> Option<DominoOutcome> {
+        self.around.contacts.domino_of(0)
+    }
+
+    fn carry(&mut self, frames: &MovingFrames) {
+        let Some(links) = &frames.arm_links else {
+            return;
+        };
+        self.carried.clear();
+        let motions = self.carriers.iter().filter_map(|link| links.get(link - 1));
+        self.carried.extend(motions.map(base_of));
     }
 
     /// Tells the rope that the attach frame's acceleration jumps now (the arm stops
@@ -170,7 +254,7 @@ impl LiveRope {
 /// The steps of one [`LiveRope::advance`].
 struct Advance<'a> {
     live: &'a mut LiveRope,
-    motion: &'a dyn Fn(f64) -> FrameMotion,
+    frames: &'a dyn Fn(f64) -> MovingFrames,
     to_t_s: f64,
 }
 
@@ -190,155 +274,70 @@ impl LaneTask for Advance<'_> {
         while done < steps {
             done += 1.0;
             live.set_step(step_s);
-            let motion = (self.motion)(from_s + span_s * (done / steps));
-            let base = base_of(&motion);
-            step(
+            let time_s = from_s + span_s * (done / steps);
+            let frames = (self.frames)(time_s);
+            live.carry(&frames);
+            let base = base_of(&frames.attach);
+            let end = StepEnd {
+                time_s,
+                step_s,
+                running: true,
+            };
+            live.around.step(
                 &mut live.links,
                 &mut live.scratch,
                 &live.rope,
-                &base,
                 &live.scheme,
-                &Unloaded::new(),
+                (&base, &live.carried),
+                &[end],
             );
+            live.restart |= live.around.contacts.imminent > 0.0;
         }
     }
 }
 
-fn base_of(m: &FrameMotion) -> BaseLanes<f64> {
+/// Checks what only a rope among things has.
+fn check_live(
+    scene: &Scene,
+    extras: RopeExtras,
+    start: &MovingFrames,
+) -> Result<(), SimulateError> {
+    scene.check()?;
+    if let (Some((obstacle, link)), None) = (scene.first_on_arm(), start.arm_links) {
+        return Err(SimulateError::Scene(SceneError::NoArm {
+            candidate: 0,
+            obstacle,
+            link,
+        }));
+    }
+    match extras.fault() {
+        Some((field, value, need)) => Err(SimulateError::Extras {
+            candidate: 0,
+            field,
+            value,
+            need,
+        }),
+        None => Ok(()),
+    }
+}
+
+fn base_of(m: &FrameMotion) -> BaseState<f64> {
     let q = attitude(m);
     let vector = |v: &Vector3<f64>| Vec3(v.x, v.y, v.z);
-    BaseLanes {
-        q: Quat {
-            w: q.w,
-            v: Vec3(q.i, q.j, q.k),
+    BaseState {
+        dynamics: BaseLanes {
+            q: Quat {
+                w: q.w,
+                v: Vec3(q.i, q.j, q.k),
+            },
+            w: vector(&m.w_rad_s),
+            alpha: vector(&m.alpha_rad_s2),
+            a: vector(&m.a_m_s2),
         },
-        w: vector(&m.w_rad_s),
-        alpha: vector(&m.alpha_rad_s2),
-        a: vector(&m.a_m_s2),
+        position: vector(&m.p_m),
+        velocity: vector(&m.v_m_s),
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        AttachMotion, Candidate, FrameTimes, Precision, SimOptions, Start, Watch, roll_out,
-    };
-
-    fn rope() -> RopeParams {
-        RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
-    }
-
-    /// Swings along x, starting and ending softly.
-    struct Swing;
-
-    impl AttachMotion for Swing {
-        fn at(&self, t_s: f64) -> FrameMotion {
-            let w = core::f64::consts::TAU;
-            let (s, c) = (w * t_s).sin_cos();
-            FrameMotion {
-                p_m: Vector3::new(0.1 * (t_s - s / w), 0.0, 1.0),
-                v_m_s: Vector3::new(0.1 * (1.0 - c), 0.0, 0.0),
-                a_m_s2: Vector3::new(0.1 * w * s, 0.0, 0.0),
-                ..FrameMotion::world()
-            }
-        }
-        fn duration_s(&self) -> f64 {
-            1.0
-        }
-        fn acceleration_jumps_s(&self) -> Vec<f64> {
-            Vec::new()
-        }
-    }
-
-    #[test]
-    fn stays_in_equilibrium_under_a_tilted_frame() {
-        let tilt = nalgebra::Rotation3::from_euler_angles(0.3, 0.9, 0.2);
-        let attach = FrameMotion {
-            r: tilt.into_inner(),
-            ..FrameMotion::world()
-        };
-        let mut live = LiveRope::new(&rope(), &attach, 1e-3).unwrap();
-        let before = live.tip();
-        live.advance(&|_| attach, 1.0);
-        assert!(
-            (live.tip() - before).norm() < 1e-9,
-            "{}",
-            live.tip() - before
-        );
-    }
-
-    /// Turns about the vertical by more than a full turn, tilted, softly.
-    struct Turn;
-
-    impl AttachMotion for Turn {
-        fn at(&self, t_s: f64) -> FrameMotion {
-            let w = core::f64::consts::TAU;
-            let (s, c) = (w * t_s).sin_cos();
-            let yaw = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 7.0 * (t_s - s / w));
-            let tilt = nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), 0.4);
-            FrameMotion {
-                r: (yaw * tilt).into_inner(),
-                w_rad_s: Vector3::z() * (7.0 * (1.0 - c)),
-                alpha_rad_s2: Vector3::z() * (7.0 * w * s),
-                ..FrameMotion::world()
-            }
-        }
-        fn duration_s(&self) -> f64 {
-            1.0
-        }
-        fn acceleration_jumps_s(&self) -> Vec<f64> {
-            Vec::new()
-        }
-    }
-
-    /// The batch reads continuous quaternions, the live rope those of matrices, whose
-    /// sign jumps: a full turn must not matter to either.
-    #[test]
-    fn follows_the_batch_simulation() {
-        let motions: [&dyn AttachMotion; 2] = [&Swing, &Turn];
-        for motion in motions {
-            let mut live = LiveRope::new(&rope(), &motion.at(0.0), 5e-4).unwrap();
-            for cycle in 1..=250 {
-                live.advance(&|t| motion.at(t), f64::from(cycle) * 0.004);
-            }
-            let options = SimOptions {
-                step_s: 5e-4,
-                precision: Precision::F64,
-                start: Start::Equilibrium,
-                frames: FrameTimes {
-                    first_s: 1.0,
-                    period_s: 1.0,
-                    count: 1,
-                },
-                watch: Watch::NOTHING,
-                horizon_s: 1.0,
-                threads: 1,
-            };
-            let rope = rope();
-            let batch = roll_out(&[Candidate::new(&rope, motion)], &options).unwrap();
-            for (node, at) in live.nodes().iter().enumerate() {
-                let d = (batch[0].nodes.position(0, node) - at).norm();
-                assert!(d < 1e-7, "node {node} differs by {d} m");
-            }
-        }
-    }
-
-    #[test]
-    fn bad_input_is_named() {
-        let world = FrameMotion::world();
-        let mut bad = rope();
-        bad.links = 0;
-        assert!(matches!(
-            LiveRope::new(&bad, &world, 1e-3),
-            Err(SimulateError::Rope { .. })
-        ));
-        assert!(matches!(
-            LiveRope::new(&rope(), &world, 0.0),
-            Err(SimulateError::Option {
-                field: "step_s",
-                ..
-            })
-        ));
-    }
-}
+mod tests;

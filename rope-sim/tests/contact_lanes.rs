@@ -1,0 +1,238 @@
+//! A rope among obstacles is its own, whatever runs beside it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::float_cmp,
+    missing_docs,
+    reason = "tests may fail loudly"
+)]
+
+mod scenes;
+
+use nalgebra::{Isometry3, Rotation3, Vector3};
+use proptest::prelude::*;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rope_sim::{
+    AirDrag, AttachMotion, Candidate, Domino, Kernel, Obstacle, Outcome, Placement, Precision,
+    Rollout, RopeExtras, Scene, Shape, roll_out_in, roll_out_in_with, roll_out_with,
+};
+use scenes::{Still, WALL_HALF_M, Whip, alone, options, random_rope, simulate};
+use shared_types::RopeParams;
+use shared_types::kinematics::FrameMotion;
+
+/// A wall with a floor beside it, a pole, and a domino.
+fn crowded() -> Scene {
+    let wall = Shape::Box {
+        half_m: WALL_HALF_M,
+    };
+    let pole = Shape::Capsule {
+        half_length_m: 0.1,
+        radius_m: 0.008,
+    };
+    Scene {
+        obstacles: vec![
+            Obstacle::fixed(wall, [0.0; 3], 0.5),
+            Obstacle::fixed(Shape::HalfSpace, [0.0, 0.0, -0.2], 0.6),
+            Obstacle {
+                shape: pole,
+                placement: Placement::Attach(Isometry3::translation(0.0, 0.0, 0.1)),
+                friction: 0.3,
+            },
+        ],
+        domino: Some(Domino {
+            foot_m: [-0.2, 0.0, -0.2],
+            facing_rad: 0.3,
+            thickness_m: 0.01,
+            width_m: 0.3,
+            height_m: 0.12,
+            mass_kg: 0.02,
+            friction: 0.4,
+        }),
+    }
+}
+
+fn extras(index: usize) -> RopeExtras {
+    let air_drag = (index % 3 == 1).then_some(AirDrag {
+        air_density_kg_m3: 1.2,
+        normal_coefficient: 1.1,
+        tangential_coefficient: 0.02,
+        lead_coefficient: 0.5,
+    });
+    RopeExtras {
+        air_drag,
+        rest_curvature_per_m: [0.0, if index % 4 == 2 { 1.5 } else { 0.0 }, 0.0],
+    }
+}
+
+fn throws(seed: u64) -> Vec<(RopeParams, Whip)> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..20)
+        .map(|i| {
+            let links = if i % 5 == 4 { 21.0 } else { 20.0 };
+            (random_rope(&mut rng, links), Whip::random(&mut rng))
+        })
+        .collect()
+}
+
+fn candidates(throws: &[(RopeParams, Whip)]) -> Vec<Candidate<'_>> {
+    let numbered = throws.iter().enumerate();
+    numbered
+        .map(|(i, (rope, whip))| Candidate::new(rope, whip).with_extras(extras(i)))
+        .collect()
+}
+
+fn run(kernel: Kernel, candidates: &[Candidate], threads: usize) -> Vec<Rollout> {
+    let mut options = options(Precision::F32, 0.35, 40.0);
+    options.threads = threads;
+    roll_out_in_with(kernel, &crowded(), candidates, &options).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(3))]
+
+    #[test]
+    fn results_do_not_depend_on_lanes_groups_or_threads(seed in 0u64..1000, turn in 1usize..19) {
+        let throws = throws(seed);
+        let candidates = candidates(&throws);
+        for family in [
+            [Kernel::Avx512F32, Kernel::Avx2F32],
+            [Kernel::Avx512F64, Kernel::ScalarF64],
+        ] {
+            let mut runs = Vec::new();
+            for kernel in family.into_iter().filter(|k| k.is_available()) {
+                let straight = run(kernel, &candidates, 1);
+                let mut turned = candidates.clone();
+                turned.rotate_left(turn);
+                let mut shuffled = run(kernel, &turned, 2);
+                shuffled.rotate_right(turn);
+                prop_assert_eq!(&straight, &shuffled);
+                runs.push(straight);
+            }
+            if let [a, b] = runs.as_slice() {
+                prop_assert_eq!(a, b);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_scene_is_touched_in_these_throws() {
+    let throws = throws(5);
+    let runs = run(Precision::F32.fastest_kernel(), &candidates(&throws), 2);
+    for obstacle in 0..3 {
+        let touched = runs.iter().filter(|r| r.contacts[obstacle].touched());
+        println!("obstacle {obstacle} touched by {}", touched.count());
+    }
+    let rocked = runs
+        .iter()
+        .filter(|r| r.domino.unwrap().peak_tilt_rad != 0.0);
+    assert!(rocked.count() > 0);
+    assert!(runs.iter().any(|r| r.contacts[0].touched()));
+    assert!(runs.iter().any(|r| r.contacts[1].touched()));
+}
+
+/// Shaken to pieces from the first step on.
+struct Violent;
+
+impl AttachMotion for Violent {
+    fn at(&self, t_s: f64) -> FrameMotion {
+        FrameMotion {
+            a_m_s2: Vector3::new(1e12 * (1e5 * t_s).sin(), 1e12, 0.0),
+            ..FrameMotion::world()
+        }
+    }
+    fn duration_s(&self) -> f64 {
+        10.0
+    }
+    fn acceleration_jumps_s(&self) -> Vec<f64> {
+        Vec::new()
+    }
+}
+
+#[test]
+fn a_rope_that_blows_up_disturbs_no_other() {
+    let throws = throws(11);
+    let mut candidates = candidates(&throws);
+    let kernel = Precision::F32.fastest_kernel();
+    let alone = run(kernel, &candidates, 1);
+    let spoilt = candidates[3].rope;
+    candidates[3] = Candidate::new(spoilt, &Violent);
+    let together = run(kernel, &candidates, 1);
+    assert_eq!(together[3].outcome, Outcome::Diverged);
+    for (index, (a, b)) in alone.iter().zip(&together).enumerate() {
+        if index != 3 {
+            assert_eq!(a.contacts, b.contacts, "candidate {index}");
+            assert_eq!(a.domino, b.domino, "candidate {index}");
+            assert_eq!(a, b, "candidate {index}");
+        }
+    }
+}
+
+/// A floor so near that contacts are looked for, but not reached, changes no bit.
+#[test]
+fn looking_for_contacts_changes_nothing() {
+    let throws = throws(23);
+    let candidates: Vec<_> = throws.iter().map(|(r, w)| Candidate::new(r, w)).collect();
+    for kernel in [Precision::F32, Precision::F64].map(Precision::fastest_kernel) {
+        let options = options(Precision::F32, 0.3, 500.0);
+        let plain = roll_out_with(kernel, &candidates, &options).unwrap();
+        let lowest = |run: &Rollout| {
+            let frames = 0..run.nodes.frames();
+            frames
+                .flat_map(|f| (0..=21).map(move |n| (f, n)))
+                .filter(|(_, n)| *n < run.nodes.nodes())
+                .map(|(f, n)| run.nodes.position(f, n).z)
+                .fold(f64::INFINITY, f64::min)
+        };
+        let lowest_m = plain.iter().map(lowest).fold(f64::INFINITY, f64::min);
+        let floor = Obstacle::fixed(Shape::HalfSpace, [0.0, 0.0, lowest_m - 0.055], 0.5);
+        let among = roll_out_in_with(kernel, &alone(floor), &candidates, &options).unwrap();
+        for (a, b) in plain.iter().zip(&among) {
+            assert!(!b.contacts[0].touched());
+            assert_eq!(a.nodes, b.nodes);
+        }
+    }
+}
+
+/// A rope that hangs from its pole is not pushed off it.
+#[test]
+fn the_mounting_is_no_contact() {
+    let pole = Obstacle {
+        shape: Shape::Capsule {
+            half_length_m: 0.1,
+            radius_m: 0.008,
+        },
+        placement: Placement::Attach(Isometry3::translation(0.0, 0.0, 0.1)),
+        friction: 0.5,
+    };
+    let rope = RopeParams::from_array([22.0, 0.55, 0.02, 0.1, 0.012, 0.06, 0.05, 0.03, 0.8]);
+    let still = Still {
+        p_m: Vector3::zeros(),
+        r: Rotation3::identity(),
+    };
+    let run = simulate(
+        &alone(pole),
+        &rope,
+        &still,
+        &options(Precision::F64, 0.5, 10.0),
+    );
+    assert!(!run.contacts[0].touched());
+    let drift = run.nodes.position(5, 22) - run.nodes.position(0, 22);
+    assert!(drift.norm() < 1e-9, "{drift}");
+    let folded = Rotation3::from_axis_angle(&Vector3::y_axis(), 3.1);
+    let still = Still { r: folded, ..still };
+    let soft = RopeParams {
+        joint_stiffness_nm_per_rad: 0.001,
+        ..rope
+    };
+    let run = roll_out_in(
+        &alone(pole),
+        &[Candidate::new(&soft, &still)],
+        &options(Precision::F64, 0.5, 10.0),
+    )
+    .unwrap();
+    // From upside down it hangs beside the pole and leans on it.
+    assert!(run[0].contacts[0].touched());
+}
