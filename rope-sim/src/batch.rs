@@ -7,7 +7,7 @@ use crate::group::{GroupTask, Member, MemberResult};
 use crate::lanes::Kernel;
 use crate::motion::{AttachMotion, LinkMotion};
 use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check, check_scene};
-use crate::scene::Scene;
+use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::watch::Watched;
 use nalgebra::{UnitQuaternion, Vector3};
 use shared_types::RopeParams;
@@ -102,9 +102,10 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
             watched: Watched::default(),
             peak_tip_speed_m_s: 0.0,
             outcome: Outcome::Diverged,
-            max_joint_angle_rad: result.max_joint_angle_rad,
-            contacts: result.contacts,
-            domino: result.domino,
+            // NaN where the very first steps failed.
+            max_joint_angle_rad: result.max_joint_angle_rad.max(0.0),
+            contacts: vec![ContactSummary::default(); result.contacts.len()],
+            domino: result.domino.map(|_| DominoOutcome::default()),
         };
     }
     Rollout {

@@ -135,7 +135,8 @@ pub struct Rollout {
     /// Largest joint angle (rad). Beyond about 2.6 the model's own law (torque flips
     /// at pi) makes the motion ill-posed.
     pub max_joint_angle_rad: f64,
-    /// What it did with each obstacle of the scene, in their order.
+    /// What it did with each obstacle of the scene, in their order; nothing after
+    /// [`Outcome::Diverged`].
     pub contacts: Vec<ContactSummary>,
     /// What became of the scene's domino.
     pub domino: Option<DominoOutcome>,

@@ -230,7 +230,17 @@ fn rest_shapes_over_a_cylinder_are_mujocos() {
         let number = |v: &serde_json::Value| v.as_f64().unwrap();
         let vector = |v: &serde_json::Value| Vector3::from_fn(|i, _| number(&v[i]));
         let rope = &case["rope"];
-        let keys = ["N", "L", "c", "k", "r", "mu", "m_L", "r_L", "link_extra_scale"];
+        let keys = [
+            "N",
+            "L",
+            "c",
+            "k",
+            "r",
+            "mu",
+            "m_L",
+            "r_L",
+            "link_extra_scale",
+        ];
         let rope = RopeParams::from_array(keys.map(|k| number(&rope[k])));
         let q = &case["attach_q_wxyz"];
         let [w, x, y, z] = [0, 1, 2, 3].map(|i| number(&q[i]));
@@ -260,12 +270,16 @@ fn rest_shapes_over_a_cylinder_are_mujocos() {
             };
             let run = simulate(&over, &rope, &still, &options);
             let rest = case["rest_nodes_m"].as_array().unwrap();
-            let offsets = rest.iter().enumerate().map(|(node, want)| {
-                (run.nodes.position(13, node) - vector(want)).norm()
-            });
+            let offsets = rest
+                .iter()
+                .enumerate()
+                .map(|(node, want)| (run.nodes.position(13, node) - vector(want)).norm());
             let largest_m = offsets.fold(0.0, f64::max);
             let creep_m = (run.nodes.position(13, 22) - run.nodes.position(12, 22)).norm();
-            println!("{} {precision:?}: {largest_m} m, creep {creep_m}", case["name"]);
+            println!(
+                "{} {precision:?}: {largest_m} m, creep {creep_m}",
+                case["name"]
+            );
             assert!(largest_m < 5e-3, "{}: {largest_m} m", case["name"]);
         }
     }

@@ -34,7 +34,7 @@ fn crowded() -> Scene {
     Scene {
         obstacles: vec![
             Obstacle::fixed(wall, [0.0; 3], 0.5),
-            Obstacle::fixed(Shape::HalfSpace, [0.0, 0.0, -0.2], 0.6),
+            Obstacle::fixed(Shape::HalfSpace, [0.0, 0.0, -0.45], 0.6),
             Obstacle {
                 shape: pole,
                 placement: Placement::Attach(Isometry3::translation(0.0, 0.0, 0.1)),
@@ -42,11 +42,11 @@ fn crowded() -> Scene {
             },
         ],
         domino: Some(Domino {
-            foot_m: [-0.2, 0.0, -0.2],
+            foot_m: [0.0, 0.0, 0.2],
             facing_rad: 0.3,
             thickness_m: 0.01,
             width_m: 0.3,
-            height_m: 0.12,
+            height_m: 0.06,
             mass_kg: 0.02,
             friction: 0.4,
         }),
@@ -163,8 +163,6 @@ fn a_rope_that_blows_up_disturbs_no_other() {
     assert_eq!(together[3].outcome, Outcome::Diverged);
     for (index, (a, b)) in alone.iter().zip(&together).enumerate() {
         if index != 3 {
-            assert_eq!(a.contacts, b.contacts, "candidate {index}");
-            assert_eq!(a.domino, b.domino, "candidate {index}");
             assert_eq!(a, b, "candidate {index}");
         }
     }

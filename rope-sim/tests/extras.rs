@@ -109,7 +109,7 @@ fn a_towed_pendulum_trails_at_the_angle_of_balance() {
             .remove(0);
         let hang = run.nodes.position(12, 1) - run.nodes.position(12, 0);
         let angle = (-hang.x).atan2(-hang.z);
-                assert!((angle - low).abs() < 2e-3, "{angle} against {low}");
+        assert!((angle - low).abs() < 2e-3, "{angle} against {low}");
         assert!(low > 0.2);
     }
 }
