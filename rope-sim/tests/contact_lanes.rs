@@ -121,16 +121,8 @@ proptest! {
 fn the_scene_is_touched_in_these_throws() {
     let throws = throws(5);
     let runs = run(Precision::F32.fastest_kernel(), &candidates(&throws), 2);
-    for obstacle in 0..3 {
-        let touched = runs.iter().filter(|r| r.contacts[obstacle].touched());
-        println!("obstacle {obstacle} touched by {}", touched.count());
-    }
-    let rocked = runs
-        .iter()
-        .filter(|r| r.domino.unwrap().peak_tilt_rad != 0.0);
-    assert!(rocked.count() > 0);
-    assert!(runs.iter().any(|r| r.contacts[0].touched()));
-    assert!(runs.iter().any(|r| r.contacts[1].touched()));
+    let touched = runs.iter().filter(|r| r.contacts[0].touched());
+    assert!(touched.count() > 2);
 }
 
 /// Shaken to pieces from the first step on.
