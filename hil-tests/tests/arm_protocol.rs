@@ -7,7 +7,9 @@
     reason = "tests may fail loudly"
 )]
 
-use hil_tests::arm::{ArmConfig, ArmStartError, SimulatedArm, clock};
+use hil_tests::arm::fault::{FaultKind, PortSet};
+use hil_tests::arm::{ArmConfig, ArmStartError, Fault, SimulatedArm, Trigger, clock};
+use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
@@ -148,28 +150,63 @@ fn read_reports(port: u16, count: usize) -> Vec<(MonotonicNs, Vec<u8>)> {
     reports
 }
 
+/// A request that is proper, damaged, or no request at all.
+fn odd_frame(rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let register = *[1, 13, 21, 29, 30, 42, 52, 81, 82, 232, 254, rng.random()]
+        .choose(rng)
+        .unwrap();
+    let mut parameters = vec![0; rng.random_range(0..60)];
+    rng.fill_bytes(&mut parameters);
+    let body = u16::try_from(1 + parameters.len()).unwrap();
+    let mut protocol: u16 = 2 + rng.random_range(0..2);
+    let mut claimed = body;
+    match rng.random_range(0..10) {
+        0 => protocol = rng.random(),
+        1 => claimed = rng.random(),
+        2 => claimed = *[0, 1, 399, 400, 401, u16::MAX].choose(rng).unwrap(),
+        3 => protocol = rng.random_range(0..2),
+        _ => {}
+    }
+    let mut frame = rng.random::<u16>().to_be_bytes().to_vec();
+    frame.extend(protocol.to_be_bytes());
+    frame.extend(claimed.to_be_bytes());
+    frame.push(register);
+    frame.extend(parameters);
+    match rng.random_range(0..8) {
+        0 => frame.truncate(rng.random_range(0..frame.len())),
+        1 => rng.fill_bytes(&mut frame),
+        _ => {}
+    }
+    frame
+}
+
+/// Ten thousand frames in bursts, split and merged at random: after each burst
+/// a fresh client gets its version.
 #[test]
 fn random_and_broken_frames_never_wedge_it() {
+    const BURSTS: usize = 100;
+    const FRAMES: usize = 100;
     let arm = start();
-    let mut good = Client::new(&arm);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    for round in 0..60 {
-        let mut bad = connect(arm.ports().command);
-        let mut bytes = vec![0; rng.random_range(1..600)];
-        rng.fill_bytes(&mut bytes);
-        if round % 2 == 0 {
-            // A good header, so that the body reaches the registers.
-            let body = u8::try_from(bytes.len().saturating_sub(6).clamp(1, 250)).unwrap();
-            let header = [0, 1, 0, 2, 0, body];
-            let n = header.len().min(bytes.len());
-            bytes[..n].copy_from_slice(&header[..n]);
+    for burst in 0..BURSTS {
+        let mut bytes: Vec<u8> = (0..FRAMES).flat_map(|_| odd_frame(&mut rng)).collect();
+        while !bytes.is_empty() {
+            // The arm closes a hopeless connection; the rest goes on a new one.
+            let mut bad = connect(arm.ports().command);
+            let part = rng.random_range(1..=bytes.len().min(4000));
+            for piece in bytes[..part].chunks(rng.random_range(1..1500)) {
+                if bad.write_all(piece).is_err() {
+                    break;
+                }
+            }
+            bytes.drain(..part);
         }
-        // The arm may have closed a hopeless connection already.
-        let _ = bad.write_all(&bytes);
-        drop(bad);
-        good.ask(&Command::GetState);
+        let reply = Client::new(&arm).ask(&Command::Version).1;
+        let ReplyData::Text(version) = reply else {
+            panic!("burst {burst}: {reply:?}");
+        };
+        assert_eq!(version.as_str(), "7,7,XS1305,AC1304,v2.7.1");
     }
-    assert_eq!(Client::new(&arm).state(), good.state());
 }
 
 #[test]
@@ -197,6 +234,68 @@ fn two_clients_share_one_arm() {
     assert!((b.q() - target).max_abs() < 1e-4);
     b.ask(&Command::SetState(StateRequest::Stop));
     assert!(a.ask(&Command::ServoJoint(target)).0.is_not_ready());
+}
+
+/// Four clients of the real-time report at once, a fifth is turned away; five
+/// of the command port are served side by side.
+#[test]
+fn as_many_clients_as_a_real_arm_takes() {
+    let arm = start();
+    let [realtime, ..] = arm.ports().reports;
+    let mut streams: Vec<_> = (0..4).map(|_| connect(realtime)).collect();
+    let mut frame = [0; 784];
+    for stream in &mut streams {
+        stream.read_exact(&mut frame).unwrap();
+    }
+    let mut fifth = connect(realtime);
+    assert!(matches!(fifth.read(&mut frame), Ok(0) | Err(_)));
+    drop(streams.pop());
+    wait_s(0.1);
+    connect(realtime).read_exact(&mut frame).unwrap();
+
+    let mut clients: Vec<_> = (0..5).map(|_| Client::new(&arm)).collect();
+    clients[0].bring_up(Mode::Servo);
+    for client in &mut clients {
+        assert_eq!(client.state(), ArmState::Ready);
+    }
+}
+
+/// The same faults as in virtual time, over real sockets.
+#[test]
+fn faults_of_the_wire_reach_the_sockets() {
+    let fault = |kind, duration_s| Fault {
+        trigger: Trigger::At(0.0),
+        duration_s,
+        kind,
+    };
+    let arm = start();
+    let mut client = Client::new(&arm);
+    client.state();
+    arm.inject(fault(FaultKind::Stall, Some(0.3)));
+    wait_s(0.05);
+    let asked = clock::now();
+    client.state();
+    let waited_s = clock::now().since_s(asked);
+    assert!(waited_s > 0.15, "{waited_s} s");
+
+    let ports = PortSet::All;
+    let mut reports = connect(arm.ports().reports[0]);
+    arm.inject(fault(FaultKind::ConnectionReset { ports }, None));
+    wait_s(0.1);
+    let mut byte = [0; 2048];
+    let error = client.stream.read(&mut byte).unwrap_err();
+    assert_eq!(error.kind(), std::io::ErrorKind::ConnectionReset);
+    while reports.read(&mut byte).is_ok() {}
+
+    let mut client = Client::new(&arm);
+    arm.inject(fault(FaultKind::HalfOpen { ports }, None));
+    wait_s(0.1);
+    let timeout = Some(Duration::from_millis(200));
+    client.stream.set_read_timeout(timeout).unwrap();
+    client.stream.write_all(&[0, 1, 0, 2, 0, 1, 13]).unwrap();
+    let error = client.stream.read(&mut byte).unwrap_err();
+    assert_eq!(error.kind(), std::io::ErrorKind::WouldBlock);
+    assert_eq!(Client::new(&arm).state(), ArmState::Stopped);
 }
 
 /// A burst of setpoints far above 250 Hz ends at the newest one.

@@ -107,8 +107,8 @@ pub struct RigArgs {
         default_value = "30000,30001,30002,30003"
     )]
     pub report_ports: Vec<u16>,
-    /// Script of faults to inject.
-    #[arg(long)]
+    /// Script of faults to inject; configs/rig/faults.toml shows every kind.
+    #[arg(long, value_name = "FILE")]
     pub faults: Option<PathBuf>,
     /// Rope on the pole; `random` draws one from the seed. Default: no rope.
     #[arg(long, value_name = "FILE|random")]

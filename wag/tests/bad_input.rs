@@ -63,6 +63,10 @@ fn prepare() -> tempfile::TempDir {
     put("notvideo.avi", "RIFF but not really");
     put("camera.toml", "calibration = \"none.conf\"\n");
     put("limits.toml", "rate_hz = 250\n");
+    put(
+        "faults.toml",
+        "[[fault]]\nat_s = 1\nkind = \"joint_stuck\"\njoint = 9\n",
+    );
     dir
 }
 
@@ -87,7 +91,13 @@ const CASES: &[Case] = &[
     (&["demo", "--task", "lob"], 1, &["lob", "not implemented"]),
     (&["rig", "--report-ports", "1,2"], 2, &["four ports"]),
     (&["rig", "--bind", "here"], 2, &["--bind"]),
-    (&["rig", "--faults", "f.toml"], 1, &["not implemented"]),
+    (&["rig", "--faults", "f.toml"], 2, &["f.toml"]),
+    (&["rig", "--faults", "text.toml"], 2, &["text.toml", "TOML"]),
+    (
+        &["rig", "--faults", "faults.toml"],
+        2,
+        &["faults.toml", "fault 1", "`joint` is 9", "from 1 to 7"],
+    ),
     (&["rig", "--camera", "x"], 2, &["--rope"]),
     (
         &[

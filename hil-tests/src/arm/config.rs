@@ -1,6 +1,11 @@
 //! How a simulated arm is set up, and why it may fail to start.
 
+use super::collision::Obstacle;
+use super::fault::FaultScript;
+use super::firmware::Firmware;
 use super::joint::JointDynamics;
+use super::pacer::Intake;
+use super::start_error::ArmStartError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{COMMAND_PORT, REPORT_PORTS};
@@ -57,6 +62,22 @@ pub struct ArmConfig {
     pub encoder_resolution_rad: f64,
     /// Linear speed limit in servo mode at the start, as a factor of 1 m/s.
     pub speed_limit_factor: f64,
+    /// Firmware: sizes of reports, what is known to the command port.
+    pub firmware: Firmware,
+    /// Lag of each joint; left out, it is drawn from the seed around `lag`.
+    pub joint_lags: Option<[JointLag; JOINTS]>,
+    /// Time that the controller has been on at the start (s).
+    pub uptime_s: f64,
+    /// What the controller's clock gains (µs/s).
+    pub clock_ppm: f64,
+    /// Whose clock paces setpoints.
+    pub intake: Intake,
+    /// What stands in the arm's way.
+    pub obstacles: Vec<Obstacle>,
+    /// Whether self collision is looked for at the start (register 77).
+    pub self_collision_check: bool,
+    /// Faults to inject.
+    pub faults: FaultScript,
 }
 
 impl Default for ArmConfig {
@@ -72,56 +93,36 @@ impl Default for ArmConfig {
             initial_q: JointVector::ZERO,
             encoder_resolution_rad: 1e-5,
             speed_limit_factor: 1.2,
+            firmware: Firmware::default(),
+            joint_lags: None,
+            uptime_s: 100.0,
+            clock_ppm: 0.0,
+            intake: Intake::default(),
+            obstacles: Vec::new(),
+            self_collision_check: false,
+            faults: FaultScript::default(),
         }
     }
 }
 
-/// Why a simulated arm did not start.
-#[derive(Debug, thiserror::Error)]
-pub enum ArmStartError {
-    /// A port below 1024 without the right to use it.
-    #[error(
-        "no permission to listen on port {port} of {bind}: run as root, set \
-         net.ipv4.ip_unprivileged_port_start to {port} or less, or choose another port"
-    )]
-    Permission {
-        /// Address.
-        bind: IpAddr,
-        /// Port.
-        port: u16,
-    },
-    /// Somebody listens there already.
-    #[error(
-        "port {port} of {bind} is in use: stop the other program, choose another port, or \
-         another address such as 127.0.0.2"
-    )]
-    PortInUse {
-        /// Address.
-        bind: IpAddr,
-        /// Port.
-        port: u16,
-    },
-    /// Any other failure to listen.
-    #[error("cannot listen on port {port} of {bind}; is this an address of this machine?")]
-    Listen {
-        /// Address.
-        bind: IpAddr,
-        /// Port.
-        port: u16,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A thread could not be started.
-    #[error("cannot start a thread for the simulated arm")]
-    Thread(#[from] std::io::Error),
-    /// A number of the set-up makes no arm.
-    #[error("`{key}` of the simulated arm {why}")]
-    Config {
-        /// Key.
-        key: &'static str,
-        /// What is wrong with it.
-        why: &'static str,
-    },
+impl JointLag {
+    fn check(&self) -> Result<(), ArmStartError> {
+        let refuse = |key, why| Err(ArmStartError::Config { key, why });
+        if !(self.dead_time_s >= 0.0 && self.dead_time_s <= 1.0) {
+            return refuse("lag.dead_time_s", "must lie between 0 and 1 s");
+        }
+        // The joint model integrates in steps of 1 ms.
+        if !(self.natural_frequency_rad_s > 0.0 && self.natural_frequency_rad_s <= 1000.0) {
+            return refuse(
+                "lag.natural_frequency_rad_s",
+                "must lie above 0 and up to 1000 rad/s",
+            );
+        }
+        if !(self.damping_ratio >= 0.1 && self.damping_ratio <= 2.0) {
+            return refuse("lag.damping_ratio", "must lie between 0.1 and 2");
+        }
+        Ok(())
+    }
 }
 
 impl ArmConfig {
@@ -131,20 +132,11 @@ impl ArmConfig {
     /// [`ArmStartError::Config`] with the key.
     pub fn check(&self) -> Result<(), ArmStartError> {
         let refuse = |key, why| Err(ArmStartError::Config { key, why });
-        let lag = &self.lag;
-        if !(lag.dead_time_s >= 0.0 && lag.dead_time_s <= 1.0) {
-            return refuse("lag.dead_time_s", "must lie between 0 and 1 s");
-        }
-        // The joint model integrates in steps of 1 ms.
-        if !(lag.natural_frequency_rad_s > 0.0 && lag.natural_frequency_rad_s <= 1000.0) {
-            return refuse(
-                "lag.natural_frequency_rad_s",
-                "must lie above 0 and up to 1000 rad/s",
-            );
-        }
-        if !(lag.damping_ratio >= 0.1 && lag.damping_ratio <= 2.0) {
-            return refuse("lag.damping_ratio", "must lie between 0.1 and 2");
-        }
+        self.lag.check()?;
+        self.joint_lags
+            .iter()
+            .flatten()
+            .try_for_each(JointLag::check)?;
         if !(self.lag_spread >= 0.0 && self.lag_spread < 1.0) {
             return refuse("lag_spread", "must be at least 0 and below 1");
         }
@@ -157,6 +149,18 @@ impl ArmConfig {
         if !(self.speed_limit_factor > 0.0 && self.speed_limit_factor.is_finite()) {
             return refuse("speed_limit_factor", "must be above 0");
         }
+        if !(self.uptime_s >= 0.0 && self.uptime_s < 1e9) {
+            return refuse("uptime_s", "must lie between 0 and 1e9 s");
+        }
+        if !(-1e5..=1e5).contains(&self.clock_ppm) {
+            return refuse("clock_ppm", "must lie between -1e5 and 1e5");
+        }
+        if !self.obstacles.iter().all(Obstacle::is_well_formed) {
+            return refuse(
+                "obstacles",
+                "needs normals that are not zero, and boxes whose min_m lies below max_m",
+            );
+        }
         Ok(())
     }
 
@@ -166,11 +170,12 @@ impl ArmConfig {
         let mut vary =
             |nominal: f64| nominal * (1.0 + self.lag_spread * rng.random_range(-1.0..=1.0));
         core::array::from_fn(|i| {
-            let lag = JointLag {
+            let drawn = JointLag {
                 dead_time_s: vary(self.lag.dead_time_s),
                 natural_frequency_rad_s: vary(self.lag.natural_frequency_rad_s),
                 damping_ratio: vary(self.lag.damping_ratio),
             };
+            let lag = self.joint_lags.map_or(drawn, |lags| lags[i]);
             JointDynamics::new(lag, self.initial_q[i], self.limits.velocity_max_rad_s[i])
         })
     }
@@ -193,8 +198,24 @@ mod tests {
 
     #[test]
     fn a_file_may_name_only_what_differs() {
-        let config: ArmConfig = toml::from_str("seed = 5\ncommand_port = 0").unwrap();
+        let text = r#"
+            seed = 5
+            command_port = 0
+            firmware = "2.8.2"
+            intake = "clock"
+            [[obstacles]]
+            plane = { point_m = [0, 0, -0.1], normal = [0, 0, 1] }
+            [[faults]]
+            on = "speed:1.5"
+            kind = "collision"
+        "#;
+        let config: ArmConfig = toml::from_str(text).unwrap();
         assert_eq!((config.seed, config.command_port), (5, 0));
+        assert_eq!((config.obstacles.len(), config.faults.faults.len()), (1, 1));
+        assert_eq!(config.firmware, Firmware(2, 8, 2));
+        config.check().unwrap();
+        let back: ArmConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();
+        assert_eq!(back, config);
         assert_eq!(config.lag, JointLag::default());
     }
 }

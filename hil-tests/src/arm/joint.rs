@@ -17,6 +17,10 @@ pub(super) struct JointDynamics {
     /// Setpoints under way, with the time they reach the drive.
     on_the_way: VecDeque<(MonotonicNs, f64)>,
     setpoint: f64,
+    /// Dead time on top of the lag's own (s).
+    pub(super) extra_lag_s: f64,
+    /// Something holds it.
+    pub(super) stuck: bool,
     pub(super) q: f64,
     pub(super) qd: f64,
     pub(super) qdd: f64,
@@ -29,6 +33,8 @@ impl JointDynamics {
             speed_max_rad_s,
             on_the_way: VecDeque::new(),
             setpoint: q,
+            extra_lag_s: 0.0,
+            stuck: false,
             q,
             qd: 0.0,
             qdd: 0.0,
@@ -37,8 +43,10 @@ impl JointDynamics {
 
     /// Gives a setpoint (rad) at time `at`.
     pub(super) fn command(&mut self, at: MonotonicNs, setpoint: f64) {
-        self.on_the_way
-            .push_back((at.plus_s(self.lag.dead_time_s), setpoint));
+        let arrival = at.plus_s(self.lag.dead_time_s + self.extra_lag_s);
+        // None overtakes the one before when the lag shrinks.
+        let last = self.on_the_way.back().map_or(arrival, |(last, _)| *last);
+        self.on_the_way.push_back((arrival.max(last), setpoint));
     }
 
     /// Runs from `from` to `to`, at most a few milliseconds later.
@@ -67,6 +75,10 @@ impl JointDynamics {
 
     /// One Runge-Kutta step of fourth order, then the speed bound.
     fn integrate(&mut self, dt_s: f64) {
+        if self.stuck {
+            (self.qd, self.qdd) = (0.0, 0.0);
+            return;
+        }
         let (q, v) = (self.q, self.qd);
         let half = 0.5 * dt_s;
         let a1 = self.acceleration(q, v);
@@ -128,5 +140,27 @@ mod tests {
             last = j.q;
         }
         assert!((j.q - 2.0).abs() < 1e-6 && j.qd.abs() < 1e-6);
+    }
+
+    /// Held for 0.2 s, late by 30 ms after that.
+    #[test]
+    fn a_stuck_joint_stands_and_an_extra_lag_only_delays() {
+        let mut j = joint(0.0, 1.0);
+        j.command(MonotonicNs(0), 0.01);
+        j.stuck = true;
+        for k in 1..=200_u64 {
+            j.advance(MonotonicNs((k - 1) * MS), MonotonicNs(k * MS));
+        }
+        assert_eq!((j.q, j.qd), (0.0, 0.0));
+        j.stuck = false;
+        j.extra_lag_s = 0.030;
+        j.command(MonotonicNs(200 * MS), 0.02);
+        let mut reached = 0;
+        for k in 201..=400_u64 {
+            j.advance(MonotonicNs((k - 1) * MS), MonotonicNs(k * MS));
+            reached = if j.q < 0.0101 { k } else { reached };
+        }
+        assert!((231..=240).contains(&reached), "{reached}");
+        assert!((j.q - 0.02).abs() < 1e-6);
     }
 }

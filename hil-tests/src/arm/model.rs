@@ -5,10 +5,15 @@
 //! ("system reset") drops all motion and leaves state 5 until the state is set
 //! to ready; any error stops the arm, leads to state 4 and mode 0.
 
+use super::collision::obstacle_depth_m;
 use super::config::ArmConfig;
+use super::controller_clock::ControllerClock;
+use super::event::{ArmCounters, ArmEvent, TimedEvent};
+use super::feedback::{Feedback, FeedbackKind};
 use super::history::JointSample;
 use super::joint::JointDynamics;
-use super::reference::{Move, Reference};
+use super::pacer::Pacer;
+use super::reference::{Move, Reference, Task};
 use super::servo::{ServoStream, SetpointLimits};
 use rt_controller::xarm::{
     ArmState, Command, CommandError, ErrorCode, Mode, Register, ReplyData, Status, TcpPose,
@@ -16,7 +21,15 @@ use rt_controller::xarm::{
 use shared_types::{JOINTS, JointState, JointVector, Limits, MonotonicNs};
 use std::collections::VecDeque;
 
+mod answer;
+mod effort;
+mod inject;
+mod raw;
 mod requests;
+mod settings;
+
+pub use answer::{Answer, AnswerData};
+pub(super) use settings::Settings;
 
 /// Step of the model (s, ns).
 pub const STEP_S: f64 = 1e-3;
@@ -27,21 +40,18 @@ const ALL_JOINTS: u8 = 0x7F;
 const BUFFER_CAPACITY: usize = 2048;
 /// Joint speed under which the arm counts as standing (rad/s).
 const STANDING_RAD_S: f64 = 2e-3;
+/// Tool speed limit in servo mode before firmware 2.3 (m/s).
+const OLD_TCP_SPEED_M_S: f64 = 1.0;
+/// How long a collision shows in the motor currents (s).
+const CURRENT_SPIKE_S: f64 = 0.05;
+/// A contact that deepens by this much is a new collision (m).
+const CONTACT_STEP_M: f64 = 1e-4;
 
 /// Warning codes of the controller.
 mod warning {
     pub(super) const QUEUE_FULL: u8 = 11;
     pub(super) const BAD_PARAMETER: u8 = 12;
     pub(super) const UNKNOWN_COMMAND: u8 = 13;
-}
-
-/// Reply to a request.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answer {
-    /// Status byte.
-    pub status: Status,
-    /// Data.
-    pub data: ReplyData,
 }
 
 /// What the controller allows, apart from errors and enabling.
@@ -54,28 +64,29 @@ enum Phase {
     NeedsReset,
 }
 
-/// Configuration that clients may change.
+/// A velocity command.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Settings {
-    pub(super) tcp_offset: TcpPose,
-    pub(super) load_kg: f64,
-    pub(super) load_centre_m: [f64; 3],
-    pub(super) collision_sensitivity: u8,
-    pub(super) teach_sensitivity: u8,
-    pub(super) joint_jerk_rad_s3: f64,
-    pub(super) joint_acceleration_rad_s2: f64,
-    pub(super) speed_limit_factor: f64,
+struct VelocityCommand {
+    qd: JointVector,
+    synchronised: bool,
+    duration_s: Option<f64>,
 }
 
 /// A simulated xArm 7 controller with its joints.
 #[derive(Debug, Clone)]
 pub struct ArmModel {
     config: ArmConfig,
+    clock: ControllerClock,
     time: MonotonicNs,
     joints: [JointDynamics; JOINTS],
+    /// What the encoders show too much (rad).
+    encoder_offset: JointVector,
     pub(super) reference: Reference,
     servo: ServoStream,
+    velocity: Pacer<VelocityCommand>,
     moves: VecDeque<Move>,
+    /// Tasks given out to moves so far.
+    tasks: u16,
     phase: Phase,
     pub(super) mode: Mode,
     pub(super) error: ErrorCode,
@@ -85,32 +96,39 @@ pub struct ArmModel {
     /// Bit `i`: the brake of joint `i + 1` is released.
     pub(super) brakes_released: u8,
     pub(super) settings: Settings,
+    /// What a power cycle brings back.
+    saved: Settings,
+    /// Code of the emergency stop that is pressed.
+    pressed: ErrorCode,
+    /// S code of each drive.
+    pub(super) servo_error: [u8; JOINTS],
+    /// Until when motor currents show a collision.
+    spike_until: MonotonicNs,
+    /// How deep the arm has got into an obstacle (m).
+    contact_m: f64,
+    counters: ArmCounters,
+    /// Client and transaction id of the request being executed.
+    origin: Option<(u32, u16)>,
+    told: (ArmState, Mode),
+    events: Vec<TimedEvent>,
+    feedback: Vec<Feedback>,
 }
 
 impl ArmModel {
     /// An arm just switched on at `start`: stopped, drives off.
     #[must_use]
     pub fn new(config: ArmConfig, start: MonotonicNs) -> Self {
-        let limits = &config.limits;
-        let settings = Settings {
-            tcp_offset: TcpPose {
-                position_m: limits.tcp_offset_m,
-                rpy_rad: [0.0; 3],
-            },
-            load_kg: 0.0,
-            load_centre_m: [0.0; 3],
-            collision_sensitivity: 3,
-            teach_sensitivity: 3,
-            joint_jerk_rad_s3: 20.0,
-            joint_acceleration_rad_s2: limits.acceleration_max_rad_s2[0],
-            speed_limit_factor: config.speed_limit_factor,
-        };
+        let settings = Settings::factory(&config);
         Self {
+            clock: ControllerClock::new(start, config.uptime_s, config.clock_ppm),
             time: start,
             joints: config.joints(),
+            encoder_offset: JointVector::ZERO,
             reference: Reference::at_rest(config.initial_q),
             servo: ServoStream::default(),
+            velocity: Pacer::default(),
             moves: VecDeque::new(),
+            tasks: 0,
             phase: Phase::Stopped,
             mode: Mode::Position,
             error: ErrorCode::NONE,
@@ -118,6 +136,16 @@ impl ArmModel {
             enabled: 0,
             brakes_released: 0,
             settings,
+            saved: settings,
+            pressed: ErrorCode::NONE,
+            servo_error: [0; JOINTS],
+            spike_until: start,
+            contact_m: 0.0,
+            counters: ArmCounters::default(),
+            origin: None,
+            told: (ArmState::Stopped, Mode::Position),
+            events: Vec::new(),
+            feedback: Vec::new(),
             config,
         }
     }
@@ -126,6 +154,51 @@ impl ArmModel {
     #[must_use]
     pub fn time(&self) -> MonotonicNs {
         self.time
+    }
+
+    /// Reading of the controller's own clock (µs).
+    #[must_use]
+    pub fn time_us(&self) -> u64 {
+        self.clock.time_us(self.time)
+    }
+
+    /// The controller's own clock.
+    #[must_use]
+    pub fn clock(&self) -> &ControllerClock {
+        &self.clock
+    }
+
+    /// Counts since the arm was made.
+    #[must_use]
+    pub fn counters(&self) -> ArmCounters {
+        ArmCounters {
+            dropped: self.servo.pacer.dropped + self.velocity.dropped,
+            repeated: self.servo.pacer.repeated + self.velocity.repeated,
+            ..self.counters
+        }
+    }
+
+    /// What has happened since the last call.
+    pub fn take_events(&mut self) -> Vec<TimedEvent> {
+        core::mem::take(&mut self.events)
+    }
+
+    pub(super) fn take_feedback(&mut self) -> Vec<Feedback> {
+        core::mem::take(&mut self.feedback)
+    }
+
+    pub(super) fn log(&mut self, event: ArmEvent) {
+        self.events.push(TimedEvent {
+            at: self.time,
+            client: self.origin.map(|(client, _)| client),
+            event,
+        });
+    }
+
+    /// Set-up, with the present firmware.
+    #[must_use]
+    pub fn config(&self) -> &ArmConfig {
+        &self.config
     }
 
     /// True joint motion at [`time`](Self::time).
@@ -146,8 +219,9 @@ impl ArmModel {
     pub fn measured_motion(&self) -> JointState {
         let step = self.config.encoder_resolution_rad;
         let truth = self.true_motion();
+        let seen = truth.q + self.encoder_offset;
         JointState {
-            q: truth.q.map(|q| (q / step).round() * step),
+            q: seen.map(|q| (q / step).round() * step),
             ..truth
         }
     }
@@ -194,7 +268,7 @@ impl ArmModel {
         self.phase == Phase::Ready && self.error.is_none() && self.enabled == ALL_JOINTS
     }
 
-    fn status(&self) -> Status {
+    pub(super) fn status(&self) -> Status {
         let mut bits = 0;
         if !self.can_move() {
             bits |= Status::NOT_READY;
@@ -222,10 +296,10 @@ impl ArmModel {
     /// One step of 1 ms.
     pub fn step(&mut self) {
         let end = MonotonicNs(self.time.0 + STEP_NS);
-        if self.mode == Mode::Servo {
-            self.run_stream(end);
-        } else {
-            self.start_next_move();
+        match self.mode {
+            Mode::Servo => self.run_stream(end),
+            Mode::JointVelocity => self.run_velocity(end),
+            _ => self.start_next_move(),
         }
         let before = self.reference.q;
         self.reference.advance(end, STEP_S, &self.config.limits);
@@ -240,6 +314,8 @@ impl ArmModel {
             joint.advance(self.time, end);
         }
         self.time = end;
+        self.watch_obstacles();
+        self.tell_state();
     }
 
     /// Executes the streamed setpoint that is due, holds when none comes.
@@ -247,7 +323,9 @@ impl ArmModel {
         if !self.can_move() {
             return;
         }
-        if let Some(setpoint) = self.servo.take(end) {
+        let cycle_s = self.cycle_s();
+        if let Some(setpoint) = self.servo.take(end, cycle_s, self.config.intake) {
+            self.counters.executed += 1;
             self.reference.jump(setpoint.q, setpoint.qd);
             self.drive_joints(setpoint.at);
         } else if self.servo.is_silent(end) && !self.reference.is_busy() {
@@ -255,34 +333,97 @@ impl ArmModel {
         }
     }
 
+    /// Executes the velocity command that is due.
+    fn run_velocity(&mut self, end: MonotonicNs) {
+        if !self.can_move() {
+            return;
+        }
+        let cycle_s = self.cycle_s();
+        if let Some((at, command)) = self.velocity.take(end, cycle_s, self.config.intake) {
+            self.counters.executed += 1;
+            // A duration of zero, like none, means without end.
+            let until = command
+                .duration_s
+                .filter(|s| *s > 0.0)
+                .map(|s| at.plus_s(self.clock.span_s(s)));
+            self.reference
+                .start_velocity(command.qd, command.synchronised, until);
+        }
+    }
+
+    /// Time between two motion commands that are taken, on our clock (s).
+    fn cycle_s(&self) -> f64 {
+        self.clock.span_s(self.config.firmware.setpoint_cycle_s())
+    }
+
     fn start_next_move(&mut self) {
         if !self.can_move() || self.mode != Mode::Position || self.reference.is_busy() {
             return;
         }
-        match self.moves.front() {
+        match self.moves.front().copied() {
             Some(next) if (next.target - self.reference.q).max_abs() > 1e-6 => {
-                self.reference.start_move(next);
+                self.tell_task(next.task, FeedbackKind::Started);
+                self.reference.start_move(&next);
             }
             // The move at the front has arrived.
-            Some(_) => {
+            Some(done) => {
                 self.moves.pop_front();
+                self.tell_task(done.task, FeedbackKind::Ended);
             }
             None => {}
         }
     }
 
-    /// A velocity command that would leave the joint range stops with C23.
+    fn tell_task(&mut self, task: Task, kind: FeedbackKind) {
+        let time_us = self.time_us();
+        self.feedback.push(Feedback {
+            task,
+            kind,
+            time_us,
+        });
+    }
+
+    /// A move or velocity that leaves the joint range, meets the arm itself or
+    /// the safety boundary stops before it does.
     fn guard_reference(&mut self, before: JointVector) {
-        if self.mode == Mode::JointVelocity
-            && self.phase == Phase::Ready
-            && self
-                .config
-                .limits
-                .position_violation(&self.reference.q)
-                .is_some()
-        {
+        if self.phase != Phase::Ready || self.mode == Mode::Servo {
+            return;
+        }
+        let outside = self.config.limits.position_violation(&self.reference.q);
+        let verdict = match outside {
+            Some(_) if self.mode == Mode::JointVelocity => Err(ErrorCode::JOINT_LIMIT),
+            _ => self.setpoint_limits().check_pose(&self.reference.q),
+        };
+        if let Err(code) = verdict {
             self.reference.jump(before, JointVector::ZERO);
-            self.raise(ErrorCode::JOINT_LIMIT);
+            self.raise(code);
+        }
+    }
+
+    /// A contact that deepens is a collision.
+    fn watch_obstacles(&mut self) {
+        let obstacles = &self.config.obstacles;
+        if obstacles.is_empty() || self.true_motion().qd.max_abs() < STANDING_RAD_S {
+            return;
+        }
+        let tool = self.settings.tcp_offset.position();
+        let depth_m = obstacle_depth_m(&self.true_motion().q, &tool, obstacles);
+        if depth_m > self.contact_m + CONTACT_STEP_M {
+            self.contact_m = depth_m;
+            if self.error.is_none() {
+                self.collide();
+            }
+        } else {
+            self.contact_m = self.contact_m.min(depth_m.max(0.0));
+        }
+    }
+
+    fn tell_state(&mut self) {
+        let now = (self.state(), self.mode);
+        if now != self.told {
+            self.told = now;
+            let (state, mode) = now;
+            self.log(ArmEvent::State { state, mode });
         }
     }
 
@@ -292,19 +433,13 @@ impl ArmModel {
         }
     }
 
-    /// Raises an error: the arm brakes, drops its buffer and goes to state 4 and
-    /// mode 0.
-    pub fn raise(&mut self, error: ErrorCode) {
-        self.error = error;
-        self.drop_motion();
-        self.phase = Phase::Stopped;
-        self.mode = Mode::Position;
-    }
-
     /// Brakes at the joints' largest acceleration and forgets what was planned.
     fn drop_motion(&mut self) {
-        self.moves.clear();
+        for unfinished in core::mem::take(&mut self.moves) {
+            self.tell_task(unfinished.task, FeedbackKind::Discarded);
+        }
         self.servo.reset();
+        self.velocity.clear();
         self.brake();
     }
 
@@ -324,10 +459,22 @@ impl ArmModel {
     }
 
     fn setpoint_limits(&self) -> SetpointLimits<'_> {
+        let has_factor = self.config.firmware.has_speed_factor();
         SetpointLimits {
             joints: &self.config.limits,
             tcp_offset: self.settings.tcp_offset.position(),
-            tcp_speed_max_m_s: self.settings.speed_limit_factor,
+            tcp_speed_max_m_s: if has_factor {
+                self.settings.speed_limit_factor
+            } else {
+                OLD_TCP_SPEED_M_S
+            },
+            tcp_speed_code: if has_factor {
+                ErrorCode::TCP_SPEED_LIMIT
+            } else {
+                ErrorCode::SPEED_LIMIT
+            },
+            self_collision: self.settings.self_collision,
+            fence_m: self.settings.fence_m(),
         }
     }
 }

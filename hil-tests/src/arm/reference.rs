@@ -3,6 +3,8 @@
 //! Streamed setpoints jump (the controller does not interpolate them); moves,
 //! velocity commands and stops are made here.
 
+use super::velocity::VelocityRamp;
+use rt_controller::xarm::Register;
 use shared_types::{JOINTS, JointVector, Limits, MonotonicNs};
 
 /// A straight joint motion with a trapezoidal speed of its fastest joint.
@@ -11,6 +13,17 @@ pub(super) struct Move {
     pub(super) target: JointVector,
     pub(super) speed_rad_s: f64,
     pub(super) acceleration_rad_s2: f64,
+    /// Who is told about its start and end.
+    pub(super) task: Task,
+}
+
+/// Where a move came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Task {
+    /// Client and transaction id of the request, `None` for the arm's own.
+    pub(super) origin: Option<(u32, u16)>,
+    pub(super) register: Register,
+    pub(super) number: u16,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -26,11 +39,8 @@ enum Profile {
         speed_max_rad_s: f64,
         acceleration_rad_s2: f64,
     },
-    /// Towards a joint velocity; to rest at `until`.
-    Velocity {
-        target: JointVector,
-        until: Option<MonotonicNs>,
-    },
+    /// Towards a joint velocity.
+    Velocity(VelocityRamp),
     /// To rest, all joints at the same time.
     Brake {
         rate_per_s: f64,
@@ -97,9 +107,15 @@ impl Reference {
         };
     }
 
-    /// Accelerates towards a joint velocity, and to rest at `until`.
-    pub(super) fn start_velocity(&mut self, target: JointVector, until: Option<MonotonicNs>) {
-        self.profile = Profile::Velocity { target, until };
+    /// Goes over to a joint velocity (rad/s), and to rest at `until`.
+    pub(super) fn start_velocity(
+        &mut self,
+        target: JointVector,
+        synchronised: bool,
+        until: Option<MonotonicNs>,
+    ) {
+        let ramp = VelocityRamp::new(target, synchronised, until, self.qd, self.qdd);
+        self.profile = Profile::Velocity(ramp);
     }
 
     /// Brakes to rest, the fastest joint at `deceleration_rad_s2`.
@@ -118,11 +134,15 @@ impl Reference {
     /// One step of `dt_s` ending at `now`.
     pub(super) fn advance(&mut self, now: MonotonicNs, dt_s: f64, limits: &Limits) {
         let before = self.qd;
-        match self.profile {
+        match &mut self.profile {
             Profile::Hold => return,
             Profile::Line { .. } => self.advance_line(dt_s),
-            Profile::Velocity { target, until } => {
-                self.advance_velocity(now, dt_s, limits, target, until);
+            Profile::Velocity(ramp) => {
+                let motion = [&mut self.q, &mut self.qd, &mut self.qdd];
+                if ramp.advance(now, dt_s, limits, motion) {
+                    self.hold();
+                }
+                return;
             }
             Profile::Brake { .. } => self.advance_brake(dt_s, limits),
         }
@@ -155,26 +175,6 @@ impl Reference {
         } else {
             self.q = *target - *direction * *left_rad;
             self.qd = *direction * *speed_rad_s;
-        }
-    }
-
-    fn advance_velocity(
-        &mut self,
-        now: MonotonicNs,
-        dt_s: f64,
-        limits: &Limits,
-        target: JointVector,
-        until: Option<MonotonicNs>,
-    ) {
-        let expired = until.is_some_and(|until| now >= until);
-        let goal = if expired { JointVector::ZERO } else { target };
-        for j in 0..JOINTS {
-            let step = limits.acceleration_max_rad_s2[j] * dt_s;
-            self.qd[j] += (goal[j] - self.qd[j]).clamp(-step, step);
-            self.q[j] += self.qd[j] * dt_s;
-        }
-        if self.qd.max_abs() == 0.0 && goal.max_abs() == 0.0 {
-            self.profile = Profile::Hold;
         }
     }
 
@@ -229,6 +229,11 @@ mod tests {
             target,
             speed_rad_s: 0.5,
             acceleration_rad_s2: 5.0,
+            task: Task {
+                origin: None,
+                register: Register::MoveJoint,
+                number: 1,
+            },
         });
         let (time_s, peak) = run(&mut reference);
         assert!((time_s - 2.1).abs() < 0.01, "{time_s}");
@@ -247,17 +252,5 @@ mod tests {
         let (time_s, _) = run(&mut reference);
         assert!((time_s - 0.1).abs() < 2.0 * DT_S, "{time_s}");
         assert!((reference.q[1] - 0.1).abs() < 1e-6 && (reference.q[3] + 0.05).abs() < 1e-6);
-    }
-
-    #[test]
-    fn velocity_ends_by_itself_when_its_time_is_over() {
-        let mut reference = Reference::at_rest(JointVector::ZERO);
-        let mut target = JointVector::ZERO;
-        target[2] = 1.0;
-        reference.start_velocity(target, Some(MonotonicNs(0).plus_s(0.5)));
-        let (time_s, peak) = run(&mut reference);
-        // Up to 1 rad/s in 50 ms, and down again after 0.5 s.
-        assert!((time_s - 0.55).abs() < 3.0 * DT_S, "{time_s}");
-        assert!((peak - 1.0).abs() < 1e-9);
     }
 }

@@ -1,31 +1,48 @@
 //! The controller's state as the frames of its report ports.
 
+use super::firmware::Firmware;
 use super::model::ArmModel;
 use rt_controller::xarm::TcpPose;
 use rt_controller::xarm::report::{
-    BasicReport, ForceReport, MAX_REPORT_LEN, NormalReport, RealtimeReport, RichReport,
+    BasicReport, ForceReport, MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport, RealtimeReport,
+    RichReport,
 };
-use shared_types::{JOINTS, JointState, JointVector, kinematics};
+use shared_types::{JOINTS, JointState, kinematics};
 
 /// One of the four report ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ReportKind {
+pub enum ReportKind {
+    /// Port 30000.
     Realtime,
+    /// Port 30001.
     Normal,
+    /// Port 30002.
     Rich,
+    /// Port 30003.
     Real,
 }
 
 impl ReportKind {
     /// In the order of the standard ports.
-    pub(super) const ALL: [Self; 4] = [Self::Realtime, Self::Normal, Self::Rich, Self::Real];
+    pub const ALL: [Self; 4] = [Self::Realtime, Self::Normal, Self::Rich, Self::Real];
 
-    /// Time between two reports (ns).
-    pub(super) const fn period_ns(self) -> u64 {
+    /// Place in [`ALL`](Self::ALL).
+    pub(super) const fn index(self) -> usize {
         match self {
-            Self::Realtime => 4_000_000,
-            Self::Normal | Self::Rich => 200_000_000,
-            Self::Real => 10_000_000,
+            Self::Realtime => 0,
+            Self::Normal => 1,
+            Self::Rich => 2,
+            Self::Real => 3,
+        }
+    }
+
+    /// Time between two reports (s).
+    #[must_use]
+    pub const fn period_s(self) -> f64 {
+        match self {
+            Self::Realtime => 0.004,
+            Self::Normal | Self::Rich => 0.2,
+            Self::Real => 0.01,
         }
     }
 
@@ -36,23 +53,34 @@ impl ReportKind {
             Self::Normal | Self::Rich | Self::Real => 32,
         }
     }
-}
 
-/// A report frame, copied out of the model so that sending needs no lock.
-pub(super) struct ReportFrame {
-    bytes: [u8; MAX_REPORT_LEN],
-    len: usize,
-}
+    /// Size of a frame, `None` where the firmware has no such port (bytes).
+    #[must_use]
+    pub fn len(self, firmware: Firmware) -> Option<usize> {
+        match self {
+            Self::Realtime => firmware.realtime_report_len(),
+            Self::Normal => Some(NORMAL_REPORT_LEN),
+            Self::Rich => Some(firmware.rich_report_len()),
+            Self::Real => Some(firmware.real_report_len()),
+        }
+    }
 
-impl ReportFrame {
-    /// The present report of one kind; `counter` counts the frames of a client.
-    pub(super) fn of(model: &ArmModel, kind: ReportKind, counter: u32) -> Self {
-        let mut bytes = [0; MAX_REPORT_LEN];
-        let written = match kind {
-            ReportKind::Realtime => realtime(model).emit(&mut bytes),
-            ReportKind::Normal => normal(model).emit(&mut bytes),
-            ReportKind::Rich => rich(model, counter).emit(&mut bytes),
-            ReportKind::Real => ForceReport {
+    /// Where the measured angle of a joint (from 0) lies in a frame (bytes).
+    pub(super) const fn joint_offset(self, joint: usize) -> usize {
+        match self {
+            Self::Realtime => 116 + 4 * joint,
+            Self::Normal | Self::Rich | Self::Real => 7 + 4 * joint,
+        }
+    }
+
+    /// The present report; `counter` counts the frames of a client.
+    pub(super) fn frame(self, model: &ArmModel, firmware: Firmware, counter: u32) -> Vec<u8> {
+        let mut bytes = vec![0; MAX_REPORT_LEN];
+        let written = match self {
+            Self::Realtime => realtime(model).emit(&mut bytes),
+            Self::Normal => normal(model).emit(&mut bytes),
+            Self::Rich => rich(model, firmware, counter).emit(&mut bytes),
+            Self::Real => ForceReport {
                 basic: basic(model),
                 external_force: [0.0; 6],
                 raw_force: [0.0; 6],
@@ -60,13 +88,48 @@ impl ReportFrame {
             .emit(&mut bytes),
         };
         // The buffer holds the longest report, so this never falls back.
-        let len = written.unwrap_or(0);
-        Self { bytes, len }
+        bytes.truncate(written.unwrap_or(0));
+        if self == Self::Rich {
+            fill_in(&mut bytes, model);
+        }
+        let len = self.len(firmware).unwrap_or(bytes.len());
+        bytes.resize(len, 0);
+        let size = u32::try_from(len).unwrap_or(u32::MAX);
+        bytes[..4].copy_from_slice(&size.to_be_bytes());
+        bytes
     }
+}
 
-    pub(super) fn as_bytes(&self) -> &[u8] {
-        &self.bytes[..self.len]
+/// Writes fields of the rich report that its codec leaves zero, at the offsets
+/// of the vendor's SDK.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "f32 is what the wire holds"
+)]
+fn fill_in(bytes: &mut [u8], model: &ArmModel) {
+    let settings = &model.settings;
+    let mut put = |at: usize, field: &[u8]| {
+        if let Some(place) = bytes.get_mut(at..at + field.len()) {
+            place.copy_from_slice(field);
+        }
+    };
+    let reduced = &settings.reduced;
+    put(315, &[u8::from(settings.self_collision)]);
+    for (j, current) in model.current_a().iter().enumerate() {
+        put(355 + 4 * j, &(*current as f32).to_le_bytes());
     }
+    let bits = u8::from(reduced.on)
+        | u8::from(settings.boundary.on) << 1
+        | u8::from(settings.reports_current) << 2;
+    put(494, &[bits, u8::from(reduced.on)]);
+    put(496, &settings.boundary_i16());
+    put(508, &reduced.tcp_speed_mm_s.to_le_bytes());
+    put(512, &reduced.joint_speed_rad_s.to_le_bytes());
+    for (i, angle) in reduced.joint_ranges_rad.iter().enumerate() {
+        put(516 + 4 * i, &angle.to_le_bytes());
+    }
+    let flags = [settings.boundary.on, settings.collision_rebound];
+    put(572, &flags.map(u8::from));
 }
 
 fn basic(model: &ArmModel) -> BasicReport {
@@ -77,7 +140,11 @@ fn basic(model: &ArmModel) -> BasicReport {
         buffered: model.buffered(),
         q: measured.q,
         tcp: model.tcp_pose(&measured.q),
-        torque_nm: JointVector::ZERO,
+        torque_nm: if model.settings.reports_current {
+            model.current_a()
+        } else {
+            model.effort_nm()
+        },
     }
 }
 
@@ -98,10 +165,10 @@ fn normal(model: &ArmModel) -> NormalReport {
     }
 }
 
-fn rich(model: &ArmModel, counter: u32) -> RichReport {
+fn rich(model: &ArmModel, version: Firmware, counter: u32) -> RichReport {
     let settings = &model.settings;
     let mut firmware = [0; 30];
-    for (to, from) in firmware.iter_mut().zip(*b"v2.7.1") {
+    for (to, from) in firmware.iter_mut().zip(format!("v{version}").bytes()) {
         *to = from;
     }
     let twist = tool_twist(model, &model.reference_motion());
@@ -115,7 +182,7 @@ fn rich(model: &ArmModel, counter: u32) -> RichReport {
         joint_jerk_rad_s3: settings.joint_jerk_rad_s3,
         joint_acceleration_max_rad_s2: settings.joint_acceleration_rad_s2,
         joint_speed_max_rad_s: model.limits().velocity_max_rad_s[0],
-        servo_error: [0; JOINTS],
+        servo_error: model.servo_error,
         temperature_c: [25; JOINTS],
         target_tcp_speed_m_s: twist.position().norm(),
         target_qd: model.reference.qd,
@@ -130,14 +197,14 @@ fn realtime(model: &ArmModel) -> RealtimeReport {
     let target = model.reference_motion();
     let actual = model.measured_motion();
     RealtimeReport {
-        time_us: model.time().0 / 1000,
+        time_us: model.time_us(),
         state: model.state(),
         mode: model.mode,
         buffered: model.buffered(),
         target,
         actual,
-        current_a: JointVector::ZERO,
-        torque_nm: JointVector::ZERO,
+        current_a: model.current_a(),
+        torque_nm: model.effort_nm(),
         target_tcp: model.tcp_pose(&target.q),
         target_twist: tool_twist(model, &target),
         actual_tcp: model.tcp_pose(&actual.q),

@@ -7,16 +7,15 @@
 //! as less than the 4 ms cycle. Jitter of the network therefore raises no false
 //! alarm on a 250 Hz stream, while a stream that is too fast is seen at once.
 
+use super::collision::self_clearance_m;
+use super::pacer::{Intake, Pacer};
+use nalgebra::Vector3;
 use rt_controller::xarm::ErrorCode;
 use shared_types::{JOINTS, JointVector, Limits, MonotonicNs, kinematics};
 use std::collections::VecDeque;
 
-use nalgebra::Vector3;
-
-/// Shortest time between two setpoints taken (s): 250 Hz.
+/// Time that a step counts for at least (s): 250 Hz.
 const CYCLE_S: f64 = 0.004;
-/// How early a setpoint may be and still be taken at once (s).
-const JITTER_S: f64 = 0.002;
 /// A longer gap ends the stream (s): below 30 Hz motion is not continuous.
 const SILENCE_S: f64 = 1.0 / 30.0;
 /// Intervals over which the rate of the stream is averaged.
@@ -36,6 +35,12 @@ pub(super) struct SetpointLimits<'a> {
     pub(super) tcp_offset: Vector3<f64>,
     /// Largest speed of that point (m/s).
     pub(super) tcp_speed_max_m_s: f64,
+    /// What a faster setpoint raises: C60, on old firmware C24.
+    pub(super) tcp_speed_code: ErrorCode,
+    /// Whether self collision is looked for.
+    pub(super) self_collision: bool,
+    /// Box that the point must stay in: smallest, largest coordinates (m).
+    pub(super) fence_m: Option<[Vector3<f64>; 2]>,
 }
 
 impl SetpointLimits<'_> {
@@ -44,7 +49,29 @@ impl SetpointLimits<'_> {
         let (min, max) = (&self.joints.position_min_rad, &self.joints.position_max_rad);
         JointVector(core::array::from_fn(|j| q[j].clamp(min[j], max[j])))
     }
+
+    /// Whether a pose is one that the arm must not take.
+    ///
+    /// # Errors
+    /// C22 for self collision, C35 outside the safety boundary.
+    pub(super) fn check_pose(&self, q: &JointVector) -> Result<(), ErrorCode> {
+        if self.self_collision && self_clearance_m(q) < 0.0 {
+            return Err(ErrorCode::SELF_COLLISION);
+        }
+        let Some([min, max]) = self.fence_m else {
+            return Ok(());
+        };
+        let tool = tool_position(q, &self.tcp_offset);
+        if tool.sup(&min).inf(&max) == tool {
+            Ok(())
+        } else {
+            Err(SAFETY_BOUNDARY)
+        }
+    }
 }
+
+/// C35: safety boundary.
+const SAFETY_BOUNDARY: ErrorCode = ErrorCode(35);
 
 /// A setpoint to execute.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,18 +87,15 @@ pub(super) struct Setpoint {
 pub(super) struct ServoStream {
     arrivals: VecDeque<MonotonicNs>,
     newest: Option<JointVector>,
-    waiting: Option<Setpoint>,
-    /// When the next setpoint is due by the 250 Hz rule.
-    due: MonotonicNs,
+    pub(super) pacer: Pacer<Setpoint>,
 }
 
 impl ServoStream {
     /// Forgets the stream; the next setpoint begins a new one.
     pub(super) fn reset(&mut self) {
-        *self = Self {
-            due: self.due,
-            ..Self::default()
-        };
+        self.arrivals.clear();
+        self.newest = None;
+        self.pacer.clear();
     }
 
     /// Whether the stream has fallen silent.
@@ -85,7 +109,8 @@ impl ServoStream {
     /// where a stream that begins now starts from.
     ///
     /// # Errors
-    /// C23 outside the joint range, C24 too fast for a joint, C60 for the tool.
+    /// C23 outside the joint range, C24 too fast for a joint, C60 for the tool;
+    /// C22 and C35 as in [`SetpointLimits::check_pose`].
     pub(super) fn offer(
         &mut self,
         at: MonotonicNs,
@@ -110,24 +135,23 @@ impl ServoStream {
         }
         let way = tool_position(&q, &limits.tcp_offset) - tool_position(&from, &limits.tcp_offset);
         if way.norm() > limits.tcp_speed_max_m_s * allowed * interval_s {
-            return Err(ErrorCode::TCP_SPEED_LIMIT);
+            return Err(limits.tcp_speed_code);
         }
+        limits.check_pose(&q)?;
         self.newest = Some(q);
-        self.waiting = Some(Setpoint { at, q, qd });
+        self.pacer.offer(at, Setpoint { at, q, qd });
         Ok(())
     }
 
     /// The setpoint to execute at or before `now`, if one is due.
-    pub(super) fn take(&mut self, now: MonotonicNs) -> Option<Setpoint> {
-        let waiting = self.waiting?;
-        let earliest = self.due.plus_s(-JITTER_S);
-        let at = waiting.at.max(earliest);
-        if at > now {
-            return None;
-        }
-        self.waiting = None;
-        self.due = self.due.max(at).plus_s(CYCLE_S);
-        Some(Setpoint { at, ..waiting })
+    pub(super) fn take(
+        &mut self,
+        now: MonotonicNs,
+        cycle_s: f64,
+        intake: Intake,
+    ) -> Option<Setpoint> {
+        let (at, setpoint) = self.pacer.take(now, cycle_s, intake)?;
+        Some(Setpoint { at, ..setpoint })
     }
 
     /// Records an arrival and returns the time its step counts for (s).
@@ -162,6 +186,21 @@ mod tests {
     /// Flange 0.66 m from joint 1's axis.
     const STRETCHED: JointVector = JointVector([0.0, 0.8, 0.0, 2.4, 0.0, 1.6, 0.0]);
 
+    fn checks(joints: &Limits) -> SetpointLimits<'_> {
+        SetpointLimits {
+            joints,
+            tcp_offset: Vector3::zeros(),
+            tcp_speed_max_m_s: 1.2,
+            tcp_speed_code: ErrorCode::TCP_SPEED_LIMIT,
+            self_collision: false,
+            fence_m: None,
+        }
+    }
+
+    fn take(servo: &mut ServoStream, now: MonotonicNs) -> Option<Setpoint> {
+        servo.take(now, CYCLE_S, Intake::Arrival)
+    }
+
     /// Streams joint `joint` at `speed_rad_s`, setpoints due every 4 ms, each
     /// `late_ms(k)` late. Returns the first error.
     fn stream(
@@ -170,11 +209,7 @@ mod tests {
         late_ms: impl Fn(u64) -> u64,
     ) -> (Option<ErrorCode>, usize) {
         let limits = Limits::default();
-        let checks = SetpointLimits {
-            joints: &limits,
-            tcp_offset: Vector3::zeros(),
-            tcp_speed_max_m_s: 1.2,
-        };
+        let checks = checks(&limits);
         let mut servo = ServoStream::default();
         let mut q = STRETCHED;
         let mut taken = 0;
@@ -183,7 +218,7 @@ mod tests {
             if let Err(code) = servo.offer(at, q, STRETCHED, &checks) {
                 return (Some(code), taken);
             }
-            taken += usize::from(servo.take(at).is_some());
+            taken += usize::from(take(&mut servo, at).is_some());
             q[joint] += speed_rad_s * 0.004;
         }
         (None, taken)
@@ -227,11 +262,7 @@ mod tests {
     #[test]
     fn a_jump_is_refused() {
         let limits = Limits::default();
-        let checks = SetpointLimits {
-            joints: &limits,
-            tcp_offset: Vector3::zeros(),
-            tcp_speed_max_m_s: 1.2,
-        };
+        let checks = checks(&limits);
         let mut servo = ServoStream::default();
         let mut far = JointVector::ZERO;
         far[6] = 1.0;
@@ -243,20 +274,33 @@ mod tests {
     }
 
     #[test]
+    fn poses_that_collide_or_leave_the_boundary_are_refused() {
+        let limits = Limits::default();
+        let mut folded = JointVector::ZERO;
+        folded[5] = 3.1;
+        let mut checks = checks(&limits);
+        assert_eq!(checks.check_pose(&folded), Ok(()));
+        checks.self_collision = true;
+        assert_eq!(checks.check_pose(&folded), Err(ErrorCode::SELF_COLLISION));
+        // The zero pose has its flange at 206, 0, 120.5 mm.
+        let box_up_to = |z: f64| Some([Vector3::repeat(-1.0), Vector3::new(1.0, 1.0, z)]);
+        checks.fence_m = box_up_to(0.13);
+        assert_eq!(checks.check_pose(&JointVector::ZERO), Ok(()));
+        checks.fence_m = box_up_to(0.11);
+        assert_eq!(checks.check_pose(&JointVector::ZERO), Err(ErrorCode(35)));
+    }
+
+    #[test]
     fn only_the_newest_of_a_burst_is_taken() {
         let limits = Limits::default();
-        let checks = SetpointLimits {
-            joints: &limits,
-            tcp_offset: Vector3::zeros(),
-            tcp_speed_max_m_s: 1.2,
-        };
+        let checks = checks(&limits);
         let mut servo = ServoStream::default();
         let mut taken = Vec::new();
         for k in 0..1000_u64 {
             let at = MonotonicNs(1000 * MS + k * MS);
             let q = JointVector::splat(1e-5 * k as f64);
             servo.offer(at, q, JointVector::ZERO, &checks).unwrap();
-            taken.extend(servo.take(at));
+            taken.extend(take(&mut servo, at));
         }
         // One second at 1 kHz: 250 are executed.
         assert!((249..=252).contains(&taken.len()), "{}", taken.len());

@@ -1,12 +1,12 @@
 //! Set-up of the rig, as read from a file or made in code.
 
 use super::camera::CameraConfig;
-use crate::arm::{ArmConfig, JointLag};
+use crate::arm::{ArmConfig, FaultScript, Firmware, Intake, JointLag, Obstacle};
 use crate::hidden::hidden_rope;
 use crate::render::Appearance;
 use serde::{Deserialize, Serialize};
 use shared_types::plan::START_POSE;
-use shared_types::{JointVector, Limits, RopeParams, StereoCamera};
+use shared_types::{JOINTS, JointVector, Limits, RopeParams, StereoCamera};
 use std::net::IpAddr;
 
 /// Set-up of the simulated rig. Every key has a default; `seed` alone gives a
@@ -26,6 +26,18 @@ pub struct RigConfig {
     pub report_ports: [u16; 4],
     /// How the joints follow setpoints.
     pub lag: JointLag,
+    /// How each joint follows; left out, drawn from the seed around `lag`.
+    pub joint_lags: Option<[JointLag; JOINTS]>,
+    /// Firmware of the arm's controller.
+    pub firmware: Firmware,
+    /// What the controller's clock gains (µs/s).
+    pub clock_ppm: f64,
+    /// Whose clock paces setpoints.
+    pub intake: Intake,
+    /// What stands in the arm's way.
+    pub obstacles: Vec<Obstacle>,
+    /// Faults of arm and wire to inject.
+    pub faults: FaultScript,
     /// Ranges, speeds and accelerations of the joints.
     pub limits: Limits,
     /// Pose at the start (rad).
@@ -55,6 +67,12 @@ impl Default for RigConfig {
             command_port: arm.command_port,
             report_ports: arm.report_ports,
             lag: arm.lag,
+            joint_lags: arm.joint_lags,
+            firmware: arm.firmware,
+            clock_ppm: arm.clock_ppm,
+            intake: arm.intake,
+            obstacles: arm.obstacles,
+            faults: arm.faults,
             limits: arm.limits,
             initial_q,
             rope: None,
@@ -94,6 +112,12 @@ impl RigConfig {
             report_ports: self.report_ports,
             seed: self.seed,
             lag: self.lag,
+            joint_lags: self.joint_lags,
+            firmware: self.firmware,
+            clock_ppm: self.clock_ppm,
+            intake: self.intake,
+            obstacles: self.obstacles.clone(),
+            faults: self.faults.clone(),
             limits: self.limits.clone(),
             initial_q: self.initial_q,
             ..ArmConfig::default()
@@ -107,7 +131,8 @@ mod tests {
 
     #[test]
     fn a_file_names_only_what_differs_and_typos_are_refused() {
-        let text = "seed = 7\ncommand_port = 0\n[camera]\nenabled = false";
+        let text = "seed = 7\ncommand_port = 0\n[camera]\nenabled = false\n\
+                    [[faults]]\nat_s = 3\nkind = \"stall\"\nduration_s = 0.19";
         let config: RigConfig = toml::from_str(text).unwrap();
         assert_eq!((config.seed, config.camera.enabled), (7, false));
         assert_eq!(config.initial_q, RigConfig::default().initial_q);

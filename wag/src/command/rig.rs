@@ -5,7 +5,7 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::session::{Session, interrupted, watch_interrupts};
 use anyhow::{Context, anyhow, bail};
-use hil_tests::arm::{ArmConfig, SimulatedArm};
+use hil_tests::arm::{ArmConfig, FaultScript, SimulatedArm};
 use hil_tests::rig::RigConfig;
 use serde_json::{Value, json};
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
@@ -14,12 +14,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
-    if let Some(path) = &args.faults {
-        return Err(Failure::failed(anyhow!(
-            "fault scripts are not implemented in this version; leave out --faults {}",
-            path.display()
-        )));
-    }
+    let faults = match &args.faults {
+        Some(path) => FaultScript::read(path).or_input()?,
+        None => FaultScript::default(),
+    };
     let report_ports: [u16; 4] = args.report_ports.clone().try_into().map_err(
         |found: Vec<u16>| {
             Failure::input(anyhow!(
@@ -35,7 +33,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     watch_interrupts().or_failed()?;
     let value = match &args.rope {
-        None => arm_alone(args, report_ports, quiet),
+        None => arm_alone(args, report_ports, faults, quiet),
         Some(rope) => {
             let mut config = RigConfig {
                 domain: args
@@ -46,6 +44,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
                 bind: args.bind,
                 command_port: args.command_port,
                 report_ports,
+                faults,
                 ..RigConfig::default()
             };
             config.camera.enabled = args.camera.is_some();
@@ -66,12 +65,18 @@ fn announce(bind: IpAddr, command: u16, reports: [u16; 4], quiet: bool) {
     }
 }
 
-fn arm_alone(args: &RigArgs, report_ports: [u16; 4], quiet: bool) -> anyhow::Result<Value> {
+fn arm_alone(
+    args: &RigArgs,
+    report_ports: [u16; 4],
+    faults: FaultScript,
+    quiet: bool,
+) -> anyhow::Result<Value> {
     let arm = SimulatedArm::start(ArmConfig {
         bind: args.bind,
         command_port: args.command_port,
         report_ports,
         seed: args.seed,
+        faults,
         ..ArmConfig::default()
     })?;
     let ports = arm.ports();

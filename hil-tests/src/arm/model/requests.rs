@@ -5,8 +5,8 @@ use rt_controller::xarm::reply::Text;
 use rt_controller::xarm::{JointQuery, StateRequest};
 use shared_types::kinematics;
 
-/// Version text of a real arm: 7 axes, type 7, 1305 arm, firmware 2.7.1.
-const VERSION: &str = "7,7,XS1305,AC1304,v2.7.1";
+/// Version text of a real arm before its firmware: 7 axes, type 7, 1305 arm.
+const MODEL: &str = "7,7,XS1305,AC1304,v";
 /// Serial numbers of arm and control box, a NUL between them.
 const SERIAL_NUMBERS: &str = "XS130500000000\0AC130400000000";
 /// Speed and acceleration of a move that names none (SDK defaults: 20 deg/s,
@@ -17,26 +17,83 @@ const DEFAULT_MOVE_ACCELERATION_RAD_S2: f64 = 8.726_646;
 impl ArmModel {
     /// Takes a request as it came from the wire at `at` and gives the reply.
     pub fn request(&mut self, at: MonotonicNs, register: u8, parameters: &[u8]) -> Answer {
-        match Command::parse(register, parameters) {
+        self.request_from(None, at, register, parameters)
+    }
+
+    /// The same for a request of a known client (its number, transaction id).
+    pub(in crate::arm) fn request_from(
+        &mut self,
+        origin: Option<(u32, u16)>,
+        at: MonotonicNs,
+        register: u8,
+        parameters: &[u8],
+    ) -> Answer {
+        self.origin = origin;
+        let answer = match Command::parse(register, parameters) {
+            Ok(command) if !self.knows(&command) => {
+                self.refuse(&CommandError::UnknownRegister(register), parameters)
+            }
             Ok(command) => self.command(at, &command),
-            Err(error) => self.refuse(&error),
+            Err(error) => self.refuse(&error, parameters),
+        };
+        self.tell_state();
+        self.origin = None;
+        answer
+    }
+
+    /// A command of the client of number `client` outside any connection.
+    pub(in crate::arm) fn command_from(&mut self, client: u32, at: MonotonicNs, command: &Command) {
+        self.origin = Some((client, 0));
+        self.command(at, command);
+        self.tell_state();
+        self.origin = None;
+    }
+
+    /// Whether a command to this register would be taken up as a setpoint or
+    /// velocity now.
+    pub(in crate::arm) fn takes_motion(&self, register: u8) -> bool {
+        let mode = match Register::from_code(register) {
+            Some(Register::ServoJoint) => Mode::Servo,
+            Some(Register::JointVelocity) => Mode::JointVelocity,
+            _ => return false,
+        };
+        self.can_move() && self.mode == mode
+    }
+
+    /// Whether the firmware has this command.
+    fn knows(&self, command: &Command) -> bool {
+        let firmware = self.config.firmware;
+        match command {
+            Command::JointPosition(JointQuery::Quantities { .. }) => firmware.has_joint_states(),
+            Command::SetSpeedLimitFactor(_) | Command::GetSpeedLimitFactor => {
+                firmware.has_speed_factor()
+            }
+            Command::FeedbackCheck | Command::FeedbackMask(_) => firmware.has_feedback(),
+            _ => true,
         }
     }
 
-    /// Settings without an effect on the simulation are accepted; anything else
-    /// that is not understood sets a warning and marks the reply as invalid.
-    fn refuse(&mut self, error: &CommandError) -> Answer {
-        match error {
-            CommandError::Untyped(register) if is_harmless_setting(*register) => {
-                return self.answer(ReplyData::None);
+    /// Registers without a typed command; what is not understood sets a warning
+    /// and marks the reply as invalid.
+    fn refuse(&mut self, error: &CommandError, parameters: &[u8]) -> Answer {
+        let code = match error {
+            CommandError::Untyped(register) => {
+                self.counters.requests += 1;
+                self.log(ArmEvent::Request {
+                    register: register.code(),
+                });
+                if let Some(data) = self.raw(*register, parameters) {
+                    return Answer {
+                        status: self.status(),
+                        data: AnswerData::Raw(data),
+                    };
+                }
+                warning::UNKNOWN_COMMAND
             }
-            CommandError::Untyped(_) | CommandError::UnknownRegister(_) => {
-                self.warning = warning::UNKNOWN_COMMAND;
-            }
-            CommandError::TooShort { .. } | CommandError::BadValue(_) => {
-                self.warning = warning::BAD_PARAMETER;
-            }
-        }
+            CommandError::UnknownRegister(_) => warning::UNKNOWN_COMMAND,
+            CommandError::TooShort { .. } | CommandError::BadValue(_) => warning::BAD_PARAMETER,
+        };
+        self.warn(code);
         let mut answer = self.answer(ReplyData::None);
         answer.status.0 |= Status::INVALID;
         answer
@@ -44,6 +101,15 @@ impl ArmModel {
 
     /// Executes a command that arrived at `at`.
     pub fn command(&mut self, at: MonotonicNs, command: &Command) -> Answer {
+        if !matches!(
+            command,
+            Command::ServoJoint(_) | Command::JointVelocity { .. }
+        ) {
+            self.counters.requests += 1;
+            self.log(ArmEvent::Request {
+                register: command.register().code(),
+            });
+        }
         let data = self
             .answer_query(command)
             .or_else(|| self.run_motion(at, command))
@@ -54,14 +120,16 @@ impl ArmModel {
     fn answer(&self, data: ReplyData) -> Answer {
         Answer {
             status: self.status(),
-            data,
+            data: AnswerData::Typed(data),
         }
     }
 
     /// Commands that only read.
     fn answer_query(&mut self, command: &Command) -> Option<ReplyData> {
         Some(match command {
-            Command::Version => ReplyData::Text(Text::new(VERSION)),
+            Command::Version => {
+                ReplyData::Text(Text::new(&format!("{MODEL}{}", self.config.firmware)))
+            }
             Command::SerialNumbers => ReplyData::Text(Text::new(SERIAL_NUMBERS)),
             Command::GetState => ReplyData::State(self.state()),
             Command::Buffered => ReplyData::Buffered(self.buffered()),
@@ -85,7 +153,7 @@ impl ArmModel {
                     quantities: *quantities,
                     position,
                     velocity,
-                    effort: JointVector::ZERO,
+                    effort: self.effort_nm(),
                 }
             }
             Command::ForwardKinematics(q) => ReplyData::Pose(self.tcp_pose(q)),
@@ -105,16 +173,26 @@ impl ArmModel {
             Command::ServoJoint(q) => {
                 if self.can_move() && self.mode == Mode::Servo {
                     self.stream(at, *q);
+                } else {
+                    self.ignore(command);
                 }
                 ReplyData::None
             }
             Command::JointVelocity {
                 velocity,
+                synchronised,
                 duration_s,
-                ..
             } => {
                 if self.can_move() && self.mode == Mode::JointVelocity {
-                    self.start_velocity(at, velocity, *duration_s);
+                    let known = self.config.firmware.has_velocity_duration();
+                    let wish = VelocityCommand {
+                        qd: *velocity,
+                        synchronised: *synchronised,
+                        duration_s: duration_s.filter(|_| known),
+                    };
+                    self.take_velocity(at, wish);
+                } else {
+                    self.ignore(command);
                 }
                 ReplyData::None
             }
@@ -123,17 +201,18 @@ impl ArmModel {
                 speed_rad_s,
                 acceleration_rad_s2,
                 checked,
-            } => self.queue_move(target, *speed_rad_s, *acceleration_rad_s2, *checked),
+            } => {
+                let speeds = [*speed_rad_s, *acceleration_rad_s2];
+                self.queue_move(command.register(), target, speeds, *checked)
+            }
             Command::MoveHome {
                 speed_rad_s,
                 acceleration_rad_s2,
                 checked,
-            } => self.queue_move(
-                &JointVector::ZERO,
-                *speed_rad_s,
-                *acceleration_rad_s2,
-                *checked,
-            ),
+            } => {
+                let speeds = [*speed_rad_s, *acceleration_rad_s2];
+                self.queue_move(command.register(), &JointVector::ZERO, speeds, *checked)
+            }
             _ => return None,
         })
     }
@@ -147,26 +226,43 @@ impl ArmModel {
         let verdict = servo.offer(at, q, present, &self.setpoint_limits());
         self.servo = servo;
         match verdict {
-            Ok(()) => self.run_stream(at),
+            Ok(()) => {
+                self.counters.motion_commands += 1;
+                self.log(ArmEvent::Setpoint(q));
+                self.run_stream(at);
+            }
             Err(error) => self.raise(error),
         }
     }
 
-    fn start_velocity(&mut self, at: MonotonicNs, velocity: &JointVector, duration_s: Option<f64>) {
+    /// A motion command that cannot be executed now is answered, no more.
+    fn ignore(&mut self, command: &Command) {
+        self.counters.ignored += 1;
+        self.log(ArmEvent::Ignored {
+            register: command.register().code(),
+        });
+    }
+
+    fn take_velocity(&mut self, at: MonotonicNs, wish: VelocityCommand) {
         let limits = &self.config.limits.velocity_max_rad_s;
-        if (0..JOINTS).any(|j| velocity[j].abs() > limits[j]) {
+        if (0..JOINTS).any(|j| wish.qd[j].abs() > limits[j]) {
             return self.raise(ErrorCode::SPEED_LIMIT);
         }
-        // A duration of zero, like none, means without end.
-        let until = duration_s.filter(|s| *s > 0.0).map(|s| at.plus_s(s));
-        self.reference.start_velocity(*velocity, until);
+        self.counters.motion_commands += 1;
+        self.log(ArmEvent::Velocity {
+            qd: wish.qd,
+            duration_s: wish.duration_s,
+        });
+        let at = at.max(self.time);
+        self.velocity.offer(at, wish);
+        self.run_velocity(at);
     }
 
     fn queue_move(
         &mut self,
+        register: Register,
         target: &JointVector,
-        speed_rad_s: f64,
-        acceleration_rad_s2: f64,
+        [speed_rad_s, acceleration_rad_s2]: [f64; 2],
         checked: Option<u8>,
     ) -> ReplyData {
         let outside = self.config.limits.position_violation(target).is_some();
@@ -175,8 +271,9 @@ impl ArmModel {
             if outside {
                 self.raise(ErrorCode::JOINT_LIMIT);
             } else if self.moves.len() >= BUFFER_CAPACITY {
-                self.warning = warning::QUEUE_FULL;
+                self.warn(warning::QUEUE_FULL);
             } else {
+                self.tasks = self.tasks.wrapping_add(1);
                 let limits = &self.config.limits;
                 let or_default = |value: f64, default: f64, max: f64| {
                     if value > 0.0 { value } else { default }.min(max)
@@ -193,6 +290,11 @@ impl ArmModel {
                         DEFAULT_MOVE_ACCELERATION_RAD_S2,
                         self.settings.joint_acceleration_rad_s2,
                     ),
+                    task: Task {
+                        origin: self.origin,
+                        register,
+                        number: self.tasks,
+                    },
                 });
             }
         }
@@ -225,7 +327,7 @@ impl ArmModel {
                 self.system_reset();
             }
             Command::CleanError => {
-                self.error = ErrorCode::NONE;
+                self.clear_error();
                 self.system_reset();
             }
             Command::CleanWarning => self.warning = 0,
@@ -260,11 +362,23 @@ impl ArmModel {
         ReplyData::None
     }
 
+    /// Clears the error, unless its cause is still there.
+    fn clear_error(&mut self) {
+        let broken = (0..JOINTS).find(|j| self.servo_error[*j] != 0);
+        self.error = match broken.and_then(|j| u8::try_from(j).ok()) {
+            _ if !self.pressed.is_none() => self.pressed,
+            Some(joint) => ErrorCode(11 + joint),
+            None => ErrorCode::NONE,
+        };
+    }
+
     fn set_state(&mut self, state: StateRequest) {
         match state {
             StateRequest::Ready => {
-                self.error = ErrorCode::NONE;
-                self.phase = Phase::Ready;
+                self.clear_error();
+                if self.error.is_none() {
+                    self.phase = Phase::Ready;
+                }
             }
             StateRequest::Pause => {
                 if self.phase == Phase::Ready {
@@ -308,31 +422,4 @@ fn set_bits(field: &mut u8, bits: u8, on: bool) {
     } else {
         *field &= !bits;
     }
-}
-
-/// Settings that a real arm takes and this one has no use for.
-fn is_harmless_setting(register: Register) -> bool {
-    matches!(
-        register,
-        Register::ReloadDynamics
-            | Register::SystemControl
-            | Register::TcpJerk
-            | Register::TcpAcceleration
-            | Register::ClearConfiguration
-            | Register::SaveConfiguration
-            | Register::GravityDirection
-            | Register::ReducedTcpSpeed
-            | Register::ReducedJointSpeed
-            | Register::SetReducedMode
-            | Register::SafetyBoundary
-            | Register::ReducedJointRange
-            | Register::Fence
-            | Register::CollisionRebound
-            | Register::ApproximateMotion
-            | Register::ReportEffort
-            | Register::SelfCollisionCheck
-            | Register::ToolModel
-            | Register::SimulationMode
-            | Register::SetParameter
-    )
 }

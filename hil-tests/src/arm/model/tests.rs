@@ -219,7 +219,7 @@ fn moves_are_queued_paused_and_resumed() {
     };
     arm.send(&go(0.5));
     let answer = arm.model.command(arm.now, &go(0.2));
-    assert_eq!(answer.data, ReplyData::Buffered(2));
+    assert_eq!(answer.data, AnswerData::Typed(ReplyData::Buffered(2)));
     arm.wait(0.2);
     assert_eq!(arm.model.state(), ArmState::Moving);
     arm.send(&Command::SetState(StateRequest::Pause));
@@ -269,10 +269,13 @@ fn commanded_and_measured_positions_are_told_apart() {
             .command(arm.now, &Command::JointPosition(query))
             .data
     };
-    let ReplyData::Joints(commanded) = ask(&mut arm, JointQuery::Commanded) else {
+    let AnswerData::Typed(ReplyData::Joints(commanded)) = ask(&mut arm, JointQuery::Commanded)
+    else {
         panic!("not the commanded joints");
     };
-    let ReplyData::JointMotion { position, .. } = ask(&mut arm, JointQuery::MEASURED) else {
+    let AnswerData::Typed(ReplyData::JointMotion { position, .. }) =
+        ask(&mut arm, JointQuery::MEASURED)
+    else {
         panic!("not the measured joints");
     };
     assert!((commanded[6] - 0.1).abs() < 1e-9);

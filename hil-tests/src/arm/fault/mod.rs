@@ -1,0 +1,16 @@
+//! Faults of arm and wire, injected by a script.
+//!
+//! A script is a TOML file with a list of `[[fault]]`; each entry says when
+//! ([`Trigger`]), for how long, and what ([`FaultKind`]). The same script runs
+//! in real and in virtual time. `configs/rig/faults.toml` shows every kind.
+
+pub mod kind;
+mod parse;
+mod runner;
+mod schema;
+mod script;
+
+pub use kind::{FaultKind, ForeignWish, PortSet, ReportPort};
+pub use parse::FaultScriptError;
+pub(super) use runner::{FaultRunner, Progress, Transition};
+pub use script::{Fault, FaultScript, Trigger};
