@@ -567,7 +567,7 @@ fn obstacles_raise_c31_and_the_boundary_c35() {
         rpy_rad: [0.0; 3],
     });
     let wall = Obstacle::Plane {
-        point_m: [0.0, 0.1, 0.0],
+        point_m: [0.0, 0.2, 0.0],
         normal: [0.0, -1.0, 0.0],
     };
     let run = |obstacles: Vec<Obstacle>, fence: bool| {
@@ -588,7 +588,7 @@ fn obstacles_raise_c31_and_the_boundary_c35() {
             b.arm.receive(b.client, b.now, &frame);
         }
         b.bring_up(Mode::Servo);
-        for _ in 0..150 {
+        for _ in 0..400 {
             b.q[0] += 0.4 * CYCLE_S;
             b.send(&Command::ServoJoint(b.q));
             b.wait(CYCLE_S);
