@@ -4,13 +4,15 @@
 //! ([`Trigger`]), for how long, and what ([`FaultKind`]). The same script runs
 //! in real and in virtual time. `configs/rig/faults.toml` shows every kind.
 
+mod error;
 pub mod kind;
 mod parse;
 mod runner;
 mod schema;
 mod script;
 
+pub use error::FaultScriptError;
 pub use kind::{FaultKind, ForeignWish, PortSet, ReportPort};
-pub use parse::FaultScriptError;
+
 pub(super) use runner::{FaultRunner, Progress, Transition};
 pub use script::{Fault, FaultScript, Trigger};

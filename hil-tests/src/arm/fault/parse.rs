@@ -1,11 +1,11 @@
 //! Scripts from TOML and back. Every error names entry, field and what is
 //! allowed there.
 
+use super::error::FaultScriptError;
 use super::kind::FaultKind;
 use super::schema::{Field, KINDS, Kind, Lasts, Values, quoted};
 use super::script::{Fault, FaultScript, Trigger};
 use crate::arm::firmware::Firmware;
-use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Longest time in a script (s).
@@ -14,79 +14,6 @@ const TIME: Values = Values::Number(0.0, LONGEST_S);
 const COUNT: Values = Values::Whole(1, u32::MAX as i64);
 const TRIGGERS: &str =
     "\"first_setpoint\", \"setpoint:N\", \"motion:PERCENT\", \"speed:RAD_PER_S\"";
-
-/// Why a fault script is refused.
-#[derive(Debug, thiserror::Error)]
-pub enum FaultScriptError {
-    /// The file cannot be read.
-    #[error("cannot read the fault script {path}", path = .path.display())]
-    Read {
-        /// File.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// Something about one file.
-    #[error("fault script {path}: {error}", path = .path.display())]
-    InFile {
-        /// File.
-        path: PathBuf,
-        /// What is wrong.
-        error: Box<FaultScriptError>,
-    },
-    /// No TOML.
-    #[error("not valid TOML: {0}")]
-    Toml(String),
-    /// Something else than a list of faults at the top.
-    #[error("`{key}` at the top; a script is a list of [[fault]] and nothing else")]
-    Top {
-        /// Key found.
-        key: String,
-    },
-    /// A field that is needed is missing.
-    #[error("fault {entry}: `{field}` is missing; give {allowed}")]
-    Missing {
-        /// Entry, from 1.
-        entry: usize,
-        /// Field.
-        field: &'static str,
-        /// What may stand there.
-        allowed: String,
-    },
-    /// A field has a value that is not allowed.
-    #[error("fault {entry}: `{field}` is {found}; allowed is {allowed}")]
-    Value {
-        /// Entry, from 1.
-        entry: usize,
-        /// Field.
-        field: &'static str,
-        /// What stands there.
-        found: String,
-        /// What may stand there.
-        allowed: String,
-    },
-    /// A field that means nothing there.
-    #[error("fault {entry}: `{field}` means nothing for `{kind}`; possible are {allowed}")]
-    Unknown {
-        /// Entry, from 1.
-        entry: usize,
-        /// Field.
-        field: String,
-        /// Kind of the fault.
-        kind: &'static str,
-        /// Fields that mean something.
-        allowed: String,
-    },
-}
-
-impl FaultScriptError {
-    pub(super) fn in_file(self, path: &Path) -> Self {
-        Self::InFile {
-            path: path.to_owned(),
-            error: Box::new(self),
-        }
-    }
-}
 
 pub(super) fn script(text: &str) -> Result<FaultScript, FaultScriptError> {
     let mut top: Table =
@@ -340,87 +267,4 @@ pub(super) fn to_table(fault: &Fault) -> Table {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The example names every kind once, and survives being written again.
-    #[test]
-    fn the_shipped_example_has_every_kind_and_comes_back() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/rig/faults.toml");
-        let script = FaultScript::read(&path).unwrap();
-        let tables: Vec<Table> = script.clone().into();
-        for kind in KINDS {
-            assert!(
-                tables.iter().any(|t| t["kind"].as_str() == Some(kind.name)),
-                "{} is not shown",
-                kind.name
-            );
-        }
-        assert_eq!(FaultScript::try_from(tables).unwrap(), script);
-    }
-
-    #[test]
-    fn errors_name_entry_field_and_what_is_allowed() {
-        let fine = "[[fault]]\nat_s = 1\nkind = \"cable_pull\"\nduration_s = 0.5\n";
-        let cases = [
-            ("[[fault]]\nat_s = 1", ["fault 2", "`kind`", "\"stall\""]),
-            (
-                "[[fault]]\nat_s = 1\nkind = \"stal\"",
-                ["fault 2", "`kind`", "\"stall\""],
-            ),
-            (
-                "[[fault]]\nkind = \"collision\"",
-                ["fault 2", "`at_s`", "first_setpoint"],
-            ),
-            (
-                "[[fault]]\nkind = \"collision\"\non = \"later\"",
-                ["fault 2", "`on`", "motion:PERCENT"],
-            ),
-            (
-                "[[fault]]\nkind = \"collision\"\non = \"motion:50\"",
-                ["fault 2", "`motion_s`", "a number"],
-            ),
-            (
-                "[[fault]]\nat_s = 1\nkind = \"stall\"",
-                ["fault 2", "`duration_s`", "a number from 0"],
-            ),
-            (
-                "[[fault]]\nat_s = 1\nkind = \"joint_stuck\"\njoint = 8",
-                ["fault 2", "`joint` is 8", "from 1 to 7"],
-            ),
-            (
-                "[[fault]]\nat_s = nan\nkind = \"collision\"",
-                ["fault 2", "`at_s` is nan", "a number"],
-            ),
-            (
-                "[[fault]]\nat_s = 1\nkind = \"report_stop\"\nport = \"30000\"",
-                ["fault 2", "`port`", "\"realtime\""],
-            ),
-            (
-                "[[fault]]\nat_s = 1\nkind = \"collision\"\nduration_s = 1",
-                ["fault 2", "`duration_s`", "collision"],
-            ),
-            (
-                "[[fault]]\nat_s = 1\nkind = \"firmware_changed\"\nversion = \"two\"",
-                ["fault 2", "`version`", "2.7.1"],
-            ),
-        ];
-        for (text, words) in cases {
-            let said = format!("{fine}{text}")
-                .parse::<FaultScript>()
-                .unwrap_err()
-                .to_string();
-            assert!(words.iter().all(|w| said.contains(w)), "{text}: {said}");
-        }
-        let top = "seed = 1".parse::<FaultScript>().unwrap_err().to_string();
-        assert!(top.contains("`seed`"), "{top}");
-    }
-
-    #[test]
-    fn a_missing_file_is_named() {
-        let said = FaultScript::read(Path::new("no_such_script.toml"))
-            .unwrap_err()
-            .to_string();
-        assert!(said.contains("no_such_script.toml"), "{said}");
-    }
-}
+mod tests;

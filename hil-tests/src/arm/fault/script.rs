@@ -1,7 +1,8 @@
 //! Scripts: which fault, when, and for how long.
 
+use super::error::FaultScriptError;
 use super::kind::FaultKind;
-use super::parse::{self, FaultScriptError};
+use super::parse;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -1,13 +1,17 @@
 //! The sending side of a connection: whole frames, never waiting.
 
 use super::plant::lock;
-use rustix::io::Errno;
-use rustix::net::{SendFlags, send};
 use socket2::SockRef;
 use std::io;
 use std::net::{Shutdown, TcpStream};
 use std::sync::Mutex;
 use std::time::Duration;
+
+/// Linux: this call does not wait, although the socket is a waiting one (its
+/// reader waits).
+const MSG_DONTWAIT: i32 = 0x40;
+/// Linux: a client that is gone is an error, not a signal.
+const MSG_NOSIGNAL: i32 = 0x4000;
 
 /// A connection, shared by the thread that reads it and those that send.
 #[derive(Debug)]
@@ -47,14 +51,17 @@ impl Line {
 
     /// Bytes taken by the socket without waiting, 0 when it is full.
     fn send_some(&self, bytes: &[u8]) -> io::Result<usize> {
-        match send(
-            &self.stream,
-            bytes,
-            SendFlags::DONTWAIT | SendFlags::NOSIGNAL,
-        ) {
-            Ok(sent) => Ok(sent),
-            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
-            Err(error) => Err(error.into()),
+        let socket = SockRef::from(&self.stream);
+        match socket.send_with_flags(bytes, MSG_DONTWAIT | MSG_NOSIGNAL) {
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+                ) =>
+            {
+                Ok(0)
+            }
+            sent => sent,
         }
     }
 
