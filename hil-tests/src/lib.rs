@@ -15,3 +15,4 @@ pub mod arm;
 pub mod hidden;
 pub mod render;
 pub mod rig;
+pub mod virtual_rig;

@@ -35,6 +35,24 @@ pub enum Sent {
     Skipped,
 }
 
+/// A connected stream of bytes that never makes its user wait: a socket, or a
+/// cable in virtual time.
+pub trait ByteWire {
+    /// Reads what has come: how many bytes, and when they arrived
+    /// (CLOCK_MONOTONIC, ns) where that is known. No byte means the end.
+    ///
+    /// # Errors
+    /// `WouldBlock` when nothing has come; anything else ends the connection.
+    fn receive(&mut self, into: &mut [u8]) -> std::io::Result<(usize, Option<u64>)>;
+
+    /// Writes as much of `bytes` as is taken at once.
+    ///
+    /// # Errors
+    /// `WouldBlock` when nothing is taken now; anything else ends the
+    /// connection.
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<usize>;
+}
+
 /// A command link to an arm. Both calls are RT-safe: bounded, no allocation,
 /// no waiting.
 pub trait ArmTransport {

@@ -1,7 +1,7 @@
 //! The command link over TCP: one write per command, replies matched by id
 //! whenever they come, never waited for.
 
-use super::{ArmTransport, LinkGone, Sent};
+use super::{ArmTransport, ByteWire, LinkGone, Sent};
 use crate::control::LinkInput;
 use crate::os::receive::{receive, stamp_arrivals};
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
@@ -18,15 +18,25 @@ const MAX_READS: usize = 4;
 /// Unacknowledged data for this long mean a broken connection.
 const USER_TIMEOUT: Duration = Duration::from_millis(1000);
 
-/// A connected, non-blocking command link.
+/// A connected, non-blocking command link, usually over a socket.
 #[derive(Debug)]
-pub struct TcpLink {
-    stream: TcpStream,
+pub struct TcpLink<W = TcpStream> {
+    stream: W,
     reader: FrameReader,
     transaction: u16,
     unanswered: heapless::Deque<(u16, u64), MAX_UNANSWERED>,
     /// Rest of a frame that the socket took only in part.
     rest: heapless::Vec<u8, MAX_FRAME_LEN>,
+}
+
+impl ByteWire for TcpStream {
+    fn receive(&mut self, into: &mut [u8]) -> std::io::Result<(usize, Option<u64>)> {
+        receive(self, into)
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.write(bytes)
+    }
 }
 
 impl TcpLink {
@@ -43,13 +53,21 @@ impl TcpLink {
         stream.set_nonblocking(true)?;
         // Without stamps a round trip is rounded up to the next look, no more.
         let _ = stamp_arrivals(&stream);
-        Ok(Self {
+        Ok(Self::over(stream))
+    }
+}
+
+impl<W: ByteWire> TcpLink<W> {
+    /// A link over a connected wire. Not RT-safe.
+    #[must_use]
+    pub fn over(stream: W) -> Self {
+        Self {
             stream,
             reader: FrameReader::new(),
             transaction: 1,
             unanswered: heapless::Deque::new(),
             rest: heapless::Vec::new(),
-        })
+        }
     }
 
     /// Writes what is left of the last frame; true when nothing is.
@@ -99,7 +117,7 @@ impl TcpLink {
 
     fn receive(&mut self, now_ns: u64, seen: &mut LinkInput) -> Result<(), LinkGone> {
         for _ in 0..MAX_READS {
-            match receive(&self.stream, self.reader.space()) {
+            match self.stream.receive(self.reader.space()) {
                 Ok((0, _)) => return Err(LinkGone),
                 Ok((n, arrival_ns)) => {
                     self.reader.commit(n);
@@ -116,8 +134,8 @@ impl TcpLink {
 }
 
 /// Bytes the socket took; 0 when it would have had to wait.
-fn write_once(stream: &mut TcpStream, bytes: &[u8]) -> Result<usize, LinkGone> {
-    match stream.write(bytes) {
+fn write_once(stream: &mut impl ByteWire, bytes: &[u8]) -> Result<usize, LinkGone> {
+    match stream.send(bytes) {
         Ok(0) => Err(LinkGone),
         Ok(n) => Ok(n),
         Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
@@ -125,7 +143,7 @@ fn write_once(stream: &mut TcpStream, bytes: &[u8]) -> Result<usize, LinkGone> {
     }
 }
 
-impl ArmTransport for TcpLink {
+impl<W: ByteWire> ArmTransport for TcpLink<W> {
     fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone> {
         if !self.flush_rest()? || self.unanswered.is_full() {
             return Ok(Sent::Skipped);

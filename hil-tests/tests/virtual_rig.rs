@@ -1,0 +1,188 @@
+//! Control core and simulated arm together in virtual time.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use hil_tests::arm::{ArmConfig, FaultScript};
+use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
+use rt_controller::control::{Motion, Thresholds};
+use shared_types::ipc::ControllerMode;
+use shared_types::plan::START_POSE;
+use shared_types::{FaultCode, JointTrajectory, JointVector, Limits};
+
+/// A swing of three joints from `from` and back, 1.5 s.
+fn swing(from: JointVector) -> Motion {
+    let mut out = from;
+    (out[1], out[3], out[5]) = (out[1] + 0.10, out[3] - 0.10, out[5] + 0.40);
+    let waypoints = [from, out, from];
+    Motion::Spline(JointTrajectory::new(&[0.0, 0.75, 1.5], &waypoints).unwrap())
+}
+
+fn rig(script: &str) -> VirtualRig {
+    let mut rig = VirtualRig::new(VirtualRigConfig {
+        limits: Limits::default(),
+        settings: Thresholds::strict().into(),
+        arm: ArmConfig {
+            initial_q: START_POSE,
+            faults: script.parse::<FaultScript>().unwrap(),
+            ..ArmConfig::default()
+        },
+        delay_s: 0.0002,
+    });
+    rig.bring_up().unwrap();
+    assert_eq!(rig.mode(), ControllerMode::Idle, "{:?}", rig.log.causes);
+    rig
+}
+
+fn run_swing(rig: &mut VirtualRig) {
+    rig.start(swing(rig.commanded()));
+    rig.run_for(2.5);
+}
+
+fn entry(on: &str, rest: &str) -> String {
+    format!("[[fault]]\n{on}\n{rest}\n")
+}
+
+/// Largest distance of the true motion from the swing as commanded, whatever
+/// the lag (rad).
+fn worst_distance(rig: &VirtualRig) -> f64 {
+    let motion = swing(rig.commanded());
+    let began = rig
+        .log
+        .records
+        .iter()
+        .find(|r| r.trajectory_s >= 0.0)
+        .unwrap()
+        .deadline_ns;
+    let at = |t_s: f64| motion.state_at(t_s.clamp(0.0, motion.duration_s())).q;
+    let off = |lag_s: f64| {
+        rig.log
+            .truth
+            .iter()
+            .filter(|s| s.at.0 >= began)
+            .map(|s| {
+                let t_s = (s.at.0 - began) as f64 * 1e-9 - lag_s;
+                (s.state.q - at(t_s)).max_abs()
+            })
+            .fold(0.0, f64::max)
+    };
+    (0..40)
+        .map(|k| off(f64::from(k) * 1e-3))
+        .fold(1.0, f64::min)
+}
+
+#[test]
+fn a_healthy_throw_passes_and_the_arm_follows() {
+    let mut rig = rig("");
+    run_swing(&mut rig);
+    assert!(rig.log.causes.is_empty(), "{:?}", rig.log.causes);
+    assert_eq!(rig.mode(), ControllerMode::Idle);
+    let setpoints: Vec<_> = rig.log.setpoints().collect();
+    assert!(
+        setpoints
+            .windows(2)
+            .all(|w| (3_900_000..4_100_000).contains(&(w[1].0.0 - w[0].0.0))),
+        "one setpoint per cycle"
+    );
+    let counters = rig.with_arm(|arm| arm.model().counters());
+    assert_eq!((counters.dropped, counters.ignored), (0, 0));
+    assert!(worst_distance(&rig) < 0.01, "{}", worst_distance(&rig));
+}
+
+/// Fault by fault: exactly one cause, of the kind expected, and rest.
+#[test]
+fn faults_of_the_arm_end_in_one_cause_each() {
+    use FaultCode as F;
+    let when = "on = \"speed:0.3\"";
+    let cases: [(&str, &[FaultCode]); 9] = [
+        ("kind = \"stall\"\nduration_s = 0.19", &[F::ReplyStalled]),
+        ("kind = \"connection_reset\"", &[F::LinkLost]),
+        ("kind = \"half_open\"", &[F::ReplyStalled]),
+        (
+            "kind = \"raise_error\"\ncode = 60",
+            &[F::ArmError, F::ArmNotReady],
+        ),
+        (
+            "kind = \"mode_changed\"\nmode = 0",
+            &[F::ArmNotReady, F::ArmModeChanged],
+        ),
+        ("kind = \"report_stop\"", &[F::ReportStale]),
+        (
+            "kind = \"tracking_lag\"\nlag_s = 0.2",
+            &[F::TrackingError, F::JointStuck, F::ReportFrozen],
+        ),
+        (
+            "kind = \"joint_stuck\"\njoint = 6",
+            &[F::TrackingError, F::JointStuck],
+        ),
+        (
+            "kind = \"encoder_jump\"\njoint = 4\nby_rad = 0.0873",
+            &[F::TrackingError, F::EncoderJump],
+        ),
+    ];
+    for (kind, want) in cases {
+        let mut rig = rig(&entry(when, kind));
+        run_swing(&mut rig);
+        let causes: Vec<_> = rig.log.causes.iter().map(|c| c.fault()).collect();
+        assert_eq!(causes.len(), 1, "{kind}: {causes:?}");
+        assert!(want.contains(&causes[0]), "{kind}: {causes:?}");
+        assert_eq!(rig.mode(), ControllerMode::Faulted, "{kind}");
+        let speed = rig.with_arm(|arm| arm.model().true_motion().qd.max_abs());
+        assert!(speed < 1e-3, "{kind}: {speed}");
+        // Nothing moves it again without an acknowledgement.
+        let before = rig.log.setpoints().count();
+        rig.start(swing(rig.commanded()));
+        rig.run_for(0.5);
+        assert_eq!(rig.log.setpoints().count(), before, "{kind}");
+    }
+}
+
+#[test]
+fn after_a_stop_and_an_acknowledgement_it_works_again() {
+    let mut rig = rig(&entry(
+        "on = \"speed:0.3\"",
+        "kind = \"raise_error\"\ncode = 31",
+    ));
+    run_swing(&mut rig);
+    assert_eq!(rig.log.causes.len(), 1);
+    rig.bring_up().unwrap();
+    assert_eq!(rig.mode(), ControllerMode::Idle);
+    assert_eq!(rig.log.causes.len(), 1);
+}
+
+/// Same set-up, same bits; another seed, another arm.
+#[test]
+fn two_runs_are_equal_bit_for_bit() {
+    let script = entry(
+        "at_s = 0.5",
+        "kind = \"replies_lost\"\nshare = 0.02\nduration_s = 1",
+    ) + &entry("at_s = 0.6", "kind = \"report_garbage\"\nframes = 2")
+        + &entry(
+            "on = \"speed:0.3\"",
+            "kind = \"replies_duplicated\"\nduration_s = 0.5",
+        );
+    let run = |seed: u64| {
+        let mut rig = VirtualRig::new(VirtualRigConfig {
+            limits: Limits::default(),
+            settings: Thresholds::relaxed().into(),
+            arm: ArmConfig {
+                initial_q: START_POSE,
+                faults: script.parse::<FaultScript>().unwrap(),
+                seed,
+                ..ArmConfig::default()
+            },
+            delay_s: 0.0003,
+        });
+        rig.bring_up().unwrap();
+        rig.oversleep([0, 0, 900_000, 0, 5_000_000, 0]);
+        run_swing(&mut rig);
+        let last: JointVector = rig.log.truth.last().unwrap().state.q;
+        (format!("{:?}{:?}", rig.log.records, rig.log.inputs), last)
+    };
+    let (first, second) = (run(1), run(1));
+    assert!(first.0 == second.0 && first.1 == second.1);
+    assert!(run(2).0 != first.0);
+}
