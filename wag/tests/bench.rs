@@ -40,8 +40,10 @@ fn bench_rope_prints_one_whole_json_object() {
         .collect();
     assert!(kernels.contains(&"PortableF32") && kernels.contains(&"ScalarF64"));
     for row in rows("kernels") {
-        for key in ["/lanes", "/still_ns", "/throw_ns", "/simulated_s_per_cpu_s"] {
-            positive(row, key);
+        positive(row, "/lanes");
+        positive(row, "/simulated_s_per_cpu_s");
+        for key in ["still", "throw", "floor_far", "on_floor"] {
+            positive(row, &format!("/{key}_ns"));
         }
     }
     for job in ["throw", "wiggle"] {

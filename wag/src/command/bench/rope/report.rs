@@ -32,6 +32,8 @@ impl Report {
                 row.lanes.to_string(),
                 format!("{:.0}", row.still_ns),
                 format!("{:.0}", row.throw_ns),
+                format!("{:.0}", row.floor_far_ns),
+                format!("{:.0}", row.on_floor_ns),
                 format!("{:.0}", row.simulated_s_per_cpu_s),
             ]
         });
@@ -40,6 +42,8 @@ impl Report {
             "ropes side by side",
             "frame still (ns)",
             "arm spline each (ns)",
+            "floor far below (ns)",
+            "falls on floor (ns)",
             "simulated s per CPU s",
         ];
         println!("{}", numbers(header, 0, rows));

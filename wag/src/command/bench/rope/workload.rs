@@ -3,8 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Kernel, PlannedArm, Precision, Rollout, SimOptions,
-    SimulateError, Start, Watch, roll_out_with,
+    AttachMotion, Candidate, FrameTimes, Kernel, Obstacle, PlannedArm, Precision, Rollout, Scene,
+    Shape, SimOptions, SimulateError, Start, Watch, roll_out_in_with,
 };
 use shared_types::rope::RANGES;
 use shared_types::trajectory::TrajectoryError;
@@ -20,6 +20,8 @@ const THROWS: usize = 4096;
 const POSE: [f64; 7] = [0.0, -0.5, 0.0, 1.0, 0.0, 1.6, 0.0];
 /// Point whose distance to the lead is watched (m).
 const TARGET_M: [f64; 3] = [1.2, 0.0, 0.6];
+/// Friction of the floor.
+const FRICTION: f64 = 0.5;
 
 /// Ropes and motions.
 #[derive(Debug)]
@@ -73,6 +75,16 @@ impl Workload {
             .map(|rope| Candidate::new(rope, motion))
             .collect()
     }
+
+    /// A floor this far below the clamp of the arm that stands still.
+    pub fn floor(&self, below_m: f64) -> Scene {
+        let clamp_m = self.still.at(0.0).p_m;
+        let top_m = [clamp_m.x, clamp_m.y, clamp_m.z - below_m];
+        Scene {
+            obstacles: vec![Obstacle::fixed(Shape::HalfSpace, top_m, FRICTION)],
+            domino: None,
+        }
+    }
 }
 
 /// Throws: steps of 0.5 ms, closest approach watched, nothing recorded.
@@ -97,7 +109,20 @@ pub fn roll_out(
     candidates: &[Candidate],
     options: &SimOptions,
 ) -> Result<(f64, Vec<Rollout>), SimulateError> {
-    let rollouts = roll_out_with(kernel, candidates, options)?;
+    roll_out_in(&Scene::EMPTY, kernel, candidates, options)
+}
+
+/// As [`roll_out`], among obstacles.
+///
+/// # Errors
+/// What the simulator refuses.
+pub fn roll_out_in(
+    scene: &Scene,
+    kernel: Kernel,
+    candidates: &[Candidate],
+    options: &SimOptions,
+) -> Result<(f64, Vec<Rollout>), SimulateError> {
+    let rollouts = roll_out_in_with(kernel, scene, candidates, options)?;
     #[allow(clippy::cast_precision_loss, reason = "some thousands")]
     let rope_steps = options.horizon_s / options.step_s * rollouts.len() as f64;
     Ok((rope_steps, rollouts))
