@@ -7,7 +7,8 @@
 //! here and never reaches the arm.
 
 use crate::control::Motion;
-use crate::control::limiter::Limiter;
+use crate::control::brake::unstoppable;
+use crate::control::limiter::{Allowance, Limiter};
 use crate::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
 use rsruckig::prelude::*;
 use shared_types::{FaultCode, JOINTS, JointVector, Limits};
@@ -85,9 +86,19 @@ pub fn plan_move(
 pub fn verify(motion: &Motion, limits: &Limits) -> Result<(), FaultCode> {
     let period_s = limits.period_s();
     let mut limiter = Limiter::at_rest(motion.start(), limits);
+    let allowed = Allowance {
+        tcp_speed_max_m_s: limits.tcp_speed_max_m_s,
+        streamed: matches!(motion, Motion::Spline(_)),
+    };
     let mut t_s = 0.0;
     loop {
-        limiter.admit(&motion.state_at(t_s).q, period_s, limits)?;
+        let state = motion.state_at(t_s);
+        limiter
+            .admit(&state.q, period_s, limits, &allowed)
+            .map_err(|found| found.fault)?;
+        if unstoppable(&state, limits).is_some() {
+            return Err(FaultCode::SetpointUnstoppable);
+        }
         if t_s > motion.duration_s() + period_s {
             return Ok(());
         }

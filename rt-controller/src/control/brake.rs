@@ -8,9 +8,21 @@
 use super::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
 use shared_types::{JOINTS, JointState, Limits};
 
-/// Brake of all joints from `from` to rest. RT-safe.
+/// Brake of all joints from `from` to rest with the jerk of motions the
+/// controller makes itself. RT-safe.
 #[must_use]
 pub fn brake(from: &JointState, limits: &Limits) -> PhasedMotion {
+    brake_with_jerk(from, limits, |j| limits.jerk_max_rad_s3[j])
+}
+
+/// Brake of all joints from `from` to rest; `jerk_max` gives the jerk of each
+/// joint, 0-based (rad/s³). RT-safe.
+#[must_use]
+pub fn brake_with_jerk(
+    from: &JointState,
+    limits: &Limits,
+    jerk_max: impl Fn(usize) -> f64,
+) -> PhasedMotion {
     let mut axes = [AxisPhases::default(); JOINTS];
     for (j, axis) in axes.iter_mut().enumerate() {
         let start = AxisState {
@@ -18,14 +30,43 @@ pub fn brake(from: &JointState, limits: &Limits) -> PhasedMotion {
             qd: from.qd[j],
             qdd: from.qdd[j],
         };
-        *axis = brake_axis(
-            start,
-            limits.acceleration_max_rad_s2[j],
-            limits.jerk_max_rad_s3[j],
-        );
+        *axis = brake_axis(start, limits.acceleration_max_rad_s2[j], jerk_max(j));
     }
     PhasedMotion::new(axes)
 }
+
+/// The joint (0-based) and the end (rad) of its range that even the hardest
+/// brake from `from` would pass, if there is one. RT-safe.
+///
+/// A setpoint is only sent when the arm can still stop after it; so the brake
+/// never has to leave a joint's range.
+#[must_use]
+pub fn unstoppable(from: &JointState, limits: &Limits) -> Option<(usize, f64, f64)> {
+    let hardest = 1.0 / limits.period_s();
+    (0..JOINTS).find_map(|j| {
+        let start = AxisState {
+            q: from.q[j],
+            qd: from.qd[j],
+            qdd: from.qdd[j],
+        };
+        let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
+        let acceleration = limits.acceleration_max_rad_s2[j];
+        let passes = |jerk: f64| {
+            let (least, most) = brake_axis(start, acceleration, jerk).range();
+            if most > high + ROUNDING_RAD {
+                Some((j, most, high))
+            } else if least < low - ROUNDING_RAD {
+                Some((j, least, low))
+            } else {
+                None
+            }
+        };
+        passes(limits.jerk_max_rad_s3[j]).and_then(|_| passes(acceleration * hardest))
+    })
+}
+
+/// Rounding of positions (rad).
+const ROUNDING_RAD: f64 = 1e-9;
 
 /// Fastest way to rest of one joint.
 ///

@@ -1,78 +1,96 @@
 //! One control cycle: [`ControlState::step`], a pure function of its input and
-//! its own state.
+//! its own state. Orders are obeyed in [`super::orders`], faults met in
+//! [`super::faults`].
 
 use super::arming::ArmingState;
-use super::brake::brake;
-use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput, Order};
-use super::limiter::Limiter;
+use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput};
+use super::finding::Finding;
+use super::limiter::{Allowance, Limiter};
 use super::mode::{Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
-use super::phases::PhasedMotion;
-use super::reaction::{Path, Reaction, reaction};
+use super::reaction::{Path, reaction};
 use super::settings::ControlSettings;
-use crate::xarm::{StateRequest, Status};
+use super::stopping::Stop;
+use super::velocity_wire::VelocityWire;
+use crate::xarm::Status;
 use shared_types::ipc::{
     CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION,
 };
-use shared_types::{Arming, FaultCode, JointState, JointVector, Limits, MonotonicNs, MotionTier};
-
-/// Starts closer than this are equal (rad); a larger difference would be a jump.
-const START_TOLERANCE_RAD: f64 = 1e-9;
+use shared_types::{FaultCode, JointState, JointVector, Limits, MonotonicNs, MotionTier, WireMode};
 
 #[derive(Debug)]
-struct Running {
-    id: u64,
-    start_ns: u64,
-    motion: Box<Motion>,
+pub(super) struct Running {
+    pub(super) id: u64,
+    pub(super) start_ns: u64,
+    pub(super) motion: Box<Motion>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Brake {
-    start_ns: u64,
-    phases: PhasedMotion,
+pub(super) struct Stopping {
+    pub(super) start_ns: u64,
+    pub(super) stop: Stop,
 }
 
 /// State of the control cycle. Sized once; stepping never allocates.
+///
+/// An adoption makes it anew, apart from its counters: a recorded run can be
+/// stepped again from any adoption on, see [`ControlState::resume`].
 #[derive(Debug)]
 pub struct ControlState {
-    limits: Limits,
-    settings: ControlSettings,
-    mode: ControllerMode,
-    fault: FaultCode,
-    cause: CauseRecord,
-    arming: ArmingState,
-    cycle: u64,
-    motions_done: u64,
-    commanded: JointState,
-    sent_ns: u64,
-    limiter: Limiter,
-    monitor: Monitor,
-    running: Option<Running>,
-    brake: Option<Brake>,
+    pub(super) limits: Limits,
+    pub(super) settings: ControlSettings,
+    pub(super) mode: ControllerMode,
+    pub(super) fault: FaultCode,
+    pub(super) cause: CauseRecord,
+    pub(super) arming: ArmingState,
+    pub(super) cycle: u64,
+    pub(super) motions_done: u64,
+    pub(super) commanded: JointState,
+    pub(super) sent_ns: u64,
+    pub(super) limiter: Limiter,
+    pub(super) tcp_speed_max_m_s: f64,
+    pub(super) wire: VelocityWire,
+    pub(super) monitor: Monitor,
+    pub(super) running: Option<Running>,
+    pub(super) stopping: Option<Stopping>,
 }
 
 impl ControlState {
     /// Offline, nothing known.
     #[must_use]
     pub fn new(limits: Limits, settings: impl Into<ControlSettings>) -> Self {
+        Self::resume(limits, settings, 0, 0)
+    }
+
+    /// Offline after `cycle` cycles and `motions_done` motions: what a record
+    /// that begins later, with an adoption, is stepped again from.
+    #[must_use]
+    pub fn resume(
+        limits: Limits,
+        settings: impl Into<ControlSettings>,
+        cycle: u64,
+        motions_done: u64,
+    ) -> Self {
         let q = JointVector::ZERO;
         let settings = settings.into();
         Self {
             limiter: Limiter::at_rest(q, &limits),
+            tcp_speed_max_m_s: limits.tcp_speed_max_m_s,
             limits,
             settings,
             mode: ControllerMode::Offline,
             fault: FaultCode::None,
             cause: CauseRecord::default(),
             arming: ArmingState::Disarmed,
-            cycle: 0,
-            motions_done: 0,
+            cycle,
+            motions_done,
             commanded: JointState::at_rest(q),
             sent_ns: 0,
-            monitor: Monitor::new(settings.thresholds),
+            wire: VelocityWire::default(),
+            monitor: Monitor::new(settings, 0, q),
             running: None,
-            brake: None,
+            stopping: None,
         }
     }
 
@@ -86,6 +104,12 @@ impl ControlState {
     #[must_use]
     pub fn period_s(&self) -> f64 {
         self.limits.period_s()
+    }
+
+    /// Number of the newest cycle.
+    #[must_use]
+    pub const fn cycle(&self) -> u64 {
+        self.cycle
     }
 
     /// State for the blackboard; stamp and real-time flag are the caller's.
@@ -107,49 +131,58 @@ impl ControlState {
         }
     }
 
-    /// Number of the newest cycle.
-    #[must_use]
-    pub const fn cycle(&self) -> u64 {
-        self.cycle
-    }
-
     /// One cycle: observe, watch, obey, command. RT-safe; returns for any input.
     pub fn step(&mut self, input: CycleInput) -> CycleOutput {
         let mut out = CycleOutput::default();
+        let mut input = input;
         self.cycle = self.cycle.wrapping_add(1);
         if !self.mode.is_moving() {
             self.retire(&mut out);
         }
-        self.monitor.observe(&input);
+        self.monitor.observe(&input, &self.limits);
         self.watch(&input, &mut out);
-        let deadline_ns = input.deadline_ns;
-        if let Some(order) = input.order {
-            self.obey(order, deadline_ns, input.link.lost, &mut out);
+        if let Some(order) = input.order.take() {
+            self.obey(order, &input, &mut out);
         }
+        let deadline_ns = input.deadline_ns;
         let trajectory_s = self.trajectory_s(deadline_ns);
-        self.command(deadline_ns, &mut out);
-        out.record = self.record(deadline_ns, input.missed, trajectory_s, &out);
-        out.record.reply_ns = input.link.reply_ns;
+        if input.link.unanswered < self.settings.thresholds.unanswered_max {
+            self.command(deadline_ns, &mut out);
+        } else {
+            // Nothing may queue up behind a stall and burst out after it.
+            self.monitor.held_back();
+        }
+        out.record = self.record(&input, trajectory_s, &out);
         out
     }
 
-    /// Time on the running motion (s), negative when none runs.
-    fn trajectory_s(&self, deadline_ns: u64) -> f64 {
-        self.running
-            .as_ref()
-            .filter(|_| self.mode.is_moving())
-            .map_or(-1.0, |r| {
-                MonotonicNs(deadline_ns).since_s(MonotonicNs(r.start_ns))
-            })
+    /// Time on the running motion (s) and the rate at which it is followed,
+    /// from the last setpoint's or this cycle's instant.
+    pub(super) fn path_at(&self, at_ns: u64) -> Option<(f64, f64)> {
+        let running = self.running.as_ref().filter(|_| self.mode.is_moving())?;
+        let since_s = |begin_ns| MonotonicNs(at_ns).since_s(MonotonicNs(begin_ns));
+        Some(match self.stopping {
+            Some(Stopping {
+                start_ns,
+                stop: Stop::Slow(slow),
+            }) => {
+                let (path_s, rate, _) = slow.at(since_s(start_ns));
+                (path_s, rate)
+            }
+            Some(Stopping {
+                stop: Stop::Brake(_),
+                ..
+            }) => (since_s(running.start_ns), 0.0),
+            None => (since_s(running.start_ns), 1.0),
+        })
     }
 
-    fn record(
-        &self,
-        deadline_ns: u64,
-        missed: u32,
-        trajectory_s: f64,
-        out: &CycleOutput,
-    ) -> CycleRecord {
+    /// Time on the running motion (s), negative when none runs.
+    pub(super) fn trajectory_s(&self, deadline_ns: u64) -> f64 {
+        self.path_at(deadline_ns).map_or(-1.0, |(path_s, _)| path_s)
+    }
+
+    fn record(&self, input: &CycleInput, trajectory_s: f64, out: &CycleOutput) -> CycleRecord {
         let (q, q_stamp_ns) = self
             .monitor
             .report()
@@ -160,17 +193,25 @@ impl ControlState {
             sent: u8::from(out.command.is_some()),
             fault: self.fault as u16,
             cycle: self.cycle,
-            deadline_ns,
-            missed,
+            deadline_ns: input.deadline_ns,
+            reply_ns: input.link.reply_ns,
+            missed: input.missed,
             trajectory_s,
             q_c: self.commanded.q,
             q,
             q_stamp_ns,
+            path_rate: self
+                .path_at(input.deadline_ns)
+                .map_or(0.0, |(_, rate)| rate),
+            qd_wire: match out.command {
+                Some(ArmCommand::Velocity { qd, .. }) => qd,
+                Some(ArmCommand::Position(_)) | None => JointVector::ZERO,
+            },
             ..CycleRecord::default()
         }
     }
 
-    /// Asks the monitors and reacts.
+    /// Asks the monitors and reacts; an arming ends where it must.
     fn watch(&mut self, input: &CycleInput, out: &mut CycleOutput) {
         match self.mode {
             ControllerMode::Offline => {}
@@ -188,190 +229,42 @@ impl ControlState {
             | ControllerMode::Moving
             | ControllerMode::Streaming
             | ControllerMode::Braking => {
-                if let Some(fault) = self.monitor.fault(input, self.mode) {
-                    self.react(fault, input.deadline_ns, out);
+                let than = self.stopping.map_or(Path::Continue, |s| s.stop.path());
+                let missed = self.missed(input);
+                if let Some(found) = self.monitor.finding(input, missed, self.mode, than) {
+                    self.react(found, input.deadline_ns, out);
                 }
+            }
+        }
+        if self.mode == ControllerMode::Idle {
+            if input.operator.released != 0 {
+                self.disarm(FaultCode::DeadManReleased, out);
+            } else if self.arming.is_expired(input.deadline_ns) {
+                self.disarm(FaultCode::ArmingExpired, out);
             }
         }
     }
 
-    fn obey(&mut self, order: Order, deadline_ns: u64, lost: bool, out: &mut CycleOutput) {
-        match order {
-            // A link that broke on its way here.
-            Order::Adopt { .. } if lost => {
-                let fault = FaultCode::LinkLost;
-                emit(out, ControlEvent::Refused { id: None, fault });
-            }
-            Order::Adopt { hold } => match self.adopt(hold, deadline_ns) {
-                Ok(()) => emit(out, ControlEvent::Adopted),
-                Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),
-            },
-            Order::Run { id, motion } => match self.admit(&motion, deadline_ns) {
-                Ok((mode, tier)) => {
-                    self.mode = mode;
-                    if self.settings.arming_required
-                        && mode == ControllerMode::Streaming
-                        && tier == MotionTier::Throw
-                    {
-                        self.arming = ArmingState::Spent;
-                    }
-                    self.monitor.motion_begins(deadline_ns);
-                    self.running = Some(Running {
-                        id,
-                        start_ns: deadline_ns,
-                        motion,
-                    });
-                    let start_ns = deadline_ns;
-                    emit(out, ControlEvent::Started { id, start_ns });
-                }
-                Err(fault) => {
-                    emit(
-                        out,
-                        ControlEvent::Refused {
-                            id: Some(id),
-                            fault,
-                        },
-                    );
-                    give_back(out, motion);
-                }
-            },
-            Order::Stop => self.react(FaultCode::OperatorStop, deadline_ns, out),
-            Order::Arm(arming) => self.arm(arming, deadline_ns, out),
-            Order::Disarm => {
-                if self.mode.is_moving() {
-                    self.react(FaultCode::Disarmed, deadline_ns, out);
-                } else {
-                    self.disarm(FaultCode::None, out);
-                }
-            }
-        }
-    }
-
-    fn arm(&mut self, arming: Arming, deadline_ns: u64, out: &mut CycleOutput) {
-        let taken = if self.mode == ControllerMode::Idle {
-            self.arming.arm(arming, deadline_ns)
-        } else {
-            Err(FaultCode::WrongMode)
-        };
-        emit(
-            out,
-            match taken {
-                Ok(arming) => ControlEvent::Armed(arming),
-                Err(fault) => ControlEvent::Refused { id: None, fault },
-            },
-        );
-    }
-
-    fn disarm(&mut self, fault: FaultCode, out: &mut CycleOutput) {
-        if core::mem::take(&mut self.arming) != ArmingState::Disarmed {
-            emit(out, ControlEvent::Disarmed { fault });
-        }
-    }
-
-    fn adopt(&mut self, hold: JointVector, deadline_ns: u64) -> Result<(), FaultCode> {
-        let mode = next_mode(self.mode, Trigger::Adopt).ok_or(FaultCode::WrongMode)?;
-        if !hold.is_finite() {
-            return Err(FaultCode::SetpointNotFinite);
-        }
-        if self.limits.position_violation(&hold).is_some() {
-            return Err(FaultCode::SetpointPosition);
-        }
-        self.mode = mode;
-        self.fault = FaultCode::None;
-        self.commanded = JointState::at_rest(hold);
-        self.limiter = Limiter::at_rest(hold, &self.limits);
-        self.sent_ns = MonotonicNs(deadline_ns).plus_s(-self.period_s()).0;
-        self.monitor.adopt(deadline_ns, hold);
-        Ok(())
-    }
-
-    /// Whether a motion may begin now, and the mode it runs in.
-    fn admit(
-        &self,
-        motion: &Motion,
-        deadline_ns: u64,
-    ) -> Result<(ControllerMode, MotionTier), FaultCode> {
-        let trigger = match motion {
-            Motion::Spline(_) => Trigger::StreamBegun,
-            Motion::Move { .. } => Trigger::MoveBegun,
-        };
-        let mode = next_mode(self.mode, trigger).ok_or(FaultCode::WrongMode)?;
-        let off = motion.start().zip_with(self.commanded.q, |a, b| a - b);
-        if !off.is_finite() || off.max_abs() > START_TOLERANCE_RAD {
-            return Err(FaultCode::StartPoseMismatch);
-        }
-        if self.monitor.report_is_stale(deadline_ns) {
-            return Err(FaultCode::ReportStale);
-        }
-        let tier = if self.settings.arming_required {
-            self.arming.admit(deadline_ns)?
-        } else {
-            MotionTier::Throw
-        };
-        Ok((mode, tier))
-    }
-
-    /// Meets a fault by the table in [`reaction`]; the first cause is kept.
-    fn react(&mut self, fault: FaultCode, deadline_ns: u64, out: &mut CycleOutput) {
-        let how = reaction(fault);
-        let trigger = if how.path == Path::Silence {
-            Trigger::LatchFault
-        } else {
-            Trigger::BrakeFault
-        };
-        let Some(mode) = next_mode(self.mode, trigger) else {
-            return;
-        };
-        if self.mode != ControllerMode::Braking {
-            self.fault = fault;
-            self.cause = self.cause_of(fault, how, deadline_ns);
-        }
-        self.mode = mode;
-        if mode == ControllerMode::Braking {
-            self.brake = Some(Brake {
-                start_ns: self.sent_ns,
-                phases: brake(&self.commanded, &self.limits),
-            });
-        } else {
-            self.latch(how.stop_arm, out);
-        }
-    }
-
-    /// The record of a cause that was just noticed.
-    fn cause_of(&self, fault: FaultCode, how: Reaction, deadline_ns: u64) -> CauseRecord {
-        CauseRecord {
-            version: PAYLOAD_VERSION,
-            code: fault as u16,
-            mode: self.mode as u8,
-            path: how.path as u8,
-            stop_arm: u8::from(how.stop_arm),
-            tier: self.arming.raw_tier(),
-            cycle: self.cycle,
-            stamp_ns: deadline_ns,
-            motion_id: self.running.as_ref().map_or(0, |r| r.id),
-            trajectory_s: self.trajectory_s(deadline_ns),
-            ..CauseRecord::default()
-        }
-    }
-
-    /// The end of every stop: no setpoints any more, the arm rests.
-    fn latch(&mut self, stop_arm: bool, out: &mut CycleOutput) {
-        self.commanded = JointState::at_rest(self.commanded.q);
-        self.brake = None;
-        if stop_arm {
-            out.request = Some(StateRequest::Stop);
-        }
-        self.disarm(self.fault, out);
-        self.cause.rest_cycle = self.cycle;
-        emit(out, ControlEvent::Latched(self.cause));
+    /// Cycles without a setpoint before this one, as the caller counts them or as
+    /// the deadlines show; the larger number, so that a jump of time is never
+    /// taken for a step of a cycle.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturates"
+    )]
+    fn missed(&self, input: &CycleInput) -> u32 {
+        let gap_s = MonotonicNs(input.deadline_ns).since_s(MonotonicNs(self.sent_ns));
+        let cycles = (gap_s / self.period_s()).round() as u32;
+        input.missed.max(cycles.saturating_sub(1))
     }
 
     /// Computes, checks and commands this cycle's setpoint.
     fn command(&mut self, deadline_ns: u64, out: &mut CycleOutput) {
         if self.mode == ControllerMode::Idle {
             let hold = JointState::at_rest(self.commanded.q);
-            if let Err(fault) = self.try_send(hold, deadline_ns, out) {
-                self.react(fault, deadline_ns, out);
+            if let Err(found) = self.try_send(hold, false, deadline_ns, out) {
+                self.react(found, deadline_ns, out);
             }
             return;
         }
@@ -381,23 +274,28 @@ impl ControlState {
         ) {
             match self.follow(deadline_ns, out) {
                 Ok(()) => return,
-                Err(fault) => self.react(fault, deadline_ns, out),
+                Err(found) => self.react(found, deadline_ns, out),
             }
         }
         if self.mode == ControllerMode::Braking {
-            self.follow_brake(deadline_ns, out);
+            self.follow_stop(deadline_ns, out);
         }
     }
 
-    fn follow(&mut self, deadline_ns: u64, out: &mut CycleOutput) -> Result<(), FaultCode> {
+    fn follow(&mut self, deadline_ns: u64, out: &mut CycleOutput) -> Result<(), Finding> {
         let Some(running) = &self.running else {
-            return Err(FaultCode::WrongMode);
+            return Err(Finding::plain(FaultCode::SetpointNotFinite));
         };
         let (id, start_ns) = (running.id, running.start_ns);
         let t_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(start_ns));
         let done = t_s >= running.motion.duration_s();
         let target = running.motion.state_at(t_s);
-        self.try_send(target, deadline_ns, out)?;
+        let streamed = self.mode == ControllerMode::Streaming;
+        if let Some((joint, q_rad, end_rad)) = super::brake::unstoppable(&target, &self.limits) {
+            let fault = FaultCode::SetpointUnstoppable;
+            return Err(Finding::of_joint(fault, joint, q_rad, end_rad));
+        }
+        self.try_send(target, streamed, deadline_ns, out)?;
         if done && let Some(mode) = next_mode(self.mode, Trigger::MotionDone) {
             self.mode = mode;
             self.commanded = JointState::at_rest(self.commanded.q);
@@ -418,25 +316,32 @@ impl ControlState {
         Ok(())
     }
 
-    /// Follows the brake. If even that breaks a limit (a joint too close to the
-    /// end of its range, say), nothing is sent and the arm stops itself.
-    fn follow_brake(&mut self, deadline_ns: u64, out: &mut CycleOutput) {
-        let Some(Brake { start_ns, phases }) = self.brake else {
+    /// Follows the way to rest. If even that breaks a limit, nothing is sent and
+    /// the arm stops itself.
+    fn follow_stop(&mut self, deadline_ns: u64, out: &mut CycleOutput) {
+        let (Some(Stopping { start_ns, stop }), Some(running)) = (self.stopping, &self.running)
+        else {
             return;
         };
         let t_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(start_ns));
-        let sent = self.try_send(phases.state_at(t_s), deadline_ns, out);
-        let ended = t_s >= phases.duration_s();
+        let target = stop.state_at(&running.motion, t_s);
+        let sent = self.try_send(target, true, deadline_ns, out);
+        let ended = t_s >= stop.duration_s();
         let trigger = if sent.is_err() {
             Trigger::LatchFault
         } else {
             Trigger::BrakeDone
         };
+        if let Err(found) = sent {
+            self.cause.second_code = found.fault as u16;
+        }
         if (ended || sent.is_err())
             && let Some(mode) = next_mode(self.mode, trigger)
         {
             self.mode = mode;
-            self.latch(sent.is_err() || reaction(self.fault).stop_arm, out);
+            let stop_arm =
+                sent.is_err() || self.cause.stop_arm != 0 || reaction(self.fault).stop_arm;
+            self.latch(stop_arm, out);
         }
     }
 
@@ -444,19 +349,46 @@ impl ControlState {
     fn try_send(
         &mut self,
         target: JointState,
+        streamed: bool,
         deadline_ns: u64,
         out: &mut CycleOutput,
-    ) -> Result<(), FaultCode> {
+    ) -> Result<(), Finding> {
         let step_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(self.sent_ns));
         if !target.is_finite() {
-            return Err(FaultCode::SetpointNotFinite);
+            return Err(Finding::plain(FaultCode::SetpointNotFinite));
         }
-        self.limiter.admit(&target.q, step_s, &self.limits)?;
+        let allowed = Allowance {
+            tcp_speed_max_m_s: self.tcp_speed_max_m_s,
+            streamed,
+        };
+        self.limiter
+            .admit(&target.q, step_s, &self.limits, &allowed)?;
         self.commanded = target;
         self.sent_ns = deadline_ns;
         self.monitor.sent(deadline_ns, target.q);
-        out.command = Some(ArmCommand::Position(target.q));
+        out.command = Some(match self.settings.wire {
+            WireMode::ServoPosition => ArmCommand::Position(target.q),
+            WireMode::JointVelocity => self.wire.command(
+                &target,
+                &self.monitor.off(),
+                step_s,
+                &self.limits,
+                self.tcp_speed_max_m_s,
+            ),
+        });
         Ok(())
+    }
+
+    /// Tool speed a motion of `mode` may show under `tier` (m/s). Moves the
+    /// controller makes itself never go faster than a wiggle once arming is in
+    /// force, whatever is armed.
+    pub(super) fn tool_speed_of(&self, mode: ControllerMode, tier: MotionTier) -> f64 {
+        let tier = if mode == ControllerMode::Moving && self.settings.arming_required {
+            tier.min(MotionTier::Wiggle)
+        } else {
+            tier
+        };
+        self.settings.tiers.of(tier, self.limits.tcp_speed_max_m_s)
     }
 
     fn retire(&mut self, out: &mut CycleOutput) {
@@ -466,16 +398,21 @@ impl ControlState {
     }
 }
 
-/// A cycle has at most four events (an order's, an end, a disarming, a latch): they fit.
-fn emit(out: &mut CycleOutput, event: ControlEvent) {
+/// A cycle has at most five events (an order's, an end, two disarmings, a latch):
+/// they fit.
+pub(super) fn emit(out: &mut CycleOutput, event: ControlEvent) {
     let _ = out.events.push(event);
 }
 
 /// A cycle retires at most two motions (the last one, a refused one): they fit.
-fn give_back(out: &mut CycleOutput, motion: Box<Motion>) {
+pub(super) fn give_back(out: &mut CycleOutput, motion: Box<Motion>) {
     let _ = out.retired.push(motion);
 }
 
 #[cfg(test)]
 #[path = "cycle_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "random_tests.rs"]
+mod random_tests;

@@ -1,6 +1,6 @@
 //! The last gate before the wire: no setpoint passes that breaks a limit.
 //!
-//! Velocity and acceleration are divided differences of the setpoints that
+//! Velocity, acceleration and jerk are divided differences of the setpoints that
 //! were really sent, at the times they were planned for. By the mean value
 //! theorem those never exceed the largest derivative of the curve they sample,
 //! so a curve within its limits always passes, missed cycles or not, and
@@ -11,21 +11,42 @@
     reason = "arithmetic of float vectors only, which cannot overflow or panic"
 )]
 
+use super::finding::Finding;
 use nalgebra::Vector3;
 use shared_types::{FaultCode, JOINTS, JointVector, Limits, kinematics};
 
-/// Relative slack for rounding.
-const RELATIVE: f64 = 1e-6;
-/// Absolute slack: rounding of positions (1e-15 rad) divided by a period twice.
-const ABSOLUTE: f64 = 1e-6;
+/// Relative slack.
+const RELATIVE: f64 = 1e-9;
+/// Rounding of positions (rad), and what one, two and three divisions by a
+/// period make of it (rad/s, rad/s², rad/s³).
+const ROUNDING: [f64; 4] = [1e-9, 1e-9, 1e-8, 1e-5];
+/// Longest way of the tool from one setpoint to the next (m): the vendor's
+/// advice, per cycle also where cycles were missed.
+pub const STEP_MAX_M: f64 = 0.010;
+/// Setpoints that a divided difference of third order looks back on.
+const WINDOW: u8 = 3;
+
+/// What may differ from motion to motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Allowance {
+    /// Largest tool speed (m/s).
+    pub tcp_speed_max_m_s: f64,
+    /// An uploaded trajectory: a clamped spline steps its acceleration at both
+    /// ends, so the jerk between setpoints may come to one full acceleration
+    /// per cycle. Motions the controller makes itself keep the jerk limit.
+    pub streamed: bool,
+}
 
 /// What was sent last, and how fast that was. RT-safe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limiter {
     q: JointVector,
     qd: JointVector,
+    qdd: JointVector,
     step_s: f64,
+    step_before_s: f64,
     p_w_tcp_m: Vector3<f64>,
+    streamed_left: u8,
 }
 
 impl Limiter {
@@ -35,8 +56,11 @@ impl Limiter {
         Self {
             q,
             qd: JointVector::ZERO,
+            qdd: JointVector::ZERO,
             step_s: limits.period_s(),
+            step_before_s: limits.period_s(),
             p_w_tcp_m: tcp(&q, limits),
+            streamed_left: 0,
         }
     }
 
@@ -50,41 +74,110 @@ impl Limiter {
         q: &JointVector,
         step_s: f64,
         limits: &Limits,
-    ) -> Result<(), FaultCode> {
+        allowed: &Allowance,
+    ) -> Result<(), Finding> {
         if !q.is_finite() || !step_s.is_finite() || step_s <= 0.0 {
-            return Err(FaultCode::SetpointNotFinite);
+            return Err(Finding::plain(FaultCode::SetpointNotFinite));
         }
-        if limits.position_violation(q).is_some() {
-            return Err(FaultCode::SetpointPosition);
-        }
+        let streamed_left = if allowed.streamed {
+            WINDOW
+        } else {
+            self.streamed_left.saturating_sub(1)
+        };
         let qd = (*q - self.q) * (1.0 / step_s);
         let qdd = (qd - self.qd) * (2.0 / (step_s + self.step_s));
+        let jerk = (qdd - self.qdd) * (3.0 / (step_s + self.step_s + self.step_before_s));
         for j in 0..JOINTS {
-            if !within(qd[j], limits.velocity_max_rad_s[j]) {
-                return Err(FaultCode::SetpointVelocity);
-            }
-            if !within(qdd[j], limits.acceleration_max_rad_s2[j]) {
-                return Err(FaultCode::SetpointAcceleration);
+            check_position(j, q[j], limits)?;
+            let steepest = limits.acceleration_max_rad_s2[j] / limits.period_s();
+            let jerk_max = if streamed_left > 0 {
+                limits.jerk_max_rad_s3[j] + steepest
+            } else {
+                limits.jerk_max_rad_s3[j]
+            };
+            for (order, (fault, value, limit)) in [
+                (
+                    FaultCode::SetpointVelocity,
+                    qd[j],
+                    limits.velocity_max_rad_s[j],
+                ),
+                (
+                    FaultCode::SetpointAcceleration,
+                    qdd[j],
+                    limits.acceleration_max_rad_s2[j],
+                ),
+                (FaultCode::SetpointJerk, jerk[j], jerk_max),
+            ]
+            .into_iter()
+            .enumerate()
+            {
+                if !within(
+                    value,
+                    limit,
+                    ROUNDING.get(order + 1).copied().unwrap_or(0.0),
+                ) {
+                    return Err(Finding::of_joint(fault, j, value, limit));
+                }
             }
         }
         let p_w_tcp_m = tcp(q, limits);
-        let speed_m_s = (p_w_tcp_m - self.p_w_tcp_m).norm() / step_s;
-        if !within(speed_m_s, limits.tcp_speed_max_m_s) {
-            return Err(FaultCode::SetpointTcpSpeed);
-        }
+        check_tool((p_w_tcp_m - self.p_w_tcp_m).norm(), step_s, limits, allowed)?;
         *self = Self {
             q: *q,
             qd,
+            qdd,
             step_s,
+            step_before_s: self.step_s,
             p_w_tcp_m,
+            streamed_left,
         };
         Ok(())
     }
 }
 
+fn check_position(j: usize, q_rad: f64, limits: &Limits) -> Result<(), Finding> {
+    let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
+    let [slack, ..] = ROUNDING;
+    if q_rad >= low - slack && q_rad <= high + slack {
+        return Ok(());
+    }
+    let limit = if q_rad < low { low } else { high };
+    Err(Finding::of_joint(
+        FaultCode::SetpointPosition,
+        j,
+        q_rad,
+        limit,
+    ))
+}
+
+fn check_tool(
+    way_m: f64,
+    step_s: f64,
+    limits: &Limits,
+    allowed: &Allowance,
+) -> Result<(), Finding> {
+    let [_, slack, ..] = ROUNDING;
+    let speed_m_s = way_m / step_s;
+    if !within(speed_m_s, allowed.tcp_speed_max_m_s, slack) {
+        let tier = allowed.tcp_speed_max_m_s < limits.tcp_speed_max_m_s;
+        let fault = if tier {
+            FaultCode::TierExceeded
+        } else {
+            FaultCode::SetpointTcpSpeed
+        };
+        return Err(Finding::new(fault, speed_m_s, allowed.tcp_speed_max_m_s));
+    }
+    let step_max_m = STEP_MAX_M * (step_s / limits.period_s()).max(1.0);
+    if within(way_m, step_max_m, slack) {
+        Ok(())
+    } else {
+        Err(Finding::new(FaultCode::SetpointStep, way_m, step_max_m))
+    }
+}
+
 /// False for NaN, too.
-fn within(value: f64, limit: f64) -> bool {
-    value.abs() <= limit * (1.0 + RELATIVE) + ABSOLUTE
+fn within(value: f64, limit: f64, rounding: f64) -> bool {
+    value.abs() <= limit * (1.0 + RELATIVE) + rounding
 }
 
 fn tcp(q: &JointVector, limits: &Limits) -> Vector3<f64> {
@@ -99,6 +192,10 @@ mod tests {
     use shared_types::plan::START_POSE;
 
     const PERIOD_S: f64 = 0.004;
+    const STREAMED: Allowance = Allowance {
+        tcp_speed_max_m_s: 1.2,
+        streamed: true,
+    };
 
     fn swing(joint: usize, by_rad: f64, in_s: f64) -> JointTrajectory {
         let mut end = START_POSE;
@@ -112,7 +209,9 @@ mod tests {
         let mut step = PERIOD_S;
         let mut cycle = 0_usize;
         while t < trajectory.duration_s() + 0.02 {
-            limiter.admit(&trajectory.state_at(t).q, step, limits)?;
+            limiter
+                .admit(&trajectory.state_at(t).q, step, limits, &STREAMED)
+                .map_err(|found| found.fault)?;
             cycle += 1;
             step = if cycle.is_multiple_of(every) {
                 3.0 * PERIOD_S
@@ -166,24 +265,64 @@ mod tests {
         let mut jump = START_POSE;
         jump[6] += 0.001;
         assert_eq!(
-            limiter.admit(&jump, PERIOD_S, &limits),
+            limiter
+                .admit(&jump, PERIOD_S, &limits, &STREAMED)
+                .map_err(|found| found.fault),
             Err(FaultCode::SetpointAcceleration)
         );
         let mut bad = START_POSE;
         bad[3] = f64::NAN;
         assert_eq!(
-            limiter.admit(&bad, PERIOD_S, &limits),
+            limiter
+                .admit(&bad, PERIOD_S, &limits, &STREAMED)
+                .map_err(|found| found.fault),
             Err(FaultCode::SetpointNotFinite)
         );
         assert_eq!(
-            limiter.admit(&START_POSE, 0.0, &limits),
+            limiter
+                .admit(&START_POSE, 0.0, &limits, &STREAMED)
+                .map_err(|found| found.fault),
             Err(FaultCode::SetpointNotFinite)
         );
         bad[3] = -0.2;
         assert_eq!(
-            limiter.admit(&bad, PERIOD_S, &limits),
+            limiter
+                .admit(&bad, PERIOD_S, &limits, &STREAMED)
+                .map_err(|found| found.fault),
             Err(FaultCode::SetpointPosition)
         );
         assert_eq!(limiter, before);
+    }
+
+    /// A setpoint whose jerk alone is too large for a motion of the controller's
+    /// own passes as part of an uploaded trajectory.
+    #[test]
+    fn only_streamed_trajectories_may_step_their_acceleration() {
+        let limits = Limits::default();
+        let mut q = START_POSE;
+        q[6] += 10.0 * PERIOD_S * PERIOD_S;
+        let own = Allowance {
+            streamed: false,
+            ..STREAMED
+        };
+        let mut limiter = Limiter::at_rest(START_POSE, &limits);
+        let found = limiter.admit(&q, PERIOD_S, &limits, &own).unwrap_err();
+        assert_eq!((found.fault, found.joint), (FaultCode::SetpointJerk, 7));
+        assert!((found.value - 2500.0).abs() < 1e-3 && found.limit == 500.0);
+        limiter.admit(&q, PERIOD_S, &limits, &STREAMED).unwrap();
+    }
+
+    #[test]
+    fn a_tier_is_slower_than_the_limits() {
+        let limits = Limits::default();
+        let mut q = START_POSE;
+        q[0] += 0.5 * PERIOD_S * PERIOD_S * 20.0;
+        let slow = Allowance {
+            tcp_speed_max_m_s: 0.01,
+            streamed: true,
+        };
+        let mut limiter = Limiter::at_rest(START_POSE, &limits);
+        let found = limiter.admit(&q, PERIOD_S, &limits, &slow).unwrap_err();
+        assert_eq!(found.fault, FaultCode::TierExceeded);
     }
 }

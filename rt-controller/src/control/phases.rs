@@ -79,6 +79,31 @@ impl AxisPhases {
             ..state
         }
     }
+
+    /// Smallest and largest position on the way (rad). RT-safe.
+    #[must_use]
+    pub fn range(&self) -> (f64, f64) {
+        let mut state = self.start;
+        let mut range = (state.q, state.q);
+        let include = |q: f64, range: &mut (f64, f64)| *range = (range.0.min(q), range.1.max(q));
+        for phase in &self.phases {
+            for t_s in turning_points(state, phase.jerk_rad_s3) {
+                if t_s > 0.0 && t_s < phase.duration_s {
+                    include(state.after(t_s, phase.jerk_rad_s3).q, &mut range);
+                }
+            }
+            state = state.after(phase.duration_s, phase.jerk_rad_s3);
+            include(state.q, &mut range);
+        }
+        range
+    }
+}
+
+/// When the velocity `qd + qdd t + jerk t²/2` is zero (s); NaN where it never is.
+fn turning_points(at: AxisState, jerk: f64) -> [f64; 2] {
+    let root = (at.qdd * at.qdd - 2.0 * jerk * at.qd).sqrt();
+    let far = -(at.qdd + root.copysign(at.qdd));
+    [far / jerk, 2.0 * at.qd / far]
 }
 
 /// Phases of all joints. RT-safe to copy and evaluate.

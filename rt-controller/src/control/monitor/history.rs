@@ -1,0 +1,110 @@
+//! The setpoints sent last: what the arm was told, and when.
+
+#![allow(
+    clippy::arithmetic_side_effects,
+    reason = "arithmetic of float vectors only; integers use wrapping calls"
+)]
+
+use shared_types::{JOINTS, JointVector, MonotonicNs};
+
+/// Setpoints remembered: 0.25 s at 250 Hz.
+const LENGTH: usize = 64;
+
+/// Fixed size, oldest overwritten. RT-safe.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Commanded {
+    sent: [(u64, JointVector); LENGTH],
+    next: usize,
+}
+
+impl Commanded {
+    /// Told to be in `q` for ever.
+    #[must_use]
+    pub const fn holding(q: JointVector) -> Self {
+        Self {
+            sent: [(0, q); LENGTH],
+            next: 0,
+        }
+    }
+
+    /// A setpoint was sent.
+    pub fn push(&mut self, deadline_ns: u64, q: JointVector) {
+        if let Some(slot) = self.sent.get_mut(self.next) {
+            *slot = (deadline_ns, q);
+        }
+        self.next = self.next.wrapping_add(1) % LENGTH;
+    }
+
+    /// Joint farthest outside what was commanded between `from_ns` and `to_ns`,
+    /// or just before, 0-based, and how far (rad).
+    #[must_use]
+    pub fn farthest(&self, q: &JointVector, from_ns: u64, to_ns: u64) -> (usize, f64) {
+        let (mut low, mut high) = (
+            JointVector::splat(f64::INFINITY),
+            JointVector::splat(f64::NEG_INFINITY),
+        );
+        let mut include = |c: &JointVector| {
+            low = low.zip_with(*c, f64::min);
+            high = high.zip_with(*c, f64::max);
+        };
+        for (_, c) in self
+            .sent
+            .iter()
+            .filter(|e| (from_ns..=to_ns).contains(&e.0))
+        {
+            include(c);
+        }
+        if let Some((_, c)) = self.entry_before(from_ns) {
+            include(c);
+        }
+        (0..JOINTS)
+            .map(|j| (j, (low[j] - q[j]).max(q[j] - high[j])))
+            .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
+    }
+
+    fn entry_before(&self, at_ns: u64) -> Option<&(u64, JointVector)> {
+        // `max_by_key` keeps the last of equals; the order of a ring is no order.
+        self.sent.iter().filter(|e| e.0 < at_ns).max_by_key(|e| e.0)
+    }
+
+    /// What was commanded at `at_ns`, linear between setpoints (rad).
+    #[must_use]
+    pub fn at(&self, at_ns: u64) -> JointVector {
+        let after = self
+            .sent
+            .iter()
+            .filter(|e| e.0 >= at_ns)
+            .min_by_key(|e| e.0);
+        match (self.entry_before(at_ns), after) {
+            (Some((t0, q0)), Some((t1, q1))) => {
+                let span_s = MonotonicNs(*t1).since_s(MonotonicNs(*t0));
+                let part = MonotonicNs(at_ns).since_s(MonotonicNs(*t0)) / span_s;
+                *q0 + (*q1 - *q0) * part
+            }
+            (Some((_, q)), None) | (None, Some((_, q))) => *q,
+            (None, None) => JointVector::ZERO,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_setpoints_it_is_linear_and_outside_constant() {
+        let mut history = Commanded::holding(JointVector::ZERO);
+        for k in 0..100_u32 {
+            history.push(
+                u64::from(k) * 4_000_000 + 1,
+                JointVector::splat(f64::from(k)),
+            );
+        }
+        let at = |ns: u64| history.at(ns)[2];
+        assert!((at(90 * 4_000_000 + 1_000_001) - 90.25).abs() < 1e-12);
+        assert_eq!(at(u64::MAX), 99.0);
+        assert_eq!(at(0), 36.0, "older ones are forgotten");
+        let (joint, off) = history.farthest(&JointVector::splat(99.5), 300_000_000, 400_000_000);
+        assert_eq!((joint, off), (0, 0.5));
+    }
+}

@@ -1,0 +1,269 @@
+//! Watches over everything that may go wrong while the arm is commanded.
+//!
+//! Pure: time is the cycle's planned deadline; nothing here reads a clock.
+//! [`Monitor::finding`] is the fault table: one line per cause, the most urgent
+//! first; how each is met is in [`super::reaction`].
+
+pub mod history;
+pub mod reports;
+
+use super::exchange::{CycleInput, LinkInput};
+use super::finding::Finding;
+use super::reaction::{Path, reaction};
+use super::settings::ControlSettings;
+use history::Commanded;
+use reports::ReportWatch;
+use shared_types::ipc::{ControllerMode, JointReport, RunCounts};
+use shared_types::{FaultCode, JointVector, Limits};
+
+/// Reports lag behind a change of mode by up to 0.2 s (field experience with
+/// the vendor's SDK), so state, mode and codes count only this long after
+/// bring-up.
+const SETTLE_NS: u64 = 300_000_000;
+
+/// A heartbeat: its count and when it last changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Heard {
+    count: u64,
+    at_ns: u64,
+}
+
+impl Heard {
+    fn hear(&mut self, count: u64, now_ns: u64) {
+        if count != self.count {
+            *self = Self {
+                count,
+                at_ns: now_ns,
+            };
+        }
+    }
+
+    const fn silent_ns(&self, now_ns: u64) -> u64 {
+        now_ns.saturating_sub(self.at_ns)
+    }
+}
+
+/// What the monitors remember from cycle to cycle. RT-safe.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Monitor {
+    settings: ControlSettings,
+    commanded: Commanded,
+    reports: ReportWatch,
+    adopted_ns: u64,
+    operator: Heard,
+    guardian: Heard,
+    counts: RunCounts,
+    arm_error: u8,
+    arm_warning: u8,
+}
+
+impl Monitor {
+    /// Nothing seen yet; the arm holds `q` since `now_ns`.
+    #[must_use]
+    pub fn new(settings: ControlSettings, now_ns: u64, q: JointVector) -> Self {
+        Self {
+            settings,
+            commanded: Commanded::holding(q),
+            reports: ReportWatch::new(),
+            adopted_ns: now_ns,
+            operator: Heard::default(),
+            guardian: Heard::default(),
+            counts: RunCounts::default(),
+            arm_error: 0,
+            arm_warning: 0,
+        }
+    }
+
+    /// A motion begins: the operator's time-out starts anew.
+    pub const fn motion_begins(&mut self, deadline_ns: u64) {
+        self.operator.at_ns = deadline_ns;
+        self.reports.motion_begins();
+    }
+
+    /// A setpoint was sent.
+    pub fn sent(&mut self, deadline_ns: u64, q: JointVector) {
+        self.commanded.push(deadline_ns, q);
+    }
+
+    /// A setpoint was held back: too many wait for their reply.
+    pub const fn held_back(&mut self) {
+        self.counts.skipped = self.counts.skipped.saturating_add(1);
+    }
+
+    /// Newest joint report.
+    #[must_use]
+    pub const fn report(&self) -> Option<&JointReport> {
+        self.reports.newest()
+    }
+
+    /// What marked the run so far.
+    #[must_use]
+    pub const fn counts(&self) -> RunCounts {
+        self.counts
+    }
+
+    /// The arm's error and warning codes as far as known.
+    #[must_use]
+    pub const fn arm_codes(&self) -> (u8, u8) {
+        (self.arm_error, self.arm_warning)
+    }
+
+    /// Commanded less measured joints at the time of the newest report (rad).
+    #[must_use]
+    pub fn off(&self) -> JointVector {
+        self.reports.off(&self.commanded)
+    }
+
+    /// Takes in what came with this cycle.
+    pub fn observe(&mut self, input: &CycleInput, limits: &Limits) {
+        let now_ns = input.deadline_ns;
+        self.operator.hear(input.operator.count, now_ns);
+        self.guardian.hear(input.guardian.count, now_ns);
+        let (link, counts) = (&input.link, &mut self.counts);
+        let add = |count: &mut u32, more: u32| *count = count.saturating_add(more);
+        add(&mut counts.missed, input.missed);
+        add(&mut counts.duplicates, link.duplicates.into());
+        add(&mut counts.out_of_order, link.out_of_order.into());
+        add(&mut counts.skipped, link.skipped.into());
+        add(&mut counts.broken_reports, input.broken_reports);
+        let warning = link.status.is_some_and(crate::xarm::Status::has_warning);
+        add(&mut counts.warnings, warning.into());
+        self.reports.broken(input.broken_reports);
+        let window_ns = self.settings.thresholds.tracking_window_ns;
+        for report in input.reports.as_slice() {
+            if report.q.is_finite() && report.qd.is_finite() {
+                let resync = self
+                    .reports
+                    .take(report, &self.commanded, window_ns, limits);
+                add(&mut self.counts.clock_resyncs, resync.into());
+            } else {
+                self.reports.broken(1);
+                add(&mut self.counts.broken_reports, 1);
+            }
+        }
+        if let Some(codes) = input.codes
+            && codes.arrival_ns.saturating_sub(self.adopted_ns) > SETTLE_NS
+        {
+            (self.arm_error, self.arm_warning) = (codes.error, codes.warning);
+        }
+    }
+
+    /// Why no motion may begin now, if anything speaks against it.
+    #[must_use]
+    pub fn refusal(&self, now_ns: u64) -> Option<FaultCode> {
+        self.reports
+            .stale(now_ns, &self.settings.thresholds)
+            .or_else(|| self.guardian_silent(now_ns))
+            .map(|found| found.fault)
+    }
+
+    /// The first fault whose reaction is harder than `than`, the most urgent
+    /// first; `missed` cycles went by without a setpoint. Not asked in `Offline` and `Faulted`. RT-safe.
+    #[must_use]
+    pub fn finding(
+        &self,
+        input: &CycleInput,
+        missed: u32,
+        mode: ControllerMode,
+        than: Path,
+    ) -> Option<Finding> {
+        let harder = |found: &Finding| reaction(found.fault).path > than;
+        let pick = |found: Option<Finding>| found.filter(harder);
+        let (now_ns, t) = (input.deadline_ns, &self.settings.thresholds);
+        pick(link_fault(&input.link))
+            .or_else(|| pick(self.arm_fault()))
+            .or_else(|| pick(self.commander_fault(input)))
+            .or_else(|| pick(stall(&input.link, t.reply_stall_ns)))
+            .or_else(|| pick((input.operator.stop != 0).then(stop)))
+            .or_else(|| {
+                if !mode.is_moving() {
+                    return None;
+                }
+                pick(late(missed, t.late_cycles_max, t.missed_cycles_max))
+                    .or_else(|| pick(self.operator_fault(input)))
+                    .or_else(|| pick(self.reports.stream_fault(&self.commanded, t)))
+                    .or_else(|| pick(self.reports.stale(now_ns, t)))
+                    .or_else(|| pick(self.reports.tracking_fault(&self.commanded, t)))
+                    .or_else(|| pick(self.guardian_silent(now_ns)))
+            })
+    }
+
+    /// An error of its own, or another program or a stop button took the arm
+    /// out of its streaming mode.
+    fn arm_fault(&self) -> Option<Finding> {
+        if self.arm_error != 0 {
+            return Some(Finding::plain(FaultCode::ArmError));
+        }
+        let report = self.report()?;
+        let settled = report.arrival_ns.saturating_sub(self.adopted_ns) > SETTLE_NS;
+        // States 1 (moving) and 2 (ready) follow setpoints.
+        let serving =
+            report.arm_mode == self.settings.wire.arm_mode() && matches!(report.arm_state, 1 | 2);
+        (settled && !serving).then(|| {
+            Finding::new(
+                FaultCode::ArmModeChanged,
+                report.arm_mode.into(),
+                self.settings.wire.arm_mode().into(),
+            )
+        })
+    }
+
+    fn commander_fault(&self, input: &CycleInput) -> Option<Finding> {
+        if input.link.foreign > 0 {
+            let found = f64::from(input.link.foreign);
+            return Some(Finding::new(FaultCode::SecondCommander, found, 0.0));
+        }
+        let position = self.settings.wire == shared_types::WireMode::ServoPosition;
+        let settled = input.deadline_ns.saturating_sub(self.adopted_ns) > SETTLE_NS;
+        (position && settled)
+            .then(|| self.reports.foreign_target())
+            .flatten()
+    }
+
+    fn operator_fault(&self, input: &CycleInput) -> Option<Finding> {
+        if input.operator.released != 0 {
+            return Some(Finding::plain(FaultCode::DeadManReleased));
+        }
+        let most_ns = self.settings.thresholds.operator_timeout_ns;
+        let silent_ns = self.operator.silent_ns(input.deadline_ns);
+        (silent_ns > most_ns).then(|| Finding::of_time(FaultCode::OperatorLost, silent_ns, most_ns))
+    }
+
+    fn guardian_silent(&self, now_ns: u64) -> Option<Finding> {
+        let most_ns = self.settings.thresholds.guardian_timeout_ns;
+        let silent_ns = self.guardian.silent_ns(now_ns);
+        (self.settings.guardian_required && silent_ns > most_ns)
+            .then(|| Finding::of_time(FaultCode::GuardianLost, silent_ns, most_ns))
+    }
+}
+
+fn stop() -> Finding {
+    Finding::plain(FaultCode::OperatorStop)
+}
+
+fn stall(link: &LinkInput, most_ns: u64) -> Option<Finding> {
+    (link.unanswered_ns > most_ns)
+        .then(|| Finding::of_time(FaultCode::ReplyStalled, link.unanswered_ns, most_ns))
+}
+
+fn late(missed: u32, slow_above: u32, stop_above: u32) -> Option<Finding> {
+    let found = |fault, limit: u32| Finding::new(fault, missed.into(), limit.into());
+    if missed > stop_above {
+        Some(found(FaultCode::DeadlineMissed, stop_above))
+    } else {
+        (missed > slow_above).then(|| found(FaultCode::LateCycles, slow_above))
+    }
+}
+
+/// Faults the command link itself shows.
+fn link_fault(link: &LinkInput) -> Option<Finding> {
+    if link.lost {
+        return Some(Finding::plain(FaultCode::LinkLost));
+    }
+    let status = link.status?;
+    if status.has_error() {
+        Some(Finding::plain(FaultCode::ArmError))
+    } else {
+        (!status.accepts_motion()).then_some(Finding::plain(FaultCode::ArmNotReady))
+    }
+}

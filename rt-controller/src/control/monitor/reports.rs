@@ -1,0 +1,231 @@
+//! Watches the joint reports: whether they come, live and make sense, and
+//! whether the arm is where it was told to be.
+
+#![allow(
+    clippy::arithmetic_side_effects,
+    reason = "arithmetic of floats only; integers use saturating calls"
+)]
+
+use super::history::Commanded;
+use crate::control::finding::Finding;
+use crate::control::settings::Thresholds;
+use shared_types::ipc::JointReport;
+use shared_types::{FaultCode, JOINTS, JointVector, Limits, MonotonicNs};
+
+/// Stamps whose distance to the arrival changes by more than this need a new
+/// map of the arm's clock (ns).
+const CLOCK_JUMP_NS: u64 = 50_000_000;
+/// A joint that moves less than this stands still (rad).
+const STILL_RAD: f64 = 1e-3;
+/// A joint is stuck when it should have moved by this much meanwhile (rad).
+const STUCK_RAD: f64 = 0.02;
+/// Frozen reports are noticed when the arm should have moved by this much (rad).
+const FROZEN_RAD: f64 = 5e-3;
+/// Beyond twice the fastest way of a joint between two reports plus this, an
+/// encoder jumped (rad).
+const JUMP_RAD: f64 = 0.02;
+/// Reports farther apart than this are not compared for jumps (s).
+const JUMP_SPAN_MAX_S: f64 = 0.1;
+/// Largest distance of the arm's own target from what it was told (rad).
+const TARGET_RAD: f64 = 0.05;
+/// Reports in a row with a foreign target that prove a second commander.
+const FOREIGN_TARGETS: u32 = 5;
+
+/// What is remembered of the reports. RT-safe.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportWatch {
+    newest: Option<JointReport>,
+    /// Since when the values are the same, to the bit (stamp, ns).
+    frozen_since_ns: u64,
+    /// Since when each joint stands still (stamp, ns), and where (rad).
+    still: [(u64, f64); JOINTS],
+    jump: Option<Finding>,
+    broken_in_a_row: u32,
+    resyncs: u32,
+    foreign_targets: u32,
+}
+
+impl ReportWatch {
+    /// Nothing seen yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            newest: None,
+            frozen_since_ns: 0,
+            still: [(0, 0.0); JOINTS],
+            jump: None,
+            broken_in_a_row: 0,
+            resyncs: 0,
+            foreign_targets: 0,
+        }
+    }
+
+    /// Newest good report.
+    #[must_use]
+    pub const fn newest(&self) -> Option<&JointReport> {
+        self.newest.as_ref()
+    }
+
+    /// A motion begins: counts start anew.
+    pub const fn motion_begins(&mut self) {
+        self.resyncs = 0;
+        self.jump = None;
+    }
+
+    /// Broken reports came.
+    pub const fn broken(&mut self, count: u32) {
+        self.broken_in_a_row = self.broken_in_a_row.saturating_add(count);
+    }
+
+    /// A report came that can be used; true when its clock had to be followed
+    /// anew.
+    pub fn take(
+        &mut self,
+        report: &JointReport,
+        commanded: &Commanded,
+        window_ns: u64,
+        limits: &Limits,
+    ) -> bool {
+        self.broken_in_a_row = 0;
+        let before = self.newest.replace(*report);
+        let Some(before) = before else {
+            self.frozen_since_ns = report.stamp_ns;
+            self.still = core::array::from_fn(|j| (report.stamp_ns, report.q[j]));
+            return false;
+        };
+        let delay = |r: &JointReport| r.arrival_ns.saturating_sub(r.stamp_ns);
+        let resync = report.stamp_ns <= before.stamp_ns
+            || delay(report).abs_diff(delay(&before)) > CLOCK_JUMP_NS;
+        if resync {
+            self.resyncs = self.resyncs.saturating_add(1);
+            self.frozen_since_ns = report.stamp_ns;
+            self.still = core::array::from_fn(|j| (report.stamp_ns, report.q[j]));
+            return true;
+        }
+        if report.q != before.q || report.qd != before.qd {
+            self.frozen_since_ns = report.stamp_ns;
+        }
+        for (j, still) in self.still.iter_mut().enumerate() {
+            if (report.q[j] - still.1).abs() > STILL_RAD {
+                *still = (report.stamp_ns, report.q[j]);
+            }
+        }
+        self.jump = self.jump.or_else(|| jump(&before, report, limits));
+        let from_ns = report.stamp_ns.saturating_sub(window_ns);
+        // Only the report with the arm's own clock names its target.
+        let foreign = report.arm_clock != 0
+            && commanded
+                .farthest(
+                    &report.q_target,
+                    from_ns,
+                    report.stamp_ns.max(report.arrival_ns),
+                )
+                .1
+                > TARGET_RAD;
+        self.foreign_targets = if foreign {
+            self.foreign_targets.saturating_add(1)
+        } else {
+            0
+        };
+        false
+    }
+
+    /// Whether the arm's own target is somebody else's.
+    #[must_use]
+    pub fn foreign_target(&self) -> Option<Finding> {
+        (self.foreign_targets >= FOREIGN_TARGETS)
+            .then_some(Finding::plain(FaultCode::SecondCommander))
+    }
+
+    /// Age of the newest report, if it is too old to move by.
+    #[must_use]
+    pub fn stale(&self, now_ns: u64, t: &Thresholds) -> Option<Finding> {
+        let age_ns = self
+            .newest
+            .map_or(now_ns, |r| now_ns.saturating_sub(r.arrival_ns));
+        (age_ns > t.report_stale_ns)
+            .then(|| Finding::of_time(FaultCode::ReportStale, age_ns, t.report_stale_ns))
+    }
+
+    /// Whether the stream itself cannot be trusted.
+    #[must_use]
+    pub fn stream_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Finding> {
+        if self.broken_in_a_row >= t.report_broken_max {
+            let (found, most) = (self.broken_in_a_row, t.report_broken_max);
+            return Some(Finding::new(
+                FaultCode::ReportBroken,
+                f64::from(found),
+                f64::from(most),
+            ));
+        }
+        if self.resyncs > t.clock_resyncs_max {
+            let (found, most) = (self.resyncs, t.clock_resyncs_max);
+            return Some(Finding::new(
+                FaultCode::ReportClock,
+                f64::from(found),
+                f64::from(most),
+            ));
+        }
+        let report = self.newest.as_ref()?;
+        let frozen_ns = report.stamp_ns.saturating_sub(self.frozen_since_ns);
+        let must_show = commanded.at(report.stamp_ns.saturating_sub(t.tracking_window_ns));
+        let moved_rad = (must_show - commanded.at(self.frozen_since_ns)).max_abs();
+        (frozen_ns > t.report_frozen_ns.max(t.tracking_window_ns) && moved_rad > FROZEN_RAD)
+            .then(|| Finding::of_time(FaultCode::ReportFrozen, frozen_ns, t.report_frozen_ns))
+    }
+
+    /// Whether the arm is somewhere else than it was told.
+    #[must_use]
+    pub fn tracking_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Finding> {
+        if let Some(jump) = self.jump {
+            return Some(jump);
+        }
+        let report = self.newest.as_ref()?;
+        let from_ns = report.stamp_ns.saturating_sub(t.tracking_window_ns);
+        let must_show = commanded.at(from_ns);
+        for (j, (since_ns, at_rad)) in self.still.iter().enumerate() {
+            let told_rad = (must_show[j] - commanded.at(*since_ns)[j]).abs();
+            let off_rad = (must_show[j] - at_rad).abs();
+            if *since_ns < from_ns && told_rad > STUCK_RAD && off_rad > STUCK_RAD {
+                return Some(Finding::of_joint(
+                    FaultCode::JointStuck,
+                    j,
+                    off_rad,
+                    STUCK_RAD,
+                ));
+            }
+        }
+        // The stamp may be early by the clock map's error; one period is plenty.
+        let to_ns = report.stamp_ns.max(report.arrival_ns);
+        let (joint, off_rad) = commanded.farthest(&report.q, from_ns, to_ns);
+        let most = t.tracking_error_max_rad;
+        (off_rad > most).then(|| Finding::of_joint(FaultCode::TrackingError, joint, off_rad, most))
+    }
+
+    /// How far the newest measured pose is behind what was commanded when it was
+    /// measured (rad).
+    #[must_use]
+    pub fn off(&self, commanded: &Commanded) -> JointVector {
+        self.newest
+            .map_or(JointVector::ZERO, |r| commanded.at(r.stamp_ns) - r.q)
+    }
+}
+
+impl Default for ReportWatch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A joint that moved farther between two reports than any joint can.
+fn jump(before: &JointReport, report: &JointReport, limits: &Limits) -> Option<Finding> {
+    let span_s = MonotonicNs(report.stamp_ns).since_s(MonotonicNs(before.stamp_ns));
+    if span_s > JUMP_SPAN_MAX_S {
+        return None;
+    }
+    (0..JOINTS).find_map(|j| {
+        let way_rad = (report.q[j] - before.q[j]).abs();
+        let most = 2.0 * limits.velocity_max_rad_s[j] * span_s + JUMP_RAD;
+        (way_rad > most).then(|| Finding::of_joint(FaultCode::EncoderJump, j, way_rad, most))
+    })
+}

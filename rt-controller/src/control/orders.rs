@@ -1,0 +1,146 @@
+//! What orders lead to.
+
+use super::arming::ArmingState;
+use super::cycle::{ControlState, Running, emit, give_back};
+use super::exchange::{ControlEvent, CycleInput, CycleOutput, Order};
+use super::finding::Finding;
+use super::limiter::Limiter;
+use super::mode::{Trigger, next_mode};
+use super::monitor::Monitor;
+use super::motion::Motion;
+use super::velocity_wire::VelocityWire;
+use shared_types::ipc::{CauseRecord, ControllerMode};
+use shared_types::{Arming, FaultCode, JointState, JointVector, MonotonicNs, MotionTier};
+
+/// Starts closer than this are equal (rad); a larger difference would be a jump.
+const START_TOLERANCE_RAD: f64 = 1e-9;
+
+impl ControlState {
+    pub(super) fn obey(&mut self, order: Order, input: &CycleInput, out: &mut CycleOutput) {
+        let deadline_ns = input.deadline_ns;
+        match order {
+            Order::Adopt { hold } => match self.adopt(hold, input) {
+                Ok(()) => emit(out, ControlEvent::Adopted),
+                Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),
+            },
+            Order::Run { id, motion } => self.run(id, motion, input, out),
+            Order::Stop => self.react(Finding::plain(FaultCode::OperatorStop), deadline_ns, out),
+            Order::Arm(arming) => self.arm(arming, input, out),
+            Order::Disarm if self.mode.is_moving() => {
+                self.react(Finding::plain(FaultCode::Disarmed), deadline_ns, out);
+            }
+            Order::Disarm => self.disarm(FaultCode::None, out),
+        }
+    }
+
+    fn arm(&mut self, arming: Arming, input: &CycleInput, out: &mut CycleOutput) {
+        let taken = if self.mode != ControllerMode::Idle {
+            Err(FaultCode::WrongMode)
+        } else if input.operator.released != 0 {
+            Err(FaultCode::DeadManReleased)
+        } else {
+            self.arming.arm(arming, input.deadline_ns)
+        };
+        emit(
+            out,
+            match taken {
+                Ok(arming) => ControlEvent::Armed(arming),
+                Err(fault) => ControlEvent::Refused { id: None, fault },
+            },
+        );
+    }
+
+    pub(super) fn disarm(&mut self, fault: FaultCode, out: &mut CycleOutput) {
+        if core::mem::take(&mut self.arming) != ArmingState::Disarmed {
+            emit(out, ControlEvent::Disarmed { fault });
+        }
+    }
+
+    fn adopt(&mut self, hold: JointVector, input: &CycleInput) -> Result<(), FaultCode> {
+        if input.link.lost {
+            // A link that broke on its way here.
+            return Err(FaultCode::LinkLost);
+        }
+        let mode = next_mode(self.mode, Trigger::Adopt).ok_or(FaultCode::WrongMode)?;
+        if !hold.is_finite() {
+            return Err(FaultCode::SetpointNotFinite);
+        }
+        if self.limits.position_violation(&hold).is_some() {
+            return Err(FaultCode::SetpointPosition);
+        }
+        let deadline_ns = input.deadline_ns;
+        self.mode = mode;
+        self.fault = FaultCode::None;
+        self.cause = CauseRecord::default();
+        self.arming = ArmingState::Disarmed;
+        self.commanded = JointState::at_rest(hold);
+        self.limiter = Limiter::at_rest(hold, &self.limits);
+        self.tcp_speed_max_m_s = self.limits.tcp_speed_max_m_s;
+        self.wire = VelocityWire::default();
+        self.sent_ns = MonotonicNs(deadline_ns).plus_s(-self.period_s()).0;
+        self.monitor = Monitor::new(self.settings, deadline_ns, hold);
+        self.monitor.observe(input, &self.limits);
+        self.stopping = None;
+        Ok(())
+    }
+
+    fn run(&mut self, id: u64, motion: Box<Motion>, input: &CycleInput, out: &mut CycleOutput) {
+        match self.admit(&motion, input) {
+            Ok((mode, tier)) => {
+                let start_ns = input.deadline_ns;
+                self.mode = mode;
+                self.tcp_speed_max_m_s = self.tool_speed_of(mode, tier);
+                let shot = mode == ControllerMode::Streaming && tier == MotionTier::Throw;
+                if self.settings.arming_required && shot {
+                    self.arming = ArmingState::Spent;
+                }
+                self.monitor.motion_begins(start_ns);
+                self.running = Some(Running {
+                    id,
+                    start_ns,
+                    motion,
+                });
+                emit(out, ControlEvent::Started { id, start_ns });
+            }
+            Err(fault) => {
+                emit(
+                    out,
+                    ControlEvent::Refused {
+                        id: Some(id),
+                        fault,
+                    },
+                );
+                give_back(out, motion);
+            }
+        }
+    }
+
+    /// Whether a motion may begin now; its mode and the tier it runs under.
+    fn admit(
+        &self,
+        motion: &Motion,
+        input: &CycleInput,
+    ) -> Result<(ControllerMode, MotionTier), FaultCode> {
+        let trigger = match motion {
+            Motion::Spline(_) => Trigger::StreamBegun,
+            Motion::Move { .. } => Trigger::MoveBegun,
+        };
+        let mode = next_mode(self.mode, trigger).ok_or(FaultCode::WrongMode)?;
+        let off = motion.start().zip_with(self.commanded.q, |a, b| a - b);
+        if !off.is_finite() || off.max_abs() > START_TOLERANCE_RAD {
+            return Err(FaultCode::StartPoseMismatch);
+        }
+        if let Some(fault) = self.monitor.refusal(input.deadline_ns) {
+            return Err(fault);
+        }
+        if input.operator.released != 0 {
+            return Err(FaultCode::DeadManReleased);
+        }
+        let tier = if self.settings.arming_required {
+            self.arming.admit(input.deadline_ns)?
+        } else {
+            MotionTier::Throw
+        };
+        Ok((mode, tier))
+    }
+}

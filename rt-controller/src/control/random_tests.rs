@@ -1,0 +1,376 @@
+//! Random inputs of every kind, for as many cycles as wanted: nothing panics, no
+//! setpoint breaks a limit, every stop has exactly one cause, and every cycle
+//! can be stepped again from its record.
+//!
+//! `WAG_LONG_TESTS=1` runs ten million cycles instead of 300 000.
+
+use super::*;
+use crate::control::record::{record_input, restore_input};
+use crate::control::{ArmCodes, LinkInput, Order, Thresholds};
+use crate::point_to_point::plan_move;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use shared_types::ipc::{GuardianBeat, InputRecord, JointReport, OperatorBeat, Reports};
+use shared_types::plan::START_POSE;
+use shared_types::{Arming, JOINTS, JointTrajectory, kinematics};
+
+const PERIOD_NS: u64 = 4_000_000;
+const PERIOD_S: f64 = 0.004;
+
+/// Motions that begin in the start pose: gentle, at the limits, and wild.
+fn motions(rng: &mut ChaCha8Rng, limits: &Limits) -> Vec<Motion> {
+    let mut near =
+        |reach: f64| START_POSE + JointVector([0.0; 7].map(|_| rng.random_range(-reach..reach)));
+    let mut pool = Vec::new();
+    for k in 0..if cfg!(miri) { 2 } else { 16 } {
+        let reach = 0.1 + 0.06 * f64::from(k);
+        let step_s = 0.1 + 0.04 * f64::from(k % 7);
+        let times = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
+        let poses = [START_POSE, near(reach), near(reach), near(reach)];
+        pool.push(Motion::Spline(
+            JointTrajectory::new(&times, &poses).unwrap(),
+        ));
+        let to = near(0.3);
+        if limits.position_violation(&to).is_none() {
+            pool.push(plan_move(&START_POSE, &to, 0.2 + 0.04 * f64::from(k), limits).unwrap());
+        }
+    }
+    pool
+}
+
+/// Any bit pattern, often a special one.
+fn any_f64(rng: &mut ChaCha8Rng) -> f64 {
+    match rng.random_range(0..6) {
+        0 => f64::NAN,
+        1 => f64::INFINITY,
+        2 => f64::NEG_INFINITY,
+        3 => rng.random_range(-10.0..10.0),
+        _ => f64::from_bits(rng.random()),
+    }
+}
+
+/// Makes inputs: mostly those of a good day, now and then anything.
+struct Chaos {
+    rng: ChaCha8Rng,
+    pool: Vec<Motion>,
+    now_ns: u64,
+    beat: u64,
+    told: [JointVector; 3],
+}
+
+impl Chaos {
+    fn new(seed: u64, limits: &Limits) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        Self {
+            pool: motions(&mut rng, limits),
+            rng,
+            now_ns: 1_000_000_000_000,
+            beat: 0,
+            told: [START_POSE; 3],
+        }
+    }
+
+    fn input(&mut self, mode: ControllerMode) -> CycleInput {
+        let rng = &mut self.rng;
+        let missed = if rng.random_ratio(1, 200) {
+            rng.random_range(0..9)
+        } else {
+            0
+        };
+        self.now_ns += PERIOD_NS * (1 + u64::from(missed));
+        self.beat += 1;
+        let mut input = CycleInput {
+            deadline_ns: self.now_ns,
+            missed,
+            operator: OperatorBeat {
+                count: self.beat,
+                ..OperatorBeat::default()
+            },
+            guardian: GuardianBeat {
+                count: self.beat,
+                ..GuardianBeat::default()
+            },
+            link: LinkInput {
+                status: Some(Status(0)),
+                reply_ns: 1000,
+                ..LinkInput::default()
+            },
+            reports: Some(JointReport {
+                arm_state: 1,
+                arm_mode: 1,
+                stamp_ns: self.now_ns - 1_000_000,
+                arrival_ns: self.now_ns - 500_000,
+                q: self.told[2],
+                ..JointReport::default()
+            })
+            .into(),
+            ..CycleInput::default()
+        };
+        input.order = self.order(mode);
+        if self.rng.random_ratio(1, 150) {
+            self.spoil(&mut input);
+        }
+        input
+    }
+
+    fn order(&mut self, mode: ControllerMode) -> Option<Order> {
+        let rng = &mut self.rng;
+        let kind = match mode {
+            ControllerMode::Faulted | ControllerMode::Offline => rng.random_range(0..3),
+            ControllerMode::Idle => rng.random_range(2..8),
+            _ if rng.random_ratio(1, 300) => rng.random_range(0..8),
+            _ => return None,
+        };
+        Some(match kind {
+            0 => Order::Adopt { hold: START_POSE },
+            1 => Order::Adopt {
+                hold: START_POSE + JointVector::splat(any_f64(rng)),
+            },
+            2 => Order::Arm(Arming {
+                tier: MotionTier::from_raw(rng.random_range(1..4)).unwrap(),
+                expires_ns: self.now_ns + rng.random_range(0..2_000_000_000),
+                area_clear: rng.random_ratio(3, 4),
+            }),
+            3 if rng.random_ratio(1, 8) => Order::Stop,
+            4 if rng.random_ratio(1, 8) => Order::Disarm,
+            _ => {
+                let id = rng.random_range(0..self.pool.len());
+                let motion = Box::new(self.pool[id].clone());
+                Order::Run {
+                    id: id as u64,
+                    motion,
+                }
+            }
+        })
+    }
+
+    fn spoil(&mut self, input: &mut CycleInput) {
+        let rng = &mut self.rng;
+        let vector = |rng: &mut ChaCha8Rng| JointVector([0.0; 7].map(|_| any_f64(rng)));
+        match rng.random_range(0..14) {
+            0 => input.deadline_ns = rng.random(),
+            1 => input.missed = rng.random(),
+            2 => input.operator.stop = 1,
+            3 => input.operator.released = 1,
+            4 => input.operator.count = rng.random(),
+            5 => input.link.status = Some(Status(rng.random())),
+            6 => input.link.unanswered_ns = rng.random(),
+            7 => input.link.unanswered = rng.random(),
+            8 => input.link.lost = true,
+            9 => input.link.foreign = rng.random(),
+            10 => input.broken_reports = rng.random(),
+            11 => {
+                let q = vector(rng);
+                input.reports.push(JointReport {
+                    q,
+                    qd: vector(rng),
+                    q_target: vector(rng),
+                    stamp_ns: rng.random(),
+                    arrival_ns: rng.random(),
+                    arm_clock: 1,
+                    arm_state: rng.random(),
+                    arm_mode: rng.random(),
+                    ..JointReport::default()
+                });
+            }
+            12 => input.reports = Reports::default(),
+            _ => {
+                input.codes = Some(ArmCodes {
+                    error: rng.random_range(0..3),
+                    arrival_ns: input.deadline_ns,
+                    ..ArmCodes::default()
+                });
+            }
+        }
+    }
+
+    fn told(&mut self, out: &CycleOutput) {
+        if let Some(q) = out.setpoint() {
+            self.told = [q, self.told[0], self.told[1]];
+        }
+    }
+}
+
+/// Judges setpoints by their finite differences; it knows nothing of the
+/// limiter.
+struct Judge {
+    /// Newest first: deadline (ns) and pose (rad).
+    last: [(u64, JointVector); 4],
+}
+
+impl Judge {
+    fn holding(q: JointVector, now_ns: u64) -> Self {
+        let at = |k: u64| (now_ns.wrapping_sub(k * PERIOD_NS), q);
+        Self {
+            last: [at(1), at(2), at(3), at(4)],
+        }
+    }
+
+    /// Largest part of a limit that was used; above 1 it was broken.
+    fn take(&mut self, at_ns: u64, q: JointVector, limits: &Limits) -> f64 {
+        self.last = [(at_ns, q), self.last[0], self.last[1], self.last[2]];
+        let span = |a: usize, b: usize| (self.last[a].0 - self.last[b].0) as f64 * 1e-9;
+        let first = |a: usize| (self.last[a].1 - self.last[a + 1].1) * (1.0 / span(a, a + 1));
+        let second = |a: usize| (first(a) - first(a + 1)) * (2.0 / span(a, a + 2));
+        let third = (second(0) - second(1)) * (3.0 / span(0, 3));
+        let mut worst = 0.0_f64;
+        let mut part = |value: f64, limit: f64, rounding: f64| {
+            worst = worst.max((value.abs() - rounding) / limit);
+            assert!(value.is_finite());
+        };
+        for j in 0..JOINTS {
+            let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
+            let middle = 0.5 * (low + high);
+            part(q[j] - middle, 0.5 * (high - low), 1e-9);
+            let a = limits.acceleration_max_rad_s2[j];
+            part(first(0)[j], limits.velocity_max_rad_s[j], 1e-9);
+            part(second(0)[j], a, 1e-8);
+            part(third[j], limits.jerk_max_rad_s3[j] + a / PERIOD_S, 1e-5);
+        }
+        let tool = |q: &JointVector| kinematics::flange_pose(q).0;
+        let way = (tool(&q) - tool(&self.last[1].1)).norm();
+        part(way / span(0, 1), limits.tcp_speed_max_m_s, 1e-9);
+        part(way, 0.01 * (span(0, 1) / PERIOD_S).max(1.0), 1e-9);
+        worst
+    }
+}
+
+fn settings(seed: u64) -> ControlSettings {
+    ControlSettings {
+        arming_required: seed.is_multiple_of(2),
+        guardian_required: seed.is_multiple_of(3),
+        ..if seed.is_multiple_of(5) {
+            Thresholds::strict().into()
+        } else {
+            Thresholds::relaxed().into()
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+struct Tally {
+    cycles: u64,
+    setpoints: u64,
+    stops: u64,
+    hard: u64,
+    by_code: std::collections::BTreeMap<u16, u64>,
+    worst: f64,
+}
+
+fn play(seed: u64, cycles: u64, tally: &mut Tally) {
+    let limits = Limits::default();
+    let mut chaos = Chaos::new(seed, &limits);
+    let mut state = ControlState::new(limits.clone(), settings(seed));
+    let mut judge = Judge::holding(START_POSE, chaos.now_ns);
+    for _ in 0..cycles {
+        let input = chaos.input(state.mode());
+        let deadline_ns = input.deadline_ns;
+        let before = state.mode();
+        let out = state.step(input);
+        let mut latches = 0;
+        for event in &out.events {
+            match event {
+                ControlEvent::Adopted => {
+                    let hold = state.summary().q_c;
+                    judge = Judge::holding(hold, deadline_ns);
+                    chaos.told = [hold; 3];
+                }
+                ControlEvent::Latched(cause) => {
+                    latches += 1;
+                    tally.stops += 1;
+                    let by_setpoint = (10..20).contains(&cause.second_code);
+                    tally.hard += u64::from(by_setpoint);
+                    *tally.by_code.entry(cause.code).or_default() += 1;
+                    assert!(cause.cycle <= cause.rest_cycle && cause.code != 0);
+                }
+                _ => {}
+            }
+        }
+        // Exactly one cause per stop.
+        let stopped = before != ControllerMode::Faulted
+            && before != ControllerMode::Offline
+            && state.mode() == ControllerMode::Faulted;
+        assert_eq!(latches, i32::from(stopped), "{before:?} {:?}", out.events);
+        chaos.told(&out);
+        if let Some(q) = out.setpoint() {
+            tally.setpoints += 1;
+            let part = judge.take(deadline_ns, q, &limits);
+            tally.worst = tally.worst.max(part);
+            assert!(part <= 1.0 + 2e-9, "seed {seed}: {part} of a limit");
+        }
+        tally.cycles += 1;
+    }
+}
+
+#[test]
+fn any_number_of_random_cycles_keep_every_limit() {
+    let runs: u64 = match std::env::var("WAG_LONG_TESTS") {
+        _ if cfg!(miri) => 1,
+        Ok(on) if on == "1" => 1000,
+        _ => 30,
+    };
+    let mut tally = Tally::default();
+    for seed in 0..runs {
+        play(seed, if cfg!(miri) { 300 } else { 10_000 }, &mut tally);
+    }
+    println!("{tally:?}");
+    if !cfg!(miri) {
+        assert!(tally.stops > 100 * runs / 30 && tally.by_code.len() > 12);
+    }
+}
+
+/// Every cycle stepped again from its bytes gives the same bytes, from the
+/// beginning and from each adoption on.
+#[test]
+fn recorded_cycles_step_again_to_the_same_bytes() {
+    let limits = Limits::default();
+    let (seeds, cycles) = if cfg!(miri) { (1, 200) } else { (8, 5000) };
+    for seed in 100..100 + seeds {
+        let mut chaos = Chaos::new(seed, &limits);
+        let mut state = ControlState::new(limits.clone(), settings(seed));
+        let mut again = ControlState::new(limits.clone(), settings(seed));
+        let mut late: Option<ControlState> = None;
+        for _ in 0..cycles {
+            let input = chaos.input(state.mode());
+            let record = record_input(&input, state.cycle() + 1);
+            let bytes = postcard::to_allocvec(&record).unwrap();
+            let read: InputRecord = postcard::from_bytes(&bytes).unwrap();
+            let restore = || {
+                restore_input(&read, |id, hash| {
+                    let motion = chaos.pool.get(usize::try_from(id).ok()?)?;
+                    (motion.fingerprint() == hash).then(|| Box::new(motion.clone()))
+                })
+                .unwrap()
+            };
+            let adopts = matches!(input.order, Some(Order::Adopt { .. }));
+            if late.is_none() && adopts {
+                late = Some(ControlState::resume(
+                    limits.clone(),
+                    settings(seed),
+                    state.cycle(),
+                    state.motions_done,
+                ));
+            }
+            let (out, repeated) = (state.step(input), again.step(restore()));
+            assert_eq!(bytes_of(&out), bytes_of(&repeated));
+            if let Some(late_state) = &mut late {
+                let resumed = late_state.step(restore());
+                if late_state.mode() == ControllerMode::Offline {
+                    // That adoption was refused; the next one will do.
+                    late = None;
+                } else {
+                    assert_eq!(bytes_of(&out), bytes_of(&resumed));
+                }
+            }
+            chaos.told(&out);
+        }
+    }
+}
+
+/// Bits of everything a cycle gives out.
+fn bytes_of(out: &CycleOutput) -> (Vec<u8>, String) {
+    let record = postcard::to_allocvec(&out.record).unwrap();
+    // `{:?}` of a float is exact: it reads back to the same bits, or is NaN.
+    let rest = format!("{:?} {:?} {:?}", out.command, out.request, out.events);
+    (record, rest)
+}
