@@ -89,62 +89,66 @@ impl Default for ControllerConfig {
     }
 }
 
-/// When the monitors give up. The defaults tolerate a shared machine and an
-/// ordinary network; tighten them on a real-time machine with a direct cable.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ThresholdSettings {
-    /// Longest silence of the operator's heartbeat while the arm moves (ms).
-    pub operator_timeout_ms: f64,
-    /// Longest wait for the reply to a setpoint (ms).
-    pub reply_stall_ms: f64,
-    /// Largest age of the newest joint report while the arm moves (ms).
-    pub report_stale_ms: f64,
-    /// Largest distance of a measured joint from everything it was told in the
-    /// last `tracking_window_ms` (rad).
-    pub tracking_error_max_rad: f64,
-    /// Longest lag of the arm that counts as normal (ms).
-    pub tracking_window_ms: f64,
-    /// Most cycles missed at once while the arm moves.
-    pub missed_cycles_max: u32,
+/// A set of thresholds that belong together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Profile {
+    /// For a real arm on a direct cable and a real-time machine.
+    Strict,
+    /// For a simulated arm on a machine shared with other programs.
+    Relaxed,
 }
 
-impl Default for ThresholdSettings {
-    fn default() -> Self {
-        Self {
-            operator_timeout_ms: 500.0,
-            reply_stall_ms: 100.0,
-            report_stale_ms: 100.0,
-            tracking_error_max_rad: 0.05,
-            tracking_window_ms: 100.0,
-            missed_cycles_max: 5,
-        }
-    }
+/// When the monitors give up. What is left out comes from the profile, and the
+/// profile, when left out, from the arm's address: relaxed for an arm on this
+/// machine, strict for any other.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ThresholdSettings {
+    /// Where all the others come from.
+    pub profile: Option<Profile>,
+    /// Longest silence of the operator's heartbeat while the arm moves (ms).
+    pub operator_timeout_ms: Option<f64>,
+    /// Longest silence of the guardian's heartbeat (ms).
+    pub guardian_timeout_ms: Option<f64>,
+    /// Longest wait for the reply to a setpoint (ms).
+    pub reply_stall_ms: Option<f64>,
+    /// Most setpoints that may wait for their reply; no more are sent meanwhile.
+    pub unanswered_max: Option<u16>,
+    /// Largest age of the newest joint report while the arm moves (ms).
+    pub report_stale_ms: Option<f64>,
+    /// Longest time in which joint reports may repeat their values while the arm
+    /// is told to move (ms).
+    pub report_frozen_ms: Option<f64>,
+    /// Largest distance of a measured joint from everything it was told in the
+    /// last `tracking_window_ms` (rad).
+    pub tracking_error_max_rad: Option<f64>,
+    /// Longest lag of the arm that counts as normal (ms).
+    pub tracking_window_ms: Option<f64>,
+    /// Most cycles missed at once without slowing the motion down.
+    pub late_cycles_max: Option<u32>,
+    /// Most cycles missed at once while the arm moves.
+    pub missed_cycles_max: Option<u32>,
 }
 
 impl ThresholdSettings {
-    /// Checked thresholds.
+    /// Checked thresholds for the arm at `arm`.
     ///
     /// # Errors
     /// [`ConfigError::Threshold`].
-    pub fn checked(&self) -> Result<Thresholds, ConfigError> {
-        let span = |key, found: f64| {
-            if (4.0..=10_000.0).contains(&found) {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "checked to be 4 to 10 000 just above"
-                )]
-                Ok((found * 1e6) as u64)
-            } else {
-                Err(ConfigError::Threshold {
-                    key,
-                    found,
-                    allowed: "4 to 10000 ms",
-                })
-            }
+    pub fn checked(&self, arm: IpAddr) -> Result<Thresholds, ConfigError> {
+        let profile = self.profile.unwrap_or(if arm.is_loopback() {
+            Profile::Relaxed
+        } else {
+            Profile::Strict
+        });
+        let base = match profile {
+            Profile::Strict => Thresholds::strict(),
+            Profile::Relaxed => Thresholds::relaxed(),
         };
-        let error = self.tracking_error_max_rad;
+        let error = self
+            .tracking_error_max_rad
+            .unwrap_or(base.tracking_error_max_rad);
         if !(error > 0.0 && error <= 1.0) {
             return Err(ConfigError::Threshold {
                 key: "tracking_error_max_rad",
@@ -152,15 +156,65 @@ impl ThresholdSettings {
                 allowed: "above 0 and at most 1 rad",
             });
         }
+        let unanswered_max = self.unanswered_max.unwrap_or(base.unanswered_max);
+        if unanswered_max == 0 {
+            return Err(ConfigError::Threshold {
+                key: "unanswered_max",
+                found: 0.0,
+                allowed: "at least 1",
+            });
+        }
         Ok(Thresholds {
-            operator_timeout_ns: span("operator_timeout_ms", self.operator_timeout_ms)?,
-            reply_stall_ns: span("reply_stall_ms", self.reply_stall_ms)?,
-            report_stale_ns: span("report_stale_ms", self.report_stale_ms)?,
+            operator_timeout_ns: span_ns(
+                "operator_timeout_ms",
+                self.operator_timeout_ms,
+                base.operator_timeout_ns,
+            )?,
+            guardian_timeout_ns: span_ns(
+                "guardian_timeout_ms",
+                self.guardian_timeout_ms,
+                base.guardian_timeout_ns,
+            )?,
+            reply_stall_ns: span_ns("reply_stall_ms", self.reply_stall_ms, base.reply_stall_ns)?,
+            report_stale_ns: span_ns(
+                "report_stale_ms",
+                self.report_stale_ms,
+                base.report_stale_ns,
+            )?,
+            report_frozen_ns: span_ns(
+                "report_frozen_ms",
+                self.report_frozen_ms,
+                base.report_frozen_ns,
+            )?,
+            tracking_window_ns: span_ns(
+                "tracking_window_ms",
+                self.tracking_window_ms,
+                base.tracking_window_ns,
+            )?,
             tracking_error_max_rad: error,
-            tracking_window_ns: span("tracking_window_ms", self.tracking_window_ms)?,
-            missed_cycles_max: self.missed_cycles_max,
-            ..Thresholds::relaxed()
+            unanswered_max,
+            late_cycles_max: self.late_cycles_max.unwrap_or(base.late_cycles_max),
+            missed_cycles_max: self.missed_cycles_max.unwrap_or(base.missed_cycles_max),
+            ..base
         })
+    }
+}
+
+/// A time from the file (ms), checked, or the profile's (ns).
+fn span_ns(key: &'static str, found_ms: Option<f64>, base_ns: u64) -> Result<u64, ConfigError> {
+    match found_ms {
+        None => Ok(base_ns),
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "4 to 10 000 ms"
+        )]
+        Some(ms) if (4.0..=10_000.0).contains(&ms) => Ok((ms * 1e6) as u64),
+        Some(found) => Err(ConfigError::Threshold {
+            key,
+            found,
+            allowed: "4 to 10000 ms",
+        }),
     }
 }
 
@@ -195,7 +249,7 @@ impl ControllerConfig {
     /// # Errors
     /// [`ConfigError`].
     pub fn check(&self) -> Result<(), ConfigError> {
-        self.thresholds.checked()?;
+        self.thresholds.checked(self.arm)?;
         match self.real_time.priority {
             Some(found) if !(11..=99).contains(&found) => Err(ConfigError::Priority { found }),
             _ => Ok(()),
@@ -256,5 +310,26 @@ mod tests {
             config.resolve_limits(),
             Err(ConfigError::LimitsTwice)
         ));
+    }
+    #[test]
+    fn an_arm_elsewhere_is_held_to_strict_thresholds() {
+        let local = ThresholdSettings::default();
+        let checked = |settings: ThresholdSettings, arm: [u8; 4]| settings.checked(arm.into());
+        assert_eq!(
+            checked(local, [127, 0, 0, 1]).unwrap(),
+            Thresholds::relaxed()
+        );
+        assert_eq!(
+            checked(local, [192, 168, 1, 203]).unwrap(),
+            Thresholds::strict()
+        );
+        let own = ThresholdSettings {
+            profile: Some(Profile::Strict),
+            reply_stall_ms: Some(20.0),
+            ..local
+        };
+        let thresholds = checked(own, [127, 0, 0, 1]).unwrap();
+        assert_eq!(thresholds.reply_stall_ns, 20_000_000);
+        assert_eq!(thresholds.late_cycles_max, 2);
     }
 }

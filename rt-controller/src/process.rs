@@ -38,7 +38,7 @@ const BRAKE_WAIT: Duration = Duration::from_secs(3);
 pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), ControllerError> {
     config.check()?;
     let limits = config.resolve_limits()?;
-    let thresholds = config.thresholds.checked()?;
+    let thresholds = config.thresholds.checked(config.arm)?;
     let bus = Bus::join(&config.domain)?;
     bus.remove_leftovers();
     let rings = rings();
