@@ -153,12 +153,15 @@ fn config(domain: &str, arm: &SmallArm) -> ControllerConfig {
             ..RealTimeSettings::default()
         },
         thresholds: ThresholdSettings {
-            operator_timeout_ms: 5000.0,
-            reply_stall_ms: 5000.0,
-            report_stale_ms: 5000.0,
-            tracking_window_ms: 200.0,
-            tracking_error_max_rad: 0.5,
-            missed_cycles_max: 1000,
+            operator_timeout_ms: Some(5000.0),
+            reply_stall_ms: Some(5000.0),
+            report_stale_ms: Some(5000.0),
+            tracking_window_ms: Some(200.0),
+            tracking_error_max_rad: Some(0.5),
+            missed_cycles_max: Some(1000),
+            late_cycles_max: Some(1000),
+            unanswered_max: Some(1000),
+            ..ThresholdSettings::default()
         },
         ..ControllerConfig::default()
     }

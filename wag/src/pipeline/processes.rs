@@ -131,10 +131,11 @@ pub fn start_controller_at(
     if arm.is_loopback() {
         // A simulated arm shares this machine with everything else: its silence
         // says more about the machine's load than about a cable.
-        config.thresholds.reply_stall_ms = 500.0;
-        config.thresholds.report_stale_ms = 500.0;
-        config.thresholds.tracking_window_ms = 500.0;
-        config.thresholds.missed_cycles_max = 50;
+        config.thresholds.reply_stall_ms = Some(500.0);
+        config.thresholds.report_stale_ms = Some(500.0);
+        config.thresholds.tracking_window_ms = Some(500.0);
+        config.thresholds.missed_cycles_max = Some(50);
+        config.thresholds.late_cycles_max = Some(50);
     } else {
         config.real_time.require = true;
     }
