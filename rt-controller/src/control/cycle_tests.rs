@@ -220,7 +220,8 @@ fn every_fault_ends_as_its_table_says() {
         (FaultCode::ReportStale, |i| i.reports = Reports::default()),
         (FaultCode::EncoderJump, |i| {
             for report in i.reports.as_mut_slice() {
-                report.q[2] += 0.051;
+                // Five degrees.
+                report.q[2] += 0.0873;
             }
         }),
         (FaultCode::ArmError, |i| i.link.status = Some(Status(0x50))),

@@ -12,9 +12,12 @@ use crate::control::settings::Thresholds;
 use shared_types::ipc::JointReport;
 use shared_types::{FaultCode, JOINTS, JointVector, Limits, MonotonicNs};
 
-/// Stamps whose distance to the arrival changes by more than this need a new
-/// map of the arm's clock (ns).
-const CLOCK_JUMP_NS: u64 = 50_000_000;
+/// A stamp farther than this from the arrival needs a new map of the arm's clock
+/// (ns); less may be a receiver that was held up.
+const CLOCK_JUMP_NS: u64 = 500_000_000;
+/// Without the arm's clock, reports read at once carry one stamp; they are taken
+/// to be this far apart (s).
+const UNCLOCKED_SPAN_S: f64 = 0.010;
 /// A joint that moves less than this stands still (rad).
 const STILL_RAD: f64 = 1e-3;
 /// A joint is stuck when it should have moved by this much meanwhile (rad).
@@ -93,9 +96,8 @@ impl ReportWatch {
             self.still = core::array::from_fn(|j| (report.stamp_ns, report.q[j]));
             return false;
         };
-        let delay = |r: &JointReport| r.arrival_ns.saturating_sub(r.stamp_ns);
-        let resync = report.stamp_ns <= before.stamp_ns
-            || delay(report).abs_diff(delay(&before)) > CLOCK_JUMP_NS;
+        let resync = report.stamp_ns < before.stamp_ns
+            || report.stamp_ns.abs_diff(report.arrival_ns) > CLOCK_JUMP_NS;
         if resync {
             self.resyncs = self.resyncs.saturating_add(1);
             self.frozen_since_ns = report.stamp_ns;
@@ -223,6 +225,11 @@ fn jump(before: &JointReport, report: &JointReport, limits: &Limits) -> Option<F
     if span_s > JUMP_SPAN_MAX_S {
         return None;
     }
+    let span_s = if report.arm_clock == 0 {
+        span_s.max(UNCLOCKED_SPAN_S)
+    } else {
+        span_s
+    };
     (0..JOINTS).find_map(|j| {
         let way_rad = (report.q[j] - before.q[j]).abs();
         let most = 2.0 * limits.velocity_max_rad_s[j] * span_s + JUMP_RAD;
