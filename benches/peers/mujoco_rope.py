@@ -13,9 +13,10 @@ import numpy as np
 from truth import CHANNELS, derived
 
 ARMATURE = 1e9
+# On this model "implicitfast" gives the same motion to the last bit, at the same speed.
 # "implicit" costs four times as much a step and is no more accurate here; RK4 treats
 # damping explicitly and is stable below about 2 us only.
-SCHEMES = ("implicitfast", "Euler")
+SCHEMES = ("Euler",)
 
 
 def version():
