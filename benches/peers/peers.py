@@ -20,7 +20,7 @@ import truth
 BOUND_MM = 5.0
 FIRST_STEP_S = 1e-4
 SHORTEST_STEP_S = 2e-6
-RADAU_STEPS_PER_FRAME = (1, 2, 3, 4, 6, 8, 11, 16)
+RADAU_STEPS_PER_FRAME = (1, 4, 6, 8)
 REPEATS = 2
 BAR = 1000.0
 ONE_ROPE = "one rope"
@@ -78,14 +78,21 @@ def of_first_order(case, engine, scheme, simulate):
 
 
 def of_third_order(case, engine, scheme, simulate, steps_s):
-    """Row of the first of `steps_s`, longest first, within the bound; its errors do not fall evenly."""
+    """Row of the fastest of `steps_s` within the bound.
+
+    Neither errors nor costs fall evenly: a step whose Newton iteration fails is taken in parts.
+    """
+    within = []
     for step_s in steps_s:
         tip_m, cpu_s = simulate(step_s)
-        error, setting = case.error_mm(tip_m), f"{1e3 * step_s:.2f} ms"
+        error = case.error_mm(tip_m)
+        print(f"   {engine} {scheme}: {error:.1f} mm in {cpu_s:.1f} CPU s at {1e3 * step_s:.2f} ms", flush=True)
         if error <= BOUND_MM:
-            return [repeated(case, engine, scheme, setting, error, cpu_s, lambda: simulate(step_s))]
-        print(f"   {engine} {scheme}: {error:.1f} mm at {setting}", flush=True)
-    return []
+            within.append((cpu_s, step_s, error))
+    if not within:
+        return []
+    cpu_s, step_s, error = min(within)
+    return [repeated(case, engine, scheme, f"{1e3 * step_s:.2f} ms", error, cpu_s, lambda: simulate(step_s))]
 
 
 def of_mujoco(case):
