@@ -54,11 +54,10 @@ impl<V: Lanes> Vec3<V> {
     /// Lane by lane `then` where `a < b`, else `otherwise`.
     #[inline(always)]
     pub(crate) fn select_less(a: V, b: V, then: Self, otherwise: Self) -> Self {
-        let pick = |t, o| V::select_less(a, b, t, o);
         Self(
-            pick(then.0, otherwise.0),
-            pick(then.1, otherwise.1),
-            pick(then.2, otherwise.2),
+            V::select_less(a, b, then.0, otherwise.0),
+            V::select_less(a, b, then.1, otherwise.1),
+            V::select_less(a, b, then.2, otherwise.2),
         )
     }
     /// `c + self x o`.
@@ -217,7 +216,8 @@ impl<V: Lanes> Mat3<V> {
 impl<V: Lanes> Mat3<V> {
     #[inline(always)]
     pub(crate) fn scale(&self, f: V) -> Self {
-        Self(self.0.map(|row| row.scale(f)))
+        let [a, b, c] = self.0;
+        Self([a.scale(f), b.scale(f), c.scale(f)])
     }
     /// `self + o`.
     #[inline(always)]

@@ -31,6 +31,8 @@ pub(crate) struct DominoLanes<V> {
     /// Moments of this step about the forward and the backward edge (N m).
     moments: [V; 2],
     lanes: Vec<Tilt>,
+    /// Whether any moved when last predicted.
+    rocked: bool,
 }
 
 /// One domino.
@@ -58,6 +60,7 @@ impl<V: Lanes> DominoLanes<V> {
             counted: zero,
             moments: [zero; 2],
             lanes: vec![Tilt::default(); count],
+            rocked: false,
         }
     }
 
@@ -84,13 +87,18 @@ impl<V: Lanes> DominoLanes<V> {
         self.lanes.iter().any(rocks)
     }
 
-    /// Its frame if it goes on as it is.
+    /// Its frame if it goes on as it is, where that is not the one given before.
     #[inline(always)]
-    pub(crate) fn predict(&mut self, h: V) -> Frame<V> {
+    pub(crate) fn predict(&mut self, h: V) -> Option<Frame<V>> {
+        let rocks = self.is_rocking();
+        let rocked = core::mem::replace(&mut self.rocked, rocks);
+        if !(rocks || rocked) {
+            return None;
+        }
         for (lane, tilt) in self.lanes.iter_mut().enumerate() {
             tilt.step_s = h.get(lane);
         }
-        self.frame()
+        Some(self.frame())
     }
 
     #[inline(always)]
@@ -163,8 +171,9 @@ impl<V: Lanes> DominoLanes<V> {
         let weight_nm = d.mass_kg * GRAVITY_M_S2 * 0.5 * d.thickness_m.hypot(d.height_m);
         let critical_rad = (d.thickness_m / d.height_m).atan();
         for (lane, (tilt, end)) in self.lanes.iter_mut().zip(ends).enumerate() {
-            if end.running && tilt.outcome.down_at_s.is_none() {
-                let moments = [self.moments[0].get(lane), self.moments[1].get(lane)];
+            let moments = [self.moments[0].get(lane), self.moments[1].get(lane)];
+            let at_rest = tilt.angle_rad == 0.0 && moments == [0.0; 2];
+            if end.running && tilt.outcome.down_at_s.is_none() && !at_rest {
                 let back_nm = weight_nm * (critical_rad - tilt.angle_rad.abs()).sin();
                 let law = |lean: f64| {
                     let moment = if lean > 0.0 { moments[0] } else { moments[1] };

@@ -93,8 +93,14 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         }
 
         while clock.next_step(&mut rope, &mut restarts) {
-            for lane in &restarts {
-                links.iter_mut().for_each(|link| link.clear_memory(*lane));
+            if !restarts.is_empty() {
+                let mut which = V::splat(0.0);
+                for lane in &restarts {
+                    which.set(*lane, 1.0);
+                }
+                for link in &mut links {
+                    link.clear_memory(which);
+                }
             }
             recorder.before_step(&clock, &links, rope.link_length);
             watcher.before_step(&clock, &links);
@@ -107,7 +113,7 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
                     &rope,
                     &base.dynamics,
                     &clock.scheme,
-                    &Unloaded::new(),
+                    &Unloaded,
                 ),
             };
             recorder.after_step(&clock, &links, rope.link_length);

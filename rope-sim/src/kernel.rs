@@ -125,8 +125,8 @@ fn eliminate<V: Lanes, L: Loads<V>>(
     while let (Some((link, links_nearer)), Some((space, spaces_nearer))) =
         (nearer.split_last_mut(), spaces.split_last_mut())
     {
-        if L::PRESENT {
-            beyond.add(loads.on_link(links_nearer.len()), rope.per_resistance);
+        if let Some(load) = loads.on_link(links_nearer.len()) {
+            beyond.add(load, rope.per_resistance);
         }
         let half = beyond.open(rope, joints.span, link.al_change);
         joints.prepare(links_nearer, spaces_nearer, rope, scheme, loads);

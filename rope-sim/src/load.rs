@@ -51,7 +51,12 @@ impl<V: Lanes> Load<V> {
         predicted: Vec3<V>,
     ) -> Self {
         let none = Vec3::zero();
-        let vw = resistance.rows().map(|row| arm.cross_add(row, none));
+        let [r0, r1, r2] = resistance.rows();
+        let vw = [
+            arm.cross_add(r0, none),
+            arm.cross_add(r1, none),
+            arm.cross_add(r2, none),
+        ];
         let Vec3(x, y, z) = arm;
         let ww = Sym3 {
             xx: y.fma(vw[2].0, -(z * vw[1].0)),
@@ -72,32 +77,63 @@ impl<V: Lanes> Load<V> {
     }
 }
 
-/// The loads of one step.
+/// The loads of one step as they come together, link by link.
+pub(crate) struct LinkLoads<V> {
+    loads: Vec<Load<V>>,
+    /// Whether a link has any.
+    present: Vec<bool>,
+}
+
+impl<V: Lanes> LinkLoads<V> {
+    #[inline(always)]
+    pub(crate) fn new(links: usize) -> Self {
+        Self {
+            loads: vec![Load::none(); links],
+            present: vec![false; links],
+        }
+    }
+
+    /// Takes all loads off.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.present.fill(false);
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, link: usize, load: &Load<V>) {
+        self.loads[link] = if self.present[link] {
+            self.loads[link].plus(load)
+        } else {
+            *load
+        };
+        self.present[link] = true;
+    }
+
+    #[inline(always)]
+    pub(crate) fn on_link(&self, link: usize) -> Option<&Load<V>> {
+        self.present[link].then(|| &self.loads[link])
+    }
+}
+
+/// What the kernel asks about the loads of one step.
 pub(crate) trait Loads<V> {
     /// Whether there are any. If so, the links are predicted before the step, because
     /// loads depend on where the rope is going to be.
     const PRESENT: bool;
-    /// Load on one link, counted from the attach point.
-    fn on_link(&self, link: usize) -> &Load<V>;
+    /// Load on one link, counted from the attach point, if it has any in any lane.
+    fn on_link(&self, link: usize) -> Option<&Load<V>>;
     /// Turn of a link against the one before in an unloaded rope.
     fn rest_turn(&self) -> Quat<V>;
 }
 
 /// Nothing acts; the compiler leaves no trace of it.
-pub(crate) struct Unloaded<V>(Load<V>);
+pub(crate) struct Unloaded;
 
-impl<V: Lanes> Unloaded<V> {
-    #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self(Load::none())
-    }
-}
-
-impl<V: Lanes> Loads<V> for Unloaded<V> {
+impl<V: Lanes> Loads<V> for Unloaded {
     const PRESENT: bool = false;
     #[inline(always)]
-    fn on_link(&self, _link: usize) -> &Load<V> {
-        &self.0
+    fn on_link(&self, _link: usize) -> Option<&Load<V>> {
+        None
     }
     #[inline(always)]
     fn rest_turn(&self) -> Quat<V> {

@@ -103,12 +103,12 @@ impl<V: Lanes> Link<V> {
         }
     }
 
-    /// Forgets the past accelerations of one lane.
+    /// Forgets the past accelerations of the lanes in which `which` is positive.
     #[inline(always)]
-    pub(crate) fn clear_memory(&mut self, lane: usize) {
-        self.a.set(lane, [0.0; 3]);
-        self.al.set(lane, [0.0; 3]);
-        self.al_change.set(lane, [0.0; 3]);
+    pub(crate) fn clear_memory(&mut self, which: V) {
+        for memory in [&mut self.a, &mut self.al, &mut self.al_change] {
+            *memory = Vec3::select_less(V::splat(0.0), which, Vec3::zero(), *memory);
+        }
     }
 
     /// Moves the attitude, velocity and algorithmic acceleration to their

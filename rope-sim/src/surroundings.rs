@@ -3,13 +3,13 @@
 use crate::algebra::Quat;
 use crate::base_path::BasePath;
 use crate::clock::{BaseState, Clock};
-use crate::contact::{Contacts, LOOK_PERIOD, Node, StepEnd, corrected, predicted};
+use crate::contact::{Contacts, LOOK_PERIOD, Node, Predicted, StepEnd, corrected, predicted};
 use crate::drag::DragLanes;
 use crate::extras::RopeExtras;
 use crate::group::{GroupTask, Member};
 use crate::kernel::{Elimination, StepReport, step};
 use crate::lanes::Lanes;
-use crate::load::{Load, Loads, Unloaded};
+use crate::load::{LinkLoads, Load, Loads, Unloaded};
 use crate::scene::{ContactSummary, DominoOutcome};
 use crate::scheme::Scheme;
 use crate::state::{Link, RopeLanes};
@@ -23,15 +23,15 @@ pub(crate) struct Around<V> {
     rest_turn: Quat<V>,
     is_curved: bool,
     nodes: Vec<Node<V>>,
-    loads: Vec<Load<V>>,
+    loads: LinkLoads<V>,
     steps: usize,
 }
 
 impl<V: Lanes> Loads<V> for Around<V> {
     const PRESENT: bool = true;
     #[inline(always)]
-    fn on_link(&self, link: usize) -> &Load<V> {
-        &self.loads[link]
+    fn on_link(&self, link: usize) -> Option<&Load<V>> {
+        self.loads.on_link(link)
     }
     #[inline(always)]
     fn rest_turn(&self) -> Quat<V> {
@@ -65,7 +65,7 @@ impl<V: Lanes> Around<V> {
                 .iter()
                 .any(|(_, e)| e.rest_curvature_per_m.iter().any(bends)),
             nodes: vec![Node::zero(); links],
-            loads: vec![Load::none(); links],
+            loads: LinkLoads::new(links),
             steps: 0,
         }
     }
@@ -98,21 +98,25 @@ impl<V: Lanes> Around<V> {
         self.steps += 1;
         let look = self.steps.is_multiple_of(LOOK_PERIOD);
         if !(in_contact || self.is_curved || self.drag.is_some()) {
-            let unloaded = Unloaded::new();
-            let report = step(links, scratch, rope, &attach.dynamics, scheme, &unloaded);
+            let report = step(links, scratch, rope, &attach.dynamics, scheme, &Unloaded);
             if look {
                 self.look(links, rope, attach, arm);
             }
             return report;
         }
-        links.iter_mut().for_each(|link| link.predict(scheme));
+        for link in links.iter_mut() {
+            link.predict(scheme);
+        }
         predicted(&mut self.nodes, links, rope, attach, scheme);
-        self.loads.fill(Load::none());
+        self.loads.clear();
         self.add_drag(links, rope, scheme);
         if in_contact {
-            let loads = &mut self.loads;
-            self.contacts
-                .load(loads, links, &self.nodes, scheme, attach, arm);
+            let predicted = Predicted {
+                links,
+                nodes: &self.nodes,
+                scheme,
+            };
+            self.contacts.load(&mut self.loads, predicted, attach, arm);
         }
         let report = step(links, scratch, rope, &attach.dynamics, scheme, &*self);
         if in_contact {
@@ -129,11 +133,12 @@ impl<V: Lanes> Around<V> {
     fn add_drag(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, scheme: &Scheme<V>) {
         let Some(drag) = &self.drag else { return };
         let per_length = rope.link_length.recip();
-        for ((load, link), node) in self.loads.iter_mut().zip(links).zip(&self.nodes) {
-            *load = drag.on_link(link, node, per_length, scheme);
+        for (index, (link, node)) in links.iter().zip(&self.nodes).enumerate() {
+            let load = drag.on_link(link, node, per_length, scheme);
+            self.loads.add(index, &load);
         }
-        if let (Some(load), Some(node)) = (self.loads.last_mut(), self.nodes.last()) {
-            *load = load.plus(&drag.on_lead(node, scheme));
+        if let Some(node) = self.nodes.last() {
+            self.loads.add(links.len() - 1, &drag.on_lead(node, scheme));
         }
     }
 }
@@ -146,6 +151,8 @@ pub(crate) struct Surroundings<'a, V> {
     arm_states: Vec<BaseState<V>>,
     arm_rope: RopeLanes<V>,
     ends: Vec<StepEnd>,
+    /// Whether any lane restarts at every step.
+    restarting: bool,
 }
 
 impl<'a, V: Lanes> Surroundings<'a, V> {
@@ -171,6 +178,7 @@ impl<'a, V: Lanes> Surroundings<'a, V> {
             arm_states: Vec::with_capacity(carriers),
             arm_rope: RopeLanes::of(plain[0]),
             ends: Vec::with_capacity(members.len()),
+            restarting: false,
         }
     }
 
@@ -197,9 +205,28 @@ impl<'a, V: Lanes> Surroundings<'a, V> {
             arm.next_step(&mut self.arm_rope, &mut restarts);
         }
         self.read_arm();
-        let lanes = clock.lanes();
+        if self.around.contacts.is_engaged() {
+            self.read_clock(clock);
+        }
+        let carriers = (attach, self.arm_states.as_slice());
+        let report = self
+            .around
+            .step(links, scratch, rope, &clock.scheme, carriers, &self.ends);
+        let imminent = self.around.contacts.imminent;
+        let any = V::any_less(V::splat(0.0), imminent);
+        if any || self.restarting {
+            for lane in 0..clock.lanes() {
+                clock.keep_restarting(lane, imminent.get(lane) > 0.0);
+            }
+        }
+        self.restarting = any;
+        report
+    }
+
+    #[inline(always)]
+    fn read_clock(&mut self, clock: &Clock<V>) {
         self.ends.clear();
-        self.ends.extend((0..lanes).map(|lane| {
+        self.ends.extend((0..clock.lanes()).map(|lane| {
             let (start_s, time_s) = clock.span_s(lane);
             StepEnd {
                 time_s,
@@ -207,14 +234,6 @@ impl<'a, V: Lanes> Surroundings<'a, V> {
                 running: !clock.finished(lane),
             }
         }));
-        let carriers = (attach, self.arm_states.as_slice());
-        let report = self
-            .around
-            .step(links, scratch, rope, &clock.scheme, carriers, &self.ends);
-        for lane in 0..lanes {
-            clock.keep_restarting(lane, self.around.contacts.imminent.get(lane) > 0.0);
-        }
-        report
     }
 
     #[inline(always)]

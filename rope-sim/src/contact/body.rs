@@ -35,11 +35,10 @@ pub(crate) struct Frame<V> {
 impl<V: Lanes> Frame<V> {
     #[inline(always)]
     fn fixed(pose: &Isometry3<f64>, origin_m: [f64; 3]) -> Self {
-        let r = pose.rotation.to_rotation_matrix();
         let p = pose.translation.vector - Vector3::from(origin_m);
         Self {
             p: constant(&p),
-            axes: [0, 1, 2].map(|c| constant(&r.matrix().column(c).into())),
+            axes: axes_of(pose),
             v: Vec3::zero(),
             w: Vec3::zero(),
         }
@@ -49,12 +48,12 @@ impl<V: Lanes> Frame<V> {
     #[inline(always)]
     fn carried(carrier: &BaseState<V>, local: &Isometry3<f64>) -> Self {
         let q: Quat<V> = carrier.dynamics.q;
-        let r = local.rotation.to_rotation_matrix();
+        let [x, y, z] = axes_of(local);
         let arm = q.turn(constant(&local.translation.vector));
         let w = carrier.dynamics.w;
         Self {
             p: carrier.position.add(arm),
-            axes: [0, 1, 2].map(|c| q.turn(constant(&r.matrix().column(c).into()))),
+            axes: [q.turn(x), q.turn(y), q.turn(z)],
             v: w.cross_add(arm, carrier.velocity),
             w,
         }
@@ -78,6 +77,18 @@ impl<V: Lanes> Frame<V> {
     pub(crate) fn velocity_at(&self, x: Vec3<V>) -> Vec3<V> {
         self.w.cross_add(x.sub(self.p), self.v)
     }
+}
+
+/// Directions of a frame's axes, in all lanes.
+#[inline(always)]
+fn axes_of<V: Lanes>(pose: &Isometry3<f64>) -> [Vec3<V>; 3] {
+    let r = pose.rotation.to_rotation_matrix();
+    let m = r.matrix();
+    [
+        constant(&m.column(0).into()),
+        constant(&m.column(1).into()),
+        constant(&m.column(2).into()),
+    ]
 }
 
 /// A number triple in all lanes.

@@ -10,6 +10,7 @@
 //! Whether it is far is decided from each lane's own motion.
 
 mod body;
+mod exchange;
 mod middle;
 mod nodes;
 mod shape;
@@ -17,29 +18,25 @@ mod summary;
 mod touch;
 
 pub(crate) use body::{Body, Carrier, Frame, constant};
+pub(crate) use exchange::Predicted;
 pub(crate) use nodes::{Node, corrected, predicted};
 
-use crate::algebra::Vec3;
 use crate::clock::BaseState;
 use crate::domino::DominoLanes;
 use crate::lanes::Lanes;
-use crate::load::Load;
-use crate::scene::{ContactSummary, DominoOutcome, Scene, Shape};
-use crate::scheme::Scheme;
-use crate::state::{Link, RopeLanes};
+use crate::scene::{ContactSummary, DominoOutcome, Scene};
+use crate::state::RopeLanes;
 use shared_types::RopeParams;
 use summary::Summaries;
-use touch::{Point, Touch};
+use touch::Touch;
 
 /// Steps between two looks at how far everything is.
 pub(crate) const LOOK_PERIOD: usize = 8;
 /// What nodes and obstacles may gain in speed between two looks (m/s), above half as
 /// much again as the fastest node.
 const SPEED_ALLOWANCE_M_S: f64 = 12.0;
-/// Stiffness of a link's surface (N/m): 0.01 mm under 1 N.
-const LINK_STIFFNESS_N_M: f64 = 1e5;
-/// Stiffness of a lead's surface (N/m): 120 g at 3 m/s push it in by less than 1 mm.
-const LEAD_STIFFNESS_N_M: f64 = 2e6;
+/// Steps a node could travel in, if it came as close as that it would be looked at.
+const REACH_STEPS: f64 = 4.0;
 /// Contact points of a link: farther node, closest point.
 const POINTS: usize = 2;
 
@@ -48,12 +45,12 @@ pub(crate) struct Contacts<V> {
     bodies: Vec<Body<V>>,
     /// By body, link, point.
     touches: Vec<[Touch<V>; POINTS]>,
-    /// Whether all lanes of both points of a link are as if never touched.
-    idle: Vec<bool>,
+    /// Whether a point is as if never touched, in all lanes.
+    idle: Vec<[bool; POINTS]>,
     /// Per body, positive in lanes that are near.
     near: Vec<V>,
     engaged: Vec<bool>,
-    /// How close a node must be for its link to be looked at (m).
+    /// How close a point of the rope must be to be looked at, less its radius (m).
     reach: V,
     radius: V,
     lead_radius: V,
@@ -100,7 +97,7 @@ impl<V: Lanes> Contacts<V> {
         let count = bodies.len();
         Self {
             touches: vec![[Touch::none(); POINTS]; count * links],
-            idle: vec![true; count * links],
+            idle: vec![[true; POINTS]; count * links],
             near: vec![V::splat(0.0); count],
             engaged: vec![false; count],
             summaries: Summaries::new(count, ropes.len()),
@@ -139,7 +136,7 @@ impl<V: Lanes> Contacts<V> {
         let travel = speed * self.max_step;
         let size = rope.link_length + self.lead_radius;
         let horizon = travel.fma(V::splat(LOOK_PERIOD as f64), size);
-        self.reach = travel.fma(V::splat(4.0), size);
+        self.reach = travel * V::splat(REACH_STEPS);
         self.imminent = zero;
         for (index, body) in self.bodies.iter_mut().enumerate() {
             body.follow(attach, arm);
@@ -149,147 +146,6 @@ impl<V: Lanes> Contacts<V> {
             }
             self.near[index] = V::select_less(least, horizon, one, zero);
             self.engaged[index] = V::any_less(zero, self.near[index]);
-        }
-    }
-
-    /// Adds the contacts' reactions at the predictions to `loads`.
-    #[inline(always)]
-    pub(crate) fn load(
-        &mut self,
-        loads: &mut [Load<V>],
-        links: &[Link<V>],
-        nodes: &[Node<V>],
-        scheme: &Scheme<V>,
-        attach: &BaseState<V>,
-        arm: &[BaseState<V>],
-    ) {
-        let count = links.len();
-        self.imminent = V::splat(0.0);
-        if let Some(domino) = &mut self.domino
-            && let Some(body) = self.bodies.last_mut()
-        {
-            body.frame = domino.predict(scheme.h);
-        }
-        for index in 0..self.bodies.len() {
-            if !self.engaged[index] {
-                continue;
-            }
-            self.bodies[index].follow(attach, arm);
-            for link in 0..count {
-                self.load_link(index, link, loads, links, nodes, scheme);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn load_link(
-        &mut self,
-        index: usize,
-        link: usize,
-        loads: &mut [Load<V>],
-        links: &[Link<V>],
-        nodes: &[Node<V>],
-        scheme: &Scheme<V>,
-    ) {
-        let zero = V::splat(0.0);
-        let body = &self.bodies[index];
-        let slot = index * links.len() + link;
-        let (node, w, al) = (&nodes[link], links[link].w, links[link].al);
-        let near = self.near[index];
-        let close = V::select_less(body.distance(node.x).0, self.reach, near, zero);
-        if !V::any_less(zero, close) {
-            if !self.idle[slot] {
-                self.touches[slot] = [Touch::none(); POINTS];
-                self.idle[slot] = true;
-            }
-            return;
-        }
-        self.idle[slot] = false;
-        let is_last = link + 1 == links.len();
-        // Of a straight link above a plane an end is closest.
-        let points = if body.shape == Shape::HalfSpace {
-            1
-        } else {
-            POINTS
-        };
-        for which in 0..points {
-            let touch = &mut self.touches[slot][which];
-            let first = V::splat(link as f64 + 0.5);
-            let point = if which == 0 {
-                let (radius, stiffness) = if is_last {
-                    (self.lead_radius, LEAD_STIFFNESS_N_M)
-                } else {
-                    (self.radius, LINK_STIFFNESS_N_M)
-                };
-                Point {
-                    back: zero,
-                    radius,
-                    stiffness: V::splat(stiffness),
-                    may_touch: V::select_less(body.first_node, first, close, zero),
-                }
-            } else {
-                let far = step_back(node.x, node.v, body, scheme.h);
-                let near = node.x.sub(node.span);
-                let v_near = node.v.sub(w.cross_add(node.span, Vec3::zero()));
-                let near = step_back(near, v_near, body, scheme.h);
-                let (back, inside) = middle::closest(body, near, far);
-                let may_touch = V::select_less(body.first_middle, first, close, zero);
-                Point {
-                    back,
-                    radius: self.radius,
-                    stiffness: V::splat(LINK_STIFFNESS_N_M),
-                    may_touch: V::select_less(zero, inside, may_touch, zero),
-                }
-            };
-            let about_to = touch.find(body, &point, node, w, scheme.h);
-            self.imminent = self.imminent.max(about_to);
-            let yielding = match &self.domino {
-                Some(domino) if body.carrier == Carrier::Domino => {
-                    touch.keep_where(domino.standing());
-                    Some(domino.mobility(touch.normal(), touch.place(node)))
-                }
-                _ => None,
-            };
-            let reaction = touch.reaction(body.friction, node, al, scheme, yielding);
-            loads[link] = loads[link].plus(&reaction);
-        }
-    }
-
-    /// Takes in the motion the step has given. `end_s` and `running` are by lane.
-    #[inline(always)]
-    pub(crate) fn settle(
-        &mut self,
-        links: &[Link<V>],
-        nodes: &[Node<V>],
-        scheme: &Scheme<V>,
-        lanes: &[StepEnd],
-    ) {
-        let count = links.len();
-        for index in 0..self.bodies.len() {
-            if !self.engaged[index] {
-                continue;
-            }
-            let body = &self.bodies[index];
-            let is_domino = body.carrier == Carrier::Domino;
-            let mut tally = summary::Tally::none();
-            for link in 0..count {
-                let slot = index * count + link;
-                if self.idle[slot] {
-                    continue;
-                }
-                for (which, touch) in self.touches[slot].iter_mut().enumerate() {
-                    let (force, at) = touch.settle(body, &nodes[link], links[link].w, scheme);
-                    let is_lead = which == 0 && link + 1 == count;
-                    tally.add(touch.force, touch.depth(), is_lead);
-                    if is_domino && let Some(domino) = &mut self.domino {
-                        domino.push(force, at);
-                    }
-                }
-            }
-            self.summaries.add(index, &tally, lanes);
-        }
-        if let Some(domino) = &mut self.domino {
-            domino.advance(lanes);
         }
     }
 
@@ -315,10 +171,4 @@ pub(crate) struct StepEnd {
     pub(crate) step_s: f64,
     /// Whether the lane still counts.
     pub(crate) running: bool,
-}
-
-/// Where a point was at the start of the step, as the obstacle at its end sees it.
-#[inline(always)]
-fn step_back<V: Lanes>(x: Vec3<V>, v: Vec3<V>, body: &Body<V>, h: V) -> Vec3<V> {
-    v.sub(body.frame.velocity_at(x)).scale_sub(h, x)
 }

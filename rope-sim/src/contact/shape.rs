@@ -15,7 +15,10 @@ const NO_LENGTH_M: f64 = 1e-9;
 pub(crate) fn distance<V: Lanes>(shape: &Shape, p: Vec3<V>) -> (V, Vec3<V>) {
     match *shape {
         Shape::HalfSpace => (p.2, Vec3::splat(0.0, 0.0, 1.0)),
-        Shape::Box { half_m } => to_box(half_m.map(V::splat), p),
+        Shape::Box { half_m } => {
+            let [x, y, z] = half_m;
+            to_box([V::splat(x), V::splat(y), V::splat(z)], p)
+        }
         Shape::Capsule {
             half_length_m,
             radius_m,

@@ -18,6 +18,7 @@ use super::nodes::Node;
 use crate::algebra::{Sym3, Vec3};
 use crate::lanes::Lanes;
 use crate::load::Load;
+use crate::scene::Shape;
 use crate::scheme::Scheme;
 
 /// Strides along the path of one step.
@@ -99,12 +100,18 @@ impl<V: Lanes> Touch<V> {
         let start = x.sub(path);
         let per_length = path.norm().max(V::splat(TINY)).recip();
         let mut done = zero;
+        // A plane is its own tangent plane.
+        let strides = if body.shape == Shape::HalfSpace {
+            0
+        } else {
+            STRIDES
+        };
         let mut stride = 0;
         let (gap, normal) = loop {
             let at = path.scale_add(done, start);
             let (distance, normal) = body.distance(at);
             let gap = distance - point.radius;
-            if stride == STRIDES {
+            if stride == strides {
                 // On to the end of the path, along the tangent plane.
                 break (normal.dot(path).fma(one - done, gap), normal);
             }
@@ -126,6 +133,12 @@ impl<V: Lanes> Touch<V> {
         let later = rate.fma(h + h + h, gap);
         let imminent = V::select_less(later, V::splat(IMMINENT_M), one, zero);
         V::select_less(zero, point.may_touch, imminent, zero)
+    }
+
+    /// Whether it pushes in any lane.
+    #[inline(always)]
+    pub(crate) fn is_active(&self) -> bool {
+        V::any_less(V::splat(0.0), self.stiffness)
     }
 
     /// The force on the link, as the step needs it.

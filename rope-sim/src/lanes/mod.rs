@@ -100,6 +100,8 @@ pub(crate) trait Lanes:
 /// Work written once for any [`Lanes`] type. `run` and everything it calls with
 /// lanes must be `#[inline(always)]`: only then is it compiled for the
 /// instruction set of the function it ends up in.
+/// Closures cannot be marked so: a step must not put lanes through one, nor through
+/// adapters that take one (`map`, `for_each`); it would run ten times slower.
 pub(crate) trait LaneTask {
     /// What the work gives back.
     type Output;

@@ -14,7 +14,8 @@ macro_rules! vector_lanes {
      $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident,
      $fnma:ident,
      $min:ident, $max:ident, $and:ident, $andnot:ident, $xor:ident,
-     |$a:ident, $b:ident, $then:ident, $otherwise:ident| $select:expr) => {
+     |$a:ident, $b:ident, $then:ident, $otherwise:ident| $select:expr,
+     |$left:ident, $right:ident| $any_less:expr) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         #[repr(transparent)]
@@ -123,6 +124,12 @@ macro_rules! vector_lanes {
                 // SAFETY: only reached inside `run_*`, see the module's text.
                 Self(unsafe { $select })
             }
+            #[inline(always)]
+            fn any_less(a: Self, b: Self) -> bool {
+                let ($left, $right) = (a.0, b.0);
+                // SAFETY: only reached inside `run_*`, see the module's text.
+                unsafe { $any_less }
+            }
         }
     };
 }
@@ -134,7 +141,8 @@ vector_lanes!(
     _mm512_fmadd_ps, _mm512_fnmadd_ps, _mm512_min_ps, _mm512_max_ps,
     _mm512_and_ps, _mm512_andnot_ps, _mm512_xor_ps,
     |a, b, then, otherwise|
-        _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b), otherwise, then)
+        _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b), otherwise, then),
+    |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) != 0
 );
 vector_lanes!(
     /// Eight `f64` in one AVX-512 register.
@@ -143,7 +151,8 @@ vector_lanes!(
     _mm512_fmadd_pd, _mm512_fnmadd_pd, _mm512_min_pd, _mm512_max_pd,
     _mm512_and_pd, _mm512_andnot_pd, _mm512_xor_pd,
     |a, b, then, otherwise|
-        _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), otherwise, then)
+        _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), otherwise, then),
+    |a, b| _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b) != 0
 );
 vector_lanes!(
     /// Eight `f32` in one AVX register.
@@ -152,7 +161,8 @@ vector_lanes!(
     _mm256_fmadd_ps, _mm256_fnmadd_ps, _mm256_min_ps, _mm256_max_ps,
     _mm256_and_ps, _mm256_andnot_ps, _mm256_xor_ps,
     |a, b, then, otherwise|
-        _mm256_blendv_ps(otherwise, then, _mm256_cmp_ps::<_CMP_LT_OQ>(a, b))
+        _mm256_blendv_ps(otherwise, then, _mm256_cmp_ps::<_CMP_LT_OQ>(a, b)),
+    |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) != 0
 );
 vector_lanes!(
     /// Four `f64` in one AVX register.
@@ -161,7 +171,8 @@ vector_lanes!(
     _mm256_fmadd_pd, _mm256_fnmadd_pd, _mm256_min_pd, _mm256_max_pd,
     _mm256_and_pd, _mm256_andnot_pd, _mm256_xor_pd,
     |a, b, then, otherwise|
-        _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LT_OQ>(a, b))
+        _mm256_blendv_pd(otherwise, then, _mm256_cmp_pd::<_CMP_LT_OQ>(a, b)),
+    |a, b| _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, b)) != 0
 );
 
 /// Runs `task` in sixteen single precision lanes.

@@ -239,7 +239,9 @@ impl LiveRope {
             _ => Phase::Regular,
         };
         if phase == Phase::Restart {
-            self.links.iter_mut().for_each(|link| link.clear_memory(0));
+            self.links
+                .iter_mut()
+                .for_each(|link| link.clear_memory(1.0));
         }
         self.restart = false;
         if phase != self.phase || (step_s - self.step_s).abs() > 0.0 {

@@ -76,7 +76,7 @@ fn rates(rope: &RopeLanes<f64>, state: &[Pose]) -> Vec<Rate> {
             rope,
             &base,
             &scheme,
-            &crate::load::Unloaded::new(),
+            &crate::load::Unloaded,
         );
     }
     links

@@ -1,0 +1,225 @@
+//! What rope and obstacles exchange in one step: forces before it, motion after it.
+
+use super::body::Body;
+use super::touch::{Point, Touch};
+use super::{Carrier, Contacts, Node, POINTS, StepEnd, middle, summary};
+use crate::algebra::Vec3;
+use crate::clock::BaseState;
+use crate::lanes::Lanes;
+use crate::load::LinkLoads;
+use crate::scene::Shape;
+use crate::scheme::Scheme;
+use crate::state::Link;
+
+/// Stiffness of a link's surface (N/m): 0.01 mm under 1 N.
+const LINK_STIFFNESS_N_M: f64 = 1e5;
+/// Stiffness of a lead's surface (N/m): 120 g at 3 m/s push it in by less than 1 mm.
+const LEAD_STIFFNESS_N_M: f64 = 2e6;
+/// Index of a link's contact point at its farther node, and of that closest to the
+/// obstacle.
+const AT_NODE: usize = 0;
+const BETWEEN: usize = 1;
+
+/// The rope at the predictions.
+#[derive(Clone, Copy)]
+pub(crate) struct Predicted<'a, V> {
+    pub(crate) links: &'a [Link<V>],
+    pub(crate) nodes: &'a [Node<V>],
+    pub(crate) scheme: &'a Scheme<V>,
+}
+
+impl<V: Lanes> Contacts<V> {
+    /// Adds the contacts' reactions at the predictions to `loads`.
+    #[inline(always)]
+    pub(crate) fn load(
+        &mut self,
+        loads: &mut LinkLoads<V>,
+        rope: Predicted<V>,
+        attach: &BaseState<V>,
+        arm: &[BaseState<V>],
+    ) {
+        self.imminent = V::splat(0.0);
+        if let Some(domino) = &mut self.domino
+            && let Some(body) = self.bodies.last_mut()
+            && let Some(frame) = domino.predict(rope.scheme.h)
+        {
+            body.frame = frame;
+        }
+        for index in 0..self.bodies.len() {
+            if !self.engaged[index] {
+                continue;
+            }
+            let body = &mut self.bodies[index];
+            body.follow(attach, arm);
+            let mut nearer_m = body.distance(attach.position).0;
+            for link in 0..rope.links.len() {
+                let farther_m = self.bodies[index].distance(rope.nodes[link].x).0;
+                self.load_link(index, link, loads, rope, [nearer_m, farther_m]);
+                nearer_m = farther_m;
+            }
+        }
+    }
+
+    /// `distances_m` are those of the link's two nodes.
+    #[inline(always)]
+    fn load_link(
+        &mut self,
+        index: usize,
+        link: usize,
+        loads: &mut LinkLoads<V>,
+        rope: Predicted<V>,
+        distances_m: [V; 2],
+    ) {
+        let zero = V::splat(0.0);
+        let node = &rope.nodes[link];
+        let body = &self.bodies[index];
+        let slot = index * rope.links.len() + link;
+        let is_last = link + 1 == rope.links.len();
+        let near = self.near[index];
+        let first = V::splat(link as f64 + 0.5);
+
+        let radius = if is_last {
+            self.lead_radius
+        } else {
+            self.radius
+        };
+        let close = V::select_less(distances_m[1], self.reach + radius, near, zero);
+        if V::any_less(zero, close) {
+            let stiffness = if is_last {
+                LEAD_STIFFNESS_N_M
+            } else {
+                LINK_STIFFNESS_N_M
+            };
+            let point = Point {
+                back: zero,
+                radius,
+                stiffness: V::splat(stiffness),
+                may_touch: V::select_less(body.first_node, first, close, zero),
+            };
+            self.press(index, (slot, AT_NODE), link, &point, loads, rope);
+        } else {
+            self.release((slot, AT_NODE));
+        }
+
+        // Of a straight link above a plane an end is closest.
+        if self.bodies[index].shape == Shape::HalfSpace {
+            return;
+        }
+        // No point of the link is closer than half of what its ends' distances leave
+        // beyond its length.
+        let length_m = node.span.norm();
+        let least_m = (distances_m[0] + distances_m[1] - length_m) * V::splat(0.5);
+        let body = &self.bodies[index];
+        let close = V::select_less(least_m, self.reach + self.radius, near, zero);
+        let may_touch = V::select_less(body.first_middle, first, close, zero);
+        if V::any_less(zero, may_touch)
+            && let Some((back, inside)) = closest_at_start(body, link, rope)
+        {
+            let point = Point {
+                back,
+                radius: self.radius,
+                stiffness: V::splat(LINK_STIFFNESS_N_M),
+                may_touch: V::select_less(zero, inside, may_touch, zero),
+            };
+            self.press(index, (slot, BETWEEN), link, &point, loads, rope);
+        } else {
+            self.release((slot, BETWEEN));
+        }
+    }
+
+    /// Presses one point of a link against a body.
+    #[inline(always)]
+    fn press(
+        &mut self,
+        index: usize,
+        (slot, which): (usize, usize),
+        link: usize,
+        point: &Point<V>,
+        loads: &mut LinkLoads<V>,
+        rope: Predicted<V>,
+    ) {
+        let (node, w, al) = (&rope.nodes[link], rope.links[link].w, rope.links[link].al);
+        let body = &self.bodies[index];
+        let touch = &mut self.touches[slot][which];
+        self.idle[slot][which] = false;
+        let about_to = touch.find(body, point, node, w, rope.scheme.h);
+        self.imminent = self.imminent.max(about_to);
+        let yielding = match &self.domino {
+            Some(domino) if body.carrier == Carrier::Domino => {
+                touch.keep_where(domino.standing());
+                Some(domino.mobility(touch.normal(), touch.place(node)))
+            }
+            _ => None,
+        };
+        if touch.is_active() {
+            let reaction = touch.reaction(body.friction, node, al, rope.scheme, yielding);
+            loads.add(link, &reaction);
+        }
+    }
+
+    /// Lets one point of a link forget what it touched.
+    #[inline(always)]
+    fn release(&mut self, (slot, which): (usize, usize)) {
+        if !self.idle[slot][which] {
+            self.touches[slot][which] = Touch::none();
+            self.idle[slot][which] = true;
+        }
+    }
+
+    /// Takes in the motion the step has given. `lanes` are their ends of the step.
+    #[inline(always)]
+    pub(crate) fn settle(
+        &mut self,
+        links: &[Link<V>],
+        nodes: &[Node<V>],
+        scheme: &Scheme<V>,
+        lanes: &[StepEnd],
+    ) {
+        let count = links.len();
+        for index in 0..self.bodies.len() {
+            if !self.engaged[index] {
+                continue;
+            }
+            let body = &self.bodies[index];
+            let is_domino = body.carrier == Carrier::Domino;
+            let mut tally = summary::Tally::none();
+            for link in 0..count {
+                for which in 0..POINTS {
+                    let slot = index * count + link;
+                    if self.idle[slot][which] {
+                        continue;
+                    }
+                    let touch = &mut self.touches[slot][which];
+                    let (force, at) = touch.settle(body, &nodes[link], links[link].w, scheme);
+                    let is_lead = which == AT_NODE && link + 1 == count;
+                    tally.add(touch.force, touch.depth(), is_lead);
+                    if is_domino && let Some(domino) = &mut self.domino {
+                        domino.push(force, at);
+                    }
+                }
+            }
+            self.summaries.add(index, &tally, lanes);
+        }
+        if let Some(domino) = &mut self.domino {
+            domino.advance(lanes);
+        }
+    }
+}
+
+/// Where a link came closest to a body at the start of the step, if anywhere between
+/// its nodes in any lane, see [`middle::closest`].
+#[inline(always)]
+fn closest_at_start<V: Lanes>(body: &Body<V>, link: usize, rope: Predicted<V>) -> Option<(V, V)> {
+    let (node, w, h) = (&rope.nodes[link], rope.links[link].w, rope.scheme.h);
+    let far = step_back(node.x, node.v, body, h);
+    let near = node.x.sub(node.span);
+    let v_near = node.v.sub(w.cross_add(node.span, Vec3::zero()));
+    let near = step_back(near, v_near, body, h);
+    middle::closest(body, near, far)
+}
+
+/// Where a point was at the start of the step, as the obstacle at its end sees it.
+#[inline(always)]
+fn step_back<V: Lanes>(x: Vec3<V>, v: Vec3<V>, body: &Body<V>, h: V) -> Vec3<V> {
+    v.sub(body.frame.velocity_at(x)).scale_sub(h, x)
+}
