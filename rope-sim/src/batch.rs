@@ -1,6 +1,7 @@
 //! Batches of simulations: grouping into lanes, threads, repeats of what blew up.
 
 use crate::base_path::{BasePath, Interval, NotFinite, attitude};
+use crate::contact::Starting;
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member, MemberResult};
@@ -10,7 +11,6 @@ use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check, chec
 use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::watch::Watched;
 use nalgebra::{UnitQuaternion, Vector3};
-use shared_types::RopeParams;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -140,11 +140,15 @@ impl Batch<'_> {
         let mut results: Vec<Option<MemberResult>> = Vec::new();
         results.resize_with(self.candidates.len(), || None);
         let next = AtomicUsize::new(0);
-        let work = || -> Result<Vec<(usize, MemberResult)>, SimulateError> {
+        // A refusal comes with its group: whichever worker met it, the first one counts.
+        let work = || -> Result<Vec<(usize, MemberResult)>, (usize, SimulateError)> {
             let mut out = Vec::new();
             let mut memory = Vec::new();
-            while let Some(group) = groups.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let results = self.run_group(group, &shared, &mut memory)?;
+            loop {
+                let at = next.fetch_add(1, Ordering::Relaxed);
+                let Some(group) = groups.get(at) else { break };
+                let results = self.run_group(group, &shared, &mut memory);
+                let results = results.map_err(|error| (at, error))?;
                 out.extend(group.iter().copied().zip(results));
             }
             Ok(out)
@@ -154,13 +158,16 @@ impl Batch<'_> {
             let handles: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
             finished.push(work());
             for handle in handles {
-                finished.push(handle.join().unwrap_or(Err(SimulateError::WorkerPanicked)));
+                let panicked = (usize::MAX, SimulateError::WorkerPanicked);
+                finished.push(handle.join().unwrap_or(Err(panicked)));
             }
         });
-        for part in finished {
-            for (index, result) in part? {
-                results[index] = Some(result);
-            }
+        let refusals = finished.iter().filter_map(|part| part.as_ref().err());
+        if let Some((_, error)) = refusals.min_by_key(|(group, _)| *group) {
+            return Err(*error);
+        }
+        for (index, result) in finished.into_iter().flatten().flatten() {
+            results[index] = Some(result);
         }
         indices
             .iter()
@@ -228,7 +235,8 @@ impl Batch<'_> {
                     candidate: *index,
                     time_s: bad.time_s,
                 })?;
-            let links = start_attitudes(candidate.rope, path, self.options.start);
+            let links = start_attitudes(candidate, path, self.options.start);
+            self.check_start(*index, path, &links)?;
             members.push(Member {
                 rope: candidate.rope,
                 path,
@@ -247,6 +255,26 @@ impl Batch<'_> {
         let finished = own.into_iter().flatten().flatten();
         memory.extend(finished.map(|path| path.intervals));
         Ok(results)
+    }
+
+    /// Refuses a rope that would start inside an obstacle.
+    fn check_start(
+        &self,
+        candidate: usize,
+        path: &BasePath,
+        links: &[[f64; 4]],
+    ) -> Result<(), SimulateError> {
+        let Candidate { rope, motion, .. } = self.candidates[candidate];
+        let on_arm = self.scene.first_on_arm().is_some();
+        let arm = on_arm.then(|| motion.arm_links(0.0)).flatten();
+        let starting = Starting {
+            candidate,
+            rope,
+            attach: &path.start,
+            arm: arm.as_ref(),
+            links,
+        };
+        Ok(starting.check(self.scene)?)
     }
 
     fn task<'m, const ALONE: bool>(&'m self, members: &'m [Member<'m>]) -> GroupTask<'m, ALONE> {
@@ -283,13 +311,14 @@ fn address(motion: &dyn AttachMotion) -> usize {
     core::ptr::from_ref(motion).cast::<()>().addr()
 }
 
-fn start_attitudes(rope: &RopeParams, path: &BasePath, start: Start) -> Vec<[f64; 4]> {
+fn start_attitudes(candidate: &Candidate, path: &BasePath, start: Start) -> Vec<[f64; 4]> {
+    let rope = candidate.rope;
     match start {
         Start::Straight { joint0_rotvec } => {
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from(joint0_rotvec));
             let q = attitude(&path.start) * turn;
             vec![[q.w, q.i, q.j, q.k]; rope.links as usize]
         }
-        Start::Equilibrium => hanging_links(rope, &path.start.r),
+        Start::Equilibrium => hanging_links(rope, &candidate.extras, &path.start.r),
     }
 }

@@ -4,11 +4,13 @@
 //! every rope has step boundaries on its own acceleration jumps.
 
 use crate::algebra::{Quat, Vec3};
-use crate::base_path::{BasePath, CHANNELS, Interval};
+use crate::base_path::{BasePath, CHANNELS, Interval, attitude};
 use crate::lanes::Lanes;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{BaseLanes, RopeLanes};
+use nalgebra::Vector3;
 use shared_types::RopeParams;
+use shared_types::kinematics::FrameMotion;
 
 /// One lane's place on its path.
 struct Cursor<'a> {
@@ -63,6 +65,27 @@ pub(crate) struct BaseState<V> {
     pub(crate) position: Vec3<V>,
     /// Its velocity (m/s).
     pub(crate) velocity: Vec3<V>,
+}
+
+impl BaseState<f64> {
+    /// Of one frame, in the world.
+    pub(crate) fn of(frame: &FrameMotion) -> Self {
+        let q = attitude(frame);
+        let vector = |v: &Vector3<f64>| Vec3(v.x, v.y, v.z);
+        Self {
+            dynamics: BaseLanes {
+                q: Quat {
+                    w: q.w,
+                    v: Vec3(q.i, q.j, q.k),
+                },
+                w: vector(&frame.w_rad_s),
+                alpha: vector(&frame.alpha_rad_s2),
+                a: vector(&frame.a_m_s2),
+            },
+            position: vector(&frame.p_m),
+            velocity: vector(&frame.v_m_s),
+        }
+    }
 }
 
 impl<'a, V: Lanes> Clock<'a, V> {

@@ -172,7 +172,7 @@ impl<V: Lanes> DominoLanes<V> {
         let critical_rad = (d.thickness_m / d.height_m).atan();
         for (lane, (tilt, end)) in self.lanes.iter_mut().zip(ends).enumerate() {
             let moments = [self.moments[0].get(lane), self.moments[1].get(lane)];
-            let at_rest = tilt.angle_rad == 0.0 && moments == [0.0; 2];
+            let at_rest = tilt.angle_rad == 0.0 && moments.iter().all(|m| *m == 0.0);
             if end.running && tilt.outcome.down_at_s.is_none() && !at_rest {
                 let back_nm = weight_nm * (critical_rad - tilt.angle_rad.abs()).sin();
                 let law = |lean: f64| {

@@ -84,7 +84,10 @@ impl SimulateError {
             Self::Rope { candidate, .. }
             | Self::Extras { candidate, .. }
             | Self::MotionTooShort { candidate, .. }
-            | Self::MotionNotFinite { candidate, .. } => Some(candidate),
+            | Self::MotionNotFinite { candidate, .. }
+            | Self::Scene(
+                SceneError::StartsInside { candidate, .. } | SceneError::NoArm { candidate, .. },
+            ) => Some(candidate),
             _ => None,
         }
     }
@@ -95,7 +98,10 @@ impl SimulateError {
             Self::Rope { candidate, .. }
             | Self::Extras { candidate, .. }
             | Self::MotionTooShort { candidate, .. }
-            | Self::MotionNotFinite { candidate, .. } => *candidate = index,
+            | Self::MotionNotFinite { candidate, .. }
+            | Self::Scene(
+                SceneError::StartsInside { candidate, .. } | SceneError::NoArm { candidate, .. },
+            ) => *candidate = index,
             _ => {}
         }
         self

@@ -9,6 +9,9 @@
 //! [`roll_out`] simulates batches, [`LiveRope`] one rope as its world unfolds.
 //! Optimisers, file formats of plans and the arm's own dynamics are not here.
 //!
+//! [`roll_out_in`] adds obstacles with friction and a domino ([`Scene`]), [`RopeExtras`]
+//! air drag and a rest curvature.
+//!
 //! Errors at the default step of 0.5 ms are below 0.3 mm at the tip in ordinary
 //! motions and grow in violent whips of stiff, hardly damped ropes.
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -61,7 +64,8 @@ pub use live::{LiveRope, MovingFrames};
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
 pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};
 pub use scene::{
-    ContactSummary, Domino, DominoOutcome, Obstacle, Placement, RopePart, Scene, SceneError, Shape,
+    ContactSummary, Domino, DominoOutcome, Obstacle, Placement, RopePart, Scene, SceneBody,
+    SceneError, Shape,
 };
 pub use watch::{
     BoxRegion, ClosestApproach, Dwell, HeightRange, LinkState, RestMeasures, SegmentApproach,

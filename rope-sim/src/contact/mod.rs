@@ -14,12 +14,14 @@ mod exchange;
 mod middle;
 mod nodes;
 mod shape;
+mod start;
 mod summary;
 mod touch;
 
 pub(crate) use body::{Body, Carrier, Frame, constant};
 pub(crate) use exchange::Predicted;
 pub(crate) use nodes::{Node, corrected, predicted};
+pub(crate) use start::Starting;
 
 use crate::clock::BaseState;
 use crate::domino::DominoLanes;

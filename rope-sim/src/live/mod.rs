@@ -1,9 +1,8 @@
 //! One rope advanced as its attach frame moves: for simulated rigs.
 
-use crate::algebra::{Quat, Vec3};
-use crate::base_path::attitude;
+use crate::algebra::Vec3;
 use crate::clock::BaseState;
-use crate::contact::{Contacts, StepEnd};
+use crate::contact::{Contacts, Starting, StepEnd};
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::extras::RopeExtras;
@@ -11,7 +10,7 @@ use crate::kernel::Elimination;
 use crate::lanes::{Kernel, LaneTask, Lanes};
 use crate::scene::{ContactSummary, DominoOutcome, Scene, SceneError};
 use crate::scheme::{Phase, Scheme, joint_resistance};
-use crate::state::{BaseLanes, Link, RopeLanes};
+use crate::state::{Link, RopeLanes};
 use crate::surroundings::Around;
 use nalgebra::Vector3;
 use shared_types::kinematics::FrameMotion;
@@ -81,12 +80,12 @@ impl LiveRope {
         Self::new_in(&Scene::EMPTY, rope, RopeExtras::NONE, &start, step_s)
     }
 
-    /// [`LiveRope::new`] among obstacles and a domino, with drag or rest curvature. A
-    /// curved rope hangs as a straight one would at first. Use steps of at most 0.5 ms.
+    /// [`LiveRope::new`] among obstacles and a domino, with drag or rest curvature. Use
+    /// steps of at most 0.5 ms.
     ///
     /// # Errors
-    /// As [`LiveRope::new`]; a scene that cannot be simulated, or has obstacles on an
-    /// arm that `start` lacks; extras out of bounds.
+    /// As [`LiveRope::new`]; a scene that cannot be simulated, that the rope would start
+    /// inside, or that has obstacles on an arm `start` lacks; extras out of bounds.
     pub fn new_in(
         scene: &Scene,
         rope: &RopeParams,
@@ -114,8 +113,17 @@ impl LiveRope {
                 time_s: 0.0,
             });
         }
+        let attitudes = hanging_links(rope, &extras, &attach.r);
+        let starting = Starting {
+            candidate: 0,
+            rope,
+            attach,
+            arm: start.arm_links.as_ref(),
+            links: &attitudes,
+        };
+        starting.check(scene)?;
         let mut links: Vec<Link<f64>> = Vec::new();
-        for q in hanging_links(rope, &attach.r) {
+        for q in attitudes {
             let mut link = Link::at_rest();
             link.q.set(0, q);
             links.push(link);
@@ -141,7 +149,7 @@ impl LiveRope {
             carried: Vec::new(),
         };
         live.carry(start);
-        let base = base_of(attach);
+        let base = BaseState::of(attach);
         live.around
             .look(&live.links, &live.rope, &base, &live.carried);
         live.place_nodes(&attach.p_m);
@@ -187,7 +195,7 @@ impl LiveRope {
         };
         self.carried.clear();
         let motions = self.carriers.iter().filter_map(|link| links.get(link - 1));
-        self.carried.extend(motions.map(base_of));
+        self.carried.extend(motions.map(BaseState::of));
     }
 
     /// Tells the rope that the attach frame's acceleration jumps now (the arm stops
@@ -279,7 +287,7 @@ impl LaneTask for Advance<'_> {
             let time_s = from_s + span_s * (done / steps);
             let frames = (self.frames)(time_s);
             live.carry(&frames);
-            let base = base_of(&frames.attach);
+            let base = BaseState::of(&frames.attach);
             let end = StepEnd {
                 time_s,
                 step_s,
@@ -320,24 +328,6 @@ fn check_live(
             need,
         }),
         None => Ok(()),
-    }
-}
-
-fn base_of(m: &FrameMotion) -> BaseState<f64> {
-    let q = attitude(m);
-    let vector = |v: &Vector3<f64>| Vec3(v.x, v.y, v.z);
-    BaseState {
-        dynamics: BaseLanes {
-            q: Quat {
-                w: q.w,
-                v: Vec3(q.i, q.j, q.k),
-            },
-            w: vector(&m.w_rad_s),
-            alpha: vector(&m.alpha_rad_s2),
-            a: vector(&m.a_m_s2),
-        },
-        position: vector(&m.p_m),
-        velocity: vector(&m.v_m_s),
     }
 }
 

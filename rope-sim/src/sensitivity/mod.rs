@@ -14,7 +14,8 @@ pub use slopes::{ApproachSlope, Doubt, LinkSlope, Neighbours, Sensitivity};
 
 use crate::batch::REPEAT_DIVISOR;
 use crate::error::SimulateError;
-use crate::rollout::{Candidate, SimOptions, check};
+use crate::rollout::{Candidate, SimOptions, check, check_scene};
+use crate::scene::Scene;
 use plan::{FamilyPlan, Plan, is_comparable};
 
 /// A candidate and the directions in which it is varied.
@@ -112,12 +113,28 @@ pub fn sensitivities(
     difference: Difference,
     options: &SimOptions,
 ) -> Result<Vec<Sensitivity>, SensitivityError> {
+    sensitivities_in(&Scene::EMPTY, families, difference, options)
+}
+
+/// [`sensitivities`] among obstacles. Slopes exist where touching does not begin, end or
+/// slip between base and neighbour; across such an event they are those of a jump, and
+/// behind an impact they keep the error of its steps, which neighbours do not share.
+///
+/// # Errors
+/// As [`sensitivities`], and what is wrong with the scene.
+pub fn sensitivities_in(
+    scene: &Scene,
+    families: &[Family],
+    difference: Difference,
+    options: &SimOptions,
+) -> Result<Vec<Sensitivity>, SensitivityError> {
     let bases: Vec<Candidate> = families.iter().map(|f| f.base).collect();
     check(&bases, options)?;
+    check_scene(scene, &bases)?;
     let plan = Plan::new(families, difference, options.precision)?;
     plan.check(options)?;
     let everyone: Vec<usize> = (0..plan.members.len()).collect();
-    let mut rollouts = plan.run(&everyone, options)?;
+    let mut rollouts = plan.run(scene, &everyone, options)?;
     let again: Vec<usize> = plan
         .families
         .iter()
@@ -129,7 +146,7 @@ pub fn sensitivities(
             step_s: options.step_s / REPEAT_DIVISOR,
             ..*options
         };
-        for (index, rollout) in again.iter().zip(plan.run(&again, &quarter)?) {
+        for (index, rollout) in again.iter().zip(plan.run(scene, &again, &quarter)?) {
             rollouts[*index] = rollout;
         }
     }

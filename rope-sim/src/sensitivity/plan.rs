@@ -4,9 +4,10 @@ use super::direction::Difference;
 use super::slopes::{Doubt, Neighbours, Sensitivity};
 use super::{Family, SensitivityError};
 use crate::base_path::steps_between_jumps;
-use crate::batch::roll_out;
+use crate::batch::roll_out_in;
 use crate::error::SimulateError;
 use crate::rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, check};
+use crate::scene::Scene;
 use shared_types::RopeParams;
 use std::ops::Range;
 
@@ -178,6 +179,7 @@ impl<'a> Plan<'a> {
     /// [`SimOptions::step_s`].
     pub(super) fn run(
         &self,
+        scene: &Scene,
         indices: &[usize],
         options: &SimOptions,
     ) -> Result<Vec<Rollout>, SensitivityError> {
@@ -189,7 +191,7 @@ impl<'a> Plan<'a> {
             .iter()
             .map(|i| self.members[*i].candidate())
             .collect();
-        roll_out(&candidates, &options).map_err(|error| {
+        roll_out_in(scene, &candidates, &options).map_err(|error| {
             match error.candidate().and_then(|c| indices.get(c)) {
                 Some(index) => self.members[*index].blame(error),
                 None => SensitivityError::Base(error),

@@ -1,182 +1,10 @@
-//! What a rope may touch, and what a rollout says about touching.
+//! Scenes that cannot be simulated, and why.
 
-use nalgebra::{Isometry3, Vector3};
+use super::{Domino, Obstacle, Placement, Scene, Shape};
+use nalgebra::Vector3;
 use shared_types::JOINTS;
 
-/// Convex body, in a frame of its own.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
-    /// Everything below z = 0.
-    HalfSpace,
-    /// Box about the origin.
-    Box {
-        /// Half its edges (m).
-        half_m: [f64; 3],
-    },
-    /// Cylinder about the z axis with hemispheres on its ends.
-    Capsule {
-        /// Half the length of the cylindrical part (m).
-        half_length_m: f64,
-        /// Radius (m).
-        radius_m: f64,
-    },
-    /// Cylinder about the z axis with flat ends.
-    Cylinder {
-        /// Half its length (m).
-        half_length_m: f64,
-        /// Radius (m).
-        radius_m: f64,
-    },
-}
-
-/// Where a shape's frame is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Placement {
-    /// Fixed in the world.
-    World(Isometry3<f64>),
-    /// Fixed in the attach frame, as the pole is. Parts of the rope that touch it
-    /// while the rope leaves the frame straight belong to the mounting and pass it.
-    Attach(Isometry3<f64>),
-    /// Fixed in a link of the arm; needs a motion that knows its arm, see
-    /// [`crate::AttachMotion::arm_links`].
-    ArmLink {
-        /// Link 1 to 7; its frame is as in `shared_types::kinematics::link_motions`.
-        link: usize,
-        /// Pose in the link's frame.
-        pose: Isometry3<f64>,
-    },
-}
-
-/// A body the rope can touch. It does not yield; contacts are inelastic with Coulomb
-/// friction. The rope's links touch as capsules of the rope's radius, the lead as a
-/// sphere.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Obstacle {
-    /// Its form.
-    pub shape: Shape,
-    /// Its place.
-    pub placement: Placement,
-    /// Coefficient of friction (1).
-    pub friction: f64,
-}
-
-/// A thin box standing on one end until the rope pushes it over. It rocks about the
-/// lower edges of its broad faces, does not slide, and does not block the rope once
-/// it has fallen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Domino {
-    /// Centre of its lower face (m, world).
-    pub foot_m: [f64; 3],
-    /// Direction its broad face looks to, about z from x (rad).
-    pub facing_rad: f64,
-    /// Edge along that direction (m).
-    pub thickness_m: f64,
-    /// Horizontal edge of the broad face (m).
-    pub width_m: f64,
-    /// Height (m).
-    pub height_m: f64,
-    /// Mass (kg).
-    pub mass_kg: f64,
-    /// Coefficient of friction against the rope (1).
-    pub friction: f64,
-}
-
-/// Everything the rope can touch.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Scene {
-    /// Bodies that do not yield.
-    pub obstacles: Vec<Obstacle>,
-    /// A domino to push over.
-    pub domino: Option<Domino>,
-}
-
-/// Which part of the rope touched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RopePart {
-    /// A link.
-    Links,
-    /// The lead.
-    Lead,
-}
-
-/// What happened between a rope and one obstacle, from the states at step ends. All
-/// numbers are zero while nothing has touched.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ContactSummary {
-    /// First touch: when (s) and by which part.
-    pub first: Option<(f64, RopePart)>,
-    /// Whether a link has touched.
-    pub links_touched: bool,
-    /// Whether the lead has touched.
-    pub lead_touched: bool,
-    /// Time in touch (s).
-    pub in_touch_s: f64,
-    /// Largest normal force of one contact point in one step (N); an impact's is its
-    /// impulse over the step.
-    pub peak_normal_force_n: f64,
-    /// Greatest depth of one contact point (m).
-    pub greatest_penetration_m: f64,
-}
-
-impl ContactSummary {
-    /// Whether anything touched.
-    #[must_use]
-    pub fn touched(&self) -> bool {
-        self.first.is_some()
-    }
-}
-
-/// What became of the domino.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct DominoOutcome {
-    /// First touch by the rope (s).
-    pub touched_at_s: Option<f64>,
-    /// When its tilt passed 45 degrees (s).
-    pub down_at_s: Option<f64>,
-    /// Greatest tilt (rad), positive along the direction it faces away from the
-    /// push; it is no longer followed beyond 45 degrees.
-    pub peak_tilt_rad: f64,
-}
-
 impl Scene {
-    /// Nothing to touch.
-    pub const EMPTY: Self = Self {
-        obstacles: Vec::new(),
-        domino: None,
-    };
-
-    /// Whether there is nothing to touch.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.obstacles.is_empty() && self.domino.is_none()
-    }
-
-    /// First obstacle on an arm link: its index and the link, 1 to 7.
-    pub(crate) fn first_on_arm(&self) -> Option<(usize, usize)> {
-        let carriers = self.obstacles.iter().enumerate();
-        carriers
-            .filter_map(|(index, o)| match o.placement {
-                Placement::ArmLink { link, .. } => Some((index, link)),
-                _ => None,
-            })
-            .next()
-    }
-
-    /// The arm links its obstacles are on, each once.
-    pub(crate) fn arm_links(&self) -> Vec<usize> {
-        let mut links: Vec<usize> = self
-            .obstacles
-            .iter()
-            .filter_map(|o| match o.placement {
-                Placement::ArmLink { link, .. } => Some(link),
-                _ => None,
-            })
-            .collect();
-        links.sort_unstable();
-        links.dedup();
-        links
-    }
-
     /// # Errors
     /// The first obstacle, or the domino, with an unusable number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
@@ -217,17 +45,6 @@ fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Option<
 }
 
 impl Obstacle {
-    /// A body fixed in the world with its own axes along the world's.
-    #[must_use]
-    pub fn fixed(shape: Shape, centre_m: [f64; 3], friction: f64) -> Self {
-        let [x, y, z] = centre_m;
-        Self {
-            shape,
-            placement: Placement::World(Isometry3::translation(x, y, z)),
-            friction,
-        }
-    }
-
     fn fault(&self) -> Option<Fault> {
         let pose = match self.placement {
             Placement::World(pose) | Placement::Attach(pose) => pose,
@@ -283,6 +100,24 @@ impl Domino {
     }
 }
 
+/// Something of a [`Scene`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SceneBody {
+    /// The obstacle with this index, from 0.
+    Obstacle(usize),
+    /// The domino.
+    Domino,
+}
+
+impl core::fmt::Display for SceneBody {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Obstacle(index) => write!(f, "obstacle {index}"),
+            Self::Domino => f.write_str("the domino"),
+        }
+    }
+}
+
 /// Why a scene cannot be simulated.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SceneError {
@@ -308,6 +143,21 @@ pub enum SceneError {
         /// What is wrong with it.
         need: &'static str,
     },
+    /// A rope starts deeper in an obstacle than a touch.
+    #[error(
+        "candidate {candidate}: at the start its rope is {depth_m} m deep in {body}, at link \
+         {link}; start it outside"
+    )]
+    StartsInside {
+        /// Index of the candidate, from 0.
+        candidate: usize,
+        /// In what.
+        body: SceneBody,
+        /// The link that is in it or ends in it, from 0 at the attach point.
+        link: usize,
+        /// How deep the rope's surface is (m).
+        depth_m: f64,
+    },
     /// An obstacle is on a link of an arm nobody knows.
     #[error(
         "obstacle {obstacle} is on arm link {link}, but the motion of candidate {candidate} knows \
@@ -326,6 +176,7 @@ pub enum SceneError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Isometry3;
 
     fn board() -> Obstacle {
         let shape = Shape::Box {

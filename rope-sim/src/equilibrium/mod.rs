@@ -4,8 +4,12 @@
 //! frame's -z axis. With `psi_i` the angle of link i from straight down, it
 //! minimises `sum k/2 (psi_i - psi_{i-1})² - g s W_i cos psi_i`, where `W_i` is the
 //! mass carried by link i (half of its own). Newton's method on the angles with a
-//! tridiagonal, positive matrix finds it in a few iterations.
+//! tridiagonal, positive matrix finds it in a few iterations. A rope with a rest
+//! curvature leaves the plane, see [`curved`].
 
+mod curved;
+
+use crate::extras::RopeExtras;
 use crate::kernel::GRAVITY_M_S2;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use shared_types::RopeParams;
@@ -15,7 +19,21 @@ const MAX_ITERATIONS: usize = 200;
 
 /// Attitudes of the links (scalar first, link to world), hanging still from an
 /// attach frame of attitude `r_attach`.
-pub(crate) fn hanging_links(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[f64; 4]> {
+pub(crate) fn hanging_links(
+    rope: &RopeParams,
+    extras: &RopeExtras,
+    r_attach: &Matrix3<f64>,
+) -> Vec<[f64; 4]> {
+    let straight = hanging_straight(rope, r_attach);
+    let curvature = Vector3::from(extras.rest_curvature_per_m);
+    if curvature == Vector3::zeros() {
+        straight
+    } else {
+        curved::hanging(rope, curvature, r_attach, &straight)
+    }
+}
+
+fn hanging_straight(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[f64; 4]> {
     let rotation = nalgebra::Rotation3::from_matrix_unchecked(*r_attach);
     let attach = UnitQuaternion::from_rotation_matrix(&rotation);
     let out: Vector3<f64> = -r_attach.column(2);
@@ -39,12 +57,7 @@ pub(crate) fn hanging_links(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[
 fn hanging_angles(rope: &RopeParams, tilt_rad: f64) -> Vec<f64> {
     let n = rope.links as usize;
     let k = rope.joint_stiffness_nm_per_rad;
-    let weight: Vec<f64> = (0..n)
-        .map(|i| {
-            let beyond = rope.link_mass_kg() * ((n - 1 - i) as f64 + 0.5);
-            GRAVITY_M_S2 * rope.link_length_m() * (beyond + rope.lead_mass_kg)
-        })
-        .collect();
+    let weight = weights_nm(rope);
     let mut psi = vec![0.0; n];
     let mut value = energy(&psi, tilt_rad, k, &weight);
     for _ in 0..MAX_ITERATIONS {
@@ -69,6 +82,16 @@ fn hanging_angles(rope: &RopeParams, tilt_rad: f64) -> Vec<f64> {
         }
     }
     psi
+}
+
+/// What hangs on each link, times its length (N m).
+fn weights_nm(rope: &RopeParams) -> Vec<f64> {
+    (1..=rope.links)
+        .map(|link| {
+            let beyond = rope.link_mass_kg() * (f64::from(rope.links - link) + 0.5);
+            GRAVITY_M_S2 * rope.link_length_m() * (beyond + rope.lead_mass_kg)
+        })
+        .collect()
 }
 
 fn energy(psi: &[f64], tilt_rad: f64, k: f64, weight: &[f64]) -> f64 {
@@ -143,7 +166,7 @@ mod tests {
     #[test]
     fn links_start_from_the_attach_frame_and_bend_down() {
         let attach = nalgebra::Rotation3::from_euler_angles(0.4, 0.7, -1.0);
-        let links = hanging_links(&rope(), attach.matrix());
+        let links = hanging_links(&rope(), &RopeExtras::NONE, attach.matrix());
         let z = |q: [f64; 4]| {
             let q =
                 UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
