@@ -5,6 +5,11 @@
 //! derivative, and with it the jerk it adds, is bounded by `6 / T²`. Speeds of
 //! joints and tool only fall; accelerations may rise, so the caller checks.
 
+#![allow(
+    clippy::arithmetic_side_effects,
+    reason = "arithmetic of float vectors only, which cannot overflow or panic"
+)]
+
 use super::motion::Motion;
 use shared_types::JointState;
 

@@ -28,6 +28,10 @@ const CYCLES_MAX: u32 = 1000;
 
 /// A way to rest, from the state commanded last. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one, in place: the real-time path makes no boxes"
+)]
 pub enum Stop {
     /// Along the path of the running motion.
     Slow(SlowDown),
