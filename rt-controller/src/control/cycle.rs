@@ -1,6 +1,6 @@
 //! One control cycle: [`ControlState::step`], a pure function of its input and
-//! its own state. Orders are obeyed in [`super::orders`], faults met in
-//! [`super::faults`].
+//! its own state. Orders are obeyed in `orders`, faults met in
+//! `faults`.
 
 use super::arming::ArmingState;
 use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput};
