@@ -140,9 +140,10 @@ impl ControlState {
             self.retire(&mut out);
         }
         self.monitor.observe(&input, &self.limits);
+        let before = self.mode;
         self.watch(&input, &mut out);
         if let Some(order) = input.order.take() {
-            self.obey(order, &input, &mut out);
+            self.obey(order, before, &input, &mut out);
         }
         let deadline_ns = input.deadline_ns;
         let trajectory_s = self.trajectory_s(deadline_ns);

@@ -631,3 +631,21 @@ fn lateness_slows_and_a_stall_holds_setpoints_back() {
     assert_eq!(cause.fault(), FaultCode::LateCycles);
     assert_eq!((cause.path, cause.counts.skipped), (1, 1));
 }
+
+/// An adoption on its way when the arm is stopped was meant for another state of
+/// the world.
+#[test]
+fn a_stop_is_not_acknowledged_by_what_was_ordered_before_it() {
+    let mut bench = Bench::holding();
+    bench.run(swing());
+    (0..60).for_each(|_| bench.cycle());
+    let mut input = bench.input(0);
+    input.link.status = Some(Status(0x50));
+    input.order = Some(Order::Adopt { hold: START_POSE });
+    bench.step(input);
+    assert_eq!(bench.state.mode(), ControllerMode::Faulted);
+    assert_eq!(bench.latched(), Some(FaultCode::ArmError));
+    let fault = FaultCode::WrongMode;
+    let refused = ControlEvent::Refused { id: None, fault };
+    assert!(bench.events.contains(&refused));
+}

@@ -16,9 +16,21 @@ use shared_types::{Arming, FaultCode, JointState, JointVector, MonotonicNs, Moti
 const START_TOLERANCE_RAD: f64 = 1e-9;
 
 impl ControlState {
-    pub(super) fn obey(&mut self, order: Order, input: &CycleInput, out: &mut CycleOutput) {
+    /// Obeys an order; `before` is the mode before this cycle looked at anything.
+    pub(super) fn obey(
+        &mut self,
+        order: Order,
+        before: ControllerMode,
+        input: &CycleInput,
+        out: &mut CycleOutput,
+    ) {
         let deadline_ns = input.deadline_ns;
         match order {
+            // Ordered before this very cycle's stop, so it acknowledges nothing.
+            Order::Adopt { .. } if before != self.mode => {
+                let fault = FaultCode::WrongMode;
+                emit(out, ControlEvent::Refused { id: None, fault });
+            }
             Order::Adopt { hold } => match self.adopt(hold, input) {
                 Ok(()) => emit(out, ControlEvent::Adopted),
                 Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),
