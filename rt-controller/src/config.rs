@@ -1,10 +1,12 @@
 //! Configuration of the controller process.
 
-use crate::control::Thresholds;
+use crate::control::{ControlSettings, Thresholds};
+use crate::guardian::GuardianSettings;
 use crate::os::RealTimeSettings;
+use crate::set_up::OnDifference;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use serde::{Deserialize, Serialize};
-use shared_types::Limits;
+use shared_types::{Limits, WireMode};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 
@@ -31,7 +33,7 @@ pub enum ConfigError {
     #[error("give either `limits_file` or a table `[limits]`, not both")]
     LimitsTwice,
     /// A threshold makes no sense.
-    #[error("`thresholds.{key}` is {found}, it must be {allowed}")]
+    #[error("`{key}` is {found}, it must be {allowed}")]
     Threshold {
         /// Key.
         key: &'static str,
@@ -62,6 +64,16 @@ pub struct ControllerConfig {
     pub report_port: u16,
     /// Report port used when the other one refuses (100 Hz).
     pub fallback_report_port: u16,
+    /// Ports with the arm's status (5 Hz), in the order in which they are tried.
+    pub status_ports: [u16; 2],
+    /// What to do when the arm's tool or its tool speed limit is not the one of
+    /// the limits.
+    pub on_difference: OnDifference,
+    /// How setpoints reach the arm.
+    pub wire: WireMode,
+    /// Whether motions need an arming. Without, every motion runs as a throw
+    /// would; for tests of other things.
+    pub arming_required: bool,
     /// File with the limits, relative to this file.
     pub limits_file: Option<PathBuf>,
     /// Limits given here; without either, those of an xArm 7.
@@ -70,21 +82,28 @@ pub struct ControllerConfig {
     pub real_time: RealTimeSettings,
     /// When the monitors give up.
     pub thresholds: ThresholdSettings,
+    /// How the guardian watches the controller.
+    pub guardian: GuardianSettings,
 }
 
 impl Default for ControllerConfig {
     fn default() -> Self {
-        let [report_port, _, _, fallback_report_port] = REPORT_PORTS;
+        let [report_port, normal, rich, fallback_report_port] = REPORT_PORTS;
         Self {
             domain: "wag".to_owned(),
             arm: IpAddr::V4(Ipv4Addr::LOCALHOST),
             command_port: COMMAND_PORT,
             report_port,
             fallback_report_port,
+            status_ports: [rich, normal],
+            on_difference: OnDifference::default(),
             limits_file: None,
             limits: None,
             real_time: RealTimeSettings::default(),
             thresholds: ThresholdSettings::default(),
+            wire: WireMode::default(),
+            arming_required: true,
+            guardian: GuardianSettings::default(),
         }
     }
 }
@@ -151,7 +170,7 @@ impl ThresholdSettings {
             .unwrap_or(base.tracking_error_max_rad);
         if !(error > 0.0 && error <= 1.0) {
             return Err(ConfigError::Threshold {
-                key: "tracking_error_max_rad",
+                key: "thresholds.tracking_error_max_rad",
                 found: error,
                 allowed: "above 0 and at most 1 rad",
             });
@@ -159,35 +178,39 @@ impl ThresholdSettings {
         let unanswered_max = self.unanswered_max.unwrap_or(base.unanswered_max);
         if unanswered_max == 0 {
             return Err(ConfigError::Threshold {
-                key: "unanswered_max",
+                key: "thresholds.unanswered_max",
                 found: 0.0,
                 allowed: "at least 1",
             });
         }
         Ok(Thresholds {
             operator_timeout_ns: span_ns(
-                "operator_timeout_ms",
+                "thresholds.operator_timeout_ms",
                 self.operator_timeout_ms,
                 base.operator_timeout_ns,
             )?,
             guardian_timeout_ns: span_ns(
-                "guardian_timeout_ms",
+                "thresholds.guardian_timeout_ms",
                 self.guardian_timeout_ms,
                 base.guardian_timeout_ns,
             )?,
-            reply_stall_ns: span_ns("reply_stall_ms", self.reply_stall_ms, base.reply_stall_ns)?,
+            reply_stall_ns: span_ns(
+                "thresholds.reply_stall_ms",
+                self.reply_stall_ms,
+                base.reply_stall_ns,
+            )?,
             report_stale_ns: span_ns(
-                "report_stale_ms",
+                "thresholds.report_stale_ms",
                 self.report_stale_ms,
                 base.report_stale_ns,
             )?,
             report_frozen_ns: span_ns(
-                "report_frozen_ms",
+                "thresholds.report_frozen_ms",
                 self.report_frozen_ms,
                 base.report_frozen_ns,
             )?,
             tracking_window_ns: span_ns(
-                "tracking_window_ms",
+                "thresholds.tracking_window_ms",
                 self.tracking_window_ms,
                 base.tracking_window_ns,
             )?,
@@ -244,12 +267,26 @@ impl ControllerConfig {
         }
     }
 
+    /// What the control core is told.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn control_settings(&self) -> Result<ControlSettings, ConfigError> {
+        Ok(ControlSettings {
+            wire: self.wire,
+            arming_required: self.arming_required,
+            guardian_required: self.guardian.required,
+            ..ControlSettings::from(self.thresholds.checked(self.arm)?)
+        })
+    }
+
     /// Checks what cannot be wrong by type alone.
     ///
     /// # Errors
     /// [`ConfigError`].
     pub fn check(&self) -> Result<(), ConfigError> {
         self.thresholds.checked(self.arm)?;
+        self.guardian.check()?;
         match self.real_time.priority {
             Some(found) if !(11..=99).contains(&found) => Err(ConfigError::Priority { found }),
             _ => Ok(()),

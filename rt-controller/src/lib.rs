@@ -29,19 +29,24 @@
     )
 )]
 
+pub mod arm_status;
 pub mod clock_map;
+pub mod commander;
 pub mod config;
 pub mod control;
 pub mod error;
+pub mod guardian;
 pub mod os;
 pub mod overrun;
 pub mod point_to_point;
 pub mod ports;
 pub mod process;
 pub mod relay;
+pub mod report_stream;
 pub mod reports;
 pub mod rt_loop;
 pub mod session;
+pub mod set_up;
 pub mod transport;
 pub mod xarm;
 

@@ -1,11 +1,19 @@
-//! What happens when a cycle comes late: whole missed periods are skipped and
-//! counted, the phase is kept, nothing is caught up.
+//! The overrun policy, skip and keep the phase: when a cycle comes late, whole
+//! missed periods are skipped and counted, later deadlines stay where they
+//! were, nothing is caught up.
 //!
 //! A burst of setpoints is worse than a gap: the arm executes only the newest
 //! and derives wrong accelerations from bunched ones.
 
 /// Two setpoints are never closer than this part of a period.
 const MIN_GAP_PART: (u64, u64) = (4, 5);
+
+/// Shortest time between two setpoints that are due every `period_ns` (ns).
+#[must_use]
+pub const fn min_gap_ns(period_ns: u64) -> u64 {
+    let (part, whole) = MIN_GAP_PART;
+    period_ns.saturating_mul(part) / whole
+}
 
 /// When a cycle runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,18 +43,13 @@ pub fn after_wake(deadline_ns: u64, woke_ns: u64, period_ns: u64) -> Wake {
     )
 }
 
-/// The next cycle after the one due at `deadline_ns` that woke at `woke_ns` and
-/// ended at `now_ns`: the first deadline that is still ahead and leaves a gap
-/// to the setpoint just sent. RT-safe.
+/// The next cycle after the one due at `deadline_ns` that sent its setpoint at
+/// `sent_ns` and ended at `now_ns`: the first deadline that is still ahead and
+/// leaves a gap to the setpoint just sent. RT-safe.
 #[must_use]
-pub fn next_wake(deadline_ns: u64, woke_ns: u64, now_ns: u64, period_ns: u64) -> Wake {
+pub fn next_wake(deadline_ns: u64, sent_ns: u64, now_ns: u64, period_ns: u64) -> Wake {
     let next_ns = deadline_ns.saturating_add(period_ns);
-    let (part, whole) = MIN_GAP_PART;
-    let gap_ns = period_ns
-        .saturating_mul(part)
-        .checked_div(whole)
-        .unwrap_or(0);
-    let earliest_ns = now_ns.max(woke_ns.saturating_add(gap_ns));
+    let earliest_ns = now_ns.max(sent_ns.saturating_add(min_gap_ns(period_ns)));
     let behind_ns = earliest_ns.saturating_sub(next_ns);
     let cycles = if period_ns == 0 {
         0

@@ -1,7 +1,9 @@
 //! The in-process rings between the control loop and the other threads:
 //! single-producer single-consumer, lock-free, sized once.
 
+use crate::arm_status::ArmStatus;
 use crate::control::{ControlEvent, CycleOutput, Motion, Order};
+use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{CycleRecord, JointReport, Reports};
 
@@ -39,6 +41,10 @@ pub struct RtPorts<T> {
     pub orders: Consumer<Mail<T>>,
     /// Joint reports in; the newest counts.
     pub reports: Consumer<JointReport>,
+    /// The arm's status in; the newest counts.
+    pub status: Consumer<ArmStatus>,
+    /// Count of reports that had to be dropped.
+    pub broken: BrokenReports,
     /// Events out.
     pub events: Producer<ControlEvent>,
     /// Cycle records out.
@@ -57,6 +63,13 @@ impl<T> RtPorts<T> {
             reports.push(report);
         }
         reports
+    }
+
+    /// The newest status that came since the last call; bounded. RT-safe.
+    pub fn newest_status(&mut self) -> Option<ArmStatus> {
+        (0..NEWEST_REPORTS)
+            .map_while(|_| self.status.pop().ok())
+            .last()
     }
 
     /// Hands a link back to be dropped. RT-safe.
@@ -91,6 +104,8 @@ pub struct RelayPorts<T> {
     pub orders: Producer<Mail<T>>,
     /// Joint reports in, every one.
     pub reports: Consumer<JointReport>,
+    /// The arm's status in, every one.
+    pub status: Consumer<ArmStatus>,
     /// Events in.
     pub events: Consumer<ControlEvent>,
     /// Cycle records in.
@@ -110,6 +125,10 @@ pub struct Rings<T> {
     pub reports_to_rt: Producer<JointReport>,
     /// The report receiver's way to the relay.
     pub reports_to_relay: Producer<JointReport>,
+    /// The status reader's way to the loop.
+    pub status_to_rt: Producer<ArmStatus>,
+    /// The status reader's way to the relay.
+    pub status_to_relay: Producer<ArmStatus>,
 }
 
 /// Makes all rings. Not RT-safe.
@@ -121,10 +140,14 @@ pub fn rings<T>() -> Rings<T> {
     let (retired, retired_out) = RingBuffer::new(FEW);
     let (reports_to_rt, newest) = RingBuffer::new(NEWEST_REPORTS);
     let (reports_to_relay, reports) = RingBuffer::new(REPORTS);
+    let (status_to_rt, status) = RingBuffer::new(NEWEST_REPORTS);
+    let (status_to_relay, status_out) = RingBuffer::new(FEW);
     Rings {
         rt: RtPorts {
             orders,
             reports: newest,
+            status,
+            broken: BrokenReports::default(),
             events,
             records,
             retired,
@@ -133,11 +156,14 @@ pub fn rings<T>() -> Rings<T> {
         relay: RelayPorts {
             orders: orders_in,
             reports,
+            status: status_out,
             events: events_out,
             records: records_out,
             retired: retired_out,
         },
         reports_to_rt,
         reports_to_relay,
+        status_to_rt,
+        status_to_relay,
     }
 }

@@ -1,22 +1,23 @@
-//! The controller process: three threads, their rings, and how they end.
+//! The controller process: four threads, their rings, and how they end.
 //!
 //! | thread | owns | scheduling |
 //! |---|---|---|
 //! | control loop | command link, blackboards, control state | FIFO, absolute deadlines |
-//! | arm reports | report connection | FIFO, ten below |
+//! | joint reports | 250 Hz report connection | FIFO, ten below |
+//! | arm status | 5 Hz report connection | ordinary |
 //! | relay (the caller's) | services, histograms, set-up connection | ordinary |
 
+use crate::arm_status;
 use crate::config::ControllerConfig;
 use crate::control::ControlState;
 use crate::error::ControllerError;
 use crate::os::{MonotonicClock, enter_real_time};
 use crate::ports::{RtPorts, rings};
-use crate::relay::Relay;
+use crate::relay::{ArmSettings, Relay};
 use crate::reports::{self, ReportSource};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::TcpLink;
-use shared_types::ipc::{Bus, ControllerBoards};
-use std::net::SocketAddr;
+use shared_types::ipc::{Bus, ControllerBoards, DomainSweep, IpcError};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,6 +29,8 @@ use std::time::{Duration, Instant};
 const TURN: Duration = Duration::from_millis(2);
 /// Longest wait for the brake when the process is asked to end.
 const BRAKE_WAIT: Duration = Duration::from_secs(3);
+/// Longest wait for the blackboards of a controller that was killed.
+const BOARDS_WAIT: Duration = Duration::from_millis(500);
 
 /// Runs the controller until `stop` is set. A moving arm is braked first; it
 /// then holds its last setpoint by itself. Blocks the calling thread.
@@ -38,12 +41,14 @@ const BRAKE_WAIT: Duration = Duration::from_secs(3);
 pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), ControllerError> {
     config.check()?;
     let limits = config.resolve_limits()?;
-    let thresholds = config.thresholds.checked(config.arm)?;
+    let settings = config.control_settings()?;
+    let _sweep = DomainSweep::new(&config.domain);
     let bus = Bus::join(&config.domain)?;
     bus.remove_leftovers();
     let rings = rings();
     let mut threads = Threads::default();
-    let control = ControlState::new(limits.clone(), thresholds);
+    let control = ControlState::new(limits.clone(), settings);
+    let broken = rings.rt.broken.clone();
     let warnings = threads.start_loop(&config, control, rings.rt)?;
     let source = ReportSource {
         arm: config.arm,
@@ -52,13 +57,33 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
         priority: config.real_time.priority.map(|p| p.saturating_sub(10)),
     };
     let quit = Arc::clone(&threads.quit);
-    threads.receiver = Some(
-        reports::spawn(source, rings.reports_to_rt, rings.reports_to_relay, quit)
-            .map_err(ControllerError::Thread)?,
+    let joints = reports::spawn(
+        source,
+        rings.reports_to_rt,
+        rings.reports_to_relay,
+        broken.clone(),
+        Arc::clone(&quit),
     );
-    let arm = SocketAddr::new(config.arm, config.command_port);
-    let stale_ns = thresholds.report_stale_ns;
-    let mut relay = Relay::open(&bus, limits, arm, stale_ns, warnings, rings.relay)?;
+    threads
+        .receivers
+        .push(joints.map_err(ControllerError::Thread)?);
+    let status = arm_status::spawn(
+        config.arm,
+        config.status_ports,
+        rings.status_to_rt,
+        rings.status_to_relay,
+        broken,
+        quit,
+    );
+    threads
+        .receivers
+        .push(status.map_err(ControllerError::Thread)?);
+    let mut relay = Relay::open(
+        &bus,
+        ArmSettings::of(&config, limits, &settings.thresholds),
+        warnings,
+        rings.relay,
+    )?;
     serve(&mut relay, &threads, stop)
 }
 
@@ -88,20 +113,37 @@ fn serve(relay: &mut Relay, threads: &Threads, stop: &AtomicBool) -> Result<(), 
     }
 }
 
+/// Creates the blackboards. Those of a controller that was killed are let go by
+/// its guardian within a moment.
+fn create_boards(bus: &Bus) -> Result<ControllerBoards, IpcError> {
+    let began = Instant::now();
+    loop {
+        match ControllerBoards::create(bus) {
+            Err(_taken) if began.elapsed() < BOARDS_WAIT => {
+                std::thread::sleep(10 * TURN);
+                bus.remove_leftovers();
+            }
+            created => return created,
+        }
+    }
+}
+
 /// The threads beside the relay. Dropping it ends and joins them.
 #[derive(Debug, Default)]
 struct Threads {
     quit: Arc<AtomicBool>,
     control_loop: Option<JoinHandle<()>>,
-    receiver: Option<JoinHandle<()>>,
+    receivers: Vec<JoinHandle<()>>,
 }
 
 impl Drop for Threads {
     fn drop(&mut self) {
         self.quit.store(true, Ordering::Relaxed);
-        for thread in [self.control_loop.take(), self.receiver.take()]
+        for thread in self
+            .control_loop
+            .take()
             .into_iter()
-            .flatten()
+            .chain(self.receivers.drain(..))
         {
             if thread.join().is_err() {
                 tracing::error!("a thread of the controller panicked");
@@ -130,7 +172,7 @@ impl Threads {
         let (ready, wait) = mpsc::channel();
         let body = move || {
             // Blackboard handles stay in the thread that made them.
-            let boards = match Bus::join(&domain).and_then(|bus| ControllerBoards::create(&bus)) {
+            let boards = match Bus::join(&domain).and_then(|bus| create_boards(&bus)) {
                 Ok(boards) => boards,
                 Err(error) => {
                     let _ = ready.send(Err(error));

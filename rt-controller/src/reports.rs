@@ -1,33 +1,21 @@
-//! The report receiver: a thread that listens to the arm's joint reports.
+//! The joint reports: a thread that decodes and stamps them and passes each on
+//! through two rings, to the control loop and to the relay.
 //!
-//! It is not the real-time thread. It connects to the real-time report (port
+//! It is not the real-time thread. It listens to the real-time report (port
 //! 30000, 250 Hz, with the arm's own clock) or, where that is refused, to the
-//! real report (port 30003, 100 Hz, without), decodes, stamps, and passes each
-//! report on through two rings: to the control loop and to the relay. Lost
-//! connections are opened again for as long as the controller runs.
+//! real report (port 30003, 100 Hz, without).
 
 use crate::clock_map::ClockMap;
-use crate::os::{now_ns, schedule::set_fifo};
-use crate::xarm::ReportReader;
-use crate::xarm::report::{ForceReport, RealtimeReport};
+use crate::os::schedule::set_fifo;
+use crate::report_stream::{BrokenReports, ReportSink, ReportStream};
+use crate::xarm::report::{ForceReport, MAX_REPORT_LEN, REALTIME_REPORT_LEN, RealtimeReport};
 use rtrb::Producer;
 use shared_types::JointVector;
 use shared_types::ipc::{JointReport, PAYLOAD_VERSION};
-use std::io::{ErrorKind, Read};
-use std::net::{IpAddr, SocketAddr, TcpStream};
+use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
-use std::time::Duration;
-
-/// Longest wait for a connection.
-const CONNECT_TIMEOUT: Duration = Duration::from_millis(500);
-/// Pause before a new attempt.
-const RETRY: Duration = Duration::from_millis(200);
-/// Longest wait for bytes before `quit` is looked at again.
-const READ_TIMEOUT: Duration = Duration::from_millis(100);
-/// Silence after which the connection is given up and opened again.
-const SILENCE_NS: u64 = 2_000_000_000;
 
 /// Where the reports are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,13 +30,6 @@ pub struct ReportSource {
     pub priority: Option<u8>,
 }
 
-/// Layout of the reports of a connection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
-    Realtime,
-    Force,
-}
-
 /// Starts the receiver; it ends soon after `quit` is set.
 ///
 /// # Errors
@@ -57,129 +38,158 @@ pub fn spawn(
     source: ReportSource,
     to_loop: Producer<JointReport>,
     to_relay: Producer<JointReport>,
+    broken: BrokenReports,
     quit: Arc<AtomicBool>,
 ) -> std::io::Result<JoinHandle<()>> {
-    let mut receiver = Receiver {
-        source,
-        to_loop,
-        to_relay,
+    let mut stream = ReportStream {
+        arm: source.arm,
+        ports: vec![source.realtime_port, source.fallback_port],
+        sink: JointSink {
+            to_loop,
+            to_relay,
+            clocks: ClockMap::default(),
+        },
+        broken,
         quit,
     };
     std::thread::Builder::new()
-        .name("arm reports".to_owned())
-        .spawn(move || receiver.run())
+        .name("joint reports".to_owned())
+        .spawn(move || {
+            if let Some(priority) = source.priority {
+                // Without it reports are merely stamped a little later.
+                let _ = set_fifo(priority);
+            }
+            stream.run();
+        })
 }
 
-struct Receiver {
-    source: ReportSource,
+struct JointSink {
     to_loop: Producer<JointReport>,
     to_relay: Producer<JointReport>,
-    quit: Arc<AtomicBool>,
+    clocks: ClockMap,
 }
 
-impl Receiver {
-    fn run(&mut self) {
-        if let Some(priority) = self.source.priority {
-            // Without it reports are merely stamped a little later.
-            let _ = set_fifo(priority);
-        }
-        while !self.quit.load(Ordering::Relaxed) {
-            if let Some((stream, layout)) = self.connect() {
-                self.listen(stream, layout);
-            }
-            std::thread::sleep(RETRY);
-        }
+impl ReportSink for JointSink {
+    fn opened(&mut self, _port: usize) {
+        self.clocks = ClockMap::default();
     }
 
-    fn connect(&self) -> Option<(TcpStream, Layout)> {
-        let open = |port| {
-            TcpStream::connect_timeout(&SocketAddr::new(self.source.arm, port), CONNECT_TIMEOUT)
+    fn take(&mut self, port: usize, frame: &[u8], arrival_ns: u64) -> bool {
+        let decoded = if port == 0 {
+            realtime(frame, arrival_ns, &mut self.clocks)
+        } else {
+            real(frame, arrival_ns)
         };
-        let (stream, layout) = open(self.source.realtime_port)
-            .map(|s| (s, Layout::Realtime))
-            .or_else(|_refused| open(self.source.fallback_port).map(|s| (s, Layout::Force)))
-            .ok()?;
-        stream.set_read_timeout(Some(READ_TIMEOUT)).ok()?;
-        tracing::info!(?layout, arm = %self.source.arm, "listening to joint reports");
-        Some((stream, layout))
-    }
-
-    /// Passes reports on until the connection breaks, falls silent or `quit`.
-    fn listen(&mut self, mut stream: TcpStream, layout: Layout) {
-        let mut reader = ReportReader::new();
-        let mut clocks = ClockMap::default();
-        let mut heard_ns = now_ns();
-        while !self.quit.load(Ordering::Relaxed) {
-            match stream.read(reader.space()) {
-                Ok(0) => break,
-                Ok(n) => reader.commit(n),
-                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                    if now_ns().saturating_sub(heard_ns) > SILENCE_NS {
-                        break;
-                    }
-                    continue;
-                }
-                Err(e) if e.kind() == ErrorKind::Interrupted => continue,
-                Err(_gone) => break,
-            }
-            heard_ns = now_ns();
-            loop {
-                match reader.next_report() {
-                    Ok(Some(frame)) => {
-                        if let Some(report) = decode(frame, layout, heard_ns, &mut clocks) {
-                            let _ = self.to_loop.push(report);
-                            let _ = self.to_relay.push(report);
-                        }
-                    }
-                    Ok(None) => break,
-                    Err(broken) => {
-                        tracing::warn!(%broken, "the joint report stream lost its place");
-                        return;
-                    }
-                }
-            }
-        }
-        tracing::debug!("joint report connection ended");
+        let Some(report) = decoded.filter(is_finite) else {
+            return false;
+        };
+        let _ = self.to_loop.push(report);
+        let _ = self.to_relay.push(report);
+        true
     }
 }
 
-/// One report as the others see it; `None` for one that is too short or holds
-/// numbers that are not finite.
-fn decode(
-    frame: &[u8],
-    layout: Layout,
-    arrival_ns: u64,
-    clocks: &mut ClockMap,
-) -> Option<JointReport> {
-    let report = match layout {
-        Layout::Realtime => {
-            let r = RealtimeReport::parse(frame).ok()?;
-            JointReport {
-                version: PAYLOAD_VERSION,
-                arm_state: r.state.code(),
-                arm_mode: r.mode.code(),
-                arm_clock: 1,
-                stamp_ns: clocks.to_monotonic_ns(r.time_us, arrival_ns),
-                arrival_ns,
-                q: r.actual.q,
-                qd: r.actual.qd,
-                q_target: r.target.q,
-            }
+fn is_finite(report: &JointReport) -> bool {
+    report.q.is_finite() && report.qd.is_finite() && report.q_target.is_finite()
+}
+
+/// A report of port 30000; `None` for another size than any firmware sends.
+fn realtime(frame: &[u8], arrival_ns: u64, clocks: &mut ClockMap) -> Option<JointReport> {
+    if !(REALTIME_REPORT_LEN..=MAX_REPORT_LEN).contains(&frame.len()) {
+        return None;
+    }
+    let r = RealtimeReport::parse(frame).ok()?;
+    Some(JointReport {
+        version: PAYLOAD_VERSION,
+        arm_state: r.state.code(),
+        arm_mode: r.mode.code(),
+        arm_clock: 1,
+        stamp_ns: clocks.to_monotonic_ns(r.time_us, arrival_ns),
+        arrival_ns,
+        q: r.actual.q,
+        qd: r.actual.qd,
+        q_target: r.target.q,
+    })
+}
+
+/// A report of port 30003, which has measured angles only.
+fn real(frame: &[u8], arrival_ns: u64) -> Option<JointReport> {
+    let r = ForceReport::parse(frame).ok()?.basic;
+    Some(JointReport {
+        version: PAYLOAD_VERSION,
+        arm_state: r.state.code(),
+        arm_mode: r.mode.code(),
+        arm_clock: 0,
+        stamp_ns: arrival_ns,
+        arrival_ns,
+        q: r.q,
+        qd: JointVector::ZERO,
+        q_target: r.q,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::xarm::{ArmState, Mode, TcpPose};
+    use rtrb::{Consumer, RingBuffer};
+    use shared_types::JointState;
+
+    fn sink() -> (JointSink, Consumer<JointReport>) {
+        let (to_loop, taken) = RingBuffer::new(4);
+        let (to_relay, _) = RingBuffer::new(4);
+        let clocks = ClockMap::default();
+        let sink = JointSink {
+            to_loop,
+            to_relay,
+            clocks,
+        };
+        (sink, taken)
+    }
+
+    fn frame(q: f64, size: usize) -> Vec<u8> {
+        let at = JointState::at_rest(JointVector::splat(q));
+        let report = RealtimeReport {
+            time_us: 5_000_000,
+            state: ArmState::Moving,
+            mode: Mode::Servo,
+            buffered: 0,
+            target: at,
+            actual: at,
+            current_a: JointVector::ZERO,
+            torque_nm: JointVector::ZERO,
+            target_tcp: TcpPose::default(),
+            target_twist: TcpPose::default(),
+            actual_tcp: TcpPose::default(),
+            actual_twist: TcpPose::default(),
+        };
+        let mut bytes = vec![0; MAX_REPORT_LEN];
+        report.emit(&mut bytes).unwrap();
+        bytes.truncate(size);
+        bytes
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_and_wrong_sizes_are_refused() {
+        let (mut sink, mut taken) = sink();
+        assert!(sink.take(0, &frame(0.5, 784), 9_000_000_000));
+        assert!(
+            sink.take(0, &frame(0.5, 804), 9_000_000_000),
+            "newer firmware"
+        );
+        for damaged in [
+            frame(f64::NAN, 784),
+            frame(f64::INFINITY, 784),
+            frame(0.5, 783),
+            frame(0.5, 145),
+            Vec::new(),
+        ] {
+            assert!(!sink.take(0, &damaged, 9_000_000_000));
+            assert!(!sink.take(1, &damaged[..damaged.len().min(80)], 9_000_000_000));
         }
-        Layout::Force => {
-            let r = ForceReport::parse(frame).ok()?.basic;
-            JointReport {
-                version: PAYLOAD_VERSION,
-                arm_state: r.state.code(),
-                arm_mode: r.mode.code(),
-                arm_clock: 0,
-                stamp_ns: arrival_ns,
-                arrival_ns,
-                q: r.q,
-                qd: JointVector::ZERO,
-                q_target: r.q,
-            }
-        }
-    };
-    (report.q.is_finite() && report.qd.is_finite() && report.q_target.is_finite()).then_some(report)
+        let report = taken.pop().unwrap();
+        assert_eq!((report.arm_mode, report.arm_clock), (1, 1));
+        assert!((report.q - JointVector::splat(0.5)).max_abs() < 1e-7);
+        assert_eq!(std::iter::from_fn(|| taken.pop().ok()).count(), 1);
+    }
 }

@@ -23,7 +23,7 @@
     )
 )]
 
-use crate::control::{ControlState, CycleInput};
+use crate::control::{ArmCodes, ControlState, CycleInput};
 use crate::os::Clock;
 use crate::overrun::{Wake, after_wake, next_wake};
 use crate::ports::RtPorts;
@@ -41,6 +41,9 @@ pub struct RtLoop<T, C> {
     boards: ControllerBoards,
     ports: RtPorts<T>,
     link: LinkSlot<T>,
+    /// Broken reports counted so far.
+    broken: u32,
+    pid: u32,
     /// Whether the thread has real-time priority and locked memory.
     pub real_time: bool,
 }
@@ -54,11 +57,13 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         ports: RtPorts<T>,
     ) -> Self {
         Self {
+            link: LinkSlot::new(control.wire()),
+            broken: ports.broken.count(),
             control,
             clock,
             boards,
             ports,
-            link: LinkSlot::default(),
+            pid: std::process::id(),
             real_time: false,
         }
     }
@@ -75,14 +80,14 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
             let woke_ns = self.clock.now_ns();
             let due = after_wake(next.deadline_ns, woke_ns, period_ns);
             let missed = due.missed.saturating_add(next.missed);
-            self.cycle(due.deadline_ns, missed, woke_ns);
-            next = next_wake(due.deadline_ns, woke_ns, self.clock.now_ns(), period_ns);
+            let sent_ns = self.cycle(due.deadline_ns, missed, woke_ns);
+            next = next_wake(due.deadline_ns, sent_ns, self.clock.now_ns(), period_ns);
         }
     }
 
     /// One cycle, due at `deadline_ns` after `missed` skipped ones, that woke at
-    /// `woke_ns`: take in, step, send, record. RT-safe.
-    pub fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) {
+    /// `woke_ns`: take in, step, send, record; returns when it sent. RT-safe.
+    pub fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) -> u64 {
         let input = self.take_in(deadline_ns, missed);
         let mut out = self.control.step(input);
         let computed_ns = self.clock.now_ns();
@@ -95,9 +100,11 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         self.boards.publish(ControllerState {
             stamp_ns: woke_ns,
             real_time: u8::from(self.real_time),
+            pid: self.pid,
             ..self.control.summary()
         });
         self.ports.put_out(out);
+        computed_ns
     }
 
     fn take_in(&mut self, deadline_ns: u64, missed: u32) -> CycleInput {
@@ -111,14 +118,18 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
             let broken = self.link.replace(None);
             self.ports.retire_link(broken);
         }
+        let broken = self.ports.broken.count();
+        let broken_reports = broken.wrapping_sub(core::mem::replace(&mut self.broken, broken));
         CycleInput {
             deadline_ns,
             missed,
             order: mail.map(|m| m.order),
             operator: self.boards.operator(),
+            guardian: self.boards.guardian(),
             link,
+            codes: self.ports.newest_status().map(ArmCodes::from),
             reports: self.ports.new_reports(),
-            ..CycleInput::default()
+            broken_reports,
         }
     }
 }

@@ -7,24 +7,14 @@
 
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
 use crate::xarm::{
-    ArmState, BrokenStream, Command, ErrorCode, FrameReader, JointQuery, Mode, Protocol, ReplyData,
-    ReplyError, StateRequest,
+    ArmState, BrokenStream, Command, ErrorCode, FrameReader, Protocol, ReplyData, ReplyError,
+    StateRequest,
 };
-use shared_types::{JointVector, Limits};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
-/// The arm checks tool speed against this times its factor (m/s).
-const SPEED_AT_FACTOR_ONE_M_S: f64 = 1.0;
-/// The arm stands when two poses read this far apart in time ...
-const STILL_INTERVAL: Duration = Duration::from_millis(30);
-/// ... differ less than this (rad).
-const STILL_RAD: f64 = 1e-4;
-/// Longest wait for the arm to become ready and to stand still.
-const READY_TIMEOUT: Duration = Duration::from_secs(3);
-
-/// Why the arm could not be set up.
+/// Why a question was not answered.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
     /// No connection.
@@ -51,38 +41,16 @@ pub enum SessionError {
     /// An answer makes no sense.
     #[error("the arm answered wrongly: {0}")]
     Reply(#[from] ReplyError),
-    /// An error that clearing does not remove.
-    #[error("the arm keeps its error {0}")]
-    Error(ErrorCode),
-    /// The arm does not become ready.
-    #[error(
-        "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
-    )]
-    NotReady {
-        /// State it stays in.
-        state: ArmState,
-    },
-    /// The arm moves by itself.
-    #[error("the arm does not stand still: stop other programs that move it")]
-    Restless,
-    /// The pose is outside the configured limits.
-    #[error(
-        "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
-    )]
-    OutsideRange {
-        /// Joint, 1-based.
-        joint: usize,
-        /// Where it stands (rad).
-        q_rad: f64,
-    },
 }
 
 /// A connection for questions. Blocks; not RT-safe.
 #[derive(Debug)]
 pub struct ArmSession {
+    address: SocketAddr,
     stream: TcpStream,
     reader: FrameReader,
     transaction: u16,
+    protocol: Protocol,
     timeout: Duration,
 }
 
@@ -100,11 +68,20 @@ impl ArmSession {
             Ok(stream)
         };
         Ok(Self {
+            address,
             stream: open().map_err(|reason| SessionError::Connect { address, reason })?,
             reader: FrameReader::new(),
             transaction: 0,
+            protocol: Protocol::Private,
             timeout,
         })
+    }
+
+    /// Changes to protocol 3 for every later request, as clients of firmware
+    /// 1.8.6 and newer do; nothing announces it. A session is over long before
+    /// the protocol's heartbeat would be due.
+    pub fn keep_heartbeat(&mut self) {
+        self.protocol = Protocol::PrivateHeartbeat;
     }
 
     /// Sends a request and waits for its answer; others are skipped.
@@ -118,7 +95,7 @@ impl ArmSession {
         };
         self.transaction = next_transaction(self.transaction);
         let mut frame = [0; MAX_FRAME_LEN];
-        let len = emit_command(&mut frame, self.transaction, Protocol::Private, command)
+        let len = emit_command(&mut frame, self.transaction, self.protocol, command)
             .map_err(|e| fail(std::io::Error::other(e)))?;
         let frame = frame.get(..len).unwrap_or_default();
         self.stream.write_all(frame).map_err(fail)?;
@@ -141,6 +118,23 @@ impl ArmSession {
         }
     }
 
+    /// Address of the arm.
+    #[must_use]
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// State of the arm.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn state(&mut self) -> Result<ArmState, SessionError> {
+        match self.ask(&Command::GetState)? {
+            ReplyData::State(state) => Ok(state),
+            _ => Ok(ArmState::Other(0)),
+        }
+    }
+
     /// Error code of the arm.
     ///
     /// # Errors
@@ -150,80 +144,6 @@ impl ArmSession {
             ReplyData::Fault { error, .. } => Ok(ErrorCode(error)),
             _ => Ok(ErrorCode::NONE),
         }
-    }
-
-    /// Enables the arm in servo mode, from whatever state it is in, and
-    /// returns the pose in which it stands (rad). Order as in the vendor's
-    /// manual: clear, enable, mode, state.
-    ///
-    /// # Errors
-    /// [`SessionError`], each with what to do.
-    pub fn bring_up(&mut self, limits: &Limits) -> Result<JointVector, SessionError> {
-        if let ReplyData::Text(text) = self.ask(&Command::Version)? {
-            tracing::info!(version = text.as_str(), "connected to the arm");
-        }
-        let enable = Command::MotionEnable {
-            joint: Command::ALL_JOINTS,
-            enable: true,
-        };
-        let factor = limits.tcp_speed_max_m_s / SPEED_AT_FACTOR_ONE_M_S;
-        for command in [
-            Command::CleanError,
-            Command::CleanWarning,
-            enable,
-            Command::SetSpeedLimitFactor(factor),
-            Command::SetMode(Mode::Servo),
-            Command::SetState(StateRequest::Ready),
-        ] {
-            self.ask(&command)?;
-        }
-        self.wait_ready()?;
-        let q = self.wait_still()?;
-        match limits.position_violation(&q) {
-            Some(j) => Err(SessionError::OutsideRange {
-                joint: j.saturating_add(1),
-                q_rad: q[j],
-            }),
-            None => Ok(q),
-        }
-    }
-
-    fn wait_ready(&mut self) -> Result<(), SessionError> {
-        let began = Instant::now();
-        loop {
-            let error = self.error_code()?;
-            let ReplyData::State(state) = self.ask(&Command::GetState)? else {
-                continue;
-            };
-            if error.is_none() && state.can_move() {
-                return Ok(());
-            }
-            if began.elapsed() > READY_TIMEOUT {
-                return Err(if error.is_none() {
-                    SessionError::NotReady { state }
-                } else {
-                    SessionError::Error(error)
-                });
-            }
-            std::thread::sleep(STILL_INTERVAL);
-        }
-    }
-
-    fn wait_still(&mut self) -> Result<JointVector, SessionError> {
-        let began = Instant::now();
-        let mut before: Option<JointVector> = None;
-        while began.elapsed() < READY_TIMEOUT {
-            let q = match self.ask(&Command::JointPosition(JointQuery::MEASURED))? {
-                ReplyData::JointMotion { position, .. } => position,
-                _ => continue,
-            };
-            if before.is_some_and(|b| (b - q).max_abs() < STILL_RAD) {
-                return Ok(q);
-            }
-            before = Some(q);
-            std::thread::sleep(STILL_INTERVAL);
-        }
-        Err(SessionError::Restless)
     }
 
     /// Asks the arm to stop by itself.

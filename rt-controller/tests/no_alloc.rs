@@ -13,7 +13,7 @@ use rt_controller::os::Clock;
 use rt_controller::point_to_point::plan_move;
 use rt_controller::ports::{Mail, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
-use rt_controller::transport::tcp::TcpLink;
+use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::MAX_FRAME_LEN;
 use rt_controller::xarm::{FrameReader, ReplyData, Status};
 use shared_types::ipc::{
@@ -157,7 +157,8 @@ impl Bench {
     }
 
     fn adopt(&mut self, arm: SocketAddr) {
-        let link = Box::new(TcpLink::connect(arm, Duration::from_secs(1)).unwrap());
+        let settings = LinkSettings::new(200, PERIOD_NS);
+        let link = Box::new(TcpLink::connect(arm, Duration::from_secs(1), settings).unwrap());
         let hold = if self.mode() == ControllerMode::Offline {
             START_POSE
         } else {

@@ -7,17 +7,21 @@
     reason = "tests may fail loudly"
 )]
 
+use rt_controller::commander::CommanderLock;
 use rt_controller::config::ThresholdSettings;
+use rt_controller::guardian::GuardianSettings;
 use rt_controller::os::{RealTimeSettings, now_ns};
 use rt_controller::xarm::frame::MAX_FRAME_LEN;
-use rt_controller::xarm::report::{MAX_REPORT_LEN, RealtimeReport};
-use rt_controller::xarm::{ArmState, Command, FrameReader, Mode, ReplyData, Status, TcpPose};
+use rt_controller::xarm::report::{BasicReport, MAX_REPORT_LEN, NormalReport, RealtimeReport};
+use rt_controller::xarm::{
+    ArmState, Command, ErrorCode, FrameReader, Mode, ReplyData, Status, TcpPose,
+};
 use rt_controller::{ControllerConfig, run};
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, ControllerMode, IpcError, OperatorEnd};
 use shared_types::plan::{START_POSE, trajectory_hash};
-use shared_types::{FaultCode, JointState, JointTrajectory, JointVector};
+use shared_types::{FaultCode, JointState, JointTrajectory, JointVector, MotionTier};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,20 +33,21 @@ use std::time::Duration;
 struct SmallArm {
     q: Arc<Mutex<JointVector>>,
     off: Arc<AtomicBool>,
-    ports: [u16; 2],
+    ports: [u16; 3],
 }
 
 impl SmallArm {
     fn start(q: JointVector) -> Self {
-        let (commands, reports) = (listen(), listen());
+        let (commands, reports, status) = (listen(), listen(), listen());
         let arm = Self {
             q: Arc::new(Mutex::new(q)),
             off: Arc::new(AtomicBool::new(false)),
-            ports: [&commands, &reports].map(|l| l.local_addr().unwrap().port()),
+            ports: [&commands, &reports, &status].map(|l| l.local_addr().unwrap().port()),
         };
         for (listener, serve) in [
             (commands, Self::answer as fn(&Self, TcpStream)),
             (reports, Self::report),
+            (status, Self::tell_status),
         ] {
             let arm = arm.clone();
             std::thread::spawn(move || {
@@ -99,6 +104,7 @@ impl SmallArm {
                 error: 0,
                 warning: 0,
             },
+            Command::GetSpeedLimitFactor => ReplyData::SpeedLimitFactor(1.2),
             Command::JointPosition(_) => ReplyData::JointMotion {
                 quantities: 1,
                 position: *self.q.lock().unwrap(),
@@ -106,6 +112,37 @@ impl SmallArm {
                 effort: JointVector::ZERO,
             },
             _ => ReplyData::None,
+        }
+    }
+
+    fn tell_status(&self, mut stream: TcpStream) {
+        let mut out = [0; MAX_REPORT_LEN];
+        while !self.off.load(Ordering::Relaxed) {
+            let report = NormalReport {
+                basic: BasicReport {
+                    state: ArmState::Ready,
+                    mode: Mode::Servo,
+                    buffered: 0,
+                    q: *self.q.lock().unwrap(),
+                    tcp: TcpPose::default(),
+                    torque_nm: JointVector::ZERO,
+                },
+                brakes_released: 0x7F,
+                enabled: 0x7F,
+                error: ErrorCode::NONE,
+                warning: 0,
+                tcp_offset: TcpPose::default(),
+                load_kg: 0.0,
+                load_centre_m: [0.0; 3],
+                collision_sensitivity: 3,
+                teach_sensitivity: 3,
+                gravity: [0.0, 0.0, -1.0],
+            };
+            let n = report.emit(&mut out).unwrap();
+            if stream.write_all(&out[..n]).is_err() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(200));
         }
     }
 
@@ -146,6 +183,7 @@ fn config(domain: &str, arm: &SmallArm) -> ControllerConfig {
         command_port: arm.ports[0],
         report_port: arm.ports[1],
         fallback_report_port: arm.ports[1],
+        status_ports: [arm.ports[2]; 2],
         // The machine may be busy with other tests: patience, no privileges.
         real_time: RealTimeSettings {
             priority: None,
@@ -162,6 +200,11 @@ fn config(domain: &str, arm: &SmallArm) -> ControllerConfig {
             late_cycles_max: Some(1000),
             unanswered_max: Some(1000),
             ..ThresholdSettings::default()
+        },
+        arming_required: false,
+        guardian: GuardianSettings {
+            required: false,
+            ..GuardianSettings::default()
         },
         ..ControllerConfig::default()
     }
@@ -321,6 +364,125 @@ fn a_day_in_the_life() {
 
     stop.store(true, Ordering::Relaxed);
     controller.join().unwrap().unwrap();
+}
+
+/// A running controller and its operator; the controller ends when dropped.
+struct Running {
+    operator: Operator,
+    stop: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Running {
+    fn start(config: ControllerConfig) -> Self {
+        let (stop, domain) = (Arc::new(AtomicBool::new(false)), config.domain.clone());
+        let flag = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || run(config, &flag).unwrap());
+        let bus = Bus::join(&domain).unwrap();
+        let operator = loop {
+            std::thread::sleep(Duration::from_millis(20));
+            if let (Ok(end), Ok(client)) = (OperatorEnd::take(&bus), RpcClient::open(&bus))
+                && client.call(&ControllerRequest::Status).is_ok()
+            {
+                break Operator { client, end };
+            }
+        };
+        Self {
+            operator,
+            stop,
+            thread: Some(thread),
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap();
+    }
+}
+
+#[test]
+fn motions_need_an_arming_and_plans_come_in_time() {
+    let arm = SmallArm::start(START_POSE);
+    let mut config = config(&format!("test_arming_{}", std::process::id()), &arm);
+    config.arming_required = true;
+    let mut running = Running::start(config);
+    let operator = &mut running.operator;
+    let arm_for = |tier, area_clear| ControllerRequest::Arm { tier, area_clear };
+    let setting_up = arm_for(MotionTier::SetUp, false);
+    assert_eq!(operator.refused(&setting_up), FaultCode::WrongMode);
+    assert_eq!(
+        operator.ask(&ControllerRequest::Bringup),
+        ControllerEvent::Done
+    );
+    let throw = swing(-0.3, 0.8);
+    assert_eq!(operator.refused(&execute(&throw)), FaultCode::NotArmed);
+    let blind = arm_for(MotionTier::Throw, false);
+    assert_eq!(operator.refused(&blind), FaultCode::NotArmed);
+    let armed = arm_for(MotionTier::Throw, true);
+    assert_eq!(operator.ask(&armed), ControllerEvent::Done);
+    match operator.ask(&ControllerRequest::Status) {
+        ControllerEvent::Status { tier, .. } => assert_eq!(tier, Some(MotionTier::Throw)),
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(
+        operator.ask(&ControllerRequest::Disarm),
+        ControllerEvent::Done
+    );
+    assert_eq!(operator.refused(&execute(&throw)), FaultCode::NotArmed);
+
+    // An announced plan that never comes, and one that does.
+    let sha256 = trajectory_hash(&throw);
+    let announce = ControllerRequest::Announce { sha256 };
+    assert_eq!(operator.refused(&announce), FaultCode::UploadTimedOut);
+    let unknown = ControllerRequest::ExecuteUploaded { sha256 };
+    assert_eq!(operator.refused(&unknown), FaultCode::WrongMode);
+    let upload = |sha256| ControllerRequest::Upload {
+        trajectory: Box::new(throw),
+        sha256,
+    };
+    assert_eq!(
+        operator.refused(&upload([1; 32])),
+        FaultCode::PlanHashMismatch
+    );
+    let pending = operator.client.call(&announce).unwrap();
+    assert_eq!(operator.ask(&upload(sha256)), ControllerEvent::Done);
+    let there = pending.finish::<IpcError>(Duration::from_secs(5), || Ok(()), |_| ());
+    assert!(matches!(there, Ok(ControllerEvent::Done)), "{there:?}");
+    assert_eq!(operator.ask(&armed), ControllerEvent::Done);
+    assert!(matches!(
+        operator.ask(&unknown),
+        ControllerEvent::Finished { .. }
+    ));
+    // One arming, one throw.
+    assert_eq!(operator.refused(&unknown), FaultCode::NotArmed);
+}
+
+#[test]
+fn another_commander_or_another_tool_is_a_refusal_that_says_what() {
+    let arm = SmallArm::start(START_POSE);
+    let mut config = config(&format!("test_refusals_{}", std::process::id()), &arm);
+    let mut spec = shared_types::LimitsSpec::from(shared_types::Limits::default());
+    spec.tcp_speed_max_m_s = 1.0;
+    config.limits = Some(spec.try_into().unwrap());
+    let mut running = Running::start(config.clone());
+    let lock = CommanderLock::take((config.arm, config.command_port).into()).unwrap();
+    let refusal = |running: &mut Running| match running.operator.ask(&ControllerRequest::Bringup) {
+        ControllerEvent::Refused { fault, message } => (fault, message),
+        other => panic!("{other:?}"),
+    };
+    let (fault, message) = refusal(&mut running);
+    assert_eq!(fault, FaultCode::SecondCommander);
+    let me = format!("process {}", std::process::id());
+    assert!(message.contains(&me), "{message}");
+    drop(lock);
+    let (fault, message) = refusal(&mut running);
+    assert_eq!(fault, FaultCode::ArmDiffers);
+    assert!(
+        message.contains("1.200") && message.contains("1.000"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -194,10 +194,13 @@ pub struct ArmArgs {
     /// Report port with joint states (250 Hz).
     #[arg(long, default_value_t = 30000)]
     pub report_port: u16,
-    /// The area is clear and the emergency stop is in reach. Needed for any
-    /// address that is not this machine.
-    #[arg(long)]
-    pub confirm: bool,
+    /// Report port with the arm's status (5 Hz); both kinds will do.
+    #[arg(long, default_value_t = 30002)]
+    pub status_port: u16,
+    /// The area is clear and the emergency stop is in reach. Asked for at any
+    /// address that is not this machine unless given here.
+    #[arg(long, alias = "confirm")]
+    pub yes: bool,
     /// Limits of the arm; default: the built-in xArm 7.
     #[arg(long)]
     pub limits: Option<PathBuf>,
@@ -423,6 +426,8 @@ pub enum ProcessName {
     Rig,
     /// Real-time controller.
     RtController,
+    /// Stops the arm when the controller is lost.
+    Guardian,
     /// Camera frames to keypoints.
     CameraIngest,
     /// Identification and planning.

@@ -349,7 +349,7 @@ const CASES: &[Case] = &[
     ),
     (&["wiggle"], 2, &["--csv", "--arm"]),
     (&["wiggle", "--csv", "no/w.csv"], 1, &["no/w.csv"]),
-    (&["wiggle", "--arm", "192.0.2.1"], 2, &["--confirm"]),
+    (&["wiggle", "--arm", "192.0.2.1"], 2, &["--yes"]),
     (
         &[
             "track",

@@ -15,7 +15,13 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-const PROCESSES: [&str; 4] = ["rig", "rt-controller", "camera-ingest", "planner"];
+const PROCESSES: [&str; 5] = [
+    "rig",
+    "rt-controller",
+    "guardian",
+    "camera-ingest",
+    "planner",
+];
 
 /// Command lines of all running processes: (pid, arguments).
 fn running() -> Vec<(u32, Vec<String>)> {

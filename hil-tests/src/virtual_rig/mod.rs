@@ -33,7 +33,7 @@ use rt_controller::control::{
 };
 use rt_controller::overrun::{Wake, after_wake, next_wake};
 use rt_controller::transport::slot::LinkSlot;
-use rt_controller::transport::tcp::TcpLink;
+use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
 use shared_types::ipc::{
@@ -135,7 +135,7 @@ impl VirtualRig {
         Self {
             network: Rc::new(RefCell::new(network)),
             control: ControlState::new(config.limits.clone(), config.settings),
-            link: LinkSlot::default(),
+            link: LinkSlot::new(config.settings.wire),
             joints: Feed::new(ReportKind::Realtime),
             codes: Feed::new(ReportKind::Rich),
             next: Wake {
@@ -222,7 +222,9 @@ impl VirtualRig {
         self.run_for(BRING_UP_S);
         drop(session);
         let stream = VirtualStream::connect(&self.network, Service::Commands)?;
-        let fresh = TcpLink::over(stream);
+        let period_ns = MonotonicNs(0).plus_s(self.config.limits.period_s()).0;
+        let unanswered_max = self.config.settings.thresholds.unanswered_max;
+        let fresh = TcpLink::over(stream, LinkSettings::new(unanswered_max, period_ns));
         drop(self.link.replace(Some(Box::new(fresh))));
         let hold = self.with_arm(|arm| arm.model().measured_motion().q);
         self.orders.push_back(Order::Adopt { hold });

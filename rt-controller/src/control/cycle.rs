@@ -112,7 +112,8 @@ impl ControlState {
         self.cycle
     }
 
-    /// State for the blackboard; stamp and real-time flag are the caller's.
+    /// State for the blackboard; stamp, process and real-time flag are the
+    /// caller's.
     #[must_use]
     pub fn summary(&self) -> ControllerState {
         ControllerState {
@@ -127,8 +128,15 @@ impl ControlState {
             q: self.monitor.report().map_or(JointVector::ZERO, |r| r.q),
             tier: self.arming.raw_tier(),
             wire: self.settings.wire as u8,
-            reserved: [0; 6],
+            reserved: [0; 2],
+            pid: 0,
         }
+    }
+
+    /// How commands reach the arm.
+    #[must_use]
+    pub const fn wire(&self) -> WireMode {
+        self.settings.wire
     }
 
     /// One cycle: observe, watch, obey, command. RT-safe; returns for any input.

@@ -43,8 +43,10 @@ impl SlowDown {
         }
         JointState {
             q: on_path.q,
-            qd: on_path.qd * rate,
-            qdd: on_path.qdd * (rate * rate) + on_path.qd * change,
+            qd: on_path.qd.map(|v| v * rate),
+            qdd: on_path
+                .qdd
+                .zip_with(on_path.qd, |a, v| a * (rate * rate) + v * change),
         }
     }
 }

@@ -3,6 +3,7 @@
 #![allow(unsafe_code, reason = "system calls without a safe wrapper")]
 
 pub mod clock;
+pub mod process;
 pub mod receive;
 pub mod schedule;
 

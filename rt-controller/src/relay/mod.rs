@@ -9,13 +9,18 @@
 mod answers;
 mod latency;
 mod requests;
+mod uploads;
 
-use crate::control::{ControlEvent, Motion, Order};
+use crate::arm_status::ArmStatus;
+use crate::commander::CommanderLock;
+use crate::config::ControllerConfig;
+use crate::control::{ControlEvent, Motion, Order, Thresholds};
 use crate::error::ControllerError;
 use crate::os::now_ns;
 use crate::ports::{Mail, RelayPorts, Retired};
 use crate::session::ArmSession;
-use crate::transport::tcp::TcpLink;
+use crate::set_up::OnDifference;
+use crate::transport::tcp::{LinkSettings, TcpLink};
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
 use latency::Latencies;
@@ -24,10 +29,11 @@ use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
     Bus, ControllerMode, CyclePublisher, CycleRecord, JointPublisher, JointReport,
 };
-use shared_types::{FaultCode, Limits};
+use shared_types::{FaultCode, Limits, MonotonicNs, MotionTier, WireMode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
+use uploads::Uploads;
 
 /// Longest wait for one answer of the arm while it is set up.
 const SET_UP_TIMEOUT: Duration = Duration::from_secs(2);
@@ -35,6 +41,43 @@ const SET_UP_TIMEOUT: Duration = Duration::from_secs(2);
 const QUESTION_TIMEOUT: Duration = Duration::from_millis(200);
 /// Longest wait of a bring-up for the first joint report.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
+
+/// The arm, how it is set up, and what it is held to.
+#[derive(Debug, Clone)]
+pub struct ArmSettings {
+    /// Command port.
+    pub command: SocketAddr,
+    /// Port with its status.
+    pub status: SocketAddr,
+    /// Limits it is held to.
+    pub limits: Limits,
+    /// What to do when it is configured otherwise.
+    pub on_difference: OnDifference,
+    /// How setpoints reach it.
+    pub wire: WireMode,
+    /// How its slowness is met.
+    pub link: LinkSettings,
+    /// Largest age of a joint report that counts as fresh (ns).
+    pub report_stale_ns: u64,
+}
+
+impl ArmSettings {
+    /// Of a checked configuration.
+    #[must_use]
+    pub fn of(config: &ControllerConfig, limits: Limits, thresholds: &Thresholds) -> Self {
+        let [status, _] = config.status_ports;
+        let period_ns = MonotonicNs(0).plus_s(limits.period_s()).0;
+        Self {
+            command: SocketAddr::new(config.arm, config.command_port),
+            status: SocketAddr::new(config.arm, status),
+            limits,
+            on_difference: config.on_difference,
+            wire: config.wire,
+            link: LinkSettings::new(thresholds.unanswered_max, period_ns),
+            report_stale_ns: thresholds.report_stale_ns,
+        }
+    }
+}
 
 /// A call that is answered later.
 enum Open {
@@ -44,6 +87,8 @@ enum Open {
         id: u64,
         next: VecDeque<Box<Motion>>,
     },
+    /// Answered when the controller is armed.
+    Arming { call: ControllerCall },
     /// Answered when the arm is latched.
     Stop { call: ControllerCall },
     /// Answered when the loop holds the arm and joint reports come.
@@ -56,9 +101,8 @@ enum Open {
 
 /// The relay and all it owns. Lives in the thread that opened it.
 pub struct Relay {
-    limits: Limits,
-    arm: SocketAddr,
-    report_stale_ns: u64,
+    arm: ArmSettings,
+    commander: Option<CommanderLock>,
     warnings: Vec<String>,
     ports: RelayPorts<TcpLink>,
     server: RpcServer<ControllerRpc>,
@@ -67,15 +111,22 @@ pub struct Relay {
     latencies: Latencies,
     newest: CycleRecord,
     newest_report: Option<JointReport>,
+    newest_status: Option<ArmStatus>,
     arm_error: ErrorCode,
     open: Vec<Open>,
+    uploads: Uploads,
+    tier: Option<MotionTier>,
     last_id: u64,
+}
+
+fn codes(status: ArmStatus) -> (ErrorCode, u8) {
+    (status.error, status.warning)
 }
 
 impl core::fmt::Debug for Relay {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Relay")
-            .field("arm", &self.arm)
+            .field("arm", &self.arm.command)
             .field("open", &self.open.len())
             .finish_non_exhaustive()
     }
@@ -89,16 +140,13 @@ impl Relay {
     /// [`ControllerError`].
     pub fn open(
         bus: &Bus,
-        limits: Limits,
-        arm: SocketAddr,
-        report_stale_ns: u64,
+        arm: ArmSettings,
         warnings: Vec<String>,
         ports: RelayPorts<TcpLink>,
     ) -> Result<Self, ControllerError> {
         Ok(Self {
-            limits,
             arm,
-            report_stale_ns,
+            commander: None,
             warnings,
             ports,
             server: RpcServer::open(bus)?,
@@ -107,8 +155,11 @@ impl Relay {
             latencies: Latencies::new()?,
             newest: CycleRecord::default(),
             newest_report: None,
+            newest_status: None,
             arm_error: ErrorCode::NONE,
             open: Vec::new(),
+            uploads: Uploads::default(),
+            tier: None,
             last_id: 0,
         })
     }
@@ -133,6 +184,7 @@ impl Relay {
             self.on_event(event);
         }
         self.settle_adoptions();
+        self.uploads.settle();
         loop {
             match self.server.receive() {
                 Ok(Some(call)) => self.serve(call),
@@ -152,7 +204,8 @@ impl Relay {
 
     /// Asks the arm itself to stop, when there is no loop any more.
     pub fn stop_arm(&mut self) {
-        let asked = ArmSession::connect(self.arm, QUESTION_TIMEOUT).and_then(|mut s| s.stop_arm());
+        let asked =
+            ArmSession::connect(self.arm.command, QUESTION_TIMEOUT).and_then(|mut s| s.stop_arm());
         if let Err(reason) = asked {
             tracing::error!(%reason, "the arm could not be asked to stop");
         }
@@ -170,9 +223,21 @@ impl Relay {
             let sent = self.joints.send_copy(report);
             failed = sent.err().or(failed);
         }
+        while let Ok(status) = self.ports.status.pop() {
+            self.on_status(status);
+        }
         if let Some(reason) = failed {
             tracing::warn!(?reason, "records could not be published");
         }
+    }
+
+    /// Remembers the arm's status and says so when its codes change.
+    fn on_status(&mut self, status: ArmStatus) {
+        let before = self.newest_status.map_or((ErrorCode::NONE, 0), codes);
+        if codes(status) != before {
+            tracing::warn!(error = %status.error, warning = status.warning, "the arm's codes changed");
+        }
+        self.newest_status = Some(status);
     }
 
     /// Hands an order to the loop.
@@ -207,8 +272,15 @@ impl Relay {
             } => self.on_finished(id, start_ns, end_ns),
             ControlEvent::Refused { id, fault } => self.on_refused(id, fault),
             ControlEvent::Latched(cause) => self.on_latched(cause.fault(), cause.cycle),
-            ControlEvent::Armed(arming) => tracing::info!(?arming, "armed"),
-            ControlEvent::Disarmed { fault } => tracing::info!(?fault, "disarmed"),
+            ControlEvent::Armed(arming) => {
+                tracing::info!(?arming, "armed");
+                self.tier = Some(arming.tier);
+                self.settle_armings(|call| answer(call, &ControllerEvent::Done));
+            }
+            ControlEvent::Disarmed { fault } => {
+                tracing::info!(?fault, "disarmed");
+                self.tier = None;
+            }
         }
     }
 
@@ -244,14 +316,28 @@ impl Relay {
                     refuse(&call, fault, "");
                 }
             }
-            None => self.open.retain(|open| {
-                let Open::Adoption { call, .. } = open else {
-                    return true;
-                };
-                refuse(call, fault, "");
-                false
-            }),
+            None => {
+                self.settle_armings(|call| refuse(call, fault, ""));
+                self.open.retain(|open| {
+                    let Open::Adoption { call, .. } = open else {
+                        return true;
+                    };
+                    refuse(call, fault, "");
+                    false
+                });
+            }
         }
+    }
+
+    /// Tells everybody who asked for an arming what came of it.
+    fn settle_armings(&mut self, tell: impl Fn(&ControllerCall)) {
+        self.open.retain(|open| match open {
+            Open::Arming { call } => {
+                tell(call);
+                false
+            }
+            Open::Adoption { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
+        });
     }
 
     fn on_latched(&mut self, fault: FaultCode, cycle: u64) {
@@ -270,13 +356,13 @@ impl Relay {
             match open {
                 Open::Motion { call, .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
                 Open::Stop { call } => answer(&call, &ControllerEvent::Done),
-                Open::Adoption { call, .. } => refuse(&call, fault, ""),
+                Open::Adoption { call, .. } | Open::Arming { call } => refuse(&call, fault, ""),
             }
         }
     }
 
     fn ask_error(&self) -> ErrorCode {
-        ArmSession::connect(self.arm, QUESTION_TIMEOUT)
+        ArmSession::connect(self.arm.command, QUESTION_TIMEOUT)
             .and_then(|mut session| session.error_code())
             .unwrap_or(ErrorCode::NONE)
     }
@@ -293,7 +379,7 @@ impl Relay {
 
     /// Answers bring-ups whose arm is held and reports its joints.
     fn settle_adoptions(&mut self) {
-        let stale_ns = self.report_stale_ns;
+        let stale_ns = self.arm.report_stale_ns;
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
@@ -310,7 +396,10 @@ impl Relay {
                 refuse(call, FaultCode::ReportStale, "");
                 false
             }
-            Open::Adoption { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
+            Open::Adoption { .. }
+            | Open::Arming { .. }
+            | Open::Motion { .. }
+            | Open::Stop { .. } => true,
         });
     }
 }

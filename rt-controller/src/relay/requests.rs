@@ -2,14 +2,18 @@
 
 use super::answers::{ControllerCall, answer, refuse};
 use super::{Open, REPORT_WAIT, Relay, SET_UP_TIMEOUT};
+use crate::commander::CommanderLock;
 use crate::control::{Motion, Order};
+use crate::os::now_ns;
 use crate::point_to_point::{MoveError, plan_move, verify};
 use crate::session::{ArmSession, SessionError};
+use crate::set_up::{SetUp, SetUpError};
 use crate::transport::tcp::TcpLink;
+use crate::transport::wire::backend;
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, JointTrajectory, JointVector};
+use shared_types::{Arming, FaultCode, JointTrajectory, JointVector, MotionTier};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -17,6 +21,8 @@ use std::time::Instant;
 const START_DISTANCE_MAX_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 /// Smaller distances need no move to the start (rad).
 const START_EQUAL_RAD: f64 = 1e-9;
+/// Longest time that an arming for setting up or wiggling lasts (ns): ten minutes.
+const ARMED_FOR_NS: u64 = 600_000_000_000;
 /// Part of the limits used for that move.
 const TO_START_SPEED_PART: f64 = 0.05;
 
@@ -43,6 +49,28 @@ impl Relay {
                 let (q, speed_part) = (*q, *speed_part);
                 self.serve_move(call, q, speed_part);
             }
+            ControllerRequest::Arm { tier, area_clear } => {
+                let (tier, area_clear) = (*tier, *area_clear);
+                self.serve_arming(call, tier, area_clear);
+            }
+            ControllerRequest::Disarm => match self.order(Order::Disarm, None) {
+                Ok(()) => answer(&call, &ControllerEvent::Done),
+                Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+            },
+            ControllerRequest::Announce { sha256 } => {
+                let sha256 = *sha256;
+                self.uploads.serve_announcement(call, sha256);
+            }
+            ControllerRequest::Upload { trajectory, sha256 } => {
+                self.uploads.serve_upload(&call, trajectory, *sha256);
+            }
+            ControllerRequest::ExecuteUploaded { sha256 } => {
+                let sha256 = *sha256;
+                match self.uploads.plan(&sha256).copied() {
+                    Some(trajectory) => self.serve_execute(call, &trajectory, &sha256),
+                    None => self.wrong_mode(&call, "there is no uploaded plan with this hash"),
+                }
+            }
             ControllerRequest::Execute { trajectory, sha256 } => {
                 let (trajectory, sha256) = (trajectory.clone(), *sha256);
                 self.serve_execute(call, &trajectory, &sha256);
@@ -58,6 +86,7 @@ impl Relay {
                 fault: FaultCode::from_raw(self.newest.fault).unwrap_or_default(),
                 arm_error: self.arm_error.0,
                 q_c: self.newest.q_c,
+                tier: self.tier,
                 warnings: self.warnings.clone(),
             },
         );
@@ -66,6 +95,22 @@ impl Relay {
     fn wrong_mode(&self, call: &ControllerCall, why: &str) {
         let message = format!("the controller is {:?}: {why}", self.mode());
         refuse(call, FaultCode::WrongMode, &message);
+    }
+
+    /// Hands an arming to the loop, which answers. Throws expire sooner there.
+    fn serve_arming(&mut self, call: ControllerCall, tier: MotionTier, area_clear: bool) {
+        if self.mode() != ControllerMode::Idle {
+            return self.wrong_mode(&call, "it is armed when it is Idle");
+        }
+        let arming = Arming {
+            tier,
+            expires_ns: now_ns().saturating_add(ARMED_FOR_NS),
+            area_clear,
+        };
+        match self.order(Order::Arm(arming), None) {
+            Ok(()) => self.open.push(Open::Arming { call }),
+            Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+        }
     }
 
     fn serve_stop(&mut self, call: ControllerCall) {
@@ -86,19 +131,8 @@ impl Relay {
     /// Sets the arm up on a connection of its own and hands a fresh command
     /// link to the loop. Nothing moves meanwhile, so waiting is harmless.
     fn set_up(&mut self, call: ControllerCall) {
-        let session = ArmSession::connect(self.arm, SET_UP_TIMEOUT);
-        let done = session.and_then(|mut session| {
-            let hold = session.bring_up(&self.limits)?;
-            let link = TcpLink::connect(self.arm, SET_UP_TIMEOUT).map_err(|reason| {
-                SessionError::Connect {
-                    address: self.arm,
-                    reason,
-                }
-            })?;
-            Ok((hold, link))
-        });
-        match done {
-            Ok((hold, link)) => match self.order(Order::Adopt { hold }, Some(Box::new(link))) {
+        match self.prepare(&call) {
+            Ok((hold, link)) => match self.order(Order::Adopt { hold }, Some(link)) {
                 Ok(()) => self.open.push(Open::Adoption {
                     call,
                     adopted: false,
@@ -106,8 +140,47 @@ impl Relay {
                 }),
                 Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
             },
-            Err(error) => refuse(&call, fault_of(&error), &error.to_string()),
+            Err((fault, detail)) => refuse(&call, fault, &detail),
         }
+    }
+
+    /// Locks the arm for this process, sets it up step by step, connects.
+    fn prepare(
+        &mut self,
+        call: &ControllerCall,
+    ) -> Result<(JointVector, Box<TcpLink>), (FaultCode, String)> {
+        let command = self.arm.command;
+        if self.commander.is_none() {
+            let lock = CommanderLock::take(command)
+                .map_err(|e| (FaultCode::SecondCommander, e.to_string()))?;
+            self.commander = Some(lock);
+        }
+        let plan = SetUp {
+            limits: &self.arm.limits,
+            mode: backend(self.arm.wire).mode(),
+            status: self.arm.status,
+            on_difference: self.arm.on_difference,
+        };
+        let mut heard = |name: &'static str, result: &str| {
+            tracing::info!(step = name, result, "setting up the arm");
+            let step = ControllerEvent::Step {
+                name: name.to_owned(),
+                result: result.to_owned(),
+            };
+            answer(call, &step);
+        };
+        ArmSession::connect(command, SET_UP_TIMEOUT)
+            .map_err(SetUpError::from)
+            .and_then(|mut session| {
+                let ready = plan.run(&mut session, &mut heard)?;
+                let link = TcpLink::connect(command, SET_UP_TIMEOUT, self.arm.link);
+                let link = link.map_err(|reason| SessionError::Connect {
+                    address: command,
+                    reason,
+                })?;
+                Ok((ready.q, Box::new(link)))
+            })
+            .map_err(|error| (fault_of(&error), error.to_string()))
     }
 
     /// Whether a motion may be asked for; refuses the call otherwise.
@@ -130,7 +203,7 @@ impl Relay {
         if !self.may_move(&call) {
             return;
         }
-        match plan_move(&self.newest.q_c, &q, speed_part, &self.limits) {
+        match plan_move(&self.newest.q_c, &q, speed_part, &self.arm.limits) {
             Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
             Err(error) => {
                 let fault = match error {
@@ -172,12 +245,12 @@ impl Relay {
         if trajectory_hash(trajectory) != *sha256 {
             return Err((FaultCode::PlanHashMismatch, String::new()));
         }
-        if let Some(margin) = self.limits.worst_violation(trajectory) {
+        if let Some(margin) = self.arm.limits.worst_violation(trajectory) {
             let detail = format!("the plan breaks a limit: {}", margin.describe());
             return Err((FaultCode::PlanOutOfLimits, detail));
         }
         let motion = Motion::Spline(*trajectory);
-        if let Err(fault) = verify(&motion, &self.limits) {
+        if let Err(fault) = verify(&motion, &self.arm.limits) {
             return Err((FaultCode::PlanOutOfLimits, fault.explain().to_owned()));
         }
         let held = self.newest.q_c;
@@ -196,7 +269,7 @@ impl Relay {
                 &held,
                 &trajectory.start(),
                 TO_START_SPEED_PART,
-                &self.limits,
+                &self.arm.limits,
             )
             .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
             motions.push_back(Box::new(to_start));
@@ -207,14 +280,15 @@ impl Relay {
 }
 
 /// The fault code nearest to what went wrong while the arm was set up.
-fn fault_of(error: &SessionError) -> FaultCode {
+fn fault_of(error: &SetUpError) -> FaultCode {
     match error {
-        SessionError::Connect { .. }
-        | SessionError::Transfer { .. }
-        | SessionError::Broken(_)
-        | SessionError::Reply(_) => FaultCode::LinkLost,
-        SessionError::Error(_) => FaultCode::ArmError,
-        SessionError::NotReady { .. } | SessionError::Restless => FaultCode::ArmNotReady,
-        SessionError::OutsideRange { .. } => FaultCode::SetpointPosition,
+        SetUpError::Session(_) | SetUpError::NoStatus { .. } => FaultCode::LinkLost,
+        SetUpError::Version { .. } => FaultCode::UnsupportedFirmware,
+        SetUpError::Range { .. } | SetUpError::Tool { .. } | SetUpError::ToolSpeed { .. } => {
+            FaultCode::ArmDiffers
+        }
+        SetUpError::ArmError(_) => FaultCode::ArmError,
+        SetUpError::NotReady { .. } | SetUpError::Restless => FaultCode::ArmNotReady,
+        SetUpError::OutsideRange { .. } => FaultCode::SetpointPosition,
     }
 }

@@ -13,9 +13,12 @@
     )
 )]
 
+pub mod heartbeat;
+pub mod in_flight;
 pub mod sim;
 pub mod slot;
 pub mod tcp;
+pub mod wire;
 
 use crate::control::LinkInput;
 use crate::xarm::Command;

@@ -1,21 +1,35 @@
 //! The place of the loop's command link: empty, connected, or just broken.
 
 use super::ArmTransport;
-use crate::control::{ArmCommand, CycleOutput, LinkInput};
+use super::wire::{WireBackend, backend};
+use crate::control::{CycleOutput, LinkInput};
 use crate::xarm::Command;
+use shared_types::WireMode;
 
 /// Holds at most one link. RT-safe; links are made and dropped elsewhere.
-#[derive(Debug)]
 pub struct LinkSlot<T> {
     link: Option<Box<T>>,
     lost: bool,
+    wire: &'static dyn WireBackend,
 }
 
-impl<T> Default for LinkSlot<T> {
-    fn default() -> Self {
+impl<T> core::fmt::Debug for LinkSlot<T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("LinkSlot")
+            .field("connected", &self.link.is_some())
+            .field("lost", &self.lost)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<T> LinkSlot<T> {
+    /// Empty; commands will travel by `wire`.
+    #[must_use]
+    pub fn new(wire: WireMode) -> Self {
         Self {
             link: None,
             lost: false,
+            wire: backend(wire),
         }
     }
 }
@@ -45,24 +59,10 @@ impl<T: ArmTransport> LinkSlot<T> {
         let Some(link) = self.link.as_mut() else {
             return;
         };
-        let setpoint = out.command.map(on_the_wire);
+        let setpoint = out.command.and_then(|c| self.wire.request(&c));
         let request = out.request.map(Command::SetState);
         for command in [setpoint, request].into_iter().flatten() {
             self.lost |= link.send(&command, now_ns).is_err();
         }
-    }
-}
-
-/// The request that carries a command.
-fn on_the_wire(command: ArmCommand) -> Command {
-    match command {
-        ArmCommand::Position(q) => Command::ServoJoint(q),
-        ArmCommand::Velocity { qd, duration_s } => Command::JointVelocity {
-            velocity: qd,
-            // Each joint takes its own velocity at once; waiting for the slowest
-            // would bend the path.
-            synchronised: false,
-            duration_s: Some(duration_s),
-        },
     }
 }

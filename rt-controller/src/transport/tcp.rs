@@ -1,30 +1,57 @@
 //! The command link over TCP: one write per command, replies matched by id
 //! whenever they come, never waited for.
+//!
+//! Commands are never bunched: a setpoint too soon after the last one, or one
+//! on top of too many unanswered ones, is left out, and so is one behind the
+//! rest of a frame that the network took only in part. Each is counted.
 
+use super::heartbeat::{Heartbeat, Silence};
+use super::in_flight::{InFlight, Matched};
 use super::{ArmTransport, ByteWire, LinkGone, Sent};
 use crate::control::LinkInput;
 use crate::os::receive::{receive, stamp_arrivals};
-use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
+use crate::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use crate::xarm::{Command, FrameReader, Protocol, Status};
 use std::io::{ErrorKind, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
-/// Commands that may wait for their reply; at 250 Hz this is 0.25 s, longer
-/// than the smallest TCP retransmission time (0.2 s) that a stall lasts.
-const MAX_UNANSWERED: usize = 64;
 /// Reads of one poll at most; each takes up to a buffer of replies.
 const MAX_READS: usize = 4;
 /// Unacknowledged data for this long mean a broken connection.
 const USER_TIMEOUT: Duration = Duration::from_millis(1000);
+
+/// How a link treats an arm that is slow to answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinkSettings {
+    /// Setpoints that may wait for their reply; no more are sent meanwhile, so
+    /// that a stall cannot end in a burst.
+    pub max_unanswered: u16,
+    /// Shortest time between two setpoints (ns).
+    pub min_gap_ns: u64,
+}
+
+impl LinkSettings {
+    /// For setpoints every `period_ns`: never closer than 0.8 of that.
+    #[must_use]
+    pub const fn new(max_unanswered: u16, period_ns: u64) -> Self {
+        Self {
+            max_unanswered,
+            min_gap_ns: crate::overrun::min_gap_ns(period_ns),
+        }
+    }
+}
 
 /// A connected, non-blocking command link, usually over a socket.
 #[derive(Debug)]
 pub struct TcpLink<W = TcpStream> {
     stream: W,
     reader: FrameReader,
-    transaction: u16,
-    unanswered: heapless::Deque<(u16, u64), MAX_UNANSWERED>,
+    settings: LinkSettings,
+    in_flight: InFlight,
+    heartbeat: Heartbeat,
+    setpoint_ns: Option<u64>,
+    skipped: u16,
     /// Rest of a frame that the socket took only in part.
     rest: heapless::Vec<u8, MAX_FRAME_LEN>,
 }
@@ -44,7 +71,11 @@ impl TcpLink {
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn connect(address: SocketAddr, timeout: Duration) -> std::io::Result<Self> {
+    pub fn connect(
+        address: SocketAddr,
+        timeout: Duration,
+        settings: LinkSettings,
+    ) -> std::io::Result<Self> {
         let stream = TcpStream::connect_timeout(&address, timeout)?;
         let socket = socket2::SockRef::from(&stream);
         socket.set_tcp_nodelay(true)?;
@@ -53,35 +84,48 @@ impl TcpLink {
         stream.set_nonblocking(true)?;
         // Without stamps a round trip is rounded up to the next look, no more.
         let _ = stamp_arrivals(&stream);
-        Ok(Self::over(stream))
+        Ok(Self::over(stream, settings))
     }
 }
 
 impl<W: ByteWire> TcpLink<W> {
     /// A link over a connected wire. Not RT-safe.
     #[must_use]
-    pub fn over(stream: W) -> Self {
+    pub fn over(stream: W, settings: LinkSettings) -> Self {
         Self {
             stream,
             reader: FrameReader::new(),
-            transaction: 1,
-            unanswered: heapless::Deque::new(),
+            settings,
+            in_flight: InFlight::default(),
+            heartbeat: Heartbeat::default(),
+            setpoint_ns: None,
+            skipped: 0,
             rest: heapless::Vec::new(),
         }
     }
 
-    /// Writes what is left of the last frame; true when nothing is.
-    fn flush_rest(&mut self) -> Result<bool, LinkGone> {
-        while !self.rest.is_empty() {
-            match write_once(&mut self.stream, &self.rest)? {
-                0 => return Ok(false),
-                n => {
-                    let left = heapless::Vec::from_slice(self.rest.get(n..).unwrap_or_default());
-                    self.rest = left.unwrap_or_default();
-                }
-            }
+    /// Writes what is left of the last frame; true when nothing was.
+    fn had_no_rest(&mut self) -> Result<bool, LinkGone> {
+        if self.rest.is_empty() {
+            return Ok(true);
         }
-        Ok(true)
+        let written = write_once(&mut self.stream, &self.rest)?;
+        let left = heapless::Vec::from_slice(self.rest.get(written..).unwrap_or_default());
+        self.rest = left.unwrap_or_default();
+        Ok(false)
+    }
+
+    /// Whether a setpoint may go out now.
+    fn has_room(&self, now_ns: u64) -> bool {
+        let spaced = self
+            .setpoint_ns
+            .is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= self.settings.min_gap_ns);
+        spaced && self.in_flight.open() < self.settings.max_unanswered
+    }
+
+    fn skip(&mut self) -> Sent {
+        self.skipped = self.skipped.saturating_add(1);
+        Sent::Skipped
     }
 
     /// Takes whole replies out of the reader; they came at `came_ns`.
@@ -92,24 +136,28 @@ impl<W: ByteWire> TcpLink<W> {
                 Ok(None) => return Ok(()),
                 Err(_broken) => return Err(LinkGone),
             };
+            // Feedback pushes and the like are nobody's reply.
             let Some(reply) = frame.as_reply() else {
                 continue;
             };
-            let known = self
-                .unanswered
-                .iter()
-                .any(|(id, _)| *id == reply.transaction);
-            if !known {
-                continue;
-            }
-            // The arm answers in order: commands before this one got no reply.
-            while let Some((id, sent_ns)) = self.unanswered.pop_front() {
-                if id == reply.transaction {
-                    let trip_ns = came_ns.saturating_sub(sent_ns);
-                    seen.reply_ns = u32::try_from(trip_ns).unwrap_or(u32::MAX);
-                    break;
+            let count = |n: u16| n.saturating_add(1);
+            let sent_ns = match self.in_flight.reply(reply.transaction) {
+                Matched::InOrder { sent_ns } => sent_ns,
+                Matched::OutOfOrder { sent_ns } => {
+                    seen.out_of_order = count(seen.out_of_order);
+                    sent_ns
                 }
-            }
+                Matched::Duplicate => {
+                    seen.duplicates = count(seen.duplicates);
+                    continue;
+                }
+                Matched::Foreign => {
+                    seen.foreign = count(seen.foreign);
+                    continue;
+                }
+            };
+            let trip_ns = came_ns.saturating_sub(sent_ns);
+            seen.reply_ns = u32::try_from(trip_ns).unwrap_or(u32::MAX);
             let before = seen.status.map_or(0, |s| s.0);
             seen.status = Some(Status(before | reply.status.0));
         }
@@ -121,6 +169,7 @@ impl<W: ByteWire> TcpLink<W> {
                 Ok((0, _)) => return Err(LinkGone),
                 Ok((n, arrival_ns)) => {
                     self.reader.commit(n);
+                    self.heartbeat.heard(now_ns);
                     let came_ns = arrival_ns.map_or(now_ns, |arrival_ns| arrival_ns.min(now_ns));
                     self.take_replies(came_ns, seen)?;
                 }
@@ -130,6 +179,15 @@ impl<W: ByteWire> TcpLink<W> {
             }
         }
         Ok(())
+    }
+
+    /// Keeps the heartbeat rule of the protocol.
+    fn keep_alive(&mut self, now_ns: u64) -> Result<(), LinkGone> {
+        match self.heartbeat.due(now_ns) {
+            Silence::Fine => Ok(()),
+            Silence::Ask => self.send(&Command::GetState, now_ns).map(|_sent| ()),
+            Silence::GiveUp => Err(LinkGone),
+        }
     }
 }
 
@@ -145,32 +203,41 @@ fn write_once(stream: &mut impl ByteWire, bytes: &[u8]) -> Result<usize, LinkGon
 
 impl<W: ByteWire> ArmTransport for TcpLink<W> {
     fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone> {
-        if !self.flush_rest()? || self.unanswered.is_full() {
-            return Ok(Sent::Skipped);
+        let is_setpoint = command.is_setpoint();
+        if !self.had_no_rest()? || (is_setpoint && !self.has_room(now_ns)) {
+            return Ok(self.skip());
         }
         let mut frame = [0; MAX_FRAME_LEN];
-        let Ok(len) = emit_command(&mut frame, self.transaction, Protocol::Private, command) else {
-            return Ok(Sent::Skipped);
+        let (id, protocol) = (self.in_flight.next_id(), Protocol::PrivateHeartbeat);
+        let Ok(len) = emit_command(&mut frame, id, protocol, command) else {
+            return Ok(self.skip());
         };
         let frame = frame.get(..len).unwrap_or_default();
         let written = write_once(&mut self.stream, frame)?;
         if written == 0 {
-            return Ok(Sent::Skipped);
+            return Ok(self.skip());
         }
         self.rest =
             heapless::Vec::from_slice(frame.get(written..).unwrap_or_default()).unwrap_or_default();
-        let _ = self.unanswered.push_back((self.transaction, now_ns));
-        self.transaction = next_transaction(self.transaction);
+        self.in_flight.sent(now_ns);
+        if is_setpoint {
+            self.setpoint_ns = Some(now_ns);
+        }
         Ok(Sent::Whole)
     }
 
     fn poll(&mut self, now_ns: u64) -> LinkInput {
-        let mut seen = LinkInput::default();
-        seen.lost = self.receive(now_ns, &mut seen).is_err();
+        let mut seen = LinkInput {
+            skipped: core::mem::take(&mut self.skipped),
+            ..LinkInput::default()
+        };
+        let received = self.receive(now_ns, &mut seen);
+        seen.lost = received.and_then(|()| self.keep_alive(now_ns)).is_err();
+        seen.unanswered = self.in_flight.open();
         seen.unanswered_ns = self
-            .unanswered
-            .front()
-            .map_or(0, |(_, sent_ns)| now_ns.saturating_sub(*sent_ns));
+            .in_flight
+            .oldest_ns()
+            .map_or(0, |sent_ns| now_ns.saturating_sub(sent_ns));
         seen
     }
 }
@@ -178,7 +245,8 @@ impl<W: ByteWire> ArmTransport for TcpLink<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::xarm::{ReplyData, StateRequest};
+    use crate::os::now_ns;
+    use crate::xarm::{Reply, ReplyData, StateRequest};
     use shared_types::JointVector;
     use std::io::Read;
     use std::net::TcpListener;
@@ -186,7 +254,8 @@ mod tests {
     fn pair() -> (TcpLink, TcpStream) {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
-        let link = TcpLink::connect(address, Duration::from_secs(1)).unwrap();
+        let settings = LinkSettings::new(64, 5);
+        let link = TcpLink::connect(address, Duration::from_secs(1), settings).unwrap();
         let (peer, _) = listener.accept().unwrap();
         peer.set_nodelay(true).unwrap();
         (link, peer)
@@ -230,27 +299,89 @@ mod tests {
         assert_eq!(link.poll(5000).unanswered_ns, 5000);
         let mut answers = replies(&mut peer, 3, Status(0));
         answers[1][7] = Status::WARNING;
-        // The second one overtakes the first, which then counts as unanswered for good.
+        // The second one overtakes the first, which holds nothing up any more.
         peer.write_all(&answers[1]).unwrap();
         let seen = poll_until(&mut link, 7000, |s| s.status.is_some());
         assert_eq!((seen.reply_ns, seen.unanswered_ns), (6000, 5000));
+        assert_eq!((seen.out_of_order, seen.unanswered), (1, 1));
         assert!(seen.status.unwrap().has_warning());
-        peer.write_all(&answers[0]).unwrap();
-        peer.write_all(&answers[2]).unwrap();
-        let seen = poll_until(&mut link, 9000, |s| s.status.is_some());
-        assert_eq!((seen.reply_ns, seen.unanswered_ns), (7000, 0));
+        for k in [0, 2, 2] {
+            peer.write_all(&answers[k]).unwrap();
+        }
+        let mut counts = (0, 0);
+        while counts.1 == 0 {
+            let seen = poll_until(&mut link, 9000, |s| {
+                s.status.is_some() || s.duplicates + s.out_of_order > 0
+            });
+            counts = (counts.0 + seen.out_of_order, counts.1 + seen.duplicates);
+        }
+        assert_eq!(counts, (1, 1));
+        assert_eq!(link.poll(9000).unanswered_ns, 0);
     }
 
     #[test]
-    fn a_silent_arm_gets_no_endless_queue_and_a_closed_one_is_noticed() {
-        let (mut link, peer) = pair();
-        let stop = Command::SetState(StateRequest::Stop);
-        for _ in 0..MAX_UNANSWERED {
-            assert_eq!(link.send(&stop, 0), Ok(Sent::Whole));
+    fn a_reply_that_was_never_asked_for_is_counted() {
+        let (mut link, mut peer) = pair();
+        let mut out = [0; MAX_FRAME_LEN];
+        let n = Reply {
+            transaction: 77,
+            protocol: Protocol::Private,
+            register: 29,
+            status: Status(0),
+            data: &[],
         }
-        assert_eq!(link.send(&stop, 0), Ok(Sent::Skipped));
+        .emit(&mut out)
+        .unwrap();
+        peer.write_all(&out[..n]).unwrap();
+        assert_eq!(poll_until(&mut link, 1, |s| s.foreign > 0).foreign, 1);
+    }
+
+    #[test]
+    fn setpoints_neither_bunch_nor_pile_up_but_a_stop_always_goes_out() {
+        let (mut link, peer) = pair();
+        let q = Command::ServoJoint(JointVector::ZERO);
+        link.settings = LinkSettings::new(3, 4_000_000);
+        assert_eq!(link.settings.min_gap_ns, 3_200_000);
+        let at = |us: u64| 1_000_000_000 + us * 1000;
+        assert_eq!(link.send(&q, at(0)), Ok(Sent::Whole));
+        assert_eq!(link.send(&q, at(3_100)), Ok(Sent::Skipped));
+        assert_eq!(link.send(&q, at(3_200)), Ok(Sent::Whole));
+        assert_eq!(link.send(&q, at(8_000)), Ok(Sent::Whole));
+        assert_eq!(link.send(&q, at(12_000)), Ok(Sent::Skipped));
+        let stop = Command::SetState(StateRequest::Stop);
+        assert_eq!(link.send(&stop, at(12_000)), Ok(Sent::Whole));
+        let seen = link.poll(at(16_000));
+        assert_eq!((seen.skipped, seen.unanswered), (2, 4));
+        assert_eq!(seen.unanswered_ns, 16_000_000);
         drop(peer);
         assert!(poll_until(&mut link, 1, |s| s.lost).lost);
+    }
+
+    #[test]
+    fn a_frame_taken_in_part_is_finished_before_the_next_begins() {
+        let (mut link, mut peer) = pair();
+        let q = Command::ServoJoint(JointVector::splat(0.2));
+        let mut frame = [0; MAX_FRAME_LEN];
+        let n = emit_command(&mut frame, 1, Protocol::PrivateHeartbeat, &q).unwrap();
+        // As if the network had taken the first ten bytes only.
+        link.stream.write_all(&frame[..10]).unwrap();
+        link.rest = heapless::Vec::from_slice(&frame[10..n]).unwrap();
+        link.in_flight.sent(0);
+        assert_eq!(link.send(&q, 1000), Ok(Sent::Skipped));
+        assert_eq!(link.send(&q, 2000), Ok(Sent::Whole));
+        let answers = replies(&mut peer, 2, Status(0));
+        assert_eq!(answers.len(), 2);
+    }
+
+    #[test]
+    fn a_silent_arm_is_asked_for_a_sign_and_then_given_up() {
+        let (mut link, mut peer) = pair();
+        let begin = now_ns();
+        assert!(!link.poll(begin).lost, "the silence begins here");
+        assert!(!link.poll(begin + 31_000_000_000).lost);
+        let asked = replies(&mut peer, 1, Status(0));
+        assert_eq!(asked[0][6], 13, "get state");
+        assert!(link.poll(begin + 91_000_000_000).lost);
     }
 
     #[test]

@@ -192,6 +192,12 @@ impl Command {
         }
     }
 
+    /// Whether it is one of a stream of setpoints, whose spacing matters.
+    #[must_use]
+    pub const fn is_setpoint(&self) -> bool {
+        matches!(self, Self::ServoJoint(_) | Self::JointVelocity { .. })
+    }
+
     /// Writes the parameters. RT-safe.
     pub(super) fn emit_parameters(&self, out: &mut ByteWriter<'_>) -> Result<(), EmitError> {
         match self {

@@ -9,6 +9,7 @@
 //! - [`command`]: typed requests; [`reply`]: typed answers to them
 //! - [`report`]: the frames the controller pushes on ports 30000 to 30003
 //! - [`stream`]: reassembles frames from a TCP stream
+//! - [`version`]: what an arm's version text says about its reports and ranges
 //! - [`register`], [`status`], [`error_code`]: the words used by all of them
 //!
 //! Values are SI on this side (m, rad, s, kg); the wire's millimetres exist
@@ -37,6 +38,7 @@ pub mod reply;
 pub mod report;
 pub mod status;
 pub mod stream;
+pub mod version;
 
 pub use bytes::EmitError;
 pub use command::{Command, CommandError, JointQuery, StateRequest};
@@ -47,6 +49,7 @@ pub use register::Register;
 pub use reply::{ReplyData, ReplyError};
 pub use status::{ArmState, Mode, Status};
 pub use stream::{BrokenStream, FrameReader, ReportReader};
+pub use version::{ArmVersion, Firmware, VersionError};
 
 /// TCP port of the command server.
 pub const COMMAND_PORT: u16 = 502;

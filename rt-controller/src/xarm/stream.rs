@@ -3,10 +3,11 @@
 //!
 //! The protocol has no start mark, so a stream that shows an impossible header
 //! has lost its place for good: the reader reports [`BrokenStream`] and stays
-//! broken until [`FrameReader::reset`]; the owner drops the connection.
+//! broken until [`StreamReader::reset`]; the owner drops the connection.
 
 use super::bytes::ByteReader;
 use super::frame::{Frame, HEADER_LEN, MAX_BODY_LEN, Protocol};
+use core::marker::PhantomData;
 
 /// Bytes a reader holds; several frames of any kind.
 pub const STREAM_CAPACITY: usize = 2048;
@@ -86,27 +87,40 @@ impl StreamBuffer {
     }
 }
 
-/// Reads command frames, requests and replies alike, from a stream. RT-safe.
-///
-/// Receive into [`space`](Self::space), [`commit`](Self::commit) the count,
-/// then call [`next_frame`](Self::next_frame) until it returns `None`.
-#[derive(Debug, Clone)]
-pub struct FrameReader {
-    buffer: StreamBuffer,
+/// Where a kind of stream cuts its frames.
+pub trait Framing {
+    /// Length of the first frame of `pending` with its header (bytes), `None`
+    /// while too little is there to tell.
+    ///
+    /// # Errors
+    /// [`BrokenStream`] for a header that no peer sends.
+    fn frame_len(pending: &[u8]) -> Result<Option<usize>, BrokenStream>;
 }
 
-impl Default for FrameReader {
+/// Cuts a stream into frames. RT-safe.
+///
+/// Receive into [`space`](Self::space), [`commit`](Self::commit) the count,
+/// then call [`FrameReader::next_frame`] or [`ReportReader::next_report`] until
+/// it returns `None`.
+#[derive(Debug, Clone)]
+pub struct StreamReader<K> {
+    buffer: StreamBuffer,
+    kind: PhantomData<K>,
+}
+
+impl<K> Default for StreamReader<K> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl FrameReader {
+impl<K> StreamReader<K> {
     /// Empty.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             buffer: StreamBuffer::new(),
+            kind: PhantomData,
         }
     }
 
@@ -131,25 +145,84 @@ impl FrameReader {
         self.buffer.start = 0;
         self.buffer.end = 0;
     }
+}
 
+impl<K: Framing> StreamReader<K> {
+    /// The next whole frame with its header. A bad header stays in front, so
+    /// that the stream stays broken.
+    fn next_bytes(&mut self) -> Result<Option<&[u8]>, BrokenStream> {
+        match K::frame_len(self.buffer.pending())? {
+            Some(len) => Ok(self.buffer.take(len)),
+            None => Ok(None),
+        }
+    }
+}
+
+/// Frames of the command port, requests and replies alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CommandFraming;
+
+/// Reads command frames, requests and replies alike, from a stream. RT-safe.
+pub type FrameReader = StreamReader<CommandFraming>;
+
+impl Framing for CommandFraming {
+    fn frame_len(pending: &[u8]) -> Result<Option<usize>, BrokenStream> {
+        let Some(header) = Header::parse(pending) else {
+            return Ok(None);
+        };
+        let (_, body_len) = header.check()?;
+        Ok(Some(HEADER_LEN.saturating_add(body_len)))
+    }
+}
+
+impl FrameReader {
     /// The next whole frame, `None` if more bytes are needed.
     ///
     /// # Errors
     /// [`BrokenStream`] on an impossible header, and from then on until `reset`.
     pub fn next_frame(&mut self) -> Result<Option<Frame<'_>>, BrokenStream> {
-        let Some(header) = Header::parse(self.buffer.pending()) else {
+        let Some(frame) = self.next_bytes()? else {
             return Ok(None);
         };
-        // A bad header stays in front, so that the stream stays broken.
-        let (protocol, body_len) = header.check()?;
-        let Some(frame) = self.buffer.take(HEADER_LEN.saturating_add(body_len)) else {
+        let Some(header) = Header::parse(frame) else {
             return Ok(None);
         };
+        let (protocol, _) = header.check()?;
         Ok(Some(Frame {
             transaction: header.transaction,
             protocol,
             body: frame.get(HEADER_LEN..).unwrap_or_default(),
         }))
+    }
+}
+
+/// Reports, which begin with their own size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReportFraming;
+
+/// Reads report frames from a stream. RT-safe.
+pub type ReportReader = StreamReader<ReportFraming>;
+
+impl Framing for ReportFraming {
+    fn frame_len(pending: &[u8]) -> Result<Option<usize>, BrokenStream> {
+        let Some(size) = ByteReader::new(pending).u32_be() else {
+            return Ok(None);
+        };
+        match usize::try_from(size) {
+            Ok(len @ 87..=1024) => Ok(Some(len)),
+            _ => Err(BrokenStream::ReportSize(size)),
+        }
+    }
+}
+
+impl ReportReader {
+    /// The next whole report with its size field, `None` if more bytes are
+    /// needed.
+    ///
+    /// # Errors
+    /// [`BrokenStream::ReportSize`], and from then on until `reset`.
+    pub fn next_report(&mut self) -> Result<Option<&[u8]>, BrokenStream> {
+        self.next_bytes()
     }
 }
 
@@ -177,65 +250,6 @@ impl Header {
             Ok((protocol, length))
         } else {
             Err(BrokenStream::Length(self.length))
-        }
-    }
-}
-
-/// Reads report frames, which begin with their own size, from a stream. RT-safe.
-#[derive(Debug, Clone)]
-pub struct ReportReader {
-    buffer: StreamBuffer,
-}
-
-impl Default for ReportReader {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl ReportReader {
-    /// Empty.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            buffer: StreamBuffer::new(),
-        }
-    }
-
-    /// Room for received bytes; see [`FrameReader::space`].
-    pub fn space(&mut self) -> &mut [u8] {
-        self.buffer.space()
-    }
-
-    /// Says how many bytes were received into [`space`](Self::space).
-    pub fn commit(&mut self, received: usize) {
-        self.buffer.commit(received);
-    }
-
-    /// Copies `bytes` in and returns how many fitted.
-    pub fn feed(&mut self, bytes: &[u8]) -> usize {
-        self.buffer.feed(bytes)
-    }
-
-    /// Forgets everything, for a new connection.
-    pub fn reset(&mut self) {
-        self.buffer.start = 0;
-        self.buffer.end = 0;
-    }
-
-    /// The next whole report with its size field, `None` if more bytes are
-    /// needed.
-    ///
-    /// # Errors
-    /// [`BrokenStream::ReportSize`], and from then on until `reset`.
-    pub fn next_report(&mut self) -> Result<Option<&[u8]>, BrokenStream> {
-        let Some(size) = ByteReader::new(self.buffer.pending()).u32_be() else {
-            return Ok(None);
-        };
-        match usize::try_from(size) {
-            Ok(len @ 87..=1024) => Ok(self.buffer.take(len)),
-            // It stays in front, so that the stream stays broken.
-            _ => Err(BrokenStream::ReportSize(size)),
         }
     }
 }

@@ -2,7 +2,8 @@
 //! without allocation or system calls on either side once opened.
 
 use super::bus::{Transport, open_error};
-use super::payload::{ControllerState, OperatorBeat, PAYLOAD_VERSION};
+use super::payload::{ControllerState, GuardianBeat, OperatorBeat, PAYLOAD_VERSION};
+use super::slots::{Place, Slots, create_slots};
 use super::{Bus, IpcError};
 use iceoryx2::port::reader::{EntryHandle, Reader};
 use iceoryx2::port::writer::{EntryHandleMut, Writer};
@@ -11,20 +12,23 @@ use iceoryx2::service::port_factory::blackboard::PortFactory;
 
 const STATE: &str = "wag/v1/controller/state";
 const OPERATOR: &str = "wag/v1/controller/operator";
+const GUARDIAN: &str = "wag/v1/controller/guardian";
 
-/// The single key of each blackboard.
+/// Key of an entry of a blackboard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ZeroCopySend)]
 #[repr(C)]
-struct Key(u32);
+pub(super) struct Key(pub(super) u32);
 
 const KEY: Key = Key(0);
 
-/// The controller's end: writes its state, reads the operator's heartbeat.
-/// Open it in the real-time thread before the loop; then both calls are RT-safe.
+/// The controller's end: writes its state, reads the heartbeats of operator and
+/// guardian. Open it in the real-time thread before the loop; then all calls
+/// are RT-safe.
 pub struct ControllerBoards {
     state: EntryHandleMut<Transport, Key, ControllerState>,
-    operator: EntryHandle<Transport, Key, OperatorBeat>,
-    _keep: (Writer<Transport, Key>, Reader<Transport, Key>),
+    operator: Slots<OperatorBeat>,
+    guardian: Slots<GuardianBeat>,
+    _keep: Writer<Transport, Key>,
 }
 
 impl core::fmt::Debug for ControllerBoards {
@@ -34,7 +38,7 @@ impl core::fmt::Debug for ControllerBoards {
 }
 
 impl ControllerBoards {
-    /// Creates both blackboards of the domain. There is one controller.
+    /// Creates the blackboards of the domain. There is one controller.
     ///
     /// # Errors
     /// [`IpcError::Open`], for instance when another controller runs.
@@ -53,23 +57,12 @@ impl ControllerBoards {
             )
             .create()
             .map_err(open_error(STATE))?;
-        let operator = bus
-            .service(OPERATOR)?
-            .blackboard_creator::<Key>()
-            .max_readers(8)
-            .max_nodes(8)
-            .add::<OperatorBeat>(KEY, OperatorBeat::default())
-            .create()
-            .map_err(open_error(OPERATOR))?;
         let writer = state.writer_builder().create().map_err(open_error(STATE))?;
-        let reader = operator
-            .reader_builder()
-            .create()
-            .map_err(open_error(OPERATOR))?;
         Ok(Self {
             state: writer.entry(&KEY).map_err(open_error(STATE))?,
-            operator: reader.entry(&KEY).map_err(open_error(OPERATOR))?,
-            _keep: (writer, reader),
+            operator: create_slots(bus, OPERATOR)?,
+            guardian: create_slots(bus, GUARDIAN)?,
+            _keep: writer,
         })
     }
 
@@ -81,11 +74,20 @@ impl ControllerBoards {
     /// Reads the newest heartbeat. RT-safe.
     #[must_use]
     pub fn operator(&self) -> OperatorBeat {
-        *self.operator.get()
+        self.operator.newest()
+    }
+
+    /// Reads the guardian's newest beat. RT-safe.
+    #[must_use]
+    pub fn guardian(&self) -> GuardianBeat {
+        self.guardian.newest()
     }
 }
 
-fn opened(bus: &Bus, name: &'static str) -> Result<PortFactory<Transport, Key>, IpcError> {
+pub(super) fn opened(
+    bus: &Bus,
+    name: &'static str,
+) -> Result<PortFactory<Transport, Key>, IpcError> {
     bus.service(name)?
         .blackboard_opener::<Key>()
         .open()
@@ -128,54 +130,32 @@ impl StateReader {
 }
 
 /// The operator's end: proves that somebody watches, and can stop the arm.
+#[derive(Debug)]
 pub struct OperatorEnd {
-    beat: EntryHandleMut<Transport, Key, OperatorBeat>,
+    place: Place<OperatorBeat>,
     last: OperatorBeat,
-    _keep: Writer<Transport, Key>,
-}
-
-impl core::fmt::Debug for OperatorEnd {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("OperatorEnd")
-            .field("last", &self.last)
-            .finish_non_exhaustive()
-    }
 }
 
 impl OperatorEnd {
     /// Takes the operator's place in a running controller's domain. There is
-    /// one operator at a time.
+    /// one operator at a time; one that was killed leaves its place free.
     ///
     /// # Errors
     /// [`IpcError::Open`] when there is no controller or the place is taken.
     pub fn take(bus: &Bus) -> Result<Self, IpcError> {
-        let service = opened(bus, OPERATOR)?;
-        let before = service
-            .reader_builder()
-            .create()
-            .map_err(open_error(OPERATOR))?
-            .entry::<OperatorBeat>(&KEY)
-            .map_err(open_error(OPERATOR))?;
+        let (place, before): (_, OperatorBeat) = Place::take(bus, OPERATOR)?;
         let last = OperatorBeat {
             version: PAYLOAD_VERSION,
             stop: 0,
-            ..*before.get()
+            ..before
         };
-        let writer = service
-            .writer_builder()
-            .create()
-            .map_err(open_error(OPERATOR))?;
-        Ok(Self {
-            beat: writer.entry(&KEY).map_err(open_error(OPERATOR))?,
-            last,
-            _keep: writer,
-        })
+        Ok(Self { place, last })
     }
 
     /// One sign of life; call it at least ten times a second while the arm moves.
     pub fn beat(&mut self) {
         self.last.count = self.last.count.wrapping_add(1);
-        self.beat.update_with_copy(self.last);
+        self.place.write(self.last);
     }
 
     /// Asks for a stop, at once and for good.
@@ -188,6 +168,39 @@ impl OperatorEnd {
     pub fn release_stop(&mut self) {
         self.last.stop = 0;
         self.beat();
+    }
+}
+
+/// The guardian's end: proves that somebody would stop the arm if the
+/// controller could not.
+#[derive(Debug)]
+pub struct GuardianEnd {
+    place: Place<GuardianBeat>,
+    count: u64,
+}
+
+impl GuardianEnd {
+    /// Takes the guardian's place in a running controller's domain. There is
+    /// one guardian at a time.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`] when there is no controller or the place is taken.
+    pub fn take(bus: &Bus) -> Result<Self, IpcError> {
+        let (place, before): (_, GuardianBeat) = Place::take(bus, GUARDIAN)?;
+        Ok(Self {
+            place,
+            count: before.count,
+        })
+    }
+
+    /// One sign of life; version and count of `beat` are set here. RT-safe.
+    pub fn beat(&mut self, beat: GuardianBeat) {
+        self.count = self.count.wrapping_add(1);
+        self.place.write(GuardianBeat {
+            version: PAYLOAD_VERSION,
+            count: self.count,
+            ..beat
+        });
     }
 }
 
@@ -222,6 +235,15 @@ mod tests {
             (controller.operator().count, controller.operator().stop),
             (2, 1)
         );
+        let mut guardian = GuardianEnd::take(&bus).unwrap();
+        guardian.beat(GuardianBeat {
+            stamp_ns: 77,
+            ..GuardianBeat::default()
+        });
+        assert_eq!(
+            (controller.guardian().count, controller.guardian().stamp_ns),
+            (1, 77)
+        );
         drop(operator);
         let mut next = OperatorEnd::take(&bus).unwrap();
         next.beat();
@@ -229,5 +251,50 @@ mod tests {
             (controller.operator().count, controller.operator().stop),
             (3, 0)
         );
+    }
+
+    /// Set for the child that is to be killed while it holds the operator's place.
+    const DOMAIN: &str = "WAG_TEST_OPERATOR_OF";
+
+    /// Not a test by itself: the child of the next one.
+    #[test]
+    fn an_operator_that_waits_to_be_killed() {
+        let Ok(domain) = std::env::var(DOMAIN) else {
+            return;
+        };
+        let bus = Bus::join(&domain).unwrap();
+        let mut operator = OperatorEnd::take(&bus).unwrap();
+        loop {
+            operator.beat();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn killed_operators_leave_their_place_to_the_next() {
+        let domain = format!("test_killed_{}", std::process::id());
+        let bus = Bus::join(&domain).unwrap();
+        let controller = ControllerBoards::create(&bus).unwrap();
+        let mut beats = 0;
+        for _ in 0..3 {
+            let mut child = std::process::Command::new(std::env::current_exe().unwrap())
+                .args([
+                    "--exact",
+                    "ipc::boards::tests::an_operator_that_waits_to_be_killed",
+                ])
+                .env(DOMAIN, &domain)
+                .stdout(std::process::Stdio::null())
+                .spawn()
+                .unwrap();
+            while controller.operator().count < beats + 3 {
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+            child.kill().unwrap();
+            child.wait().unwrap();
+            beats = controller.operator().count;
+        }
+        let mut operator = OperatorEnd::take(&bus).unwrap();
+        operator.beat();
+        assert_eq!(controller.operator().count, beats + 1);
     }
 }

@@ -54,6 +54,28 @@ pub(super) fn open_error<E: core::fmt::Debug>(service: &'static str) -> impl Fn(
     }
 }
 
+/// The library's configuration for a domain: a prefix of its own for every file.
+pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if domain.is_empty() || domain.len() > 40 || !domain.chars().all(plain) {
+        return Err(IpcError::Domain {
+            domain: domain.to_owned(),
+        });
+    }
+    let mut config = Config::default();
+    config.global.prefix =
+        FileName::new(prefix_of(domain).as_bytes()).map_err(|e| IpcError::Join {
+            domain: domain.to_owned(),
+            reason: format!("{e:?}"),
+        })?;
+    Ok(config)
+}
+
+/// What the name of every file of a domain begins with.
+pub(super) fn prefix_of(domain: &str) -> String {
+    format!("wag_{domain}_")
+}
+
 impl Bus {
     /// Joins `domain`. Files left by killed processes of the same user are
     /// removed on the way.
@@ -61,19 +83,11 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Domain`] for a bad name, [`IpcError::Join`] otherwise.
     pub fn join(domain: &str) -> Result<Self, IpcError> {
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if domain.is_empty() || domain.len() > 40 || !domain.chars().all(plain) {
-            return Err(IpcError::Domain {
-                domain: domain.to_owned(),
-            });
-        }
+        let config = config_of(domain)?;
         let fail = |reason: String| IpcError::Join {
             domain: domain.to_owned(),
             reason,
         };
-        let mut config = Config::default();
-        config.global.prefix = FileName::new(format!("wag_{domain}_").as_bytes())
-            .map_err(|e| fail(format!("{e:?}")))?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)

@@ -8,6 +8,7 @@ use crate::joint::JointVector;
 use crate::limits::Limits;
 use crate::plan::Plan;
 use crate::rope::{RopeEstimate, RopeParams};
+use crate::tier::MotionTier;
 use crate::trajectory::JointTrajectory;
 use serde::{Deserialize, Serialize};
 
@@ -281,6 +282,34 @@ pub enum ControllerRequest {
         /// [`crate::plan::trajectory_hash`] of it.
         sha256: [u8; 32],
     },
+    /// Allow motions of a tier: a throw once, begun within ten seconds, and only
+    /// with a clear area; the others for ten minutes. Any stop disarms.
+    Arm {
+        /// What for.
+        tier: MotionTier,
+        /// The operator declared that nobody is within reach of arm and rope.
+        area_clear: bool,
+    },
+    /// Allow no motion any more; one that runs is braked.
+    Disarm,
+    /// A plan with this hash will be uploaded by somebody; `Done` when it is
+    /// there, refused when it does not come in time.
+    Announce {
+        /// [`crate::plan::trajectory_hash`] of it.
+        sha256: [u8; 32],
+    },
+    /// Keep this trajectory until it is executed.
+    Upload {
+        /// The trajectory.
+        trajectory: Box<JointTrajectory>,
+        /// [`crate::plan::trajectory_hash`] of it.
+        sha256: [u8; 32],
+    },
+    /// Check the uploaded trajectory and stream it, like `Execute`.
+    ExecuteUploaded {
+        /// [`crate::plan::trajectory_hash`] of it.
+        sha256: [u8; 32],
+    },
     /// Brake and latch.
     Stop,
     /// Accept a fault, so that the arm may move again.
@@ -334,8 +363,17 @@ pub enum ControllerEvent {
         arm_error: u8,
         /// Commanded joints (rad).
         q_c: JointVector,
+        /// What the controller is armed for.
+        tier: Option<MotionTier>,
         /// Real-time set-up steps that failed, in words; empty when all is well.
         warnings: Vec<String>,
+    },
+    /// A step of a bring-up is done.
+    Step {
+        /// Which step.
+        name: String,
+        /// What came of it.
+        result: String,
     },
     /// The motion began.
     Started {
@@ -382,7 +420,10 @@ impl Rpc for ControllerRpc {
     type Request = ControllerRequest;
     type Event = ControllerEvent;
     fn is_last(event: &ControllerEvent) -> bool {
-        !matches!(event, ControllerEvent::Started { .. })
+        !matches!(
+            event,
+            ControllerEvent::Started { .. } | ControllerEvent::Step { .. }
+        )
     }
 }
 

@@ -12,7 +12,7 @@
 //! | [`Bus::keypoint_publisher`] | tracker -> planner, recorder | pub-sub |
 //! | [`Bus::cycle_publisher`] | controller's relay -> recorder | pub-sub |
 //! | [`Bus::joint_publisher`] | controller's relay -> recorder | pub-sub |
-//! | [`ControllerBoards`] | controller state out, operator's heartbeat in | blackboard |
+//! | [`ControllerBoards`] | controller state out, heartbeats of operator and guardian in | blackboard |
 //! | [`rpc`] | `wag` <-> camera, planner, controller, rig | request-response, streamed answers |
 //!
 //! All processes of one installation run as one user and name the same domain;
@@ -25,8 +25,10 @@ mod input;
 pub mod message;
 mod payload;
 pub mod rpc;
+mod slots;
+mod sweep;
 
-pub use boards::{ControllerBoards, OperatorEnd, StateReader};
+pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, StateReader};
 pub use bus::{
     Bus, CyclePublisher, CycleSubscriber, FramePublisher, FrameSubscriber, JointPublisher,
     JointSubscriber, KeypointPublisher, KeypointSubscriber,
@@ -39,6 +41,7 @@ pub use payload::{
     ControllerMode, ControllerState, CycleRecord, FrameHeader, GuardianBeat, JointReport,
     OperatorBeat, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
+pub use sweep::DomainSweep;
 
 /// Why shared memory could not be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -98,7 +98,9 @@ pub struct ControllerState {
     /// Raw [`crate::WireMode`].
     pub wire: u8,
     /// Zero.
-    pub reserved: [u8; 6],
+    pub reserved: [u8; 2],
+    /// The controller's process.
+    pub pid: u32,
 }
 
 /// The operator's sign of life, on a blackboard. RT-safe to copy.

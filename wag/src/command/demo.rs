@@ -6,7 +6,7 @@ use super::plan::{describe, planner_config, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder};
+use crate::pipeline::{self, ArmAddress, ArmLink, CalmInput, Film, RunFolder};
 use crate::progress::Stage;
 use crate::session::{Session, watch_interrupts};
 use anyhow::{Context, anyhow, bail};
@@ -23,7 +23,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
-use shared_types::{JointTrajectory, Limits, Plan, RopeEstimate, StereoCamera};
+use shared_types::{JointTrajectory, Limits, MotionTier, Plan, RopeEstimate, StereoCamera};
 use std::time::{Duration, Instant};
 
 /// Speed of moves between poses, as a part of the fastest move.
@@ -137,10 +137,10 @@ impl<'a> Demo<'a> {
         let calibration = rig_config.stereo_camera();
         pipeline::write_calibration(folder, &calibration)?;
         let rig = pipeline::start_rig(session, folder, rig_config)?;
-        let ports = arm_ports(session, &rig)?;
+        let address = arm_ports(session, &rig)?;
         let camera = pipeline::start_camera(session, folder)?;
         let planner = pipeline::start_planner(session, folder, &settings)?;
-        let arm = pipeline::start_controller(session, folder, &limits, ports)?;
+        let arm = pipeline::start_controller(session, folder, &limits, address)?;
         record.stages.start_s = stage.done("rig, controller, camera and planner are up");
         Ok(Self {
             folder,
@@ -161,11 +161,13 @@ impl<'a> Demo<'a> {
     fn bring_up(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<()> {
         let stage = Stage::begin("bring-up", self.quiet);
         self.record.warnings = pipeline::acquire(self.session, &self.arm)?;
+        // The arm is simulated: nobody needs to be asked.
+        pipeline::arm_for(self.session, &self.arm, MotionTier::SetUp)?;
         pipeline::move_to(self.session, &self.arm, wiggle.start(), MOVE_SPEED)?;
         stage.say("waiting for the rope to hang still");
         let still = pipeline::wait_still(self.session, &self.camera, STILL_S)?;
         self.record.stages.bringup_s = stage.done(if still {
-            "arm enabled, rope hangs still"
+            "arm enabled and armed (simulated: nobody asked), rope hangs still"
         } else {
             "arm enabled, rope still sways a little"
         });
@@ -175,6 +177,7 @@ impl<'a> Demo<'a> {
     /// Streams the wiggle and films it.
     fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
         let stage = Stage::begin("wiggle", self.quiet);
+        pipeline::arm_for(self.session, &self.arm, MotionTier::Wiggle)?;
         let film = pipeline::film_during(
             self.session,
             &self.camera,
@@ -281,6 +284,7 @@ impl<'a> Demo<'a> {
     /// Throws once, open loop, filmed.
     fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
         let stage = Stage::begin("throw", self.quiet);
+        pipeline::arm_for(self.session, &self.arm, MotionTier::Throw)?;
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
         let film = pipeline::film_during(
@@ -340,9 +344,9 @@ impl<'a> Demo<'a> {
     }
 }
 
-fn arm_ports(session: &mut Session, rig: &RpcClient<RigRpc>) -> anyhow::Result<(u16, u16)> {
+fn arm_ports(session: &mut Session, rig: &RpcClient<RigRpc>) -> anyhow::Result<ArmAddress> {
     match session.ask(rig, &RigRequest::Ports, Duration::from_secs(5), |_| ())? {
-        RigEvent::Ports { command, reports } => Ok((command, reports[0])),
+        RigEvent::Ports { command, reports } => Ok(ArmAddress::of_rig(command, reports)),
         RigEvent::Failed { message } => Err(anyhow!(message)),
         other => bail!("the rig answered with {other:?}"),
     }

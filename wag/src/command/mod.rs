@@ -1,5 +1,6 @@
 //! One file per command.
 
+mod area;
 mod bench;
 mod check;
 mod demo;

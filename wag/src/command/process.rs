@@ -8,6 +8,7 @@ use crate::failure::{OrInput, Outcome};
 use crate::files;
 use crate::session::{interrupted, watch_interrupts};
 use anyhow::Context;
+use shared_types::ipc::DomainSweep;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -15,10 +16,12 @@ use std::time::Duration;
 const PARENT_EVERY: Duration = Duration::from_millis(100);
 /// How long an orderly end may take before the process simply exits.
 const END_WITHIN: Duration = Duration::from_millis(1200);
+/// The same where an arm may have to be braked first.
+const BRAKE_WITHIN: Duration = Duration::from_millis(4500);
 
 /// Sets the stop flag when the parent is gone, and ends the process if it does
 /// not manage to end itself.
-fn watch_parent(parent: Option<u32>) -> anyhow::Result<()> {
+fn watch_parent(parent: Option<u32>, end_within: Duration) -> anyhow::Result<()> {
     std::thread::Builder::new()
         .name("parent-watch".to_owned())
         .spawn(move || {
@@ -29,7 +32,7 @@ fn watch_parent(parent: Option<u32>) -> anyhow::Result<()> {
                     interrupted().store(true, Ordering::SeqCst);
                 }
                 if interrupted().load(Ordering::SeqCst) {
-                    std::thread::sleep(END_WITHIN);
+                    std::thread::sleep(end_within);
                     tracing::warn!("not ended in time, exiting");
                     std::process::exit(1);
                 }
@@ -46,11 +49,24 @@ fn read<T: serde::de::DeserializeOwned>(args: &ProcessArgs) -> anyhow::Result<T>
 
 pub fn run(args: &ProcessArgs) -> Outcome {
     watch_interrupts().or_failed()?;
-    watch_parent(args.parent).or_failed()?;
+    let end_within = match args.name {
+        ProcessName::RtController | ProcessName::Guardian => BRAKE_WITHIN,
+        ProcessName::Rig | ProcessName::CameraIngest | ProcessName::Planner => END_WITHIN,
+    };
+    watch_parent(args.parent, end_within).or_failed()?;
     let stop = interrupted();
+    // Dropped after everything of the process that uses the domain.
+    let domain = read::<toml::Table>(args).or_input()?;
+    let _sweep = domain
+        .get("domain")
+        .and_then(toml::Value::as_str)
+        .map(DomainSweep::new);
     match args.name {
         ProcessName::Rig => hil_tests::rig::run(&read(args).or_input()?, stop).or_failed(),
         ProcessName::RtController => rt_controller::run(read(args).or_input()?, stop).or_failed(),
+        ProcessName::Guardian => {
+            rt_controller::guardian::run(&read(args).or_input()?, stop).or_failed()
+        }
         ProcessName::CameraIngest => {
             camera_ingest::process::run(&read(args).or_input()?, stop).or_failed()
         }

@@ -1,32 +1,20 @@
 //! `wag throw`: execute a plan on an arm, once, open loop, with latencies.
 
+use super::area::require_clear_area;
 use super::check::read_plan;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::pipeline::{self, RunFolder};
+use crate::pipeline::{self, ArmAddress, RunFolder};
 use crate::progress::Stage;
 use crate::session::{Session, watch_interrupts};
 use anyhow::anyhow;
 use serde_json::{Value, json};
-use shared_types::{JointTrajectory, Limits};
+use shared_types::{JointTrajectory, Limits, MotionTier};
 use std::path::Path;
 
 /// Part of the arm's speed limits used for the move to the start pose.
 const MOVE_SPEED: f64 = 0.1;
-
-/// An arm that is not this machine moves only when somebody says the area is
-/// clear.
-pub fn require_confirmation(arm: &ArmArgs) -> Outcome {
-    match arm.address {
-        Some(address) if !address.is_loopback() && !arm.confirm && !arm.dry_run => {
-            Err(Failure::input(anyhow!(
-                "{address} is a real arm: clear the area, keep the emergency stop in reach, and add --confirm"
-            )))
-        }
-        _ => Ok(()),
-    }
-}
 
 /// Moves to a trajectory's start and streams it; returns what was measured.
 pub fn drive(
@@ -58,7 +46,11 @@ pub fn drive(
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    let result = stream(&mut session, &folder, arm, limits, trajectory, quiet);
+    let tier = match name {
+        "throw" => MotionTier::Throw,
+        _ => MotionTier::Wiggle,
+    };
+    let result = stream(&mut session, &folder, arm, limits, trajectory, tier, quiet);
     session.end(result.is_ok());
     let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
     let kept = session.recorder.write(folder.path(), epoch_ns);
@@ -81,21 +73,33 @@ fn stream(
     arm: &ArmArgs,
     limits: &Limits,
     trajectory: &JointTrajectory,
+    tier: MotionTier,
     quiet: bool,
 ) -> anyhow::Result<Value> {
     let stage = Stage::begin("bring-up", quiet);
     let address = arm.address.ok_or_else(|| anyhow!("no arm named"))?;
-    let ports = (arm.command_port, arm.report_port);
-    let link = pipeline::start_controller_at(session, folder, limits, address, ports)?;
+    let address = ArmAddress {
+        ip: address,
+        command: arm.command_port,
+        joints: arm.report_port,
+        status: [arm.status_port; 2],
+    };
+    let link = pipeline::start_controller(session, folder, limits, address)?;
     let warnings = pipeline::acquire(session, &link)?;
     for warning in &warnings {
         tracing::warn!("{warning}");
     }
     stage.say("moving to the start pose");
+    pipeline::arm_for(session, &link, MotionTier::SetUp)?;
     pipeline::move_to(session, &link, trajectory.start(), MOVE_SPEED)?;
-    stage.done("arm stands at the start");
+    stage.done(if address.ip.is_loopback() {
+        "arm stands at the start; simulated, so it is armed without asking"
+    } else {
+        "arm stands at the start"
+    });
     let stage = Stage::begin("stream", quiet);
     pipeline::latency(session, &link)?;
+    pipeline::arm_for(session, &link, tier)?;
     let span = pipeline::execute(&link, trajectory)?.finish(session)?;
     let latency = pipeline::latency(session, &link)?;
     stage.done(&format!(
@@ -110,7 +114,7 @@ fn stream(
 
 pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
-    require_confirmation(&args.arm)?;
+    require_clear_area(&args.arm, "THROW", quiet)?;
     let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
     let run = drive(
         &args.arm,

@@ -1,7 +1,8 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
+use super::area::require_clear_area;
 use super::plan::{planner_config, write_trajectory_csv};
-use super::throw::{drive, require_confirmation};
+use super::throw::drive;
 use crate::cli::WiggleArgs;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
@@ -15,7 +16,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             "say what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it"
         )));
     }
-    require_confirmation(&args.arm)?;
+    require_clear_area(&args.arm, "WIGGLE", quiet)?;
     let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
     let config = planner_config(None).or_failed()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;

@@ -7,7 +7,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::plan::trajectory_hash;
-use shared_types::{JointTrajectory, JointVector};
+use shared_types::{JointTrajectory, JointVector, MotionTier};
 use std::time::Duration;
 
 /// A connection to the controller.
@@ -42,6 +42,7 @@ fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
             anyhow!("the controller stopped {what} in cycle {cycle} ({fault:?}{arm}): {message}")
         }
         ControllerEvent::Status { .. }
+        | ControllerEvent::Step { .. }
         | ControllerEvent::Started { .. }
         | ControllerEvent::Finished { .. }
         | ControllerEvent::Done
@@ -73,6 +74,18 @@ pub fn acquire(session: &mut Session, arm: &ArmLink) -> anyhow::Result<Vec<Strin
         ControllerEvent::Status { warnings, .. } => Ok(warnings),
         other => Err(refusal("to report its state", &other)),
     }
+}
+
+/// Arms the controller for a tier of motions. Whoever calls this has made sure
+/// that the area is clear, or that the arm is simulated.
+pub fn arm_for(session: &mut Session, arm: &ArmLink, tier: MotionTier) -> anyhow::Result<()> {
+    let request = ControllerRequest::Arm {
+        tier,
+        area_clear: true,
+    };
+    let done = session.ask(arm, &request, Duration::from_secs(5), |_| ())?;
+    ensure!(done == ControllerEvent::Done, refusal("to arm", &done));
+    Ok(())
 }
 
 fn span(what: &str, event: &ControllerEvent) -> anyhow::Result<MotionSpan> {

@@ -11,12 +11,12 @@ mod processes;
 mod run_folder;
 mod stages;
 
-pub use arm::{ArmLink, acquire, execute, latency, move_to};
+pub use arm::{ArmLink, acquire, arm_for, execute, latency, move_to};
 pub use calm::{CalmInput, Calmed, calm};
 pub use lag::joint_lag_s;
 pub use observe::{Film, film_during};
 pub use processes::{
-    rig_config, start_camera, start_controller, start_controller_at, start_planner, start_rig,
+    ArmAddress, rig_config, start_camera, start_controller, start_planner, start_rig,
     write_calibration,
 };
 pub use run_folder::RunFolder;

@@ -7,6 +7,7 @@ use camera_ingest::process::CameraConfig;
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use rt_controller::ControllerConfig;
+use rt_controller::set_up::OnDifference;
 use shared_types::ipc::message::{
     CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigRequest, RigRpc,
 };
@@ -54,6 +55,7 @@ pub fn start_rig(
     session.start(&ProcessSpec {
         name: "rig",
         config,
+        holds_arm: false,
     })?;
     session.connect(&RigRequest::Ports, STARTUP)
 }
@@ -72,6 +74,7 @@ pub fn start_camera(
     session.start(&ProcessSpec {
         name: "camera-ingest",
         config,
+        holds_arm: false,
     })?;
     session.connect(&CameraRequest::Ping, STARTUP)
 }
@@ -90,61 +93,88 @@ pub fn start_planner(
     session.start(&ProcessSpec {
         name: "planner",
         config,
+        holds_arm: false,
     })?;
     session.connect(&PlannerRequest::Ping, STARTUP)
 }
 
-/// Starts the controller for an arm on this machine.
+/// Where an arm listens.
+#[derive(Debug, Clone, Copy)]
+pub struct ArmAddress {
+    /// Its address.
+    pub ip: IpAddr,
+    /// Command port.
+    pub command: u16,
+    /// Port with joint states (250 Hz).
+    pub joints: u16,
+    /// Ports with its status (5 Hz), in the order in which they are tried.
+    pub status: [u16; 2],
+}
+
+impl ArmAddress {
+    /// The simulated arm of a rig on this machine; `reports` stand for ports
+    /// 30000 to 30003.
+    pub fn of_rig(command: u16, reports: [u16; 4]) -> Self {
+        let [joints, normal, rich, _] = reports;
+        Self {
+            ip: IpAddr::V4(Ipv4Addr::LOCALHOST),
+            command,
+            joints,
+            status: [rich, normal],
+        }
+    }
+}
+
+/// Starts the controller for an arm, and its guardian.
 pub fn start_controller(
     session: &mut Session,
     folder: &RunFolder,
     limits: &Limits,
-    ports: (u16, u16),
+    arm: ArmAddress,
 ) -> anyhow::Result<ArmLink> {
-    start_controller_at(
-        session,
-        folder,
-        limits,
-        IpAddr::V4(Ipv4Addr::LOCALHOST),
-        ports,
-    )
+    let config = folder.config("rt-controller", &controller_config(folder, limits, arm)?)?;
+    for name in ["rt-controller", "guardian"] {
+        session.start(&ProcessSpec {
+            name,
+            config: config.clone(),
+            holds_arm: true,
+        })?;
+    }
+    session.connect(&ControllerRequest::Status, STARTUP)
 }
 
-/// Starts the controller for an arm anywhere; `ports` are those of commands and
-/// of the real-time report.
-pub fn start_controller_at(
-    session: &mut Session,
+/// The shipped file with this run's domain, arm and limits.
+fn controller_config(
     folder: &RunFolder,
     limits: &Limits,
-    arm: IpAddr,
-    ports: (u16, u16),
-) -> anyhow::Result<ArmLink> {
+    arm: ArmAddress,
+) -> anyhow::Result<ControllerConfig> {
     let shipped: ControllerConfig = toml::from_str(CONTROLLER)?;
     let mut config = ControllerConfig {
         domain: folder.domain.clone(),
-        arm,
-        command_port: ports.0,
-        report_port: ports.1,
+        arm: arm.ip,
+        command_port: arm.command,
+        report_port: arm.joints,
+        status_ports: arm.status,
         limits: Some(limits.clone()),
         ..shipped
     };
-    if arm.is_loopback() {
+    if arm.ip.is_loopback() {
         // A simulated arm shares this machine with everything else: its silence
         // says more about the machine's load than about a cable.
         config.thresholds.reply_stall_ms = Some(500.0);
+        config.thresholds.unanswered_max = Some(125);
         config.thresholds.report_stale_ms = Some(500.0);
         config.thresholds.tracking_window_ms = Some(500.0);
         config.thresholds.missed_cycles_max = Some(50);
         config.thresholds.late_cycles_max = Some(50);
+        config.guardian.silence_ms = 500.0;
+        // Nobody configured it, so nobody needs to look.
+        config.on_difference = OnDifference::Set;
     } else {
         config.real_time.require = true;
     }
-    let config = folder.config("rt-controller", &config)?;
-    session.start(&ProcessSpec {
-        name: "rt-controller",
-        config,
-    })?;
-    session.connect(&ControllerRequest::Status, STARTUP)
+    Ok(config)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use super::{ProcessSpec, Recorder, Supervisor};
 use anyhow::{Context, anyhow, bail};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
-use shared_types::ipc::{Bus, IpcError, OperatorEnd};
+use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -36,13 +36,14 @@ impl From<IpcError> for SessionError {
 #[derive(Debug)]
 pub struct Session {
     // Order matters: the heartbeat ends before the processes, the processes
-    // before the connection to shared memory.
+    // before the connection to shared memory, and that before the sweep.
     operator: Option<OperatorEnd>,
     /// Child processes.
     supervisor: Supervisor,
     /// Everything received.
     pub recorder: Recorder,
     bus: Bus,
+    _sweep: DomainSweep,
     log_folder: PathBuf,
     last_beat: Instant,
 }
@@ -59,6 +60,7 @@ impl Session {
             supervisor: Supervisor::default(),
             recorder: Recorder::open(&bus)?,
             bus,
+            _sweep: DomainSweep::new(domain),
             log_folder: log_folder.to_owned(),
             last_beat: Instant::now(),
         })

@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 
 /// How long a child may take to end itself after it was asked.
 const GRACE: Duration = Duration::from_millis(1500);
+/// The same for a child that may have to brake an arm first.
+const BRAKE_GRACE: Duration = Duration::from_millis(5000);
 
 /// One process to start.
 #[derive(Debug)]
@@ -23,6 +25,8 @@ pub struct ProcessSpec {
     pub name: &'static str,
     /// Its configuration file.
     pub config: PathBuf,
+    /// Whether it holds an arm: it ends before everything the arm may need.
+    pub holds_arm: bool,
 }
 
 #[derive(Debug)]
@@ -30,6 +34,7 @@ struct Running {
     name: &'static str,
     child: Child,
     log: PathBuf,
+    holds_arm: bool,
 }
 
 /// Owns child processes; ends them when dropped.
@@ -78,6 +83,7 @@ impl Supervisor {
             name: spec.name,
             child,
             log,
+            holds_arm: spec.holds_arm,
         });
         Ok(())
     }
@@ -102,32 +108,39 @@ impl Supervisor {
         Ok(())
     }
 
-    /// Asks every child to end, last started first, and kills what does not.
+    /// Asks every child to end and kills what does not: first those that hold an
+    /// arm, then the others, each time last started first.
     pub fn stop(&mut self) {
-        for running in self.children.iter_mut().rev() {
-            if matches!(running.child.try_wait(), Ok(None))
-                && let Some(pid) = i32::try_from(running.child.id())
-                    .ok()
-                    .and_then(Pid::from_raw)
-            {
-                let _ = kill_process(pid, Signal::TERM);
-            }
+        let (arm, others) = self.children.drain(..).partition(|child| child.holds_arm);
+        end_together(arm, BRAKE_GRACE);
+        end_together(others, GRACE);
+    }
+}
+
+fn end_together(mut children: Vec<Running>, grace: Duration) {
+    for running in children.iter_mut().rev() {
+        if matches!(running.child.try_wait(), Ok(None))
+            && let Some(pid) = i32::try_from(running.child.id())
+                .ok()
+                .and_then(Pid::from_raw)
+        {
+            let _ = kill_process(pid, Signal::TERM);
         }
-        let asked = Instant::now();
-        for mut running in self.children.drain(..).rev() {
-            loop {
-                match running.child.try_wait() {
-                    Ok(None) if asked.elapsed() < GRACE => {
-                        std::thread::sleep(Duration::from_millis(5));
-                    }
-                    Ok(None) => {
-                        tracing::warn!(name = running.name, "did not end in time and is killed");
-                        let _ = running.child.kill();
-                        let _ = running.child.wait();
-                        break;
-                    }
-                    Ok(Some(_)) | Err(_) => break,
+    }
+    let asked = Instant::now();
+    for mut running in children.into_iter().rev() {
+        loop {
+            match running.child.try_wait() {
+                Ok(None) if asked.elapsed() < grace => {
+                    std::thread::sleep(Duration::from_millis(5));
                 }
+                Ok(None) => {
+                    tracing::warn!(name = running.name, "did not end in time and is killed");
+                    let _ = running.child.kill();
+                    let _ = running.child.wait();
+                    break;
+                }
+                Ok(Some(_)) | Err(_) => break,
             }
         }
     }

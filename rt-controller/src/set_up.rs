@@ -1,0 +1,339 @@
+//! Bring-up and recovery: from whatever state the arm is in to one that follows
+//! setpoints, step by step, each with its result.
+//!
+//! Nothing of the arm is trusted: its firmware, joint ranges, tool and speed
+//! limit are read and compared with what the controller is configured for. A
+//! difference is a refusal that names both, unless the configuration says that
+//! the arm shall be set. Order of the recovery as in the vendor's manual: clear
+//! error, enable, mode, state.
+
+use crate::session::{ArmSession, SessionError};
+use crate::xarm::report::{MAX_REPORT_LEN, NormalReport};
+use crate::xarm::{
+    ArmState, ArmVersion, Command, ErrorCode, Firmware, JointQuery, Mode, ReplyData, ReportReader,
+    StateRequest, TcpPose, VersionError,
+};
+use serde::{Deserialize, Serialize};
+use shared_types::{JointVector, Limits};
+use std::io::Read;
+use std::net::{SocketAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+/// The arm checks tool speed against this times its factor (m/s).
+const SPEED_AT_FACTOR_ONE_M_S: f64 = 1.0;
+/// Speed limits closer than this are equal: they are f32 on the wire (m/s).
+const SPEED_EQUAL_M_S: f64 = 1e-4;
+/// Tool offsets closer than this are equal (m).
+const OFFSET_EQUAL_M: f64 = 1e-4;
+/// The arm stands when two poses read this far apart in time ...
+const STILL_INTERVAL: Duration = Duration::from_millis(30);
+/// ... differ less than this (rad).
+const STILL_RAD: f64 = 1e-4;
+/// Longest wait for the arm to become ready and to stand still.
+const READY_TIMEOUT: Duration = Duration::from_secs(3);
+/// Longest wait for a status report; five come a second.
+const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// What is done about an arm that is configured otherwise than the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnDifference {
+    /// Refuse and name both values. For a real arm: somebody configured it, and
+    /// somebody should look.
+    #[default]
+    Refuse,
+    /// Set the arm to what the controller is configured for.
+    Set,
+}
+
+/// Why the arm could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum SetUpError {
+    /// It did not answer, or not sensibly.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// Another arm, or a firmware that cannot be driven.
+    #[error("the arm at {arm} says `{text}`: {reason}")]
+    Version {
+        /// Address.
+        arm: SocketAddr,
+        /// Its version text.
+        text: String,
+        /// Why it is refused.
+        reason: VersionError,
+    },
+    /// The configured joint range is wider than the arm's.
+    #[error(
+        "joint {joint} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms"
+    )]
+    Range {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Configured limit (rad).
+        limit_rad: f64,
+    },
+    /// The tool configured in the arm is another one.
+    #[error(
+        "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: set one to the other (`on_difference = \"set\"` sets the arm)"
+    )]
+    Tool {
+        /// In the arm (m).
+        arm_m: [f64; 3],
+        /// In the limits (m).
+        configured_m: [f64; 3],
+    },
+    /// The tool speed limit of the arm is another one.
+    #[error(
+        "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: set one to the other (`on_difference = \"set\"` sets the arm)"
+    )]
+    ToolSpeed {
+        /// In the arm (m/s).
+        arm_m_s: f64,
+        /// In the limits (m/s).
+        configured_m_s: f64,
+    },
+    /// The status report cannot be read.
+    #[error("no status report from the arm at {address} ({reason}): check the report ports")]
+    NoStatus {
+        /// Address tried.
+        address: SocketAddr,
+        /// What the system said.
+        reason: std::io::Error,
+    },
+    /// An error that clearing does not remove.
+    #[error("the arm keeps its error {0}")]
+    ArmError(ErrorCode),
+    /// The arm does not become ready.
+    #[error(
+        "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
+    )]
+    NotReady {
+        /// State it stays in.
+        state: ArmState,
+    },
+    /// The arm moves by itself.
+    #[error("the arm does not stand still: stop other programs that move it")]
+    Restless,
+    /// The pose is outside the configured limits.
+    #[error(
+        "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
+    )]
+    OutsideRange {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Where it stands (rad).
+        q_rad: f64,
+    },
+}
+
+/// What an arm is set up for.
+#[derive(Debug, Clone, Copy)]
+pub struct SetUp<'a> {
+    /// Limits the controller is configured for.
+    pub limits: &'a Limits,
+    /// Mode in which it takes setpoints.
+    pub mode: Mode,
+    /// Port with normal or rich reports.
+    pub status: SocketAddr,
+    /// What to do about differences.
+    pub on_difference: OnDifference,
+}
+
+/// An arm that is ready.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadyArm {
+    /// Where it stands (rad).
+    pub q: JointVector,
+    /// What it is.
+    pub version: ArmVersion,
+}
+
+/// Hears of every step that was done: its name and its result.
+pub type StepHeard<'a> = &'a mut dyn FnMut(&'static str, &str);
+
+impl SetUp<'_> {
+    /// Sets up the arm behind `session`; `heard` is told each step.
+    ///
+    /// # Errors
+    /// [`SetUpError`]; the step that failed was not told.
+    pub fn run(
+        &self,
+        session: &mut ArmSession,
+        heard: StepHeard<'_>,
+    ) -> Result<ReadyArm, SetUpError> {
+        let version = self.identify(session)?;
+        heard(
+            "identify",
+            &format!("xArm 7, firmware {}", version.firmware),
+        );
+        heard("tool", &self.match_tool(session)?);
+        heard(
+            "tool speed",
+            &self.match_tool_speed(session, version.firmware)?,
+        );
+        let enable = Command::MotionEnable {
+            joint: Command::ALL_JOINTS,
+            enable: true,
+        };
+        for (name, command) in [
+            ("clear error", Command::CleanError),
+            ("clear warning", Command::CleanWarning),
+            ("enable", enable),
+            ("mode", Command::SetMode(self.mode)),
+            ("state", Command::SetState(StateRequest::Ready)),
+        ] {
+            session.ask(&command)?;
+            heard(name, "taken");
+        }
+        heard("ready", &format!("{:?}", wait_ready(session)?));
+        let q = wait_still(session)?;
+        heard("still", "the arm stands");
+        match self.limits.position_violation(&q) {
+            Some(j) => Err(SetUpError::OutsideRange {
+                joint: j.saturating_add(1),
+                q_rad: q[j],
+            }),
+            None => Ok(ReadyArm { q, version }),
+        }
+    }
+
+    /// Reads the version and refuses what cannot be driven.
+    fn identify(&self, session: &mut ArmSession) -> Result<ArmVersion, SetUpError> {
+        let text = match session.ask(&Command::Version)? {
+            ReplyData::Text(text) => text.as_str().to_owned(),
+            _ => String::new(),
+        };
+        let checked = ArmVersion::parse(&text).and_then(|v| v.check().map(|()| v));
+        let version = checked.map_err(|reason| SetUpError::Version {
+            arm: session.address(),
+            text,
+            reason,
+        })?;
+        // Every firmware that passes is new enough for protocol 3.
+        session.keep_heartbeat();
+        match version.wider_than_the_arm(self.limits) {
+            Some((joint, limit_rad)) => Err(SetUpError::Range {
+                joint: joint.saturating_add(1),
+                limit_rad,
+            }),
+            None => Ok(version),
+        }
+    }
+
+    fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
+        let configured_m = self.limits.tcp_offset_m;
+        let arm_m = read_status(self.status)?.tcp_offset.position_m;
+        let apart_m = arm_m
+            .iter()
+            .zip(&configured_m)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        // A report that is not a number is no agreement either.
+        if apart_m <= OFFSET_EQUAL_M && arm_m.iter().all(|v| v.is_finite()) {
+            return Ok(format!("{configured_m:?} m as configured"));
+        }
+        match self.on_difference {
+            OnDifference::Refuse => Err(SetUpError::Tool {
+                arm_m,
+                configured_m,
+            }),
+            OnDifference::Set => {
+                session.ask(&Command::TcpOffset(TcpPose {
+                    position_m: configured_m,
+                    rpy_rad: [0.0; 3],
+                }))?;
+                Ok(format!("set from {arm_m:?} to {configured_m:?} m"))
+            }
+        }
+    }
+
+    fn match_tool_speed(
+        &self,
+        session: &mut ArmSession,
+        firmware: Firmware,
+    ) -> Result<String, SetUpError> {
+        let configured_m_s = self.limits.tcp_speed_max_m_s;
+        let settable = firmware >= Firmware::SPEED_FACTOR;
+        let factor = match settable.then(|| session.ask(&Command::GetSpeedLimitFactor)) {
+            Some(reply) => match reply? {
+                ReplyData::SpeedLimitFactor(factor) => factor,
+                _ => f64::NAN,
+            },
+            None => 1.0,
+        };
+        let arm_m_s = factor * SPEED_AT_FACTOR_ONE_M_S;
+        if (arm_m_s - configured_m_s).abs() <= SPEED_EQUAL_M_S {
+            return Ok(format!("{configured_m_s:.3} m/s as configured"));
+        }
+        if self.on_difference == OnDifference::Refuse || !settable {
+            return Err(SetUpError::ToolSpeed {
+                arm_m_s,
+                configured_m_s,
+            });
+        }
+        let factor = configured_m_s / SPEED_AT_FACTOR_ONE_M_S;
+        session.ask(&Command::SetSpeedLimitFactor(factor))?;
+        Ok(format!("set from {arm_m_s:.3} to {configured_m_s:.3} m/s"))
+    }
+}
+
+/// The newest status report; one comes at once with every connection.
+fn read_status(address: SocketAddr) -> Result<NormalReport, SetUpError> {
+    let fail = |reason| SetUpError::NoStatus { address, reason };
+    let other = |e: &dyn std::error::Error| fail(std::io::Error::other(e.to_string()));
+    let mut stream = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).map_err(fail)?;
+    stream
+        .set_read_timeout(Some(REPORT_TIMEOUT))
+        .map_err(fail)?;
+    let mut reader = ReportReader::new();
+    let mut received = 0;
+    while received <= MAX_REPORT_LEN {
+        if let Some(frame) = reader.next_report().map_err(|e| other(&e))? {
+            return NormalReport::parse(frame).map_err(|e| other(&e));
+        }
+        match stream.read(reader.space()).map_err(fail)? {
+            0 => break,
+            n => {
+                reader.commit(n);
+                received = received.saturating_add(n);
+            }
+        }
+    }
+    Err(fail(std::io::ErrorKind::UnexpectedEof.into()))
+}
+
+fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {
+    let began = Instant::now();
+    loop {
+        let error = session.error_code()?;
+        let state = session.state()?;
+        if error.is_none() && state.can_move() {
+            return Ok(state);
+        }
+        if began.elapsed() > READY_TIMEOUT {
+            return Err(if error.is_none() {
+                SetUpError::NotReady { state }
+            } else {
+                SetUpError::ArmError(error)
+            });
+        }
+        std::thread::sleep(STILL_INTERVAL);
+    }
+}
+
+fn wait_still(session: &mut ArmSession) -> Result<JointVector, SetUpError> {
+    let began = Instant::now();
+    let mut before: Option<JointVector> = None;
+    while began.elapsed() < READY_TIMEOUT {
+        let q = match session.ask(&Command::JointPosition(JointQuery::MEASURED))? {
+            ReplyData::JointMotion { position, .. } => position,
+            _ => continue,
+        };
+        if before.is_some_and(|b| (b - q).max_abs() < STILL_RAD) {
+            return Ok(q);
+        }
+        before = Some(q);
+        std::thread::sleep(STILL_INTERVAL);
+    }
+    Err(SetUpError::Restless)
+}

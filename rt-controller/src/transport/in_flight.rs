@@ -1,0 +1,252 @@
+//! Which commands wait for their reply, and what a reply that comes means.
+//!
+//! Replies are matched by transaction id, so they may come late, twice or in
+//! another order without harm. A reply to an id that was never sent on this
+//! connection is the trace of somebody else.
+
+use crate::xarm::frame::next_transaction;
+
+/// Commands remembered: one second of setpoints. A power of two, so that the
+/// slot of an id never changes.
+const WINDOW: usize = 256;
+
+/// What became of a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Fate {
+    /// Nothing sent in this slot yet.
+    #[default]
+    Unused,
+    /// No reply yet.
+    Open,
+    /// A later command was answered first; its own reply may still come.
+    Overtaken,
+    /// Answered.
+    Answered,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Sent {
+    id: u16,
+    sent_ns: u64,
+    fate: Fate,
+}
+
+/// What a reply means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Matched {
+    /// Answers the oldest open command.
+    InOrder {
+        /// When the command was sent (ns).
+        sent_ns: u64,
+    },
+    /// Answers a command that later ones overtook, or overtakes earlier ones.
+    OutOfOrder {
+        /// When the command was sent (ns).
+        sent_ns: u64,
+    },
+    /// The command was answered before.
+    Duplicate,
+    /// No such command was sent here.
+    Foreign,
+}
+
+/// The commands sent last. Fixed size, RT-safe.
+#[derive(Debug, Clone)]
+pub struct InFlight {
+    sent: [Sent; WINDOW],
+    /// Id of the next command.
+    next: u16,
+    /// Id of the oldest command that is open, `next` if none is.
+    oldest: u16,
+    open: u16,
+}
+
+impl Default for InFlight {
+    fn default() -> Self {
+        Self {
+            sent: [Sent::default(); WINDOW],
+            next: 1,
+            oldest: 1,
+            open: 0,
+        }
+    }
+}
+
+impl InFlight {
+    /// Id for the next command.
+    #[must_use]
+    pub const fn next_id(&self) -> u16 {
+        self.next
+    }
+
+    /// Commands without a reply, those overtaken left out.
+    #[must_use]
+    pub const fn open(&self) -> u16 {
+        self.open
+    }
+
+    /// When the oldest open command was sent (ns).
+    #[must_use]
+    pub fn oldest_ns(&self) -> Option<u64> {
+        (self.open > 0)
+            .then(|| self.slot(self.oldest))
+            .flatten()
+            .map(|sent| sent.sent_ns)
+    }
+
+    /// The command with [`next_id`](Self::next_id) was sent at `now_ns`.
+    pub fn sent(&mut self, now_ns: u64) {
+        let id = self.next;
+        if self.open == 0 {
+            self.oldest = id;
+        }
+        if let Some(slot) = self.sent.get_mut(place(id)) {
+            if slot.fate == Fate::Open {
+                // A whole window without any reply: the oldest is given up.
+                self.open = self.open.saturating_sub(1);
+            }
+            *slot = Sent {
+                id,
+                sent_ns: now_ns,
+                fate: Fate::Open,
+            };
+            self.open = self.open.saturating_add(1);
+        }
+        self.next = next_transaction(id);
+        self.settle();
+    }
+
+    /// A reply with transaction `id` came.
+    pub fn reply(&mut self, id: u16) -> Matched {
+        let Some(Sent { sent_ns, fate, .. }) = self.slot(id).copied() else {
+            return Matched::Foreign;
+        };
+        let matched = match fate {
+            Fate::Unused => return Matched::Foreign,
+            Fate::Answered => return Matched::Duplicate,
+            Fate::Overtaken => Matched::OutOfOrder { sent_ns },
+            Fate::Open if id == self.oldest => Matched::InOrder { sent_ns },
+            Fate::Open => {
+                self.overtake(id);
+                Matched::OutOfOrder { sent_ns }
+            }
+        };
+        if fate == Fate::Open {
+            self.open = self.open.saturating_sub(1);
+        }
+        self.mark(id, Fate::Answered);
+        self.settle();
+        matched
+    }
+
+    fn slot(&self, id: u16) -> Option<&Sent> {
+        self.sent.get(place(id)).filter(|sent| sent.id == id)
+    }
+
+    fn mark(&mut self, id: u16, fate: Fate) {
+        if let Some(slot) = self.sent.get_mut(place(id)) {
+            slot.fate = fate;
+        }
+    }
+
+    /// Every open command before `id` counts as overtaken.
+    fn overtake(&mut self, id: u16) {
+        for _ in 0..WINDOW {
+            if self.oldest == id {
+                return;
+            }
+            if self.slot(self.oldest).is_some_and(|s| s.fate == Fate::Open) {
+                self.mark(self.oldest, Fate::Overtaken);
+                self.open = self.open.saturating_sub(1);
+            }
+            self.oldest = next_transaction(self.oldest);
+        }
+    }
+
+    /// Moves `oldest` on to the oldest open command.
+    fn settle(&mut self) {
+        for _ in 0..WINDOW {
+            let open = self.slot(self.oldest).is_some_and(|s| s.fate == Fate::Open);
+            if open || self.oldest == self.next {
+                return;
+            }
+            self.oldest = next_transaction(self.oldest);
+        }
+    }
+}
+
+fn place(id: u16) -> usize {
+    usize::from(id) % WINDOW
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn with_sent(count: u64) -> InFlight {
+        let mut in_flight = InFlight::default();
+        for k in 0..count {
+            in_flight.sent(1000 * k);
+        }
+        in_flight
+    }
+
+    #[test]
+    fn order_repetition_and_strangers_are_told_apart() {
+        let mut f = with_sent(4);
+        assert_eq!(f.reply(1), Matched::InOrder { sent_ns: 0 });
+        assert_eq!(f.reply(1), Matched::Duplicate);
+        assert_eq!(f.reply(3), Matched::OutOfOrder { sent_ns: 2000 });
+        // The second one was overtaken: it holds nothing up any more.
+        assert_eq!((f.open(), f.oldest_ns()), (1, Some(3000)));
+        assert_eq!(f.reply(2), Matched::OutOfOrder { sent_ns: 1000 });
+        assert_eq!(f.reply(2), Matched::Duplicate);
+        assert_eq!(f.reply(5), Matched::Foreign);
+        assert_eq!(f.reply(40_000), Matched::Foreign);
+        assert_eq!(f.reply(4), Matched::InOrder { sent_ns: 3000 });
+        assert_eq!((f.open(), f.oldest_ns()), (0, None));
+    }
+
+    #[test]
+    fn silence_keeps_the_age_of_the_oldest_of_the_last_second() {
+        let f = with_sent(1000);
+        assert_eq!(usize::from(f.open()), WINDOW);
+        assert_eq!(f.oldest_ns(), Some(1000 * (1000 - WINDOW as u64)));
+    }
+
+    proptest! {
+        /// Against a plain model: replies in any order, with repetitions.
+        #[test]
+        fn counts_are_right_over_the_wrap(
+            begin in 65_000_u16..65_535, steps in prop::collection::vec((any::<bool>(), 0_usize..20), 1..1500),
+        ) {
+            let mut f = InFlight { next: begin, oldest: begin, ..InFlight::default() };
+            let mut sent: Vec<(u16, u64, bool)> = Vec::new(); // id, time, answered
+            let mut answered_up_to = 0;
+            for (k, (send, back)) in steps.into_iter().enumerate() {
+                let now_ns = 1 + k as u64;
+                if send || sent.is_empty() {
+                    sent.push((f.next_id(), now_ns, false));
+                    f.sent(now_ns);
+                } else {
+                    let at = sent.len().saturating_sub(1 + back);
+                    let (id, sent_ns, before) = sent[at];
+                    let matched = f.reply(id);
+                    if before {
+                        prop_assert_eq!(matched, Matched::Duplicate);
+                    } else {
+                        let (in_order, out) = (Matched::InOrder { sent_ns }, Matched::OutOfOrder { sent_ns });
+                        prop_assert!([in_order, out].contains(&matched), "{:?}", matched);
+                        answered_up_to = answered_up_to.max(at + 1);
+                    }
+                    sent[at].2 = true;
+                }
+                let open = (sent.len() - answered_up_to).min(WINDOW);
+                prop_assert_eq!(usize::from(f.open()), open);
+                let oldest = sent.get(sent.len() - open).map(|s| s.1);
+                prop_assert_eq!(f.oldest_ns(), oldest);
+            }
+        }
+    }
+}
