@@ -3,8 +3,8 @@
 //! Two searches share one strategy, [`cmaes`]: [`sysid`] fits the rope's
 //! parameters to keypoints (the paper's Φ-CMA-ES), and [`tasks`] finds the joint
 //! waypoints of a throw (CMA-ES-traj) with the pieces of [`trajopt`] and
-//! [`collide`]. [`wiggle`] makes the motion that is filmed. The physics is that
-//! of `rope-sim`.
+//! [`collide`]. [`wiggle`] makes the motion that is filmed. [`response`] finds how
+//! the arm follows its setpoints. The physics is that of `rope-sim`.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     test,
@@ -22,6 +22,7 @@ pub mod calm;
 pub mod cmaes;
 pub mod collide;
 pub mod process;
+pub mod response;
 pub mod ropes;
 pub mod synthetic;
 pub mod sysid;
