@@ -23,7 +23,8 @@ const AGREED_MIN: f64 = 0.5;
 /// Delay from command to target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetDelay {
-    /// Interval that the most setpoints agree on (s).
+    /// Interval that the most setpoints agree on (s); as wide as the reports'
+    /// period when these keep step with the setpoints.
     pub interval_s: [f64; 2],
     /// Part of the setpoints that agree.
     pub agreed_part: f64,
@@ -39,10 +40,11 @@ pub fn command_to_target(recording: &Recording) -> Option<TargetDelay> {
     if brackets.len() < SEEN_MIN {
         return None;
     }
-    let (interval_s, agreed) = most_agreed(&brackets)?;
+    let ([low_s, high_s], agreed) = most_agreed(&brackets)?;
     let agreed_part = agreed as f64 / brackets.len() as f64;
     (agreed_part >= AGREED_MIN).then_some(TargetDelay {
-        interval_s,
+        // Nothing is taken before it is sent, whatever the clocks say.
+        interval_s: [low_s.max(0.0), high_s.max(0.0)],
         agreed_part,
         seen: brackets.len(),
     })
@@ -145,7 +147,7 @@ mod tests {
         Recording {
             setpoints,
             samples,
-            round_trip_min_s: 0.0,
+            round_trip_s: 0.0,
         }
     }
 

@@ -32,16 +32,22 @@ const STARTS: usize = 4;
 /// Steps within one valley, and rounds of weighing the reports anew.
 const STEPS: usize = 40;
 const ROUNDS: usize = 3;
-/// Reports per block of the interval estimate: 80 ms at 250 Hz.
-const BLOCK: usize = 20;
-/// Half a 95 % interval in standard deviations.
+/// Reports per block of the interval estimate: 0.24 s at 250 Hz, since the map
+/// of the arm's clock wanders that slowly.
+const BLOCK: usize = 60;
+/// How late the map of the arm's clock may put a report: it lets go 200 ppm
+/// between the fastest reports, about one a second (s).
+const CLOCK_MAP_S: f64 = 2e-4;
+/// Half a 95 % interval in standard deviations, and what few blocks add to it:
+/// Student's quantile is 1.96 + 2.4 / degrees of freedom to a few percent.
 const HALF_95: f64 = 1.96;
+const HALF_95_FEW: f64 = 2.4;
 
 /// The most likely parameters of one joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     parameters: Parameters,
-    std_dev: Parameters,
+    half_95: Parameters,
     /// Root mean square of the residuals, wild ones cut (rad).
     pub(super) residual_rad: f64,
     /// Whether a parameter sits at the end of its range.
@@ -208,7 +214,10 @@ impl Fit {
             let score: Parameters = block.iter().sum();
             scatter += score * score.transpose();
         }
-        let robust = inverse * scatter * inverse;
+        // Few blocks scatter less than many would, by the parameters fitted.
+        let blocks = rows.len().div_ceil(BLOCK).max(6) as f64;
+        let freedom = blocks - 5.0;
+        let robust = inverse * scatter * inverse * (blocks / freedom);
         // Whichever is wider: what the noise allows, or what was seen.
         let std_dev =
             Parameters::from_fn(|i, _| robust[(i, i)].max(inverse[(i, i)]).max(0.0).sqrt());
@@ -216,7 +225,7 @@ impl Fit {
         let squares: f64 = off.iter().zip(&speeds).map(|(r, v)| cut(r, v)).sum();
         Some(Self {
             parameters,
-            std_dev,
+            half_95: std_dev * (HALF_95 + HALF_95_FEW / freedom),
             residual_rad: (squares / off.len().max(1) as f64).sqrt(),
             at_bound: (1..3).any(|i| parameters[i] <= LOW[i] || parameters[i] >= HIGH[i])
                 || parameters[0] >= HIGH[0],
@@ -225,10 +234,10 @@ impl Fit {
     }
 
     /// The result in the units of the file. The lower end of the dead time
-    /// leaves room for `round_trip_min_s`, the time on the wire that two clocks
-    /// cannot tell from a lag.
-    pub(super) fn tracking_lag(&self, round_trip_min_s: f64) -> TrackingLag {
-        let half = self.std_dev * HALF_95;
+    /// leaves room for what two clocks cannot tell from a lag: `round_trip_s` on
+    /// the wire, and the error of their map.
+    pub(super) fn tracking_lag(&self, round_trip_s: f64) -> TrackingLag {
+        let half = self.half_95;
         let p = self.parameters;
         let exponential = |i: usize, unit: f64| Estimate {
             value: p[i].exp() * unit,
@@ -237,7 +246,10 @@ impl Fit {
         TrackingLag {
             dead_time_s: Estimate {
                 value: p[0],
-                interval: [(p[0] - half[0] - round_trip_min_s).max(0.0), p[0] + half[0]],
+                interval: [
+                    (p[0] - half[0] - round_trip_s - CLOCK_MAP_S).max(0.0),
+                    p[0] + half[0],
+                ],
             },
             natural_frequency_hz: exponential(1, 1.0 / core::f64::consts::TAU),
             damping_ratio: exponential(2, 1.0),

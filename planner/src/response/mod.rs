@@ -61,9 +61,9 @@ pub struct Recording {
     pub setpoints: Vec<Setpoint>,
     /// Joint reports.
     pub samples: Vec<Sample>,
-    /// Shortest round trip of a setpoint and its reply (s): how far the two
-    /// clocks may be apart unnoticed. 0 when unknown.
-    pub round_trip_min_s: f64,
+    /// Typical round trip of a setpoint and its reply (s): what time on the wire
+    /// may add to a dead time. 0 when unknown.
+    pub round_trip_s: f64,
 }
 
 /// Why a recording is refused.
@@ -193,7 +193,7 @@ fn identify_joint(recording: &Recording, joint: usize) -> Result<TrackingLag, No
     if fit.residual_rad > UNEXPLAINED_MAX * window::spread_rad(&windows) {
         return Err(NotExcited::Unexplained);
     }
-    let lag = fit.tracking_lag(recording.round_trip_min_s);
+    let lag = fit.tracking_lag(recording.round_trip_s);
     let known = |e: shared_types::response::Estimate, half: f64| e.interval[1] - e.value <= half;
     let part = |e: shared_types::response::Estimate| known(e, PART_HALF_MAX * e.value);
     let distinct = !fit.at_bound

@@ -68,7 +68,7 @@ fn recording(joints: &[usize], lags: &[Lag; JOINTS], seed: u64) -> Recording {
     Recording {
         setpoints,
         samples,
-        round_trip_min_s: 2e-4,
+        round_trip_s: 2e-4,
     }
 }
 

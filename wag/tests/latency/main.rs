@@ -1,0 +1,84 @@
+//! The arm's response is found again: on twenty simulated arms in virtual time,
+//! and on one over sockets by the command itself.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+mod command;
+mod virtual_time;
+
+use hil_tests::arm::JointLag;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use shared_types::JOINTS;
+use shared_types::response::TrackingLag;
+
+/// A secret for each joint, anywhere in what is plausible for such arms.
+fn secret_lags(rng: &mut ChaCha8Rng) -> [JointLag; JOINTS] {
+    core::array::from_fn(|_| JointLag {
+        dead_time_s: rng.random_range(0.008..0.06),
+        natural_frequency_rad_s: core::f64::consts::TAU * rng.random_range(4.0..25.0),
+        damping_ratio: rng.random_range(0.5..1.2),
+    })
+}
+
+/// How far an estimate is off.
+#[derive(Debug, Clone, Copy)]
+struct Errors {
+    dead_time_s: f64,
+    /// Of the -3 dB bandwidth, as a part of it.
+    bandwidth: f64,
+    /// Of the natural frequency, as a part of it.
+    natural_frequency: f64,
+    damping_ratio: f64,
+}
+
+impl Errors {
+    fn of(found: &TrackingLag, secret: &JointLag) -> Self {
+        let exactly = |value| shared_types::response::Estimate {
+            value,
+            interval: [value; 2],
+        };
+        let truth = TrackingLag {
+            dead_time_s: exactly(secret.dead_time_s),
+            natural_frequency_hz: exactly(secret.natural_frequency_rad_s / core::f64::consts::TAU),
+            damping_ratio: exactly(secret.damping_ratio),
+            ..*found
+        };
+        let part = |found: f64, true_: f64| (found / true_ - 1.0).abs();
+        Self {
+            dead_time_s: (found.dead_time_s.value - secret.dead_time_s).abs(),
+            bandwidth: part(found.bandwidth_hz(), truth.bandwidth_hz()),
+            natural_frequency: part(
+                found.natural_frequency_hz.value,
+                truth.natural_frequency_hz.value,
+            ),
+            damping_ratio: (found.damping_ratio.value - secret.damping_ratio).abs(),
+        }
+    }
+
+    /// Dead time within 2 ms, bandwidth and natural frequency within 10 %.
+    fn is_accepted(&self) -> bool {
+        self.dead_time_s < 2e-3 && self.bandwidth < 0.1 && self.natural_frequency < 0.1
+    }
+}
+
+/// Prints worst and median of each error.
+fn report(name: &str, all: &[Errors]) {
+    let line = |what: &str, scale: f64, pick: fn(&Errors) -> f64| {
+        let mut values: Vec<f64> = all.iter().map(|e| scale * pick(e)).collect();
+        values.sort_by(f64::total_cmp);
+        let worst = values.last().unwrap();
+        println!(
+            "{name}: {what}: worst {worst:.3}, median {:.3}",
+            values[values.len() / 2]
+        );
+    };
+    line("dead time (ms)", 1e3, |e| e.dead_time_s);
+    line("bandwidth (%)", 1e2, |e| e.bandwidth);
+    line("natural frequency (%)", 1e2, |e| e.natural_frequency);
+    line("damping ratio", 1.0, |e| e.damping_ratio);
+}
