@@ -53,6 +53,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Execute a plan on an arm, record it, measure latencies.
     Throw(ThrowArgs),
+    /// Measure how late everything is: the control loop, each joint, the camera.
+    Latency(LatencyArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
     /// Measure how fast this machine runs a part of the system.
@@ -365,6 +367,32 @@ pub struct ThrowArgs {
     /// Folder for the run; it must not exist. Default: runs/TIME-throw.
     #[arg(long)]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `wag latency`.
+#[derive(Debug, Args)]
+pub struct LatencyArgs {
+    /// Arm to move: one joint after the other, small and ever faster.
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder of a recorded run to read instead.
+    #[arg(long, conflicts_with_all = ["address", "joints", "excitation", "seed", "out"])]
+    pub run: Option<PathBuf>,
+    /// Joints to move (1 to 7); default: all.
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=7))]
+    pub joints: Vec<u8>,
+    /// Shape of the motion (TOML); default: the built-in one.
+    #[arg(long)]
+    pub excitation: Option<PathBuf>,
+    /// Seed of the phases the motion begins with; default: the motion's own.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Folder for the run; it must not exist. Default: runs/TIME-latency.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// The arm's response (TOML). Default: arm-response.toml in the run folder.
+    #[arg(long)]
+    pub response: Option<PathBuf>,
 }
 
 /// Arguments of `wag score`.

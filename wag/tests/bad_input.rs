@@ -510,6 +510,34 @@ const CASES: &[Case] = &[
         2,
         &["300"],
     ),
+    (&["latency"], 2, &["--arm", "--run"]),
+    (
+        &["latency", "--run", "none"],
+        2,
+        &["none", "does not exist"],
+    ),
+    (&["latency", "--run", "."], 2, &["cycles.csv"]),
+    (
+        &["latency", "--run", ".", "--arm", "127.0.0.1"],
+        2,
+        &["cannot be used with"],
+    ),
+    (
+        &["latency", "--arm", "127.0.0.1", "--joints", "8"],
+        2,
+        &["8"],
+    ),
+    (
+        &[
+            "latency",
+            "--arm",
+            "127.0.0.1",
+            "--excitation",
+            "unknown.toml",
+        ],
+        2,
+        &["unknown.toml"],
+    ),
     (
         &["process", "planner", "--config", "none.toml"],
         2,

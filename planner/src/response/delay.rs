@@ -131,7 +131,7 @@ mod tests {
                 let taken = |(i, s): &(usize, &Setpoint)| {
                     s.sent_s + if i % 20 == 0 { 0.009 } else { 0.0023 } <= at_s
                 };
-                let told = setpoints.iter().enumerate().filter(taken).last().unwrap().1;
+                let told = setpoints.iter().enumerate().rfind(taken).unwrap().1;
                 let q_target = if smoothed {
                     at(at_s - 0.01)
                 } else {

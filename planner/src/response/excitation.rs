@@ -73,7 +73,7 @@ fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
         ),
     ];
     for (key, value, low, high) in rules {
-        if !(value >= low && value <= high) {
+        if !(low..=high).contains(&value) {
             return Err(ExcitationError::Value {
                 key,
                 value,

@@ -19,7 +19,7 @@ mod noise;
 mod window;
 
 use fit::Fit;
-use shared_types::response::{JointResponse, NotExcited, TrackingLag};
+use shared_types::response::{Estimate, JointResponse, NotExcited, TrackingLag};
 use shared_types::{JOINTS, JointVector};
 use window::Window;
 
@@ -122,7 +122,7 @@ impl Recording {
         let shared = self
             .samples
             .iter()
-            .filter(|s| s.at_s >= first.sent_s && s.at_s <= last.sent_s)
+            .filter(|s| (first.sent_s..=last.sent_s).contains(&s.at_s))
             .count();
         if shared < SAMPLES_MIN {
             return Err(ResponseError::Apart);
@@ -182,11 +182,9 @@ pub fn identify(
 
 fn identify_joint(recording: &Recording, joint: usize) -> Result<TrackingLag, NotExcited> {
     let windows = Window::all(recording, joint);
-    if windows.iter().map(Window::travel_rad).fold(0.0, f64::max) < TRAVEL_MIN_RAD {
-        return Err(NotExcited::Still);
-    }
+    let travel_rad = windows.iter().map(Window::travel_rad).fold(0.0, f64::max);
     let samples: usize = windows.iter().map(|w| w.samples.len()).sum();
-    if samples < SAMPLES_MIN {
+    if travel_rad < TRAVEL_MIN_RAD || samples < SAMPLES_MIN {
         return Err(NotExcited::Still);
     }
     let fit = Fit::of(&windows).ok_or(NotExcited::Unexplained)?;
@@ -194,17 +192,19 @@ fn identify_joint(recording: &Recording, joint: usize) -> Result<TrackingLag, No
         return Err(NotExcited::Unexplained);
     }
     let lag = fit.tracking_lag(recording.round_trip_s);
-    let known = |e: shared_types::response::Estimate, half: f64| e.interval[1] - e.value <= half;
-    let part = |e: shared_types::response::Estimate| known(e, PART_HALF_MAX * e.value);
-    let distinct = !fit.at_bound
-        && known(lag.dead_time_s, DEAD_TIME_HALF_MAX_S)
-        && part(lag.natural_frequency_hz)
-        && part(lag.damping_ratio);
-    if distinct {
-        Ok(lag)
-    } else {
-        Err(NotExcited::Indistinct)
+    if fit.at_bound || !is_distinct(&lag) {
+        return Err(NotExcited::Indistinct);
     }
+    Ok(lag)
+}
+
+/// Whether dead time and lag are known well enough to be told apart.
+fn is_distinct(lag: &TrackingLag) -> bool {
+    let half = |e: &Estimate| e.interval[1] - e.value;
+    let part = |e: &Estimate| half(e) / e.value;
+    half(&lag.dead_time_s) <= DEAD_TIME_HALF_MAX_S
+        && part(&lag.natural_frequency_hz) <= PART_HALF_MAX
+        && part(&lag.damping_ratio) <= PART_HALF_MAX
 }
 
 #[cfg(test)]

@@ -6,21 +6,27 @@ use shared_types::ipc::message::{LatencyReport, Percentiles};
 
 /// Largest latency told apart (ns): ten seconds.
 const MAX_NS: u64 = 10_000_000_000;
+/// Upper edge of the first bin shown (ns).
+const FIRST_BIN_NS: u64 = 1000;
 
 /// Histograms since they were last taken.
 #[derive(Debug)]
-pub(super) struct Latencies {
+pub struct Latencies {
     wake: Histogram<u64>,
     compute: Histogram<u64>,
     send: Histogram<u64>,
     reply: Histogram<u64>,
     cycles: u64,
     missed: u64,
+    longest_miss: u32,
 }
 
 impl Latencies {
     /// Empty.
-    pub(super) fn new() -> Result<Self, hdrhistogram::CreationError> {
+    ///
+    /// # Errors
+    /// Never for the bounds used here; they are the library's to refuse.
+    pub fn new() -> Result<Self, hdrhistogram::CreationError> {
         let empty = || Histogram::new_with_bounds(1, MAX_NS, 3);
         Ok(Self {
             wake: empty()?,
@@ -29,13 +35,15 @@ impl Latencies {
             reply: empty()?,
             cycles: 0,
             missed: 0,
+            longest_miss: 0,
         })
     }
 
     /// Adds one cycle.
-    pub(super) fn record(&mut self, r: &CycleRecord) {
+    pub fn record(&mut self, r: &CycleRecord) {
         self.cycles += 1;
         self.missed += u64::from(r.missed);
+        self.longest_miss = self.longest_miss.max(r.missed);
         self.wake.saturating_record(u64::from(r.wake_late_ns));
         self.compute.saturating_record(u64::from(r.compute_ns));
         if r.sent != 0 {
@@ -46,16 +54,40 @@ impl Latencies {
         }
     }
 
-    /// The report, after which everything starts from zero.
-    pub(super) fn take(&mut self) -> LatencyReport {
-        let report = LatencyReport {
+    /// What was seen so far.
+    #[must_use]
+    pub fn report(&self) -> LatencyReport {
+        LatencyReport {
             wake: percentiles(&self.wake),
             compute: percentiles(&self.compute),
             send: percentiles(&self.send),
             reply: percentiles(&self.reply),
             cycles: self.cycles,
             missed: self.missed,
-        };
+            longest_miss: self.longest_miss,
+        }
+    }
+
+    /// Histograms of wake-up, compute, send and reply: upper edge of each bin
+    /// (µs), each twice the one before, and how many fell into it.
+    #[must_use]
+    pub fn bins(&self) -> [Vec<(f64, u64)>; 4] {
+        [&self.wake, &self.compute, &self.send, &self.reply].map(|histogram| {
+            histogram
+                .iter_log(FIRST_BIN_NS, 2.0)
+                .map(|bin| {
+                    (
+                        us(bin.value_iterated_to()),
+                        bin.count_since_last_iteration(),
+                    )
+                })
+                .collect()
+        })
+    }
+
+    /// The report, after which everything starts from zero.
+    pub(super) fn take(&mut self) -> LatencyReport {
+        let report = self.report();
         for histogram in [
             &mut self.wake,
             &mut self.compute,
@@ -64,14 +96,17 @@ impl Latencies {
         ] {
             histogram.reset();
         }
-        (self.cycles, self.missed) = (0, 0);
+        (self.cycles, self.missed, self.longest_miss) = (0, 0, 0);
         report
     }
 }
 
+#[allow(clippy::cast_precision_loss, reason = "at most 1e10")]
+fn us(ns: u64) -> f64 {
+    ns as f64 / 1e3
+}
+
 fn percentiles(histogram: &Histogram<u64>) -> Percentiles {
-    #[allow(clippy::cast_precision_loss, reason = "at most 1e10")]
-    let us = |ns: u64| ns as f64 / 1e3;
     Percentiles {
         count: histogram.len(),
         p50_us: us(histogram.value_at_quantile(0.5)),
@@ -91,15 +126,25 @@ mod tests {
         for k in 1..=1000 {
             latencies.record(&CycleRecord {
                 wake_late_ns: k * 1000,
-                missed: u32::from(k == 7),
+                missed: [0, 0, 3][k as usize % 3] * u32::from(k < 7),
                 ..CycleRecord::default()
             });
         }
-        let report = latencies.take();
+        let report = latencies.report();
         assert_eq!(
-            (report.cycles, report.missed, report.reply.count),
-            (1000, 1, 0)
+            (report.cycles, report.missed, report.longest_miss),
+            (1000, 6, 3)
         );
+        assert_eq!(report.reply.count, 0);
+        let [wake, _, _, reply] = latencies.bins();
+        assert!(reply.is_empty());
+        assert_eq!(wake.iter().map(|(_, count)| count).sum::<u64>(), 1000);
+        // 1 µs, then up to 2, 4, ... 1024 µs.
+        assert!(
+            wake.len() == 11 && (wake[3].0 / 8.0 - 1.0).abs() < 0.01,
+            "{wake:?}"
+        );
+        assert_eq!(latencies.take(), report);
         for (found, expected) in [
             (report.wake.p50_us, 500.0),
             (report.wake.p99_us, 990.0),

@@ -23,7 +23,7 @@ use crate::set_up::OnDifference;
 use crate::transport::tcp::{LinkSettings, TcpLink};
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
-use latency::Latencies;
+pub use latency::Latencies;
 use shared_types::ipc::message::{ControllerEvent, ControllerRpc};
 use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{

@@ -348,6 +348,8 @@ pub struct LatencyReport {
     pub cycles: u64,
     /// Cycles missed.
     pub missed: u64,
+    /// Most cycles missed at once.
+    pub longest_miss: u32,
 }
 
 /// Answers of the controller.

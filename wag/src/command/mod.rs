@@ -6,6 +6,7 @@ mod check;
 mod demo;
 mod demo_summary;
 mod identify;
+mod latency;
 mod plan;
 mod process;
 mod rig;
@@ -35,6 +36,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Plan(PlanCommand::Drape(_)) => Err(plan::not_there("drape")),
         Command::Check(args) => check::run(args, quiet),
         Command::Throw(args) => throw::run(args, quiet),
+        Command::Latency(args) => latency::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Process(args) => process::run(args).map(|()| None),

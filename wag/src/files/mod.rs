@@ -1,11 +1,13 @@
 //! Files of people and runs: reading with errors that name file and field,
 //! writing so that nothing is ever half there.
 
+mod arm_response;
 mod atomic;
 mod limits;
 mod motion;
 mod rope;
 
+pub use arm_response::{read_excitation, write_arm_response};
 pub use atomic::{write_atomic, write_json};
 pub use limits::{default_limits, read_limits};
 pub use motion::{read_joints, read_pose, write_joints};

@@ -1,1 +1,116 @@
+//! `wag latency` on a simulated arm with a secret, over sockets, and again from
+//! the run it recorded.
 
+use super::{Errors, report, secret_lags};
+use hil_tests::arm::{ArmConfig, JointLag, SimulatedArm};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+use shared_types::{ArmResponse, JOINTS};
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Joints that are moved (1-based); the others rest.
+const MOVED: [usize; 3] = [1, 4, 6];
+
+fn wag(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn parsed(output: &Output) -> Value {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    serde_json::from_slice(&output.stdout).expect("standard output is one JSON object")
+}
+
+fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let response: ArmResponse = toml::from_str(&text).unwrap();
+    // A busy machine delays setpoints and reports; a joint it hides is said to be
+    // indistinct, which is right. What is said to be known must be.
+    let errors: Vec<Errors> = (1..)
+        .zip(&response.joints)
+        .filter_map(|(joint, found)| {
+            assert!(
+                found.lag().is_none() || MOVED.contains(&joint),
+                "joint {joint}: {text}"
+            );
+            let error = Errors::of(found.lag()?, &secrets[joint - 1]);
+            assert!(error.is_accepted(), "joint {joint}: {error:?}\n{text}");
+            Some(error)
+        })
+        .collect();
+    assert!(!errors.is_empty(), "{text}");
+    errors
+}
+
+#[test]
+fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
+    let secrets = secret_lags(&mut ChaCha8Rng::seed_from_u64(77));
+    let arm = SimulatedArm::start(ArmConfig {
+        command_port: 0,
+        report_ports: [0; 4],
+        seed: 77,
+        joint_lags: Some(secrets),
+        ..ArmConfig::default()
+    })
+    .unwrap();
+    let ports = arm.ports();
+    let dir = tempfile::tempdir().unwrap();
+    let run = dir.path().join("run");
+    let [command, joints, status] =
+        [ports.command, ports.reports[0], ports.reports[2]].map(|p| p.to_string());
+    let told = parsed(&wag(&[
+        "latency",
+        "--json",
+        "--arm",
+        "127.0.0.1",
+        "--command-port",
+        &command,
+        "--report-port",
+        &joints,
+        "--status-port",
+        &status,
+        "--joints",
+        "1,4,6",
+        "--seed",
+        "3",
+        "--out",
+        run.to_str().unwrap(),
+    ]));
+    assert_eq!(told["command"], "latency");
+    assert_eq!(told["excitation"]["seed"], 3);
+    assert_eq!(told["joints"].as_array().unwrap().len(), JOINTS);
+    assert!(told["loop"]["cycles"].as_u64().unwrap() > 2000);
+    for part in ["wake", "compute", "send", "reply"] {
+        let part = &told["loop"][part];
+        let binned: u64 = part["bins"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|b| b["count"].as_u64().unwrap())
+            .sum();
+        assert_eq!(part["count"].as_u64().unwrap(), binned);
+    }
+    let high = told["command_to_target"]["interval_s"][1].as_f64().unwrap();
+    assert!(high > 0.0 && high < 0.02, "{high}");
+    report(
+        "over sockets",
+        &check(&run.join("arm-response.toml"), &secrets),
+    );
+
+    let again = dir.path().join("again.toml");
+    let told = parsed(&wag(&[
+        "latency",
+        "--json",
+        "--run",
+        run.to_str().unwrap(),
+        "--response",
+        again.to_str().unwrap(),
+    ]));
+    assert!(told["command_to_target"].is_null() && told["excitation"].is_null());
+    report("from the run", &check(&again, &secrets));
+}

@@ -1,0 +1,127 @@
+//! Moving an arm so that its joints show how they follow.
+
+use super::Evidence;
+use crate::cli::LatencyArgs;
+use crate::command::area::require_clear_area;
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::files;
+use crate::pipeline::{self, ArmAddress, RunFolder};
+use crate::progress::Stage;
+use crate::session::{Session, watch_interrupts};
+use anyhow::anyhow;
+use planner::response::excitation::sweep;
+use shared_types::response::Excitation;
+use shared_types::{JOINTS, JointTrajectory, Limits, MotionTier};
+use std::net::IpAddr;
+use std::time::Duration;
+
+/// Part of the arm's speed limits used for the move to the pose.
+const MOVE_SPEED: f64 = 0.1;
+/// Rest before and after each sweep, so that every joint starts and ends at rest.
+const REST: Duration = Duration::from_millis(600);
+
+/// Moves the arm and keeps what was recorded; `None` for a dry run.
+pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Evidence>> {
+    let Some(address) = args.arm.address else {
+        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
+    };
+    let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
+    let mut excitation = match &args.excitation {
+        Some(path) => files::read_excitation(path).or_input()?,
+        None => Excitation::default(),
+    };
+    excitation.seed = args.seed.unwrap_or(excitation.seed);
+    let sweeps = sweeps(args, &excitation, &limits)?;
+    if args.arm.dry_run {
+        if !quiet {
+            let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
+            println!(
+                "dry run: {} sweeps keep all limits and would move {address} for {moving_s:.0} s",
+                sweeps.len()
+            );
+        }
+        return Ok(None);
+    }
+    require_clear_area(&args.arm, "MEASURE", quiet)?;
+    watch_interrupts().or_failed()?;
+    let folder = RunFolder::create(args.out.as_deref(), "latency")?;
+    let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
+    let result = stream(
+        &mut session,
+        &folder,
+        args,
+        address,
+        &limits,
+        &sweeps,
+        quiet,
+    );
+    session.end(result.is_ok());
+    let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
+    let kept = session.recorder.write(folder.path(), epoch_ns);
+    result.or_failed()?;
+    kept.or_failed()?;
+    let recorder = &mut session.recorder;
+    let reports = core::mem::take(&mut recorder.joints);
+    Ok(Some(Evidence {
+        source: format!("arm {address}:{}", args.arm.command_port),
+        folder: folder.path().to_owned(),
+        cycles: core::mem::take(&mut recorder.cycles),
+        has_targets: reports.iter().any(|r| r.arm_clock != 0),
+        reports,
+        excitation: Some(excitation),
+        camera_offset_s: None,
+    }))
+}
+
+/// The sweeps asked for, with their joints (1-based).
+fn sweeps(
+    args: &LatencyArgs,
+    excitation: &Excitation,
+    limits: &Limits,
+) -> Outcome<Vec<(usize, JointTrajectory)>> {
+    let joints: Vec<usize> = match args.joints.as_slice() {
+        [] => (1..=JOINTS).collect(),
+        named => named.iter().map(|j| usize::from(*j)).collect(),
+    };
+    joints
+        .into_iter()
+        .map(|joint| Ok((joint, sweep(excitation, limits, joint - 1).or_input()?)))
+        .collect()
+}
+
+fn stream(
+    session: &mut Session,
+    folder: &RunFolder,
+    args: &LatencyArgs,
+    ip: IpAddr,
+    limits: &Limits,
+    sweeps: &[(usize, JointTrajectory)],
+    quiet: bool,
+) -> anyhow::Result<()> {
+    let stage = Stage::begin("bring-up", quiet);
+    let address = ArmAddress {
+        ip,
+        command: args.arm.command_port,
+        joints: args.arm.report_port,
+        status: [args.arm.status_port; 2],
+    };
+    let link = pipeline::start_controller(session, folder, limits, address)?;
+    for warning in pipeline::acquire(session, &link)? {
+        tracing::warn!("{warning}");
+    }
+    stage.say("moving to the pose");
+    pipeline::arm_for(session, &link, MotionTier::SetUp)?;
+    if let Some((_, first)) = sweeps.first() {
+        pipeline::move_to(session, &link, first.start(), MOVE_SPEED)?;
+    }
+    stage.done("arm stands in the pose of the sweeps");
+    let stage = Stage::begin("sweep", quiet);
+    for (place, (joint, sweep)) in sweeps.iter().enumerate() {
+        stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
+        session.idle(REST)?;
+        pipeline::execute(&link, sweep)?.finish(session)?;
+    }
+    session.idle(REST)?;
+    stage.done(&format!("{} joints swept", sweeps.len()));
+    Ok(())
+}
