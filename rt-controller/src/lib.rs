@@ -41,6 +41,7 @@ pub mod overrun;
 pub mod point_to_point;
 pub mod ports;
 pub mod process;
+pub mod recording;
 pub mod relay;
 pub mod report_stream;
 pub mod reports;

@@ -2,13 +2,18 @@
 //! single-producer single-consumer, lock-free, sized once.
 
 use crate::arm_status::ArmStatus;
-use crate::control::{ControlEvent, CycleOutput, Motion, Order};
+use crate::control::{ControlEvent, ControlState, CycleOutput, Motion, Order};
+use crate::recording::{RecordedCycle, Snapshot};
 use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
-use shared_types::ipc::{CycleRecord, JointReport, Reports};
+use shared_types::ipc::{CycleRecord, InputRecord, JointReport, Reports};
 
 /// Cycle records kept while the relay is busy: sixteen seconds at 250 Hz.
 const RECORDS: usize = 4096;
+/// Whole states kept for the relay, one a second.
+const STATES: usize = 4;
+/// Cycles from one whole state to the next.
+const STATE_EVERY: u64 = 250;
 /// Joint reports kept for the relay: the same time.
 const REPORTS: usize = 4096;
 /// Joint reports kept for the loop; it takes them all every cycle.
@@ -47,6 +52,10 @@ pub struct RtPorts<T> {
     pub broken: BrokenReports,
     /// Events out.
     pub events: Producer<ControlEvent>,
+    /// What each cycle was told, out, before its record.
+    pub inputs: Producer<InputRecord>,
+    /// Whole states before a cycle, out, before that cycle's record.
+    pub states: Producer<Snapshot>,
     /// Cycle records out.
     pub records: Producer<CycleRecord>,
     /// What is to be dropped, out.
@@ -79,6 +88,22 @@ impl<T> RtPorts<T> {
         }
     }
 
+    /// Passes on the whole state once a second, before a cycle. RT-safe.
+    pub fn put_state(&mut self, control: &ControlState) {
+        if control.cycle().is_multiple_of(STATE_EVERY)
+            && !self.states.is_full()
+            && let Some(snapshot) = Snapshot::of(control)
+        {
+            let _ = self.states.push(snapshot);
+        }
+    }
+
+    /// Passes on what a cycle was told, before its record. RT-safe.
+    pub fn put_input(&mut self, told: InputRecord) {
+        // When the ring is full, so is that of the records, which counts losses.
+        let _ = self.inputs.push(told);
+    }
+
     /// Passes on what a cycle produced, its record first. RT-safe.
     pub fn put_out(&mut self, out: CycleOutput) {
         let record = CycleRecord {
@@ -108,10 +133,40 @@ pub struct RelayPorts<T> {
     pub status: Consumer<ArmStatus>,
     /// Events in.
     pub events: Consumer<ControlEvent>,
+    /// What each cycle was told, in.
+    pub inputs: Consumer<InputRecord>,
+    /// Whole states, in.
+    pub states: Consumer<Snapshot>,
     /// Cycle records in.
     pub records: Consumer<CycleRecord>,
     /// What is to be dropped, in.
     pub retired: Consumer<Retired<T>>,
+}
+
+impl<T> RelayPorts<T> {
+    /// What the cycle of a record was told, joined with that record; `None` if
+    /// it got lost.
+    pub fn recorded(&mut self, record: CycleRecord) -> Option<RecordedCycle> {
+        while self.inputs.peek().ok()?.cycle < record.cycle {
+            let _ = self.inputs.pop();
+        }
+        if self.inputs.peek().ok()?.cycle != record.cycle {
+            return None;
+        }
+        let input = self.inputs.pop().ok()?;
+        Some(RecordedCycle { input, record })
+    }
+
+    /// The state before a cycle, if it was passed on.
+    pub fn state_before(&mut self, cycle: u64) -> Option<Snapshot> {
+        while self.states.peek().is_ok_and(|s| s.next_cycle <= cycle) {
+            let found = self.states.pop().ok().filter(|s| s.next_cycle == cycle);
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    }
 }
 
 /// All rings of a controller.
@@ -137,6 +192,8 @@ pub fn rings<T>() -> Rings<T> {
     let (orders_in, orders) = RingBuffer::new(FEW);
     let (events, events_out) = RingBuffer::new(FEW);
     let (records, records_out) = RingBuffer::new(RECORDS);
+    let (inputs, inputs_out) = RingBuffer::new(RECORDS);
+    let (states, states_out) = RingBuffer::new(STATES);
     let (retired, retired_out) = RingBuffer::new(FEW);
     let (reports_to_rt, newest) = RingBuffer::new(NEWEST_REPORTS);
     let (reports_to_relay, reports) = RingBuffer::new(REPORTS);
@@ -149,6 +206,8 @@ pub fn rings<T>() -> Rings<T> {
             status,
             broken: BrokenReports::default(),
             events,
+            inputs,
+            states,
             records,
             retired,
             dropped: 0,
@@ -158,6 +217,8 @@ pub fn rings<T>() -> Rings<T> {
             reports,
             status: status_out,
             events: events_out,
+            inputs: inputs_out,
+            states: states_out,
             records: records_out,
             retired: retired_out,
         },

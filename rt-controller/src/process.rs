@@ -94,6 +94,7 @@ fn serve(relay: &mut Relay, threads: &Threads, stop: &AtomicBool) -> Result<(), 
         relay.turn();
         if !threads.loop_lives() {
             relay.stop_arm();
+            relay.end_recording();
             return Err(ControllerError::LoopEnded);
         }
         if stop.load(Ordering::Relaxed) {
@@ -106,6 +107,7 @@ fn serve(relay: &mut Relay, threads: &Threads, stop: &AtomicBool) -> Result<(), 
                 // Once more, for callers whose answer the last cycle brought.
                 std::thread::sleep(TURN);
                 relay.turn();
+                relay.end_recording();
                 return Ok(());
             }
         }

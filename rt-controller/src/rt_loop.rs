@@ -23,6 +23,7 @@
     )
 )]
 
+use crate::control::record::record_input;
 use crate::control::{ArmCodes, ControlState, CycleInput};
 use crate::os::Clock;
 use crate::overrun::{Wake, after_wake, next_wake};
@@ -88,7 +89,10 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
     /// One cycle, due at `deadline_ns` after `missed` skipped ones, that woke at
     /// `woke_ns`: take in, step, send, record; returns when it sent. RT-safe.
     pub fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) -> u64 {
+        self.ports.put_state(&self.control);
         let input = self.take_in(deadline_ns, missed);
+        let next = self.control.cycle().wrapping_add(1);
+        self.ports.put_input(record_input(&input, next));
         let mut out = self.control.step(input);
         let computed_ns = self.clock.now_ns();
         self.link.send(&out, computed_ns);

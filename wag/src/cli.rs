@@ -55,6 +55,12 @@ pub enum Command {
     Throw(ThrowArgs),
     /// Measure how late everything is: the control loop, each joint, the camera.
     Latency(LatencyArgs),
+    /// Attach to a running controller and record every one of its cycles.
+    Record(RecordArgs),
+    /// Step the controller's core over a recorded run again and compare every bit.
+    Replay(ReplayArgs),
+    /// Say why a run was stopped, or how close it came to its limits.
+    Explain(ExplainArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
     /// Measure how fast this machine runs a part of the system.
@@ -393,6 +399,37 @@ pub struct LatencyArgs {
     /// The arm's response (TOML). Default: arm-response.toml in the run folder.
     #[arg(long)]
     pub response: Option<PathBuf>,
+}
+
+/// Arguments of `wag record`.
+#[derive(Debug, Args)]
+pub struct RecordArgs {
+    /// Shared-memory domain of the controller, as in its configuration.
+    #[arg(long, default_value = "wag")]
+    pub domain: String,
+    /// Stop after this long (s); default: on Ctrl-C.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+    /// Folder for the run; it must not exist. Default: runs/TIME-record.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `wag replay`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// Run folder, or its file cycles.bin.
+    pub run: PathBuf,
+    /// First cycle to compare; the core is stepped from the keyframe before.
+    #[arg(long, default_value_t = 0)]
+    pub from_cycle: u64,
+}
+
+/// Arguments of `wag explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// Run folder, or its file cycles.bin.
+    pub run: PathBuf,
 }
 
 /// Arguments of `wag score`.

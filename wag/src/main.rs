@@ -23,6 +23,7 @@ mod failure;
 mod files;
 mod pipeline;
 mod progress;
+mod recording;
 mod session;
 mod table;
 

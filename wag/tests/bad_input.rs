@@ -60,7 +60,13 @@ fn prepare() -> tempfile::TempDir {
     );
     put("text.toml", "this is not toml");
     put("damaged.json", "{\"version\": ");
-    put("notvideo.avi", "RIFF but not really");
+    put(
+        "notvideo.avi",
+        "RIFF but not really, and long enough for a header",
+    );
+    put("empty.bin", "");
+    put("cut.bin", "WAGR\u{1}\0\u{1}\0");
+    put("other.bin", &format!("WAGR\u{9}{}", "\0".repeat(40)));
     put("camera.toml", "calibration = \"none.conf\"\n");
     put("limits.toml", "rate_hz = 250\n");
     put(
@@ -89,6 +95,38 @@ const CASES: &[Case] = &[
     (&["demo", "--out", "."], 2, &["exists already"]),
     (&["demo", "--out", "rope.toml/run"], 2, &["rope.toml/run"]),
     (&["demo", "--task", "lob"], 1, &["lob", "not implemented"]),
+    (&["replay", "none.run"], 2, &["none.run", "does not exist"]),
+    (&["replay", "."], 2, &["no run folder", "cycles.bin"]),
+    (&["replay", "empty.bin"], 2, &["empty.bin", "is empty"]),
+    (
+        &["replay", "notvideo.avi"],
+        2,
+        &["notvideo.avi", "no recording"],
+    ),
+    (
+        &["replay", "cut.bin"],
+        2,
+        &["cut.bin", "cut off", "first chunk"],
+    ),
+    (&["replay", "other.bin"], 2, &["other.bin", "layout 9"]),
+    (&["explain", "none.run"], 2, &["none.run", "does not exist"]),
+    (&["explain", "."], 2, &["no run folder", "cycles.bin"]),
+    (&["explain", "empty.bin"], 2, &["empty.bin", "is empty"]),
+    (
+        &["explain", "notvideo.avi"],
+        2,
+        &["notvideo.avi", "no recording"],
+    ),
+    (
+        &["explain", "cut.bin"],
+        2,
+        &["cut.bin", "cut off", "first chunk"],
+    ),
+    (&["explain", "other.bin"], 2, &["other.bin", "layout 9"]),
+    (&["replay", ".", "--from-cycle=x"], 2, &["--from-cycle"]),
+    (&["record", "--out", "."], 2, &["exists already"]),
+    (&["record", "--seconds", "0"], 2, &["--seconds"]),
+    (&["record", "--domain", "a b"], 2, &["a b", "letters"]),
     (&["rig", "--report-ports", "1,2"], 2, &["four ports"]),
     (&["rig", "--bind", "here"], 2, &["--bind"]),
     (&["rig", "--faults", "f.toml"], 2, &["f.toml"]),

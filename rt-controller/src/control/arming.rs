@@ -10,13 +10,14 @@
 //!
 //! Nothing re-arms by itself.
 
+use serde::{Deserialize, Serialize};
 use shared_types::{Arming, FaultCode, MotionTier};
 
 /// Longest time from arming a throw to its begin (ns).
 pub const THROW_WITHIN_NS: u64 = 10_000_000_000;
 
 /// What motions are allowed. RT-safe.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ArmingState {
     /// None.
     #[default]

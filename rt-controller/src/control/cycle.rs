@@ -14,6 +14,7 @@ use super::settings::ControlSettings;
 use super::stopping::Stop;
 use super::velocity_wire::VelocityWire;
 use crate::xarm::Status;
+use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
     CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION,
 };
@@ -26,7 +27,7 @@ pub(super) struct Running {
     pub(super) motion: Box<Motion>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Stopping {
     pub(super) start_ns: u64,
     pub(super) stop: Stop,
@@ -36,7 +37,7 @@ pub(super) struct Stopping {
 ///
 /// An adoption makes it anew, apart from its counters: a recorded run can be
 /// stepped again from any adoption on, see [`ControlState::resume`].
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct ControlState {
     pub(super) limits: Limits,
     pub(super) settings: ControlSettings,
@@ -52,6 +53,7 @@ pub struct ControlState {
     pub(super) tcp_speed_max_m_s: f64,
     pub(super) wire: VelocityWire,
     pub(super) monitor: Monitor,
+    #[serde(skip)]
     pub(super) running: Option<Running>,
     pub(super) stopping: Option<Stopping>,
 }

@@ -1,10 +1,11 @@
 //! What a check found: the fault, and by how much.
 
+use serde::{Deserialize, Serialize};
 use shared_types::FaultCode;
 use shared_types::ipc::LimitBroken;
 
 /// A fault with the numbers that make it one. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// The fault.
     pub fault: FaultCode,

@@ -13,6 +13,7 @@
 
 use super::finding::Finding;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use shared_types::{FaultCode, JOINTS, JointVector, Limits, kinematics};
 
 /// Relative slack.
@@ -38,7 +39,7 @@ pub struct Allowance {
 }
 
 /// What was sent last, and how fast that was. RT-safe.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Limiter {
     q: JointVector,
     qd: JointVector,

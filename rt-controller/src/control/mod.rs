@@ -32,6 +32,7 @@ pub mod phases;
 pub mod reaction;
 pub mod record;
 pub mod settings;
+pub mod snapshot;
 pub mod stopping;
 pub mod velocity_wire;
 

@@ -11,10 +11,11 @@
 )]
 
 use super::motion::Motion;
+use serde::{Deserialize, Serialize};
 use shared_types::JointState;
 
 /// A slow-down to rest along the path. RT-safe.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlowDown {
     /// Time on the path at its begin (s).
     pub from_s: f64,

@@ -16,6 +16,7 @@ use super::motion::Motion;
 use super::path_clock::SlowDown;
 use super::phases::PhasedMotion;
 use super::reaction::Path;
+use serde::{Deserialize, Serialize};
 use shared_types::{JointState, Limits};
 
 /// Durations of slow-downs that are tried (s).
@@ -27,7 +28,7 @@ const HARDER: [f64; 3] = [1.0, 2.0, 5.0];
 const CYCLES_MAX: u32 = 1000;
 
 /// A way to rest, from the state commanded last. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[allow(
     clippy::large_enum_variant,
     reason = "there is one, in place: the real-time path makes no boxes"

@@ -13,6 +13,7 @@
 )]
 
 use super::exchange::ArmCommand;
+use serde::{Deserialize, Serialize};
 use shared_types::{JOINTS, JointState, JointVector, Limits, kinematics};
 
 /// Gain of the position loop (1/s): slow beside the arm's own response, so that
@@ -24,7 +25,7 @@ pub const CORRECTION_MAX_RAD_S: f64 = 0.2;
 pub const DURATION_CYCLES: f64 = 3.0;
 
 /// The velocity sent last. RT-safe.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct VelocityWire {
     qd: JointVector,
 }

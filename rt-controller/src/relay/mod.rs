@@ -8,6 +8,7 @@
 
 mod answers;
 mod latency;
+mod recording;
 mod requests;
 mod uploads;
 
@@ -24,6 +25,7 @@ use crate::transport::tcp::{LinkSettings, TcpLink};
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
 pub use latency::Latencies;
+use recording::RecordingFeed;
 use shared_types::ipc::message::{ControllerEvent, ControllerRpc};
 use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
@@ -108,6 +110,7 @@ pub struct Relay {
     server: RpcServer<ControllerRpc>,
     cycles: CyclePublisher,
     joints: JointPublisher,
+    recording: RecordingFeed,
     latencies: Latencies,
     newest: CycleRecord,
     newest_report: Option<JointReport>,
@@ -152,6 +155,7 @@ impl Relay {
             server: RpcServer::open(bus)?,
             cycles: bus.cycle_publisher()?,
             joints: bus.joint_publisher()?,
+            recording: RecordingFeed::open(bus)?,
             latencies: Latencies::new()?,
             newest: CycleRecord::default(),
             newest_report: None,
@@ -197,6 +201,11 @@ impl Relay {
         }
     }
 
+    /// Hands out what is recorded but not sent yet; the last thing to do.
+    pub fn end_recording(&mut self) {
+        self.recording.flush();
+    }
+
     /// Asks the loop to brake and latch.
     pub fn stop(&mut self) {
         let _ = self.order(Order::Stop, None);
@@ -217,6 +226,12 @@ impl Relay {
             self.latencies.record(&record);
             self.newest = record;
             failed = self.cycles.send_copy(record).err().or(failed);
+            if let Some(state) = self.ports.state_before(record.cycle) {
+                self.recording.state(&state);
+            }
+            if let Some(cycle) = self.ports.recorded(record) {
+                self.recording.cycle(&cycle);
+            }
         }
         while let Ok(report) = self.ports.reports.pop() {
             self.newest_report = Some(report);
@@ -271,7 +286,10 @@ impl Relay {
                 end_ns,
             } => self.on_finished(id, start_ns, end_ns),
             ControlEvent::Refused { id, fault } => self.on_refused(id, fault),
-            ControlEvent::Latched(cause) => self.on_latched(cause.fault(), cause.cycle),
+            ControlEvent::Latched(cause) => {
+                self.recording.cause(&cause);
+                self.on_latched(cause.fault(), cause.cycle);
+            }
             ControlEvent::Armed(arming) => {
                 tracing::info!(?arming, "armed");
                 self.tier = Some(arming.tier);
@@ -371,6 +389,7 @@ impl Relay {
     fn begin(&mut self, call: ControllerCall, motion: Box<Motion>, next: VecDeque<Box<Motion>>) {
         self.last_id += 1;
         let id = self.last_id;
+        self.recording.motion(id, &motion);
         match self.order(Order::Run { id, motion }, None) {
             Ok(()) => self.open.push(Open::Motion { call, id, next }),
             Err(fault) => refuse(&call, fault, ""),

@@ -26,11 +26,16 @@ pub type CycleSubscriber = Subscriber<Transport, CycleRecord, ()>;
 pub type JointPublisher = Publisher<Transport, JointReport, ()>;
 /// Receives joint reports.
 pub type JointSubscriber = Subscriber<Transport, JointReport, ()>;
+/// Publishes the chunks of a recording.
+pub type ChunkPublisher = Publisher<Transport, [u8], ()>;
+/// Receives the chunks of a recording.
+pub type ChunkSubscriber = Subscriber<Transport, [u8], ()>;
 
 const FRAMES: &str = "wag/v1/camera/frames";
 const KEYPOINTS: &str = "wag/v1/camera/keypoints";
 const CYCLES: &str = "wag/v1/controller/cycles";
 const JOINTS: &str = "wag/v1/controller/joints";
+const RECORDING: &str = "wag/v1/controller/recording";
 
 /// Frames a slow subscriber may lag behind before it loses the oldest.
 const FRAME_BUFFER: usize = 16;
@@ -38,6 +43,8 @@ const FRAME_BUFFER: usize = 16;
 const KEYPOINT_BUFFER: usize = 1024;
 /// Cycle records and joint reports kept for a subscriber: four seconds.
 const RECORD_BUFFER: usize = 1024;
+/// Chunks of a recording kept for a subscriber, ten to the second: twelve seconds.
+const CHUNK_BUFFER: usize = 128;
 
 /// One process's connection to a shared-memory domain.
 ///
@@ -245,5 +252,46 @@ impl Bus {
             .buffer_size(RECORD_BUFFER)
             .create()
             .map_err(open_error(JOINTS))
+    }
+
+    fn chunks(&self) -> Result<publish_subscribe::PortFactory<Transport, [u8], ()>, IpcError> {
+        self.service(RECORDING)?
+            .publish_subscribe::<[u8]>()
+            .max_publishers(1)
+            .max_subscribers(3)
+            .max_nodes(8)
+            .subscriber_max_buffer_size(CHUNK_BUFFER)
+            .subscriber_max_borrowed_samples(1)
+            .history_size(0)
+            .enable_safe_overflow(true)
+            .open_or_create()
+            .map_err(open_error(RECORDING))
+    }
+
+    /// Publishes chunks of a recording, of at most `chunk_bytes` bytes. One per
+    /// domain; the relay thread's.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn chunk_publisher(&self, chunk_bytes: usize) -> Result<ChunkPublisher, IpcError> {
+        self.chunks()?
+            .publisher_builder()
+            .initial_max_slice_len(chunk_bytes)
+            .max_loaned_samples(1)
+            .create()
+            .map_err(open_error(RECORDING))
+    }
+
+    /// Receives chunks of a recording; a slow reader loses the oldest, never
+    /// slows the controller.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn chunk_subscriber(&self) -> Result<ChunkSubscriber, IpcError> {
+        self.chunks()?
+            .subscriber_builder()
+            .buffer_size(CHUNK_BUFFER)
+            .create()
+            .map_err(open_error(RECORDING))
     }
 }

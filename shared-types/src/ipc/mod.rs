@@ -12,6 +12,7 @@
 //! | [`Bus::keypoint_publisher`] | tracker -> planner, recorder | pub-sub |
 //! | [`Bus::cycle_publisher`] | controller's relay -> recorder | pub-sub |
 //! | [`Bus::joint_publisher`] | controller's relay -> recorder | pub-sub |
+//! | [`Bus::chunk_publisher`] | controller's relay -> recorder | pub-sub of bytes: every cycle's inputs and answers |
 //! | [`ControllerBoards`] | controller state out, heartbeats of operator and guardian in | blackboard |
 //! | [`rpc`] | `wag` <-> camera, planner, controller, rig | request-response, streamed answers |
 //!
@@ -30,8 +31,8 @@ mod sweep;
 
 pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, StateReader};
 pub use bus::{
-    Bus, CyclePublisher, CycleSubscriber, FramePublisher, FrameSubscriber, JointPublisher,
-    JointSubscriber, KeypointPublisher, KeypointSubscriber,
+    Bus, ChunkPublisher, ChunkSubscriber, CyclePublisher, CycleSubscriber, FramePublisher,
+    FrameSubscriber, JointPublisher, JointSubscriber, KeypointPublisher, KeypointSubscriber,
 };
 pub use cause::{CauseRecord, LimitBroken, RunCounts};
 pub use input::{

@@ -8,6 +8,7 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::pipeline::{self, ArmAddress, ArmLink, CalmInput, Film, RunFolder};
 use crate::progress::Stage;
+use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::{Session, watch_interrupts};
 use anyhow::{Context, anyhow, bail};
 use hil_tests::render::Appearance;
@@ -69,10 +70,15 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let began = Instant::now();
     let mut record = DemoRecord::new(args.seed, target_m, &folder);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
+    session
+        .record_cycles(&folder.file(CYCLES_FILE))
+        .or_failed()?;
     let result = throw_once(&folder, &mut session, &mut record, quiet);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let kept = session.recorder.write(folder.path(), record.epoch_ns());
+    record.recording.clone_from(&session.recorded);
+    explain_stop(folder.path(), quiet);
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
     files::write_json(&folder.file("summary.json"), &record).or_failed()?;
     result

@@ -1,6 +1,7 @@
 //! What a demo keeps and shows: every stage's figures, and the truth apart.
 
 use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
+use crate::recording::RecordingReport;
 use crate::table;
 use anyhow::bail;
 use comfy_table::Table;
@@ -107,6 +108,8 @@ pub struct DemoRecord {
     /// What the real-time set-up could not get.
     pub warnings: Vec<String>,
     truth: Option<TruthFigures>,
+    /// What became of the recording of control cycles.
+    pub recording: Option<RecordingReport>,
 }
 
 impl DemoRecord {
@@ -137,6 +140,7 @@ impl DemoRecord {
             latency: None,
             warnings: Vec::new(),
             truth: None,
+            recording: None,
         }
     }
 

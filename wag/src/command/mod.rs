@@ -5,10 +5,13 @@ mod bench;
 mod check;
 mod demo;
 mod demo_summary;
+mod explain;
 mod identify;
 mod latency;
 mod plan;
 mod process;
+mod record;
+mod replay;
 mod rig;
 mod score;
 mod sim;
@@ -37,6 +40,9 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Check(args) => check::run(args, quiet),
         Command::Throw(args) => throw::run(args, quiet),
         Command::Latency(args) => latency::run(args, quiet),
+        Command::Record(args) => record::run(args, quiet),
+        Command::Replay(args) => replay::run(args, quiet),
+        Command::Explain(args) => explain::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Process(args) => process::run(args).map(|()| None),

@@ -7,6 +7,7 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::pipeline::{self, ArmAddress, RunFolder};
 use crate::progress::Stage;
+use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::{Session, watch_interrupts};
 use anyhow::anyhow;
 use serde_json::{Value, json};
@@ -46,6 +47,9 @@ pub fn drive(
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
+    session
+        .record_cycles(&folder.file(CYCLES_FILE))
+        .or_failed()?;
     let tier = match name {
         "throw" => MotionTier::Throw,
         _ => MotionTier::Wiggle,
@@ -54,10 +58,12 @@ pub fn drive(
     session.end(result.is_ok());
     let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
     let kept = session.recorder.write(folder.path(), epoch_ns);
-    let summary = match &result {
+    let mut summary = match &result {
         Ok(value) => value.clone(),
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
     };
+    summary["recording"] = json!(session.recorded);
+    explain_stop(folder.path(), quiet);
     files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
     let value = result.or_failed()?;
     kept.or_failed()?;

@@ -2,6 +2,7 @@
 //! operator's heartbeat, the recorder, and what to show meanwhile.
 
 use super::{ProcessSpec, Recorder, Supervisor};
+use crate::recording::{RecordingReport, RecordingThread};
 use anyhow::{Context, anyhow, bail};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
@@ -42,8 +43,12 @@ pub struct Session {
     supervisor: Supervisor,
     /// Everything received.
     pub recorder: Recorder,
+    recording: Option<RecordingThread>,
+    /// What became of the recording of control cycles, once the session ended.
+    pub recorded: Option<RecordingReport>,
     bus: Bus,
     _sweep: DomainSweep,
+    domain: String,
     log_folder: PathBuf,
     last_beat: Instant,
 }
@@ -59,11 +64,21 @@ impl Session {
             operator: None,
             supervisor: Supervisor::default(),
             recorder: Recorder::open(&bus)?,
+            recording: None,
+            recorded: None,
             bus,
             _sweep: DomainSweep::new(domain),
+            domain: domain.to_owned(),
             log_folder: log_folder.to_owned(),
             last_beat: Instant::now(),
         })
+    }
+
+    /// Records every control cycle of this session in `path`; call it before the
+    /// controller is started.
+    pub fn record_cycles(&mut self, path: &Path) -> anyhow::Result<()> {
+        self.recording = Some(RecordingThread::start(&self.domain, path)?);
+        Ok(())
     }
 
     /// Starts a process.
@@ -205,6 +220,17 @@ impl Session {
         }
         let _ = self.recorder.drain();
         self.supervisor.stop();
+        if let Some(recording) = self.recording.take() {
+            let report = recording.finish();
+            if let Some(error) = &report.disk_error {
+                tracing::warn!(
+                    unwritten = report.unwritten_chunks,
+                    %error,
+                    "the recording of control cycles is not whole: make room on the disk"
+                );
+            }
+            self.recorded = Some(report);
+        }
         self.bus.remove_leftovers();
     }
 }

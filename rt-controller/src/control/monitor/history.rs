@@ -5,14 +5,16 @@
     reason = "arithmetic of float vectors only; integers use wrapping calls"
 )]
 
+use serde::{Deserialize, Serialize};
 use shared_types::{JOINTS, JointVector, MonotonicNs};
 
 /// Setpoints remembered: 0.25 s at 250 Hz.
 const LENGTH: usize = 64;
 
 /// Fixed size, oldest overwritten. RT-safe.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Commanded {
+    #[serde(with = "crate::control::snapshot::array")]
     sent: [(u64, JointVector); LENGTH],
     next: usize,
 }

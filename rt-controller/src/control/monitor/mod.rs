@@ -13,6 +13,7 @@ use super::reaction::{Path, reaction};
 use super::settings::ControlSettings;
 use history::Commanded;
 use reports::ReportWatch;
+use serde::{Deserialize, Serialize};
 use shared_types::ipc::{ControllerMode, JointReport, RunCounts};
 use shared_types::{FaultCode, JointVector, Limits};
 
@@ -22,7 +23,7 @@ use shared_types::{FaultCode, JointVector, Limits};
 const SETTLE_NS: u64 = 300_000_000;
 
 /// A heartbeat: its count and when it last changed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 struct Heard {
     count: u64,
     at_ns: u64,
@@ -44,7 +45,7 @@ impl Heard {
 }
 
 /// What the monitors remember from cycle to cycle. RT-safe.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Monitor {
     settings: ControlSettings,
     commanded: Commanded,

@@ -9,6 +9,7 @@
 use super::history::Commanded;
 use crate::control::finding::Finding;
 use crate::control::settings::Thresholds;
+use serde::{Deserialize, Serialize};
 use shared_types::ipc::JointReport;
 use shared_types::{FaultCode, JOINTS, JointVector, Limits, MonotonicNs};
 
@@ -35,7 +36,7 @@ const TARGET_RAD: f64 = 0.05;
 const FOREIGN_TARGETS: u32 = 5;
 
 /// What is remembered of the reports. RT-safe.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReportWatch {
     newest: Option<JointReport>,
     /// Since when the values are the same, to the bit (stamp, ns).

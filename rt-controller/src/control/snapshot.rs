@@ -1,0 +1,110 @@
+//! The whole state as bytes and back, for keyframes of recordings.
+//!
+//! The running motion is named by number and fingerprint; everything else is
+//! in the bytes, limits and thresholds included.
+
+use super::cycle::{ControlState, Running};
+use super::motion::Motion;
+use super::settings::ControlSettings;
+use serde::{Deserialize, Serialize};
+use shared_types::Limits;
+
+/// The running motion without its content.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Named {
+    id: u64,
+    start_ns: u64,
+    hash: u64,
+}
+
+impl ControlState {
+    /// The limits it keeps.
+    #[must_use]
+    pub const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// What it is configured to do.
+    #[must_use]
+    pub const fn settings(&self) -> &ControlSettings {
+        &self.settings
+    }
+
+    /// Writes the state to the front of `bytes`; returns how many were needed,
+    /// `None` when there are too few. RT-safe.
+    #[must_use]
+    pub fn write_to(&self, bytes: &mut [u8]) -> Option<usize> {
+        let named = self.running.as_ref().map(|running| Named {
+            id: running.id,
+            start_ns: running.start_ns,
+            hash: running.motion.fingerprint(),
+        });
+        postcard::to_slice(&(named, self), bytes)
+            .ok()
+            .map(|written| written.len())
+    }
+
+    /// The state that [`ControlState::write_to`] wrote; `motion_of` finds the
+    /// running motion by number and fingerprint. `None` when the bytes are of
+    /// another version or the motion is not there.
+    pub fn read_from(
+        bytes: &[u8],
+        motion_of: impl FnOnce(u64, u64) -> Option<Box<Motion>>,
+    ) -> Option<Self> {
+        let ((named, mut state), rest) =
+            postcard::take_from_bytes::<(Option<Named>, Self)>(bytes).ok()?;
+        if !rest.is_empty() {
+            return None;
+        }
+        if let Some(Named { id, start_ns, hash }) = named {
+            state.running = Some(Running {
+                id,
+                start_ns,
+                motion: motion_of(id, hash)?,
+            });
+        }
+        Some(state)
+    }
+}
+
+/// Arrays longer than serde's own, as plain rows of their elements.
+pub(super) mod array {
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::ser::{Serialize, SerializeTuple, Serializer};
+
+    pub(crate) fn serialize<S: Serializer, T: Serialize, const N: usize>(
+        items: &[T; N],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        let mut row = serializer.serialize_tuple(N)?;
+        for item in items {
+            row.serialize_element(item)?;
+        }
+        row.end()
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+        deserializer: D,
+    ) -> Result<[T; N], D::Error> {
+        let mut items = heapless::Vec::<T, N>::new();
+        struct Row<'a, T, const N: usize>(&'a mut heapless::Vec<T, N>);
+        impl<'de, T: Deserialize<'de>, const N: usize> serde::de::Visitor<'de> for Row<'_, T, N> {
+            type Value = ();
+            fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                write!(f, "{N} elements")
+            }
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut row: A) -> Result<(), A::Error> {
+                while let Some(item) = row.next_element()? {
+                    self.0
+                        .push(item)
+                        .map_err(|_full| A::Error::custom("too many elements"))?;
+                }
+                Ok(())
+            }
+        }
+        deserializer.deserialize_tuple(N, Row(&mut items))?;
+        items
+            .into_array()
+            .map_err(|_short| D::Error::custom("too few elements"))
+    }
+}

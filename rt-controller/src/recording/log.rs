@@ -1,0 +1,278 @@
+//! Chunks back into items, past every kind of damage.
+
+use super::chunk::{self, Front};
+use super::item::Item;
+use core::fmt;
+
+/// Why bytes are no recording at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LogError {
+    /// Nothing in it.
+    #[error("the recording is empty: nothing was recorded, or the disk was full")]
+    Empty,
+    /// Something else.
+    #[error("this is no recording of control cycles: it does not begin with a chunk")]
+    Foreign,
+    /// Another version.
+    #[error(
+        "the recording has layout {found}, this program reads layout {}; use the version of `wag` that made it",
+        chunk::FORMAT
+    )]
+    Format {
+        /// Layout found.
+        found: u16,
+    },
+    /// The first chunk is not whole.
+    #[error("the recording is cut off within its first chunk ({bytes} bytes): nothing can be read")]
+    Cut {
+        /// Bytes there are.
+        bytes: usize,
+    },
+}
+
+/// A place where a recording does not go on as it should.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flaw {
+    /// Chunks that never reached the file.
+    Lost {
+        /// How many.
+        chunks: u32,
+        /// Number of the chunk after them.
+        before: u32,
+    },
+    /// Bytes that are no chunk, or one with a wrong checksum.
+    Damaged {
+        /// Where they begin in the file.
+        offset: usize,
+        /// How many.
+        bytes: usize,
+    },
+    /// The file ends within a chunk.
+    Cut {
+        /// Where that chunk begins in the file.
+        offset: usize,
+        /// Bytes of it that are there.
+        bytes: usize,
+    },
+}
+
+impl fmt::Display for Flaw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost { chunks, before } => write!(
+                f,
+                "{chunks} chunk(s) before chunk {before} never reached the file"
+            ),
+            Self::Damaged { offset, bytes } => {
+                write!(f, "{bytes} bytes from byte {offset} on are damaged")
+            }
+            Self::Cut { offset, bytes } => write!(
+                f,
+                "the file ends within a chunk: the last {bytes} bytes, from byte {offset} on, cannot be read"
+            ),
+        }
+    }
+}
+
+/// What comes next in a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Read {
+    /// An item.
+    Item(Item),
+    /// Something is missing here; items go on behind it, from a keyframe they
+    /// make sense again.
+    Flaw(Flaw),
+}
+
+/// Reads a recording item by item.
+#[derive(Debug, Clone)]
+pub struct LogReader<'a> {
+    bytes: &'a [u8],
+    offset: usize,
+    /// Items left of the present chunk, and where it began.
+    items: &'a [u8],
+    chunk_at: usize,
+    next_sequence: Option<u32>,
+}
+
+impl<'a> LogReader<'a> {
+    /// Looks at the first chunk.
+    ///
+    /// # Errors
+    /// [`LogError`].
+    pub fn open(bytes: &'a [u8]) -> Result<Self, LogError> {
+        match chunk::read(bytes) {
+            _ if bytes.is_empty() => Err(LogError::Empty),
+            Front::OtherFormat(found) => Err(LogError::Format { found }),
+            Front::Cut if chunk::distance_to_next(bytes) == bytes.len() => {
+                Err(LogError::Cut { bytes: bytes.len() })
+            }
+            // A damaged first chunk does not matter if others follow.
+            Front::Damaged if chunk::distance_to_next(bytes) == bytes.len() => {
+                Err(LogError::Foreign)
+            }
+            Front::Chunk { .. } | Front::Cut | Front::Damaged => Ok(Self {
+                bytes,
+                offset: 0,
+                items: &[],
+                chunk_at: 0,
+                next_sequence: None,
+            }),
+        }
+    }
+
+    /// Steps over what cannot be read.
+    fn skip(&mut self, rest: &[u8]) -> Flaw {
+        let offset = self.offset;
+        let bytes = chunk::distance_to_next(rest);
+        self.offset += bytes;
+        Flaw::Damaged { offset, bytes }
+    }
+
+    /// Takes in the next chunk; `None` at the end.
+    fn next_chunk(&mut self) -> Option<Option<Flaw>> {
+        let rest = self.bytes.get(self.offset..).filter(|r| !r.is_empty())?;
+        match chunk::read(rest) {
+            Front::Chunk {
+                header,
+                payload,
+                len,
+            } => {
+                self.chunk_at = self.offset;
+                self.items = payload;
+                self.offset += len;
+                let expected = self.next_sequence.unwrap_or(header.sequence);
+                self.next_sequence = Some(header.sequence.wrapping_add(1));
+                // A controller that starts anew counts from zero again.
+                let missing = header.sequence.wrapping_sub(expected);
+                let anew = header.sequence == 0;
+                Some((missing != 0 && !anew).then_some(Flaw::Lost {
+                    chunks: missing,
+                    before: header.sequence,
+                }))
+            }
+            Front::Cut if chunk::distance_to_next(rest) == rest.len() => {
+                let flaw = Flaw::Cut {
+                    offset: self.offset,
+                    bytes: rest.len(),
+                };
+                self.offset = self.bytes.len();
+                Some(Some(flaw))
+            }
+            Front::Cut | Front::OtherFormat(_) | Front::Damaged => {
+                // The checksum says that a chunk is missing; the numbers need not.
+                self.next_sequence = None;
+                Some(Some(self.skip(rest)))
+            }
+        }
+    }
+}
+
+impl Iterator for LogReader<'_> {
+    type Item = Read;
+
+    fn next(&mut self) -> Option<Read> {
+        while self.items.is_empty() {
+            if let Some(flaw) = self.next_chunk()? {
+                return Some(Read::Flaw(flaw));
+            }
+        }
+        match postcard::take_from_bytes::<Item>(self.items) {
+            Ok((item, rest)) => {
+                self.items = rest;
+                Some(Read::Item(item))
+            }
+            // The checksum is right, so it was written by another layout.
+            Err(_unknown) => {
+                self.items = &[];
+                Some(Read::Flaw(Flaw::Damaged {
+                    offset: self.chunk_at,
+                    bytes: self.offset - self.chunk_at,
+                }))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ChunkWriter, RecordedCycle};
+    use super::*;
+
+    fn recording(cycles: u64) -> Vec<u8> {
+        let mut writer = ChunkWriter::default();
+        let mut bytes = Vec::new();
+        for cycle in 1..=cycles {
+            let mut one = RecordedCycle::default();
+            one.input.cycle = cycle;
+            bytes.extend(writer.cycle(&one).unwrap_or_default());
+        }
+        bytes.extend(writer.flush().unwrap_or_default());
+        bytes
+    }
+
+    fn cycles(bytes: &[u8]) -> (Vec<u64>, Vec<Flaw>) {
+        let (mut found, mut flaws) = (Vec::new(), Vec::new());
+        for read in LogReader::open(bytes).unwrap() {
+            match read {
+                Read::Item(Item::Cycle(c)) => found.push(c.input.cycle),
+                Read::Item(other) => panic!("{other:?}"),
+                Read::Flaw(flaw) => flaws.push(flaw),
+            }
+        }
+        (found, flaws)
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_reads_up_to_its_last_whole_chunk() {
+        let bytes = recording(60);
+        assert_eq!(cycles(&bytes), ((1..=60).collect(), vec![]));
+        let first = chunk::distance_to_next(&bytes);
+        for cut in (first..bytes.len()).step_by(97) {
+            let (found, flaws) = cycles(&bytes[..cut]);
+            assert!(matches!(found.len(), 25 | 50), "{} at {cut}", found.len());
+            let whole = cut % first == 0;
+            assert_eq!(flaws.is_empty(), whole, "{flaws:?}");
+        }
+        assert_eq!(
+            LogReader::open(&bytes[..first - 1]).unwrap_err(),
+            LogError::Cut { bytes: first - 1 }
+        );
+    }
+
+    #[test]
+    fn damage_and_losses_are_told_apart_and_stepped_over() {
+        let bytes = recording(75);
+        let chunk = chunk::distance_to_next(&bytes);
+        let mut damaged = bytes.clone();
+        damaged[chunk + 100] ^= 1;
+        let (found, flaws) = cycles(&damaged);
+        assert_eq!(found, (1..=25).chain(51..=75).collect::<Vec<_>>());
+        assert_eq!(
+            flaws,
+            [Flaw::Damaged {
+                offset: chunk,
+                bytes: chunk
+            }]
+        );
+        let mut lost = bytes.clone();
+        lost.drain(chunk..2 * chunk);
+        assert_eq!(
+            cycles(&lost).1,
+            [Flaw::Lost {
+                chunks: 1,
+                before: 2
+            }]
+        );
+    }
+
+    #[test]
+    fn what_is_no_recording_is_refused() {
+        let open = |bytes: &[u8]| LogReader::open(bytes).unwrap_err();
+        assert_eq!(open(b""), LogError::Empty);
+        assert_eq!(open(b"t,q1,q2\n0,0,0\n and so on"), LogError::Foreign);
+        let mut other = recording(1);
+        other[4] = 9;
+        assert_eq!(open(&other), LogError::Format { found: 9 });
+    }
+}

@@ -1,0 +1,89 @@
+//! `wag replay`: steps the controller's core over a recorded run again and
+//! compares every record, bit by bit.
+
+use crate::cli::ReplayArgs;
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::recording::read_recording;
+use anyhow::{Context, anyhow};
+use rt_controller::recording::{Gap, Replay, replay};
+use serde_json::{Value, json};
+
+pub fn run(args: &ReplayArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let bytes = read_recording(&args.run).or_input()?;
+    let found = replay(&bytes, args.from_cycle)
+        .with_context(|| format!("`{}`", args.run.display()))
+        .or_input()?;
+    if !quiet {
+        print!("{}", show(&found));
+    }
+    if !found.is_exact() {
+        return Err(Failure::failed(anyhow!(verdict(&found))));
+    }
+    Ok(Some(
+        json!({ "ok": true, "command": "replay", "run": args.run, "replay": found }),
+    ))
+}
+
+/// What is wrong, in one line.
+fn verdict(found: &Replay) -> String {
+    let difference = found.first_difference.as_ref().map(|first| {
+        format!(
+            "{} bytes differ, first in cycle {}, field `{}`: recorded {}, replayed {}",
+            found.differing_bytes,
+            first.cycle,
+            first.unequal.field,
+            first.unequal.recorded,
+            first.unequal.replayed
+        )
+    });
+    let damage = found
+        .gaps
+        .iter()
+        .find(|g| g.damaged)
+        .map(|g| format!("the recording is damaged: {}", g.reason));
+    [difference, damage]
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>()
+        .join("; ")
+}
+
+fn show(found: &Replay) -> String {
+    let mut text = format!(
+        "cycles compared  {} ({} to {}), with {} whole states and {} stops\n\
+         differing bytes  {}\n",
+        found.cycles,
+        found.first_cycle,
+        found.last_cycle,
+        found.states,
+        found.causes,
+        found.differing_bytes
+    );
+    for gap in &found.gaps {
+        text.push_str(&format!("gap              {}\n", describe(gap)));
+    }
+    if found.skipped > 0 {
+        text.push_str(&format!(
+            "not compared     {} cycles that follow a gap, up to the next keyframe\n",
+            found.skipped
+        ));
+    }
+    if found.core != rt_controller::recording::CORE_VERSION {
+        text.push_str(&format!(
+            "recorded by      version {}; this is {}\n",
+            found.core,
+            rt_controller::recording::CORE_VERSION
+        ));
+    }
+    text
+}
+
+fn describe(gap: &Gap) -> String {
+    let after = gap
+        .after_cycle
+        .map_or("at the begin".to_owned(), |c| format!("after cycle {c}"));
+    let until = gap
+        .until_cycle
+        .map_or("to the end".to_owned(), |c| format!("until cycle {c}"));
+    format!("{after} {until}: {}", gap.reason)
+}

@@ -1,0 +1,30 @@
+//! What a run folder keeps of the reasons for a stop.
+
+use super::{CAUSE_FILE, CYCLES_FILE, Explanation, Flight, explain, show};
+use crate::files;
+use std::path::Path;
+
+/// Explains the recording of a run folder and keeps the explanation there as
+/// `cause.json` when the arm was stopped. `None` when there is no recording to
+/// explain; that never spoils the run itself.
+pub fn keep_cause(run: &Path) -> Option<Explanation> {
+    let bytes = std::fs::read(run.join(CYCLES_FILE)).ok()?;
+    let flight = Flight::read(&bytes).ok()?;
+    let found = explain(&flight);
+    if found.stopped
+        && let Err(reason) = files::write_json(&run.join(CAUSE_FILE), &found)
+    {
+        tracing::warn!(%reason, "the cause of the stop could not be kept");
+    }
+    Some(found)
+}
+
+/// Keeps the explanation of a run that was stopped and shows it, unless `quiet`.
+pub fn explain_stop(run: &Path, quiet: bool) {
+    if let Some(found) = keep_cause(run)
+        && found.stopped
+        && !quiet
+    {
+        eprint!("{}", show(&found));
+    }
+}

@@ -1,0 +1,408 @@
+//! Why the arm was stopped, or how close it came to it.
+
+use super::flight::{Flight, Moment, WorstJoint};
+use super::margins::{Margin, smallest_margins};
+use rt_controller::xarm::ErrorCode;
+use serde::Serialize;
+use shared_types::ipc::{CauseRecord, ControllerMode, RunCounts};
+use shared_types::{FaultCode, MotionTier};
+
+/// Ends of the rows around a stop (ms); a row covers what lies between the end
+/// before and its own.
+const ROWS_MS: [f64; 16] = [
+    -500.0, -200.0, -100.0, -50.0, -20.0, -8.0, -4.0, 0.0, 4.0, 8.0, 20.0, 50.0, 100.0, 200.0,
+    500.0, 1000.0,
+];
+/// Begin of the first row (ms).
+const BEGIN_MS: f64 = -1001.0;
+/// The arm's own code may come this long after the stop (ms).
+const CODE_WITHIN_MS: f64 = 1000.0;
+
+/// What the file says about a whole run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explanation {
+    /// Whether the arm was stopped by anything but the orderly end.
+    pub stopped: bool,
+    /// Cycles read.
+    pub cycles: usize,
+    /// Time they span (s).
+    pub duration_s: f64,
+    /// Every stop, in order.
+    pub stops: Vec<Stop>,
+    /// Whether the controller was ended while the arm rested.
+    pub ended_in_order: bool,
+    /// How close the run came to its limits.
+    pub margins: Vec<Margin>,
+    /// What is missing in the recording.
+    pub flaws: Vec<String>,
+}
+
+/// Which limit was broken and by how much.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Broken {
+    /// Joint 1 to 7, if it is about one.
+    pub joint: Option<u32>,
+    /// What was found.
+    pub value: f64,
+    /// What is allowed.
+    pub limit: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+/// One stop.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stop {
+    /// Cause.
+    pub code: FaultCode,
+    /// Its number.
+    pub number: u16,
+    /// What happened.
+    pub what: String,
+    /// What to do.
+    pub remedy: String,
+    /// What made the stop harder on the way.
+    pub second: Option<FaultCode>,
+    /// The arm's own error code, 0 for none.
+    pub arm_error: u8,
+    /// What that code means.
+    pub arm_error_meaning: Option<String>,
+    /// The arm's own warning code, 0 for none.
+    pub arm_warning: u8,
+    /// Cycle in which it was noticed.
+    pub cycle: u64,
+    /// When (s from the first cycle).
+    pub time_s: f64,
+    /// Mode then.
+    pub mode: ControllerMode,
+    /// Armed tier.
+    pub tier: Option<&'static str>,
+    /// Motion that ran.
+    pub motion: Option<u64>,
+    /// Time on it (s).
+    pub motion_s: Option<f64>,
+    /// How it was met.
+    pub met: &'static str,
+    /// Whether the arm itself was asked to stop.
+    pub arm_asked_to_stop: bool,
+    /// Time from the cause to the end of setpoints (s).
+    pub rest_after_s: f64,
+    /// Which limit.
+    pub broken: Option<Broken>,
+    /// What happened since the arm was adopted.
+    pub counts: RunCounts,
+    /// The second before and the second after.
+    pub around: Vec<Row>,
+}
+
+/// Some cycles around a stop, each figure the worst of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// End of the row (ms from the cause).
+    pub until_ms: f64,
+    /// Mode at its end.
+    pub mode: ControllerMode,
+    /// Time on the motion at its end (s).
+    pub motion_s: Option<f64>,
+    /// How fast the path is followed at its end.
+    pub path_rate: f64,
+    /// Joint speed (rad/s).
+    pub speed: WorstJoint,
+    /// Joint acceleration (rad/s²).
+    pub acceleration: WorstJoint,
+    /// Tool speed (m/s).
+    pub tool_m_s: f64,
+    /// Tool speed that is allowed (m/s).
+    pub tool_max_m_s: f64,
+    /// Age of the oldest unanswered setpoint (ms).
+    pub link_ms: f64,
+    /// Age of the newest joint report (ms).
+    pub report_ms: Option<f64>,
+    /// Cycles missed.
+    pub missed: u32,
+}
+
+/// Explains a recording.
+pub fn explain(flight: &Flight) -> Explanation {
+    let (ends, stops): (Vec<_>, Vec<_>) = flight.causes.iter().partition(|c| is_orderly_end(c));
+    Explanation {
+        stopped: !stops.is_empty(),
+        cycles: flight.moments.len(),
+        duration_s: flight.duration_s(),
+        stops: stops.into_iter().map(|c| stop(flight, c)).collect(),
+        ended_in_order: !ends.is_empty(),
+        margins: smallest_margins(flight),
+        flaws: flight.flaws.clone(),
+    }
+}
+
+/// A controller that ends tells its loop to stop; with the arm at rest nothing
+/// is stopped by that.
+fn is_orderly_end(cause: &CauseRecord) -> bool {
+    cause.fault() == FaultCode::OperatorStop && cause.mode_then() == ControllerMode::Idle
+}
+
+fn stop(flight: &Flight, cause: &CauseRecord) -> Stop {
+    let code = cause.fault();
+    let (what, remedy) = code
+        .explain()
+        .split_once("; ")
+        .unwrap_or((code.explain(), ""));
+    let arm_error = arm_error(flight, cause);
+    let rest_ns = flight
+        .moments
+        .iter()
+        .find(|m| m.cycle == cause.rest_cycle)
+        .map_or(cause.stamp_ns, |m| m.deadline_ns);
+    Stop {
+        code,
+        number: cause.code,
+        what: what.to_owned(),
+        remedy: remedy.to_owned(),
+        second: FaultCode::from_raw(cause.second_code).filter(|c| *c != FaultCode::None),
+        arm_error,
+        arm_error_meaning: (arm_error != 0).then(|| ErrorCode(arm_error).to_string()),
+        arm_warning: cause.arm_warning,
+        cycle: cause.cycle,
+        time_s: flight.time_s(cause.stamp_ns),
+        mode: cause.mode_then(),
+        tier: MotionTier::from_raw(cause.tier).map(tier_name),
+        motion: Some(cause.motion_id).filter(|id| *id != 0),
+        motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),
+        met: met(cause.path),
+        arm_asked_to_stop: cause.stop_arm != 0,
+        rest_after_s: flight.time_s(rest_ns) - flight.time_s(cause.stamp_ns),
+        broken: broken(cause),
+        counts: cause.counts,
+        around: around(flight, cause.stamp_ns),
+    }
+}
+
+const fn tier_name(tier: MotionTier) -> &'static str {
+    match tier {
+        MotionTier::SetUp => "set-up",
+        MotionTier::Wiggle => "wiggle",
+        MotionTier::Throw => "throw",
+    }
+}
+
+/// The core knows the arm's code only if the arm had said it by then; five times
+/// a second it does.
+fn arm_error(flight: &Flight, cause: &CauseRecord) -> u8 {
+    if cause.arm_error != 0 {
+        return cause.arm_error;
+    }
+    flight
+        .moments
+        .iter()
+        .filter(|m| (0.0..=CODE_WITHIN_MS).contains(&since_ms(m, cause.stamp_ns)))
+        .find_map(|m| m.arm_error)
+        .unwrap_or(0)
+}
+
+const fn met(path: u8) -> &'static str {
+    match path {
+        0 => "refused",
+        1 => "slowed to rest along the path",
+        2 => "braked, every joint by itself",
+        _ => "no setpoints any more",
+    }
+}
+
+fn broken(cause: &CauseRecord) -> Option<Broken> {
+    let found = &cause.limit;
+    (found.value != 0.0 || found.limit != 0.0).then(|| Broken {
+        joint: Some(found.joint).filter(|j| *j != 0),
+        value: found.value,
+        limit: found.limit,
+        unit: unit(cause.fault()),
+    })
+}
+
+/// Unit of a cause's numbers, as [`shared_types::ipc::LimitBroken`] says.
+const fn unit(code: FaultCode) -> &'static str {
+    use FaultCode as F;
+    match code {
+        F::SetpointVelocity => "rad/s",
+        F::SetpointAcceleration => "rad/s²",
+        F::SetpointJerk => "rad/s³",
+        F::SetpointTcpSpeed | F::TierExceeded => "m/s",
+        F::SetpointStep => "m",
+        F::DeadlineMissed | F::LateCycles => "cycles",
+        F::OperatorLost
+        | F::GuardianLost
+        | F::ReplyStalled
+        | F::ReportStale
+        | F::ReportFrozen
+        | F::ArmingExpired
+        | F::UploadTimedOut => "s",
+        F::ReportBroken | F::ReportClock => "times",
+        F::SetpointPosition
+        | F::SetpointUnstoppable
+        | F::TrackingError
+        | F::JointStuck
+        | F::EncoderJump
+        | F::SecondCommander
+        | F::StartPoseMismatch => "rad",
+        _ => "",
+    }
+}
+
+fn since_ms(moment: &Moment, stamp_ns: u64) -> f64 {
+    shared_types::MonotonicNs(moment.deadline_ns).since_s(shared_types::MonotonicNs(stamp_ns)) * 1e3
+}
+
+fn around(flight: &Flight, stamp_ns: u64) -> Vec<Row> {
+    let mut from_ms = BEGIN_MS;
+    let mut rows = Vec::new();
+    for until_ms in ROWS_MS {
+        // Deadlines lie on a grid of whole milliseconds, give or take rounding.
+        let within = |m: &&Moment| {
+            let at_ms = since_ms(m, stamp_ns) - 0.5;
+            at_ms > from_ms && at_ms <= until_ms
+        };
+        let covered: Vec<&Moment> = flight.moments.iter().filter(within).collect();
+        rows.extend(row(until_ms, &covered));
+        from_ms = until_ms;
+    }
+    rows
+}
+
+fn row(until_ms: f64, moments: &[&Moment]) -> Option<Row> {
+    let last = moments.last()?;
+    let worst = |of: fn(&Moment) -> WorstJoint| {
+        moments
+            .iter()
+            .map(|m| of(m))
+            .max_by(|a, b| a.part().total_cmp(&b.part()))
+            .unwrap_or_default()
+    };
+    let most = |of: fn(&Moment) -> f64| moments.iter().map(|m| of(m)).fold(0.0, f64::max);
+    Some(Row {
+        until_ms,
+        mode: last.mode,
+        motion_s: Some(last.trajectory_s).filter(|t| *t >= 0.0),
+        path_rate: last.path_rate,
+        speed: worst(|m| m.speed),
+        acceleration: worst(|m| m.acceleration),
+        tool_m_s: most(|m| m.tool_m_s),
+        tool_max_m_s: last.tool_max_m_s,
+        link_ms: most(|m| m.link_ms),
+        report_ms: moments
+            .iter()
+            .filter_map(|m| m.report_ms)
+            .max_by(f64::total_cmp),
+        missed: moments.iter().map(|m| m.missed).sum(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rt_controller::control::{ControlSettings, Thresholds};
+    use shared_types::ipc::LimitBroken;
+    use shared_types::{JointVector, Limits};
+
+    const PERIOD_NS: u64 = 4_000_000;
+
+    fn moment(cycle: u64) -> Moment {
+        Moment {
+            cycle,
+            deadline_ns: cycle * PERIOD_NS,
+            mode: if cycle <= 300 {
+                ControllerMode::Streaming
+            } else {
+                ControllerMode::Faulted
+            },
+            trajectory_s: 0.5,
+            path_rate: 1.0,
+            q_c: JointVector::ZERO,
+            speed: WorstJoint::default(),
+            acceleration: WorstJoint::default(),
+            tool_m_s: f64::from(u8::from(cycle == 299)),
+            tool_max_m_s: 1.2,
+            link_ms: 0.0,
+            report_ms: Some(3.0),
+            missed: u32::from(cycle == 290),
+            arm_error: (cycle == 340).then_some(31),
+        }
+    }
+
+    fn flight(causes: Vec<CauseRecord>) -> Flight {
+        Flight {
+            moments: (1..=700).map(moment).collect(),
+            causes,
+            limits: Limits::default(),
+            settings: ControlSettings::from(Thresholds::strict()),
+            flaws: Vec::new(),
+        }
+    }
+
+    fn cause() -> CauseRecord {
+        CauseRecord {
+            code: FaultCode::TrackingError as u16,
+            mode: ControllerMode::Streaming as u8,
+            path: 2,
+            stop_arm: 1,
+            cycle: 300,
+            stamp_ns: 300 * PERIOD_NS,
+            rest_cycle: 324,
+            limit: LimitBroken {
+                joint: 4,
+                value: 0.071,
+                limit: 0.05,
+                ..LimitBroken::default()
+            },
+            ..CauseRecord::default()
+        }
+    }
+
+    #[test]
+    fn a_stop_is_told_with_its_numbers_and_its_surroundings() {
+        let found = explain(&flight(vec![cause()]));
+        assert!(found.stopped && !found.ended_in_order);
+        let stop = &found.stops[0];
+        let broken = stop.broken.as_ref().unwrap();
+        assert_eq!((broken.joint, broken.unit), (Some(4), "rad"));
+        assert_eq!(stop.arm_error, 31, "said 160 ms after the stop");
+        assert!((stop.rest_after_s - 0.096).abs() < 1e-9);
+        assert!((stop.time_s - 1.196).abs() < 1e-9);
+        assert!(!stop.remedy.is_empty());
+        // Every cycle from a second before to a second after is in one row.
+        let missed: u32 = stop.around.iter().map(|r| r.missed).sum();
+        assert_eq!((stop.around.len(), missed), (ROWS_MS.len(), 1));
+        let before = stop.around.iter().find(|r| r.until_ms == -4.0).unwrap();
+        assert_eq!(before.tool_m_s, 1.0);
+        let page = super::super::show(&found);
+        for word in [
+            "joint 4: 0.0710 rad",
+            "+42.0 %",
+            "at rest after 96 ms",
+            "C31",
+        ] {
+            assert!(page.contains(word), "`{word}` is not in\n{page}");
+        }
+    }
+
+    #[test]
+    fn a_controller_that_is_ended_at_rest_was_not_stopped() {
+        let end = CauseRecord {
+            code: FaultCode::OperatorStop as u16,
+            mode: ControllerMode::Idle as u8,
+            cycle: 690,
+            ..cause()
+        };
+        let found = explain(&flight(vec![end]));
+        assert!(!found.stopped && found.ended_in_order && found.stops.is_empty());
+        let page = super::super::show(&found);
+        assert!(
+            page.contains("NOT STOPPED") && page.contains("tool speed"),
+            "{page}"
+        );
+        let moving = CauseRecord {
+            mode: ControllerMode::Streaming as u8,
+            ..end
+        };
+        assert!(explain(&flight(vec![moving])).stopped);
+    }
+}

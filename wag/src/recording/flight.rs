@@ -1,0 +1,233 @@
+//! A recording as a row of moments: what a person wants to know of each cycle.
+
+use rt_controller::control::{ControlSettings, ControlState};
+use rt_controller::recording::{Item, LogError, LogReader, Read, RecordedCycle};
+use serde::Serialize;
+use shared_types::ipc::{CauseRecord, ControllerMode, OrderKind};
+use shared_types::{JOINTS, JointVector, Limits, MonotonicNs, MotionTier, kinematics};
+
+/// Setpoints farther apart than this say nothing about speed (s).
+const APART_MAX_S: f64 = 0.1;
+
+/// The joint that comes closest to its limit. 0 stands for none.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct WorstJoint {
+    /// Joint 1 to 7.
+    pub joint: usize,
+    /// Value, in the unit of the limit.
+    pub value: f64,
+    /// Its limit.
+    pub limit: f64,
+}
+
+impl WorstJoint {
+    /// Part of the limit (0 to 1 and beyond).
+    pub fn part(&self) -> f64 {
+        if self.limit > 0.0 {
+            self.value.abs() / self.limit
+        } else {
+            0.0
+        }
+    }
+
+    fn of(values: &JointVector, limits: &JointVector) -> Self {
+        (0..JOINTS)
+            .map(|j| Self {
+                joint: j + 1,
+                value: values[j],
+                limit: limits[j],
+            })
+            .max_by(|a, b| a.part().total_cmp(&b.part()))
+            .unwrap_or_default()
+    }
+}
+
+/// One cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Number.
+    pub cycle: u64,
+    /// Planned wake-up (CLOCK_MONOTONIC, ns).
+    pub deadline_ns: u64,
+    /// Mode after it.
+    pub mode: ControllerMode,
+    /// Time on the motion (s), negative when none runs.
+    pub trajectory_s: f64,
+    /// How fast the path is followed.
+    pub path_rate: f64,
+    /// Commanded joints (rad).
+    pub q_c: JointVector,
+    /// Commanded joint speed closest to its limit (rad/s).
+    pub speed: WorstJoint,
+    /// Commanded joint acceleration closest to its limit (rad/s²).
+    pub acceleration: WorstJoint,
+    /// Commanded tool speed (m/s).
+    pub tool_m_s: f64,
+    /// Tool speed that is allowed (m/s).
+    pub tool_max_m_s: f64,
+    /// Age of the oldest unanswered setpoint (ms).
+    pub link_ms: f64,
+    /// Age of the newest joint report (ms); none before the first.
+    pub report_ms: Option<f64>,
+    /// Cycles missed before it.
+    pub missed: u32,
+    /// Error code of the arm, if it said one.
+    pub arm_error: Option<u8>,
+}
+
+/// A recording, read.
+#[derive(Debug)]
+pub struct Flight {
+    /// Every cycle that could be read.
+    pub moments: Vec<Moment>,
+    /// Every stop.
+    pub causes: Vec<CauseRecord>,
+    /// Limits of the run.
+    pub limits: Limits,
+    /// Thresholds and the rest of the settings.
+    pub settings: ControlSettings,
+    /// Places where the recording does not go on as it should, in words.
+    pub flaws: Vec<String>,
+}
+
+impl Flight {
+    /// Reads a recording.
+    ///
+    /// # Errors
+    /// [`LogError`] when it is none; [`LogError::Foreign`] when it holds no
+    /// keyframe this version can read.
+    pub fn read(bytes: &[u8]) -> Result<Self, LogError> {
+        let mut flight = Self {
+            moments: Vec::new(),
+            causes: Vec::new(),
+            limits: Limits::default(),
+            settings: ControlSettings::from(rt_controller::control::Thresholds::relaxed()),
+            flaws: Vec::new(),
+        };
+        let mut known = false;
+        let mut eye = Eye::default();
+        for read in LogReader::open(bytes)? {
+            match read {
+                Read::Flaw(flaw) => flight.flaws.push(flaw.to_string()),
+                Read::Item(Item::Cause(cause)) => flight.causes.push(*cause),
+                Read::Item(Item::Cycle(cycle)) => {
+                    let moment = eye.see(&cycle, &flight.limits, &flight.settings);
+                    flight.moments.push(moment);
+                }
+                Read::Item(Item::Keyframe(keyframe)) if !known => {
+                    if let Some(state) = keyframe.state() {
+                        flight.take_settings(&state);
+                        known = true;
+                    }
+                }
+                Read::Item(Item::Keyframe(_) | Item::Motion { .. }) => {}
+            }
+        }
+        if known {
+            Ok(flight)
+        } else {
+            Err(LogError::Foreign)
+        }
+    }
+
+    fn take_settings(&mut self, state: &ControlState) {
+        self.limits = state.limits().clone();
+        self.settings = *state.settings();
+    }
+
+    /// Seconds from the first cycle.
+    pub fn time_s(&self, stamp_ns: u64) -> f64 {
+        let first = self.moments.first().map_or(stamp_ns, |m| m.deadline_ns);
+        MonotonicNs(stamp_ns).since_s(MonotonicNs(first))
+    }
+
+    /// Seconds from the first to the last cycle.
+    pub fn duration_s(&self) -> f64 {
+        self.moments
+            .last()
+            .map_or(0.0, |m| self.time_s(m.deadline_ns))
+    }
+}
+
+/// What is remembered from cycle to cycle to see speeds and ages.
+#[derive(Debug, Default)]
+struct Eye {
+    before: Option<Sent>,
+    report_ns: Option<u64>,
+    tier: Option<MotionTier>,
+}
+
+/// A setpoint and how it moved.
+#[derive(Debug, Clone, Copy)]
+struct Sent {
+    q: JointVector,
+    qd: JointVector,
+    at_ns: u64,
+    tool_m: nalgebra::Vector3<f64>,
+}
+
+impl Eye {
+    fn see(
+        &mut self,
+        cycle: &RecordedCycle,
+        limits: &Limits,
+        settings: &ControlSettings,
+    ) -> Moment {
+        let (input, record) = (&cycle.input, &cycle.record);
+        if OrderKind::from_raw(input.order.kind) == Some(OrderKind::Arm) {
+            self.tier = MotionTier::from_raw(input.order.tier);
+        }
+        let newest = input.reports.as_slice().last().map(|r| r.arrival_ns);
+        self.report_ns = newest.or(self.report_ns);
+        let tier = self
+            .tier
+            .filter(|_| settings.arming_required)
+            .unwrap_or(MotionTier::Throw);
+        let age_ms = |from_ns: u64| input.deadline_ns.saturating_sub(from_ns) as f64 / 1e6;
+        let mut moment = Moment {
+            cycle: record.cycle,
+            deadline_ns: input.deadline_ns,
+            mode: ControllerMode::from_raw(record.mode),
+            trajectory_s: record.trajectory_s,
+            path_rate: record.path_rate,
+            q_c: record.q_c,
+            speed: WorstJoint::default(),
+            acceleration: WorstJoint::default(),
+            tool_m_s: 0.0,
+            tool_max_m_s: settings.tiers.of(tier, limits.tcp_speed_max_m_s),
+            link_ms: input.link.unanswered_ns as f64 / 1e6,
+            report_ms: self.report_ns.map(age_ms),
+            missed: input.missed,
+            arm_error: (input.codes.present != 0 && input.codes.error != 0)
+                .then_some(input.codes.error),
+        };
+        self.speeds(&mut moment, record.sent != 0, limits);
+        moment
+    }
+
+    /// Divided differences of the setpoints that were really sent.
+    fn speeds(&mut self, moment: &mut Moment, sent: bool, limits: &Limits) {
+        if !sent {
+            self.before = None;
+            return;
+        }
+        let (p, r) = kinematics::flange_pose(&moment.q_c);
+        let mut now = Sent {
+            q: moment.q_c,
+            qd: JointVector::ZERO,
+            at_ns: moment.deadline_ns,
+            tool_m: p + r * limits.tcp_offset(),
+        };
+        if let Some(before) = self.before {
+            let step_s = MonotonicNs(now.at_ns).since_s(MonotonicNs(before.at_ns));
+            if step_s > 0.0 && step_s < APART_MAX_S {
+                now.qd = (now.q - before.q) * (1.0 / step_s);
+                let qdd = (now.qd - before.qd) * (1.0 / step_s);
+                moment.speed = WorstJoint::of(&now.qd, &limits.velocity_max_rad_s);
+                moment.acceleration = WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
+                moment.tool_m_s = (now.tool_m - before.tool_m).norm() / step_s;
+            }
+        }
+        self.before = Some(now);
+    }
+}

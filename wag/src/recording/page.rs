@@ -1,0 +1,212 @@
+//! An explanation as one page of text.
+
+use super::explanation::{Explanation, Row, Stop};
+use super::flight::WorstJoint;
+use super::margins::Margin;
+use crate::table;
+use comfy_table::Table;
+use std::fmt::Write;
+
+/// Width of the names in front of each line.
+const NAME: usize = 15;
+
+/// The whole page.
+pub fn show(found: &Explanation) -> String {
+    let mut page = String::new();
+    for (n, stop) in found.stops.iter().enumerate() {
+        if n > 0 {
+            page.push('\n');
+        }
+        show_stop(&mut page, stop);
+    }
+    if found.stops.is_empty() {
+        let end = if found.ended_in_order {
+            "the controller was ended in order"
+        } else {
+            "the recording ends while the controller runs"
+        };
+        let _ = writeln!(
+            page,
+            "NOT STOPPED: {} cycles in {:.3} s; {end}\n",
+            found.cycles, found.duration_s
+        );
+        let _ = writeln!(page, "Smallest margins:\n{}", margins(&found.margins));
+    }
+    for flaw in &found.flaws {
+        let _ = writeln!(page, "the recording is not whole: {flaw}");
+    }
+    page
+}
+
+fn line(page: &mut String, name: &str, text: &str) {
+    let _ = writeln!(page, "  {name:<NAME$} {text}");
+}
+
+fn show_stop(page: &mut String, stop: &Stop) {
+    let _ = writeln!(
+        page,
+        "STOPPED: {:?} (code {}) in cycle {}, {:.3} s into the recording",
+        stop.code, stop.number, stop.cycle, stop.time_s
+    );
+    line(page, "what happened", &stop.what);
+    line(page, "by how much", &by_how_much(stop));
+    line(page, "where", &place(stop));
+    let asked = if stop.arm_asked_to_stop {
+        "; the arm was asked to stop"
+    } else {
+        ""
+    };
+    line(
+        page,
+        "how it was met",
+        &format!(
+            "{}{asked}; at rest after {:.0} ms",
+            stop.met,
+            1e3 * stop.rest_after_s
+        ),
+    );
+    if let Some(second) = stop.second {
+        line(
+            page,
+            "on the way",
+            &format!("{second:?}: {}", second.explain()),
+        );
+    }
+    if let Some(meaning) = &stop.arm_error_meaning {
+        line(page, "the arm says", meaning);
+    }
+    if stop.arm_warning != 0 {
+        line(page, "arm's warning", &format!("W{}", stop.arm_warning));
+    }
+    if let Some(counts) = counts(stop) {
+        line(page, "until then", &counts);
+    }
+    line(page, "what to do", &stop.remedy);
+    let _ = writeln!(page, "\n{}", around(&stop.around));
+}
+
+fn by_how_much(stop: &Stop) -> String {
+    let Some(broken) = &stop.broken else {
+        return "nothing to measure".to_owned();
+    };
+    let joint = broken
+        .joint
+        .map_or_else(String::new, |j| format!("joint {j}: "));
+    let over = if broken.limit.abs() > 0.0 {
+        let part = 100.0 * (broken.value.abs() / broken.limit.abs() - 1.0);
+        format!(" ({part:+.1} %)")
+    } else {
+        String::new()
+    };
+    let unit = broken.unit;
+    format!(
+        "{joint}{} {unit}, allowed {} {unit}{over}",
+        short(broken.value),
+        short(broken.limit)
+    )
+}
+
+/// Four figures, enough to compare and short enough to read.
+fn short(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e6 {
+        return format!("{value:.0}");
+    }
+    match value.abs() {
+        v if v >= 100.0 => format!("{value:.1}"),
+        v if v >= 1.0 => format!("{value:.3}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
+fn place(stop: &Stop) -> String {
+    let mut text = format!("{:?}", stop.mode).to_lowercase();
+    if let Some(motion) = stop.motion {
+        let _ = write!(text, ", motion {motion}");
+    }
+    if let Some(t) = stop.motion_s {
+        let _ = write!(text, ", {t:.3} s into it");
+    }
+    if let Some(tier) = stop.tier {
+        let _ = write!(text, "; armed for {tier}");
+    }
+    text
+}
+
+fn counts(stop: &Stop) -> Option<String> {
+    let c = &stop.counts;
+    let named = [
+        (c.missed, "cycles missed"),
+        (c.skipped, "setpoints not sent"),
+        (c.duplicates, "replies twice"),
+        (c.out_of_order, "replies out of order"),
+        (c.broken_reports, "broken reports"),
+        (c.clock_resyncs, "clock resyncs"),
+        (c.warnings, "cycles with a warning"),
+    ];
+    let found: Vec<String> = named
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
+        .collect();
+    (!found.is_empty()).then(|| found.join(", "))
+}
+
+fn percent(worst: &WorstJoint) -> String {
+    if worst.joint == 0 {
+        return "-".to_owned();
+    }
+    format!("{:.0} % J{}", 100.0 * worst.part(), worst.joint)
+}
+
+fn around(rows: &[Row]) -> Table {
+    let header = [
+        "until ms",
+        "motion s",
+        "path rate",
+        "joint speed",
+        "joint acc.",
+        "tool m/s",
+        "allowed",
+        "link ms",
+        "report ms",
+        "missed",
+        "mode",
+    ];
+    table::numbers(
+        header,
+        1,
+        rows.iter().map(|r| {
+            [
+                format!("{:.0}", r.until_ms),
+                r.motion_s.map_or("-".to_owned(), |t| format!("{t:.3}")),
+                format!("{:.2}", r.path_rate),
+                percent(&r.speed),
+                percent(&r.acceleration),
+                format!("{:.3}", r.tool_m_s),
+                format!("{:.2}", r.tool_max_m_s),
+                format!("{:.1}", r.link_ms),
+                r.report_ms.map_or("-".to_owned(), |a| format!("{a:.1}")),
+                r.missed.to_string(),
+                format!("{:?}", r.mode).to_lowercase(),
+            ]
+        }),
+    )
+}
+
+fn margins(margins: &[Margin]) -> Table {
+    table::numbers(
+        ["limit", "used", "value", "allowed", "at s", "joint", "unit"],
+        1,
+        margins.iter().map(|m| {
+            [
+                m.what.to_owned(),
+                format!("{:.1} %", 100.0 * m.part),
+                short(m.value),
+                short(m.limit),
+                format!("{:.3}", m.time_s),
+                m.joint.map_or("-".to_owned(), |j| j.to_string()),
+                m.unit.to_owned(),
+            ]
+        }),
+    )
+}

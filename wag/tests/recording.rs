@@ -1,0 +1,230 @@
+//! A run on the simulated arm is recorded; replay finds no difference, explain
+//! says why it was stopped or how close it came to its limits; a recorder may
+//! attach at any time.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// A simulated arm; it ends with the test.
+struct Rig {
+    process: Child,
+    /// Command port and the four report ports.
+    ports: Vec<String>,
+}
+
+impl Rig {
+    fn start(faults: Option<&Path>) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
+        command.args(["rig", "--command-port", "0", "--report-ports", "0,0,0,0"]);
+        if let Some(path) = faults {
+            command.arg("--faults").arg(path);
+        }
+        let mut process = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let ports = line
+            .split(|c: char| !c.is_ascii_digit())
+            .filter(|p| p.len() >= 4)
+            .map(str::to_owned)
+            .collect();
+        Self { process, ports }
+    }
+
+    fn wiggle(&self, run: &Path) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_wag"))
+            .args(["wiggle", "--arm", "127.0.0.1"])
+            .args(["--command-port", &self.ports[0]])
+            .args(["--report-port", &self.ports[1]])
+            .args(["--status-port", &self.ports[3]])
+            .arg("--out")
+            .arg(run)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    }
+}
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn wag(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(args)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn json(args: &[&str]) -> Value {
+    let output = wag(&[args, &["--json"]].concat());
+    assert!(
+        output.status.success(),
+        "wag {}: {}",
+        args.join(" "),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Replays a run and returns how many cycles were compared.
+fn replays_exactly(run: &str) -> u64 {
+    let told = json(&["replay", run]);
+    let found = &told["replay"];
+    assert_eq!(found["differing_bytes"], 0, "{found}");
+    assert_eq!(found["gaps"].as_array().unwrap().len(), 0, "{found}");
+    assert_eq!(found["skipped"], 0, "{found}");
+    assert_eq!(found["first_cycle"], 1, "{found}");
+    found["cycles"].as_u64().unwrap()
+}
+
+#[test]
+fn a_stopped_run_is_explained_and_replays_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let faults = folder.path().join("faults.toml");
+    let script = "[[fault]]\non = \"setpoint:700\"\nkind = \"raise_error\"\ncode = 31\n";
+    fs::write(&faults, script).unwrap();
+    let rig = Rig::start(Some(&faults));
+    let path = folder.path().join("run");
+    let run = path.display().to_string();
+    let output = rig.wiggle(&path).wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("STOPPED: ArmError"), "{said}");
+
+    assert!(replays_exactly(&run) > 500);
+    let told = json(&["explain", &run]);
+    let found = &told["explanation"];
+    assert_eq!(found["stopped"], true);
+    let stops = found["stops"].as_array().unwrap();
+    assert_eq!(stops.len(), 1, "{found:#}");
+    let stop = &stops[0];
+    assert_eq!(stop["arm_error"], 31, "{stop:#}");
+    assert!(stop["around"].as_array().unwrap().len() >= 8, "{stop:#}");
+    let kept: Value = serde_json::from_slice(&fs::read(path.join("cause.json")).unwrap()).unwrap();
+    assert_eq!(&kept, found);
+    let page = String::from_utf8(wag(&["explain", &run]).stdout).unwrap();
+    println!("{page}");
+    for word in ["what happened", "what to do", "until ms", "C31"] {
+        assert!(page.contains(word), "`{word}` is not in\n{page}");
+    }
+    a_changed_file_is_noticed(&path);
+}
+
+/// One flipped bit is found, a cut file reads up to its last whole chunk.
+fn a_changed_file_is_noticed(run: &Path) {
+    let whole = fs::read(run.join("cycles.bin")).unwrap();
+    let file = run.join("changed.bin");
+    let name = file.display().to_string();
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 1;
+    fs::write(&file, flipped).unwrap();
+    let output = wag(&["replay", &name]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("damaged"), "{said}");
+    fs::write(&file, &whole[..whole.len() * 2 / 3]).unwrap();
+    let told = json(&["replay", &name]);
+    assert_eq!(told["replay"]["differing_bytes"], 0);
+    assert_eq!(told["replay"]["gaps"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn a_whole_run_shows_its_margins_and_a_recorder_may_join_late() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Rig::start(None);
+    let path = folder.path().join("run");
+    let wiggle = rig.wiggle(&path);
+    let late = folder.path().join("late").display().to_string();
+    attach_late(&path, wiggle.id(), &late);
+    let output = wiggle.wait_with_output().unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let run = path.display().to_string();
+    assert!(replays_exactly(&run) > 1000);
+    let told = json(&["explain", &run]);
+    let found = &told["explanation"];
+    assert_eq!(found["stopped"], false, "{found:#}");
+    assert_eq!(found["ended_in_order"], true, "{found:#}");
+    let margins = found["margins"].as_array().unwrap();
+    let speed = margins.iter().find(|m| m["what"] == "joint speed").unwrap();
+    let part = speed["part"].as_f64().unwrap();
+    assert!(part > 0.01 && part <= 1.0, "{speed}");
+    assert!(!path.join("cause.json").exists());
+    let page = String::from_utf8(wag(&["explain", &run]).stdout).unwrap();
+    println!("{page}");
+    assert!(page.contains("NOT STOPPED"), "{page}");
+    let told = json(&["replay", &late]);
+    let found = &told["replay"];
+    assert_eq!(found["differing_bytes"], 0, "{found}");
+    assert!(found["first_cycle"].as_u64().unwrap() > 1, "{found}");
+    assert!(found["cycles"].as_u64().unwrap() > 100, "{found}");
+}
+
+/// Records one and a half seconds of a run under way.
+fn attach_late(run: &Path, pid: u32, out: &str) {
+    let began = Instant::now();
+    while fs::metadata(run.join("cycles.bin")).map_or(0, |m| m.len()) < 200_000 {
+        assert!(
+            began.elapsed() < Duration::from_secs(30),
+            "nothing recorded"
+        );
+        sleep(Duration::from_millis(10));
+    }
+    let domain = format!("run-{pid}");
+    let output = wag(&[
+        "record",
+        "--domain",
+        &domain,
+        "--seconds",
+        "2.5",
+        "--out",
+        out,
+    ]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
+#[test]
+fn a_recorder_without_a_controller_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("late").display().to_string();
+    let domain = format!("nobody-{}", std::process::id());
+    let output = wag(&[
+        "record",
+        "--domain",
+        &domain,
+        "--seconds",
+        "0.2",
+        "--out",
+        &out,
+    ]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("no controller runs"), "{said}");
+}
