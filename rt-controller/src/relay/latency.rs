@@ -73,8 +73,10 @@ impl Latencies {
     #[must_use]
     pub fn bins(&self) -> [Vec<(f64, u64)>; 4] {
         [&self.wake, &self.compute, &self.send, &self.reply].map(|histogram| {
+            // An empty histogram would give one bin of nothing.
             histogram
                 .iter_log(FIRST_BIN_NS, 2.0)
+                .filter(|_| !histogram.is_empty())
                 .map(|bin| {
                     (
                         us(bin.value_iterated_to()),

@@ -30,7 +30,7 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
     let text = std::fs::read_to_string(path).unwrap();
     let response: ArmResponse = toml::from_str(&text).unwrap();
     // A busy machine delays setpoints and reports; a joint it hides is said to be
-    // indistinct, which is right. What is said to be known must be.
+    // indistinct, which is right. How exact the rest is, is shown in virtual time.
     let errors: Vec<Errors> = (1..)
         .zip(&response.joints)
         .filter_map(|(joint, found)| {
@@ -39,7 +39,7 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
                 "joint {joint}: {text}"
             );
             let error = Errors::of(found.lag()?, &secrets[joint - 1]);
-            assert!(error.is_accepted(), "joint {joint}: {error:?}\n{text}");
+            assert!(error.is_plausible(), "joint {joint}: {error:?}\n{text}");
             Some(error)
         })
         .collect();

@@ -64,6 +64,12 @@ impl Errors {
     fn is_accepted(&self) -> bool {
         self.dead_time_s < 2e-3 && self.bandwidth < 0.1 && self.natural_frequency < 0.1
     }
+
+    /// Dead time within two cycles, the rest within a quarter: what a shared
+    /// machine, whose wake-ups blur the measurement itself, can be held to.
+    fn is_plausible(&self) -> bool {
+        self.dead_time_s < 8e-3 && self.bandwidth < 0.25 && self.natural_frequency < 0.25
+    }
 }
 
 /// Prints worst and median of each error.
