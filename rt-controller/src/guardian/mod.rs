@@ -7,7 +7,7 @@
 //! when the controller's process was killed, hangs, or lost its link. It reads
 //! the controller's newest state from a blackboard every 2 ms; a sign of life
 //! older than three cycles, or the end of the process, is a loss. What it does
-//! about it is decided by [`decision`], pure and tested in virtual time; [`line`]
+//! about it is decided by [`decision`], pure and tested in virtual time; [`mod@line`]
 //! talks to the arm without ever waiting.
 //!
 //! It writes a beat of its own, which the controller wants to see before it
