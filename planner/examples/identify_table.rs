@@ -10,8 +10,8 @@
     reason = "an example may stop with a message"
 )]
 
+use planner::filming::{FilmNoise, FilmTiming, film, side_camera};
 use planner::ropes::{random_rope, random_strike_target};
-use planner::synthetic::{FilmOptions, film, side_camera};
 use planner::sysid::{Appearance, IdentifyOptions, Observation, identify};
 use planner::tasks::{StrikeConfig, StrikeOptions, StrikeRequest, ThrowSimulator, plan_strike};
 use planner::wiggle::{WiggleConfig, wiggle};
@@ -79,16 +79,15 @@ fn main() {
     for seed in 0..number("ropes", 20u64) {
         let rope = random_rope(seed + 500);
         let clock_offset_s = ((seed % 9) as f64 - 4.0) * 6e-3;
-        let options = FilmOptions {
-            noise_px: number("noise", 1.0),
-            shared_noise: number("shared", 0.5),
+        let noise = FilmNoise {
+            shared_part: number("shared", 0.5),
             clock_offset_s,
-            seed,
-            ..FilmOptions::default()
+            ..FilmNoise::white(number("noise", 1.0), seed)
         };
-        let track = film(&rope, &motion, &camera, &options).expect("a rope of the ranges");
+        let filmed = film(&rope, &motion, &camera, 25, &FilmTiming::default(), &noise)
+            .expect("a rope of the ranges");
         let observation = Observation {
-            track: &track,
+            track: &filmed.track,
             camera: &camera,
             motion: &motion,
             appearance: Appearance {

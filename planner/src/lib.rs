@@ -4,7 +4,8 @@
 //! parameters to keypoints (the paper's Φ-CMA-ES), and [`tasks`] finds the joint
 //! waypoints of a throw (CMA-ES-traj) with the pieces of [`trajopt`] and
 //! [`collide`]. [`wiggle`] makes the motion that is filmed. [`response`] finds how
-//! the arm follows its setpoints. The physics is that of `rope-sim`.
+//! the arm follows its setpoints. [`filming`] makes recordings of known ropes with
+//! the errors of real ones. The physics is that of `rope-sim`.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     test,
@@ -21,10 +22,11 @@
 pub mod calm;
 pub mod cmaes;
 pub mod collide;
+pub mod filming;
+pub mod observation;
 pub mod process;
 pub mod response;
 pub mod ropes;
-pub mod synthetic;
 pub mod sysid;
 pub mod tasks;
 pub mod trajopt;

@@ -10,8 +10,8 @@
     reason = "tests may fail loudly"
 )]
 
+use planner::filming::{FilmNoise, FilmTiming, film, side_camera};
 use planner::ropes::random_rope;
-use planner::synthetic::{FilmOptions, film, side_camera};
 use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Observation, identify};
 use planner::wiggle::{WiggleConfig, wiggle};
 use rope_sim::{PlannedArm, PoseRow, PoseTrack};
@@ -51,12 +51,13 @@ fn planted_parameters_are_found_in_noise() {
     let camera = side_camera();
     for seed in [21, 22] {
         let rope = random_rope(seed);
-        let options = FilmOptions {
+        let noise = FilmNoise {
             clock_offset_s: 0.017,
-            seed,
-            ..FilmOptions::default()
+            ..FilmNoise::white(1.0, seed)
         };
-        let track = film(&rope, &arm, &camera, &options).unwrap();
+        let track = film(&rope, &arm, &camera, 25, &FilmTiming::default(), &noise)
+            .unwrap()
+            .track;
         let observation = Observation {
             track: &track,
             camera: &camera,
@@ -93,7 +94,17 @@ fn planted_parameters_are_found_in_noise() {
 fn the_estimate_does_not_depend_on_threads() {
     let arm = wiggling_arm();
     let camera = side_camera();
-    let track = film(&random_rope(5), &arm, &camera, &FilmOptions::default()).unwrap();
+    let noise = FilmNoise::white(1.0, 0);
+    let track = film(
+        &random_rope(5),
+        &arm,
+        &camera,
+        25,
+        &FilmTiming::default(),
+        &noise,
+    )
+    .unwrap()
+    .track;
     let observation = Observation {
         track: &track,
         camera: &camera,
@@ -118,11 +129,14 @@ fn useless_films_are_refused_with_the_reason() {
     let arm = wiggling_arm();
     let short =
         PlannedArm::new(JointTrajectory::hold(shared_types::plan::START_POSE, 2.0).unwrap());
-    let options = FilmOptions {
+    let timing = FilmTiming {
         frames: 200,
-        ..FilmOptions::default()
+        rate_hz: 60.0,
     };
-    let track = film(&random_rope(1), &arm, &camera, &options).unwrap();
+    let noise = FilmNoise::white(1.0, 0);
+    let track = film(&random_rope(1), &arm, &camera, 25, &timing, &noise)
+        .unwrap()
+        .track;
     let refuse = |track: &KeypointTrack, motion: &PlannedArm| {
         let observation = Observation {
             track,

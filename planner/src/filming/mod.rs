@@ -1,0 +1,46 @@
+//! Films of known ropes: what a camera's tracker would give, made from the
+//! simulator.
+//!
+//! [`record`] simulates many ropes in one batch and keeps the paths of their
+//! keypoints in the world ([`RopeFilm`]); [`project`] looks at one of them through
+//! a camera, with the errors a real recording has ([`FilmNoise`]). The two are
+//! apart so that a network sees the same rope through fresh noise every time
+//! without simulating it again. [`film`] does both for one rope.
+
+mod camera;
+mod noise;
+mod project;
+mod record;
+
+pub use camera::side_camera;
+pub use noise::{FilmNoise, NoiseError, Randomisation};
+pub use project::{FilmTiming, Filmed, project};
+pub use record::{KeypointLayout, RecordOptions, RopeFilm, record};
+
+use rope_sim::{AttachMotion, SimulateError};
+use shared_types::{RopeParams, StereoCamera};
+
+/// Films one rope: `keypoints` of them uniform in arc length, simulated finely.
+///
+/// # Errors
+/// What the rope simulator refuses.
+pub fn film(
+    rope: &RopeParams,
+    motion: &dyn AttachMotion,
+    camera: &StereoCamera,
+    keypoints: usize,
+    timing: &FilmTiming,
+    noise: &FilmNoise,
+) -> Result<Filmed, SimulateError> {
+    let options = RecordOptions {
+        layout: KeypointLayout::Uniform(keypoints),
+        duration_s: timing.duration_s() + noise.clock_offset_s.abs() + 0.05,
+        ..RecordOptions::default()
+    };
+    let films = record(core::slice::from_ref(rope), motion, &options)?;
+    // One rope in, one film out.
+    Ok(project(&films[0], camera, timing, noise))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,183 @@
+//! What the network Φ-NN sees of a filmed wiggle.
+//!
+//! One code makes it from simulated films and from a camera's keypoints: 400
+//! frames at 60 Hz of keypoints relative to the first one and of the rope's
+//! segment angles (the paper's features), plus the widths of rope and lead.
+//! Pixels are undistorted and cast onto the vertical plane in which the arm
+//! wiggles ([`ViewPlane`]), so that neither lens nor camera placement nor a
+//! rolling shutter is left in the numbers. What was not seen is zero and marked so.
+//!
+//! Channels of a frame, all finite:
+//!
+//! | channels | content |
+//! |---|---|
+//! | 0, 1 | first keypoint (clamp) relative to its mean over the film: forward, up (m) |
+//! | 2 … 2K-1 | keypoint k relative to the first: forward, up (m) |
+//! | 2K … 3K-2 | angle of segment k against straight down, positive forward (rad), continuous along the rope |
+//! | 3K-1 | 1 if the frame was seen, else 0 and the whole frame is 0 |
+//!
+//! The clamp's way would be zero relative to itself; its own sway tells the scale
+//! of the picture and the phase of the motion instead. Angles are not split into
+//! sine and cosine: a rope that hangs never points straight up, where they jump.
+
+mod frames;
+mod plane;
+
+pub use plane::ViewPlane;
+
+use crate::sysid::Appearance;
+use frames::FrameTable;
+use serde::{Deserialize, Serialize};
+use shared_types::keypoints::KeypointError;
+use shared_types::{KeypointTrack, StereoCamera};
+
+/// Numbers in [`WiggleFeatures::widths`].
+pub const WIDTHS: usize = 4;
+
+/// Shape of the features; part of a network's identity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FeatureDefinition {
+    /// Version of the meaning of the channels: [`FeatureDefinition::VERSION`].
+    pub version: u32,
+    /// Frames.
+    pub frames: usize,
+    /// Frames per second (Hz).
+    pub rate_hz: f64,
+    /// Keypoints, uniform in arc length from the clamp to the lead's centre.
+    pub keypoints: usize,
+}
+
+impl Default for FeatureDefinition {
+    fn default() -> Self {
+        Self {
+            version: Self::VERSION,
+            frames: 400,
+            rate_hz: 60.0,
+            keypoints: 16,
+        }
+    }
+}
+
+impl FeatureDefinition {
+    /// Version of the meaning of the channels that this code makes.
+    pub const VERSION: u32 = 1;
+
+    /// Channels of a frame.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        3 * self.keypoints
+    }
+}
+
+/// Input of the network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WiggleFeatures {
+    /// What the numbers mean.
+    pub definition: FeatureDefinition,
+    /// Frame by frame, channel by channel.
+    pub motion: Vec<f32>,
+    /// Half widths of rope and lead (m), each followed by 1; two zeros where it
+    /// was not seen.
+    pub widths: [f32; WIDTHS],
+    /// Frames that were seen.
+    pub seen: usize,
+}
+
+impl WiggleFeatures {
+    /// Blanks frames as if they had not been seen.
+    pub fn mask(&mut self, frames: core::ops::Range<usize>) {
+        let channels = self.definition.channels();
+        let frames =
+            frames.start.min(self.definition.frames)..frames.end.min(self.definition.frames);
+        for frame in
+            self.motion[frames.start * channels..frames.end * channels].chunks_mut(channels)
+        {
+            if frame[channels - 1] > 0.0 {
+                self.seen -= 1;
+            }
+            frame.fill(0.0);
+        }
+    }
+}
+
+/// Why keypoints give no features.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ObserveError {
+    /// The keypoints contradict themselves.
+    #[error(transparent)]
+    Keypoints(#[from] KeypointError),
+    /// The camera looks along the plane of the wiggle.
+    #[error(
+        "the camera looks at the plane of the wiggle from {degrees:.0} degrees, at least {min} are needed: film it from the side"
+    )]
+    EdgeOn {
+        /// Angle between the view and the plane (degrees).
+        degrees: f64,
+        /// Smallest angle allowed (degrees).
+        min: f64,
+    },
+    /// The clamp hardly moves sideways, so that there is no plane of the wiggle.
+    #[error("the clamp moves {moved_mm:.1} mm sideways, at least {min_mm} mm make a wiggle")]
+    NoWiggle {
+        /// Way of the clamp (mm).
+        moved_mm: f64,
+        /// Way needed (mm).
+        min_mm: f64,
+    },
+    /// The rope was seen in too few frames.
+    #[error(
+        "the rope was seen in {seen} of {frames} frames at 60 Hz, the network needs {min}: film again with the whole rope in view"
+    )]
+    TooFewSeen {
+        /// Frames seen.
+        seen: usize,
+        /// Frames of the network's input.
+        frames: usize,
+        /// Frames needed.
+        min: usize,
+    },
+}
+
+/// Features of a recording whose motion lies in `plane`.
+///
+/// # Errors
+/// Bad keypoints, a camera that looks along the plane, or a rope hardly ever seen.
+pub fn observe(
+    definition: FeatureDefinition,
+    track: &KeypointTrack,
+    appearance: Appearance,
+    camera: &StereoCamera,
+    plane: &ViewPlane,
+) -> Result<WiggleFeatures, ObserveError> {
+    track.validate()?;
+    let view = plane.seen_from(camera)?;
+    let table = FrameTable::new(&definition, track, camera, &view);
+    let min = definition.frames / 4;
+    if table.seen() < min {
+        return Err(ObserveError::TooFewSeen {
+            seen: table.seen(),
+            frames: definition.frames,
+            min,
+        });
+    }
+    Ok(WiggleFeatures {
+        definition,
+        motion: table.features(),
+        widths: widths(appearance),
+        seen: table.seen(),
+    })
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "single precision is plenty"
+)]
+fn widths(appearance: Appearance) -> [f32; WIDTHS] {
+    let [rope, lead] = [appearance.rope_radius_m, appearance.lead_radius_m]
+        .map(|seen| seen.map_or([0.0, 0.0], |radius_m| [radius_m as f32, 1.0]));
+    [rope[0], rope[1], lead[0], lead[1]]
+}
+
+#[cfg(test)]
+mod tests;
