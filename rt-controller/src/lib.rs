@@ -49,6 +49,7 @@ pub mod rt_loop;
 pub mod session;
 pub mod set_up;
 pub mod transport;
+pub mod trial;
 pub mod xarm;
 
 pub use config::ControllerConfig;

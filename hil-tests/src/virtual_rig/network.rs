@@ -61,7 +61,7 @@ impl Network {
 pub struct VirtualStream {
     network: Rc<RefCell<Network>>,
     pub(super) client: u32,
-    /// Rest of a frame that was read in part.
+    /// What came and did not fit into the last read.
     unread: Vec<u8>,
 }
 
@@ -90,19 +90,20 @@ impl Drop for VirtualStream {
 }
 
 impl ByteWire for VirtualStream {
+    /// All that has come and fits, as a socket gives it.
     fn receive(&mut self, into: &mut [u8]) -> std::io::Result<(usize, Option<u64>)> {
         let mut net = self.network.borrow_mut();
+        while self.unread.len() < into.len()
+            && let Some(frame) = net.take_frame(self.client)
+        {
+            self.unread.extend(frame);
+        }
         if self.unread.is_empty() {
-            match net.take_frame(self.client) {
-                Some(frame) => self.unread = frame,
-                None => {
-                    return match net.arm.closing(self.client) {
-                        None => Err(ErrorKind::WouldBlock.into()),
-                        Some(Closing::Finish) => Ok((0, None)),
-                        Some(Closing::Reset) => Err(ErrorKind::ConnectionReset.into()),
-                    };
-                }
-            }
+            return match net.arm.closing(self.client) {
+                None => Err(ErrorKind::WouldBlock.into()),
+                Some(Closing::Finish) => Ok((0, None)),
+                Some(Closing::Reset) => Err(ErrorKind::ConnectionReset.into()),
+            };
         }
         let taken = self.unread.len().min(into.len());
         into[..taken].copy_from_slice(&self.unread[..taken]);

@@ -74,7 +74,7 @@ pub fn enter_real_time(settings: &RealTimeSettings) -> Vec<SetupWarning> {
         warnings.push(SetupWarning::Memory { reason });
     }
     if let Some(cpu) = settings.cpu
-        && let Err(reason) = pin_to(cpu)
+        && let Err(reason) = run_on(&[cpu])
     {
         warnings.push(SetupWarning::Affinity { cpu, reason });
     }
@@ -111,14 +111,21 @@ pub fn set_fifo(priority: u8) -> Result<(), Error> {
     }
 }
 
-fn pin_to(cpu: usize) -> Result<(), Error> {
-    if cpu >= usize::try_from(libc::CPU_SETSIZE).unwrap_or_default() {
+/// Runs the calling thread, and threads it starts later, on `cpus` only.
+///
+/// # Errors
+/// What the system says; `InvalidInput` for a core beyond any machine's.
+pub fn run_on(cpus: &[usize]) -> Result<(), Error> {
+    let most = usize::try_from(libc::CPU_SETSIZE).unwrap_or_default();
+    if cpus.iter().any(|cpu| *cpu >= most) {
         return Err(Error::from(std::io::ErrorKind::InvalidInput));
     }
     // SAFETY: an all-zero cpu_set_t is the empty set, by its documentation.
     let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
-    // SAFETY: `cpu` is below CPU_SETSIZE, checked above.
-    unsafe { libc::CPU_SET(cpu, &mut set) };
+    for cpu in cpus {
+        // SAFETY: `cpu` is below CPU_SETSIZE, checked above.
+        unsafe { libc::CPU_SET(*cpu, &mut set) };
+    }
     // SAFETY: pid 0 is the calling thread; the size is that of the set passed.
     match unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) } {
         0 => Ok(()),

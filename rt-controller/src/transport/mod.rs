@@ -28,15 +28,18 @@ use crate::xarm::Command;
 #[error("the connection to the arm is gone")]
 pub struct LinkGone;
 
-/// What became of a command.
+/// What became of the commands of a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sent {
-    /// Handed to the network.
+    /// All were handed to the network.
     Whole,
-    /// Not sent: the network or the arm has not taken the ones before.
-    /// Nothing is queued, so nothing bursts out later.
+    /// One or more were not sent: the network or the arm has not taken the ones
+    /// before. Nothing is queued, so nothing bursts out later.
     Skipped,
 }
+
+/// Commands of one cycle at most: a setpoint and a request.
+pub const MAX_COMMANDS: usize = 2;
 
 /// A connected stream of bytes that never makes its user wait: a socket, or a
 /// cable in virtual time.
@@ -56,16 +59,17 @@ pub trait ByteWire {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<usize>;
 }
 
-/// A command link to an arm. Both calls are RT-safe: bounded, no allocation,
-/// no waiting.
+/// A command link to an arm. Both calls are made once per cycle and are
+/// RT-safe: bounded, no allocation, no waiting, one system call at most.
 pub trait ArmTransport {
-    /// Sends one command at `now_ns` (CLOCK_MONOTONIC).
+    /// Sends the commands of a cycle, none to [`MAX_COMMANDS`], in one write at
+    /// `now_ns` (CLOCK_MONOTONIC).
     ///
     /// # Errors
     /// [`LinkGone`].
-    fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone>;
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone>;
 
-    /// Takes in the replies that have come until `now_ns`; `lost` in the
-    /// result says that the connection is gone.
+    /// Takes in, in one read, the replies that have come until `now_ns`; `lost`
+    /// in the result says that the connection is gone.
     fn poll(&mut self, now_ns: u64) -> LinkInput;
 }

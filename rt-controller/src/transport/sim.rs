@@ -26,18 +26,20 @@ pub struct IdealArm {
 }
 
 impl ArmTransport for IdealArm {
-    fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone> {
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone> {
         if self.gone {
             return Err(LinkGone);
         }
-        match command {
-            Command::ServoJoint(q) => {
-                self.q = Some(*q);
-                self.setpoints = self.setpoints.wrapping_add(1);
+        for command in commands {
+            match command {
+                Command::ServoJoint(q) => {
+                    self.q = Some(*q);
+                    self.setpoints = self.setpoints.wrapping_add(1);
+                }
+                _ => self.requests = self.requests.wrapping_add(1),
             }
-            _ => self.requests = self.requests.wrapping_add(1),
+            self.oldest_ns = self.oldest_ns.or(Some(now_ns));
         }
-        self.oldest_ns = self.oldest_ns.or(Some(now_ns));
         Ok(Sent::Whole)
     }
 

@@ -1,7 +1,7 @@
 //! The place of the loop's command link: empty, connected, or just broken.
 
-use super::ArmTransport;
 use super::wire::{WireBackend, backend};
+use super::{ArmTransport, MAX_COMMANDS};
 use crate::control::{CycleOutput, LinkInput};
 use crate::xarm::Command;
 use shared_types::WireMode;
@@ -54,15 +54,19 @@ impl<T: ArmTransport> LinkSlot<T> {
         seen
     }
 
-    /// Sends a cycle's command and request, in this order.
+    /// Sends a cycle's command and request, in this order and at once. Call it
+    /// every cycle: without a command a question of the link's own may go out.
     pub fn send(&mut self, out: &CycleOutput, now_ns: u64) {
         let Some(link) = self.link.as_mut() else {
             return;
         };
         let setpoint = out.command.and_then(|c| self.wire.request(&c));
         let request = out.request.map(Command::SetState);
+        let mut commands: heapless::Vec<Command, MAX_COMMANDS> = heapless::Vec::new();
         for command in [setpoint, request].into_iter().flatten() {
-            self.lost |= link.send(&command, now_ns).is_err();
+            // Two at most: they fit.
+            let _ = commands.push(command);
         }
+        self.lost |= link.send(&commands, now_ns).is_err();
     }
 }

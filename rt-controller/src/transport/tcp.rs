@@ -1,5 +1,5 @@
-//! The command link over TCP: one write per command, replies matched by id
-//! whenever they come, never waited for.
+//! The command link over TCP: one write and one read per cycle at most, replies
+//! matched by id whenever they come, never waited for.
 //!
 //! Commands are never bunched: a setpoint too soon after the last one, or one
 //! on top of too many unanswered ones, is left out, and so is one behind the
@@ -7,17 +7,17 @@
 
 use super::heartbeat::{Heartbeat, Silence};
 use super::in_flight::{InFlight, Matched};
-use super::{ArmTransport, ByteWire, LinkGone, Sent};
+use super::{ArmTransport, ByteWire, LinkGone, MAX_COMMANDS, Sent};
 use crate::control::LinkInput;
 use crate::os::receive::{receive, stamp_arrivals};
-use crate::xarm::frame::{MAX_FRAME_LEN, emit_command};
+use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
 use crate::xarm::{Command, FrameReader, Protocol, Status};
 use std::io::{ErrorKind, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
-/// Reads of one poll at most; each takes up to a buffer of replies.
-const MAX_READS: usize = 4;
+/// Bytes that one write may hold: the rest of a frame and those of one cycle.
+const WRITE_LEN: usize = 1024;
 /// Unacknowledged data for this long mean a broken connection.
 const USER_TIMEOUT: Duration = Duration::from_millis(1000);
 
@@ -52,8 +52,18 @@ pub struct TcpLink<W = TcpStream> {
     heartbeat: Heartbeat,
     setpoint_ns: Option<u64>,
     skipped: u16,
+    /// The arm was silent for long and is to be asked for a sign of life.
+    ask: bool,
     /// Rest of a frame that the socket took only in part.
-    rest: heapless::Vec<u8, MAX_FRAME_LEN>,
+    rest: heapless::Vec<u8, WRITE_LEN>,
+}
+
+/// A frame that waits for its write.
+#[derive(Debug, Clone, Copy)]
+struct Written {
+    begin: usize,
+    end: usize,
+    is_setpoint: bool,
 }
 
 impl ByteWire for TcpStream {
@@ -100,19 +110,52 @@ impl<W: ByteWire> TcpLink<W> {
             heartbeat: Heartbeat::default(),
             setpoint_ns: None,
             skipped: 0,
+            ask: false,
             rest: heapless::Vec::new(),
         }
     }
 
-    /// Writes what is left of the last frame; true when nothing was.
-    fn had_no_rest(&mut self) -> Result<bool, LinkGone> {
+    /// Appends the frame of `command` with transaction `id` to what is to be
+    /// written; `None` if it may not go out now or has no room.
+    fn append(&mut self, command: &Command, id: u16, allowed: bool) -> Option<Written> {
+        if !allowed {
+            return None;
+        }
+        let mut frame = [0; MAX_FRAME_LEN];
+        let len = emit_command(&mut frame, id, Protocol::PrivateHeartbeat, command).ok()?;
+        let begin = self.rest.len();
+        self.rest.extend_from_slice(frame.get(..len)?).ok()?;
+        Some(Written {
+            begin,
+            end: self.rest.len(),
+            is_setpoint: command.is_setpoint(),
+        })
+    }
+
+    /// Writes `rest` and the frames behind it, once; a frame of which nothing was
+    /// taken is left out. True when all were taken, at least in part.
+    fn write(&mut self, frames: &[Written], now_ns: u64) -> Result<bool, LinkGone> {
         if self.rest.is_empty() {
             return Ok(true);
         }
         let written = write_once(&mut self.stream, &self.rest)?;
-        let left = heapless::Vec::from_slice(self.rest.get(written..).unwrap_or_default());
-        self.rest = left.unwrap_or_default();
-        Ok(false)
+        let mut keep = frames.first().map_or(self.rest.len(), |first| first.begin);
+        let mut all = true;
+        for frame in frames {
+            if written > frame.begin {
+                keep = frame.end;
+                self.in_flight.sent(now_ns);
+                if frame.is_setpoint {
+                    self.setpoint_ns = Some(now_ns);
+                }
+            } else {
+                all = false;
+                self.skip();
+            }
+        }
+        let left = self.rest.get(written..keep).unwrap_or_default();
+        self.rest = heapless::Vec::from_slice(left).unwrap_or_default();
+        Ok(all)
     }
 
     /// Whether a setpoint may go out now.
@@ -123,9 +166,8 @@ impl<W: ByteWire> TcpLink<W> {
         spaced && self.in_flight.open() < self.settings.max_unanswered
     }
 
-    fn skip(&mut self) -> Sent {
+    fn skip(&mut self) {
         self.skipped = self.skipped.saturating_add(1);
-        Sent::Skipped
     }
 
     /// Takes whole replies out of the reader; they came at `came_ns`.
@@ -163,29 +205,30 @@ impl<W: ByteWire> TcpLink<W> {
         }
     }
 
+    /// One read, into room for two hundred replies; should there ever be more,
+    /// the next cycle takes them.
     fn receive(&mut self, now_ns: u64, seen: &mut LinkInput) -> Result<(), LinkGone> {
-        for _ in 0..MAX_READS {
-            match self.stream.receive(self.reader.space()) {
-                Ok((0, _)) => return Err(LinkGone),
-                Ok((n, arrival_ns)) => {
-                    self.reader.commit(n);
-                    self.heartbeat.heard(now_ns);
-                    let came_ns = arrival_ns.map_or(now_ns, |arrival_ns| arrival_ns.min(now_ns));
-                    self.take_replies(came_ns, seen)?;
-                }
-                Err(e) if e.kind() == ErrorKind::WouldBlock => return Ok(()),
-                Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                Err(_gone) => return Err(LinkGone),
+        match self.stream.receive(self.reader.space()) {
+            Ok((0, _)) => Err(LinkGone),
+            Ok((n, arrival_ns)) => {
+                self.reader.commit(n);
+                self.heartbeat.heard(now_ns);
+                let came_ns = arrival_ns.map_or(now_ns, |arrival_ns| arrival_ns.min(now_ns));
+                self.take_replies(came_ns, seen)
             }
+            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(()),
+            Err(_gone) => Err(LinkGone),
         }
-        Ok(())
     }
 
     /// Keeps the heartbeat rule of the protocol.
     fn keep_alive(&mut self, now_ns: u64) -> Result<(), LinkGone> {
         match self.heartbeat.due(now_ns) {
             Silence::Fine => Ok(()),
-            Silence::Ask => self.send(&Command::GetState, now_ns).map(|_sent| ()),
+            Silence::Ask => {
+                self.ask = true;
+                Ok(())
+            }
             Silence::GiveUp => Err(LinkGone),
         }
     }
@@ -202,28 +245,28 @@ fn write_once(stream: &mut impl ByteWire, bytes: &[u8]) -> Result<usize, LinkGon
 }
 
 impl<W: ByteWire> ArmTransport for TcpLink<W> {
-    fn send(&mut self, command: &Command, now_ns: u64) -> Result<Sent, LinkGone> {
-        let is_setpoint = command.is_setpoint();
-        if !self.had_no_rest()? || (is_setpoint && !self.has_room(now_ns)) {
-            return Ok(self.skip());
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone> {
+        let clear = self.rest.is_empty();
+        let mut frames: heapless::Vec<Written, MAX_COMMANDS> = heapless::Vec::new();
+        let mut id = self.in_flight.next_id();
+        // Any command is a question, too.
+        let asked = core::mem::take(&mut self.ask) && commands.is_empty();
+        let question = asked.then_some(&Command::GetState);
+        let mut all = true;
+        for command in commands.iter().chain(question) {
+            let allowed = !command.is_setpoint() || (clear && self.has_room(now_ns));
+            let appended = self
+                .append(command, id, allowed)
+                .is_some_and(|frame| frames.push(frame).is_ok());
+            if appended {
+                id = next_transaction(id);
+            } else {
+                all = false;
+                self.skip();
+            }
         }
-        let mut frame = [0; MAX_FRAME_LEN];
-        let (id, protocol) = (self.in_flight.next_id(), Protocol::PrivateHeartbeat);
-        let Ok(len) = emit_command(&mut frame, id, protocol, command) else {
-            return Ok(self.skip());
-        };
-        let frame = frame.get(..len).unwrap_or_default();
-        let written = write_once(&mut self.stream, frame)?;
-        if written == 0 {
-            return Ok(self.skip());
-        }
-        self.rest =
-            heapless::Vec::from_slice(frame.get(written..).unwrap_or_default()).unwrap_or_default();
-        self.in_flight.sent(now_ns);
-        if is_setpoint {
-            self.setpoint_ns = Some(now_ns);
-        }
-        Ok(Sent::Whole)
+        all &= self.write(&frames, now_ns)?;
+        Ok(if all { Sent::Whole } else { Sent::Skipped })
     }
 
     fn poll(&mut self, now_ns: u64) -> LinkInput {
@@ -294,7 +337,7 @@ mod tests {
         let (mut link, mut peer) = pair();
         let setpoint = Command::ServoJoint(JointVector::splat(0.1));
         for k in 0..3 {
-            assert_eq!(link.send(&setpoint, 1000 * k), Ok(Sent::Whole));
+            assert_eq!(link.send(&[setpoint], 1000 * k), Ok(Sent::Whole));
         }
         assert_eq!(link.poll(5000).unanswered_ns, 5000);
         let mut answers = replies(&mut peer, 3, Status(0));
@@ -343,13 +386,13 @@ mod tests {
         link.settings = LinkSettings::new(3, 4_000_000);
         assert_eq!(link.settings.min_gap_ns, 3_200_000);
         let at = |us: u64| 1_000_000_000 + us * 1000;
-        assert_eq!(link.send(&q, at(0)), Ok(Sent::Whole));
-        assert_eq!(link.send(&q, at(3_100)), Ok(Sent::Skipped));
-        assert_eq!(link.send(&q, at(3_200)), Ok(Sent::Whole));
-        assert_eq!(link.send(&q, at(8_000)), Ok(Sent::Whole));
-        assert_eq!(link.send(&q, at(12_000)), Ok(Sent::Skipped));
+        assert_eq!(link.send(&[q], at(0)), Ok(Sent::Whole));
+        assert_eq!(link.send(&[q], at(3_100)), Ok(Sent::Skipped));
+        assert_eq!(link.send(&[q], at(3_200)), Ok(Sent::Whole));
+        assert_eq!(link.send(&[q], at(8_000)), Ok(Sent::Whole));
+        assert_eq!(link.send(&[q], at(12_000)), Ok(Sent::Skipped));
         let stop = Command::SetState(StateRequest::Stop);
-        assert_eq!(link.send(&stop, at(12_000)), Ok(Sent::Whole));
+        assert_eq!(link.send(&[stop], at(12_000)), Ok(Sent::Whole));
         let seen = link.poll(at(16_000));
         assert_eq!((seen.skipped, seen.unanswered), (2, 4));
         assert_eq!(seen.unanswered_ns, 16_000_000);
@@ -367,10 +410,85 @@ mod tests {
         link.stream.write_all(&frame[..10]).unwrap();
         link.rest = heapless::Vec::from_slice(&frame[10..n]).unwrap();
         link.in_flight.sent(0);
-        assert_eq!(link.send(&q, 1000), Ok(Sent::Skipped));
-        assert_eq!(link.send(&q, 2000), Ok(Sent::Whole));
+        assert_eq!(link.send(&[q], 1000), Ok(Sent::Skipped));
+        assert_eq!(link.send(&[q], 2000), Ok(Sent::Whole));
         let answers = replies(&mut peer, 2, Status(0));
         assert_eq!(answers.len(), 2);
+    }
+
+    #[test]
+    fn a_setpoint_and_a_stop_leave_in_one_write_behind_a_rest_only_the_stop() {
+        let (mut link, mut peer) = pair();
+        let q = Command::ServoJoint(JointVector::splat(0.2));
+        let stop = Command::SetState(StateRequest::Stop);
+        assert_eq!(link.send(&[q, stop], 1000), Ok(Sent::Whole));
+        assert_eq!(replies(&mut peer, 2, Status(0)).len(), 2);
+        let mut frame = [0; MAX_FRAME_LEN];
+        let n = emit_command(&mut frame, 3, Protocol::PrivateHeartbeat, &q).unwrap();
+        link.stream.write_all(&frame[..10]).unwrap();
+        link.rest = heapless::Vec::from_slice(&frame[10..n]).unwrap();
+        link.in_flight.sent(2000);
+        assert_eq!(link.send(&[q, stop], 3000), Ok(Sent::Skipped));
+        let answers = replies(&mut peer, 2, Status(0));
+        let ids: Vec<u8> = answers.iter().map(|a| a[1]).collect();
+        let registers: Vec<u8> = answers.iter().map(|a| a[6]).collect();
+        assert_eq!((ids, registers[1]), (vec![3, 4], 12));
+        assert!(link.rest.is_empty());
+        assert_eq!(link.poll(4000).skipped, 1);
+    }
+
+    /// A wire that takes the first bytes only, then nothing.
+    struct Narrow {
+        left: usize,
+        taken: Vec<u8>,
+        writes: usize,
+    }
+
+    impl ByteWire for Narrow {
+        fn receive(&mut self, _: &mut [u8]) -> std::io::Result<(usize, Option<u64>)> {
+            Err(ErrorKind::WouldBlock.into())
+        }
+        fn send(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.writes += 1;
+            let taken = bytes.len().min(self.left);
+            if taken == 0 {
+                return Err(ErrorKind::WouldBlock.into());
+            }
+            self.left -= taken;
+            self.taken.extend(&bytes[..taken]);
+            Ok(taken)
+        }
+    }
+
+    #[test]
+    fn wherever_the_network_stops_taking_whole_frames_in_order_come_out() {
+        let q = Command::ServoJoint(JointVector::splat(0.2));
+        let stop = Command::SetState(StateRequest::Stop);
+        let mut frame = [0; MAX_FRAME_LEN];
+        let whole = emit_command(&mut frame, 1, Protocol::PrivateHeartbeat, &q).unwrap();
+        for left in 0..60 {
+            let wire = Narrow {
+                left,
+                taken: Vec::new(),
+                writes: 0,
+            };
+            let mut link = TcpLink::over(wire, LinkSettings::new(64, 5));
+            let sent = link.send(&[q, stop], 1000).unwrap();
+            assert_eq!(sent == Sent::Whole, left > whole, "{left}");
+            assert_eq!(link.stream.writes, 1);
+            let begun = u16::from(left > 0) + u16::from(left > whole);
+            assert_eq!(link.in_flight.open(), begun, "{left}");
+            link.stream.left = 1000;
+            link.send(&[], 2000).unwrap();
+            link.send(&[q], 3000).unwrap();
+            let mut reader = FrameReader::new();
+            reader.feed(&link.stream.taken);
+            let mut ids = Vec::new();
+            while let Some(frame) = reader.next_frame().unwrap() {
+                ids.push(frame.as_request().unwrap().transaction);
+            }
+            assert_eq!(ids, (1..=begun + 1).collect::<Vec<_>>(), "{left}");
+        }
     }
 
     #[test]
@@ -378,7 +496,11 @@ mod tests {
         let (mut link, mut peer) = pair();
         let begin = now_ns();
         assert!(!link.poll(begin).lost, "the silence begins here");
-        assert!(!link.poll(begin + 31_000_000_000).lost);
+        assert_eq!(link.send(&[], begin), Ok(Sent::Whole));
+        let later = begin + 31_000_000_000;
+        assert!(!link.poll(later).lost);
+        assert_eq!(link.in_flight.open(), 0);
+        assert_eq!(link.send(&[], later), Ok(Sent::Whole));
         let asked = replies(&mut peer, 1, Status(0));
         assert_eq!(asked[0][6], 13, "get state");
         assert!(link.poll(begin + 91_000_000_000).lost);

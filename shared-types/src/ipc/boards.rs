@@ -164,6 +164,18 @@ impl OperatorEnd {
         self.beat();
     }
 
+    /// The dead-man switch was let go: a motion that runs is braked.
+    pub fn let_go(&mut self) {
+        self.last.released = 1;
+        self.beat();
+    }
+
+    /// The dead-man switch is held again.
+    pub fn hold(&mut self) {
+        self.last.released = 0;
+        self.beat();
+    }
+
     /// Withdraws the stop, so that it can be acknowledged.
     pub fn release_stop(&mut self) {
         self.last.stop = 0;

@@ -1,0 +1,360 @@
+//! A trial of the real loop on this machine: how late it wakes, how long it
+//! computes, how long its system calls take.
+//!
+//! The loop is the real one, with its blackboards, rings and command link over
+//! TCP; it streams a motion of joint 7 all the time. Only the arm is missing: a
+//! thread answers each request and does nothing else. The loop runs in slices,
+//! so that something else can have its core in between.
+
+mod answerer;
+mod timed_link;
+
+use crate::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
+use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, now_ns};
+use crate::ports::{Mail, RelayPorts, rings};
+use crate::rt_loop::RtLoop;
+use crate::transport::tcp::{LinkSettings, TcpLink};
+use answerer::Answerer;
+use rtrb::{Consumer, Producer, RingBuffer};
+use shared_types::ipc::{
+    Bus, ControllerBoards, ControllerMode, CycleRecord, DomainSweep, IpcError, JointReport,
+    OperatorEnd,
+};
+use shared_types::plan::START_POSE;
+use shared_types::{JointTrajectory, JointVector, Limits, MonotonicNs, TrajectoryError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use timed_link::TimedLink;
+
+/// Pause between two turns of the part that the relay would do.
+const TURN: Duration = Duration::from_millis(2);
+/// Longest wait for the loop to begin to move.
+const BEGIN_WAIT: Duration = Duration::from_secs(10);
+/// Connection to the answering thread.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Poll times on their way out of the loop.
+const POLLS: usize = 4096;
+/// Cycles at the begin of a slice that do not count: caches and branch
+/// predictors are another program's.
+const WARM_UP: usize = 5;
+
+/// Why there is no trial.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// No shared memory.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+    /// No socket or thread.
+    #[error("the trial cannot begin: {0}")]
+    System(#[from] std::io::Error),
+    /// The motion of the trial; a defect.
+    #[error(transparent)]
+    Motion(#[from] TrajectoryError),
+    /// The loop does not move; a defect, or a machine that does not run it.
+    #[error("the control loop does not run (mode {0:?}); look whether the machine is overloaded")]
+    Still(ControllerMode),
+    /// The loop's thread ended.
+    #[error("the control loop ended by itself")]
+    Ended,
+}
+
+/// Times of one cycle (ns).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CycleTimes {
+    /// From the deadline to the first instruction after the sleep.
+    pub wake_ns: u64,
+    /// The receive call and what it brought.
+    pub receive_ns: u64,
+    /// Everything else up to the setpoint: inputs, core, record.
+    pub compute_ns: u64,
+    /// The send call.
+    pub send_ns: u64,
+    /// Cycles skipped before this one.
+    pub missed: u32,
+}
+
+/// A slice to run.
+struct Go {
+    quit: Arc<AtomicBool>,
+}
+
+/// The loop in its thread, at rest between slices.
+#[derive(Debug)]
+pub struct Trial {
+    warnings: Vec<String>,
+    go: Option<mpsc::Sender<Go>>,
+    rested: mpsc::Receiver<()>,
+    thread: Option<JoinHandle<()>>,
+    relay: RelayPorts<TimedLink>,
+    reports: Producer<JointReport>,
+    polls: Option<Producer<u32>>,
+    polled: Consumer<u32>,
+    operator: OperatorEnd,
+    answerer: Answerer,
+    period_ns: u64,
+    mode: ControllerMode,
+    q: JointVector,
+    motions: u64,
+    _bus: Bus,
+    _sweep: DomainSweep,
+}
+
+/// Nothing that a busy machine does may stop the motion: the trial measures.
+fn patient() -> ControlSettings {
+    const EVER_NS: u64 = u64::MAX / 4;
+    ControlSettings::from(Thresholds {
+        operator_timeout_ns: EVER_NS,
+        reply_stall_ns: EVER_NS,
+        unanswered_max: 250,
+        report_stale_ns: EVER_NS,
+        report_frozen_ns: EVER_NS,
+        tracking_error_max_rad: f64::MAX,
+        clock_resyncs_max: u32::MAX,
+        report_broken_max: u32::MAX,
+        late_cycles_max: u32::MAX,
+        missed_cycles_max: u32::MAX,
+        ..Thresholds::relaxed()
+    })
+}
+
+impl Trial {
+    /// Sets the loop up in a shared-memory domain of its own. It takes what it
+    /// can have of `real_time`; see [`warnings`](Self::warnings).
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn new(domain: &str, real_time: RealTimeSettings) -> Result<Self, TrialError> {
+        let sweep = DomainSweep::new(domain);
+        let bus = Bus::join(domain)?;
+        let limits = Limits::default();
+        let period_ns = MonotonicNs(0).plus_s(limits.period_s()).0;
+        let all = rings();
+        let (polls, polled) = RingBuffer::new(POLLS);
+        let (go, begin) = mpsc::channel::<Go>();
+        let (rest, rested) = mpsc::channel();
+        let (ready, wait) = mpsc::channel();
+        let (control, ports, its_domain) = (
+            ControlState::new(limits, patient()),
+            all.rt,
+            domain.to_owned(),
+        );
+        let body = move || {
+            let boards = Bus::join(&its_domain).and_then(|bus| ControllerBoards::create(&bus));
+            let boards = match boards {
+                Ok(boards) => boards,
+                Err(error) => {
+                    let _ = ready.send(Err(error));
+                    return;
+                }
+            };
+            let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
+            let warnings = enter_real_time(&real_time);
+            let _ = ready.send(Ok(warnings.iter().map(ToString::to_string).collect()));
+            while let Ok(Go { quit }) = begin.recv() {
+                rt.run(&quit);
+                let _ = rest.send(());
+            }
+        };
+        let thread = std::thread::Builder::new()
+            .name("control loop".to_owned())
+            .spawn(body)?;
+        let warnings = wait.recv().map_err(|_gone| TrialError::Ended)??;
+        Ok(Self {
+            warnings,
+            go: Some(go),
+            rested,
+            thread: Some(thread),
+            relay: all.relay,
+            reports: all.reports_to_rt,
+            polls: Some(polls),
+            polled,
+            operator: OperatorEnd::take(&bus)?,
+            answerer: Answerer::start()?,
+            period_ns,
+            mode: ControllerMode::Offline,
+            q: START_POSE,
+            motions: 0,
+            _bus: bus,
+            _sweep: sweep,
+        })
+    }
+
+    /// Real-time properties that could not be had, in words.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Runs the loop for `span`, then lets it rest; times of the cycles in which
+    /// it moved.
+    ///
+    /// # Errors
+    /// [`TrialError`].
+    pub fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, TrialError> {
+        let quit = Arc::new(AtomicBool::new(false));
+        let go = self.go.as_ref().ok_or(TrialError::Ended)?;
+        go.send(Go {
+            quit: Arc::clone(&quit),
+        })
+        .map_err(|_gone| TrialError::Ended)?;
+        let ran = self.follow(span);
+        quit.store(true, Ordering::Relaxed);
+        self.rested.recv().map_err(|_gone| TrialError::Ended)?;
+        let mut times = ran?;
+        times.drain(..WARM_UP.min(times.len()));
+        Ok(times)
+    }
+
+    /// Does the relay's part, keeps the arm moving and collects.
+    fn follow(&mut self, span: Duration) -> Result<Vec<CycleTimes>, TrialError> {
+        let (began, mut moving_since) = (Instant::now(), None);
+        let mut times = Vec::new();
+        self.prompt()?;
+        loop {
+            std::thread::sleep(TURN);
+            self.operator.beat();
+            let _ = self.reports.push(self.report());
+            while self.relay.retired.pop().is_ok() {}
+            while self.relay.events.pop().is_ok() {}
+            while self.relay.inputs.pop().is_ok() {}
+            while self.relay.states.pop().is_ok() {}
+            while let Ok(record) = self.relay.records.pop() {
+                let before = self.mode;
+                self.mode = ControllerMode::from_raw(record.mode);
+                self.q = record.q_c;
+                // Without a link nothing is polled.
+                let linked = [before, self.mode] != [ControllerMode::Offline; 2];
+                let poll_ns = if linked {
+                    self.polled.pop().unwrap_or(0)
+                } else {
+                    0
+                };
+                if self.mode == ControllerMode::Streaming && before == self.mode {
+                    times.push(times_of(&record, poll_ns));
+                }
+                if self.mode != before && !self.mode.is_moving() {
+                    self.prompt()?;
+                }
+            }
+            if self.mode == ControllerMode::Streaming {
+                moving_since.get_or_insert_with(Instant::now);
+            }
+            if moving_since.is_some_and(|since: Instant| since.elapsed() >= span) {
+                return Ok(times);
+            }
+            if moving_since.is_none() && began.elapsed() > BEGIN_WAIT {
+                return Err(TrialError::Still(self.mode));
+            }
+        }
+    }
+
+    /// Orders what leads to a moving arm from where the loop is.
+    fn prompt(&mut self) -> Result<(), TrialError> {
+        let mail = match self.mode {
+            ControllerMode::Offline | ControllerMode::Faulted => {
+                let Some(polls) = self.polls.take() else {
+                    return Err(TrialError::Still(self.mode));
+                };
+                let settings = LinkSettings::new(250, self.period_ns);
+                let address = self.answerer.address();
+                let link = TcpLink::connect(address, CONNECT_TIMEOUT, settings)?;
+                Mail {
+                    order: Order::Adopt { hold: START_POSE },
+                    link: Some(Box::new(TimedLink::new(link, polls))),
+                }
+            }
+            ControllerMode::Idle => {
+                self.motions += 1;
+                let motion = Box::new(swinging(self.q)?);
+                let order = Order::Run {
+                    id: self.motions,
+                    motion,
+                };
+                Mail { order, link: None }
+            }
+            ControllerMode::Moving | ControllerMode::Streaming | ControllerMode::Braking => {
+                return Ok(());
+            }
+        };
+        self.relay
+            .orders
+            .push(mail)
+            .map_err(|_full| TrialError::Ended)
+    }
+
+    /// An arm that is where it was told to be.
+    fn report(&self) -> JointReport {
+        let now_ns = now_ns();
+        JointReport {
+            arm_state: 1,
+            arm_mode: patient().wire.arm_mode(),
+            stamp_ns: now_ns,
+            arrival_ns: now_ns,
+            q: self.q,
+            ..JointReport::default()
+        }
+    }
+}
+
+impl Drop for Trial {
+    fn drop(&mut self) {
+        // Without a sender the thread ends.
+        self.go = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn times_of(record: &CycleRecord, poll_ns: u32) -> CycleTimes {
+    CycleTimes {
+        wake_ns: record.wake_late_ns.into(),
+        receive_ns: poll_ns.into(),
+        compute_ns: record.compute_ns.saturating_sub(poll_ns).into(),
+        send_ns: record.send_ns.saturating_sub(record.compute_ns).into(),
+        missed: record.missed,
+    }
+}
+
+/// Joint 7 back and forth for eight minutes, slowly.
+fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
+    let (times_s, poses): (Vec<f64>, Vec<JointVector>) = (0..240)
+        .map(|k| {
+            let mut q = from;
+            q[6] += 0.3 * f64::from(k % 2);
+            (2.0 * f64::from(k), q)
+        })
+        .unzip();
+    JointTrajectory::new(&times_s, &poses).map(Motion::Spline)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_runs_in_slices_and_times_every_cycle_in_parts() {
+        let domain = format!("test_trial_{}", std::process::id());
+        let ordinary = RealTimeSettings {
+            priority: None,
+            cpu: None,
+            lock_memory: false,
+            require: false,
+        };
+        let mut trial = Trial::new(&domain, ordinary).unwrap();
+        assert!(trial.warnings().is_empty());
+        for _ in 0..3 {
+            let times = trial.slice(Duration::from_millis(400)).unwrap();
+            assert!(times.len() > 3, "{}", times.len());
+            for t in &times {
+                assert!(
+                    t.receive_ns > 0 && t.compute_ns > 0 && t.send_ns > 0,
+                    "{t:?}"
+                );
+            }
+        }
+    }
+}

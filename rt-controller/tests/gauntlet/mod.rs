@@ -1,0 +1,300 @@
+//! The real loop body over a real socket, driven through every mode and every
+//! fault it can meet, in virtual time. Whoever runs it looks at each cycle
+//! through a [`Watch`].
+
+pub(crate) mod arm;
+pub(crate) mod ways;
+
+use arm::{EchoArm, Manners};
+use rt_controller::control::{
+    ControlEvent, ControlSettings, ControlState, Motion, Order, Thresholds,
+};
+use rt_controller::os::Clock;
+use rt_controller::ports::{Mail, Rings, rings};
+use rt_controller::rt_loop::RtLoop;
+use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use shared_types::ipc::{
+    Bus, ControllerBoards, ControllerMode, CycleRecord, GuardianBeat, GuardianEnd, JointReport,
+    OperatorEnd,
+};
+use shared_types::plan::START_POSE;
+use shared_types::{Arming, FaultCode, JointVector, Limits, LimitsSpec, MotionTier, WireMode};
+use std::cell::Cell;
+use std::collections::BTreeSet;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+/// Sees every cycle.
+pub(crate) trait Watch {
+    /// Calls `body`, one turn of the loop, once.
+    fn around(&mut self, body: &mut dyn FnMut());
+}
+
+/// Time that moves by hand.
+struct Hand(Rc<Cell<u64>>);
+
+impl Clock for Hand {
+    fn now_ns(&self) -> u64 {
+        self.0.get()
+    }
+    fn sleep_until(&mut self, deadline_ns: u64) {
+        self.0.set(deadline_ns);
+    }
+}
+
+/// Changes a report that would have been right: what the arm said when this
+/// began, and how many cycles ago.
+pub(crate) type Spoil = fn(&mut JointReport, &JointReport, u32);
+
+/// What goes wrong from now on.
+#[derive(Debug, Default)]
+pub(crate) struct Mood {
+    pub(crate) operator_silent: bool,
+    pub(crate) guardian_silent: bool,
+    pub(crate) reports_stop: bool,
+    /// Cycles that the next one misses.
+    pub(crate) missed: u32,
+    pub(crate) reports: Option<Spoil>,
+}
+
+/// The loop with all that is around it.
+pub(crate) struct Bench<'w> {
+    rt: RtLoop<TcpLink, Hand>,
+    clock: Rc<Cell<u64>>,
+    rings: Rings<TcpLink>,
+    pub(crate) arm: EchoArm,
+    pub(crate) operator: OperatorEnd,
+    guardian: GuardianEnd,
+    watch: &'w mut dyn Watch,
+    pub(crate) limits: Limits,
+    wire: WireMode,
+    period_ns: u64,
+    pub(crate) now_ns: u64,
+    pub(crate) newest: CycleRecord,
+    said: JointReport,
+    pub(crate) mood: Mood,
+    mood_cycles: u32,
+    asked: u64,
+    pub(crate) cycles: u64,
+    pub(crate) seen: [u64; 6],
+    /// Causes of stops and refusals so far.
+    pub(crate) met: BTreeSet<u16>,
+    pub(crate) last_cause: FaultCode,
+}
+
+const UNANSWERED_MAX: u16 = 200;
+
+fn settings(wire: WireMode) -> ControlSettings {
+    ControlSettings {
+        wire,
+        arming_required: true,
+        guardian_required: true,
+        ..ControlSettings::from(Thresholds {
+            // The arm's thread is waited for now and then only.
+            reply_stall_ns: 400_000_000,
+            unanswered_max: UNANSWERED_MAX,
+            late_cycles_max: 2,
+            ..Thresholds::relaxed()
+        })
+    }
+}
+
+impl<'w> Bench<'w> {
+    pub(crate) fn new(
+        wire: WireMode,
+        rate_hz: f64,
+        arm: &EchoArm,
+        watch: &'w mut dyn Watch,
+    ) -> Self {
+        let name = format!(
+            "test_gauntlet_{}_{}_{rate_hz}",
+            std::process::id(),
+            wire as u8
+        );
+        let bus = Bus::join(&name).unwrap();
+        let boards = ControllerBoards::create(&bus).unwrap();
+        let limits = Limits::try_from(LimitsSpec {
+            rate_hz,
+            ..Limits::default().into()
+        })
+        .unwrap();
+        let mut all = rings();
+        let rt_ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
+        let now_ns = 1_000_000_000_000;
+        let clock = Rc::new(Cell::new(now_ns));
+        let control = ControlState::new(limits.clone(), settings(wire));
+        Self {
+            rt: RtLoop::new(control, Hand(Rc::clone(&clock)), boards, rt_ports),
+            clock,
+            rings: all,
+            arm: arm.clone(),
+            operator: OperatorEnd::take(&bus).unwrap(),
+            guardian: GuardianEnd::take(&bus).unwrap(),
+            watch,
+            period_ns: (1e9 * limits.period_s()).round() as u64,
+            limits,
+            wire,
+            now_ns,
+            newest: CycleRecord::default(),
+            said: JointReport::default(),
+            mood: Mood::default(),
+            mood_cycles: 0,
+            asked: 0,
+            cycles: 0,
+            seen: [0; 6],
+            met: BTreeSet::new(),
+            last_cause: FaultCode::None,
+        }
+    }
+
+    /// One turn of the loop, and everything that others do meanwhile.
+    pub(crate) fn cycle(&mut self) {
+        let missed = std::mem::take(&mut self.mood.missed);
+        self.now_ns += self.period_ns * u64::from(missed + 1);
+        self.clock.set(self.now_ns);
+        if !self.mood.operator_silent {
+            self.operator.beat();
+        }
+        if !self.mood.guardian_silent {
+            self.guardian.beat(GuardianBeat {
+                phase: 1,
+                connected: 1,
+                ..GuardianBeat::default()
+            });
+        }
+        if !self.mood.reports_stop {
+            let report = self.report();
+            self.rings.reports_to_rt.push(report).unwrap();
+        }
+        let (rt, now_ns) = (&mut self.rt, self.now_ns);
+        self.watch.around(&mut || {
+            rt.cycle(now_ns, missed, now_ns);
+        });
+        self.cycles += 1;
+        self.newest = self.rings.relay.records.pop().unwrap();
+        self.seen[usize::from(self.newest.mode)] += 1;
+        self.asked += u64::from(self.newest.sent);
+        while self.rings.relay.retired.pop().is_ok() {}
+        while let Ok(event) = self.rings.relay.events.pop() {
+            self.take(&event);
+        }
+        if self.cycles.is_multiple_of(16) {
+            self.wait_for_the_arm();
+        }
+    }
+
+    fn take(&mut self, event: &ControlEvent) {
+        let code = match event {
+            ControlEvent::Latched(cause) => {
+                self.last_cause = cause.fault();
+                self.asked += u64::from(cause.stop_arm);
+                cause.fault()
+            }
+            ControlEvent::Refused { fault, .. } | ControlEvent::Disarmed { fault } => *fault,
+            _ => return,
+        };
+        self.met.insert(code as u16);
+    }
+
+    fn report(&mut self) -> JointReport {
+        let mut report = JointReport {
+            arm_state: 1,
+            arm_mode: self.wire.arm_mode(),
+            stamp_ns: self.now_ns,
+            arrival_ns: self.now_ns,
+            q: self.newest.q_c,
+            ..JointReport::default()
+        };
+        match self.mood.reports {
+            Some(spoil) => {
+                self.mood_cycles += 1;
+                spoil(&mut report, &self.said, self.mood_cycles);
+            }
+            None => {
+                self.said = report;
+                self.mood_cycles = 0;
+            }
+        }
+        report
+    }
+
+    /// Lets the arm's thread catch up; in the loop no time passes meanwhile.
+    fn wait_for_the_arm(&mut self) {
+        let began = Instant::now();
+        while self.linked() && !self.arm.is_done_with(self.asked) {
+            assert!(began.elapsed() < Duration::from_secs(20), "no answer");
+            std::thread::sleep(Duration::from_micros(50));
+        }
+    }
+
+    fn linked(&self) -> bool {
+        ![ControllerMode::Offline, ControllerMode::Faulted].contains(&self.mode())
+    }
+
+    pub(crate) fn order(&mut self, order: Order) {
+        self.send(order, None);
+    }
+
+    fn send(&mut self, order: Order, link: Option<Box<TcpLink>>) {
+        self.rings.relay.orders.push(Mail { order, link }).unwrap();
+        self.cycle();
+    }
+
+    pub(crate) fn mode(&self) -> ControllerMode {
+        ControllerMode::from_raw(self.newest.mode)
+    }
+
+    /// Everything is well again and the arm is held, over a fresh connection.
+    pub(crate) fn recover(&mut self) {
+        self.mood = Mood::default();
+        self.operator.hold();
+        self.operator.release_stop();
+        self.arm.be(Manners::Good);
+        self.asked = self.arm.heard();
+        let settings = LinkSettings::new(UNANSWERED_MAX, self.period_ns);
+        let timeout = Duration::from_secs(5);
+        let link = TcpLink::connect(self.arm.address, timeout, settings).unwrap();
+        self.newest.q_c = START_POSE;
+        let hold = Order::Adopt { hold: START_POSE };
+        self.send(hold, Some(Box::new(link)));
+        assert_eq!(self.mode(), ControllerMode::Idle);
+    }
+
+    /// Arms, begins `motion` and follows it for `cycles` at most.
+    pub(crate) fn begin(&mut self, motion: Motion, tier: MotionTier, cycles: usize) {
+        self.order(Order::Arm(Arming {
+            tier,
+            expires_ns: self.now_ns + 1_000_000_000,
+            area_clear: true,
+        }));
+        let motion = Box::new(motion);
+        self.order(Order::Run { id: 1, motion });
+        for _ in 0..cycles {
+            self.cycle();
+        }
+    }
+
+    /// Turns until the arm rests.
+    pub(crate) fn until_still(&mut self) {
+        for _ in 0..3000 {
+            if !self.mode().is_moving() {
+                return;
+            }
+            self.cycle();
+        }
+        panic!("it moves and moves: {:?}", self.newest);
+    }
+
+    /// Holds a while, longer than the reports of a fresh arm are mistrusted.
+    pub(crate) fn hold(&mut self) {
+        for _ in 0..90 {
+            self.cycle();
+        }
+    }
+
+    pub(crate) fn pose(joint: usize, by_rad: f64) -> JointVector {
+        let mut q = START_POSE;
+        q[joint - 1] += by_rad;
+        q
+    }
+}

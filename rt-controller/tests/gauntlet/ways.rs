@@ -1,0 +1,229 @@
+//! A way to every fault: how the loop is brought to it while it moves.
+
+use super::arm::{EchoArm, Manners};
+use super::{Bench, Watch};
+use rt_controller::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
+use rt_controller::control::{Motion, Order};
+use rt_controller::point_to_point::plan_move;
+use shared_types::ipc::ControllerMode;
+use shared_types::plan::START_POSE;
+use shared_types::{
+    Arming, FaultCode, JOINTS, JointTrajectory, JointVector, Limits, LimitsSpec, MotionTier,
+    WireMode,
+};
+use std::collections::BTreeSet;
+
+/// A way to a fault.
+enum Way {
+    /// A motion runs and this is done to it.
+    Spoilt(fn(&mut Bench<'_>)),
+    /// This motion is begun.
+    Motion(fn(&Limits) -> Motion, MotionTier),
+    /// Nothing moves for it: an order is refused.
+    Refused(fn(&mut Bench<'_>)),
+    /// The loop cannot meet it, because ...
+    Never(&'static str),
+}
+
+/// Every code has its arm here: a new one has to say how it is met.
+#[allow(clippy::too_many_lines, reason = "one line per code")]
+fn way_to(code: FaultCode) -> Way {
+    use FaultCode as F;
+    use Way::{Motion, Never, Refused, Spoilt};
+    const RELAY: Way = Never("the relay's, before the loop hears of a motion");
+    match code {
+        F::None => Never("no fault"),
+        F::OperatorStop => Spoilt(|b| b.operator.stop()),
+        F::OperatorLost => Spoilt(|b| b.mood.operator_silent = true),
+        F::GuardianLost => Spoilt(|b| b.mood.guardian_silent = true),
+        F::DeadManReleased => Spoilt(|b| b.operator.let_go()),
+        F::Disarmed => Spoilt(|b| b.order(Order::Disarm)),
+        F::SetpointNotFinite => Motion(|_| not_finite(), MotionTier::Throw),
+        F::SetpointPosition => Refused(|b| {
+            b.order(Order::Stop);
+            let hold = Bench::pose(2, 3.0);
+            b.order(Order::Adopt { hold });
+        }),
+        F::SetpointVelocity => Motion(|_| spline(7, 4.6, 2.0), MotionTier::Throw),
+        F::SetpointAcceleration => Motion(|_| spline(7, 0.2, 0.2), MotionTier::Throw),
+        F::SetpointTcpSpeed => Motion(|_| spline(1, 3.4, 1.55), MotionTier::Throw),
+        F::SetpointJerk => Motion(jerky, MotionTier::Throw),
+        // Ten millimetres per cycle are slower than the tool may be at 100 Hz.
+        F::SetpointStep => Motion(|_| spline(1, 2.6, 1.55), MotionTier::Throw),
+        F::SetpointUnstoppable => Motion(|_| spline(6, 2.2, 1.2), MotionTier::Throw),
+        F::TierExceeded => Motion(|_| spline(1, 3.4, 1.55), MotionTier::Wiggle),
+        F::DeadlineMissed => Spoilt(|b| b.mood.missed = 7),
+        F::LateCycles => Spoilt(|b| b.mood.missed = 4),
+        F::ReplyStalled => Spoilt(|b| b.arm.be(Manners::Mute)),
+        F::LinkLost => Spoilt(|b| b.arm.be(Manners::HangUp)),
+        F::ArmError => Spoilt(|b| b.arm.be(Manners::Error)),
+        F::ArmNotReady => Spoilt(|b| b.arm.be(Manners::NotReady)),
+        F::SecondCommander => Spoilt(|b| b.arm.be(Manners::Foreign)),
+        F::ReportStale => Spoilt(|b| b.mood.reports_stop = true),
+        F::ReportFrozen => Spoilt(|b| {
+            b.mood.reports = Some(|r, before, _| (r.q, r.qd) = (before.q, before.qd));
+        }),
+        F::ReportClock => Spoilt(|b| b.mood.reports = Some(|r, _, _| r.stamp_ns -= 1_000_000_000)),
+        F::ReportBroken => {
+            Spoilt(|b| b.mood.reports = Some(|r, _, _| r.q = JointVector::splat(f64::NAN)))
+        }
+        F::TrackingError => Spoilt(|b| {
+            b.mood.reports = Some(|r, _, cycles| r.q[2] += 0.003 * f64::from(cycles));
+        }),
+        F::JointStuck => Spoilt(|b| b.mood.reports = Some(|r, before, _| r.q[5] = before.q[5])),
+        F::EncoderJump => Spoilt(|b| b.mood.reports = Some(|r, _, _| r.q[3] += 0.3)),
+        F::ArmModeChanged => Spoilt(|b| b.mood.reports = Some(|r, _, _| r.arm_mode = 0)),
+        F::StartPoseMismatch => Refused(|b| {
+            let from = Bench::pose(3, 0.1);
+            let motion = JointTrajectory::hold(from, 1.0).unwrap();
+            b.begin(super::Motion::Spline(motion), MotionTier::Throw, 0);
+        }),
+        F::WrongMode => Refused(|b| {
+            b.begin(swing(), MotionTier::Throw, 20);
+            let motion = Box::new(swing());
+            b.order(Order::Run { id: 2, motion });
+        }),
+        F::NotArmed => Refused(|b| {
+            let motion = Box::new(swing());
+            b.order(Order::Run { id: 1, motion });
+        }),
+        F::ArmingExpired => Refused(|b| {
+            b.order(Order::Arm(Arming {
+                tier: MotionTier::Wiggle,
+                expires_ns: b.now_ns + 20_000_000,
+                area_clear: true,
+            }));
+            b.hold();
+        }),
+        F::PlanOutOfLimits | F::PlanHashMismatch | F::UploadTimedOut => RELAY,
+        F::UnsupportedFirmware | F::ArmDiffers => Never("the set-up's, before any link"),
+    }
+}
+
+/// A stretch of `joint` (1-based) by `by_rad` in `span_s`, and back.
+fn spline(joint: usize, by_rad: f64, span_s: f64) -> Motion {
+    let poses = [START_POSE, Bench::pose(joint, by_rad), START_POSE];
+    let times_s = [0.0, span_s, 2.0 * span_s];
+    Motion::Spline(JointTrajectory::new(&times_s, &poses).unwrap())
+}
+
+/// Within the limits, joints 2, 4 and 6.
+fn swing() -> Motion {
+    let mut out = START_POSE;
+    (out[1], out[3], out[5]) = (out[1] - 0.1, out[3] - 0.1, out[5] - 0.6);
+    let poses = [START_POSE, out, START_POSE];
+    Motion::Spline(JointTrajectory::new(&[0.0, 0.8, 1.6], &poses).unwrap())
+}
+
+/// Within the limits, from pose to pose.
+fn go(limits: &Limits) -> Motion {
+    let mut to = START_POSE;
+    (to[1], to[5]) = (to[1] + 0.2, to[5] + 0.9);
+    plan_move(&START_POSE, &to, 0.3, limits).unwrap()
+}
+
+/// Rests for a while and then is no number.
+fn not_finite() -> Motion {
+    let axes: [AxisPhases; JOINTS] = core::array::from_fn(|j| {
+        let mut phases = [Phase::default(); MAX_PHASES];
+        phases[0].duration_s = 0.2;
+        (phases[1].duration_s, phases[1].jerk_rad_s3) = (0.2, f64::NAN);
+        let start = AxisState {
+            q: START_POSE[j],
+            ..AxisState::default()
+        };
+        AxisPhases::new(start, phases)
+    });
+    let (phases, end) = (PhasedMotion::new(axes), START_POSE);
+    Motion::Move { phases, end }
+}
+
+/// A move with twice the jerk that is allowed.
+fn jerky(limits: &Limits) -> Motion {
+    let harder = Limits::try_from(LimitsSpec {
+        jerk_max_rad_s3: limits.jerk_max_rad_s3 * 2.0,
+        ..limits.clone().into()
+    })
+    .unwrap();
+    plan_move(&START_POSE, &Bench::pose(7, 1.0), 1.0, &harder).unwrap()
+}
+
+/// Brings the loop to `code`, with each kind of motion where one is spoilt;
+/// false where it cannot be brought there.
+fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
+    let motions = [swing(), go(&bench.limits)];
+    match way_to(code) {
+        Way::Never(_because) => return false,
+        Way::Refused(ask) => {
+            bench.recover();
+            bench.cycle();
+            ask(bench);
+            bench.until_still();
+            assert!(bench.met.contains(&(code as u16)), "{code:?}");
+        }
+        Way::Motion(make, tier) => {
+            bench.recover();
+            bench.last_cause = FaultCode::None;
+            bench.begin(make(&bench.limits), tier, 0);
+            bench.until_still();
+            assert_eq!(bench.last_cause, code);
+        }
+        Way::Spoilt(spoil) => {
+            for motion in motions {
+                bench.recover();
+                bench.hold();
+                bench.begin(motion, MotionTier::Throw, 30);
+                assert!(bench.mode().is_moving(), "{code:?}");
+                bench.last_cause = FaultCode::None;
+                spoil(bench);
+                bench.until_still();
+                assert_eq!(bench.last_cause, code);
+            }
+        }
+    }
+    true
+}
+
+/// Runs at least `cycles` through every mode and every fault that can be met,
+/// with every wire, and says how many ran.
+pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
+    let arm = EchoArm::start();
+    let (mut met, mut seen, mut ran) = (BTreeSet::new(), [0; 6], 0);
+    // At 250 Hz the tool's speed limit comes before its largest step, at 100 Hz
+    // after it.
+    let set_ups = [
+        (WireMode::ServoPosition, 250.0, FaultCode::SetpointStep),
+        (WireMode::JointVelocity, 250.0, FaultCode::SetpointStep),
+        (WireMode::ServoPosition, 100.0, FaultCode::SetpointTcpSpeed),
+    ];
+    for (wire, rate_hz, hidden) in set_ups {
+        let mut bench = Bench::new(wire, rate_hz, &arm, watch);
+        for _ in 0..5 {
+            bench.cycle();
+        }
+        while bench.cycles < cycles / 3 + 1 {
+            for code in FaultCode::ALL {
+                if code != hidden && lead_to(&mut bench, code) {
+                    met.insert(code as u16);
+                }
+            }
+            bench.recover();
+            bench.begin(swing(), MotionTier::Throw, 0);
+            bench.until_still();
+            assert_eq!(bench.mode(), ControllerMode::Idle, "a throw in peace");
+        }
+        ran += bench.cycles;
+        for (sum, more) in seen.iter_mut().zip(bench.seen) {
+            *sum += more;
+        }
+    }
+    println!("{ran} cycles, by mode (Offline to Faulted): {seen:?}; codes met: {met:?}");
+    assert!(seen.iter().all(|cycles| *cycles > 0), "{seen:?}");
+    let expected: BTreeSet<u16> = FaultCode::ALL
+        .into_iter()
+        .filter(|code| !matches!(way_to(*code), Way::Never(_)))
+        .map(|code| code as u16)
+        .collect();
+    assert_eq!(met, expected);
+    ran
+}

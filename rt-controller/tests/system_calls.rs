@@ -1,0 +1,390 @@
+//! Per cycle the real-time thread makes these system calls and no others: one
+//! clock sleep, one receive and one send at most.
+//!
+//! Counted over the loop body through every mode and fault, and over the whole
+//! loop while an armed arm moves and readers come and are killed.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    unsafe_code,
+    reason = "tests may fail loudly; a seccomp filter is unsafe by nature"
+)]
+
+#[path = "system_calls/counter.rs"]
+mod counter;
+mod gauntlet;
+
+use counter::Calls;
+use gauntlet::Watch;
+use gauntlet::arm::EchoArm;
+use libc::{SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto};
+use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
+use rt_controller::os::{Clock, MonotonicClock, now_ns};
+use rt_controller::ports::{Mail, RelayPorts, Rings, rings};
+use rt_controller::rt_loop::RtLoop;
+use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use shared_types::ipc::{
+    Bus, ControllerBoards, ControllerMode, CycleRecord, JointReport, OperatorEnd, StateReader,
+};
+use shared_types::plan::START_POSE;
+use shared_types::{Arming, JointTrajectory, Limits, MotionTier};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// What a cycle may call.
+const ALLOWED: [libc::c_long; 3] = [SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto];
+
+/// What cycles called.
+#[derive(Debug, Default, Clone, PartialEq, Eq)]
+struct Sums {
+    cycles: u64,
+    sleeps: u64,
+    receives: u64,
+    sends: u64,
+    /// Cycles before the first that received.
+    unlinked: u64,
+}
+
+impl Sums {
+    /// Judges the calls of one cycle.
+    fn add(&mut self, calls: &Calls) {
+        let others = calls.beside(&ALLOWED);
+        assert!(others.is_empty(), "system calls (number, count) {others:?}");
+        let [sleeps, receives, sends] = ALLOWED.map(|number| calls.of(number));
+        assert_eq!(sleeps, 1, "sleeps");
+        assert!(receives <= 1 && sends <= 1, "{receives} and {sends}");
+        self.cycles += 1;
+        self.sleeps += u64::from(sleeps);
+        self.receives += u64::from(receives);
+        self.sends += u64::from(sends);
+        self.unlinked += u64::from(self.receives == 0);
+    }
+}
+
+/// Counts around each turn of the loop's body, with the sleep before it.
+#[derive(Default)]
+struct Watched {
+    begun: bool,
+    sums: Sums,
+}
+
+impl Watch for Watched {
+    fn around(&mut self, body: &mut dyn FnMut()) {
+        if !std::mem::replace(&mut self.begun, true) {
+            counter::watch_this_thread();
+        }
+        counter::take();
+        counter::count(true);
+        MonotonicClock.sleep_until(now_ns() + 1000);
+        body();
+        counter::count(false);
+        self.sums.add(&counter::take());
+    }
+}
+
+#[test]
+fn through_every_mode_and_fault_a_cycle_sleeps_receives_and_sends_once_at_most() {
+    let thread = std::thread::spawn(|| {
+        let mut watched = Watched::default();
+        gauntlet::ways::run(30_000, &mut watched);
+        watched.sums
+    });
+    let sums = thread.join().expect("a cycle called something else");
+    println!("{sums:?}");
+    assert!(sums.cycles >= 30_000 && sums.receives * 10 > sums.cycles * 9);
+    assert!(sums.sends * 2 > sums.cycles);
+}
+
+/// The loop's clock, which knows where a cycle ends.
+struct CountedClock {
+    inner: MonotonicClock,
+    begun: bool,
+    sums: Sums,
+}
+
+impl Clock for CountedClock {
+    fn now_ns(&self) -> u64 {
+        self.inner.now_ns()
+    }
+
+    fn sleep_until(&mut self, deadline_ns: u64) {
+        if std::mem::replace(&mut self.begun, true) {
+            counter::count(false);
+            self.sums.add(&counter::take());
+        } else {
+            counter::watch_this_thread();
+        }
+        counter::count(true);
+        self.inner.sleep_until(deadline_ns);
+    }
+}
+
+/// A running loop in a thread of its own, and what the relay would hold.
+struct Running {
+    thread: JoinHandle<Sums>,
+    quit: Arc<AtomicBool>,
+    rings: Rings<TcpLink>,
+    newest: CycleRecord,
+}
+
+/// Nothing that a busy machine does to this test may stop the motion.
+fn patient() -> ControlSettings {
+    const MINUTE_NS: u64 = 60_000_000_000;
+    ControlSettings {
+        arming_required: true,
+        ..ControlSettings::from(Thresholds {
+            operator_timeout_ns: MINUTE_NS,
+            reply_stall_ns: MINUTE_NS,
+            report_stale_ns: MINUTE_NS,
+            report_frozen_ns: MINUTE_NS,
+            tracking_error_max_rad: 10.0,
+            tracking_window_ns: MINUTE_NS,
+            unanswered_max: 250,
+            late_cycles_max: 100_000,
+            missed_cycles_max: 100_000,
+            ..Thresholds::relaxed()
+        })
+    }
+}
+
+fn start_loop(domain: &str) -> Running {
+    let mut all = rings();
+    let ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
+    let quit = Arc::new(AtomicBool::new(false));
+    let (its_quit, domain) = (Arc::clone(&quit), domain.to_owned());
+    let (ready, wait) = std::sync::mpsc::channel();
+    let thread = std::thread::spawn(move || {
+        let bus = Bus::join(&domain).unwrap();
+        let boards = ControllerBoards::create(&bus).unwrap();
+        let clock = CountedClock {
+            inner: MonotonicClock,
+            begun: false,
+            sums: Sums::default(),
+        };
+        let control = ControlState::new(Limits::default(), patient());
+        let mut rt = RtLoop::new(control, clock, boards, ports);
+        ready.send(()).unwrap();
+        rt.run(&its_quit);
+        counter::count(false);
+        rt.clock().sums.clone()
+    });
+    wait.recv().unwrap();
+    Running {
+        thread,
+        quit,
+        rings: all,
+        newest: CycleRecord::default(),
+    }
+}
+
+/// What the relay does beside: passes records on to whoever listens.
+struct Beside {
+    bus: Bus,
+    cycles: shared_types::ipc::CyclePublisher,
+    operator: OperatorEnd,
+}
+
+impl Running {
+    fn relay(&mut self) -> &mut RelayPorts<TcpLink> {
+        &mut self.rings.relay
+    }
+
+    /// Turns the relay until `done` or for ten seconds.
+    fn until(&mut self, beside: &mut Beside, mut done: impl FnMut(&CycleRecord) -> bool) {
+        let began = Instant::now();
+        while !done(&self.newest) {
+            assert!(!self.thread.is_finished(), "the loop ended");
+            assert!(
+                began.elapsed() < Duration::from_secs(60),
+                "{:?}",
+                self.newest
+            );
+            beside.operator.beat();
+            while let Ok(record) = self.rings.relay.records.pop() {
+                self.newest = record;
+                beside.cycles.send_copy(record).unwrap();
+            }
+            while self.rings.relay.retired.pop().is_ok() {}
+            while self.rings.relay.events.pop().is_ok() {}
+            let report = JointReport {
+                arm_state: 1,
+                arm_mode: 1,
+                stamp_ns: now_ns(),
+                arrival_ns: now_ns(),
+                q: self.newest.q_c,
+                ..JointReport::default()
+            };
+            let _ = self.rings.reports_to_rt.push(report);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn order(&mut self, order: Order, link: Option<Box<TcpLink>>) {
+        self.relay().orders.push(Mail { order, link }).unwrap();
+    }
+}
+
+/// Eight minutes of joint 7, back and forth: armed and moving all the time.
+fn endless() -> Motion {
+    let (times_s, poses): (Vec<f64>, Vec<_>) = (0..240)
+        .map(|k| {
+            let mut q = START_POSE;
+            q[6] = 0.3 * f64::from(k % 2);
+            (2.0 * f64::from(k), q)
+        })
+        .unzip();
+    Motion::Spline(JointTrajectory::new(&times_s, &poses).unwrap())
+}
+
+/// Set for the children that read and wait to be killed.
+const DOMAIN: &str = "WAG_TEST_READER_OF";
+
+/// Not a test by itself: the child of the next one.
+#[test]
+fn a_reader_that_waits_to_be_killed() {
+    let Ok(domain) = std::env::var(DOMAIN) else {
+        return;
+    };
+    let bus = Bus::join(&domain).unwrap();
+    let state = StateReader::open(&bus).unwrap();
+    let cycles = bus.cycle_subscriber().unwrap();
+    let mut heard = 0;
+    while heard < 5 {
+        while cycles.receive().unwrap().is_some() {
+            heard += 1;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(state.get().cycle > 0);
+    println!("\nattached");
+    loop {
+        let _ = (state.get(), cycles.receive());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn spawn_reader(domain: &str) -> Child {
+    Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "a_reader_that_waits_to_be_killed", "--nocapture"])
+        .env(DOMAIN, domain)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Says when the child has attached.
+fn attached(child: &mut Child) -> Arc<AtomicBool> {
+    let seen = Arc::new(AtomicBool::new(false));
+    let (told, lines) = (
+        Arc::clone(&seen),
+        BufReader::new(child.stdout.take().unwrap()),
+    );
+    std::thread::spawn(move || {
+        for line in lines.lines().map_while(Result::ok) {
+            told.fetch_or(line == "attached", Ordering::SeqCst);
+        }
+    });
+    seen
+}
+
+#[test]
+fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
+    let domain = format!("test_calls_{}", std::process::id());
+    let mut running = start_loop(&domain);
+    let bus = Bus::join(&domain).unwrap();
+    let mut beside = Beside {
+        cycles: bus.cycle_publisher().unwrap(),
+        operator: OperatorEnd::take(&bus).unwrap(),
+        bus,
+    };
+    let arm = EchoArm::start();
+    running.until(&mut beside, |newest| newest.cycle > 3);
+    let settings = LinkSettings::new(250, 4_000_000);
+    let link = TcpLink::connect(arm.address, Duration::from_secs(5), settings).unwrap();
+    running.order(Order::Adopt { hold: START_POSE }, Some(Box::new(link)));
+    let adopted = |r: &CycleRecord| r.mode == ControllerMode::Idle as u8;
+    running.until(&mut beside, adopted);
+    running.order(
+        Order::Arm(Arming {
+            tier: MotionTier::Throw,
+            expires_ns: now_ns() + 10_000_000_000,
+            area_clear: true,
+        }),
+        None,
+    );
+    let motion = Box::new(endless());
+    running.order(Order::Run { id: 1, motion }, None);
+    let moves = |r: &CycleRecord| r.mode == ControllerMode::Streaming as u8;
+    running.until(&mut beside, moves);
+    for _ in 0..5 {
+        let mut child = spawn_reader(&domain);
+        let is_there = attached(&mut child);
+        running.until(&mut beside, |_| is_there.load(Ordering::SeqCst));
+        let at = running.newest.cycle;
+        running.until(&mut beside, |r| r.cycle > at + 50);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        beside.bus.remove_leftovers();
+        let at = running.newest.cycle;
+        running.until(&mut beside, |r| r.cycle > at + 50);
+        assert!(moves(&running.newest), "{:?}", running.newest);
+    }
+    running.quit.store(true, Ordering::SeqCst);
+    let sums = running
+        .thread
+        .join()
+        .expect("a cycle called something else");
+    println!("{sums:?}");
+    assert!(sums.cycles >= 500, "{sums:?}");
+    // Not one cycle without its receive once there is a link.
+    assert_eq!(sums.receives + sums.unlinked, sums.cycles);
+    assert!(sums.sends * 10 > sums.receives * 9);
+}
+
+/// The judge itself: what it must not overlook.
+#[test]
+fn a_second_receive_a_second_sleep_and_a_printed_line_are_seen() {
+    let calls_of = |body: fn()| {
+        std::thread::spawn(move || {
+            counter::watch_this_thread();
+            counter::take();
+            counter::count(true);
+            body();
+            counter::count(false);
+            counter::take()
+        })
+        .join()
+        .unwrap()
+    };
+    let judge = |calls: &Calls| {
+        let judged = std::panic::AssertUnwindSafe(|| Sums::default().add(calls));
+        std::panic::catch_unwind(judged).is_ok()
+    };
+    let sleep = || MonotonicClock.sleep_until(1);
+    assert!(judge(&calls_of(sleep)));
+    assert!(!judge(&calls_of(|| {
+        MonotonicClock.sleep_until(1);
+        MonotonicClock.sleep_until(1);
+    })));
+    assert!(!judge(&calls_of(|| {
+        MonotonicClock.sleep_until(1);
+        // SAFETY: no descriptor and no message: the call fails and does nothing.
+        unsafe { libc::recvmsg(-1, core::ptr::null_mut(), 0) };
+        // SAFETY: as above.
+        unsafe { libc::recvmsg(-1, core::ptr::null_mut(), 0) };
+    })));
+    let printed = calls_of(|| {
+        MonotonicClock.sleep_until(1);
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), b"a line\n");
+    });
+    assert_eq!(printed.of(libc::SYS_write), 1);
+    assert!(!judge(&printed));
+}
