@@ -4,18 +4,30 @@
 //! its way; the offset is the smallest `a - s` seen, since nothing arrives
 //! before it was sent. The estimate is let go slowly upwards, so that two
 //! clocks that drift apart stay mapped.
+//!
+//! A clock that is set back makes every report look late. A receiver that was
+//! held up finds late reports, too, but all at once, and punctual ones behind
+//! them.
 
 /// Drift between the clocks that is followed (ns per s): 200 ppm.
 const DRIFT_NS_PER_S: i128 = 200_000;
-/// A stamp further from the map than this starts a new map (ns): the arm was
-/// restarted, or its clock jumped.
-const JUMP_NS: i128 = 1_000_000_000;
+/// A stamp further from the map than this starts a new map at once (ns): the arm
+/// was restarted, or its clock jumped. Below what the monitors take for a jump.
+const JUMP_NS: i128 = 400_000_000;
+/// Reports later than this (ns) ...
+const LATE_NS: i128 = 20_000_000;
+/// ... for at least this long, without a punctual one, start a new map as well
+/// (ns).
+const LATE_FOR_NS: u64 = 100_000_000;
 
 /// Maps stamps of one report stream.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ClockMap {
     /// Offset (ns) and the arrival it was last moved at.
     offset: Option<(i128, u64)>,
+    /// Arrival of the first of the late reports in a row, and the smallest
+    /// offset that they show (ns).
+    late: Option<(u64, i128)>,
 }
 
 impl ClockMap {
@@ -27,16 +39,35 @@ impl ClockMap {
             Some((offset, at_ns)) => {
                 let since_ns = i128::from(arrival_ns.saturating_sub(at_ns));
                 let relaxed = offset + since_ns * DRIFT_NS_PER_S / 1_000_000_000;
-                if (seen - relaxed).abs() > JUMP_NS {
+                let jumped = (seen - relaxed).abs() > JUMP_NS;
+                if jumped {
+                    self.late = None;
                     seen
                 } else {
-                    seen.min(relaxed)
+                    self.late_for_long(seen, relaxed, arrival_ns)
+                        .unwrap_or_else(|| seen.min(relaxed))
                 }
             }
             None => seen,
         };
         self.offset = Some((offset, arrival_ns));
         u64::try_from(i128::from(stamp_us) * 1000 + offset).unwrap_or(arrival_ns)
+    }
+
+    /// The offset that reports show which have been late for long.
+    fn late_for_long(&mut self, seen: i128, relaxed: i128, arrival_ns: u64) -> Option<i128> {
+        if seen - relaxed <= LATE_NS {
+            self.late = None;
+            return None;
+        }
+        let (since_ns, smallest) = self.late.unwrap_or((arrival_ns, seen));
+        let smallest = smallest.min(seen);
+        self.late = Some((since_ns, smallest));
+        let long = arrival_ns.saturating_sub(since_ns) > LATE_FOR_NS;
+        if long {
+            self.late = None;
+        }
+        long.then_some(smallest)
     }
 }
 
@@ -69,6 +100,34 @@ mod tests {
                     assert!((0..600_000).contains(&error_ns), "{k}: {error_ns}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_clock_set_back_is_followed_and_a_receiver_held_up_is_not() {
+        const MS: u64 = 1_000_000;
+        for back_ms in [30, 300, 450, 900, 5000] {
+            let mut map = ClockMap::default();
+            let mut off_ns = 0;
+            for k in 0..200_u64 {
+                let arrival_ns = 60_000 * MS + 4 * k * MS;
+                let set_back_us = if k < 50 { 0 } else { back_ms * 1000 };
+                let mapped = map.to_monotonic_ns(20_000_000 + 4000 * k - set_back_us, arrival_ns);
+                off_ns = arrival_ns.abs_diff(mapped);
+            }
+            assert!(off_ns < MS, "{back_ms} ms: off by {off_ns} ns");
+        }
+        // Seventy-five reports at once, 300 ms after the first of them was sent.
+        let mut map = ClockMap::default();
+        for k in 0..200_u64 {
+            let sent_ns = 60_000 * MS + 4 * k * MS;
+            let arrival_ns = if (50..125).contains(&k) {
+                60_000 * MS + 4 * 125 * MS
+            } else {
+                sent_ns
+            };
+            let mapped = map.to_monotonic_ns(20_000_000 + 4000 * k, arrival_ns);
+            assert!(mapped.abs_diff(sent_ns) < MS, "report {k}");
         }
     }
 

@@ -25,6 +25,8 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// Name of the control thread, by which the guardian finds it.
+pub(crate) const CONTROL_THREAD: &str = "control loop";
 /// Pause between two turns of the relay.
 const TURN: Duration = Duration::from_millis(2);
 /// Longest wait for the brake when the process is asked to end.
@@ -193,7 +195,7 @@ impl Threads {
             }
         };
         let thread = std::thread::Builder::new()
-            .name("control loop".to_owned())
+            .name(CONTROL_THREAD.to_owned())
             .spawn(body)
             .map_err(ControllerError::Thread)?;
         self.control_loop = Some(thread);

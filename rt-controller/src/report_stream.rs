@@ -2,7 +2,10 @@
 //! connecting again, for as long as the controller runs.
 //!
 //! What the frames mean is the sink's business. A frame that cannot be used is
-//! dropped and counted; a stream that lost its place is opened anew.
+//! dropped and counted; a stream that lost its place is opened anew at once. A
+//! torn report is filled up with the beginning of the next one: such a frame may
+//! hold proper numbers in wrong places, so one that took long to arrive, or that
+//! is followed by what is no report, is dropped as well.
 
 use crate::os::now_ns;
 use crate::xarm::ReportReader;
@@ -18,6 +21,9 @@ const CONNECT_TIMEOUT: Duration = Duration::from_millis(500);
 const RETRY: Duration = Duration::from_millis(200);
 /// Longest wait for bytes before `quit` is looked at again.
 const READ_TIMEOUT: Duration = Duration::from_millis(100);
+/// Longest time from the first byte of a report to its last (ns); half the time
+/// between two. A report is one packet.
+const ARRIVES_WITHIN_NS: u64 = 2_000_000;
 /// Silence after which the connection is given up and opened again.
 const SILENCE_NS: u64 = 2_000_000_000;
 
@@ -66,14 +72,20 @@ impl<S: ReportSink> ReportStream<S> {
     /// Listens until `quit` is set.
     pub fn run(&mut self) {
         while !self.quit.load(Ordering::Relaxed) {
+            let opened_ns = now_ns();
+            let mut at_once = false;
             if let Some((port, stream)) = self.connect() {
                 self.sink.opened(port);
-                self.listen(port, stream);
+                let lost_its_place = self.listen(port, stream);
+                let lasted_ns = u128::from(now_ns().saturating_sub(opened_ns));
+                at_once = lost_its_place && lasted_ns > RETRY.as_nanos();
             }
             if self.quit.load(Ordering::Relaxed) {
                 return;
             }
-            std::thread::sleep(RETRY);
+            if !at_once {
+                std::thread::sleep(RETRY);
+            }
         }
     }
 
@@ -89,10 +101,11 @@ impl<S: ReportSink> ReportStream<S> {
         ports.find_map(|(index, port)| open(*port).map(|stream| (index, stream)))
     }
 
-    /// Passes frames on until the connection breaks, falls silent or `quit`.
-    fn listen(&mut self, port: usize, mut stream: TcpStream) {
+    /// Passes frames on until the connection breaks, falls silent or `quit`;
+    /// true when it lost its place instead.
+    fn listen(&mut self, port: usize, mut stream: TcpStream) -> bool {
         let mut reader = ReportReader::new();
-        let mut size = None;
+        let mut seen = Seen::default();
         let mut heard_ns = now_ns();
         while !self.quit.load(Ordering::Relaxed) {
             match stream.read(reader.space()) {
@@ -108,11 +121,12 @@ impl<S: ReportSink> ReportStream<S> {
                 Err(_gone) => break,
             }
             heard_ns = now_ns();
-            if !self.pass_on(port, &mut reader, &mut size, heard_ns) {
-                return;
+            if !self.pass_on(port, &mut reader, &mut seen, heard_ns) {
+                return true;
             }
         }
         tracing::debug!("report connection ended");
+        false
     }
 
     /// Passes all whole frames on; false when the stream lost its place. The
@@ -122,20 +136,27 @@ impl<S: ReportSink> ReportStream<S> {
         &mut self,
         port: usize,
         reader: &mut ReportReader,
-        size: &mut Option<usize>,
+        seen: &mut Seen,
         arrival_ns: u64,
     ) -> bool {
         loop {
+            let followed_by_a_report = reader.is_followed_by_a_report();
+            let begun_ns = seen.begun_ns.take().unwrap_or(arrival_ns);
             match reader.next_report() {
                 Ok(Some(frame)) => {
-                    let fits = size.is_none_or(|size| size == frame.len());
-                    if fits && self.sink.take(port, frame, arrival_ns) {
-                        *size = Some(frame.len());
+                    let torn = !followed_by_a_report
+                        || arrival_ns.saturating_sub(begun_ns) > ARRIVES_WITHIN_NS;
+                    let fits = seen.size.is_none_or(|size| size == frame.len());
+                    if fits && !torn && self.sink.take(port, frame, arrival_ns) {
+                        seen.size = Some(frame.len());
                     } else {
                         self.broken.add_one();
                     }
                 }
-                Ok(None) => return true,
+                Ok(None) => {
+                    seen.begun_ns = (!reader.is_empty()).then_some(begun_ns);
+                    return true;
+                }
                 Err(broken) => {
                     self.broken.add_one();
                     tracing::warn!(%broken, "a report stream lost its place");
@@ -144,6 +165,15 @@ impl<S: ReportSink> ReportStream<S> {
             }
         }
     }
+}
+
+/// What is remembered of a connection.
+#[derive(Debug, Default)]
+struct Seen {
+    /// Size of its reports (bytes).
+    size: Option<usize>,
+    /// When the first byte of a report that is not whole yet came (ns).
+    begun_ns: Option<u64>,
 }
 
 #[cfg(test)]
@@ -190,21 +220,39 @@ mod tests {
         let wait = Duration::from_secs(10);
 
         let (mut peer, _) = server.accept().unwrap();
-        let mut bytes = frame(135, 1);
-        bytes.extend(frame(145, 1)); // another size
-        bytes.extend(frame(135, 0xFF)); // unusable
-        bytes.extend(frame(135, 2));
-        bytes.extend([0xFF; 8]); // no size at all
-        for part in bytes.chunks(50) {
-            peer.write_all(part).unwrap();
+        for bytes in [
+            frame(135, 1),
+            frame(145, 1),    // another size
+            frame(135, 0xFF), // unusable
+            frame(135, 2),
+        ] {
+            peer.write_all(&bytes).unwrap();
         }
         assert_eq!(sizes.recv_timeout(wait), Ok(135));
         assert_eq!(sizes.recv_timeout(wait), Ok(135));
+        peer.write_all(&[0xFF; 8]).unwrap(); // no size at all
 
         let (mut again, _) = server.accept().unwrap();
         again.write_all(&frame(145, 1)).unwrap();
         assert_eq!(sizes.recv_timeout(wait), Ok(145));
         assert_eq!(broken.count(), 3);
+
+        // Torn: filled up by the next one, whose rest is no report, at once ...
+        let mut torn = frame(145, 1)[..60].to_vec();
+        torn.extend(frame(145, 1));
+        again.write_all(&torn).unwrap();
+        let (mut again, _) = server.accept().unwrap();
+        again.write_all(&frame(135, 1)).unwrap();
+        assert_eq!(sizes.recv_timeout(wait), Ok(135), "nothing of the torn one");
+        // ... or only when the next one comes.
+        again.write_all(&frame(135, 1)[..60]).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+        again.write_all(&frame(135, 1)[..75]).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+        again.write_all(&frame(135, 2)).unwrap();
+        assert_eq!(sizes.recv_timeout(wait), Ok(135));
+        assert!(sizes.try_recv().is_err(), "the late one was dropped");
+        assert_eq!(broken.count(), 6);
         quit.store(true, Ordering::Relaxed);
         listening.join().unwrap();
     }

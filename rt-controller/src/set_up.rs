@@ -1,18 +1,19 @@
 //! Bring-up and recovery: from whatever state the arm is in to one that follows
 //! setpoints, step by step, each with its result.
 //!
-//! Nothing of the arm is trusted: its firmware, joint ranges, tool and speed
-//! limit are read and compared with what the controller is configured for. A
-//! difference is a refusal that names both, unless the configuration says that
+//! Nothing of the arm is trusted: its firmware, report layouts, joint ranges, tool
+//! and speed limit are read and compared with what the controller is configured
+//! for. A difference is a refusal that names both, unless the configuration says that
 //! the arm shall be set. Order of the recovery as in the vendor's manual: clear
 //! error, enable, mode, state.
 
 use crate::session::{ArmSession, SessionError};
-use crate::xarm::report::{MAX_REPORT_LEN, NormalReport};
+use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport};
 use crate::xarm::{
     ArmState, ArmVersion, Command, ErrorCode, Firmware, JointQuery, Mode, ReplyData, ReportReader,
     StateRequest, TcpPose, VersionError,
 };
+use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 use shared_types::{JointVector, Limits};
 use std::io::Read;
@@ -61,6 +62,20 @@ pub enum SetUpError {
         text: String,
         /// Why it is refused.
         reason: VersionError,
+    },
+    /// Reports of another size than this firmware sends: fields may lie elsewhere.
+    #[error(
+        "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
+    )]
+    Layout {
+        /// Port.
+        port: u16,
+        /// Firmware that the arm names.
+        firmware: Firmware,
+        /// Size found (bytes).
+        found: usize,
+        /// Sizes known for this firmware (bytes).
+        expected: String,
     },
     /// The configured joint range is wider than the arm's.
     #[error(
@@ -135,6 +150,8 @@ pub struct SetUp<'a> {
     pub mode: Mode,
     /// Port with normal or rich reports.
     pub status: SocketAddr,
+    /// Port with real-time reports.
+    pub joints: SocketAddr,
     /// What to do about differences.
     pub on_difference: OnDifference,
 }
@@ -166,6 +183,7 @@ impl SetUp<'_> {
             "identify",
             &format!("xArm 7, firmware {}", version.firmware),
         );
+        heard("reports", &self.match_layout(version.firmware)?);
         heard("tool", &self.match_tool(session)?);
         heard(
             "tool speed",
@@ -220,9 +238,51 @@ impl SetUp<'_> {
         }
     }
 
+    /// Compares the size of the reports with what the firmware is known to send.
+    fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
+        let refuse = |address: SocketAddr, found, sizes: &RangeInclusive<usize>| {
+            let (least, most) = (sizes.start(), sizes.end());
+            Err(SetUpError::Layout {
+                port: address.port(),
+                firmware,
+                found,
+                expected: if least == most {
+                    least.to_string()
+                } else {
+                    format!("{least} to {most}")
+                },
+            })
+        };
+        let status = read_report(self.status)?.len();
+        let sizes = firmware.rich_sizes();
+        // The normal report is the same everywhere.
+        if status != NORMAL_REPORT_LEN && !sizes.contains(&status) {
+            return refuse(self.status, status, &sizes);
+        }
+        let sizes = firmware.realtime_sizes();
+        match read_report(self.joints) {
+            Ok(report) if sizes.contains(&report.len()) => Ok(format!(
+                "{} and {status} bytes, as of {firmware}",
+                report.len()
+            )),
+            Ok(report) => refuse(self.joints, report.len(), &sizes),
+            // As many clients as it takes are there: the 100 Hz report serves.
+            Err(reason) => Ok(format!(
+                "{status} bytes, as of {firmware}; no real-time report ({reason})"
+            )),
+        }
+    }
+
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
-        let arm_m = read_status(self.status)?.tcp_offset.position_m;
+        let status = read_report(self.status)?;
+        let arm_m = NormalReport::parse(&status)
+            .map_err(|e| SetUpError::NoStatus {
+                address: self.status,
+                reason: std::io::Error::other(e.to_string()),
+            })?
+            .tcp_offset
+            .position_m;
         let apart_m = arm_m
             .iter()
             .zip(&configured_m)
@@ -277,8 +337,8 @@ impl SetUp<'_> {
     }
 }
 
-/// The newest status report; one comes at once with every connection.
-fn read_status(address: SocketAddr) -> Result<NormalReport, SetUpError> {
+/// The newest report of a port; one comes at once with every connection.
+fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
     let fail = |reason| SetUpError::NoStatus { address, reason };
     let other = |e: &dyn std::error::Error| fail(std::io::Error::other(e.to_string()));
     let mut stream = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).map_err(fail)?;
@@ -289,7 +349,7 @@ fn read_status(address: SocketAddr) -> Result<NormalReport, SetUpError> {
     let mut received = 0;
     while received <= MAX_REPORT_LEN {
         if let Some(frame) = reader.next_report().map_err(|e| other(&e))? {
-            return NormalReport::parse(frame).map_err(|e| other(&e));
+            return Ok(frame.to_vec());
         }
         match stream.read(reader.space()).map_err(fail)? {
             0 => break,

@@ -44,7 +44,7 @@ pub use collision::Obstacle;
 pub use config::{ArmConfig, JointLag};
 pub use controller_clock::ControllerClock;
 pub use endpoint::{ArmEndpoint, Closing, ConnectRefused, Service};
-pub use event::{ArmCounters, ArmEvent, TimedEvent};
+pub use event::{ArmCounters, ArmEvent, EventLog, TimedEvent};
 pub use fault::{Fault, FaultKind, FaultScript, FaultScriptError, Trigger};
 pub use firmware::Firmware;
 pub use history::{JointSample, MotionHistory};

@@ -7,7 +7,7 @@
 
 use super::config::ArmConfig;
 use super::endpoint::Service;
-use super::event::ArmCounters;
+use super::event::{ArmCounters, EventLog};
 use super::fault::Fault;
 use super::history::MotionHistory;
 use super::reports::ReportKind;
@@ -92,6 +92,12 @@ impl SimulatedArm {
     #[must_use]
     pub fn history(&self) -> MotionHistory {
         self.plant.history.clone()
+    }
+
+    /// What it got and what happened to it, stamped CLOCK_MONOTONIC.
+    #[must_use]
+    pub fn events(&self) -> EventLog {
+        self.plant.events.clone()
     }
 
     /// Counts of commands since the start.

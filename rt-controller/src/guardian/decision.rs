@@ -1,7 +1,7 @@
 //! What the guardian does and when: pure, no clock, no I/O.
 //!
 //! ```text
-//!            controller fresh           lost while moving
+//!            controller fresh        lost or cut off while moving
 //!  Waiting ------------------> Watching -----------------> Stopping
 //!     ^                           |                          |   | 3 s without
 //!     |    lost at rest           |      state 4 or 5 read   |   | state 4
@@ -11,6 +11,10 @@
 //!                                           Stopped
 //! ```
 //!
+//! Cut off is a controller that lives but has lost its link to the moving arm:
+//! it cannot ask for the stop itself. A stop under way ends when the fault is
+//! acknowledged, since the controller has a new link by then.
+//!
 //! Stopping is the way the vendor's own SDK does it: state 4 is asked for, then
 //! read; again every 0.1 s for at most 3 s.
 
@@ -18,6 +22,8 @@ use crate::xarm::ArmState;
 
 /// The stop is asked for this often (ns).
 const ASK_EVERY_NS: u64 = 100_000_000;
+/// Silence at rest after which the controller is looked for anew (ns).
+const FORGET_AFTER_NS: u64 = 500_000_000;
 /// Time in which the arm must be seen stopped (ns).
 const STOP_WITHIN_NS: u64 = 3_000_000_000;
 
@@ -41,8 +47,20 @@ pub struct Pulse {
     pub stamp_ns: u64,
     /// Whether the arm moved in it.
     pub moving: bool,
-    /// Whether its process has ended.
+    /// Whether its control thread or its process has ended.
     pub ended: bool,
+    /// Whether it has latched because its link to the arm failed.
+    pub cut_off: bool,
+}
+
+/// Why the arm is being stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Emergency {
+    /// The controller ended or fell silent.
+    #[default]
+    Lost,
+    /// The controller lives but cannot reach the arm.
+    CutOff,
 }
 
 /// What the guardian is doing. Numbers are part of the shared layout.
@@ -81,6 +99,9 @@ pub struct Guardian {
     since_ns: u64,
     asked_ns: Option<u64>,
     lost_stamp_ns: u64,
+    emergency: Emergency,
+    /// Whether the arm moved when the controller was seen last.
+    moved: bool,
 }
 
 impl Guardian {
@@ -93,7 +114,15 @@ impl Guardian {
             since_ns: 0,
             asked_ns: None,
             lost_stamp_ns: 0,
+            emergency: Emergency::Lost,
+            moved: false,
         }
+    }
+
+    /// Why the arm is being stopped, or was.
+    #[must_use]
+    pub const fn emergency(&self) -> Emergency {
+        self.emergency
     }
 
     /// Present phase.
@@ -141,32 +170,48 @@ impl Guardian {
     }
 
     fn wait(&mut self, input: &GuardianInput) -> GuardianOutput {
-        let alive = input
-            .pulse
-            .is_some_and(|pulse| !self.is_lost(input, &pulse));
-        if alive {
+        let Some(pulse) = input.pulse else {
+            return look_again(true);
+        };
+        if !self.is_lost(input, &pulse) {
             self.enter(GuardianPhase::Watching, input.now_ns);
+            self.moved = pulse.moving;
             return GuardianOutput::default();
         }
-        GuardianOutput {
-            look_again: true,
-            ..GuardianOutput::default()
+        if pulse.moving {
+            // It began to move and was lost before it could be watched.
+            return self.stop_for(Emergency::Lost, &pulse, input);
         }
+        look_again(is_gone(input, &pulse))
     }
 
     fn watch(&mut self, input: &GuardianInput) -> GuardianOutput {
-        let Some(pulse) = input.pulse.filter(|pulse| self.is_lost(input, pulse)) else {
+        let Some(pulse) = input.pulse else {
             return GuardianOutput::default();
         };
+        let moved = core::mem::replace(&mut self.moved, pulse.moving);
+        if !self.is_lost(input, &pulse) {
+            if pulse.cut_off && moved {
+                return self.stop_for(Emergency::CutOff, &pulse, input);
+            }
+            return GuardianOutput::default();
+        }
         if !pulse.moving {
             // At rest the arm holds by itself.
             self.enter(GuardianPhase::Waiting, input.now_ns);
-            return GuardianOutput {
-                look_again: true,
-                ..GuardianOutput::default()
-            };
+            return look_again(is_gone(input, &pulse));
         }
+        self.stop_for(Emergency::Lost, &pulse, input)
+    }
+
+    fn stop_for(
+        &mut self,
+        emergency: Emergency,
+        pulse: &Pulse,
+        input: &GuardianInput,
+    ) -> GuardianOutput {
         self.enter(GuardianPhase::Stopping, input.now_ns);
+        self.emergency = emergency;
         self.lost_stamp_ns = pulse.stamp_ns;
         self.asked_ns = None;
         self.ask(input)
@@ -179,6 +224,11 @@ impl Guardian {
                 ArmState::Stopped | ArmState::NeedsReset
             )
         };
+        let reached_again = |pulse: &Pulse| !self.is_lost(input, pulse) && !pulse.cut_off;
+        if self.emergency == Emergency::CutOff && input.pulse.as_ref().is_some_and(reached_again) {
+            self.enter(GuardianPhase::Watching, input.now_ns);
+            return GuardianOutput::default();
+        }
         // A state read before the first request says nothing.
         if self.asked_ns.is_some() && input.arm_state.is_some_and(stopped) {
             self.phase = GuardianPhase::Stopped;
@@ -216,11 +266,20 @@ impl Guardian {
             self.enter(GuardianPhase::Watching, input.now_ns);
             return GuardianOutput::default();
         }
-        let look_again = input.pulse.is_none_or(|pulse| self.is_lost(input, &pulse));
-        GuardianOutput {
-            look_again,
-            ..GuardianOutput::default()
-        }
+        look_again(input.pulse.is_none_or(|pulse| self.is_lost(input, &pulse)))
+    }
+}
+
+/// Whether a controller that is lost at rest will not come back.
+fn is_gone(input: &GuardianInput, pulse: &Pulse) -> bool {
+    pulse.ended || input.now_ns.saturating_sub(pulse.stamp_ns) > FORGET_AFTER_NS
+}
+
+/// Nothing to do but, perhaps, to look for another controller.
+fn look_again(look_again: bool) -> GuardianOutput {
+    GuardianOutput {
+        look_again,
+        ..GuardianOutput::default()
     }
 }
 
@@ -256,6 +315,7 @@ mod tests {
                         stamp_ns,
                         moving: true,
                         ended: false,
+                        cut_off: false,
                     }),
                     arm_state: self.stops_ns.map(|t| if now_ns >= t { 4 } else { 1 }),
                     connected: true,
@@ -295,6 +355,7 @@ mod tests {
                 stamp_ns: 999 * MS,
                 moving: true,
                 ended: false,
+                cut_off: false,
             }),
             connected: true,
             ..GuardianInput::default()
@@ -343,6 +404,7 @@ mod tests {
             stamp_ns: 1000 * MS,
             moving: false,
             ended: false,
+            cut_off: false,
         };
         let mut input = GuardianInput {
             now_ns: 1001 * MS,
@@ -354,7 +416,7 @@ mod tests {
         assert_eq!(guardian.phase(), GuardianPhase::Watching);
         input.now_ns = 2000 * MS;
         let out = guardian.step(&input);
-        assert!(!out.ask_stop && out.look_again);
+        assert!(!out.ask_stop && out.look_again, "silent for long");
         assert_eq!(guardian.phase(), GuardianPhase::Waiting);
     }
 
@@ -374,6 +436,7 @@ mod tests {
                     stamp_ns: now_ms * MS,
                     moving,
                     ended: false,
+                    cut_off: false,
                 }),
                 connected: true,
                 ..GuardianInput::default()
@@ -393,6 +456,7 @@ mod tests {
                 stamp_ns: 1000 * MS,
                 moving: true,
                 ended: false,
+                cut_off: false,
             }),
             connected: false,
             ..GuardianInput::default()
@@ -403,5 +467,90 @@ mod tests {
         input.now_ns += 30 * MS;
         input.connected = true;
         assert!(guardian.step(&input).ask_stop);
+    }
+
+    /// Turns of a guardian that watches a living controller.
+    struct Turns {
+        guardian: Guardian,
+        now_ns: u64,
+    }
+
+    impl Turns {
+        fn new() -> Self {
+            Self {
+                guardian: Guardian::new(SILENCE_NS),
+                now_ns: 1000 * MS,
+            }
+        }
+
+        fn turn(&mut self, moving: bool, cut_off: bool) -> GuardianOutput {
+            self.now_ns += TURN_NS;
+            self.guardian.step(&GuardianInput {
+                now_ns: self.now_ns,
+                pulse: Some(Pulse {
+                    stamp_ns: self.now_ns,
+                    moving,
+                    ended: false,
+                    cut_off,
+                }),
+                connected: true,
+                ..GuardianInput::default()
+            })
+        }
+    }
+
+    #[test]
+    fn a_controller_cut_off_from_a_moving_arm_has_it_stopped_until_it_is_acknowledged() {
+        let mut turns = Turns::new();
+        turns.turn(true, false);
+        assert!(!turns.turn(true, false).ask_stop);
+        assert!(
+            turns.turn(false, true).ask_stop,
+            "in the turn that shows it"
+        );
+        assert_eq!(turns.guardian.emergency(), Emergency::CutOff);
+        assert!(!turns.turn(false, true).ask_stop, "again after 0.1 s only");
+        turns.now_ns += 100 * MS;
+        assert!(turns.turn(false, true).ask_stop);
+        turns.now_ns += 100 * MS;
+        assert!(!turns.turn(false, false).ask_stop, "acknowledged");
+        assert_eq!(turns.guardian.phase(), GuardianPhase::Watching);
+        assert!(!turns.turn(true, false).ask_stop);
+    }
+
+    #[test]
+    fn a_controller_that_moves_and_dies_right_after_a_silence_at_rest_is_met() {
+        let mut turns = Turns::new();
+        turns.turn(false, false);
+        let resting = Pulse {
+            stamp_ns: turns.now_ns,
+            ..Pulse::default()
+        };
+        let mut input = GuardianInput {
+            now_ns: turns.now_ns + 20 * MS,
+            pulse: Some(resting),
+            connected: true,
+            ..GuardianInput::default()
+        };
+        let out = turns.guardian.step(&input);
+        assert_eq!(turns.guardian.phase(), GuardianPhase::Waiting);
+        assert!(!out.look_again, "it may only be held up");
+        input.pulse = Some(Pulse {
+            stamp_ns: input.now_ns + MS,
+            moving: true,
+            ended: true,
+            cut_off: false,
+        });
+        input.now_ns += 2 * MS;
+        assert!(turns.guardian.step(&input).ask_stop);
+    }
+
+    #[test]
+    fn a_link_lost_at_rest_is_no_emergency() {
+        let mut turns = Turns::new();
+        for cut_off in [false, false, true, true] {
+            assert!(!turns.turn(false, cut_off).ask_stop);
+        }
+        assert_eq!(turns.guardian.phase(), GuardianPhase::Watching);
     }
 }

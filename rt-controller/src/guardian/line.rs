@@ -35,6 +35,8 @@ struct Open {
     question: u16,
     asked_ns: u64,
     heard_ns: u64,
+    /// When the newest stop was asked for.
+    stop_ns: Option<u64>,
 }
 
 /// A connection that comes back by itself.
@@ -95,12 +97,20 @@ impl ArmLine {
     }
 
     /// Asks the arm to stop, then for its state; false when it could not be sent.
+    /// A connection on which the last stop met with silence is not tried twice: a
+    /// new one is opened in the next turns.
     pub fn ask_stop(&mut self, now_ns: u64) -> bool {
         let Phase::Up(open) = &mut self.phase else {
             return false;
         };
+        if open.stop_ns.is_some_and(|at_ns| open.heard_ns <= at_ns) {
+            tracing::warn!("the arm does not answer on this connection; opening another");
+            self.phase = Phase::Down { retry_ns: now_ns };
+            return false;
+        }
         let stop = Command::SetState(StateRequest::Stop);
         let sent = open.send(&stop).and_then(|_| open.ask_state(now_ns));
+        open.stop_ns = Some(now_ns);
         if let Err(reason) = &sent {
             tracing::warn!(%reason, "the stop could not be sent");
             self.phase = Phase::Down { retry_ns: now_ns };
@@ -150,6 +160,7 @@ fn take(address: SocketAddr, now_ns: u64, socket: &Socket) -> Result<Phase> {
         question: 0,
         asked_ns: 0,
         heard_ns: now_ns,
+        stop_ns: None,
     })))
 }
 
@@ -278,6 +289,11 @@ mod tests {
         until(&mut line, &mut now_ns, |_, state| state == Some(4));
         assert_eq!(asked.try_iter().take(3).collect::<Vec<_>>(), [13, 12, 13]);
 
+        // Heard since: the same connection serves for the next stop.
+        now_ns += 100 * MS;
+        assert!(line.ask_stop(now_ns));
+        until(&mut line, &mut now_ns, |_, state| state == Some(4));
+
         // The arm goes silent: the connection is given up and opened again.
         now_ns += SILENCE_NS + MS;
         line.turn(now_ns);
@@ -285,5 +301,24 @@ mod tests {
         server.join().unwrap();
         until(&mut line, &mut now_ns, |line, _| line.is_connected());
         assert!(listener.accept().is_ok());
+    }
+
+    #[test]
+    fn a_stop_that_meets_silence_goes_out_again_on_another_connection() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut line = ArmLine::new(listener.local_addr().unwrap());
+        let mut now_ns = 1_000_000_000_000;
+        until(&mut line, &mut now_ns, |line, _| line.is_connected());
+        // Taken in by the system, read by nobody.
+        let (_deaf, _) = listener.accept().unwrap();
+        assert!(line.ask_stop(now_ns));
+        now_ns += 100 * MS;
+        assert!(!line.ask_stop(now_ns));
+        until(&mut line, &mut now_ns, |line, _| line.is_connected());
+        let (sender, _asked) = mpsc::channel();
+        let (second, _) = listener.accept().unwrap();
+        std::thread::spawn(move || serve(second, &sender));
+        assert!(line.ask_stop(now_ns));
+        until(&mut line, &mut now_ns, |_, state| state == Some(4));
     }
 }

@@ -6,7 +6,8 @@
 //! next. The guardian has a connection of its own, so it stops the arm also
 //! when the controller's process was killed, hangs, or lost its link. It reads
 //! the controller's newest state from a blackboard every 2 ms; a sign of life
-//! older than three cycles, or the end of the process, is a loss. What it does
+//! older than three cycles, or the end of its control thread, is a loss; so is a
+//! controller that stopped because its own link failed. What it does
 //! about it is decided by [`decision`], pure and tested in virtual time; [`mod@line`]
 //! talks to the arm without ever waiting.
 //!
@@ -23,7 +24,7 @@ pub use settings::GuardianSettings;
 use crate::config::ControllerConfig;
 use crate::error::ControllerError;
 use crate::os::{Clock, MonotonicClock, RealTimeSettings, enter_real_time};
-use decision::{Guardian, GuardianInput, GuardianPhase};
+use decision::{Emergency, Guardian, GuardianInput, GuardianPhase};
 use line::ArmLine;
 use shared_types::ipc::{Bus, DomainSweep, GuardianBeat};
 use std::net::SocketAddr;
@@ -149,10 +150,13 @@ impl Post {
         match phase {
             GuardianPhase::Waiting => tracing::info!("no controller to guard"),
             GuardianPhase::Watching => tracing::info!("guarding the controller"),
-            GuardianPhase::Stopping => tracing::error!(
-                reaction_ms,
-                "the controller was lost while the arm moved; the arm is asked to stop"
-            ),
+            GuardianPhase::Stopping => {
+                let why = match self.mind.emergency() {
+                    Emergency::Lost => "the controller was lost while the arm moved",
+                    Emergency::CutOff => "the controller lost its link while the arm moved",
+                };
+                tracing::error!(reaction_ms, "{why}; the arm is asked to stop");
+            }
             GuardianPhase::Stopped => tracing::error!(reaction_ms, "the arm was seen stopped"),
             GuardianPhase::Unheard => tracing::error!(
                 "the arm was asked to stop for 3 s but was not seen stopped: press its emergency stop"

@@ -1,8 +1,12 @@
 //! The controller being watched: its state on a blackboard, and its process.
 
 use super::decision::Pulse;
-use crate::os::process::ProcessWatch;
-use shared_types::ipc::{Bus, ControllerMode, GuardianBeat, GuardianEnd, IpcError, StateReader};
+use crate::os::process::{ProcessWatch, thread_lives, thread_of};
+use crate::process::CONTROL_THREAD;
+use shared_types::FaultCode;
+use shared_types::ipc::{
+    Bus, ControllerMode, ControllerState, GuardianBeat, GuardianEnd, IpcError, StateReader,
+};
 
 /// A controller that was found, dead or alive.
 #[derive(Debug)]
@@ -11,6 +15,8 @@ pub(super) struct Watched {
     end: GuardianEnd,
     process: Option<ProcessWatch>,
     pid: u32,
+    /// Its control thread, as the system counts.
+    thread: Option<u32>,
 }
 
 impl Watched {
@@ -21,6 +27,7 @@ impl Watched {
             end: GuardianEnd::take(bus)?,
             process: None,
             pid: 0,
+            thread: None,
         })
     }
 
@@ -32,16 +39,34 @@ impl Watched {
             // numbers) its silence still tells.
             self.pid = state.pid;
             self.process = ProcessWatch::new(state.pid).ok();
+            self.thread = thread_of(state.pid, CONTROL_THREAD);
         }
         (state.stamp_ns > 0).then(|| Pulse {
             stamp_ns: state.stamp_ns,
             moving: ControllerMode::from_raw(state.mode).is_moving(),
-            ended: self.process.as_ref().is_some_and(ProcessWatch::has_ended),
+            ended: self.has_ended(),
+            cut_off: is_cut_off(&state),
         })
+    }
+
+    /// The control thread goes first when its process is killed: it has
+    /// real-time priority, while the process as a whole is gone only when its
+    /// last ordinary thread was given time to die and its memory is freed.
+    fn has_ended(&self) -> bool {
+        let thread_ended = self.thread.is_some_and(|id| !thread_lives(self.pid, id));
+        thread_ended || self.process.as_ref().is_some_and(ProcessWatch::has_ended)
     }
 
     /// Writes a sign of life of the guardian.
     pub(super) fn beat(&mut self, beat: GuardianBeat) {
         self.end.beat(beat);
     }
+}
+
+/// Whether the controller stopped because its link failed, so that its own
+/// request for a stop may not have reached the arm.
+fn is_cut_off(state: &ControllerState) -> bool {
+    let fault = FaultCode::from_raw(state.fault);
+    ControllerMode::from_raw(state.mode) == ControllerMode::Faulted
+        && matches!(fault, Some(FaultCode::LinkLost | FaultCode::ReplyStalled))
 }

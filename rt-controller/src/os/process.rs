@@ -31,6 +31,36 @@ pub fn peer_pid(stream: &UnixStream) -> Option<u32> {
     u32::try_from(credentials.pid).ok().filter(|pid| *pid > 0)
 }
 
+/// Number of the only thread of process `pid` with this name, as the system
+/// counts; `None` when there is none, or more than one. Not RT-safe.
+#[must_use]
+pub fn thread_of(pid: u32, name: &str) -> Option<u32> {
+    let threads = std::fs::read_dir(format!("/proc/{pid}/task")).ok()?;
+    let mut found = threads.flatten().filter(|thread| {
+        std::fs::read_to_string(thread.path().join("comm")).is_ok_and(|comm| comm.trim() == name)
+    });
+    let first = found.next()?;
+    match found.next() {
+        None => first.file_name().to_str()?.parse().ok(),
+        Some(_another) => None,
+    }
+}
+
+/// Whether thread `thread` of process `pid` is there; true where that cannot be
+/// told. One system call that never waits.
+#[must_use]
+pub fn thread_lives(pid: u32, thread: u32) -> bool {
+    let (Ok(pid), Ok(thread)) = (libc::pid_t::try_from(pid), libc::pid_t::try_from(thread)) else {
+        return true;
+    };
+    if pid <= 0 || thread <= 0 {
+        return true;
+    }
+    // SAFETY: takes numbers only; signal 0 checks and does nothing.
+    let code = unsafe { libc::syscall(libc::SYS_tgkill, pid, thread, 0) };
+    code == 0 || Error::last_os_error().raw_os_error() != Some(libc::ESRCH)
+}
+
 /// Watches one process for its end, however it ends.
 #[derive(Debug)]
 pub struct ProcessWatch {
@@ -74,6 +104,36 @@ impl ProcessWatch {
 mod tests {
     use super::*;
     use std::process::{Command, Stdio};
+
+    #[test]
+    fn an_ended_thread_is_seen() {
+        let name = "to be found";
+        let (begin, begun) = std::sync::mpsc::channel();
+        let (end, ended) = std::sync::mpsc::channel::<()>();
+        let thread = std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || {
+                begin.send(()).unwrap();
+                let _ = ended.recv();
+            })
+            .unwrap();
+        begun.recv().unwrap();
+        let me = std::process::id();
+        let id = thread_of(me, name).unwrap();
+        assert_eq!(thread_of(me, "nobody's name"), None);
+        assert!(thread_lives(me, id) && thread_lives(me, me));
+        assert!(thread_lives(me, 0), "unknown is not ended");
+        drop(end);
+        thread.join().unwrap();
+        // The system lets go of a thread a moment after it was joined.
+        for _ in 0..2000 {
+            if !thread_lives(me, id) {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        assert!(!thread_lives(me, id));
+    }
 
     #[test]
     fn an_ended_process_is_seen_before_it_is_waited_for() {

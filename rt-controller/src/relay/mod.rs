@@ -51,6 +51,8 @@ pub struct ArmSettings {
     pub command: SocketAddr,
     /// Port with its status.
     pub status: SocketAddr,
+    /// Port with its joint reports.
+    pub joints: SocketAddr,
     /// Limits it is held to.
     pub limits: Limits,
     /// What to do when it is configured otherwise.
@@ -72,6 +74,7 @@ impl ArmSettings {
         Self {
             command: SocketAddr::new(config.arm, config.command_port),
             status: SocketAddr::new(config.arm, status),
+            joints: SocketAddr::new(config.arm, config.report_port),
             limits,
             on_difference: config.on_difference,
             wire: config.wire,

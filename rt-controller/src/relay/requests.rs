@@ -159,6 +159,7 @@ impl Relay {
             limits: &self.arm.limits,
             mode: backend(self.arm.wire).mode(),
             status: self.arm.status,
+            joints: self.arm.joints,
             on_difference: self.arm.on_difference,
         };
         let mut heard = |name: &'static str, result: &str| {
@@ -283,7 +284,7 @@ impl Relay {
 fn fault_of(error: &SetUpError) -> FaultCode {
     match error {
         SetUpError::Session(_) | SetUpError::NoStatus { .. } => FaultCode::LinkLost,
-        SetUpError::Version { .. } => FaultCode::UnsupportedFirmware,
+        SetUpError::Version { .. } | SetUpError::Layout { .. } => FaultCode::UnsupportedFirmware,
         SetUpError::Range { .. } | SetUpError::Tool { .. } | SetUpError::ToolSpeed { .. } => {
             FaultCode::ArmDiffers
         }

@@ -147,6 +147,14 @@ impl<K> StreamReader<K> {
     }
 }
 
+impl<K> StreamReader<K> {
+    /// Whether every byte received has been taken.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.buffer.pending().is_empty()
+    }
+}
+
 impl<K: Framing> StreamReader<K> {
     /// The next whole frame with its header. A bad header stays in front, so
     /// that the stream stays broken.
@@ -216,6 +224,18 @@ impl Framing for ReportFraming {
 }
 
 impl ReportReader {
+    /// Whether what has come behind the next report looks like another one;
+    /// true while too little has come to tell.
+    #[must_use]
+    pub fn is_followed_by_a_report(&self) -> bool {
+        let pending = self.buffer.pending();
+        let Ok(Some(len)) = ReportFraming::frame_len(pending) else {
+            return true;
+        };
+        let behind = pending.get(len..).unwrap_or_default();
+        ReportFraming::frame_len(behind).is_ok()
+    }
+
     /// The next whole report with its size field, `None` if more bytes are
     /// needed.
     ///

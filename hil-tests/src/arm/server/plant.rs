@@ -4,7 +4,7 @@ use super::line::Line;
 use crate::arm::clock;
 use crate::arm::config::ArmConfig;
 use crate::arm::endpoint::{ArmEndpoint, Closing, ConnectRefused, Service};
-use crate::arm::event::{ArmEvent, TimedEvent};
+use crate::arm::event::{ArmEvent, EventLog, TimedEvent};
 use crate::arm::history::MotionHistory;
 use crate::arm::model::STEP_S;
 use rt_controller::os::{RealTimeSettings, enter_real_time};
@@ -44,6 +44,7 @@ pub(super) struct Plant {
     endpoint: Mutex<ArmEndpoint>,
     lines: Mutex<BTreeMap<u32, Arc<Line>>>,
     pub(super) history: MotionHistory,
+    pub(super) events: EventLog,
     stop: AtomicBool,
 }
 
@@ -53,6 +54,7 @@ impl Plant {
             endpoint: Mutex::new(ArmEndpoint::new(config, clock::now())),
             lines: Mutex::default(),
             history: MotionHistory::default(),
+            events: EventLog::default(),
             stop: AtomicBool::new(false),
         }
     }
@@ -69,6 +71,8 @@ impl Plant {
         self.history.extend(samples);
         let used = use_endpoint(&mut endpoint, now);
         let events = endpoint.take_events();
+        // Kept before the lock is given up, so that they stay in order.
+        self.events.extend(&events);
         drop(endpoint);
         events.iter().for_each(report);
         used

@@ -1,0 +1,193 @@
+//! The processes of a stand: this very program again, told by its environment
+//! what to be. A child ends when its parent is gone or closes its input.
+
+use rt_controller::ControllerConfig;
+use shared_types::ipc::Bus;
+use std::fs::File;
+use std::io::Read;
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// The child's configuration, as TOML; for a subscriber the domain.
+const CONFIG: &str = "WAG_TEST_CHILD_CONFIG";
+
+/// What a child is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The real-time controller.
+    Controller,
+    /// The guardian.
+    Guardian,
+    /// A viewer that attaches to everything and takes in what comes.
+    Viewer,
+    /// A recorder that attaches and never takes anything in.
+    Sleeper,
+}
+
+impl Role {
+    const fn test(self) -> &'static str {
+        match self {
+            Self::Controller => "child::is_a_controller",
+            Self::Guardian => "child::is_a_guardian",
+            Self::Viewer => "child::is_a_viewer",
+            Self::Sleeper => "child::is_a_sleeper",
+        }
+    }
+}
+
+/// A child; it is asked to end, then made to, when dropped.
+#[derive(Debug)]
+pub struct Process {
+    child: Child,
+    input: Option<ChildStdin>,
+    log: PathBuf,
+}
+
+impl Process {
+    /// Starts a child that logs into a file named after `name` and its role.
+    pub fn start(role: Role, name: &str, config: &str) -> Self {
+        Self::spawn(role, name, config, |_| ()).unwrap()
+    }
+
+    /// The same as another user; `None` when that user may not run this program.
+    pub fn start_as_nobody(role: Role, name: &str, config: &str) -> Option<Self> {
+        const NOBODY: u32 = 65_534;
+        Self::spawn(role, name, config, |c| {
+            c.uid(NOBODY).gid(NOBODY);
+        })
+        .ok()
+    }
+
+    fn spawn(
+        role: Role,
+        name: &str,
+        config: &str,
+        change: impl FnOnce(&mut Command),
+    ) -> std::io::Result<Self> {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+        let log = folder.join(format!("{name}-{role:?}.log"));
+        let mut command = Command::new(std::env::current_exe()?);
+        command
+            .args(["--exact", role.test(), "--nocapture"])
+            .env(CONFIG, config)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(File::create(&log)?);
+        change(&mut command);
+        let mut child = command.spawn()?;
+        Ok(Self {
+            input: child.stdin.take(),
+            child,
+            log,
+        })
+    }
+
+    /// Waits until it ends by itself; its exit code.
+    pub fn wait(&mut self) -> Option<i32> {
+        self.child.wait().unwrap().code()
+    }
+
+    /// What it logged.
+    pub fn log(&self) -> String {
+        std::fs::read_to_string(&self.log).unwrap_or_default()
+    }
+
+    /// SIGKILL.
+    pub fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// Asks it to end and waits.
+    pub fn end(&mut self) {
+        drop(self.input.take());
+        let began = Instant::now();
+        while self.child.try_wait().unwrap().is_none() {
+            if began.elapsed() > Duration::from_secs(10) {
+                self.kill();
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// The configuration, in a child; its end is watched for from here on.
+fn config() -> Option<(String, &'static AtomicBool)> {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let config = std::env::var(CONFIG).ok()?;
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .init();
+    std::thread::spawn(|| {
+        let _ = std::io::stdin().read_to_end(&mut Vec::new());
+        STOP.store(true, Ordering::SeqCst);
+    });
+    Some((config, &STOP))
+}
+
+/// Says why a process could not do its work, as its program would.
+fn tell(end: &Result<(), rt_controller::ControllerError>) {
+    if let Err(error) = end {
+        eprintln!("{error}");
+        std::process::exit(1);
+    }
+}
+
+/// Not a test by itself: the controller of a stand.
+#[test]
+fn is_a_controller() {
+    if let Some((config, stop)) = config() {
+        let config: ControllerConfig = toml::from_str(&config).unwrap();
+        tell(&rt_controller::run(config, stop));
+    }
+}
+
+/// Not a test by itself: the guardian of a stand.
+#[test]
+fn is_a_guardian() {
+    if let Some((config, stop)) = config() {
+        let config: ControllerConfig = toml::from_str(&config).unwrap();
+        tell(&rt_controller::guardian::run(&config, stop));
+    }
+}
+
+/// Not a test by itself: attaches, takes everything in, and waits for its end.
+#[test]
+fn is_a_viewer() {
+    if let Some((domain, stop)) = config() {
+        let bus = Bus::join(&domain).unwrap();
+        let (cycles, joints) = (
+            bus.cycle_subscriber().unwrap(),
+            bus.joint_subscriber().unwrap(),
+        );
+        while !stop.load(Ordering::SeqCst) {
+            while cycles.receive().unwrap().is_some() {}
+            while joints.receive().unwrap().is_some() {}
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+/// Not a test by itself: attaches to the records and sleeps.
+#[test]
+fn is_a_sleeper() {
+    if let Some((domain, stop)) = config() {
+        let bus = Bus::join(&domain).unwrap();
+        let _cycles = bus.cycle_subscriber().unwrap();
+        let _chunks = bus.chunk_subscriber().unwrap();
+        let _joints = bus.joint_subscriber().unwrap();
+        while !stop.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Plans that must not run: from elsewhere, damaged, out of limits, too late.
+
+use super::stand::{Stand, execute, swing};
+use serde::{Deserialize, Serialize};
+use shared_types::ipc::Bus;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
+use shared_types::ipc::rpc::{Rpc, RpcClient};
+use shared_types::plan::{START_POSE, trajectory_hash};
+use shared_types::{FaultCode, JointTrajectory, JointVector, MotionTier};
+use std::time::Duration;
+
+/// The controller's service, for requests that no proper program would make.
+struct Anything;
+
+/// The bytes of a request: its number, then whatever follows.
+#[derive(Serialize, Deserialize)]
+struct Execute {
+    kind: u32,
+    times_s: Vec<f64>,
+    waypoints_rad: Vec<Vec<f64>>,
+    sha256: [u8; 32],
+}
+
+impl Rpc for Anything {
+    const NAME: &'static str = ControllerRpc::NAME;
+    type Request = Vec<u8>;
+    type Event = ControllerEvent;
+    fn is_last(_event: &ControllerEvent) -> bool {
+        true
+    }
+}
+
+#[test]
+fn fault_22_a_plan_that_begins_elsewhere_is_refused_with_the_distance() {
+    let mut stand = Stand::start("elsewhere");
+    stand.make_ready();
+    let mut from = START_POSE;
+    from[2] += 0.6_f64.to_radians();
+    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    let (fault, message) = stand.refused(&execute(&swing(from)));
+    assert_eq!(fault, FaultCode::StartPoseMismatch);
+    assert!(message.contains("0.60 deg"), "{message}");
+    stand.works_again();
+    stand.finish();
+}
+
+#[test]
+fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
+    let mut stand = Stand::start("damaged");
+    stand.make_ready();
+    let plan = swing(START_POSE);
+    let request = ControllerRequest::Execute {
+        trajectory: Box::new(plan),
+        sha256: [9; 32],
+    };
+    assert_eq!(stand.refused(&request).0, FaultCode::PlanHashMismatch);
+    let mut far = START_POSE;
+    far[3] = 4.5;
+    let out_of_range = JointTrajectory::new(&[0.0, 3.0], &[START_POSE, far]).unwrap();
+    let (fault, message) = stand.refused(&execute(&out_of_range));
+    assert_eq!(fault, FaultCode::PlanOutOfLimits);
+    assert!(message.contains("joint 4"), "{message}");
+
+    // What no type of ours can hold: sent as bytes, it is not even a request.
+    let bus = Bus::join(&stand.config.domain).unwrap();
+    let client = RpcClient::<Anything>::open(&bus).unwrap();
+    let waypoints = || {
+        plan.waypoints()
+            .iter()
+            .map(|q| q.iter().copied().collect())
+            .collect()
+    };
+    let proper = || Execute {
+        kind: 3,
+        times_s: plan.times_s().to_vec(),
+        waypoints_rad: waypoints(),
+        sha256: trajectory_hash(&plan),
+    };
+    let mut cases = vec![proper(), proper(), proper(), proper()];
+    cases[0].waypoints_rad[1][4] = f64::NAN;
+    cases[1].times_s.swap(1, 2);
+    cases[2].waypoints_rad[2].pop();
+    cases[3].times_s.pop();
+    for bytes in cases
+        .iter()
+        .map(|case| postcard::to_allocvec(case).unwrap())
+    {
+        let pending = client.call(&bytes);
+        let end = pending.and_then(|p| {
+            p.finish::<shared_types::ipc::IpcError>(Duration::from_secs(2), || Ok(()), |_| ())
+        });
+        assert!(
+            !matches!(
+                end,
+                Ok(ControllerEvent::Started { .. } | ControllerEvent::Finished { .. })
+            ),
+            "{end:?}"
+        );
+        assert!(matches!(
+            stand.ask(&ControllerRequest::Status),
+            ControllerEvent::Status { .. }
+        ));
+    }
+    stand.works_again();
+    let flight = stand.finish();
+    let moved = flight
+        .cycles
+        .iter()
+        .filter(|c| c.record.trajectory_s >= 0.0)
+        .count();
+    assert!(moved > 500, "the last throw only: {moved} cycles");
+}
+
+#[test]
+fn fault_24_a_plan_too_fast_for_the_tool_is_refused_with_time_and_margin() {
+    let mut stand = Stand::start("too_fast");
+    stand.make_ready();
+    // The arm turns about its base, 0.6 m away from the tool.
+    let turned = |by: f64| {
+        let mut q: JointVector = START_POSE;
+        q[0] += by;
+        q
+    };
+    let fast = JointTrajectory::new(&[0.0, 1.0], &[START_POSE, turned(1.7)]).unwrap();
+    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    let (fault, message) = stand.refused(&execute(&fast));
+    println!("{message}");
+    assert_eq!(fault, FaultCode::PlanOutOfLimits);
+    assert!(
+        message.contains("m/s") && message.contains(" s"),
+        "{message}"
+    );
+    stand.works_again();
+    stand.finish();
+}
+
+#[test]
+fn fault_26_an_upload_that_hangs_is_refused_after_its_time() {
+    let mut stand = Stand::start("hangs");
+    stand.make_ready();
+    let plan = swing(START_POSE);
+    let sha256 = trajectory_hash(&plan);
+    let announce = ControllerRequest::Announce { sha256 };
+    assert_eq!(stand.refused(&announce).0, FaultCode::UploadTimedOut);
+    let late = ControllerRequest::ExecuteUploaded { sha256 };
+    assert_eq!(stand.refused(&late).0, FaultCode::WrongMode);
+    let trajectory = Box::new(plan);
+    let upload = ControllerRequest::Upload { trajectory, sha256 };
+    assert_eq!(stand.ask(&upload), ControllerEvent::Done);
+    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    assert!(matches!(stand.ask(&late), ControllerEvent::Finished { .. }));
+    stand.finish();
+}

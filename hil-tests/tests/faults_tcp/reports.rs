@@ -1,0 +1,164 @@
+//! The joint reports: silent, frozen, out of time, torn, no numbers; and arms
+//! whose reports have another layout.
+
+use super::stand::{Stand, at_speed};
+use hil_tests::arm::{ArmConfig, Firmware};
+use rt_controller::ControllerConfig;
+use shared_types::FaultCode;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
+
+/// The profile's own patience with reports: 100 ms.
+fn impatient(config: &mut ControllerConfig) {
+    config.thresholds.report_stale_ms = None;
+}
+
+#[test]
+fn fault_14_reports_that_stop_slow_the_motion_along_its_path() {
+    let mut stand = Stand::with("report_stop", ArmConfig::default(), impatient);
+    stand.make_ready();
+    let script = at_speed("kind = \"report_stop\"\nport = \"all\"\nduration_s = 1.0");
+    stand.stopped_by(&script, &[FaultCode::ReportStale]);
+    stand.works_again();
+    let flight = stand.finish();
+    assert_eq!(flight.causes[0].path, 1, "{:?}", flight.causes[0]);
+}
+
+#[test]
+fn fault_15_frozen_reports_slow_the_motion_along_its_path() {
+    let mut stand = Stand::start("report_freeze");
+    stand.make_ready();
+    let script = at_speed("kind = \"report_freeze\"\nport = \"all\"\nduration_s = 1.0");
+    let expected = [FaultCode::ReportFrozen, FaultCode::JointStuck];
+    stand.stopped_by(&script, &expected);
+    stand.works_again();
+    stand.finish();
+}
+
+#[test]
+fn fault_16_a_clock_that_jumps_wraps_or_drifts_is_followed() {
+    let mut stand = Stand::start("report_clock");
+    stand.make_ready();
+    for kind in [
+        "kind = \"report_time_jump\"\nby_s = -0.8",
+        "kind = \"report_time_jump\"\nby_s = -0.2",
+        "kind = \"report_time_jump\"\nby_s = 3.0",
+        "kind = \"report_time_wrap\"",
+        "kind = \"report_time_drift\"\nppm = 200\nduration_s = 1.5",
+    ] {
+        stand.inject(&at_speed(kind));
+        let answer = stand.throw();
+        assert!(
+            matches!(answer, ControllerEvent::Finished { .. }),
+            "{kind}: {answer:?}"
+        );
+    }
+    stand.finish();
+}
+
+#[test]
+fn fault_17_broken_reports_are_dropped_and_too_many_in_a_row_slow_the_motion() {
+    let mut stand = Stand::start("report_broken");
+    stand.make_ready();
+    for kind in [
+        "kind = \"report_nan\"\nframes = 2\njoint = 2",
+        "kind = \"report_infinity\"\nframes = 2\njoint = 5",
+        "kind = \"report_torn\"\nframes = 1\nkeep_bytes = 60",
+        "kind = \"report_length\"\nframes = 1\nclaim_bytes = 12",
+    ] {
+        stand.inject(&at_speed(kind));
+        let answer = stand.throw();
+        assert!(
+            matches!(answer, ControllerEvent::Finished { .. }),
+            "{kind}: {answer:?}"
+        );
+    }
+    let script = at_speed("kind = \"report_nan\"\nframes = 200\njoint = 2");
+    stand.stopped_by(&script, &[FaultCode::ReportBroken]);
+    stand.works_again();
+    let flight = stand.finish();
+    let broken = flight.total(|c| c.input.broken_reports);
+    assert!(broken >= 10, "{broken}");
+    assert_eq!(flight.causes[0].path, 1, "{:?}", flight.causes[0]);
+}
+
+#[test]
+fn fault_18_a_firmware_without_the_reports_needed_is_refused() {
+    let old = ArmConfig {
+        firmware: Firmware(1, 12, 0),
+        ..ArmConfig::default()
+    };
+    let mut stand = Stand::with("old", old, |_| ());
+    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
+    assert!(message.contains("v1.12.0"), "{message}");
+    stand.finish();
+}
+
+/// A line between controller and arm that passes everything on but says that the
+/// firmware is v2.8.2. Its port.
+fn a_line_that_lies(arm_port: u16) -> u16 {
+    const TRUE: &[u8] = b"v2.7.1";
+    const SAID: &[u8] = b"v2.8.2";
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let port = listener.local_addr().unwrap().port();
+    std::thread::spawn(move || {
+        for near in listener.incoming().map_while(Result::ok) {
+            let Ok(far) = TcpStream::connect((Ipv4Addr::LOCALHOST, arm_port)) else {
+                return;
+            };
+            for (mut from, mut to) in [
+                (near.try_clone().unwrap(), far.try_clone().unwrap()),
+                (far, near),
+            ] {
+                std::thread::spawn(move || {
+                    let mut bytes = [0; 2048];
+                    while let Ok(n @ 1..) = from.read(&mut bytes) {
+                        if let Some(at) = bytes[..n].windows(TRUE.len()).position(|w| w == TRUE) {
+                            bytes[at..at + SAID.len()].copy_from_slice(SAID);
+                        }
+                        if to.write_all(&bytes[..n]).is_err() {
+                            break;
+                        }
+                    }
+                    let _ = to.shutdown(Shutdown::Both);
+                });
+            }
+        }
+    });
+    port
+}
+
+#[test]
+fn fault_18_reports_of_another_layout_than_the_firmwares_are_refused() {
+    let mut stand = Stand::with("liar", ArmConfig::default(), |config| {
+        config.command_port = a_line_that_lies(config.command_port);
+    });
+    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
+    for word in ["v2.8.2", "574", "587"] {
+        assert!(message.contains(word), "{message}");
+    }
+    let refused = ControllerRequest::Acknowledge;
+    assert_eq!(
+        stand.refused(&refused).0,
+        FaultCode::WrongMode,
+        "nothing was brought up"
+    );
+    stand.finish();
+}
+
+#[test]
+fn fault_18_another_report_on_the_port_of_the_joint_reports_is_refused() {
+    let mut stand = Stand::with("ports", ArmConfig::default(), |config| {
+        config.report_port = config.fallback_report_port;
+    });
+    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
+    assert!(
+        message.contains("135") && message.contains("784"),
+        "{message}"
+    );
+    stand.finish();
+}

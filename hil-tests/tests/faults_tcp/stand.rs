@@ -1,0 +1,393 @@
+//! A test stand: arm, controller, guardian, and an operator who asks for things.
+
+use super::child::{Process, Role};
+use super::flight::Flight;
+use hil_tests::arm::{ArmConfig, FaultScript, SimulatedArm, clock};
+use rt_controller::ControllerConfig;
+use rt_controller::config::{Profile, ThresholdSettings};
+use rt_controller::guardian::GuardianSettings;
+use rt_controller::os::RealTimeSettings;
+use rt_controller::recording::{Item, LogReader, Read};
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
+use shared_types::ipc::rpc::{Pending, RpcClient};
+use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
+use shared_types::plan::{START_POSE, trajectory_hash};
+use shared_types::{FaultCode, JointTrajectory, JointVector, MonotonicNs, MotionTier, WireMode};
+use std::time::{Duration, Instant};
+
+/// Longest wait for anything.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+/// Pause between two turns of the operator.
+const TURN: Duration = Duration::from_millis(2);
+
+/// A swing of three joints out and back, twice, 2.4 s; its fastest joint reaches
+/// 0.8 rad/s.
+pub fn swing(from: JointVector) -> JointTrajectory {
+    let mut out = from;
+    (out[1], out[3], out[5]) = (out[1] + 0.08, out[3] - 0.08, out[5] + 0.25);
+    let times = [0.0, 0.6, 1.2, 1.8, 2.4];
+    JointTrajectory::new(&times, &[from, out, from, out, from]).unwrap()
+}
+
+pub fn execute(trajectory: &JointTrajectory) -> ControllerRequest {
+    ControllerRequest::Execute {
+        trajectory: Box::new(*trajectory),
+        sha256: trajectory_hash(trajectory),
+    }
+}
+
+/// One entry of a fault script that strikes when the arm is at speed.
+pub fn at_speed(rest: &str) -> String {
+    format!("[[fault]]\non = \"speed:0.5\"\n{rest}\n")
+}
+
+/// The controller's configuration for the arm, patient where only a busy machine
+/// would be noticed.
+pub fn patient(name: &str, arm: &SimulatedArm) -> ControllerConfig {
+    let [realtime, normal, rich, real] = arm.ports().reports;
+    ControllerConfig {
+        domain: format!("faults_{name}_{}", std::process::id()),
+        command_port: arm.ports().command,
+        report_port: realtime,
+        fallback_report_port: real,
+        status_ports: [rich, normal],
+        real_time: RealTimeSettings {
+            // A test program is large; its memory stays where it is.
+            lock_memory: false,
+            ..RealTimeSettings::default()
+        },
+        thresholds: ThresholdSettings {
+            profile: Some(Profile::Relaxed),
+            operator_timeout_ms: Some(5000.0),
+            guardian_timeout_ms: Some(1000.0),
+            reply_stall_ms: Some(500.0),
+            unanswered_max: Some(125),
+            report_stale_ms: Some(500.0),
+            missed_cycles_max: Some(50),
+            late_cycles_max: Some(50),
+            ..ThresholdSettings::default()
+        },
+        guardian: GuardianSettings {
+            silence_ms: 1000.0,
+            ..GuardianSettings::default()
+        },
+        ..ControllerConfig::default()
+    }
+}
+
+/// Arm, controller, guardian and operator.
+pub struct Stand {
+    // The order of the fields is the order in which a failed test takes them down.
+    operator: Option<OperatorEnd>,
+    client: RpcClient<ControllerRpc>,
+    chunks: ChunkSubscriber,
+    pub controller: Process,
+    pub guardian: Option<Process>,
+    pub arm: SimulatedArm,
+    pub bus: Bus,
+    pub config: ControllerConfig,
+    recording: Vec<u8>,
+    truth_ns: MonotonicNs,
+    flight: Flight,
+    _sweep: DomainSweep,
+}
+
+impl Stand {
+    /// A stand without special wishes.
+    pub fn start(name: &str) -> Self {
+        Self::with(name, ArmConfig::default(), |_| ())
+    }
+
+    /// A stand with an arm and changes to the controller's configuration of its
+    /// own.
+    pub fn with(name: &str, arm: ArmConfig, change: impl FnOnce(&mut ControllerConfig)) -> Self {
+        let arm = SimulatedArm::start(ArmConfig {
+            command_port: 0,
+            report_ports: [0; 4],
+            initial_q: START_POSE,
+            ..arm
+        })
+        .unwrap();
+        let mut config = patient(name, &arm);
+        change(&mut config);
+        let sweep = DomainSweep::new(&config.domain);
+        let bus = Bus::join(&config.domain).unwrap();
+        let chunks = bus.chunk_subscriber().unwrap();
+        let text = toml::to_string(&config).unwrap();
+        let controller = Process::start(Role::Controller, name, &text);
+        let guardian = config
+            .guardian
+            .required
+            .then(|| Process::start(Role::Guardian, name, &text));
+        let (operator, client) = meet(&bus, &controller);
+        let truth_ns = clock::now();
+        let mut stand = Self {
+            operator: Some(operator),
+            client,
+            chunks,
+            controller,
+            guardian,
+            flight: Flight::new(config.resolve_limits().unwrap(), config.wire),
+            arm,
+            bus,
+            config,
+            recording: Vec::new(),
+            truth_ns,
+            _sweep: sweep,
+        };
+        stand.wait_until("the controller", |s| {
+            matches!(
+                s.ask(&ControllerRequest::Status),
+                ControllerEvent::Status { .. }
+            )
+        });
+        stand
+    }
+
+    /// The operator's heartbeat, and what has come meanwhile.
+    pub fn turn(&mut self) {
+        if let Some(operator) = &mut self.operator {
+            operator.beat();
+        }
+        self.drain();
+        std::thread::sleep(TURN);
+    }
+
+    /// The same without a heartbeat.
+    pub fn drain(&mut self) {
+        while let Some(chunk) = self.chunks.receive().unwrap() {
+            self.recording.extend_from_slice(&chunk);
+        }
+        let truth = self.arm.history().since(self.truth_ns);
+        self.truth_ns = truth.last().map_or(self.truth_ns, |s| s.at);
+        self.flight.truth.extend(truth);
+    }
+
+    /// Starts the controller anew in the same domain, after it was killed; the
+    /// operator of the old one leaves.
+    pub fn start_controller_again(&mut self) {
+        self.operator = None;
+        let text = toml::to_string(&self.config).unwrap();
+        self.controller = Process::start(Role::Controller, "again", &text);
+        let (operator, client) = meet(&self.bus, &self.controller);
+        (self.operator, self.client) = (Some(operator), client);
+    }
+
+    /// Turns for some time.
+    pub fn rest(&mut self, span: Duration) {
+        let began = Instant::now();
+        while began.elapsed() < span {
+            self.turn();
+        }
+    }
+
+    pub fn wait_until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+        let began = Instant::now();
+        while !done(self) {
+            assert!(
+                began.elapsed() < PATIENCE,
+                "{what} never came; the controller says:\n{}",
+                self.controller.log()
+            );
+            self.turn();
+        }
+    }
+
+    pub fn call(&mut self, request: &ControllerRequest) -> Pending<ControllerRpc> {
+        self.client.call(request).unwrap()
+    }
+
+    /// Waits for the last answer to a call.
+    pub fn answer(&mut self, pending: &Pending<ControllerRpc>) -> ControllerEvent {
+        let began = Instant::now();
+        loop {
+            match pending.try_next() {
+                Ok(Some(ControllerEvent::Started { .. } | ControllerEvent::Step { .. }))
+                | Ok(None) => {}
+                Ok(Some(event)) => return event,
+                Err(error) => panic!("{error}:\n{}", self.controller.log()),
+            }
+            assert!(began.elapsed() < PATIENCE, "{}", self.controller.log());
+            self.turn();
+        }
+    }
+
+    pub fn ask(&mut self, request: &ControllerRequest) -> ControllerEvent {
+        let pending = self.call(request);
+        self.answer(&pending)
+    }
+
+    /// Asks for what must be refused; the fault and the words.
+    pub fn refused(&mut self, request: &ControllerRequest) -> (FaultCode, String) {
+        match self.ask(request) {
+            ControllerEvent::Refused { fault, message } => (fault, message),
+            other => panic!("not refused: {other:?}"),
+        }
+    }
+
+    pub fn mode(&mut self) -> (ControllerMode, FaultCode) {
+        match self.ask(&ControllerRequest::Status) {
+            ControllerEvent::Status { mode, fault, .. } => (mode, fault),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Pose that the controller commands (rad).
+    pub fn commanded(&mut self) -> JointVector {
+        match self.ask(&ControllerRequest::Status) {
+            ControllerEvent::Status { q_c, .. } => q_c,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Brings the arm up, or acknowledges a fault; both want an arm that can be
+    /// recovered by then.
+    pub fn make_ready(&mut self) {
+        self.wait_until("a ready arm", |s| {
+            let request = match s.mode().0 {
+                ControllerMode::Offline => ControllerRequest::Bringup,
+                ControllerMode::Idle => return true,
+                _ => ControllerRequest::Acknowledge,
+            };
+            s.ask(&request);
+            false
+        });
+        // The guardian is seen by then, too.
+        self.rest(Duration::from_millis(100));
+    }
+
+    pub fn arm_for(&mut self, tier: MotionTier) -> ControllerEvent {
+        self.ask(&ControllerRequest::Arm {
+            tier,
+            area_clear: true,
+        })
+    }
+
+    /// Adds the faults of a script to the arm's.
+    pub fn inject(&self, script: &str) {
+        for fault in script.parse::<FaultScript>().unwrap().faults {
+            self.arm.inject(fault);
+        }
+    }
+
+    /// Arms and begins to swing from where the arm stands.
+    pub fn begin(&mut self) -> Pending<ControllerRpc> {
+        let from = self.commanded();
+        assert_eq!(self.arm_for(MotionTier::Throw), ControllerEvent::Done);
+        self.call(&execute(&swing(from)))
+    }
+
+    /// Arms, swings, and what came of it.
+    pub fn throw(&mut self) -> ControllerEvent {
+        let pending = self.begin();
+        self.answer(&pending)
+    }
+
+    /// Waits until the arm is asked to move faster than half a radian a second.
+    pub fn wait_for_speed(&mut self) {
+        self.wait_until("the motion", |s| {
+            s.arm
+                .history()
+                .latest()
+                .is_some_and(|sample| sample.state.qd.max_abs() > 0.5)
+        });
+    }
+
+    /// A throw that a fault stops: the answer names one of `expected`, and
+    /// nothing moves until it is acknowledged. Returns what was answered.
+    pub fn stopped_by(&mut self, script: &str, expected: &[FaultCode]) -> ControllerEvent {
+        self.inject(script);
+        let answer = self.throw();
+        let ControllerEvent::Stopped { fault, .. } = answer else {
+            panic!("not stopped: {answer:?}");
+        };
+        assert!(expected.contains(&fault), "{fault:?} by {script}");
+        self.flight.expect(expected);
+        self.is_latched();
+        answer
+    }
+
+    /// The stop that has just been answered holds, whatever is asked for.
+    pub fn is_latched(&mut self) {
+        assert_eq!(self.mode().0, ControllerMode::Faulted);
+        let from = self.commanded();
+        for request in [
+            ControllerRequest::Arm {
+                tier: MotionTier::Throw,
+                area_clear: true,
+            },
+            ControllerRequest::MoveTo {
+                q: START_POSE,
+                speed_part: 0.1,
+            },
+            execute(&swing(from)),
+            ControllerRequest::Bringup,
+        ] {
+            assert_eq!(self.refused(&request).0, FaultCode::WrongMode);
+        }
+        // Time to come to rest, then time in which nothing may move.
+        self.rest(Duration::from_millis(700));
+        let from_ns = clock::now();
+        self.rest(Duration::from_millis(500));
+        self.flight.at_rest_between(from_ns, clock::now());
+    }
+
+    /// After an acknowledgement the arm works as before.
+    pub fn works_again(&mut self) {
+        self.make_ready();
+        assert!(matches!(self.throw(), ControllerEvent::Finished { .. }));
+    }
+
+    /// The stop expected next, made by something else than a script.
+    pub fn expect(&mut self, faults: &[FaultCode]) {
+        self.flight.expect(faults);
+    }
+
+    /// Ends all processes in order and hands over what was recorded, checked.
+    pub fn finish(mut self) -> Flight {
+        if self.mode().0 == ControllerMode::Idle {
+            // Its end is one more stop, of an arm that stands.
+            self.flight.expect(&[FaultCode::OperatorStop]);
+        }
+        self.controller.end();
+        if let Some(guardian) = &mut self.guardian {
+            guardian.end();
+        }
+        self.drain();
+        self.flight.arm = self.arm.events().since(MonotonicNs(0));
+        for read in LogReader::open(&self.recording).unwrap() {
+            match read {
+                Read::Item(Item::Cycle(cycle)) => self.flight.cycles.push(*cycle),
+                Read::Item(Item::Cause(cause)) => self.flight.causes.push(*cause),
+                Read::Item(Item::Keyframe(_) | Item::Motion { .. }) => {}
+                Read::Flaw(flaw) => panic!("{flaw}"),
+            }
+        }
+        let flight = std::mem::take(&mut self.flight);
+        flight.check();
+        flight
+    }
+
+    /// Whether setpoints travel as velocities.
+    pub fn velocity(config: &mut ControllerConfig) {
+        config.wire = WireMode::JointVelocity;
+    }
+}
+
+/// Waits until the operator's place and the service are there.
+fn meet(bus: &Bus, controller: &Process) -> (OperatorEnd, RpcClient<ControllerRpc>) {
+    let began = Instant::now();
+    loop {
+        if let (Ok(end), Ok(client)) = (OperatorEnd::take(bus), RpcClient::open(bus))
+            && client.call(&ControllerRequest::Status).is_ok()
+        {
+            return (end, client);
+        }
+        assert!(
+            began.elapsed() < PATIENCE,
+            "the controller never came:\n{}",
+            controller.log()
+        );
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
