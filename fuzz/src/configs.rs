@@ -1,0 +1,45 @@
+//! Configuration: the controller's, and the limits.
+
+use rt_controller::ControllerConfig;
+use shared_types::{ArmResponse, Limits};
+
+/// Reads `data` as each kind; what passes its checks resolves, and what was read
+/// can be written and read again.
+///
+/// # Panics
+/// When a configuration that was read cannot be written and read again.
+pub fn run(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    if let Ok(config) = toml::from_str::<ControllerConfig>(text) {
+        if config.check().is_ok() {
+            let _ = config.control_settings();
+        }
+        if config.limits_file.is_none() {
+            let _ = config.resolve_limits();
+        }
+        let written = toml::to_string(&config).unwrap();
+        assert_eq!(
+            toml::from_str::<ControllerConfig>(&written).unwrap(),
+            config
+        );
+    }
+    if let Ok(limits) = toml::from_str::<Limits>(text) {
+        let written = toml::to_string(&limits).unwrap();
+        assert_eq!(toml::from_str::<Limits>(&written).unwrap(), limits);
+    }
+    if let Ok(response) = toml::from_str::<ArmResponse>(text) {
+        let _ = toml::to_string(&response).unwrap();
+    }
+}
+
+/// The files as we write them.
+pub fn seeds() -> Vec<Vec<u8>> {
+    let config: ControllerConfig = toml::from_str("").unwrap();
+    vec![
+        toml::to_string(&config).unwrap().into_bytes(),
+        toml::to_string(&Limits::default()).unwrap().into_bytes(),
+        b"[real_time]\npriority = 80\ncpu = 1\nlock_memory = true\nrequire = true\n".to_vec(),
+    ]
+}
