@@ -76,7 +76,7 @@ fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
         waypoints_rad: waypoints(),
         sha256: trajectory_hash(&plan),
     };
-    let mut cases = vec![proper(), proper(), proper(), proper()];
+    let mut cases = [proper(), proper(), proper(), proper()];
     cases[0].waypoints_rad[1][4] = f64::NAN;
     cases[1].times_s.swap(1, 2);
     cases[2].waypoints_rad[2].pop();
