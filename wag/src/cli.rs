@@ -461,6 +461,12 @@ pub struct BenchArgs {
     /// Seed of the ropes and motions.
     #[arg(long, default_value_t = 5)]
     pub seed: u64,
+    /// `rt`: time of each contender (s).
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    pub seconds: u32,
+    /// `rt`: core of the control loop; default: the last one.
+    #[arg(long)]
+    pub cpu: Option<usize>,
 }
 
 /// Benchmarks known by name.
@@ -468,6 +474,8 @@ pub struct BenchArgs {
 pub enum BenchName {
     /// The rope simulator: kernels, jobs, scaling.
     Rope,
+    /// The control loop: wake-up error beside `cyclictest`, times within a cycle.
+    Rt,
 }
 
 /// Arguments of `wag process`.

@@ -5,6 +5,7 @@
 
 mod machine;
 mod rope;
+mod rt;
 mod spent;
 
 use crate::cli::{BenchArgs, BenchName};
@@ -15,5 +16,6 @@ use serde_json::Value;
 pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     match args.name {
         BenchName::Rope => rope::run(args, quiet),
+        BenchName::Rt => rt::run(args, quiet),
     }
 }
