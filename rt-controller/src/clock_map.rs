@@ -5,7 +5,8 @@
 //! before it was sent. The estimate is let go slowly upwards, so that two
 //! clocks that drift apart stay mapped.
 //!
-//! A clock that is set back makes every report look late. A receiver that was
+//! A clock that is set back shows at once by a stamp before the last one. One that
+//! lags after a gap makes every report look late. A receiver that was
 //! held up finds late reports, too, but all at once, and punctual ones behind
 //! them.
 
@@ -20,6 +21,12 @@ const LATE_NS: i128 = 20_000_000;
 /// (ns).
 const LATE_FOR_NS: u64 = 100_000_000;
 
+/// How the arm's clock was read for a report, see
+/// [`JointReport::arm_clock`](shared_types::ipc::JointReport::arm_clock).
+pub const CLOCK_USED: u16 = 1;
+/// The same with a new map, because the clock jumped.
+pub const CLOCK_ANEW: u16 = 2;
+
 /// Maps stamps of one report stream.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ClockMap {
@@ -28,6 +35,10 @@ pub struct ClockMap {
     /// Arrival of the first of the late reports in a row, and the smallest
     /// offset that they show (ns).
     late: Option<(u64, i128)>,
+    /// The newest stamp (µs).
+    stamp_us: u64,
+    /// The newest stamp began a new map.
+    anew: bool,
 }
 
 impl ClockMap {
@@ -35,23 +46,35 @@ impl ClockMap {
     /// CLOCK_MONOTONIC (ns), given that it arrived at `arrival_ns`.
     pub fn to_monotonic_ns(&mut self, stamp_us: u64, arrival_ns: u64) -> u64 {
         let seen = i128::from(arrival_ns) - i128::from(stamp_us) * 1000;
+        // Reports come in order, so a stamp that goes back is a clock that did.
+        let back = stamp_us < core::mem::replace(&mut self.stamp_us, stamp_us);
+        self.anew = false;
         let offset = match self.offset {
             Some((offset, at_ns)) => {
                 let since_ns = i128::from(arrival_ns.saturating_sub(at_ns));
                 let relaxed = offset + since_ns * DRIFT_NS_PER_S / 1_000_000_000;
-                let jumped = (seen - relaxed).abs() > JUMP_NS;
+                let jumped = back || (seen - relaxed).abs() > JUMP_NS;
                 if jumped {
                     self.late = None;
+                    self.anew = true;
                     seen
+                } else if let Some(smallest) = self.late_for_long(seen, relaxed, arrival_ns) {
+                    self.anew = true;
+                    smallest
                 } else {
-                    self.late_for_long(seen, relaxed, arrival_ns)
-                        .unwrap_or_else(|| seen.min(relaxed))
+                    seen.min(relaxed)
                 }
             }
             None => seen,
         };
         self.offset = Some((offset, arrival_ns));
         u64::try_from(i128::from(stamp_us) * 1000 + offset).unwrap_or(arrival_ns)
+    }
+
+    /// [`CLOCK_USED`], or [`CLOCK_ANEW`] when the newest stamp began a new map.
+    #[must_use]
+    pub const fn reading(&self) -> u16 {
+        if self.anew { CLOCK_ANEW } else { CLOCK_USED }
     }
 
     /// The offset that reports show which have been late for long.
@@ -138,7 +161,11 @@ mod tests {
             map.to_monotonic_ns(9_000_000, 50_000_000_000),
             50_000_000_000
         );
+        assert_eq!(map.reading(), CLOCK_USED);
         assert_eq!(map.to_monotonic_ns(100, 51_000_000_000), 51_000_000_000);
+        assert_eq!(map.reading(), CLOCK_ANEW);
+        assert_eq!(map.to_monotonic_ns(4100, 51_004_000_000), 51_004_000_000);
+        assert_eq!(map.reading(), CLOCK_USED);
     }
 
     proptest! {

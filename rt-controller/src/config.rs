@@ -1,5 +1,6 @@
 //! Configuration of the controller process.
 
+use crate::control::settings::TRACKING_WINDOW_MAX_MS;
 use crate::control::{ControlSettings, Thresholds};
 use crate::guardian::GuardianSettings;
 use crate::os::RealTimeSettings;
@@ -142,7 +143,7 @@ pub struct ThresholdSettings {
     /// Largest distance of a measured joint from everything it was told in the
     /// last `tracking_window_ms` (rad).
     pub tracking_error_max_rad: Option<f64>,
-    /// Longest lag of the arm that counts as normal (ms).
+    /// Longest lag of the arm that counts as normal (ms), 250 at most.
     pub tracking_window_ms: Option<f64>,
     /// Most cycles missed at once without slowing the motion down.
     pub late_cycles_max: Option<u32>,
@@ -209,17 +210,26 @@ impl ThresholdSettings {
                 self.report_frozen_ms,
                 base.report_frozen_ns,
             )?,
-            tracking_window_ns: span_ns(
-                "thresholds.tracking_window_ms",
-                self.tracking_window_ms,
-                base.tracking_window_ns,
-            )?,
+            tracking_window_ns: self.window_ns(base.tracking_window_ns)?,
             tracking_error_max_rad: error,
             unanswered_max,
             late_cycles_max: self.late_cycles_max.unwrap_or(base.late_cycles_max),
             missed_cycles_max: self.missed_cycles_max.unwrap_or(base.missed_cycles_max),
             ..base
         })
+    }
+
+    /// No longer than what is remembered of the setpoints.
+    fn window_ns(&self, base_ns: u64) -> Result<u64, ConfigError> {
+        let key = "thresholds.tracking_window_ms";
+        match self.tracking_window_ms {
+            Some(found) if found > TRACKING_WINDOW_MAX_MS => Err(ConfigError::Threshold {
+                key,
+                found,
+                allowed: "4 to 250 ms",
+            }),
+            given => span_ns(key, given, base_ns),
+        }
     }
 }
 
@@ -335,6 +345,12 @@ mod tests {
                 .unwrap_err()
                 .to_string()
                 .contains("thresholds.reply_stall_ms")
+        );
+        config = parse("[thresholds]\ntracking_window_ms = 251.0").unwrap();
+        let said = config.check().unwrap_err().to_string();
+        assert!(
+            said.contains("tracking_window_ms") && said.contains("250"),
+            "{said}"
         );
         config = parse("[real_time]\npriority = 5").unwrap();
         assert!(matches!(

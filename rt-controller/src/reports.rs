@@ -98,13 +98,17 @@ fn realtime(frame: &[u8], arrival_ns: u64, clocks: &mut ClockMap) -> Option<Join
     if !(REALTIME_REPORT_LEN..=MAX_REPORT_LEN).contains(&frame.len()) {
         return None;
     }
-    let r = RealtimeReport::parse(frame).ok()?;
+    // Before the clock is followed: nonsense must not lead it astray.
+    let r = RealtimeReport::parse(frame)
+        .ok()
+        .filter(RealtimeReport::is_plausible)?;
     Some(JointReport {
         version: PAYLOAD_VERSION,
         arm_state: r.state.code(),
         arm_mode: r.mode.code(),
-        arm_clock: 1,
+        // The reading is of this very stamp.
         stamp_ns: clocks.to_monotonic_ns(r.time_us, arrival_ns),
+        arm_clock: clocks.reading(),
         arrival_ns,
         q: r.actual.q,
         qd: r.actual.qd,

@@ -27,7 +27,7 @@
 use crate::control::record::record_input;
 use crate::control::{ArmCodes, ControlState, CycleInput};
 use crate::os::Clock;
-use crate::overrun::{Wake, after_wake, next_wake};
+use crate::overrun::{Wake, after_wake, next_wake, setpoint_late_ns};
 use crate::ports::RtPorts;
 use crate::transport::ArmTransport;
 use crate::transport::slot::LinkSlot;
@@ -97,7 +97,9 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
     /// One cycle, due at `deadline_ns` after `missed` skipped ones, that woke at
     /// `woke_ns`: take in, step, send, record; returns when it sent. RT-safe.
     pub fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) -> u64 {
-        let input = self.take_in(deadline_ns, missed);
+        let mut input = self.take_in(deadline_ns, missed);
+        let period_ns = MonotonicNs(0).plus_s(self.control.period_s()).0;
+        input.late_ns = setpoint_late_ns(deadline_ns, woke_ns, missed, period_ns);
         let next = self.control.cycle().wrapping_add(1);
         self.ports.put_input(record_input(&input, next));
         let mut out = self.control.step(input);
@@ -137,6 +139,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         CycleInput {
             deadline_ns,
             missed,
+            late_ns: 0,
             order: mail.map(|m| m.order),
             operator: self.boards.operator(),
             guardian: self.boards.guardian(),

@@ -81,6 +81,8 @@ pub struct ArmModel {
     config: ArmConfig,
     clock: ControllerClock,
     time: MonotonicNs,
+    /// When the newest request arrived.
+    arrived: MonotonicNs,
     joints: [JointDynamics; JOINTS],
     /// What the encoders show too much (rad).
     encoder_offset: JointVector,
@@ -125,6 +127,7 @@ impl ArmModel {
         Self {
             clock: ControllerClock::new(start, config.uptime_s, config.clock_ppm),
             time: start,
+            arrived: start,
             joints: config.joints(),
             encoder_offset: JointVector::ZERO,
             reference: Reference::at_rest(config.initial_q),
@@ -192,7 +195,7 @@ impl ArmModel {
 
     pub(super) fn log(&mut self, event: ArmEvent) {
         self.events.push(TimedEvent {
-            at: self.time,
+            at: self.time.max(self.arrived),
             client: self.origin.map(|(client, _)| client),
             event,
         });

@@ -26,6 +26,8 @@ pub(super) struct Feed {
     size: Option<usize>,
     clocks: ClockMap,
     retry: MonotonicNs,
+    /// When it was opened last.
+    opened: MonotonicNs,
     /// Frames dropped since they were last asked for.
     broken: u32,
 }
@@ -39,6 +41,7 @@ impl Feed {
             size: None,
             clocks: ClockMap::default(),
             retry: MonotonicNs(0),
+            opened: MonotonicNs(0),
             broken: 0,
         }
     }
@@ -58,6 +61,7 @@ impl Feed {
         let now = network.borrow().now;
         if self.stream.is_none() && now >= self.retry {
             self.retry = now.plus_s(RETRY_S);
+            self.opened = now;
             self.stream = VirtualStream::connect(network, Service::Reports(self.kind)).ok();
             self.reader.reset();
             self.size = None;
@@ -70,10 +74,12 @@ impl Feed {
                 _ => return self.lose(now),
             }
             loop {
+                // A torn report is filled up with the beginning of the next.
+                let whole = self.reader.is_followed_by_a_report();
                 match self.reader.next_report() {
                     Ok(Some(frame)) => {
                         let fits = self.size.is_none_or(|size| size == frame.len());
-                        if fits && take(frame, &mut self.clocks) {
+                        if whole && fits && take(frame, &mut self.clocks) {
                             self.size = Some(frame.len());
                         } else {
                             self.broken += 1;
@@ -82,7 +88,12 @@ impl Feed {
                     Ok(None) => break,
                     Err(_lost_place) => {
                         self.broken += 1;
-                        return self.lose(now);
+                        self.lose(now);
+                        // One that has lasted is opened again at once.
+                        if now.since_s(self.opened) > RETRY_S {
+                            self.retry = now;
+                        }
+                        return;
                     }
                 }
             }
@@ -99,24 +110,23 @@ impl Feed {
         let arrival_ns = network.borrow().now.0;
         let mut reports = Vec::new();
         self.frames(network, |frame, clocks| {
-            let Ok(r) = RealtimeReport::parse(frame) else {
+            let parsed = RealtimeReport::parse(frame).ok();
+            let Some(r) = parsed.filter(RealtimeReport::is_plausible) else {
                 return false;
             };
-            let finite = r.actual.is_finite() && r.target.is_finite();
-            if finite {
-                reports.push(JointReport {
-                    version: PAYLOAD_VERSION,
-                    arm_state: r.state.code(),
-                    arm_mode: r.mode.code(),
-                    arm_clock: 1,
-                    stamp_ns: clocks.to_monotonic_ns(r.time_us, arrival_ns),
-                    arrival_ns,
-                    q: r.actual.q,
-                    qd: r.actual.qd,
-                    q_target: r.target.q,
-                });
-            }
-            finite
+            reports.push(JointReport {
+                version: PAYLOAD_VERSION,
+                arm_state: r.state.code(),
+                arm_mode: r.mode.code(),
+                // The reading is of this very stamp.
+                stamp_ns: clocks.to_monotonic_ns(r.time_us, arrival_ns),
+                arm_clock: clocks.reading(),
+                arrival_ns,
+                q: r.actual.q,
+                qd: r.actual.qd,
+                q_target: r.target.q,
+            });
+            true
         });
         reports
     }

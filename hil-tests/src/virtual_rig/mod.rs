@@ -31,14 +31,14 @@ use rt_controller::control::record::record_input;
 use rt_controller::control::{
     ControlEvent, ControlSettings, ControlState, CycleInput, Motion, Order,
 };
-use rt_controller::overrun::{Wake, after_wake, next_wake};
+use rt_controller::overrun::{Wake, after_wake, next_wake, setpoint_late_ns};
 use rt_controller::transport::slot::LinkSlot;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
 use shared_types::ipc::{
     CauseRecord, ControllerMode, CycleRecord, GuardianBeat, InputRecord, OperatorBeat,
-    PAYLOAD_VERSION, Reports,
+    PAYLOAD_VERSION, Reports, RunCounts,
 };
 use shared_types::{JointVector, Limits, MonotonicNs, WireMode};
 use std::cell::RefCell;
@@ -182,6 +182,18 @@ impl VirtualRig {
         self.control.summary().q_c
     }
 
+    /// What marked the run since the controller took the arm over.
+    #[must_use]
+    pub fn counts(&self) -> RunCounts {
+        self.control.counts()
+    }
+
+    /// Whether the controller is connected to the arm.
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.link.is_connected()
+    }
+
     /// Looks at the arm.
     pub fn with_arm<R>(&self, look: impl FnOnce(&mut ArmEndpoint) -> R) -> R {
         look(&mut self.network.borrow_mut().arm)
@@ -229,6 +241,35 @@ impl VirtualRig {
         let hold = self.with_arm(|arm| arm.model().measured_motion().q);
         self.orders.push_back(Order::Adopt { hold });
         self.run_cycles(2);
+        Ok(())
+    }
+
+    /// The controller's process dies, its connections with it; the arm is alone
+    /// for `span_s`. Then a new process begins its cycles, knowing nothing.
+    pub fn kill_controller(&mut self, span_s: f64) {
+        drop(self.link.replace(None));
+        self.joints = Feed::new(ReportKind::Realtime);
+        self.codes = Feed::new(ReportKind::Rich);
+        self.orders.clear();
+        self.control = ControlState::new(self.config.limits.clone(), self.config.settings);
+        let until = self.now().plus_s(span_s);
+        self.advance_to(until);
+        self.next = Wake {
+            deadline_ns: until.plus_s(self.config.limits.period_s()).0,
+            missed: 0,
+        };
+    }
+
+    /// Somebody with a connection of his own, as the guardian has, sends the arm
+    /// a command.
+    ///
+    /// # Errors
+    /// [`ConnectRefused`] when the arm cannot be reached.
+    pub fn command_from_elsewhere(&mut self, command: &Command) -> Result<(), ConnectRefused> {
+        let mut session = VirtualStream::connect(&self.network, Service::Commands)?;
+        ask(&mut session, 0, command);
+        // It is gone only once the command has got there.
+        self.advance_to(self.now().plus_s(self.config.delay_s));
         Ok(())
     }
 
@@ -300,7 +341,9 @@ impl VirtualRig {
     }
 
     fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) {
-        let input = self.take_in(deadline_ns, missed);
+        let mut input = self.take_in(deadline_ns, missed);
+        let period_ns = MonotonicNs(0).plus_s(self.config.limits.period_s()).0;
+        input.late_ns = setpoint_late_ns(deadline_ns, woke_ns, missed, period_ns);
         self.log
             .inputs
             .push(record_input(&input, self.control.cycle() + 1));
@@ -334,6 +377,7 @@ impl VirtualRig {
         CycleInput {
             deadline_ns,
             missed,
+            late_ns: 0,
             order: self.orders.pop_front(),
             operator: self.operator_beat,
             guardian: self.guardian_beat,

@@ -5,8 +5,9 @@
 //! hold it, ramp it back. It needs no iteration and no memory, so a brake is
 //! always available; there is nothing that could refuse.
 
+use super::finding::Finding;
 use super::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
-use shared_types::{JOINTS, JointState, Limits};
+use shared_types::{FaultCode, JOINTS, JointState, Limits};
 
 /// Brake of all joints from `from` to rest with the jerk of motions the
 /// controller makes itself. RT-safe.
@@ -62,6 +63,36 @@ pub fn unstoppable(from: &JointState, limits: &Limits) -> Option<(usize, f64, f6
             }
         };
         passes(limits.jerk_max_rad_s3[j]).and_then(|_| passes(acceleration * hardest))
+    })
+}
+
+/// What is wrong with the motion in `at`, if even the hardest brake from there
+/// breaks the speed or acceleration limit of a joint. RT-safe.
+///
+/// Differences of setpoints are means, so they show an excess only after the
+/// motion itself has it; then no brake could begin within the limits.
+#[must_use]
+pub fn too_fast(at: &JointState, limits: &Limits) -> Option<Finding> {
+    let hardest = 1.0 / limits.period_s();
+    (0..JOINTS).find_map(|j| {
+        let (speed_max, most) = (
+            limits.velocity_max_rad_s[j],
+            limits.acceleration_max_rad_s2[j],
+        );
+        let (qd, qdd) = (at.qd[j], at.qdd[j]);
+        // Taking the acceleration away changes the speed once more.
+        let peak = qd + qdd * qdd.abs() / (2.0 * most * hardest);
+        let speed = qd.abs().max(peak.abs());
+        let slack = 1.0 + ROUNDING_RAD;
+        if speed > speed_max * slack + ROUNDING_RAD {
+            let fault = FaultCode::SetpointVelocity;
+            Some(Finding::of_joint(fault, j, speed, speed_max))
+        } else if qdd.abs() > most * slack + ROUNDING_RAD {
+            let fault = FaultCode::SetpointAcceleration;
+            Some(Finding::of_joint(fault, j, qdd, most))
+        } else {
+            None
+        }
     })
 }
 

@@ -16,7 +16,7 @@ use super::velocity_wire::VelocityWire;
 use crate::xarm::Status;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
-    CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION,
+    CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts,
 };
 use shared_types::{FaultCode, JointState, JointVector, Limits, MonotonicNs, MotionTier, WireMode};
 
@@ -135,6 +135,12 @@ impl ControlState {
         }
     }
 
+    /// What marked the run since the adoption.
+    #[must_use]
+    pub const fn counts(&self) -> RunCounts {
+        self.monitor.counts()
+    }
+
     /// How commands reach the arm.
     #[must_use]
     pub const fn wire(&self) -> WireMode {
@@ -145,6 +151,9 @@ impl ControlState {
     pub fn step(&mut self, input: CycleInput) -> CycleOutput {
         let mut out = CycleOutput::default();
         let mut input = input;
+        let planned_ns = input.deadline_ns;
+        // From here on the deadline is the instant that the setpoint is for.
+        input.deadline_ns = planned_ns.saturating_add(input.late_ns.into());
         self.cycle = self.cycle.wrapping_add(1);
         if !self.mode.is_moving() {
             self.retire(&mut out);
@@ -163,7 +172,10 @@ impl ControlState {
             // Nothing may queue up behind a stall and burst out after it.
             self.monitor.held_back();
         }
-        out.record = self.record(&input, trajectory_s, &out);
+        out.record = CycleRecord {
+            deadline_ns: planned_ns,
+            ..self.record(&input, trajectory_s, &out)
+        };
         out
     }
 
@@ -243,7 +255,7 @@ impl ControlState {
                 let than = self.stopping.map_or(Path::Continue, |s| s.stop.path());
                 let missed = self.missed(input);
                 if let Some(found) = self.monitor.finding(input, missed, self.mode, than) {
-                    self.react(found, input.deadline_ns, out);
+                    self.react(self.with_speed(found), input.deadline_ns, out);
                 }
             }
         }
@@ -305,6 +317,9 @@ impl ControlState {
         if let Some((joint, q_rad, end_rad)) = super::brake::unstoppable(&target, &self.limits) {
             let fault = FaultCode::SetpointUnstoppable;
             return Err(Finding::of_joint(fault, joint, q_rad, end_rad));
+        }
+        if let Some(found) = super::brake::too_fast(&target, &self.limits) {
+            return Err(found);
         }
         self.try_send(target, streamed, deadline_ns, out)?;
         if done && let Some(mode) = next_mode(self.mode, Trigger::MotionDone) {

@@ -76,6 +76,9 @@ pub struct CycleInput {
     pub deadline_ns: u64,
     /// Cycles missed before this one.
     pub missed: u32,
+    /// How much later than the deadline the instant is that the setpoint is for,
+    /// 0 when the cycle was punctual (ns).
+    pub late_ns: u32,
     /// At most one order.
     pub order: Option<Order>,
     /// Newest heartbeat of the operator, with the dead-man switch.

@@ -9,7 +9,7 @@ use super::reaction::{Path, Reaction, reaction};
 use super::stopping::{StopFrom, choose_stop};
 use crate::xarm::StateRequest;
 use shared_types::ipc::{CauseRecord, ControllerMode, PAYLOAD_VERSION};
-use shared_types::{FaultCode, JointState, MonotonicNs};
+use shared_types::{FaultCode, JOINTS, JointState, MonotonicNs, WireMode, kinematics};
 
 impl ControlState {
     /// Meets a fault by the table in [`reaction`]; the first cause is kept.
@@ -47,6 +47,34 @@ impl ControlState {
             }
             None => {}
         }
+    }
+
+    /// An arm that stops by an error of its own mostly does so for speed (C24,
+    /// C60); its code comes later, so the cause shows the speed commanded last
+    /// that was nearest to its limit.
+    pub(super) fn with_speed(&self, found: Finding) -> Finding {
+        if found.fault != FaultCode::ArmError || !self.mode.is_moving() {
+            return found;
+        }
+        let qd = match self.settings.wire {
+            WireMode::ServoPosition => self.limiter.speed(),
+            WireMode::JointVelocity => self.wire.newest(),
+        };
+        let (q, limits) = (&self.commanded.q, &self.limits);
+        let tool_m_s = kinematics::tool_speed_m_s(q, &qd, &limits.tcp_offset());
+        let of_tool = Finding::new(found.fault, tool_m_s, limits.tcp_speed_max_m_s);
+        (0..JOINTS)
+            .map(|j| {
+                let speed = qd[j].abs();
+                Finding::of_joint(found.fault, j, speed, limits.velocity_max_rad_s[j])
+            })
+            .fold(of_tool, |most, joint| {
+                if joint.part() > most.part() {
+                    joint
+                } else {
+                    most
+                }
+            })
     }
 
     /// Notes what made a stop that is under way harder.

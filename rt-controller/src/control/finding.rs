@@ -51,6 +51,16 @@ impl Finding {
         Self::new(fault, value_ns as f64 * 1e-9, limit_ns as f64 * 1e-9)
     }
 
+    /// Part of the limit that was found; NaN without numbers.
+    #[must_use]
+    #[allow(
+        clippy::arithmetic_side_effects,
+        reason = "division of floats, which cannot panic"
+    )]
+    pub const fn part(&self) -> f64 {
+        self.value / self.limit
+    }
+
     /// As the cause record holds it.
     #[must_use]
     pub fn limit_broken(&self) -> LimitBroken {

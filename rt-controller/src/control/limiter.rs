@@ -24,6 +24,9 @@ const ROUNDING: [f64; 4] = [1e-9, 1e-9, 1e-8, 1e-5];
 /// Longest way of the tool from one setpoint to the next (m): the vendor's
 /// advice, per cycle also where cycles were missed.
 pub const STEP_MAX_M: f64 = 0.010;
+/// After a longer pause the arm stands at the last setpoint (s): below 30 Hz its
+/// motion is not continuous.
+pub const CONTINUOUS_S: f64 = 1.0 / 30.0;
 /// Setpoints that a divided difference of third order looks back on.
 const WINDOW: u8 = 3;
 
@@ -65,6 +68,12 @@ impl Limiter {
         }
     }
 
+    /// Speed of the newest step (rad/s).
+    #[must_use]
+    pub const fn speed(&self) -> JointVector {
+        self.qd
+    }
+
     /// Checks the setpoint that follows `step_s` after the last one and, when
     /// it passes, remembers it as sent. RT-safe.
     ///
@@ -80,6 +89,7 @@ impl Limiter {
         if !q.is_finite() || !step_s.is_finite() || step_s <= 0.0 {
             return Err(Finding::plain(FaultCode::SetpointNotFinite));
         }
+        self.check_pause(q, step_s, limits, allowed)?;
         let streamed_left = if allowed.streamed {
             WINDOW
         } else {
@@ -133,6 +143,34 @@ impl Limiter {
             streamed_left,
         };
         Ok(())
+    }
+}
+
+impl Limiter {
+    /// After a pause the arm sets out from rest, however long the pause was: it
+    /// must be able to get to the setpoint as if only the longest continuous
+    /// interval had passed.
+    fn check_pause(
+        &self,
+        q: &JointVector,
+        step_s: f64,
+        limits: &Limits,
+        allowed: &Allowance,
+    ) -> Result<(), Finding> {
+        if step_s <= CONTINUOUS_S {
+            return Ok(());
+        }
+        let [_, slack, ..] = ROUNDING;
+        let qd = (*q - self.q) * (1.0 / CONTINUOUS_S);
+        let way_m = (tcp(q, limits) - self.p_w_tcp_m).norm();
+        let reached = (0..JOINTS).all(|j| within(qd[j], limits.velocity_max_rad_s[j], slack))
+            && within(way_m / CONTINUOUS_S, allowed.tcp_speed_max_m_s, slack);
+        if reached {
+            return Ok(());
+        }
+        let missed = |span_s: f64| span_s / limits.period_s() - 1.0;
+        let (found, most) = (missed(step_s), missed(CONTINUOUS_S));
+        Err(Finding::new(FaultCode::DeadlineMissed, found, most))
     }
 }
 
@@ -311,6 +349,22 @@ mod tests {
         assert_eq!((found.fault, found.joint), (FaultCode::SetpointJerk, 7));
         assert!((found.value - 2500.0).abs() < 1e-3 && found.limit == 500.0);
         limiter.admit(&q, PERIOD_S, &limits, &STREAMED).unwrap();
+    }
+
+    /// 200 ms of silence: 90 mrad can be reached at 180 deg/s within 1/30 s, 110
+    /// cannot, although either is slow over the whole pause.
+    #[test]
+    fn after_a_pause_the_arm_sets_out_from_rest() {
+        let limits = Limits::default();
+        let step = |rad: f64, step_s: f64| {
+            let mut q = START_POSE;
+            q[6] += rad;
+            let mut limiter = Limiter::at_rest(START_POSE, &limits);
+            let taken = limiter.admit(&q, step_s, &limits, &STREAMED);
+            taken.map_err(|found| (found.fault, found.value.round()))
+        };
+        assert_eq!(step(0.09, 0.2), Ok(()));
+        assert_eq!(step(0.11, 0.2), Err((FaultCode::DeadlineMissed, 49.0)));
     }
 
     #[test]

@@ -14,6 +14,9 @@ use shared_types::{Arming, FaultCode, JointState, JointVector, MonotonicNs, Moti
 
 /// Starts closer than this are equal (rad); a larger difference would be a jump.
 const START_TOLERANCE_RAD: f64 = 1e-9;
+/// The arm may stand this far from where it was told to be when a motion begins
+/// (rad): half a degree.
+const START_ASTRAY_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
 impl ControlState {
     /// Obeys an order; `before` is the mode before this cycle looked at anything.
@@ -144,6 +147,9 @@ impl ControlState {
         }
         if let Some(fault) = self.monitor.refusal(input.deadline_ns) {
             return Err(fault);
+        }
+        if self.monitor.astray_rad() > START_ASTRAY_RAD {
+            return Err(FaultCode::StartPoseMismatch);
         }
         if input.operator.released != 0 {
             return Err(FaultCode::DeadManReleased);

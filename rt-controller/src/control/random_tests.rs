@@ -7,6 +7,7 @@
 use super::*;
 use crate::control::record::{record_input, restore_input};
 use crate::control::{ArmCodes, LinkInput, Order, Thresholds};
+use crate::overrun::min_gap_ns;
 use crate::point_to_point::plan_move;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -54,6 +55,8 @@ struct Chaos {
     rng: ChaCha8Rng,
     pool: Vec<Motion>,
     now_ns: u64,
+    /// Instant of the last setpoint.
+    sent_ns: u64,
     beat: u64,
     told: [JointVector; 3],
 }
@@ -65,6 +68,7 @@ impl Chaos {
             pool: motions(&mut rng, limits),
             rng,
             now_ns: 1_000_000_000_000,
+            sent_ns: 0,
             beat: 0,
             told: [START_POSE; 3],
         }
@@ -72,16 +76,27 @@ impl Chaos {
 
     fn input(&mut self, mode: ControllerMode) -> CycleInput {
         let rng = &mut self.rng;
-        let missed = if rng.random_ratio(1, 200) {
+        let mut missed = if rng.random_ratio(1, 200) {
             rng.random_range(0..9)
         } else {
             0
         };
         self.now_ns += PERIOD_NS * (1 + u64::from(missed));
+        if self.now_ns < self.sent_ns + min_gap_ns(PERIOD_NS) {
+            self.now_ns += PERIOD_NS;
+            missed += 1;
+        }
+        let late_ns = if rng.random_ratio(1, 20) {
+            rng.random_range(200_000..4_000_000)
+        } else {
+            0
+        };
+        self.sent_ns = self.now_ns + u64::from(late_ns);
         self.beat += 1;
         let mut input = CycleInput {
             deadline_ns: self.now_ns,
             missed,
+            late_ns,
             operator: OperatorBeat {
                 count: self.beat,
                 ..OperatorBeat::default()
@@ -264,7 +279,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
     let mut judge = Judge::holding(START_POSE, chaos.now_ns);
     for _ in 0..cycles {
         let input = chaos.input(state.mode());
-        let deadline_ns = input.deadline_ns;
+        let deadline_ns = input.deadline_ns.saturating_add(input.late_ns.into());
         let before = state.mode();
         let out = state.step(input);
         let mut latches = 0;

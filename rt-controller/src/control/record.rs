@@ -58,7 +58,7 @@ pub fn record_input(input: &CycleInput, cycle: u64) -> InputRecord {
         cycle,
         deadline_ns: input.deadline_ns,
         broken_reports: input.broken_reports,
-        reserved: 0,
+        late_ns: input.late_ns,
         order: input
             .order
             .as_ref()
@@ -148,6 +148,7 @@ pub fn restore_input(
     Ok(CycleInput {
         deadline_ns: record.deadline_ns,
         missed: record.missed,
+        late_ns: record.late_ns,
         order: restore_order(record, motion_of)?,
         operator: record.operator,
         guardian: record.guardian,

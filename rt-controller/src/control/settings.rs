@@ -5,6 +5,9 @@ use shared_types::{MotionTier, WireMode};
 
 const MS: u64 = 1_000_000;
 
+/// Longest `tracking_window` (ms): what was commanded longer ago is forgotten.
+pub const TRACKING_WINDOW_MAX_MS: f64 = 250.0;
+
 /// When the monitors give up.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Thresholds {
@@ -39,13 +42,14 @@ pub struct Thresholds {
 
 impl Thresholds {
     /// For a real arm on a direct cable and a real-time machine: a stall is
-    /// noticed after two cycles of 4 ms.
+    /// noticed two cycles of 4 ms after the setpoint that met it; what it takes
+    /// to compute and send that setpoint is less than the millisecond left.
     #[must_use]
     pub const fn strict() -> Self {
         Self {
             operator_timeout_ns: 300 * MS,
             guardian_timeout_ns: 50 * MS,
-            reply_stall_ns: 8 * MS,
+            reply_stall_ns: 7 * MS,
             unanswered_max: 3,
             report_stale_ns: 80 * MS,
             report_frozen_ns: 60 * MS,

@@ -21,6 +21,8 @@ use shared_types::{JOINTS, JointState, JointVector, Limits, kinematics};
 pub const GAIN_PER_S: f64 = 4.0;
 /// Most that the position loop may add (rad/s).
 pub const CORRECTION_MAX_RAD_S: f64 = 0.2;
+/// Part of the speed limit that is used: the wire's 32-bit floats may round up.
+const OF_LIMIT: f64 = 1.0 - 1e-6;
 /// The arm stops by itself after this many cycles without a new command.
 pub const DURATION_CYCLES: f64 = 3.0;
 
@@ -54,7 +56,7 @@ impl VelocityWire {
         for j in 0..JOINTS {
             let off_rad = if off[j].is_finite() { off[j] } else { 0.0 };
             let back = (GAIN_PER_S * off_rad).clamp(-CORRECTION_MAX_RAD_S, CORRECTION_MAX_RAD_S);
-            let most = limits.velocity_max_rad_s[j];
+            let most = limits.velocity_max_rad_s[j] * OF_LIMIT;
             wanted[j] = (target.qd[j] + ahead[j] + back).clamp(-most, most);
         }
         let speed_m_s = kinematics::tool_speed_m_s(&target.q, &wanted, &limits.tcp_offset());

@@ -35,6 +35,12 @@ impl<T> LinkSlot<T> {
 }
 
 impl<T: ArmTransport> LinkSlot<T> {
+    /// Whether there is a link.
+    #[must_use]
+    pub const fn is_connected(&self) -> bool {
+        self.link.is_some()
+    }
+
     /// Puts a fresh link in; the old one comes back, to be dropped elsewhere.
     #[must_use]
     pub fn replace(&mut self, fresh: Option<Box<T>>) -> Option<Box<T>> {

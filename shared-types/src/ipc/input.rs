@@ -199,8 +199,9 @@ pub struct InputRecord {
     pub deadline_ns: u64,
     /// Joint reports dropped as broken since the last cycle.
     pub broken_reports: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// How much later than the deadline the instant of the setpoint is, 0 when
+    /// the cycle was punctual (ns).
+    pub late_ns: u32,
     /// Order.
     pub order: OrderRecord,
     /// Newest heartbeat of the operator.

@@ -191,7 +191,8 @@ pub struct JointReport {
     pub arm_state: u8,
     /// Arm mode.
     pub arm_mode: u8,
-    /// 1 when the arm's own clock stamp was used.
+    /// 1 when the arm's own clock stamp was used, 2 when that clock jumped and is
+    /// followed anew from this report on.
     pub arm_clock: u16,
     /// When the joints were measured, on CLOCK_MONOTONIC (ns).
     pub stamp_ns: u64,

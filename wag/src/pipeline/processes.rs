@@ -165,7 +165,7 @@ fn controller_config(
         config.thresholds.reply_stall_ms = Some(500.0);
         config.thresholds.unanswered_max = Some(125);
         config.thresholds.report_stale_ms = Some(500.0);
-        config.thresholds.tracking_window_ms = Some(500.0);
+        config.thresholds.tracking_window_ms = Some(250.0);
         config.thresholds.missed_cycles_max = Some(50);
         config.thresholds.late_cycles_max = Some(50);
         config.guardian.silence_ms = 500.0;

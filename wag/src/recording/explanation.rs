@@ -215,15 +215,18 @@ fn broken(cause: &CauseRecord) -> Option<Broken> {
         joint: Some(found.joint).filter(|j| *j != 0),
         value: found.value,
         limit: found.limit,
-        unit: unit(cause.fault()),
+        unit: unit(cause.fault(), found.joint),
     })
 }
 
-/// Unit of a cause's numbers, as [`shared_types::ipc::LimitBroken`] says.
-const fn unit(code: FaultCode) -> &'static str {
+/// Unit of a cause's numbers, as [`shared_types::ipc::LimitBroken`] says; `joint`
+/// is 0 for the tool.
+const fn unit(code: FaultCode, joint: u32) -> &'static str {
     use FaultCode as F;
     match code {
-        F::SetpointVelocity => "rad/s",
+        // The speed that was nearest to its limit.
+        F::ArmError if joint == 0 => "m/s",
+        F::ArmError | F::SetpointVelocity => "rad/s",
         F::SetpointAcceleration => "rad/s²",
         F::SetpointJerk => "rad/s³",
         F::SetpointTcpSpeed | F::TierExceeded => "m/s",

@@ -47,7 +47,8 @@ impl WorstJoint {
 pub struct Moment {
     /// Number.
     pub cycle: u64,
-    /// Planned wake-up (CLOCK_MONOTONIC, ns).
+    /// Instant its setpoint is for: the planned wake-up, or the real one where
+    /// that was late (CLOCK_MONOTONIC, ns).
     pub deadline_ns: u64,
     /// Mode after it.
     pub mode: ControllerMode,
@@ -186,7 +187,7 @@ impl Eye {
         let age_ms = |from_ns: u64| input.deadline_ns.saturating_sub(from_ns) as f64 / 1e6;
         let mut moment = Moment {
             cycle: record.cycle,
-            deadline_ns: input.deadline_ns,
+            deadline_ns: input.deadline_ns.saturating_add(input.late_ns.into()),
             mode: ControllerMode::from_raw(record.mode),
             trajectory_s: record.trajectory_s,
             path_rate: record.path_rate,

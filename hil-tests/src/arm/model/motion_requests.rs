@@ -62,6 +62,8 @@ impl ArmModel {
     /// exceed 250 Hz, then by a later step.
     fn stream(&mut self, at: MonotonicNs, q: JointVector) {
         let at = at.max(self.time);
+        // What was due before this one came has had its turn.
+        self.run_stream(at);
         let present = self.reference.q;
         let mut servo = std::mem::take(&mut self.servo);
         let verdict = servo.offer(at, q, present, &self.setpoint_limits());
@@ -95,6 +97,7 @@ impl ArmModel {
             duration_s: wish.duration_s,
         });
         let at = at.max(self.time);
+        self.run_velocity(at);
         self.velocity.offer(at, wish);
         self.run_velocity(at);
     }

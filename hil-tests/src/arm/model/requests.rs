@@ -24,6 +24,7 @@ impl ArmModel {
         parameters: &[u8],
     ) -> Answer {
         self.origin = origin;
+        self.arrived = self.arrived.max(at);
         let answer = match Command::parse(register, parameters) {
             Ok(command) if !self.knows(&command) => {
                 self.refuse(&CommandError::UnknownRegister(register), parameters)
@@ -39,6 +40,7 @@ impl ArmModel {
     /// A command of the client of number `client` outside any connection.
     pub(in crate::arm) fn command_from(&mut self, client: u32, at: MonotonicNs, command: &Command) {
         self.origin = Some((client, 0));
+        self.arrived = self.arrived.max(at);
         self.command(at, command);
         self.tell_state();
         self.origin = None;

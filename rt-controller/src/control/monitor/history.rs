@@ -8,7 +8,8 @@
 use serde::{Deserialize, Serialize};
 use shared_types::{JOINTS, JointVector, MonotonicNs};
 
-/// Setpoints remembered: 0.25 s at 250 Hz.
+/// Setpoints remembered: 0.256 s at 250 Hz; no window may be longer than
+/// [`TRACKING_WINDOW_MAX_MS`](crate::control::settings::TRACKING_WINDOW_MAX_MS).
 const LENGTH: usize = 64;
 
 /// Fixed size, oldest overwritten. RT-safe.

@@ -115,6 +115,13 @@ impl Monitor {
         self.reports.off(&self.commanded)
     }
 
+    /// How far the arm stands from everything it was told lately (rad).
+    #[must_use]
+    pub fn astray_rad(&self) -> f64 {
+        let window_ns = self.settings.thresholds.tracking_window_ns;
+        self.reports.astray(&self.commanded, window_ns).1
+    }
+
     /// Takes in what came with this cycle.
     pub fn observe(&mut self, input: &CycleInput, limits: &Limits) {
         let now_ns = input.deadline_ns;
@@ -180,8 +187,9 @@ impl Monitor {
                 if !mode.is_moving() {
                     return None;
                 }
-                pick(late(missed, t.late_cycles_max, t.missed_cycles_max))
+                pick(gap(missed, t.missed_cycles_max))
                     .or_else(|| pick(self.operator_fault(input)))
+                    .or_else(|| pick(late(missed, t.late_cycles_max)))
                     .or_else(|| pick(self.reports.stream_fault(&self.commanded, t)))
                     .or_else(|| pick(self.reports.stale(now_ns, t)))
                     .or_else(|| pick(self.reports.tracking_fault(&self.commanded, t)))
@@ -247,13 +255,14 @@ fn stall(link: &LinkInput, most_ns: u64) -> Option<Finding> {
         .then(|| Finding::of_time(FaultCode::ReplyStalled, link.unanswered_ns, most_ns))
 }
 
-fn late(missed: u32, slow_above: u32, stop_above: u32) -> Option<Finding> {
-    let found = |fault, limit: u32| Finding::new(fault, missed.into(), limit.into());
-    if missed > stop_above {
-        Some(found(FaultCode::DeadlineMissed, stop_above))
-    } else {
-        (missed > slow_above).then(|| found(FaultCode::LateCycles, slow_above))
-    }
+/// So many cycles missed that the arm has stood still meanwhile.
+fn gap(missed: u32, most: u32) -> Option<Finding> {
+    (missed > most).then(|| Finding::new(FaultCode::DeadlineMissed, missed.into(), most.into()))
+}
+
+/// Some cycles missed.
+fn late(missed: u32, most: u32) -> Option<Finding> {
+    (missed > most).then(|| Finding::new(FaultCode::LateCycles, missed.into(), most.into()))
 }
 
 /// Faults the command link itself shows.

@@ -7,6 +7,7 @@
 )]
 
 use super::history::Commanded;
+use crate::clock_map::CLOCK_ANEW;
 use crate::control::finding::Finding;
 use crate::control::settings::Thresholds;
 use serde::{Deserialize, Serialize};
@@ -30,10 +31,27 @@ const FROZEN_RAD: f64 = 5e-3;
 const JUMP_RAD: f64 = 0.02;
 /// Reports farther apart than this are not compared for jumps (s).
 const JUMP_SPAN_MAX_S: f64 = 0.1;
-/// Largest distance of the arm's own target from what it was told (rad).
-const TARGET_RAD: f64 = 0.05;
-/// Reports in a row with a foreign target that prove a second commander.
-const FOREIGN_TARGETS: u32 = 5;
+/// Largest distance of the arm's own target from everything it was told within
+/// the window (rad); rounding on the wire is a thousandth of that.
+const TARGET_RAD: f64 = 5e-4;
+/// What a report with a foreign target adds to the suspicion of a second
+/// commander; one with a target of ours takes one off. Setpoints of two
+/// streams alternate, so foreign ones hardly ever come in a row: this finds
+/// whoever's setpoint is seen more than once in thirty-two reports.
+const FOREIGN_WEIGHT: u32 = 32;
+/// Suspicion that is proof: five foreign targets in a row.
+const FOREIGN_PROOF: u32 = 160;
+
+/// A joint that stands still. RT-safe to copy.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Still {
+    /// Since when (stamp, ns).
+    since_ns: u64,
+    /// Where (rad).
+    at_rad: f64,
+    /// What it was told then (rad).
+    told_rad: f64,
+}
 
 /// What is remembered of the reports. RT-safe.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,12 +59,11 @@ pub struct ReportWatch {
     newest: Option<JointReport>,
     /// Since when the values are the same, to the bit (stamp, ns).
     frozen_since_ns: u64,
-    /// Since when each joint stands still (stamp, ns), and where (rad).
-    still: [(u64, f64); JOINTS],
+    still: [Still; JOINTS],
     jump: Option<Finding>,
     broken_in_a_row: u32,
     resyncs: u32,
-    foreign_targets: u32,
+    suspicion: u32,
 }
 
 impl ReportWatch {
@@ -56,11 +73,15 @@ impl ReportWatch {
         Self {
             newest: None,
             frozen_since_ns: 0,
-            still: [(0, 0.0); JOINTS],
+            still: [Still {
+                since_ns: 0,
+                at_rad: 0.0,
+                told_rad: 0.0,
+            }; JOINTS],
             jump: None,
             broken_in_a_row: 0,
             resyncs: 0,
-            foreign_targets: 0,
+            suspicion: 0,
         }
     }
 
@@ -91,26 +112,33 @@ impl ReportWatch {
         limits: &Limits,
     ) -> bool {
         self.broken_in_a_row = 0;
+        let told = commanded.at(report.stamp_ns);
+        let stands = |j: usize| Still {
+            since_ns: report.stamp_ns,
+            at_rad: report.q[j],
+            told_rad: told[j],
+        };
         let before = self.newest.replace(*report);
         let Some(before) = before else {
             self.frozen_since_ns = report.stamp_ns;
-            self.still = core::array::from_fn(|j| (report.stamp_ns, report.q[j]));
+            self.still = core::array::from_fn(stands);
             return false;
         };
-        let resync = report.stamp_ns < before.stamp_ns
+        let resync = report.arm_clock == CLOCK_ANEW
+            || report.stamp_ns < before.stamp_ns
             || report.stamp_ns.abs_diff(report.arrival_ns) > CLOCK_JUMP_NS;
         if resync {
             self.resyncs = self.resyncs.saturating_add(1);
             self.frozen_since_ns = report.stamp_ns;
-            self.still = core::array::from_fn(|j| (report.stamp_ns, report.q[j]));
+            self.still = core::array::from_fn(stands);
             return true;
         }
         if report.q != before.q || report.qd != before.qd {
             self.frozen_since_ns = report.stamp_ns;
         }
         for (j, still) in self.still.iter_mut().enumerate() {
-            if (report.q[j] - still.1).abs() > STILL_RAD {
-                *still = (report.stamp_ns, report.q[j]);
+            if (report.q[j] - still.at_rad).abs() > STILL_RAD {
+                *still = stands(j);
             }
         }
         self.jump = self.jump.or_else(|| jump(&before, report, limits));
@@ -125,10 +153,17 @@ impl ReportWatch {
                 )
                 .1
                 > TARGET_RAD;
-        self.foreign_targets = if foreign {
-            self.foreign_targets.saturating_add(1)
+        // A report that repeats itself says nothing new.
+        let repeats =
+            report.q == before.q && report.qd == before.qd && report.q_target == before.q_target;
+        self.suspicion = if repeats {
+            self.suspicion
+        } else if foreign {
+            self.suspicion
+                .saturating_add(FOREIGN_WEIGHT)
+                .min(FOREIGN_PROOF)
         } else {
-            0
+            self.suspicion.saturating_sub(1)
         };
         false
     }
@@ -136,8 +171,7 @@ impl ReportWatch {
     /// Whether the arm's own target is somebody else's.
     #[must_use]
     pub fn foreign_target(&self) -> Option<Finding> {
-        (self.foreign_targets >= FOREIGN_TARGETS)
-            .then_some(Finding::plain(FaultCode::SecondCommander))
+        (self.suspicion >= FOREIGN_PROOF).then_some(Finding::plain(FaultCode::SecondCommander))
     }
 
     /// Age of the newest report, if it is too old to move by.
@@ -184,12 +218,17 @@ impl ReportWatch {
             return Some(jump);
         }
         let report = self.newest.as_ref()?;
+        // Reports that repeat themselves do not tell where the arm is.
+        let same_ns = report.stamp_ns.saturating_sub(self.frozen_since_ns);
+        if same_ns > t.report_frozen_ns.max(t.tracking_window_ns) {
+            return None;
+        }
         let from_ns = report.stamp_ns.saturating_sub(t.tracking_window_ns);
         let must_show = commanded.at(from_ns);
-        for (j, (since_ns, at_rad)) in self.still.iter().enumerate() {
-            let told_rad = (must_show[j] - commanded.at(*since_ns)[j]).abs();
-            let off_rad = (must_show[j] - at_rad).abs();
-            if *since_ns < from_ns && told_rad > STUCK_RAD && off_rad > STUCK_RAD {
+        for (j, still) in self.still.iter().enumerate() {
+            let told_rad = (must_show[j] - still.told_rad).abs();
+            let off_rad = (must_show[j] - still.at_rad).abs();
+            if still.since_ns < from_ns && told_rad > STUCK_RAD && off_rad > STUCK_RAD {
                 return Some(Finding::of_joint(
                     FaultCode::JointStuck,
                     j,
@@ -198,11 +237,19 @@ impl ReportWatch {
                 ));
             }
         }
-        // The stamp may be early by the clock map's error; one period is plenty.
-        let to_ns = report.stamp_ns.max(report.arrival_ns);
-        let (joint, off_rad) = commanded.farthest(&report.q, from_ns, to_ns);
+        let (joint, off_rad) = self.astray(commanded, t.tracking_window_ns);
         let most = t.tracking_error_max_rad;
         (off_rad > most).then(|| Finding::of_joint(FaultCode::TrackingError, joint, off_rad, most))
+    }
+
+    /// Joint (0-based) whose newest measured position is farthest outside what
+    /// it was told within `window_ns`, and how far (rad).
+    #[must_use]
+    pub fn astray(&self, commanded: &Commanded, window_ns: u64) -> (usize, f64) {
+        self.newest.map_or((0, 0.0), |report| {
+            let from_ns = report.stamp_ns.saturating_sub(window_ns);
+            commanded.farthest(&report.q, from_ns, report.stamp_ns.max(report.arrival_ns))
+        })
     }
 
     /// How far the newest measured pose is behind what was commanded when it was

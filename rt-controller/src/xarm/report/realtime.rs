@@ -46,7 +46,25 @@ pub struct RealtimeReport {
     pub actual_twist: TcpPose,
 }
 
+/// Beyond what any joint can reach or do; more is no measurement (rad, rad/s).
+const PLAUSIBLE: (f64, f64) = (7.0, 50.0);
+/// Largest state and mode that firmware reports, as in the vendor's SDK.
+const LARGEST_CODES: (u8, u8) = (9, 11);
+
 impl RealtimeReport {
+    /// Whether these are joints, state and mode of an arm, and not bytes that
+    /// happen to have the length of a report.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        let (q_max, qd_max) = PLAUSIBLE;
+        let within = |v: &JointVector, most: f64| v.is_finite() && v.max_abs() <= most;
+        within(&self.actual.q, q_max)
+            && within(&self.target.q, q_max)
+            && within(&self.actual.qd, qd_max)
+            && self.state.code() <= LARGEST_CODES.0
+            && self.mode.code() <= LARGEST_CODES.1
+    }
+
     /// Writes [`REALTIME_REPORT_LEN`] bytes and returns that.
     ///
     /// # Errors
