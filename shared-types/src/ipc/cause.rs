@@ -15,8 +15,9 @@ pub struct LimitBroken {
     pub reserved: u32,
     /// What was found. Its unit follows from the code: rad, rad/s, rad/s²,
     /// rad/s³ or m/s for setpoints, m for a step, s for silences and stalls,
-    /// rad for tracking, cycles for misses; both numbers are zero where there
-    /// is nothing to measure.
+    /// rad for tracking, cycles for misses, and for an error of the arm the speed
+    /// that was nearest to its limit (rad/s of a joint, m/s of the tool); both
+    /// numbers are zero where there is nothing to measure.
     pub value: f64,
     /// What is allowed.
     pub limit: f64,

@@ -1,0 +1,248 @@
+//! What every stop, and every fault that is no stop, must look like.
+
+use super::limits;
+use super::stage::Stage;
+use rt_controller::control::reaction::Path;
+use rt_controller::control::{ControlEvent, Motion, Order};
+use shared_types::ipc::{CauseRecord, ControllerMode};
+use shared_types::{FaultCode, JointTrajectory, JointVector, MonotonicNs};
+
+/// Speed under which the arm stands (rad/s).
+const STANDING_RAD_S: f64 = 1e-3;
+/// Longest time from the cause to standstill (s).
+const STOP_WITHIN_S: f64 = 1.5;
+
+/// Back and forth with joint 7, possible wherever the arm stopped.
+pub(crate) fn nod(from: JointVector) -> Motion {
+    let mut out = from;
+    out[6] += if from[6] > 0.0 { -0.2 } else { 0.2 };
+    let times = [0.0, 0.4, 0.8];
+    Motion::Spline(JointTrajectory::new(&times, &[from, out, from]).unwrap())
+}
+
+/// What a stop is expected to be.
+#[derive(Clone, Copy)]
+pub(crate) struct Stop {
+    pub(crate) fault: FaultCode,
+    pub(crate) path: Path,
+    /// The arm is asked to stop.
+    pub(crate) stop_arm: bool,
+}
+
+/// Slowed along the path.
+pub(crate) fn slowed(fault: FaultCode) -> Stop {
+    let (path, stop_arm) = (Path::Slow, false);
+    Stop {
+        fault,
+        path,
+        stop_arm,
+    }
+}
+
+/// Braked in joint space.
+pub(crate) fn braked(fault: FaultCode) -> Stop {
+    let (path, stop_arm) = (Path::Brake, false);
+    Stop {
+        fault,
+        path,
+        stop_arm,
+    }
+}
+
+/// Braked, then the arm asked to stop.
+pub(crate) fn braked_and_stopped(fault: FaultCode) -> Stop {
+    let (path, stop_arm) = (Path::Brake, true);
+    Stop {
+        fault,
+        path,
+        stop_arm,
+    }
+}
+
+/// No setpoints any more, the arm asked to stop.
+pub(crate) fn stopped(fault: FaultCode) -> Stop {
+    let (path, stop_arm) = (Path::Silence, true);
+    Stop {
+        fault,
+        path,
+        stop_arm,
+    }
+}
+
+/// No setpoints any more; the arm has stopped by itself or cannot hear.
+pub(crate) fn silenced(fault: FaultCode) -> Stop {
+    let (path, stop_arm) = (Path::Silence, false);
+    Stop {
+        fault,
+        path,
+        stop_arm,
+    }
+}
+
+impl Stage {
+    /// Asserts all there is to a stop that has happened, and that nothing moves
+    /// the arm for two seconds, whatever is ordered; gives the cause.
+    pub(crate) fn assert_stop(&mut self, want: Stop) -> CauseRecord {
+        let cause = self.assert_one_cause(want);
+        // What a dead link delivers later is no setpoint any more.
+        let wire_until = match want.path {
+            Path::Silence => MonotonicNs(cause.stamp_ns),
+            _ => MonotonicNs(u64::MAX),
+        };
+        limits::assert_kept(self, wire_until);
+        self.assert_standstill(&cause);
+        self.assert_nothing_moves_it();
+        assert_eq!(
+            self.rig.log.causes,
+            [cause],
+            "one cause, whatever came later"
+        );
+        cause
+    }
+
+    fn assert_one_cause(&self, want: Stop) -> CauseRecord {
+        let causes = &self.rig.log.causes;
+        assert_eq!(
+            causes.len(),
+            1,
+            "{:?} {:?}: {causes:?}",
+            self.wire,
+            want.fault
+        );
+        let cause = causes[0];
+        let said = (cause.fault(), cause.path, cause.stop_arm != 0);
+        let wanted = (want.fault, want.path as u8, want.stop_arm);
+        assert_eq!(said, wanted, "{:?}: {cause:?}", self.wire);
+        assert!(cause.cycle <= cause.rest_cycle && cause.motion_id > 0);
+        let (value, limit) = (cause.limit.value, cause.limit.limit);
+        // Codes that are no excess: an error shows how near the speed limit was.
+        let excess = !matches!(want.fault, FaultCode::ArmError | FaultCode::ArmModeChanged);
+        assert!(!excess || value >= limit, "{value} of {limit}: {cause:?}");
+        cause
+    }
+
+    fn assert_standstill(&self, cause: &CauseRecord) {
+        assert_eq!(self.rig.mode(), ControllerMode::Faulted);
+        let truth = &self.rig.log.truth;
+        let moving = |q: &JointVector| q.max_abs() > STANDING_RAD_S;
+        // Some plans are stopped before they begin.
+        let Some(last) = truth.iter().rfind(|s| moving(&s.state.qd)) else {
+            return;
+        };
+        let took_s = last.at.since_s(MonotonicNs(cause.stamp_ns));
+        assert!(took_s < STOP_WITHIN_S, "{took_s} s after {cause:?}");
+        assert!(self.rig.now().since_s(last.at) > 0.1, "it still moves");
+    }
+
+    /// Two seconds of orders of every kind without an acknowledgement.
+    pub(crate) fn assert_nothing_moves_it(&mut self) {
+        let (commands, refusals) = (self.commands(), self.refusals().len());
+        let stood = self.rig.log.truth.len();
+        let mut ordered = 0;
+        for k in 0..20 {
+            self.rig.dead_man_released = k % 3 == 1;
+            self.arm();
+            self.rig.start(nod(self.rig.commanded()));
+            self.rig.order(Order::Disarm);
+            self.rig.order(Order::Stop);
+            self.rig.run_for(0.1);
+            ordered += 2;
+        }
+        self.rig.dead_man_released = false;
+        assert_eq!(self.commands(), commands, "commands after the stop");
+        let refused = &self.refusals()[refusals..];
+        assert_eq!(refused.len(), ordered);
+        assert!(
+            refused.iter().all(|(_, why)| *why == FaultCode::WrongMode),
+            "{refused:?}"
+        );
+        let moved = self.rig.log.truth[stood..]
+            .iter()
+            .map(|s| s.state.qd.max_abs());
+        assert!(
+            moved.fold(0.0, f64::max) < STANDING_RAD_S,
+            "it moved after the stop"
+        );
+    }
+
+    /// Asserts that the operator's acknowledgement, and nothing less, brings the
+    /// arm back: it moves again once it is armed.
+    pub(crate) fn assert_works_again(&mut self) {
+        let (finished, causes) = (self.finished(), self.rig.log.causes.len());
+        self.rig.bring_up().unwrap();
+        self.rig.run_for(0.5);
+        assert_eq!(
+            self.rig.mode(),
+            ControllerMode::Idle,
+            "{:?}",
+            self.rig.log.causes
+        );
+        self.rig.start(nod(self.rig.commanded()));
+        self.rig.run_cycles(2);
+        let (_, refused) = *self.refusals().last().unwrap();
+        assert_eq!(refused, FaultCode::NotArmed, "nothing re-arms by itself");
+        self.arm();
+        self.rig.start(nod(self.rig.commanded()));
+        let stood = self.rig.log.truth.len();
+        self.rig.run_for(1.2);
+        assert_eq!(self.finished(), finished + 1, "{:?}", self.rig.log.causes);
+        assert_eq!(self.rig.log.causes.len(), causes);
+        let moved = self.rig.log.truth[stood..]
+            .iter()
+            .map(|s| s.state.qd[6].abs());
+        assert!(moved.fold(0.0, f64::max) > 0.3, "it does not move");
+    }
+
+    /// Asserts that the throw went on to its end, within all limits, as if
+    /// nothing had happened.
+    pub(crate) fn assert_undisturbed(&self) {
+        self.assert_finished();
+        self.assert_same_path();
+    }
+
+    /// Asserts that the same was commanded as if nothing had happened.
+    pub(crate) fn assert_same_path(&self) {
+        let undisturbed = Self::thrown(self.wire, "");
+        let path = |stage: &Self| -> Vec<(f64, JointVector)> {
+            stage.on_path().map(|r| (r.trajectory_s, r.q_c)).collect()
+        };
+        assert!(path(self) == path(&undisturbed), "another path");
+    }
+
+    /// Asserts that the throw went on to its end, within all limits.
+    pub(crate) fn assert_finished(&self) {
+        self.assert_ended();
+        limits::assert_kept(self, MonotonicNs(u64::MAX));
+    }
+
+    /// The same where setpoints may arrive a little beside the instant they are
+    /// for.
+    pub(crate) fn assert_finished_with_jitter(&self, jitter_s: f64) {
+        self.assert_ended();
+        limits::assert_kept_with_jitter(self, jitter_s);
+    }
+
+    fn assert_ended(&self) {
+        let log = &self.rig.log;
+        assert!(log.causes.is_empty(), "{:?}: {:?}", self.wire, log.causes);
+        assert_eq!(
+            (self.finished(), self.rig.mode()),
+            (1, ControllerMode::Idle)
+        );
+        assert_eq!(self.arm_errors(), [0_u8; 0]);
+        let off = self.rig.with_arm(|arm| arm.model().true_motion().q) - self.throw.end();
+        assert!(off.max_abs() < 2e-3, "{:?}: ends {off:?} off", self.wire);
+        assert!(self.speed() < STANDING_RAD_S);
+    }
+
+    /// Asserts that nothing moved and that the last motion was refused for
+    /// `fault`.
+    pub(crate) fn assert_refused(&self, fault: FaultCode) {
+        let (id, why) = *self.refusals().last().expect("nothing was refused");
+        assert_eq!((id.is_some(), why), (true, fault));
+        let started = |e: &(u64, ControlEvent)| matches!(e.1, ControlEvent::Started { .. });
+        assert!(!self.rig.log.events.iter().any(started));
+        assert!(self.on_path().next().is_none());
+        assert!(self.rig.log.causes.is_empty(), "{:?}", self.rig.log.causes);
+    }
+}

@@ -1,0 +1,240 @@
+//! Faults of the machine and of clocks: 2, 3, 33, 34, 35.
+
+use super::judge::{braked_and_stopped, slowed, stopped};
+use super::stage::{Stage, WIRES, config};
+use hil_tests::arm::Intake;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rt_controller::control::record::restore_input;
+use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
+use shared_types::{Arming, FaultCode, JointTrajectory, Limits, MonotonicNs, MotionTier, WireMode};
+
+const MS: u64 = 1_000_000;
+
+/// Wakes so late that one, two or three cycles are lost, at many phases.
+#[test]
+fn fault_02_a_single_late_wake_up_costs_its_setpoints_and_no_more() {
+    for wire in WIRES {
+        for late_us in [300, 900, 2000, 3900, 4300, 6000, 7900, 8000] {
+            let mut stage = Stage::throwing(wire, "");
+            stage.run_part(0.5);
+            stage.rig.oversleep([late_us * 1000]);
+            stage.finish();
+            stage.assert_finished();
+            let missed = stage.rig.counts().missed;
+            assert_eq!(missed > 0, late_us > 800, "{late_us} us: {missed} missed");
+            assert_on_time(&stage);
+        }
+    }
+}
+
+/// No time is lost: a setpoint is where the path is when it is sent.
+fn assert_on_time(stage: &Stage) {
+    let log = &stage.rig.log;
+    let began = stage.on_path().next().unwrap().deadline_ns;
+    for (record, input) in log.records.iter().zip(&log.inputs) {
+        if record.sent == 1 && record.trajectory_s >= 0.0 {
+            let at_ns = record.deadline_ns + u64::from(input.late_ns) - began;
+            assert!((record.trajectory_s - at_ns as f64 * 1e-9).abs() < 1e-9);
+        }
+    }
+}
+
+/// Late again and again at full speed: the arm, which judges setpoints by when
+/// they arrive, never sees one too far from the last.
+#[test]
+fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
+    for wire in WIRES {
+        for first_us in [500, 1500, 2500, 3500, 3900] {
+            let mut stage = Stage::throwing(wire, "");
+            stage.run_part(0.2);
+            let pairs = (0..60).flat_map(|k| [first_us * MS / 1000, (k % 4) * 900_000, 0]);
+            stage.rig.oversleep(pairs);
+            stage.finish();
+            stage.assert_finished();
+        }
+    }
+}
+
+#[test]
+fn fault_02_three_cycles_lost_at_once_slow_the_motion() {
+    for wire in WIRES {
+        let mut stage = Stage::throwing(wire, "");
+        stage.run_part(0.5);
+        stage.rig.oversleep([12 * MS + 300_000]);
+        stage.finish();
+        let cause = stage.assert_stop(slowed(FaultCode::LateCycles));
+        assert_eq!((cause.limit.value, cause.limit.limit), (3.0, 2.0));
+        stage.assert_works_again();
+    }
+}
+
+/// In the gap the arm has come to rest: a brake from where it was would begin
+/// with a jump.
+#[test]
+fn fault_03_twenty_lost_cycles_end_the_motion() {
+    for wire in WIRES {
+        let mut stage = Stage::throwing(wire, "");
+        stage.run_part(0.5);
+        stage.rig.oversleep([80 * MS]);
+        stage.finish();
+        let cause = stage.assert_stop(stopped(FaultCode::DeadlineMissed));
+        assert_eq!((cause.limit.value, cause.limit.limit), (20.0, 5.0));
+        stage.assert_works_again();
+    }
+}
+
+/// Where lost cycles are allowed for, as on a simulated arm, the arm still never
+/// gets a setpoint that it cannot reach from rest.
+#[test]
+fn fault_03_patience_does_not_turn_a_gap_into_a_jump() {
+    for wire in WIRES {
+        let mut config = config(wire, "");
+        config.settings = ControlSettings {
+            wire,
+            guardian_required: true,
+            arming_required: true,
+            ..Thresholds {
+                late_cycles_max: 50,
+                missed_cycles_max: 50,
+                ..Thresholds::relaxed()
+            }
+            .into()
+        };
+        let mut stage = Stage::of(config);
+        stage.begin();
+        stage.run_part(0.5);
+        stage.rig.oversleep([160 * MS]);
+        stage.finish();
+        stage.assert_stop(match wire {
+            WireMode::ServoPosition => stopped(FaultCode::DeadlineMissed),
+            // Its own watchdog has stopped this arm elsewhere than it was told.
+            WireMode::JointVelocity => braked_and_stopped(FaultCode::TrackingError),
+        });
+        assert_eq!(stage.arm_errors(), [0_u8; 0]);
+        stage.assert_works_again();
+    }
+}
+
+/// The core has no wall clock: its input is all it knows, every time in it is of
+/// the monotonic clock, and what it was told makes it do the same at any hour.
+#[test]
+fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
+    for wire in WIRES {
+        let stage = Stage::thrown(wire, "");
+        let throw = stage.throw;
+        let mut again = ControlState::new(Limits::default(), config(wire, "").settings);
+        for (told, did) in stage.rig.log.inputs.iter().zip(&stage.rig.log.records) {
+            let motion = |_, _| Some(Box::new(Motion::Spline(throw)));
+            let mut out = again.step(restore_input(told, motion).unwrap());
+            // What the rig measured, not the core.
+            out.record.wake_late_ns = did.wake_late_ns;
+            out.record.compute_ns = did.compute_ns;
+            assert_eq!(out.record, *did);
+        }
+        stage.assert_finished();
+    }
+}
+
+/// Every wake-up late by a random time: within bounds the throw goes on.
+#[test]
+fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
+    for wire in WIRES {
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut stage = Stage::throwing(wire, "");
+            stage
+                .rig
+                .oversleep((0..1000).map(|_| match rng.random_range(0..100) {
+                    0..80 => rng.random_range(0..30_000),
+                    80..97 => rng.random_range(200_000..3_990_000),
+                    _ => rng.random_range(4 * MS..6 * MS),
+                }));
+            stage.finish();
+            stage.assert_finished_with_jitter(0.000_031);
+            assert!(stage.rig.counts().missed > 10);
+        }
+    }
+}
+
+#[test]
+fn fault_34_beyond_the_bounds_the_motion_is_slowed() {
+    for wire in WIRES {
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut stage = Stage::throwing(wire, "");
+            let calm = rng.random_range(20..200);
+            let late = |_| rng.random_range(200_000..3_990_000);
+            let jitter: Vec<u64> = (0..calm).map(late).collect();
+            stage.rig.oversleep(jitter);
+            stage.rig.oversleep([rng.random_range(13 * MS..19 * MS)]);
+            stage.finish();
+            stage.assert_stop(slowed(FaultCode::LateCycles));
+        }
+    }
+}
+
+/// Two clocks a thousandth apart for a minute: setpoints slip past each other
+/// evenly, and nothing else shows.
+#[test]
+fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
+    for wire in WIRES {
+        for ppm in [1000.0, -1000.0] {
+            let mut config = config(wire, "");
+            config.arm.clock_ppm = ppm;
+            config.arm.intake = Intake::Clock;
+            let mut stage = Stage::of(config);
+            stage.rig.order(Order::Arm(Arming {
+                tier: MotionTier::Wiggle,
+                expires_ns: u64::MAX,
+                area_clear: false,
+            }));
+            let from = stage.rig.commanded();
+            let poses: Vec<_> = (0..13)
+                .map(|k| {
+                    let mut q = from;
+                    q[6] += if k % 2 == 1 { 1.0 } else { 0.0 };
+                    q
+                })
+                .collect();
+            let times: Vec<f64> = (0..13).map(|k| 5.0 * f64::from(k)).collect();
+            let minute = JointTrajectory::new(&times, &poses).unwrap();
+            stage.rig.start(Motion::Spline(minute));
+            stage.rig.run_for(61.0);
+            assert!(
+                stage.rig.log.causes.is_empty(),
+                "{:?}",
+                stage.rig.log.causes
+            );
+            assert_eq!(stage.finished(), 1);
+            super::limits::assert_kept(&stage, stage.rig.now());
+            // 62 s are 15 500 cycles, of which a thousandth slips.
+            let counters = stage.rig.with_arm(|arm| arm.model().counters());
+            let slipped = counters.dropped + counters.repeated;
+            assert!((10..25).contains(&slipped), "{wire:?} {ppm}: {counters:?}");
+            if wire == WireMode::ServoPosition {
+                assert_no_beat(&stage, &minute);
+            }
+        }
+    }
+}
+
+/// A slip makes the arm one cycle earlier or later and is no swing: over the whole
+/// minute the joint's delay stays within a cycle and a half.
+fn assert_no_beat(stage: &Stage, minute: &JointTrajectory) {
+    let began = stage.on_path().next().unwrap().deadline_ns;
+    let (mut least, mut most) = (f64::MAX, f64::MIN);
+    for sample in &stage.rig.log.truth {
+        let t_s = sample.at.since_s(MonotonicNs(began));
+        if !(1.0..59.0).contains(&t_s) {
+            continue;
+        }
+        let path = minute.state_at(t_s);
+        // Where the joint moves evenly, its distance tells the delay.
+        if path.qd[6].abs() > 0.29 {
+            let delay_s = (path.q[6] - sample.state.q[6]) / path.qd[6];
+            (least, most) = (least.min(delay_s), most.max(delay_s));
+        }
+    }
+    assert!(most - least < 0.006, "{least} to {most} s");
+}

@@ -1,0 +1,24 @@
+//! The 36 faults of `docs/src/faults.md`, each a test in virtual time: the real
+//! control core, pacing and command link against the simulated arm.
+//!
+//! [`stage`] sets a throw up, [`judge`] says what every stop must look like,
+//! whatever its cause; the other modules hold the faults by family.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::float_cmp,
+    reason = "tests may fail loudly"
+)]
+
+mod arm;
+mod judge;
+mod limits;
+mod link;
+mod machine;
+mod operator;
+mod plan;
+mod processes;
+mod reports;
+mod stage;
+mod tracking;

@@ -1,0 +1,163 @@
+//! The operator lets go or withdraws the arming: 36.
+
+use super::limits;
+use super::stage::{Stage, WIRES};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rt_controller::control::reaction::Path;
+use rt_controller::control::{ControlEvent, Motion, Order};
+use shared_types::ipc::ControllerMode;
+use shared_types::limits::LimitsSpec;
+use shared_types::{FaultCode, JointTrajectory, JointVector, Limits, MonotonicNs, WireMode};
+
+/// Limits that a throw of each wire uses fully. An arm that follows velocities
+/// makes its own jerk and cannot follow steps of the full acceleration closely.
+fn limits_of(wire: WireMode) -> Limits {
+    let limits = Limits::default();
+    match wire {
+        WireMode::ServoPosition => limits,
+        WireMode::JointVelocity => Limits::try_from(LimitsSpec {
+            acceleration_max_rad_s2: limits.acceleration_max_rad_s2 * 0.5,
+            ..limits.into()
+        })
+        .unwrap(),
+    }
+}
+
+/// A random throw from `from` with four waypoints, as fast as `limits` allow to
+/// ten milliseconds.
+fn random_throw(from: JointVector, limits: &Limits, rng: &mut ChaCha8Rng) -> JointTrajectory {
+    loop {
+        let mut away = || from + JointVector([0.0; 7].map(|_| rng.random_range(-0.7..0.7)));
+        let poses = [from, away(), away(), away()];
+        let found = (20..200).find_map(|k| {
+            let step_s = f64::from(k) * 0.01;
+            let times = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
+            let throw = JointTrajectory::new(&times, &poses).unwrap();
+            limits.worst_violation(&throw).is_none().then_some(throw)
+        });
+        if let Some(throw) = found {
+            return throw;
+        }
+    }
+}
+
+/// How the operator takes the arm back.
+#[derive(Debug, Clone, Copy)]
+enum Withdrawal {
+    LetsGo,
+    Disarms,
+    Stops,
+}
+
+impl Withdrawal {
+    fn happens(self, stage: &mut Stage) -> FaultCode {
+        match self {
+            Self::LetsGo => {
+                stage.rig.dead_man_released = true;
+                FaultCode::DeadManReleased
+            }
+            Self::Disarms => {
+                stage.rig.order(Order::Disarm);
+                FaultCode::Disarmed
+            }
+            Self::Stops => {
+                stage.rig.operator_stop = true;
+                FaultCode::OperatorStop
+            }
+        }
+    }
+}
+
+/// Stops `stage` after `part` of its throw; asserts that the very next cycle
+/// brakes and that everything to standstill is within limits.
+fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
+    stage.run_part(part);
+    assert_eq!(
+        stage.rig.mode(),
+        ControllerMode::Streaming,
+        "{:?}",
+        stage.rig.log.causes
+    );
+    let before = stage.rig.log.records.last().unwrap().cycle;
+    let fault = how.happens(stage);
+    stage.rig.run_cycles(1);
+    let first = *stage.rig.log.records.last().unwrap();
+    assert_eq!(first.cycle, before + 1);
+    assert_eq!((first.sent, first.mode), (1, ControllerMode::Braking as u8));
+    stage.rig.run_for(0.8);
+    let causes = &stage.rig.log.causes;
+    assert_eq!(causes.len(), 1, "{how:?} at {part}: {causes:?}");
+    let cause = causes[0];
+    assert_eq!((cause.fault(), cause.path), (fault, Path::Brake as u8));
+    assert_eq!(
+        (cause.cycle, cause.stop_arm, cause.second_code),
+        (before + 1, 0, 0),
+        "{cause:?}"
+    );
+    assert_eq!(stage.rig.mode(), ControllerMode::Faulted);
+    limits::assert_kept(stage, MonotonicNs(u64::MAX));
+    assert!(stage.speed() < 1e-3, "{}", stage.speed());
+}
+
+#[test]
+fn fault_36_the_arm_is_braked_within_a_cycle_at_1000_random_moments_of_fast_throws() {
+    let mut rng = ChaCha8Rng::seed_from_u64(36);
+    let mut throws = [None; 2];
+    for k in 0..1000 {
+        let wire = WIRES[k % 2];
+        let mut stage = Stage::ready(wire, "");
+        // Ten moments of each throw.
+        if k % 20 < 2 {
+            let from = stage.rig.commanded();
+            throws[k % 2] = Some(random_throw(from, &limits_of(wire), &mut rng));
+        }
+        stage.throw = throws[k % 2].unwrap();
+        stage.begin();
+        let how = if rng.random_bool(0.5) {
+            Withdrawal::LetsGo
+        } else {
+            Withdrawal::Disarms
+        };
+        let part = rng.random_range(0.0..0.97);
+        assert_braked_at(&mut stage, how, part);
+    }
+}
+
+/// The whole judgement, for each way and each wire.
+#[test]
+fn fault_36_nothing_moves_until_the_operator_acknowledges_and_arms_again() {
+    for wire in WIRES {
+        for how in [Withdrawal::LetsGo, Withdrawal::Disarms, Withdrawal::Stops] {
+            let mut stage = Stage::throwing(wire, "");
+            assert_braked_at(&mut stage, how, 0.55);
+            stage.rig.operator_stop = false;
+            let fault = stage.rig.log.causes[0].fault();
+            stage.assert_stop(super::judge::braked(fault));
+            stage.assert_works_again();
+        }
+    }
+}
+
+/// With the switch let go nothing is armed and nothing begins; an arming ends
+/// with it.
+#[test]
+fn fault_36_a_switch_that_is_let_go_disarms_and_refuses() {
+    for wire in WIRES {
+        let mut stage = Stage::ready(wire, "");
+        stage.arm();
+        stage.rig.run_cycles(2);
+        stage.rig.dead_man_released = true;
+        stage.rig.run_cycles(1);
+        let fault = FaultCode::DeadManReleased;
+        let (_, last) = *stage.rig.log.events.last().unwrap();
+        assert_eq!(last, ControlEvent::Disarmed { fault });
+        stage.arm();
+        stage.rig.run_cycles(1);
+        assert_eq!(*stage.refusals().last().unwrap(), (None, fault));
+        stage.rig.dead_man_released = false;
+        stage.rig.start(Motion::Spline(stage.throw));
+        stage.rig.run_cycles(2);
+        stage.assert_refused(FaultCode::NotArmed);
+    }
+}
