@@ -203,10 +203,6 @@ impl Trial {
         loop {
             std::thread::sleep(TURN);
             self.operator.beat();
-            if heard {
-                // Before, the arm would report a pose from before the pause.
-                let _ = self.reports.push(self.report());
-            }
             while self.relay.retired.pop().is_ok() {}
             while self.relay.events.pop().is_ok() {}
             while self.relay.inputs.pop().is_ok() {}
@@ -229,6 +225,10 @@ impl Trial {
                 if self.mode != before && !self.mode.is_moving() {
                     self.prompt()?;
                 }
+            }
+            if heard {
+                // Of the newest pose: one from before a pause would jump.
+                let _ = self.reports.push(self.report());
             }
             if self.mode == ControllerMode::Streaming {
                 moving_since.get_or_insert_with(Instant::now);
