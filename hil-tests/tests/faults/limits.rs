@@ -183,7 +183,7 @@ fn assert_true_motion(stage: &Stage) {
     let part = match late {
         None | Some(0) => 1.05,
         Some(1..=2) => 1.25,
-        Some(_) => 1.5,
+        Some(_) => 1.7,
     };
     for sample in &stage.rig.log.truth {
         let state = &sample.state;
