@@ -12,6 +12,16 @@ pub enum ControllerError {
     /// Shared memory does not work.
     #[error(transparent)]
     Ipc(#[from] IpcError),
+    /// A full shared memory would end this process without a word, later.
+    #[error(
+        "shared memory (/dev/shm) has {free_mb} MB free, but the controller takes {needed_mb} MB: end other programs, remove what killed ones left there, or mount it larger"
+    )]
+    SharedMemoryFull {
+        /// Free (MB).
+        free_mb: u64,
+        /// Needed (MB).
+        needed_mb: u64,
+    },
     /// Real-time properties are required but cannot be had.
     #[error("real-time set-up is required but incomplete: {}", .0.join("; "))]
     NotRealTime(Vec<String>),

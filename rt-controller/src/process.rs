@@ -11,7 +11,7 @@ use crate::arm_status;
 use crate::config::ControllerConfig;
 use crate::control::ControlState;
 use crate::error::ControllerError;
-use crate::os::{MonotonicClock, enter_real_time};
+use crate::os::{MonotonicClock, enter_real_time, shared_memory_free_mb};
 use crate::ports::{RtPorts, rings};
 use crate::relay::{ArmSettings, Relay};
 use crate::reports::{self, ReportSource};
@@ -29,6 +29,9 @@ use std::time::{Duration, Instant};
 pub(crate) const CONTROL_THREAD: &str = "control loop";
 /// Pause between two turns of the relay.
 const TURN: Duration = Duration::from_millis(2);
+/// Room that the controller's services take in shared memory, with some to spare
+/// for those who attach (MB); 97 were found in use.
+const ROOM_MB: u64 = 128;
 /// Longest wait for the brake when the process is asked to end.
 const BRAKE_WAIT: Duration = Duration::from_secs(3);
 /// Longest wait for the blackboards of a controller that was killed.
@@ -44,6 +47,7 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     config.check()?;
     let limits = config.resolve_limits()?;
     let settings = config.control_settings()?;
+    require_room()?;
     let _sweep = DomainSweep::new(&config.domain);
     let bus = Bus::join(&config.domain)?;
     bus.remove_leftovers();
@@ -87,6 +91,18 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
         rings.relay,
     )?;
     serve(&mut relay, &threads, stop)
+}
+
+/// Refuses to begin where shared memory is too small or full.
+fn require_room() -> Result<(), ControllerError> {
+    match shared_memory_free_mb() {
+        Some(free_mb) if free_mb < ROOM_MB => Err(ControllerError::SharedMemoryFull {
+            free_mb,
+            needed_mb: ROOM_MB,
+        }),
+        // Where the system does not say, the library says what it misses.
+        _ => Ok(()),
+    }
 }
 
 /// Turns the relay until `stop`, then until the arm rests.

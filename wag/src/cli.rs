@@ -215,6 +215,10 @@ pub struct ArmArgs {
     /// Check everything and show what would happen, without moving.
     #[arg(long)]
     pub dry_run: bool,
+    /// Use standard input as a dead-man switch: the arm moves only until Enter is
+    /// pressed or standard input ends.
+    #[arg(long)]
+    pub dead_man: bool,
 }
 
 /// Arguments of `wag wiggle`.

@@ -2,7 +2,7 @@
 //! what to be. A child ends when its parent is gone or closes its input.
 
 use rt_controller::ControllerConfig;
-use shared_types::ipc::Bus;
+use shared_types::ipc::{Bus, OperatorEnd};
 use std::fs::File;
 use std::io::Read;
 use std::os::unix::process::CommandExt;
@@ -21,6 +21,8 @@ pub enum Role {
     Controller,
     /// The guardian.
     Guardian,
+    /// An operator who beats and does nothing else.
+    Operator,
     /// A viewer that attaches to everything and takes in what comes.
     Viewer,
     /// A recorder that attaches and never takes anything in.
@@ -32,6 +34,7 @@ impl Role {
         match self {
             Self::Controller => "child::is_a_controller",
             Self::Guardian => "child::is_a_guardian",
+            Self::Operator => "child::is_an_operator",
             Self::Viewer => "child::is_a_viewer",
             Self::Sleeper => "child::is_a_sleeper",
         }
@@ -67,8 +70,7 @@ impl Process {
         config: &str,
         change: impl FnOnce(&mut Command),
     ) -> std::io::Result<Self> {
-        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
-        let log = folder.join(format!("{name}-{role:?}.log"));
+        let log = log_of(role, name);
         let mut command = Command::new(std::env::current_exe()?);
         command
             .args(["--exact", role.test(), "--nocapture"])
@@ -77,6 +79,39 @@ impl Process {
             .stdout(Stdio::null())
             .stderr(File::create(&log)?);
         change(&mut command);
+        Self::of(command, log)
+    }
+
+    /// Starts the controller where shared memory has room for 16 MB only; `None`
+    /// where no such place can be made, which takes the superuser.
+    pub fn start_with_little_room(name: &str, config: &str) -> Option<Self> {
+        const SMALL: &str = "mount -t tmpfs -o size=16m tmpfs /dev/shm";
+        let this = std::env::current_exe().ok()?;
+        let place = |then: &str| {
+            let mut command = Command::new("unshare");
+            command.args(["-m", "sh", "-c", &format!("{SMALL} && {then}")]);
+            command
+        };
+        let can = place("true").stderr(Stdio::null()).status().ok()?;
+        if !can.success() {
+            return None;
+        }
+        let role = Role::Controller;
+        let log = log_of(role, name);
+        let mut command = place(&format!(
+            "exec '{}' --exact {} --nocapture",
+            this.display(),
+            role.test()
+        ));
+        command
+            .env(CONFIG, config)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(File::create(&log).ok()?);
+        Self::of(command, log).ok()
+    }
+
+    fn of(mut command: Command, log: PathBuf) -> std::io::Result<Self> {
         let mut child = command.spawn()?;
         Ok(Self {
             input: child.stdin.take(),
@@ -121,6 +156,11 @@ impl Drop for Process {
     }
 }
 
+fn log_of(role: Role, name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    folder.join(format!("{name}-{role:?}.log"))
+}
+
 /// The configuration, in a child; its end is watched for from here on.
 fn config() -> Option<(String, &'static AtomicBool)> {
     static STOP: AtomicBool = AtomicBool::new(false);
@@ -158,6 +198,19 @@ fn is_a_guardian() {
     if let Some((config, stop)) = config() {
         let config: ControllerConfig = toml::from_str(&config).unwrap();
         tell(&rt_controller::guardian::run(&config, stop));
+    }
+}
+
+/// Not a test by itself: holds the operator's place and beats.
+#[test]
+fn is_an_operator() {
+    if let Some((domain, stop)) = config() {
+        let bus = Bus::join(&domain).unwrap();
+        let mut operator = OperatorEnd::take(&bus).unwrap();
+        while !stop.load(Ordering::SeqCst) {
+            operator.beat();
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 }
 

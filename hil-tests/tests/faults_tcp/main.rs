@@ -19,6 +19,7 @@ mod errors;
 mod flight;
 mod joints;
 mod link;
+mod operator;
 mod plans;
 mod processes;
 mod reports;

@@ -2,8 +2,8 @@
 
 use super::child::{Process, Role};
 use super::flight::Flight;
-use super::stand::{PATIENCE, Stand, execute, swing};
-use hil_tests::arm::{ArmConfig, ArmEvent, JointSample, TimedEvent, clock};
+use super::stand::{PATIENCE, Stand, execute, patient, swing};
+use hil_tests::arm::{ArmConfig, ArmEvent, JointSample, SimulatedArm, TimedEvent, clock};
 use rt_controller::xarm::ArmState;
 use shared_types::ipc::message::ControllerEvent;
 use shared_types::{FaultCode, MonotonicNs, MotionTier};
@@ -211,4 +211,23 @@ fn fault_32_another_users_shared_memory_is_a_plain_refusal() {
     let log = other.log();
     assert!(log.contains("same user"), "{log}");
     stand.finish();
+}
+
+#[test]
+fn fault_32_shared_memory_without_room_is_a_plain_refusal() {
+    let arm = SimulatedArm::start(ArmConfig {
+        command_port: 0,
+        report_ports: [0; 4],
+        ..ArmConfig::default()
+    })
+    .unwrap();
+    let text = toml::to_string(&patient("room", &arm)).unwrap();
+    let Some(mut controller) = Process::start_with_little_room("room", &text) else {
+        println!("skipped: only the superuser can give a program another /dev/shm");
+        return;
+    };
+    let code = controller.wait();
+    let log = controller.log();
+    assert_eq!(code, Some(1), "{log}");
+    assert!(log.contains("/dev/shm") && log.contains("MB free"), "{log}");
 }

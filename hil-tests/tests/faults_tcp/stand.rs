@@ -163,6 +163,19 @@ impl Stand {
         self.flight.truth.extend(truth);
     }
 
+    pub fn operator(&mut self) -> &mut OperatorEnd {
+        self.operator.as_mut().unwrap()
+    }
+
+    /// Leaves the operator's place.
+    pub fn leave(&mut self) {
+        self.operator = None;
+    }
+
+    pub fn take_the_operators_place(&mut self) {
+        self.operator = Some(OperatorEnd::take(&self.bus).unwrap());
+    }
+
     /// Starts the controller anew in the same domain, after it was killed; the
     /// operator of the old one leaves.
     pub fn start_controller_again(&mut self) {

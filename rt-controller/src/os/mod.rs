@@ -5,7 +5,9 @@
 pub mod clock;
 pub mod process;
 pub mod receive;
+mod room;
 pub mod schedule;
 
 pub use clock::{Clock, MonotonicClock, now_ns};
+pub use room::shared_memory_free_mb;
 pub use schedule::{RealTimeSettings, SetupWarning, enter_real_time};

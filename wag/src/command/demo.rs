@@ -6,7 +6,7 @@ use super::plan::{describe, planner_config, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::pipeline::{self, ArmAddress, ArmLink, CalmInput, Film, RunFolder};
+use crate::pipeline::{self, ArmAddress, ArmLink, CalmInput, Film, RunFolder, Shot};
 use crate::progress::Stage;
 use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::{Session, watch_interrupts};
@@ -189,8 +189,11 @@ impl<'a> Demo<'a> {
             &self.camera,
             &self.arm,
             wiggle,
-            WIGGLE_FRAMES,
-            false,
+            Shot {
+                frames: WIGGLE_FRAMES,
+                both_eyes: false,
+                throw: false,
+            },
             &stage,
         )?;
         self.record.set_wiggle(&film);
@@ -298,8 +301,11 @@ impl<'a> Demo<'a> {
             &self.camera,
             &self.arm,
             &plan.trajectory,
-            THROW_FRAMES,
-            true,
+            Shot {
+                frames: THROW_FRAMES,
+                both_eyes: true,
+                throw: true,
+            },
             &stage,
         )?;
         self.record

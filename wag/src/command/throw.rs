@@ -50,6 +50,9 @@ pub fn drive(
     session
         .record_cycles(&folder.file(CYCLES_FILE))
         .or_failed()?;
+    if arm.dead_man {
+        session.hold_dead_man(quiet).or_failed()?;
+    }
     let tier = match name {
         "throw" => MotionTier::Throw,
         _ => MotionTier::Wiggle,

@@ -135,6 +135,14 @@ impl Streaming {
         let event = session.finish(&self.pending, timeout, |_| ())?;
         span("the trajectory", &event)
     }
+
+    /// The same for a throw: the plan lies in the controller whole, so planner and
+    /// camera may die meanwhile. Their death is an error afterwards.
+    pub fn finish_committed(self, session: &mut Session) -> anyhow::Result<MotionSpan> {
+        let timeout = Duration::from_secs_f64(self.duration_s + 10.0);
+        let event = session.finish_committed(&self.pending, timeout)?;
+        span("the trajectory", &event)
+    }
 }
 
 /// Latency histograms of the control loop since the last call.

@@ -14,7 +14,7 @@ mod stages;
 pub use arm::{ArmLink, acquire, arm_for, execute, latency, move_to};
 pub use calm::{CalmInput, Calmed, calm};
 pub use lag::joint_lag_s;
-pub use observe::{Film, film_during};
+pub use observe::{Film, Shot, film_during};
 pub use processes::{
     ArmAddress, rig_config, start_camera, start_controller, start_planner, start_rig,
     write_calibration,

@@ -22,16 +22,31 @@ pub struct Film {
     pub motion: MotionSpan,
 }
 
-/// Records `frames` frames; as soon as the first is kept, streams `trajectory`.
+/// What to film, and whether the motion goes on without the camera.
+#[derive(Debug, Clone, Copy)]
+pub struct Shot {
+    /// Frames to keep.
+    pub frames: u32,
+    /// Keep the right eye too.
+    pub both_eyes: bool,
+    /// The motion is a throw: it is finished whatever becomes of the film. Others
+    /// are made for the film's sake and braked when it is lost.
+    pub throw: bool,
+}
+
+/// Records the frames of `shot`; as soon as the first is kept, streams
+/// `trajectory`.
 pub fn film_during(
     session: &mut Session,
     camera: &RpcClient<CameraRpc>,
     arm: &ArmLink,
     trajectory: &JointTrajectory,
-    frames: u32,
-    both_eyes: bool,
+    shot: Shot,
     stage: &Stage,
 ) -> anyhow::Result<Film> {
+    let Shot {
+        frames, both_eyes, ..
+    } = shot;
     let recording = camera.call(&CameraRequest::Record { frames, both_eyes })?;
     let first_stamp_ns = match session.next(&recording, Duration::from_secs(5))? {
         CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
@@ -39,7 +54,11 @@ pub fn film_during(
         other => bail!("the camera process answered a recording with {other:?}"),
     };
     let streaming = execute(arm, trajectory)?;
-    let motion = streaming.finish(session)?;
+    let motion = if shot.throw {
+        streaming.finish_committed(session)?
+    } else {
+        streaming.finish(session)?
+    };
     let timeout = Duration::from_secs_f64(f64::from(frames) / 15.0 + 5.0);
     let event = session.finish(&recording, timeout, |event| {
         if let CameraEvent::Progress(p) = event {

@@ -1,7 +1,7 @@
 //! The session a command works in: shared memory, supervised processes, the
 //! operator's heartbeat, the recorder, and what to show meanwhile.
 
-use super::{ProcessSpec, Recorder, Supervisor};
+use super::{DeadMan, ProcessSpec, Recorder, Supervisor};
 use crate::recording::{RecordingReport, RecordingThread};
 use anyhow::{Context, anyhow, bail};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
@@ -39,6 +39,10 @@ pub struct Session {
     // Order matters: the heartbeat ends before the processes, the processes
     // before the connection to shared memory, and that before the sweep.
     operator: Option<OperatorEnd>,
+    /// The operator's dead-man switch, where there is one.
+    dead_man: Option<DeadMan>,
+    /// A motion runs that nobody but the controller is needed for.
+    committed: bool,
     /// Child processes.
     supervisor: Supervisor,
     /// Everything received.
@@ -62,6 +66,8 @@ impl Session {
         let bus = Bus::join(domain)?;
         Ok(Self {
             operator: None,
+            dead_man: None,
+            committed: false,
             supervisor: Supervisor::default(),
             recorder: Recorder::open(&bus)?,
             recording: None,
@@ -81,6 +87,15 @@ impl Session {
         Ok(())
     }
 
+    /// Makes standard input the operator's dead-man switch, held from now on.
+    pub fn hold_dead_man(&mut self, quiet: bool) -> anyhow::Result<()> {
+        self.dead_man = Some(DeadMan::hold()?);
+        if !quiet {
+            println!("Enter lets go of the dead-man switch; Ctrl-C stops as well");
+        }
+        Ok(())
+    }
+
     /// Starts a process.
     pub fn start(&mut self, spec: &ProcessSpec) -> anyhow::Result<()> {
         self.supervisor.start(spec, &self.log_folder)
@@ -89,14 +104,20 @@ impl Session {
     /// One turn of everything that must go on while something else is waited
     /// for. Fails when a process died or the user pressed Ctrl-C.
     pub fn tick(&mut self) -> anyhow::Result<()> {
-        if let Some(operator) = &mut self.operator
-            && self.last_beat.elapsed() >= BEAT_EVERY
-        {
-            operator.beat();
-            self.last_beat = Instant::now();
+        if let Some(operator) = &mut self.operator {
+            if self.dead_man.as_ref().is_some_and(DeadMan::is_let_go) {
+                operator.let_go();
+            } else if self.last_beat.elapsed() >= BEAT_EVERY {
+                operator.beat();
+                self.last_beat = Instant::now();
+            }
         }
         self.recorder.drain()?;
-        self.supervisor.check()?;
+        if self.committed {
+            self.supervisor.check_arm()?;
+        } else {
+            self.supervisor.check()?;
+        }
         if INTERRUPTED.load(Ordering::SeqCst) {
             bail!("interrupted; the arm was told to stop and all processes were ended");
         }
@@ -166,6 +187,21 @@ impl Session {
     ) -> anyhow::Result<R::Event> {
         let result = pending.finish(timeout, || self.tick().map_err(SessionError), each);
         self.explain(result)
+    }
+
+    /// The same while a motion runs that lies in the controller whole: the death
+    /// of a process that does not hold the arm stops nothing. It is reported after
+    /// the motion, by the error that this returns then.
+    pub fn finish_committed<R: Rpc>(
+        &mut self,
+        pending: &Pending<R>,
+        timeout: Duration,
+    ) -> anyhow::Result<R::Event> {
+        self.committed = true;
+        let event = self.finish(pending, timeout, |_| ());
+        self.committed = false;
+        self.supervisor.check()?;
+        event
     }
 
     /// Waits for the next event of a request under way.

@@ -1,9 +1,11 @@
 //! A running set of processes: started, watched, recorded, ended together.
 
+mod dead_man;
 mod live;
 mod recorder;
 mod supervisor;
 
+use dead_man::DeadMan;
 pub use live::{Session, interrupted, watch_interrupts};
 pub use recorder::Recorder;
 pub use supervisor::{ProcessSpec, Supervisor};

@@ -90,7 +90,16 @@ impl Supervisor {
 
     /// Fails when any child has ended on its own.
     pub fn check(&mut self) -> anyhow::Result<()> {
-        for running in &mut self.children {
+        self.check_those(|_| true)
+    }
+
+    /// Fails when a child that holds the arm has ended on its own.
+    pub fn check_arm(&mut self) -> anyhow::Result<()> {
+        self.check_those(|running| running.holds_arm)
+    }
+
+    fn check_those(&mut self, which: impl Fn(&Running) -> bool) -> anyhow::Result<()> {
+        for running in self.children.iter_mut().filter(|r| which(r)) {
             if let Some(status) = running
                 .child
                 .try_wait()

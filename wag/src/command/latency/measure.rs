@@ -46,6 +46,9 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Evidenc
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "latency")?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
+    if args.arm.dead_man {
+        session.hold_dead_man(quiet).or_failed()?;
+    }
     let result = stream(
         &mut session,
         &folder,

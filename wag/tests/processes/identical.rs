@@ -1,0 +1,328 @@
+//! A plan is executed identically, byte for byte in the record, with planner and
+//! camera killed half-way.
+
+use super::shell::{arm, read, send, until, wag};
+use camera_ingest::process::CameraConfig;
+use hil_tests::arm::{ArmEvent, SimulatedArm};
+use planner::process::PlannerConfig;
+use rt_controller::ControllerConfig;
+use rustix::process::Signal;
+use shared_types::ipc::message::{
+    CameraRequest, CameraRpc, ControllerEvent, ControllerRequest, ControllerRpc, PlannerRequest,
+    PlannerRpc, StrikeOrder,
+};
+use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
+use shared_types::ipc::{
+    Bus, CauseRecord, ChunkSubscriber, ControllerMode, CycleRecord, DomainSweep, OperatorEnd,
+    StateReader,
+};
+use shared_types::plan::{START_POSE, trajectory_hash};
+use shared_types::{
+    FaultCode, JointTrajectory, JointVector, Limits, MonotonicNs, MotionTier, RopeParams,
+};
+use std::path::Path;
+use std::process::Child;
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Cycles of half the plan.
+const HALF_WAY: u64 = 250;
+
+/// A throw of 2 s.
+fn plan() -> JointTrajectory {
+    let mut out: JointVector = START_POSE;
+    (out[1], out[3], out[5]) = (out[1] + 0.10, out[3] - 0.12, out[5] + 0.45);
+    JointTrajectory::new(&[0.0, 1.0, 2.0], &[START_POSE, out, START_POSE]).unwrap()
+}
+
+/// A process of `wag`; it is killed when dropped.
+struct Part(Child);
+
+impl Part {
+    fn start<T: serde::Serialize>(folder: &Path, name: &str, config: &T) -> Self {
+        let path = folder.join(format!("{name}.toml"));
+        std::fs::write(&path, toml::to_string(config).unwrap()).unwrap();
+        let log = std::fs::File::create(folder.join(format!("{name}.log"))).unwrap();
+        let mut command = wag(&["process", name, "--config"]);
+        command.arg(&path).env("WAG_LOG", "info").stderr(log);
+        Self(command.spawn().unwrap())
+    }
+
+    fn kill(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+
+    /// Asks it to end in order.
+    fn end(&mut self) {
+        send(self.0.id(), Signal::TERM);
+        self.0.wait().unwrap();
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// What is compared: everything a cycle commanded, on the plan's own clock. What
+/// was measured, and when, is the machine's and the arm's.
+fn commanded(records: &[CycleRecord]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for record in records.iter().filter(|r| r.trajectory_s >= 0.0) {
+        let of_the_plan = CycleRecord {
+            cycle: 0,
+            deadline_ns: 0,
+            wake_late_ns: 0,
+            compute_ns: 0,
+            send_ns: 0,
+            reply_ns: 0,
+            q: JointVector::ZERO,
+            q_stamp_ns: 0,
+            ..*record
+        };
+        bytes.extend(postcard::to_allocvec(&of_the_plan).unwrap());
+    }
+    bytes
+}
+
+/// What reached the arm while it was at it.
+fn arrived(arm: &SimulatedArm, from: MonotonicNs) -> Vec<[u64; 7]> {
+    let bits = |q: JointVector| core::array::from_fn(|j| q[j].to_bits());
+    let events = arm.events().since(from);
+    let setpoints = events.iter().filter_map(|e| match e.event {
+        ArmEvent::Setpoint(q) => Some(bits(q)),
+        _ => None,
+    });
+    let mut seen: Vec<[u64; 7]> = setpoints.collect();
+    seen.dedup();
+    seen
+}
+
+/// The processes of a throw, and who watches them.
+struct Play {
+    // In the order in which a failed test takes them down.
+    operator: OperatorEnd,
+    client: RpcClient<ControllerRpc>,
+    chunks: ChunkSubscriber,
+    state: StateReader,
+    controller: Part,
+    guardian: Part,
+    planner: Part,
+    camera: Part,
+    arm: SimulatedArm,
+    bus: Bus,
+    recording: Vec<u8>,
+    _sweep: DomainSweep,
+}
+
+impl Play {
+    fn start(folder: &Path, name: &str) -> Self {
+        let arm = arm();
+        let domain = format!("identical_{name}_{}", std::process::id());
+        let sweep = DomainSweep::new(&domain);
+        let bus = Bus::join(&domain).unwrap();
+        let chunks = bus.chunk_subscriber().unwrap();
+        let config = patient(&domain, &arm);
+        let planner = PlannerConfig {
+            domain: domain.clone(),
+            ..PlannerConfig::default()
+        };
+        let controller = Part::start(folder, "rt-controller", &config);
+        let guardian = Part::start(folder, "guardian", &config);
+        let planner = Part::start(folder, "planner", &planner);
+        let camera = Part::start(folder, "camera-ingest", &CameraConfig { domain });
+        let client = open::<ControllerRpc>(&bus, &ControllerRequest::Status);
+        let operator = until("the operator's place", PATIENCE, || {
+            OperatorEnd::take(&bus).ok()
+        });
+        Self {
+            operator,
+            client,
+            chunks,
+            state: StateReader::open(&bus).unwrap(),
+            controller,
+            guardian,
+            planner,
+            camera,
+            arm,
+            bus,
+            recording: Vec::new(),
+            _sweep: sweep,
+        }
+    }
+
+    fn drain(&mut self) {
+        while let Some(chunk) = self.chunks.receive().unwrap() {
+            self.recording.extend_from_slice(&chunk);
+        }
+    }
+
+    /// Waits for the last answer to a call; `meanwhile` is done every turn.
+    fn answer(
+        &mut self,
+        pending: &Pending<ControllerRpc>,
+        mut meanwhile: impl FnMut(&mut Self),
+    ) -> ControllerEvent {
+        until("an answer", PATIENCE, || {
+            self.operator.beat();
+            self.drain();
+            meanwhile(self);
+            pending.try_next().unwrap().filter(ControllerRpc::is_last)
+        })
+    }
+
+    fn ask(&mut self, request: &ControllerRequest) -> ControllerEvent {
+        let pending = self.client.call(request).unwrap();
+        self.answer(&pending, |_| ())
+    }
+
+    /// Brings the arm up and arms it for the throw.
+    fn arm_for_a_throw(&mut self, guardian_log: &Path) {
+        assert_eq!(self.ask(&ControllerRequest::Bringup), ControllerEvent::Done);
+        // The guardian may come a moment later than the controller.
+        until("the guardian", PATIENCE, || {
+            self.ask(&ControllerRequest::Status);
+            let log = std::fs::read_to_string(guardian_log).ok()?;
+            log.contains("guarding the controller").then_some(())
+        });
+        let armed = ControllerRequest::Arm {
+            tier: MotionTier::Throw,
+            area_clear: true,
+        };
+        assert_eq!(self.ask(&armed), ControllerEvent::Done);
+    }
+
+    /// Runs the plan to its end; with `murder`, planner and camera are killed when
+    /// half of it is done.
+    fn throw(&mut self, murder: bool) {
+        let trajectory = Box::new(plan());
+        let sha256 = trajectory_hash(&trajectory);
+        let execute = ControllerRequest::Execute { trajectory, sha256 };
+        let pending = self.client.call(&execute).unwrap();
+        let mut begin = None;
+        let end = self.answer(&pending, |play| {
+            let now = play.state.get();
+            if now.mode == ControllerMode::Streaming as u8 {
+                let first = *begin.get_or_insert(now.cycle);
+                if murder && now.cycle > first + HALF_WAY {
+                    play.planner.kill();
+                    play.camera.kill();
+                }
+            }
+        });
+        assert!(matches!(end, ControllerEvent::Finished { .. }), "{end:?}");
+        let dead = self.planner.0.try_wait().unwrap().is_some();
+        assert_eq!(dead, murder, "killed while the arm moved, or never");
+    }
+
+    /// Ends controller and guardian in order; cycles and causes.
+    fn end(mut self) -> (Vec<CycleRecord>, Vec<CauseRecord>, SimulatedArm) {
+        self.controller.end();
+        self.guardian.end();
+        self.drain();
+        let (cycles, causes) = read(&self.recording);
+        (cycles, causes, self.arm)
+    }
+}
+
+/// Patient where only a busy machine would be noticed.
+fn patient(domain: &str, arm: &SimulatedArm) -> ControllerConfig {
+    let [joints, normal, rich, real] = arm.ports().reports;
+    let mut config = ControllerConfig {
+        domain: domain.to_owned(),
+        command_port: arm.ports().command,
+        report_port: joints,
+        fallback_report_port: real,
+        status_ports: [rich, normal],
+        ..ControllerConfig::default()
+    };
+    let thresholds = &mut config.thresholds;
+    thresholds.operator_timeout_ms = Some(5000.0);
+    thresholds.reply_stall_ms = Some(500.0);
+    thresholds.unanswered_max = Some(125);
+    thresholds.report_stale_ms = Some(500.0);
+    thresholds.late_cycles_max = Some(50);
+    thresholds.missed_cycles_max = Some(50);
+    config.guardian.silence_ms = 500.0;
+    config
+}
+
+/// One throw of the plan; with `murder`, planner and camera are killed half-way,
+/// both at work. The record, what arrived at the arm, and cycles missed.
+fn throw(folder: &Path, name: &str, murder: bool) -> (Vec<u8>, Vec<[u64; 7]>, u32) {
+    let folder = folder.join(name);
+    std::fs::create_dir(&folder).unwrap();
+    let mut play = Play::start(&folder, name);
+    // Both are at work: a throw is being planned, a film is being kept.
+    let planner = open::<PlannerRpc>(&play.bus, &PlannerRequest::Ping);
+    let planned = planner.call(&strike()).unwrap();
+    play.arm_for_a_throw(&folder.join("guardian.log"));
+    let camera = open::<CameraRpc>(&play.bus, &CameraRequest::Ping);
+    let film = CameraRequest::Record {
+        frames: 10_000,
+        both_eyes: true,
+    };
+    let filmed = camera.call(&film).unwrap();
+    let began = hil_tests::arm::clock::now();
+    play.throw(murder);
+    drop((planned, filmed));
+    let (cycles, causes, arm) = play.end();
+    // Its end at rest is a stop, too.
+    let met: Vec<_> = causes.iter().map(|c| (c.fault(), c.motion_id)).collect();
+    assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
+    let missed = cycles.iter().map(|c| c.missed).sum();
+    (commanded(&cycles), arrived(&arm, began), missed)
+}
+
+fn strike() -> PlannerRequest {
+    PlannerRequest::Strike(Box::new(StrikeOrder {
+        rope: RopeParams {
+            links: 23,
+            length_m: 0.55,
+            joint_damping_nms_per_rad: 0.02,
+            joint_stiffness_nm_per_rad: 0.3,
+            radius_m: 0.006,
+            mass_per_length_kg_per_m: 0.06,
+            lead_mass_kg: 0.06,
+            lead_radius_m: 0.025,
+            link_extra_scale: 1.0,
+        },
+        target_m: [0.95, 0.0, 0.2],
+        limits: Limits::default(),
+        seed: 1,
+    }))
+}
+
+/// A client of a service, once its process answers.
+fn open<R: Rpc>(bus: &Bus, ping: &R::Request) -> RpcClient<R> {
+    let client = RpcClient::<R>::open(bus).unwrap();
+    let pending = until("a service", PATIENCE, || client.call(ping).ok());
+    until("its answer", PATIENCE, || pending.try_next().unwrap());
+    client
+}
+
+#[test]
+fn a_plan_runs_byte_for_byte_the_same_with_planner_and_camera_killed_half_way() {
+    let folder = tempfile::tempdir().unwrap();
+    // A cycle that the machine itself missed is missing in the record, and says
+    // nothing about who was killed: such a throw is made again.
+    let whole = |name: &str, murder: bool| {
+        (0..8)
+            .map(|k| throw(folder.path(), &format!("{name}{k}"), murder))
+            .find(|(_, _, missed)| *missed == 0)
+            .expect("this machine misses cycles all the time")
+    };
+    let (quiet, at_the_arm, _) = whole("quiet", false);
+    assert!(
+        quiet.len() > 500 * 60,
+        "two seconds of cycles: {}",
+        quiet.len()
+    );
+    let (killed, at_the_arm_then, _) = whole("killed", true);
+    assert_eq!(quiet.len(), killed.len());
+    let differing = quiet.iter().zip(&killed).filter(|(a, b)| a != b).count();
+    assert_eq!(differing, 0, "bytes of the record differ");
+    assert_eq!(at_the_arm, at_the_arm_then, "and so it was at the arm");
+}
