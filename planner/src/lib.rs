@@ -30,5 +30,6 @@ pub mod ropes;
 pub mod sysid;
 pub mod tasks;
 pub mod trajopt;
+pub mod trials;
 pub mod wiggle;
 mod workers;

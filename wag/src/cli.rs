@@ -65,6 +65,8 @@ pub enum Command {
     Score(ScoreArgs),
     /// Measure how fast this machine runs a part of the system.
     Bench(BenchArgs),
+    /// Make a result of the paper again, on simulated ropes.
+    Reproduce(ReproduceArgs),
     /// Run one of the processes in the foreground (what `wag` itself starts).
     #[command(hide = true)]
     Process(ProcessArgs),
@@ -283,9 +285,9 @@ pub struct ObservationArgs {
 pub enum MethodName {
     /// A trained network.
     Nn,
-    /// A fit of the simulator to the pixels.
+    /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
     Cmaes,
-    /// Network first, then a fit.
+    /// A quick proposal, then refined.
     Hybrid,
 }
 
@@ -302,7 +304,7 @@ pub struct IdentifyArgs {
     #[command(flatten)]
     pub motion: MotionArgs,
     /// Method.
-    #[arg(long, value_enum, default_value_t = MethodName::Cmaes)]
+    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
     #[arg(long)]
@@ -476,6 +478,37 @@ pub enum BenchName {
     Rope,
     /// The control loop: wake-up error beside `cyclictest`, times within a cycle.
     Rt,
+    /// Identification: time of each method.
+    Identify,
+}
+
+/// Arguments of `wag reproduce`.
+#[derive(Debug, Args)]
+pub struct ReproduceArgs {
+    /// Which result.
+    #[arg(value_enum)]
+    pub name: ReproduceName,
+    /// Simulated ropes.
+    #[arg(long, default_value_t = 1000)]
+    pub ropes: u64,
+    /// Seed of the ropes, the films and the searches.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Method.
+    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
+    pub method: MethodName,
+    /// Result file (JSON); a run that was broken off goes on from it.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Results known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReproduceName {
+    /// Errors of identified parameters (the paper's in-domain table) and coverage.
+    Sysid,
+    /// Telling ropes outside the parameter ranges from those inside.
+    SysidOod,
 }
 
 /// Arguments of `wag process`.

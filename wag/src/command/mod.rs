@@ -12,6 +12,7 @@ mod plan;
 mod process;
 mod record;
 mod replay;
+mod reproduce;
 mod rig;
 mod score;
 mod sim;
@@ -45,6 +46,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Explain(args) => explain::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
+        Command::Reproduce(args) => reproduce::run(args, quiet),
         Command::Process(args) => process::run(args).map(|()| None),
     }
 }
