@@ -134,7 +134,7 @@ pub fn method_of(name: MethodName) -> anyhow::Result<Method> {
         MethodName::Cmaes => Ok(Method::Cmaes),
         MethodName::Hybrid => Ok(Method::Hybrid),
         MethodName::Nn => Err(anyhow!(
-            "this version has no trained network; use --method hybrid or --method cmaes"
+            "identification by the network alone is not implemented in this version; use --method hybrid or --method cmaes"
         )),
     }
 }
