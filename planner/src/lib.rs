@@ -32,4 +32,5 @@ pub mod tasks;
 pub mod trajopt;
 pub mod trials;
 pub mod wiggle;
+pub mod wiggle_design;
 mod workers;

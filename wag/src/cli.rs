@@ -222,6 +222,15 @@ pub struct ArmArgs {
 /// Arguments of `wag wiggle`.
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
+    /// Say how well ropes of the ranges could be known from it, and from the paper's.
+    #[arg(long)]
+    pub evaluate: bool,
+    /// Search the most telling wiggle within the limits and say how well it does.
+    #[arg(long)]
+    pub optimise: bool,
+    /// Seed of the ropes a wiggle is judged by.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
     /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
@@ -488,7 +497,7 @@ pub struct ReproduceArgs {
     /// Which result.
     #[arg(value_enum)]
     pub name: ReproduceName,
-    /// Simulated ropes.
+    /// Simulated ropes (motion-fidelity has its own).
     #[arg(long, default_value_t = 1000)]
     pub ropes: u64,
     /// Seed of the ropes, the films and the searches.
@@ -509,6 +518,8 @@ pub enum ReproduceName {
     Sysid,
     /// Telling ropes outside the parameter ranges from those inside.
     SysidOod,
+    /// Motion of an identified rope in a throw it was not identified from.
+    MotionFidelity,
 }
 
 /// Arguments of `wag process`.

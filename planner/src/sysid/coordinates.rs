@@ -54,8 +54,9 @@ pub(super) mod parameter {
     pub(in crate::sysid) const EXTRA_SCALE: usize = 8;
 }
 
-/// Mass per length of simulated ropes (kg/m): any would do, see the module.
-const SIMULATED_MASS_PER_LENGTH: f64 = 0.06;
+/// Mass per length of simulated ropes (kg/m): any would do, see the module; small, so
+/// that the stiffest ropes of a wide search stay within what the simulator accepts.
+const SIMULATED_MASS_PER_LENGTH: f64 = 0.01;
 /// Radius of simulated ropes (m): too small to rule the link inertia.
 const SIMULATED_RADIUS_M: f64 = 1e-4;
 
@@ -70,9 +71,9 @@ pub struct Appearance {
 
 impl Appearance {
     /// How far a half width seen in the picture may be from the radius (m): a part of
-    /// it for the distance of the camera, and a third of a pixel of this size.
+    /// it for the distance of the camera, and a quarter of a pixel of this size.
     pub(super) fn std_dev_m(radius_m: f64, pixel_m: f64) -> f64 {
-        (0.03 * radius_m).hypot(0.3 * pixel_m)
+        (0.02 * radius_m).hypot(0.25 * pixel_m)
     }
 }
 
@@ -94,7 +95,6 @@ pub(super) struct Coordinates {
     /// prior it is weak: their edges come in with [`super::posterior`].
     pub(super) prior_mean: Point,
     pub(super) prior_std: Point,
-    pub(super) reach: Reach,
 }
 
 /// Coordinates of a rope; clock and camera are 0.
@@ -190,7 +190,6 @@ impl Coordinates {
             upper: Point::zeros(),
             prior_mean: Point::zeros(),
             prior_std: Point::zeros(),
-            reach,
         };
         for (i, (low, high)) in boxes.into_iter().enumerate() {
             out.lower[i] = low;

@@ -14,6 +14,7 @@ mod coarse;
 mod coordinates;
 mod descent;
 mod film;
+mod information;
 mod linear;
 mod noise;
 mod novelty;
@@ -24,6 +25,7 @@ pub mod scale;
 mod search;
 
 pub use coordinates::Appearance;
+pub use information::{WiggleInformation, information};
 
 use crate::cmaes::CmaError;
 use camera_pose::CorrectionPrior;

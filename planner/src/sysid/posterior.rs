@@ -23,6 +23,8 @@ use shared_types::rope::{Ambiguity, LINK_COUNTS, RANGES, ROPE_PARAMETERS, RopePo
 const DRAWS: usize = 4096;
 /// Effective draws below which no rope of the ranges fits.
 const EFFECTIVE_MIN: f64 = 40.0;
+/// Error of taking the film for linear in the link count (1).
+const LINKS_STD: f64 = 0.5;
 /// Part of the prior's deviation above which a direction was not seen.
 const UNSEEN_PART: f64 = 0.7;
 
@@ -68,7 +70,7 @@ pub(super) fn believe(
     let links_probability = links_of(&draws);
     let posterior = summarise(&draws, links_probability, fit);
     Believed {
-        params: likeliest(&draws, &posterior),
+        params: likeliest(&draws, &posterior, lead_mass_kg),
         posterior,
     }
 }
@@ -82,7 +84,7 @@ fn normalise(draws: &mut [Draw]) {
 
 /// Probability of each link count of the ranges from the fit alone.
 fn count_probabilities(fit: &Refined) -> [f64; LINK_COUNTS] {
-    let variance = fit.covariance[(LINKS, LINKS)].max(1e-6) * fit.inflation;
+    let variance = fit.covariance[(LINKS, LINKS)] * fit.inflation + LINKS_STD.powi(2);
     let (low, _) = link_range();
     let mut count = f64::from(low) - 1.0;
     let logs: [f64; LINK_COUNTS] = core::array::from_fn(|_| {
@@ -152,7 +154,9 @@ fn draw(
                 uniform(&mut rng, p::EXTRA_SCALE),
             ];
             let inside = |i: usize| values[i] >= RANGES[i].min && values[i] <= RANGES[i].max;
-            let inside = [p::LENGTH, p::LEAD_RADIUS].into_iter().all(inside);
+            let inside = [p::LENGTH, p::RADIUS, p::LEAD_RADIUS]
+                .into_iter()
+                .all(inside);
             Draw {
                 values,
                 coordinates: x,
@@ -255,14 +259,19 @@ fn ambiguities(covariance: &[[f64; ROPE_PARAMETERS]; ROPE_PARAMETERS]) -> Vec<Am
 
 /// One rope whose ratios are those of the fit: means of the coordinates, medians of the
 /// link count and of the common factor.
-fn likeliest(draws: &[Draw], posterior: &RopePosterior) -> RopeParams {
+fn likeliest(
+    draws: &[Draw],
+    posterior: &RopePosterior,
+    lead_mass_kg: Option<f64>,
+) -> RopeParams {
     let mut x = Vector::zeros();
     for d in draws {
         x += d.coordinates * d.weight;
     }
     // The median, like that of the common factor: the least mean error.
     let [links] = quantiles(draws, |d| d.values[parameter::LINKS], [0.5]);
-    let [mu] = quantiles(draws, |d| d.values[parameter::MASS_PER_LENGTH], [0.5]);
+    let [median] = quantiles(draws, |d| d.values[parameter::MASS_PER_LENGTH], [0.5]);
+    let mu = lead_mass_kg.map_or(median, |m| m / x[3].exp());
     let s = x[0] / links;
     RopeParams::from_array([
         links,

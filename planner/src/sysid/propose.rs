@@ -7,8 +7,8 @@
 use super::IdentifyError;
 use super::coarse::Comparer;
 use super::coordinates::{
-    CLOCK, Coordinates, DAMPING, INERTIA, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Point, Reach,
-    STIFFNESS, middle_links, point_of,
+    CLOCK, Coordinates, DAMPING, INERTIA, LEAD_MASS, LENGTH, LINKS, Point, STIFFNESS, middle_links,
+    point_of,
 };
 use super::descent::{Account, DescentRules, Walker, descend};
 use super::film::{Fidelity, Film};
@@ -101,22 +101,11 @@ fn improve(
     descend(film, coordinates, starts, &rules, account)
 }
 
-/// Ropes drawn from the ranges, or far around them.
+/// Ropes drawn from the ranges.
 fn bank(coordinates: &Coordinates, seed: u64) -> Vec<Point> {
     let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0xba4c_0000);
     (0..BANK)
-        .map(|_| {
-            let x = match coordinates.reach {
-                Reach::Ranges => point_of(&random_rope(rng.random())),
-                Reach::Wide => Point::from_fn(|i, _| match i {
-                    LENGTH | STIFFNESS | DAMPING | LEAD_MASS | LEAD_RADIUS => {
-                        rng.random_range(coordinates.lower[i]..=coordinates.upper[i])
-                    }
-                    _ => 0.0,
-                }),
-            };
-            searchable(coordinates, x)
-        })
+        .map(|_| searchable(coordinates, point_of(&random_rope(rng.random()))))
         .collect()
 }
 

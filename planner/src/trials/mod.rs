@@ -2,9 +2,11 @@
 //! to: errors per parameter, errors of the ratios that matter for a throw, and how
 //! often intervals hold the truth.
 
+mod fidelity;
 mod outside;
 mod summary;
 
+pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
 pub use outside::{area_under_curve, outside_rope};
 pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
 
@@ -48,6 +50,12 @@ pub enum TrialError {
         index: u64,
         /// What is wrong.
         source: SimulateError,
+    },
+    /// The film has no frame.
+    #[error("trial {index}: the film has no frame; film longer")]
+    EmptyFilm {
+        /// Index of the trial.
+        index: u64,
     },
     /// Identification failed.
     #[error("trial {index}: {source}")]

@@ -19,6 +19,7 @@ mod sim;
 mod throw;
 mod track;
 mod wiggle;
+mod wiggle_design;
 
 use crate::cli::{Cli, Command, PlanCommand, SimCommand};
 use crate::failure::Outcome;

@@ -3,6 +3,7 @@
 //! Trials are kept in a result file with their seed and version; a run that was broken
 //! off goes on from it.
 
+mod fidelity;
 mod kept;
 mod ood;
 mod sysid;
@@ -15,6 +16,7 @@ use serde_json::Value;
 pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     match args.name {
         ReproduceName::Sysid => sysid::run(args, quiet),
+        ReproduceName::MotionFidelity => fidelity::run(args, quiet),
         ReproduceName::SysidOod => ood::run(args, quiet),
     }
 }
