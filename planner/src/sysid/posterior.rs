@@ -259,11 +259,7 @@ fn ambiguities(covariance: &[[f64; ROPE_PARAMETERS]; ROPE_PARAMETERS]) -> Vec<Am
 
 /// One rope whose ratios are those of the fit: means of the coordinates, medians of the
 /// link count and of the common factor.
-fn likeliest(
-    draws: &[Draw],
-    posterior: &RopePosterior,
-    lead_mass_kg: Option<f64>,
-) -> RopeParams {
+fn likeliest(draws: &[Draw], posterior: &RopePosterior, lead_mass_kg: Option<f64>) -> RopeParams {
     let mut x = Vector::zeros();
     for d in draws {
         x += d.coordinates * d.weight;
