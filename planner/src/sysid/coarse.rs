@@ -6,7 +6,7 @@
 
 use super::IdentifyError;
 use super::camera_pose::CORRECTIONS;
-use super::coordinates::{CAMERA, CLOCK, Coordinates, LINKS, Point, simulated_rope};
+use super::coordinates::{CAMERA, CLOCK, Coordinates, LINKS, Point, link_range, simulated_rope};
 use super::film::{Fidelity, Film, Instant, Sighting, is_finite, sample_s};
 use crate::workers::map_in_order;
 use nalgebra::{SMatrix, SVector};
@@ -86,14 +86,16 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Compares candidates, each with its own link count.
+    /// Compares candidates, each with its own link count, the nearest of the ranges.
     pub(super) fn compare(&self, points: &[Point]) -> Result<Vec<Compared>, IdentifyError> {
+        // Lanes hold ropes of one count: few counts fill them.
+        let (fewest, most) = link_range();
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a small positive number"
         )]
-        let links = |x: &Point| x[LINKS].round().max(1.0) as u32;
+        let links = |x: &Point| (x[LINKS].round().max(1.0) as u32).clamp(fewest, most);
         let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links(x))).collect();
         let rollouts = self.film.simulate(&ropes, Fidelity::Coarse)?;
         let jobs: Vec<_> = points.iter().zip(&rollouts).collect();
