@@ -1,8 +1,8 @@
-//! Identifies random ropes from synthetic films and prints the errors; then
-//! throws at random targets with the identified and judges with the true rope.
+//! Identifies random ropes from simulated films with the paper's noise and prints the
+//! errors.
 //!
-//! `identify_table [--ropes 20] [--noise 1.0] [--shared 0.5] [--degrees 18]
-//! [--hertz 1.1] [--generations 50] [--throw 1] [--verbose 1]`
+//! `identify_table [--ropes 50] [--seed 1] [--first 0] [--cmaes 1] [--verbose 1]
+//! [--tracking 3.0] [--degrees 16.5] [--hertz 1.3]`
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -10,14 +10,9 @@
     reason = "an example may stop with a message"
 )]
 
-use planner::filming::{FilmNoise, FilmTiming, film, side_camera};
-use planner::ropes::{random_rope, random_strike_target};
-use planner::sysid::{Appearance, IdentifyOptions, Observation, identify};
-use planner::tasks::{StrikeConfig, StrikeOptions, StrikeRequest, ThrowSimulator, plan_strike};
-use planner::wiggle::{WiggleConfig, wiggle};
-use rope_sim::PlannedArm;
-use shared_types::{Limits, RopeEstimate, RopeParams};
-use std::ops::ControlFlow;
+use planner::sysid::{IdentifyOptions, Method};
+use planner::trials::{Trial, TrialRig, summarise, trial_rope};
+use planner::wiggle::WiggleConfig;
 use std::time::Instant;
 
 fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
@@ -30,137 +25,93 @@ fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
         })
 }
 
-fn line(name: &str, mut values: Vec<f64>) {
-    values.sort_by(f64::total_cmp);
-    let at = |part: usize| values[(values.len() - 1) * part / 10];
-    println!(
-        "{name:34} median {:8.3}  p90 {:8.3}  max {:8.3}",
-        at(5),
-        at(9),
-        at(10)
-    );
-}
-
-/// Error of the strike planned for `found` and thrown with `rope` (cm).
-fn strike_error_cm(rope: &RopeParams, found: &RopeParams, seed: u64) -> f64 {
-    let request = StrikeRequest {
-        rope: *found,
-        target_m: random_strike_target(seed),
-        limits: Limits::default(),
-        options: StrikeOptions {
-            seed,
-            ..StrikeOptions::default()
-        },
-        config: StrikeConfig::default(),
-    };
-    let plan = plan_strike(&request, &mut |_| ControlFlow::Continue(()))
-        .expect("targets of the table are in reach");
-    ThrowSimulator::for_strike(&request)
-        .run(&[(rope, &plan.trajectory)])
-        .expect("a planned throw simulates")[0]
-        .closest_m
-        * 100.0
-}
-
-fn relative(found: &RopeParams, truth: &RopeParams, f: impl Fn(&RopeParams) -> f64) -> f64 {
-    (f(found) / f(truth) - 1.0).abs() * 100.0
-}
-
 fn main() {
     let config = WiggleConfig {
-        amplitude_rad: number("degrees", 18.0f64).to_radians(),
-        frequency_hz: number("hertz", 1.1),
+        amplitude_rad: number("degrees", 16.5f64).to_radians(),
+        frequency_hz: number("hertz", 1.3),
         ..WiggleConfig::default()
     };
-    let motion =
-        PlannedArm::new(wiggle(&config, &Limits::default()).expect("a wiggle within the limits"));
-    let camera = side_camera();
-    let mut columns: [Vec<f64>; 10] = Default::default();
-    for seed in 0..number("ropes", 20u64) {
-        let rope = random_rope(seed + 500);
-        let clock_offset_s = ((seed % 9) as f64 - 4.0) * 6e-3;
-        let noise = FilmNoise {
-            shared_part: number("shared", 0.5),
-            clock_offset_s,
-            ..FilmNoise::white(number("noise", 1.0), seed)
-        };
-        let filmed = film(&rope, &motion, &camera, 25, &FilmTiming::default(), &noise)
-            .expect("a rope of the ranges");
-        let observation = Observation {
-            track: &filmed.track,
-            camera: &camera,
-            motion: &motion,
-            appearance: Appearance {
-                rope_radius_m: Some(rope.radius_m),
-                lead_radius_m: Some(rope.lead_radius_m * 1.05),
-            },
-        };
-        let identify_options = IdentifyOptions {
-            generations: number("generations", 50),
-            seed,
-            ..IdentifyOptions::default()
-        };
+    let mut rig = TrialRig::new(&config).expect("a wiggle within the limits");
+    rig.randomisation.tracking_px[1] = number("tracking", 3.0);
+    let seed = number("seed", 1u64);
+    let options = IdentifyOptions {
+        seed,
+        method: if number("cmaes", 0) == 1 {
+            Method::Cmaes
+        } else {
+            Method::Hybrid
+        },
+        ..IdentifyOptions::default()
+    };
+    let first = number("first", 0u64);
+    let mut trials = Vec::new();
+    let mut seconds = 0.0;
+    for index in first..first + number("ropes", 50u64) {
+        let rope = trial_rope(seed, index);
+        let filmed = rig.film(&rope, seed, index).expect("a rope of the ranges");
         let start = Instant::now();
-        let RopeEstimate {
-            params: found,
-            std_dev,
-            residual_px,
-            simulations,
-            time_offset_s,
-            ..
-        } = identify(&observation, &identify_options, &mut |_| {
-            ControlFlow::Continue(())
-        })
-        .expect("a clean film");
-        let seconds = start.elapsed().as_secs_f64();
-        let bending = |r: &RopeParams| {
-            r.joint_stiffness_nm_per_rad * r.link_length_m() / r.mass_per_length_kg_per_m
-        };
-        let damping = |r: &RopeParams| {
-            r.joint_damping_nms_per_rad * r.link_length_m() / r.mass_per_length_kg_per_m
-        };
-        let lead = |r: &RopeParams| r.lead_mass_kg / r.mass_per_length_kg_per_m;
-        let length_mm = (found.length_m - rope.length_m).abs() * 1e3;
-        let row = [
-            length_mm,
-            relative(&found, &rope, bending),
-            relative(&found, &rope, damping),
-            relative(&found, &rope, lead),
-            (time_offset_s - clock_offset_s).abs() * 1e3,
-            length_mm * 1e-3 / std_dev[1].unwrap_or(f64::NAN),
-            residual_px,
-            f64::from(simulations),
-            seconds,
-            if number("throw", 1) == 1 {
-                strike_error_cm(&rope, &found, seed)
-            } else {
-                0.0
-            },
-        ];
+        let found = rig
+            .fit(&filmed, index, &options)
+            .expect("a rope of the ranges");
+        let took = start.elapsed().as_secs_f64();
+        seconds += took;
+        let trial = Trial::new(index, &rope, &found);
         if number("verbose", 0) == 1 {
+            let c = &found.circumstances;
+            let z: Vec<f64> = (0..9)
+                .map(|i| {
+                    (trial.found[i] - trial.truth[i]) / found.posterior.covariance[i][i].sqrt()
+                })
+                .collect();
             println!(
-                "{seed}: {row:.2?}\n  true  {:.4?}\n  found {:.4?}",
-                rope.to_array(),
-                found.to_array()
+                "{index} {took:.2} s, {} sims, {:.3} px, novelty {:.2}, inflation {:.2}, clock {:.4}\n  true  {:.4?}\n  found {:.4?}\n  z     {z:.2?}\n  noise {:.2?} {:.2?} camera {:.4?} {:.4?}",
+                found.simulations,
+                found.residual_px,
+                found.novelty.score,
+                found.posterior.inflation,
+                found.time_offset_s,
+                trial.truth,
+                trial.found,
+                [
+                    c.noise_along.sigma_px,
+                    c.noise_along.in_time,
+                    c.noise_along.along_rope
+                ],
+                [
+                    c.noise_across.sigma_px,
+                    c.noise_across.in_time,
+                    c.noise_across.along_rope
+                ],
+                c.camera_position_m,
+                c.camera_rotation_rad,
             );
         }
-        for (column, value) in columns.iter_mut().zip(row) {
-            column.push(value);
-        }
+        trials.push(trial);
     }
-    let names = [
-        "length (mm)",
-        "bending stiffness / mass (%)",
-        "damping / mass (%)",
-        "lead mass / mass (%)",
-        "clock offset (ms)",
-        "length error / its deviation",
-        "residual (px)",
-        "simulations",
-        "seconds",
-        "strike with the identified (cm)",
-    ];
-    for (name, column) in names.into_iter().zip(columns) {
-        line(name, column);
+    let s = summarise(&trials);
+    for row in &s.parameters {
+        println!(
+            "{:18} mean {:9.5}  median {:9.5}  paper {:7.4}  middle {:7.4}  best {:7.4}  coverage {:.3}",
+            row.label,
+            row.mean_error,
+            row.median_error,
+            row.paper,
+            row.middle,
+            row.best_possible.unwrap_or(f64::NAN),
+            row.coverage
+        );
     }
+    for row in &s.ratios {
+        println!(
+            "{:42} median {:7.4}  p90 {:7.4}",
+            row.label, row.median, row.p90
+        );
+    }
+    println!(
+        "outside {:.3}, residual {:.3} px, {:.0} simulations, {:.2} s each",
+        s.taken_for_outside,
+        s.residual_px,
+        s.simulations,
+        seconds / trials.len().max(1) as f64
+    );
 }

@@ -31,5 +31,7 @@ pub mod ropes;
 pub mod sysid;
 pub mod tasks;
 pub mod trajopt;
+pub mod trials;
 pub mod wiggle;
+pub mod wiggle_design;
 mod workers;

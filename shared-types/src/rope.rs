@@ -216,6 +216,80 @@ impl RopeParams {
     }
 }
 
+/// Link counts of [`RANGES`].
+pub const LINK_COUNTS: usize = 7;
+
+/// A combination of parameters that an observation cannot tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ambiguity {
+    /// Unit vector over the parameters in the order of [`RANGES`], each in deviations
+    /// of its range.
+    pub direction: [f64; ROPE_PARAMETERS],
+    /// Part of the prior's deviation that is left along it (0 to 1, or a little above).
+    pub kept: f64,
+}
+
+/// What an observation and the parameter ranges say about a rope together. All arrays
+/// are in the order of [`RANGES`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RopePosterior {
+    /// Means.
+    pub mean: [f64; ROPE_PARAMETERS],
+    /// Covariance.
+    pub covariance: [[f64; ROPE_PARAMETERS]; ROPE_PARAMETERS],
+    /// Intervals that hold the truth with a probability of 90 %.
+    pub interval_90: [[f64; 2]; ROPE_PARAMETERS],
+    /// Probability of each link count of the ranges, the smallest first.
+    pub links_probability: [f64; LINK_COUNTS],
+    /// What cannot be told apart, the least known first.
+    pub ambiguities: Vec<Ambiguity>,
+    /// Factor by which variances were widened because parts of the film disagree.
+    pub inflation: f64,
+}
+
+/// Noise of the keypoints in one direction, as found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct KeypointNoise {
+    /// Standard deviation (px).
+    pub sigma_px: f64,
+    /// Correlation from frame to frame.
+    pub in_time: f64,
+    /// Correlation from keypoint to keypoint.
+    pub along_rope: f64,
+}
+
+/// What the fit says beside the rope.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FitCircumstances {
+    /// Noise along the rope.
+    pub noise_along: KeypointNoise,
+    /// Noise across the rope.
+    pub noise_across: KeypointNoise,
+    /// Correction of the camera's position in the world (m).
+    pub camera_position_m: [f64; 3],
+    /// Correction of the camera's attitude, a rotation vector in its own frame (rad).
+    pub camera_rotation_rad: [f64; 3],
+}
+
+/// How far a rope is from those the ranges know.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Novelty {
+    /// Score: about how many deviations the rope is outside.
+    pub score: f64,
+    /// Score from which it counts as outside.
+    pub limit: f64,
+    /// What speaks for it; empty below the limit.
+    pub reasons: Vec<String>,
+}
+
+impl Novelty {
+    /// Whether the rope is not one of those the ranges know.
+    #[must_use]
+    pub fn is_outside(&self) -> bool {
+        self.score >= self.limit
+    }
+}
+
 /// An identified rope with its uncertainty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RopeEstimate {
@@ -226,7 +300,8 @@ pub struct RopeEstimate {
     pub std_dev: [Option<f64>; ROPE_PARAMETERS],
     /// Root mean square distance between observed and simulated keypoints (px).
     pub residual_px: f64,
-    /// Method that made it: `cmaes`.
+    /// Method that made it: `cmaes`; `hybrid-search` or `hybrid-network` after what
+    /// proposed the start; `hybrid-wide` if the rope is outside the ranges.
     pub method: heapless::String<16>,
     /// Simulations used.
     pub simulations: u32,
@@ -234,6 +309,12 @@ pub struct RopeEstimate {
     pub seed: u64,
     /// Offset added to the joint motion's clock to match the camera's (s).
     pub time_offset_s: f64,
+    /// Everything that is known about the parameters.
+    pub posterior: RopePosterior,
+    /// Noise and camera as the fit found them.
+    pub circumstances: FitCircumstances,
+    /// Whether the rope is one of those the ranges know.
+    pub novelty: Novelty,
 }
 
 #[cfg(test)]

@@ -65,6 +65,8 @@ pub enum Command {
     Score(ScoreArgs),
     /// Measure how fast this machine runs a part of the system.
     Bench(BenchArgs),
+    /// Make a result of the paper again, on simulated ropes.
+    Reproduce(ReproduceArgs),
     /// Run one of the processes in the foreground (what `wag` itself starts).
     #[command(hide = true)]
     Process(ProcessArgs),
@@ -224,6 +226,15 @@ pub struct ArmArgs {
 /// Arguments of `wag wiggle`.
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
+    /// Say how well ropes of the ranges could be known from it, and from the paper's.
+    #[arg(long)]
+    pub evaluate: bool,
+    /// Search the most telling wiggle within the limits and say how well it does.
+    #[arg(long)]
+    pub optimise: bool,
+    /// Seed of the ropes a wiggle is judged by.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
     /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
@@ -287,9 +298,9 @@ pub struct ObservationArgs {
 pub enum MethodName {
     /// A trained network.
     Nn,
-    /// A fit of the simulator to the pixels.
+    /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
     Cmaes,
-    /// Network first, then a fit.
+    /// A quick proposal, then refined.
     Hybrid,
 }
 
@@ -306,7 +317,7 @@ pub struct IdentifyArgs {
     #[command(flatten)]
     pub motion: MotionArgs,
     /// Method.
-    #[arg(long, value_enum, default_value_t = MethodName::Cmaes)]
+    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
     #[arg(long)]
@@ -480,6 +491,39 @@ pub enum BenchName {
     Rope,
     /// The control loop: wake-up error beside `cyclictest`, times within a cycle.
     Rt,
+    /// Identification: time of each method.
+    Identify,
+}
+
+/// Arguments of `wag reproduce`.
+#[derive(Debug, Args)]
+pub struct ReproduceArgs {
+    /// Which result.
+    #[arg(value_enum)]
+    pub name: ReproduceName,
+    /// Simulated ropes (motion-fidelity has its own).
+    #[arg(long, default_value_t = 1000)]
+    pub ropes: u64,
+    /// Seed of the ropes, the films and the searches.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Method.
+    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
+    pub method: MethodName,
+    /// Result file (JSON); a run that was broken off goes on from it.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Results known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReproduceName {
+    /// Errors of identified parameters (the paper's in-domain table) and coverage.
+    Sysid,
+    /// Telling ropes outside the parameter ranges from those inside.
+    SysidOod,
+    /// Motion of an identified rope in a throw it was not identified from.
+    MotionFidelity,
 }
 
 /// Arguments of `wag process`.

@@ -5,7 +5,7 @@
 //! distance between the two (a clamp that hides the first millimetres of rope)
 //! does not matter.
 
-use super::observe::Sighting;
+use super::film::Sighting;
 use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
 
@@ -22,7 +22,7 @@ pub(super) struct ClockWindow {
 /// square).
 const MOTION_MIN_PX: f64 = 3.0;
 /// Half width left to the fit where the clamp was seen moving (s).
-const HALF_WIDTH_S: f64 = 0.008;
+const HALF_WIDTH_S: f64 = 0.03;
 
 /// Finds the offset within `max_s` from the sightings of the clamp.
 pub(super) fn clock_window(

@@ -1,18 +1,22 @@
-//! The coordinates in which a rope is searched.
+//! The coordinates in which a rope, the clocks and the camera are fitted.
 //!
 //! Motion depends on bending stiffness and damping per length (`k s`, `c s`),
 //! masses and length, up to one common factor of stiffness, damping and masses.
 //! These are the coordinates: a change of the link count then leaves the motion
-//! nearly alone, so that the count is chosen after the search. Rope radius and
-//! link extra scale act only through the tiny link inertia and are not searched.
+//! nearly alone, so that the count can be fitted like a number and rounded. The
+//! common factor is left to [`super::scale`].
 
+use super::camera_pose::CorrectionPrior;
 use super::clock::ClockWindow;
-use super::scale::MassScale;
+use nalgebra::{SMatrix, SVector};
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
 
+/// Coordinates that need a simulation of their own, the link count left out.
+pub(super) const ROPE: usize = 6;
 /// Number of coordinates.
-pub(super) const COORDINATES: usize = 6;
+pub(super) const FREE: usize = 14;
+
 /// Rope length (m).
 pub(super) const LENGTH: usize = 0;
 /// `ln(k s / µ)`.
@@ -23,21 +27,38 @@ pub(super) const DAMPING: usize = 2;
 pub(super) const LEAD_MASS: usize = 3;
 /// Radius of the lead (m).
 pub(super) const LEAD_RADIUS: usize = 4;
+/// Radius of a link's inertia in half links, `max(e, 2 r / s)` (1).
+pub(super) const INERTIA: usize = 5;
+/// Number of links, as if it were a real number.
+pub(super) const LINKS: usize = 6;
 /// Clock offset between arm and camera (s).
-pub(super) const CLOCK: usize = 5;
+pub(super) const CLOCK: usize = 7;
+/// First of the six corrections of the camera's place.
+pub(super) const CAMERA: usize = 8;
+
+/// A point of the fit.
+pub(super) type Point = SVector<f64, FREE>;
+/// Matrix over the coordinates.
+pub(super) type Square = SMatrix<f64, FREE, FREE>;
 
 /// Indices into [`RANGES`].
-mod parameter {
-    pub(super) const LINKS: usize = 0;
-    pub(super) const LENGTH: usize = 1;
-    pub(super) const DAMPING: usize = 2;
-    pub(super) const STIFFNESS: usize = 3;
-    pub(super) const RADIUS: usize = 4;
-    pub(super) const MASS_PER_LENGTH: usize = 5;
-    pub(super) const LEAD_MASS: usize = 6;
-    pub(super) const LEAD_RADIUS: usize = 7;
-    pub(super) const EXTRA_SCALE: usize = 8;
+pub(super) mod parameter {
+    pub(in crate::sysid) const LINKS: usize = 0;
+    pub(in crate::sysid) const LENGTH: usize = 1;
+    pub(in crate::sysid) const DAMPING: usize = 2;
+    pub(in crate::sysid) const STIFFNESS: usize = 3;
+    pub(in crate::sysid) const RADIUS: usize = 4;
+    pub(in crate::sysid) const MASS_PER_LENGTH: usize = 5;
+    pub(in crate::sysid) const LEAD_MASS: usize = 6;
+    pub(in crate::sysid) const LEAD_RADIUS: usize = 7;
+    pub(in crate::sysid) const EXTRA_SCALE: usize = 8;
 }
+
+/// Mass per length of simulated ropes (kg/m): any would do, see the module; small, so
+/// that the stiffest ropes of a wide search stay within what the simulator accepts.
+const SIMULATED_MASS_PER_LENGTH: f64 = 0.01;
+/// Radius of simulated ropes (m): too small to rule the link inertia.
+const SIMULATED_RADIUS_M: f64 = 1e-4;
 
 /// Sizes seen in the picture, where it was sharp enough.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -48,163 +69,170 @@ pub struct Appearance {
     pub lead_radius_m: Option<f64>,
 }
 
-/// Box of the search and the way from its points to ropes.
+impl Appearance {
+    /// How far a half width seen in the picture may be from the radius (m): a part of
+    /// it for the distance of the camera, and a quarter of a pixel of this size.
+    pub(super) fn std_dev_m(radius_m: f64, pixel_m: f64) -> f64 {
+        (0.02 * radius_m).hypot(0.25 * pixel_m)
+    }
+}
+
+/// Which ropes are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// Those of the parameter ranges, with a margin.
+    Ranges,
+    /// Far beyond them.
+    Wide,
+}
+
+/// Box of the fit, its prior, and the way from its points to ropes.
 #[derive(Debug, Clone)]
 pub(super) struct Coordinates {
-    pub(super) lower: [f64; COORDINATES],
-    pub(super) upper: [f64; COORDINATES],
-    pub(super) middle: [f64; COORDINATES],
-    links: u32,
-    rope_radius_m: f64,
-    link_extra_scale: f64,
-    scale: MassScale,
+    pub(super) lower: Point,
+    pub(super) upper: Point,
+    /// Mean and deviation of the prior used while fitting. Where the ranges are the
+    /// prior it is weak: their edges come in with [`super::posterior`].
+    pub(super) prior_mean: Point,
+    pub(super) prior_std: Point,
 }
 
-fn middle_of(parameter: usize) -> f64 {
-    (RANGES[parameter].min + RANGES[parameter].max) / 2.0
+/// Coordinates of a rope; clock and camera are 0.
+pub(super) fn point_of(rope: &RopeParams) -> Point {
+    let s = rope.link_length_m();
+    let mu = rope.mass_per_length_kg_per_m;
+    let mut x = Point::zeros();
+    x[LENGTH] = rope.length_m;
+    x[STIFFNESS] = (rope.joint_stiffness_nm_per_rad * s / mu).ln();
+    x[DAMPING] = (rope.joint_damping_nms_per_rad * s / mu).ln();
+    x[LEAD_MASS] = (rope.lead_mass_kg / mu).ln();
+    x[LEAD_RADIUS] = rope.lead_radius_m;
+    x[INERTIA] = rope.link_extra_scale.max(2.0 * rope.radius_m / s);
+    x[LINKS] = f64::from(rope.links);
+    x
 }
 
-fn middle_links() -> u32 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a range of small positive numbers"
-    )]
-    let links = middle_of(parameter::LINKS).round() as u32;
-    links
+/// The rope to simulate at a point, with this many links.
+pub(super) fn simulated_rope(x: &Point, links: u32) -> RopeParams {
+    let link_length = x[LENGTH] / f64::from(links);
+    let mu = SIMULATED_MASS_PER_LENGTH;
+    RopeParams {
+        links,
+        length_m: x[LENGTH],
+        joint_damping_nms_per_rad: mu * x[DAMPING].exp() / link_length,
+        joint_stiffness_nm_per_rad: mu * x[STIFFNESS].exp() / link_length,
+        radius_m: SIMULATED_RADIUS_M,
+        mass_per_length_kg_per_m: mu,
+        lead_mass_kg: mu * x[LEAD_MASS].exp(),
+        lead_radius_m: x[LEAD_RADIUS],
+        link_extra_scale: x[INERTIA],
+    }
+}
+
+/// Smallest and largest link count of the ranges.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a range of small positive numbers"
+)]
+pub(super) fn link_range() -> (u32, u32) {
+    let range = RANGES[parameter::LINKS];
+    (range.min as u32, range.max as u32)
+}
+
+/// The link count a fit is linearised at.
+pub(super) fn middle_links() -> u32 {
+    let (low, high) = link_range();
+    u32::midpoint(low, high)
 }
 
 impl Coordinates {
     /// The box for a film with this appearance and clock.
     pub(super) fn new(
         appearance: Appearance,
-        lead_mass_kg: Option<f64>,
+        pixel_m: f64,
         clock: ClockWindow,
+        camera: &CorrectionPrior,
+        reach: Reach,
     ) -> Self {
         use parameter as p;
-        let links = (RANGES[p::LINKS].min, RANGES[p::LINKS].max);
-        let length = (RANGES[p::LENGTH].min - 0.05, RANGES[p::LENGTH].max + 0.05);
-        let link_length = (length.0 / links.1, length.1 / links.0);
-        let mass = RANGES[p::MASS_PER_LENGTH];
-        let ratio = |parameter: usize, (s0, s1): (f64, f64), widen: f64| {
-            let r = RANGES[parameter];
-            (
-                (r.min * widen * s0 / mass.max).ln(),
-                (r.max * s1 / mass.min).ln(),
-            )
+        let range = |i: usize| (RANGES[i].min, RANGES[i].max);
+        let (links, length, mass) = (range(p::LINKS), range(p::LENGTH), range(p::MASS_PER_LENGTH));
+        let ratio = |i: usize, (s0, s1): (f64, f64)| {
+            let (low, high) = range(i);
+            ((low * s0 / mass.1).ln(), (high * s1 / mass.0).ln())
         };
-        let lead_radius = appearance.lead_radius_m.map_or(
-            (0.010, RANGES[p::LEAD_RADIUS].max + 0.005),
-            // A width in pixels is good to a pixel or two of motion blur.
-            |r| ((r * 0.8).max(0.003), r * 1.2),
-        );
+        let link_length = (length.0 / links.1, length.1 / links.0);
+        // How far beyond the ranges: (below, above) in each coordinate's unit.
+        let (far_m, far_ln, far_radius_m) = match reach {
+            Reach::Ranges => ((0.10, 0.10), (1.4, 1.0), (0.010, 0.010)),
+            Reach::Wide => ((0.25, 0.60), (4.0, 2.5), (0.012, 0.040)),
+        };
+        let widened =
+            |(low, high): (f64, f64), (below, above): (f64, f64)| (low - below, high + above);
+        let lead_radius = widened(range(p::LEAD_RADIUS), far_radius_m);
         let boxes = [
-            length,
-            ratio(p::STIFFNESS, link_length, 1.0),
-            ratio(p::DAMPING, link_length, 1.0),
+            widened(length, far_m),
+            widened(ratio(p::STIFFNESS, link_length), (far_ln.0 + 1.0, far_ln.1)),
+            widened(ratio(p::DAMPING, link_length), (far_ln.0 + 1.0, far_ln.1)),
             // Leads of real ropes weigh as little as a quarter of the range's end.
-            ratio(p::LEAD_MASS, (1.0, 1.0), 0.25),
-            lead_radius,
+            widened(ratio(p::LEAD_MASS, (1.0, 1.0)), far_ln),
+            (lead_radius.0.max(0.003), lead_radius.1),
+            (0.2, 2.0),
+            (links.0 - 6.0, links.1 + 6.0),
             (
                 clock.offset_s - clock.half_width_s,
                 clock.offset_s + clock.half_width_s,
             ),
         ];
-        Self {
-            lower: boxes.map(|b| b.0),
-            upper: boxes.map(|b| b.1),
-            middle: boxes.map(|b| (b.0 + b.1) / 2.0),
-            links: middle_links(),
-            rope_radius_m: appearance
-                .rope_radius_m
-                .unwrap_or_else(|| middle_of(p::RADIUS))
-                .max(1e-4),
-            link_extra_scale: middle_of(p::EXTRA_SCALE),
-            scale: MassScale::new(lead_mass_kg),
-        }
-    }
-
-    /// The same box for ropes of another link count.
-    pub(super) fn with_links(&self, links: u32) -> Self {
-        Self {
-            links,
-            ..self.clone()
-        }
-    }
-
-    /// Link counts of the ranges.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a range of small positive numbers"
-    )]
-    pub(super) fn link_counts() -> impl Iterator<Item = u32> {
-        let range = RANGES[parameter::LINKS];
-        range.min as u32..=range.max as u32
-    }
-
-    /// Deviation of the first generation: a quarter of the box.
-    pub(super) fn spread(&self) -> [f64; COORDINATES] {
-        core::array::from_fn(|i| (self.upper[i] - self.lower[i]) / 4.0)
-    }
-
-    /// The rope of a point, its masses at the likeliest scale.
-    pub(super) fn rope(&self, x: &[f64; COORDINATES]) -> RopeParams {
-        let links = f64::from(self.links);
-        let link_length = x[LENGTH] / links;
-        let ratios = [
-            x[STIFFNESS].exp() / link_length,
-            x[DAMPING].exp() / link_length,
-            x[LEAD_MASS].exp(),
-        ];
-        let mass_per_length = self.scale.mass_per_length(ratios).middle;
-        RopeParams::from_array([
-            links,
-            x[LENGTH],
-            ratios[1] * mass_per_length,
-            ratios[0] * mass_per_length,
-            self.rope_radius_m,
-            mass_per_length,
-            ratios[2] * mass_per_length,
-            x[LEAD_RADIUS],
-            self.link_extra_scale,
-        ])
-    }
-
-    /// Standard deviations in the order of [`RANGES`] from those of the
-    /// coordinates (`None` where the film says nothing).
-    pub(super) fn rope_std_dev(
-        &self,
-        x: &[f64; COORDINATES],
-        std_dev: &[Option<f64>; COORDINATES],
-    ) -> [Option<f64>; shared_types::rope::ROPE_PARAMETERS] {
-        use parameter as p;
-        let rope = self.rope(x).to_array();
-        let link_length = x[LENGTH] / f64::from(self.links);
-        let ratios = [
-            x[STIFFNESS].exp() / link_length,
-            x[DAMPING].exp() / link_length,
-            x[LEAD_MASS].exp(),
-        ];
-        let scale = self.scale.mass_per_length(ratios);
-        let relative_scale = scale.std_dev / scale.middle;
-        let with_scale =
-            |value: f64, log_std: Option<f64>| log_std.map(|s| value * s.hypot(relative_scale));
-        let mut out = [None; shared_types::rope::ROPE_PARAMETERS];
-        out[p::LENGTH] = std_dev[LENGTH];
-        out[p::DAMPING] = with_scale(rope[p::DAMPING], std_dev[DAMPING]);
-        out[p::STIFFNESS] = with_scale(rope[p::STIFFNESS], std_dev[STIFFNESS]);
-        out[p::MASS_PER_LENGTH] = Some(match self.scale.is_weighed() {
-            // A weighed lead leaves the error of the mass ratio to the rope.
-            true => rope[p::MASS_PER_LENGTH] * std_dev[LEAD_MASS].unwrap_or(1.0),
-            false => scale.std_dev,
-        });
-        out[p::LEAD_MASS] = match self.scale.is_weighed() {
-            true => Some(0.0),
-            false => with_scale(rope[p::LEAD_MASS], std_dev[LEAD_MASS]),
+        let mut out = Self {
+            lower: Point::zeros(),
+            upper: Point::zeros(),
+            prior_mean: Point::zeros(),
+            prior_std: Point::zeros(),
         };
-        out[p::LEAD_RADIUS] = std_dev[LEAD_RADIUS];
+        for (i, (low, high)) in boxes.into_iter().enumerate() {
+            out.lower[i] = low;
+            out.upper[i] = high;
+            out.prior_mean[i] = f64::midpoint(low, high);
+            // Weak: a box's width.
+            out.prior_std[i] = high - low;
+        }
+        out.prior_mean[INERTIA] = 0.95;
+        out.prior_std[INERTIA] = 0.22;
+        out.prior_std[LINKS] = 4.0;
+        if let Some(radius_m) = appearance.lead_radius_m {
+            out.prior_mean[LEAD_RADIUS] = radius_m;
+            out.prior_std[LEAD_RADIUS] = Appearance::std_dev_m(radius_m, pixel_m);
+        }
+        for (i, std_dev) in camera.std_dev.iter().enumerate() {
+            out.lower[CAMERA + i] = -5.0 * std_dev;
+            out.upper[CAMERA + i] = 5.0 * std_dev;
+            out.prior_std[CAMERA + i] = *std_dev;
+        }
         out
+    }
+
+    /// The nearest point of the box.
+    pub(super) fn clamped(&self, x: &Point) -> Point {
+        Point::from_fn(|i, _| x[i].clamp(self.lower[i], self.upper[i]))
+    }
+
+    /// Deviations of `x` from the prior's mean in its deviations, squared and summed.
+    pub(super) fn prior_distance2(&self, x: &Point) -> f64 {
+        (x - self.prior_mean)
+            .component_div(&self.prior_std)
+            .norm_squared()
+    }
+
+    /// The same for one coordinate, over its deviation: the prior's gradient.
+    pub(super) fn prior_gradient(&self, x: &Point) -> Point {
+        (x - self.prior_mean).component_div(&self.prior_std.component_mul(&self.prior_std))
+    }
+
+    /// Inverse covariance of the prior.
+    pub(super) fn prior_information(&self) -> Square {
+        Square::from_diagonal(&self.prior_std.map(|s| 1.0 / (s * s)))
     }
 }
 
@@ -213,54 +241,34 @@ mod tests {
     use super::*;
     use crate::ropes::random_rope;
 
-    /// Coordinates of a rope, the inverse of [`Coordinates::rope`] up to scale.
-    fn point_of(rope: &RopeParams) -> [f64; COORDINATES] {
-        let s = rope.link_length_m();
-        let mu = rope.mass_per_length_kg_per_m;
-        [
-            rope.length_m,
-            (rope.joint_stiffness_nm_per_rad * s / mu).ln(),
-            (rope.joint_damping_nms_per_rad * s / mu).ln(),
-            (rope.lead_mass_kg / mu).ln(),
-            rope.lead_radius_m,
-            0.0,
-        ]
-    }
-
     #[test]
     fn every_rope_of_the_ranges_lies_in_the_box_and_keeps_its_ratios() {
+        let clock = ClockWindow {
+            offset_s: 0.0,
+            half_width_s: 0.01,
+        };
+        let camera = CorrectionPrior { std_dev: [0.02; 6] };
+        let c = Coordinates::new(Appearance::default(), 0.003, clock, &camera, Reach::Ranges);
         for seed in 0..300 {
             let rope = random_rope(seed);
-            let clock = ClockWindow {
-                offset_s: 0.0,
-                half_width_s: 0.01,
-            };
-            for lead_mass_kg in [None, Some(rope.lead_mass_kg)] {
-                let c = Coordinates::new(Appearance::default(), lead_mass_kg, clock)
-                    .with_links(rope.links);
-                let x = point_of(&rope);
-                for i in 0..COORDINATES {
-                    assert!(x[i] >= c.lower[i] && x[i] <= c.upper[i], "{i}: {}", x[i]);
-                }
-                let back = c.rope(&x);
-                assert!(back.validate().is_ok());
-                let factor = back.mass_per_length_kg_per_m / rope.mass_per_length_kg_per_m;
-                for (a, b) in [
-                    (back.lead_mass_kg, rope.lead_mass_kg),
-                    (
-                        back.joint_stiffness_nm_per_rad,
-                        rope.joint_stiffness_nm_per_rad,
-                    ),
-                    (
-                        back.joint_damping_nms_per_rad,
-                        rope.joint_damping_nms_per_rad,
-                    ),
-                ] {
-                    assert!((a / b / factor - 1.0).abs() < 1e-9);
-                }
-                if lead_mass_kg.is_some() {
-                    assert!((factor - 1.0).abs() < 1e-9);
-                }
+            let x = point_of(&rope);
+            assert_eq!(c.clamped(&x), x, "{rope:?}");
+            let back = simulated_rope(&x, rope.links);
+            assert!(back.validate().is_ok());
+            let factor = back.mass_per_length_kg_per_m / rope.mass_per_length_kg_per_m;
+            for (a, b) in [
+                (back.lead_mass_kg, rope.lead_mass_kg),
+                (
+                    back.joint_stiffness_nm_per_rad,
+                    rope.joint_stiffness_nm_per_rad,
+                ),
+                (
+                    back.joint_damping_nms_per_rad,
+                    rope.joint_damping_nms_per_rad,
+                ),
+                (back.link_inertia_kg_m2(), rope.link_inertia_kg_m2()),
+            ] {
+                assert!((a / b / factor - 1.0).abs() < 1e-9);
             }
         }
     }

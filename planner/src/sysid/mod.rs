@@ -1,28 +1,49 @@
-//! Φ-CMA-ES: rope parameters from the keypoints of one filmed wiggle.
+//! Rope parameters from the keypoints of one filmed wiggle.
 //!
-//! Paper, baseline Φ-CMA-ES: 60 candidates by 50 generations minimise the pixel
-//! distance between observed and simulated keypoints; the attach frame moves as
-//! measured. What the film can tell are ratios of stiffness, damping and masses
-//! (multiplying all of them by one factor changes no motion), so the search runs
-//! over those, and [`scale`] adds the factor that the parameter ranges, or a
-//! weighed lead, make likely. A Gauss-Newton polish gives the uncertainty.
+//! Something proposes a rope: a fast search, or the paper's Φ-CMA-ES ([`Method`]).
+//! Gauss-Newton steps refine it against every pixel, the offset of the clocks and a
+//! small error of the camera's place along with it, under a noise estimated from the
+//! residuals. What the film can tell are ratios of stiffness, damping and masses
+//! (multiplying all of them by one factor changes no motion), so the fit runs over
+//! those, and [`scale`] adds the factor that the parameter ranges, or a weighed lead,
+//! make likely. The result is a posterior over the nine parameters.
 
+mod camera_pose;
 mod clock;
+mod coarse;
 mod coordinates;
-mod observe;
-mod polish;
+mod descent;
+mod film;
+mod information;
+mod linear;
+mod noise;
+mod novelty;
+mod posterior;
+mod propose;
+mod refine;
 pub mod scale;
+mod search;
 
 pub use coordinates::Appearance;
+pub use information::{WiggleInformation, information};
 
-use crate::cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
-use clock::clock_window;
-use coordinates::{COORDINATES, Coordinates};
-use observe::Film;
+use crate::cmaes::CmaError;
+use camera_pose::CorrectionPrior;
+use clock::{ClockWindow, clock_window};
+use coordinates::{CLOCK, Coordinates, Reach};
+use descent::{Account, Walker};
+use film::Film;
+use novelty::novelty;
+use posterior::believe;
+use propose::{fast_search, from_proposal};
+use refine::{Refined, refine};
+use rope_sim::sensitivity::SensitivityError;
 use rope_sim::{AttachMotion, SimulateError};
+use search::search;
 use serde::{Deserialize, Serialize};
 use shared_types::keypoints::KeypointError;
-use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
+use shared_types::rope::{FitCircumstances, KeypointNoise, Novelty};
+use shared_types::{KeypointTrack, RopeEstimate, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
 
 /// What was filmed.
@@ -55,10 +76,14 @@ impl core::fmt::Debug for Observation<'_> {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IdentifyOptions {
+    /// How the start of the refinement is found.
+    pub method: Method,
     /// Candidates per generation (paper: 60).
     pub population: usize,
     /// Most generations (paper: 50).
     pub generations: usize,
+    /// Whether a search of Φ-CMA-ES stops where it has all but ceased to improve.
+    pub early_stop: bool,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Step of the rope simulation in the search (s).
@@ -73,8 +98,12 @@ pub struct IdentifyOptions {
     pub lead_mass_kg: Option<f64>,
     /// Largest offset between the clocks of arm and camera (s).
     pub clock_offset_max_s: f64,
-    /// Pixel distance beyond which a keypoint counts as an outlier (Huber).
-    pub outlier_px: f64,
+    /// Deviation of the camera's position in each direction (m).
+    pub camera_position_std_m: f64,
+    /// Deviation of the point the camera looks at, in each direction (m).
+    pub camera_look_at_std_m: f64,
+    /// Deviation of the camera's roll (rad).
+    pub camera_roll_std_rad: f64,
     /// Keypoints below this confidence are not used.
     pub confidence_min: f64,
     /// Distance (px) above which a search counts as caught in a side minimum
@@ -91,18 +120,22 @@ pub struct IdentifyOptions {
 impl Default for IdentifyOptions {
     fn default() -> Self {
         Self {
+            method: Method::Hybrid,
             population: 60,
             generations: 50,
+            early_stop: true,
             seed: 0,
             search_step_s: 2e-3,
             step_s: 1e-3,
             threads: 2,
             search_frames_max: 100,
             lead_mass_kg: None,
-            clock_offset_max_s: 0.06,
-            outlier_px: 3.0,
+            clock_offset_max_s: 0.4,
+            camera_position_std_m: 0.02,
+            camera_look_at_std_m: 0.02,
+            camera_roll_std_rad: 0.01,
             confidence_min: 0.2,
-            repeat_above_px: 2.5,
+            repeat_above_px: 4.5,
             repeats_max: 2,
             lost_part_max: 0.05,
             frames_min: 60,
@@ -110,7 +143,7 @@ impl Default for IdentifyOptions {
     }
 }
 
-/// How far a fit has come, told after every generation.
+/// How far a fit has come, told after every generation or step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitProgress {
     /// Generations done.
@@ -179,6 +212,9 @@ pub enum IdentifyError {
     /// The rope simulator refused or failed.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// Slopes of the simulation could not be taken.
+    #[error(transparent)]
+    Slopes(SensitivityError),
     /// The caller broke off.
     #[error("identification was cancelled after generation {generation}")]
     Cancelled {
@@ -187,13 +223,38 @@ pub enum IdentifyError {
     },
 }
 
-/// Fits the rope's parameters and the clock offset to an observation.
+/// How a rope is identified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// A proposal, refined.
+    #[default]
+    Hybrid,
+    /// The paper's Φ-CMA-ES, refined.
+    Cmaes,
+}
+
+/// Identifies the rope, the clock offset and the camera's place from an observation.
 /// Deterministic for a seed, whatever the threads.
 ///
 /// # Errors
 /// See [`IdentifyError`].
 pub fn identify(
     observation: &Observation<'_>,
+    options: &IdentifyOptions,
+    progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
+) -> Result<RopeEstimate, IdentifyError> {
+    identify_from(observation, None, options, progress)
+}
+
+/// [`identify`] from a rope that something else proposes, such as a network's answer;
+/// [`Method::Cmaes`] searches by itself all the same.
+///
+/// # Errors
+/// See [`IdentifyError`].
+pub fn identify_from(
+    observation: &Observation<'_>,
+    proposed: Option<&RopeParams>,
     options: &IdentifyOptions,
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
@@ -205,28 +266,136 @@ pub fn identify(
         observation.motion,
         options.clock_offset_max_s,
     );
-    let coordinates = Coordinates::new(observation.appearance, options.lead_mass_kg, clock);
-    let mut found = search(&film, &coordinates, options, options.seed, progress)?;
-    for repeat in 1..=options.repeats_max as u64 {
-        if found.distance_px <= options.repeat_above_px {
-            break;
-        }
-        let seed = options.seed.wrapping_add(repeat << 32);
-        let again = search(&film, &coordinates, options, seed, progress)?;
-        let simulations = found.simulations + again.simulations;
-        if again.distance_px < found.distance_px {
-            found = again;
-        }
-        found.simulations = simulations;
+    let mut account = Account {
+        simulations: 0,
+        steps: 0,
+        steps_max: match options.method {
+            Method::Hybrid => HYBRID_STEPS,
+            Method::Cmaes => options.generations + REFINE_STEPS,
+        },
+        progress,
+    };
+    let task = Task {
+        film: &film,
+        options,
+        clock,
+        camera: CorrectionPrior::new(options),
+    };
+    let (fit, label) = match (options.method, proposed) {
+        (Method::Hybrid, Some(rope)) => (task.proposed(rope, &mut account)?, "hybrid-network"),
+        (Method::Hybrid, None) => (task.hybrid(&mut account)?, "hybrid-search"),
+        (Method::Cmaes, _) => (task.cmaes(Reach::Ranges, &mut account)?, "cmaes"),
+    };
+    let found = novelty(&fit);
+    if !found.is_outside() || options.method == Method::Cmaes {
+        return Ok(task.estimate(&fit, found, label, account.simulations));
     }
-    polish::polish(&film, &coordinates, options.seed, &found)
+    tracing::info!(
+        score = found.score,
+        "the rope is outside the ranges: wide search"
+    );
+    let wide = task.cmaes(Reach::Wide, &mut account)?;
+    let fit = if wide.residual_px < fit.residual_px {
+        wide
+    } else {
+        fit
+    };
+    let found = novelty(&fit);
+    Ok(task.estimate(&fit, found, "hybrid-wide", account.simulations))
 }
 
-/// Result of the global search.
-struct Found {
-    x: [f64; COORDINATES],
-    distance_px: f64,
-    simulations: usize,
+/// About how many steps a refinement takes, and a fast search with it.
+const REFINE_STEPS: usize = 12;
+const HYBRID_STEPS: usize = 30;
+
+/// One identification.
+struct Task<'a> {
+    film: &'a Film<'a>,
+    options: &'a IdentifyOptions,
+    clock: ClockWindow,
+    camera: CorrectionPrior,
+}
+
+impl Task<'_> {
+    fn coordinates(&self, reach: Reach) -> Coordinates {
+        let appearance = self.film.observation.appearance;
+        let pixel_m = self.film.viewer.pixel_m();
+        Coordinates::new(appearance, pixel_m, self.clock, &self.camera, reach)
+    }
+
+    /// A fast search, refined.
+    fn hybrid(&self, account: &mut Account<'_>) -> Result<Refined, IdentifyError> {
+        let coordinates = self.coordinates(Reach::Ranges);
+        let walkers = fast_search(self.film, &coordinates, self.options.seed, account)?;
+        self.refine(&coordinates, &walkers, account)
+    }
+
+    /// A proposed rope, refined.
+    fn proposed(
+        &self,
+        rope: &RopeParams,
+        account: &mut Account<'_>,
+    ) -> Result<Refined, IdentifyError> {
+        let coordinates = self.coordinates(Reach::Ranges);
+        let walkers = from_proposal(self.film, &coordinates, rope, account)?;
+        self.refine(&coordinates, &walkers, account)
+    }
+
+    fn refine(
+        &self,
+        coordinates: &Coordinates,
+        walkers: &[Walker],
+        account: &mut Account<'_>,
+    ) -> Result<Refined, IdentifyError> {
+        let best = walkers.first().ok_or(IdentifyError::NothingVisible)?;
+        let noise_px = best.at.distance_px / 2.0_f64.sqrt();
+        refine(self.film, coordinates, &best.x, noise_px, account)
+    }
+
+    /// The global search, refined.
+    fn cmaes(&self, reach: Reach, account: &mut Account<'_>) -> Result<Refined, IdentifyError> {
+        let coordinates = self.coordinates(reach);
+        let found = search(self.film, &coordinates, self.options, account)?;
+        let noise_px = found.distance_px / 2.0_f64.sqrt();
+        refine(self.film, &coordinates, &found.x, noise_px, account)
+    }
+
+    fn estimate(
+        &self,
+        fit: &Refined,
+        novelty: Novelty,
+        label: &str,
+        simulations: usize,
+    ) -> RopeEstimate {
+        let options = self.options;
+        let appearance = self.film.observation.appearance;
+        let pixel_m = self.film.viewer.pixel_m();
+        let believed = believe(fit, appearance, pixel_m, options.lead_mass_kg, options.seed);
+        let (camera_position_m, camera_rotation_rad) =
+            self.film.viewer.moved(&linear::corrections(&fit.x));
+        let [along, across] = fit.noise.axes.map(|a| KeypointNoise {
+            sigma_px: a.sigma_px,
+            in_time: a.in_time,
+            along_rope: a.along_rope,
+        });
+        RopeEstimate {
+            params: believed.params,
+            std_dev: believed.std_dev(),
+            residual_px: fit.residual_px,
+            method: label.try_into().unwrap_or_default(),
+            simulations: u32::try_from(simulations).unwrap_or(u32::MAX),
+            seed: options.seed,
+            time_offset_s: fit.x[CLOCK],
+            posterior: believed.posterior,
+            circumstances: FitCircumstances {
+                noise_along: along,
+                noise_across: across,
+                camera_position_m,
+                camera_rotation_rad,
+            },
+            novelty,
+        }
+    }
 }
 
 fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyError> {
@@ -250,6 +419,7 @@ fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyE
     if motion_s < film_s {
         return Err(IdentifyError::MotionTooShort { motion_s, film_s });
     }
+    let deviation = |value: f64| value > 0.0 && value <= 1.0;
     let rules = [
         (
             "search_step_s",
@@ -276,10 +446,22 @@ fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyE
             "above 0 and below 10 kg",
         ),
         (
-            "outlier_px",
-            options.outlier_px,
-            options.outlier_px > 0.0,
-            "above 0",
+            "camera_position_std_m",
+            options.camera_position_std_m,
+            deviation(options.camera_position_std_m),
+            "above 0 and at most 1 m",
+        ),
+        (
+            "camera_look_at_std_m",
+            options.camera_look_at_std_m,
+            deviation(options.camera_look_at_std_m),
+            "above 0 and at most 1 m",
+        ),
+        (
+            "camera_roll_std_rad",
+            options.camera_roll_std_rad,
+            deviation(options.camera_roll_std_rad),
+            "above 0 and at most 1 rad",
         ),
     ];
     for (option, value, holds, expected) in rules {
@@ -292,74 +474,4 @@ fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyE
         }
     }
     Ok(())
-}
-
-/// The global search.
-fn search(
-    film: &Film<'_>,
-    coordinates: &Coordinates,
-    options: &IdentifyOptions,
-    seed: u64,
-    progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
-) -> Result<Found, IdentifyError> {
-    let mut strategy = CmaEs::new(CmaOptions {
-        mean: coordinates.middle.to_vec(),
-        std_dev: coordinates.spread().to_vec(),
-        lower: coordinates.lower.to_vec(),
-        upper: coordinates.upper.to_vec(),
-        population: options.population,
-        draws_max: 1,
-        seed,
-        stop: StopRules {
-            generations_max: options.generations,
-            ..StopRules::default()
-        },
-    })?;
-    let mut simulations = 0;
-    let mut history = Vec::new();
-    loop {
-        let points: Vec<[f64; COORDINATES]> = strategy
-            .ask(&mut |_| true)?
-            .iter()
-            .map(|x| core::array::from_fn(|i| x[i]))
-            .collect();
-        let fitness = film.distances_px(coordinates, &points)?;
-        simulations += points.len();
-        strategy.tell(&fitness)?;
-        let (residual_px, best) = match strategy.best() {
-            Some(best) if best.fitness < observe::INVISIBLE_PX => {
-                (best.fitness, core::array::from_fn(|i| best.x[i]))
-            }
-            _ => return Err(IdentifyError::NothingVisible),
-        };
-        let report = FitProgress {
-            generation: strategy.generation(),
-            generations: options.generations,
-            residual_px,
-            simulations,
-        };
-        if progress(report).is_break() {
-            return Err(IdentifyError::Cancelled {
-                generation: report.generation,
-            });
-        }
-        history.push(residual_px);
-        if strategy.stop().is_some() || stalled(&history) {
-            tracing::debug!(simulations, residual_px, "rope search ended");
-            return Ok(Found {
-                x: best,
-                distance_px: residual_px,
-                simulations,
-            });
-        }
-    }
-}
-
-/// Whether the best distance has all but ceased to fall: from there the polish
-/// goes on faster.
-fn stalled(history: &[f64]) -> bool {
-    const WINDOW: usize = 6;
-    const PART: f64 = 0.02;
-    let now = history.len();
-    now > 2 * WINDOW && history[now - 1] > (1.0 - PART) * history[now - 1 - WINDOW]
 }

@@ -45,15 +45,7 @@ impl MassScale {
                 std_dev: 0.0,
             };
         }
-        let [stiffness, damping, mass, lead] = [RANGES[3], RANGES[2], RANGES[5], RANGES[6]];
-        let bounds = [
-            (mass.min, mass.max),
-            (stiffness.min / ratios[0], stiffness.max / ratios[0]),
-            (damping.min / ratios[1], damping.max / ratios[1]),
-            (lead.min / ratios[2], lead.max / ratios[2]),
-        ];
-        let low = bounds.iter().map(|b| b.0).fold(0.0, f64::max);
-        let high = bounds.iter().map(|b| b.1).fold(f64::INFINITY, f64::min);
+        let (low, high) = bounds(ratios);
         if low < high {
             cubic_density(low, high)
         } else {
@@ -66,6 +58,69 @@ impl MassScale {
             }
         }
     }
+}
+
+/// A mass per length drawn for given ratios.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DrawnMass {
+    /// Mass per length (kg/m).
+    pub(super) mass_per_length: f64,
+    /// Prior density of the ratios' logarithms, up to one factor; 0 if no rope of the
+    /// ranges has them.
+    pub(super) density: f64,
+}
+
+impl MassScale {
+    /// The mass per length at the quantile `part` (0 to 1) of its density for the
+    /// ratios `[k/µ, c/µ, m_L/µ]`.
+    pub(super) fn draw(&self, ratios: [f64; 3], part: f64) -> DrawnMass {
+        let product: f64 = ratios.iter().product();
+        if let Some(lead_mass_kg) = self.lead_mass_kg {
+            let mass_per_length = lead_mass_kg / ratios[2];
+            let inside = |i: usize, value: f64| value >= RANGES[i].min && value <= RANGES[i].max;
+            let possible = inside(5, mass_per_length)
+                && inside(3, ratios[0] * mass_per_length)
+                && inside(2, ratios[1] * mass_per_length);
+            return DrawnMass {
+                mass_per_length,
+                density: if possible {
+                    ratios[0] * ratios[1] * mass_per_length.powi(3)
+                } else {
+                    0.0
+                },
+            };
+        }
+        let (low, high) = bounds(ratios);
+        if low < high {
+            let (a, b) = (low.powi(4), high.powi(4));
+            DrawnMass {
+                mass_per_length: (a + part * (b - a)).powf(0.25),
+                density: product * (b - a),
+            }
+        } else {
+            // As wide as the ranges are apart from each other.
+            DrawnMass {
+                mass_per_length: low * (high / low).powf(part),
+                density: 0.0,
+            }
+        }
+    }
+}
+
+/// Interval of the mass per length in which all four parameters stay in their ranges;
+/// empty, the lower end above the upper one, if there is none.
+fn bounds(ratios: [f64; 3]) -> (f64, f64) {
+    let [stiffness, damping, mass, lead] = [RANGES[3], RANGES[2], RANGES[5], RANGES[6]];
+    let bounds = [
+        (mass.min, mass.max),
+        (stiffness.min / ratios[0], stiffness.max / ratios[0]),
+        (damping.min / ratios[1], damping.max / ratios[1]),
+        (lead.min / ratios[2], lead.max / ratios[2]),
+    ];
+    (
+        bounds.iter().map(|b| b.0).fold(0.0, f64::max),
+        bounds.iter().map(|b| b.1).fold(f64::INFINITY, f64::min),
+    )
 }
 
 /// Median and deviation of the density proportional to `x³` on an interval.

@@ -11,11 +11,11 @@ use crate::table;
 use anyhow::{Context, anyhow};
 use camera_ingest::load_camera;
 use comfy_table::Table;
-use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Observation, identify};
+use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
-use shared_types::rope::RANGES;
+use shared_types::rope::{Ambiguity, RANGES};
 use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -86,24 +86,61 @@ fn parameter_table(estimate: &RopeEstimate) -> Table {
     let values = RANGES
         .iter()
         .zip(estimate.params.to_array())
-        .zip(estimate.std_dev);
-    let rows = values.map(|((range, value), std_dev)| {
+        .zip(estimate.std_dev)
+        .zip(estimate.posterior.interval_90);
+    let rows = values.map(|(((range, value), std_dev), [low, high])| {
         [
             range.label.to_owned(),
             format!("{value:.4}"),
             table::std_dev(std_dev),
+            format!("{low:.4} to {high:.4}"),
             range.unit.to_owned(),
         ]
     });
-    table::numbers(["parameter", "identified", "± std", "unit"], 1, rows)
+    let header = ["parameter", "identified", "± std", "90 % interval", "unit"];
+    table::numbers(header, 1, rows)
+}
+
+/// A combination of parameters that the film leaves open, in words.
+fn in_words(ambiguity: &Ambiguity) -> String {
+    const PART: f64 = 0.3;
+    let parts: Vec<String> = RANGES
+        .iter()
+        .zip(ambiguity.direction)
+        .filter(|(_, part)| part.abs() > PART)
+        .map(|(range, part)| format!("{}{}", if part < 0.0 { "-" } else { "+" }, range.label))
+        .collect();
+    parts.join(" ")
+}
+
+/// What a person should know beside the numbers.
+fn print_remarks(estimate: &RopeEstimate) {
+    for ambiguity in &estimate.posterior.ambiguities {
+        println!("not told apart by the film: {}", in_words(ambiguity));
+    }
+    if estimate.novelty.is_outside() {
+        println!(
+            "the rope is outside the known ranges (score {:.1}, limit {:.1}): {}",
+            estimate.novelty.score,
+            estimate.novelty.limit,
+            estimate.novelty.reasons.join("; ")
+        );
+    }
+}
+
+/// The planner's name of a method.
+pub fn method_of(name: MethodName) -> anyhow::Result<Method> {
+    match name {
+        MethodName::Cmaes => Ok(Method::Cmaes),
+        MethodName::Hybrid => Ok(Method::Hybrid),
+        MethodName::Nn => Err(anyhow!(
+            "identification by the network alone is not implemented in this version; use --method hybrid or --method cmaes"
+        )),
+    }
 }
 
 pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
-    if args.method != MethodName::Cmaes {
-        return Err(Failure::failed(anyhow!(
-            "the network methods are not implemented in this version; use --method cmaes"
-        )));
-    }
+    let method = method_of(args.method).or_failed()?;
     let camera = load_camera(&args.camera).or_input()?;
     let motion = attach_motion(&args.motion).or_input()?;
     let config = planner_config(None).or_failed()?;
@@ -117,6 +154,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         appearance,
     };
     let options = IdentifyOptions {
+        method,
         seed: args.seed,
         lead_mass_kg: args.lead_mass,
         ..config.identify
@@ -147,10 +185,14 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
             estimate.residual_px,
             args.out.display()
         );
+        print_remarks(&estimate);
     }
     Ok(Some(json!({
         "ok": true, "command": "identify", "out": args.out, "seconds": seconds,
         "rope": estimate.params, "std_dev": estimate.std_dev, "residual_px": estimate.residual_px,
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
+        "method": estimate.method, "posterior": estimate.posterior,
+        "circumstances": estimate.circumstances, "novelty": estimate.novelty,
+        "out_of_distribution": estimate.novelty.is_outside(),
     })))
 }

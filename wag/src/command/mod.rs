@@ -12,12 +12,14 @@ mod plan;
 mod process;
 mod record;
 mod replay;
+mod reproduce;
 mod rig;
 mod score;
 mod sim;
 mod throw;
 mod track;
 mod wiggle;
+mod wiggle_design;
 
 use crate::cli::{Cli, Command, PlanCommand, SimCommand};
 use crate::failure::Outcome;
@@ -45,6 +47,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Explain(args) => explain::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
+        Command::Reproduce(args) => reproduce::run(args, quiet),
         Command::Process(args) => process::run(args).map(|()| None),
     }
 }

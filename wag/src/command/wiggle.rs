@@ -3,6 +3,7 @@
 use super::area::require_clear_area;
 use super::plan::{planner_config, write_trajectory_csv};
 use super::throw::drive;
+use super::wiggle_design;
 use crate::cli::WiggleArgs;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
@@ -11,9 +12,12 @@ use planner::wiggle::wiggle;
 use serde_json::{Value, json};
 
 pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
+    if args.evaluate || args.optimise {
+        return wiggle_design::run(args, quiet);
+    }
     if args.csv.is_none() && args.arm.address.is_none() {
         return Err(Failure::input(anyhow!(
-            "say what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it"
+            "say what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate says what it tells"
         )));
     }
     require_clear_area(&args.arm, "WIGGLE", quiet)?;

@@ -6,13 +6,17 @@ use shared_types::rope::{RANGES, RopeEstimate, RopeParams};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Reads the nine parameters; tables `[uncertainty]` and `[fit]` are allowed
-/// and left alone, any other unknown key is refused.
+/// Tables of an identified rope beside its parameters.
+const BESIDE: [&str; 4] = ["uncertainty", "interval_90", "fit", "posterior"];
+
+/// Reads the nine parameters; the tables of an identified rope are allowed and left
+/// alone, any other unknown key is refused.
 pub fn read_rope(path: &Path) -> anyhow::Result<RopeParams> {
     let fail = || format!("rope file `{}`", path.display());
     let mut table: toml::Table = toml::from_str(&read_text(path)?).with_context(fail)?;
-    table.remove("uncertainty");
-    table.remove("fit");
+    for beside in BESIDE {
+        table.remove(beside);
+    }
     let rope: RopeParams = table.try_into().with_context(fail)?;
     rope.validate().with_context(fail)?;
     Ok(rope)
@@ -31,21 +35,42 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> anyhow::Resu
             writeln!(text, "{} = {s:e}", range.key)?;
         }
     }
+    text.push_str("\n# Intervals that hold the truth with a probability of 90 %.\n[interval_90]\n");
+    for (range, [low, high]) in RANGES.iter().zip(estimate.posterior.interval_90) {
+        writeln!(text, "{} = [{low:e}, {high:e}]", range.key)?;
+    }
     write!(
         text,
-        "\n[fit]\nmethod = \"{}\"\nresidual_px = {:.4}\nsimulations = {}\nseed = {}\ntime_offset_s = {:.6}\n",
+        "\n[fit]\nmethod = \"{}\"\nresidual_px = {:.4}\nsimulations = {}\nseed = {}\ntime_offset_s = {:.6}\nout_of_distribution = {}\nnovelty = {:.3}\n",
         estimate.method,
         estimate.residual_px,
         estimate.simulations,
         estimate.seed,
-        estimate.time_offset_s
+        estimate.time_offset_s,
+        estimate.novelty.is_outside(),
+        estimate.novelty.score
     )?;
+    text.push_str(
+        "\n# Mean and covariance in the order of the keys above; probability of 20 to 26 links.\n",
+    );
+    let posterior = toml::Table::from_iter([(
+        "posterior".to_owned(),
+        toml::Value::try_from(&estimate.posterior)?,
+    )]);
+    text.push_str(&toml::to_string(&posterior)?);
     write_atomic(path, text.as_bytes())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_types::rope::{Ambiguity, FitCircumstances, KeypointNoise, Novelty, RopePosterior};
+
+    const NOISE: KeypointNoise = KeypointNoise {
+        sigma_px: 1.0,
+        in_time: 0.8,
+        along_rope: 0.1,
+    };
 
     fn estimate() -> RopeEstimate {
         RopeEstimate {
@@ -68,6 +93,28 @@ mod tests {
             simulations: 3000,
             seed: 7,
             time_offset_s: -0.0012,
+            posterior: RopePosterior {
+                mean: [23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 0.85],
+                covariance: [[1e-4; 9]; 9],
+                interval_90: [[0.01, 0.6]; 9],
+                links_probability: [1.0 / 7.0; 7],
+                ambiguities: vec![Ambiguity {
+                    direction: [1.0 / 3.0; 9],
+                    kept: 0.9,
+                }],
+                inflation: 1.0,
+            },
+            circumstances: FitCircumstances {
+                noise_along: NOISE,
+                noise_across: NOISE,
+                camera_position_m: [0.0; 3],
+                camera_rotation_rad: [0.0; 3],
+            },
+            novelty: Novelty {
+                score: 0.5,
+                limit: 4.0,
+                reasons: Vec::new(),
+            },
         }
     }
 
@@ -77,6 +124,12 @@ mod tests {
         let path = dir.path().join("rope.toml");
         write_rope_estimate(&path, &estimate()).unwrap();
         assert_eq!(read_rope(&path).unwrap(), estimate().params);
+        let table: toml::Table = std::fs::read_to_string(&path).unwrap().parse().unwrap();
+        let interval = table["interval_90"]["length_m"].as_array().unwrap();
+        assert_eq!(interval[1].as_float(), Some(0.6));
+        let covariance = table["posterior"]["covariance"].as_array().unwrap();
+        assert_eq!(covariance.len(), 9);
+        assert_eq!(table["fit"]["out_of_distribution"].as_bool(), Some(false));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! A benchmark measures and compares with limits; it does not judge: the exit code
 //! is 0 whatever the figures are.
 
+mod identify;
 mod machine;
 mod rope;
 mod rt;
@@ -17,5 +18,6 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     match args.name {
         BenchName::Rope => rope::run(args, quiet),
         BenchName::Rt => rt::run(args, quiet),
+        BenchName::Identify => identify::run(args, quiet),
     }
 }

@@ -1,0 +1,135 @@
+//! The noise of tracked keypoints, estimated from what a fit leaves over.
+//!
+//! A tracker errs more along the rope than across it, slowly in time, and alike at
+//! neighbouring keypoints. Both axes get a size and two lag-one correlations; a
+//! correlation in time and one along the rope make a separable noise whose residuals
+//! are whitened by one difference in each direction.
+
+use super::coordinates::FREE;
+use super::film::Grid;
+
+/// Slopes of a pixel over the coordinates, then its residual, in one axis.
+pub(super) type Row = [f64; FREE + 1];
+/// Rows along and across the rope of every cell of a [`Grid`].
+pub(super) type Rows = Vec<Option<[Row; 2]>>;
+
+/// Column of the residual in a [`Row`].
+pub(super) const RESIDUAL: usize = FREE;
+/// Correlations above this are taken to be this: beyond, whitening is a difference.
+const CORRELATION_MAX: f64 = 0.97;
+/// Least noise (px): a perfect track still has rounding and the step error of the
+/// simulation in it.
+const SIGMA_MIN_PX: f64 = 0.05;
+/// Residuals beyond so many deviations do not count for the estimate.
+const CLIP: f64 = 3.0;
+
+/// Noise in one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct AxisNoise {
+    /// Standard deviation (px).
+    pub(super) sigma_px: f64,
+    /// Correlation from frame to frame.
+    pub(super) in_time: f64,
+    /// Correlation from keypoint to keypoint.
+    pub(super) along_rope: f64,
+}
+
+/// Noise along and across the rope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noise {
+    pub(super) axes: [AxisNoise; 2],
+}
+
+impl Noise {
+    /// Independent noise of one size.
+    pub(super) fn white(sigma_px: f64) -> Self {
+        let axis = AxisNoise {
+            sigma_px: sigma_px.max(SIGMA_MIN_PX),
+            in_time: 0.0,
+            along_rope: 0.0,
+        };
+        Self { axes: [axis; 2] }
+    }
+
+    /// The noise that residuals show.
+    pub(super) fn estimate(grid: &Grid, rows: &Rows) -> Self {
+        Self {
+            axes: [0, 1].map(|axis| AxisNoise::estimate(grid, rows, axis)),
+        }
+    }
+
+    /// Divides by the noise and takes the correlations out, in place.
+    pub(super) fn whiten(&self, grid: &Grid, rows: &mut Rows) {
+        let k = grid.keypoints;
+        for (axis, noise) in self.axes.iter().enumerate() {
+            for cell in rows.iter_mut().flatten() {
+                for value in &mut cell[axis] {
+                    *value /= noise.sigma_px;
+                }
+            }
+            // From the end, so that every difference is taken with the original.
+            for index in (k..rows.len()).rev() {
+                if grid.follows[index / k] {
+                    subtract(rows, index, index - k, axis, noise.in_time);
+                }
+            }
+            for index in (1..rows.len()).rev() {
+                if index % k != 0 {
+                    subtract(rows, index, index - 1, axis, noise.along_rope);
+                }
+            }
+        }
+    }
+}
+
+/// `(row - ρ before) / sqrt(1 - ρ²)`: what is new at `index`.
+fn subtract(rows: &mut Rows, index: usize, before: usize, axis: usize, correlation: f64) {
+    let (head, tail) = rows.split_at_mut(index);
+    let (Some(Some(before)), Some(Some(row))) = (head.get(before), tail.first_mut()) else {
+        return;
+    };
+    let scale = 1.0 / (1.0 - correlation * correlation).sqrt();
+    for (value, old) in row[axis].iter_mut().zip(&before[axis]) {
+        *value = (*value - correlation * old) * scale;
+    }
+}
+
+impl AxisNoise {
+    #[allow(clippy::cast_precision_loss, reason = "counts are small")]
+    fn estimate(grid: &Grid, rows: &Rows, axis: usize) -> Self {
+        let residual = |i: usize| rows[i].as_ref().map(|r| r[axis][RESIDUAL]);
+        let mut sizes: Vec<f64> = (0..rows.len()).filter_map(residual).map(f64::abs).collect();
+        if sizes.is_empty() {
+            return Noise::white(1.0).axes[axis];
+        }
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        // The median of a normal variable's size is 0.6745 deviations.
+        let limit = CLIP * (*median / 0.6745).max(SIGMA_MIN_PX);
+        let clipped = |i: usize| residual(i).map(|r| r.clamp(-limit, limit));
+        let squares: f64 = (0..rows.len()).filter_map(clipped).map(|r| r * r).sum();
+        let sigma = (squares / sizes.len() as f64).sqrt();
+        let k = grid.keypoints;
+        let lag = |step: usize, linked: &dyn Fn(usize) -> bool| {
+            let (mut products, mut squares) = (0.0, 0.0);
+            for i in step..rows.len() {
+                if linked(i)
+                    && let (Some(a), Some(b)) = (clipped(i), clipped(i - step))
+                {
+                    products += a * b;
+                    squares += f64::midpoint(a * a, b * b);
+                }
+            }
+            if squares > 0.0 {
+                (products / squares).clamp(0.0, CORRELATION_MAX)
+            } else {
+                0.0
+            }
+        };
+        Self {
+            sigma_px: sigma.max(SIGMA_MIN_PX),
+            in_time: lag(k, &|i| grid.follows[i / k]),
+            along_rope: lag(1, &|i| !i.is_multiple_of(k)),
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Identification of simulated ropes whose truth is known, and what such trials add up
+//! to: errors per parameter, errors of the ratios that matter for a throw, and how
+//! often intervals hold the truth.
+
+mod fidelity;
+mod outside;
+mod summary;
+
+pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
+pub use outside::{area_under_curve, outside_rope};
+pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
+
+use crate::filming::{FilmTiming, Filmed, Randomisation, film, side_camera};
+use crate::ropes::random_rope;
+use crate::sysid::{FitProgress, IdentifyError, IdentifyOptions, Observation, identify};
+use crate::wiggle::{WiggleConfig, WiggleError, wiggle};
+use crate::workers::map_in_order;
+use rope_sim::{PlannedArm, SimulateError};
+use serde::{Deserialize, Serialize};
+use shared_types::rope::ROPE_PARAMETERS;
+use shared_types::{Limits, RopeEstimate, RopeParams, StereoCamera};
+use std::ops::ControlFlow;
+
+/// Keypoints per frame.
+const KEYPOINTS: usize = 24;
+/// Keeps the ropes of trials apart from those of any training.
+const SALT: u64 = 0x7e57_0000_0000_0000;
+
+/// How ropes are filmed in trials.
+#[derive(Debug, Clone)]
+pub struct TrialRig {
+    /// Motion of the arm.
+    pub motion: PlannedArm,
+    /// Where the camera is said to stand.
+    pub camera: StereoCamera,
+    /// Errors of the recordings.
+    pub randomisation: Randomisation,
+}
+
+/// Why a trial could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// There is no wiggle.
+    #[error(transparent)]
+    Wiggle(#[from] WiggleError),
+    /// The film could not be simulated.
+    #[error("trial {index}: {source}")]
+    Film {
+        /// Index of the trial.
+        index: u64,
+        /// What is wrong.
+        source: SimulateError,
+    },
+    /// The film has no frame.
+    #[error("trial {index}: the film has no frame; film longer")]
+    EmptyFilm {
+        /// Index of the trial.
+        index: u64,
+    },
+    /// Identification failed.
+    #[error("trial {index}: {source}")]
+    Identify {
+        /// Index of the trial.
+        index: u64,
+        /// What is wrong.
+        source: IdentifyError,
+    },
+}
+
+/// One identified rope with its truth. Arrays are in the order of the parameter ranges.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    /// Index of the trial under its seed.
+    pub index: u64,
+    /// True parameters.
+    pub truth: [f64; ROPE_PARAMETERS],
+    /// Found parameters.
+    pub found: [f64; ROPE_PARAMETERS],
+    /// Intervals of 90 %.
+    pub interval_90: [[f64; 2]; ROPE_PARAMETERS],
+    /// Distance of the fit to the keypoints (px).
+    pub residual_px: f64,
+    /// Score of the novelty, and whether the rope was taken for one outside the ranges.
+    pub novelty: f64,
+    /// Whether it was.
+    pub outside: bool,
+    /// Method as the estimate names it.
+    pub method: String,
+    /// Ropes simulated.
+    pub simulations: u32,
+}
+
+impl TrialRig {
+    /// The wiggle of the configuration, filmed from the side with the paper's noise.
+    ///
+    /// # Errors
+    /// If the arm may not execute it.
+    pub fn new(config: &WiggleConfig) -> Result<Self, TrialError> {
+        Ok(Self {
+            motion: PlannedArm::new(wiggle(config, &Limits::default())?),
+            camera: side_camera(),
+            randomisation: Randomisation::default(),
+        })
+    }
+
+    /// Films a rope with the errors of recording `index` of `seed`.
+    ///
+    /// # Errors
+    /// What the simulator refuses.
+    pub fn film(&self, rope: &RopeParams, seed: u64, index: u64) -> Result<Filmed, TrialError> {
+        let noise = self.randomisation.draw(seed ^ SALT, index);
+        let timing = FilmTiming::default();
+        film(rope, &self.motion, &self.camera, KEYPOINTS, &timing, &noise)
+            .map_err(|source| TrialError::Film { index, source })
+    }
+
+    /// Identifies the rope of a film.
+    ///
+    /// # Errors
+    /// What identification refuses.
+    pub fn fit(
+        &self,
+        filmed: &Filmed,
+        index: u64,
+        options: &IdentifyOptions,
+    ) -> Result<RopeEstimate, TrialError> {
+        let observation = Observation {
+            track: &filmed.track,
+            camera: &self.camera,
+            motion: &self.motion,
+            appearance: filmed.appearance,
+        };
+        let options = IdentifyOptions {
+            seed: options.seed ^ index,
+            ..*options
+        };
+        identify(&observation, &options, &mut |_: FitProgress| {
+            ControlFlow::Continue(())
+        })
+        .map_err(|source| TrialError::Identify { index, source })
+    }
+}
+
+/// Rope `index` of the trials of `seed`.
+#[must_use]
+pub fn trial_rope(seed: u64, index: u64) -> RopeParams {
+    random_rope(SALT ^ (seed << 32) ^ index)
+}
+
+impl Trial {
+    /// A trial from a rope and what was found.
+    #[must_use]
+    pub fn new(index: u64, truth: &RopeParams, found: &RopeEstimate) -> Self {
+        Self {
+            index,
+            truth: truth.to_array(),
+            found: found.params.to_array(),
+            interval_90: found.posterior.interval_90,
+            residual_px: found.residual_px,
+            novelty: found.novelty.score,
+            outside: found.novelty.is_outside(),
+            method: found.method.to_string(),
+            simulations: found.simulations,
+        }
+    }
+}
+
+/// Films and identifies the ropes with these indices, in parallel; trials in the order
+/// of the indices, whatever the threads.
+///
+/// # Errors
+/// The first trial that cannot be made.
+pub fn run(
+    rig: &TrialRig,
+    rope: impl Fn(u64) -> RopeParams + Sync,
+    seed: u64,
+    indices: &[u64],
+    options: &IdentifyOptions,
+) -> Result<Vec<Trial>, TrialError> {
+    let alone = IdentifyOptions {
+        threads: 1,
+        ..*options
+    };
+    let trials = map_in_order(indices, options.threads, |index| {
+        let truth = rope(*index);
+        let filmed = rig.film(&truth, seed, *index)?;
+        let found = rig.fit(&filmed, *index, &alone)?;
+        Ok(Trial::new(*index, &truth, &found))
+    });
+    trials.into_iter().collect()
+}

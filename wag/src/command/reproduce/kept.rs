@@ -1,0 +1,137 @@
+//! Trials kept in a file, so that none is made twice.
+
+use crate::cli::ReproduceArgs;
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::files;
+use crate::progress::Stage;
+use crate::session::interrupted;
+use anyhow::{Context, anyhow};
+use planner::sysid::IdentifyOptions;
+use planner::trials::{Trial, TrialRig, run};
+use serde::{Deserialize, Serialize};
+use shared_types::RopeParams;
+use shared_types::ipc::message::Progress;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// Trials made between two writes of the file.
+const BATCH: usize = 16;
+
+/// The file of one result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Kept {
+    /// Name of the result.
+    pub name: String,
+    /// Version of the program.
+    pub version: String,
+    /// Seed of ropes, films and searches.
+    pub seed: u64,
+    /// Method asked for.
+    pub method: String,
+    /// Trials in the order of their indices.
+    pub trials: Vec<Trial>,
+}
+
+impl Kept {
+    /// What an earlier run left at `path`, or nothing yet.
+    fn open(path: Option<&Path>, empty: Self) -> anyhow::Result<Self> {
+        let Some(path) = path.filter(|p| p.exists()) else {
+            return Ok(empty);
+        };
+        let fail = || format!("result file `{}`", path.display());
+        let kept: Self = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
+        let same = kept.name == empty.name
+            && kept.version == empty.version
+            && kept.seed == empty.seed
+            && kept.method == empty.method;
+        if same {
+            return Ok(kept);
+        }
+        Err(anyhow!(
+            "is of `{}`, version {}, seed {}, method {}: name another file with --out, or remove it",
+            kept.name,
+            kept.version,
+            kept.seed,
+            kept.method
+        ))
+        .with_context(fail)
+    }
+
+    fn write(&self, path: Option<&PathBuf>) -> anyhow::Result<()> {
+        path.map_or(Ok(()), |path| files::write_json(path, self))
+    }
+}
+
+/// Makes `count` trials, or goes on with those of an earlier run.
+pub(super) fn trials(
+    name: &str,
+    args: &ReproduceArgs,
+    count: u64,
+    rig: &TrialRig,
+    options: &IdentifyOptions,
+    rope: impl Fn(u64) -> RopeParams + Sync,
+    stage: &Stage,
+) -> Outcome<Vec<Trial>> {
+    let empty = Kept {
+        name: name.to_owned(),
+        version: shared_types::VERSION.to_owned(),
+        seed: args.seed,
+        method: format!("{:?}", options.method).to_lowercase(),
+        trials: Vec::new(),
+    };
+    let mut kept = Kept::open(args.out.as_deref(), empty).or_input()?;
+    kept.trials
+        .truncate(usize::try_from(count).unwrap_or(usize::MAX));
+    let all: Vec<u64> = (kept.trials.len() as u64..count).collect();
+    for batch in all.chunks(BATCH) {
+        kept.trials
+            .extend(run(rig, &rope, args.seed, batch, options).or_failed()?);
+        kept.write(args.out.as_ref()).or_failed()?;
+        stage.progress(&Progress {
+            done: u32::try_from(kept.trials.len()).unwrap_or(u32::MAX),
+            total: u32::try_from(count).unwrap_or(u32::MAX),
+            value: kept.trials.last().map_or(0.0, |t| t.residual_px),
+            label: "ropes, residual px".to_owned(),
+        });
+        if interrupted().load(Ordering::SeqCst) {
+            return Err(Failure::failed(anyhow!(
+                "interrupted after {} of {count} ropes{}",
+                kept.trials.len(),
+                match args.out {
+                    Some(_) => "; the same command goes on from there",
+                    None => "; with --out FILE it could go on from there",
+                }
+            )));
+        }
+    }
+    Ok(kept.trials)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn empty(seed: u64) -> Kept {
+        Kept {
+            name: "sysid".to_owned(),
+            version: shared_types::VERSION.to_owned(),
+            seed,
+            method: "hybrid".to_owned(),
+            trials: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_file_of_another_seed_is_refused_and_the_same_goes_on() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("result.json");
+        assert_eq!(Kept::open(Some(&path), empty(1)).unwrap(), empty(1));
+        empty(1).write(Some(&path)).unwrap();
+        assert_eq!(Kept::open(Some(&path), empty(1)).unwrap(), empty(1));
+        let error = format!("{:#}", Kept::open(Some(&path), empty(2)).unwrap_err());
+        assert!(
+            error.contains("result.json") && error.contains("seed 1"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,22 @@
+//! `wag reproduce NAME`: a result of the paper again, on simulated ropes.
+//!
+//! Trials are kept in a result file with their seed and version; a run that was broken
+//! off goes on from it.
+
+mod fidelity;
+mod kept;
+mod ood;
+mod sysid;
+
+use crate::cli::{ReproduceArgs, ReproduceName};
+use crate::failure::Outcome;
+use serde_json::Value;
+
+/// Makes a result. The value is what `--json` prints.
+pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
+    match args.name {
+        ReproduceName::Sysid => sysid::run(args, quiet),
+        ReproduceName::MotionFidelity => fidelity::run(args, quiet),
+        ReproduceName::SysidOod => ood::run(args, quiet),
+    }
+}

@@ -1,0 +1,71 @@
+//! `wag reproduce sysid-ood`: are ropes outside the parameter ranges noticed?
+//!
+//! As many ropes like chains and beyond the ranges as ropes inside, all with the
+//! paper's noise.
+
+use super::kept::trials;
+use crate::cli::ReproduceArgs;
+use crate::command::identify::method_of;
+use crate::command::plan::planner_config;
+use crate::failure::{OrInput, Outcome};
+use crate::progress::Stage;
+use planner::sysid::IdentifyOptions;
+use planner::trials::{Trial, TrialRig, area_under_curve, outside_rope, trial_rope};
+use serde_json::{Value, json};
+
+/// Part of some trials taken for ropes outside.
+#[allow(clippy::cast_precision_loss, reason = "counts are small")]
+fn taken_for_outside(trials: &[Trial]) -> f64 {
+    trials.iter().filter(|t| t.outside).count() as f64 / trials.len().max(1) as f64
+}
+
+pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let method = method_of(args.method).or_failed()?;
+    let config = planner_config(None).or_failed()?;
+    let rig = TrialRig::new(&config.wiggle).or_failed()?;
+    let options = IdentifyOptions {
+        method,
+        seed: args.seed,
+        ..config.identify
+    };
+    crate::session::watch_interrupts().or_failed()?;
+    let stage = Stage::begin("sysid-ood", quiet);
+    // Even indices are inside, odd ones outside.
+    let rope = |index: u64| {
+        if index.is_multiple_of(2) {
+            trial_rope(args.seed, index / 2)
+        } else {
+            outside_rope(args.seed, index / 2)
+        }
+    };
+    let all = trials(
+        "sysid-ood",
+        args,
+        2 * args.ropes,
+        &rig,
+        &options,
+        rope,
+        &stage,
+    )?;
+    let (inside, outside): (Vec<Trial>, Vec<Trial>) =
+        all.into_iter().partition(|t| t.index.is_multiple_of(2));
+    let scores = |trials: &[Trial]| trials.iter().map(|t| t.novelty).collect::<Vec<f64>>();
+    let area = area_under_curve(&scores(&outside), &scores(&inside));
+    let (found, false_alarms) = (taken_for_outside(&outside), taken_for_outside(&inside));
+    let seconds = stage.done(&format!("{} ropes", inside.len() + outside.len()));
+    if !quiet {
+        println!(
+            "{} ropes inside, {} outside: area under the curve {area:.3}, {:.1} % found, {:.1} % false alarms",
+            inside.len(),
+            outside.len(),
+            100.0 * found,
+            100.0 * false_alarms
+        );
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "reproduce sysid-ood", "version": shared_types::VERSION,
+        "seed": args.seed, "method": options.method, "ropes_inside": inside.len(),
+        "ropes_outside": outside.len(), "area_under_curve": area, "found": found,
+        "false_alarms": false_alarms, "seconds": seconds, "out": args.out,
+    })))
+}

@@ -1,0 +1,80 @@
+//! `wag reproduce sysid`: errors of identified parameters beside the paper's, and
+//! whether intervals of 90 % hold the truth that often.
+
+use super::kept::trials;
+use crate::cli::ReproduceArgs;
+use crate::command::identify::method_of;
+use crate::command::plan::planner_config;
+use crate::failure::{OrInput, Outcome};
+use crate::progress::Stage;
+use crate::table::numbers;
+use planner::sysid::IdentifyOptions;
+use planner::trials::{SysidSummary, TrialRig, summarise, trial_rope};
+use serde_json::{Value, json};
+use shared_types::rope::RANGES;
+
+pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let method = method_of(args.method).or_failed()?;
+    let config = planner_config(None).or_failed()?;
+    let rig = TrialRig::new(&config.wiggle).or_failed()?;
+    let options = IdentifyOptions {
+        method,
+        seed: args.seed,
+        ..config.identify
+    };
+    crate::session::watch_interrupts().or_failed()?;
+    let stage = Stage::begin("sysid", quiet);
+    let rope = |index| trial_rope(args.seed, index);
+    let all = trials("sysid", args, args.ropes, &rig, &options, rope, &stage)?;
+    let summary = summarise(&all);
+    let seconds = stage.done(&format!("{} ropes", all.len()));
+    if !quiet {
+        print(&summary);
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "reproduce sysid", "version": shared_types::VERSION,
+        "seed": args.seed, "method": options.method, "ropes": all.len(), "seconds": seconds,
+        "out": args.out, "summary": summary,
+    })))
+}
+
+fn print(summary: &SysidSummary) {
+    let rows = summary.parameters.iter().zip(RANGES).map(|(row, range)| {
+        [
+            row.label.clone(),
+            format!("{:.4}", row.mean_error),
+            format!("{:.4}", row.paper),
+            format!("{:.4}", row.middle),
+            row.best_possible
+                .map_or_else(|| "-".to_owned(), |b| format!("{b:.4}")),
+            format!("{:.1}", 100.0 * row.coverage),
+            range.unit.to_owned(),
+        ]
+    });
+    let header = [
+        "mean absolute error",
+        "here",
+        "paper's network",
+        "middle of range",
+        "best possible",
+        "90 % interval holds (%)",
+        "unit",
+    ];
+    println!("{}", numbers(header, 1, rows));
+    let rows = summary.ratios.iter().map(|row| {
+        [
+            row.label.clone(),
+            format!("{:.2}", 100.0 * row.median),
+            format!("{:.2}", 100.0 * row.p90),
+        ]
+    });
+    let header = ["error of ratios", "median (%)", "nine tenths below (%)"];
+    println!("\n{}", numbers(header, 0, rows));
+    println!(
+        "\n{} ropes of the ranges, {:.1} % taken for ropes outside, residual {:.2} px, {:.0} simulations each",
+        summary.trials,
+        100.0 * summary.taken_for_outside,
+        summary.residual_px,
+        summary.simulations
+    );
+}

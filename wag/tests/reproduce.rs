@@ -1,0 +1,68 @@
+//! `wag reproduce` and `wag bench identify`: complete JSON, kept trials.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use serde_json::Value;
+use std::process::{Command, Output};
+
+fn wag(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn report(args: &[&str]) -> Value {
+    let output = wag(args);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    serde_json::from_slice(&output.stdout).expect("standard output is JSON")
+}
+
+#[test]
+fn trials_are_kept_and_gone_on_with() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sysid.json");
+    let path = path.to_str().unwrap();
+    let sysid = |ropes: &'static str, seed: &'static str| {
+        vec![
+            "reproduce",
+            "sysid",
+            "--ropes",
+            ropes,
+            "--seed",
+            seed,
+            "--json",
+            "--out",
+        ]
+    };
+    let run = |ropes, seed| report(&[&sysid(ropes, seed)[..], &[path]].concat());
+    assert_eq!(run("1", "3")["summary"]["trials"], 1);
+    let kept: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let both = run("2", "3");
+    assert_eq!(both["command"], "reproduce sysid");
+    assert_eq!(both["summary"]["parameters"].as_array().unwrap().len(), 9);
+    let more: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    assert_eq!(more["trials"][0], kept["trials"][0]);
+    assert_eq!(more["trials"].as_array().unwrap().len(), 2);
+    let refused = wag(&[&sysid("2", "4")[..], &[path]].concat());
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stdout).contains("seed 3"));
+}
+
+#[test]
+fn bench_identify_prints_both_methods() {
+    let report = report(&["bench", "identify", "--quick", "--json"]);
+    assert_eq!(report["command"], "bench identify");
+    let methods = report["methods"].as_array().unwrap();
+    assert_eq!(methods.len(), 2);
+    for row in methods {
+        assert!(row["wall_s"].as_f64().unwrap() > 0.0);
+        assert!(row["limit_wall_s"].as_f64().unwrap() > 0.0);
+    }
+    assert!(methods[1]["simulations"].as_f64().unwrap() >= 3000.0);
+}
