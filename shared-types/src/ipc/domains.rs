@@ -41,9 +41,7 @@ fn own_folder(folder: &Path, user: u32) -> Result<(), IpcError> {
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
         Err(e) => return Err(fail(e.to_string())),
     }
-    let found = folder
-        .symlink_metadata()
-        .map_err(|e| fail(e.to_string()))?;
+    let found = folder.symlink_metadata().map_err(|e| fail(e.to_string()))?;
     if !found.is_dir() {
         return Err(fail("it is no folder".to_owned()));
     }
