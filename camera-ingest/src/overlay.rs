@@ -111,27 +111,69 @@ impl Picture {
         }
     }
 
-    /// Writes a PNG file.
+    /// The picture made smaller by a whole factor, each pixel the mean of those it
+    /// stands for; rows and columns left over are cut off.
+    #[must_use]
+    pub fn shrunk(&self, factor: usize) -> Self {
+        let factor = factor.max(1);
+        let mut small = Self::black(self.width_px / factor, self.height_px / factor);
+        let count = factor * factor;
+        for v in 0..small.height_px {
+            for u in 0..small.width_px {
+                let mut sum = [0; 3];
+                for row in v * factor..(v + 1) * factor {
+                    let from = (row * self.width_px + u * factor) * 3;
+                    for pixel in self.rgb[from..from + factor * 3].chunks_exact(3) {
+                        for (sum, &c) in sum.iter_mut().zip(pixel) {
+                            *sum += usize::from(c);
+                        }
+                    }
+                }
+                let at = (v * small.width_px + u) * 3;
+                for (to, sum) in small.rgb[at..at + 3].iter_mut().zip(sum) {
+                    *to = u8::try_from(sum / count).unwrap_or(u8::MAX);
+                }
+            }
+        }
+        small
+    }
+
+    /// The picture as a PNG file's bytes.
+    ///
+    /// # Errors
+    /// The picture is too large for one.
+    pub fn to_png(&self) -> Result<Vec<u8>, OverlayError> {
+        let large = OverlayError::Input("the picture is too large for a PNG");
+        let (Ok(width), Ok(height)) = (u32::try_from(self.width_px), u32::try_from(self.height_px))
+        else {
+            return Err(large);
+        };
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let written = encoder
+            .write_header()
+            .and_then(|mut writer| writer.write_image_data(&self.rgb));
+        written.map_err(|_e| large).map(|()| bytes)
+    }
+
+    /// Writes a PNG file, whole or not at all.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<(), OverlayError> {
-        let fail = |reason: String| OverlayError::Write {
-            path: path.to_owned(),
-            reason,
-        };
-        let file = std::fs::File::create(path).map_err(|e| fail(e.to_string()))?;
-        let (Ok(width), Ok(height)) = (u32::try_from(self.width_px), u32::try_from(self.height_px))
-        else {
-            return Err(OverlayError::Input("the picture is too large for a PNG"));
-        };
-        let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header().map_err(|e| fail(e.to_string()))?;
-        writer
-            .write_image_data(&self.rgb)
-            .map_err(|e| fail(e.to_string()))
+        let bytes = self.to_png()?;
+        let mut part = path.as_os_str().to_owned();
+        part.push(".part");
+        let written = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
+        written.map_err(|e| {
+            let _ = std::fs::remove_file(&part);
+            OverlayError::Write {
+                path: path.to_owned(),
+                reason: e.to_string(),
+            }
+        })
     }
 }
 
@@ -153,7 +195,10 @@ pub fn contact_sheet(pictures: &[Picture], columns: usize) -> Result<Picture, Ov
     Ok(sheet)
 }
 
-/// Contact sheet of chosen frames with their keypoints drawn.
+/// Widest picture in a contact sheet (px): a dozen stay around a megabyte.
+const SHEET_WIDTH_PX: usize = 340;
+
+/// Contact sheet of chosen frames, made smaller, with their keypoints drawn.
 ///
 /// # Errors
 /// No frame chosen.
@@ -167,13 +212,18 @@ pub fn keypoint_sheet(
         .iter()
         .filter_map(|&i| Some((frames.get(i)?, track.frames.get(i)?)))
         .map(|(frame, tracked)| {
-            let mut picture = Picture::of(frame);
+            let factor = frame.width_px.div_ceil(SHEET_WIDTH_PX).max(1);
+            let mut picture = Picture::of(frame).shrunk(factor);
+            // The middle of pixel 0 stands for those of pixels 0 to factor - 1.
+            #[allow(clippy::cast_precision_loss, reason = "pixels of an image")]
+            let small = |x: f64| (x + 0.5) / factor as f64 - 0.5;
+            let points: Vec<[f64; 2]> = tracked.points.iter().map(|p| p.map(small)).collect();
             let line = if tracked.lost {
                 [255, 0, 0]
             } else {
                 [0, 255, 255]
             };
-            picture.polyline(&tracked.points, line, [255, 0, 255]);
+            picture.polyline(&points, line, [255, 0, 255]);
             picture
         })
         .collect();
@@ -272,6 +322,36 @@ mod tests {
         picture.cross([7.0, 3.0], 3, [0, 255, 0]);
         let red = picture.rgb.chunks(3).filter(|p| p[0] == 255).count();
         assert_eq!(red, 7, "a row of eight, one under the cross");
+    }
+
+    #[test]
+    fn a_smaller_picture_holds_the_means() {
+        let mut picture = Picture::of(&grey(100));
+        picture.set(0, 0, [0, 200, 100]);
+        let small = picture.shrunk(2);
+        assert_eq!((small.width_px, small.height_px), (4, 2));
+        assert_eq!(small.rgb[..6], [75, 125, 100, 100, 100, 100]);
+        assert_eq!(picture.shrunk(3).width_px, 2);
+        assert_eq!(picture.shrunk(1), picture);
+    }
+
+    #[test]
+    fn a_picture_that_cannot_be_written_leaves_nothing() {
+        let dir = std::env::temp_dir().join(format!("picture-{}", std::process::id()));
+        std::fs::create_dir_all(dir.join("taken.png")).unwrap();
+        assert!(
+            Picture::of(&grey(0))
+                .write_png(&dir.join("taken.png"))
+                .is_err()
+        );
+        assert!(
+            Picture::of(&grey(0))
+                .write_png(&dir.join("no/a.png"))
+                .is_err()
+        );
+        let left = std::fs::read_dir(&dir).unwrap().count();
+        std::fs::remove_dir_all(&dir).unwrap();
+        assert_eq!(left, 1, "the folder that was in the way");
     }
 
     #[test]

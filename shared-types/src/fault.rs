@@ -139,24 +139,27 @@ impl FaultCode {
         Self::ALL.into_iter().find(|c| *c as u16 == raw)
     }
 
-    /// What happened and what to do, one sentence each.
+    /// What happened and what to do, one sentence each. Running a command of `wag`
+    /// again starts a fresh controller, whose bring-up clears the arm's errors; a
+    /// program that keeps its controller sends
+    /// [`crate::ipc::message::ControllerRequest::Acknowledge`] instead.
     #[must_use]
     #[allow(clippy::too_many_lines, reason = "one line per code")]
     pub const fn explain(self) -> &'static str {
         match self {
             Self::None => "no fault",
-            Self::OperatorStop => "the operator asked for a stop; acknowledge to go on",
+            Self::OperatorStop => "the operator asked for a stop; to go on, run the command again",
             Self::OperatorLost => {
-                "the operator's heartbeat went silent while the arm moved; restart the operator's program, then acknowledge"
+                "the operator's heartbeat went silent while the arm moved; run the command again, and keep its program running while the arm moves"
             }
             Self::GuardianLost => {
-                "the guardian that stops the arm when the controller dies went silent; restart it, then acknowledge"
+                "the guardian that stops the arm when the controller dies went silent; restart it, then run the command again"
             }
             Self::DeadManReleased => {
-                "the operator let go of the dead-man switch while the arm moved; hold it, then acknowledge"
+                "the operator let go of the dead-man switch while the arm moved; hold it, then run the command again"
             }
             Self::Disarmed => {
-                "the arming was withdrawn while the arm moved; acknowledge, then arm again"
+                "the arming was withdrawn while the arm moved; arm again by running the command again"
             }
             Self::SetpointNotFinite => {
                 "a setpoint was not a finite number; this is a defect, keep the run folder and report it"
@@ -189,40 +192,40 @@ impl FaultCode {
                 "the arm did not answer in time; use a direct cable and nothing else on that network port"
             }
             Self::LinkLost => {
-                "the connection to the arm was lost; check power and cable, then acknowledge"
+                "the connection to the arm was lost; check power and cable, then run the command again"
             }
             Self::ReportStale => {
-                "joint reports stopped coming; check the arm's report ports, then acknowledge"
+                "joint reports stopped coming; check the arm's report ports, then run the command again"
             }
             Self::TrackingError => {
-                "the arm is not where it was told to be; look for an obstacle, then acknowledge"
+                "the arm is not where it was told to be; look for an obstacle, then run the command again"
             }
             Self::LateCycles => {
                 "the control thread was late by more than two cycles and the motion was slowed to rest; give it real-time priority and a core of its own"
             }
             Self::ReportFrozen => {
-                "joint reports come but their values stand still; restart the arm's controller, then acknowledge"
+                "joint reports come but their values stand still; restart the arm's controller, then run the command again"
             }
             Self::ReportClock => {
-                "the time stamps of the joint reports jump; restart the arm's controller, then acknowledge"
+                "the time stamps of the joint reports jump; restart the arm's controller, then run the command again"
             }
             Self::ReportBroken => {
-                "joint reports come torn or hold nonsense; check cable and firmware, then acknowledge"
+                "joint reports come torn or hold nonsense; check cable and firmware, then run the command again"
             }
             Self::ArmError => {
-                "the arm raised an error of its own (its code is in the record); remove the cause, then acknowledge"
+                "the arm raised an error of its own (its code is in the record); remove the cause, then run the command again"
             }
             Self::ArmModeChanged => {
-                "the arm left servo mode, probably by another program or its emergency stop; make sure there is one commander, then acknowledge"
+                "the arm left servo mode, probably by another program or its emergency stop; make sure there is one commander, then run the command again"
             }
             Self::ArmNotReady => {
-                "the arm refused to move (stopped, in error or not enabled); clear its state, then acknowledge"
+                "the arm refused to move (stopped, in error or not enabled); clear its state, then run the command again"
             }
             Self::JointStuck => {
-                "a joint does not follow; look for an obstacle or a failed drive before you acknowledge"
+                "a joint does not follow; look for an obstacle or a failed drive before you run the command again"
             }
             Self::EncoderJump => {
-                "a measured joint angle jumped; have its encoder checked before you acknowledge"
+                "a measured joint angle jumped; have its encoder checked before you run the command again"
             }
             Self::StartPoseMismatch => {
                 "the arm stands too far from the start of the plan; move it to the start pose first"
@@ -243,7 +246,7 @@ impl FaultCode {
                 "the upload of the plan did not end in time; see whether the planner still runs and send it again"
             }
             Self::SecondCommander => {
-                "somebody else commands the arm; end the other program, then acknowledge"
+                "somebody else commands the arm; end the other program, then run the command again"
             }
             Self::UnsupportedFirmware => {
                 "the arm's firmware is too old or unknown; update it with the vendor's tool"

@@ -1,7 +1,7 @@
 //! The command line.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::net::IpAddr;
+use std::net::{IpAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -22,6 +22,9 @@ pub struct Cli {
     /// Print one JSON object on standard output and nothing else there.
     #[arg(long, global = true)]
     pub json: bool,
+    /// Seed of everything random; a command without chance takes it and ignores it.
+    #[arg(long, global = true, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: Option<u64>,
     /// Log more to standard error (-v info, -vv debug).
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
@@ -79,7 +82,7 @@ pub struct DemoArgs {
     #[arg(long, value_enum, default_value_t = TaskName::Strike)]
     pub task: TaskName,
     /// Seed of the hidden rope, the target, the noise and every search.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
     /// Folder for the run; it must not exist. Default: runs/TIME-demo-SEED.
     #[arg(long)]
@@ -87,6 +90,10 @@ pub struct DemoArgs {
     /// Target x,y,z in the arm's base frame (m); default: random from the seed.
     #[arg(long, allow_hyphen_values = true)]
     pub target: Option<Point>,
+    /// Set-up of the simulated rig (TOML), as configs/rig/demo.toml; default: that
+    /// file. Domain, seed, ports and target are the demo's own.
+    #[arg(long, value_name = "FILE")]
+    pub rig_config: Option<PathBuf>,
 }
 
 /// Tasks known by name.
@@ -127,7 +134,7 @@ pub struct RigArgs {
     #[arg(long, value_name = "DOMAIN")]
     pub camera: Option<String>,
     /// Seed of the hidden rope and the noise.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
 }
 
@@ -195,8 +202,8 @@ pub struct SimThrowArgs {
 /// How to reach an arm.
 #[derive(Debug, Args)]
 pub struct ArmArgs {
-    /// Address of the arm's controller.
-    #[arg(long = "arm", value_name = "ADDR")]
+    /// Address or name of the arm's controller.
+    #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
     pub address: Option<IpAddr>,
     /// Command port.
     #[arg(long, default_value_t = 502)]
@@ -214,7 +221,8 @@ pub struct ArmArgs {
     /// Limits of the arm; default: the built-in xArm 7.
     #[arg(long)]
     pub limits: Option<PathBuf>,
-    /// Check everything and show what would happen, without moving.
+    /// Check the motion against the limits and stop there: connects to nothing,
+    /// needs no --arm.
     #[arg(long)]
     pub dry_run: bool,
     /// Use standard input as a dead-man switch: the arm moves only until Enter is
@@ -320,10 +328,10 @@ pub struct IdentifyArgs {
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
     /// Seed of the search.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
     /// Rope parameters with their uncertainty (TOML).
     #[arg(long)]
@@ -357,7 +365,7 @@ pub struct PlanArgs {
     #[arg(long)]
     pub config: Option<PathBuf>,
     /// Seed of the search.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
     /// The plan (JSON).
     #[arg(long)]
@@ -365,6 +373,10 @@ pub struct PlanArgs {
     /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
+    /// Write the plan even if the tip is predicted to miss the target by more than
+    /// 5 cm.
+    #[arg(long)]
+    pub allow_miss: bool,
 }
 
 /// Arguments of `wag check`.
@@ -402,16 +414,19 @@ pub struct LatencyArgs {
     /// Joints to move (1 to 7); default: all.
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=7))]
     pub joints: Vec<u8>,
-    /// Shape of the motion (TOML); default: the built-in one.
-    #[arg(long)]
+    /// Shape of the motion (TOML); default: the built-in one. In its pose the tool is
+    /// far from the axes of joints 1 and 3, which the allowed tool speed then keeps
+    /// too slow to be measured: `pose_rad` names another.
+    #[arg(long, value_name = "FILE")]
     pub excitation: Option<PathBuf>,
     /// Seed of the phases the motion begins with; default: the motion's own.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// Folder for the run; it must not exist. Default: runs/TIME-latency.
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// The arm's response (TOML). Default: arm-response.toml in the run folder.
+    /// The arm's response (TOML). Default: arm-response.toml in the run folder, where
+    /// one that is there already is kept.
     #[arg(long)]
     pub response: Option<PathBuf>,
 }
@@ -419,9 +434,13 @@ pub struct LatencyArgs {
 /// Arguments of `wag record`.
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// Shared-memory domain of the controller, as in its configuration.
-    #[arg(long, default_value = "wag")]
-    pub domain: String,
+    /// Run folder of a running command; its controller is recorded.
+    #[arg(conflicts_with = "domain")]
+    pub run: Option<PathBuf>,
+    /// Shared-memory domain of the controller, as in its configuration, whether it
+    /// runs yet or not. Default: that of the only controller that runs.
+    #[arg(long)]
+    pub domain: Option<String>,
     /// Stop after this long (s); default: on Ctrl-C.
     #[arg(long)]
     pub seconds: Option<f64>,
@@ -474,7 +493,7 @@ pub struct BenchArgs {
     #[arg(long)]
     pub quick: bool,
     /// Seed of the ropes and motions.
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
     /// `rt`: time of each contender (s).
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
@@ -555,6 +574,36 @@ pub enum ProcessName {
     Planner,
 }
 
+/// A seed.
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
+}
+
+/// A mass (kg).
+fn mass_kg(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(mass) if mass > 0.0 && f64::is_finite(mass) => Ok(mass),
+        _ => Err("a mass is a number above 0, in kg".to_owned()),
+    }
+}
+
+/// An address, or a name that has one; version 4 is what an arm speaks.
+fn host(text: &str) -> Result<IpAddr, String> {
+    if let Ok(address) = text.parse() {
+        return Ok(address);
+    }
+    let found: Vec<IpAddr> = (text, 0u16)
+        .to_socket_addrs()
+        .map_err(|e| format!("`{text}` is no address and has none ({e})"))?
+        .map(|socket| socket.ip())
+        .collect();
+    let first = found.iter().find(|ip| ip.is_ipv4()).or(found.first());
+    first
+        .copied()
+        .ok_or_else(|| format!("`{text}` has no address"))
+}
+
 /// Three finite numbers `x,y,z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point(pub [f64; 3]);
@@ -600,6 +649,37 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_takes_a_seed_before_or_after_its_name() {
+        let of = |args: &[&str]| Cli::try_parse_from(args);
+        let demo = |args: &[&str]| match of(args).unwrap().command {
+            Command::Demo(demo) => demo.seed,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(demo(&["wag", "demo"]), 1);
+        assert_eq!(demo(&["wag", "demo", "--seed", "7"]), 7);
+        assert_eq!(demo(&["wag", "--seed", "7", "demo"]), 7);
+        assert_eq!(
+            of(&["wag", "check", "p", "--seed", "3"]).unwrap().seed,
+            Some(3)
+        );
+        for bad in ["-1", "1.5", "x"] {
+            let said = of(&["wag", "demo", "--seed", bad]).unwrap_err().to_string();
+            assert!(said.contains("whole number from 0"), "{said}");
+        }
+    }
+
+    #[test]
+    fn masses_and_hosts_are_checked() {
+        assert_eq!(mass_kg("0.05"), Ok(0.05));
+        for bad in ["nan", "-1", "0", "inf", "heavy"] {
+            assert!(mass_kg(bad).is_err(), "{bad}");
+        }
+        assert_eq!(host("192.168.1.7"), Ok("192.168.1.7".parse().unwrap()));
+        assert!(host("localhost").unwrap().is_loopback());
+        assert!(host("no such host").is_err());
     }
 
     #[test]

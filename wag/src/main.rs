@@ -17,6 +17,10 @@
     )
 )]
 
+// First: its macros stand for the standard ones everywhere below.
+#[macro_use]
+mod output;
+
 mod cli;
 mod command;
 mod failure;
@@ -36,32 +40,53 @@ use tracing_subscriber::prelude::*;
 fn main() -> ExitCode {
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,
-        Err(e) => {
-            let _ = e.print();
-            return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
-        }
+        Err(e) => return refuse_usage(&e),
     };
     start_logging(cli.verbose);
-    match command::run(&cli) {
+    let code = match command::run(&cli) {
         Ok(result) => {
             if cli.json
                 && let Some(value) = result
             {
-                println!("{value:#}");
+                output::object(&value);
             }
-            ExitCode::SUCCESS
+            0
         }
         Err(failure) => {
             if cli.json {
-                println!(
-                    "{:#}",
-                    serde_json::json!({ "ok": false, "error": failure.to_string() })
-                );
+                output::object(&serde_json::json!({ "ok": false, "error": failure.to_string() }));
             }
             eprintln!("error: {failure}");
-            ExitCode::from(failure.exit_code())
+            failure.exit_code()
         }
+    };
+    ExitCode::from(match output::failure() {
+        Some(reason) => {
+            eprintln!("error: cannot write to standard output: {reason}");
+            code.max(1)
+        }
+        None => code,
+    })
+}
+
+/// Help, version or a wrong command line; `--json` counts even there.
+fn refuse_usage(error: &clap::Error) -> ExitCode {
+    let text = error.render();
+    if !error.use_stderr() {
+        print!("{text}");
+        return ExitCode::SUCCESS;
     }
+    if std::env::args_os().any(|arg| arg == "--json") {
+        let text = text.to_string();
+        let said = text.trim().strip_prefix("error: ").unwrap_or(&text);
+        output::object(&serde_json::json!({ "ok": false, "error": said }));
+    }
+    if std::io::stderr().is_terminal() {
+        eprint!("{}", text.ansi());
+    } else {
+        eprint!("{text}");
+    }
+    ExitCode::from(2)
 }
 
 /// Logs to standard error; `WAG_LOG` sets the filter (`debug`, `planner=trace`).

@@ -24,7 +24,50 @@ pub fn numbers<const N: usize>(
     table
 }
 
+/// Significant digits of a deviation; a value is told as far down as its deviation.
+const DIGITS: i32 = 3;
+/// Significant digits of a value whose deviation is not known.
+const DIGITS_ALONE: i32 = 4;
+
+/// Decimals that show `digits` significant ones of `value`.
+fn decimals(value: f64, digits: i32) -> usize {
+    if value == 0.0 || !value.is_finite() {
+        return 1;
+    }
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a logarithm of a finite number is a small number"
+    )]
+    let before = value.abs().log10().floor() as i32 + 1;
+    usize::try_from(digits - before).unwrap_or(0).min(12)
+}
+
+/// A value with the decimals its deviation deserves.
+pub fn number(value: f64, std_dev: Option<f64>) -> String {
+    let decimals = match std_dev {
+        Some(s) if s > 0.0 => decimals(s, DIGITS),
+        _ => decimals(value, DIGITS_ALONE),
+    };
+    format!("{value:.decimals$}")
+}
+
 /// A standard deviation, or that the observation says nothing.
 pub fn std_dev(value: Option<f64>) -> String {
-    value.map_or_else(|| "not seen".to_owned(), |s| format!("{s:.4}"))
+    value.map_or_else(|| "not seen".to_owned(), |s| number(s, Some(s)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_told_as_far_down_as_its_deviation() {
+        assert_eq!(number(0.551_234_5, Some(0.001_234_5)), "0.55123");
+        assert_eq!(std_dev(Some(0.001_234_5)), "0.00123");
+        assert_eq!(number(0.000_059_87, None), "0.00005987");
+        assert_eq!(number(23.0, None), "23.00");
+        assert_eq!(number(12_345.6, Some(250.0)), "12346");
+        assert_eq!(number(0.0, None), "0.0");
+        assert_eq!(std_dev(None), "not seen");
+    }
 }

@@ -368,7 +368,7 @@ const CASES: &[Case] = &[
             "--out",
             "no/o.npy",
         ],
-        1,
+        2,
         &["no/o.npy"],
     ),
     (
@@ -386,7 +386,7 @@ const CASES: &[Case] = &[
         &["pose.csv", "q1"],
     ),
     (&["wiggle"], 2, &["--csv", "--arm"]),
-    (&["wiggle", "--csv", "no/w.csv"], 1, &["no/w.csv"]),
+    (&["wiggle", "--csv", "no/w.csv"], 2, &["no/w.csv"]),
     (&["wiggle", "--arm", "192.0.2.1"], 2, &["--yes"]),
     (
         &[

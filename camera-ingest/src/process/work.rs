@@ -18,7 +18,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Pictures in a contact sheet, and how many stand in a row.
-const SHEET: (usize, usize) = (20, 4);
+const SHEET: (usize, usize) = (12, 3);
 /// Exposures in a picture of a throw.
 const STROBES: usize = 14;
 
@@ -154,14 +154,14 @@ fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<Camera
     }
     // The picture is worth having even when the score fails.
     let found = measure(recording, camera, *tip_rgb, *target_rgb);
-    if let Some(path) = picture {
-        write_strobe(
-            recording,
-            found.as_ref().ok().map(|s| s.time_s),
-            Path::new(path),
-        )?;
-    }
-    Ok(CameraEvent::Scored(found?))
+    let drawn = picture.as_ref().map_or(Ok(()), |path| {
+        let closest_s = found.as_ref().ok().map(|s| s.time_s);
+        write_strobe(recording, closest_s, Path::new(path))
+    });
+    // What went wrong first is told; a picture is the lesser loss.
+    let found = found?;
+    drawn?;
+    Ok(CameraEvent::Scored(found))
 }
 
 fn measure(

@@ -20,10 +20,11 @@ mod service;
 pub use camera::{CameraConfig, Resolution};
 pub use config::RigConfig;
 
-use crate::arm::{ArmStartError, SimulatedArm};
+use crate::arm::{ArmPorts, ArmStartError, SimulatedArm};
 use nalgebra::Vector3;
 use record::Record;
 use rope_sim::SimulateError;
+use service::Service;
 use shared_types::ipc::IpcError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -43,6 +44,12 @@ pub enum RigError {
         min: f64,
         /// Largest value.
         max: f64,
+    },
+    /// Another rig answers in this domain.
+    #[error("domain `{domain}` is in use by another rig; end that one or name another domain")]
+    DomainInUse {
+        /// The domain.
+        domain: String,
     },
     /// The arm did not start.
     #[error(transparent)]
@@ -114,13 +121,28 @@ fn check(config: &RigConfig) -> Result<(), RigError> {
 /// # Errors
 /// [`RigError`]: a bad set-up, a port in use, shared memory, a machine too slow.
 pub fn run(config: &RigConfig, stop: &AtomicBool) -> Result<(), RigError> {
+    run_announced(config, stop, |_| ())
+}
+
+/// [`run`] that tells its ports as soon as the arm listens.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_announced(
+    config: &RigConfig,
+    stop: &AtomicBool,
+    announce: impl FnOnce(ArmPorts),
+) -> Result<(), RigError> {
     check(config)?;
+    // Before the arm listens: a second rig must not answer for the first.
+    let service = Service::open(&config.domain)?;
     let rope = config.rope();
     let record = Record::default();
     record.place_target(config.target_m.map(Vector3::from));
     let arm = SimulatedArm::start(config.arm())?;
     let (history, ports) = (arm.history(), arm.ports());
     tracing::info!(command = ports.command, domain = %config.domain, "rig started");
+    announce(ports);
     let ended = AtomicBool::new(false);
     let (record, ended) = (&record, &ended);
     let outcome = thread::scope(|scope| {
@@ -144,20 +166,18 @@ pub fn run(config: &RigConfig, stop: &AtomicBool) -> Result<(), RigError> {
                 "rig-physics",
                 Box::new(move || physics::run(&rope, &history, record, ended)),
             ),
-            part(
-                "rig-service",
-                Box::new(move || service::run(config, ports, record, ended)),
-            ),
             part("rig-camera", Box::new(move || film(config, record, ended))),
         ];
-        while !stop.load(Ordering::Acquire) && !ended.load(Ordering::Acquire) {
-            thread::sleep(Duration::from_millis(10));
-        }
-        ended.store(true, Ordering::Release);
-        started.into_iter().try_for_each(|part| {
+        let over = || stop.load(Ordering::Acquire) || ended.load(Ordering::Acquire);
+        let served = {
+            let _end = EndWhenDropped(ended);
+            service.run(config, ports, record, over)
+        };
+        let parts = started.into_iter().try_for_each(|part| {
             let (name, handle) = part?;
             handle.join().unwrap_or(Err(RigError::Panicked { name }))
-        })
+        });
+        served.and(parts)
     });
     arm.stop();
     outcome
@@ -194,5 +214,32 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(said.contains("camera.frame_rate_hz"), "{said}");
+    }
+
+    #[test]
+    fn a_second_rig_in_a_domain_is_refused_before_its_arm_listens() {
+        let mut config = RigConfig {
+            domain: format!("test_two_rigs_{}", std::process::id()),
+            command_port: 0,
+            report_ports: [0; 4],
+            ..RigConfig::default()
+        };
+        config.camera.enabled = false;
+        let stop = AtomicBool::new(false);
+        let (told, ports) = std::sync::mpsc::channel();
+        thread::scope(|scope| {
+            let first = scope.spawn(|| run_announced(&config, &stop, |p| told.send(p).unwrap()));
+            assert_ne!(ports.recv().unwrap().command, 0);
+            let mut listened = false;
+            let second = run_announced(&config, &AtomicBool::new(true), |_| listened = true);
+            stop.store(true, Ordering::Release);
+            first.join().unwrap().unwrap();
+            let said = second.unwrap_err().to_string();
+            assert!(
+                said.contains(&config.domain) && said.contains("another rig"),
+                "{said}"
+            );
+            assert!(!listened);
+        });
     }
 }

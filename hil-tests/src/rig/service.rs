@@ -9,32 +9,58 @@ use shared_types::MonotonicNs;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{Bus, IpcError};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 const PAUSE: Duration = Duration::from_millis(4);
+/// What the library says of a second server.
+const TOO_MANY_SERVERS: &str = "ExceedsMaxSupportedServers";
 /// How long a question about the very last moments waits for physics.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Serves until `stop`.
-pub(super) fn run(
-    config: &RigConfig,
-    ports: ArmPorts,
-    record: &Record,
-    stop: &AtomicBool,
-) -> Result<(), RigError> {
-    let bus = Bus::join(&config.domain)?;
-    let server = RpcServer::<RigRpc>::open(&bus)?;
-    while !stop.load(Ordering::Acquire) {
-        match server.receive() {
-            Ok(Some(call)) => reply(&call, &answer(&call.request, config, ports, record)),
-            Ok(None) => std::thread::sleep(PAUSE),
-            // One damaged question must not end the rig.
-            Err(error @ IpcError::Message { .. }) => tracing::warn!(%error, "question dropped"),
-            Err(error) => return Err(error.into()),
-        }
+/// The rig's end of its service; stays in the thread that opened it.
+pub(super) struct Service {
+    // Order matters: the server ends before its connection.
+    server: RpcServer<RigRpc>,
+    _bus: Bus,
+}
+
+impl Service {
+    /// Opens the service.
+    ///
+    /// # Errors
+    /// [`RigError::DomainInUse`] when another rig serves, [`RigError::Ipc`].
+    pub(super) fn open(domain: &str) -> Result<Self, RigError> {
+        let bus = Bus::join(domain)?;
+        let server = RpcServer::<RigRpc>::open(&bus).map_err(|error| match error {
+            IpcError::Open { ref reason, .. } if reason.contains(TOO_MANY_SERVERS) => {
+                RigError::DomainInUse {
+                    domain: domain.to_owned(),
+                }
+            }
+            other => other.into(),
+        })?;
+        Ok(Self { server, _bus: bus })
     }
-    Ok(())
+
+    /// Serves until it is `over`.
+    pub(super) fn run(
+        &self,
+        config: &RigConfig,
+        ports: ArmPorts,
+        record: &Record,
+        over: impl Fn() -> bool,
+    ) -> Result<(), RigError> {
+        while !over() {
+            match self.server.receive() {
+                Ok(Some(call)) => reply(&call, &answer(&call.request, config, ports, record)),
+                Ok(None) => std::thread::sleep(PAUSE),
+                // One damaged question must not end the rig.
+                Err(error @ IpcError::Message { .. }) => tracing::warn!(%error, "question dropped"),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
 }
 
 fn reply(call: &Call<RigRpc>, event: &RigEvent) {

@@ -372,7 +372,16 @@ impl Relay {
         if !self.arm_error.is_none() {
             fault = FaultCode::ArmError;
         }
-        tracing::warn!(?fault, cycle, arm_error = %self.arm_error, "stopped");
+        let moved = self
+            .open
+            .iter()
+            .any(|open| matches!(open, Open::Motion { .. }));
+        if fault == FaultCode::OperatorStop && !moved {
+            // How every session ends: nothing moved, nothing is wrong.
+            tracing::info!(cycle, "told to stop at rest");
+        } else {
+            tracing::warn!(?fault, cycle, arm_error = %self.arm_error, "stopped");
+        }
         for open in self.open.drain(..) {
             match open {
                 Open::Motion { call, .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),

@@ -61,7 +61,8 @@ pub(super) fn open_error<E: core::fmt::Debug>(service: &'static str) -> impl Fn(
     }
 }
 
-/// The library's configuration for a domain: a prefix of its own for every file.
+/// The library's configuration for a domain: a prefix of its own for every file,
+/// in this user's folder.
 pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if domain.is_empty() || domain.len() > 40 || !domain.chars().all(plain) {
@@ -69,12 +70,16 @@ pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
             domain: domain.to_owned(),
         });
     }
+    let root = super::domains::root_folder()?;
+    let fail = |e: SemanticStringError| IpcError::Join {
+        domain: domain.to_owned(),
+        folder: root.clone(),
+        reason: format!("{e:?}"),
+    };
     let mut config = Config::default();
-    config.global.prefix =
-        FileName::new(prefix_of(domain).as_bytes()).map_err(|e| IpcError::Join {
-            domain: domain.to_owned(),
-            reason: format!("{e:?}"),
-        })?;
+    config.global.prefix = FileName::new(prefix_of(domain).as_bytes()).map_err(fail)?;
+    let path = Path::new(root.as_os_str().as_encoded_bytes()).map_err(fail)?;
+    config.global.set_root_path(&path);
     Ok(config)
 }
 
@@ -88,11 +93,14 @@ impl Bus {
     /// removed on the way.
     ///
     /// # Errors
-    /// [`IpcError::Domain`] for a bad name, [`IpcError::Join`] otherwise.
+    /// [`IpcError::Domain`] for a bad name, [`IpcError::Folder`] without a folder
+    /// of this user's own, [`IpcError::Join`] otherwise.
     pub fn join(domain: &str) -> Result<Self, IpcError> {
         let config = config_of(domain)?;
+        let root = super::domains::root_folder()?;
         let fail = |reason: String| IpcError::Join {
             domain: domain.to_owned(),
+            folder: root,
             reason,
         };
         let node = NodeBuilder::new()

@@ -22,6 +22,7 @@
 mod boards;
 mod bus;
 mod cause;
+mod domains;
 mod input;
 pub mod message;
 mod payload;
@@ -35,6 +36,7 @@ pub use bus::{
     FrameSubscriber, JointPublisher, JointSubscriber, KeypointPublisher, KeypointSubscriber,
 };
 pub use cause::{CauseRecord, LimitBroken, RunCounts};
+pub use domains::running_controllers;
 pub use input::{
     ArmCodesRecord, InputRecord, LinkRecord, OrderKind, OrderRecord, REPORTS_PER_CYCLE, Reports,
 };
@@ -53,14 +55,26 @@ pub enum IpcError {
         /// Name given.
         domain: String,
     },
+    /// The folder in which this user's processes meet cannot be used.
+    #[error(
+        "cannot use `{}`, where the processes of one user meet: {reason}; remove it or have it removed", .folder.display()
+    )]
+    Folder {
+        /// The folder.
+        folder: std::path::PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// The process could not join shared memory at all.
     #[error(
         "cannot join shared memory (domain `{domain}`): {reason}; all processes must run as the same user, \
-         and /dev/shm must be writable with some 100 MB free"
+         `{}` and /dev/shm must be writable with some 100 MB free", .folder.display()
     )]
     Join {
         /// Domain name.
         domain: String,
+        /// This user's folder.
+        folder: std::path::PathBuf,
         /// What the library said.
         reason: String,
     },

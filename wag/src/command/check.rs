@@ -30,7 +30,7 @@ fn kind_name(kind: LimitKind) -> &'static str {
         LimitKind::PositionMax => "position, upper",
         LimitKind::Velocity => "speed",
         LimitKind::Acceleration => "acceleration",
-        LimitKind::TcpSpeed => "tool speed",
+        LimitKind::TcpSpeed => "speed",
     }
 }
 

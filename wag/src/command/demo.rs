@@ -2,7 +2,7 @@
 //! bottom as the data flows.
 
 use super::demo_summary::{DemoRecord, show};
-use super::plan::{describe, planner_config, write_trajectory_csv};
+use super::plan::{clear_of_arm, describe, planner_config, warnings, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
@@ -65,6 +65,8 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
         .map_or_else(|| random_target(args.seed), |p| p.0);
     // Refused before anything starts, whatever rope turns out to be there.
     check_reach(target_m, RANGES[1].max).or_input()?;
+    clear_of_arm(target_m).or_input()?;
+    let rig = pipeline::shipped_rig(args.rig_config.as_deref()).or_input()?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{}", args.seed))?;
     let began = Instant::now();
@@ -73,7 +75,7 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     session
         .record_cycles(&folder.file(CYCLES_FILE))
         .or_failed()?;
-    let result = throw_once(&folder, &mut session, &mut record, quiet);
+    let result = throw_once(&folder, &mut session, &mut record, &rig, quiet);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let kept = session.recorder.write(folder.path(), record.epoch_ns());
@@ -96,10 +98,11 @@ fn throw_once(
     folder: &RunFolder,
     session: &mut Session,
     record: &mut DemoRecord,
+    rig: &RigConfig,
     quiet: bool,
 ) -> anyhow::Result<()> {
     let settings = planner_config(None)?;
-    let rig_config = pipeline::rig_config(folder, record.seed, record.target_m)?;
+    let rig_config = pipeline::rig_config(folder, rig, record.seed, record.target_m);
     let mut demo = Demo::start(folder, session, record, quiet, settings, &rig_config)?;
     let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
     demo.bring_up(&motion)?;
@@ -256,6 +259,12 @@ impl<'a> Demo<'a> {
             &self.limits,
         )?;
         self.record.stages.plan_s = stage.done(&describe(&plan));
+        for warning in warnings(&plan) {
+            if !self.quiet {
+                eprintln!("warning: {warning}");
+            }
+            self.record.warnings.push(warning);
+        }
         self.record.set_plan(&plan);
         Ok(plan)
     }

@@ -105,7 +105,7 @@ pub struct DemoRecord {
     score: Option<ScoreResult>,
     score_failed: Option<String>,
     latency: Option<LatencyReport>,
-    /// What the real-time set-up could not get.
+    /// What the real-time set-up could not get, and what is poor about the plan.
     pub warnings: Vec<String>,
     truth: Option<TruthFigures>,
     /// What became of the recording of control cycles.
@@ -238,9 +238,9 @@ fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
     let rows = (0..ROPE_PARAMETERS).map(|i| {
         [
             RANGES[i].label.to_owned(),
-            format!("{:.4}", found[i]),
+            table::number(found[i], estimate.std_dev[i]),
             table::std_dev(estimate.std_dev[i]),
-            format!("{:.4}", real[i]),
+            table::number(real[i], estimate.std_dev[i]),
             RANGES[i].unit.to_owned(),
         ]
     });
@@ -277,7 +277,10 @@ pub fn show(record: &DemoRecord) {
     }
     if let Some(latency) = &record.latency {
         println!("{}", latency_table(latency));
-        println!("{} cycles, {} missed\n", latency.cycles, latency.missed);
+        println!(
+            "throw: {} cycles, {} missed\n",
+            latency.cycles, latency.missed
+        );
     }
     let s = &record.stages;
     println!(
@@ -295,7 +298,7 @@ pub fn show(record: &DemoRecord) {
         record.wall_s
     );
     for warning in &record.warnings {
-        println!("real-time set-up: {warning}");
+        println!("warning: {warning}");
     }
     let cm =
         |v: Option<f64>| v.map_or_else(|| "unknown".to_owned(), |m| format!("{:.1} cm", 100.0 * m));

@@ -22,11 +22,33 @@ mod wiggle;
 mod wiggle_design;
 
 use crate::cli::{Cli, Command, PlanCommand, SimCommand};
-use crate::failure::Outcome;
+use crate::failure::{OrInput, Outcome};
 use serde_json::Value;
+use std::path::Path;
+
+/// Files a command is asked to write. Minutes of work must not end with the news
+/// that there is no such folder.
+fn results(command: &Command) -> Vec<&Path> {
+    let named: &[Option<&Path>] = match command {
+        Command::Sim(SimCommand::Rope(args)) => &[Some(&args.out)],
+        Command::Sim(SimCommand::Throw(args)) => &[Some(&args.out)],
+        Command::Wiggle(args) => &[args.csv.as_deref()],
+        Command::Track(args) => &[Some(&args.out), args.overlay.as_deref()],
+        Command::Identify(args) => &[Some(&args.out)],
+        Command::Plan(
+            PlanCommand::Strike(args) | PlanCommand::Lob(args) | PlanCommand::Drape(args),
+        ) => &[Some(&args.out), args.csv.as_deref()],
+        Command::Latency(args) => &[args.response.as_deref()],
+        _ => &[],
+    };
+    named.iter().flatten().copied().collect()
+}
 
 /// Runs a command. The value is what `--json` prints.
 pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
+    for path in results(&cli.command) {
+        crate::files::check_writable(path).or_input()?;
+    }
     let quiet = cli.json;
     match &cli.command {
         Command::Demo(args) => demo::run(args, quiet),

@@ -5,12 +5,13 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
 use crate::session::interrupted;
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
+use nalgebra::Vector3;
 use planner::process::PlannerConfig;
-use planner::tasks::{PlanError, StrikeOptions, StrikeRequest, plan_strike};
+use planner::tasks::{PlanError, StrikeOptions, StrikeRequest, plan_strike, start_pose_for};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
-use shared_types::{JointTrajectory, Limits, Plan};
+use shared_types::{JointTrajectory, JointVector, Limits, Plan, kinematics};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -32,6 +33,52 @@ pub fn not_there(task: &str) -> Failure {
     Failure::failed(anyhow!(
         "planning a {task} is not implemented in this version; `wag plan strike` is"
     ))
+}
+
+/// Radius of a cylinder around everything of the arm near its base axis: base,
+/// shoulder and the stand below (m).
+const BODY_RADIUS_M: f64 = 0.15;
+/// Its upper end: the shoulder stands 0.267 m high (m).
+const BODY_TOP_M: f64 = 0.40;
+/// Half the thickness of the arm's links and of the pole, with some room (m).
+const LINK_RADIUS_M: f64 = 0.08;
+
+/// Refuses targets in the base or where the arm stands before the throw.
+///
+/// # Errors
+/// Which part the target lies in.
+pub fn clear_of_arm(target_m: [f64; 3]) -> anyhow::Result<()> {
+    let [x, y, z] = target_m;
+    let refuse = |part: &str| {
+        bail!(
+            "target ({x:.3}, {y:.3}, {z:.3}) m lies in the arm's {part}; name one at least {:.0} cm away from it",
+            100.0 * LINK_RADIUS_M
+        )
+    };
+    if x.hypot(y) < BODY_RADIUS_M && z < BODY_TOP_M {
+        return refuse("base");
+    }
+    let target = Vector3::new(x, y, z);
+    let chain = arm_chain(&start_pose_for(target_m));
+    let near = |pair: &[Vector3<f64>]| distance_to_segment(target, pair[0], pair[1]);
+    if chain.windows(2).map(near).any(|d| d < LINK_RADIUS_M) {
+        return refuse("links in the start pose");
+    }
+    Ok(())
+}
+
+/// Points along the arm in a pose: the shoulder, the joints, the flange, the pole's end (m).
+fn arm_chain(q: &JointVector) -> Vec<Vector3<f64>> {
+    let mut chain: Vec<Vector3<f64>> = kinematics::link_poses(q).iter().map(|f| f.0).collect();
+    chain.push(kinematics::flange_pose(q).0);
+    chain.push(kinematics::attach_pose(q).0);
+    chain
+}
+
+fn distance_to_segment(p: Vector3<f64>, a: Vector3<f64>, b: Vector3<f64>) -> f64 {
+    let along = b - a;
+    let t = (p - a).dot(&along) / along.norm_squared().max(1e-12);
+    (p - a - along * t.clamp(0.0, 1.0)).norm()
 }
 
 /// Writes a trajectory as joints at the limits' rate, its last row at rest.
@@ -65,6 +112,36 @@ fn classify(error: PlanError) -> Failure {
     }
 }
 
+/// Predicted distances of tip and target above which a plan is told to be poor,
+/// and above which it is refused (m).
+const MISS_WARN_M: f64 = 0.01;
+const MISS_MAX_M: f64 = 0.05;
+
+/// What is wrong with a plan that keeps every limit.
+pub fn warnings(plan: &Plan) -> Vec<String> {
+    miss(plan.predicted_error_m).into_iter().collect()
+}
+
+fn miss(predicted_error_m: f64) -> Option<String> {
+    (predicted_error_m > MISS_WARN_M).then(|| {
+        format!(
+            "the tip is predicted to miss the target by {:.1} cm; try another --seed or a target nearer to the middle of the reach",
+            100.0 * predicted_error_m
+        )
+    })
+}
+
+/// Refuses a plan that would not hit, unless that is wanted.
+fn check_miss(predicted_error_m: f64, args: &PlanArgs) -> anyhow::Result<()> {
+    match miss(predicted_error_m) {
+        Some(said) if predicted_error_m > MISS_MAX_M && !args.allow_miss => bail!(
+            "{said}; `{}` is not written, --allow-miss would write it",
+            args.out.display()
+        ),
+        _ => Ok(()),
+    }
+}
+
 /// One line about a plan.
 pub fn describe(plan: &Plan) -> String {
     format!(
@@ -77,6 +154,7 @@ pub fn describe(plan: &Plan) -> String {
 
 pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
+    clear_of_arm(args.target.0).or_input()?;
     let limits = files::read_limits(args.limits.as_deref()).or_input()?;
     let config = planner_config(args.config.as_deref()).or_input()?;
     crate::session::watch_interrupts().or_failed()?;
@@ -105,16 +183,21 @@ pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         }
     })
     .map_err(classify)?;
+    let warnings = warnings(&plan);
+    check_miss(plan.predicted_error_m, args).or_failed()?;
     stage.done(&describe(&plan));
     files::write_json(&args.out, &plan).or_failed()?;
     if let Some(path) = &args.csv {
         write_trajectory_csv(path, &plan.trajectory, &limits).or_failed()?;
     }
     if !quiet {
-        println!("{} -> `{}`", describe(&plan), args.out.display());
+        for warning in &warnings {
+            eprintln!("warning: {warning}");
+        }
+        println!("plan written to `{}`", args.out.display());
     }
     Ok(Some(json!({
-        "ok": true, "command": "plan strike", "out": args.out, "seed": args.seed,
+        "ok": true, "command": "plan strike", "out": args.out, "seed": args.seed, "warnings": warnings,
         "target_m": args.target.0, "predicted_error_m": plan.predicted_error_m,
         "predicted_time_s": plan.predicted_time_s, "simulations": plan.simulations,
         "resampled": plan.resampled, "trajectory_sha256": plan.trajectory_sha256,
@@ -124,6 +207,45 @@ pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plan_that_misses_is_told_or_refused() {
+        let mut args = PlanArgs {
+            rope: "rope.toml".into(),
+            target: crate::cli::Point([1.0, 0.0, 0.4]),
+            limits: None,
+            config: None,
+            seed: 1,
+            out: "plan.json".into(),
+            csv: None,
+            allow_miss: false,
+        };
+        assert_eq!(miss(0.004), None);
+        assert!(miss(0.03).unwrap().contains("3.0 cm"));
+        assert!(check_miss(0.03, &args).is_ok());
+        let said = check_miss(0.08, &args).unwrap_err().to_string();
+        assert!(
+            said.contains("8.0 cm") && said.contains("--allow-miss"),
+            "{said}"
+        );
+        args.allow_miss = true;
+        assert!(check_miss(0.08, &args).is_ok());
+    }
+
+    #[test]
+    fn targets_in_the_arm_are_refused() {
+        let said = |t| format!("{:#}", clear_of_arm(t).unwrap_err());
+        assert!(said([0.0, 0.0, 0.1]).contains("base"));
+        assert!(said([0.05, -0.05, -0.3]).contains("base"));
+        let flange = kinematics::flange_pose(&start_pose_for([1.0, 0.0, 0.0])).0;
+        assert!(said(flange.into()).contains("links"), "{flange}");
+        let turned = start_pose_for([0.6, 0.6, 0.0]);
+        let end = kinematics::attach_pose(&turned).0;
+        assert!(said(end.into()).contains("links"), "{end}");
+        for free in [[1.0, 0.0, 0.4], [0.85, 0.3, -0.1], [1.05, -0.3, 0.6]] {
+            assert!(clear_of_arm(free).is_ok(), "{free:?}");
+        }
+    }
 
     #[test]
     fn the_shipped_file_says_what_the_defaults_are() {

@@ -5,9 +5,11 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::pipeline::RunFolder;
 use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
 use crate::session::{interrupted, watch_interrupts};
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
+use rt_controller::ControllerConfig;
 use serde_json::{Value, json};
-use shared_types::ipc::Bus;
+use shared_types::ipc::{Bus, DomainSweep, running_controllers};
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -17,15 +19,20 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
             "--seconds must be a number above zero"
         )));
     }
+    if let Some(out) = &args.out {
+        RunFolder::refuse_existing(out)?;
+    }
+    let domain = chosen_domain(args)?;
+    // Goes last, so that no file of the domain stays when this was its last user.
+    let _sweep = DomainSweep::new(&domain);
     // A wrong domain leaves no folder behind.
-    Bus::join(&args.domain).or_input()?;
+    Bus::join(&domain).or_input()?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
-    let thread = RecordingThread::start(&args.domain, &folder.file(CYCLES_FILE)).or_failed()?;
+    let thread = RecordingThread::start(&domain, &folder.file(CYCLES_FILE)).or_failed()?;
     if !quiet {
         println!(
-            "recording the controller of domain `{}` in {}; Ctrl-C ends it",
-            args.domain,
+            "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",
             folder.path().display()
         );
     }
@@ -38,13 +45,14 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
         std::thread::sleep(Duration::from_millis(20));
     }
     let report = thread.finish();
+    judge(&report, &domain).map_err(Failure::failed)?;
     let explanation = keep_cause(folder.path());
     let summary = json!({
-        "ok": report.chunks > 0, "command": "record", "run": folder.path(), "domain": args.domain,
+        "ok": report.chunks > 0, "command": "record", "run": folder.path(), "domain": domain,
         "recording": report, "explanation": explanation,
     });
     crate::files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
-    judge(&report, &args.domain).map_err(Failure::failed)?;
+    disk(&report).map_err(Failure::failed)?;
     if !quiet {
         println!(
             "{:.1} MB; read it with `wag explain {}`",
@@ -55,14 +63,71 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(summary))
 }
 
+/// The domain to record: named, of a run folder, or of the only controller there is.
+fn chosen_domain(args: &RecordArgs) -> Outcome<String> {
+    if let Some(run) = &args.run {
+        let domain = domain_of_run(run).or_input()?;
+        let runs = running_controllers();
+        return if runs.contains(&domain) {
+            Ok(domain)
+        } else {
+            Err(Failure::failed(anyhow!(
+                "the controller of run `{}` does not run any more; {}",
+                run.display(),
+                those_that_run(&runs)
+            )))
+        };
+    }
+    if let Some(domain) = &args.domain {
+        return Ok(domain.clone());
+    }
+    let mut runs = running_controllers();
+    match (runs.pop(), runs.as_slice()) {
+        (Some(only), []) => Ok(only),
+        (last, others) => {
+            let all: Vec<String> = others.iter().cloned().chain(last).collect();
+            Err(Failure::failed(anyhow!("{}", those_that_run(&all))))
+        }
+    }
+}
+
+/// The domain a run's controller was configured with.
+fn domain_of_run(run: &Path) -> anyhow::Result<String> {
+    let path = run.join("config").join("rt-controller.toml");
+    let text = crate::files::read_text(&path)
+        .with_context(|| format!("`{}` is no run folder with a controller", run.display()))?;
+    let config: ControllerConfig =
+        toml::from_str(&text).with_context(|| format!("`{}`", path.display()))?;
+    Ok(config.domain)
+}
+
+fn those_that_run(domains: &[String]) -> String {
+    if domains.is_empty() {
+        "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned()
+    } else {
+        format!(
+            "controllers of these domains run: {}; name one with --domain",
+            domains.join(", ")
+        )
+    }
+}
+
+/// Nothing recorded is nothing to keep.
 fn judge(report: &RecordingReport, domain: &str) -> anyhow::Result<()> {
+    if report.chunks == 0 && report.disk_error.is_none() {
+        return Err(anyhow!(
+            "nothing was recorded: no controller runs in domain `{domain}`; {}",
+            those_that_run(&running_controllers())
+        ));
+    }
+    Ok(())
+}
+
+fn disk(report: &RecordingReport) -> anyhow::Result<()> {
     match &report.disk_error {
         Some(error) => Err(anyhow!(
             "{} chunks could not be written ({error}); make room on the disk",
             report.unwritten_chunks
-        )),
-        None if report.chunks == 0 => Err(anyhow!(
-            "nothing was recorded: no controller runs in domain `{domain}`"
         )),
         None => Ok(()),
     }

@@ -3,7 +3,7 @@
 
 use crate::cli::ReplayArgs;
 use crate::failure::{Failure, OrInput, Outcome};
-use crate::recording::read_recording;
+use crate::recording::{Flight, explain, read_recording};
 use anyhow::{Context, anyhow};
 use rt_controller::recording::{Gap, Replay, replay};
 use serde_json::{Value, json};
@@ -13,14 +13,20 @@ pub fn run(args: &ReplayArgs, quiet: bool) -> Outcome<Option<Value>> {
     let found = replay(&bytes, args.from_cycle)
         .with_context(|| format!("`{}`", args.run.display()))
         .or_input()?;
+    // The end of a controller at rest is recorded as a stop, but is none.
+    let stops = Flight::read(&bytes).map_or(found.causes, |flight| {
+        let stops = explain(&flight).stops;
+        let compared = stops.iter().filter(|s| s.cycle >= found.first_cycle);
+        compared.count() as u64
+    });
     if !quiet {
-        print!("{}", show(&found));
+        print!("{}", show(&found, stops));
     }
     if !found.is_exact() {
         return Err(Failure::failed(anyhow!(verdict(&found))));
     }
     Ok(Some(
-        json!({ "ok": true, "command": "replay", "run": args.run, "replay": found }),
+        json!({ "ok": true, "command": "replay", "run": args.run, "stops": stops, "replay": found }),
     ))
 }
 
@@ -48,7 +54,7 @@ fn verdict(found: &Replay) -> String {
         .join("; ")
 }
 
-fn show(found: &Replay) -> String {
+fn show(found: &Replay, stops: u64) -> String {
     let mut text = format!(
         "cycles compared  {} ({} to {}), with {} whole states and {} stops\n\
          differing bytes  {}\n",
@@ -56,7 +62,7 @@ fn show(found: &Replay) -> String {
         found.first_cycle,
         found.last_cycle,
         found.states,
-        found.causes,
+        stops,
         found.differing_bytes
     );
     for gap in &found.gaps {

@@ -3,14 +3,15 @@
 use crate::cli::RigArgs;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::session::{Session, interrupted, watch_interrupts};
-use anyhow::{Context, anyhow, bail};
-use hil_tests::arm::{ArmConfig, FaultScript, SimulatedArm};
-use hil_tests::rig::RigConfig;
+use crate::output;
+use crate::session::{interrupted, watch_interrupts};
+use anyhow::anyhow;
+use hil_tests::arm::{ArmConfig, ArmPorts, FaultScript, SimulatedArm};
+use hil_tests::rig::{RigConfig, run_announced};
 use serde_json::{Value, json};
-use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
+use shared_types::ipc::DomainSweep;
 use std::net::IpAddr;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
@@ -32,8 +33,8 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
         )));
     }
     watch_interrupts().or_failed()?;
-    let value = match &args.rope {
-        None => arm_alone(args, report_ports, faults, quiet),
+    match &args.rope {
+        None => arm_alone(args, report_ports, faults, quiet).or_failed()?,
         Some(rope) => {
             let mut config = RigConfig {
                 domain: args
@@ -51,16 +52,27 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
             if rope != "random" {
                 config.rope = Some(files::read_rope(rope.as_ref()).or_input()?);
             }
-            whole_rig(&config, quiet)
+            // Goes last: nothing of the domain stays once the rig is gone.
+            let _sweep = DomainSweep::new(&config.domain);
+            let announce = |ports| announce(config.bind, ports, quiet);
+            run_announced(&config, interrupted(), announce).or_failed()?;
         }
-    };
-    value.or_failed().map(Some)
+    }
+    Ok(None)
 }
 
-fn announce(bind: IpAddr, command: u16, reports: [u16; 4], quiet: bool) {
-    if !quiet {
+/// Says where the arm listens as soon as it does: whoever starts a rig waits for
+/// its ports, not for its end.
+fn announce(bind: IpAddr, ports: ArmPorts, quiet: bool) {
+    if quiet {
+        output::object(&json!({
+            "ok": true, "command": "rig", "bind": bind,
+            "command_port": ports.command, "report_ports": ports.reports,
+        }));
+    } else {
         println!(
-            "simulated xArm 7 at {bind}: commands on {command}, reports on {reports:?}; Ctrl-C ends it"
+            "simulated xArm 7 at {bind}: commands on {}, reports on {:?}; Ctrl-C ends it",
+            ports.command, ports.reports
         );
     }
 }
@@ -70,7 +82,7 @@ fn arm_alone(
     report_ports: [u16; 4],
     faults: FaultScript,
     quiet: bool,
-) -> anyhow::Result<Value> {
+) -> anyhow::Result<()> {
     let arm = SimulatedArm::start(ArmConfig {
         bind: args.bind,
         command_port: args.command_port,
@@ -79,57 +91,10 @@ fn arm_alone(
         faults,
         ..ArmConfig::default()
     })?;
-    let ports = arm.ports();
-    announce(args.bind, ports.command, ports.reports, quiet);
+    announce(args.bind, arm.ports(), quiet);
     while !interrupted().load(Ordering::SeqCst) {
         std::thread::sleep(Duration::from_millis(50));
     }
     arm.stop();
-    Ok(
-        json!({ "ok": true, "command": "rig", "command_port": ports.command, "report_ports": ports.reports }),
-    )
-}
-
-/// Arm, rope and perhaps camera; the rig runs in a thread of its own.
-fn whole_rig(config: &RigConfig, quiet: bool) -> anyhow::Result<Value> {
-    let ended = AtomicBool::new(false);
-    std::thread::scope(|scope| {
-        let rig = scope.spawn(|| {
-            let outcome = hil_tests::rig::run(config, interrupted());
-            ended.store(true, Ordering::SeqCst);
-            outcome
-        });
-        let ports = rig_ports(config, &ended);
-        if let Ok((command, reports)) = &ports {
-            announce(config.bind, *command, *reports, quiet);
-        }
-        match rig.join() {
-            Ok(outcome) => outcome?,
-            Err(_) => bail!("the rig ended by a defect; see the messages above"),
-        }
-        let (command, reports) = ports?;
-        Ok(
-            json!({ "ok": true, "command": "rig", "command_port": command, "report_ports": reports }),
-        )
-    })
-}
-
-/// Asks the rig for its ports as soon as it serves.
-fn rig_ports(config: &RigConfig, ended: &AtomicBool) -> anyhow::Result<(u16, [u16; 4])> {
-    // The rig needs a moment to open its services; it may also fail at once.
-    let folder = std::env::temp_dir();
-    let mut session = Session::new(&config.domain, &folder)?;
-    for _ in 0..200 {
-        if ended.load(Ordering::SeqCst) {
-            break;
-        }
-        if let Ok(rig) = session.connect::<RigRpc>(&RigRequest::Ports, Duration::from_millis(50)) {
-            let event = session.ask(&rig, &RigRequest::Ports, Duration::from_secs(5), |_| ())?;
-            return match event {
-                RigEvent::Ports { command, reports } => Ok((command, reports)),
-                other => Err(anyhow!("the rig answered with {other:?}")),
-            };
-        }
-    }
-    None.context("the rig did not come up")
+    Ok(())
 }

@@ -27,7 +27,7 @@ pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
         1e3 * found.interval_m[1],
         found.time_s
     );
-    stage.done(&line);
+    stage.done("tip and target measured");
     if !quiet {
         println!("{line}");
     }

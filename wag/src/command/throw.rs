@@ -26,9 +26,6 @@ pub fn drive(
     name: &str,
     quiet: bool,
 ) -> Outcome<Option<Value>> {
-    let Some(address) = arm.address else {
-        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
-    };
     if let Some(worst) = limits.worst_violation(trajectory) {
         return Err(Failure::input(anyhow!(
             "the {name} breaks a limit: {}",
@@ -38,11 +35,16 @@ pub fn drive(
     if arm.dry_run {
         if !quiet {
             println!(
-                "dry run: the {name} keeps all limits and would run {:.2} s on {address}",
+                "dry run: the {name} keeps all limits and would run {:.2} s; nothing was connected",
                 trajectory.duration_s()
             );
         }
-        return Ok(None);
+        return Ok(Some(
+            json!({ "dry_run": true, "duration_s": trajectory.duration_s() }),
+        ));
+    }
+    if arm.address.is_none() {
+        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
     }
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(out, name)?;

@@ -15,7 +15,7 @@ use shared_types::StereoCamera;
 use std::path::Path;
 
 /// Pictures in a contact sheet, and how many stand in a row.
-const SHEET: (usize, usize) = (20, 4);
+const SHEET: (usize, usize) = (12, 3);
 
 /// The clamp's motion from joints or from the attach frame's pose.
 pub fn clamp_path(motion: &MotionArgs) -> anyhow::Result<ClampPath> {
@@ -76,15 +76,16 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(path) = &args.overlay {
         let step = frames.len().div_ceil(SHEET.0).max(1);
         let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
-        keypoint_sheet(frames, &result.track, &chosen, SHEET.1)
-            .and_then(|sheet| sheet.write_png(path))
+        let sheet = keypoint_sheet(frames, &result.track, &chosen, SHEET.1)
+            .and_then(|sheet| sheet.to_png())
             .or_failed()?;
+        files::write_atomic(path, &sheet).or_failed()?;
     }
     let lost = result.track.frames.iter().filter(|f| f.lost).count();
     let line = format!("{} frames, rope lost in {lost}", result.track.frames.len());
     let seconds = stage.done(&line);
     if !quiet {
-        println!("{line} -> `{}`", args.out.display());
+        println!("keypoints written to `{}`", args.out.display());
     }
     Ok(Some(json!({
         "ok": true, "command": "track", "out": args.out, "frames": result.track.frames.len(),

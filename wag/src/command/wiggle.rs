@@ -15,7 +15,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     if args.evaluate || args.optimise {
         return wiggle_design::run(args, quiet);
     }
-    if args.csv.is_none() && args.arm.address.is_none() {
+    if args.csv.is_none() && args.arm.address.is_none() && !args.arm.dry_run {
         return Err(Failure::input(anyhow!(
             "say what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate says what it tells"
         )));
@@ -34,16 +34,17 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             );
         }
     }
-    let run = match args.arm.address {
-        Some(_) => drive(
+    let run = if args.arm.address.is_some() || args.arm.dry_run {
+        drive(
             &args.arm,
             &limits,
             &trajectory,
             args.out.as_deref(),
             "wiggle",
             quiet,
-        )?,
-        None => None,
+        )?
+    } else {
+        None
     };
     Ok(Some(json!({
         "ok": true, "command": "wiggle", "csv": args.csv, "duration_s": trajectory.duration_s(), "run": run,

@@ -8,7 +8,7 @@ mod motion;
 mod rope;
 
 pub use arm_response::{read_excitation, write_arm_response};
-pub use atomic::{write_atomic, write_json};
+pub use atomic::{check_writable, write_atomic, write_json};
 pub use limits::{default_limits, read_limits};
 pub use motion::{read_joints, read_pose, write_joints};
 pub use rope::{read_rope, write_rope_estimate};

@@ -2,6 +2,7 @@
 
 use super::{ArmLink, RunFolder, STARTUP};
 use crate::session::{ProcessSpec, Session};
+use anyhow::Context;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::process::CameraConfig;
 use hil_tests::rig::RigConfig;
@@ -19,17 +20,26 @@ use std::path::Path;
 const CONTROLLER: &str = include_str!("../../../configs/rt/controller.toml");
 const RIG: &str = include_str!("../../../configs/rig/demo.toml");
 
-/// The demo's rig: the shipped file, this run's domain and seed, free ports.
-pub fn rig_config(folder: &RunFolder, seed: u64, target_m: [f64; 3]) -> anyhow::Result<RigConfig> {
-    let shipped: RigConfig = toml::from_str(RIG)?;
-    Ok(RigConfig {
+/// The set-up of a rig: a file of the user's, or the shipped one.
+pub fn shipped_rig(path: Option<&Path>) -> anyhow::Result<RigConfig> {
+    match path {
+        None => Ok(toml::from_str(RIG)?),
+        Some(path) => toml::from_str(&crate::files::read_text(path)?)
+            .with_context(|| format!("rig file `{}`", path.display())),
+    }
+}
+
+/// The demo's rig: a set-up with this run's domain and seed, free ports, a target.
+pub fn rig_config(folder: &RunFolder, rig: &RigConfig, seed: u64, target_m: [f64; 3]) -> RigConfig {
+    RigConfig {
         domain: folder.domain.clone(),
         seed,
+        bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
         command_port: 0,
         report_ports: [0; 4],
         target_m: Some(target_m),
-        ..shipped
-    })
+        ..rig.clone()
+    }
 }
 
 /// Writes the camera's calibration into the run folder, as a lab's would lie

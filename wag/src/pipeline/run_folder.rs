@@ -24,12 +24,7 @@ impl RunFolder {
                 PathBuf::from("runs").join(format!("{stamp}-{name}-{}", std::process::id()))
             }
         };
-        if path.exists() {
-            return Err(Failure::input(anyhow!(
-                "run folder `{}` exists already; name another one with --out",
-                path.display()
-            )));
-        }
+        Self::refuse_existing(&path)?;
         for folder in ["config", "log"] {
             std::fs::create_dir_all(path.join(folder))
                 .with_context(|| {
@@ -44,6 +39,17 @@ impl RunFolder {
             path,
             domain: format!("run-{}", std::process::id()),
         })
+    }
+
+    /// Refuses a folder that is there already; results are never mixed.
+    pub fn refuse_existing(path: &Path) -> Outcome {
+        if path.exists() {
+            return Err(Failure::input(anyhow!(
+                "run folder `{}` exists already; name another one with --out",
+                path.display()
+            )));
+        }
+        Ok(())
     }
 
     /// The folder.
@@ -67,5 +73,47 @@ impl RunFolder {
         let text = toml::to_string(config).with_context(|| format!("configuration of {name}"))?;
         crate::files::write_atomic(&path, text.as_bytes())?;
         Ok(path)
+    }
+}
+
+/// A run that left nothing leaves no folder either: one without any file in it
+/// tells nothing and is in the way of the next try.
+impl Drop for RunFolder {
+    fn drop(&mut self) {
+        let cycles = self.file(crate::recording::CYCLES_FILE);
+        if cycles.metadata().is_ok_and(|file| file.len() == 0) {
+            let _ = std::fs::remove_file(cycles);
+        }
+        // Removes empty folders only.
+        for folder in [self.path.join("config"), self.log(), self.path.clone()] {
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_without_results_leaves_no_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("run");
+        let folder = RunFolder::create(Some(&out), "test").unwrap();
+        std::fs::write(folder.file(crate::recording::CYCLES_FILE), "").unwrap();
+        assert!(out.join("log").is_dir());
+        drop(folder);
+        assert!(!out.exists());
+        let folder = RunFolder::create(Some(&out), "test").unwrap();
+        folder
+            .config(
+                "rig",
+                &[("a", 1)]
+                    .into_iter()
+                    .collect::<std::collections::BTreeMap<_, _>>(),
+            )
+            .unwrap();
+        drop(folder);
+        assert!(out.join("config/rig.toml").is_file());
     }
 }

@@ -89,10 +89,27 @@ pub struct Stop {
     pub rest_after_s: f64,
     /// Which limit.
     pub broken: Option<Broken>,
+    /// The setpoint that was sent latest in the second before.
+    pub latest: Option<Late>,
     /// What happened since the arm was adopted.
     pub counts: RunCounts,
     /// The second before and the second after.
     pub around: Vec<Row>,
+}
+
+/// A setpoint that was sent late, and what the arm made of it: it takes setpoints
+/// as they come, so one that covers more motion than the arm had time for breaks
+/// its speed limits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Late {
+    /// Cycle of the setpoint.
+    pub cycle: u64,
+    /// From its planned wake-up until it was sent (ms).
+    pub late_ms: f64,
+    /// Motion covered by the setpoint after it (ms at full path rate).
+    pub next_covered_ms: Option<f64>,
+    /// Time between the two on the wire (ms).
+    pub next_came_after_ms: Option<f64>,
 }
 
 /// Some cycles around a stop, each figure the worst of them.
@@ -120,6 +137,8 @@ pub struct Row {
     pub report_ms: Option<f64>,
     /// Cycles missed.
     pub missed: u32,
+    /// From planned wake-up to sent (ms).
+    pub late_ms: Option<f64>,
 }
 
 /// Explains a recording.
@@ -173,6 +192,7 @@ fn stop(flight: &Flight, cause: &CauseRecord) -> Stop {
         arm_asked_to_stop: cause.stop_arm != 0,
         rest_after_s: flight.time_s(rest_ns) - flight.time_s(cause.stamp_ns),
         broken: broken(cause),
+        latest: latest(flight, cause.stamp_ns),
         counts: cause.counts,
         around: around(flight, cause.stamp_ns),
     }
@@ -296,6 +316,45 @@ fn row(until_ms: f64, moments: &[&Moment]) -> Option<Row> {
             .filter_map(|m| m.report_ms)
             .max_by(f64::total_cmp),
         missed: moments.iter().map(|m| m.missed).sum(),
+        late_ms: moments
+            .iter()
+            .filter_map(|m| m.late_ms)
+            .max_by(f64::total_cmp),
+    })
+}
+
+fn planned_after_ms(after: &Moment, before: &Moment) -> f64 {
+    use shared_types::MonotonicNs as At;
+    At(after.planned_ns).since_s(At(before.planned_ns)) * 1e3
+}
+
+/// The setpoint of the second before the stop that was sent latest, and the one
+/// after it.
+fn latest(flight: &Flight, stamp_ns: u64) -> Option<Late> {
+    let sent: Vec<(&Moment, f64)> = flight
+        .moments
+        .iter()
+        .filter(|m| (BEGIN_MS..=0.5).contains(&since_ms(m, stamp_ns)))
+        .filter_map(|m| Some((m, m.late_ms?)))
+        .collect();
+    let (at, _) = sent
+        .iter()
+        .enumerate()
+        .max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))?;
+    let (moment, late_ms) = sent[at];
+    let next = sent.get(at + 1);
+    Some(Late {
+        cycle: moment.cycle,
+        late_ms,
+        next_covered_ms: next.map(|(after, _)| {
+            if moment.trajectory_s >= 0.0 && after.trajectory_s >= moment.trajectory_s {
+                1e3 * (after.trajectory_s - moment.trajectory_s)
+            } else {
+                since_ms(after, moment.deadline_ns)
+            }
+        }),
+        next_came_after_ms: next
+            .map(|(after, late)| planned_after_ms(after, moment) + late - late_ms),
     })
 }
 
@@ -312,6 +371,7 @@ mod tests {
         Moment {
             cycle,
             deadline_ns: cycle * PERIOD_NS,
+            planned_ns: cycle * PERIOD_NS,
             mode: if cycle <= 300 {
                 ControllerMode::Streaming
             } else {
@@ -327,6 +387,7 @@ mod tests {
             link_ms: 0.0,
             report_ms: Some(3.0),
             missed: u32::from(cycle == 290),
+            late_ms: Some(if cycle == 289 { 3.4 } else { 0.2 }),
             arm_error: (cycle == 340).then_some(31),
         }
     }
@@ -376,8 +437,12 @@ mod tests {
         assert_eq!((stop.around.len(), missed), (ROWS_MS.len(), 1));
         let before = stop.around.iter().find(|r| r.until_ms == -4.0).unwrap();
         assert_eq!(before.tool_m_s, 1.0);
+        let late = stop.latest.as_ref().unwrap();
+        assert_eq!((late.cycle, late.late_ms), (289, 3.4));
+        assert!((late.next_came_after_ms.unwrap() - 0.8).abs() < 1e-9);
         let page = super::super::show(&found);
         for word in [
+            "setpoint 289 was sent 3.4 ms late",
             "joint 4: 0.0710 rad",
             "+42.0 %",
             "at rest after 96 ms",

@@ -50,6 +50,8 @@ pub struct Moment {
     /// Instant its setpoint is for: the planned wake-up, or the real one where
     /// that was late (CLOCK_MONOTONIC, ns).
     pub deadline_ns: u64,
+    /// Planned wake-up (CLOCK_MONOTONIC, ns).
+    pub planned_ns: u64,
     /// Mode after it.
     pub mode: ControllerMode,
     /// Time on the motion (s), negative when none runs.
@@ -72,6 +74,8 @@ pub struct Moment {
     pub report_ms: Option<f64>,
     /// Cycles missed before it.
     pub missed: u32,
+    /// From the planned wake-up until its setpoint was sent (ms), if one was.
+    pub late_ms: Option<f64>,
     /// Error code of the arm, if it said one.
     pub arm_error: Option<u8>,
 }
@@ -115,13 +119,19 @@ impl Flight {
                     let moment = eye.see(&cycle, &flight.limits, &flight.settings);
                     flight.moments.push(moment);
                 }
-                Read::Item(Item::Keyframe(keyframe)) if !known => {
-                    if let Some(state) = keyframe.state() {
+                Read::Item(Item::Keyframe(keyframe)) => {
+                    let Some(state) = keyframe.state() else {
+                        continue;
+                    };
+                    // An arming from before the recording shows only here.
+                    let tier = MotionTier::from_raw(state.summary().tier);
+                    eye.tier = tier.or(eye.tier);
+                    if !known {
                         flight.take_settings(&state);
                         known = true;
                     }
                 }
-                Read::Item(Item::Keyframe(_) | Item::Motion { .. }) => {}
+                Read::Item(Item::Motion { .. }) => {}
             }
         }
         if known {
@@ -162,7 +172,8 @@ struct Eye {
 #[derive(Debug, Clone, Copy)]
 struct Sent {
     q: JointVector,
-    qd: JointVector,
+    /// Mean speed since the setpoint before (rad/s) and the time between (s).
+    moved: Option<(JointVector, f64)>,
     at_ns: u64,
     tool_m: nalgebra::Vector3<f64>,
 }
@@ -180,15 +191,23 @@ impl Eye {
         }
         let newest = input.reports.as_slice().last().map(|r| r.arrival_ns);
         self.report_ns = newest.or(self.report_ns);
-        let tier = self
+        let mode = ControllerMode::from_raw(record.mode);
+        let armed = self
             .tier
             .filter(|_| settings.arming_required)
             .unwrap_or(MotionTier::Throw);
+        // Moves the controller makes itself are never faster than a wiggle.
+        let tier = if mode == ControllerMode::Moving && settings.arming_required {
+            armed.min(MotionTier::Wiggle)
+        } else {
+            armed
+        };
         let age_ms = |from_ns: u64| input.deadline_ns.saturating_sub(from_ns) as f64 / 1e6;
         let mut moment = Moment {
             cycle: record.cycle,
             deadline_ns: input.deadline_ns.saturating_add(input.late_ns.into()),
-            mode: ControllerMode::from_raw(record.mode),
+            planned_ns: input.deadline_ns,
+            mode,
             trajectory_s: record.trajectory_s,
             path_rate: record.path_rate,
             q_c: record.q_c,
@@ -199,6 +218,8 @@ impl Eye {
             link_ms: input.link.unanswered_ns as f64 / 1e6,
             report_ms: self.report_ns.map(age_ms),
             missed: input.missed,
+            late_ms: (record.sent != 0)
+                .then(|| (f64::from(record.wake_late_ns) + f64::from(record.send_ns)) / 1e6),
             arm_error: (input.codes.present != 0 && input.codes.error != 0)
                 .then_some(input.codes.error),
         };
@@ -215,20 +236,79 @@ impl Eye {
         let (p, r) = kinematics::flange_pose(&moment.q_c);
         let mut now = Sent {
             q: moment.q_c,
-            qd: JointVector::ZERO,
+            moved: None,
             at_ns: moment.deadline_ns,
             tool_m: p + r * limits.tcp_offset(),
         };
         if let Some(before) = self.before {
             let step_s = MonotonicNs(now.at_ns).since_s(MonotonicNs(before.at_ns));
             if step_s > 0.0 && step_s < APART_MAX_S {
-                now.qd = (now.q - before.q) * (1.0 / step_s);
-                let qdd = (now.qd - before.qd) * (1.0 / step_s);
-                moment.speed = WorstJoint::of(&now.qd, &limits.velocity_max_rad_s);
-                moment.acceleration = WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
+                let qd = (now.q - before.q) * (1.0 / step_s);
+                now.moved = Some((qd, step_s));
+                moment.speed = WorstJoint::of(&qd, &limits.velocity_max_rad_s);
+                // Two mean speeds belong to the middles of their steps. What the arm
+                // did before the first setpoint is not known.
+                if let Some((qd_before, step_before_s)) = before.moved {
+                    let apart_s = (step_s + step_before_s) / 2.0;
+                    let qdd = (qd - qd_before) * (1.0 / apart_s);
+                    moment.acceleration = WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
+                }
                 moment.tool_m_s = (now.tool_m - before.tool_m).norm() / step_s;
             }
         }
         self.before = Some(now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sent(eye: &mut Eye, at_ms: u64, q1: f64) -> Moment {
+        let mut q = JointVector::ZERO;
+        q[0] = q1;
+        let mut moment = Moment {
+            cycle: at_ms / 4,
+            deadline_ns: at_ms * 1_000_000,
+            planned_ns: at_ms * 1_000_000,
+            mode: ControllerMode::Streaming,
+            trajectory_s: 0.0,
+            path_rate: 1.0,
+            q_c: q,
+            speed: WorstJoint::default(),
+            acceleration: WorstJoint::default(),
+            tool_m_s: 0.0,
+            tool_max_m_s: 1.0,
+            link_ms: 0.0,
+            report_ms: None,
+            missed: 0,
+            late_ms: Some(0.1),
+            arm_error: None,
+        };
+        eye.speeds(&mut moment, true, &Limits::default());
+        moment
+    }
+
+    /// q = a t²/2 from a start in motion, sampled with a cycle left out: the
+    /// acceleration is `a` wherever it can be known, never more.
+    #[test]
+    fn acceleration_is_neither_invented_at_the_begin_nor_by_missed_cycles() {
+        let (a, v0) = (6.0, 1.0);
+        let q = |ms: u64| {
+            let t = ms as f64 * 1e-3;
+            v0 * t + a * t * t / 2.0
+        };
+        let mut eye = Eye::default();
+        let seen: Vec<Moment> = [0, 4, 8, 20, 24, 28]
+            .iter()
+            .map(|ms| sent(&mut eye, *ms, q(*ms)))
+            .collect();
+        assert_eq!(seen[0].speed, WorstJoint::default());
+        assert_eq!(seen[1].acceleration, WorstJoint::default());
+        assert!((seen[1].speed.value - (v0 + a * 0.002)).abs() < 1e-9);
+        for moment in &seen[2..] {
+            let found = moment.acceleration;
+            assert!((found.value - a).abs() < 1e-6, "{moment:?}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! An explanation as one page of text.
 
-use super::explanation::{Explanation, Row, Stop};
+use super::explanation::{Explanation, Late, Row, Stop};
 use super::flight::WorstJoint;
 use super::margins::Margin;
 use crate::table;
@@ -81,6 +81,9 @@ fn show_stop(page: &mut String, stop: &Stop) {
     if let Some(counts) = counts(stop) {
         line(page, "until then", &counts);
     }
+    if let Some(late) = &stop.latest {
+        line(page, "setpoints", &lateness(late));
+    }
     line(page, "what to do", &stop.remedy);
     let _ = writeln!(page, "\n{}", around(&stop.around));
 }
@@ -104,6 +107,20 @@ fn by_how_much(stop: &Stop) -> String {
         short(broken.value),
         short(broken.limit)
     )
+}
+
+fn lateness(late: &Late) -> String {
+    let mut text = format!(
+        "setpoint {} was sent {:.1} ms late, the latest of the second before",
+        late.cycle, late.late_ms
+    );
+    if let (Some(covered_ms), Some(after_ms)) = (late.next_covered_ms, late.next_came_after_ms) {
+        let _ = write!(
+            text,
+            "; the next came {after_ms:.1} ms later and covered {covered_ms:.1} ms of motion"
+        );
+    }
+    text
 }
 
 /// Four figures, enough to compare and short enough to read.
@@ -169,6 +186,7 @@ fn around(rows: &[Row]) -> Table {
         "allowed",
         "link ms",
         "report ms",
+        "late ms",
         "missed",
         "mode",
     ];
@@ -186,6 +204,7 @@ fn around(rows: &[Row]) -> Table {
                 format!("{:.2}", r.tool_max_m_s),
                 format!("{:.1}", r.link_ms),
                 r.report_ms.map_or("-".to_owned(), |a| format!("{a:.1}")),
+                r.late_ms.map_or("-".to_owned(), |l| format!("{l:.1}")),
                 r.missed.to_string(),
                 format!("{:?}", r.mode).to_lowercase(),
             ]

@@ -10,6 +10,7 @@ use crate::progress::Stage;
 use crate::session::{Session, watch_interrupts};
 use anyhow::anyhow;
 use planner::response::excitation::sweep;
+use serde_json::{Value, json};
 use shared_types::response::Excitation;
 use shared_types::{JOINTS, JointTrajectory, Limits, MotionTier};
 use std::net::IpAddr;
@@ -20,11 +21,15 @@ const MOVE_SPEED: f64 = 0.1;
 /// Rest before and after each sweep, so that every joint starts and ends at rest.
 const REST: Duration = Duration::from_millis(600);
 
-/// Moves the arm and keeps what was recorded; `None` for a dry run.
-pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Evidence>> {
-    let Some(address) = args.arm.address else {
-        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
-    };
+/// What a measurement would do.
+struct Intent {
+    limits: Limits,
+    excitation: Excitation,
+    /// Joints (1-based) and their motions.
+    sweeps: Vec<(usize, JointTrajectory)>,
+}
+
+fn intent(args: &LatencyArgs) -> Outcome<Intent> {
     let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
     let mut excitation = match &args.excitation {
         Some(path) => files::read_excitation(path).or_input()?,
@@ -32,16 +37,38 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Evidenc
     };
     excitation.seed = args.seed.unwrap_or(excitation.seed);
     let sweeps = sweeps(args, &excitation, &limits)?;
-    if args.arm.dry_run {
-        if !quiet {
-            let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
-            println!(
-                "dry run: {} sweeps keep all limits and would move {address} for {moving_s:.0} s",
-                sweeps.len()
-            );
-        }
-        return Ok(None);
+    Ok(Intent {
+        limits,
+        excitation,
+        sweeps,
+    })
+}
+
+/// Checks the motions and connects to nothing.
+pub(super) fn dry_run(args: &LatencyArgs, quiet: bool) -> Outcome<Value> {
+    let sweeps = intent(args)?.sweeps;
+    let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
+    if !quiet {
+        println!(
+            "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
+            sweeps.len()
+        );
     }
+    Ok(json!({
+        "ok": true, "command": "latency", "dry_run": true, "sweeps": sweeps.len(), "duration_s": moving_s,
+    }))
+}
+
+/// Moves the arm and keeps what was recorded.
+pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
+    let Some(address) = args.arm.address else {
+        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
+    };
+    let Intent {
+        limits,
+        excitation,
+        sweeps,
+    } = intent(args)?;
     require_clear_area(&args.arm, "MEASURE", quiet)?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "latency")?;
@@ -65,7 +92,7 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Evidenc
     kept.or_failed()?;
     let recorder = &mut session.recorder;
     let reports = core::mem::take(&mut recorder.joints);
-    Ok(Some(Evidence {
+    Ok(Evidence {
         source: format!("arm {address}:{}", args.arm.command_port),
         folder: folder.path().to_owned(),
         cycles: core::mem::take(&mut recorder.cycles),
@@ -73,7 +100,7 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Evidenc
         reports,
         excitation: Some(excitation),
         camera_offset_s: None,
-    }))
+    })
 }
 
 /// The sweeps asked for, with their joints (1-based).

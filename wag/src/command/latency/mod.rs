@@ -55,10 +55,8 @@ struct Findings {
 
 pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let evidence = match (&args.arm.address, &args.run) {
-        (Some(_), None) => match measure::measure(args, quiet)? {
-            Some(evidence) => evidence,
-            None => return Ok(None),
-        },
+        (_, None) if args.arm.dry_run => return measure::dry_run(args, quiet).map(Some),
+        (Some(_), None) => measure::measure(args, quiet)?,
         (None, Some(run)) => recorded::read(run).or_input()?,
         _ => {
             return Err(Failure::input(anyhow!(
@@ -67,24 +65,32 @@ pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
         }
     };
     let findings = examine(&evidence, quiet)?;
-    let path = args
-        .response
-        .clone()
-        .unwrap_or_else(|| evidence.folder.join(RESPONSE_FILE));
-    files::write_arm_response(&path, &findings.response).or_failed()?;
-    let value = show::json(&findings, &evidence, &path);
+    let known = findings.response.joints.iter().any(|j| j.lag().is_some());
+    let path = response_path(args, &evidence).filter(|_| known);
+    if let Some(path) = &path {
+        files::write_arm_response(path, &findings.response).or_failed()?;
+    }
+    let value = show::json(&findings, &evidence, path.as_deref());
     if args.arm.address.is_some() {
         files::write_json(&evidence.folder.join("summary.json"), &value).or_failed()?;
     }
     if !quiet {
-        show::print(&findings, &evidence, &path);
+        show::print(&findings, &evidence, path.as_deref());
     }
-    if findings.response.joints.iter().all(|j| j.lag().is_none()) {
+    if !known {
         return Err(Failure::failed(anyhow!(
-            "no joint moved in a way that shows how it follows; measure with `wag latency --arm ADDR`"
+            "no joint moved in a way that shows how it follows, so nothing is written; measure with `wag latency --arm ADDR`"
         )));
     }
     Ok(Some(value))
+}
+
+/// Where the response goes: a file that was named, or the run folder's own. What a
+/// folder holds already was measured with the arm's own targets at hand and is
+/// never replaced by what its tables say.
+fn response_path(args: &LatencyArgs, evidence: &Evidence) -> Option<PathBuf> {
+    let own = || Some(evidence.folder.join(RESPONSE_FILE)).filter(|path| !path.exists());
+    args.response.clone().or_else(own)
 }
 
 fn examine(evidence: &Evidence, quiet: bool) -> Outcome<Findings> {

@@ -6,7 +6,7 @@ use comfy_table::Table;
 use serde_json::{Value, json};
 use shared_types::JointResponse;
 use shared_types::ipc::message::{LatencyReport, Percentiles};
-use shared_types::response::{Estimate, TrackingLag};
+use shared_types::response::{Estimate, NotExcited, TrackingLag};
 use std::path::Path;
 
 fn loop_table(report: &LatencyReport) -> Table {
@@ -84,7 +84,7 @@ fn joint_table(findings: &Findings) -> Table {
 }
 
 /// Prints tables and one line for each other result.
-pub(super) fn print(findings: &Findings, evidence: &Evidence, path: &Path) {
+pub(super) fn print(findings: &Findings, evidence: &Evidence, path: Option<&Path>) {
     let report = findings.latencies.report();
     println!("{}", loop_table(&report));
     println!(
@@ -108,11 +108,29 @@ pub(super) fn print(findings: &Findings, evidence: &Evidence, path: &Path) {
     if let Some(offset_s) = findings.camera_offset_s {
         println!("Camera against arm: {:.1} ms.", 1e3 * offset_s);
     }
-    println!("Written to {}.", path.display());
+    let slow: Vec<String> = (1..)
+        .zip(&findings.response.joints)
+        .filter(|(_, j)| matches!(j, JointResponse::NotExcited(NotExcited::Indistinct)))
+        .map(|(joint, _): (usize, _)| joint.to_string())
+        .collect();
+    if !slow.is_empty() {
+        println!(
+            "Joints {}: the tool speed allowed while setting up keeps them too slow to be measured. A pose with the tool nearer to their axes (`pose_rad` of --excitation FILE) lets them swing faster; measure them alone with --joints {}.",
+            slow.join(", "),
+            slow.join(",")
+        );
+    }
+    match path {
+        Some(path) => println!("Written to {}.", path.display()),
+        None => println!(
+            "Not written: {} is kept; name another file with --response.",
+            evidence.folder.join(super::RESPONSE_FILE).display()
+        ),
+    }
 }
 
 /// What `--json` prints and `summary.json` keeps.
-pub(super) fn json(findings: &Findings, evidence: &Evidence, path: &Path) -> Value {
+pub(super) fn json(findings: &Findings, evidence: &Evidence, path: Option<&Path>) -> Value {
     let report = findings.latencies.report();
     let joints: Vec<Value> = (1..)
         .zip(&findings.response.joints)
