@@ -138,22 +138,32 @@ fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
     }
 }
 
-/// Every wake-up late by a random time: within bounds the throw goes on.
+/// The same throw at 95 % of its speed: what counts as punctual may come up to
+/// 0.2 ms late, a twentieth of a cycle, and the arm sees that much more speed.
+fn slower(throw: &JointTrajectory) -> JointTrajectory {
+    let times: Vec<f64> = throw.times_s().iter().map(|t_s| t_s / 0.95).collect();
+    JointTrajectory::new(&times, throw.waypoints()).unwrap()
+}
+
+/// Every wake-up late by a random time: within bounds a throw that leaves a
+/// twentieth of the speed limits goes on.
 #[test]
 fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
     for wire in WIRES {
         for seed in 0..20 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut stage = Stage::throwing(wire, "");
+            let mut stage = Stage::ready(wire, "");
+            stage.throw = slower(&stage.throw);
+            stage.begin();
             stage
                 .rig
                 .oversleep((0..1000).map(|_| match rng.random_range(0..100) {
-                    0..80 => rng.random_range(0..30_000),
+                    0..80 => rng.random_range(0..200_000),
                     80..97 => rng.random_range(200_000..3_990_000),
                     _ => rng.random_range(4 * MS..6 * MS),
                 }));
             stage.finish();
-            stage.assert_finished_with_jitter(0.000_031);
+            stage.assert_finished_with_jitter(0.000_201);
             assert!(stage.rig.counts().missed > 10);
         }
     }
