@@ -24,6 +24,7 @@ pub mod cmaes;
 pub mod collide;
 pub mod filming;
 pub mod observation;
+pub mod phi;
 pub mod process;
 pub mod response;
 pub mod ropes;

@@ -1,0 +1,225 @@
+//! What a model file says about itself, and whether to believe it.
+
+use super::file::parts;
+use crate::filming::Randomisation;
+use crate::observation::FeatureDefinition;
+use crate::wiggle::WiggleConfig;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use shared_types::rope::{RANGES, ROPE_PARAMETERS};
+
+/// Key of the metadata in the model file; the value is JSON.
+pub const METADATA_KEY: &str = "phi-nn";
+/// Version of the metadata and of the network's inputs and outputs.
+pub const FORMAT: u32 = 1;
+
+/// One of the network's outputs: 0 is `min`, 1 is `max`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterScale {
+    /// Key in `rope.toml`.
+    pub key: String,
+    /// Value at output 0.
+    pub min: f64,
+    /// Value at output 1.
+    pub max: f64,
+}
+
+/// How the network came to be.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainingRecord {
+    /// Seed of ropes, noise and first weights.
+    pub seed: u64,
+    /// Ropes trained on.
+    pub ropes: usize,
+    /// Hash of their simulated motions (SHA-256, hexadecimal).
+    pub data_sha256: String,
+    /// Optimisation steps.
+    pub steps: usize,
+    /// Films per step.
+    pub batch: usize,
+    /// Noise they were filmed with.
+    pub randomisation: Randomisation,
+}
+
+/// What the trained network gave for [`probe`](super::probe).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeOutputs {
+    /// Normalised parameters.
+    pub mean: Vec<f32>,
+    /// Logarithms of their variances.
+    pub log_variance: Vec<f32>,
+}
+
+/// Metadata of a model file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhiMetadata {
+    /// Version: [`FORMAT`].
+    pub format: u32,
+    /// Meaning of the input.
+    pub features: FeatureDefinition,
+    /// The motion that was filmed.
+    pub wiggle: WiggleConfig,
+    /// Meaning of the outputs, in their order.
+    pub parameters: Vec<ParameterScale>,
+    /// Oddity that one in a hundred ropes of the ranges exceeds.
+    pub oddity_limit: f64,
+    /// Outputs that every runtime must give again.
+    pub probe: ProbeOutputs,
+    /// How it was trained.
+    pub training: TrainingRecord,
+    /// Hash of the graph with all weights (SHA-256, hexadecimal).
+    pub graph_sha256: String,
+}
+
+/// Why a file is not used as a model.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The file cannot be read.
+    #[error("model {path}: {source}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The bytes are no ONNX model.
+    #[error("model {name}: not an ONNX file: {reason}")]
+    NotOnnx {
+        /// File or `embedded`.
+        name: String,
+        /// What was wrong.
+        reason: String,
+    },
+    /// An ONNX model without this program's metadata.
+    #[error(
+        "model {name}: has no `{METADATA_KEY}` metadata, so it was not written by phi-train: export it again"
+    )]
+    NoMetadata {
+        /// File or `embedded`.
+        name: String,
+    },
+    /// Metadata that cannot be understood or does not fit this program.
+    #[error("model {name}: {reason}")]
+    Unfit {
+        /// File or `embedded`.
+        name: String,
+        /// What does not fit.
+        reason: String,
+    },
+    /// The weights are not those that were written.
+    #[error("model {name}: damaged, its weights do not have the hash they were written with")]
+    Damaged {
+        /// File or `embedded`.
+        name: String,
+    },
+    /// The runtime computes something else than the trained network did.
+    #[error(
+        "model {name}: the network runtime's answer to the test input is off by {difference:.1e}, at most {limit:.0e} is allowed: use another runtime"
+    )]
+    OtherAnswer {
+        /// File or `embedded`.
+        name: String,
+        /// Largest difference.
+        difference: f32,
+        /// Largest difference allowed.
+        limit: f32,
+    },
+    /// The runtime refused or failed.
+    #[error("model {name}: the network runtime failed: {reason}")]
+    Runtime {
+        /// File or `embedded`.
+        name: String,
+        /// The runtime's words.
+        reason: String,
+    },
+}
+
+/// Hash of a graph as it stands in a model file, with all its weights.
+#[must_use]
+pub fn graph_sha256(graph: &[u8]) -> String {
+    hex(Sha256::digest(graph).as_slice())
+}
+
+/// Lower-case hexadecimal digits.
+#[must_use]
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+impl PhiMetadata {
+    /// Reads and checks the metadata of a model file's bytes; `name` is for
+    /// messages.
+    ///
+    /// # Errors
+    /// The reason why these bytes are not used as a model.
+    pub fn read(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
+        let name = || name.to_owned();
+        let not_onnx = |reason: &str| ModelError::NotOnnx {
+            name: name(),
+            reason: reason.to_owned(),
+        };
+        let Ok(found) = parts(bytes) else {
+            return Err(not_onnx("cut short, or something else"));
+        };
+        let graph = found.graph.ok_or_else(|| not_onnx("it has no graph"))?;
+        let (_, text) = found
+            .metadata
+            .iter()
+            .find(|(key, _)| *key == METADATA_KEY)
+            .ok_or_else(|| ModelError::NoMetadata { name: name() })?;
+        let unfit = |reason: String| ModelError::Unfit {
+            name: name(),
+            reason,
+        };
+        let metadata: Self = serde_json::from_str(text)
+            .map_err(|error| unfit(format!("metadata not understood: {error}")))?;
+        metadata.check().map_err(unfit)?;
+        if graph_sha256(graph) != metadata.graph_sha256 {
+            return Err(ModelError::Damaged { name: name() });
+        }
+        Ok(metadata)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.format != FORMAT {
+            return Err(format!(
+                "format {}, this program reads {FORMAT}: export it again",
+                self.format
+            ));
+        }
+        if self.features.version != FeatureDefinition::VERSION {
+            return Err(format!(
+                "trained on features of version {}, this program makes {}: train it again",
+                self.features.version,
+                FeatureDefinition::VERSION
+            ));
+        }
+        let fits = self.parameters.len() == ROPE_PARAMETERS
+            && self
+                .parameters
+                .iter()
+                .zip(RANGES)
+                .all(|(p, range)| p.key == range.key && p.min < p.max);
+        if !fits {
+            let found: Vec<&str> = self.parameters.iter().map(|p| p.key.as_str()).collect();
+            return Err(format!(
+                "its outputs are {}, not the nine rope parameters in their order",
+                found.join(", ")
+            ));
+        }
+        Ok(())
+    }
+
+    /// Physical values of nine normalised outputs, order of [`RANGES`].
+    #[must_use]
+    pub fn physical(&self, normalised: [f64; ROPE_PARAMETERS]) -> [f64; ROPE_PARAMETERS] {
+        core::array::from_fn(|i| {
+            let p = &self.parameters[i];
+            p.min + normalised[i] * (p.max - p.min)
+        })
+    }
+}

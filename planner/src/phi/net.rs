@@ -1,0 +1,242 @@
+//! The network in its runtime.
+
+use super::metadata::{ModelError, PhiMetadata};
+use super::probe::{PARITY, difference, probe};
+use super::{INPUTS, OUTPUTS};
+use crate::observation::{FeatureDefinition, WIDTHS, WiggleFeatures};
+use ort::environment::Environment;
+use ort::session::Session;
+use ort::session::builder::GraphOptimizationLevel;
+use ort::value::TensorRef;
+use shared_types::rope::ROPE_PARAMETERS;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// What the network makes of one observation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Parameters, order of [`shared_types::rope::RANGES`]; the link count is not
+    /// rounded.
+    pub parameters: [f64; ROPE_PARAMETERS],
+    /// Their standard deviations as the network estimates them.
+    pub std_dev: [f64; ROPE_PARAMETERS],
+    /// How unlike the known ropes this one looks: near 1 for those, above
+    /// [`PhiMetadata::oddity_limit`] for one in a hundred of them.
+    pub oddity: f64,
+}
+
+/// The network's outputs as they are, for one observation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawOutputs {
+    /// Normalised parameters.
+    pub mean: Vec<f32>,
+    /// Logarithms of their variances.
+    pub log_variance: Vec<f32>,
+    /// Embedding.
+    pub embedding: Vec<f32>,
+    /// Mean squared deviation of the embedding from those of known ropes.
+    pub oddity: f32,
+}
+
+/// Why there is no prediction.
+#[derive(Debug, thiserror::Error)]
+pub enum PredictError {
+    /// The features are not those the network was trained on.
+    #[error("the network was trained on {trained:?}, the observation has {given:?}")]
+    OtherFeatures {
+        /// The network's.
+        trained: FeatureDefinition,
+        /// The observation's.
+        given: FeatureDefinition,
+    },
+    /// The runtime failed.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// A loaded network. One prediction at a time; give each worker its own.
+pub struct PhiNet {
+    name: String,
+    metadata: PhiMetadata,
+    session: Session,
+}
+
+impl core::fmt::Debug for PhiNet {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("PhiNet")
+            .field("name", &self.name)
+            .field("metadata", &self.metadata)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The runtime of this process, or why there is none.
+fn runtime() -> Result<Environment, String> {
+    static RUNTIME: OnceLock<Result<Environment, String>> = OnceLock::new();
+    RUNTIME
+        .get_or_init(|| match std::env::var_os("ORT_DYLIB_PATH") {
+            Some(path) => {
+                let named = |error: &dyn core::fmt::Display| {
+                    format!("ORT_DYLIB_PATH={}: {error}", path.to_string_lossy())
+                };
+                let builder = ort::init_from(&path).map_err(|e| named(&e))?;
+                builder.build().map_err(|e| named(&e))
+            }
+            None => embedded(),
+        })
+        .clone()
+}
+
+#[cfg(feature = "embedded-runtime")]
+fn embedded() -> Result<Environment, String> {
+    ort::set_api(ort_tract::api());
+    ort::init().build().map_err(|error| error.to_string())
+}
+
+#[cfg(not(feature = "embedded-runtime"))]
+fn embedded() -> Result<Environment, String> {
+    Err("this build has no embedded runtime: set ORT_DYLIB_PATH to an ONNX Runtime library".into())
+}
+
+impl PhiNet {
+    /// Loads a model file.
+    ///
+    /// # Errors
+    /// The reason why the file is not used.
+    pub fn load(path: &Path) -> Result<Self, ModelError> {
+        let name = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|source| ModelError::Unreadable {
+            path: name.clone(),
+            source,
+        })?;
+        Self::from_bytes(&name, &bytes)
+    }
+
+    /// Loads a model from memory; `name` is for messages.
+    ///
+    /// # Errors
+    /// The reason why these bytes are not used.
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
+        let metadata = PhiMetadata::read(name, bytes)?;
+        let failed = |reason: String| ModelError::Runtime {
+            name: name.to_owned(),
+            reason,
+        };
+        let environment = runtime().map_err(failed)?;
+        let session = Session::builder(&environment)
+            .map_err(|e| failed(e.to_string()))?
+            .with_optimization_level(GraphOptimizationLevel::Level3)
+            .map_err(|e| failed(e.to_string()))?
+            .commit_from_memory(bytes)
+            .map_err(|e| failed(e.to_string()))?;
+        let mut net = Self {
+            name: name.to_owned(),
+            metadata,
+            session,
+        };
+        net.try_out()?;
+        Ok(net)
+    }
+
+    /// Asks it for the answer it must know, so that a graph of the wrong shape or
+    /// a runtime that computes something else shows now.
+    fn try_out(&mut self) -> Result<(), ModelError> {
+        let asked = probe(self.metadata.features);
+        let answer = self.outputs(&asked.motion, &asked.widths)?;
+        let expected = &self.metadata.probe;
+        let off = difference(&expected.mean, &answer.mean)
+            .max(difference(&expected.log_variance, &answer.log_variance));
+        if off > PARITY {
+            return Err(ModelError::OtherAnswer {
+                name: self.name.clone(),
+                difference: off,
+                limit: PARITY,
+            });
+        }
+        Ok(())
+    }
+
+    /// What the model says about itself.
+    #[must_use]
+    pub fn metadata(&self) -> &PhiMetadata {
+        &self.metadata
+    }
+
+    /// Rope parameters behind an observation.
+    ///
+    /// # Errors
+    /// Other features than it was trained on, or a failing runtime.
+    pub fn predict(&mut self, features: &WiggleFeatures) -> Result<Prediction, PredictError> {
+        let out = self.run(features)?;
+        let normalised = core::array::from_fn(|i| f64::from(out.mean[i]));
+        let std_dev = core::array::from_fn(|i| {
+            let p = &self.metadata.parameters[i];
+            // A deviation beyond the range or far below a thousandth of it is the
+            // estimate's own error.
+            let deviation = (f64::from(out.log_variance[i]) / 2.0).exp();
+            deviation.clamp(1e-4, 1.0) * (p.max - p.min)
+        });
+        Ok(Prediction {
+            parameters: self.metadata.physical(normalised),
+            std_dev,
+            oddity: f64::from(out.oddity),
+        })
+    }
+
+    /// The network's outputs as they are.
+    ///
+    /// # Errors
+    /// As [`PhiNet::predict`].
+    pub fn run(&mut self, features: &WiggleFeatures) -> Result<RawOutputs, PredictError> {
+        if features.definition != self.metadata.features {
+            return Err(PredictError::OtherFeatures {
+                trained: self.metadata.features,
+                given: features.definition,
+            });
+        }
+        Ok(self.outputs(&features.motion, &features.widths)?)
+    }
+
+    /// All outputs for one observation.
+    fn outputs(&mut self, motion: &[f32], widths: &[f32]) -> Result<RawOutputs, ModelError> {
+        let name = self.name.clone();
+        let failed = |reason: String| ModelError::Runtime {
+            name: name.clone(),
+            reason,
+        };
+        let definition = self.metadata.features;
+        let shape = [1, definition.frames, definition.channels()];
+        let motion =
+            TensorRef::from_array_view((shape, motion)).map_err(|e| failed(e.to_string()))?;
+        let widths =
+            TensorRef::from_array_view(([1, WIDTHS], widths)).map_err(|e| failed(e.to_string()))?;
+        let inputs = ort::inputs![INPUTS[0] => motion, INPUTS[1] => widths];
+        let found = self
+            .session
+            .run(inputs)
+            .map_err(|e| failed(e.to_string()))?;
+        let read = |output: &str, count: Option<usize>| {
+            let value = found
+                .get(output)
+                .ok_or_else(|| failed(format!("no output `{output}`")))?;
+            let (_, numbers) = value
+                .try_extract_tensor::<f32>()
+                .map_err(|e| failed(e.to_string()))?;
+            let whole = count.is_none_or(|count| numbers.len() == count);
+            if whole && numbers.iter().all(|x| x.is_finite()) {
+                Ok(numbers.to_vec())
+            } else {
+                Err(failed(format!(
+                    "output `{output}` has {} numbers, or some that are not finite",
+                    numbers.len()
+                )))
+            }
+        };
+        Ok(RawOutputs {
+            mean: read(OUTPUTS[0], Some(ROPE_PARAMETERS))?,
+            log_variance: read(OUTPUTS[1], Some(ROPE_PARAMETERS))?,
+            embedding: read(OUTPUTS[2], None)?,
+            oddity: read(OUTPUTS[3], Some(1))?[0],
+        })
+    }
+}

@@ -1,0 +1,468 @@
+//! The trained network as an ONNX file that says what it is, checked against the
+//! network it was made from.
+
+use crate::TrainingError;
+use crate::batches::Batch;
+use crate::checkpoint::State;
+use crate::network::{EMBEDDING, KERNEL, NORM_EPSILON, PADDING, PhiModel};
+use crate::onnx::{
+    ATTRIBUTE_FLOAT, ATTRIBUTE_INT, ATTRIBUTE_INTS, Attribute, Dimension, DimensionValue, FLOAT,
+    Graph, INT64, Model, Node, OperatorSet, StringEntry, Tensor, TensorShape, TensorType,
+    ValueInfo, ValueType,
+};
+use crate::standard::Standard;
+use crate::trainer::{Predicted, predict};
+use burn::module::Module;
+use burn::nn::Linear;
+use burn::tensor::{Device, Tensor as BurnTensor};
+use nalgebra::{DMatrix, DVector};
+use planner::observation::{FeatureDefinition, WIDTHS};
+use planner::phi::{
+    FORMAT, INPUTS, METADATA_KEY, OUTPUTS, PARITY, ParameterScale, PhiMetadata, ProbeOutputs,
+    TrainingRecord, difference, graph_sha256, probe,
+};
+use prost::Message;
+use shared_types::RopeParams;
+use shared_types::rope::{RANGES, ROPE_PARAMETERS};
+
+/// ONNX operator set: the first with GELU.
+const OPSET: i64 = 20;
+/// Version of the file format that goes with it.
+const IR_VERSION: i64 = 9;
+
+/// How embeddings of known ropes are distributed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Familiar {
+    /// Their mean.
+    mean: Vec<f32>,
+    /// Takes a deviation from the mean to numbers of mean square 1, row-major.
+    whiten: Vec<f32>,
+    /// Oddity that one in a hundred exceeds.
+    pub limit: f64,
+}
+
+impl Familiar {
+    /// Measures the embeddings of known ropes, and how odd `others` of the same
+    /// kind seem beside them.
+    ///
+    /// # Errors
+    /// Too few of them, or embeddings that are not finite.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        reason = "single precision is plenty for a score"
+    )]
+    pub fn measure(known: &[Predicted], others: &[Predicted]) -> Result<Self, TrainingError> {
+        let wrong = |value: String| TrainingError::Value {
+            key: "ropes for the oddity",
+            value,
+            expected: "2 or more with finite embeddings",
+        };
+        let count = known.len();
+        if count < 2 || others.is_empty() {
+            return Err(wrong(count.to_string()));
+        }
+        let row = |p: &Predicted| {
+            DVector::from_iterator(EMBEDDING, p.embedding.iter().map(|x| f64::from(*x)))
+        };
+        let rows: Vec<DVector<f64>> = known.iter().map(row).collect();
+        let mean: DVector<f64> = rows.iter().sum::<DVector<f64>>() / count as f64;
+        let mut covariance = DMatrix::zeros(EMBEDDING, EMBEDDING);
+        for row in &rows {
+            let d = row - &mean;
+            covariance.ger(1.0 / count as f64, &d, &d, 1.0);
+        }
+        // Directions in which known ropes hardly differ count as if they differed
+        // by a hundredth of the others: a score, not a sentence.
+        let floor = 1e-4 * covariance.trace() / EMBEDDING as f64 + 1e-12;
+        covariance += DMatrix::identity(EMBEDDING, EMBEDDING) * floor;
+        let lower = covariance
+            .cholesky()
+            .ok_or_else(|| wrong("embeddings without spread".to_owned()))?
+            .l();
+        let inverse = lower
+            .try_inverse()
+            .ok_or_else(|| wrong("embeddings without spread".to_owned()))?;
+        let score = |p: &Predicted| (&inverse * (row(p) - &mean)).norm_squared() / EMBEDDING as f64;
+        let mut scores: Vec<f64> = others.iter().map(score).collect();
+        scores.sort_by(f64::total_cmp);
+        let count = scores.len();
+        Ok(Self {
+            mean: mean.iter().map(|x| *x as f32).collect(),
+            // A row vector times this is the same as the inverse times a column.
+            whiten: inverse.iter().map(|x| *x as f32).collect(),
+            limit: scores[(count * 99 / 100).min(count - 1)],
+        })
+    }
+}
+
+/// The bytes of the ONNX file.
+///
+/// # Errors
+/// Weights that the tensor library does not hand out.
+pub fn to_onnx(state: &State, familiar: &Familiar) -> Result<Vec<u8>, TrainingError> {
+    let config = &state.progress.config;
+    let features = config.features();
+    let graph = GraphWriter::default().network(
+        &state.model,
+        &state.progress.standard,
+        &features,
+        familiar,
+    )?;
+    let metadata = PhiMetadata {
+        format: FORMAT,
+        features,
+        wiggle: config.data.wiggle,
+        parameters: RANGES
+            .iter()
+            .map(|range| ParameterScale {
+                key: range.key.to_owned(),
+                min: range.min,
+                max: range.max,
+            })
+            .collect(),
+        oddity_limit: familiar.limit,
+        probe: probe_outputs(state)?,
+        training: TrainingRecord {
+            seed: config.training.seed,
+            ropes: config.data.ropes,
+            data_sha256: state.progress.data_sha256.clone(),
+            steps: state.progress.step,
+            batch: config.training.batch,
+            randomisation: config.randomisation,
+        },
+        graph_sha256: graph_sha256(&graph.encode_to_vec()),
+    };
+    let value = serde_json::to_string(&metadata).map_err(|error| TrainingError::Tensors {
+        reason: format!("metadata: {error}"),
+    })?;
+    Ok(Model {
+        ir_version: IR_VERSION,
+        producer_name: "phi-train".to_owned(),
+        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        graph: Some(graph),
+        opset_import: vec![OperatorSet {
+            domain: String::new(),
+            version: OPSET,
+        }],
+        metadata_props: vec![StringEntry {
+            key: METADATA_KEY.to_owned(),
+            value,
+        }],
+    }
+    .encode_to_vec())
+}
+
+/// The network's answer to the test input.
+fn probe_outputs(state: &State) -> Result<ProbeOutputs, TrainingError> {
+    let config = &state.progress.config;
+    let mut film = Batch::with_capacity(1);
+    // Which rope it is told to be does not matter.
+    let rope = RopeParams::from_array(RANGES.map(|range| range.min));
+    film.push(probe(config.features()), &rope, &state.progress.standard);
+    let found = predict(&state.model.valid(), config, &film, &Device::flex())?;
+    let first = found.into_iter().next();
+    first
+        .map(|p| ProbeOutputs {
+            mean: p.mean,
+            log_variance: p.log_variance,
+        })
+        .ok_or_else(|| TrainingError::Tensors {
+            reason: "no answer to the test input".to_owned(),
+        })
+}
+
+/// Compares a file's outputs with the network's for standardised films.
+///
+/// # Errors
+/// The first output that differs by more than [`PARITY`].
+pub fn compare(network: &[Predicted], file: &[Predicted]) -> Result<f32, TrainingError> {
+    let mut worst = 0.0_f32;
+    for (a, b) in network.iter().zip(file) {
+        let pairs: [(&'static str, &[f32], &[f32]); 3] = [
+            (OUTPUTS[0], &a.mean, &b.mean),
+            (OUTPUTS[1], &a.log_variance, &b.log_variance),
+            (OUTPUTS[2], &a.embedding, &b.embedding),
+        ];
+        for (output, a, b) in pairs {
+            let difference = difference(a, b);
+            if difference > PARITY {
+                return Err(TrainingError::NotTheSame {
+                    output,
+                    difference,
+                    limit: PARITY,
+                });
+            }
+            worst = worst.max(difference);
+        }
+    }
+    Ok(worst)
+}
+
+#[derive(Default)]
+struct GraphWriter {
+    graph: Graph,
+}
+
+impl GraphWriter {
+    fn network(
+        mut self,
+        model: &PhiModel,
+        standard: &Standard,
+        features: &FeatureDefinition,
+        familiar: &Familiar,
+    ) -> Result<Graph, TrainingError> {
+        let channels = features.channels();
+        self.graph.name = "phi-nn".to_owned();
+        self.graph.input = vec![
+            value(INPUTS[0], &[features.frames, channels]),
+            value(INPUTS[1], &[WIDTHS]),
+        ];
+        self.graph.output = vec![
+            value(OUTPUTS[0], &[ROPE_PARAMETERS]),
+            value(OUTPUTS[1], &[ROPE_PARAMETERS]),
+            value(OUTPUTS[2], &[EMBEDDING]),
+            value(OUTPUTS[3], &[1]),
+        ];
+        let x = self.standardised_motion(standard, channels);
+        let mut x = self.transpose(&x);
+        for (i, block) in model.blocks.iter().enumerate() {
+            let [rows, out] = block.convolution.weight.dims();
+            let weight = numbers(block.convolution.weight.val())?;
+            let name = format!("block{i}");
+            let kernel = self.floats(
+                &format!("{name}.weight"),
+                &[out, rows / KERNEL, KERNEL],
+                &as_kernel(&weight, rows / KERNEL, out),
+            );
+            let bias = self.bias(&name, &block.convolution)?;
+            let pads = [PADDING[0] as i64, PADDING[1] as i64];
+            x = self.node(
+                "Conv",
+                &[&x, &kernel, &bias],
+                &[ints("kernel_shape", &[KERNEL as i64]), ints("pads", &pads)],
+            );
+            x = self.transpose(&x);
+            let gamma = numbers(block.norm.gamma.val())?;
+            let beta = block.norm.beta.as_ref().map(|b| numbers(b.val()));
+            let beta = beta.unwrap_or_else(|| Ok(vec![0.0; out]))?;
+            let gamma = self.floats(&format!("{name}.norm.scale"), &[out], &gamma);
+            let beta = self.floats(&format!("{name}.norm.bias"), &[out], &beta);
+            #[allow(clippy::cast_possible_truncation, reason = "1e-5 in single precision")]
+            let epsilon = NORM_EPSILON as f32;
+            x = self.node(
+                "LayerNormalization",
+                &[&x, &gamma, &beta],
+                &[int("axis", -1), float("epsilon", epsilon)],
+            );
+            x = self.node("Gelu", &[&x], &[]);
+            x = self.transpose(&x);
+            x = self.average(&x, 2);
+        }
+        x = self.average(&x, features.frames / 8 / model.pooled);
+        x = self.transpose(&x);
+        x = self.node("Flatten", &[&x], &[int("axis", 1)]);
+        let widths = self.standardised_widths(standard);
+        x = self.node("Concat", &[&x, &widths], &[int("axis", 1)]);
+        x = self.linear("embed", &x, &model.embed)?;
+        let embedding = self.named("Gelu", &[&x], &[], OUTPUTS[2]);
+        x = self.linear("head0", &embedding, &model.head[0])?;
+        x = self.node("Gelu", &[&x], &[]);
+        x = self.linear("head1", &x, &model.head[1])?;
+        let hidden = self.node("Gelu", &[&x], &[]);
+        x = self.linear("head2", &hidden, &model.head[2])?;
+        self.named("Sigmoid", &[&x], &[], OUTPUTS[0]);
+        x = self.linear("spread0", &hidden, &model.spread[0])?;
+        x = self.node("Gelu", &[&x], &[]);
+        x = self.linear("spread1", &x, &model.spread[1])?;
+        self.named("Identity", &[&x], &[], OUTPUTS[1]);
+        self.oddity(&embedding, familiar);
+        Ok(self.graph)
+    }
+
+    /// (x - mean) * scale * mask, the mask being the last channel.
+    fn standardised_motion(&mut self, standard: &Standard, channels: usize) -> String {
+        let mean = self.floats("motion.mean", &[channels], &standard.mean);
+        let scale = self.floats("motion.scale", &[channels], &standard.scale);
+        let last = channels as i64 - 1;
+        let start = self.integers("mask.start", &[last]);
+        let end = self.integers("mask.end", &[last + 1]);
+        let axis = self.integers("mask.axis", &[2]);
+        let mask = self.node("Slice", &[INPUTS[0], &start, &end, &axis], &[]);
+        let x = self.node("Sub", &[INPUTS[0], &mean], &[]);
+        let x = self.node("Mul", &[&x, &scale], &[]);
+        self.node("Mul", &[&x, &mask], &[])
+    }
+
+    /// A width that was not seen is 0 with mark 0, so that one matrix does it.
+    fn standardised_widths(&mut self, standard: &Standard) -> String {
+        let mut matrix = [0.0; WIDTHS * WIDTHS];
+        for i in 0..2 {
+            let scale = standard.width_scale[i];
+            matrix[2 * i * WIDTHS + 2 * i] = scale;
+            matrix[(2 * i + 1) * WIDTHS + 2 * i] = -standard.width_mean[i] * scale;
+            matrix[(2 * i + 1) * WIDTHS + 2 * i + 1] = 1.0;
+        }
+        let matrix = self.floats("widths.matrix", &[WIDTHS, WIDTHS], &matrix);
+        self.node("MatMul", &[INPUTS[1], &matrix], &[])
+    }
+
+    /// Mean square of the whitened embedding.
+    fn oddity(&mut self, embedding: &str, familiar: &Familiar) {
+        let mean = self.floats("familiar.mean", &[EMBEDDING], &familiar.mean);
+        let whiten = self.floats("familiar.whiten", &[EMBEDDING, EMBEDDING], &familiar.whiten);
+        #[allow(clippy::cast_precision_loss, reason = "256 is exact")]
+        let share = vec![1.0 / EMBEDDING as f32; EMBEDDING];
+        let share = self.floats("familiar.share", &[EMBEDDING, 1], &share);
+        let x = self.node("Sub", &[embedding, &mean], &[]);
+        let x = self.node("MatMul", &[&x, &whiten], &[]);
+        let x = self.node("Mul", &[&x, &x], &[]);
+        self.named("MatMul", &[&x, &share], &[], OUTPUTS[3]);
+    }
+
+    fn linear(&mut self, name: &str, x: &str, layer: &Linear) -> Result<String, TrainingError> {
+        let dims = layer.weight.dims();
+        let weight = numbers(layer.weight.val())?;
+        let weight = self.floats(&format!("{name}.weight"), &dims, &weight);
+        let bias = self.bias(name, layer)?;
+        Ok(self.node("Gemm", &[x, &weight, &bias], &[]))
+    }
+
+    fn bias(&mut self, name: &str, layer: &Linear) -> Result<String, TrainingError> {
+        let [_, out] = layer.weight.dims();
+        let bias = layer.bias.as_ref().map(|b| numbers(b.val()));
+        let bias = bias.unwrap_or_else(|| Ok(vec![0.0; out]))?;
+        Ok(self.floats(&format!("{name}.bias"), &[out], &bias))
+    }
+
+    fn transpose(&mut self, x: &str) -> String {
+        self.node("Transpose", &[x], &[ints("perm", &[0, 2, 1])])
+    }
+
+    fn average(&mut self, x: &str, width: usize) -> String {
+        let width = [width as i64];
+        self.node(
+            "AveragePool",
+            &[x],
+            &[ints("kernel_shape", &width), ints("strides", &width)],
+        )
+    }
+
+    fn node(&mut self, op: &str, inputs: &[&str], attributes: &[Attribute]) -> String {
+        let output = format!("x{}", self.graph.node.len());
+        self.named(op, inputs, attributes, &output)
+    }
+
+    fn named(
+        &mut self,
+        op: &str,
+        inputs: &[&str],
+        attributes: &[Attribute],
+        output: &str,
+    ) -> String {
+        self.graph.node.push(Node {
+            input: inputs.iter().map(|i| (*i).to_owned()).collect(),
+            output: vec![output.to_owned()],
+            name: format!("{op}_{}", self.graph.node.len()),
+            op_type: op.to_owned(),
+            attribute: attributes.to_vec(),
+        });
+        output.to_owned()
+    }
+
+    fn floats(&mut self, name: &str, dims: &[usize], numbers: &[f32]) -> String {
+        let bytes = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.constant(name, FLOAT, dims, bytes)
+    }
+
+    fn integers(&mut self, name: &str, numbers: &[i64]) -> String {
+        let bytes = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.constant(name, INT64, &[numbers.len()], bytes)
+    }
+
+    fn constant(
+        &mut self,
+        name: &str,
+        data_type: i32,
+        dims: &[usize],
+        raw_data: Vec<u8>,
+    ) -> String {
+        self.graph.initializer.push(Tensor {
+            dims: dims.iter().map(|d| *d as i64).collect(),
+            data_type,
+            name: name.to_owned(),
+            raw_data,
+        });
+        name.to_owned()
+    }
+}
+
+fn numbers<const D: usize>(tensor: BurnTensor<D>) -> Result<Vec<f32>, TrainingError> {
+    tensor
+        .into_data()
+        .try_into_vec::<f32>()
+        .map_err(|error| TrainingError::Tensors {
+            reason: format!("{error:?}"),
+        })
+}
+
+/// Weight `[(tap, in), out]` as ONNX has it: `[out, in, tap]`.
+fn as_kernel(weight: &[f32], channels_in: usize, channels_out: usize) -> Vec<f32> {
+    let mut kernel = Vec::with_capacity(weight.len());
+    for out in 0..channels_out {
+        for channel in 0..channels_in {
+            for tap in 0..KERNEL {
+                kernel.push(weight[(tap * channels_in + channel) * channels_out + out]);
+            }
+        }
+    }
+    kernel
+}
+
+/// A float tensor with any number of films.
+fn value(name: &str, sizes: &[usize]) -> ValueInfo {
+    let films = Dimension {
+        value: Some(DimensionValue::Name("n".to_owned())),
+    };
+    let fixed = sizes.iter().map(|size| Dimension {
+        value: Some(DimensionValue::Size(*size as i64)),
+    });
+    ValueInfo {
+        name: name.to_owned(),
+        value_type: Some(ValueType {
+            tensor_type: Some(TensorType {
+                elem_type: FLOAT,
+                shape: Some(TensorShape {
+                    dim: core::iter::once(films).chain(fixed).collect(),
+                }),
+            }),
+        }),
+    }
+}
+
+fn int(name: &str, i: i64) -> Attribute {
+    Attribute {
+        name: name.to_owned(),
+        i,
+        kind: ATTRIBUTE_INT,
+        ..Attribute::default()
+    }
+}
+
+fn ints(name: &str, ints: &[i64]) -> Attribute {
+    Attribute {
+        name: name.to_owned(),
+        ints: ints.to_vec(),
+        kind: ATTRIBUTE_INTS,
+        ..Attribute::default()
+    }
+}
+
+fn float(name: &str, f: f32) -> Attribute {
+    Attribute {
+        name: name.to_owned(),
+        f,
+        kind: ATTRIBUTE_FLOAT,
+        ..Attribute::default()
+    }
+}
