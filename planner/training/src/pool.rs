@@ -329,6 +329,13 @@ mod tests {
     use super::*;
     use planner::wiggle::WiggleConfig;
 
+    /// A folder of this test's own, empty at first.
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("phi-pool-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        folder
+    }
+
     fn data() -> DataConfig {
         DataConfig {
             seed: 4,
@@ -341,10 +348,10 @@ mod tests {
 
     #[test]
     fn a_pool_is_the_same_made_again_or_by_more_threads() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = folder("same");
         let recipe = Recipe::new(&data(), Share::Training, 1);
-        recipe.make(folder.path(), 0..1, &mut |_| ()).unwrap();
-        let pool = recipe.load(folder.path()).unwrap();
+        recipe.make(&folder, 0..1, &mut |_| ()).unwrap();
+        let pool = recipe.load(&folder).unwrap();
         let again = Recipe::new(&data(), Share::Training, 2)
             .simulate(0)
             .unwrap();
@@ -357,31 +364,33 @@ mod tests {
         assert!(pool.film(6).is_none());
         let held_out = Recipe::new(&data(), Share::HeldOut, 1).simulate(0).unwrap();
         assert_ne!(held_out.rope(0), pool.rope(0));
+        std::fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
     fn damaged_and_foreign_shards_are_refused_and_made_again() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = folder("damaged");
         let recipe = Recipe::new(&data(), Share::HeldOut, 1);
-        recipe.make(folder.path(), 0..1, &mut |_| ()).unwrap();
-        let path = recipe.path(folder.path(), 0);
+        recipe.make(&folder, 0..1, &mut |_| ()).unwrap();
+        let path = recipe.path(&folder, 0);
         let good = std::fs::read(&path).unwrap();
         let mut bad = good.clone();
         bad[500] ^= 1;
         for wrong in [&bad[..], &good[..good.len() - 7], b"WAG"] {
             std::fs::write(&path, wrong).unwrap();
-            let refused = recipe.load(folder.path()).unwrap_err();
+            let refused = recipe.load(&folder).unwrap_err();
             assert!(refused.to_string().contains("dataset"), "{refused}");
         }
-        recipe.make(folder.path(), 0..1, &mut |_| ()).unwrap();
+        recipe.make(&folder, 0..1, &mut |_| ()).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), good);
         let other = DataConfig { seed: 5, ..data() };
-        let refused = Recipe::new(&other, Share::HeldOut, 1).load(folder.path());
+        let refused = Recipe::new(&other, Share::HeldOut, 1).load(&folder);
         assert!(
             refused
                 .unwrap_err()
                 .to_string()
                 .contains("another configuration")
         );
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }

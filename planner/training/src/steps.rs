@@ -126,18 +126,13 @@ pub(crate) fn train(arguments: &TrainArguments) -> Result<(), TrainingError> {
     Ok(())
 }
 
-/// Films of the first ropes of a share with their predictions.
-struct Looked {
-    films: Batch,
-    predicted: Vec<Predicted>,
-}
-
+/// Predictions for films of the first ropes of a share.
 fn look(
     state: &State,
     studio: &Studio<'_>,
     pool: &Pool,
     count: usize,
-) -> Result<Looked, TrainingError> {
+) -> Result<Vec<Predicted>, TrainingError> {
     let bar = bar(count, "films {bar:30} {pos}/{len}, {eta} left");
     let mut films = Batch::with_capacity(count);
     for i in 0..count {
@@ -146,13 +141,12 @@ fn look(
     }
     bar.finish_and_clear();
     let device = Device::flex();
-    let predicted = predict(
+    predict(
         &state.model.valid(),
         &state.progress.config,
         &films,
         &device,
-    )?;
-    Ok(Looked { films, predicted })
+    )
 }
 
 pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<(), TrainingError> {
@@ -173,7 +167,7 @@ pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<(), TrainingErro
                 deviation.clamp(1e-4, 1.0) * (RANGES[i].max - RANGES[i].min)
             }),
         };
-        looked.predicted.iter().map(in_units).collect()
+        looked.iter().map(in_units).collect()
     };
     let evaluation = judge(&judged);
     if arguments.json {
@@ -217,9 +211,9 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<(), TrainingError> {
     )?;
     let studio = Studio::new(&config, &held_out)?;
     let others = look(&state, &studio, &held_out, held_out.len())?;
-    let familiar = Familiar::measure(&known.predicted, &others.predicted)?;
+    let familiar = Familiar::measure(&known, &others)?;
     let bytes = to_onnx(&state, &familiar)?;
-    from_file::check(&bytes, &studio, &others.predicted)?;
+    from_file::check(&bytes, &studio, &others)?;
     write(&arguments.out, &bytes)?;
     println!(
         "{}: {} bytes after {} steps, {}",

@@ -85,8 +85,9 @@ fn a_training_learns_resumes_bit_for_bit_and_is_written_as_it_is() {
     let config = tiny();
     let pools = [Share::Training, Share::HeldOut]
         .map(|share| Recipe::new(&config.data, share, 2).simulate(0).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let whole_folder = folder.path().join("whole");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("tiny-training");
+    let _ = std::fs::remove_dir_all(&folder);
+    let whole_folder = folder.join("whole");
     let mut losses = Vec::new();
     let whole = trainer(&config, &pools, &whole_folder, 1)
         .run(&mut |_, _, loss, _| {
@@ -100,7 +101,7 @@ fn a_training_learns_resumes_bit_for_bit_and_is_written_as_it_is() {
     assert!(last < 0.9 * first, "{first} {last}");
 
     // Ended after 13 steps and gone on from the file, with other threads.
-    let parts_folder = folder.path().join("parts");
+    let parts_folder = folder.join("parts");
     let paused = trainer(&config, &pools, &parts_folder, 2)
         .run(&mut |done, _, _, _| done < 13)
         .unwrap();
