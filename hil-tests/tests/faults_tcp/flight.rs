@@ -67,11 +67,8 @@ impl Flight {
     }
 
     /// Cycles that sent a setpoint.
-    fn sent(&self) -> impl Iterator<Item = &CycleRecord> {
-        self.cycles
-            .iter()
-            .map(|c| &c.record)
-            .filter(|r| r.sent != 0)
+    fn sent(&self) -> impl Iterator<Item = &RecordedCycle> {
+        self.cycles.iter().filter(|c| c.record.sent != 0)
     }
 
     /// All that holds of every flight.
@@ -114,8 +111,7 @@ impl Flight {
         let sent: Vec<_> = self.sent().collect();
         let runs = sent.chunk_by(|a, b| {
             // An adoption begins anew where the arm stands.
-            let pause_ns = b.deadline_ns - a.deadline_ns;
-            pause_ns < 500_000_000 && a.mode != ControllerMode::Faulted as u8
+            seconds(a, b) < 0.5 && a.record.mode != ControllerMode::Faulted as u8
         });
         for run in runs {
             for pair in run.windows(2) {
@@ -127,25 +123,27 @@ impl Flight {
         }
     }
 
-    fn keeps_speed(&self, a: &CycleRecord, b: &CycleRecord) {
+    fn keeps_speed(&self, a: &RecordedCycle, b: &RecordedCycle) {
         let span_s = seconds(a, b);
-        let tool = |r: &CycleRecord| {
-            let (p_w_m, r_w) = kinematics::flange_pose(&r.q_c);
+        let (a, b) = (&a.record.q_c, &b.record.q_c);
+        let tool = |q: &JointVector| {
+            let (p_w_m, r_w) = kinematics::flange_pose(q);
             p_w_m + r_w * self.limits.tcp_offset()
         };
         let tool_m_s = (tool(b) - tool(a)).norm() / span_s;
         let most_m_s = self.limits.tcp_speed_max_m_s;
         assert!(tool_m_s <= most_m_s * (1.0 + ROUNDING), "{tool_m_s} m/s");
         for j in 0..JOINTS {
-            let speed = (b.q_c[j] - a.q_c[j]).abs() / span_s;
+            let speed = (b[j] - a[j]).abs() / span_s;
             let most = self.limits.velocity_max_rad_s[j];
             assert!(speed <= most * (1.0 + ROUNDING), "joint {j}: {speed} rad/s");
         }
     }
 
-    fn keeps_acceleration(&self, three: &[&CycleRecord]) {
-        let speed =
-            |a: &CycleRecord, b: &CycleRecord, j: usize| (b.q_c[j] - a.q_c[j]) / seconds(a, b);
+    fn keeps_acceleration(&self, three: &[&RecordedCycle]) {
+        let speed = |a: &RecordedCycle, b: &RecordedCycle, j: usize| {
+            (b.record.q_c[j] - a.record.q_c[j]) / seconds(a, b)
+        };
         let middle_s = 0.5 * seconds(three[0], three[2]);
         for j in 0..JOINTS {
             let change = speed(three[1], three[2], j) - speed(three[0], three[1], j);
@@ -154,16 +152,16 @@ impl Flight {
             assert!(
                 found <= most * (1.0 + ROUNDING),
                 "joint {j}: {found} rad/s² in cycle {}",
-                three[2].cycle
+                three[2].record.cycle
             );
         }
     }
 
     /// What reached the arm is what the cycles sent, in order, nothing twice.
     fn the_arm_got_what_was_recorded(&self) {
-        let mut sent = self.sent().map(|r| match self.wire {
-            WireMode::ServoPosition => on_the_wire(&r.q_c),
-            WireMode::JointVelocity => on_the_wire(&r.qd_wire),
+        let mut sent = self.sent().map(|c| match self.wire {
+            WireMode::ServoPosition => on_the_wire(&c.record.q_c),
+            WireMode::JointVelocity => on_the_wire(&c.record.qd_wire),
         });
         for event in &self.arm {
             let (ArmEvent::Setpoint(got) | ArmEvent::Velocity { qd: got, .. }) = event.event else {
@@ -187,8 +185,11 @@ impl Flight {
     }
 }
 
-fn seconds(a: &CycleRecord, b: &CycleRecord) -> f64 {
-    MonotonicNs(b.deadline_ns).since_s(MonotonicNs(a.deadline_ns))
+/// Time between the instants that two setpoints are for: those of the deadlines,
+/// or of the later ones at which they were really sent.
+fn seconds(a: &RecordedCycle, b: &RecordedCycle) -> f64 {
+    let instant = |c: &RecordedCycle| MonotonicNs(c.input.deadline_ns + u64::from(c.input.late_ns));
+    instant(b).since_s(instant(a))
 }
 
 /// As the wire carries it: 32 bits.
