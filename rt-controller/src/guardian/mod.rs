@@ -38,6 +38,9 @@ const LOOK_EVERY_NS: u64 = 50_000_000;
 /// Longest stay after being asked to end while the arm moves (ns): the
 /// controller brakes first.
 const LEAVE_WITHIN_NS: u64 = 4_000_000_000;
+/// The same where no connection to the arm can be had (ns): its host is down or
+/// gone, and whoever ends the guardian is told to look at the arm.
+const LEAVE_UNHEARD_WITHIN_NS: u64 = 1_500_000_000;
 
 /// Guards the arm and the controller of `config` until `stop` is set; when the
 /// arm moves then, until it stands. Blocks the calling thread.
@@ -65,8 +68,18 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
         let now_ns = clock.now_ns();
         let moving = post.turn(&bus, now_ns);
         if stop.load(Ordering::Relaxed) {
-            let since_ns = *leaving_ns.get_or_insert(now_ns);
-            if !moving || now_ns.saturating_sub(since_ns) > LEAVE_WITHIN_NS {
+            let since_ns = now_ns.saturating_sub(*leaving_ns.get_or_insert(now_ns));
+            let most_ns = if post.line.is_connected() {
+                LEAVE_WITHIN_NS
+            } else {
+                LEAVE_UNHEARD_WITHIN_NS
+            };
+            if moving && since_ns > most_ns {
+                tracing::error!(
+                    "leaving an arm that was not seen stopped: press its emergency stop"
+                );
+            }
+            if !moving || since_ns > most_ns {
                 return Ok(());
             }
         }

@@ -9,6 +9,5 @@
 )]
 
 mod demo;
-mod identical;
 mod operator;
 mod shell;
