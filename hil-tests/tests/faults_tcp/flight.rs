@@ -1,6 +1,7 @@
 //! What a stand has recorded, and what must hold of every flight.
 
 use hil_tests::arm::{ArmEvent, JointSample, TimedEvent};
+use rt_controller::overrun::setpoint_late_ns;
 use rt_controller::recording::RecordedCycle;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord};
 use shared_types::{FaultCode, JOINTS, JointVector, Limits, MonotonicNs, WireMode, kinematics};
@@ -188,7 +189,15 @@ impl Flight {
 }
 
 fn seconds(a: &CycleRecord, b: &CycleRecord) -> f64 {
-    MonotonicNs(b.deadline_ns).since_s(MonotonicNs(a.deadline_ns))
+    instant(b).since_s(instant(a))
+}
+
+/// The instant that a cycle's setpoint is for: a late one is that of its wake-up.
+fn instant(r: &CycleRecord) -> MonotonicNs {
+    const PERIOD_NS: u64 = 4_000_000;
+    let woke_ns = r.deadline_ns + u64::from(r.wake_late_ns);
+    let late_ns = setpoint_late_ns(r.deadline_ns, woke_ns, r.missed, PERIOD_NS);
+    MonotonicNs(r.deadline_ns + u64::from(late_ns))
 }
 
 /// As the wire carries it: 32 bits.
