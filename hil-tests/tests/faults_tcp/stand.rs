@@ -13,7 +13,17 @@ use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
 use shared_types::plan::{START_POSE, trajectory_hash};
 use shared_types::{FaultCode, JointTrajectory, JointVector, MonotonicNs, MotionTier, WireMode};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+/// Stands take turns: each has a control loop of its own to keep punctual.
+static TURNS: Mutex<()> = Mutex::new(());
+
+thread_local! {
+    /// The turn of this thread's test, until the thread ends.
+    static ALONE: MutexGuard<'static, ()> =
+        TURNS.lock().unwrap_or_else(PoisonError::into_inner);
+}
 
 /// Longest wait for anything.
 pub const PATIENCE: Duration = Duration::from_secs(30);
@@ -101,6 +111,7 @@ impl Stand {
     /// A stand with an arm and changes to the controller's configuration of its
     /// own.
     pub fn with(name: &str, arm: ArmConfig, change: impl FnOnce(&mut ControllerConfig)) -> Self {
+        ALONE.with(|_turn| ());
         let arm = SimulatedArm::start(ArmConfig {
             command_port: 0,
             report_ports: [0; 4],
