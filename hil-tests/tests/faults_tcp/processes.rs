@@ -195,7 +195,7 @@ fn fault_32_what_a_killed_controller_left_does_not_block_the_next() {
 
 /// Whether the next program can be another user: for the superuser only.
 #[test]
-fn fault_32_another_users_shared_memory_is_a_plain_refusal() {
+fn fault_32_another_users_controller_of_the_same_name_disturbs_nothing() {
     use std::os::unix::fs::MetadataExt;
     if std::fs::metadata("/proc/self").unwrap().uid() != 0 {
         println!("skipped: only the superuser can start a program as somebody else");
@@ -203,15 +203,14 @@ fn fault_32_another_users_shared_memory_is_a_plain_refusal() {
     }
     let stand = Stand::start("owner");
     let text = toml::to_string(&stand.config).unwrap();
-    let Some(mut other) = Process::start_as_nobody(Role::Controller, "owner_2", &text) else {
+    let Some(other) = Process::start_as_nobody(Role::Controller, "owner_2", &text) else {
         println!("skipped: this program cannot be read by other users");
         return;
     };
-    let code = other.wait();
-    assert_ne!(code, Some(0), "{}", other.log());
-    let log = other.log();
-    assert!(log.contains("same user"), "{log}");
+    // Each user's processes meet in a folder of their own.
+    std::thread::sleep(Duration::from_millis(500));
     stand.finish();
+    drop(other);
 }
 
 #[test]
