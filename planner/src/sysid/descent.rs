@@ -3,7 +3,7 @@
 use super::coordinates::{Coordinates, Point, Square};
 use super::film::{Fidelity, Film};
 use super::linear::{Linearised, Normal, linearise};
-use super::noise::Noise;
+use super::noise::{Noise, Rows};
 use super::{FitProgress, IdentifyError};
 
 /// Damping of the first step, relative to the diagonal.
@@ -68,16 +68,17 @@ impl Account<'_> {
 }
 
 /// Descends from every start; the walkers that could be simulated at all, the lowest
-/// cost first.
+/// cost first. `near` as in [`linearise`].
 pub(super) fn descend(
     film: &Film<'_>,
     coordinates: &Coordinates,
     starts: &[Point],
+    near: &[&Rows],
     rules: &DescentRules,
     account: &mut Account<'_>,
 ) -> Result<Vec<Walker>, IdentifyError> {
     let starts: Vec<Point> = starts.iter().map(|x| coordinates.clamped(x)).collect();
-    let (found, simulations) = linearise(film, &starts, rules.links, rules.fidelity)?;
+    let (found, simulations) = linearise(film, &starts, near, rules.links, rules.fidelity)?;
     let walkers: Vec<Walker> = starts
         .iter()
         .zip(found)
@@ -106,7 +107,8 @@ pub(super) fn go_on(
             break;
         }
         let points: Vec<Point> = trials.iter().map(|(_, x)| *x).collect();
-        let (found, simulations) = linearise(film, &points, rules.links, rules.fidelity)?;
+        let near: Vec<&Rows> = trials.iter().map(|(i, _)| &walkers[*i].at.rows).collect();
+        let (found, simulations) = linearise(film, &points, &near, rules.links, rules.fidelity)?;
         for ((i, x), at) in trials.into_iter().zip(found) {
             let there = at.map(|at| Walker::new(film, coordinates, rules, x, at));
             walkers[i].judge(there, rules);

@@ -101,7 +101,7 @@ pub fn information(
         Reach::Ranges,
     );
     let x = point_of(rope);
-    let (mut at, _) = linearise(&seen, &[x], rope.links, fidelity)?;
+    let (mut at, _) = linearise(&seen, &[x], &[], rope.links, fidelity)?;
     let Some(Some(at)) = at.pop() else {
         return Ok(None);
     };

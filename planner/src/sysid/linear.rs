@@ -17,10 +17,10 @@ use rope_sim::sensitivity::{
 use rope_sim::{Candidate, NodeTrack, Rollout};
 use shared_types::RopeParams;
 
-/// Steps of the differences in double precision: length (m), three logarithms, lead
-/// radius (m), inertia radius (1).
-const FINE_STEPS: [f64; ROPE] = [2e-4, 5e-3, 5e-3, 5e-3, 5e-4, 5e-2];
-/// In single precision, one-sided.
+/// Steps of the one-sided differences in double precision: length (m), three
+/// logarithms, lead radius (m), inertia radius (1).
+const FINE_STEPS: [f64; ROPE] = [2e-5, 5e-4, 5e-4, 5e-4, 1e-4, 5e-3];
+/// In single precision.
 const COARSE_STEPS: [f64; ROPE] = [2e-3, 4e-2, 4e-2, 4e-2, 2e-3, 0.0];
 /// Step of the camera's corrections (m, rad) and of the clock (s).
 const CAMERA_STEP: f64 = 1e-4;
@@ -57,15 +57,20 @@ pub(super) struct Linearised {
 struct Pair<'a> {
     coordinate: usize,
     to: &'a Rollout,
-    from: &'a Rollout,
+    /// `None` is the base itself.
+    from: Option<&'a Rollout>,
     span: f64,
 }
 
 /// Residuals and slopes at each point, for ropes of `links` links; `None` where the
 /// rope cannot be simulated or is not in view. Also how many ropes were simulated.
+///
+/// `near` are the rows of a point nearby, one per point or none at all: the slopes over
+/// the link count, which hardly change and fill no lanes, are taken over from there.
 pub(super) fn linearise(
     film: &Film<'_>,
     points: &[Point],
+    near: &[&Rows],
     links: u32,
     fidelity: Fidelity,
 ) -> Result<(Vec<Option<Linearised>>, usize), IdentifyError> {
@@ -83,7 +88,7 @@ pub(super) fn linearise(
         })
         .collect();
     let counts = neighbour_counts(links);
-    let other: Vec<RopeParams> = if fine {
+    let other: Vec<RopeParams> = if fine && near.is_empty() {
         let of = |x| counts.map(|n| simulated_rope(x, n));
         points.iter().flat_map(of).collect()
     } else {
@@ -93,13 +98,9 @@ pub(super) fn linearise(
         base: Candidate::new(rope, motion),
         directions: &[],
     }));
-    let difference = if fine {
-        Difference::Central
-    } else {
-        Difference::Forward
-    };
-    let all = sensitivities(&families, difference, &film.sim_options(fidelity))
-        .map_err(unwrap_sensitivity)?;
+    let options = film.sim_options(fidelity);
+    let all =
+        sensitivities(&families, Difference::Forward, &options).map_err(unwrap_sensitivity)?;
     let simulations = all.iter().map(simulated).sum();
     let (bases, others) = all.split_at(points.len());
     let out = points.iter().zip(bases).enumerate().map(|(i, (x, at))| {
@@ -111,12 +112,15 @@ pub(super) fn linearise(
             pairs.push(Pair {
                 coordinate: LINKS,
                 to: &to.base,
-                from: &from.base,
+                from: Some(&from.base),
                 span: f64::from(counts[0]) - f64::from(counts[1]),
             });
         }
         is_finite(&at.base)
-            .then(|| compare(film, x, links, &at.base, &pairs, fidelity))
+            .then(|| {
+                let near = near.get(i).copied();
+                compare(film, x, links, &at.base, &pairs, near, fidelity)
+            })
             .flatten()
     });
     Ok((out.collect(), simulations))
@@ -148,9 +152,9 @@ fn simulated(s: &Sensitivity) -> usize {
 
 fn directions(x: &Point, links: u32, fine: bool) -> Vec<Direction<'static>> {
     let steps = if fine { FINE_STEPS } else { COARSE_STEPS };
-    let beside = |i: usize, sign: f64| {
+    let beside = |i: usize| {
         let mut moved = *x;
-        moved[i] += sign * steps[i];
+        moved[i] += steps[i];
         Beside {
             at: simulated_rope(&moved, links),
             distance: steps[i],
@@ -160,8 +164,8 @@ fn directions(x: &Point, links: u32, fine: bool) -> Vec<Direction<'static>> {
         .into_iter()
         .filter(|i| steps[*i] > 0.0)
         .map(|i| Direction::Rope {
-            plus: beside(i, 1.0),
-            minus: fine.then(|| beside(i, -1.0)),
+            plus: beside(i),
+            minus: None,
         })
         .collect()
 }
@@ -174,7 +178,7 @@ fn pairs(at: &Sensitivity) -> Vec<Pair<'_>> {
         .map(|(coordinate, n)| Pair {
             coordinate,
             to: &n.to,
-            from: n.from.as_ref().unwrap_or(&at.base),
+            from: n.from.as_ref(),
             span: n.span,
         })
         .collect()
@@ -203,6 +207,7 @@ fn compare(
     links: u32,
     base: &Rollout,
     pairs: &[Pair<'_>],
+    near: Option<&Rows>,
     fidelity: Fidelity,
 ) -> Option<Linearised> {
     let c = corrections(x);
@@ -223,7 +228,17 @@ fn compare(
             None => Some(None),
         }
     });
-    let rows: Rows = rows.into_iter().collect::<Option<_>>()?;
+    let mut rows: Rows = rows.into_iter().collect::<Option<_>>()?;
+    for (row, near) in rows.iter_mut().zip(near.into_iter().flatten()) {
+        if let (Some(row), Some(near)) = (row, near) {
+            for (row, near) in row.iter_mut().zip(near) {
+                row[LINKS] = near[LINKS];
+            }
+        }
+    }
+    for axis in rows.iter_mut().flatten().flatten() {
+        axis[RESIDUAL] += comparison.more_links * axis[LINKS];
+    }
     let (mut sum, mut count) = (0.0, 0.0);
     for row in rows.iter().flatten() {
         sum += row[0][RESIDUAL].powi(2) + row[1][RESIDUAL].powi(2);
@@ -246,7 +261,9 @@ impl Comparison<'_> {
         let mut out = [[0.0; FREE + 1]; 2];
         for pair in self.pairs {
             let to = now.position(&pair.to.nodes, sighting.along);
-            let from = now.position(&pair.from.nodes, sighting.along);
+            let from = pair
+                .from
+                .map_or(p, |r| now.position(&r.nodes, sighting.along));
             let moved = self.view.project(&(p + (to - from)))?;
             for axis in 0..2 {
                 out[axis][pair.coordinate] = (moved[axis] - seen[axis]) / pair.span;
@@ -263,8 +280,7 @@ impl Comparison<'_> {
         for axis in 0..2 {
             // A camera clock that is ahead sees an earlier rope.
             out[axis][CLOCK] = (a[axis] - b[axis]) / (2.0 * CLOCK_STEP_S);
-            out[axis][RESIDUAL] =
-                seen[axis] - sighting.pixel[axis] + self.more_links * out[axis][LINKS];
+            out[axis][RESIDUAL] = seen[axis] - sighting.pixel[axis];
         }
         for (i, view) in self.beside.iter().enumerate() {
             let moved = view.project(&p)?;

@@ -88,11 +88,11 @@ pub struct IdentifyOptions {
     pub seed: u64,
     /// Step of the rope simulation in the search (s).
     pub search_step_s: f64,
-    /// Step of the rope simulation in the polish (s).
+    /// Step of the rope simulation in the refinement (s).
     pub step_s: f64,
     /// Threads.
     pub threads: usize,
-    /// Most frames that the search compares; the polish compares all.
+    /// Most frames that the search compares; the refinement compares all.
     pub search_frames_max: usize,
     /// Mass of the lead if it was weighed; fixes the scale of all masses (kg).
     pub lead_mass_kg: Option<f64>,
@@ -125,8 +125,8 @@ impl Default for IdentifyOptions {
             generations: 50,
             early_stop: true,
             seed: 0,
-            search_step_s: 2e-3,
-            step_s: 1e-3,
+            search_step_s: 4e-3,
+            step_s: 2e-3,
             threads: 2,
             search_frames_max: 100,
             lead_mass_kg: None,
@@ -355,7 +355,16 @@ impl Task<'_> {
     /// The global search, refined.
     fn cmaes(&self, reach: Reach, account: &mut Account<'_>) -> Result<Refined, IdentifyError> {
         let coordinates = self.coordinates(reach);
-        let found = search(self.film, &coordinates, self.options, account)?;
+        // A rope that no candidate resembles would have every repeat for nothing.
+        let repeats_max = match reach {
+            Reach::Ranges => self.options.repeats_max,
+            Reach::Wide => 0,
+        };
+        let options = IdentifyOptions {
+            repeats_max,
+            ..*self.options
+        };
+        let found = search(self.film, &coordinates, &options, account)?;
         let noise_px = found.distance_px / 2.0_f64.sqrt();
         refine(self.film, &coordinates, &found.x, noise_px, account)
     }

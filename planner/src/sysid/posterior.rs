@@ -224,7 +224,9 @@ fn summarise(
             }
         }
     }
-    let interval_90 = core::array::from_fn(|i| quantiles(draws, |d| d.values[i], [0.05, 0.95]));
+    let mut interval_90 = core::array::from_fn(|i| quantiles(draws, |d| d.values[i], [0.05, 0.95]));
+    interval_90[parameter::LINKS] =
+        [0.05, 0.95].map(|part| count_quantile(&links_probability, part));
     RopePosterior {
         mean,
         covariance,
@@ -233,6 +235,23 @@ fn summarise(
         ambiguities: ambiguities(&covariance),
         inflation: fit.inflation,
     }
+}
+
+/// Quantile of the link count, the probability of each count spread evenly over half a
+/// link to both sides: an interval between whole counts would hold the truth far more
+/// often than it says.
+fn count_quantile(probability: &[f64; LINK_COUNTS], part: f64) -> f64 {
+    let (low, high) = link_range();
+    let mut edge = f64::from(low) - 0.5;
+    let mut below = 0.0;
+    for p in probability {
+        if below + p >= part && *p > 0.0 {
+            return edge + (part - below) / p;
+        }
+        below += p;
+        edge += 1.0;
+    }
+    f64::from(high) + 0.5
 }
 
 /// Deviation of the ranges as a prior.
@@ -289,5 +308,21 @@ impl Believed {
             let deviation = self.posterior.covariance[i][i].max(0.0).sqrt();
             (deviation < UNSEEN_PART * prior_std(i)).then_some(deviation)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_the_count_lie_between_counts() {
+        let sure = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        assert!((count_quantile(&sure, 0.05) - 22.55).abs() < 1e-12);
+        assert!((count_quantile(&sure, 0.95) - 23.45).abs() < 1e-12);
+        let even = [1.0 / 7.0; LINK_COUNTS];
+        assert!((count_quantile(&even, 0.5) - 23.0).abs() < 1e-12);
+        // Nine tenths of evenly likely counts, no more.
+        assert!((count_quantile(&even, 0.95) - count_quantile(&even, 0.05) - 6.3).abs() < 1e-9);
     }
 }

@@ -10,7 +10,7 @@ use super::coordinates::{
     CLOCK, Coordinates, DAMPING, INERTIA, LEAD_MASS, LENGTH, LINKS, Point, STIFFNESS, middle_links,
     point_of,
 };
-use super::descent::{Account, DescentRules, Walker, descend};
+use super::descent::{Account, DescentRules, Walker, descend, go_on};
 use super::film::{Fidelity, Film};
 use super::noise::Noise;
 use crate::ropes::random_rope;
@@ -22,8 +22,11 @@ use shared_types::RopeParams;
 const BANK: usize = 192;
 /// Ropes improved.
 const STARTS: usize = 6;
-/// Coarse steps.
-const ITERATIONS: usize = 14;
+/// Coarse steps of all of them, and of those that have come furthest.
+const FIRST_STEPS: usize = 4;
+const LAST_STEPS: usize = 10;
+/// How many of them go on.
+const FINALISTS: usize = 2;
 /// Noise assumed while searching (px): only its ratio to the priors counts, which are
 /// weak.
 const NOISE_PX: f64 = 4.0;
@@ -91,14 +94,17 @@ fn improve(
     starts: &[Point],
     account: &mut Account<'_>,
 ) -> Result<Vec<Walker>, IdentifyError> {
-    let rules = DescentRules {
+    let rules = |iterations| DescentRules {
         fidelity: Fidelity::Coarse,
         links: middle_links(),
         noise: Noise::white(NOISE_PX),
-        iterations: ITERATIONS,
+        iterations,
         settled_below: 0.05,
     };
-    descend(film, coordinates, starts, &rules, account)
+    let first = rules(FIRST_STEPS);
+    let mut walkers = descend(film, coordinates, starts, &[], &first, account)?;
+    walkers.truncate(FINALISTS);
+    go_on(film, coordinates, walkers, &rules(LAST_STEPS), account)
 }
 
 /// Ropes drawn from the ranges.

@@ -11,11 +11,12 @@ use super::film::{Fidelity, Film};
 use super::linear::Normal;
 use super::noise::Noise;
 
-/// Most steps: until the noise is known, with its first and with its later estimates.
+/// Most steps: until the noise is known, with its first estimate, and with the second at
+/// the likeliest link count.
 const FIRST_STEPS: usize = 6;
 const SECOND_STEPS: usize = 5;
-const LAST_STEPS: usize = 2;
-/// A cost lower by less than this is no better: a hundredth of a deviation.
+const LAST_STEPS: usize = 4;
+/// A cost lower by less than this is no better: a tenth of a deviation.
 const SETTLED: f64 = 5e-3;
 
 /// A refined fit.
@@ -55,18 +56,17 @@ pub(super) fn refine(
             .ok_or(IdentifyError::NothingVisible)
     };
 
-    let first = rules(middle_links(), Noise::white(noise_px), FIRST_STEPS);
-    let mut walker = best(descend(film, coordinates, &[*start], &first, account)?)?;
-    for steps in [SECOND_STEPS, LAST_STEPS] {
-        let rules = rules(middle_links(), estimate(&walker), steps);
-        let again = Walker::new(film, coordinates, &rules, walker.x, walker.at);
-        walker = best(go_on(film, coordinates, vec![again], &rules, account)?)?;
-    }
+    let middle = middle_links();
+    let first = rules(middle, Noise::white(noise_px), FIRST_STEPS);
+    let starts = [*start];
+    let mut walker = best(descend(film, coordinates, &starts, &[], &first, account)?)?;
+    let second = rules(middle, estimate(&walker), SECOND_STEPS);
+    let again = Walker::new(film, coordinates, &second, walker.x, walker.at);
+    walker = best(go_on(film, coordinates, vec![again], &second, account)?)?;
     let links = likeliest_links(&walker.x);
-    if links != middle_links() {
-        let rules = rules(links, estimate(&walker), LAST_STEPS);
-        walker = best(descend(film, coordinates, &[walker.x], &rules, account)?)?;
-    }
+    let last = rules(links, estimate(&walker), LAST_STEPS);
+    let (starts, near) = ([walker.x], [&walker.at.rows]);
+    walker = best(descend(film, coordinates, &starts, &near, &last, account)?)?;
     let noise = estimate(&walker);
     let normal = walker.at.normal(film, Fidelity::Fine, &noise);
     let covariance = (normal.information + coordinates.prior_information())

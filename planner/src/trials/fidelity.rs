@@ -5,7 +5,7 @@
 //! a rest curvature. As in the paper, a throw is compared by the correlation of Fourier
 //! spectra and by the mean distance of points of the rope per frame.
 
-use super::{KEYPOINTS, TrialError, TrialRig};
+use super::{KEYPOINTS, TrialError, TrialRig, trial_rope};
 use crate::filming::{FilmTiming, Filmed, RopeFilm, project};
 use crate::sysid::IdentifyOptions;
 use nalgebra::Vector3;
@@ -119,6 +119,10 @@ pub struct FidelityRow {
     pub distance_m: f64,
     /// The same of a rope of the ranges' middle (m).
     pub middle_distance_m: f64,
+    /// Correlation of a rope drawn from the ranges.
+    pub random_correlation: f64,
+    /// Distance of that rope (m).
+    pub random_distance_m: f64,
     /// Distance of the fit to the keypoints (px).
     pub residual_px: f64,
     /// Method as the estimate names it.
@@ -225,11 +229,14 @@ impl TrialRig {
         let truth = moved(&rope.params, rope.extras)?;
         let found_paths = moved(&found.params, RopeExtras::NONE)?;
         let middle = moved(&middle_rope(), RopeExtras::NONE)?;
+        let random = moved(&trial_rope(seed, index), RopeExtras::NONE)?;
         Ok(FidelityRow {
             name: rope.name.clone(),
             frequency_correlation: spectra_correlation(&truth, &found_paths),
             distance_m: mean_distance_m(&truth, &found_paths),
             middle_distance_m: mean_distance_m(&truth, &middle),
+            random_correlation: spectra_correlation(&truth, &random),
+            random_distance_m: mean_distance_m(&truth, &random),
             residual_px: found.residual_px,
             method: found.method.to_string(),
         })

@@ -1,29 +1,29 @@
 //! `wag reproduce motion-fidelity`: ropes from outside the model class, identified from
 //! one noisy wiggle, compared in a throw.
 
+use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::command::identify::method_of;
-use crate::command::plan::planner_config;
-use crate::failure::{OrInput, Outcome};
+use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
+use crate::session::interrupted;
 use crate::table::numbers;
-use anyhow::Context;
-use planner::sysid::IdentifyOptions;
+use anyhow::{Context, anyhow};
+use planner::process::PlannerConfig;
 use planner::tasks::{StrikeOptions, StrikeRequest, plan_strike};
-use planner::trials::{FidelityConfig, FidelityRow, TrialRig, middle_rope};
+use planner::trials::{FidelityConfig, FidelityRow, middle_rope};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::{JointTrajectory, Limits};
 use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
 
 const ROPES: &str = include_str!("../../../../configs/planner/fidelity.toml");
 /// Where the compared throw would have to strike (m).
 const TARGET_M: [f64; 3] = [1.0, 0.0, 0.4];
 
 /// A throw planned for the middle of the ranges: no rope compared knows it.
-fn throw(seed: u64) -> anyhow::Result<JointTrajectory> {
-    let config = planner_config(None)?;
+fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
     let request = StrikeRequest {
         rope: middle_rope(),
         target_m: TARGET_M,
@@ -32,29 +32,29 @@ fn throw(seed: u64) -> anyhow::Result<JointTrajectory> {
             seed,
             ..config.search
         },
-        config: config.strike,
+        config: config.strike.clone(),
     };
     let plan = plan_strike(&request, &mut |_| ControlFlow::Continue(()))?;
     Ok(plan.trajectory)
 }
 
 pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let method = method_of(args.method).or_failed()?;
-    let config = planner_config(None).or_failed()?;
-    let rig = TrialRig::new(&config.wiggle).or_failed()?;
-    let options = IdentifyOptions {
-        method,
-        seed: args.seed,
-        ..config.identify
-    };
+    let Setup {
+        config,
+        rig,
+        options,
+    } = Setup::new(args).or_failed()?;
     let ropes = toml::from_str::<FidelityConfig>(ROPES)
         .context("the built-in `configs/planner/fidelity.toml` is damaged")
         .or_failed()?
         .ropes();
     let stage = Stage::begin("fidelity", quiet);
-    let throw = throw(args.seed).or_failed()?;
+    let throw = throw(&config, args.seed).or_failed()?;
     let mut rows: Vec<FidelityRow> = Vec::new();
     for (index, rope) in (0_u64..).zip(&ropes) {
+        if interrupted().load(Ordering::SeqCst) {
+            return Err(Failure::failed(anyhow!("interrupted")));
+        }
         let row = rig.fidelity(rope, &throw, args.seed, index, &options);
         rows.push(row.or_failed()?);
         stage.progress(&Progress {
@@ -69,20 +69,26 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     let mean =
         |of: fn(&FidelityRow) -> f64| rows.iter().map(of).sum::<f64>() / rows.len().max(1) as f64;
     let (correlation, distance_m) = (mean(|r| r.frequency_correlation), mean(|r| r.distance_m));
+    let (random, random_m) = (
+        mean(|r| r.random_correlation),
+        mean(|r| r.random_distance_m),
+    );
     let middle_m = mean(|r| r.middle_distance_m);
     if !quiet {
         print(&rows);
         println!(
-            "\nmean: correlation {correlation:.3} (paper 0.95), {:.2} cm per frame (paper 5.4), middle of the ranges {:.2} cm",
+            "\nmean: correlation {correlation:.4} (paper 0.95), {:.2} cm per frame (paper 5.4)\nfor scale: middle of the ranges {:.2} cm; random ropes of the ranges correlation {random:.4}, {:.2} cm",
             100.0 * distance_m,
-            100.0 * middle_m
+            100.0 * middle_m,
+            100.0 * random_m
         );
     }
     let value = json!({
         "ok": true, "command": "reproduce motion-fidelity", "version": shared_types::VERSION,
         "seed": args.seed, "method": options.method, "seconds": seconds,
         "frequency_correlation": correlation, "distance_m": distance_m,
-        "middle_distance_m": middle_m, "ropes": rows, "out": args.out,
+        "middle_distance_m": middle_m, "random_correlation": random,
+        "random_distance_m": random_m, "ropes": rows, "out": args.out,
     });
     if let Some(path) = &args.out {
         files::write_json(path, &value).or_failed()?;
@@ -94,9 +100,10 @@ fn print(rows: &[FidelityRow]) {
     let lines = rows.iter().map(|row| {
         [
             row.name.clone(),
-            format!("{:.3}", row.frequency_correlation),
+            format!("{:.4}", row.frequency_correlation),
             format!("{:.2}", 100.0 * row.distance_m),
             format!("{:.2}", 100.0 * row.middle_distance_m),
+            format!("{:.2}", 100.0 * row.random_distance_m),
             format!("{:.2}", row.residual_px),
             row.method.clone(),
         ]
@@ -106,6 +113,7 @@ fn print(rows: &[FidelityRow]) {
         "frequency correlation",
         "cm per frame",
         "middle of ranges (cm)",
+        "random rope (cm)",
         "residual (px)",
         "method",
     ];

@@ -6,6 +6,7 @@
 mod fidelity;
 mod kept;
 mod ood;
+mod setup;
 mod sysid;
 
 use crate::cli::{ReproduceArgs, ReproduceName};

@@ -4,13 +4,11 @@
 //! paper's noise.
 
 use super::kept::trials;
+use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::command::identify::method_of;
-use crate::command::plan::planner_config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
-use planner::sysid::IdentifyOptions;
-use planner::trials::{Trial, TrialRig, area_under_curve, outside_rope, trial_rope};
+use planner::trials::{Trial, area_under_curve, outside_rope, trial_rope};
 use serde_json::{Value, json};
 
 /// Part of some trials taken for ropes outside.
@@ -20,15 +18,7 @@ fn taken_for_outside(trials: &[Trial]) -> f64 {
 }
 
 pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let method = method_of(args.method).or_failed()?;
-    let config = planner_config(None).or_failed()?;
-    let rig = TrialRig::new(&config.wiggle).or_failed()?;
-    let options = IdentifyOptions {
-        method,
-        seed: args.seed,
-        ..config.identify
-    };
-    crate::session::watch_interrupts().or_failed()?;
+    let Setup { rig, options, .. } = Setup::new(args).or_failed()?;
     let stage = Stage::begin("sysid-ood", quiet);
     // Even indices are inside, odd ones outside.
     let rope = |index: u64| {

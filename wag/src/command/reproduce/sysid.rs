@@ -2,27 +2,17 @@
 //! whether intervals of 90 % hold the truth that often.
 
 use super::kept::trials;
+use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::command::identify::method_of;
-use crate::command::plan::planner_config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
 use crate::table::numbers;
-use planner::sysid::IdentifyOptions;
-use planner::trials::{SysidSummary, TrialRig, summarise, trial_rope};
+use planner::trials::{SysidSummary, summarise, trial_rope};
 use serde_json::{Value, json};
 use shared_types::rope::RANGES;
 
 pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let method = method_of(args.method).or_failed()?;
-    let config = planner_config(None).or_failed()?;
-    let rig = TrialRig::new(&config.wiggle).or_failed()?;
-    let options = IdentifyOptions {
-        method,
-        seed: args.seed,
-        ..config.identify
-    };
-    crate::session::watch_interrupts().or_failed()?;
+    let Setup { rig, options, .. } = Setup::new(args).or_failed()?;
     let stage = Stage::begin("sysid", quiet);
     let rope = |index| trial_rope(args.seed, index);
     let all = trials("sysid", args, args.ropes, &rig, &options, rope, &stage)?;
@@ -43,6 +33,7 @@ fn print(summary: &SysidSummary) {
         [
             row.label.clone(),
             format!("{:.4}", row.mean_error),
+            format!("{:.4}", row.median_error),
             format!("{:.4}", row.paper),
             format!("{:.4}", row.middle),
             row.best_possible
@@ -54,6 +45,7 @@ fn print(summary: &SysidSummary) {
     let header = [
         "mean absolute error",
         "here",
+        "median here",
         "paper's network",
         "middle of range",
         "best possible",
