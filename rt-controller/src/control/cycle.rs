@@ -436,8 +436,16 @@ pub(super) fn give_back(out: &mut CycleOutput, motion: Box<Motion>) {
 }
 
 #[cfg(test)]
+#[path = "cycle_bench.rs"]
+mod bench;
+
+#[cfg(test)]
 #[path = "cycle_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "reaction_tests.rs"]
+mod reaction_tests;
 
 #[cfg(test)]
 #[path = "random_tests.rs"]

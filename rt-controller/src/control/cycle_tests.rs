@@ -1,160 +1,14 @@
-//! Tests of whole cycles, in virtual time.
+//! Motions, orders and limits over whole cycles, in virtual time.
 
+use super::bench::{Bench, go, swing};
 use super::*;
 use crate::control::exchange::Order;
-use crate::control::limiter::{Allowance, Limiter};
-use crate::control::{LinkInput, Thresholds};
-use crate::point_to_point::plan_move;
-use crate::xarm::StateRequest;
+use crate::control::limiter::Limiter;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use shared_types::JointTrajectory;
 use shared_types::ipc::{JointReport, OperatorBeat, Reports};
 use shared_types::plan::START_POSE;
-
-const PERIOD_NS: u64 = 4_000_000;
-
-/// A controller with an arm that follows two cycles late.
-struct Bench {
-    state: ControlState,
-    now_ns: u64,
-    beat: u64,
-    commanded: [JointVector; 3],
-    /// Judges what is sent, independently of the state's own limiter.
-    judge: Limiter,
-    events: Vec<ControlEvent>,
-    sent: Vec<JointVector>,
-    requests: Vec<StateRequest>,
-}
-
-impl Bench {
-    fn offline() -> Self {
-        let limits = Limits::default();
-        Self {
-            judge: Limiter::at_rest(START_POSE, &limits),
-            state: ControlState::new(limits, Thresholds::relaxed()),
-            now_ns: 1_000_000_000_000,
-            beat: 0,
-            commanded: [START_POSE; 3],
-            events: Vec::new(),
-            sent: Vec::new(),
-            requests: Vec::new(),
-        }
-    }
-
-    fn holding() -> Self {
-        let mut bench = Self::offline();
-        bench.order(Order::Adopt { hold: START_POSE });
-        for _ in 0..100 {
-            bench.cycle();
-        }
-        assert_eq!(bench.state.mode(), ControllerMode::Idle);
-        bench.events.clear();
-        bench
-    }
-
-    fn input(&mut self, missed: u32) -> CycleInput {
-        self.now_ns += PERIOD_NS * (1 + u64::from(missed));
-        self.beat += 1;
-        CycleInput {
-            deadline_ns: self.now_ns,
-            missed,
-            order: None,
-            operator: OperatorBeat {
-                count: self.beat,
-                ..OperatorBeat::default()
-            },
-            link: LinkInput {
-                status: Some(Status(0)),
-                reply_ns: 1000,
-                ..LinkInput::default()
-            },
-            reports: Some(JointReport {
-                arm_state: 1,
-                arm_mode: 1,
-                stamp_ns: self.now_ns - 1_000_000,
-                arrival_ns: self.now_ns - 500_000,
-                q: self.commanded[2],
-                ..JointReport::default()
-            })
-            .into(),
-            ..CycleInput::default()
-        }
-    }
-
-    fn step(&mut self, input: CycleInput) {
-        let step_s = f64::from(input.missed + 1) * 0.004;
-        let out = self.state.step(input);
-        if let Some(q) = out.setpoint() {
-            let limits = Limits::default();
-            let allowed = Allowance {
-                tcp_speed_max_m_s: limits.tcp_speed_max_m_s,
-                streamed: true,
-            };
-            self.judge.admit(&q, step_s, &limits, &allowed).unwrap();
-            self.sent.push(q);
-            self.commanded = [q, self.commanded[0], self.commanded[1]];
-        }
-        self.events.extend(out.events.iter().copied());
-        self.requests.extend(out.request);
-    }
-
-    fn cycle(&mut self) {
-        let input = self.input(0);
-        self.step(input);
-    }
-
-    /// Where the judge's even steps do not fit.
-    fn cycle_unjudged(&mut self, missed: u32) {
-        let input = self.input(missed);
-        let out = self.state.step(input);
-        if let Some(q) = out.setpoint() {
-            self.commanded = [q, self.commanded[0], self.commanded[1]];
-        }
-        self.events.extend(out.events.iter().copied());
-        self.requests.extend(out.request);
-    }
-
-    fn order(&mut self, order: Order) {
-        let mut input = self.input(0);
-        input.order = Some(order);
-        self.step(input);
-    }
-
-    fn run(&mut self, motion: Motion) {
-        let motion = Box::new(motion);
-        self.order(Order::Run { id: 7, motion });
-    }
-
-    fn cycles_until_still(&mut self) -> usize {
-        (0..5000)
-            .take_while(|_| {
-                self.cycle();
-                self.state.mode().is_moving()
-            })
-            .count()
-    }
-
-    fn latched(&self) -> Option<FaultCode> {
-        self.events.iter().find_map(|event| match event {
-            ControlEvent::Latched(cause) => Some(cause.fault()),
-            _ => None,
-        })
-    }
-}
-
-fn swing() -> Motion {
-    let mut up = START_POSE;
-    (up[5], up[1]) = (up[5] - 0.6, up[1] - 0.2);
-    let times = [0.0, 0.6, 1.2];
-    Motion::Spline(JointTrajectory::new(&times, &[START_POSE, up, START_POSE]).unwrap())
-}
-
-fn go() -> Motion {
-    let mut to = START_POSE;
-    (to[0], to[3]) = (0.5, 1.9);
-    plan_move(&START_POSE, &to, 0.2, &Limits::default()).unwrap()
-}
 
 #[test]
 fn a_trajectory_is_streamed_at_its_planned_times() {
@@ -205,6 +59,36 @@ fn a_missed_cycle_costs_its_setpoint_and_no_time() {
     bench.step(input);
     assert_eq!(bench.latched(), Some(FaultCode::DeadlineMissed));
     assert_eq!((bench.commanded[0], bench.requests.len()), (last, 1));
+}
+
+/// A motion that begins in a late cycle keeps to the deadlines all the same: its
+/// punctual setpoints lie at whole periods of it.
+#[test]
+fn a_motion_that_begins_late_is_on_time_from_its_second_setpoint_on() {
+    let mut bench = Bench::holding();
+    bench.sent.clear();
+    let motion = swing();
+    let mut input = bench.input(0);
+    let start = input.deadline_ns;
+    input.late_ns = 1_300_000;
+    input.order = Some(Order::Run {
+        id: 7,
+        motion: Box::new(motion.clone()),
+    });
+    bench.step(input);
+    bench.cycles_until_still();
+    let end = bench.events.iter().find_map(|event| match event {
+        ControlEvent::Finished {
+            start_ns, end_ns, ..
+        } => Some((*start_ns, *end_ns)),
+        _ => None,
+    });
+    assert_eq!(end, Some((start, start + 1_200_000_000)));
+    for (k, q) in (0..301_u32).zip(&bench.sent) {
+        let t_s = if k == 0 { 0.0013 } else { f64::from(k) * 0.004 };
+        let expected = motion.state_at(t_s).q;
+        assert!((*q - expected).max_abs() < 1e-9, "cycle {k}");
+    }
 }
 
 #[test]
@@ -419,233 +303,4 @@ proptest! {
         }
         prop_assert!(!bench.state.mode().is_moving());
     }
-}
-
-/// Spoils the reports of a swing from its begin and gives the cause.
-fn swing_with(mut spoil: impl FnMut(usize, &mut JointReport)) -> Vec<ControlEvent> {
-    let mut bench = Bench::holding();
-    bench.run(swing());
-    for k in 0..300 {
-        let mut input = bench.input(0);
-        for report in input.reports.as_mut_slice() {
-            spoil(k, report);
-        }
-        bench.step(input);
-    }
-    bench.events
-}
-
-fn cause_in(events: &[ControlEvent]) -> Option<CauseRecord> {
-    let mut causes = events.iter().filter_map(|event| match event {
-        ControlEvent::Latched(cause) => Some(*cause),
-        _ => None,
-    });
-    let first = causes.next();
-    assert!(causes.next().is_none(), "one cause per stop");
-    first
-}
-
-#[test]
-fn what_is_wrong_with_an_arm_is_told_apart() {
-    // Creeps away from its path.
-    let events = swing_with(|k, report| report.q[6] += 0.001 * k as f64);
-    let cause = cause_in(&events).unwrap();
-    assert_eq!(cause.fault(), FaultCode::TrackingError);
-    assert_eq!(cause.limit.joint, 7);
-    assert!(cause.limit.value > 0.05 && cause.limit.limit == 0.05);
-    // One joint stands still.
-    let cause = cause_in(&swing_with(|_, report| report.q[5] = START_POSE[5])).unwrap();
-    assert_eq!(cause.fault(), FaultCode::JointStuck);
-    assert_eq!(cause.limit.joint, 6);
-    // Everything stands still, to the bit.
-    let mut frozen = None;
-    let events = swing_with(|_, report| report.q = *frozen.get_or_insert(report.q));
-    assert_eq!(cause_in(&events).unwrap().fault(), FaultCode::ReportFrozen);
-    // Nonsense in every report.
-    let cause = cause_in(&swing_with(|_, report| report.qd[0] = f64::NAN)).unwrap();
-    assert_eq!(cause.fault(), FaultCode::ReportBroken);
-    assert_eq!(
-        (cause.limit.value, cause.counts.broken_reports > 4),
-        (5.0, true)
-    );
-    // A clock that jumps to and fro.
-    let events = swing_with(|k, report| report.stamp_ns -= 60_000_000 * (k as u64 % 2));
-    assert_eq!(cause_in(&events).unwrap().fault(), FaultCode::ReportClock);
-    // The arm's own target is somebody else's.
-    let events = swing_with(|_, report| {
-        report.arm_clock = 1;
-        report.q_target = JointVector::ZERO;
-    });
-    assert_eq!(
-        cause_in(&events).unwrap().fault(),
-        FaultCode::SecondCommander
-    );
-    assert_eq!(cause_in(&swing_with(|_, _| ())), None);
-}
-
-/// A slowed swing stays on its path; a stop on the way makes it a brake, and
-/// the first cause stays the cause.
-#[test]
-fn a_slowed_motion_keeps_to_its_path_unless_something_worse_comes() {
-    for worse_after in [None, Some(5)] {
-        let mut bench = Bench::holding();
-        bench.run(swing());
-        (0..60).for_each(|_| bench.cycle());
-        let input = bench.input(0);
-        let report_ns = input.deadline_ns;
-        bench.step(input);
-        for _ in 0..300 {
-            let mut input = bench.input(0);
-            input.reports = Reports::default();
-            if worse_after.is_some() && input.deadline_ns > report_ns + 120_000_000 {
-                input.operator.stop = 1;
-            }
-            bench.step(input);
-            let q = bench.commanded[0];
-            let near = (0..2400)
-                .map(|i| (swing().state_at(f64::from(i) * 0.0005).q - q).max_abs())
-                .fold(f64::INFINITY, f64::min);
-            if worse_after.is_none() {
-                assert!(near < 1e-3, "{near}");
-            }
-        }
-        let cause = cause_in(&bench.events).unwrap();
-        assert_eq!(cause.fault(), FaultCode::ReportStale);
-        let second = worse_after.map_or(0, |_| FaultCode::OperatorStop as u16);
-        assert_eq!(cause.second_code, second);
-        assert_eq!(bench.requests.len(), 0);
-    }
-}
-
-fn armed_bench() -> Bench {
-    let mut bench = Bench::offline();
-    let settings = ControlSettings {
-        arming_required: true,
-        ..Thresholds::relaxed().into()
-    };
-    bench.state = ControlState::new(Limits::default(), settings);
-    bench.order(Order::Adopt { hold: START_POSE });
-    (0..100).for_each(|_| bench.cycle());
-    bench.events.clear();
-    bench
-}
-
-fn throw_arming(bench: &Bench) -> Order {
-    Order::Arm(shared_types::Arming {
-        tier: MotionTier::Throw,
-        expires_ns: bench.now_ns + 8_000_000_000,
-        area_clear: true,
-    })
-}
-
-#[test]
-fn a_throw_is_armed_for_one_shot_and_nothing_re_arms_it() {
-    let mut bench = armed_bench();
-    let refused = |fault| ControlEvent::Refused { id: Some(7), fault };
-    bench.run(swing());
-    assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    let order = throw_arming(&bench);
-    bench.order(order);
-    bench.run(swing());
-    bench.cycles_until_still();
-    assert!(bench.events.contains(&ControlEvent::Disarmed {
-        fault: FaultCode::None
-    }));
-    bench.events.clear();
-    bench.run(swing());
-    assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    // Expiry and the dead-man switch disarm while idle.
-    for released in [0, 1] {
-        let order = throw_arming(&bench);
-        bench.order(order);
-        let mut input = bench.input(0);
-        input.operator.released = released;
-        if released == 0 {
-            bench.now_ns += 8_000_000_000;
-            input = bench.input(0);
-        }
-        bench.step(input);
-        bench.events.clear();
-        bench.run(swing());
-        assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    }
-}
-
-#[test]
-fn a_disarmed_or_released_motion_brakes_in_the_very_cycle() {
-    for (fault, released) in [(FaultCode::Disarmed, 0), (FaultCode::DeadManReleased, 1)] {
-        let mut bench = armed_bench();
-        let order = throw_arming(&bench);
-        bench.order(order);
-        bench.run(swing());
-        (0..60).for_each(|_| bench.cycle());
-        let mut input = bench.input(0);
-        input.operator.released = released;
-        if released == 0 {
-            input.order = Some(Order::Disarm);
-        }
-        bench.step(input);
-        assert_eq!(bench.state.mode(), ControllerMode::Braking);
-        bench.cycles_until_still();
-        assert_eq!(bench.latched(), Some(fault));
-        assert_eq!(bench.requests.len(), 0);
-    }
-}
-
-#[test]
-fn a_tier_slows_nobody_down_silently_but_stops_what_is_too_fast() {
-    let mut bench = armed_bench();
-    bench.order(Order::Arm(shared_types::Arming {
-        tier: MotionTier::SetUp,
-        expires_ns: u64::MAX,
-        area_clear: false,
-    }));
-    bench.run(swing());
-    bench.cycles_until_still();
-    let cause = cause_in(&bench.events).unwrap();
-    assert_eq!(cause.fault(), FaultCode::TierExceeded);
-    assert!(cause.limit.value > 0.25 && cause.limit.limit == 0.25);
-}
-
-/// Late cycles slow the motion, a stall lets nothing pile up.
-#[test]
-fn lateness_slows_and_a_stall_holds_setpoints_back() {
-    let strict = Thresholds::strict();
-    let mut bench = Bench::holding();
-    bench.state = ControlState::new(Limits::default(), strict);
-    bench.order(Order::Adopt { hold: START_POSE });
-    (0..100).for_each(|_| bench.cycle());
-    bench.run(swing());
-    (0..40).for_each(|_| bench.cycle());
-    let mut input = bench.input(0);
-    input.link.unanswered = strict.unanswered_max;
-    let sent = bench.sent.len();
-    bench.step(input);
-    assert_eq!(bench.sent.len(), sent, "held back");
-    bench.judge = Limiter::at_rest(bench.commanded[0], &Limits::default());
-    bench.cycle_unjudged(0);
-    bench.cycle_unjudged(3);
-    assert_eq!(bench.state.mode(), ControllerMode::Braking);
-    (0..400).for_each(|_| bench.cycle_unjudged(0));
-    let cause = cause_in(&bench.events).unwrap();
-    assert_eq!(cause.fault(), FaultCode::LateCycles);
-    assert_eq!((cause.path, cause.counts.skipped), (1, 1));
-}
-
-/// An adoption on its way when the arm is stopped was meant for another state of
-/// the world.
-#[test]
-fn a_stop_is_not_acknowledged_by_what_was_ordered_before_it() {
-    let mut bench = Bench::holding();
-    bench.run(swing());
-    (0..60).for_each(|_| bench.cycle());
-    let mut input = bench.input(0);
-    input.link.status = Some(Status(0x50));
-    input.order = Some(Order::Adopt { hold: START_POSE });
-    bench.step(input);
-    assert_eq!(bench.state.mode(), ControllerMode::Faulted);
-    assert_eq!(bench.latched(), Some(FaultCode::ArmError));
-    let fault = FaultCode::WrongMode;
-    let refused = ControlEvent::Refused { id: None, fault };
-    assert!(bench.events.contains(&refused));
 }

@@ -102,7 +102,9 @@ impl ControlState {
     fn run(&mut self, id: u64, motion: Box<Motion>, input: &CycleInput, out: &mut CycleOutput) {
         match self.admit(&motion, input) {
             Ok((mode, tier)) => {
-                let start_ns = input.deadline_ns;
+                // The planned instant, also of a late cycle: punctual setpoints then lie
+                // at whole periods of every motion, the same ones in every run.
+                let start_ns = input.deadline_ns.saturating_sub(input.late_ns.into());
                 self.mode = mode;
                 self.tcp_speed_max_m_s = self.tool_speed_of(mode, tier);
                 let shot = mode == ControllerMode::Streaming && tier == MotionTier::Throw;

@@ -3,6 +3,7 @@
 
 use super::arm::MotionSpan;
 use crate::session::Recorder;
+use shared_types::MonotonicNs;
 use shared_types::ipc::{CycleRecord, JointReport};
 
 /// Largest lag looked for (ms).
@@ -17,9 +18,23 @@ pub fn joint_lag_s(recorder: &Recorder, motion: &MotionSpan, joint: usize) -> Op
         .cycles
         .iter()
         .filter(|c| during(c.deadline_ns))
-        .copied()
+        .map(|c| dated(c, motion.start_ns))
         .collect();
     lag_s(&cycles, &recorder.joints, joint)
+}
+
+/// A cycle dated by the instant that its setpoint is for: a late one is not for its
+/// deadline.
+fn dated(cycle: &CycleRecord, start_ns: u64) -> CycleRecord {
+    let followed = cycle.trajectory_s >= 0.0 && cycle.path_rate >= 1.0;
+    CycleRecord {
+        deadline_ns: if followed {
+            MonotonicNs(start_ns).plus_s(cycle.trajectory_s).0
+        } else {
+            cycle.deadline_ns
+        },
+        ..*cycle
+    }
 }
 
 /// Delay (s) that explains a recording best, to a millisecond; `None` when the
@@ -36,7 +51,7 @@ fn lag_s(cycles: &[CycleRecord], reports: &[JointReport], joint: usize) -> Optio
     let commanded = |at_ns: u64| {
         let after = cycles.partition_point(|c| c.deadline_ns <= at_ns);
         let (a, b) = (cycles.get(after.checked_sub(1)?)?, cycles.get(after)?);
-        let span = (b.deadline_ns - a.deadline_ns) as f64;
+        let span = b.deadline_ns.checked_sub(a.deadline_ns)? as f64;
         let part = (at_ns - a.deadline_ns) as f64 / span;
         Some(a.q_c[joint] + part * (b.q_c[joint] - a.q_c[joint]))
     };

@@ -9,5 +9,6 @@
 )]
 
 mod demo;
+mod identical;
 mod operator;
 mod shell;

@@ -1,0 +1,43 @@
+//! Ten minutes of core and simulated arm with faults, recorded, replay to the bit.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+mod flight;
+
+use flight::fly;
+use rt_controller::recording::Item;
+use rt_controller::recording::{LogReader, Read, replay};
+use std::collections::BTreeSet;
+
+#[test]
+fn ten_minutes_with_a_fault_every_six_seconds_replay_to_the_bit() {
+    let flight = fly(600.0);
+    let found = replay(&flight.bytes, 0).unwrap();
+    let kinds: BTreeSet<u16> = LogReader::open(&flight.bytes)
+        .unwrap()
+        .filter_map(|read| match read {
+            Read::Item(Item::Cause(cause)) => Some(cause.code),
+            Read::Item(_) | Read::Flaw(_) => None,
+        })
+        .collect();
+    println!(
+        "{} cycles, {} causes of kinds {kinds:?}, {:.1} MB",
+        found.cycles,
+        found.causes,
+        flight.bytes.len() as f64 / 1e6
+    );
+    assert!(
+        found.is_exact(),
+        "{:?} {:?}",
+        found.first_difference,
+        found.gaps
+    );
+    assert_eq!((found.cycles, found.differing_bytes), (flight.cycles, 0));
+    assert_eq!(found.causes, flight.causes as u64);
+    assert!(found.cycles > 149_000, "{}", found.cycles);
+    assert!(found.causes > 40 && kinds.len() >= 7, "{kinds:?}");
+}

@@ -1,0 +1,165 @@
+//! A core with an arm that follows it, for tests of whole cycles in virtual time.
+
+use super::*;
+use crate::control::exchange::Order;
+use crate::control::limiter::{Allowance, Limiter};
+use crate::control::{LinkInput, Thresholds};
+use crate::point_to_point::plan_move;
+use crate::xarm::StateRequest;
+use shared_types::JointTrajectory;
+use shared_types::ipc::{JointReport, OperatorBeat};
+use shared_types::plan::START_POSE;
+
+pub(super) const PERIOD_NS: u64 = 4_000_000;
+
+/// A controller with an arm that follows two cycles late.
+pub(super) struct Bench {
+    pub(super) state: ControlState,
+    pub(super) now_ns: u64,
+    pub(super) beat: u64,
+    pub(super) commanded: [JointVector; 3],
+    /// Judges what is sent, independently of the state's own limiter.
+    pub(super) judge: Limiter,
+    pub(super) events: Vec<ControlEvent>,
+    pub(super) sent: Vec<JointVector>,
+    pub(super) requests: Vec<StateRequest>,
+}
+
+impl Bench {
+    pub(super) fn offline() -> Self {
+        let limits = Limits::default();
+        Self {
+            judge: Limiter::at_rest(START_POSE, &limits),
+            state: ControlState::new(limits, Thresholds::relaxed()),
+            now_ns: 1_000_000_000_000,
+            beat: 0,
+            commanded: [START_POSE; 3],
+            events: Vec::new(),
+            sent: Vec::new(),
+            requests: Vec::new(),
+        }
+    }
+
+    pub(super) fn holding() -> Self {
+        let mut bench = Self::offline();
+        bench.order(Order::Adopt { hold: START_POSE });
+        for _ in 0..100 {
+            bench.cycle();
+        }
+        assert_eq!(bench.state.mode(), ControllerMode::Idle);
+        bench.events.clear();
+        bench
+    }
+
+    pub(super) fn input(&mut self, missed: u32) -> CycleInput {
+        self.now_ns += PERIOD_NS * (1 + u64::from(missed));
+        self.beat += 1;
+        CycleInput {
+            deadline_ns: self.now_ns,
+            missed,
+            order: None,
+            operator: OperatorBeat {
+                count: self.beat,
+                ..OperatorBeat::default()
+            },
+            link: LinkInput {
+                status: Some(Status(0)),
+                reply_ns: 1000,
+                ..LinkInput::default()
+            },
+            reports: Some(JointReport {
+                arm_state: 1,
+                arm_mode: 1,
+                stamp_ns: self.now_ns - 1_000_000,
+                arrival_ns: self.now_ns - 500_000,
+                q: self.commanded[2],
+                ..JointReport::default()
+            })
+            .into(),
+            ..CycleInput::default()
+        }
+    }
+
+    pub(super) fn step(&mut self, input: CycleInput) {
+        let step_s = f64::from(input.missed + 1) * 0.004;
+        let out = self.state.step(input);
+        if let Some(q) = out.setpoint() {
+            let limits = Limits::default();
+            let allowed = Allowance {
+                tcp_speed_max_m_s: limits.tcp_speed_max_m_s,
+                streamed: true,
+            };
+            self.judge.admit(&q, step_s, &limits, &allowed).unwrap();
+            self.sent.push(q);
+            self.commanded = [q, self.commanded[0], self.commanded[1]];
+        }
+        self.events.extend(out.events.iter().copied());
+        self.requests.extend(out.request);
+    }
+
+    pub(super) fn cycle(&mut self) {
+        let input = self.input(0);
+        self.step(input);
+    }
+
+    /// Where the judge's even steps do not fit.
+    pub(super) fn cycle_unjudged(&mut self, missed: u32) {
+        let input = self.input(missed);
+        let out = self.state.step(input);
+        if let Some(q) = out.setpoint() {
+            self.commanded = [q, self.commanded[0], self.commanded[1]];
+        }
+        self.events.extend(out.events.iter().copied());
+        self.requests.extend(out.request);
+    }
+
+    pub(super) fn order(&mut self, order: Order) {
+        let mut input = self.input(0);
+        input.order = Some(order);
+        self.step(input);
+    }
+
+    pub(super) fn run(&mut self, motion: Motion) {
+        let motion = Box::new(motion);
+        self.order(Order::Run { id: 7, motion });
+    }
+
+    pub(super) fn cycles_until_still(&mut self) -> usize {
+        (0..5000)
+            .take_while(|_| {
+                self.cycle();
+                self.state.mode().is_moving()
+            })
+            .count()
+    }
+
+    pub(super) fn latched(&self) -> Option<FaultCode> {
+        self.events.iter().find_map(|event| match event {
+            ControlEvent::Latched(cause) => Some(cause.fault()),
+            _ => None,
+        })
+    }
+}
+
+pub(super) fn swing() -> Motion {
+    let mut up = START_POSE;
+    (up[5], up[1]) = (up[5] - 0.6, up[1] - 0.2);
+    let times = [0.0, 0.6, 1.2];
+    Motion::Spline(JointTrajectory::new(&times, &[START_POSE, up, START_POSE]).unwrap())
+}
+
+pub(super) fn go() -> Motion {
+    let mut to = START_POSE;
+    (to[0], to[3]) = (0.5, 1.9);
+    plan_move(&START_POSE, &to, 0.2, &Limits::default()).unwrap()
+}
+
+pub(super) fn cause_in(events: &[ControlEvent]) -> Option<CauseRecord> {
+    let mut causes = events.iter().filter_map(|event| match event {
+        ControlEvent::Latched(cause) => Some(*cause),
+        _ => None,
+    });
+    let first = causes.next();
+    assert!(causes.next().is_none(), "one cause per stop");
+    first
+}
