@@ -21,7 +21,7 @@ use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,
 };
 use shared_types::plan::START_POSE;
-use shared_types::{JointTrajectory, JointVector, Limits, MonotonicNs, TrajectoryError};
+use shared_types::{FaultCode, JointTrajectory, JointVector, Limits, MonotonicNs, TrajectoryError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -55,8 +55,17 @@ pub enum TrialError {
     #[error(transparent)]
     Motion(#[from] TrajectoryError),
     /// The loop does not move; a defect, or a machine that does not run it.
-    #[error("the control loop does not run (mode {0:?}); look whether the machine is overloaded")]
-    Still(ControllerMode),
+    #[error(
+        "the control loop does not move (mode {mode:?}: {}); look whether the \
+         machine is overloaded",
+        .fault.explain()
+    )]
+    Still {
+        /// Where it is.
+        mode: ControllerMode,
+        /// What stopped it last.
+        fault: FaultCode,
+    },
     /// The loop's thread ended.
     #[error("the control loop ended by itself")]
     Ended,
@@ -82,7 +91,10 @@ pub struct Trial {
     answerer: Answerer,
     period_ns: u64,
     mode: ControllerMode,
+    fault: FaultCode,
     q: JointVector,
+    /// Deadline of the newest setpoint that a report may follow (ns).
+    due_ns: u64,
     motions: u64,
     _bus: Bus,
     _sweep: DomainSweep,
@@ -162,7 +174,9 @@ impl Trial {
             answerer: Answerer::start()?,
             period_ns,
             mode: ControllerMode::Offline,
+            fault: FaultCode::None,
             q: START_POSE,
+            due_ns: 0,
             motions: 0,
             _bus: bus,
             _sweep: sweep,
@@ -198,7 +212,7 @@ impl Trial {
     /// Does the relay's part, keeps the arm moving and collects.
     fn follow(&mut self, span: Duration) -> Result<Vec<CycleTimes>, TrialError> {
         let (began, mut moving_since) = (Instant::now(), None);
-        let (mut times, mut heard) = (Vec::new(), false);
+        let mut times = Vec::new();
         self.prompt()?;
         loop {
             std::thread::sleep(TURN);
@@ -209,9 +223,10 @@ impl Trial {
             while self.relay.states.pop().is_ok() {}
             while let Ok(record) = self.relay.records.pop() {
                 let before = self.mode;
-                heard = true;
                 self.mode = ControllerMode::from_raw(record.mode);
+                self.fault = FaultCode::from_raw(record.fault).unwrap_or(FaultCode::None);
                 self.q = record.q_c;
+                self.due_ns = record.deadline_ns;
                 // Without a link nothing is polled.
                 let linked = [before, self.mode] != [ControllerMode::Offline; 2];
                 let poll_ns = if linked {
@@ -226,9 +241,10 @@ impl Trial {
                     self.prompt()?;
                 }
             }
-            if heard {
-                // Of the newest pose: one from before a pause would jump.
-                let _ = self.reports.push(self.report());
+            // Of a new pose only: one from before a pause would jump.
+            let due_ns = core::mem::take(&mut self.due_ns);
+            if due_ns > 0 {
+                let _ = self.reports.push(report(self.q, due_ns));
             }
             if self.mode == ControllerMode::Streaming {
                 moving_since.get_or_insert_with(Instant::now);
@@ -237,17 +253,29 @@ impl Trial {
                 return Ok(times);
             }
             if moving_since.is_none() && began.elapsed() > BEGIN_WAIT {
-                return Err(TrialError::Still(self.mode));
+                return Err(self.still());
             }
+        }
+    }
+
+    const fn still(&self) -> TrialError {
+        TrialError::Still {
+            mode: self.mode,
+            fault: self.fault,
         }
     }
 
     /// Orders what leads to a moving arm from where the loop is.
     fn prompt(&mut self) -> Result<(), TrialError> {
         let mail = match self.mode {
-            ControllerMode::Offline | ControllerMode::Faulted => {
+            // Acknowledged: the trial measures, whatever the machine did to it.
+            ControllerMode::Faulted => Mail {
+                order: Order::Adopt { hold: self.q },
+                link: None,
+            },
+            ControllerMode::Offline => {
                 let Some(polls) = self.polls.take() else {
-                    return Err(TrialError::Still(self.mode));
+                    return Err(self.still());
                 };
                 let settings = LinkSettings::new(250, self.period_ns);
                 let address = self.answerer.address();
@@ -275,18 +303,17 @@ impl Trial {
             .push(mail)
             .map_err(|_full| TrialError::Ended)
     }
+}
 
-    /// An arm that is where it was told to be.
-    fn report(&self) -> JointReport {
-        let now_ns = now_ns();
-        JointReport {
-            arm_state: 1,
-            arm_mode: patient().wire.arm_mode(),
-            stamp_ns: now_ns,
-            arrival_ns: now_ns,
-            q: self.q,
-            ..JointReport::default()
-        }
+/// An arm that is where it was told to be by the setpoint due at `due_ns`.
+fn report(q: JointVector, due_ns: u64) -> JointReport {
+    JointReport {
+        arm_state: 1,
+        arm_mode: patient().wire.arm_mode(),
+        stamp_ns: due_ns,
+        arrival_ns: now_ns(),
+        q,
+        ..JointReport::default()
     }
 }
 

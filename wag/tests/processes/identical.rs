@@ -29,11 +29,12 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Cycles of half the plan.
 const HALF_WAY: u64 = 250;
 
-/// A throw of 2 s.
+/// A throw of 2 s, from where the arm is held: it reports single precision.
 fn plan() -> JointTrajectory {
-    let mut out: JointVector = START_POSE;
+    let held: JointVector = START_POSE.map(|q| f64::from(q as f32));
+    let mut out = held;
     (out[1], out[3], out[5]) = (out[1] + 0.10, out[3] - 0.12, out[5] + 0.45);
-    JointTrajectory::new(&[0.0, 1.0, 2.0], &[START_POSE, out, START_POSE]).unwrap()
+    JointTrajectory::new(&[0.0, 1.0, 2.0], &[held, out, held]).unwrap()
 }
 
 /// A process of `wag`; it is killed when dropped.
