@@ -146,4 +146,24 @@ mod tests {
         assert!(read(&b"PK\x03\x04"[..]).is_err());
         assert!(write_f64(io::sink(), &[4], &[1.0]).is_err());
     }
+
+    proptest::proptest! {
+        #[test]
+        fn spoilt_files_are_read_or_refused(
+            changes in proptest::collection::vec((0_usize..200, proptest::num::u8::ANY), 1..6),
+            cut in 0_usize..260,
+        ) {
+            let mut file = Vec::new();
+            write_f64(&mut file, &[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+            for (at, byte) in changes {
+                let at = at % file.len();
+                file[at] = byte;
+            }
+            file.truncate(cut);
+            if let Ok(array) = read(&file[..]) {
+                let size: usize = array.shape.iter().product();
+                proptest::prop_assert_eq!(size, array.values.len());
+            }
+        }
+    }
 }

@@ -117,6 +117,8 @@ pub fn read_pose(path: &Path) -> anyhow::Result<Vec<PoseRow>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     fn refused(text: &str) -> String {
         let dir = tempfile::tempdir().unwrap();
@@ -147,5 +149,55 @@ mod tests {
         assert!(refused(head).contains("at least two rows"));
         let short = refused(&format!("{head}0,0,0\n"));
         assert!(short.contains("line 2"), "{short}");
+    }
+
+    /// `text` with up to eight bytes changed, inserted or taken out.
+    fn spoilt(text: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
+        const OFTEN: &[u8] = b"0-9.eE,\n\"\r#=[]' NaNinf";
+        let mut bytes = text.to_vec();
+        for _ in 0..rng.random_range(1..=8) {
+            let at = rng.random_range(0..bytes.len().max(1)).min(bytes.len());
+            let byte = if rng.random() {
+                OFTEN[rng.random_range(0..OFTEN.len())]
+            } else {
+                rng.random()
+            };
+            match rng.random_range(0..3) {
+                0 if at < bytes.len() => bytes[at] = byte,
+                1 if at < bytes.len() => drop(bytes.remove(at)),
+                _ => bytes.insert(at, byte),
+            }
+        }
+        bytes
+    }
+
+    #[test]
+    fn spoilt_tables_are_read_or_refused() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.csv");
+        let rows = "0,1,2,3,4,5,6,7\n0.1,1,2,3,4,5,6,7\n";
+        let joints = format!("t,q1,q2,q3,q4,q5,q6,q7\n{rows}");
+        let pose = "t,x,y,z,qw,qx,qy,qz\n0,0.5,0,0.5,1,0,0,0\n0.1,0.5,0,0.5,0,1,0,0\n";
+        let (mut read, mut refused) = (0, 0);
+        for _ in 0..3000 {
+            std::fs::write(&path, spoilt(joints.as_bytes(), &mut rng)).unwrap();
+            match read_joints(&path) {
+                Ok(table) => {
+                    assert!(table.q.iter().all(JointVector::is_finite));
+                    assert!(table.times_s.is_sorted_by(|a, b| a < b));
+                    read += 1;
+                }
+                Err(error) => {
+                    assert!(format!("{error:#}").contains("m.csv"), "{error:#}");
+                    refused += 1;
+                }
+            }
+            std::fs::write(&path, spoilt(pose.as_bytes(), &mut rng)).unwrap();
+            if let Err(error) = read_pose(&path) {
+                assert!(format!("{error:#}").contains("m.csv"), "{error:#}");
+            }
+        }
+        assert!(read > 100 && refused > 100, "{read} {refused}");
     }
 }

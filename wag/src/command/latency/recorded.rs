@@ -127,6 +127,8 @@ fn camera_offset_s(path: &Path) -> anyhow::Result<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     const HEADER: &str = "cycle,deadline_s,mode,fault,sent,wake_late_us,compute_us,send_us,reply_us,missed,dropped,trajectory_s,q1_c,q2_c,q3_c,q4_c,q5_c,q6_c,q7_c\n";
 
@@ -174,5 +176,24 @@ mod tests {
         );
         std::fs::remove_file(dir.path().join("cycles.csv")).unwrap();
         assert!(said(dir.path()).contains("cycles.csv"));
+    }
+
+    #[test]
+    fn spoilt_runs_are_read_or_refused() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let row = "7,0.004,Streaming,None,1,12.5,3.0,20.1,310.0,2,0,-1,1,2,3,4,5,6,7\n";
+        let whole = format!("{HEADER}{row}{row}");
+        let dir = run(&whole);
+        for _ in 0..3000 {
+            let mut bytes = whole.clone().into_bytes();
+            for _ in 0..rng.random_range(1..6) {
+                let at = rng.random_range(0..bytes.len());
+                bytes[at] = rng.random();
+            }
+            std::fs::write(dir.path().join("cycles.csv"), bytes).unwrap();
+            if let Err(error) = read(dir.path()) {
+                assert!(format!("{error:#}").contains("cycles.csv"), "{error:#}");
+            }
+        }
     }
 }

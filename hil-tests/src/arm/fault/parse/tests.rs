@@ -1,4 +1,6 @@
 use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
 /// The example names every kind once, and survives being written again.
@@ -80,4 +82,31 @@ fn a_missing_file_is_named() {
         .unwrap_err()
         .to_string();
     assert!(said.contains("no_such_script.toml"), "{said}");
+}
+
+#[test]
+fn spoilt_scripts_are_read_or_refused_and_survive_being_written() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/rig/faults.toml");
+    let whole = std::fs::read_to_string(path).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let (mut read, mut refused) = (0, 0);
+    for _ in 0..3000 {
+        let mut bytes = whole.clone().into_bytes();
+        for _ in 0..rng.random_range(1..4) {
+            let at = rng.random_range(0..bytes.len());
+            bytes[at] = b"0-9.e\n\"#=[]x"[rng.random_range(0..12)];
+        }
+        let Ok(text) = String::from_utf8(bytes) else {
+            continue;
+        };
+        match text.parse::<FaultScript>() {
+            Ok(script) => {
+                let tables: Vec<Table> = script.clone().into();
+                assert_eq!(FaultScript::try_from(tables).unwrap(), script);
+                read += 1;
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(read > 100 && refused > 100, "{read} {refused}");
 }
