@@ -87,6 +87,8 @@ pub(super) struct Film<'a> {
     pub(super) observation: &'a Observation<'a>,
     pub(super) viewer: Viewer<'a>,
     pub(super) threads: usize,
+    /// Least noise of the tracker, in each axis (px).
+    pub(super) noise_min_px: f64,
     search_step_s: f64,
     step_s: f64,
     horizon_s: f64,
@@ -129,6 +131,7 @@ impl<'a> Film<'a> {
         Self {
             viewer: Viewer::new(observation.camera, &observation.motion.at(0.0).p_m),
             threads: options.threads.max(1),
+            noise_min_px: options.noise_min_px,
             search_step_s: options.search_step_s,
             step_s: options.step_s,
             horizon_s: (film_s + options.clock_offset_max_s + 0.03)

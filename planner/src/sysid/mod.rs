@@ -104,6 +104,9 @@ pub struct IdentifyOptions {
     pub camera_look_at_std_m: f64,
     /// Deviation of the camera's roll (rad).
     pub camera_roll_std_rad: f64,
+    /// Least deviation of a keypoint, along and across the rope (px): errors that last
+    /// through the film do not show in what a fit leaves over.
+    pub noise_min_px: f64,
     /// Keypoints below this confidence are not used.
     pub confidence_min: f64,
     /// Distance (px) above which a search counts as caught in a side minimum
@@ -134,6 +137,7 @@ impl Default for IdentifyOptions {
             camera_position_std_m: 0.02,
             camera_look_at_std_m: 0.02,
             camera_roll_std_rad: 0.01,
+            noise_min_px: 0.2,
             confidence_min: 0.2,
             repeat_above_px: 4.5,
             repeats_max: 2,
@@ -471,6 +475,12 @@ fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyE
             options.camera_roll_std_rad,
             deviation(options.camera_roll_std_rad),
             "above 0 and at most 1 rad",
+        ),
+        (
+            "noise_min_px",
+            options.noise_min_px,
+            options.noise_min_px >= 0.0 && options.noise_min_px <= 10.0,
+            "0 to 10 px",
         ),
     ];
     for (option, value, holds, expected) in rules {

@@ -58,6 +58,15 @@ impl Noise {
         }
     }
 
+    /// The same, at least of this size: what lasts through a film (a tracker's edge a
+    /// little off, a lens not quite as calibrated) hides in the fit, not in residuals.
+    pub(super) fn at_least(mut self, sigma_px: f64) -> Self {
+        for axis in &mut self.axes {
+            axis.sigma_px = axis.sigma_px.max(sigma_px);
+        }
+        self
+    }
+
     /// Divides by the noise and takes the correlations out, in place.
     pub(super) fn whiten(&self, grid: &Grid, rows: &mut Rows) {
         let k = grid.keypoints;
@@ -131,5 +140,21 @@ impl AxisNoise {
             in_time: lag(k, &|i| grid.follows[i / k]),
             along_rope: lag(1, &|i| !i.is_multiple_of(k)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_least_noise_raises_the_smaller_axis_alone() {
+        let mut noise = Noise::white(1.5);
+        noise.axes[0].sigma_px = 0.06;
+        noise.axes[0].in_time = 0.9;
+        let raised = noise.at_least(0.2);
+        assert_eq!(raised.axes[0].sigma_px, 0.2);
+        assert_eq!(raised.axes[0].in_time, 0.9);
+        assert_eq!(raised.axes[1], noise.axes[1]);
     }
 }

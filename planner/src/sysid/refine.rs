@@ -48,7 +48,9 @@ pub(super) fn refine(
         iterations,
         settled_below: SETTLED,
     };
-    let estimate = |w: &Walker| Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows);
+    let estimate = |w: &Walker| {
+        Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows).at_least(film.noise_min_px)
+    };
     let best = |walkers: Vec<Walker>| {
         walkers
             .into_iter()

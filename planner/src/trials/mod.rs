@@ -132,6 +132,11 @@ impl TrialRig {
         };
         let options = IdentifyOptions {
             seed: options.seed ^ index,
+            // As these films are made: nothing but noise that comes and goes, and a
+            // camera as far off as said.
+            noise_min_px: 0.0,
+            camera_position_std_m: self.randomisation.camera_position_m.max(1e-4),
+            camera_look_at_std_m: self.randomisation.camera_lookat_m.max(1e-4),
             ..*options
         };
         identify(&observation, &options, &mut |_: FitProgress| {

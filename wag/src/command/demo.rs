@@ -38,6 +38,9 @@ const WIGGLE_JOINT: usize = 5;
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a throw: two and a half seconds.
 const THROW_FRAMES: u32 = 150;
+/// How well the rig's camera is known to stand where its calibration says (m, and rad of
+/// roll): exactly, but for what its lens leaves over.
+const CAMERA_STD: f64 = 1e-3;
 /// Time after the last setpoint that still belongs to the throw (ns).
 const AFTER_THROW_NS: u64 = 600_000_000;
 /// Longest wait for the rope to hang still (s).
@@ -101,7 +104,10 @@ fn throw_once(
     rig: &RigConfig,
     quiet: bool,
 ) -> anyhow::Result<()> {
-    let settings = planner_config(None)?;
+    let mut settings = planner_config(None)?;
+    settings.identify.camera_position_std_m = CAMERA_STD;
+    settings.identify.camera_look_at_std_m = CAMERA_STD;
+    settings.identify.camera_roll_std_rad = CAMERA_STD;
     let rig_config = pipeline::rig_config(folder, rig, record.seed, record.target_m);
     let mut demo = Demo::start(folder, session, record, quiet, settings, &rig_config)?;
     let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
