@@ -301,7 +301,7 @@ pub struct RopeEstimate {
     /// Root mean square distance between observed and simulated keypoints (px).
     pub residual_px: f64,
     /// Method that made it: `cmaes`; `hybrid-search` or `hybrid-network` after what
-    /// proposed the start; `hybrid-wide` if the rope is outside the ranges.
+    /// proposed the start; `hybrid-wide` if the rope is outside the ranges; `network`.
     pub method: heapless::String<16>,
     /// Simulations used.
     pub simulations: u32,

@@ -1,7 +1,8 @@
 //! Keypoints of a recording on the network's own grid of times and places.
 
-use super::FeatureDefinition;
+use super::alignment::{Sway, delay_s};
 use super::plane::PlaneView;
+use super::{FeatureDefinition, ObserveError};
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 
@@ -31,7 +32,8 @@ impl FrameTable {
         track: &KeypointTrack,
         camera: &StereoCamera,
         view: &PlaneView,
-    ) -> Self {
+        sway: &Sway,
+    ) -> Result<Self, ObserveError> {
         let seen: Vec<Seen> = track
             .frames
             .iter()
@@ -39,8 +41,20 @@ impl FrameTable {
             .filter_map(|frame| see(frame, definition.keypoints, camera, view))
             .collect();
         let start_s = track.frames.first().map_or(0.0, |f| f.t_s);
-        // The grid's times are those of the first row, whatever the shutter.
-        let first_s = start_s + camera.row_time_s(0.0);
+        let min = definition.frames / 4;
+        if seen.len() < min {
+            return Err(ObserveError::TooFewSeen {
+                seen: seen.len(),
+                frames: definition.frames,
+                min,
+            });
+        }
+        let clamp: Vec<[f64; 2]> = seen
+            .iter()
+            .map(|s| [s.points[0][2] - start_s, s.points[0][0]])
+            .collect();
+        // The grid's times are those of the wiggle.
+        let first_s = start_s + delay_s(&clamp, sway)?;
         let mut next = 0;
         #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
         let frames = (0..definition.frames)
@@ -55,10 +69,10 @@ impl FrameTable {
                     .collect()
             })
             .collect();
-        Self {
+        Ok(Self {
             definition: *definition,
             frames,
-        }
+        })
     }
 
     /// Number of frames seen.

@@ -5,7 +5,8 @@
 //! segment angles (the paper's features), plus the widths of rope and lead.
 //! Pixels are undistorted and cast onto the vertical plane in which the arm
 //! wiggles ([`ViewPlane`]), so that neither lens nor camera placement nor a
-//! rolling shutter is left in the numbers. What was not seen is zero and marked so.
+//! rolling shutter is left in the numbers. Time counts from the beginning of the wiggle,
+//! which the clamp's own way tells. What was not seen is zero and marked so.
 //!
 //! Channels of a frame, all finite:
 //!
@@ -20,6 +21,7 @@
 //! of the picture and the phase of the motion instead. Angles are not split into
 //! sine and cosine: a rope that hangs never points straight up, where they jump.
 
+mod alignment;
 mod frames;
 mod plane;
 
@@ -61,7 +63,7 @@ impl Default for FeatureDefinition {
 
 impl FeatureDefinition {
     /// Version of the meaning of the channels that this code makes.
-    pub const VERSION: u32 = 1;
+    pub const VERSION: u32 = 2;
 
     /// Channels of a frame.
     #[must_use]
@@ -125,6 +127,19 @@ pub enum ObserveError {
         /// Way needed (mm).
         min_mm: f64,
     },
+    /// The clamp does not move as in the wiggle that the features are for.
+    #[error(
+        "the clamp does not move as in the wiggle the network was trained on: correlation {correlation:.2} (at least {correlation_min} is needed), sway {:.0} % of the trained one's: film that wiggle, or use --method hybrid",
+        part * 100.0
+    )]
+    OtherWiggle {
+        /// Of the clamp's sway with the known one.
+        correlation: f64,
+        /// Least correlation.
+        correlation_min: f64,
+        /// Size of the sway as a part of the known one's.
+        part: f64,
+    },
     /// The rope was seen in too few frames.
     #[error(
         "the rope was seen in {seen} of {frames} frames at 60 Hz, the network needs {min}: film again with the whole rope in view"
@@ -139,10 +154,11 @@ pub enum ObserveError {
     },
 }
 
-/// Features of a recording whose motion lies in `plane`.
+/// Features of a recording of the wiggle of `plane`.
 ///
 /// # Errors
-/// Bad keypoints, a camera that looks along the plane, or a rope hardly ever seen.
+/// Bad keypoints, a camera that looks along the plane, a clamp that moves otherwise, or
+/// a rope hardly ever seen.
 pub fn observe(
     definition: FeatureDefinition,
     track: &KeypointTrack,
@@ -152,7 +168,7 @@ pub fn observe(
 ) -> Result<WiggleFeatures, ObserveError> {
     track.validate()?;
     let view = plane.seen_from(camera)?;
-    let table = FrameTable::new(&definition, track, camera, &view);
+    let table = FrameTable::new(&definition, track, camera, &view, &plane.sway)?;
     let min = definition.frames / 4;
     if table.seen() < min {
         return Err(ObserveError::TooFewSeen {

@@ -1,6 +1,7 @@
 //! The vertical plane in which the arm wiggles, and pixels cast onto it.
 
 use super::ObserveError;
+use super::alignment::Sway;
 use nalgebra::{Matrix3, Vector3};
 use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
@@ -10,13 +11,15 @@ const ANGLE_MIN_DEGREES: f64 = 30.0;
 /// Least sideways way of a clamp that wiggles (m).
 const WAY_MIN_M: f64 = 0.01;
 
-/// A vertical plane: forward is the horizontal direction in it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A vertical plane: forward is the horizontal direction in it; and how the clamp
+/// sways in it.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ViewPlane {
     /// A point of the plane (world, m).
     pub origin_m: Vector3<f64>,
     /// Horizontal unit vector in the plane, away from the arm's base.
     pub forward: Vector3<f64>,
+    pub(super) sway: Sway,
 }
 
 impl ViewPlane {
@@ -25,10 +28,11 @@ impl ViewPlane {
     /// # Errors
     /// [`ObserveError::NoWiggle`] if it hardly moves sideways.
     pub fn of_motion(motion: &dyn AttachMotion, duration_s: f64) -> Result<Self, ObserveError> {
-        const SAMPLES: u32 = 200;
+        const SAMPLES: u32 = 1500;
+        let period_s = duration_s / f64::from(SAMPLES);
         let places: Vec<Vector3<f64>> = (0..=SAMPLES)
             .map(|i| {
-                let t_s = duration_s * f64::from(i) / f64::from(SAMPLES);
+                let t_s = period_s * f64::from(i);
                 motion.at(t_s.min(motion.duration_s())).p_m
             })
             .collect();
@@ -52,9 +56,14 @@ impl ViewPlane {
                 min_mm: WAY_MIN_M * 1e3,
             });
         }
+        let forward_m = places.iter().map(|p| (p - mean).dot(&forward)).collect();
         Ok(Self {
             origin_m: mean,
             forward,
+            sway: Sway {
+                period_s,
+                forward_m,
+            },
         })
     }
 

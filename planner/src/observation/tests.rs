@@ -157,11 +157,12 @@ fn masking_blanks_whole_frames_and_counts_them() {
 fn angles_are_continuous_along_a_rope_thrown_over() {
     let camera = side_camera();
     let mut track = filmed(&camera);
-    // A rope that curls once around: pixels on a circle.
+    // A rope that curls once around: pixels on a circle that begins at the clamp.
     for frame in &mut track.frames {
+        let [u, v] = frame.points[0];
         for (k, p) in frame.points.iter_mut().enumerate() {
             let angle = k as f64 / 15.0 * 5.5;
-            *p = [335.0 + 60.0 * angle.cos(), 187.0 + 60.0 * angle.sin()];
+            *p = [u - 60.0 + 60.0 * angle.cos(), v + 60.0 * angle.sin()];
         }
     }
     let f = features(&track, &camera);
@@ -219,4 +220,61 @@ fn widths_not_seen_are_marked() {
         lead_radius_m: Some(0.02),
     };
     assert_eq!(widths(seen), [0.0, 0.0, 0.02, 1.0]);
+}
+
+/// A film of the hanging rope under a wiggle, begun `padding_frames` early.
+fn film_of(config: &WiggleConfig, padding_frames: u32) -> KeypointTrack {
+    let arm = PlannedArm::new(wiggle(config, &Limits::default()).unwrap());
+    let noise = FilmNoise {
+        padding_frames,
+        clock_offset_s: 0.007,
+        ..FilmNoise::default()
+    };
+    let timing = FilmTiming::default();
+    film(&random_rope(2), &arm, &side_camera(), 16, &timing, &noise)
+        .unwrap()
+        .track
+}
+
+#[test]
+fn time_counts_from_the_wiggle_whenever_the_film_began() {
+    let camera = side_camera();
+    let early = features(&film_of(&WiggleConfig::default(), 15), &camera);
+    let plain = features(&filmed(&camera), &camera);
+    // The film that began early ends before the last frames.
+    assert!((380..390).contains(&early.seen), "{}", early.seen);
+    for i in (20..380).step_by(9) {
+        let range = i * 48 + 2..i * 48 + 32;
+        let pairs = early.motion[range.clone()].iter().zip(&plain.motion[range]);
+        let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(apart < 4e-3, "frame {i}: {apart}");
+    }
+}
+
+#[test]
+fn another_wiggle_is_refused() {
+    let camera = side_camera();
+    let plane = ViewPlane::of_motion(&arm(), 6.7).unwrap();
+    let usual = WiggleConfig::default();
+    let slow = WiggleConfig {
+        frequency_hz: 1.0,
+        ..usual
+    };
+    let small = WiggleConfig {
+        amplitude_rad: usual.amplitude_rad * 0.6,
+        ..usual
+    };
+    for other in [slow, small] {
+        let refused = observe(
+            FeatureDefinition::default(),
+            &film_of(&other, 0),
+            Appearance::default(),
+            &camera,
+            &plane,
+        );
+        assert!(
+            matches!(refused, Err(ObserveError::OtherWiggle { .. })),
+            "{other:?}"
+        );
+    }
 }

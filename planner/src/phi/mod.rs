@@ -6,12 +6,16 @@
 //! `ORT_DYLIB_PATH` names one. Files that were not written by `phi-train`, or not
 //! for these features and parameters, or were damaged since, are refused.
 
+#[cfg(feature = "network")]
+mod estimate;
 mod file;
 mod metadata;
 #[cfg(feature = "network")]
 mod net;
 mod probe;
 
+#[cfg(feature = "network")]
+pub use estimate::{NetworkError, identify_by_network};
 pub use metadata::{
     FORMAT, METADATA_KEY, ModelError, ParameterScale, PhiMetadata, ProbeOutputs, TrainingRecord,
     graph_sha256, hex,

@@ -2,12 +2,18 @@
 
 use super::metadata::{ModelError, PhiMetadata};
 use super::probe::{PARITY, difference, probe};
-use super::{INPUTS, OUTPUTS};
-use crate::observation::{FeatureDefinition, WIDTHS, WiggleFeatures};
+use super::{INPUTS, NetworkError, OUTPUTS};
+use crate::observation::{
+    FeatureDefinition, ObserveError, ViewPlane, WIDTHS, WiggleFeatures, observe,
+};
+use crate::sysid::Observation;
+use crate::wiggle::wiggle;
 use ort::environment::Environment;
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::value::TensorRef;
+use rope_sim::PlannedArm;
+use shared_types::Limits;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -58,8 +64,12 @@ pub enum PredictError {
 pub struct PhiNet {
     name: String,
     metadata: PhiMetadata,
+    plane: ViewPlane,
     session: Session,
 }
+
+/// The network that comes with this version (`configs/models/README.md`).
+const EMBEDDED: &[u8] = include_bytes!("../../../configs/models/phi-nn.onnx");
 
 impl core::fmt::Debug for PhiNet {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -98,7 +108,22 @@ fn embedded() -> Result<Environment, String> {
     Err("this build has no embedded runtime: set ORT_DYLIB_PATH to an ONNX Runtime library".into())
 }
 
+/// The wiggle that the network was trained on, as the camera sees it.
+fn plane_of(metadata: &PhiMetadata) -> Result<ViewPlane, String> {
+    let wiggle = wiggle(&metadata.wiggle, &Limits::default());
+    let arm = PlannedArm::new(wiggle.map_err(|error| error.to_string())?);
+    ViewPlane::of_motion(&arm, metadata.wiggle.filmed_s).map_err(|error| error.to_string())
+}
+
 impl PhiNet {
+    /// The network that comes with this version.
+    ///
+    /// # Errors
+    /// A runtime that cannot be used.
+    pub fn embedded() -> Result<Self, ModelError> {
+        Self::from_bytes("embedded", EMBEDDED)
+    }
+
     /// Loads a model file.
     ///
     /// # Errors
@@ -129,9 +154,14 @@ impl PhiNet {
             .map_err(|e| failed(e.to_string()))?
             .commit_from_memory(bytes)
             .map_err(|e| failed(e.to_string()))?;
+        let plane = plane_of(&metadata).map_err(|reason| ModelError::Unfit {
+            name: name.to_owned(),
+            reason,
+        })?;
         let mut net = Self {
             name: name.to_owned(),
             metadata,
+            plane,
             session,
         };
         net.try_out()?;
@@ -162,7 +192,30 @@ impl PhiNet {
         &self.metadata
     }
 
-    /// Rope parameters behind an observation.
+    /// What the network sees of an observation of its wiggle.
+    ///
+    /// # Errors
+    /// See [`ObserveError`].
+    pub fn see(&self, observation: &Observation<'_>) -> Result<WiggleFeatures, ObserveError> {
+        observe(
+            self.metadata.features,
+            observation.track,
+            observation.appearance,
+            observation.camera,
+            &self.plane,
+        )
+    }
+
+    /// Rope parameters behind an observation of its wiggle.
+    ///
+    /// # Errors
+    /// A film that cannot be judged, or a failing runtime.
+    pub fn look(&mut self, observation: &Observation<'_>) -> Result<Prediction, NetworkError> {
+        let features = self.see(observation)?;
+        Ok(self.predict(&features)?)
+    }
+
+    /// Rope parameters behind features.
     ///
     /// # Errors
     /// Other features than it was trained on, or a failing runtime.

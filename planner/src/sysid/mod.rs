@@ -8,6 +8,7 @@
 //! those, and [`scale`] adds the factor that the parameter ranges, or a weighed lead,
 //! make likely. The result is a posterior over the nine parameters.
 
+mod alone;
 mod camera_pose;
 mod clock;
 mod coarse;
@@ -24,6 +25,7 @@ mod refine;
 pub mod scale;
 mod search;
 
+pub use alone::{Compared, compare};
 pub use coordinates::Appearance;
 pub use information::{WiggleInformation, information};
 
@@ -219,6 +221,9 @@ pub enum IdentifyError {
     /// Slopes of the simulation could not be taken.
     #[error(transparent)]
     Slopes(SensitivityError),
+    /// The network was asked for here, where there is none.
+    #[error("method `network` is none of a search: use `hybrid` or `cmaes` here")]
+    NoNetwork,
     /// The caller broke off.
     #[error("identification was cancelled after generation {generation}")]
     Cancelled {
@@ -236,6 +241,8 @@ pub enum Method {
     Hybrid,
     /// The paper's Φ-CMA-ES, refined.
     Cmaes,
+    /// The network alone, which is asked by [`crate::phi`] and not by [`identify`].
+    Network,
 }
 
 /// Identifies the rope, the clock offset and the camera's place from an observation.
@@ -263,6 +270,9 @@ pub fn identify_from(
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
     check(observation, options)?;
+    if options.method == Method::Network {
+        return Err(IdentifyError::NoNetwork);
+    }
     let film = Film::new(observation, options);
     let clock = clock_window(
         &film.clamp(),
@@ -275,7 +285,7 @@ pub fn identify_from(
         steps: 0,
         steps_max: match options.method {
             Method::Hybrid => HYBRID_STEPS,
-            Method::Cmaes => options.generations + REFINE_STEPS,
+            Method::Cmaes | Method::Network => options.generations + REFINE_STEPS,
         },
         progress,
     };
@@ -288,7 +298,7 @@ pub fn identify_from(
     let (fit, label) = match (options.method, proposed) {
         (Method::Hybrid, Some(rope)) => (task.proposed(rope, &mut account)?, "hybrid-network"),
         (Method::Hybrid, None) => (task.hybrid(&mut account)?, "hybrid-search"),
-        (Method::Cmaes, _) => (task.cmaes(Reach::Ranges, &mut account)?, "cmaes"),
+        (Method::Cmaes | Method::Network, _) => (task.cmaes(Reach::Ranges, &mut account)?, "cmaes"),
     };
     let found = novelty(&fit);
     if !found.is_outside() || options.method == Method::Cmaes {

@@ -11,7 +11,11 @@ pub use outside::{area_under_curve, outside_rope};
 pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
 
 use crate::filming::{FilmTiming, Filmed, Randomisation, film, side_camera};
+#[cfg(feature = "network")]
+use crate::phi::{PhiNet, identify_by_network};
 use crate::ropes::random_rope;
+#[cfg(feature = "network")]
+use crate::sysid::Method;
 use crate::sysid::{FitProgress, IdentifyError, IdentifyOptions, Observation, identify};
 use crate::wiggle::{WiggleConfig, WiggleError, wiggle};
 use crate::workers::map_in_order;
@@ -20,6 +24,8 @@ use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
 use shared_types::{Limits, RopeEstimate, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
+#[cfg(feature = "network")]
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Keypoints per frame.
 const KEYPOINTS: usize = 24;
@@ -35,6 +41,9 @@ pub struct TrialRig {
     pub camera: StereoCamera,
     /// Errors of the recordings.
     pub randomisation: Randomisation,
+    /// The network, for [`Method::Network`](crate::sysid::Method::Network).
+    #[cfg(feature = "network")]
+    pub network: Option<Arc<Mutex<PhiNet>>>,
 }
 
 /// Why a trial could not be made.
@@ -56,6 +65,15 @@ pub enum TrialError {
     EmptyFilm {
         /// Index of the trial.
         index: u64,
+    },
+    /// The network gave no answer.
+    #[cfg(feature = "network")]
+    #[error("trial {index}: {source}")]
+    Network {
+        /// Index of the trial.
+        index: u64,
+        /// What is wrong.
+        source: crate::phi::NetworkError,
     },
     /// Identification failed.
     #[error("trial {index}: {source}")]
@@ -100,6 +118,8 @@ impl TrialRig {
             motion: PlannedArm::new(wiggle(config, &Limits::default())?),
             camera: side_camera(),
             randomisation: Randomisation::default(),
+            #[cfg(feature = "network")]
+            network: None,
         })
     }
 
@@ -114,6 +134,17 @@ impl TrialRig {
             .map_err(|source| TrialError::Film { index, source })
     }
 
+    /// A film with all that is known beside it.
+    #[must_use]
+    pub fn observation<'a>(&'a self, filmed: &'a Filmed) -> Observation<'a> {
+        Observation {
+            track: &filmed.track,
+            camera: &self.camera,
+            motion: &self.motion,
+            appearance: filmed.appearance,
+        }
+    }
+
     /// Identifies the rope of a film.
     ///
     /// # Errors
@@ -124,12 +155,7 @@ impl TrialRig {
         index: u64,
         options: &IdentifyOptions,
     ) -> Result<RopeEstimate, TrialError> {
-        let observation = Observation {
-            track: &filmed.track,
-            camera: &self.camera,
-            motion: &self.motion,
-            appearance: filmed.appearance,
-        };
+        let observation = self.observation(filmed);
         let options = IdentifyOptions {
             seed: options.seed ^ index,
             // As these films are made: nothing but noise that comes and goes, and a
@@ -139,6 +165,13 @@ impl TrialRig {
             camera_look_at_std_m: self.randomisation.camera_lookat_m.max(1e-4),
             ..*options
         };
+        #[cfg(feature = "network")]
+        if let (Method::Network, Some(net)) = (options.method, &self.network) {
+            // A network that panicked once is as good as before.
+            let mut net = net.lock().unwrap_or_else(PoisonError::into_inner);
+            return identify_by_network(&mut net, &observation, &options)
+                .map_err(|source| TrialError::Network { index, source });
+        }
         identify(&observation, &options, &mut |_: FitProgress| {
             ControlFlow::Continue(())
         })

@@ -6,6 +6,8 @@ use crate::config::TrainingConfig;
 use crate::draws::{Purpose, generator, order, seed_for};
 use crate::masking::MaskPhase;
 use crate::pool::Pool;
+use crate::principal::PRINCIPAL;
+use crate::ratios::{RATIOS, log_ratios};
 use crate::standard::Standard;
 use planner::filming::{FilmNoise, FilmTiming, project, side_camera};
 use planner::observation::{FeatureDefinition, ViewPlane, WIDTHS, WiggleFeatures, observe};
@@ -16,6 +18,8 @@ use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use shared_types::{Limits, RopeParams, StereoCamera};
 use std::sync::mpsc::{Receiver, sync_channel};
 
+/// Films that mean film, scales and principal components are measured on.
+const STANDARD_FILMS: usize = 600;
 /// Batches made ahead by each thread.
 const AHEAD: usize = 2;
 
@@ -28,8 +32,12 @@ pub struct Batch {
     pub motion: Vec<f32>,
     /// Film by film.
     pub widths: Vec<f32>,
+    /// Principal components, film by film.
+    pub principal: Vec<f32>,
     /// Normalised parameters, film by film.
     pub targets: Vec<f32>,
+    /// Logarithms of ratios, film by film.
+    pub ratios: Vec<f32>,
 }
 
 /// Parameters as parts of their ranges, order of [`RANGES`].
@@ -105,13 +113,14 @@ impl<'a> Studio<'a> {
         self.film(index, &self.config.randomisation.draw(seed, index as u64))
     }
 
-    /// Mean and scale of the features, from films of the first ropes.
+    /// Mean, scale and principal components, from films of the first ropes.
     ///
     /// # Errors
     /// As [`Studio::film`].
     pub fn standard(&self) -> Result<Standard, TrainingError> {
         let seed = seed_for(self.config.training.seed, Purpose::Noise);
-        let films: Vec<WiggleFeatures> = (0..self.pool.len().min(256))
+        let count = self.pool.len().min(STANDARD_FILMS);
+        let films: Vec<WiggleFeatures> = (0..count)
             // Noise that no step of the training has.
             .map(|i| {
                 self.film(
@@ -120,7 +129,10 @@ impl<'a> Studio<'a> {
                 )
             })
             .collect::<Result<_, _>>()?;
-        Ok(Standard::measure(&films))
+        let clean: Vec<WiggleFeatures> = (0..count)
+            .map(|i| self.film(i, &FilmNoise::default()))
+            .collect::<Result<_, _>>()?;
+        Ok(Standard::measure(&films, &clean))
     }
 
     /// The batch of a training step.
@@ -209,7 +221,9 @@ impl Batch {
             films: 0,
             motion: Vec::new(),
             widths: Vec::with_capacity(films * WIDTHS),
+            principal: Vec::with_capacity(films * PRINCIPAL),
             targets: Vec::with_capacity(films * ROPE_PARAMETERS),
+            ratios: Vec::with_capacity(films * RATIOS),
         }
     }
 
@@ -217,8 +231,10 @@ impl Batch {
     pub fn push(&mut self, mut features: WiggleFeatures, rope: &RopeParams, standard: &Standard) {
         standard.motion(&mut features.motion);
         self.films += 1;
+        self.principal.extend(standard.principal(&features.motion));
         self.motion.append(&mut features.motion);
         self.widths.extend(standard.widths(features.widths));
         self.targets.extend(normalised(rope));
+        self.ratios.extend(log_ratios(rope));
     }
 }

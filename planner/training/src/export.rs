@@ -10,6 +10,7 @@ use crate::onnx::{
     Graph, INT64, Model, Node, OperatorSet, StringEntry, Tensor, TensorShape, TensorType,
     ValueInfo, ValueType,
 };
+use crate::principal::{POOL, PRINCIPAL};
 use crate::standard::Standard;
 use crate::trainer::{Predicted, predict};
 use burn::module::Module;
@@ -224,8 +225,9 @@ impl GraphWriter {
             value(OUTPUTS[2], &[EMBEDDING]),
             value(OUTPUTS[3], &[1]),
         ];
-        let x = self.standardised_motion(standard, channels);
+        let x = self.standardised_motion(standard, features);
         let mut x = self.transpose(&x);
+        let principal = self.principal(&x, standard);
         for (i, block) in model.blocks.iter().enumerate() {
             let [rows, out] = block.convolution.weight.dims();
             let weight = numbers(block.convolution.weight.val())?;
@@ -263,7 +265,7 @@ impl GraphWriter {
         x = self.transpose(&x);
         x = self.node("Flatten", &[&x], &[int("axis", 1)]);
         let widths = self.standardised_widths(standard);
-        x = self.node("Concat", &[&x, &widths], &[int("axis", 1)]);
+        x = self.node("Concat", &[&x, &widths, &principal], &[int("axis", 1)]);
         x = self.linear("embed", &x, &model.embed)?;
         let embedding = self.named("Gelu", &[&x], &[], OUTPUTS[2]);
         x = self.linear("head0", &embedding, &model.head[0])?;
@@ -281,8 +283,9 @@ impl GraphWriter {
     }
 
     /// (x - mean) * scale * mask, the mask being the last channel.
-    fn standardised_motion(&mut self, standard: &Standard, channels: usize) -> String {
-        let mean = self.floats("motion.mean", &[channels], &standard.mean);
+    fn standardised_motion(&mut self, standard: &Standard, features: &FeatureDefinition) -> String {
+        let channels = features.channels();
+        let mean = self.floats("motion.mean", &[features.frames, channels], &standard.mean);
         let scale = self.floats("motion.scale", &[channels], &standard.scale);
         let last = channels as i64 - 1;
         let start = self.integers("mask.start", &[last]);
@@ -292,6 +295,17 @@ impl GraphWriter {
         let x = self.node("Sub", &[INPUTS[0], &mean], &[]);
         let x = self.node("Mul", &[&x, &scale], &[]);
         self.node("Mul", &[&x, &mask], &[])
+    }
+
+    /// Principal components of standardised motion, transposed.
+    fn principal(&mut self, x: &str, standard: &Standard) -> String {
+        let matrix = &standard.principal.matrix;
+        let dims = [matrix.len() / PRINCIPAL, PRINCIPAL];
+        let matrix = self.floats("principal", &dims, matrix);
+        let x = self.average(x, POOL);
+        let x = self.transpose(&x);
+        let x = self.node("Flatten", &[&x], &[int("axis", 1)]);
+        self.node("MatMul", &[&x, &matrix], &[])
     }
 
     /// A width that was not seen is 0 with mark 0, so that one matrix does it.

@@ -40,6 +40,8 @@ pub mod network;
 mod onnx;
 pub mod plots;
 pub mod pool;
+pub mod principal;
+mod ratios;
 pub mod standard;
 pub mod trainer;
 

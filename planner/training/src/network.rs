@@ -3,15 +3,18 @@
 //!
 //! Three blocks of convolution (kernel 8), layer norm, GELU, average pooling by 2
 //! and dropout; adaptive pooling; a linear layer to 256 numbers, the embedding,
-//! that also sees the widths; a head of 128 and 64 to the nine normalised
+//! that also sees the widths and the motion's principal components; a head of 128 and 64 to the nine normalised
 //! parameters. A second, smaller head says how far off each is. It reads the
-//! first one's last layer but does not change it.
+//! first one's last layer but does not change it. A third one, of use in training only,
+//! is asked for the ratios that a film can tell.
 //!
 //! Data are channel-last. A convolution is one matrix product over the eight
 //! shifted copies of its input side by side, which on a CPU is faster than the
 //! tensor library's own.
 
 use crate::config::NetworkConfig;
+use crate::principal::PRINCIPAL;
+use crate::ratios::RATIOS;
 use burn::module::Module;
 use burn::nn::{Dropout, DropoutConfig, LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::activation::{gelu, sigmoid};
@@ -51,6 +54,8 @@ pub struct PhiModel {
     pub head: Vec<Linear>,
     /// Head of the deviations: 64 to 32 and the logarithms of the variances.
     pub spread: Vec<Linear>,
+    /// Head of the ratios.
+    pub ratios: Linear,
     /// Length after adaptive pooling.
     pub pooled: usize,
 }
@@ -64,6 +69,8 @@ pub struct Outputs {
     pub log_variance: Tensor<2>,
     /// Embedding `[n, 256]`.
     pub embedding: Tensor<2>,
+    /// Logarithms of ratios `[n, 3]`.
+    pub ratios: Tensor<2>,
 }
 
 impl PhiModel {
@@ -89,36 +96,40 @@ impl PhiModel {
         let layer = |a, b| LinearConfig::new(a, b).init(device);
         Self {
             blocks,
-            embed: layer(config.pooled * channels_in + WIDTHS, EMBEDDING),
+            embed: layer(config.pooled * channels_in + WIDTHS + PRINCIPAL, EMBEDDING),
             head: vec![
                 layer(EMBEDDING, HEAD[0]),
                 layer(HEAD[0], HEAD[1]),
                 layer(HEAD[1], ROPE_PARAMETERS),
             ],
             spread: vec![layer(HEAD[1], SPREAD), layer(SPREAD, ROPE_PARAMETERS)],
+            ratios: layer(HEAD[1], RATIOS),
             pooled: config.pooled,
         }
     }
 
-    /// Standardised motion `[n, frames, channels]` and widths `[n, 4]` to outputs.
+    /// Standardised motion `[n, frames, channels]`, widths `[n, 4]` and principal
+    /// components `[n, 64]` to outputs.
     #[must_use]
-    pub fn forward(&self, motion: Tensor<3>, widths: Tensor<2>) -> Outputs {
+    pub fn forward(&self, motion: Tensor<3>, widths: Tensor<2>, principal: Tensor<2>) -> Outputs {
         let mut x = motion;
         for block in &self.blocks {
             x = block.forward(x);
         }
         let [films, length, channels] = x.dims();
         let x = pool(x, length / self.pooled).reshape([films, self.pooled * channels]);
-        let x = Tensor::cat(vec![x, widths], 1);
+        let x = Tensor::cat(vec![x, widths, principal], 1);
         let embedding = gelu(self.embed.forward(x));
         let [first, second, third] = [&self.head[0], &self.head[1], &self.head[2]];
         let hidden = gelu(second.forward(gelu(first.forward(embedding.clone()))));
+        let ratios = self.ratios.forward(hidden.clone());
         let mean = sigmoid(third.forward(hidden.clone()));
         let spread = gelu(self.spread[0].forward(hidden.detach()));
         Outputs {
             mean,
             log_variance: self.spread[1].forward(spread),
             embedding,
+            ratios,
         }
     }
 }

@@ -1,50 +1,52 @@
-//! Features shifted and scaled to mean 0 and deviation 1.
+//! Features as deviations from the mean film, and the few numbers that tell most.
 //!
-//! A keypoint's height, say, is half a metre with a deviation of centimetres; the
-//! motion is in the deviation. The written network contains these numbers, so that
-//! its input is in metres and radians.
+//! Films of the same wiggle are all but the same; the rope is in the difference. So
+//! each channel is taken relative to its mean over all ropes at that frame, and
+//! scaled to deviation 1. Beside the motion itself the network sees its principal
+//! components ([`Standard::principal`]). The written network contains these numbers,
+//! so that its input is in metres and radians.
 
-use planner::observation::{WIDTHS, WiggleFeatures};
+use crate::principal::{PRINCIPAL, Principal};
+use planner::observation::{FeatureDefinition, WIDTHS, WiggleFeatures};
 use serde::{Deserialize, Serialize};
 
 /// Mean and scale of every channel and width.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Standard {
-    /// Mean of each channel over the frames that were seen.
+    /// Mean of each frame's channels over the films in which it was seen.
     pub mean: Vec<f32>,
-    /// One over the deviation of each channel.
+    /// One over the deviation of each channel from these means.
     pub scale: Vec<f32>,
     /// Mean of rope and lead half width (m).
     pub width_mean: [f32; 2],
     /// One over their deviation (1/m).
     pub width_scale: [f32; 2],
+    /// What tells most of the motion.
+    pub principal: Principal,
 }
 
 impl Standard {
-    /// Measures films.
+    /// Measures films with all their errors, and without any.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
         reason = "single precision is plenty for means and deviations"
     )]
-    pub fn measure(films: &[WiggleFeatures]) -> Self {
-        let channels = films.first().map_or(1, |f| f.definition.channels());
-        let seen = |f: &WiggleFeatures| -> Vec<Vec<f32>> {
-            let frames = f.motion.chunks(channels);
-            frames
-                .filter(|c| c[channels - 1] > 0.0)
-                .map(<[f32]>::to_vec)
-                .collect()
-        };
-        let frames: Vec<Vec<f32>> = films.iter().flat_map(seen).collect();
-        let (mut mean, mut scale): (Vec<f32>, Vec<f32>) = (0..channels)
-            .map(|c| moments(frames.iter().map(|f| f64::from(f[c]))))
-            .map(|(mean, deviation)| (mean as f32, (1.0 / deviation.max(1e-3)) as f32))
-            .unzip();
+    pub fn measure(films: &[WiggleFeatures], clean: &[WiggleFeatures]) -> Self {
+        let definition = films
+            .first()
+            .map_or_else(Default::default, |f| f.definition);
+        let channels = definition.channels();
+        let mut mean = mean_film(films, &definition);
+        let mut scale: Vec<f32> = (0..channels)
+            .map(|channel| deviation(films, &mean, channels, channel))
+            .map(|deviation| (1.0 / deviation.max(1e-3)) as f32)
+            .collect();
         // The mark of a seen frame stays what it is.
-        mean[channels - 1] = 0.0;
+        for frame in mean.chunks_mut(channels) {
+            frame[channels - 1] = 0.0;
+        }
         scale[channels - 1] = 1.0;
         let width = |i: usize| {
             let known = films.iter().filter(|f| f.widths[2 * i + 1] > 0.0);
@@ -52,24 +54,42 @@ impl Standard {
             (mean as f32, (1.0 / deviation.max(1e-4)) as f32)
         };
         let (rope, lead) = (width(0), width(1));
-        Self {
+        let mut standard = Self {
             mean,
             scale,
             width_mean: [rope.0, lead.0],
             width_scale: [rope.1, lead.1],
-        }
+            principal: Principal::none(),
+        };
+        let standardised = |films: &[WiggleFeatures]| -> Vec<Vec<f32>> {
+            let one = |f: &WiggleFeatures| {
+                let mut motion = f.motion.clone();
+                standard.motion(&mut motion);
+                motion
+            };
+            films.iter().map(one).collect()
+        };
+        let (films, clean) = (standardised(films), standardised(clean));
+        standard.principal = Principal::measure(&films, &clean, &standard.scale, &definition);
+        standard
     }
 
     /// Standardises the motion; frames not seen stay 0.
     pub fn motion(&self, motion: &mut [f32]) {
-        let channels = self.mean.len();
-        for frame in motion.chunks_mut(channels) {
+        let channels = self.scale.len();
+        let frames = motion.chunks_mut(channels).zip(self.mean.chunks(channels));
+        for (frame, mean) in frames {
             let mask = frame[channels - 1];
-            let numbers = self.mean.iter().zip(&self.scale);
-            for (x, (mean, scale)) in frame.iter_mut().zip(numbers) {
+            for ((x, mean), scale) in frame.iter_mut().zip(mean).zip(&self.scale) {
                 *x = (*x - mean) * scale * mask;
             }
         }
+    }
+
+    /// Principal components of standardised motion.
+    #[must_use]
+    pub fn principal(&self, motion: &[f32]) -> [f32; PRINCIPAL] {
+        self.principal.of(motion, self.scale.len())
     }
 
     /// Standardises the widths; those not seen stay 0.
@@ -81,6 +101,40 @@ impl Standard {
         };
         [value(0), widths[1], value(1), widths[3]]
     }
+}
+
+/// Mean of every frame's channels over the films in which it was seen.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "single precision is plenty for means"
+)]
+fn mean_film(films: &[WiggleFeatures], definition: &FeatureDefinition) -> Vec<f32> {
+    let channels = definition.channels();
+    let mut sums = vec![0.0_f64; definition.frames * channels];
+    for film in films {
+        for (sum, x) in sums.iter_mut().zip(&film.motion) {
+            *sum += f64::from(*x);
+        }
+    }
+    for frame in sums.chunks_mut(channels) {
+        // The sum of the marks is the number of films in which it was seen.
+        let seen = frame[channels - 1].max(1.0);
+        frame.iter_mut().for_each(|sum| *sum /= seen);
+    }
+    sums.into_iter().map(|x| x as f32).collect()
+}
+
+/// Deviation of a channel from the mean film, over all frames seen.
+fn deviation(films: &[WiggleFeatures], mean: &[f32], channels: usize, channel: usize) -> f64 {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for film in films {
+        let frames = film.motion.chunks(channels).zip(mean.chunks(channels));
+        for (frame, mean) in frames.filter(|(frame, _)| frame[channels - 1] > 0.0) {
+            squares += f64::from(frame[channel] - mean[channel]).powi(2);
+            count += 1.0;
+        }
+    }
+    (squares / f64::max(count, 1.0)).sqrt()
 }
 
 /// Mean and standard deviation; 0 and 1 of nothing.
@@ -101,10 +155,9 @@ fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use planner::observation::FeatureDefinition;
 
     #[test]
-    fn seen_frames_get_mean_0_and_deviation_1_and_others_stay_0() {
+    fn seen_frames_become_deviations_from_the_mean_film_and_others_stay_0() {
         let definition = FeatureDefinition {
             frames: 100,
             keypoints: 2,
@@ -114,7 +167,8 @@ mod tests {
             let frame = |i: u16| {
                 let x = f32::from(i);
                 let seen = f32::from(u8::from(i >= 20));
-                [x, x * 0.5 + shift, 3.0 - x, 0.1 * x, 7.0 * x, 1.0].map(|v| v * seen)
+                let values = [x, x * 0.5 + shift, 3.0 - x, 0.1 * x - shift, 7.0 * x, 1.0];
+                values.map(|v| v * seen)
             };
             WiggleFeatures {
                 definition,
@@ -124,15 +178,19 @@ mod tests {
             }
         };
         let films = [film(0.0), film(0.02)];
-        let standard = Standard::measure(&films);
+        let standard = Standard::measure(&films, &films);
         let mut motion = films[0].motion.clone();
         standard.motion(&mut motion);
         assert!(motion[..20 * 6].iter().all(|x| *x == 0.0));
-        let seen: Vec<f32> = motion[20 * 6..].chunks(6).map(|f| f[2]).collect();
-        let mean = seen.iter().sum::<f32>() / 80.0;
-        let square = seen.iter().map(|x| x * x).sum::<f32>() / 80.0;
-        assert!(mean.abs() < 1e-3 && (square - 1.0).abs() < 1e-3);
-        assert_eq!(motion[20 * 6 + 5], 1.0);
+        // The two films differ in channels 1 and 3 only, by one deviation each way.
+        for frame in motion[20 * 6..].chunks(6) {
+            assert!((frame[1] + 1.0).abs() < 2e-3 && (frame[3] - 1.0).abs() < 2e-3);
+            assert!(frame[0].abs() < 1e-3 && frame[2].abs() < 1e-3 && frame[5] == 1.0);
+        }
+        // One number tells the two apart.
+        let found = standard.principal(&motion);
+        assert!((found[0].abs() - 1.0).abs() < 0.01, "{found:?}");
+        assert!(found[1..].iter().all(|x| x.abs() < 0.05), "{found:?}");
         let widths = standard.widths(films[0].widths);
         assert!((widths[0] + 1.0).abs() < 1e-3, "{widths:?}");
         assert_eq!(widths[1..], [1.0, 0.0, 0.0]);

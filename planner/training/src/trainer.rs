@@ -9,6 +9,8 @@ use crate::files::write_whole;
 use crate::network::{Outputs, PhiModel};
 use crate::plots::plot_losses;
 use crate::pool::Pool;
+use crate::principal::PRINCIPAL;
+use crate::ratios::RATIOS;
 use crate::standard::Standard;
 use burn::module::Module;
 use burn::optim::GradientsParams;
@@ -19,6 +21,9 @@ use shared_types::rope::ROPE_PARAMETERS;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Weight of the ratios' squared errors, which are in deviations, beside those of the
+/// parameters, which are in parts of the ranges.
+const RATIO_PART: f64 = 0.1;
 /// Films predicted at once.
 const PREDICT_BATCH: usize = 50;
 
@@ -143,22 +148,19 @@ impl Trainer<'_> {
         // same.
         let seed = seed_for(self.config.training.seed, Purpose::Dropout);
         device.seed(seed.wrapping_add(step as u64));
-        let targets = tensor(batch.targets, [batch.films, ROPE_PARAMETERS], device);
-        let out = forward(
-            &state.model,
-            self.config,
-            batch.films,
-            batch.motion,
-            batch.widths,
-            device,
-        );
+        let films = batch.films;
+        let targets = tensor(batch.targets, [films, ROPE_PARAMETERS], device);
+        let ratios = tensor(batch.ratios, [films, RATIOS], device);
+        let input = [batch.motion, batch.widths, batch.principal];
+        let out = forward(&state.model, self.config, films, input, device);
         let error = out.mean.sub(targets).powi_scalar(2);
         let fit = error.clone().mean();
         // Gaussian likelihood of the errors as they are, scaled down so that the
         // two losses are of one size; the heads share no gradient.
         let spread = out.log_variance.clamp(-14.0, 4.0);
         let likelihood = (error.detach() * spread.clone().neg().exp() + spread).mean();
-        let loss = fit.clone() + likelihood.mul_scalar(0.01);
+        let ratios = out.ratios.sub(ratios).powi_scalar(2).mean();
+        let loss = fit.clone() + ratios.mul_scalar(RATIO_PART) + likelihood.mul_scalar(0.01);
         let value: f32 = fit.into_scalar();
         if !value.is_finite() {
             return Err(TrainingError::Diverged { step, loss: value });
@@ -273,9 +275,13 @@ pub fn predict(
     let mut all = Vec::with_capacity(films.films);
     for first in (0..films.films).step_by(PREDICT_BATCH) {
         let count = PREDICT_BATCH.min(films.films - first);
-        let motion = films.motion[first * each..(first + count) * each].to_vec();
-        let widths = films.widths[first * WIDTHS..(first + count) * WIDTHS].to_vec();
-        let out = forward(model, config, count, motion, widths, device);
+        let part = |numbers: &[f32], each| numbers[first * each..(first + count) * each].to_vec();
+        let input = [
+            part(&films.motion, each),
+            part(&films.widths, WIDTHS),
+            part(&films.principal, PRINCIPAL),
+        ];
+        let out = forward(model, config, count, input, device);
         let rows = |t: Tensor<2>| -> Result<Vec<Vec<f32>>, TrainingError> {
             let [_, width] = t.dims();
             let numbers = t.into_data().try_into_vec::<f32>();
@@ -306,8 +312,7 @@ fn forward(
     model: &PhiModel,
     config: &TrainingConfig,
     films: usize,
-    motion: Vec<f32>,
-    widths: Vec<f32>,
+    [motion, widths, principal]: [Vec<f32>; 3],
     device: &Device,
 ) -> Outputs {
     let features = config.features();
@@ -315,6 +320,7 @@ fn forward(
     model.forward(
         tensor(motion, shape, device),
         tensor(widths, [films, WIDTHS], device),
+        tensor(principal, [films, PRINCIPAL], device),
     )
 }
 

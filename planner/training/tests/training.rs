@@ -194,6 +194,50 @@ fn written_as_it_is(state: &State, held_out: &Pool) {
     assert!(missing.to_string().contains("/no/such/model.onnx"));
 }
 
+/// The model that comes with this version, in the runtime of this build.
+#[cfg(feature = "network")]
+#[test]
+fn the_shipped_network_reads_ropes_it_never_saw() {
+    use planner::phi::PhiNet;
+    use shared_types::rope::RANGES;
+
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/models/phi-nn.toml");
+    let mut config = TrainingConfig::load(&path).unwrap();
+    let mut net = PhiNet::embedded().unwrap();
+    let record = net.metadata().training.clone();
+    assert_eq!(record.ropes, config.data.ropes);
+    assert_eq!(record.steps, config.training.steps);
+    assert_eq!(record.randomisation, config.randomisation);
+    assert_eq!(net.metadata().features, config.features());
+    // Other ropes and other noise than those it was trained and judged on.
+    config.data.seed = 77;
+    config.data.held_out = 48;
+    let pool = Recipe::new(&config.data, Share::HeldOut, 2)
+        .simulate(0)
+        .unwrap();
+    let studio = Studio::new(&config, &pool).unwrap();
+    let mut errors = [0.0; 9];
+    for i in 0..pool.len() {
+        let found = net.predict(&studio.held_out(i).unwrap()).unwrap();
+        let truth = pool.rope(i).to_array();
+        for (k, error) in errors.iter_mut().enumerate() {
+            *error += (found.parameters[k] - truth[k]).abs() / pool.len() as f64;
+        }
+    }
+    // A quarter above the figures of the model card for so few ropes.
+    let limits = [
+        2.0, 0.0075, 0.0055, 0.11, 0.0012, 0.0155, 0.0150, 0.0018, 0.23,
+    ];
+    for (k, limit) in limits.into_iter().enumerate() {
+        assert!(
+            errors[k] < limit,
+            "{}: {} above {limit}",
+            RANGES[k].label,
+            errors[k]
+        );
+    }
+}
+
 #[test]
 fn the_shipped_configuration_is_the_papers() {
     let config = configured();
