@@ -304,7 +304,7 @@ pub struct ObservationArgs {
 /// How to identify.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
-    /// A trained network.
+    /// The network alone: at once, for the built-in wiggle only.
     Nn,
     /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
     Cmaes,
@@ -327,6 +327,9 @@ pub struct IdentifyArgs {
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
+    /// Network for --method nn instead of the built-in one (ONNX, written by phi-train).
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
     #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
@@ -529,6 +532,9 @@ pub struct ReproduceArgs {
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
+    /// Network for --method nn instead of the built-in one (ONNX, written by phi-train).
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
     /// Result file (JSON); a run that was broken off goes on from it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

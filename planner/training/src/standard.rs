@@ -165,7 +165,7 @@ mod tests {
         };
         let film = |shift: f32| {
             let frame = |i: u16| {
-                let x = f32::from(i);
+                let x = f32::from(i) * 1e-3;
                 let seen = f32::from(u8::from(i >= 20));
                 let values = [x, x * 0.5 + shift, 3.0 - x, 0.1 * x - shift, 7.0 * x, 1.0];
                 values.map(|v| v * seen)

@@ -1,5 +1,6 @@
 //! `wag identify`: rope parameters from a video or from keypoints.
 
+use super::network::{network, no_model_without_network};
 use super::plan::planner_config;
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName, MotionArgs};
@@ -11,6 +12,7 @@ use crate::table;
 use anyhow::{Context, anyhow};
 use camera_ingest::load_camera;
 use comfy_table::Table;
+use planner::phi::{NetworkError, identify_by_network};
 use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use serde_json::{Value, json};
@@ -81,6 +83,14 @@ fn classify(error: IdentifyError) -> Failure {
     }
 }
 
+fn classify_network(error: NetworkError) -> Failure {
+    if error.is_input() {
+        Failure::input(error)
+    } else {
+        Failure::failed(error)
+    }
+}
+
 /// Identified parameters as a table.
 fn parameter_table(estimate: &RopeEstimate) -> Table {
     let values = RANGES
@@ -129,18 +139,21 @@ fn print_remarks(estimate: &RopeEstimate) {
 }
 
 /// The planner's name of a method.
-pub fn method_of(name: MethodName) -> anyhow::Result<Method> {
+pub fn method_of(name: MethodName) -> Method {
     match name {
-        MethodName::Cmaes => Ok(Method::Cmaes),
-        MethodName::Hybrid => Ok(Method::Hybrid),
-        MethodName::Nn => Err(anyhow!(
-            "identification by the network alone is not implemented in this version; use --method hybrid or --method cmaes"
-        )),
+        MethodName::Cmaes => Method::Cmaes,
+        MethodName::Hybrid => Method::Hybrid,
+        MethodName::Nn => Method::Network,
     }
 }
 
 pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let method = method_of(args.method).or_failed()?;
+    let method = method_of(args.method);
+    let model = args.model.as_deref();
+    no_model_without_network(method, model)?;
+    let net = (method == Method::Network)
+        .then(|| network(model))
+        .transpose()?;
     let camera = load_camera(&args.camera).or_input()?;
     let motion = attach_motion(&args.motion).or_input()?;
     let config = planner_config(None).or_failed()?;
@@ -159,20 +172,12 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         lead_mass_kg: args.lead_mass,
         ..config.identify
     };
-    let estimate = identify(&observation, &options, &mut |p| {
-        stage.progress(&Progress {
-            done: u32::try_from(p.generation).unwrap_or(u32::MAX),
-            total: u32::try_from(p.generations).unwrap_or(u32::MAX),
-            value: p.residual_px,
-            label: "residual px".to_owned(),
-        });
-        if interrupted().load(Ordering::SeqCst) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
+    let estimate = match net {
+        Some(mut net) => {
+            identify_by_network(&mut net, &observation, &options).map_err(classify_network)?
         }
-    })
-    .map_err(classify)?;
+        None => searched(&observation, &options, &stage).map_err(classify)?,
+    };
     let seconds = stage.done(&format!(
         "residual {:.2} px, {} simulations",
         estimate.residual_px, estimate.simulations
@@ -195,4 +200,25 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         "circumstances": estimate.circumstances, "novelty": estimate.novelty,
         "out_of_distribution": estimate.novelty.is_outside(),
     })))
+}
+
+/// Searches for the rope, with progress, until done or interrupted.
+fn searched(
+    observation: &Observation<'_>,
+    options: &IdentifyOptions,
+    stage: &Stage,
+) -> Result<RopeEstimate, IdentifyError> {
+    identify(observation, options, &mut |p| {
+        stage.progress(&Progress {
+            done: u32::try_from(p.generation).unwrap_or(u32::MAX),
+            total: u32::try_from(p.generations).unwrap_or(u32::MAX),
+            value: p.residual_px,
+            label: "residual px".to_owned(),
+        });
+        if interrupted().load(Ordering::SeqCst) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
 }

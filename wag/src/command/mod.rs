@@ -8,6 +8,7 @@ mod demo_summary;
 mod explain;
 mod identify;
 mod latency;
+mod network;
 mod plan;
 mod process;
 mod record;

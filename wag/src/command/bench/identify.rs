@@ -3,10 +3,12 @@
 use super::machine::Machine;
 use super::spent::least;
 use crate::cli::BenchArgs;
+use crate::command::network::network;
 use crate::command::plan::planner_config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
 use crate::table::numbers;
+use planner::filming::Filmed;
 use planner::sysid::{IdentifyOptions, Method};
 use planner::trials::{TrialRig, trial_rope};
 use serde::Serialize;
@@ -34,18 +36,18 @@ fn extent(quick: bool) -> (u64, usize) {
 fn measure(
     rig: &TrialRig,
     args: &BenchArgs,
-    options: &IdentifyOptions,
     (method, limit_wall_s): (&'static str, f64),
+    mut identify: impl FnMut(&Filmed, u64) -> Outcome<f64>,
 ) -> Outcome<Row> {
     let (ropes, repeats) = extent(args.quick);
     let (mut wall_s, mut cpu_s, mut simulations) = (0.0, 0.0, 0.0);
     for index in 0..ropes {
         let rope = trial_rope(args.seed, index);
         let filmed = rig.film(&rope, args.seed, index).or_failed()?;
-        let (spent, found) = least(repeats, || rig.fit(&filmed, index, options)).or_failed()?;
+        let (spent, simulated) = least(repeats, || identify(&filmed, index))?;
         wall_s += spent.wall_s;
         cpu_s += spent.cpu_s;
-        simulations += f64::from(found.simulations);
+        simulations += simulated;
     }
     #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
     let count = ropes as f64;
@@ -70,7 +72,21 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         ..config.identify
     };
     let stage = Stage::begin("identify", quiet);
-    let hybrid = measure(&rig, args, &options, ("hybrid", 2.0))?;
+    let mut net = network(None)?;
+    let nn = measure(&rig, args, ("nn", 0.010), |filmed, _| {
+        // From keypoints to parameters; nothing is simulated.
+        net.look(&rig.observation(filmed)).or_failed()?;
+        Ok(0.0)
+    })?;
+    stage.say("network measured");
+    let fit = |options: IdentifyOptions| {
+        let rig = &rig;
+        move |filmed: &Filmed, index: u64| {
+            let found = rig.fit(filmed, index, &options).or_failed()?;
+            Ok(f64::from(found.simulations))
+        }
+    };
+    let hybrid = measure(&rig, args, ("hybrid", 2.0), fit(options))?;
     stage.say("hybrid measured");
     // Without its early stop and repeats: all the simulations of the paper.
     let whole = IdentifyOptions {
@@ -79,18 +95,18 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         repeats_max: 0,
         ..options
     };
-    let cmaes = measure(&rig, args, &whole, ("cmaes", 6.0))?;
-    stage.done("2 methods measured");
-    let rows = [hybrid, cmaes];
+    let cmaes = measure(&rig, args, ("cmaes", 6.0), fit(whole))?;
+    stage.done("3 methods measured");
+    let rows = [nn, hybrid, cmaes];
     if !quiet {
         println!("{machine}\nseed {}", args.seed);
         let lines = rows.iter().map(|row| {
             [
                 row.method.to_owned(),
-                format!("{:.2}", row.wall_s),
-                format!("{:.2}", row.cpu_s),
+                format!("{:.4}", row.wall_s),
+                format!("{:.4}", row.cpu_s),
                 format!("{:.0}", row.simulations),
-                format!("{:.0} s kept: {}", row.limit_wall_s, row.within_limit),
+                format!("{} s kept: {}", row.limit_wall_s, row.within_limit),
             ]
         });
         let header = [

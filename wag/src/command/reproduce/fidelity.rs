@@ -43,7 +43,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         config,
         rig,
         options,
-    } = Setup::new(args).or_failed()?;
+    } = Setup::new(args)?;
     let ropes = toml::from_str::<FidelityConfig>(ROPES)
         .context("the built-in `configs/planner/fidelity.toml` is damaged")
         .or_failed()?

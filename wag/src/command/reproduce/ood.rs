@@ -6,7 +6,7 @@
 use super::kept::trials;
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::failure::{OrInput, Outcome};
+use crate::failure::Outcome;
 use crate::progress::Stage;
 use planner::trials::{Trial, area_under_curve, outside_rope, trial_rope};
 use serde_json::{Value, json};
@@ -18,7 +18,7 @@ fn taken_for_outside(trials: &[Trial]) -> f64 {
 }
 
 pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let Setup { rig, options, .. } = Setup::new(args).or_failed()?;
+    let Setup { rig, options, .. } = Setup::new(args)?;
     let stage = Stage::begin("sysid-ood", quiet);
     // Even indices are inside, odd ones outside.
     let rope = |index: u64| {

@@ -2,7 +2,9 @@
 
 use crate::cli::ReproduceArgs;
 use crate::command::identify::method_of;
+use crate::command::network::with_network;
 use crate::command::plan::planner_config;
+use crate::failure::{OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::sysid::IdentifyOptions;
 use planner::trials::TrialRig;
@@ -15,12 +17,14 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    pub fn new(args: &ReproduceArgs) -> anyhow::Result<Self> {
-        let method = method_of(args.method)?;
-        let config = planner_config(None)?;
-        crate::session::watch_interrupts()?;
+    pub fn new(args: &ReproduceArgs) -> Outcome<Self> {
+        let method = method_of(args.method);
+        let config = planner_config(None).or_failed()?;
+        let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
+        with_network(&mut rig, method, args.model.as_deref())?;
+        crate::session::watch_interrupts().or_failed()?;
         Ok(Self {
-            rig: TrialRig::new(&config.wiggle)?,
+            rig,
             options: IdentifyOptions {
                 method,
                 seed: args.seed,

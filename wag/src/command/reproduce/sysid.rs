@@ -4,7 +4,7 @@
 use super::kept::trials;
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::failure::{OrInput, Outcome};
+use crate::failure::Outcome;
 use crate::progress::Stage;
 use crate::table::numbers;
 use planner::trials::{SysidSummary, summarise, trial_rope};
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use shared_types::rope::RANGES;
 
 pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let Setup { rig, options, .. } = Setup::new(args).or_failed()?;
+    let Setup { rig, options, .. } = Setup::new(args)?;
     let stage = Stage::begin("sysid", quiet);
     let rope = |index| trial_rope(args.seed, index);
     let all = trials("sysid", args, args.ropes, &rig, &options, rope, &stage)?;
