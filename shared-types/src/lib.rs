@@ -43,7 +43,7 @@ pub use fault::FaultCode;
 pub use joint::{JOINTS, JointState, JointVector};
 pub use keypoints::{KeypointFrame, KeypointTrack};
 pub use limits::{Limits, LimitsSpec};
-pub use plan::{Plan, Task};
+pub use plan::{Condition, ErrorForecast, LimitedBy, Plan, Task, Verdict};
 pub use response::{ArmResponse, JointResponse, TrackingLag};
 pub use rope::{RopeEstimate, RopeParams};
 pub use tier::{Arming, MotionTier};

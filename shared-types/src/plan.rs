@@ -13,6 +13,72 @@ use sha2::{Digest, Sha256};
 pub enum Task {
     /// The tip passes through the target.
     Strike,
+    /// The tip fells a domino on a board and comes to lie there.
+    Lob,
+    /// The rope comes to hang over a wall.
+    Drape,
+}
+
+impl Task {
+    /// Name as in commands and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Strike => "strike",
+            Self::Lob => "lob",
+            Self::Drape => "drape",
+        }
+    }
+}
+
+/// One condition of a task's success.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    /// What must be so.
+    pub name: String,
+    /// Whether it is.
+    pub met: bool,
+}
+
+/// What a task makes of one simulated throw.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// Whether the task succeeded.
+    pub success: bool,
+    /// Its conditions, in the task's order.
+    pub conditions: Vec<Condition>,
+}
+
+/// What keeps a plan from being better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitedBy {
+    /// Nothing: it is as good as was asked for.
+    Nothing,
+    /// A limit of the arm's speed or acceleration is used to the full.
+    ArmSpeed,
+    /// A joint is at the end of its range.
+    JointRange,
+    /// Contacts of rope or tool.
+    Contact,
+    /// The search was not longer.
+    Budget,
+}
+
+/// Error to expect when the rope is only known as well as it was identified.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorForecast {
+    /// Ropes drawn from what is known about the rope.
+    pub ropes: u32,
+    /// Mean error over them (m).
+    pub mean_m: f64,
+    /// Median error (m).
+    pub median_m: f64,
+    /// Interval that holds the error with a probability of 90 % (m).
+    pub interval_90_m: [f64; 2],
 }
 
 /// A planned throw. JSON form: `plan.json`.
@@ -37,6 +103,18 @@ pub struct Plan {
     pub predicted_time_s: f64,
     /// Fitness of the best candidate.
     pub fitness: f64,
+    /// Whether the search was broken off: the best throw up to then.
+    #[serde(default)]
+    pub interrupted: bool,
+    /// What keeps it from being better.
+    #[serde(default)]
+    pub limited_by: Option<LimitedBy>,
+    /// What the task makes of the simulated throw.
+    #[serde(default)]
+    pub verdict: Verdict,
+    /// Error to expect over ropes drawn from the posterior.
+    #[serde(default)]
+    pub forecast: Option<ErrorForecast>,
     /// Simulations used.
     pub simulations: u32,
     /// Candidates drawn again because they broke a limit.

@@ -377,9 +377,13 @@ pub struct PlanArgs {
     #[arg(long)]
     pub csv: Option<PathBuf>,
     /// Write the plan even if the tip is predicted to miss the target by more than
-    /// 5 cm.
+    /// 5 cm, or the task to fail.
     #[arg(long)]
     pub allow_miss: bool,
+    /// Plan for this many ropes drawn from what identification left open, and forecast
+    /// the error; 0 plans for the likeliest rope alone.
+    #[arg(long, default_value_t = 0, value_name = "K")]
+    pub robust: usize,
 }
 
 /// Arguments of `wag check`.
@@ -515,6 +519,8 @@ pub enum BenchName {
     Rt,
     /// Identification: time of each method.
     Identify,
+    /// Planning: time of one throw of each task, and what it is spent on.
+    Plan,
 }
 
 /// Arguments of `wag reproduce`.
@@ -523,9 +529,10 @@ pub struct ReproduceArgs {
     /// Which result.
     #[arg(value_enum)]
     pub name: ReproduceName,
-    /// Simulated ropes (motion-fidelity has its own).
-    #[arg(long, default_value_t = 1000)]
-    pub ropes: u64,
+    /// Simulated ropes; default: 1000, for sim-pipeline 100, for lob-drape its own 24
+    /// (motion-fidelity has its own).
+    #[arg(long)]
+    pub ropes: Option<u64>,
     /// Seed of the ropes, the films and the searches.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -549,6 +556,10 @@ pub enum ReproduceName {
     SysidOod,
     /// Motion of an identified rope in a throw it was not identified from.
     MotionFidelity,
+    /// Error of planned strikes: true, identified and random parameters.
+    SimPipeline,
+    /// Success of lobs and drapes planned with identified parameters.
+    LobDrape,
 }
 
 /// Arguments of `wag process`.

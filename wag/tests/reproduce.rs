@@ -93,3 +93,45 @@ fn bench_identify_prints_every_method() {
     }
     assert!(methods[2]["simulations"].as_f64().unwrap() >= 3000.0);
 }
+
+#[test]
+fn bench_plan_splits_the_time_of_every_task() {
+    let report = report(&["bench", "plan", "--quick", "--json"]);
+    let tasks = report["tasks"].as_array().unwrap();
+    assert_eq!(tasks.len(), 3);
+    for row in tasks {
+        assert!(row["rollouts_per_s"].as_f64().unwrap() > 0.0);
+        let parts = ["rope_part", "contacts_part", "search_part"];
+        let whole: f64 = parts.iter().map(|p| row[p].as_f64().unwrap()).sum();
+        assert!((whole - 1.0).abs() < 1e-9, "{row}");
+    }
+}
+
+/// One rope of each, gone on with to no more.
+#[test]
+fn results_of_planning_are_whole_and_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (pipeline, both) = (at("pipeline.json"), at("both.json"));
+    let strikes = [
+        "reproduce",
+        "sim-pipeline",
+        "--ropes",
+        "1",
+        "--json",
+        "--out",
+    ];
+    let first = report(&[&strikes[..], &[&pipeline]].concat());
+    let rows = first["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 4);
+    assert!(
+        rows[0]["error"]["median_m"].as_f64().unwrap() < 0.01,
+        "{first}"
+    );
+    let again = report(&[&strikes[..], &[&pipeline]].concat());
+    assert_eq!(first["rows"], again["rows"]);
+    let tasks = ["reproduce", "lob-drape", "--ropes", "1", "--json", "--out"];
+    let tasks = report(&[&tasks[..], &[&both]].concat());
+    assert_eq!(tasks["trials"].as_array().unwrap().len(), 1);
+    assert!(tasks["trials"][0]["drape"]["error_m"].as_f64().unwrap() < 0.2);
+}

@@ -148,3 +148,87 @@ fn bad_options_are_named() {
         })
     ));
 }
+
+/// Written down as JSON in between, a search goes on as if nothing had happened.
+#[test]
+fn a_saved_search_goes_on_to_the_bit() {
+    let mut straight = CmaEs::new(options(9, 0.5, 0.3, 3)).unwrap();
+    let step = |search: &mut CmaEs| {
+        let x = search.ask(&mut |x| x[0] < 2.0).unwrap();
+        search
+            .tell(&x.iter().map(|x| rosenbrock(x)).collect::<Vec<_>>())
+            .unwrap();
+    };
+    (0..40).for_each(|_| step(&mut straight));
+    let text = serde_json::to_string(&straight.save()).unwrap();
+    let saved: SavedSearch = serde_json::from_str(&text).unwrap();
+    let mut resumed = CmaEs::resume(options(9, 0.5, 0.3, 3), &saved).unwrap();
+    for _ in 0..40 {
+        step(&mut straight);
+        step(&mut resumed);
+    }
+    assert_eq!(straight.save(), resumed.save());
+    assert!(matches!(
+        CmaEs::resume(options(9, 0.5, 0.3, 4), &saved),
+        Err(CmaError::Saved { field: "seed", .. })
+    ));
+    assert!(matches!(
+        CmaEs::resume(options(8, 0.5, 0.3, 3), &saved),
+        Err(CmaError::Saved { .. })
+    ));
+}
+
+/// A small population is caught on Rastrigin; restarts get out.
+#[test]
+fn restarts_solve_what_one_search_does_not() {
+    let alone = (0..5)
+        .filter(|seed| {
+            let mut o = options(9, 3.0, 2.0, *seed);
+            o.stop.fitness_tolerance = 1e-9;
+            run(o, rastrigin).0.stop() == Some(StopReason::FitnessTarget)
+        })
+        .count();
+    assert!(alone <= 1, "{alone}");
+    for rule in [RestartRule::Ipop, RestartRule::Bipop] {
+        let solved = (0..5)
+            .filter(|seed| {
+                let mut o = options(9, 3.0, 2.0, *seed);
+                o.stop.fitness_tolerance = 1e-9;
+                let mut search = Restarted::new(o, rule, 300_000).unwrap();
+                while search.stop().is_none() {
+                    let x = search.ask(&mut |_| true).unwrap();
+                    search
+                        .tell(&x.iter().map(|x| rastrigin(x)).collect::<Vec<_>>())
+                        .unwrap();
+                }
+                assert!(search.runs() > 1 || search.best().unwrap().fitness < 1e-9);
+                search.stop() == Some(StopReason::FitnessTarget)
+            })
+            .count();
+        assert!(solved >= 4, "{rule:?} solved {solved} of 5");
+    }
+}
+
+/// Integers are found, each candidate has them, and the search does not end with all
+/// candidates on a wrong one.
+#[test]
+fn integer_coordinates_reach_their_optimum() {
+    let goal = [3.0, -7.0, 12.0];
+    let value = |x: &[f64]| {
+        let whole: f64 = (0..3).map(|i| (x[i] - goal[i]).powi(2)).sum();
+        whole + sphere(&x[3..])
+    };
+    for seed in 0..5 {
+        let mut o = options(9, 0.4, 2.0, seed);
+        o.integers = vec![0, 1, 2];
+        let (search, evaluations) = run(o, |x| {
+            assert!(x[..3].iter().all(|v| v.fract() == 0.0));
+            value(x)
+        });
+        assert_eq!(search.stop(), Some(StopReason::FitnessTarget), "{seed}");
+        assert!(evaluations < 20_000, "{evaluations}");
+    }
+    let mut o = options(3, 0.0, 1.0, 0);
+    o.integers = vec![3];
+    assert!(matches!(CmaEs::new(o), Err(CmaError::Integer { .. })));
+}

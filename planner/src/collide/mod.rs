@@ -6,10 +6,12 @@
 //! "CMA-ES Fitness Functions", shared quantities) and measures clearances.
 
 mod arm;
+mod block;
 mod capsule;
 mod rope;
 
 pub use arm::{ArmShape, Part, Scene, tool_contacts};
+pub use block::{Block, block_contacts};
 pub use capsule::Capsule;
 pub use rope::{RopeShape, rope_clearance_m, rope_contacts};
 

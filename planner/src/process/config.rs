@@ -2,9 +2,12 @@
 
 use crate::calm::CalmConfig;
 use crate::sysid::IdentifyOptions;
-use crate::tasks::{StrikeConfig, StrikeOptions};
+use crate::tasks::{
+    Drape, DrapeConfig, Lob, LobConfig, PlanOptions, Strike, ThrowConfig, ThrowTask,
+};
 use crate::wiggle::WiggleConfig;
 use serde::{Deserialize, Serialize};
+use shared_types::Task;
 
 /// Everything the planner can be told. TOML form: keys as the fields; every
 /// table may be left out.
@@ -19,16 +22,43 @@ pub struct PlannerConfig {
     pub identify: IdentifyOptions,
     /// Size of the search for a throw.
     #[serde(default)]
-    pub search: StrikeOptions,
+    pub search: PlanOptions,
     /// Tuned values of strikes.
     #[serde(default)]
-    pub strike: StrikeConfig,
+    pub strike: ThrowConfig,
+    /// Tuned values of lobs.
+    #[serde(default)]
+    pub lob: LobConfig,
+    /// Tuned values of drapes.
+    #[serde(default)]
+    pub drape: DrapeConfig,
     /// The wiggle.
     #[serde(default)]
     pub wiggle: WiggleConfig,
     /// Moves that take the sway out of the rope.
     #[serde(default)]
     pub calm: CalmConfig,
+}
+
+impl PlannerConfig {
+    /// A task at a target (m), as configured.
+    #[must_use]
+    pub fn task(&self, kind: Task, target_m: [f64; 3]) -> Box<dyn ThrowTask> {
+        match kind {
+            Task::Strike => Box::new(Strike {
+                target_m,
+                config: self.strike.clone(),
+            }),
+            Task::Lob => Box::new(Lob {
+                target_m,
+                config: self.lob.clone(),
+            }),
+            Task::Drape => Box::new(Drape {
+                target_m,
+                config: self.drape.clone(),
+            }),
+        }
+    }
 }
 
 fn default_domain() -> String {
@@ -40,8 +70,10 @@ impl Default for PlannerConfig {
         Self {
             domain: default_domain(),
             identify: IdentifyOptions::default(),
-            search: StrikeOptions::default(),
-            strike: StrikeConfig::default(),
+            search: PlanOptions::default(),
+            strike: ThrowConfig::default(),
+            lob: LobConfig::default(),
+            drape: DrapeConfig::default(),
             wiggle: WiggleConfig::default(),
             calm: CalmConfig::default(),
         }

@@ -9,7 +9,7 @@ mod config;
 
 use crate::calm::{CalmError, CalmRequest, calm};
 use crate::sysid::{self, Appearance, IdentifyOptions, Observation};
-use crate::tasks::{StrikeOptions, StrikeRequest, plan_strike};
+use crate::tasks::{Belief, PlanError, PlanOptions, PlanRequest, plan_throw};
 use collect::Collector;
 pub use config::PlannerConfig;
 use rope_sim::MeasuredArm;
@@ -18,7 +18,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{Bus, IpcError};
-use shared_types::{JointVector, MonotonicNs};
+use shared_types::{JointVector, MonotonicNs, Task};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -192,17 +192,19 @@ fn strike(
     call: &Call<PlannerRpc>,
     stop: &AtomicBool,
 ) -> Result<PlannerEvent, PlannerProcessError> {
-    let request = StrikeRequest {
+    let task = config.task(Task::Strike, order.target_m);
+    let request = PlanRequest {
         rope: order.rope,
-        target_m: order.target_m,
         limits: order.limits.clone(),
-        options: StrikeOptions {
+        options: PlanOptions {
             seed: order.seed,
             ..config.search
         },
-        config: config.strike.clone(),
+        belief: Belief::default(),
     };
-    let plan = plan_strike(&request, &mut |p| {
+    let mut generation = 0;
+    let plan = plan_throw(&*task, &request, &mut |p| {
+        generation = p.generation;
         report(
             call,
             stop,
@@ -214,5 +216,10 @@ fn strike(
             },
         )
     })?;
+    // Nobody waits for a throw that was broken off, and nobody may throw it by mistake.
+    if plan.interrupted {
+        return Err(PlanError::Cancelled { generation }.into());
+    }
+    let plan = plan.into_plan(Task::Strike, &*task, &request);
     Ok(PlannerEvent::Planned(Box::new(plan)))
 }

@@ -1,16 +1,34 @@
-//! The tasks a throw can have, one file each, and what they share: progress,
-//! errors, start pose and reach.
+//! The tasks a throw can have, one file each behind one trait, and what they share: the
+//! search, progress, errors, start pose and reach.
 
+mod belief;
+mod config;
+mod drape;
+mod lob;
+mod planning;
 mod reach;
-pub mod strike;
+mod robust;
+mod scene;
+mod strike;
+mod task;
+#[cfg(test)]
+mod tests;
 mod throw;
 
+pub use belief::{Belief, ropes_of};
+pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
+pub use drape::{Drape, DrapeConfig};
+pub use lob::{Lob, LobConfig};
+pub use planning::{PlanRequest, Planned, plan_throw};
 pub use reach::{check_reach, start_pose_for};
-pub use strike::{StrikeConfig, StrikeOptions, StrikeRequest, plan_strike};
+pub use scene::PlanarScene;
+pub use strike::Strike;
+pub use task::{ThrowTask, proximity_reward, simulator_for, verdict};
 pub use throw::{ThrowOutcome, ThrowSimulator};
 
 use crate::cmaes::CmaError;
 use rope_sim::SimulateError;
+use rope_sim::sensitivity::SensitivityError;
 use shared_types::TrajectoryError;
 use shared_types::rope::RopeError;
 
@@ -73,6 +91,9 @@ pub enum PlanError {
     /// The rope simulator refused or failed.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// Neighbouring throws could not be simulated.
+    #[error(transparent)]
+    Slopes(#[from] SensitivityError),
     /// The best throw found still lets arm or pole collide.
     #[error(
         "every throw found within {simulations} simulations lets the arm or its pole collide: move the target away from the arm or search longer"

@@ -1,19 +1,22 @@
-//! Simulated throws: rope, arm and contacts of many candidates at once.
+//! Simulated throws: rope, arm, scene and contacts of many candidates at once.
 
 use super::PlanError;
-use crate::collide::{ArmShape, ContactCounts, RopeShape, Scene, rope_contacts, tool_contacts};
+use crate::collide::{
+    ArmShape, Block, ContactCounts, RopeShape, Scene as Surroundings, block_contacts,
+    rope_contacts, tool_contacts,
+};
 use crate::workers::map_in_order;
 use nalgebra::Vector3;
 use rope_sim::{
-    Candidate, FrameTimes, Outcome, PlannedArm, Precision, Rollout, SimOptions, Start, Watch,
-    roll_out,
+    Candidate, ContactSummary, DominoOutcome, FrameTimes, Outcome, PlannedArm, Precision, Rollout,
+    Scene, SimOptions, Start, Watch, Watched, roll_out_in,
 };
 use shared_types::{JointTrajectory, RopeParams};
 
 /// What one simulated throw did.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ThrowOutcome {
-    /// Smallest distance between tip and target, in continuous time (m).
+    /// Smallest distance between tip and watched point, in continuous time (m).
     pub closest_m: f64,
     /// When it occurs (s after the start).
     pub closest_s: f64,
@@ -22,28 +25,67 @@ pub struct ThrowOutcome {
     /// Whether the simulation stayed finite; the other fields mean nothing if
     /// it did not.
     pub finite: bool,
+    /// Everything the task asked to be watched.
+    pub watched: Watched,
+    /// What the rope did with each obstacle of the task's scene.
+    pub obstacles: Vec<ContactSummary>,
+    /// What became of its domino.
+    pub domino: Option<DominoOutcome>,
+    /// End of the simulation (s after the start).
+    pub end_s: f64,
+    /// The watched point (m).
+    pub point_m: [f64; 3],
 }
 
-/// How throws at one target are simulated.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How throws of one task are simulated.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ThrowSimulator {
-    /// Target of the tip (m).
-    pub target_m: [f64; 3],
+    /// What is measured; [`Watch::point_m`] must be among it.
+    pub watch: Watch,
+    /// What the rope can touch.
+    pub scene: Scene,
+    /// What arm and pole must not touch.
+    pub keep_clear: Vec<Block>,
     /// Time simulated after the motion's end (s).
     pub tail_s: f64,
+    /// Time after the motion's end in which contacts with the arm are looked for (s).
+    pub contact_tail_s: f64,
     /// Step of the rope simulation (s).
     pub step_s: f64,
     /// Arithmetic of the rope simulation.
     pub precision: Precision,
-    /// Period at which contacts are looked for (s).
+    /// Period at which contacts with the arm are looked for (s).
     pub contact_period_s: f64,
     /// Column and floor.
-    pub scene: Scene,
+    pub surroundings: Surroundings,
     /// Threads.
     pub threads: usize,
 }
 
 impl ThrowSimulator {
+    /// The same in double precision at half the step: what predictions come from.
+    #[must_use]
+    pub fn exact(&self) -> Self {
+        Self {
+            precision: Precision::F64,
+            step_s: self.step_s / 2.0,
+            ..self.clone()
+        }
+    }
+
+    /// Options of the rope simulation for motions that end at `motion_s`.
+    pub(crate) fn options(&self, motion_s: f64, frames: FrameTimes) -> SimOptions {
+        SimOptions {
+            step_s: self.step_s,
+            precision: self.precision,
+            start: Start::Equilibrium,
+            frames,
+            watch: self.watch,
+            horizon_s: motion_s + self.tail_s,
+            threads: self.threads,
+        }
+    }
+
     /// Throws each trajectory with its rope. Results are in the order of the
     /// input and do not depend on the number of threads.
     ///
@@ -53,44 +95,37 @@ impl ThrowSimulator {
         &self,
         throws: &[(&RopeParams, &JointTrajectory)],
     ) -> Result<Vec<ThrowOutcome>, PlanError> {
-        let horizon_s = throws
+        let motion_s = throws
             .iter()
             .map(|(_, t)| t.duration_s())
-            .fold(0.0, f64::max)
-            + self.tail_s;
+            .fold(0.0, f64::max);
         let arms: Vec<PlannedArm> = throws.iter().map(|(_, t)| PlannedArm::new(**t)).collect();
         let candidates: Vec<Candidate<'_>> = throws
             .iter()
             .zip(&arms)
             .map(|((rope, _), arm)| Candidate::new(rope, arm))
             .collect();
+        let looked_s = motion_s + self.contact_tail_s.min(self.tail_s);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a positive count of a few hundred"
         )]
-        let count = (horizon_s / self.contact_period_s).floor() as usize + 1;
-        let rollouts = roll_out(
-            &candidates,
-            &SimOptions {
-                step_s: self.step_s,
-                precision: self.precision,
-                start: Start::Equilibrium,
-                frames: FrameTimes {
-                    first_s: 0.0,
-                    period_s: self.contact_period_s,
-                    count,
-                },
-                watch: Watch::point(self.target_m),
-                horizon_s,
-                threads: self.threads,
-            },
-        )?;
+        let count = (looked_s / self.contact_period_s).floor() as usize + 1;
+        let frames = FrameTimes {
+            first_s: 0.0,
+            period_s: self.contact_period_s,
+            count,
+        };
+        let options = self.options(motion_s, frames);
+        let rollouts = roll_out_in(&self.scene, &candidates, &options)?;
         let jobs: Vec<_> = throws.iter().zip(&rollouts).collect();
         Ok(map_in_order(
             &jobs,
             self.threads,
-            |((rope, trajectory), rollout)| self.outcome(rope, trajectory, rollout),
+            |((rope, trajectory), rollout)| {
+                self.outcome(rope, trajectory, rollout, options.horizon_s)
+            },
         ))
     }
 
@@ -99,18 +134,26 @@ impl ThrowSimulator {
         rope: &RopeParams,
         trajectory: &JointTrajectory,
         rollout: &Rollout,
+        end_s: f64,
     ) -> ThrowOutcome {
         let mut contacts = ContactCounts::default();
         let shape = RopeShape::from(rope);
         let mut nodes: Vec<Vector3<f64>> = Vec::new();
+        let mut arm = ArmShape::at(&trajectory.state_at(0.0).q);
+        let mut of_arm = ContactCounts::default();
         let mut time_s = 0.0;
         for frame in 0..rollout.nodes.frames() {
-            let arm = ArmShape::at(&trajectory.state_at(time_s).q);
-            contacts += tool_contacts(&arm, &self.scene);
+            // Once the arm stands, only the rope moves on.
+            if time_s < trajectory.duration_s() + self.contact_period_s {
+                arm = ArmShape::at(&trajectory.state_at(time_s).q);
+                of_arm = tool_contacts(&arm, &self.surroundings);
+                of_arm.pole_robot += block_contacts(&arm, &self.keep_clear);
+            }
+            contacts += of_arm;
             nodes.clear();
             nodes
                 .extend((0..rollout.nodes.nodes()).map(|node| rollout.nodes.position(frame, node)));
-            contacts += rope_contacts(&arm, &self.scene, &shape, &nodes);
+            contacts += rope_contacts(&arm, &self.surroundings, &shape, &nodes);
             time_s += self.contact_period_s;
         }
         let closest = rollout
@@ -122,6 +165,11 @@ impl ThrowSimulator {
             closest_s: closest.map_or(0.0, |c| c.time_s),
             contacts,
             finite: closest.is_some(),
+            watched: rollout.watched.clone(),
+            obstacles: rollout.contacts.clone(),
+            domino: rollout.domino,
+            end_s,
+            point_m: self.watch.point_m.unwrap_or_default(),
         }
     }
 }

@@ -6,9 +6,13 @@
 //! rejected when they are drawn.
 
 mod decode;
+mod pole;
+mod polish;
 mod screen;
 mod search;
 
 pub use decode::{Dimensions, WAYPOINTS, WaypointSpace};
+pub use pole::{PolePose, reach_pose};
+pub use polish::{Polish, Polished, polish};
 pub use screen::{Clearance, Screen};
-pub use search::{SearchOptions, SearchResult, Value, Valued, search};
+pub use search::{Found, SearchOptions, SearchResult, Value, Valued, search};

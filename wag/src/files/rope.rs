@@ -2,7 +2,7 @@
 
 use super::{read_text, write_atomic};
 use anyhow::Context;
-use shared_types::rope::{RANGES, RopeEstimate, RopeParams};
+use shared_types::rope::{RANGES, RopeEstimate, RopeParams, RopePosterior};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -20,6 +20,17 @@ pub fn read_rope(path: &Path) -> anyhow::Result<RopeParams> {
     let rope: RopeParams = table.try_into().with_context(fail)?;
     rope.validate().with_context(fail)?;
     Ok(rope)
+}
+
+/// Reads what was left open when the rope was identified; `None` for a rope that was
+/// not.
+pub fn read_posterior(path: &Path) -> anyhow::Result<Option<RopePosterior>> {
+    let fail = || format!("rope file `{}`, table `posterior`", path.display());
+    let mut table: toml::Table = toml::from_str(&read_text(path)?).with_context(fail)?;
+    let Some(posterior) = table.remove("posterior") else {
+        return Ok(None);
+    };
+    Ok(Some(posterior.try_into().with_context(fail)?))
 }
 
 /// Writes an identified rope.
@@ -64,7 +75,7 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> anyhow::Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::rope::{Ambiguity, FitCircumstances, KeypointNoise, Novelty, RopePosterior};
+    use shared_types::rope::{Ambiguity, FitCircumstances, KeypointNoise, Novelty};
 
     const NOISE: KeypointNoise = KeypointNoise {
         sigma_px: 1.0,
@@ -124,6 +135,8 @@ mod tests {
         let path = dir.path().join("rope.toml");
         write_rope_estimate(&path, &estimate()).unwrap();
         assert_eq!(read_rope(&path).unwrap(), estimate().params);
+        let posterior = read_posterior(&path).unwrap();
+        assert_eq!(posterior, Some(estimate().posterior));
         let table: toml::Table = std::fs::read_to_string(&path).unwrap().parse().unwrap();
         let interval = table["interval_90"]["length_m"].as_array().unwrap();
         assert_eq!(interval[1].as_float(), Some(0.6));

@@ -5,6 +5,7 @@
 
 mod identify;
 mod machine;
+mod plan;
 mod rope;
 mod rt;
 mod spent;
@@ -19,5 +20,6 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         BenchName::Rope => rope::run(args, quiet),
         BenchName::Rt => rt::run(args, quiet),
         BenchName::Identify => identify::run(args, quiet),
+        BenchName::Plan => plan::run(args, quiet),
     }
 }

@@ -10,11 +10,11 @@ use crate::session::interrupted;
 use crate::table::numbers;
 use anyhow::{Context, anyhow};
 use planner::process::PlannerConfig;
-use planner::tasks::{StrikeOptions, StrikeRequest, plan_strike};
+use planner::tasks::{Belief, PlanOptions, PlanRequest, plan_throw};
 use planner::trials::{FidelityConfig, FidelityRow, middle_rope};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
-use shared_types::{JointTrajectory, Limits};
+use shared_types::{JointTrajectory, Limits, Task};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
@@ -24,17 +24,17 @@ const TARGET_M: [f64; 3] = [1.0, 0.0, 0.4];
 
 /// A throw planned for the middle of the ranges: no rope compared knows it.
 fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
-    let request = StrikeRequest {
+    let request = PlanRequest {
         rope: middle_rope(),
-        target_m: TARGET_M,
         limits: Limits::default(),
-        options: StrikeOptions {
+        options: PlanOptions {
             seed,
             ..config.search
         },
-        config: config.strike.clone(),
+        belief: Belief::default(),
     };
-    let plan = plan_strike(&request, &mut |_| ControlFlow::Continue(()))?;
+    let task = config.task(Task::Strike, TARGET_M);
+    let plan = plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()))?;
     Ok(plan.trajectory)
 }
 

@@ -8,6 +8,7 @@ use crate::session::interrupted;
 use anyhow::{Context, anyhow};
 use planner::sysid::IdentifyOptions;
 use planner::trials::{Trial, TrialRig, run};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
 use shared_types::ipc::message::Progress;
@@ -19,7 +20,7 @@ const BATCH: usize = 16;
 
 /// The file of one result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Kept {
+pub(super) struct Kept<T> {
     /// Name of the result.
     pub name: String,
     /// Version of the program.
@@ -29,10 +30,10 @@ pub(super) struct Kept {
     /// Method asked for.
     pub method: String,
     /// Trials in the order of their indices.
-    pub trials: Vec<Trial>,
+    pub trials: Vec<T>,
 }
 
-impl Kept {
+impl<T: Serialize + DeserializeOwned> Kept<T> {
     /// What an earlier run left at `path`, or nothing yet.
     fn open(path: Option<&Path>, empty: Self) -> anyhow::Result<Self> {
         let Some(path) = path.filter(|p| p.exists()) else {
@@ -62,36 +63,47 @@ impl Kept {
     }
 }
 
-/// Makes `count` trials, or goes on with those of an earlier run.
-pub(super) fn trials(
-    name: &str,
+/// A sequence of trials: how many, how many between two writes, and what is told.
+pub(super) struct Sequence<'a, T> {
+    /// Name of the result.
+    pub name: &'a str,
+    /// Method asked for.
+    pub method: String,
+    /// Trials wanted.
+    pub count: u64,
+    /// Trials made between two writes of the file.
+    pub batch: usize,
+    /// Figure of the latest trial, and what it is.
+    pub told: (fn(&T) -> f64, &'a str),
+}
+
+/// Makes the trials of a sequence, or goes on with those of an earlier run.
+pub(super) fn kept_trials<T: Serialize + DeserializeOwned>(
+    sequence: &Sequence<'_, T>,
     args: &ReproduceArgs,
-    count: u64,
-    rig: &TrialRig,
-    options: &IdentifyOptions,
-    rope: impl Fn(u64) -> RopeParams + Sync,
     stage: &Stage,
-) -> Outcome<Vec<Trial>> {
+    mut make: impl FnMut(&[u64]) -> Outcome<Vec<T>>,
+) -> Outcome<Vec<T>> {
+    let count = sequence.count;
     let empty = Kept {
-        name: name.to_owned(),
+        name: sequence.name.to_owned(),
         version: shared_types::VERSION.to_owned(),
         seed: args.seed,
-        method: format!("{:?}", options.method).to_lowercase(),
+        method: sequence.method.clone(),
         trials: Vec::new(),
     };
     let mut kept = Kept::open(args.out.as_deref(), empty).or_input()?;
     kept.trials
         .truncate(usize::try_from(count).unwrap_or(usize::MAX));
     let all: Vec<u64> = (kept.trials.len() as u64..count).collect();
-    for batch in all.chunks(BATCH) {
-        kept.trials
-            .extend(run(rig, &rope, args.seed, batch, options).or_failed()?);
+    for batch in all.chunks(sequence.batch) {
+        kept.trials.extend(make(batch)?);
         kept.write(args.out.as_ref()).or_failed()?;
         stage.progress(&Progress {
             done: u32::try_from(kept.trials.len()).unwrap_or(u32::MAX),
             total: u32::try_from(count).unwrap_or(u32::MAX),
-            value: kept.trials.last().map_or(0.0, |t| t.residual_px),
-            label: "ropes, residual px".to_owned(),
+            value: kept.trials.last().map_or(0.0, sequence.told.0),
+            label: sequence.told.1.to_owned(),
         });
         if interrupted().load(Ordering::SeqCst) {
             return Err(Failure::failed(anyhow!(
@@ -107,11 +119,33 @@ pub(super) fn trials(
     Ok(kept.trials)
 }
 
+/// Identifies `count` ropes, or goes on with those of an earlier run.
+pub(super) fn trials(
+    name: &str,
+    args: &ReproduceArgs,
+    count: u64,
+    rig: &TrialRig,
+    options: &IdentifyOptions,
+    rope: impl Fn(u64) -> RopeParams + Sync,
+    stage: &Stage,
+) -> Outcome<Vec<Trial>> {
+    let sequence = Sequence {
+        name,
+        method: format!("{:?}", options.method).to_lowercase(),
+        count,
+        batch: BATCH,
+        told: (|t: &Trial| t.residual_px, "ropes, residual px"),
+    };
+    kept_trials(&sequence, args, stage, |batch| {
+        run(rig, &rope, args.seed, batch, options).or_failed()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn empty(seed: u64) -> Kept {
+    fn empty(seed: u64) -> Kept<Trial> {
         Kept {
             name: "sysid".to_owned(),
             version: shared_types::VERSION.to_owned(),

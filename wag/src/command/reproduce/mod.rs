@@ -5,7 +5,9 @@
 
 mod fidelity;
 mod kept;
+mod lob_drape;
 mod ood;
+mod pipeline;
 mod setup;
 mod sysid;
 
@@ -13,11 +15,16 @@ use crate::cli::{ReproduceArgs, ReproduceName};
 use crate::failure::Outcome;
 use serde_json::Value;
 
+/// Ropes of a result of identification.
+const ROPES: u64 = 1000;
+
 /// Makes a result. The value is what `--json` prints.
 pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     match args.name {
         ReproduceName::Sysid => sysid::run(args, quiet),
         ReproduceName::MotionFidelity => fidelity::run(args, quiet),
         ReproduceName::SysidOod => ood::run(args, quiet),
+        ReproduceName::SimPipeline => pipeline::run(args, quiet),
+        ReproduceName::LobDrape => lob_drape::run(args, quiet),
     }
 }

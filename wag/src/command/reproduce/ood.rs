@@ -3,6 +3,7 @@
 //! As many ropes like chains and beyond the ranges as ropes inside, all with the
 //! paper's noise.
 
+use super::ROPES;
 use super::kept::trials;
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
@@ -31,7 +32,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     let all = trials(
         "sysid-ood",
         args,
-        2 * args.ropes,
+        2 * args.ropes.unwrap_or(ROPES),
         &rig,
         &options,
         rope,

@@ -1,6 +1,7 @@
 //! `wag reproduce sysid`: errors of identified parameters beside the paper's, and
 //! whether intervals of 90 % hold the truth that often.
 
+use super::ROPES;
 use super::kept::trials;
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
@@ -15,7 +16,15 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     let Setup { rig, options, .. } = Setup::new(args)?;
     let stage = Stage::begin("sysid", quiet);
     let rope = |index| trial_rope(args.seed, index);
-    let all = trials("sysid", args, args.ropes, &rig, &options, rope, &stage)?;
+    let all = trials(
+        "sysid",
+        args,
+        args.ropes.unwrap_or(ROPES),
+        &rig,
+        &options,
+        rope,
+        &stage,
+    )?;
     let summary = summarise(&all);
     let seconds = stage.done(&format!("{} ropes", all.len()));
     if !quiet {

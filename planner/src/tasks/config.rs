@@ -1,13 +1,15 @@
-//! What is tuned about striking, and the size of its search.
+//! What is tuned about throws of every task, and the size of their search.
 
+use crate::collide::ContactCounts;
 use crate::trajopt::{Clearance, Dimensions, WAYPOINTS};
 use serde::{Deserialize, Serialize};
 use shared_types::{JOINTS, RopeParams};
 
-/// Weights of the fitness terms. The paper gives the terms, not the weights.
+/// Weights of the fitness terms that all tasks share. The paper gives the terms, not
+/// the weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct StrikeWeights {
+pub struct ThrowWeights {
     /// Of the distance `d_min` (1/m).
     pub distance_per_m: f64,
     /// Of the proximity reward `R_prox`.
@@ -25,7 +27,7 @@ pub struct StrikeWeights {
     pub base_contact: f64,
 }
 
-impl Default for StrikeWeights {
+impl Default for ThrowWeights {
     fn default() -> Self {
         Self {
             distance_per_m: 1.0,
@@ -39,6 +41,16 @@ impl Default for StrikeWeights {
     }
 }
 
+impl ThrowWeights {
+    /// `P_coll`: weighted contact counts, the base region weighing most.
+    #[must_use]
+    pub fn contacts(&self, contacts: &ContactCounts) -> f64 {
+        self.rope_contact * f64::from(contacts.rope_robot)
+            + self.pole_contact * f64::from(contacts.pole_robot)
+            + self.base_contact * f64::from(contacts.base_region)
+    }
+}
+
 /// Relative changes of the rope under which the finalists are compared: about
 /// what identification leaves open.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,6 +58,8 @@ impl Default for StrikeWeights {
 pub struct Robustness {
     /// Finalists compared; 1 switches the comparison off.
     pub finalists: usize,
+    /// How many of them are polished where the task can be.
+    pub polished: usize,
     /// Change of the length (1).
     pub length: f64,
     /// Change of stiffness over mass (1).
@@ -60,6 +74,7 @@ impl Default for Robustness {
     fn default() -> Self {
         Self {
             finalists: 12,
+            polished: 4,
             length: 0.003,
             stiffness: 0.03,
             damping: 0.03,
@@ -88,38 +103,53 @@ impl Robustness {
     }
 }
 
-/// Everything about striking that is tuned rather than asked for.
+/// What is tuned about the throws of a task rather than asked for; the defaults are
+/// those of striking.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct StrikeConfig {
+pub struct ThrowConfig {
+    /// Most generations of one search (paper: 25 for striking, 50 for lobbing, 15 for
+    /// draping).
+    pub generations: usize,
     /// Times of the three waypoints (s).
     pub waypoint_times_s: [f64; WAYPOINTS],
-    /// Deviation of the first generation for each joint (rad). The mean is the
-    /// start pose: for striking the paper starts unbiased.
+    /// Deviation of the first generation for each joint (rad). Its mean is the start
+    /// pose, or the task's warm start.
     pub std_dev_rad: [f64; JOINTS],
-    /// Time simulated after the motion's end (s).
+    /// Time simulated after the motion's end in the search (s).
     pub tail_s: f64,
+    /// Time after the motion's end for which the finalists are observed and judged (s).
+    pub observed_s: f64,
+    /// Time after the motion's end in which contacts of the rope with the arm are
+    /// looked for (s).
+    pub contact_tail_s: f64,
     /// Period at which contacts are looked for (s).
     pub contact_period_s: f64,
     /// Draws of one candidate before it is pulled towards the mean.
     pub draws_max: usize,
+    /// Part of a generation that succeeds from which a search is done; none to search on.
+    pub stop_success_part: Option<f64>,
     /// Weights of the fitness terms.
-    pub weights: StrikeWeights,
+    pub weights: ThrowWeights,
     /// Distances the tool keeps from the scene.
     pub clearance: Clearance,
     /// Comparison of the finalists.
     pub robustness: Robustness,
 }
 
-impl Default for StrikeConfig {
+impl Default for ThrowConfig {
     fn default() -> Self {
         Self {
+            generations: 25,
             waypoint_times_s: [0.45, 0.80, 1.15],
             std_dev_rad: [0.15, 0.35, 0.25, 0.35, 0.25, 0.5, 0.25],
             tail_s: 0.35,
+            observed_s: 0.35,
+            contact_tail_s: 0.35,
             contact_period_s: 0.015,
             draws_max: 40,
-            weights: StrikeWeights::default(),
+            stop_success_part: None,
+            weights: ThrowWeights::default(),
             clearance: Clearance::default(),
             robustness: Robustness::default(),
         }
@@ -129,32 +159,39 @@ impl Default for StrikeConfig {
 /// Size of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct StrikeOptions {
+pub struct PlanOptions {
     /// Which joints move.
     pub dimensions: Dimensions,
     /// Candidates per generation (paper: 60).
     pub population: usize,
-    /// Most generations (paper: 25).
-    pub generations: usize,
+    /// Most generations of one search; the task's own number if left out.
+    pub generations: Option<usize>,
+    /// Most searches: where one ends without a throw that is good enough, the next
+    /// begins with other random numbers. 1 is the paper's budget.
+    pub searches: usize,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Step of the rope simulation (s).
     pub step_s: f64,
     /// Threads.
     pub threads: usize,
-    /// Error that is good enough to stop (m).
+    /// Error below which no further search begins (m).
+    pub good_enough_m: f64,
+    /// Error that is good enough to stop within a search (m).
     pub stop_below_m: Option<f64>,
 }
 
-impl Default for StrikeOptions {
+impl Default for PlanOptions {
     fn default() -> Self {
         Self {
             dimensions: Dimensions::Planar,
             population: 60,
-            generations: 25,
+            generations: None,
+            searches: 3,
             seed: 0,
             step_s: 5e-4,
             threads: 2,
+            good_enough_m: 1e-3,
             stop_below_m: None,
         }
     }

@@ -1,0 +1,135 @@
+//! Throws that are good for every rope it might be.
+
+use super::planning::{Finalist, Point, Setup};
+use super::{Belief, PlanError, PlanProgress, ThrowOutcome};
+use crate::trajopt::{SearchOptions, Valued, search};
+use shared_types::{ErrorForecast, JointTrajectory};
+use std::ops::ControlFlow;
+
+/// Part of the ropes whose errors a robust plan looks at twice: the worst fifth.
+const WORST_PART: f64 = 0.2;
+/// Weight of their mean beside the mean of all.
+const WORST_WEIGHT: f64 = 1.0;
+/// Spread of the first generation, relative to that of the search from scratch.
+const SPREAD: f64 = 0.15;
+const POPULATION: usize = 16;
+const GENERATIONS: usize = 12;
+
+/// Mean and mean of the worst fifth (conditional value at risk), added up.
+fn risk(mut values: Vec<f64>) -> f64 {
+    values.sort_by(|a, b| b.total_cmp(a));
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a handful of ropes"
+    )]
+    let worst = (WORST_PART * values.len() as f64).ceil() as usize;
+    let mean = |v: &[f64]| {
+        #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
+        let count = v.len().max(1) as f64;
+        v.iter().sum::<f64>() / count
+    };
+    mean(&values) + WORST_WEIGHT * mean(&values[..worst.min(values.len())])
+}
+
+/// Searches around a finalist for the throw with the least risk over the believed ropes.
+/// Returns the throws found, best first, with the simulations made.
+pub(super) fn search_around(
+    setup: &Setup<'_>,
+    belief: &Belief,
+    around: &Finalist,
+    progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+) -> Result<(Vec<Point>, u32), PlanError> {
+    let ropes = &belief.optimised;
+    let options = SearchOptions {
+        start: around.x.clone(),
+        population: POPULATION,
+        generations: GENERATIONS,
+        seed: setup.request.options.seed ^ 0x0b57,
+        std_dev_rad: setup.std_dev_rad.iter().map(|s| s * SPREAD).collect(),
+        draws_max: setup.task.config().draws_max,
+        stop_below_m: None,
+        stop_success_part: None,
+        keep: 1,
+    };
+    let mut value = |trajectories: &[JointTrajectory]| {
+        let throws: Vec<_> = trajectories
+            .iter()
+            .flat_map(|t| ropes.iter().map(move |rope| (rope, t)))
+            .collect();
+        let outcomes = setup.simulator.run(&throws)?;
+        let of_throw = |(t, outcomes): (&JointTrajectory, &[ThrowOutcome])| {
+            let each = |(rope, o): (_, &ThrowOutcome)| setup.fitness(rope, t, o);
+            let fitness = risk(ropes.iter().zip(outcomes).map(each).collect());
+            let errors = outcomes.iter().map(|o| setup.task.error_m(o));
+            Valued {
+                fitness,
+                error_m: risk(errors.collect()) / (1.0 + WORST_WEIGHT),
+                success: false,
+            }
+        };
+        let all = trajectories.iter().zip(outcomes.chunks(ropes.len()));
+        Ok(all.map(of_throw).collect())
+    };
+    let bounds = setup.bounds.clone();
+    let found = search(
+        &setup.space,
+        &setup.screen,
+        bounds,
+        &options,
+        &mut value,
+        progress,
+    )?;
+    let simulations = found
+        .simulations
+        .saturating_mul(u32::try_from(ropes.len()).unwrap_or(1));
+    let best = found.best.into_iter().map(|f| (f.x, f.trajectory));
+    Ok((best.collect(), simulations))
+}
+
+/// The error to expect of a throw over the ropes of the forecast.
+pub(super) fn forecast(
+    setup: &Setup<'_>,
+    belief: &Belief,
+    trajectory: &JointTrajectory,
+) -> Result<Option<ErrorForecast>, PlanError> {
+    if belief.forecast.is_empty() {
+        return Ok(None);
+    }
+    let throws: Vec<_> = belief.forecast.iter().map(|r| (r, trajectory)).collect();
+    let outcomes = setup.judging.run(&throws)?;
+    let finite = outcomes.iter().filter(|o| o.finite);
+    let mut errors: Vec<f64> = finite.map(|o| setup.task.error_m(o)).collect();
+    errors.sort_by(f64::total_cmp);
+    if errors.is_empty() {
+        return Ok(None);
+    }
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index of the list"
+    )]
+    let at = |part: f64| errors[(part * (errors.len() - 1) as f64).round() as usize];
+    #[allow(clippy::cast_precision_loss, reason = "a few dozen ropes")]
+    let mean_m = errors.iter().sum::<f64>() / errors.len() as f64;
+    Ok(Some(ErrorForecast {
+        ropes: u32::try_from(errors.len()).unwrap_or(u32::MAX),
+        mean_m,
+        median_m: at(0.5),
+        interval_90_m: [at(0.05), at(0.95)],
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::risk;
+
+    #[test]
+    fn the_worst_fifth_counts_twice() {
+        let values = vec![1.0, 2.0, 3.0, 4.0, 10.0];
+        assert!((risk(values) - (4.0 + 10.0)).abs() < 1e-12);
+        assert!((risk(vec![2.0]) - 4.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,242 @@
+use super::*;
+use crate::collide::ContactCounts;
+use crate::ropes::random_rope;
+use planning::Setup;
+use shared_types::{Limits, Plan, Task};
+use std::ops::ControlFlow;
+
+fn strike(target_m: [f64; 3]) -> Strike {
+    Strike {
+        target_m,
+        config: ThrowConfig::default(),
+    }
+}
+
+fn request() -> PlanRequest {
+    PlanRequest {
+        rope: random_rope(11),
+        limits: Limits::default(),
+        options: PlanOptions {
+            population: 24,
+            generations: Some(12),
+            searches: 1,
+            ..PlanOptions::default()
+        },
+        belief: Belief::default(),
+    }
+}
+
+fn go_on(_: PlanProgress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn plan(task: &dyn ThrowTask, request: &PlanRequest) -> Plan {
+    plan_throw(task, request, &mut go_on)
+        .unwrap()
+        .into_plan(Task::Strike, task, request)
+}
+
+#[test]
+fn fitness_is_the_sum_of_its_named_terms() {
+    let (task, r) = (strike([0.9, 0.0, 0.2]), request());
+    let setup = Setup::new(&task, &r).unwrap();
+    let rest = setup.space.decode(&setup.space.resting()).unwrap();
+    let outcome = ThrowOutcome {
+        closest_m: 0.25,
+        closest_s: 0.7,
+        contacts: ContactCounts {
+            rope_robot: 3,
+            pole_robot: 2,
+            base_region: 1,
+        },
+        finite: true,
+        ..ThrowOutcome::default()
+    };
+    let got = setup.fitness(&r.rope, &rest, &outcome);
+    let want = 0.25 - 1.0 / 1.25 + 3.0 * 0.02 + 2.0 * 0.1 + 0.2;
+    assert!((got - want).abs() < 1e-12);
+    let mut x = setup.space.resting();
+    x[0] += 0.2;
+    let moved = setup.space.decode(&x).unwrap();
+    assert!((planning::joint_motion_rad(&moved) - 0.4).abs() < 1e-12);
+    let lost = ThrowOutcome {
+        finite: false,
+        ..outcome
+    };
+    assert!(setup.fitness(&r.rope, &rest, &lost) > 100.0);
+}
+
+/// A small search alone ends centimetres away; polished it meets the target.
+#[test]
+fn a_small_search_is_polished_onto_the_target_and_keeps_every_limit() {
+    let mut generations = 0;
+    let (mut task, r) = (strike([0.95, 0.25, 0.1]), request());
+    let planned = plan_throw(&task, &r, &mut |p| {
+        generations = p.generation;
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert!(planned.error_m < 5e-4, "{}", planned.error_m);
+    assert_eq!(planned.limited_by, shared_types::LimitedBy::Nothing);
+    assert!(planned.verdict.success && !planned.interrupted);
+    assert_eq!(generations, 12);
+    let plan = planned.into_plan(Task::Strike, &task, &r);
+    assert!(plan.margins.iter().all(|m| m.left >= 0.0));
+    assert_eq!(plan.trajectory.start(), start_pose_for(task.target_m));
+    task.config.robustness.polished = 0;
+    let rough = plan_throw(&task, &r, &mut go_on).unwrap();
+    assert!(rough.error_m > plan.predicted_error_m, "{}", rough.error_m);
+}
+
+/// Byte for byte, as it would be written down.
+#[test]
+fn same_plan_for_one_two_and_four_threads() {
+    let (task, mut r) = (strike([0.9, -0.2, 0.3]), request());
+    r.options.generations = Some(4);
+    let written = |r: &PlanRequest| serde_json::to_vec(&plan(&task, r)).unwrap();
+    r.options.threads = 1;
+    let one = written(&r);
+    for threads in [2, 4] {
+        r.options.threads = threads;
+        assert!(one == written(&r), "{threads} threads");
+    }
+    r.options.seed += 1;
+    assert!(one != written(&r));
+}
+
+#[test]
+fn impossible_requests_are_refused_before_any_simulation() {
+    let mut called = false;
+    let mut progress = |_: PlanProgress| {
+        called = true;
+        ControlFlow::Continue(())
+    };
+    let far = plan_throw(&strike([1.8, 0.3, 0.4]), &request(), &mut progress);
+    assert!(matches!(far, Err(PlanError::Unreachable { .. })));
+    let task = strike([0.9, 0.0, 0.2]);
+    let mut r = request();
+    r.rope.length_m = f64::NAN;
+    let broken = plan_throw(&task, &r, &mut progress);
+    assert!(matches!(broken, Err(PlanError::Rope(_))));
+    let mut r = request();
+    r.options.step_s = 0.0;
+    assert!(matches!(
+        plan_throw(&task, &r, &mut progress),
+        Err(PlanError::Option {
+            option: "step_s",
+            ..
+        })
+    ));
+    assert!(!called);
+}
+
+#[test]
+fn a_search_broken_off_leaves_the_best_so_far() {
+    let (task, r) = (strike([0.9, 0.0, 0.2]), request());
+    let mut generations = 0;
+    let planned = plan_throw(&task, &r, &mut |p| {
+        generations = p.generation;
+        if p.generation == 2 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .unwrap();
+    assert_eq!(generations, 2);
+    assert!(planned.interrupted && planned.error_m < 0.3);
+    let written = planned.into_plan(Task::Strike, &task, &r);
+    assert!(written.interrupted);
+    assert!(written.margins.iter().all(|m| m.left >= 0.0));
+}
+
+/// Scenes stand on the target's bearing, and warm starts are throws the arm can make.
+#[test]
+fn warm_starts_are_executable_at_any_bearing() {
+    let rope = random_rope(3);
+    let tasks: [Box<dyn ThrowTask>; 2] = [
+        Box::new(Lob {
+            target_m: [0.7, 0.45, 0.20],
+            config: LobConfig::default(),
+        }),
+        Box::new(Drape {
+            target_m: [0.65, -0.35, 0.30],
+            config: DrapeConfig::default(),
+        }),
+    ];
+    for task in tasks {
+        let mut r = request();
+        r.rope = rope;
+        let setup = Setup::new(&*task, &r).unwrap();
+        assert_ne!(setup.start, setup.space.resting(), "{}", task.name());
+        assert!(setup.screen.accepts(&setup.start), "{}", task.name());
+        assert_eq!(
+            task.keep_clear()[0].pose.translation.vector.y.signum(),
+            task.target_m()[1].signum()
+        );
+    }
+}
+
+/// What a rope on the board, or over the wall, is said to have done.
+#[test]
+fn lobs_and_drapes_are_judged_by_their_conditions() {
+    let rope = random_rope(5);
+    let met =
+        |v: &shared_types::Verdict| -> Vec<bool> { v.conditions.iter().map(|c| c.met).collect() };
+    let lob = Lob {
+        target_m: [0.85, 0.0, 0.20],
+        config: LobConfig::default(),
+    };
+    let mut outcome = ThrowOutcome {
+        finite: true,
+        end_s: 5.0,
+        ..ThrowOutcome::default()
+    };
+    let stay = |since_s| rope_sim::Dwell {
+        total_s: 1.0,
+        longest_s: 1.0,
+        longest_from_s: 0.0,
+        inside_since_s: since_s,
+    };
+    outcome.watched.dwell = Some(stay(Some(4.5)));
+    outcome.domino = Some(rope_sim::DominoOutcome {
+        down_at_s: Some(1.2),
+        ..Default::default()
+    });
+    assert_eq!(met(&lob.judge(&rope, &outcome)), [true, false, true]);
+    assert!(!lob.judge(&rope, &outcome).success);
+    outcome.watched.dwell = Some(stay(Some(3.9)));
+    assert!(lob.judge(&rope, &outcome).success);
+    outcome.domino = None;
+    assert_eq!(met(&lob.judge(&rope, &outcome)), [false, true, false]);
+
+    let drape = Drape {
+        target_m: [0.75, 0.0, 0.30],
+        config: DrapeConfig::default(),
+    };
+    let rest = rope_sim::RestMeasures {
+        tip_height_spread_m: 0.02,
+        middle_movement_m: 0.01,
+        tip_m: [0.78, 0.0, 0.1],
+        tip_velocity_m_s: [0.0; 3],
+        middle_m: [0.75, 0.0, 0.31],
+        middle_velocity_m_s: [0.0; 3],
+    };
+    outcome.watched.rest = Some(rest);
+    outcome.obstacles = vec![rope_sim::ContactSummary {
+        first: Some((1.5, rope_sim::RopePart::Links)),
+        ..Default::default()
+    }];
+    assert!(drape.judge(&rope, &outcome).success);
+    assert!((drape.error_m(&outcome) - 0.01).abs() < 1e-12);
+    outcome.watched.rest = Some(rope_sim::RestMeasures {
+        middle_movement_m: 0.04,
+        ..rest
+    });
+    assert_eq!(
+        met(&drape.judge(&rope, &outcome)),
+        [true, false, true, true]
+    );
+    outcome.watched.dwell = Some(stay(None));
+    assert_eq!(met(&drape.judge(&rope, &outcome))[..2], [false, false]);
+}

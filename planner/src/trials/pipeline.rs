@@ -1,0 +1,229 @@
+//! The paper's simulated pipeline: strikes planned with true, identified and random
+//! parameters, thrown with the true rope.
+
+use super::{TrialError, TrialRig, trial_rope};
+use crate::process::PlannerConfig;
+use crate::ropes::random_strike_target;
+use crate::sysid::IdentifyOptions;
+use crate::tasks::{
+    Belief, PlanError, PlanOptions, PlanRequest, Planned, ThrowSimulator, ThrowTask, plan_throw,
+    simulator_for,
+};
+use crate::workers::map_in_order;
+use serde::{Deserialize, Serialize};
+use shared_types::rope::ROPE_PARAMETERS;
+use shared_types::{JointTrajectory, Limits, RopeParams, Task};
+use std::ops::ControlFlow;
+
+/// Keeps the ropes planned for at random apart from those thrown.
+const OTHER: u64 = 0x0074_6865_7200;
+/// Searches of the longer budget; three of the paper's size take about three seconds on
+/// two cores.
+const SEARCHES: usize = 3;
+
+/// What one strike did.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Strikes {
+    /// Distance of tip and target with the true rope (m).
+    pub error_m: f64,
+    /// Distance that the plan predicted for the rope it was planned for (m).
+    pub predicted_m: f64,
+    /// Throws simulated to plan it.
+    pub simulations: u32,
+}
+
+/// One rope and target.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PipelineTrial {
+    /// Index of the trial under its seed.
+    pub index: u64,
+    /// Target (m).
+    pub target_m: [f64; 3],
+    /// True parameters.
+    pub truth: [f64; ROPE_PARAMETERS],
+    /// Identified parameters.
+    pub found: [f64; ROPE_PARAMETERS],
+    /// Planned with the truth in one search of the paper's size.
+    pub true_rope: Strikes,
+    /// Planned with the truth in up to three such searches.
+    pub true_rope_longer: Strikes,
+    /// Planned with the identified parameters.
+    pub identified: Strikes,
+    /// Planned for another rope of the ranges.
+    pub random: Strikes,
+}
+
+/// Plans for one rope and throws with another.
+struct Thrower<'a> {
+    task: &'a dyn ThrowTask,
+    options: PlanOptions,
+    truth: RopeParams,
+}
+
+impl Thrower<'_> {
+    fn plan(&self, rope: &RopeParams, searches: usize) -> Result<Planned, PlanError> {
+        let request = PlanRequest {
+            rope: *rope,
+            limits: Limits::default(),
+            options: PlanOptions {
+                searches,
+                ..self.options
+            },
+            belief: Belief::default(),
+        };
+        plan_throw(self.task, &request, &mut |_| ControlFlow::Continue(()))
+    }
+
+    fn throw(&self, planned: &Planned) -> Result<Strikes, PlanError> {
+        Ok(Strikes {
+            error_m: self.error_m(&planned.trajectory)?,
+            predicted_m: planned.error_m,
+            simulations: planned.simulations,
+        })
+    }
+
+    /// With the true rope, in double precision at half the step (m).
+    fn error_m(&self, trajectory: &JointTrajectory) -> Result<f64, PlanError> {
+        let simulator = ThrowSimulator {
+            tail_s: self.task.config().observed_s,
+            ..simulator_for(self.task, &self.truth, &self.options)
+        };
+        let outcomes = simulator.exact().run(&[(&self.truth, trajectory)])?;
+        Ok(outcomes
+            .first()
+            .map_or(f64::INFINITY, |o| self.task.error_m(o)))
+    }
+}
+
+fn trial(
+    rig: &TrialRig,
+    config: &PlannerConfig,
+    options: &IdentifyOptions,
+    seed: u64,
+    index: u64,
+) -> Result<PipelineTrial, TrialError> {
+    let truth = trial_rope(seed, index);
+    let target_m = random_strike_target((seed << 32) ^ index);
+    let filmed = rig.film(&truth, seed, index)?;
+    let found = rig.fit(&filmed, index, options)?.params;
+    let task = config.task(Task::Strike, target_m);
+    let thrower = Thrower {
+        task: &*task,
+        options: PlanOptions {
+            seed: seed ^ index,
+            threads: 1,
+            ..config.search
+        },
+        truth,
+    };
+    let planned = || -> Result<PipelineTrial, PlanError> {
+        let once = thrower.plan(&truth, 1)?;
+        let true_rope = thrower.throw(&once)?;
+        // A further search begins only where the first was not good enough.
+        let true_rope_longer = if once.error_m <= thrower.options.good_enough_m {
+            true_rope
+        } else {
+            thrower.throw(&thrower.plan(&truth, SEARCHES)?)?
+        };
+        Ok(PipelineTrial {
+            index,
+            target_m,
+            truth: truth.to_array(),
+            found: found.to_array(),
+            true_rope,
+            true_rope_longer,
+            identified: thrower.throw(&thrower.plan(&found, SEARCHES)?)?,
+            random: thrower.throw(&thrower.plan(&trial_rope(seed ^ OTHER, index), 1)?)?,
+        })
+    };
+    planned().map_err(|source| TrialError::Plan {
+        index,
+        source: Box::new(source),
+    })
+}
+
+/// Makes the trials with these indices, in parallel; in their order, whatever the
+/// threads.
+///
+/// # Errors
+/// The first trial that cannot be made.
+pub fn pipeline_trials(
+    rig: &TrialRig,
+    config: &PlannerConfig,
+    options: &IdentifyOptions,
+    seed: u64,
+    indices: &[u64],
+) -> Result<Vec<PipelineTrial>, TrialError> {
+    let alone = IdentifyOptions {
+        threads: 1,
+        ..*options
+    };
+    map_in_order(indices, options.threads, |index| {
+        trial(rig, config, &alone, seed, *index)
+    })
+    .into_iter()
+    .collect()
+}
+
+/// How errors spread (m).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Median.
+    pub median_m: f64,
+    /// Smallest.
+    pub min_m: f64,
+    /// Greatest.
+    pub max_m: f64,
+    /// 99 of 100 are below.
+    pub p99_m: f64,
+    /// Mean.
+    pub mean_m: f64,
+    /// Standard deviation.
+    pub std_m: f64,
+}
+
+impl Spread {
+    /// Of these errors (m); not a number for none.
+    #[must_use]
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index of the list"
+    )]
+    pub fn of(errors_m: impl IntoIterator<Item = f64>) -> Self {
+        let mut sorted: Vec<f64> = errors_m.into_iter().collect();
+        sorted.sort_by(f64::total_cmp);
+        let count = sorted.len() as f64;
+        let at = |part: f64| {
+            let index = (part * (count - 1.0).max(0.0)).round() as usize;
+            sorted.get(index).copied().unwrap_or(f64::NAN)
+        };
+        let mean_m = sorted.iter().sum::<f64>() / count;
+        let squares: f64 = sorted.iter().map(|e| (e - mean_m).powi(2)).sum();
+        Self {
+            median_m: at(0.5),
+            min_m: at(0.0),
+            max_m: at(1.0),
+            p99_m: at(0.99),
+            mean_m,
+            std_m: (squares / count).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_is_that_of_the_numbers() {
+        let s = Spread::of([3.0, 1.0, 2.0, 6.0, 3.0]);
+        assert_eq!(
+            (s.median_m, s.min_m, s.max_m, s.mean_m),
+            (3.0, 1.0, 6.0, 3.0)
+        );
+        assert!((s.std_m - (14.0_f64 / 5.0).sqrt()).abs() < 1e-12);
+        assert!(Spread::of([]).mean_m.is_nan());
+    }
+}

@@ -1,0 +1,58 @@
+//! `wag plan`: broken off, it leaves the best throw so far, marked as such.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use std::io::Read;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const ROPE: &str = "links = 20
+length_m = 0.5
+joint_damping_nms_per_rad = 0.01
+joint_stiffness_nm_per_rad = 0.2
+radius_m = 0.006
+mass_per_length_kg_per_m = 0.05
+lead_mass_kg = 0.04
+lead_radius_m = 0.02
+link_extra_scale = 0.9
+";
+/// A search that would last for hours.
+const ENDLESS: &str = "[search]\ngenerations = 1000000\npopulation = 2000\n";
+
+#[test]
+fn an_interrupt_leaves_the_best_plan_so_far() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(at("rope.toml"), ROPE).unwrap();
+    std::fs::write(at("planner.toml"), ENDLESS).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(["plan", "strike", "--target", "0.95,0.1,0.2", "--json"])
+        .args(["--rope", &at("rope.toml"), "--config", &at("planner.toml")])
+        .args(["--out", &at("plan.json"), "--allow-miss"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(child.try_wait().unwrap().is_none(), "ended by itself");
+    let pid = Pid::from_raw(child.id().try_into().unwrap()).unwrap();
+    kill_process(pid, Signal::INT).unwrap();
+    let mut answer = String::new();
+    let mut stdout = child.stdout.take().unwrap();
+    stdout.read_to_string(&mut answer).unwrap();
+    assert!(child.wait().unwrap().success(), "{answer}");
+    let answer: Value = serde_json::from_str(&answer).unwrap();
+    assert_eq!(answer["interrupted"], true);
+    assert!(answer["warnings"].to_string().contains("broken off"));
+    let plan: Value =
+        serde_json::from_str(&std::fs::read_to_string(at("plan.json")).unwrap()).unwrap();
+    assert_eq!(plan["interrupted"], true);
+    let margins = plan["margins"].as_array().unwrap();
+    assert!(margins.iter().all(|m| m["left"].as_f64().unwrap() >= 0.0));
+}
