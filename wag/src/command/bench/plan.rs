@@ -37,7 +37,7 @@ struct Row {
     simulations: u32,
     rollouts_per_s: f64,
     /// Parts of the processor time: rope with its contacts, contacts with the arm, all
-    /// else (drawing, screening, learning).
+    /// else (drawing, screening, learning, what finalists are observed longer and finer).
     rope_part: f64,
     contacts_part: f64,
     search_part: f64,
@@ -76,7 +76,9 @@ fn measure(
     let simulations = f64::from(planned.simulations);
     #[allow(clippy::cast_precision_loss, reason = "a small count")]
     let part = |cpu_s: f64| (cpu_s / BATCH as f64 * simulations / whole.cpu_s).clamp(0.0, 1.0);
-    let (rope_part, both_part) = (part(rope.cpu_s), part(both.cpu_s));
+    let both_part = part(both.cpu_s);
+    // Both are measured, and noise may turn their order.
+    let rope_part = part(rope.cpu_s).min(both_part);
     Ok(Row {
         task: kind.name(),
         wall_s: whole.wall_s,
@@ -84,7 +86,7 @@ fn measure(
         simulations: planned.simulations,
         rollouts_per_s: simulations / whole.wall_s,
         rope_part,
-        contacts_part: (both_part - rope_part).max(0.0),
+        contacts_part: both_part - rope_part,
         search_part: 1.0 - both_part,
         limit_wall_s,
         within_limit: whole.wall_s < limit_wall_s,
