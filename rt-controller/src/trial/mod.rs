@@ -327,12 +327,17 @@ impl Drop for Trial {
     }
 }
 
-/// Joint 7 back and forth for eight minutes, slowly.
+/// Joint 7 to and fro by this (rad): in a pause of a second it never gets farther
+/// than one setpoint may go.
+const SWING_RAD: f64 = 0.1;
+
+/// Joint 7 to and fro for eight minutes, slowly, and never away from its middle.
 fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
+    let inwards = -SWING_RAD * from[6].signum();
     let (times_s, poses): (Vec<f64>, Vec<JointVector>) = (0..240)
         .map(|k| {
             let mut q = from;
-            q[6] += 0.3 * f64::from(k % 2);
+            q[6] += inwards * f64::from(k % 2);
             (2.0 * f64::from(k), q)
         })
         .unzip();
