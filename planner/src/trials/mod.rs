@@ -46,7 +46,7 @@ pub struct TrialRig {
     pub camera: StereoCamera,
     /// Errors of the recordings.
     pub randomisation: Randomisation,
-    /// The network, for [`Method::Network`](crate::sysid::Method::Network).
+    /// The network, for [`crate::sysid::Method::Network`].
     #[cfg(feature = "network")]
     pub network: Option<Arc<Mutex<PhiNet>>>,
 }
