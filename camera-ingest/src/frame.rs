@@ -83,6 +83,15 @@ impl EyeFrame {
         }
     }
 
+    /// Left eye of a side-by-side JPEG.
+    ///
+    /// # Errors
+    /// As [`StereoFrame::from_jpeg`].
+    pub fn left_from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
+        let (packed, size) = decode(bytes)?;
+        Ok(planes(&packed, size, size[0] / 2, stamp_ns, sequence))
+    }
+
     /// Packed RGB, 3 bytes a pixel.
     #[must_use]
     pub fn to_rgb(&self) -> Vec<u8> {
@@ -144,40 +153,62 @@ impl StereoFrame {
     /// # Errors
     /// The JPEG is damaged or its width is no side-by-side pair.
     pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        // Asking for YCbCr spares a colour conversion we would only undo.
-        let options = DecoderOptions::new_fast()
-            .jpeg_set_out_colorspace(ColorSpace::YCbCr)
-            .set_strict_mode(true);
-        // The decoder fills what is missing with grey; the end marker tells.
-        let end = bytes.iter().rposition(|&b| b != 0).unwrap_or(0);
-        if end == 0 || bytes[end - 1..=end] != [0xff, 0xd9] {
-            return Err(FrameError::Jpeg(
-                "it has no end marker, so a part is missing".to_owned(),
-            ));
-        }
-        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-        let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::Jpeg(format!("{e:?}"));
-        let packed = decoder.decode().map_err(jpeg)?;
-        let (width_px, height_px) = decoder
-            .dimensions()
-            .ok_or_else(|| FrameError::Jpeg("no dimensions".to_owned()))?;
-        check_width(width_px)?;
-        if packed.len() != width_px * height_px * 3 {
-            return Err(FrameError::Jpeg("not a colour picture".to_owned()));
-        }
-        let mut frame = blank(width_px, height_px, stamp_ns, sequence);
-        for (six, (pair, (cb, cr))) in packed.chunks_exact(6).zip(
-            frame
-                .luma
-                .chunks_exact_mut(2)
-                .zip(frame.cb.iter_mut().zip(&mut frame.cr)),
-        ) {
+        let (packed, size) = decode(bytes)?;
+        let frame = planes(&packed, size, size[0], stamp_ns, sequence);
+        Ok(Self(frame))
+    }
+}
+
+/// Packed Y, Cb, Cr of every pixel, and width and height.
+fn decode(bytes: &[u8]) -> Result<(Vec<u8>, [usize; 2]), FrameError> {
+    // Asking for YCbCr spares a colour conversion we would only undo.
+    let options = DecoderOptions::new_fast()
+        .jpeg_set_out_colorspace(ColorSpace::YCbCr)
+        .set_strict_mode(true);
+    // The decoder fills what is missing with grey; the end marker tells.
+    let end = bytes.iter().rposition(|&b| b != 0).unwrap_or(0);
+    if end == 0 || bytes[end - 1..=end] != [0xff, 0xd9] {
+        return Err(FrameError::Jpeg(
+            "it has no end marker, so a part is missing".to_owned(),
+        ));
+    }
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::Jpeg(format!("{e:?}"));
+    let packed = decoder.decode().map_err(jpeg)?;
+    let (width_px, height_px) = decoder
+        .dimensions()
+        .ok_or_else(|| FrameError::Jpeg("no dimensions".to_owned()))?;
+    check_width(width_px)?;
+    if packed.len() != width_px * height_px * 3 {
+        return Err(FrameError::Jpeg("not a colour picture".to_owned()));
+    }
+    Ok((packed, [width_px, height_px]))
+}
+
+/// The first `columns` columns of a packed picture.
+fn planes(
+    packed: &[u8],
+    [width_px, height_px]: [usize; 2],
+    columns: usize,
+    stamp_ns: u64,
+    sequence: u64,
+) -> EyeFrame {
+    let mut frame = blank(columns, height_px, stamp_ns, sequence);
+    let rows = packed.chunks_exact(width_px * 3);
+    let half = columns / 2;
+    let chroma = frame
+        .cb
+        .chunks_exact_mut(half)
+        .zip(frame.cr.chunks_exact_mut(half));
+    for ((row, luma), (cb, cr)) in rows.zip(frame.luma.chunks_exact_mut(columns)).zip(chroma) {
+        let pairs = luma.chunks_exact_mut(2).zip(cb.iter_mut().zip(cr));
+        for (six, (pair, (cb, cr))) in row.chunks_exact(6).zip(pairs) {
             (pair[0], pair[1]) = (six[0], six[3]);
             *cb = six[1].midpoint(six[4]);
             *cr = six[2].midpoint(six[5]);
         }
-        Ok(Self(frame))
     }
+    frame
 }
 
 fn check_width(width_px: usize) -> Result<(), FrameError> {

@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::{FrameSource, SourceError, read_bytes};
-use crate::frame::StereoFrame;
+use crate::frame::{EyeFrame, FrameError, StereoFrame};
 
 const REMEDY: &str = "record side-by-side Motion-JPEG into an AVI, or convert to it";
 const TRUNCATED: &str = "the file is truncated: copy it again or record again";
@@ -55,12 +55,12 @@ impl AviSource {
     }
 }
 
-impl FrameSource for AviSource {
-    fn len(&self) -> usize {
-        self.chunks.len()
-    }
-
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+impl AviSource {
+    fn decode<T>(
+        &self,
+        index: usize,
+        decode: impl Fn(&[u8], u64, u64) -> Result<T, FrameError>,
+    ) -> Result<T, SourceError> {
         let (Some(range), Some(stamp)) = (self.chunks.get(index), self.stamps.get(index)) else {
             return Err(SourceError::OutOfRange {
                 path: self.path.clone(),
@@ -69,13 +69,25 @@ impl FrameSource for AviSource {
             });
         };
         let jpeg = &self.bytes[range.clone()];
-        StereoFrame::from_jpeg(jpeg, stamp.stamp_ns, stamp.sequence).map_err(|source| {
-            SourceError::Frame {
-                path: self.path.clone(),
-                frame: index,
-                source,
-            }
+        decode(jpeg, stamp.stamp_ns, stamp.sequence).map_err(|source| SourceError::Frame {
+            path: self.path.clone(),
+            frame: index,
+            source,
         })
+    }
+}
+
+impl FrameSource for AviSource {
+    fn len(&self) -> usize {
+        self.chunks.len()
+    }
+
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        self.decode(index, StereoFrame::from_jpeg)
+    }
+
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        self.decode(index, EyeFrame::left_from_jpeg)
     }
 }
 
@@ -99,27 +111,20 @@ fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceErr
     }
     let mut frame_us = None;
     let mut frames = Vec::new();
-    let mut at = 12;
+    let (mut at, mut missing) = (12, 0);
     while let Some((code, body)) = chunk(bytes, at) {
         let list = bytes.get(body.start..body.start + 4);
         if &code == b"LIST" && (list == Some(b"movi") || list == Some(b"hdrl")) {
             // Go inside: the next chunk starts after the list's name.
-            if list == Some(b"movi") && body.end > bytes.len() {
-                let read = frames.len();
-                return Err(fail(
-                    format!(
-                        "the frame list ends {} bytes early (after frame {read})",
-                        body.end - bytes.len()
-                    ),
-                    TRUNCATED,
-                ));
-            }
+            // A list that ends beyond the file is walked to where the file ends, so
+            // that the error can name the frame.
+            missing = missing.max(body.end.saturating_sub(bytes.len()));
             at = body.start + 4;
             continue;
         }
         if body.end > bytes.len() {
             return Err(fail(
-                format!("chunk after frame {} ends beyond the file", frames.len()),
+                format!("frame {} ends beyond the file", frames.len()),
                 TRUNCATED,
             ));
         }
@@ -133,6 +138,13 @@ fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceErr
             _ => {}
         }
         at = body.end + body.len() % 2;
+    }
+    if missing > 0 {
+        let reason = format!(
+            "it ends {missing} bytes early, before frame {}",
+            frames.len()
+        );
+        return Err(fail(reason, TRUNCATED));
     }
     match (frame_us, frames.is_empty()) {
         (Some(us), false) if us > 0 => Ok((us, frames)),
@@ -250,13 +262,19 @@ mod tests {
         let cut = open("cut", &whole[..whole.len() - 3], None)
             .unwrap_err()
             .to_string();
-        assert!(cut.contains("truncated"), "{cut}");
+        assert!(
+            cut.contains("truncated") && cut.contains("frame 1 ends"),
+            "{cut}"
+        );
         let other = open("other", b"RIFF....WAVEfmt ", None)
             .unwrap_err()
             .to_string();
         assert!(other.contains("not a RIFF AVI"), "{other}");
         let empty = open("empty", &avi(&[]), None).unwrap_err().to_string();
         assert!(empty.contains("no video frames"), "{empty}");
+        let second = open("second", &whole[..whole.len() - 13], None);
+        let second = second.unwrap_err().to_string();
+        assert!(second.contains("before frame 1"), "{second}");
         // Whatever is cut off, there is an answer and no panic.
         for end in 0..whole.len() {
             let _ = open("any", &whole[..end], None);

@@ -86,6 +86,14 @@ pub trait FrameSource {
     /// # Errors
     /// The frame does not exist or is damaged.
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError>;
+
+    /// Decodes the left eye of one frame.
+    ///
+    /// # Errors
+    /// The frame does not exist or is damaged.
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        self.read(index).map(|frame| frame.left())
+    }
 }
 
 /// Frames that are in memory already.
@@ -125,9 +133,7 @@ pub fn open_video(path: &Path) -> Result<AviSource, SourceError> {
 /// # Errors
 /// A frame is damaged.
 pub fn read_left(source: &mut dyn FrameSource) -> Result<Vec<EyeFrame>, SourceError> {
-    (0..source.len())
-        .map(|i| source.read(i).map(|f| f.left()))
-        .collect()
+    (0..source.len()).map(|i| source.read_left(i)).collect()
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, SourceError> {

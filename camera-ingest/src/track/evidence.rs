@@ -52,7 +52,44 @@ impl Window {
     }
 }
 
-/// Coverage of the pixels of a window, 0 to about 1.
+/// Columns of each row of a window that are looked at, upper bounds exclusive.
+#[derive(Debug, Clone)]
+pub(super) struct Band {
+    columns: Vec<[usize; 2]>,
+}
+
+impl Band {
+    /// All of a window.
+    pub(super) fn all(window: Window) -> Self {
+        Self {
+            columns: vec![[window.u0, window.u1]; window.v1 - window.v0],
+        }
+    }
+
+    /// What lies within `reach_px` of some pixels, on either axis. A rope's
+    /// window is mostly empty of rope.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the window first"
+    )]
+    pub(super) fn along(pixels: &[[f64; 2]], reach_px: f64, window: Window) -> Self {
+        let mut columns = vec![[window.u1, window.u0]; window.v1 - window.v0];
+        let bound = |x: f64, low: usize, high: usize| x.clamp(low as f64, high as f64) as usize;
+        for [u, v] in pixels {
+            let [left, right] =
+                [u - reach_px, u + reach_px + 2.0].map(|x| bound(x, window.u0, window.u1));
+            let [top, bottom] = [v - reach_px, v + reach_px + 2.0]
+                .map(|x| bound(x, window.v0, window.v1) - window.v0);
+            for row in &mut columns[top..bottom.max(top)] {
+                *row = [row[0].min(left), row[1].max(right)];
+            }
+        }
+        Self { columns }
+    }
+}
+
+/// Coverage of the pixels of a window, 0 to about 1; 0 outside its band.
 #[derive(Debug, Clone)]
 pub(super) struct Coverage {
     pub(super) window: Window,
@@ -126,6 +163,11 @@ impl Matter<'_> {
 
     /// Coverage of a window of a frame.
     pub(super) fn coverage(&self, frame: &EyeFrame, window: Window) -> Coverage {
+        self.coverage_of(frame, window, &Band::all(window))
+    }
+
+    /// Coverage of a band of a window.
+    pub(super) fn coverage_of(&self, frame: &EyeFrame, window: Window, band: &Band) -> Coverage {
         let noise2 = (4.0 * self.background.noise).powi(2);
         let limits = Limits {
             noise2,
@@ -142,11 +184,13 @@ impl Matter<'_> {
         let inverse_gain = 1.0 / self.gain;
         let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
         let empty = &self.background.image;
-        let mut values = Vec::with_capacity((window.u1 - window.u0) * (window.v1 - window.v0));
-        for v in window.v0..window.v1 {
+        let width = window.u1 - window.u0;
+        let mut values = vec![0.0; width * (window.v1 - window.v0)];
+        for (v, &[from, to]) in (window.v0..window.v1).zip(&band.columns) {
             let row = v * frame.width_px;
             let half = v * (frame.width_px / 2);
-            for u in window.u0..window.u1 {
+            let start = (v - window.v0) * width;
+            for u in from..to {
                 let (y, c) = (row + u, half + u / 2);
                 let seen = [
                     f32::from(frame.luma[y]) * inverse_gain,
@@ -154,12 +198,12 @@ impl Matter<'_> {
                     light(frame.cr[c]),
                 ];
                 let behind = [empty.luma[y], empty.cb[c], empty.cr[c]].map(f32::from);
-                values.push(self.of_pixel(seen, behind, &shades, limits));
+                values[start + u - window.u0] = self.of_pixel(seen, behind, &shades, limits);
             }
         }
         Coverage {
             window,
-            width: window.u1 - window.u0,
+            width,
             values,
         }
     }

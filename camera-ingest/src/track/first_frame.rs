@@ -42,6 +42,8 @@ pub(super) struct FirstLook {
     /// Colours and how much they scatter.
     pub(super) rope: (Colour, f32),
     pub(super) lead: (Colour, f32),
+    /// Nothing else could be the lead.
+    pub(super) sole: bool,
 }
 
 /// Why nothing was found.
@@ -53,7 +55,8 @@ pub(super) enum NotFound {
     NothingHangs(f64),
 }
 
-/// Finds rope and lead in a frame in which they hang still.
+/// Finds rope and lead in a frame, in which they hang still unless the rope's
+/// length along the mask is known already to lie in `length_m`.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -66,6 +69,7 @@ pub(super) fn find(
     camera: &StereoCamera,
     plane: &RopePlane,
     clamp: &ClampSample,
+    length_m: Option<[f64; 2]>,
 ) -> Result<FirstLook, NotFound> {
     let gain = background.gain(frame);
     let width = frame.width_px;
@@ -87,7 +91,7 @@ pub(super) fn find(
         (GAP_PX * image_scale) as u32,
         (FIRST_GAP_M * plane.px_per_m) as u32,
     );
-    let at = lead::Search {
+    let lead::Best { at, sole } = lead::Search {
         frame,
         background,
         gain,
@@ -95,6 +99,7 @@ pub(super) fn find(
         depth_px: &depth,
         ways: &ways,
         px_per_m: plane.px_per_m,
+        length_m: length_m.unwrap_or([lead::LEAST_ROPE_M, f64::INFINITY]),
     }
     .best()
     .map_err(|TooShort(longest_m)| NotFound::NothingHangs(longest_m))?;
@@ -132,6 +137,7 @@ pub(super) fn find(
         lead_radius_px,
         rope,
         lead,
+        sole,
     })
 }
 

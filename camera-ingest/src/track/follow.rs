@@ -5,7 +5,7 @@ use shared_types::StereoCamera;
 use super::background::Background;
 use super::clamp::ClampPath;
 use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
-use super::evidence::{Colour, Matter, Window};
+use super::evidence::{Band, Colour, Coverage, Matter, Window};
 use super::first_frame::{LEAD_FULL, LEAD_SHADES};
 use super::lateral::{Across, Search, measure};
 use super::lead;
@@ -16,7 +16,7 @@ use crate::frame::EyeFrame;
 /// Nodes of the tracked curve.
 pub(super) const NODES: usize = 64;
 /// Search range across the curve (px).
-const RANGE_PX: f64 = 12.0;
+pub(super) const RANGE_PX: f64 = 12.0;
 /// Search range after the rope was lost (px).
 const WIDE_RANGE_PX: f64 = 32.0;
 /// Strength of smoothing against weights of at most 1: features longer than
@@ -38,6 +38,24 @@ const LOST_BELOW: f64 = 0.3;
 const FAT_ROPE_PX: f64 = 2.2;
 /// Weight of clamp and lead against a node's.
 const ANCHOR: f64 = 50.0;
+/// Coverage of something beside the rope that can be taken for it.
+const RIVAL: f64 = 0.6;
+/// Part of the nodes beside which a rival makes a frame ambiguous.
+const RIVALS: f64 = 0.12;
+/// Part of the search range in which the lead is looked for first.
+const NEAR: f64 = 0.3;
+/// Part of the lead's area that, seen near the expected place, ends the search.
+const ENOUGH_LEAD: f64 = 0.7;
+
+/// The lead in one frame.
+struct LeadFound {
+    /// `None` when too little of it is seen.
+    centre: Option<Point>,
+    /// Part of its area that is seen.
+    seen: f64,
+    /// A second one is near.
+    rival: bool,
+}
 
 /// What the rope looks like, learnt from the first frame.
 #[derive(Debug, Clone)]
@@ -74,6 +92,9 @@ pub(super) struct State {
     /// Coverage found at each node, 0 to 1.
     pub(super) confidence: Vec<f64>,
     pub(super) lost: bool,
+    /// Something that looks like the rope or its lead is so near that one may
+    /// have been taken for the other.
+    pub(super) ambiguous: bool,
 }
 
 impl State {
@@ -133,7 +154,7 @@ impl Follower<'_> {
     }
 
     /// Finds the rope near a predicted curve.
-    fn locate(
+    pub(super) fn locate(
         &self,
         frame: &EyeFrame,
         gain: f32,
@@ -156,7 +177,11 @@ impl Follower<'_> {
             );
         }
         let tip_speed = norm(before.velocity[NODES - 1]);
-        let (lead, lead_seen) = self.find_lead(frame, gain, &curve, tip_speed, range_px);
+        let LeadFound {
+            centre: lead,
+            seen: lead_seen,
+            rival: lead_rival,
+        } = self.find_lead(frame, gain, &curve, tip_speed, range_px);
         if let Some(lead) = lead {
             let miss = sub(lead, curve[NODES - 1]);
             blend(&mut curve, miss, |part| part * part);
@@ -184,6 +209,9 @@ impl Follower<'_> {
         let long = self.plausible_length(length(&fitted), lead.is_some());
         let curve = resample(&fitted, long, NODES);
 
+        let rivals = found[first..=last].iter();
+        let rivals = rivals.filter(|node| node.rival > RIVAL).count();
+        let ambiguous = lead_rival || rivals as f64 > RIVALS * NODES as f64;
         let mut confidence: Vec<f64> = found.iter().map(|node| node.confidence).collect();
         let at_end = if lead.is_some() {
             lead_seen
@@ -209,6 +237,7 @@ impl Follower<'_> {
             curve,
             confidence,
             lost,
+            ambiguous,
         }
     }
 
@@ -227,9 +256,11 @@ impl Follower<'_> {
             .zip(normals(curve))
             .map(|(v, n)| (v[0] * n[0] + v[1] * n[1]).abs() * exposure)
             .collect();
-        let pixels = curve.iter().map(|p| self.plane.to_pixel(*p));
-        let window = Window::around(pixels, range_px + 4.0, frame);
-        let coverage = self.rope_matter(gain).coverage(frame, window);
+        let pixels: Vec<[f64; 2]> = curve.iter().map(|p| self.plane.to_pixel(*p)).collect();
+        let reach_px = range_px + 4.0;
+        let window = Window::around(pixels.iter().copied(), reach_px, frame);
+        let band = Band::along(&pixels, reach_px, window);
+        let coverage = self.rope_matter(gain).coverage_of(frame, window, &band);
         let search = Search {
             range_px,
             rope_radius_px: self.model.rope_radius_m * self.plane.px_per_m,
@@ -292,8 +323,8 @@ impl Follower<'_> {
         }
     }
 
-    /// Centre of the lead near a predicted place, and the part of its area seen.
-    /// A centroid over a shrinking window (mean shift).
+    /// The lead near a predicted place: a centroid over a shrinking window (mean
+    /// shift), then its outline.
     fn find_lead(
         &self,
         frame: &EyeFrame,
@@ -301,31 +332,36 @@ impl Follower<'_> {
         predicted: &[Point],
         speed_m_s: f64,
         range_px: f64,
-    ) -> (Option<Point>, f64) {
+    ) -> LeadFound {
         let radius = self.model.lead_radius_m * self.plane.px_per_m;
         let blur = speed_m_s * self.camera.exposure_s * self.plane.px_per_m;
-        let mut centre = self.plane.to_pixel(predicted[NODES - 1]);
         let expected = Circle {
-            centre,
+            centre: self.plane.to_pixel(predicted[NODES - 1]),
             radius_px: radius,
         };
         // The widest look, and room for the centre to move.
         let margin = radius + 2.0 * range_px + blur / 2.0 + 2.0;
-        let window = Window::around(std::iter::once(centre), margin, frame);
+        let window = Window::around(std::iter::once(expected.centre), margin, frame);
         let coverage = self.lead_matter(gain).coverage(frame, window);
         let tight = radius + blur / 2.0 + 1.5;
-        let mut area = 0.0;
-        for part in [1.0, 0.6, 0.3, 0.0, 0.0, 0.0] {
-            (area, centre) = coverage.centroid(centre, tight + part * range_px);
+        let whole = std::f64::consts::PI * radius * radius;
+        // Near the expected place first: further off there may be another one.
+        let near = [NEAR, NEAR / 2.0, 0.0, 0.0, 0.0];
+        let far = [1.0, 0.6, 0.3, 0.0, 0.0, 0.0];
+        let (mut area, mut centre) = shift(&coverage, expected.centre, tight, range_px, &near);
+        if area < ENOUGH_LEAD * whole {
+            (area, centre) = shift(&coverage, expected.centre, tight, range_px, &far);
         }
-        let seen = (area / (std::f64::consts::PI * radius * radius)).min(1.0);
+        let seen = (area / whole).min(1.0);
         let contrast = Contrast {
             frame,
             background: self.background,
             gain,
         };
+        let blends_in = self.model.lead_blends_in();
+        let around = coverage.centroid(centre, tight + range_px).0 - area;
         let rope = self.rope_at_lead(predicted);
-        if self.model.lead_blends_in() {
+        if blends_in {
             // A centroid would creep up the rope.
             centre = contrast
                 .free_end(expected, rope, range_px)
@@ -333,11 +369,28 @@ impl Follower<'_> {
         } else if let Some(circle) = contrast.circle(Circle { centre, ..expected }, blur, rope) {
             centre = circle.centre;
         }
-        (
-            (seen > LEAST_LEAD).then(|| self.plane.point_at(centre)),
+        LeadFound {
+            centre: (seen > LEAST_LEAD).then(|| self.plane.point_at(centre)),
             seen,
-        )
+            rival: !blends_in && around > RIVAL * whole,
+        }
     }
+}
+
+/// Mean shift: sum and centroid of coverage over windows of the radii `tight_px`
+/// and the given parts of `range_px`.
+fn shift(
+    coverage: &Coverage,
+    mut centre: [f64; 2],
+    tight_px: f64,
+    range_px: f64,
+    parts: &[f64],
+) -> (f64, [f64; 2]) {
+    let mut area = 0.0;
+    for part in parts {
+        (area, centre) = coverage.centroid(centre, tight_px + part * range_px);
+    }
+    (area, centre)
 }
 
 /// Adds `shift` to every node times a factor of its place (0 clamp, 1 lead).

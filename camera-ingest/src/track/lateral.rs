@@ -37,6 +37,8 @@ pub(super) struct Across {
     pub(super) point: Point,
     /// Coverage there relative to a fully visible rope, 0 to 1.
     pub(super) confidence: f64,
+    /// Coverage of the best other place on the same normal, clear of this one.
+    pub(super) rival: f64,
 }
 
 /// Measures every node of `curve` along its normal. The first node (the clamp)
@@ -90,9 +92,17 @@ pub(super) fn measure(
             let row = &samples[node * lanes..(node + 1) * lanes];
             let reach = (search.rope_radius_px + search.blur_px[node] / 2.0 + 1.0) / STEP_PX;
             let centre = row_centroid(row, row_centroid(row, lane as f64, reach), reach);
+            // Beside the rope's own blurred image.
+            let clear = (2.0 * reach).ceil() as usize + 2;
+            let others = &seen[node * lanes..(node + 1) * lanes];
+            let rival = others[..lane.saturating_sub(clear)]
+                .iter()
+                .chain(&others[(lane + clear).min(lanes)..])
+                .fold(0.0, |most: f64, s| most.max(*s));
             Across {
                 point: add(curve[node], scale(across[node], offset(centre))),
                 confidence: seen[node * lanes + lane],
+                rival,
             }
         })
         .collect()

@@ -16,7 +16,7 @@ use crate::frame::EyeFrame;
 /// What is rope whatever follows: this part of the way from the clamp (m).
 const SURELY_ROPE_M: [f64; 2] = [0.03, 0.25];
 /// The lead hangs at least this far from the clamp (m).
-const LEAST_ROPE_M: f64 = 0.12;
+pub(super) const LEAST_ROPE_M: f64 = 0.12;
 /// Colour distance that is as good as certain (grey levels).
 const CLEAR_COLOUR: f32 = 50.0;
 /// Colour distance that says nothing: noise and compression (grey levels).
@@ -24,6 +24,11 @@ const UNCLEAR_COLOUR: f32 = 10.0;
 /// Colours nearer than this to the rope's are the rope's (grey levels), plus
 /// twice the rope's own scatter.
 const ROPE_COLOUR: f32 = 25.0;
+/// A hypothesis this much better than another one is clearly better.
+const CLEAR_SCORE: f64 = 0.7;
+/// Hypotheses nearer than this to each other are the same lead (part of the
+/// longest way).
+const APART: f64 = 0.15;
 /// Noise moves the mask's edge by this (px).
 const RAGGED_PX: f32 = 0.7;
 /// Brightness a shadow leaves.
@@ -39,6 +44,8 @@ pub(super) struct Search<'a> {
     pub(super) depth_px: &'a [f32],
     pub(super) ways: &'a Geodesic,
     pub(super) px_per_m: f64,
+    /// Least and greatest length of the way to the lead (m).
+    pub(super) length_m: [f64; 2],
 }
 
 /// What the rope near the clamp looks like.
@@ -48,13 +55,22 @@ struct Rope {
     depth_px: f32,
 }
 
+/// The best hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Best {
+    /// Index of the pixel.
+    pub(super) at: usize,
+    /// No other place, well apart from it, is nearly as good.
+    pub(super) sole: bool,
+}
+
 /// Why there is no lead: the longest way found (m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TooShort(pub(super) f64);
 
 impl Search<'_> {
-    /// Index of the pixel that is most likely the lead's centre.
-    pub(super) fn best(&self) -> Result<usize, TooShort> {
+    /// The pixel that is most likely the lead's centre.
+    pub(super) fn best(&self) -> Result<Best, TooShort> {
         let reached: Vec<(usize, f64)> = (0..self.mask.len())
             .filter(|&at| self.mask[at])
             .filter_map(|at| Some((at, self.ways.length_px(at)? / self.px_per_m)))
@@ -70,13 +86,30 @@ impl Search<'_> {
         let score = |at: usize, length_m: f64| {
             self.fatter(at, &rope) + self.unlike(at, &rope) + share_within(&rope_lengths, length_m)
         };
-        ridges
+        let scored: Vec<(usize, f64)> = ridges
             .iter()
-            .filter(|r| r.1 >= LEAST_ROPE_M)
+            .filter(|r| (self.length_m[0]..=self.length_m[1]).contains(&r.1))
             .map(|&(at, length_m)| (at, score(at, length_m)))
+            .collect();
+        let &(at, most) = scored
+            .iter()
             .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(at, _)| at)
-            .ok_or(TooShort(longest_m))
+            .ok_or(TooShort(longest_m))?;
+        let apart_px = APART * longest_m * self.px_per_m;
+        let rival = |&&(other, score): &&(usize, f64)| {
+            score > most - CLEAR_SCORE && self.distance_px(at, other) > apart_px
+        };
+        Ok(Best {
+            at,
+            sole: scored.iter().find(rival).is_none(),
+        })
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
+    fn distance_px(&self, a: usize, b: usize) -> f64 {
+        let width = self.frame.width_px;
+        let along = |x: usize, y: usize| x.abs_diff(y) as f64;
+        along(a % width, b % width).hypot(along(a / width, b / width))
     }
 
     /// No neighbour lies deeper inside the mask.

@@ -5,7 +5,8 @@
 //! the first frame, in which the rope hangs still, gives centreline, lead and
 //! colours; from there the curve is followed frame by frame, predicted,
 //! measured across, smoothed and anchored at the clamp (known from the arm) and
-//! the lead.
+//! the lead. After a gap, a loss, or when something like the rope came near, the
+//! rope is looked for anew and followed back to where both ways agree.
 
 mod appearance;
 mod background;
@@ -19,6 +20,7 @@ mod lateral;
 mod lead;
 mod outline;
 mod plane;
+mod pursuit;
 
 use std::time::{Duration, Instant};
 
@@ -112,7 +114,7 @@ pub enum TrackError {
     },
     /// The clamp cannot be seen.
     #[error(
-        "tracking: in the first frame the clamp should be at pixel ({u:.0}, {v:.0}), outside the \
+        "tracking: in the first frame (frame 0) the clamp should be at pixel ({u:.0}, {v:.0}), outside the \
          image; check the camera's extrinsics and the clamp's path"
     )]
     ClampOutside {
@@ -123,12 +125,25 @@ pub enum TrackError {
     },
     /// No rope in the first frame.
     #[error(
-        "tracking: nothing long enough hangs on the clamp in the first frame (longest {longest_m:.3} \
+        "tracking: nothing long enough hangs on the clamp in the first frame (frame 0; longest {longest_m:.3} \
          m); the rope must hang still at first, move later, and differ from what is behind it"
     )]
     NoRope {
         /// Longest moving thing that hangs on the clamp (m).
         longest_m: f64,
+    },
+    /// The rope cannot be followed.
+    #[error(
+        "tracking: the rope is lost in {lost} of {frames} frames, first in frame {first}; does it \
+         leave the image, or does something cover it?"
+    )]
+    MostlyLost {
+        /// Frames in which it is lost.
+        lost: usize,
+        /// All frames.
+        frames: usize,
+        /// First frame in which it is lost, from 0.
+        first: usize,
     },
 }
 
@@ -139,8 +154,8 @@ pub enum TrackError {
 /// pixels, uniform in arc length on the rope's plane.
 ///
 /// # Errors
-/// Bad input, or no rope found in the first frame. Losing the rope later is no
-/// error: those frames are marked `lost`.
+/// Bad input, no rope found in the first frame, or the rope lost in most frames.
+/// Losing it in some is no error: those frames are marked `lost`.
 pub fn track(
     frames: &[EyeFrame],
     camera: &StereoCamera,
@@ -163,20 +178,30 @@ pub fn track(
         u: f64::NAN,
         v: f64::NAN,
     })?;
-    let look = first_frame::find(&frames[0], &background, camera, &plane, &clamp.at(0.0)).map_err(
-        |e| match e {
-            NotFound::ClampOutside([u, v]) => TrackError::ClampOutside { u, v },
-            NotFound::NothingHangs(longest_m) => TrackError::NoRope { longest_m },
-        },
-    )?;
+    let look = first_frame::find(
+        &frames[0],
+        &background,
+        camera,
+        &plane,
+        &clamp.at(0.0),
+        None,
+    )
+    .map_err(|e| match e {
+        NotFound::ClampOutside([u, v]) => TrackError::ClampOutside { u, v },
+        NotFound::NothingHangs(longest_m) => TrackError::NoRope { longest_m },
+    })?;
     let (follower, first) = learn(&frames[0], camera, clamp, &plane, &background, &look);
     let first_time = start.elapsed();
 
     let start = Instant::now();
-    let mut states = vec![first];
-    for (frame, &t_s) in frames.iter().zip(&times_s).skip(1) {
-        let next = follower.step(frame, t_s, &states[states.len() - 1]);
-        states.push(next);
+    let states = pursuit::pursue(&follower, frames, &times_s, first);
+    let lost = states.iter().filter(|s| s.lost).count();
+    if lost * 2 > states.len() {
+        return Err(TrackError::MostlyLost {
+            lost,
+            frames: states.len(),
+            first: states.iter().position(|s| s.lost).unwrap_or(0),
+        });
     }
     let tracked = states
         .iter()
@@ -278,6 +303,7 @@ fn learn<'a>(
         velocity: vec![[0.0; 2]; NODES],
         confidence: vec![1.0; NODES],
         lost: false,
+        ambiguous: false,
     };
     let contrast = Contrast {
         frame,

@@ -1,0 +1,357 @@
+//! What goes wrong with recordings, done to good ones.
+
+use super::Wiggle;
+use camera_ingest::EyeFrame;
+use camera_ingest::track::ClampSample;
+use camera_ingest::{ClampPath, frame::ycc_from_rgb};
+use nalgebra::{Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use std::ops::Range;
+
+fn byte(x: f64) -> u8 {
+    x.round().clamp(0.0, 255.0) as u8
+}
+
+impl Wiggle {
+    fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+        let mut at = 0..;
+        self.frames.retain(|_| wanted(at.next().unwrap()));
+        let mut at = 0..;
+        self.truth.retain(|_| wanted(at.next().unwrap()));
+    }
+
+    /// A part of the frames is missing, here and there.
+    pub(crate) fn dropped(mut self, part: f64, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let lost: Vec<bool> = self
+            .frames
+            .iter()
+            .map(|_| rng.random::<f64>() < part)
+            .collect();
+        self.keep(|i| i == 0 || !lost[i]);
+        self
+    }
+
+    /// Some frames in a row are missing.
+    pub(crate) fn without(mut self, gap: Range<usize>) -> Self {
+        self.keep(|i| !gap.contains(&i));
+        self
+    }
+
+    /// The exposure drifts until the last frame is `last` times as bright.
+    pub(crate) fn drifting(mut self, last: f64) -> Self {
+        let count = (self.frames.len() - 1) as f64;
+        for (i, frame) in self.frames.iter_mut().enumerate() {
+            let gain = 1.0 + (last - 1.0) * i as f64 / count;
+            for y in &mut frame.luma {
+                *y = byte(f64::from(*y) * gain);
+            }
+            for c in frame.cb.iter_mut().chain(&mut frame.cr) {
+                *c = byte(128.0 + (f64::from(*c) - 128.0) * gain);
+            }
+        }
+        self
+    }
+
+    /// Adds noise of a standard deviation (levels of 255; half of it in chroma).
+    pub(crate) fn noisy(mut self, sigma: f64, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (luma, chroma) = (
+            Normal::new(0.0, sigma).unwrap(),
+            Normal::new(0.0, sigma / 2.0).unwrap(),
+        );
+        for frame in &mut self.frames {
+            for y in &mut frame.luma {
+                *y = byte(f64::from(*y) + luma.sample(&mut rng));
+            }
+            for c in frame.cb.iter_mut().chain(&mut frame.cr) {
+                *c = byte(f64::from(*c) + chroma.sample(&mut rng));
+            }
+        }
+        self
+    }
+
+    /// A hand goes before the middle of the rope for some frames.
+    pub(crate) fn covered(mut self, during: Range<usize>) -> Self {
+        let [y, cb, cr] = ycc_from_rgb([198, 150, 125]);
+        let middle = self.nodes() / 2;
+        for i in during {
+            let [u, v] = self.truth[i][middle];
+            // 9 cm by 16 cm at this distance.
+            let inside = |x: f64, w: f64| ((x - u) / 17.0).powi(2) + ((w - v) / 30.0).powi(2) < 1.0;
+            let around = [u - 18.0, v - 31.0, u + 18.0, v + 31.0];
+            paint(&mut self.frames[i], around, |x, w| {
+                inside(x, w).then_some([y, cb, cr])
+            });
+        }
+        self
+    }
+
+    /// A second rope of the same colours swings beside the first one, held by
+    /// something else `away_px` to the side.
+    pub(crate) fn doubled(mut self, away_px: f64, rgb: [[u8; 3]; 2]) -> Self {
+        let [rope, lead] = rgb.map(ycc_from_rgb);
+        let start = self.truth[0].clone();
+        let last = start.len() - 1;
+        for (i, frame) in self.frames.iter_mut().enumerate() {
+            let swing = 0.5 * (std::f64::consts::TAU * 0.9 * i as f64 / 60.0).sin();
+            let points: Vec<[f64; 2]> = start
+                .iter()
+                .map(|p| {
+                    let down = p[1] - start[0][1];
+                    let angle = swing * (1.0 + 0.3 * down / 200.0);
+                    [
+                        start[0][0] + away_px + down * angle.sin(),
+                        start[0][1] + down * angle.cos(),
+                    ]
+                })
+                .collect();
+            let stroke = |frame: &mut EyeFrame, a: [f64; 2], b: [f64; 2], radius: f64, colour| {
+                let low = [0, 1].map(|k| a[k].min(b[k]) - radius - 1.0);
+                let high = [0, 1].map(|k| a[k].max(b[k]) + radius + 1.0);
+                paint(frame, [low[0], low[1], high[0], high[1]], |x, y| {
+                    (distance([x, y], a, b) < radius).then_some(colour)
+                });
+            };
+            for pair in points.windows(2) {
+                stroke(frame, pair[0], pair[1], 2.3, rope);
+            }
+            stroke(frame, points[last], points[last], 7.0, lead);
+        }
+        self
+    }
+
+    /// Twice the motion blur: what differs from the still scene is smeared along
+    /// its own motion. Boxes of lengths 1 and sqrt(3) have together twice the
+    /// spread of the first.
+    pub(crate) fn smeared(mut self) -> Self {
+        let scene = median(&self.frames);
+        let count = self.frames.len();
+        let last_node = self.nodes() - 1;
+        for i in 0..count {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(count - 1));
+            let dt = (self.frames[b].stamp_ns - self.frames[a].stamp_ns) as f64 * 1e-9;
+            let exposure = 3.0_f64.sqrt() * self.camera.exposure_s / dt;
+            let truth = &self.truth;
+            let motion: Vec<[f64; 2]> = (0..=last_node)
+                .map(|n| [0, 1].map(|k| (truth[b][n][k] - truth[a][n][k]) * exposure))
+                .collect();
+            let here = self.truth[i].clone();
+            let original = self.frames[i].clone();
+            let width = original.width_px;
+            let mut smear = |plane: fn(&mut EyeFrame) -> &mut Vec<u8>, step: usize| {
+                let mut from = original.clone();
+                let from = plane(&mut from).clone();
+                let mut still = scene.clone();
+                let still = plane(&mut still).clone();
+                let to = plane(&mut self.frames[i]);
+                let row = width / step;
+                let (low, high) = (0..2).fold(([0.0; 2], [0.0; 2]), |(mut low, mut high), k| {
+                    let along = || here.iter().map(|q| q[k]);
+                    low[k] = along().fold(f64::INFINITY, f64::min) - 50.0;
+                    high[k] = along().fold(0.0, f64::max) + 50.0;
+                    (low, high)
+                });
+                for (at, value) in to.iter_mut().enumerate() {
+                    let p = [(at % row * step) as f64, (at / row) as f64];
+                    if (0..2).any(|k| p[k] < low[k] || p[k] > high[k]) {
+                        continue;
+                    }
+                    let (node, away) = here
+                        .iter()
+                        .map(|q| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2))
+                        .enumerate()
+                        .min_by(|x, y| x.1.total_cmp(&y.1))
+                        .unwrap();
+                    let [du, dv] = motion[node];
+                    if away.sqrt() > 14.0 + du.hypot(dv) {
+                        continue;
+                    }
+                    let samples = 9;
+                    let sum: f64 = (0..samples)
+                        .map(|k| {
+                            let part = (k as f64 + 0.5) / samples as f64 - 0.5;
+                            let x = (p[0] - part * du) / step as f64;
+                            let y = (p[1] - part * dv).round();
+                            let y = y.clamp(0.0, (from.len() / row - 1) as f64) as usize;
+                            let x = x.round().clamp(0.0, (row - 1) as f64) as usize;
+                            f64::from(from[y * row + x]) - f64::from(still[y * row + x])
+                        })
+                        .sum();
+                    *value = byte(f64::from(still[at]) + sum / samples as f64);
+                }
+            };
+            smear(|f| &mut f.luma, 1);
+            smear(|f| &mut f.cb, 2);
+            smear(|f| &mut f.cr, 2);
+        }
+        self
+    }
+
+    /// Out of focus: a Gaussian of the given spread (px).
+    pub(crate) fn defocused(mut self, sigma_px: f64) -> Self {
+        for frame in &mut self.frames {
+            let (w, h) = (frame.width_px, frame.height_px);
+            frame.luma = gaussian(&frame.luma, w, h, [sigma_px; 2]);
+            let chroma = [sigma_px / 2.0, sigma_px];
+            frame.cb = gaussian(&frame.cb, w / 2, h, chroma);
+            frame.cr = gaussian(&frame.cr, w / 2, h, chroma);
+        }
+        self
+    }
+
+    /// Everything seen in a mirror: the same as a mirrored world filmed by a
+    /// mirrored camera.
+    pub(crate) fn mirrored(mut self) -> Self {
+        let flip = |plane: &mut Vec<u8>, width: usize| {
+            plane.chunks_exact_mut(width).for_each(<[u8]>::reverse);
+        };
+        let width = self.frames[0].width_px;
+        for frame in &mut self.frames {
+            flip(&mut frame.luma, width);
+            flip(&mut frame.cb, width / 2);
+            flip(&mut frame.cr, width / 2);
+        }
+        let last = width as f64 - 1.0;
+        self.truth
+            .iter_mut()
+            .flatten()
+            .for_each(|p| p[0] = last - p[0]);
+        let eye = &mut self.camera.left;
+        eye.cx = last - eye.cx;
+        eye.distortion[3] = -eye.distortion[3];
+        let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
+        self.camera.r_w_cam = mirror * self.camera.r_w_cam * mirror;
+        self.camera.p_w_cam_m = mirror * self.camera.p_w_cam_m;
+        let samples = self.clamp.samples().iter();
+        let samples = samples.map(|s| ClampSample {
+            p_w_m: mirror * s.p_w_m,
+            pole_w: mirror * s.pole_w,
+            ..*s
+        });
+        self.clamp = ClampPath::new(samples.collect()).unwrap();
+        self
+    }
+
+    /// A camera turned by 90 degrees about its optical axis: the picture's right
+    /// becomes its bottom.
+    pub(crate) fn turned(mut self) -> Self {
+        let (w, h) = (self.frames[0].width_px, self.frames[0].height_px);
+        for frame in &mut self.frames {
+            // (u, v) -> (h - 1 - v, u).
+            let source = frame.clone();
+            let at = |u: usize, v: usize| source.ycc(v, h - 1 - u);
+            (frame.width_px, frame.height_px) = (h, w);
+            frame.luma = (0..w * h).map(|i| at(i % h, i / h)[0]).collect();
+            let chroma = |k: usize| -> Vec<u8> {
+                (0..w * h / 2)
+                    .map(|i| {
+                        let (u, v) = (i % (h / 2) * 2, i / (h / 2));
+                        at(u, v)[k].midpoint(at(u + 1, v)[k])
+                    })
+                    .collect()
+            };
+            (frame.cb, frame.cr) = (chroma(1), chroma(2));
+        }
+        let last = h as f64 - 1.0;
+        self.truth
+            .iter_mut()
+            .flatten()
+            .for_each(|p| *p = [last - p[1], p[0]]);
+        // New axes: x' = -y, y' = x.
+        let turn = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let camera = &mut self.camera;
+        camera.r_w_cam *= turn.transpose();
+        (camera.width_px, camera.height_px) = (camera.height_px, camera.width_px);
+        let eye = camera.left;
+        let [k1, k2, p1, p2, k3] = eye.distortion;
+        camera.left.fx = eye.fy;
+        camera.left.fy = eye.fx;
+        camera.left.cx = last - eye.cy;
+        camera.left.cy = eye.cx;
+        camera.left.distortion = [k1, k2, p2, -p1, k3];
+        self
+    }
+}
+
+/// Paints within a box `[u0, v0, u1, v1]`.
+fn paint(
+    frame: &mut EyeFrame,
+    [u0, v0, u1, v1]: [f64; 4],
+    colour: impl Fn(f64, f64) -> Option<[f32; 3]>,
+) {
+    let width = frame.width_px;
+    let bound = |x: f64, most: usize| x.clamp(0.0, most as f64) as usize;
+    for v in bound(v0, frame.height_px)..bound(v1, frame.height_px) {
+        for u in bound(u0, width)..bound(u1, width) {
+            if let Some([y, cb, cr]) = colour(u as f64, v as f64) {
+                frame.luma[v * width + u] = y as u8;
+                frame.cb[v * (width / 2) + u / 2] = cb as u8;
+                frame.cr[v * (width / 2) + u / 2] = cr as u8;
+            }
+        }
+    }
+}
+
+fn distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (d, e) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let long = (d[0] * d[0] + d[1] * d[1]).max(1e-9);
+    let part = ((d[0] * e[0] + d[1] * e[1]) / long).clamp(0.0, 1.0);
+    (e[0] - part * d[0]).hypot(e[1] - part * d[1])
+}
+
+/// Median over every seventh frame.
+fn median(frames: &[EyeFrame]) -> EyeFrame {
+    let chosen: Vec<&EyeFrame> = frames.iter().step_by(7).collect();
+    let plane = |pick: fn(&EyeFrame) -> &Vec<u8>| -> Vec<u8> {
+        (0..pick(chosen[0]).len())
+            .map(|at| {
+                let mut values: Vec<u8> = chosen.iter().map(|f| pick(f)[at]).collect();
+                values.sort_unstable();
+                values[values.len() / 2]
+            })
+            .collect()
+    };
+    EyeFrame {
+        luma: plane(|f| &f.luma),
+        cb: plane(|f| &f.cb),
+        cr: plane(|f| &f.cr),
+        ..frames[0].clone()
+    }
+}
+
+fn gaussian(plane: &[u8], width: usize, height: usize, sigma: [f64; 2]) -> Vec<u8> {
+    let kernel = |s: f64| -> Vec<f64> {
+        let reach = (3.0 * s).ceil() as i32;
+        let raw: Vec<f64> = (-reach..=reach)
+            .map(|i| (-0.5 * (f64::from(i) / s).powi(2)).exp())
+            .collect();
+        let sum: f64 = raw.iter().sum();
+        raw.iter().map(|k| k / sum).collect()
+    };
+    let pass = |from: &[f64], k: &[f64], along_row: bool| -> Vec<f64> {
+        let reach = (k.len() / 2) as isize;
+        (0..from.len())
+            .map(|at| {
+                let (u, v) = ((at % width) as isize, (at / width) as isize);
+                k.iter()
+                    .zip(-reach..)
+                    .map(|(k, d)| {
+                        let (x, y) = if along_row { (u + d, v) } else { (u, v + d) };
+                        let x = x.clamp(0, width as isize - 1) as usize;
+                        let y = y.clamp(0, height as isize - 1) as usize;
+                        k * from[y * width + x]
+                    })
+                    .sum()
+            })
+            .collect()
+    };
+    let start: Vec<f64> = plane.iter().map(|&b| f64::from(b)).collect();
+    let rows = pass(&start, &kernel(sigma[0]), true);
+    pass(&rows, &kernel(sigma[1]), false)
+        .into_iter()
+        .map(byte)
+        .collect()
+}

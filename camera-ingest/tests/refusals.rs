@@ -1,0 +1,169 @@
+//! Videos that cannot be used are refused, with the frame and what to do.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::cast_precision_loss,
+    reason = "tests may fail loudly"
+)]
+
+mod recording;
+
+use std::path::PathBuf;
+
+use camera_ingest::source::FrameSource;
+use camera_ingest::track::TrackOptions;
+use camera_ingest::{EyeFrame, TrackError, open_video, track};
+use recording::{Wiggle, folder};
+
+const FRAMES: usize = 60;
+
+fn refusal(wiggle: &Wiggle) -> TrackError {
+    let options = TrackOptions::default();
+    track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options).unwrap_err()
+}
+
+/// Takes the rope out of the frames from `first` on: only what was seen there
+/// before or after it is left.
+fn emptied(mut wiggle: Wiggle, first: usize) -> Wiggle {
+    // The rope has left these columns for good or has not come yet.
+    let (early, late) = (wiggle.frames[0].clone(), wiggle.frames[45].clone());
+    let near = |i: usize, u: usize, v: usize| {
+        let nodes = wiggle.truth[i].iter();
+        nodes
+            .map(|p| (p[0] - u as f64).hypot(p[1] - v as f64))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let mut empty = late.clone();
+    for v in 0..empty.height_px {
+        for u in 0..empty.width_px {
+            if near(45, u, v) < near(0, u, v) {
+                let (at, chroma) = (v * empty.width_px + u, v * empty.width_px / 2 + u / 2);
+                empty.luma[at] = early.luma[at];
+                (empty.cb[chroma], empty.cr[chroma]) = (early.cb[chroma], early.cr[chroma]);
+            }
+        }
+    }
+    for frame in &mut wiggle.frames[first..] {
+        *frame = EyeFrame {
+            stamp_ns: frame.stamp_ns,
+            sequence: frame.sequence,
+            ..empty.clone()
+        };
+    }
+    wiggle
+}
+
+#[test]
+fn no_rope() {
+    let Some(wiggle) = Wiggle::read_first("a1", FRAMES) else {
+        return;
+    };
+    let error = refusal(&emptied(wiggle, 0));
+    assert!(matches!(error, TrackError::NoRope { .. }), "{error}");
+    assert!(error.to_string().contains("frame 0"), "{error}");
+}
+
+#[test]
+fn a_rope_that_goes_away() {
+    let Some(wiggle) = Wiggle::read_first("a1", FRAMES) else {
+        return;
+    };
+    let error = refusal(&emptied(wiggle, 20));
+    let TrackError::MostlyLost { lost, first, .. } = error else {
+        panic!("{error}");
+    };
+    assert!(
+        (38..=40).contains(&lost) && (20..=22).contains(&first),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_camera_that_looks_elsewhere() {
+    let Some(mut wiggle) = Wiggle::read_first("a1", FRAMES) else {
+        return;
+    };
+    wiggle.camera.p_w_cam_m.x += 3.0;
+    let error = refusal(&wiggle);
+    assert!(matches!(error, TrackError::ClampOutside { .. }), "{error}");
+    assert!(error.to_string().contains("frame 0"), "{error}");
+}
+
+#[test]
+fn another_size() {
+    let Some(mut wiggle) = Wiggle::read_first("a1", FRAMES) else {
+        return;
+    };
+    let small = &mut wiggle.frames[5];
+    small.height_px -= 2;
+    small.luma.truncate(small.width_px * small.height_px);
+    small.cb.truncate(small.width_px * small.height_px / 2);
+    small.cr.truncate(small.width_px * small.height_px / 2);
+    let error = refusal(&wiggle).to_string();
+    assert!(error.contains("frame 5 is [672, 374] px"), "{error}");
+}
+
+/// Where the bodies of an AVI's frames lie.
+fn bodies(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let movi = bytes.windows(4).position(|w| w == b"movi").unwrap() + 4;
+    let mut at = movi;
+    let mut found = Vec::new();
+    while bytes.get(at..at + 4) == Some(b"00dc") {
+        let size = u32::from_le_bytes(bytes[at + 4..at + 8].try_into().unwrap()) as usize;
+        found.push(at + 8..at + 8 + size);
+        at += 8 + size + size % 2;
+    }
+    found
+}
+
+fn written(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("refusal-{}-{name}.avi", std::process::id()));
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+#[test]
+fn a_truncated_video() {
+    let Some(folder) = folder("a2") else { return };
+    let bytes = std::fs::read(folder.join("video.avi")).unwrap();
+    let frame = bodies(&bytes)[123].clone();
+    let path = written("cut", &bytes[..frame.start + 1000]);
+    let error = open_video(&path).unwrap_err().to_string();
+    std::fs::remove_file(&path).unwrap();
+    assert!(
+        error.contains("frame 123 ends beyond the file") && error.contains("copy it again"),
+        "{error}"
+    );
+}
+
+#[test]
+fn corrupted_pictures() {
+    let Some(folder) = folder("a2") else { return };
+    let whole = std::fs::read(folder.join("video.avi")).unwrap();
+    let body = bodies(&whole)[17].clone();
+    let middle = body.start + body.len() / 2;
+    type Damage<'a> = (&'a str, &'a dyn Fn(&mut [u8]));
+    let damages: [Damage<'_>; 4] = [
+        ("zeros", &|b| b[middle..middle + 400].fill(0)),
+        ("ones", &|b| b[middle..middle + 400].fill(0xff)),
+        ("noise", &|b| {
+            for (i, x) in b[middle..middle + 400].iter_mut().enumerate() {
+                *x ^= (i * i + 7 * i + 1) as u8;
+            }
+        }),
+        ("head", &|b| b[body.start..body.start + 40].fill(0x55)),
+    ];
+    for (name, damage) in damages {
+        let mut bytes = whole.clone();
+        damage(&mut bytes);
+        let path = written(name, &bytes);
+        let mut video = open_video(&path).unwrap();
+        assert!(video.read_left(16).is_ok(), "{name}");
+        let read = video.read_left(17).map(|_| ());
+        std::fs::remove_file(&path).unwrap();
+        let error = read.expect_err(name).to_string();
+        assert!(error.contains("frame 17"), "{name}: {error}");
+    }
+}

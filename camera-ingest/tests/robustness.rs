@@ -1,0 +1,203 @@
+//! The tracker on recordings to which something bad was done: it stays nearly as
+//! exact as on the good ones or says that it lost the rope, and is never wrong
+//! with confidence.
+//!
+//! Of each recording the first two seconds are used; all of it with
+//! `WAG_LONG_TESTS=1`.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "tests may fail loudly"
+)]
+
+#[path = "recording/alter.rs"]
+mod alter;
+mod recording;
+
+use std::sync::OnceLock;
+
+use camera_ingest::track;
+use camera_ingest::track::TrackOptions;
+use recording::{Wiggle, quantile};
+
+/// Frames of a recording that are used.
+const SHORT: usize = 120;
+/// A node that is further off is wrong (px).
+const WRONG_PX: f64 = 20.0;
+
+/// A recording and how well it is tracked as it is.
+struct Clean {
+    name: &'static str,
+    wiggle: Wiggle,
+    outcome: Outcome,
+}
+
+/// Both recordings, read and tracked once; empty, said aloud, where they are not.
+fn clean() -> &'static [Clean] {
+    static CLEAN: OnceLock<Vec<Clean>> = OnceLock::new();
+    CLEAN.get_or_init(|| {
+        let whole = std::env::var_os("WAG_LONG_TESTS").is_some();
+        let most = if whole { usize::MAX } else { SHORT };
+        let read = |name| {
+            let wiggle = Wiggle::read_first(name, most)?;
+            Some(Clean {
+                name,
+                outcome: outcome(&wiggle),
+                wiggle,
+            })
+        };
+        ["a1", "a2"].into_iter().filter_map(read).collect()
+    })
+}
+
+/// How well a recording was tracked.
+#[derive(Debug)]
+struct Outcome {
+    /// Median and 95th percentile over the frames not lost (px).
+    error_px: [f64; 2],
+    lost: usize,
+    /// Frame, node, error and confidence of what was wrong with confidence.
+    wrong: Vec<(usize, usize, f64, f64)>,
+}
+
+fn outcome(wiggle: &Wiggle) -> Outcome {
+    let options = TrackOptions {
+        keypoints: wiggle.nodes(),
+        ..TrackOptions::default()
+    };
+    let result = track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options).unwrap();
+    let errors = wiggle.errors(&result);
+    let frames = &result.track.frames;
+    let kept: Vec<f64> = errors
+        .iter()
+        .zip(frames)
+        .filter(|(_, frame)| !frame.lost)
+        .flat_map(|(errors, _)| errors.iter().copied())
+        .collect();
+    let mut wrong = Vec::new();
+    for (index, (errors, frame)) in errors.iter().zip(frames).enumerate() {
+        for (node, (&error, &confidence)) in errors.iter().zip(&frame.confidence).enumerate() {
+            if error > WRONG_PX && confidence > 0.5 {
+                wrong.push((index, node, error, confidence));
+            }
+        }
+    }
+    Outcome {
+        error_px: [0.5, 0.95].map(|q| quantile(&kept, q)),
+        lost: frames.iter().filter(|f| f.lost).count(),
+        wrong,
+    }
+}
+
+/// Twice the error of the clean recording at most, or lost; nothing wrong with
+/// confidence. At most so many frames may be given up.
+fn assert_bears_on(clean: &Clean, what: &str, most_lost: usize, altered: &Wiggle) {
+    let (name, before) = (clean.name, &clean.outcome);
+    let after = outcome(altered);
+    println!(
+        "{name}, {what}: {:.2?} -> {:.2?} px, {} lost, {} wrong",
+        before.error_px,
+        after.error_px,
+        after.lost,
+        after.wrong.len()
+    );
+    assert!(
+        after.wrong.is_empty(),
+        "{name}, {what}: first {:.2?}",
+        after.wrong[0]
+    );
+    assert!(
+        after.lost <= most_lost,
+        "{name}, {what}: {} lost",
+        after.lost
+    );
+    for (before, after) in before.error_px.iter().zip(after.error_px) {
+        assert!(after <= 2.0 * before, "{name}, {what}: {after:.2} px");
+    }
+}
+
+/// Both recordings.
+fn assert_bears(what: &str, most_lost: usize, alter: impl Fn(Wiggle) -> Wiggle) {
+    for clean in clean() {
+        assert_bears_on(clean, what, most_lost, &alter(clean.wiggle.clone()));
+    }
+}
+
+#[test]
+fn a_fifth_of_the_frames_dropped() {
+    assert_bears("a fifth dropped", 0, |w| w.dropped(0.2, 7));
+}
+
+#[test]
+fn half_a_second_missing() {
+    assert_bears("30 frames missing", 30, |w| w.without(60..90));
+}
+
+#[test]
+fn brightness_drifts_down_and_up() {
+    assert_bears("40 % darker", 20, |w| w.drifting(0.6));
+    assert_bears("40 % brighter", 20, |w| w.drifting(1.4));
+}
+
+#[test]
+fn a_hand_before_the_rope() {
+    assert_bears("hand", 20, |w| w.covered(50..70));
+}
+
+/// Spread of a still pixel's luma over time; compression takes some of it away.
+fn noise(wiggle: &Wiggle) -> f64 {
+    let pairs = wiggle.frames[10].luma.iter().zip(&wiggle.frames[11].luma);
+    let mut squares: Vec<f64> = pairs
+        .map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2))
+        .collect();
+    squares.sort_by(f64::total_cmp);
+    // What moves is less than a tenth.
+    let still = &squares[..squares.len() * 9 / 10];
+    (still.iter().sum::<f64>() / still.len() as f64 / 2.0).sqrt()
+}
+
+#[test]
+fn twice_the_noise() {
+    assert_bears("twice the noise", 0, |w| {
+        let more = 3.0_f64.sqrt() * noise(&w);
+        println!("noise {:.2} and {more:.2} levels", noise(&w));
+        w.noisy(more, 3)
+    });
+}
+
+#[test]
+fn twice_the_blur() {
+    assert_bears("twice the motion blur", 0, Wiggle::smeared);
+    // The one with less contrast.
+    if let Some(clean) = clean().last() {
+        let altered = clean.wiggle.clone().defocused(1.2);
+        assert_bears_on(clean, "out of focus", 0, &altered);
+    }
+}
+
+#[test]
+fn mirrored_and_turned_cameras() {
+    assert_bears("mirrored", 0, Wiggle::mirrored);
+    assert_bears("turned", 0, Wiggle::turned);
+}
+
+#[test]
+fn a_second_rope_moves_beside() {
+    for clean in clean() {
+        let rgb = if clean.name == "a1" {
+            [[182, 91, 48], [243, 219, 28]]
+        } else {
+            [[124, 85, 60], [31, 30, 26]]
+        };
+        for away_px in [110.0, -90.0] {
+            let altered = clean.wiggle.clone().doubled(away_px, rgb);
+            assert_bears_on(clean, "a second rope", 20, &altered);
+        }
+    }
+}
