@@ -10,7 +10,6 @@ use planner::cmaes::{CmaOptions, RestartRule, Restarted, StopReason};
 
 const TARGET: f64 = 1e-8;
 const EVALUATIONS_MAX: usize = 400_000;
-const SEEDS: u64 = 20;
 
 /// Name, mean and deviation of the first generation, and the function.
 type Case = (&'static str, f64, f64, fn(&[f64]) -> f64);
@@ -41,8 +40,14 @@ const CASES: [Case; 5] = [
     }),
 ];
 
-fn line((name, mean, std_dev, f): &Case, n: usize, population: Option<usize>, restarts: u64) {
-    for seed in 0..SEEDS {
+fn line(
+    (name, mean, std_dev, f): &Case,
+    n: usize,
+    population: Option<usize>,
+    restarts: u64,
+    seeds: u64,
+) {
+    for seed in 0..seeds {
         let mut options = CmaOptions::unbounded(vec![*mean; n], *std_dev, seed);
         options.population = population.unwrap_or(options.population);
         options.stop.fitness_target = TARGET;
@@ -62,13 +67,21 @@ fn line((name, mean, std_dev, f): &Case, n: usize, population: Option<usize>, re
     }
 }
 
+/// `cmaes_table [SEEDS] [FUNCTION]`: 20 seeds of all functions if left out.
 fn main() {
+    let seeds = std::env::args()
+        .nth(1)
+        .map_or(20, |s| s.parse().expect("a number of seeds"));
+    let only = std::env::args().nth(2);
+    let wanted = |case: &Case| only.as_ref().is_none_or(|name| name == case.0);
     println!("function,dimensions,seed,population,restarts,evaluations,solved");
     for (n, many) in [(9, 180), (21, 420)] {
-        for case in &CASES {
+        for case in CASES.iter().filter(|case| wanted(case)) {
             let population = (case.0 == "rastrigin").then_some(many);
-            line(case, n, population, 0);
+            line(case, n, population, 0, seeds);
         }
     }
-    line(&CASES[4], 9, None, 7);
+    if wanted(&CASES[4]) {
+        line(&CASES[4], 9, None, 7, seeds);
+    }
 }

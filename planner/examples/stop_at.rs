@@ -67,6 +67,7 @@ fn main() {
             ..PlanOptions::default()
         },
         belief: Belief::default(),
+        following: None,
     };
     let planned = plan_throw(&task, &request, &mut |_| ControlFlow::Continue(()))
         .expect("the target is in reach");

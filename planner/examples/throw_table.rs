@@ -92,6 +92,7 @@ fn main() {
                 ..config.search
             },
             belief: Belief::default(),
+            following: None,
         };
         let start = Instant::now();
         let planned = match plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(())) {

@@ -4,7 +4,7 @@
 //! parameters to keypoints (the paper's Φ-CMA-ES), and [`tasks`] finds the joint
 //! waypoints of a throw (CMA-ES-traj) with the pieces of [`trajopt`] and
 //! [`collide`]. [`wiggle`] makes the motion that is filmed. [`response`] finds how
-//! the arm follows its setpoints. [`filming`] makes recordings of known ropes with
+//! the arm follows its setpoints, and [`preflight`] says what it will make of a plan. [`filming`] makes recordings of known ropes with
 //! the errors of real ones. The physics is that of `rope-sim`.
 #![forbid(unsafe_code)]
 #![cfg_attr(
@@ -25,6 +25,7 @@ pub mod collide;
 pub mod filming;
 pub mod observation;
 pub mod phi;
+pub mod preflight;
 pub mod process;
 pub mod response;
 pub mod ropes;

@@ -115,6 +115,10 @@ pub struct Plan {
     /// Error to expect over ropes drawn from the posterior.
     #[serde(default)]
     pub forecast: Option<ErrorForecast>,
+    /// Where the response of the arm that it is planned for was measured; none for an arm
+    /// that does exactly what it is told.
+    #[serde(default)]
+    pub arm_response: Option<String>,
     /// Simulations used.
     pub simulations: u32,
     /// Candidates drawn again because they broke a limit.

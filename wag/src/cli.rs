@@ -1,5 +1,7 @@
 //! The command line.
 
+use crate::command::check::CheckArgs;
+use crate::command::plan::PlanArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::net::{IpAddr, ToSocketAddrs};
 use std::path::PathBuf;
@@ -352,50 +354,6 @@ pub enum PlanCommand {
     Drape(PlanArgs),
 }
 
-/// Arguments of `wag plan`.
-#[derive(Debug, Args)]
-pub struct PlanArgs {
-    /// Rope parameters.
-    #[arg(long)]
-    pub rope: PathBuf,
-    /// Target x,y,z in the arm's base frame (m).
-    #[arg(long, allow_hyphen_values = true)]
-    pub target: Point,
-    /// Limits of the arm; default: the built-in xArm 7.
-    #[arg(long)]
-    pub limits: Option<PathBuf>,
-    /// Tuned values of the planner (TOML); default: the built-in ones.
-    #[arg(long)]
-    pub config: Option<PathBuf>,
-    /// Seed of the search.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
-    pub seed: u64,
-    /// The plan (JSON).
-    #[arg(long)]
-    pub out: PathBuf,
-    /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
-    #[arg(long)]
-    pub csv: Option<PathBuf>,
-    /// Write the plan even if the tip is predicted to miss the target by more than
-    /// 5 cm, or the task to fail.
-    #[arg(long)]
-    pub allow_miss: bool,
-    /// Plan for this many ropes drawn from what identification left open, and forecast
-    /// the error; 0 plans for the likeliest rope alone.
-    #[arg(long, default_value_t = 0, value_name = "K")]
-    pub robust: usize,
-}
-
-/// Arguments of `wag check`.
-#[derive(Debug, Args)]
-pub struct CheckArgs {
-    /// The plan.
-    pub plan: PathBuf,
-    /// Limits of the arm; default: the built-in xArm 7.
-    #[arg(long)]
-    pub limits: Option<PathBuf>,
-}
-
 /// Arguments of `wag throw`.
 #[derive(Debug, Args)]
 pub struct ThrowArgs {
@@ -592,7 +550,7 @@ pub enum ProcessName {
 }
 
 /// A seed.
-fn seed(text: &str) -> Result<u64, String> {
+pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
 }

@@ -566,7 +566,38 @@ const CASES: &[Case] = &[
         2,
         &["rope.toml", "posterior", "--robust"],
     ),
+    (
+        &[
+            "plan",
+            "strike",
+            "--rope",
+            "rope.toml",
+            "--target",
+            "1,0,0.3",
+            "--arm-response",
+            "limits.toml",
+            "--out",
+            "p.json",
+        ],
+        2,
+        &["arm response", "limits.toml"],
+    ),
     (&["check", "none.json"], 2, &["none.json"]),
+    (
+        &["check", "none.json", "--fence", "-1,1,0.2"],
+        2,
+        &["--fence", "6 numbers"],
+    ),
+    (
+        &["check", "none.json", "--fence", "-1,1,0.2,-0.2,0,1"],
+        2,
+        &["boundary", "in y"],
+    ),
+    (
+        &["check", "none.json", "--speed-factor", "0"],
+        2,
+        &["--speed-factor"],
+    ),
     (&["check", "damaged.json"], 2, &["damaged.json"]),
     (
         &["throw", "damaged.json", "--arm", "127.0.0.1"],

@@ -76,6 +76,9 @@ pub struct ArmConfig {
     pub obstacles: Vec<Obstacle>,
     /// Whether self collision is looked for at the start (register 77).
     pub self_collision_check: bool,
+    /// Safety boundary at the start, as register 52 holds it: x+, x-, y+, y-, z+, z-
+    /// (mm); none if it is switched off.
+    pub fence_mm: Option<[i32; 6]>,
     /// Faults to inject.
     pub faults: FaultScript,
 }
@@ -100,6 +103,7 @@ impl Default for ArmConfig {
             intake: Intake::default(),
             obstacles: Vec::new(),
             self_collision_check: false,
+            fence_mm: None,
             faults: FaultScript::default(),
         }
     }

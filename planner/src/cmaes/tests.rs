@@ -232,3 +232,20 @@ fn integer_coordinates_reach_their_optimum() {
     o.integers = vec![3];
     assert!(matches!(CmaEs::new(o), Err(CmaError::Integer { .. })));
 }
+
+/// Begun so narrowly that all candidates round to one number, integers move all the
+/// same: their deviation is lifted.
+#[test]
+fn integers_move_from_a_start_that_rounds_to_one_number() {
+    for seed in 0..5 {
+        let mut o = options(6, 0.0, 1.0, seed);
+        o.integers = vec![0, 1];
+        o.std_dev[0] = 0.02;
+        o.std_dev[1] = 0.02;
+        let (search, evaluations) = run(o, |x| {
+            (x[0] - 4.0).powi(2) + (x[1] + 3.0).powi(2) + sphere(&x[2..])
+        });
+        assert_eq!(search.stop(), Some(StopReason::FitnessTarget), "{seed}");
+        assert!(evaluations < 10_000, "{evaluations}");
+    }
+}

@@ -135,6 +135,19 @@ impl ArmShape {
         });
         Self { capsules }
     }
+
+    /// Smallest gap between links two or more apart, negative when they overlap (m): the
+    /// bare capsules, without the pole, which the arm does not know of.
+    #[must_use]
+    pub fn self_clearance_m(&self) -> f64 {
+        let links = &self.capsules[..LINK_CAPSULES.len()];
+        let pairs = links.iter().enumerate().flat_map(|(i, (a, one))| {
+            let rest = links[i + 1..].iter();
+            rest.filter(move |(b, _)| b.order() >= a.order() + 2)
+                .map(move |(_, other)| one.distance_to_m(other))
+        });
+        pairs.fold(f64::INFINITY, f64::min) + 2.0 * WRAP_MARGIN_M
+    }
 }
 
 /// Contacts of the tool side (links 6, 7 and pole) with the rest of the arm
@@ -211,6 +224,15 @@ mod tests {
             }
         }
         assert!(inside > 5, "{inside}");
+    }
+
+    /// The vendor's zero pose is free, its smallest gap 11 mm.
+    #[test]
+    fn the_zero_pose_is_free_by_eleven_millimetres() {
+        let gap_m = ArmShape::at(&JointVector::ZERO).self_clearance_m();
+        assert!((gap_m - 0.011).abs() < 0.002, "{gap_m}");
+        let folded = ArmShape::at(&JointVector([0.0, 0.0, 0.0, 0.0, 0.0, 3.1, 0.0]));
+        assert!(folded.self_clearance_m() < 0.0);
     }
 
     #[test]

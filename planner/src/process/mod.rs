@@ -201,6 +201,7 @@ fn strike(
             ..config.search
         },
         belief: Belief::default(),
+        following: None,
     };
     let mut generation = 0;
     let plan = plan_throw(&*task, &request, &mut |p| {

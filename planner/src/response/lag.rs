@@ -22,6 +22,16 @@ struct State {
 const SERIES_BELOW: f64 = 1e-3;
 
 impl Lag {
+    /// Time from a step's sending until less than a ten-thousandth of it is missing (s): that of
+    /// the slower of its two decays.
+    pub(super) fn arrival_s(&self) -> f64 {
+        const LEFT: f64 = 1e-4;
+        let z = self.damping_ratio;
+        let slowest = self.natural_frequency_rad_s * (z - (z * z - 1.0).max(0.0).sqrt());
+        // A critical decay has a linear term as well; the factor covers it.
+        self.dead_time_s + 1.4 * -LEFT.ln() / slowest.max(1e-3)
+    }
+
     /// Free motion for `dt_s` under a constant setpoint, exact for any damping.
     fn advance(&self, state: State, dt_s: f64) -> State {
         let (w, z) = (self.natural_frequency_rad_s, self.damping_ratio);

@@ -5,7 +5,8 @@
 //! dead time and second-order lag (gain one) by maximum likelihood: the lag is
 //! integrated exactly through the staircase of setpoints, so that neither the
 //! cycle nor the jitter of either side limits the resolution. [`delay`] tells
-//! how long a setpoint takes until the arm names it as its target.
+//! how long a setpoint takes until the arm names it as its target. [`Following`] is the
+//! way back: the motion of an arm so measured.
 //!
 //! It lives with the planner, and not with the commands, because it is
 //! identification: plans are to be made through the lag it finds. It sees no
@@ -14,9 +15,12 @@
 pub mod delay;
 pub mod excitation;
 mod fit;
+mod following;
 mod lag;
 mod noise;
 mod window;
+
+pub use following::{FollowError, Following};
 
 use fit::Fit;
 use shared_types::response::{Estimate, JointResponse, NotExcited, TrackingLag};

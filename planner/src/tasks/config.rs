@@ -171,8 +171,11 @@ pub struct PlanOptions {
     pub searches: usize,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Step of the rope simulation (s).
+    /// Step of the rope simulation for finalists and their polish (s).
     pub step_s: f64,
+    /// Step in the generations of a search, which only rank (s); `step_s` if that is
+    /// greater.
+    pub search_step_s: f64,
     /// Threads.
     pub threads: usize,
     /// Error below which no further search begins (m).
@@ -190,6 +193,7 @@ impl Default for PlanOptions {
             searches: 3,
             seed: 0,
             step_s: 5e-4,
+            search_step_s: 1e-3,
             threads: 2,
             good_enough_m: 1e-3,
             stop_below_m: None,

@@ -165,13 +165,9 @@ impl ThrowTask for Drape {
 
     /// Up and back, forth over the wall, then down before it.
     fn warm_start(&self, rope: &RopeParams) -> Vec<PolePose> {
-        let [x, y, z] = self.target_m;
-        let rho_m = x.hypot(y);
         let l = rope.length_m;
-        let pose = |d_rho: f64, up_m: f64, tilt_rad: f64| PolePose {
-            rho_m: rho_m + d_rho,
-            z_m: z + up_m,
-            tilt_rad,
+        let pose = |outside_m, above_m, tilt_rad| {
+            PolePose::beside(self.target_m, outside_m, above_m, tilt_rad)
         };
         vec![
             pose(-0.25, 0.7 * l, 0.5),

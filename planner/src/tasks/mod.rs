@@ -4,11 +4,14 @@
 mod belief;
 mod config;
 mod drape;
+mod finalists;
 mod lob;
 mod planning;
 mod reach;
+mod reach_map;
 mod robust;
 mod scene;
+mod setup;
 mod strike;
 mod task;
 #[cfg(test)]
@@ -21,12 +24,14 @@ pub use drape::{Drape, DrapeConfig};
 pub use lob::{Lob, LobConfig};
 pub use planning::{PlanRequest, Planned, plan_throw};
 pub use reach::{check_reach, start_pose_for};
+pub use reach_map::{Cell, ReachMap};
 pub use scene::PlanarScene;
 pub use strike::Strike;
 pub use task::{ThrowTask, proximity_reward, simulator_for, verdict};
 pub use throw::{ThrowOutcome, ThrowSimulator};
 
 use crate::cmaes::CmaError;
+use crate::response::FollowError;
 use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
 use shared_types::TrajectoryError;
@@ -94,6 +99,9 @@ pub enum PlanError {
     /// Neighbouring throws could not be simulated.
     #[error(transparent)]
     Slopes(#[from] SensitivityError),
+    /// How the arm moves is not known.
+    #[error(transparent)]
+    Follow(#[from] FollowError),
     /// The best throw found still lets arm or pole collide.
     #[error(
         "every throw found within {simulations} simulations lets the arm or its pole collide: move the target away from the arm or search longer"

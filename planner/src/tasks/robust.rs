@@ -1,6 +1,7 @@
 //! Throws that are good for every rope it might be.
 
-use super::planning::{Finalist, Point, Setup};
+use super::finalists::Finalist;
+use super::setup::{Point, Setup};
 use super::{Belief, PlanError, PlanProgress, ThrowOutcome};
 use crate::trajopt::{SearchOptions, Valued, search};
 use shared_types::{ErrorForecast, JointTrajectory};

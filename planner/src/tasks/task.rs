@@ -101,6 +101,7 @@ pub fn simulator_for(
             column_half_width_m: config.clearance.column_half_width_m,
             floor_z_m: config.clearance.floor_z_m,
         },
+        following: None,
         threads: options.threads.max(1),
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::collide::ContactCounts;
 use crate::ropes::random_rope;
-use planning::Setup;
+use setup::Setup;
 use shared_types::{Limits, Plan, Task};
 use std::ops::ControlFlow;
 
@@ -23,6 +23,7 @@ fn request() -> PlanRequest {
             ..PlanOptions::default()
         },
         belief: Belief::default(),
+        following: None,
     }
 }
 
@@ -58,7 +59,7 @@ fn fitness_is_the_sum_of_its_named_terms() {
     let mut x = setup.space.resting();
     x[0] += 0.2;
     let moved = setup.space.decode(&x).unwrap();
-    assert!((planning::joint_motion_rad(&moved) - 0.4).abs() < 1e-12);
+    assert!((setup::joint_motion_rad(&moved) - 0.4).abs() < 1e-12);
     let lost = ThrowOutcome {
         finite: false,
         ..outcome

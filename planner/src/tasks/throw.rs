@@ -5,6 +5,7 @@ use crate::collide::{
     ArmShape, Block, ContactCounts, RopeShape, Scene as Surroundings, block_contacts,
     rope_contacts, tool_contacts,
 };
+use crate::response::Following;
 use crate::workers::map_in_order;
 use nalgebra::Vector3;
 use rope_sim::{
@@ -58,6 +59,8 @@ pub struct ThrowSimulator {
     pub contact_period_s: f64,
     /// Column and floor.
     pub surroundings: Surroundings,
+    /// How the arm follows what it is told; none for an arm that does exactly that.
+    pub following: Option<Following>,
     /// Threads.
     pub threads: usize,
 }
@@ -86,7 +89,18 @@ impl ThrowSimulator {
         }
     }
 
-    /// Throws each trajectory with its rope. Results are in the order of the
+    /// What the arm does when it is told a trajectory.
+    ///
+    /// # Errors
+    /// A joint moves whose response is not known.
+    pub fn motion(&self, command: &JointTrajectory) -> Result<JointTrajectory, PlanError> {
+        match &self.following {
+            None => Ok(*command),
+            Some(following) => Ok(following.motion(command)?),
+        }
+    }
+
+    /// Commands each trajectory with its rope. Results are in the order of the
     /// input and do not depend on the number of threads.
     ///
     /// # Errors
@@ -95,11 +109,13 @@ impl ThrowSimulator {
         &self,
         throws: &[(&RopeParams, &JointTrajectory)],
     ) -> Result<Vec<ThrowOutcome>, PlanError> {
-        let motion_s = throws
+        let motions = throws
             .iter()
-            .map(|(_, t)| t.duration_s())
-            .fold(0.0, f64::max);
-        let arms: Vec<PlannedArm> = throws.iter().map(|(_, t)| PlannedArm::new(**t)).collect();
+            .map(|(_, command)| self.motion(command))
+            .collect::<Result<Vec<_>, _>>()?;
+        let motion_s = motions.iter().map(JointTrajectory::duration_s);
+        let motion_s = motion_s.fold(0.0, f64::max);
+        let arms: Vec<PlannedArm> = motions.iter().map(|m| PlannedArm::new(*m)).collect();
         let candidates: Vec<Candidate<'_>> = throws
             .iter()
             .zip(&arms)
@@ -119,33 +135,31 @@ impl ThrowSimulator {
         };
         let options = self.options(motion_s, frames);
         let rollouts = roll_out_in(&self.scene, &candidates, &options)?;
-        let jobs: Vec<_> = throws.iter().zip(&rollouts).collect();
+        let jobs: Vec<_> = throws.iter().zip(&motions).zip(&rollouts).collect();
         Ok(map_in_order(
             &jobs,
             self.threads,
-            |((rope, trajectory), rollout)| {
-                self.outcome(rope, trajectory, rollout, options.horizon_s)
-            },
+            |(((rope, _), motion), rollout)| self.outcome(rope, motion, rollout, options.horizon_s),
         ))
     }
 
     fn outcome(
         &self,
         rope: &RopeParams,
-        trajectory: &JointTrajectory,
+        motion: &JointTrajectory,
         rollout: &Rollout,
         end_s: f64,
     ) -> ThrowOutcome {
         let mut contacts = ContactCounts::default();
         let shape = RopeShape::from(rope);
         let mut nodes: Vec<Vector3<f64>> = Vec::new();
-        let mut arm = ArmShape::at(&trajectory.state_at(0.0).q);
+        let mut arm = ArmShape::at(&motion.state_at(0.0).q);
         let mut of_arm = ContactCounts::default();
         let mut time_s = 0.0;
         for frame in 0..rollout.nodes.frames() {
             // Once the arm stands, only the rope moves on.
-            if time_s < trajectory.duration_s() + self.contact_period_s {
-                arm = ArmShape::at(&trajectory.state_at(time_s).q);
+            if time_s < motion.duration_s() + self.contact_period_s {
+                arm = ArmShape::at(&motion.state_at(time_s).q);
                 of_arm = tool_contacts(&arm, &self.surroundings);
                 of_arm.pole_robot += block_contacts(&arm, &self.keep_clear);
             }

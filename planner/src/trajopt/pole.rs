@@ -39,6 +39,18 @@ impl PolePose {
         }
     }
 
+    /// A pose by how far the pole's end is outside and above a point (m), and its tilt
+    /// (rad).
+    #[must_use]
+    pub fn beside(point_m: [f64; 3], outside_m: f64, above_m: f64, tilt_rad: f64) -> Self {
+        let [x, y, z] = point_m;
+        Self {
+            rho_m: x.hypot(y) + outside_m,
+            z_m: z + above_m,
+            tilt_rad,
+        }
+    }
+
     fn minus(self, other: Self) -> Vector3<f64> {
         let turn = (self.tilt_rad - other.tilt_rad).sin();
         Vector3::new(self.rho_m - other.rho_m, self.z_m - other.z_m, 0.3 * turn)

@@ -8,6 +8,7 @@
 
 use super::decode::WaypointSpace;
 use super::screen::Screen;
+use crate::response::Following;
 use crate::tasks::PlanError;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -47,6 +48,8 @@ pub struct Polish<'a> {
     pub screen: &'a Screen,
     /// The rope.
     pub rope: &'a RopeParams,
+    /// How the arm follows what it is told.
+    pub following: Option<&'a Following>,
     /// Rope simulation for slopes, and for the miss itself.
     pub slopes: &'a SimOptions,
     /// The finer one.
@@ -119,8 +122,13 @@ fn miss_of(work: &Polish<'_>, approach: &ClosestApproach) -> Vector3<f64> {
 
 impl Polish<'_> {
     fn motions(&self, points: &[impl AsRef<[f64]>]) -> Result<Vec<PlannedArm>, PlanError> {
-        let decode =
-            |x: &[f64]| -> Result<JointTrajectory, PlanError> { Ok(self.space.decode(x)?) };
+        let decode = |x: &[f64]| -> Result<JointTrajectory, PlanError> {
+            let command = self.space.decode(x)?;
+            Ok(match self.following {
+                None => command,
+                Some(following) => following.motion(&command)?,
+            })
+        };
         points
             .iter()
             .map(|x| Ok(PlannedArm::new(decode(x.as_ref())?)))

@@ -118,6 +118,7 @@ fn judged(
             ..config.search
         },
         belief: Belief::default(),
+        following: None,
     };
     let planned = match plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(())) {
         Err(PlanError::OnlyCollisions { .. }) => return Ok(None),

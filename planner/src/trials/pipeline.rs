@@ -70,6 +70,7 @@ impl Thrower<'_> {
                 ..self.options
             },
             belief: Belief::default(),
+            following: None,
         };
         plan_throw(self.task, &request, &mut |_| ControlFlow::Continue(()))
     }

@@ -1,16 +1,52 @@
 //! `wag check`: preflight of a plan.
 
-use crate::cli::CheckArgs;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::table;
 use anyhow::{Context, anyhow, ensure};
+use clap::{Args, ValueEnum};
 use comfy_table::Table;
+use planner::collide::{ArmShape, Scene, tool_contacts};
+use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
 use serde_json::{Value, json};
-use shared_types::Plan;
 use shared_types::limits::{LimitKind, Margin};
 use shared_types::plan::trajectory_hash_hex;
-use std::path::Path;
+use shared_types::{JointTrajectory, Plan, WireMode};
+use std::path::{Path, PathBuf};
+
+/// How setpoints reach the arm, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum WireName {
+    /// Joint positions, the arm's mode 1.
+    Servo,
+    /// Joint velocities, the arm's mode 4.
+    Velocity,
+}
+
+/// Arguments of `wag check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The plan.
+    pub plan: PathBuf,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// How setpoints reach the arm.
+    #[arg(long, value_enum, default_value_t = WireName::Servo)]
+    pub wire: WireName,
+    /// Linear speed limit set in the arm, as a factor of 1 m/s (servo only).
+    #[arg(long, default_value_t = 1.2, value_name = "FACTOR")]
+    pub speed_factor: f64,
+    /// Safety boundary set in the arm: x-,x+,y-,y+,z-,z+ of the tool (m).
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        value_name = "SIDES"
+    )]
+    pub fence: Option<Vec<f64>>,
+}
 
 /// Reads a plan and verifies that it is whole.
 pub fn read_plan(path: &Path) -> anyhow::Result<Plan> {
@@ -34,16 +70,6 @@ fn kind_name(kind: LimitKind) -> &'static str {
     }
 }
 
-/// The arm's own error code for breaking a limit, where it has one.
-fn arm_code(kind: LimitKind) -> Option<&'static str> {
-    match kind {
-        LimitKind::PositionMin | LimitKind::PositionMax => Some("C23"),
-        LimitKind::Velocity => Some("C24"),
-        LimitKind::TcpSpeed => Some("C60"),
-        LimitKind::Acceleration => None,
-    }
-}
-
 fn margin_table(margins: &[Margin]) -> Table {
     let rows = margins.iter().map(|m| {
         let who = if m.joint == 0 {
@@ -62,7 +88,62 @@ fn margin_table(margins: &[Margin]) -> Table {
     table::numbers(["limit", "extreme", "allowed", "at (s)", "left"], 0, rows)
 }
 
+fn rule_table(margins: &[RuleMargin]) -> Table {
+    let rows = margins.iter().map(|m| {
+        [
+            m.rule
+                .code()
+                .map_or_else(|| "-".to_owned(), |c| format!("C{c}")),
+            m.rule.name().to_owned(),
+            format!("{:.4}", m.value),
+            format!("{:.4}", m.limit),
+            format!("{:.3}", m.time_s),
+            format!("{:.4} {}", m.left(), m.rule.unit()),
+        ]
+    });
+    let header = ["arm", "judges", "extreme", "stops at", "at (s)", "left"];
+    table::numbers(header, 0, rows)
+}
+
+/// What the arm is set up to judge by.
+fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
+    ensure!(
+        args.speed_factor > 0.0 && args.speed_factor.is_finite(),
+        "--speed-factor is {}, but must be above 0",
+        args.speed_factor
+    );
+    let fence = match args.fence.as_deref() {
+        None => None,
+        Some([x0, x1, y0, y1, z0, z1]) => Some(Fence::new([*x0, *x1, *y0, *y1, *z0, *z1])?),
+        Some(sides) => anyhow::bail!("--fence takes 6 numbers, found {}", sides.len()),
+    };
+    Ok(JudgedArm {
+        wire: match args.wire {
+            WireName::Servo => WireMode::ServoPosition,
+            WireName::Velocity => WireMode::JointVelocity,
+        },
+        speed_factor: args.speed_factor,
+        fence,
+    })
+}
+
+/// When pole or wrist first come to arm, column or floor (s), which the arm would only
+/// feel.
+fn tool_contact_s(trajectory: &JointTrajectory, period_s: f64) -> Option<f64> {
+    let scene = Scene::default();
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a trajectory lasts at most ten minutes"
+    )]
+    let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
+    (0..=cycles)
+        .map(|k| f64::from(k) * period_s)
+        .find(|t| !tool_contacts(&ArmShape::at(&trajectory.state_at(*t).q), &scene).none())
+}
+
 pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let arm = judged_arm(args).or_input()?;
     let plan = read_plan(&args.plan).or_input()?;
     let limits = files::read_limits(args.limits.as_deref()).or_input()?;
     let margins = limits.margins(&plan.trajectory);
@@ -70,31 +151,51 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
         .iter()
         .filter(|m| m.left.is_nan() || m.left < 0.0)
         .collect();
+    let judged = arm_margins(&plan.trajectory, &limits, &arm);
     if !quiet {
-        println!("{}", margin_table(&margins));
+        println!("{}\n\n{}", margin_table(&margins), rule_table(&judged));
     }
+    let refuse = |what: String| {
+        Err(Failure::failed(anyhow!(
+            "plan `{}` {what}",
+            args.plan.display()
+        )))
+    };
+    let stop = first_stop(&judged);
+    let arm_says = stop.map_or_else(
+        || "the controller would refuse it".to_owned(),
+        |m| match m.rule.code() {
+            Some(code) => format!("the arm would stop with C{code}: {}", m.describe()),
+            None => format!("the controller would stop it: {}", m.describe()),
+        },
+    );
     if let Some(worst) = limits.worst_violation(&plan.trajectory) {
-        let stop = arm_code(worst.kind).map_or_else(
-            || "the controller would refuse it".to_owned(),
-            |code| format!("the arm would stop with {code}"),
-        );
-        return Err(Failure::failed(anyhow!(
-            "plan `{}` breaks {} of {} limits; the worst is {}: {stop}",
-            args.plan.display(),
+        return refuse(format!(
+            "breaks {} of {} limits; the worst is {}; {arm_says}",
             broken.len(),
             margins.len(),
             worst.describe()
-        )));
+        ));
     }
+    if stop.is_some() {
+        return refuse(format!("keeps the limits, but {arm_says}"));
+    }
+    let contact_s = tool_contact_s(&plan.trajectory, limits.period_s());
     if !quiet {
+        if let Some(contact_s) = contact_s {
+            eprintln!(
+                "warning: pole or wrist come within 5 mm of arm, column or floor at {contact_s:.3} s"
+            );
+        }
         let tightest = margins.iter().min_by(|a, b| a.left.total_cmp(&b.left));
         println!(
-            "All {} limits are kept. Tightest: {}.",
+            "All {} limits are kept, and the arm would not stop. Tightest: {}.",
             margins.len(),
             tightest.map_or_else(String::new, Margin::describe)
         );
     }
-    Ok(Some(
-        json!({ "ok": true, "command": "check", "margins": margins }),
-    ))
+    Ok(Some(json!({
+        "ok": true, "command": "check", "wire": arm.wire, "margins": margins, "arm": judged,
+        "tool_contact_s": contact_s,
+    })))
 }

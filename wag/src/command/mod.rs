@@ -2,15 +2,16 @@
 
 mod area;
 mod bench;
-mod check;
+pub mod check;
 mod demo;
 mod demo_summary;
 mod explain;
 mod identify;
 mod latency;
 mod network;
-mod plan;
+pub mod plan;
 mod process;
+mod reach_picture;
 mod record;
 mod replay;
 mod reproduce;
@@ -39,7 +40,7 @@ fn results(command: &Command) -> Vec<&Path> {
         Command::Identify(args) => &[Some(&args.out)],
         Command::Plan(
             PlanCommand::Strike(args) | PlanCommand::Lob(args) | PlanCommand::Drape(args),
-        ) => &[Some(&args.out), args.csv.as_deref()],
+        ) => &[Some(&args.out), args.csv.as_deref(), args.reach.as_deref()],
         Command::Latency(args) => &[args.response.as_deref()],
         _ => &[],
     };

@@ -1,20 +1,66 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
-use crate::cli::PlanArgs;
+use super::reach_picture;
+use crate::cli::{Point, seed};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
 use crate::session::interrupted;
 use anyhow::{Context, anyhow, bail};
+use clap::Args;
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
-use planner::tasks::{Belief, PlanError, PlanOptions, PlanRequest, plan_throw, start_pose_for};
+use planner::response::Following;
+use planner::tasks::{
+    Belief, PlanError, PlanOptions, PlanRequest, ReachMap, ThrowConfig, plan_throw, start_pose_for,
+};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::{JointTrajectory, JointVector, Limits, Plan, Task, kinematics};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+
+/// Arguments of `wag plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// Rope parameters.
+    #[arg(long)]
+    pub rope: PathBuf,
+    /// Target x,y,z in the arm's base frame (m).
+    #[arg(long, allow_hyphen_values = true)]
+    pub target: Point,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Tuned values of the planner (TOML); default: the built-in ones.
+    #[arg(long)]
+    pub config: Option<PathBuf>,
+    /// Seed of the search.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// The plan (JSON).
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+    /// Write the plan even if the tip is predicted to miss the target by more than
+    /// 5 cm, or the task to fail.
+    #[arg(long)]
+    pub allow_miss: bool,
+    /// Plan for this many ropes drawn from what identification left open, and forecast
+    /// the error; 0 plans for the likeliest rope alone.
+    #[arg(long, default_value_t = 0, value_name = "K")]
+    pub robust: usize,
+    /// The arm's response as written by `wag latency` (TOML): the throw is planned for an
+    /// arm that follows its commands so, and its commands make up for it.
+    #[arg(long, value_name = "FILE")]
+    pub arm_response: Option<PathBuf>,
+    /// Draw which targets this rope reaches (SVG), and refuse one that it does not.
+    #[arg(long, value_name = "FILE")]
+    pub reach: Option<PathBuf>,
+}
 
 const PLANNER: &str = include_str!("../../../configs/planner/planner.toml");
 
@@ -107,6 +153,7 @@ fn classify(error: PlanError) -> Failure {
         PlanError::TargetNotFinite { .. }
         | PlanError::Unreachable { .. }
         | PlanError::Rope(_)
+        | PlanError::Follow(_)
         | PlanError::Option { .. } => Failure::input(error),
         _ => Failure::failed(error),
     }
@@ -186,6 +233,29 @@ fn belief(args: &PlanArgs) -> anyhow::Result<Belief> {
     ))
 }
 
+/// Draws which targets the rope reaches; refuses one that it does not.
+fn reach(
+    path: &Path,
+    args: &PlanArgs,
+    limits: &Limits,
+    config: &ThrowConfig,
+    quiet: bool,
+) -> Outcome<()> {
+    /// The reach is explored before anything else is done.
+    const THREADS: usize = 2;
+    let rope = files::read_rope(&args.rope).or_input()?;
+    let stage = Stage::begin("reach", quiet);
+    let map = ReachMap::explore(&rope, limits, config, args.seed, THREADS).map_err(classify)?;
+    let picture = reach_picture::svg(&map, &rope, args.target.0, args.seed);
+    files::write_atomic(path, picture.as_bytes()).or_failed()?;
+    stage.done(&format!(
+        "{} throws, drawn in `{}`",
+        map.throws,
+        path.display()
+    ));
+    map.check(args.target.0).map_err(classify)
+}
+
 /// One line about a plan.
 pub fn describe(plan: &Plan) -> String {
     format!(
@@ -203,6 +273,11 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let limits = files::read_limits(args.limits.as_deref()).or_input()?;
     let config = planner_config(args.config.as_deref()).or_input()?;
     let belief = belief(args).or_input()?;
+    let response = args.arm_response.as_deref().map(files::read_arm_response);
+    let response = response.transpose().or_input()?;
+    if let Some(path) = &args.reach {
+        reach(path, args, &limits, &config.strike, quiet)?;
+    }
     crate::session::watch_interrupts().or_failed()?;
     let stage = Stage::begin("plan", quiet);
     let request = PlanRequest {
@@ -213,6 +288,7 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
             ..config.search
         },
         belief,
+        following: response.map(|r| Following::new(&r, &limits)),
     };
     let task = config.task(kind, args.target.0);
     let planned = plan_throw(&*task, &request, &mut |p| {
@@ -257,7 +333,7 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         "warnings": warnings, "target_m": args.target.0, "predicted_error_m": plan.predicted_error_m,
         "predicted_time_s": plan.predicted_time_s, "simulations": plan.simulations,
         "resampled": plan.resampled, "interrupted": plan.interrupted, "limited_by": plan.limited_by,
-        "verdict": plan.verdict, "forecast": plan.forecast,
+        "arm_response": plan.arm_response, "reach": args.reach, "verdict": plan.verdict, "forecast": plan.forecast,
         "trajectory_sha256": plan.trajectory_sha256,
     })))
 }

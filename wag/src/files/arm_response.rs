@@ -18,6 +18,11 @@ pub fn write_arm_response(path: &Path, response: &ArmResponse) -> anyhow::Result
     write_atomic(path, text.as_bytes())
 }
 
+/// Reads a measured response.
+pub fn read_arm_response(path: &Path) -> anyhow::Result<ArmResponse> {
+    toml::from_str(&read_text(path)?).with_context(|| format!("arm response `{}`", path.display()))
+}
+
 /// Reads the sweep an arm is to be measured with; keys left out keep their
 /// defaults.
 pub fn read_excitation(path: &Path) -> anyhow::Result<Excitation> {
@@ -42,8 +47,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("arm-response.toml");
         write_arm_response(&path, &response).unwrap();
-        let back: ArmResponse = toml::from_str(&read_text(&path).unwrap()).unwrap();
-        assert_eq!(back, response);
+        assert_eq!(read_arm_response(&path).unwrap(), response);
     }
 
     #[test]

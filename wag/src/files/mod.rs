@@ -7,7 +7,7 @@ mod limits;
 mod motion;
 mod rope;
 
-pub use arm_response::{read_excitation, write_arm_response};
+pub use arm_response::{read_arm_response, read_excitation, write_arm_response};
 pub use atomic::{check_writable, write_atomic, write_json};
 pub use limits::{default_limits, read_limits};
 pub use motion::{read_joints, read_pose, write_joints};

@@ -68,8 +68,10 @@ impl Settings {
             reports_current: false,
             collision_rebound: false,
             boundary: Boundary {
-                on: false,
-                sides_mm: [2000, -2000, 2000, -2000, 2000, -2000],
+                on: config.fence_mm.is_some(),
+                sides_mm: config
+                    .fence_mm
+                    .unwrap_or([2000, -2000, 2000, -2000, 2000, -2000]),
             },
             reduced: Reduced {
                 on: false,

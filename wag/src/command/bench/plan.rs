@@ -62,6 +62,7 @@ fn measure(
             ..config.search
         },
         belief: Belief::default(),
+        following: None,
     };
     let plan = || plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()));
     let (whole, planned): (_, Planned) = least(repeats, plan).or_failed()?;

@@ -32,6 +32,7 @@ fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
             ..config.search
         },
         belief: Belief::default(),
+        following: None,
     };
     let task = config.task(Task::Strike, TARGET_M);
     let plan = plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()))?;

@@ -1,0 +1,48 @@
+//! What an arm will make of a plan before it is sent: every rule it judges streamed
+//! motion by, with what is left of it, where and when.
+//!
+//! The limits of [`Limits`] bound the curve itself, and the controller refuses a plan
+//! that breaks one. The arm sees setpoints only, one per cycle, and has rules of its own:
+//! joint range (C23), joint speed (C24), tool speed (C60), self collision (C22), safety
+//! boundary (C35). They are judged here on the setpoints as they will stand on the wire.
+
+mod rules;
+mod setpoints;
+
+pub use rules::{Fence, FenceError, JudgedArm, Rule, RuleMargin};
+
+use setpoints::setpoints;
+use shared_types::{JointTrajectory, Limits};
+
+/// Everything the arm judges, in the order in which it does.
+#[must_use]
+pub fn arm_margins(
+    trajectory: &JointTrajectory,
+    limits: &Limits,
+    arm: &JudgedArm,
+) -> Vec<RuleMargin> {
+    let mut margins = arm.rules(limits);
+    let mut before = None;
+    for (time_s, q) in setpoints(trajectory, limits.period_s()) {
+        let before_q = before.replace(q).unwrap_or(q);
+        for margin in &mut margins {
+            let found = margin.rule.value(&before_q, &q, limits, arm);
+            margin.meet(found, time_s);
+        }
+    }
+    margins
+}
+
+/// The rule that stops the arm first, if any does.
+#[must_use]
+pub fn first_stop(margins: &[RuleMargin]) -> Option<&RuleMargin> {
+    let broken = margins.iter().filter(|m| m.broken_s.is_some());
+    // Of rules broken by one setpoint the arm finds the earlier one.
+    broken.min_by(|a, b| {
+        let at = |m: &RuleMargin| m.broken_s.unwrap_or(f64::INFINITY);
+        at(a).total_cmp(&at(b))
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,294 @@
+//! The rules of the arm, one by one.
+
+use crate::collide::ArmShape;
+use nalgebra::Vector3;
+use serde::Serialize;
+use shared_types::{JOINTS, JointVector, Limits, WireMode, kinematics};
+
+/// How far outside its range a streamed position is still taken (rad): 0.1 deg, as the
+/// vendor's SDK tests it.
+const RANGE_TOLERANCE_RAD: f64 = core::f64::consts::PI / 1800.0;
+/// Part by which a speed may exceed its limit before the arm stops: positions are
+/// rounded on the wire, and the arm's clock is not ours.
+const SPEED_SLACK: f64 = 1e-3;
+/// Longest way of the tool from one setpoint to the next that the vendor advises (m); the
+/// controller stops at it.
+const STEP_MAX_M: f64 = 0.010;
+/// How far joints may be beyond the plan when velocities are sent (rad): the firmware's
+/// ramps round corners off, and the position loop brings them back.
+const VELOCITY_STRAY_RAD: f64 = 0.015;
+/// How much that may close the gap between links, and move the tool (m).
+const VELOCITY_GAP_M: f64 = 0.003;
+const VELOCITY_STRAY_M: f64 = 0.015;
+
+/// A box that the tool must stay in, as the arm's safety boundary.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fence {
+    /// Smallest coordinates (m).
+    pub min_m: [f64; 3],
+    /// Largest coordinates (m).
+    pub max_m: [f64; 3],
+}
+
+/// A box without an inside.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the safety boundary needs its lower side below its upper one in {axis}, found {low} and {high} m"
+)]
+pub struct FenceError {
+    /// Axis.
+    pub axis: char,
+    /// Lower side (m).
+    pub low: f64,
+    /// Upper side (m).
+    pub high: f64,
+}
+
+impl Fence {
+    /// From x-, x+, y-, y+, z-, z+ (m).
+    ///
+    /// # Errors
+    /// A side that is not finite, or not below its partner.
+    pub fn new(sides_m: [f64; 6]) -> Result<Self, FenceError> {
+        let [x0, x1, y0, y1, z0, z1] = sides_m;
+        for (axis, low, high) in [('x', x0, x1), ('y', y0, y1), ('z', z0, z1)] {
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                return Err(FenceError { axis, low, high });
+            }
+        }
+        Ok(Self {
+            min_m: [x0, y0, z0],
+            max_m: [x1, y1, z1],
+        })
+    }
+
+    /// Distance to the nearest side, negative outside (m).
+    fn inside_m(&self, p: &Vector3<f64>) -> f64 {
+        let low = p - Vector3::from(self.min_m);
+        let high = Vector3::from(self.max_m) - p;
+        low.inf(&high).min()
+    }
+}
+
+/// What an arm judges by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct JudgedArm {
+    /// How setpoints reach it.
+    pub wire: WireMode,
+    /// Linear speed limit of servo mode, the factor of 1 m/s set in the arm.
+    pub speed_factor: f64,
+    /// Safety boundary, if one is set.
+    pub fence: Option<Fence>,
+}
+
+impl Default for JudgedArm {
+    /// As delivered: positions, factor 1.2, no boundary.
+    fn default() -> Self {
+        Self {
+            wire: WireMode::ServoPosition,
+            speed_factor: 1.2,
+            fence: None,
+        }
+    }
+}
+
+/// One rule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// Joints outside their range (rad).
+    JointRange,
+    /// Speed of the fastest joint (rad/s).
+    JointSpeed,
+    /// Speed of the tool (m/s).
+    ToolSpeed,
+    /// Gap between links two or more apart (m).
+    SelfCollision,
+    /// Distance of the tool to the safety boundary (m).
+    SafetyBoundary,
+    /// Way of the tool in one cycle (m).
+    StepLength,
+}
+
+impl Rule {
+    /// The arm's error code; none where the controller is the one to stop.
+    #[must_use]
+    pub fn code(self) -> Option<u8> {
+        match self {
+            Self::SelfCollision => Some(22),
+            Self::JointRange => Some(23),
+            Self::JointSpeed => Some(24),
+            Self::SafetyBoundary => Some(35),
+            Self::ToolSpeed => Some(60),
+            Self::StepLength => None,
+        }
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::JointRange => "joint outside its range",
+            Self::JointSpeed => "joint speed of setpoints",
+            Self::ToolSpeed => "tool speed of setpoints",
+            Self::SelfCollision => "gap between links",
+            Self::SafetyBoundary => "tool inside the boundary",
+            Self::StepLength => "tool step per cycle",
+        }
+    }
+
+    /// Unit of its value.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::JointRange => "rad",
+            Self::JointSpeed => "rad/s",
+            Self::ToolSpeed => "m/s",
+            Self::SelfCollision | Self::SafetyBoundary | Self::StepLength => "m",
+        }
+    }
+
+    /// Whether small values break it.
+    fn is_least(self) -> bool {
+        matches!(self, Self::SelfCollision | Self::SafetyBoundary)
+    }
+
+    /// Its value for a setpoint that follows another.
+    pub(super) fn value(
+        self,
+        before: &JointVector,
+        q: &JointVector,
+        limits: &Limits,
+        arm: &JudgedArm,
+    ) -> f64 {
+        let way_m = || (tool(q, limits) - tool(before, limits)).norm();
+        match self {
+            Self::JointRange => (0..JOINTS)
+                .map(|j| {
+                    let below = limits.position_min_rad[j] - q[j];
+                    below.max(q[j] - limits.position_max_rad[j])
+                })
+                .fold(f64::NEG_INFINITY, f64::max),
+            // Where joints differ, the one with the least left counts.
+            Self::JointSpeed => {
+                let speed = |j: usize| (q[j] - before[j]).abs() / limits.period_s();
+                let part = |j: usize| speed(j) / limits.velocity_max_rad_s[j];
+                let worst = (0..JOINTS).max_by(|a, b| part(*a).total_cmp(&part(*b)));
+                worst.map_or(0.0, |j| part(j) * limits.velocity_max_rad_s[0])
+            }
+            Self::ToolSpeed => way_m() / limits.period_s(),
+            Self::StepLength => way_m(),
+            Self::SelfCollision => ArmShape::at(q).self_clearance_m(),
+            Self::SafetyBoundary => arm
+                .fence
+                .map_or(f64::INFINITY, |f| f.inside_m(&tool(q, limits))),
+        }
+    }
+}
+
+fn tool(q: &JointVector, limits: &Limits) -> Vector3<f64> {
+    let (p, r) = kinematics::flange_pose(q);
+    p + r * limits.tcp_offset()
+}
+
+/// How close the setpoints come to one rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RuleMargin {
+    /// Which.
+    pub rule: Rule,
+    /// Extreme value, in the rule's unit.
+    pub value: f64,
+    /// The value at which the arm stops.
+    pub limit: f64,
+    /// When the extreme occurs (s).
+    pub time_s: f64,
+    /// When the rule is first broken (s).
+    pub broken_s: Option<f64>,
+}
+
+impl RuleMargin {
+    fn new(rule: Rule, limit: f64) -> Self {
+        Self {
+            rule,
+            value: if rule.is_least() {
+                f64::INFINITY
+            } else {
+                f64::NEG_INFINITY
+            },
+            limit,
+            time_s: 0.0,
+            broken_s: None,
+        }
+    }
+
+    pub(super) fn meet(&mut self, value: f64, time_s: f64) {
+        let least = self.rule.is_least();
+        let (worse, broken) = if least {
+            (value < self.value, value < self.limit)
+        } else {
+            (value > self.value, value > self.limit)
+        };
+        if worse {
+            (self.value, self.time_s) = (value, time_s);
+        }
+        if broken || value.is_nan() {
+            self.broken_s.get_or_insert(time_s);
+        }
+    }
+
+    /// What is left until the arm stops, in the rule's unit; negative when it does.
+    #[must_use]
+    pub fn left(&self) -> f64 {
+        if self.rule.is_least() {
+            self.value - self.limit
+        } else {
+            self.limit - self.value
+        }
+    }
+
+    /// One line for people.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let unit = self.rule.unit();
+        format!(
+            "{} {:.4} {unit} against {:.4} {unit} at {:.3} s",
+            self.rule.name(),
+            self.value,
+            self.limit,
+            self.broken_s.unwrap_or(self.time_s)
+        )
+    }
+}
+
+impl JudgedArm {
+    /// The rules of its mode, in the order in which it looks at them.
+    pub(super) fn rules(&self, limits: &Limits) -> Vec<RuleMargin> {
+        let speed = 1.0 + SPEED_SLACK;
+        // The controller looks before the arm does.
+        let step = RuleMargin::new(Rule::StepLength, STEP_MAX_M);
+        let mut out = match self.wire {
+            WireMode::ServoPosition => vec![
+                step,
+                RuleMargin::new(Rule::JointRange, RANGE_TOLERANCE_RAD),
+                RuleMargin::new(Rule::JointSpeed, limits.velocity_max_rad_s[0] * speed),
+                RuleMargin::new(Rule::ToolSpeed, self.speed_factor * speed),
+                RuleMargin::new(Rule::SelfCollision, 0.0),
+            ],
+            // Speeds are limited before they are sent; where the joints go is not quite
+            // where the plan goes.
+            WireMode::JointVelocity => vec![
+                step,
+                RuleMargin::new(Rule::JointRange, -VELOCITY_STRAY_RAD),
+                RuleMargin::new(Rule::SelfCollision, VELOCITY_GAP_M),
+            ],
+        };
+        if self.fence.is_some() {
+            let stray_m = match self.wire {
+                WireMode::ServoPosition => 0.0,
+                WireMode::JointVelocity => VELOCITY_STRAY_M,
+            };
+            out.push(RuleMargin::new(Rule::SafetyBoundary, stray_m));
+        }
+        out
+    }
+}

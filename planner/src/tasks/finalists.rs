@@ -1,0 +1,116 @@
+//! The throws that are compared at the end: polished, and observed with all ropes.
+
+use super::setup::{Count, Point, Setup};
+use super::{PlanError, ThrowOutcome};
+use crate::trajopt::{Found, Polish, polish};
+use rope_sim::FrameTimes;
+use shared_types::JointTrajectory;
+
+/// A throw that is compared at the end.
+#[derive(Debug, Clone)]
+pub(super) struct Finalist {
+    pub(super) x: Vec<f64>,
+    pub(super) trajectory: JointTrajectory,
+    /// Outcome with the rope planned for.
+    pub(super) outcome: ThrowOutcome,
+    /// Smaller is better.
+    pub(super) score: f64,
+    /// Part of the ropes compared with which the task succeeds.
+    successes: f64,
+}
+
+impl Setup<'_> {
+    /// The best of a search with all ropes; the best of those polished.
+    pub(super) fn compare(
+        &self,
+        found: Vec<Found>,
+        count: &mut Count,
+    ) -> Result<Vec<Finalist>, PlanError> {
+        let points = found.into_iter().map(|f| (f.x, f.trajectory)).collect();
+        let mut finalists = self.finalists(points, count)?;
+        if self.task.polishes() {
+            let best = finalists
+                .iter()
+                .take(self.task.config().robustness.polished);
+            let points: Vec<Vec<f64>> = best.map(|f| f.x.clone()).collect();
+            let frames = FrameTimes::NONE;
+            let motion = self.simulator.motion(&self.space.decode(&self.start)?)?;
+            let motion_s = motion.duration_s();
+            let work = Polish {
+                space: &self.space,
+                screen: &self.screen,
+                rope: &self.request.rope,
+                following: self.request.following.as_ref(),
+                slopes: &self.simulator.options(motion_s, frames),
+                exact: &self.simulator.exact().options(motion_s, frames),
+                seed: self.request.options.seed,
+            };
+            let (polished, simulations) = polish(&work, &points)?;
+            count.add(simulations);
+            let points = polished
+                .into_iter()
+                .map(|p| Ok((p.x.clone(), self.space.decode(&p.x)?)))
+                .collect::<Result<Vec<_>, PlanError>>()?;
+            finalists.extend(self.finalists(points, count)?);
+            finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        }
+        Ok(finalists)
+    }
+
+    /// Throws observed to the end with all ropes, the best first. One that lets the arm
+    /// collide is none.
+    pub(super) fn finalists(
+        &self,
+        points: Vec<Point>,
+        count: &mut Count,
+    ) -> Result<Vec<Finalist>, PlanError> {
+        let throws: Vec<_> = points
+            .iter()
+            .flat_map(|(_, t)| self.ropes.iter().map(move |rope| (rope, t)))
+            .collect();
+        let mut outcomes = self.judging.run(&throws)?;
+        count.add(throws.len());
+        let mut out = Vec::new();
+        for (x, trajectory) in points {
+            let own: Vec<ThrowOutcome> = outcomes.drain(..self.ropes.len()).collect();
+            if !own[0].finite || own[0].contacts.pole_robot > 0 {
+                continue;
+            }
+            out.push(self.finalist(x, trajectory, own));
+        }
+        out.sort_by(|a, b| a.score.total_cmp(&b.score));
+        Ok(out)
+    }
+
+    fn finalist(
+        &self,
+        x: Vec<f64>,
+        trajectory: JointTrajectory,
+        outcomes: Vec<ThrowOutcome>,
+    ) -> Finalist {
+        #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
+        let count = outcomes.len().max(1) as f64;
+        let squares: f64 = outcomes.iter().map(|o| self.task.error_m(o).powi(2)).sum();
+        let good = self.ropes.iter().zip(&outcomes);
+        let good = good.filter(|(rope, o)| o.finite && self.task.judge(rope, o).success);
+        #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
+        let successes = good.count() as f64 / count;
+        let contacts = self.task.config().weights.contacts(&outcomes[0].contacts);
+        Finalist {
+            x,
+            trajectory,
+            score: (squares / count).sqrt() + contacts + (1.0 - successes),
+            successes,
+            outcome: outcomes.into_iter().next().unwrap_or_default(),
+        }
+    }
+
+    /// Whether no further search is needed.
+    pub(super) fn is_good(&self, finalist: &Finalist) -> bool {
+        // All but one of the ropes compared.
+        const SUCCESSES: f64 = 0.85;
+        let error_m = self.task.error_m(&finalist.outcome);
+        let close = !self.task.polishes() || error_m <= self.request.options.good_enough_m;
+        close && finalist.successes >= SUCCESSES && finalist.outcome.contacts.none()
+    }
+}
