@@ -1,5 +1,6 @@
 //! Prints the tracker's error against the rendered recordings' exact truth:
-//! `track_error FOLDER [sheet.png [first last]]`.
+//! `track_error FOLDER [sheet.png [first last]]`; for a name that ends in `.avi` a
+//! film of the keypoints is written.
 #![allow(
     clippy::expect_used,
     clippy::cast_precision_loss,
@@ -9,6 +10,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use camera_ingest::film::keypoint_film;
 use camera_ingest::source::read_left;
 use camera_ingest::track::{ClampPath, TrackOptions};
 use camera_ingest::{load_camera, open_video, overlay, track};
@@ -103,7 +105,10 @@ fn main() {
         );
     }
     println!();
-    if let Some(sheet) = args.get(2) {
+    if let Some(name) = args.get(2).filter(|name| name.ends_with(".avi")) {
+        let film = keypoint_film(&frames, &result.track).expect("film");
+        std::fs::write(name, film).expect("film");
+    } else if let Some(sheet) = args.get(2) {
         let chosen: Vec<usize> = if args.len() > 3 {
             args[3..].iter().filter_map(|a| a.parse().ok()).collect()
         } else {

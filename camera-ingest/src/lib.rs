@@ -2,7 +2,7 @@
 //!
 //! Reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
 //! in the left eye ([`mod@track`]), measures tip and target in stereo ([`mod@score`]),
-//! draws what it found ([`overlay`]) and says when a rope hangs still
+//! draws what it found ([`overlay`], [`film`]) and says when a rope hangs still
 //! ([`still`]).
 //!
 //! It is *not* the place for rope physics, identification or planning: it
@@ -20,6 +20,7 @@
 )]
 
 pub mod calib;
+pub mod film;
 pub mod frame;
 pub mod overlay;
 pub mod process;

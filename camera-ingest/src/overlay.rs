@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use shared_types::keypoints::TrackedFrame;
+
 use crate::frame::EyeFrame;
 
 /// Why a picture cannot be written.
@@ -198,6 +200,25 @@ pub fn contact_sheet(pictures: &[Picture], columns: usize) -> Result<Picture, Ov
 /// Widest picture in a contact sheet (px): a dozen stay around a megabyte.
 const SHEET_WIDTH_PX: usize = 340;
 
+/// A frame with its keypoints, red where the rope is lost.
+pub(crate) fn drawn(frame: &EyeFrame, tracked: &TrackedFrame) -> Picture {
+    draw_rope(Picture::of(frame), tracked, 1)
+}
+
+fn draw_rope(mut picture: Picture, tracked: &TrackedFrame, factor: usize) -> Picture {
+    // The middle of pixel 0 stands for those of pixels 0 to factor - 1.
+    #[allow(clippy::cast_precision_loss, reason = "pixels of an image")]
+    let small = |x: f64| (x + 0.5) / factor as f64 - 0.5;
+    let points: Vec<[f64; 2]> = tracked.points.iter().map(|p| p.map(small)).collect();
+    let line = if tracked.lost {
+        [255, 0, 0]
+    } else {
+        [0, 255, 255]
+    };
+    picture.polyline(&points, line, [255, 0, 255]);
+    picture
+}
+
 /// Contact sheet of chosen frames, made smaller, with their keypoints drawn.
 ///
 /// # Errors
@@ -213,18 +234,7 @@ pub fn keypoint_sheet(
         .filter_map(|&i| Some((frames.get(i)?, track.frames.get(i)?)))
         .map(|(frame, tracked)| {
             let factor = frame.width_px.div_ceil(SHEET_WIDTH_PX).max(1);
-            let mut picture = Picture::of(frame).shrunk(factor);
-            // The middle of pixel 0 stands for those of pixels 0 to factor - 1.
-            #[allow(clippy::cast_precision_loss, reason = "pixels of an image")]
-            let small = |x: f64| (x + 0.5) / factor as f64 - 0.5;
-            let points: Vec<[f64; 2]> = tracked.points.iter().map(|p| p.map(small)).collect();
-            let line = if tracked.lost {
-                [255, 0, 0]
-            } else {
-                [0, 255, 255]
-            };
-            picture.polyline(&points, line, [255, 0, 255]);
-            picture
+            draw_rope(Picture::of(frame).shrunk(factor), tracked, factor)
         })
         .collect();
     contact_sheet(&pictures, columns)

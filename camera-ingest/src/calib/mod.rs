@@ -1,16 +1,20 @@
-//! Calibration files: the vendor's factory `.conf` and this system's
-//! `camera.toml`, read into and written from a [`StereoCamera`].
+//! Calibration files - the vendor's factory `.conf`, ROS and OpenCV YAML, and this
+//! system's `camera.toml` - and where the camera stands, found from a printed
+//! board.
 //!
-//! It is *not* the place for estimating a calibration.
+//! It is *not* the place for estimating lenses: those come from the files.
 
+pub mod board;
+pub mod extrinsics;
 mod factory;
 mod ini;
 mod settings;
+mod yaml;
 
 use std::path::{Path, PathBuf};
 
 pub use factory::{VideoMode, write_factory_conf};
-pub use settings::write_camera_toml;
+pub use settings::{write_camera_toml, write_extrinsics};
 use shared_types::StereoCamera;
 
 /// Why a calibration cannot be used.
@@ -71,14 +75,13 @@ pub enum CalibError {
         /// What is wrong with it.
         problem: &'static str,
     },
-    /// The calibration is of a kind that is not read.
-    #[error(
-        "calibration {path}: camera_info YAML is not supported; give the camera's factory \
-         SNxxxx.conf (the vendor's tool stores it under its settings folder)"
-    )]
-    Unsupported {
+    /// A YAML calibration cannot be used.
+    #[error("calibration {path}: {reason}")]
+    Yaml {
         /// File concerned.
         path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
     },
 }
 
@@ -95,7 +98,9 @@ pub fn load_camera(path: &Path) -> Result<StereoCamera, CalibError> {
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"))
     {
-        return Err(CalibError::Unsupported { path: calibration });
+        let right = settings.calibration_right.as_ref().map(|p| folder.join(p));
+        let eyes = yaml::read(&calibration, right.as_deref(), settings.mode)?;
+        return Ok(settings.camera(eyes));
     }
     let eyes = factory::read(&calibration, settings.mode)?;
     Ok(settings.camera(eyes))
@@ -185,8 +190,8 @@ mod tests {
         assert!(mode.contains("LEFT_CAM_HD"), "{mode}");
         let scaled = message("scaled", CONF, &SETTINGS.replace("[1, 0, 0]", "[2, 0, 0]"));
         assert!(scaled.contains("rotation"), "{scaled}");
-        let yaml = message("yaml", CONF, &SETTINGS.replace("camera.conf", "info.yaml"));
-        assert!(yaml.contains("not supported"), "{yaml}");
+        let yaml = message("yaml", CONF, &SETTINGS.replace("camera.conf", "left.yaml"));
+        assert!(yaml.contains("left.yaml"), "{yaml}");
         let absent = load_camera(Path::new("/nowhere/camera.toml")).unwrap_err();
         assert!(absent.to_string().contains("/nowhere/camera.toml"));
     }

@@ -15,6 +15,9 @@ use super::{CalibError, read_text, write_text};
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraSettings {
     pub(super) calibration: PathBuf,
+    /// ROS: the right eye's file, where its name does not follow from the left's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) calibration_right: Option<PathBuf>,
     pub(super) mode: VideoMode,
     shutter: Shutter,
     exposure_s: f64,
@@ -108,18 +111,59 @@ pub fn write_camera_toml(
     let r = &camera.r_w_cam;
     let settings = CameraSettings {
         calibration: calibration.to_owned(),
+        calibration_right: None,
         mode,
         shutter: camera.shutter,
         exposure_s: camera.exposure_s,
         line_time_s: camera.line_time_s,
         extrinsics: Extrinsics {
             position_m: camera.p_w_cam_m.into(),
-            rotation: core::array::from_fn(|row| core::array::from_fn(|col| r[(row, col)])),
+            rotation: rows(r),
         },
     };
-    let text = toml::to_string(&settings).map_err(|e| CalibError::Settings {
+    write(path, &settings)
+}
+
+fn rows(r: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    core::array::from_fn(|row| core::array::from_fn(|col| r[(row, col)]))
+}
+
+fn write(path: &Path, settings: &CameraSettings) -> Result<(), CalibError> {
+    let text = toml::to_string(settings).map_err(|e| CalibError::Settings {
         path: path.to_owned(),
         reason: e.to_string(),
     })?;
     write_text(path, &text)
+}
+
+/// Writes the settings of `from` with another place of the camera; calibration
+/// files stay where they are.
+///
+/// # Errors
+/// `from` cannot be read or `path` not be written.
+pub fn write_extrinsics(
+    path: &Path,
+    from: &Path,
+    r_w_cam: &Matrix3<f64>,
+    p_w_cam_m: &Vector3<f64>,
+) -> Result<(), CalibError> {
+    let mut settings = read(from)?;
+    let folder = |p: &Path| {
+        let parent = p.parent().filter(|f| !f.as_os_str().is_empty());
+        std::fs::canonicalize(parent.unwrap_or(Path::new(".")))
+    };
+    let io = |source| CalibError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let (here, there) = (folder(path).map_err(io)?, folder(from).map_err(io)?);
+    if here != there {
+        settings.calibration = there.join(&settings.calibration);
+        settings.calibration_right = settings.calibration_right.map(|p| there.join(p));
+    }
+    settings.extrinsics = Extrinsics {
+        position_m: (*p_w_cam_m).into(),
+        rotation: rows(r_w_cam),
+    };
+    write(path, &settings)
 }

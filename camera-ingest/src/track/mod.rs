@@ -269,7 +269,8 @@ fn check(
 /// `count` indices spread over `0..len`.
 pub(crate) fn spread(len: usize, count: usize) -> Vec<usize> {
     let count = count.min(len);
-    (0..count).map(|i| i * (len - 1) / (count - 1)).collect()
+    let steps = count.saturating_sub(1).max(1);
+    (0..count).map(|i| i * (len - 1) / steps).collect()
 }
 
 /// Turns the first look into a model of the rope and the first state.

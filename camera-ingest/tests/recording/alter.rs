@@ -22,6 +22,12 @@ impl Wiggle {
         self.truth.retain(|_| wanted(at.next().unwrap()));
     }
 
+    /// The first `count` frames.
+    pub(crate) fn shortened(mut self, count: usize) -> Self {
+        self.keep(|i| i < count);
+        self
+    }
+
     /// A part of the frames is missing, here and there.
     pub(crate) fn dropped(mut self, part: f64, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -1,0 +1,188 @@
+//! A printed ChArUco board: what is on it, where it hangs, and its corners in a
+//! picture.
+
+use std::path::{Path, PathBuf};
+
+use calib_targets_charuco::{
+    CharucoBoardSpec, CharucoDetector, CharucoParams, GrayImageView, resolve_dictionary,
+};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::extrinsics::Sighted;
+use crate::frame::EyeFrame;
+use crate::source::{FrameSource, SourceError};
+
+/// Corners both eyes must see for a picture to count.
+const LEAST_CORNERS: usize = 6;
+
+/// Why a board cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardError {
+    /// The description cannot be read or does not parse.
+    #[error("board {path}: {reason}")]
+    File {
+        /// File concerned.
+        path: PathBuf,
+        /// What is wrong, with the field.
+        reason: String,
+    },
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The board was not found.
+    #[error(
+        "the board was found by both eyes in none of {frames} frames (at best {most} corners, \
+         {least} are needed); show it whole, flat and lit, and check rows, columns and dictionary",
+        least = LEAST_CORNERS
+    )]
+    NotFound {
+        /// Frames looked at.
+        frames: usize,
+        /// Most corners seen by both eyes.
+        most: usize,
+    },
+}
+
+/// Description of a board, file `board.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Board {
+    /// Squares from top to bottom.
+    pub rows: u32,
+    /// Squares from left to right.
+    pub columns: u32,
+    /// Side of a square (m).
+    pub square_m: f64,
+    /// Side of a marker (m).
+    pub marker_m: f64,
+    /// Marker dictionary by OpenCV's name, such as `DICT_4X4_50` or
+    /// `DICT_APRILTAG_36h11`.
+    pub dictionary: String,
+    /// Where the board hangs.
+    pub pose: BoardPose,
+}
+
+/// Pose of a board in the world.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardPose {
+    /// Outer corner of the first, black square (m).
+    pub position_m: [f64; 3],
+    /// Rows of the rotation board to world; the board's x points along its rows,
+    /// y down its columns, z into it.
+    pub rotation: [[f64; 3]; 3],
+}
+
+impl Board {
+    /// Reads `board.toml`.
+    ///
+    /// # Errors
+    /// The file is missing or a field is impossible.
+    pub fn read(path: &Path) -> Result<Self, BoardError> {
+        let fail = |reason: String| BoardError::File {
+            path: path.to_owned(),
+            reason,
+        };
+        let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
+        let board: Self = toml::from_str(&text).map_err(|e| fail(e.to_string()))?;
+        board.detector().map_err(fail)?;
+        let r = board.rotation();
+        if (r * r.transpose() - Matrix3::identity()).norm() > 1e-3 || r.determinant() < 0.0 {
+            return Err(fail("pose.rotation is no rotation matrix".to_owned()));
+        }
+        Ok(board)
+    }
+
+    fn rotation(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| self.pose.rotation[row][column])
+    }
+
+    fn detector(&self) -> Result<CharucoDetector, String> {
+        if !(self.square_m > 0.0 && self.marker_m > 0.0 && self.marker_m < self.square_m) {
+            return Err(
+                "square_m and marker_m must be positive, the marker the smaller".to_owned(),
+            );
+        }
+        let dictionary = resolve_dictionary(&self.dictionary)
+            .ok_or_else(|| format!("dictionary {:?} is not known", self.dictionary))?;
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "only the ratio is used by the detector"
+        )]
+        let (square, ratio) = (self.square_m as f32, (self.marker_m / self.square_m) as f32);
+        let spec = CharucoBoardSpec::new(self.rows, self.columns, square, ratio, dictionary);
+        CharucoDetector::new(CharucoParams::for_board(spec)).map_err(|e| e.to_string())
+    }
+
+    /// Place of an inner corner in the world (m).
+    fn corner_w_m(&self, id: u32) -> Vector3<f64> {
+        let across = self.columns - 1;
+        let x = f64::from(id % across + 1) * self.square_m;
+        let y = f64::from(id / across + 1) * self.square_m;
+        Vector3::from(self.pose.position_m) + self.rotation() * Vector3::new(x, y, 0.0)
+    }
+
+    /// Corners seen by both eyes in some frames spread over a recording, in which
+    /// the board hangs still.
+    ///
+    /// # Errors
+    /// A frame is damaged, or the board is in none of them.
+    pub fn look(
+        &self,
+        source: &mut dyn FrameSource,
+        frames: usize,
+    ) -> Result<Vec<Sighted>, BoardError> {
+        let detector = self.detector().map_err(|reason| BoardError::File {
+            path: PathBuf::from("(board)"),
+            reason,
+        })?;
+        let chosen = crate::track::spread(source.len(), frames.max(2));
+        let (mut seen, mut most) = (Vec::new(), 0);
+        for &index in &chosen {
+            let frame = source.read(index)?;
+            let left = corners(&detector, &frame.left());
+            let right = corners(&detector, &frame.right());
+            let both: Vec<Sighted> = left
+                .iter()
+                .filter_map(|(id, pixel)| {
+                    let other = right.iter().find(|(other, _)| other == id)?.1;
+                    Some(Sighted {
+                        p_w_m: self.corner_w_m(*id),
+                        pixels: [*pixel, other],
+                    })
+                })
+                .collect();
+            most = most.max(both.len());
+            if both.len() >= LEAST_CORNERS {
+                seen.extend(both);
+            }
+        }
+        if seen.is_empty() {
+            return Err(BoardError::NotFound {
+                frames: chosen.len(),
+                most,
+            });
+        }
+        Ok(seen)
+    }
+}
+
+/// Corners in one eye's picture: id and raw pixel, integers at pixel centres.
+fn corners(detector: &CharucoDetector, eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
+    let view = GrayImageView {
+        width: eye.width_px,
+        height: eye.height_px,
+        data: &eye.luma,
+    };
+    // A miss is no error: the other frames may show the board.
+    detector.detect(&view).map_or_else(
+        |_miss| Vec::new(),
+        |found| {
+            let corners = found.corners.iter();
+            corners
+                .map(|c| (c.id, [f64::from(c.position.x), f64::from(c.position.y)]))
+                .collect()
+        },
+    )
+}
