@@ -144,6 +144,17 @@ fn smooth_step(x: f64) -> f64 {
 /// # Errors
 /// Values out of range, or a motion the arm may not execute.
 pub fn wiggle(config: &WiggleConfig, limits: &Limits) -> Result<JointTrajectory, WiggleError> {
+    let trajectory = unlimited(config)?;
+    match limits.worst_violation(&trajectory) {
+        Some(margin) => Err(WiggleError::BreaksLimit {
+            what: margin.describe(),
+        }),
+        None => Ok(trajectory),
+    }
+}
+
+/// [`wiggle`] of an arm without limits: for simulations only.
+pub(crate) fn unlimited(config: &WiggleConfig) -> Result<JointTrajectory, WiggleError> {
     config.check()?;
     #[allow(
         clippy::cast_possible_truncation,
@@ -159,13 +170,7 @@ pub fn wiggle(config: &WiggleConfig, limits: &Limits) -> Result<JointTrajectory,
             (t, q)
         })
         .unzip();
-    let trajectory = JointTrajectory::new(&times, &poses)?;
-    match limits.worst_violation(&trajectory) {
-        Some(margin) => Err(WiggleError::BreaksLimit {
-            what: margin.describe(),
-        }),
-        None => Ok(trajectory),
-    }
+    Ok(JointTrajectory::new(&times, &poses)?)
 }
 
 /// Nearest approach of one rope to arm or column during a wiggle.

@@ -11,6 +11,7 @@
 )]
 
 use planner::filming::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
+use planner::observation::ObservedPoints;
 use planner::ropes::random_rope;
 use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify};
 use planner::trials::{TrialRig, outside_rope, summarise, trial_rope};
@@ -66,6 +67,7 @@ fn both_methods_find_planted_parameters_in_noise() {
         let film = filmed(&rope, &noise);
         let observation = Observation {
             track: &film.track,
+            points: ObservedPoints::ArcLength,
             camera: &camera,
             motion: &arm,
             appearance: Appearance {
@@ -218,6 +220,7 @@ fn useless_films_are_refused_with_the_reason() {
     let refuse = |track: &KeypointTrack, motion: &PlannedArm| {
         let observation = Observation {
             track,
+            points: ObservedPoints::ArcLength,
             camera: &camera,
             motion,
             appearance: Appearance::default(),
@@ -341,6 +344,7 @@ fn the_recorded_rope_is_identified_from_its_true_keypoints() {
     let track = true_keypoints_of(folder);
     let observation = Observation {
         track: &track,
+        points: ObservedPoints::ArcLength,
         camera: &camera,
         motion: &motion,
         appearance: Appearance {

@@ -310,8 +310,11 @@ pub enum MethodName {
     Nn,
     /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
     Cmaes,
-    /// A quick proposal, then refined.
+    /// A quick proposal of the network, or of a search where it knows no such film, then
+    /// refined.
     Hybrid,
+    /// A quick proposal of a search, then refined.
+    HybridSearch,
 }
 
 /// Arguments of `wag identify`.
@@ -329,7 +332,8 @@ pub struct IdentifyArgs {
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
-    /// Network for --method nn instead of the built-in one (ONNX, written by phi-train).
+    /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
+    /// phi-train).
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
@@ -487,8 +491,8 @@ pub struct ReproduceArgs {
     /// Which result.
     #[arg(value_enum)]
     pub name: ReproduceName,
-    /// Simulated ropes; default: 1000, for sim-pipeline 100, for lob-drape its own 24
-    /// (motion-fidelity has its own).
+    /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
+    /// each wiggle, for lob-drape its own 24 (motion-fidelity has its own).
     #[arg(long)]
     pub ropes: Option<u64>,
     /// Seed of the ropes, the films and the searches.
@@ -497,7 +501,8 @@ pub struct ReproduceArgs {
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
-    /// Network for --method nn instead of the built-in one (ONNX, written by phi-train).
+    /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
+    /// phi-train).
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Result file (JSON); a run that was broken off goes on from it.
@@ -512,6 +517,8 @@ pub enum ReproduceName {
     Sysid,
     /// Telling ropes outside the parameter ranges from those inside.
     SysidOod,
+    /// Errors of identified parameters with each of the paper's nine wiggles.
+    WiggleAblation,
     /// Motion of an identified rope in a throw it was not identified from.
     MotionFidelity,
     /// Error of planned strikes: true, identified and random parameters.

@@ -19,6 +19,12 @@ fn wag(folder: &Path, args: &[&str]) -> Output {
         .unwrap()
 }
 
+/// A network that reads what no camera shows.
+const LINKS: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../configs/models/phi-nn-links.onnx"
+);
+
 const ROPE: &str = "links = 23\nlength_m = 0.55\njoint_damping_nms_per_rad = 0.006\n\
     joint_stiffness_nm_per_rad = 0.15\nradius_m = 0.0055\nmass_per_length_kg_per_m = 0.05\n\
     lead_mass_kg = 0.05\nlead_radius_m = 0.02\nlink_extra_scale = 1.0\n";
@@ -512,6 +518,8 @@ const CASES: &[Case] = &[
             "camera.toml",
             "--pose",
             "pose.csv",
+            "--method",
+            "cmaes",
             "--model",
             "m.onnx",
             "--out",
@@ -519,6 +527,30 @@ const CASES: &[Case] = &[
         ],
         2,
         &["m.onnx", "--method nn"],
+    ),
+    (
+        &[
+            "identify",
+            "--keypoints",
+            "k.json",
+            "--camera",
+            "camera.toml",
+            "--pose",
+            "pose.csv",
+            "--method",
+            "nn",
+            "--model",
+            LINKS,
+            "--out",
+            "r.toml",
+        ],
+        2,
+        &["link", "only simulated films show"],
+    ),
+    (
+        &["reproduce", "wiggle-ablation", "--method", "nn"],
+        2,
+        &["one wiggle only"],
     ),
     (
         &[

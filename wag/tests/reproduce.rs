@@ -46,9 +46,15 @@ fn trials_are_kept_and_gone_on_with() {
     let both = run("2", "3");
     assert_eq!(both["command"], "reproduce sysid");
     assert_eq!(both["summary"]["parameters"].as_array().unwrap().len(), 9);
+    let methods = |kept: &Value| -> Vec<String> {
+        let trials = kept["trials"].as_array().unwrap();
+        let name = |t: &Value| t["method"].as_str().unwrap().to_owned();
+        trials.iter().map(name).collect()
+    };
     let more: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     assert_eq!(more["trials"][0], kept["trials"][0]);
-    assert_eq!(more["trials"].as_array().unwrap().len(), 2);
+    // The network has a proposal for both.
+    assert_eq!(methods(&more), ["hybrid-network"; 2]);
     let refused = wag(&[&sysid("2", "4")[..], &[path]].concat());
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stdout).contains("seed 3"));
@@ -74,6 +80,50 @@ fn the_network_answers_at_once_and_better_than_the_middle_of_the_ranges() {
         let number = |key: &str| rows[i][key].as_f64().unwrap();
         let part = number("mean_error") / number("middle");
         assert!(part < 0.7, "{}: {part}", rows[i]["label"]);
+    }
+}
+
+/// The network that reads link centres knows their number.
+#[test]
+fn link_centres_tell_the_link_count() {
+    let model = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../configs/models/phi-nn-links.onnx"
+    );
+    let sysid = ["reproduce", "sysid", "--ropes", "24", "--seed", "5"];
+    let with = |method| {
+        [
+            &sysid[..],
+            &["--method", method, "--model", model, "--json"],
+        ]
+        .concat()
+    };
+    let report = report(&with("nn"));
+    let links = &report["summary"]["parameters"][0];
+    assert!(links["mean_error"].as_f64().unwrap() < 0.15, "{links}");
+    let refused = wag(&with("hybrid"));
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stdout).contains("only simulated films show"));
+}
+
+/// One rope with each of the nine wiggles, no more than the film tells of its ratios.
+#[test]
+fn every_wiggle_of_the_ablation_identifies_a_rope() {
+    let report = report(&[
+        "reproduce",
+        "wiggle-ablation",
+        "--ropes",
+        "1",
+        "--seed",
+        "5",
+        "--json",
+    ]);
+    let wiggles = report["wiggles"].as_array().unwrap();
+    assert_eq!(wiggles.len(), 9);
+    for wiggle in wiggles {
+        let length = &wiggle["summary"]["parameters"][1];
+        assert!(length["mean_error"].as_f64().unwrap() < 0.02, "{wiggle}");
+        assert_eq!(wiggle["paper"].as_array().unwrap().len(), 9);
     }
 }
 

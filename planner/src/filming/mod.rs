@@ -20,7 +20,8 @@ pub use record::{KeypointLayout, RecordOptions, RopeFilm, record};
 use rope_sim::{AttachMotion, SimulateError};
 use shared_types::{RopeParams, StereoCamera};
 
-/// Films one rope: `keypoints` of them uniform in arc length, simulated finely.
+/// Films one rope, simulated finely. A number of keypoints means so many, uniform in arc
+/// length.
 ///
 /// # Errors
 /// What the rope simulator refuses.
@@ -28,12 +29,12 @@ pub fn film(
     rope: &RopeParams,
     motion: &dyn AttachMotion,
     camera: &StereoCamera,
-    keypoints: usize,
+    keypoints: impl Into<KeypointLayout>,
     timing: &FilmTiming,
     noise: &FilmNoise,
 ) -> Result<Filmed, SimulateError> {
     let options = RecordOptions {
-        layout: KeypointLayout::Uniform(keypoints),
+        layout: keypoints.into(),
         duration_s: timing.duration_s() + noise.clock_offset_s.abs() + 0.05,
         ..RecordOptions::default()
     };

@@ -18,6 +18,13 @@ pub enum KeypointLayout {
     LinkCentres,
 }
 
+impl From<usize> for KeypointLayout {
+    /// This many, uniform in arc length.
+    fn from(keypoints: usize) -> Self {
+        Self::Uniform(keypoints)
+    }
+}
+
 /// How films are recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordOptions {

@@ -2,7 +2,7 @@
 
 use super::alignment::{Sway, delay_s};
 use super::plane::PlaneView;
-use super::{FeatureDefinition, ObserveError};
+use super::{FeatureDefinition, ObserveError, ObservedPoints};
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 
@@ -16,7 +16,8 @@ const GAP_FRAMES_MAX: f64 = 2.5;
 
 /// A frame's keypoints in the plane, each with the time it was exposed.
 struct Seen {
-    /// Forward, up (m) and exposure (s) of each keypoint of the grid.
+    /// Forward, up (m) and exposure (s) of each keypoint of the grid; of link centres
+    /// those there are.
     points: Vec<[f64; 3]>,
 }
 
@@ -38,7 +39,7 @@ impl FrameTable {
             .frames
             .iter()
             .filter(|frame| !frame.lost)
-            .filter_map(|frame| see(frame, definition.keypoints, camera, view))
+            .filter_map(|frame| see(frame, definition, camera, view))
             .collect();
         let start_s = track.frames.first().map_or(0.0, |f| f.t_s);
         let min = definition.frames / 4;
@@ -55,6 +56,7 @@ impl FrameTable {
             .collect();
         // The grid's times are those of the wiggle.
         let first_s = start_s + delay_s(&clamp, sway)?;
+        let keypoints = seen[0].points.len();
         let mut next = 0;
         #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
         let frames = (0..definition.frames)
@@ -64,7 +66,7 @@ impl FrameTable {
                     next += 1;
                 }
                 let frame_s = 1.0 / definition.rate_hz;
-                (0..definition.keypoints)
+                (0..keypoints)
                     .map(|k| at_time(&seen, next, k, t_s, frame_s))
                     .collect()
             })
@@ -95,8 +97,11 @@ impl FrameTable {
             }
         }
         let channels = self.definition.channels();
+        let angles_end = channels - 1;
+        let angles_begin = 2 * self.definition.keypoints;
         let mut out = Vec::with_capacity(self.frames.len() * channels);
         for frame in &self.frames {
+            let begin = out.len();
             let Some(points) = frame else {
                 out.resize(out.len() + channels, 0.0);
                 continue;
@@ -107,6 +112,8 @@ impl FrameTable {
                 [p[0] - reference[0], p[1] - reference[1]]
             });
             out.extend(relative.map(|x| x as f32));
+            // Links that the rope does not have.
+            out.resize(begin + angles_begin, 0.0);
             let mut before: f64 = 0.0;
             for pair in points.windows(2) {
                 let angle = (pair[1][0] - pair[0][0]).atan2(pair[0][1] - pair[1][1]);
@@ -119,6 +126,7 @@ impl FrameTable {
                 before += turn;
                 out.push(before as f32);
             }
+            out.resize(begin + angles_end, 0.0);
             out.push(1.0);
         }
         out
@@ -128,7 +136,7 @@ impl FrameTable {
 /// One frame's keypoints in the plane, at the grid's places along the rope.
 fn see(
     frame: &TrackedFrame,
-    keypoints: usize,
+    definition: &FeatureDefinition,
     camera: &StereoCamera,
     view: &PlaneView,
 ) -> Option<Seen> {
@@ -143,6 +151,10 @@ fn see(
         })
         .collect();
     let whole = bridge(&found)?;
+    if definition.points == ObservedPoints::LinkCentres {
+        return Some(Seen { points: whole });
+    }
+    let keypoints = definition.keypoints;
     let points = (0..keypoints)
         .map(|k| {
             #[allow(

@@ -17,9 +17,10 @@
 //! | 2K … 3K-2 | angle of segment k against straight down, positive forward (rad), continuous along the rope |
 //! | 3K-1 | 1 if the frame was seen, else 0 and the whole frame is 0 |
 //!
-//! The clamp's way would be zero relative to itself; its own sway tells the scale
-//! of the picture and the phase of the motion instead. Angles are not split into
-//! sine and cosine: a rope that hangs never points straight up, where they jump.
+//! Keypoints are uniform in arc length, as a tracker gives them, or the centres of the
+//! rope's links as in the paper's simulated films ([`ObservedPoints`]). Then a rope with
+//! fewer links than K leaves the last keypoints and segments at 0: the link count is
+//! plain to see, which no camera can do.
 
 mod alignment;
 mod frames;
@@ -36,6 +37,18 @@ use shared_types::{KeypointTrack, StereoCamera};
 /// Numbers in [`WiggleFeatures::widths`].
 pub const WIDTHS: usize = 4;
 
+/// Places on the rope that are observed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObservedPoints {
+    /// Uniform in arc length from the clamp to the lead's centre: what a tracker gives.
+    #[default]
+    ArcLength,
+    /// The centres of the links from the clamp on, as many as the rope has: what only a
+    /// simulated film shows.
+    LinkCentres,
+}
+
 /// Shape of the features; part of a network's identity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -46,8 +59,11 @@ pub struct FeatureDefinition {
     pub frames: usize,
     /// Frames per second (Hz).
     pub rate_hz: f64,
-    /// Keypoints, uniform in arc length from the clamp to the lead's centre.
+    /// Keypoints; of link centres the most there may be.
     pub keypoints: usize,
+    /// Where on the rope they lie.
+    #[serde(default)]
+    pub points: ObservedPoints,
 }
 
 impl Default for FeatureDefinition {
@@ -57,6 +73,7 @@ impl Default for FeatureDefinition {
             frames: 400,
             rate_hz: 60.0,
             keypoints: 16,
+            points: ObservedPoints::ArcLength,
         }
     }
 }
@@ -140,6 +157,24 @@ pub enum ObserveError {
         /// Size of the sway as a part of the known one's.
         part: f64,
     },
+    /// More link centres than the features have room for, or no two.
+    #[error("{found} link centres, but 2 to {max} are expected")]
+    LinkCentres {
+        /// Points of the track.
+        found: usize,
+        /// Most there may be.
+        max: usize,
+    },
+    /// The network reads link centres, which a camera does not show.
+    #[error(
+        "the network reads the centres of the rope's links, which only simulated films show (wag reproduce sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
+    )]
+    NeedsLinkCentres,
+    /// The film shows link centres, the network reads keypoints uniform in arc length.
+    #[error(
+        "the film shows link centres, but the network reads keypoints uniform in arc length: name one trained with `points = \"link-centres\"`"
+    )]
+    NeedsArcLength,
     /// The rope was seen in too few frames.
     #[error(
         "the rope was seen in {seen} of {frames} frames at 60 Hz, the network needs {min}: film again with the whole rope in view"
@@ -167,6 +202,13 @@ pub fn observe(
     plane: &ViewPlane,
 ) -> Result<WiggleFeatures, ObserveError> {
     track.validate()?;
+    let links = definition.points == ObservedPoints::LinkCentres;
+    if links && !(2..=definition.keypoints).contains(&track.keypoints) {
+        return Err(ObserveError::LinkCentres {
+            found: track.keypoints,
+            max: definition.keypoints,
+        });
+    }
     let view = plane.seen_from(camera)?;
     let table = FrameTable::new(&definition, track, camera, &view, &plane.sway)?;
     let min = definition.frames / 4;

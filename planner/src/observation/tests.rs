@@ -1,10 +1,10 @@
 use super::*;
-use crate::filming::{FilmNoise, FilmTiming, film, side_camera};
+use crate::filming::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
 use nalgebra::{Matrix3, Vector3};
 use rope_sim::PlannedArm;
-use shared_types::{Intrinsics, JointTrajectory, Limits, Shutter};
+use shared_types::{Intrinsics, JointTrajectory, Limits, RopeParams, Shutter};
 
 fn arm() -> PlannedArm {
     PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
@@ -277,4 +277,50 @@ fn another_wiggle_is_refused() {
             "{other:?}"
         );
     }
+}
+
+#[test]
+fn link_centres_show_how_many_links_there_are() {
+    let (arm, camera) = (arm(), side_camera());
+    let plane = ViewPlane::of_motion(&arm, 6.7).unwrap();
+    let definition = FeatureDefinition {
+        keypoints: 26,
+        points: ObservedPoints::LinkCentres,
+        ..FeatureDefinition::default()
+    };
+    let track_of = |links: u32| {
+        let rope = RopeParams {
+            links,
+            ..random_rope(2)
+        };
+        let noise = FilmNoise::white(2.0, 3);
+        let layout = KeypointLayout::LinkCentres;
+        film(&rope, &arm, &camera, layout, &FilmTiming::default(), &noise)
+            .unwrap()
+            .track
+    };
+    let look = |definition, links| {
+        let track = track_of(links);
+        observe(definition, &track, Appearance::default(), &camera, &plane)
+    };
+    for links in [21, 26] {
+        let features = look(definition, links).unwrap();
+        let channels = definition.channels();
+        let frame = &features.motion[100 * channels..101 * channels];
+        let links = links as usize;
+        // Places and angles of the links there are, and zeros for the others.
+        assert!(frame[2..2 * links].iter().any(|x| x.abs() > 0.1));
+        assert!(frame[2 * links..52].iter().all(|x| *x == 0.0));
+        assert!(frame[52..51 + links].iter().all(|x| *x != 0.0));
+        assert!(frame[51 + links..77].iter().all(|x| *x == 0.0));
+        assert_eq!(frame[77], 1.0);
+    }
+    let few = FeatureDefinition {
+        keypoints: 20,
+        ..definition
+    };
+    assert_eq!(
+        look(few, 21).unwrap_err(),
+        ObserveError::LinkCentres { found: 21, max: 20 }
+    );
 }

@@ -13,6 +13,8 @@ mod metadata;
 #[cfg(feature = "network")]
 mod net;
 mod probe;
+#[cfg(feature = "network")]
+mod propose;
 
 #[cfg(feature = "network")]
 pub use estimate::{NetworkError, identify_by_network};
@@ -22,6 +24,8 @@ pub use metadata::{
 };
 #[cfg(feature = "network")]
 pub use net::{PhiNet, PredictError, Prediction, RawOutputs};
+#[cfg(feature = "network")]
+pub use propose::{HybridError, identify_with_network, proposal};
 
 pub use probe::{PARITY, difference, probe};
 

@@ -4,7 +4,7 @@ use super::metadata::{ModelError, PhiMetadata};
 use super::probe::{PARITY, difference, probe};
 use super::{INPUTS, NetworkError, OUTPUTS};
 use crate::observation::{
-    FeatureDefinition, ObserveError, ViewPlane, WIDTHS, WiggleFeatures, observe,
+    FeatureDefinition, ObserveError, ObservedPoints, ViewPlane, WIDTHS, WiggleFeatures, observe,
 };
 use crate::sysid::Observation;
 use crate::wiggle::wiggle;
@@ -197,6 +197,15 @@ impl PhiNet {
     /// # Errors
     /// See [`ObserveError`].
     pub fn see(&self, observation: &Observation<'_>) -> Result<WiggleFeatures, ObserveError> {
+        match (self.metadata.features.points, observation.points) {
+            (ObservedPoints::LinkCentres, ObservedPoints::ArcLength) => {
+                return Err(ObserveError::NeedsLinkCentres);
+            }
+            (ObservedPoints::ArcLength, ObservedPoints::LinkCentres) => {
+                return Err(ObserveError::NeedsArcLength);
+            }
+            _ => {}
+        }
         observe(
             self.metadata.features,
             observation.track,

@@ -8,7 +8,10 @@ mod collect;
 mod config;
 
 use crate::calm::{CalmError, CalmRequest, calm};
-use crate::sysid::{self, Appearance, IdentifyOptions, Observation};
+use crate::observation::ObservedPoints;
+#[cfg(feature = "network")]
+use crate::phi::{HybridError, PhiNet, PredictError, identify_with_network};
+use crate::sysid::{self, Appearance, FitProgress, IdentifyOptions, Observation};
 use crate::tasks::{Belief, PlanError, PlanOptions, PlanRequest, plan_throw};
 use collect::Collector;
 pub use config::PlannerConfig;
@@ -18,7 +21,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{Bus, IpcError};
-use shared_types::{JointVector, MonotonicNs, Task};
+use shared_types::{JointVector, MonotonicNs, RopeEstimate, Task};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -47,6 +50,10 @@ pub enum PlannerProcessError {
     /// Identification failed.
     #[error(transparent)]
     Identify(#[from] sysid::IdentifyError),
+    /// The network failed.
+    #[cfg(feature = "network")]
+    #[error(transparent)]
+    Network(#[from] PredictError),
     /// Planning a calming move failed.
     #[error(transparent)]
     Calm(#[from] CalmError),
@@ -134,6 +141,7 @@ fn identify(
         });
     let observation = Observation {
         track: &track,
+        points: ObservedPoints::ArcLength,
         camera: &request.camera,
         motion: &motion,
         appearance,
@@ -143,7 +151,7 @@ fn identify(
         lead_mass_kg: request.lead_mass_kg,
         ..config.identify
     };
-    let estimate = sysid::identify(&observation, &options, &mut |p| {
+    let estimate = fit(&observation, &options, &mut |p| {
         report(
             call,
             stop,
@@ -156,6 +164,26 @@ fn identify(
         )
     })?;
     Ok(PlannerEvent::Identified(Box::new(estimate)))
+}
+
+/// The fit, from the built-in network's proposal where it has one.
+fn fit(
+    observation: &Observation<'_>,
+    options: &IdentifyOptions,
+    progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
+) -> Result<RopeEstimate, PlannerProcessError> {
+    #[cfg(feature = "network")]
+    match PhiNet::embedded() {
+        Ok(mut net) => {
+            let found = identify_with_network(&mut net, observation, options, progress);
+            return found.map_err(|error| match error {
+                HybridError::Identify(error) => error.into(),
+                HybridError::Network(error) => error.into(),
+            });
+        }
+        Err(error) => tracing::warn!(%error, "no network: a search proposes the rope"),
+    }
+    Ok(sysid::identify(observation, options, progress)?)
 }
 
 /// Times count from the first joint sample, at which the rope hangs still.

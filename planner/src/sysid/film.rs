@@ -2,6 +2,7 @@
 
 use super::camera_pose::Viewer;
 use super::{IdentifyError, IdentifyOptions, Observation};
+use crate::observation::ObservedPoints;
 use nalgebra::Vector3;
 use rope_sim::{FrameTimes, NodeTrack, Outcome, Precision, Rollout, SimOptions, Start, Watch};
 use shared_types::keypoints::TrackedFrame;
@@ -56,11 +57,14 @@ impl Grid {
         confidence_min: f64,
     ) -> Self {
         #[allow(clippy::cast_precision_loss, reason = "keypoint counts are small")]
-        let last = (observation.track.keypoints - 1) as f64;
+        let keypoints = observation.track.keypoints as f64;
         let sighting = |frame: &TrackedFrame, i: usize| {
             let (pixel, confidence) = (frame.points[i], frame.confidence[i]);
             #[allow(clippy::cast_precision_loss, reason = "keypoint counts are small")]
-            let along = i as f64 / last;
+            let along = match observation.points {
+                ObservedPoints::ArcLength => i as f64 / (keypoints - 1.0),
+                ObservedPoints::LinkCentres => (i as f64 + 0.5) / keypoints,
+            };
             (confidence >= confidence_min && confidence > 0.0).then(|| Sighting {
                 time_s: frame.t_s + observation.camera.row_time_s(pixel[1]),
                 along,

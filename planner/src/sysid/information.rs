@@ -15,6 +15,7 @@ use super::linear::linearise;
 use super::noise::{AxisNoise, Noise};
 use super::{Appearance, IdentifyError, IdentifyOptions, Observation};
 use crate::filming::{FilmNoise, FilmTiming, film};
+use crate::observation::ObservedPoints;
 use nalgebra::SMatrix;
 use rope_sim::AttachMotion;
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,7 @@ pub fn information(
     )?;
     let observation = Observation {
         track: &filmed.track,
+        points: ObservedPoints::ArcLength,
         camera,
         motion,
         appearance: Appearance::default(),

@@ -1,6 +1,7 @@
 //! Rope parameters from the keypoints of one filmed wiggle.
 //!
-//! Something proposes a rope: a fast search, or the paper's Φ-CMA-ES ([`Method`]).
+//! Something proposes a rope: a network, a fast search, or the paper's Φ-CMA-ES
+//! ([`Method`]).
 //! Gauss-Newton steps refine it against every pixel, the offset of the clocks and a
 //! small error of the camera's place along with it, under a noise estimated from the
 //! residuals. What the film can tell are ratios of stiffness, damping and masses
@@ -30,6 +31,7 @@ pub use coordinates::Appearance;
 pub use information::{WiggleInformation, information};
 
 use crate::cmaes::CmaError;
+use crate::observation::ObservedPoints;
 use camera_pose::CorrectionPrior;
 use clock::{ClockWindow, clock_window};
 use coordinates::{CLOCK, Coordinates, Reach};
@@ -51,9 +53,10 @@ use std::ops::ControlFlow;
 /// What was filmed.
 #[derive(Clone, Copy)]
 pub struct Observation<'a> {
-    /// Keypoints, uniform in arc length from clamp to lead centre; times count
-    /// from the first frame.
+    /// Keypoints, from the clamp to the lead; times count from the first frame.
     pub track: &'a KeypointTrack,
+    /// Where on the rope they lie: uniform in arc length in anything that a camera saw.
+    pub points: ObservedPoints,
     /// The camera; keypoints are raw pixels of its left eye.
     pub camera: &'a StereoCamera,
     /// Measured motion of the attach frame; t = 0 is the first frame, up to the
@@ -236,9 +239,12 @@ pub enum IdentifyError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// A proposal, refined.
+    /// A proposal, refined: the network's where there is one for the film, else that of
+    /// a fast search.
     #[default]
     Hybrid,
+    /// The proposal of a fast search, refined.
+    HybridSearch,
     /// The paper's Φ-CMA-ES, refined.
     Cmaes,
     /// The network alone, which is asked by [`crate::phi`] and not by [`identify`].
@@ -258,8 +264,9 @@ pub fn identify(
     identify_from(observation, None, options, progress)
 }
 
-/// [`identify`] from a rope that something else proposes, such as a network's answer;
-/// [`Method::Cmaes`] searches by itself all the same.
+/// [`identify`] from a rope that something else proposes, such as a network's answer. A
+/// fast search is made all the same where the fit from there looks like that of a rope
+/// outside the ranges, and by every method but [`Method::Hybrid`].
 ///
 /// # Errors
 /// See [`IdentifyError`].
@@ -284,7 +291,7 @@ pub fn identify_from(
         simulations: 0,
         steps: 0,
         steps_max: match options.method {
-            Method::Hybrid => HYBRID_STEPS,
+            Method::Hybrid | Method::HybridSearch => HYBRID_STEPS,
             Method::Cmaes | Method::Network => options.generations + REFINE_STEPS,
         },
         progress,
@@ -296,8 +303,8 @@ pub fn identify_from(
         camera: CorrectionPrior::new(options),
     };
     let (fit, label) = match (options.method, proposed) {
-        (Method::Hybrid, Some(rope)) => (task.proposed(rope, &mut account)?, "hybrid-network"),
-        (Method::Hybrid, None) => (task.hybrid(&mut account)?, "hybrid-search"),
+        (Method::Hybrid, Some(rope)) => task.proposed(rope, &mut account)?,
+        (Method::Hybrid | Method::HybridSearch, _) => (task.hybrid(&mut account)?, SEARCHED),
         (Method::Cmaes | Method::Network, _) => (task.cmaes(Reach::Ranges, &mut account)?, "cmaes"),
     };
     let found = novelty(&fit);
@@ -321,6 +328,8 @@ pub fn identify_from(
 /// About how many steps a refinement takes, and a fast search with it.
 const REFINE_STEPS: usize = 12;
 const HYBRID_STEPS: usize = 30;
+/// Name of a fast search, refined.
+const SEARCHED: &str = "hybrid-search";
 
 /// One identification.
 struct Task<'a> {
@@ -344,15 +353,24 @@ impl Task<'_> {
         self.refine(&coordinates, &walkers, account)
     }
 
-    /// A proposed rope, refined.
+    /// A proposed rope, refined; a fast search if it ends where no rope of the ranges is.
     fn proposed(
         &self,
         rope: &RopeParams,
         account: &mut Account<'_>,
-    ) -> Result<Refined, IdentifyError> {
+    ) -> Result<(Refined, &'static str), IdentifyError> {
         let coordinates = self.coordinates(Reach::Ranges);
         let walkers = from_proposal(self.film, &coordinates, rope, account)?;
-        self.refine(&coordinates, &walkers, account)
+        let near = self.refine(&coordinates, &walkers, account)?;
+        if !novelty(&near).is_outside() {
+            return Ok((near, "hybrid-network"));
+        }
+        let searched = self.hybrid(account)?;
+        if searched.residual_px < near.residual_px {
+            Ok((searched, SEARCHED))
+        } else {
+            Ok((near, "hybrid-network"))
+        }
     }
 
     fn refine(

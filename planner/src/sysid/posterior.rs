@@ -25,6 +25,8 @@ const DRAWS: usize = 4096;
 const EFFECTIVE_MIN: f64 = 40.0;
 /// Error of taking the film for linear in the link count (1).
 const LINKS_STD: f64 = 0.5;
+/// Probability of an interval.
+const NINE_TENTHS: f64 = 0.9;
 /// Part of the prior's deviation above which a direction was not seen.
 const UNSEEN_PART: f64 = 0.7;
 
@@ -225,8 +227,7 @@ fn summarise(
         }
     }
     let mut interval_90 = core::array::from_fn(|i| quantiles(draws, |d| d.values[i], [0.05, 0.95]));
-    interval_90[parameter::LINKS] =
-        [0.05, 0.95].map(|part| count_quantile(&links_probability, part));
+    interval_90[parameter::LINKS] = count_interval(&links_probability);
     RopePosterior {
         mean,
         covariance,
@@ -237,21 +238,34 @@ fn summarise(
     }
 }
 
-/// Quantile of the link count, the probability of each count spread evenly over half a
-/// link to both sides: an interval between whole counts would hold the truth far more
-/// often than it says.
-fn count_quantile(probability: &[f64; LINK_COUNTS], part: f64) -> f64 {
-    let (low, high) = link_range();
-    let mut edge = f64::from(low) - 0.5;
-    let mut below = 0.0;
-    for p in probability {
-        if below + p >= part && *p > 0.0 {
-            return edge + (part - below) / p;
+/// First and last of the likeliest link counts whose probability is as close to nine
+/// tenths as whole counts allow: with one count more it would be farther off, above or
+/// below. The fewest counts with nine tenths or more would hold the truth too often.
+fn count_interval(probability: &[f64; LINK_COUNTS]) -> [f64; 2] {
+    let (mut first, mut sum) = (0, 0.0);
+    for (i, p) in probability.iter().enumerate() {
+        if *p > sum {
+            (first, sum) = (i, *p);
         }
-        below += p;
-        edge += 1.0;
     }
-    f64::from(high) + 0.5
+    let mut last = first;
+    loop {
+        let below = first.checked_sub(1).map_or(-1.0, |i| probability[i]);
+        let above = probability.get(last + 1).copied().unwrap_or(-1.0);
+        let next = below.max(above);
+        if next < 0.0 || (sum + next - NINE_TENTHS).abs() >= (sum - NINE_TENTHS).abs() {
+            break;
+        }
+        sum += next;
+        if above >= below {
+            last += 1;
+        } else {
+            first -= 1;
+        }
+    }
+    let (low, _) = link_range();
+    #[allow(clippy::cast_precision_loss, reason = "seven counts")]
+    [first, last].map(|i| f64::from(low) + i as f64)
 }
 
 /// Deviation of the ranges as a prior.
@@ -316,13 +330,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_of_the_count_lie_between_counts() {
+    fn intervals_of_the_count_hold_what_is_closest_to_nine_tenths() {
         let sure = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-        assert!((count_quantile(&sure, 0.05) - 22.55).abs() < 1e-12);
-        assert!((count_quantile(&sure, 0.95) - 23.45).abs() < 1e-12);
-        let even = [1.0 / 7.0; LINK_COUNTS];
-        assert!((count_quantile(&even, 0.5) - 23.0).abs() < 1e-12);
-        // Nine tenths of evenly likely counts, no more.
-        assert!((count_quantile(&even, 0.95) - count_quantile(&even, 0.05) - 6.3).abs() < 1e-9);
+        assert_eq!(count_interval(&sure), [23.0, 23.0]);
+        // Six of seven even counts are 86 %, all of them 100 %.
+        let [low, high] = count_interval(&[1.0 / 7.0; LINK_COUNTS]);
+        assert_eq!(high - low, 5.0);
+        // 80 %, or 95 %.
+        let sloping = [0.5, 0.3, 0.15, 0.05, 0.0, 0.0, 0.0];
+        assert_eq!(count_interval(&sloping), [20.0, 22.0]);
+        // 85 %, or 98 %.
+        let steep = [0.0, 0.0, 0.01, 0.01, 0.13, 0.45, 0.4];
+        assert_eq!(count_interval(&steep), [25.0, 26.0]);
+        // Equal on both sides: one of them, and the middle always.
+        let even = [0.02, 0.06, 0.12, 0.6, 0.12, 0.06, 0.02];
+        assert_eq!(count_interval(&even)[0], 22.0);
     }
 }

@@ -7,19 +7,24 @@ mod lob_drape;
 mod outside;
 mod pipeline;
 mod summary;
+mod wiggles;
 
 pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
 pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
 pub use outside::{area_under_curve, outside_rope};
 pub use pipeline::{PipelineTrial, Spread, Strikes, pipeline_trials};
 pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
+pub use wiggles::{AblatedWiggle, ablated_wiggles};
 
-use crate::filming::{FilmTiming, Filmed, Randomisation, film, side_camera};
+use crate::filming::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
+use crate::observation::ObservedPoints;
 #[cfg(feature = "network")]
-use crate::phi::{PhiNet, identify_by_network};
+use crate::phi::{HybridError, PhiNet, identify_by_network, proposal};
 use crate::ropes::random_rope;
 #[cfg(feature = "network")]
 use crate::sysid::Method;
+#[cfg(feature = "network")]
+use crate::sysid::identify_from;
 use crate::sysid::{FitProgress, IdentifyError, IdentifyOptions, Observation, identify};
 use crate::tasks::PlanError;
 use crate::wiggle::{WiggleConfig, WiggleError, wiggle};
@@ -46,7 +51,10 @@ pub struct TrialRig {
     pub camera: StereoCamera,
     /// Errors of the recordings.
     pub randomisation: Randomisation,
-    /// The network, for [`crate::sysid::Method::Network`].
+    /// Where on the rope the keypoints of its films lie.
+    pub points: ObservedPoints,
+    /// The network, for [`crate::sysid::Method::Network`] and what the hybrid starts
+    /// from.
     #[cfg(feature = "network")]
     pub network: Option<Arc<Mutex<PhiNet>>>,
 }
@@ -87,6 +95,15 @@ pub enum TrialError {
         index: u64,
         /// What is wrong.
         source: crate::phi::NetworkError,
+    },
+    /// The fit from the network's proposal failed.
+    #[cfg(feature = "network")]
+    #[error("trial {index}: {source}")]
+    Hybrid {
+        /// Index of the trial.
+        index: u64,
+        /// What is wrong.
+        source: HybridError,
     },
     /// Identification failed.
     #[error("trial {index}: {source}")]
@@ -131,6 +148,7 @@ impl TrialRig {
             motion: PlannedArm::new(wiggle(config, &Limits::default())?),
             camera: side_camera(),
             randomisation: Randomisation::default(),
+            points: ObservedPoints::ArcLength,
             #[cfg(feature = "network")]
             network: None,
         })
@@ -143,7 +161,11 @@ impl TrialRig {
     pub fn film(&self, rope: &RopeParams, seed: u64, index: u64) -> Result<Filmed, TrialError> {
         let noise = self.randomisation.draw(seed ^ SALT, index);
         let timing = FilmTiming::default();
-        film(rope, &self.motion, &self.camera, KEYPOINTS, &timing, &noise)
+        let layout = match self.points {
+            ObservedPoints::ArcLength => KeypointLayout::Uniform(KEYPOINTS),
+            ObservedPoints::LinkCentres => KeypointLayout::LinkCentres,
+        };
+        film(rope, &self.motion, &self.camera, layout, &timing, &noise)
             .map_err(|source| TrialError::Film { index, source })
     }
 
@@ -152,6 +174,7 @@ impl TrialRig {
     pub fn observation<'a>(&'a self, filmed: &'a Filmed) -> Observation<'a> {
         Observation {
             track: &filmed.track,
+            points: self.points,
             camera: &self.camera,
             motion: &self.motion,
             appearance: filmed.appearance,
@@ -179,17 +202,39 @@ impl TrialRig {
             ..*options
         };
         #[cfg(feature = "network")]
-        if let (Method::Network, Some(net)) = (options.method, &self.network) {
-            // A network that panicked once is as good as before.
-            let mut net = net.lock().unwrap_or_else(PoisonError::into_inner);
-            return identify_by_network(&mut net, &observation, &options)
-                .map_err(|source| TrialError::Network { index, source });
+        if let Some(net) = &self.network {
+            return with_network(net, &observation, index, &options);
         }
         identify(&observation, &options, &mut |_: FitProgress| {
             ControlFlow::Continue(())
         })
         .map_err(|source| TrialError::Identify { index, source })
     }
+}
+
+/// Identifies with the network at hand. It is asked by one thread at a time, the fit is
+/// everybody's own.
+#[cfg(feature = "network")]
+fn with_network(
+    net: &Mutex<PhiNet>,
+    observation: &Observation<'_>,
+    index: u64,
+    options: &IdentifyOptions,
+) -> Result<RopeEstimate, TrialError> {
+    // A network that panicked once is as good as before.
+    let lock = || net.lock().unwrap_or_else(PoisonError::into_inner);
+    if options.method == Method::Network {
+        return identify_by_network(&mut lock(), observation, options)
+            .map_err(|source| TrialError::Network { index, source });
+    }
+    let proposed = proposal(&mut lock(), observation, options);
+    proposed
+        .map_err(HybridError::from)
+        .and_then(|rope| {
+            let quiet = &mut |_: FitProgress| ControlFlow::Continue(());
+            Ok(identify_from(observation, rope.as_ref(), options, quiet)?)
+        })
+        .map_err(|source| TrialError::Hybrid { index, source })
 }
 
 /// Rope `index` of the trials of `seed`.

@@ -3,9 +3,10 @@
 use crate::TrainingError;
 use crate::masking::MaskPhase;
 use planner::filming::Randomisation;
-use planner::observation::FeatureDefinition;
+use planner::observation::{FeatureDefinition, ObservedPoints};
 use planner::wiggle::WiggleConfig;
 use serde::{Deserialize, Serialize};
+use shared_types::rope::RANGES;
 use std::path::Path;
 
 /// Everything that decides what network comes out.
@@ -33,8 +34,12 @@ pub struct DataConfig {
     pub ropes: usize,
     /// Ropes that only judge.
     pub held_out: usize,
-    /// Keypoints kept of each rope, and seen by the network.
+    /// Keypoints kept of each rope, and seen by the network; of link centres the most
+    /// there may be.
     pub keypoints: usize,
+    /// Where on the rope they lie.
+    #[serde(default)]
+    pub points: ObservedPoints,
     /// The motion that is filmed.
     #[serde(default)]
     pub wiggle: WiggleConfig,
@@ -115,6 +120,12 @@ impl TrainingConfig {
                 "2 to 32",
             ),
             (
+                "data.keypoints",
+                data.keypoints.to_string(),
+                data.points == ObservedPoints::ArcLength || data.keypoints >= most_links(),
+                "at least the most links of the ranges, 26, for link centres",
+            ),
+            (
                 "network.channels",
                 format!("{:?}", network.channels),
                 network.channels.iter().all(|c| (1..=1024).contains(c)),
@@ -182,9 +193,20 @@ impl TrainingConfig {
     pub fn features(&self) -> FeatureDefinition {
         FeatureDefinition {
             keypoints: self.data.keypoints,
+            points: self.data.points,
             ..FeatureDefinition::default()
         }
     }
+}
+
+/// Most links of the ranges.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a small positive whole number"
+)]
+fn most_links() -> usize {
+    RANGES[0].max as usize
 }
 
 impl OptimisationConfig {

@@ -11,6 +11,7 @@ use crate::config::DataConfig;
 use crate::files::{read, write_whole};
 use crate::hypercube::{Hypercube, Share};
 use planner::filming::{KeypointLayout, RecordOptions, RopeFilm, record};
+use planner::observation::ObservedPoints;
 use planner::phi::hex;
 use planner::wiggle::wiggle;
 use rope_sim::PlannedArm;
@@ -38,7 +39,10 @@ impl Recipe {
     /// The recipe of a share of the configured data; `threads` change nothing.
     #[must_use]
     pub fn new(data: &DataConfig, share: Share, threads: usize) -> Self {
-        let layout = KeypointLayout::Uniform(data.keypoints);
+        let layout = match data.points {
+            ObservedPoints::ArcLength => KeypointLayout::Uniform(data.keypoints),
+            ObservedPoints::LinkCentres => KeypointLayout::LinkCentres,
+        };
         Self {
             data: data.clone(),
             share,
@@ -102,7 +106,7 @@ impl Recipe {
         let arm = PlannedArm::new(wiggle(&self.data.wiggle, &Limits::default())?);
         let cube = Hypercube::new(self.data.seed, self.share, self.ropes());
         let ropes: Vec<RopeParams> = self.range(shard).map(|i| cube.rope(i)).collect();
-        let mut pool = Pool::empty(self.data.keypoints, self.options.period_s);
+        let mut pool = self.empty();
         // Enough at once to fill the simulator's lanes with ropes of each link
         // count.
         for part in ropes.chunks(250) {
@@ -139,12 +143,22 @@ impl Recipe {
     /// # Errors
     /// A shard that is missing, damaged, or of another recipe.
     pub fn load(&self, folder: &Path) -> Result<Pool, TrainingError> {
-        let mut pool = Pool::empty(self.data.keypoints, self.options.period_s);
+        let mut pool = self.empty();
         for shard in 0..self.shards() {
             let path = self.path(folder, shard);
             pool.append(self.load_shard(&path, shard)?);
         }
         Ok(pool)
+    }
+
+    fn empty(&self) -> Pool {
+        Pool {
+            keypoints: self.data.keypoints,
+            points: self.data.points,
+            period_s: self.options.period_s,
+            ropes: Vec::new(),
+            positions: Vec::new(),
+        }
     }
 
     fn load_shard(&self, path: &Path, shard: usize) -> Result<Pool, TrainingError> {
@@ -160,23 +174,16 @@ impl Recipe {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pool {
     keypoints: usize,
+    points: ObservedPoints,
     period_s: f64,
     /// Ropes, each with whether its simulation stayed finite.
     ropes: Vec<(RopeParams, bool)>,
-    /// Rope by rope, sample by sample, keypoint by keypoint, x y z.
+    /// Rope by rope, sample by sample, keypoint by keypoint, x y z; zeros for links that
+    /// a rope does not have.
     positions: Vec<i16>,
 }
 
 impl Pool {
-    fn empty(keypoints: usize, period_s: f64) -> Self {
-        Self {
-            keypoints,
-            period_s,
-            ropes: Vec::new(),
-            positions: Vec::new(),
-        }
-    }
-
     /// Number of ropes.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -209,13 +216,16 @@ impl Pool {
     pub fn film(&self, index: usize) -> Option<RopeFilm> {
         let each = self.positions.len() / self.len().max(1);
         let positions = self.positions.get(index * each..(index + 1) * each)?;
-        let positions = positions.iter().map(|x| f32::from(*x) / UNITS_PER_M);
-        RopeFilm::from_positions(
-            self.ropes[index].0,
-            self.period_s,
-            self.keypoints,
-            positions.collect(),
-        )
+        let rope = self.ropes[index].0;
+        let keypoints = match self.points {
+            ObservedPoints::ArcLength => self.keypoints,
+            ObservedPoints::LinkCentres => self.keypoints.min(rope.links as usize),
+        };
+        let positions = positions
+            .chunks_exact(3 * self.keypoints)
+            .flat_map(|sample| &sample[..3 * keypoints])
+            .map(|x| f32::from(*x) / UNITS_PER_M);
+        RopeFilm::from_positions(rope, self.period_s, keypoints, positions.collect())
     }
 
     /// Hash of all ropes and motions (SHA-256, hexadecimal).
@@ -241,11 +251,12 @@ impl Pool {
             clippy::cast_possible_truncation,
             reason = "saturates 2 m from the base, beyond any rope's reach"
         )]
-        let units = film
-            .positions_m()
-            .iter()
-            .map(|x| (x * UNITS_PER_M).round() as i16);
-        self.positions.extend(units);
+        let unit = |x: &f32| (x * UNITS_PER_M).round() as i16;
+        for sample in film.positions_m().chunks_exact(3 * film.keypoints()) {
+            let filled = self.positions.len() + 3 * self.keypoints;
+            self.positions.extend(sample.iter().map(unit));
+            self.positions.resize(filled, 0);
+        }
     }
 
     fn append(&mut self, other: Self) {
@@ -313,13 +324,12 @@ impl Pool {
             })
             .collect();
         Ok(Self {
-            keypoints,
-            period_s: recipe.options.period_s,
             ropes,
             positions: positions
                 .chunks_exact(2)
                 .map(|x| i16::from_le_bytes([x[0], x[1]]))
                 .collect(),
+            ..recipe.empty()
         })
     }
 }
@@ -342,6 +352,7 @@ mod tests {
             ropes: 6,
             held_out: 3,
             keypoints: 5,
+            points: ObservedPoints::ArcLength,
             wiggle: WiggleConfig::default(),
         }
     }
@@ -365,6 +376,28 @@ mod tests {
         let held_out = Recipe::new(&data(), Share::HeldOut, 1).simulate(0).unwrap();
         assert_ne!(held_out.rope(0), pool.rope(0));
         std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn link_centres_are_kept_as_many_as_a_rope_has() {
+        let data = DataConfig {
+            keypoints: 26,
+            points: ObservedPoints::LinkCentres,
+            ..data()
+        };
+        let pool = Recipe::new(&data, Share::Training, 1).simulate(0).unwrap();
+        let mut counts = Vec::new();
+        for i in 0..pool.len() {
+            let (rope, film) = (*pool.rope(i), pool.film(i).unwrap());
+            let links = rope.links as usize;
+            assert_eq!(film.keypoints(), links);
+            let hanging = film.position(0.0, 0) - film.position(0.0, links - 1);
+            let between = rope.length_m * (1.0 - 1.0 / f64::from(rope.links));
+            assert!((hanging.norm() - between).abs() < 1e-3);
+            counts.push(links);
+        }
+        counts.dedup();
+        assert!(counts.len() > 1, "{counts:?}");
     }
 
     #[test]

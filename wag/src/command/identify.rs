@@ -1,6 +1,6 @@
 //! `wag identify`: rope parameters from a video or from keypoints.
 
-use super::network::{network, no_model_without_network};
+use super::network::{asks_network, network_for_camera, no_model_without_network};
 use super::plan::planner_config;
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName, MotionArgs};
@@ -12,13 +12,16 @@ use crate::table;
 use anyhow::{Context, anyhow};
 use camera_ingest::load_camera;
 use comfy_table::Table;
-use planner::phi::{NetworkError, identify_by_network};
-use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify};
+use planner::observation::ObservedPoints;
+use planner::phi::{NetworkError, identify_by_network, proposal};
+use planner::sysid::{
+    Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify_from,
+};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::rope::{Ambiguity, RANGES};
-use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
+use shared_types::{KeypointTrack, RopeEstimate, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
@@ -143,6 +146,7 @@ pub fn method_of(name: MethodName) -> Method {
     match name {
         MethodName::Cmaes => Method::Cmaes,
         MethodName::Hybrid => Method::Hybrid,
+        MethodName::HybridSearch => Method::HybridSearch,
         MethodName::Nn => Method::Network,
     }
 }
@@ -151,8 +155,8 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let method = method_of(args.method);
     let model = args.model.as_deref();
     no_model_without_network(method, model)?;
-    let net = (method == Method::Network)
-        .then(|| network(model))
+    let net = asks_network(method)
+        .then(|| network_for_camera(model))
         .transpose()?;
     let camera = load_camera(&args.camera).or_input()?;
     let motion = attach_motion(&args.motion).or_input()?;
@@ -162,6 +166,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let stage = Stage::begin("identify", quiet);
     let observation = Observation {
         track: &track,
+        points: ObservedPoints::ArcLength,
         camera: &camera,
         motion: motion.as_ref(),
         appearance,
@@ -173,10 +178,14 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         ..config.identify
     };
     let estimate = match net {
-        Some(mut net) => {
+        Some(mut net) if method == Method::Network => {
             identify_by_network(&mut net, &observation, &options).map_err(classify_network)?
         }
-        None => searched(&observation, &options, &stage).map_err(classify)?,
+        Some(mut net) => {
+            let proposed = proposal(&mut net, &observation, &options).or_failed()?;
+            fitted(&observation, proposed.as_ref(), &options, &stage).map_err(classify)?
+        }
+        None => fitted(&observation, None, &options, &stage).map_err(classify)?,
     };
     let seconds = stage.done(&format!(
         "residual {:.2} px, {} simulations",
@@ -202,13 +211,15 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     })))
 }
 
-/// Searches for the rope, with progress, until done or interrupted.
-fn searched(
+/// Fits the rope, from one that is proposed if there is one, with progress, until done or
+/// interrupted.
+fn fitted(
     observation: &Observation<'_>,
+    proposed: Option<&RopeParams>,
     options: &IdentifyOptions,
     stage: &Stage,
 ) -> Result<RopeEstimate, IdentifyError> {
-    identify(observation, options, &mut |p| {
+    identify_from(observation, proposed, options, &mut |p| {
         stage.progress(&Progress {
             done: u32::try_from(p.generation).unwrap_or(u32::MAX),
             total: u32::try_from(p.generations).unwrap_or(u32::MAX),

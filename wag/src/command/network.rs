@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, Outcome};
 use anyhow::anyhow;
+use planner::observation::{ObserveError, ObservedPoints};
 use planner::phi::{ModelError, PhiNet};
 use planner::sysid::Method;
 use planner::trials::TrialRig;
@@ -24,14 +25,38 @@ pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
     })
 }
 
-/// Gives a rig the network if the method is to be the network.
+/// [`network`] for what a camera sees.
+///
+/// # Errors
+/// As [`network`], or a network that reads what no camera shows.
+pub fn network_for_camera(model: Option<&Path>) -> Outcome<PhiNet> {
+    let net = network(model)?;
+    match net.metadata().features.points {
+        ObservedPoints::ArcLength => Ok(net),
+        ObservedPoints::LinkCentres => Err(Failure::input(ObserveError::NeedsLinkCentres)),
+    }
+}
+
+/// Whether a method asks a network.
+pub fn asks_network(method: Method) -> bool {
+    matches!(method, Method::Network | Method::Hybrid)
+}
+
+/// Gives a rig the network if the method asks one, and lets it film what the network
+/// reads.
 ///
 /// # Errors
 /// As [`network`], or a model for a method that asks none.
 pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) -> Outcome {
     no_model_without_network(method, model)?;
-    if method == Method::Network {
-        rig.network = Some(Arc::new(Mutex::new(network(model)?)));
+    if asks_network(method) {
+        // A fit looks at keypoints as a camera gives them.
+        let net = match method {
+            Method::Network => network(model)?,
+            _ => network_for_camera(model)?,
+        };
+        rig.points = net.metadata().features.points;
+        rig.network = Some(Arc::new(Mutex::new(net)));
     }
     Ok(())
 }
@@ -42,8 +67,8 @@ pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) ->
 /// What to do instead.
 pub fn no_model_without_network(method: Method, model: Option<&Path>) -> Outcome {
     match model {
-        Some(path) if method != Method::Network => Err(Failure::input(anyhow!(
-            "--model {} is for --method nn only",
+        Some(path) if !asks_network(method) => Err(Failure::input(anyhow!(
+            "--model {} is for --method nn and hybrid only",
             path.display()
         ))),
         _ => Ok(()),

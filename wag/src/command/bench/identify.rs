@@ -3,7 +3,7 @@
 use super::machine::Machine;
 use super::spent::least;
 use crate::cli::BenchArgs;
-use crate::command::network::network;
+use crate::command::network::{network, with_network};
 use crate::command::plan::planner_config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
@@ -64,7 +64,8 @@ fn measure(
 
 pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let config = planner_config(None).or_failed()?;
-    let rig = TrialRig::new(&config.wiggle).or_failed()?;
+    let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
+    with_network(&mut rig, Method::Hybrid, None)?;
     let machine = Machine::here();
     let options = IdentifyOptions {
         seed: args.seed,

@@ -10,6 +10,7 @@ mod ood;
 mod pipeline;
 mod setup;
 mod sysid;
+mod wiggles;
 
 use crate::cli::{ReproduceArgs, ReproduceName};
 use crate::failure::Outcome;
@@ -24,6 +25,7 @@ pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         ReproduceName::Sysid => sysid::run(args, quiet),
         ReproduceName::MotionFidelity => fidelity::run(args, quiet),
         ReproduceName::SysidOod => ood::run(args, quiet),
+        ReproduceName::WiggleAblation => wiggles::run(args, quiet),
         ReproduceName::SimPipeline => pipeline::run(args, quiet),
         ReproduceName::LobDrape => lob_drape::run(args, quiet),
     }
