@@ -4,7 +4,8 @@
 //!
 //! A burst of setpoints is worse than a gap: the arm executes only the newest
 //! and derives wrong accelerations from bunched ones. For the same reason a
-//! setpoint that goes out late is the one of that later instant.
+//! setpoint that goes out late is the one of that later instant, and one that
+//! became late only while it was computed does not go out at all.
 
 /// Two setpoints are never closer than this part of a period.
 const MIN_GAP_PART: (u64, u64) = (4, 5);
@@ -33,6 +34,43 @@ pub fn setpoint_late_ns(deadline_ns: u64, woke_ns: u64, missed: u32, period_ns: 
         0
     } else {
         u32::try_from(late_ns).unwrap_or(u32::MAX)
+    }
+}
+
+/// A setpoint older than this part of a period when it is about to be sent is
+/// held back: 0.4 ms at 250 Hz.
+const STALE_PART: u64 = 10;
+
+/// Setpoints that were computed and not sent, because the thread was held up
+/// between its wake-up and the send.
+///
+/// Sent all the same, the next one would follow too soon for the way between the
+/// two, and the arm would see more speed than the motion has; without it the arm
+/// sees one longer step in one longer time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct HoldBack {
+    in_a_row: u32,
+}
+
+impl HoldBack {
+    /// Cycles since the last setpoint sent that had theirs held back; they count
+    /// as missed. RT-safe.
+    #[must_use]
+    pub const fn missed(&self) -> u32 {
+        self.in_a_row
+    }
+
+    /// Whether the setpoint for `instant_ns`, about to be sent at `now_ns`, must
+    /// not go out. Ask once per setpoint. RT-safe.
+    #[must_use]
+    pub fn holds(&mut self, instant_ns: u64, now_ns: u64, period_ns: u64) -> bool {
+        let stale = now_ns.saturating_sub(instant_ns) > (period_ns / STALE_PART).max(1);
+        self.in_a_row = if stale {
+            self.in_a_row.saturating_add(1)
+        } else {
+            0
+        };
+        stale
     }
 }
 
@@ -65,7 +103,7 @@ pub fn after_wake(deadline_ns: u64, woke_ns: u64, period_ns: u64) -> Wake {
 }
 
 /// The next cycle after the one due at `deadline_ns` that sent its setpoint at
-/// `sent_ns` and ended at `now_ns`: the first deadline that is still ahead and
+/// `sent_ns`, at its deadline if it sent none, and ended at `now_ns`: the first deadline that is still ahead and
 /// leaves a gap to the setpoint just sent. RT-safe.
 #[must_use]
 pub fn next_wake(deadline_ns: u64, sent_ns: u64, now_ns: u64, period_ns: u64) -> Wake {
@@ -131,6 +169,17 @@ mod tests {
         assert_eq!((late(0, 0), late(200, 0), late(201, 0)), (0, 0, 201_000));
         assert_eq!((late(0, 1), late(50, 1)), (0, 50_000));
         assert_eq!(setpoint_late_ns(10 * P, 9 * P, 3, P), 0);
+    }
+
+    #[test]
+    fn a_setpoint_that_grew_old_is_held_back_and_counts_as_missed() {
+        let mut held = HoldBack::default();
+        assert!(!held.holds(10 * P, 10 * P + 400_000, P));
+        assert!(held.holds(11 * P, 11 * P + 400_001, P));
+        assert!(held.holds(12 * P, 13 * P, P));
+        assert_eq!(held.missed(), 2);
+        assert!(!held.holds(13 * P, 13 * P - 5, P));
+        assert_eq!(held.missed(), 0);
     }
 
     proptest! {

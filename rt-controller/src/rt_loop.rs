@@ -27,7 +27,7 @@
 use crate::control::record::record_input;
 use crate::control::{ArmCodes, ControlState, CycleInput};
 use crate::os::Clock;
-use crate::overrun::{Wake, after_wake, next_wake, setpoint_late_ns};
+use crate::overrun::{HoldBack, Wake, after_wake, next_wake, setpoint_late_ns};
 use crate::ports::RtPorts;
 use crate::transport::ArmTransport;
 use crate::transport::slot::LinkSlot;
@@ -43,6 +43,7 @@ pub struct RtLoop<T, C> {
     boards: ControllerBoards,
     ports: RtPorts<T>,
     link: LinkSlot<T>,
+    held: HoldBack,
     /// Broken reports counted so far.
     broken: u32,
     pid: u32,
@@ -62,6 +63,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         ports.put_state(&control);
         Self {
             link: LinkSlot::new(control.wire()),
+            held: HoldBack::default(),
             broken: ports.broken.count(),
             control,
             clock,
@@ -95,21 +97,26 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
     }
 
     /// One cycle, due at `deadline_ns` after `missed` skipped ones, that woke at
-    /// `woke_ns`: take in, step, send, record; returns when it sent. RT-safe.
+    /// `woke_ns`: take in, step, send, record; returns when it sent, its deadline
+    /// if it held its setpoint back. RT-safe.
     pub fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) -> u64 {
+        let missed = missed.saturating_add(self.held.missed());
         let mut input = self.take_in(deadline_ns, missed);
         let period_ns = MonotonicNs(0).plus_s(self.control.period_s()).0;
         input.late_ns = setpoint_late_ns(deadline_ns, woke_ns, missed, period_ns);
+        let instant_ns = deadline_ns.saturating_add(input.late_ns.into());
         let next = self.control.cycle().wrapping_add(1);
         self.ports.put_input(record_input(&input, next));
         let mut out = self.control.step(input);
         let computed_ns = self.clock.now_ns();
-        self.link.send(&out, computed_ns);
+        let held = out.command.is_some() && self.held.holds(instant_ns, computed_ns, period_ns);
+        let command = out.command.filter(|_| !held);
+        self.link.send(command, out.request, computed_ns);
         let sent_ns = self.clock.now_ns();
 
         out.record.wake_late_ns = span_ns(deadline_ns, woke_ns);
         out.record.compute_ns = span_ns(woke_ns, computed_ns);
-        out.record.send_ns = out.command.map_or(0, |_| span_ns(woke_ns, sent_ns));
+        out.record.send_ns = command.map_or(0, |_| span_ns(woke_ns, sent_ns));
         self.boards.publish(ControllerState {
             stamp_ns: woke_ns,
             real_time: u8::from(self.real_time),
@@ -120,7 +127,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         // The state before the next cycle. It takes longer than all the rest, so
         // it is written when the setpoint is out.
         self.ports.put_state(&self.control);
-        computed_ns
+        if held { deadline_ns } else { computed_ns }
     }
 
     fn take_in(&mut self, deadline_ns: u64, missed: u32) -> CycleInput {

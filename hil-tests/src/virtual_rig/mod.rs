@@ -31,7 +31,7 @@ use rt_controller::control::record::record_input;
 use rt_controller::control::{
     ControlEvent, ControlSettings, ControlState, CycleInput, Motion, Order,
 };
-use rt_controller::overrun::{Wake, after_wake, next_wake, setpoint_late_ns};
+use rt_controller::overrun::{HoldBack, Wake, after_wake, next_wake, setpoint_late_ns};
 use rt_controller::transport::slot::LinkSlot;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
@@ -111,6 +111,9 @@ pub struct VirtualRig {
     orders: VecDeque<Order>,
     /// By how much the next wake-ups come late (ns).
     late_ns: VecDeque<u64>,
+    /// For how long the next cycles are held up before they send (ns).
+    held_up_ns: VecDeque<u64>,
+    held: HoldBack,
     motions: u64,
     operator_beat: OperatorBeat,
     guardian_beat: GuardianBeat,
@@ -144,6 +147,8 @@ impl VirtualRig {
             },
             orders: VecDeque::new(),
             late_ns: VecDeque::new(),
+            held_up_ns: VecDeque::new(),
+            held: HoldBack::default(),
             motions: 0,
             operator_beat: OperatorBeat {
                 version: PAYLOAD_VERSION,
@@ -291,6 +296,11 @@ impl VirtualRig {
         self.late_ns.extend(late_ns);
     }
 
+    /// The next cycles are held up for these times between wake-up and send (ns).
+    pub fn hold_up(&mut self, held_up_ns: impl IntoIterator<Item = u64>) {
+        self.held_up_ns.extend(held_up_ns);
+    }
+
     /// Runs `count` cycles.
     pub fn run_cycles(&mut self, count: usize) {
         for _ in 0..count {
@@ -330,8 +340,8 @@ impl VirtualRig {
         self.advance_to(MonotonicNs(woke_ns));
         let due = after_wake(self.next.deadline_ns, woke_ns, period_ns);
         let missed = due.missed.saturating_add(self.next.missed);
-        self.cycle(due.deadline_ns, missed, woke_ns);
-        self.next = next_wake(due.deadline_ns, woke_ns, self.now().0, period_ns);
+        let sent_ns = self.cycle(due.deadline_ns, missed, woke_ns);
+        self.next = next_wake(due.deadline_ns, sent_ns, self.now().0, period_ns);
     }
 
     fn advance_to(&mut self, now: MonotonicNs) {
@@ -340,21 +350,30 @@ impl VirtualRig {
         self.log.arm_events.extend(net.arm.take_events());
     }
 
-    fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) {
+    /// One cycle, as the real loop's; returns when it sent.
+    fn cycle(&mut self, deadline_ns: u64, missed: u32, woke_ns: u64) -> u64 {
+        let missed = missed.saturating_add(self.held.missed());
         let mut input = self.take_in(deadline_ns, missed);
         let period_ns = MonotonicNs(0).plus_s(self.config.limits.period_s()).0;
         input.late_ns = setpoint_late_ns(deadline_ns, woke_ns, missed, period_ns);
         self.log
             .inputs
             .push(record_input(&input, self.control.cycle() + 1));
+        let instant_ns = deadline_ns.saturating_add(input.late_ns.into());
         let mut out = self.control.step(input);
-        self.advance_to(MonotonicNs(woke_ns).plus_s(COMPUTE_S));
-        self.link.send(&out, self.now().0);
+        let held_up_ns = self.held_up_ns.pop_front().unwrap_or(0);
+        let computed_ns = MonotonicNs(woke_ns).plus_s(COMPUTE_S).0;
+        self.advance_to(MonotonicNs(computed_ns.saturating_add(held_up_ns)));
+        let now_ns = self.now().0;
+        let held = out.command.is_some() && self.held.holds(instant_ns, now_ns, period_ns);
+        let command = out.command.filter(|_| !held);
+        self.link.send(command, out.request, now_ns);
         let span_ns = |from_ns: u64, to_ns: u64| {
             u32::try_from(to_ns.saturating_sub(from_ns)).unwrap_or(u32::MAX)
         };
         out.record.wake_late_ns = span_ns(deadline_ns, woke_ns);
-        out.record.compute_ns = span_ns(woke_ns, self.now().0);
+        out.record.compute_ns = span_ns(woke_ns, now_ns);
+        out.record.send_ns = command.map_or(0, |_| span_ns(woke_ns, now_ns));
         self.log.records.push(out.record);
         for event in &out.events {
             if let ControlEvent::Latched(cause) = event {
@@ -362,6 +381,7 @@ impl VirtualRig {
             }
             self.log.events.push((self.control.cycle(), *event));
         }
+        if held { deadline_ns } else { now_ns }
     }
 
     fn take_in(&mut self, deadline_ns: u64, missed: u32) -> CycleInput {

@@ -7,6 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::restore_input;
 use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
+use shared_types::ipc::CauseRecord;
 use shared_types::{Arming, FaultCode, JointTrajectory, Limits, MonotonicNs, MotionTier, WireMode};
 
 const MS: u64 = 1_000_000;
@@ -53,6 +54,42 @@ fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
             stage.finish();
             stage.assert_finished();
         }
+    }
+}
+
+/// Held up between its wake-up and the send, at full speed: the setpoint that
+/// grew old meanwhile does not go out, so the arm never sees the next one too
+/// soon after it.
+#[test]
+fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
+    for wire in WIRES {
+        for held_us in [300, 500, 1500, 2500, 3500, 3900, 4500, 7000] {
+            let mut stage = Stage::throwing(wire, "");
+            stage.run_part(0.2);
+            let often = (0..60).flat_map(|k| [held_us * 1000, (k % 4) * 300_000, 0]);
+            stage.rig.hold_up(often);
+            stage.finish();
+            stage.assert_finished();
+            let missed = stage.rig.counts().missed;
+            assert_eq!(missed > 0, held_us > 400, "{held_us} us: {missed} missed");
+            assert_on_time(&stage);
+        }
+    }
+}
+
+/// Held up in every cycle, nothing would be sent any more: that is met as missed
+/// cycles are.
+#[test]
+fn fault_02_a_machine_that_is_always_too_slow_stops_the_motion() {
+    for wire in WIRES {
+        let mut stage = Stage::throwing(wire, "");
+        stage.run_part(0.2);
+        stage.rig.hold_up([MS; 2000]);
+        stage.finish();
+        let causes = &stage.rig.log.causes;
+        let faults: Vec<FaultCode> = causes.iter().map(CauseRecord::fault).collect();
+        assert_eq!(faults, [FaultCode::LateCycles]);
+        assert_eq!(stage.arm_errors(), [0_u8; 0]);
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::wire::{WireBackend, backend};
 use super::{ArmTransport, MAX_COMMANDS};
-use crate::control::{CycleOutput, LinkInput};
-use crate::xarm::Command;
+use crate::control::{ArmCommand, LinkInput};
+use crate::xarm::{Command, StateRequest};
 use shared_types::WireMode;
 
 /// Holds at most one link. RT-safe; links are made and dropped elsewhere.
@@ -62,12 +62,17 @@ impl<T: ArmTransport> LinkSlot<T> {
 
     /// Sends a cycle's command and request, in this order and at once. Call it
     /// every cycle: without a command a question of the link's own may go out.
-    pub fn send(&mut self, out: &CycleOutput, now_ns: u64) {
+    pub fn send(
+        &mut self,
+        command: Option<ArmCommand>,
+        request: Option<StateRequest>,
+        now_ns: u64,
+    ) {
         let Some(link) = self.link.as_mut() else {
             return;
         };
-        let setpoint = out.command.and_then(|c| self.wire.request(&c));
-        let request = out.request.map(Command::SetState);
+        let setpoint = command.and_then(|c| self.wire.request(&c));
+        let request = request.map(Command::SetState);
         let mut commands: heapless::Vec<Command, MAX_COMMANDS> = heapless::Vec::new();
         for command in [setpoint, request].into_iter().flatten() {
             // Two at most: they fit.

@@ -7,6 +7,7 @@
 //! so that something else can have its core in between.
 
 mod answerer;
+mod bare;
 mod timed_link;
 mod times;
 
@@ -16,6 +17,7 @@ use crate::ports::{Mail, RelayPorts, rings};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::{LinkSettings, TcpLink};
 use answerer::Answerer;
+pub use bare::bare_slice;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,

@@ -147,7 +147,7 @@ pub struct CycleRecord {
     pub version: u32,
     /// Mode after the cycle, raw [`ControllerMode`].
     pub mode: u8,
-    /// 1 when a setpoint was sent.
+    /// 1 when a setpoint was commanded; it did not go out where `send_ns` is 0.
     pub sent: u8,
     /// Fault latched, raw [`crate::FaultCode`].
     pub fault: u16,

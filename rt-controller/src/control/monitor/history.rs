@@ -50,35 +50,38 @@ impl Commanded {
             low = low.zip_with(*c, f64::min);
             high = high.zip_with(*c, f64::max);
         };
-        for (_, c) in self
-            .sent
-            .iter()
-            .filter(|e| (from_ns..=to_ns).contains(&e.0))
-        {
-            include(c);
-        }
-        if let Some((_, c)) = self.entry_before(from_ns) {
-            include(c);
+        for (at_ns, c) in self.newest_first() {
+            if *at_ns <= to_ns || *at_ns < from_ns {
+                include(c);
+            }
+            if *at_ns < from_ns {
+                break;
+            }
         }
         (0..JOINTS)
             .map(|j| (j, (low[j] - q[j]).max(q[j] - high[j])))
             .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
     }
 
-    fn entry_before(&self, at_ns: u64) -> Option<&(u64, JointVector)> {
-        // `max_by_key` keeps the last of equals; the order of a ring is no order.
-        self.sent.iter().filter(|e| e.0 < at_ns).max_by_key(|e| e.0)
+    /// Setpoints are sent in the order of their times, so the ring is in order.
+    fn newest_first(&self) -> impl Iterator<Item = &(u64, JointVector)> {
+        let (newer, older) = self.sent.split_at_checked(self.next).unwrap_or_default();
+        newer.iter().rev().chain(older.iter().rev())
     }
 
     /// What was commanded at `at_ns`, linear between setpoints (rad).
     #[must_use]
     pub fn at(&self, at_ns: u64) -> JointVector {
-        let after = self
-            .sent
-            .iter()
-            .filter(|e| e.0 >= at_ns)
-            .min_by_key(|e| e.0);
-        match (self.entry_before(at_ns), after) {
+        let mut after = None;
+        let mut before = None;
+        for entry in self.newest_first() {
+            if entry.0 < at_ns {
+                before = Some(entry);
+                break;
+            }
+            after = Some(entry);
+        }
+        match (before, after) {
             (Some((t0, q0)), Some((t1, q1))) => {
                 let span_s = MonotonicNs(*t1).since_s(MonotonicNs(*t0));
                 let part = MonotonicNs(at_ns).since_s(MonotonicNs(*t0)) / span_s;

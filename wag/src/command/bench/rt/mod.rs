@@ -1,7 +1,8 @@
 //! `wag bench rt`: how punctual the control loop is on this machine, beside
 //! `cyclictest` with the same priority, period and core.
 //!
-//! The two take turns of a second each on one core, so that both meet the same
+//! The two, and a loop that does nothing but read the clock for as long as ours
+//! computes, take turns of a second each on one core, so that all meet the same
 //! neighbours; all other cores are kept busy meanwhile.
 
 mod cyclictest;
@@ -17,7 +18,7 @@ use load::Load;
 use report::{Beside, Percentiles, Report};
 use rt_controller::os::RealTimeSettings;
 use rt_controller::os::schedule::run_on;
-use rt_controller::trial::{CycleTimes, Trial};
+use rt_controller::trial::{CycleTimes, Trial, bare_slice};
 use serde_json::Value;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -63,9 +64,9 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     let _load = Load::begin(&others).or_failed()?;
     let domain = format!("bench-rt-{}", std::process::id());
-    let mut trial = Trial::new(&domain, real_time).or_failed()?;
+    let mut trial = Trial::new(&domain, real_time.clone()).or_failed()?;
     let stage = Stage::begin("real time", quiet);
-    let measured = take_turns(&mut trial, &rival, seconds, |done| {
+    let measured = take_turns(&mut trial, &real_time, &rival, seconds, |done| {
         stage.say(format!("{done} of {seconds} s each"));
     })?;
     stage.done(&format!("{} cycles", measured.ours.len()));
@@ -87,6 +88,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         ),
         receive: Percentiles::of(measured.ours.iter().map(|t| t.receive_ns)),
         compute: Percentiles::of(measured.ours.iter().map(|t| t.compute_ns)),
+        bare: Percentiles::of(measured.bare),
         send: Percentiles::of(measured.ours.iter().map(|t| t.send_ns)),
         no_cyclictest: measured.no_rival.map(|e| e.to_string()),
     };
@@ -96,9 +98,10 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     serde_json::to_value(&report).or_failed().map(Some)
 }
 
-/// Samples of both.
+/// Samples of all.
 struct Measured {
     ours: Vec<CycleTimes>,
+    bare: Vec<u64>,
     rival: Option<Vec<u64>>,
     no_rival: Option<CyclictestError>,
 }
@@ -106,18 +109,23 @@ struct Measured {
 /// Turn by turn, until each has had its time.
 fn take_turns(
     trial: &mut Trial,
+    real_time: &RealTimeSettings,
     rival: &Cyclictest,
     seconds: u32,
     mut say: impl FnMut(u32),
 ) -> Outcome<Measured> {
     let mut measured = Measured {
         ours: Vec::new(),
+        bare: Vec::new(),
         rival: Some(Vec::new()),
         no_rival: None,
     };
     for turn in 0..seconds {
         say(turn);
         measured.ours.extend(trial.slice(SLICE).or_failed()?);
+        let work_ns = median(measured.ours.iter().map(|t| t.compute_ns));
+        let bare = bare_slice(real_time, work_ns, PERIOD, SLICE);
+        measured.bare.extend(bare.or_failed()?);
         if let Some(late_ns) = &mut measured.rival {
             match rival.slice(SLICE) {
                 Ok(more) => late_ns.extend(more),
@@ -129,6 +137,12 @@ fn take_turns(
         }
     }
     Ok(measured)
+}
+
+fn median(samples: impl Iterator<Item = u64>) -> u64 {
+    let mut sorted: Vec<u64> = samples.collect();
+    sorted.sort_unstable();
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0)
 }
 
 /// Asks the kernel to keep cores out of deep sleep while the file is open, as

@@ -97,6 +97,8 @@ pub struct Report {
     pub receive: Percentiles,
     /// Inputs, core and record, without system calls.
     pub compute: Percentiles,
+    /// A loop that only reads the clock for as long as the median of `compute`.
+    pub bare: Percentiles,
     /// The send call.
     pub send: Percentiles,
     /// Why there is nothing to compare with.
@@ -130,6 +132,7 @@ impl Report {
         }
         rows.push(row("receive call", &self.receive));
         rows.push(row("compute", &self.compute));
+        rows.push(row("nothing, for as long", &self.bare));
         rows.push(row("send call", &self.send));
         let header = [
             "",
@@ -154,6 +157,11 @@ impl Report {
                 &format!("at most {COMPUTE_MAX_US:.0} us")
             ),
             self.missed
+        );
+        println!(
+            "a loop that does nothing for {:.1} us is held up to {:.1} us at p99.9: \
+             so much of it is interrupts of this machine",
+            self.bare.p50_us, self.bare.p999_us
         );
         if let Some(reason) = &self.no_cyclictest {
             println!("{reason}");
