@@ -30,15 +30,11 @@
 )]
 
 pub mod arm_status;
-pub mod clock_map;
 pub mod commander;
 pub mod config;
-pub mod control;
 pub mod error;
 pub mod guardian;
 pub mod os;
-pub mod overrun;
-pub mod point_to_point;
 pub mod ports;
 pub mod process;
 pub mod recording;
@@ -50,8 +46,8 @@ pub mod session;
 pub mod set_up;
 pub mod transport;
 pub mod trial;
-pub mod xarm;
 
 pub use config::ControllerConfig;
+pub use control_core::{clock_map, control, overrun, point_to_point, xarm};
 pub use error::ControllerError;
 pub use process::run;

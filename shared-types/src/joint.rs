@@ -1,6 +1,7 @@
 //! Vectors over the seven arm joints.
 
 use core::ops::{Add, Index, IndexMut, Mul, Sub};
+#[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +10,8 @@ pub const JOINTS: usize = 7;
 
 /// One number per joint, joint 1 first. The unit is that of the context: rad,
 /// rad/s, rad/s² or rad/s³. RT-safe.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 #[serde(transparent)]
 pub struct JointVector(pub [f64; JOINTS]);
@@ -95,7 +97,8 @@ impl Mul<f64> for JointVector {
 }
 
 /// Position, velocity and acceleration of all joints at one instant. RT-safe.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct JointState {
     /// Position (rad).

@@ -35,7 +35,7 @@ fn rest_rotation(joint: usize) -> Matrix3<f64> {
 }
 
 fn turn_z(angle_rad: f64) -> Matrix3<f64> {
-    let (s, c) = angle_rad.sin_cos();
+    let (s, c) = libm::sincos(angle_rad);
     Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 }
 
@@ -165,11 +165,11 @@ fn flip_yz(r: &Matrix3<f64>) -> Matrix3<f64> {
 /// Fixed-axis roll, pitch, yaw (`Rz Ry Rx`) of an attitude, as the arm reports it.
 #[must_use]
 pub fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
-    let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
+    let pitch = libm::atan2(-r[(2, 0)], libm::hypot(r[(0, 0)], r[(1, 0)]));
     [
-        r[(2, 1)].atan2(r[(2, 2)]),
+        libm::atan2(r[(2, 1)], r[(2, 2)]),
         pitch,
-        r[(1, 0)].atan2(r[(0, 0)]),
+        libm::atan2(r[(1, 0)], r[(0, 0)]),
     ]
 }
 

@@ -11,6 +11,9 @@
 //! Conventions: SI units and radians everywhere; the unit comes last in the
 //! name of a raw number (`timeout_ms`); the world frame `w` is the arm base
 //! (x forward, z up, REP-103); `p_w_tip` is the tip's position expressed in `w`.
+//!
+//! Without the feature `std` it is what the control core needs and no more.
+#![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![forbid(unsafe_code)]
 #![cfg_attr(
     test,
@@ -23,28 +26,40 @@
     )
 )]
 
+extern crate alloc;
+
+#[cfg(feature = "std")]
 pub mod camera;
 pub mod fault;
 pub mod ipc;
 pub mod joint;
+#[cfg(feature = "std")]
 pub mod keypoints;
 pub mod kinematics;
 pub mod limits;
+#[cfg(feature = "std")]
 pub mod plan;
+#[cfg(feature = "std")]
 pub mod response;
+#[cfg(feature = "std")]
 pub mod rope;
 pub mod tier;
 pub mod time;
 pub mod trajectory;
 pub mod wire;
 
+#[cfg(feature = "std")]
 pub use camera::{Intrinsics, Shutter, StereoCamera};
 pub use fault::FaultCode;
 pub use joint::{JOINTS, JointState, JointVector};
+#[cfg(feature = "std")]
 pub use keypoints::{KeypointFrame, KeypointTrack};
 pub use limits::{Limits, LimitsSpec};
+#[cfg(feature = "std")]
 pub use plan::{Condition, ErrorForecast, LimitedBy, Plan, Task, Verdict};
+#[cfg(feature = "std")]
 pub use response::{ArmResponse, JointResponse, TrackingLag};
+#[cfg(feature = "std")]
 pub use rope::{RopeEstimate, RopeParams};
 pub use tier::{Arming, MotionTier};
 pub use time::MonotonicNs;

@@ -7,6 +7,9 @@
 use crate::joint::{JOINTS, JointVector};
 use crate::kinematics;
 use crate::trajectory::JointTrajectory;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -288,7 +291,7 @@ impl Margin {
             LimitKind::TcpSpeed => ("speed", "m/s"),
         };
         let who = if self.joint == 0 {
-            "tool".to_owned()
+            String::from("tool")
         } else {
             format!("joint {}", self.joint)
         };

@@ -7,6 +7,8 @@
 //! evaluating it is RT-safe (no allocation, bounded search).
 
 use crate::joint::{JOINTS, JointState, JointVector};
+use alloc::vec::Vec;
+#[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +58,8 @@ pub enum TrajectoryError {
 
 /// A validated clamped cubic spline through joint-space waypoints. RT-safe to
 /// evaluate; construct it before the loop.
-#[derive(Clone, Copy, PartialEq, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 #[serde(try_from = "TrajectoryForm", into = "TrajectoryForm")]
 pub struct JointTrajectory {
@@ -316,7 +319,7 @@ impl JointTrajectory {
                     t0 + vertex,
                 );
             }
-            let disc = (m0 * m0 - 4.0 * curve * v0).max(0.0).sqrt();
+            let disc = libm::sqrt((m0 * m0 - 4.0 * curve * v0).max(0.0));
             let qq = -0.5 * (m0 + disc.copysign(m0));
             for u in [0.0, h, qq / curve, v0 / qq] {
                 if (0.0..=h).contains(&u) {

@@ -2,11 +2,13 @@
 
 use super::payload::ControllerMode;
 use crate::fault::FaultCode;
+#[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 /// Which limit was met or broken, with both numbers. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct LimitBroken {
     /// Joint 1 to 7; 0 when it is about no single joint.
@@ -25,7 +27,8 @@ pub struct LimitBroken {
 
 /// What happened since the arm was last adopted without stopping it: each of
 /// these marks the run. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct RunCounts {
     /// Cycles missed.
@@ -49,7 +52,8 @@ pub struct RunCounts {
 
 /// One stop: the first cause, where it met the motion, and by how much.
 /// Exactly one is made per latched stop. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct CauseRecord {
     /// [`super::PAYLOAD_VERSION`].

@@ -6,6 +6,7 @@
 
 use super::payload::{GuardianBeat, JointReport, OperatorBeat};
 use crate::joint::JointVector;
+#[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -15,7 +16,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub const REPORTS_PER_CYCLE: usize = 3;
 
 /// The joint reports of one cycle, oldest first. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct Reports {
     len: u64,
@@ -117,7 +119,8 @@ impl OrderKind {
 }
 
 /// An order as plain data; what its kind does not use is zero. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct OrderRecord {
     /// Raw [`OrderKind`].
@@ -141,7 +144,8 @@ pub struct OrderRecord {
 }
 
 /// What the command link showed, as plain data. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct LinkRecord {
     /// Age of the oldest setpoint without a reply (ns).
@@ -166,7 +170,8 @@ pub struct LinkRecord {
 
 /// What the arm says about itself five times a second, as plain data. RT-safe
 /// to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct ArmCodesRecord {
     /// 1 when one came since the last cycle; the rest is zero otherwise.
@@ -186,7 +191,8 @@ pub struct ArmCodesRecord {
 }
 
 /// Everything one cycle was told. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct InputRecord {
     /// [`super::PAYLOAD_VERSION`].

@@ -16,27 +16,43 @@
 //! | [`ControllerBoards`] | controller state out, heartbeats of operator and guardian in | blackboard |
 //! | [`rpc`] | `wag` <-> camera, planner, controller, rig | request-response, streamed answers |
 //!
+//! Without the feature `std` only the payloads are here, plain data.
+//!
 //! All processes of one installation run as one user and name the same domain;
 //! two domains never see each other.
 
+#[cfg(feature = "std")]
 mod boards;
+#[cfg(feature = "std")]
 mod bus;
 mod cause;
+#[cfg(feature = "std")]
 mod domains;
+#[cfg(feature = "std")]
+mod error;
 mod input;
+#[cfg(feature = "std")]
 pub mod message;
 mod payload;
+#[cfg(feature = "std")]
 pub mod rpc;
+#[cfg(feature = "std")]
 mod slots;
+#[cfg(feature = "std")]
 mod sweep;
 
+#[cfg(feature = "std")]
 pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, StateReader};
+#[cfg(feature = "std")]
 pub use bus::{
     Bus, ChunkPublisher, ChunkSubscriber, CyclePublisher, CycleSubscriber, FramePublisher,
     FrameSubscriber, JointPublisher, JointSubscriber, KeypointPublisher, KeypointSubscriber,
 };
 pub use cause::{CauseRecord, LimitBroken, RunCounts};
+#[cfg(feature = "std")]
 pub use domains::running_controllers;
+#[cfg(feature = "std")]
+pub use error::IpcError;
 pub use input::{
     ArmCodesRecord, InputRecord, LinkRecord, OrderKind, OrderRecord, REPORTS_PER_CYCLE, Reports,
 };
@@ -44,78 +60,5 @@ pub use payload::{
     ControllerMode, ControllerState, CycleRecord, FrameHeader, GuardianBeat, JointReport,
     OperatorBeat, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
+#[cfg(feature = "std")]
 pub use sweep::DomainSweep;
-
-/// Why shared memory could not be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum IpcError {
-    /// The domain name cannot be part of a file name.
-    #[error("shared-memory domain `{domain}` must be 1 to 40 letters, digits, `-` or `_`")]
-    Domain {
-        /// Name given.
-        domain: String,
-    },
-    /// The folder in which this user's processes meet cannot be used.
-    #[error(
-        "cannot use `{}`, where the processes of one user meet: {reason}; remove it or have it removed", .folder.display()
-    )]
-    Folder {
-        /// The folder.
-        folder: std::path::PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The process could not join shared memory at all.
-    #[error(
-        "cannot join shared memory (domain `{domain}`): {reason}; all processes must run as the same user, \
-         `{}` and /dev/shm must be writable with some 100 MB free", .folder.display()
-    )]
-    Join {
-        /// Domain name.
-        domain: String,
-        /// This user's folder.
-        folder: std::path::PathBuf,
-        /// What the library said.
-        reason: String,
-    },
-    /// A service could not be opened.
-    #[error(
-        "cannot open shared-memory service `{service}`: {reason}; all processes must run as the same user and be of the same version"
-    )]
-    Open {
-        /// Service name.
-        service: &'static str,
-        /// What the library said.
-        reason: String,
-    },
-    /// A message could not be sent or received.
-    #[error("shared-memory service `{service}` failed: {reason}")]
-    Transfer {
-        /// Service name.
-        service: &'static str,
-        /// What the library said.
-        reason: String,
-    },
-    /// A message could not be understood.
-    #[error("a message on `{service}` is damaged or of another version: {reason}")]
-    Message {
-        /// Service name.
-        service: &'static str,
-        /// What was wrong.
-        reason: String,
-    },
-    /// The other end is gone.
-    #[error("the process behind `{service}` is not there any more")]
-    Gone {
-        /// Service name.
-        service: &'static str,
-    },
-    /// Nobody answered in time.
-    #[error("the process behind `{service}` did not answer within {timeout_s} s")]
-    TimedOut {
-        /// Service name.
-        service: &'static str,
-        /// How long was waited (s).
-        timeout_s: u64,
-    },
-}

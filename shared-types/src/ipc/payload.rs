@@ -2,6 +2,7 @@
 //! names carry the version too, so that old readers never see new layouts.
 
 use crate::joint::JointVector;
+#[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,8 @@ pub const PAYLOAD_VERSION: u32 = 2;
 pub const PIXEL_FORMAT_YUYV: u32 = 1;
 
 /// Header of a side-by-side stereo frame; the payload is the pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct FrameHeader {
     /// [`PAYLOAD_VERSION`].
@@ -72,7 +74,8 @@ impl ControllerMode {
 }
 
 /// State of the controller, on a blackboard. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct ControllerState {
     /// [`PAYLOAD_VERSION`].
@@ -104,7 +107,8 @@ pub struct ControllerState {
 }
 
 /// The operator's sign of life, on a blackboard. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct OperatorBeat {
     /// [`PAYLOAD_VERSION`].
@@ -120,7 +124,8 @@ pub struct OperatorBeat {
 }
 
 /// The guardian's sign of life, on a blackboard. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct GuardianBeat {
     /// [`PAYLOAD_VERSION`].
@@ -140,7 +145,8 @@ pub struct GuardianBeat {
 
 /// One control cycle. Written by the real-time thread into a ring, published by
 /// the relay. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct CycleRecord {
     /// [`PAYLOAD_VERSION`].
@@ -182,7 +188,8 @@ pub struct CycleRecord {
 }
 
 /// One joint report of the arm, as received. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
 pub struct JointReport {
     /// [`PAYLOAD_VERSION`].

@@ -14,6 +14,7 @@ use super::settings::ControlSettings;
 use super::stopping::Stop;
 use super::velocity_wire::VelocityWire;
 use crate::xarm::Status;
+use alloc::boxed::Box;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
     CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts,
@@ -278,7 +279,7 @@ impl ControlState {
     )]
     fn missed(&self, input: &CycleInput) -> u32 {
         let gap_s = MonotonicNs(input.deadline_ns).since_s(MonotonicNs(self.sent_ns));
-        let cycles = (gap_s / self.period_s()).round() as u32;
+        let cycles = libm::round(gap_s / self.period_s()) as u32;
         input.missed.max(cycles.saturating_sub(1))
     }
 

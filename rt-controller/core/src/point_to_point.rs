@@ -10,6 +10,8 @@ use crate::control::Motion;
 use crate::control::brake::unstoppable;
 use crate::control::limiter::{Allowance, Limiter};
 use crate::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
+use alloc::format;
+use alloc::string::{String, ToString};
 use rsruckig::prelude::*;
 use shared_types::{FaultCode, JOINTS, JointVector, Limits};
 
@@ -121,8 +123,8 @@ fn generate(
         // that a gentle move is gentle from its first cycle on.
         let slack = 1.0 - 1e-9;
         input.max_velocity[j] = limits.velocity_max_rad_s[j] * slack * part;
-        input.max_acceleration[j] = limits.acceleration_max_rad_s2[j] * slack * part.powi(2);
-        input.max_jerk[j] = limits.jerk_max_rad_s3[j] * slack * part.powi(3);
+        input.max_acceleration[j] = limits.acceleration_max_rad_s2[j] * slack * part * part;
+        input.max_jerk[j] = limits.jerk_max_rad_s3[j] * slack * part * part * part;
     }
     let mut generator = Ruckig::<JOINTS, ThrowErrorHandler>::new(None, limits.period_s());
     let mut trajectory = Trajectory::<JOINTS>::new(None);
@@ -136,7 +138,7 @@ fn generate(
     let profiles = trajectory
         .profiles
         .first()
-        .ok_or_else(|| failed("it is empty".to_owned()))?;
+        .ok_or_else(|| failed(String::from("it is empty")))?;
     let mut axes = [AxisPhases::default(); JOINTS];
     for (j, (axis, profile)) in axes.iter_mut().zip(profiles.iter()).enumerate() {
         let mut phases = [Phase::default(); MAX_PHASES];
@@ -155,7 +157,7 @@ fn generate(
     let phases = PhasedMotion::new(axes);
     let arrives = phases.state_at(phases.duration_s() + 1.0).q - *to;
     if !(arrives.is_finite() && arrives.max_abs() < 1e-9) {
-        return Err(failed("it does not arrive at the target".to_owned()));
+        return Err(failed(String::from("it does not arrive at the target")));
     }
     Ok(Motion::Move { phases, end: *to })
 }

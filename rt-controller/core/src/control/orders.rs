@@ -9,6 +9,7 @@ use super::mode::{Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
 use super::velocity_wire::VelocityWire;
+use alloc::boxed::Box;
 use shared_types::ipc::{CauseRecord, ControllerMode};
 use shared_types::{Arming, FaultCode, JointState, JointVector, MonotonicNs, MotionTier};
 

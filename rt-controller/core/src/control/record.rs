@@ -8,6 +8,7 @@
 use super::exchange::{ArmCodes, CycleInput, LinkInput, Order};
 use super::motion::Motion;
 use crate::xarm::Status;
+use alloc::boxed::Box;
 use shared_types::ipc::{
     ArmCodesRecord, InputRecord, LinkRecord, OrderKind, OrderRecord, PAYLOAD_VERSION,
 };

@@ -2,6 +2,7 @@
 
 use super::motion::Motion;
 use crate::xarm::{StateRequest, Status};
+use alloc::boxed::Box;
 use shared_types::ipc::{CauseRecord, CycleRecord, GuardianBeat, OperatorBeat, Reports};
 use shared_types::{Arming, FaultCode, JointVector};
 

@@ -6,6 +6,7 @@
 use super::cycle::{ControlState, Running};
 use super::motion::Motion;
 use super::settings::ControlSettings;
+use alloc::boxed::Box;
 use serde::{Deserialize, Serialize};
 use shared_types::Limits;
 

@@ -6,14 +6,10 @@
 //! and the monitors ([`monitor`]). Time is the cycle's planned deadline, so a
 //! recorded run can be stepped again with the same result.
 //!
-//! It uses `core`, and `alloc` for the one box a motion comes in; what binds it to
-//! `std` are the record types, which [`shared_types::ipc`] makes for shared memory.
+//! It uses `core`, and `alloc` for the one box a motion comes in.
 #![cfg_attr(
     not(test),
     deny(
-        clippy::std_instead_of_core,
-        clippy::std_instead_of_alloc,
-        clippy::alloc_instead_of_core,
         clippy::indexing_slicing,
         clippy::arithmetic_side_effects,
         clippy::expect_used,
