@@ -37,10 +37,6 @@ pub fn setpoint_late_ns(deadline_ns: u64, woke_ns: u64, missed: u32, period_ns: 
     }
 }
 
-/// A setpoint older than this part of a period when it is about to be sent is
-/// held back: 0.4 ms at 250 Hz.
-const STALE_PART: u64 = 10;
-
 /// Setpoints that were computed and not sent, because the thread was held up
 /// between its wake-up and the send.
 ///
@@ -61,10 +57,11 @@ impl HoldBack {
     }
 
     /// Whether the setpoint for `instant_ns`, about to be sent at `now_ns`, must
-    /// not go out. Ask once per setpoint. RT-safe.
+    /// not go out: whether it would be late by more than a wake-up may be. Ask
+    /// once per setpoint. RT-safe.
     #[must_use]
     pub fn holds(&mut self, instant_ns: u64, now_ns: u64, period_ns: u64) -> bool {
-        let stale = now_ns.saturating_sub(instant_ns) > (period_ns / STALE_PART).max(1);
+        let stale = now_ns.saturating_sub(instant_ns) > (period_ns / PUNCTUAL_PART).max(1);
         self.in_a_row = if stale {
             self.in_a_row.saturating_add(1)
         } else {
@@ -174,8 +171,8 @@ mod tests {
     #[test]
     fn a_setpoint_that_grew_old_is_held_back_and_counts_as_missed() {
         let mut held = HoldBack::default();
-        assert!(!held.holds(10 * P, 10 * P + 400_000, P));
-        assert!(held.holds(11 * P, 11 * P + 400_001, P));
+        assert!(!held.holds(10 * P, 10 * P + 200_000, P));
+        assert!(held.holds(11 * P, 11 * P + 200_001, P));
         assert!(held.holds(12 * P, 13 * P, P));
         assert_eq!(held.missed(), 2);
         assert!(!held.holds(13 * P, 13 * P - 5, P));
