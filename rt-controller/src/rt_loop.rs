@@ -104,12 +104,11 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         let mut input = self.take_in(deadline_ns, missed);
         let period_ns = MonotonicNs(0).plus_s(self.control.period_s()).0;
         input.late_ns = setpoint_late_ns(deadline_ns, woke_ns, missed, period_ns);
-        let instant_ns = deadline_ns.saturating_add(input.late_ns.into());
         let next = self.control.cycle().wrapping_add(1);
         self.ports.put_input(record_input(&input, next));
         let mut out = self.control.step(input);
         let computed_ns = self.clock.now_ns();
-        let held = out.command.is_some() && self.held.holds(instant_ns, computed_ns, period_ns);
+        let held = out.command.is_some() && self.held.holds(woke_ns, computed_ns, period_ns);
         let command = out.command.filter(|_| !held);
         self.link.send(command, out.request, computed_ns);
         let sent_ns = self.clock.now_ns();

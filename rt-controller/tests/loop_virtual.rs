@@ -24,23 +24,36 @@ const PERIOD_NS: u64 = 4_000_000;
 const BEGIN_NS: u64 = 1_000_000_000_000;
 
 /// Time that passes while the loop sleeps; every so often it oversleeps, by the
-/// next of `late_ns`. Sets `quit` after `sleeps`.
+/// next of `late_ns`, or is held up by the next of `held_ns` right after its
+/// wake-up. Sets `quit` after `sleeps`.
 struct LateClock {
     now_ns: Rc<Cell<u64>>,
     late_ns: Vec<u64>,
+    held_ns: Vec<u64>,
+    /// Whether the wake-up has been looked at.
+    woke: Cell<bool>,
     sleeps: usize,
     quit: Arc<AtomicBool>,
 }
 
 impl Clock for LateClock {
     fn now_ns(&self) -> u64 {
-        self.now_ns.get()
+        let now_ns = self.now_ns.get();
+        let held_ns = if self.woke.replace(true) {
+            0
+        } else {
+            self.held_ns.get(self.sleeps).copied().unwrap_or_default()
+        };
+        // A look at the clock takes time, too.
+        self.now_ns.set(now_ns + 1 + held_ns);
+        now_ns
     }
 
     fn sleep_until(&mut self, deadline_ns: u64) {
         let late_ns = self.late_ns.get(self.sleeps).copied().unwrap_or_default();
         self.now_ns
             .set(self.now_ns.get().max(deadline_ns) + late_ns);
+        self.woke.set(false);
         self.sleeps = self.sleeps.saturating_sub(1);
         self.quit.store(self.sleeps == 0, Ordering::Relaxed);
     }
@@ -48,6 +61,16 @@ impl Clock for LateClock {
 
 /// Runs the loop with an arm for as many cycles as `late_ns` has entries.
 fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
+    run_held_up(name, arm, late_ns, Vec::new())
+}
+
+/// The same, held up after its wake-ups by `held_ns`.
+fn run_held_up(
+    name: &str,
+    arm: IdealArm,
+    late_ns: Vec<u64>,
+    held_ns: Vec<u64>,
+) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
     let bus = Bus::join(&format!("test_{name}_{}", std::process::id())).unwrap();
     let boards = ControllerBoards::create(&bus).unwrap();
     let thresholds = Thresholds {
@@ -69,6 +92,8 @@ fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, Relay
         now_ns: Rc::new(Cell::new(BEGIN_NS)),
         sleeps: late_ns.len(),
         late_ns,
+        held_ns,
+        woke: Cell::new(true),
         quit: Arc::clone(&quit),
     };
     let control = ControlState::new(Limits::default(), thresholds);
@@ -105,6 +130,25 @@ fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
     assert_eq!(cycles, 6);
     assert_eq!(latched(&mut relay), None);
     assert!(records.iter().all(|r| r.sent == 1));
+}
+
+#[test]
+fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
+    // Microseconds, entries consumed from the back: after the sleep that they
+    // stand for, so the first of them belongs to nobody.
+    let held_us = [0, 0, 150, 0, 3500, 0, 0, 300, 250, 0, 0, 0];
+    let held_ns = held_us.map(|us: u64| us * 1000).to_vec();
+    let arm = IdealArm::default();
+    let (records, mut relay) = run_held_up("held", arm, vec![0; held_us.len()], held_ns);
+    let went: Vec<(bool, u32)> = records.iter().map(|r| (r.send_ns > 0, r.missed)).collect();
+    let held: Vec<usize> = (0..went.len())
+        .filter(|k| !went[*k].0 && records[*k].sent == 1)
+        .collect();
+    assert_eq!(held.len(), 3, "{went:?}");
+    // Each counts as missed for the one behind it.
+    let missed: Vec<u32> = held.iter().map(|k| went[k + 1].1).collect();
+    assert_eq!(missed, [1, 2, 1], "{went:?}");
+    assert_eq!(latched(&mut relay), None);
 }
 
 #[test]

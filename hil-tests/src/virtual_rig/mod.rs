@@ -359,13 +359,12 @@ impl VirtualRig {
         self.log
             .inputs
             .push(record_input(&input, self.control.cycle() + 1));
-        let instant_ns = deadline_ns.saturating_add(input.late_ns.into());
         let mut out = self.control.step(input);
         let held_up_ns = self.held_up_ns.pop_front().unwrap_or(0);
         let computed_ns = MonotonicNs(woke_ns).plus_s(COMPUTE_S).0;
         self.advance_to(MonotonicNs(computed_ns.saturating_add(held_up_ns)));
         let now_ns = self.now().0;
-        let held = out.command.is_some() && self.held.holds(instant_ns, now_ns, period_ns);
+        let held = out.command.is_some() && self.held.holds(woke_ns, now_ns, period_ns);
         let command = out.command.filter(|_| !held);
         self.link.send(command, out.request, now_ns);
         let span_ns = |from_ns: u64, to_ns: u64| {

@@ -171,6 +171,7 @@ fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
             // What the rig measured, not the core.
             out.record.wake_late_ns = did.wake_late_ns;
             out.record.compute_ns = did.compute_ns;
+            out.record.send_ns = did.send_ns;
             assert_eq!(out.record, *did);
         }
         stage.assert_finished();

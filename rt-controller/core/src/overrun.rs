@@ -56,12 +56,12 @@ impl HoldBack {
         self.in_a_row
     }
 
-    /// Whether the setpoint for `instant_ns`, about to be sent at `now_ns`, must
-    /// not go out: whether it would be late by more than a wake-up may be. Ask
-    /// once per setpoint. RT-safe.
+    /// Whether the setpoint about to be sent at `now_ns` must not go out: whether
+    /// more time has passed since the wake-up at `woke_ns` than a wake-up may be
+    /// late. Ask once per setpoint. RT-safe.
     #[must_use]
-    pub fn holds(&mut self, instant_ns: u64, now_ns: u64, period_ns: u64) -> bool {
-        let stale = now_ns.saturating_sub(instant_ns) > (period_ns / PUNCTUAL_PART).max(1);
+    pub fn holds(&mut self, woke_ns: u64, now_ns: u64, period_ns: u64) -> bool {
+        let stale = now_ns.saturating_sub(woke_ns) > (period_ns / PUNCTUAL_PART).max(1);
         self.in_a_row = if stale {
             self.in_a_row.saturating_add(1)
         } else {
