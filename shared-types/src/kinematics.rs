@@ -5,6 +5,7 @@
 //! the vendor (UFACTORY xArm 7 manual); each joint turns about the z axis of
 //! its own frame. The flange is frame 7, its z axis points out of the tool side.
 
+use crate::exact;
 use crate::joint::{JOINTS, JointState, JointVector};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -165,7 +166,8 @@ fn flip_yz(r: &Matrix3<f64>) -> Matrix3<f64> {
 /// Fixed-axis roll, pitch, yaw (`Rz Ry Rx`) of an attitude, as the arm reports it.
 #[must_use]
 pub fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
-    let pitch = libm::atan2(-r[(2, 0)], libm::hypot(r[(0, 0)], r[(1, 0)]));
+    let across = exact::sqrt(r[(0, 0)] * r[(0, 0)] + r[(1, 0)] * r[(1, 0)]);
+    let pitch = libm::atan2(-r[(2, 0)], across);
     [
         libm::atan2(r[(2, 1)], r[(2, 2)]),
         pitch,

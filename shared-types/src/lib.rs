@@ -30,6 +30,7 @@ extern crate alloc;
 
 #[cfg(feature = "std")]
 pub mod camera;
+pub mod exact;
 pub mod fault;
 pub mod ipc;
 pub mod joint;

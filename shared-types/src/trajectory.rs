@@ -319,7 +319,7 @@ impl JointTrajectory {
                     t0 + vertex,
                 );
             }
-            let disc = libm::sqrt((m0 * m0 - 4.0 * curve * v0).max(0.0));
+            let disc = crate::exact::sqrt((m0 * m0 - 4.0 * curve * v0).max(0.0));
             let qq = -0.5 * (m0 + disc.copysign(m0));
             for u in [0.0, h, qq / curve, v0 / qq] {
                 if (0.0..=h).contains(&u) {

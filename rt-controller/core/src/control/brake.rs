@@ -7,7 +7,7 @@
 
 use super::finding::Finding;
 use super::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
-use shared_types::{FaultCode, JOINTS, JointState, Limits};
+use shared_types::{FaultCode, JOINTS, JointState, Limits, exact};
 
 /// Brake of all joints from `from` to rest with the jerk of motions the
 /// controller makes itself. RT-safe.
@@ -111,7 +111,7 @@ fn brake_axis(start: AxisState, acceleration_max: f64, jerk_max: f64) -> AxisPha
     let push = if remaining > 0.0 { -1.0 } else { 1.0 };
     let (a, gain) = (push * start.qdd, -push * start.qd);
     let limit = acceleration_max.max(a.abs());
-    let triangle = libm::sqrt((jerk_max * gain + a * a / 2.0).max(0.0));
+    let triangle = exact::sqrt((jerk_max * gain + a * a / 2.0).max(0.0));
     let peak = triangle.min(limit);
     let hold_s = if triangle > limit {
         (gain - (2.0 * limit * limit - a * a) / (2.0 * jerk_max)) / limit

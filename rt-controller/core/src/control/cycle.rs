@@ -279,7 +279,7 @@ impl ControlState {
     )]
     fn missed(&self, input: &CycleInput) -> u32 {
         let gap_s = MonotonicNs(input.deadline_ns).since_s(MonotonicNs(self.sent_ns));
-        let cycles = libm::round(gap_s / self.period_s()) as u32;
+        let cycles = shared_types::exact::round(gap_s / self.period_s()) as u32;
         input.missed.max(cycles.saturating_sub(1))
     }
 

@@ -101,7 +101,7 @@ impl AxisPhases {
 
 /// When the velocity `qd + qdd t + jerk t²/2` is zero (s); NaN where it never is.
 fn turning_points(at: AxisState, jerk: f64) -> [f64; 2] {
-    let root = libm::sqrt(at.qdd * at.qdd - 2.0 * jerk * at.qd);
+    let root = shared_types::exact::sqrt(at.qdd * at.qdd - 2.0 * jerk * at.qd);
     let far = -(at.qdd + root.copysign(at.qdd));
     [far / jerk, 2.0 * at.qd / far]
 }
