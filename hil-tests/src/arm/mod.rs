@@ -37,6 +37,7 @@ mod reference;
 mod reports;
 pub mod server;
 mod servo;
+mod setpoint_check;
 mod start_error;
 mod velocity;
 

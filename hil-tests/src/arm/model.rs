@@ -14,7 +14,8 @@ use super::history::JointSample;
 use super::joint::JointDynamics;
 use super::pacer::Pacer;
 use super::reference::{Move, Reference, Task};
-use super::servo::{ServoStream, SetpointLimits};
+use super::servo::ServoStream;
+use super::setpoint_check::SetpointLimits;
 use rt_controller::xarm::{
     ArmState, Command, CommandError, ErrorCode, Mode, Register, ReplyData, Status, TcpPose,
 };

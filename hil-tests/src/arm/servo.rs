@@ -6,12 +6,13 @@
 //! before, over the mean interval of the last setpoints, which is never taken
 //! as less than the 4 ms cycle. Jitter of the network therefore raises no false
 //! alarm on a 250 Hz stream, while a stream that is too fast is seen at once.
+//! Setpoints that arrive at one instant, as those that one read brings do, may
+//! also be measured from the last one that came before them.
 
-use super::collision::self_clearance_m;
 use super::pacer::{Intake, Pacer};
-use nalgebra::Vector3;
+use super::setpoint_check::{SetpointLimits, Step};
 use rt_controller::xarm::ErrorCode;
-use shared_types::{JOINTS, JointVector, Limits, MonotonicNs, kinematics};
+use shared_types::{JointVector, MonotonicNs};
 use std::collections::VecDeque;
 
 /// Time that a step counts for at least (s): 250 Hz.
@@ -20,59 +21,6 @@ const CYCLE_S: f64 = 0.004;
 const SILENCE_S: f64 = 1.0 / 30.0;
 /// Intervals over which the rate of the stream is averaged.
 const INTERVALS: usize = 25;
-/// Part of a limit that rounding to the wire's f32 may exceed it by.
-const ROUNDING: f64 = 1e-3;
-
-/// How far outside its range a setpoint is still taken (rad): 0.1 deg, as in the
-/// SDK's own test. The joint goes to the end of the range then.
-const RANGE_TOLERANCE_RAD: f64 = core::f64::consts::PI / 1800.0;
-
-/// What a setpoint is checked against.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SetpointLimits<'a> {
-    pub(super) joints: &'a Limits,
-    /// Tool centre point in the flange frame (m).
-    pub(super) tcp_offset: Vector3<f64>,
-    /// Largest speed of that point (m/s).
-    pub(super) tcp_speed_max_m_s: f64,
-    /// What a faster setpoint raises: C60, on old firmware C24.
-    pub(super) tcp_speed_code: ErrorCode,
-    /// Whether self collision is looked for.
-    pub(super) self_collision: bool,
-    /// Box that the point must stay in: smallest, largest coordinates (m).
-    pub(super) fence_m: Option<[Vector3<f64>; 2]>,
-}
-
-impl SetpointLimits<'_> {
-    /// The nearest joint position inside the range.
-    fn clamp(&self, q: &JointVector) -> JointVector {
-        let (min, max) = (&self.joints.position_min_rad, &self.joints.position_max_rad);
-        JointVector(core::array::from_fn(|j| q[j].clamp(min[j], max[j])))
-    }
-
-    /// Whether a pose is one that the arm must not take.
-    ///
-    /// # Errors
-    /// C22 for self collision, C35 outside the safety boundary.
-    pub(super) fn check_pose(&self, q: &JointVector) -> Result<(), ErrorCode> {
-        if self.self_collision && self_clearance_m(q) < 0.0 {
-            return Err(ErrorCode::SELF_COLLISION);
-        }
-        let Some([min, max]) = self.fence_m else {
-            return Ok(());
-        };
-        let tool = tool_position(q, &self.tcp_offset);
-        if tool.sup(&min).inf(&max) == tool {
-            Ok(())
-        } else {
-            Err(SAFETY_BOUNDARY)
-        }
-    }
-}
-
-/// C35: safety boundary.
-const SAFETY_BOUNDARY: ErrorCode = ErrorCode(35);
-
 /// A setpoint to execute.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Setpoint {
@@ -87,6 +35,8 @@ pub(super) struct Setpoint {
 pub(super) struct ServoStream {
     arrivals: VecDeque<MonotonicNs>,
     newest: Option<JointVector>,
+    /// The step of the last setpoint that did not arrive together with another.
+    last_step: Option<Step>,
     pub(super) pacer: Pacer<Setpoint>,
 }
 
@@ -95,6 +45,7 @@ impl ServoStream {
     pub(super) fn reset(&mut self) {
         self.arrivals.clear();
         self.newest = None;
+        self.last_step = None;
         self.pacer.clear();
     }
 
@@ -105,38 +56,27 @@ impl ServoStream {
             .is_none_or(|last| now.since_s(*last) > SILENCE_S)
     }
 
-    /// Checks a setpoint and keeps it as the newest one. `present` (rad) is
-    /// where a stream that begins now starts from.
+    /// Checks a setpoint that arrived at `arrived` and keeps it as the newest
+    /// one, to be executed from `at` on. `present` (rad) is where a stream that
+    /// begins now starts from.
     ///
     /// # Errors
-    /// C23 outside the joint range, C24 too fast for a joint, C60 for the tool;
+    /// C23 outside the joint range, C24 too fast for a joint, C60 for the tool,
     /// C22 and C35 as in [`SetpointLimits::check_pose`].
     pub(super) fn offer(
         &mut self,
+        arrived: MonotonicNs,
         at: MonotonicNs,
         q: JointVector,
         present: JointVector,
         limits: &SetpointLimits<'_>,
     ) -> Result<(), ErrorCode> {
-        if self.is_silent(at) {
-            self.arrivals.clear();
-        }
-        let interval_s = self.note_arrival(at);
-        let inside = limits.clamp(&q);
-        if (q - inside).max_abs() > RANGE_TOLERANCE_RAD {
-            return Err(ErrorCode::JOINT_LIMIT);
-        }
-        let q = inside;
-        let from = self.newest.unwrap_or(present);
-        let qd = (q - from) * (1.0 / interval_s);
-        let allowed = 1.0 + ROUNDING;
-        if (0..JOINTS).any(|j| qd[j].abs() > limits.joints.velocity_max_rad_s[j] * allowed) {
-            return Err(ErrorCode::SPEED_LIMIT);
-        }
-        let way = tool_position(&q, &limits.tcp_offset) - tool_position(&from, &limits.tcp_offset);
-        if way.norm() > limits.tcp_speed_max_m_s * allowed * interval_s {
-            return Err(limits.tcp_speed_code);
-        }
+        let (single, together) = self.note_arrival(arrived, present);
+        let q = limits.in_range(&q)?;
+        let qd = single.speed(&q, limits).or_else(|error| {
+            let together = together.ok_or(error)?;
+            together.speed(&q, limits)
+        })?;
         limits.check_pose(&q)?;
         self.newest = Some(q);
         self.pacer.offer(at, Setpoint { at, q, qd });
@@ -154,33 +94,46 @@ impl ServoStream {
         Some(Setpoint { at, ..setpoint })
     }
 
-    /// Records an arrival and returns the time its step counts for (s).
-    fn note_arrival(&mut self, at: MonotonicNs) -> f64 {
-        let last = self.arrivals.back().map(|last| at.since_s(*last));
-        self.arrivals.push_back(at);
+    /// Records an arrival, never before the last one: from where and over which
+    /// time its step counts, and what counts besides if it arrived together with
+    /// the setpoint before.
+    fn note_arrival(&mut self, arrived: MonotonicNs, present: JointVector) -> (Step, Option<Step>) {
+        if self.is_silent(arrived) {
+            self.arrivals.clear();
+        }
+        let last = self.arrivals.back().copied();
+        let arrived = last.map_or(arrived, |last| arrived.max(last));
+        self.arrivals.push_back(arrived);
         if self.arrivals.len() > INTERVALS + 1 {
             self.arrivals.pop_front();
         }
-        let Some(last_s) = last else {
-            return SILENCE_S;
+        let step = Step {
+            from: self.newest.unwrap_or(present),
+            interval_s: last.map_or(SILENCE_S, |last| self.interval_s(arrived, last)),
         };
+        if last == Some(arrived) {
+            return (step, self.last_step);
+        }
+        self.last_step = Some(step);
+        (step, None)
+    }
+
+    /// What the way since the arrival at `last` is measured by (s).
+    fn interval_s(&self, arrived: MonotonicNs, last: MonotonicNs) -> f64 {
         let span_s = self
             .arrivals
             .front()
-            .map_or(0.0, |first| at.since_s(*first));
+            .map_or(0.0, |first| arrived.since_s(*first));
         let mean_s = span_s / (self.arrivals.len() - 1) as f64;
-        mean_s.max(last_s).clamp(CYCLE_S, SILENCE_S)
+        mean_s.max(arrived.since_s(last)).clamp(CYCLE_S, SILENCE_S)
     }
-}
-
-fn tool_position(q: &JointVector, offset: &Vector3<f64>) -> Vector3<f64> {
-    let (p, r) = kinematics::flange_pose(q);
-    p + r * offset
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
+    use shared_types::{Limits, kinematics};
 
     const MS: u64 = 1_000_000;
     /// Flange 0.66 m from joint 1's axis.
@@ -215,7 +168,7 @@ mod tests {
         let mut taken = 0;
         for k in 0..200_u64 {
             let at = MonotonicNs((4 * k + late_ms(k)) * MS);
-            if let Err(code) = servo.offer(at, q, STRETCHED, &checks) {
+            if let Err(code) = servo.offer(at, at, q, STRETCHED, &checks) {
                 return (Some(code), taken);
             }
             taken += usize::from(take(&mut servo, at).is_some());
@@ -259,6 +212,40 @@ mod tests {
         assert_eq!(stream(6, 3.0, |k| k % 2).0, None);
     }
 
+    /// A reader held up takes up two setpoints at once, the second of them sent
+    /// 2 ms late: no error. A stream that is too fast is none the less.
+    #[test]
+    fn setpoints_of_one_read_count_from_the_one_before_them() {
+        let limits = Limits::default();
+        let checks = checks(&limits);
+        let send = |speed_rad_s: f64| {
+            let mut servo = ServoStream::default();
+            let mut offer = |arrived_ms: u64, path_ms: u64| {
+                let at = MonotonicNs((1000 + arrived_ms) * MS);
+                let mut q = JointVector::ZERO;
+                q[6] = speed_rad_s * path_ms as f64 * 1e-3;
+                servo.offer(at, at, q, JointVector::ZERO, &checks)
+            };
+            (0..25).try_for_each(|k| offer(4 * k, 4 * k))?;
+            offer(106, 100)?;
+            offer(106, 106)?;
+            offer(108, 108)
+        };
+        assert_eq!(send(3.0), Ok(()));
+        assert_eq!(send(3.2), Err(ErrorCode::SPEED_LIMIT));
+        let mut servo = ServoStream::default();
+        let mut offer = |ms: u64, q6: f64| {
+            let mut q = JointVector::ZERO;
+            q[6] = q6;
+            servo.offer(MonotonicNs(ms * MS), MonotonicNs(ms * MS), q, q, &checks)
+        };
+        assert_eq!((offer(4, 0.0), offer(8, 0.0)), (Ok(()), Ok(())));
+        assert_eq!(
+            (offer(16, 0.01), offer(16, 0.026)),
+            (Ok(()), Err(ErrorCode::SPEED_LIMIT))
+        );
+    }
+
     #[test]
     fn a_jump_is_refused() {
         let limits = Limits::default();
@@ -266,28 +253,23 @@ mod tests {
         let mut servo = ServoStream::default();
         let mut far = JointVector::ZERO;
         far[6] = 1.0;
-        let refused = servo.offer(MonotonicNs(MS), far, JointVector::ZERO, &checks);
+        let refused = servo.offer(
+            MonotonicNs(MS),
+            MonotonicNs(MS),
+            far,
+            JointVector::ZERO,
+            &checks,
+        );
         assert_eq!(refused, Err(ErrorCode::SPEED_LIMIT));
         far[3] = -1.0;
-        let refused = servo.offer(MonotonicNs(MS), far, JointVector::ZERO, &checks);
+        let refused = servo.offer(
+            MonotonicNs(MS),
+            MonotonicNs(MS),
+            far,
+            JointVector::ZERO,
+            &checks,
+        );
         assert_eq!(refused, Err(ErrorCode::JOINT_LIMIT));
-    }
-
-    #[test]
-    fn poses_that_collide_or_leave_the_boundary_are_refused() {
-        let limits = Limits::default();
-        let mut folded = JointVector::ZERO;
-        folded[5] = 3.1;
-        let mut checks = checks(&limits);
-        assert_eq!(checks.check_pose(&folded), Ok(()));
-        checks.self_collision = true;
-        assert_eq!(checks.check_pose(&folded), Err(ErrorCode::SELF_COLLISION));
-        // The zero pose has its flange at 206, 0, 120.5 mm.
-        let box_up_to = |z: f64| Some([Vector3::repeat(-1.0), Vector3::new(1.0, 1.0, z)]);
-        checks.fence_m = box_up_to(0.13);
-        assert_eq!(checks.check_pose(&JointVector::ZERO), Ok(()));
-        checks.fence_m = box_up_to(0.11);
-        assert_eq!(checks.check_pose(&JointVector::ZERO), Err(ErrorCode(35)));
     }
 
     #[test]
@@ -299,7 +281,7 @@ mod tests {
         for k in 0..1000_u64 {
             let at = MonotonicNs(1000 * MS + k * MS);
             let q = JointVector::splat(1e-5 * k as f64);
-            servo.offer(at, q, JointVector::ZERO, &checks).unwrap();
+            servo.offer(at, at, q, JointVector::ZERO, &checks).unwrap();
             taken.extend(take(&mut servo, at));
         }
         // One second at 1 kHz: 250 are executed.

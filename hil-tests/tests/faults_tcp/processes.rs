@@ -12,17 +12,25 @@ use std::time::{Duration, Instant};
 
 /// The arm's log is exact to a millisecond, its own step, and some.
 const LOG_STEP_S: f64 = 2e-3;
+/// Kills, and rounds in which so many must come about.
+const KILLS: usize = 5;
+const ROUNDS_MAX: usize = 15;
 /// The three cycles a real arm is guarded with.
 const SILENCE_MS: f64 = 12.0;
 
-/// Kills the controller at speed; when it was, and what the arm got since.
-fn killed_at_speed(stand: &mut Stand) -> MonotonicNs {
+/// Kills the controller at speed and tells when that was; `None` if the
+/// guardian stopped the arm before, as it must when the machine itself stood
+/// still for longer than the guardian waits.
+fn killed_at_speed(stand: &mut Stand) -> Option<MonotonicNs> {
     stand.make_ready();
     stand.begin();
-    stand.wait_for_speed();
+    stand.wait_until("the motion", |s| s.is_fast() || s.guardian_acted());
+    if stand.guardian_acted() {
+        return None;
+    }
     let killed = clock::now();
     stand.controller.kill();
-    killed
+    Some(killed)
 }
 
 /// When the arm's state became "stopped" after `from`.
@@ -42,14 +50,18 @@ fn stopped_at(events: &[TimedEvent], from: MonotonicNs) -> Option<MonotonicNs> {
 
 /// The requirement is 20 ms on a machine that is not shared. Of five kills the
 /// fastest shows what the guardian does; all must be met.
+///
+/// Rounds in which the machine stood still before the kill are not kills.
 #[test]
 fn fault_28_a_killed_controller_is_met_by_the_guardian_within_20_ms() {
     let mut reactions_ms = Vec::new();
-    for round in 0..5 {
+    for round in 0..ROUNDS_MAX {
         let mut stand = Stand::with(&format!("killed_{round}"), ArmConfig::default(), |config| {
             config.guardian.silence_ms = SILENCE_MS
         });
-        let killed = killed_at_speed(&mut stand);
+        let Some(killed) = killed_at_speed(&mut stand) else {
+            continue;
+        };
         let began = Instant::now();
         let from = killed.plus_s(-LOG_STEP_S);
         let stopped = loop {
@@ -62,7 +74,11 @@ fn fault_28_a_killed_controller_is_met_by_the_guardian_within_20_ms() {
         reactions_ms.push(stopped.since_s(killed) * 1e3);
         std::thread::sleep(Duration::from_millis(300));
         assert!(speed_since(&stand, clock::now()) < 2e-3);
+        if reactions_ms.len() == KILLS {
+            break;
+        }
     }
+    assert_eq!(reactions_ms.len(), KILLS, "the machine never ran smoothly");
     reactions_ms.sort_by(f64::total_cmp);
     println!("from SIGKILL to the arm's own stop (ms): {reactions_ms:.2?}");
     assert!(reactions_ms[0] <= 20.0, "{reactions_ms:?}");
@@ -83,7 +99,7 @@ fn fault_28_in_velocity_mode_the_arm_stops_by_itself_without_any_guardian() {
         Stand::velocity(config);
         config.guardian.required = false;
     });
-    let killed = killed_at_speed(&mut stand);
+    let killed = killed_at_speed(&mut stand).expect("nobody else stops it");
     std::thread::sleep(Duration::from_millis(600));
     assert!(speed_since(&stand, clock::now()) < 2e-3);
     let moving = |s: &JointSample| s.state.qd.max_abs() > 2e-3;
@@ -189,7 +205,7 @@ fn fault_32_what_a_killed_controller_left_does_not_block_the_next() {
         config.guardian.required = false;
     });
     for _ in 0..2 {
-        killed_at_speed(&mut stand);
+        killed_at_speed(&mut stand).expect("nobody else stops it");
         std::thread::sleep(Duration::from_millis(300));
         stand.start_controller_again();
     }

@@ -309,12 +309,22 @@ impl Stand {
 
     /// Waits until the arm is asked to move faster than half a radian a second.
     pub fn wait_for_speed(&mut self) {
-        self.wait_until("the motion", |s| {
-            s.arm
-                .history()
-                .latest()
-                .is_some_and(|sample| sample.state.qd.max_abs() > 0.5)
-        });
+        self.wait_until("the motion", |s| s.is_fast());
+    }
+
+    /// Whether the arm moves faster than that.
+    pub fn is_fast(&self) -> bool {
+        self.arm
+            .history()
+            .latest()
+            .is_some_and(|sample| sample.state.qd.max_abs() > 0.5)
+    }
+
+    /// Whether the guardian has asked the arm to stop.
+    pub fn guardian_acted(&self) -> bool {
+        self.guardian
+            .as_ref()
+            .is_some_and(|guardian| guardian.log().contains("the arm is asked to stop"))
     }
 
     /// A throw that a fault stops: the answer names one of `expected`, and

@@ -146,7 +146,7 @@ impl ArmEndpoint {
     }
 
     /// Bytes of a client that arrived at `at`; the model has been advanced to
-    /// that time. Whether it still listens to this client.
+    /// that time or past it. Whether it still listens to this client.
     pub fn receive(&mut self, client: u32, at: MonotonicNs, bytes: &[u8]) -> bool {
         let dark = self.is_dark();
         let Some(state) = self.clients.get_mut(&client) else {

@@ -44,7 +44,10 @@ impl ArmEndpoint {
         }
     }
 
-    fn handle(&mut self, client: u32, at: MonotonicNs, frame: &Frame<'_>) {
+    /// A request that arrived at `arrived`. It may have been read later, when
+    /// other things had happened already: then those come first.
+    fn handle(&mut self, client: u32, arrived: MonotonicNs, frame: &Frame<'_>) {
+        let at = arrived.max(self.model.time());
         // Only the private protocol is spoken here; a heartbeat is taken
         // silently, as is standard Modbus.
         let spoken = matches!(
@@ -79,7 +82,7 @@ impl ArmEndpoint {
         }
         let mut answer = self.model.request_from(
             Some((client, request.transaction)),
-            at,
+            arrived,
             request.register,
             request.parameters,
         );

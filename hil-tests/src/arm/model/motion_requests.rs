@@ -60,13 +60,13 @@ impl ArmModel {
 
     /// A streamed setpoint: checked on arrival, taken at once unless that would
     /// exceed 250 Hz, then by a later step.
-    fn stream(&mut self, at: MonotonicNs, q: JointVector) {
-        let at = at.max(self.time);
+    fn stream(&mut self, arrived: MonotonicNs, q: JointVector) {
+        let at = arrived.max(self.time);
         // What was due before this one came has had its turn.
         self.run_stream(at);
         let present = self.reference.q;
         let mut servo = std::mem::take(&mut self.servo);
-        let verdict = servo.offer(at, q, present, &self.setpoint_limits());
+        let verdict = servo.offer(arrived, at, q, present, &self.setpoint_limits());
         self.servo = servo;
         match verdict {
             Ok(()) => {

@@ -4,8 +4,10 @@ use super::plant::{Plant, stand_for_another_machine};
 use crate::arm::clock;
 use crate::arm::endpoint::Service;
 use crate::arm::start_error::ArmStartError;
+use rt_controller::os::receive::{receive, stamp_arrivals};
+use shared_types::MonotonicNs;
 use socket2::{Domain, SockRef, Socket, Type};
-use std::io::{self, Read};
+use std::io;
 use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -15,6 +17,8 @@ use std::time::Duration;
 const BACKLOG: i32 = 64;
 /// Bytes read at once.
 const READ_LEN: usize = 2048;
+/// Older stamps are not believed (s).
+const STAMP_AGE_MAX_S: f64 = 0.1;
 /// Pause of a reader that must not read.
 const DEAF_PAUSE: Duration = Duration::from_millis(2);
 
@@ -74,6 +78,8 @@ fn accept_all(listener: &TcpListener, service: Service, plant: &Arc<Plant>) {
 
 fn serve(stream: TcpStream, service: Service, plant: &Arc<Plant>) -> io::Result<JoinHandle<()>> {
     stream.set_nodelay(true)?;
+    // Without stamps the time of reading counts.
+    let _ = stamp_arrivals(&stream);
     let (id, line) = plant.connect(stream, service).map_err(io::Error::other)?;
     let reading_plant = Arc::clone(plant);
     let spawned = thread::Builder::new()
@@ -91,16 +97,16 @@ fn serve(stream: TcpStream, service: Service, plant: &Arc<Plant>) -> io::Result<
 
 /// Reads until the client leaves or its connection is closed. Clients of report
 /// ports say nothing; reading notices that they leave.
-fn read_all(mut stream: &TcpStream, id: u32, plant: &Plant, line: &super::line::Line) {
+fn read_all(stream: &TcpStream, id: u32, plant: &Plant, line: &super::line::Line) {
     let mut bytes = [0; READ_LEN];
     while !plant.is_stopping() {
-        let received = match stream.read(&mut bytes) {
-            Ok(0) => return,
+        let (received, stamp_ns) = match receive(stream, &mut bytes) {
+            Ok((0, _)) => return,
             Ok(received) => received,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
             Err(_gone) => return,
         };
-        let arrival = clock::now();
+        let arrival = arrival(stamp_ns, clock::now());
         let listens =
             plant.with_endpoint(|endpoint, _| endpoint.receive(id, arrival, &bytes[..received]));
         plant.flush(id, line);
@@ -110,6 +116,16 @@ fn read_all(mut stream: &TcpStream, id: u32, plant: &Plant, line: &super::line::
             }
         }
     }
+}
+
+/// When bytes reached the network: this thread may be held up with the whole
+/// machine, a controller of its own would not be. A stamp far from now is that
+/// of a wall clock that was set meanwhile.
+fn arrival(stamp_ns: Option<u64>, now: MonotonicNs) -> MonotonicNs {
+    stamp_ns
+        .map(|ns| MonotonicNs(ns.min(now.0)))
+        .filter(|stamp| now.since_s(*stamp) < STAMP_AGE_MAX_S)
+        .unwrap_or(now)
 }
 
 fn is_closed(id: u32, plant: &Plant) -> bool {
