@@ -11,6 +11,9 @@ use shared_types::{Limits, WireMode};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 
+/// Longest time awake before a deadline: a quarter of the period (us).
+const REHEARSE_MAX_US: u32 = 1000;
+
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -297,6 +300,14 @@ impl ControllerConfig {
     pub fn check(&self) -> Result<(), ConfigError> {
         self.thresholds.checked(self.arm)?;
         self.guardian.check()?;
+        let rehearse_us = self.real_time.rehearse_us;
+        if rehearse_us > REHEARSE_MAX_US {
+            return Err(ConfigError::Threshold {
+                key: "real_time.rehearse_us",
+                found: rehearse_us.into(),
+                allowed: "0 to 1000 us",
+            });
+        }
         match self.real_time.priority {
             Some(found) if !(11..=99).contains(&found) => Err(ConfigError::Priority { found }),
             _ => Ok(()),
@@ -357,6 +368,12 @@ mod tests {
             config.check(),
             Err(ConfigError::Priority { found: 5 })
         ));
+        config = parse("[real_time]\nrehearse_us = 1001").unwrap();
+        let said = config.check().unwrap_err().to_string();
+        assert!(
+            said.contains("rehearse_us") && said.contains("1000"),
+            "{said}"
+        );
         config.limits = Some(Limits::default());
         config.limits_file = Some("x".into());
         assert!(matches!(

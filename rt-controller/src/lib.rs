@@ -38,6 +38,7 @@ pub mod os;
 pub mod ports;
 pub mod process;
 pub mod recording;
+pub mod rehearsal;
 pub mod relay;
 pub mod report_stream;
 pub mod reports;

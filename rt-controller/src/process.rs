@@ -13,6 +13,7 @@ use crate::control::ControlState;
 use crate::error::ControllerError;
 use crate::os::{MonotonicClock, enter_real_time, shared_memory_free_mb};
 use crate::ports::{RtPorts, rings};
+use crate::rehearsal::Rehearsal;
 use crate::relay::{ArmSettings, Relay};
 use crate::reports::{self, ReportSource};
 use crate::rt_loop::RtLoop;
@@ -190,6 +191,8 @@ impl Threads {
         let (domain, settings) = (config.domain.clone(), config.real_time.clone());
         let quit = Arc::clone(&self.quit);
         let (ready, wait) = mpsc::channel();
+        let ahead_us = config.real_time.rehearse_us;
+        let rehearsal = Rehearsal::new(config.resolve_limits()?, control.wire(), ahead_us)?;
         let body = move || {
             // Blackboard handles stay in the thread that made them.
             let boards = match Bus::join(&domain).and_then(|bus| create_boards(&bus)) {
@@ -200,6 +203,7 @@ impl Threads {
                 }
             };
             let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
+            rt.rehearse(rehearsal);
             let warnings = enter_real_time(&settings);
             rt.real_time =
                 warnings.is_empty() && settings.priority.is_some() && settings.lock_memory;

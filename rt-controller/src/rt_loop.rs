@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!  deadline k          ~10 us          ~40 us            deadline k+1
-//!     |--late--|--poll, step--|--send, record--|-- sleep --|
-//!     wake     input          setpoint out                 4 ms later
+//!     |--late--|--poll, step--|--send, record--|-- sleep, rehearse --|
+//!     wake     input          setpoint out                     4 ms later
 //! ```
 //!
 //! The thread runs under `SCHED_FIFO` with locked memory where it may. Its
@@ -29,6 +29,7 @@ use crate::control::{ArmCodes, ControlState, CycleInput};
 use crate::os::Clock;
 use crate::overrun::{HoldBack, Wake, after_wake, next_wake, setpoint_late_ns};
 use crate::ports::RtPorts;
+use crate::rehearsal::Rehearsal;
 use crate::transport::ArmTransport;
 use crate::transport::slot::LinkSlot;
 use shared_types::MonotonicNs;
@@ -44,6 +45,7 @@ pub struct RtLoop<T, C> {
     ports: RtPorts<T>,
     link: LinkSlot<T>,
     held: HoldBack,
+    rehearsal: Option<Rehearsal>,
     /// Broken reports counted so far.
     broken: u32,
     pid: u32,
@@ -64,6 +66,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         Self {
             link: LinkSlot::new(control.wire()),
             held: HoldBack::default(),
+            rehearsal: None,
             broken: ports.broken.count(),
             control,
             clock,
@@ -79,6 +82,11 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         &self.clock
     }
 
+    /// Rehearses each cycle from now on, if that is to be any time ahead.
+    pub fn rehearse(&mut self, rehearsal: Rehearsal) {
+        self.rehearsal = Some(rehearsal).filter(|r| r.ahead_ns > 0);
+    }
+
     /// Runs until `quit` is set.
     pub fn run(&mut self, quit: &AtomicBool) {
         let period_ns = MonotonicNs(0).plus_s(self.control.period_s()).0;
@@ -87,12 +95,30 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
             missed: 0,
         };
         while !quit.load(Ordering::Relaxed) {
-            self.clock.sleep_until(next.deadline_ns);
+            self.wait_until(next.deadline_ns);
             let woke_ns = self.clock.now_ns();
             let due = after_wake(next.deadline_ns, woke_ns, period_ns);
             let missed = due.missed.saturating_add(next.missed);
             let sent_ns = self.cycle(due.deadline_ns, missed, woke_ns);
             next = next_wake(due.deadline_ns, sent_ns, self.clock.now_ns(), period_ns);
+        }
+    }
+
+    /// Sleeps until the deadline, or until it is time to rehearse; then at most
+    /// half of that time goes by before the rehearsal, or there is none.
+    fn wait_until(&mut self, deadline_ns: u64) {
+        let Some(rehearsal) = &mut self.rehearsal else {
+            return self.clock.sleep_until(deadline_ns);
+        };
+        let ahead_ns = rehearsal.ahead_ns;
+        self.clock.sleep_until(deadline_ns.saturating_sub(ahead_ns));
+        let latest_ns = deadline_ns.saturating_sub(ahead_ns / 2);
+        if self.clock.now_ns() < latest_ns {
+            let (operator, guardian) = (self.boards.operator(), self.boards.guardian());
+            rehearsal.cycle(deadline_ns, operator, guardian);
+        }
+        while self.clock.now_ns() < deadline_ns {
+            core::hint::spin_loop();
         }
     }
 

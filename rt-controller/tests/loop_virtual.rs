@@ -10,6 +10,7 @@
 use rt_controller::control::{ControlEvent, ControlState, Order, Thresholds};
 use rt_controller::os::Clock;
 use rt_controller::ports::{Mail, RelayPorts, rings};
+use rt_controller::rehearsal::Rehearsal;
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::sim::IdealArm;
 use shared_types::ipc::{Bus, ControllerBoards, CycleRecord};
@@ -61,15 +62,17 @@ impl Clock for LateClock {
 
 /// Runs the loop with an arm for as many cycles as `late_ns` has entries.
 fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
-    run_held_up(name, arm, late_ns, Vec::new())
+    run_so(name, arm, late_ns, Vec::new(), 0)
 }
 
-/// The same, held up after its wake-ups by `held_ns`.
-fn run_held_up(
+/// The same, held up after its wake-ups by `held_ns`, rehearsing `ahead_us`
+/// before each deadline.
+fn run_so(
     name: &str,
     arm: IdealArm,
     late_ns: Vec<u64>,
     held_ns: Vec<u64>,
+    ahead_us: u32,
 ) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
     let bus = Bus::join(&format!("test_{name}_{}", std::process::id())).unwrap();
     let boards = ControllerBoards::create(&bus).unwrap();
@@ -97,7 +100,10 @@ fn run_held_up(
         quit: Arc::clone(&quit),
     };
     let control = ControlState::new(Limits::default(), thresholds);
-    RtLoop::new(control, clock, boards, rings.rt).run(&quit);
+    let wire = control.wire();
+    let mut rt = RtLoop::new(control, clock, boards, rings.rt);
+    rt.rehearse(Rehearsal::new(Limits::default(), wire, ahead_us).unwrap());
+    rt.run(&quit);
     let records = std::iter::from_fn(|| relay.records.pop().ok()).collect();
     (records, relay)
 }
@@ -132,6 +138,41 @@ fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
     assert!(records.iter().all(|r| r.sent == 1));
 }
 
+/// A loop that wakes early to rehearse tells the arm the same, and lateness up to
+/// the time ahead is over at the deadline.
+#[test]
+fn a_rehearsal_takes_lateness_away_and_changes_nothing_else() {
+    let late_us = [0, 30, 150, 0, 0, 90, 9_500, 0, 199, 0, 400, 0, 3_990, 0];
+    let late_ns = late_us.map(|us: u64| us * 1000).to_vec();
+    let so = |name, ahead_us| {
+        let arm = IdealArm::default();
+        run_so(name, arm, late_ns.clone(), Vec::new(), ahead_us)
+    };
+    let (plain, _) = so("plain", 0);
+    let (early, mut relay) = so("early", 200);
+    assert_eq!(latched(&mut relay), None);
+    let late = |r: &CycleRecord| u64::from(r.wake_late_ns);
+    // The first wake-up is punctual.
+    let wakes_us = std::iter::once(&0).chain(late_us.iter().rev());
+    for (record, wake_us) in early.iter().zip(wakes_us) {
+        let left_ns = (wake_us % 4000 * 1000).saturating_sub(200_000);
+        assert!(
+            late(record).abs_diff(left_ns) < 5_000,
+            "{wake_us} {record:?}"
+        );
+        assert_eq!(record.q_c, START_POSE);
+    }
+    let lost = |all: &[CycleRecord]| all.iter().map(|r| r.missed).sum::<u32>();
+    assert!(
+        lost(&early) <= lost(&plain),
+        "{} {}",
+        lost(&early),
+        lost(&plain)
+    );
+    assert!(early.iter().all(|r| r.sent == 1));
+    assert!(late(&plain[2]) + late(&plain[1]) > 0);
+}
+
 #[test]
 fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
     // Microseconds, entries consumed from the back: after the sleep that they
@@ -139,7 +180,7 @@ fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
     let held_us = [0, 0, 150, 0, 3500, 0, 0, 300, 250, 0, 0, 0];
     let held_ns = held_us.map(|us: u64| us * 1000).to_vec();
     let arm = IdealArm::default();
-    let (records, mut relay) = run_held_up("held", arm, vec![0; held_us.len()], held_ns);
+    let (records, mut relay) = run_so("held", arm, vec![0; held_us.len()], held_ns, 0);
     let went: Vec<(bool, u32)> = records.iter().map(|r| (r.send_ns > 0, r.missed)).collect();
     let held: Vec<usize> = (0..went.len())
         .filter(|k| !went[*k].0 && records[*k].sent == 1)

@@ -13,6 +13,9 @@
 mod gauntlet;
 
 use gauntlet::Watch;
+use rt_controller::rehearsal::Rehearsal;
+use shared_types::ipc::{GuardianBeat, OperatorBeat};
+use shared_types::{Limits, WireMode};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -71,6 +74,22 @@ fn no_cycle_of_a_hundred_thousand_touches_the_heap() {
     let cycles = gauntlet::ways::run(100_000, &mut watch);
     assert!(cycles >= 100_000);
     assert_eq!(watch.0, 0);
+}
+
+/// Ten minutes: the swing of the rehearsal ends once and begins again.
+#[test]
+fn no_rehearsal_touches_the_heap() {
+    let (limits, wire) = (Limits::default(), WireMode::ServoPosition);
+    let mut rehearsal = Rehearsal::new(limits, wire, 200).unwrap();
+    let before = touches();
+    for cycle in 1..=150_000_u64 {
+        rehearsal.cycle(
+            cycle * 4_000_000,
+            OperatorBeat::default(),
+            GuardianBeat::default(),
+        );
+    }
+    assert_eq!(touches() - before, 0);
 }
 
 #[test]

@@ -25,6 +25,7 @@ use libc::{SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto};
 use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
 use rt_controller::os::{Clock, MonotonicClock, now_ns};
 use rt_controller::ports::{Mail, RelayPorts, Rings, rings};
+use rt_controller::rehearsal::Rehearsal;
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use shared_types::ipc::{
@@ -171,6 +172,8 @@ fn start_loop(domain: &str) -> Running {
         };
         let control = ControlState::new(Limits::default(), patient());
         let mut rt = RtLoop::new(control, clock, boards, ports);
+        let wire = patient().wire;
+        rt.rehearse(Rehearsal::new(Limits::default(), wire, 200).unwrap());
         ready.send(()).unwrap();
         rt.run(&its_quit);
         counter::count(false);

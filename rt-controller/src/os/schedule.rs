@@ -17,6 +17,9 @@ pub struct RealTimeSettings {
     pub lock_memory: bool,
     /// Refuse to start when any of these cannot be had. Set it on a real arm.
     pub require: bool,
+    /// How long before each deadline the control thread wakes (us): it rehearses
+    /// the cycle and waits by looking at the clock. 0: it sleeps to the deadline.
+    pub rehearse_us: u32,
 }
 
 impl Default for RealTimeSettings {
@@ -26,6 +29,7 @@ impl Default for RealTimeSettings {
             cpu: None,
             lock_memory: true,
             require: false,
+            rehearse_us: 200,
         }
     }
 }
@@ -150,6 +154,7 @@ mod tests {
             cpu: Some(1_000_000),
             lock_memory: false,
             require: false,
+            rehearse_us: 0,
         };
         let words: Vec<String> = std::thread::spawn(move || {
             enter_real_time(&settings)

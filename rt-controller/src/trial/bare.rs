@@ -60,6 +60,7 @@ mod tests {
             cpu: None,
             lock_memory: false,
             require: false,
+            rehearse_us: 0,
         };
         let [period, span] = [1, 20].map(Duration::from_millis);
         let spans_ns = bare_slice(&ordinary, 50_000, period, span).unwrap();

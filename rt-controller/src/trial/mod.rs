@@ -11,9 +11,10 @@ mod bare;
 mod timed_link;
 mod times;
 
-use crate::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
+use crate::control::{ControlState, Order};
 use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, now_ns};
 use crate::ports::{Mail, RelayPorts, rings};
+use crate::rehearsal::{Rehearsal, patient, report, swinging};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::{LinkSettings, TcpLink};
 use answerer::Answerer;
@@ -23,7 +24,7 @@ use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,
 };
 use shared_types::plan::START_POSE;
-use shared_types::{FaultCode, JointTrajectory, JointVector, Limits, MonotonicNs, TrajectoryError};
+use shared_types::{FaultCode, JointVector, Limits, MonotonicNs, TrajectoryError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -102,25 +103,6 @@ pub struct Trial {
     _sweep: DomainSweep,
 }
 
-/// Nothing that a busy machine does may stop the motion: the trial measures.
-fn patient() -> ControlSettings {
-    const EVER_NS: u64 = u64::MAX / 4;
-    ControlSettings::from(Thresholds {
-        operator_timeout_ns: EVER_NS,
-        reply_stall_ns: EVER_NS,
-        unanswered_max: 250,
-        report_stale_ns: EVER_NS,
-        report_frozen_ns: EVER_NS,
-        tracking_error_max_rad: f64::INFINITY,
-        tracking_window_ns: EVER_NS,
-        clock_resyncs_max: u32::MAX,
-        report_broken_max: u32::MAX,
-        late_cycles_max: u32::MAX,
-        missed_cycles_max: u32::MAX,
-        ..Thresholds::relaxed()
-    })
-}
-
 impl Trial {
     /// Sets the loop up in a shared-memory domain of its own. It takes what it
     /// can have of `real_time`; see [`warnings`](Self::warnings).
@@ -138,10 +120,11 @@ impl Trial {
         let (rest, rested) = mpsc::channel();
         let (ready, wait) = mpsc::channel();
         let (control, ports, its_domain) = (
-            ControlState::new(limits, patient()),
+            ControlState::new(limits.clone(), patient()),
             all.rt,
             domain.to_owned(),
         );
+        let rehearsal = Rehearsal::new(limits, patient().wire, real_time.rehearse_us)?;
         let body = move || {
             let boards = Bus::join(&its_domain).and_then(|bus| ControllerBoards::create(&bus));
             let boards = match boards {
@@ -152,6 +135,7 @@ impl Trial {
                 }
             };
             let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
+            rt.rehearse(rehearsal);
             let warnings = enter_real_time(&real_time);
             let _ = ready.send(Ok(warnings.iter().map(ToString::to_string).collect()));
             while let Ok(Go { quit }) = begin.recv() {
@@ -246,7 +230,9 @@ impl Trial {
             // Of a new pose only: one from before a pause would jump.
             let due_ns = core::mem::take(&mut self.due_ns);
             if due_ns > 0 {
-                let _ = self.reports.push(report(self.q, due_ns));
+                let _ = self
+                    .reports
+                    .push(report(self.q, patient().wire, due_ns, now_ns()));
             }
             if self.mode == ControllerMode::Streaming {
                 moving_since.get_or_insert_with(Instant::now);
@@ -307,18 +293,6 @@ impl Trial {
     }
 }
 
-/// An arm that is where it was told to be by the setpoint due at `due_ns`.
-fn report(q: JointVector, due_ns: u64) -> JointReport {
-    JointReport {
-        arm_state: 1,
-        arm_mode: patient().wire.arm_mode(),
-        stamp_ns: due_ns,
-        arrival_ns: now_ns(),
-        q,
-        ..JointReport::default()
-    }
-}
-
 impl Drop for Trial {
     fn drop(&mut self) {
         // Without a sender the thread ends.
@@ -327,23 +301,6 @@ impl Drop for Trial {
             let _ = thread.join();
         }
     }
-}
-
-/// Joint 7 to and fro by this (rad): in a pause of a second it never gets farther
-/// than one setpoint may go.
-const SWING_RAD: f64 = 0.1;
-
-/// Joint 7 to and fro for eight minutes, slowly, and never away from its middle.
-fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
-    let inwards = -SWING_RAD * from[6].signum();
-    let (times_s, poses): (Vec<f64>, Vec<JointVector>) = (0..240)
-        .map(|k| {
-            let mut q = from;
-            q[6] += inwards * f64::from(k % 2);
-            (2.0 * f64::from(k), q)
-        })
-        .unzip();
-    JointTrajectory::new(&times_s, &poses).map(Motion::Spline)
 }
 
 #[cfg(test)]
@@ -358,6 +315,7 @@ mod tests {
             cpu: None,
             lock_memory: false,
             require: false,
+            rehearse_us: 100,
         };
         let mut trial = Trial::new(&domain, ordinary).unwrap();
         assert!(trial.warnings().is_empty());
