@@ -492,7 +492,8 @@ pub struct ReproduceArgs {
     #[arg(value_enum)]
     pub name: ReproduceName,
     /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
-    /// each wiggle, for lob-drape its own 24 (motion-fidelity has its own).
+    /// each wiggle, for lob-drape its own 24, for robust 200
+    /// (motion-fidelity has its own).
     #[arg(long)]
     pub ropes: Option<u64>,
     /// Seed of the ropes, the films and the searches.
@@ -525,6 +526,8 @@ pub enum ReproduceName {
     SimPipeline,
     /// Success of lobs and drapes planned with identified parameters.
     LobDrape,
+    /// Strikes planned for every rope it might be, beside plain ones, and their forecasts.
+    Robust,
 }
 
 /// Arguments of `wag process`.

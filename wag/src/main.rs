@@ -92,8 +92,8 @@ fn refuse_usage(error: &clap::Error) -> ExitCode {
 /// Logs to standard error; `WAG_LOG` sets the filter (`debug`, `planner=trace`).
 fn start_logging(verbose: u8) {
     let default = match verbose {
-        0 => "warn,iceoryx2=error",
-        1 => "info,iceoryx2=error",
+        0 => "warn,iceoryx2=error,tract_onnx=error",
+        1 => "info,iceoryx2=error,tract_onnx=error",
         _ => "debug",
     };
     let filter: Targets = std::env::var("WAG_LOG")

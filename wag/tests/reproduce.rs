@@ -184,4 +184,11 @@ fn results_of_planning_are_whole_and_kept() {
     let tasks = report(&[&tasks[..], &[&both]].concat());
     assert_eq!(tasks["trials"].as_array().unwrap().len(), 1);
     assert!(tasks["trials"][0]["drape"]["error_m"].as_f64().unwrap() < 0.2);
+    let robust = report(&["reproduce", "robust", "--ropes", "1", "--json"]);
+    let rows = robust["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    for row in rows {
+        assert!(row["median_m"].as_f64().unwrap() < 0.05, "{row}");
+        assert!(row["width_m"].as_f64().unwrap() > 0.0, "{row}");
+    }
 }

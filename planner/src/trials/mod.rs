@@ -6,14 +6,18 @@ mod fidelity;
 mod lob_drape;
 mod outside;
 mod pipeline;
+mod robust;
 mod summary;
+mod thrower;
 mod wiggles;
 
 pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
 pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
 pub use outside::{area_under_curve, outside_rope};
-pub use pipeline::{PipelineTrial, Spread, Strikes, pipeline_trials};
+pub use pipeline::{PipelineTrial, Spread, pipeline_trials};
+pub use robust::{Foreseen, RobustTrial, robust_trials};
 pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
+pub use thrower::Strikes;
 pub use wiggles::{AblatedWiggle, ablated_wiggles};
 
 use crate::filming::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};

@@ -1,36 +1,22 @@
 //! The paper's simulated pipeline: strikes planned with true, identified and random
 //! parameters, thrown with the true rope.
 
+use super::thrower::{Strikes, Thrower};
 use super::{TrialError, TrialRig, trial_rope};
 use crate::process::PlannerConfig;
 use crate::ropes::random_strike_target;
 use crate::sysid::IdentifyOptions;
-use crate::tasks::{
-    Belief, PlanError, PlanOptions, PlanRequest, Planned, ThrowSimulator, ThrowTask, plan_throw,
-    simulator_for,
-};
+use crate::tasks::{Belief, PlanError, PlanOptions};
 use crate::workers::map_in_order;
 use serde::{Deserialize, Serialize};
+use shared_types::Task;
 use shared_types::rope::ROPE_PARAMETERS;
-use shared_types::{JointTrajectory, Limits, RopeParams, Task};
-use std::ops::ControlFlow;
 
 /// Keeps the ropes planned for at random apart from those thrown.
 const OTHER: u64 = 0x0074_6865_7200;
 /// Searches of the longer budget; three of the paper's size take about three seconds on
 /// two cores.
 const SEARCHES: usize = 3;
-
-/// What one strike did.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Strikes {
-    /// Distance of tip and target with the true rope (m).
-    pub error_m: f64,
-    /// Distance that the plan predicted for the rope it was planned for (m).
-    pub predicted_m: f64,
-    /// Throws simulated to plan it.
-    pub simulations: u32,
-}
 
 /// One rope and target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,49 +37,6 @@ pub struct PipelineTrial {
     pub identified: Strikes,
     /// Planned for another rope of the ranges.
     pub random: Strikes,
-}
-
-/// Plans for one rope and throws with another.
-struct Thrower<'a> {
-    task: &'a dyn ThrowTask,
-    options: PlanOptions,
-    truth: RopeParams,
-}
-
-impl Thrower<'_> {
-    fn plan(&self, rope: &RopeParams, searches: usize) -> Result<Planned, PlanError> {
-        let request = PlanRequest {
-            rope: *rope,
-            limits: Limits::default(),
-            options: PlanOptions {
-                searches,
-                ..self.options
-            },
-            belief: Belief::default(),
-            following: None,
-        };
-        plan_throw(self.task, &request, &mut |_| ControlFlow::Continue(()))
-    }
-
-    fn throw(&self, planned: &Planned) -> Result<Strikes, PlanError> {
-        Ok(Strikes {
-            error_m: self.error_m(&planned.trajectory)?,
-            predicted_m: planned.error_m,
-            simulations: planned.simulations,
-        })
-    }
-
-    /// With the true rope, in double precision at half the step (m).
-    fn error_m(&self, trajectory: &JointTrajectory) -> Result<f64, PlanError> {
-        let simulator = ThrowSimulator {
-            tail_s: self.task.config().observed_s,
-            ..simulator_for(self.task, &self.truth, &self.options)
-        };
-        let outcomes = simulator.exact().run(&[(&self.truth, trajectory)])?;
-        Ok(outcomes
-            .first()
-            .map_or(f64::INFINITY, |o| self.task.error_m(o)))
-    }
 }
 
 fn trial(
@@ -118,13 +61,13 @@ fn trial(
         truth,
     };
     let planned = || -> Result<PipelineTrial, PlanError> {
-        let once = thrower.plan(&truth, 1)?;
+        let once = thrower.plan(&truth, 1, Belief::default())?;
         let true_rope = thrower.throw(&once)?;
         // A further search begins only where the first was not good enough.
         let true_rope_longer = if once.error_m <= thrower.options.good_enough_m {
             true_rope
         } else {
-            thrower.throw(&thrower.plan(&truth, SEARCHES)?)?
+            thrower.throw(&thrower.plan(&truth, SEARCHES, Belief::default())?)?
         };
         Ok(PipelineTrial {
             index,
@@ -133,8 +76,12 @@ fn trial(
             found: found.to_array(),
             true_rope,
             true_rope_longer,
-            identified: thrower.throw(&thrower.plan(&found, SEARCHES)?)?,
-            random: thrower.throw(&thrower.plan(&trial_rope(seed ^ OTHER, index), 1)?)?,
+            identified: thrower.throw(&thrower.plan(&found, SEARCHES, Belief::default())?)?,
+            random: thrower.throw(&thrower.plan(
+                &trial_rope(seed ^ OTHER, index),
+                1,
+                Belief::default(),
+            )?)?,
         })
     };
     planned().map_err(|source| TrialError::Plan {

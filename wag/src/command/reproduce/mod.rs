@@ -8,6 +8,7 @@ mod kept;
 mod lob_drape;
 mod ood;
 mod pipeline;
+mod robust;
 mod setup;
 mod sysid;
 mod wiggles;
@@ -28,5 +29,6 @@ pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         ReproduceName::WiggleAblation => wiggles::run(args, quiet),
         ReproduceName::SimPipeline => pipeline::run(args, quiet),
         ReproduceName::LobDrape => lob_drape::run(args, quiet),
+        ReproduceName::Robust => robust::run(args, quiet),
     }
 }

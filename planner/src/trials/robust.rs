@@ -1,0 +1,148 @@
+//! Strikes planned for one identified rope beside strikes planned for every rope it might
+//! be, and whether the forecast holds.
+
+use super::thrower::{Strikes, Thrower};
+use super::{TrialError, TrialRig, trial_rope};
+use crate::process::PlannerConfig;
+use crate::ropes::random_strike_target;
+use crate::sysid::IdentifyOptions;
+use crate::tasks::{Belief, PlanError, PlanOptions};
+use crate::workers::map_in_order;
+use serde::{Deserialize, Serialize};
+use shared_types::{ErrorForecast, RopeParams, Task};
+
+/// Ropes that a robust plan is optimised over, and that a forecast is made with.
+const OPTIMISED: usize = 8;
+const FORECAST: usize = 64;
+/// Searches of a plan.
+const SEARCHES: usize = 3;
+
+/// One strike and what was to be expected of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Foreseen {
+    /// What it did.
+    pub strike: Strikes,
+    /// What the posterior of the rope let expect; `None` where no drawn rope could be
+    /// simulated.
+    pub forecast: Option<ErrorForecast>,
+}
+
+impl Foreseen {
+    /// Whether the error lies within its forecast interval.
+    #[must_use]
+    pub fn is_covered(&self) -> bool {
+        self.forecast.is_some_and(|f| {
+            let [low, high] = f.interval_90_m;
+            (low..=high).contains(&self.strike.error_m)
+        })
+    }
+}
+
+/// One rope and target.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RobustTrial {
+    /// Index of the trial under its seed.
+    pub index: u64,
+    /// Target (m).
+    pub target_m: [f64; 3],
+    /// Planned with the identified parameters.
+    pub plain: Foreseen,
+    /// Planned with eight ropes of the posterior.
+    pub robust: Foreseen,
+}
+
+fn trial(
+    rig: &TrialRig,
+    config: &PlannerConfig,
+    options: &IdentifyOptions,
+    seed: u64,
+    index: u64,
+) -> Result<RobustTrial, TrialError> {
+    let truth = trial_rope(seed, index);
+    let target_m = random_strike_target((seed << 32) ^ index);
+    let filmed = rig.film(&truth, seed, index)?;
+    let found = rig.fit(&filmed, index, options)?;
+    let task = config.task(Task::Strike, target_m);
+    let thrower = Thrower {
+        task: &*task,
+        options: PlanOptions {
+            seed: seed ^ index,
+            threads: 1,
+            ..config.search
+        },
+        truth,
+    };
+    let rope: RopeParams = found.params;
+    let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
+        let drawn = Belief::drawn(&rope, &found.posterior, optimised, FORECAST, seed ^ index);
+        let planned = thrower.plan(&rope, SEARCHES, drawn)?;
+        Ok(Foreseen {
+            strike: thrower.throw(&planned)?,
+            forecast: planned.forecast,
+        })
+    };
+    let both = || -> Result<RobustTrial, PlanError> {
+        Ok(RobustTrial {
+            index,
+            target_m,
+            plain: foreseen(0)?,
+            robust: foreseen(OPTIMISED)?,
+        })
+    };
+    both().map_err(|source| TrialError::Plan {
+        index,
+        source: Box::new(source),
+    })
+}
+
+/// Makes the trials with these indices, in parallel; in their order, whatever the
+/// threads.
+///
+/// # Errors
+/// The first trial that cannot be made.
+pub fn robust_trials(
+    rig: &TrialRig,
+    config: &PlannerConfig,
+    options: &IdentifyOptions,
+    seed: u64,
+    indices: &[u64],
+) -> Result<Vec<RobustTrial>, TrialError> {
+    let alone = IdentifyOptions {
+        threads: 1,
+        ..*options
+    };
+    map_in_order(indices, options.threads, |index| {
+        trial(rig, config, &alone, seed, *index)
+    })
+    .into_iter()
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_covered_within_its_interval_only() {
+        let of = |error_m: f64| Foreseen {
+            strike: Strikes {
+                error_m,
+                predicted_m: 0.0,
+                simulations: 1,
+            },
+            forecast: Some(ErrorForecast {
+                ropes: 64,
+                mean_m: 0.01,
+                median_m: 0.01,
+                interval_90_m: [0.002, 0.02],
+            }),
+        };
+        assert!(of(0.002).is_covered() && of(0.02).is_covered());
+        assert!(!of(0.0019).is_covered() && !of(0.021).is_covered());
+        let blind = Foreseen {
+            forecast: None,
+            ..of(0.01)
+        };
+        assert!(!blind.is_covered());
+    }
+}
