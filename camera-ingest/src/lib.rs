@@ -28,6 +28,7 @@ pub mod score;
 pub mod source;
 pub mod still;
 pub mod track;
+mod whole_file;
 
 pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};

@@ -1,5 +1,6 @@
 //! Pictures for people: keypoints over frames, and the strobe picture of a throw.
 
+use crate::whole_file::write_whole;
 use std::path::{Path, PathBuf};
 
 use shared_types::keypoints::TrackedFrame;
@@ -166,15 +167,9 @@ impl Picture {
     /// The file cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<(), OverlayError> {
         let bytes = self.to_png()?;
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let written = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
-        written.map_err(|e| {
-            let _ = std::fs::remove_file(&part);
-            OverlayError::Write {
-                path: path.to_owned(),
-                reason: e.to_string(),
-            }
+        write_whole(path, &bytes).map_err(|e| OverlayError::Write {
+            path: path.to_owned(),
+            reason: e.to_string(),
         })
     }
 }

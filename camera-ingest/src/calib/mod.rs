@@ -11,6 +11,7 @@ mod ini;
 mod settings;
 mod yaml;
 
+use crate::whole_file::write_whole;
 use std::path::{Path, PathBuf};
 
 pub use factory::{VideoMode, write_factory_conf};
@@ -114,7 +115,7 @@ fn read_text(path: &Path) -> Result<String, CalibError> {
 }
 
 fn write_text(path: &Path, text: &str) -> Result<(), CalibError> {
-    std::fs::write(path, text).map_err(|source| CalibError::Io {
+    write_whole(path, text.as_bytes()).map_err(|source| CalibError::Io {
         path: path.to_owned(),
         source,
     })
