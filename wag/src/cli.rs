@@ -492,7 +492,8 @@ pub struct ReproduceArgs {
     #[arg(value_enum)]
     pub name: ReproduceName,
     /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
-    /// each wiggle, for lob-drape its own 24, for robust 200
+    /// each wiggle, for lob-drape its own 24, for robust 200,
+    /// for parameter-importance 30
     /// (motion-fidelity has its own).
     #[arg(long)]
     pub ropes: Option<u64>,
@@ -528,6 +529,8 @@ pub enum ReproduceName {
     LobDrape,
     /// Strikes planned for every rope it might be, beside plain ones, and their forecasts.
     Robust,
+    /// Error of strikes planned with only some parameters identified.
+    ParameterImportance,
 }
 
 /// Arguments of `wag process`.

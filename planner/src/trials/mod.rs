@@ -3,6 +3,7 @@
 //! often intervals hold the truth.
 
 mod fidelity;
+mod importance;
 mod lob_drape;
 mod outside;
 mod pipeline;
@@ -12,6 +13,7 @@ mod thrower;
 mod wiggles;
 
 pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
+pub use importance::{ImportanceTrial, importance_trials};
 pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
 pub use outside::{area_under_curve, outside_rope};
 pub use pipeline::{PipelineTrial, Spread, pipeline_trials};

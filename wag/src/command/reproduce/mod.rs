@@ -4,6 +4,7 @@
 //! off goes on from it.
 
 mod fidelity;
+mod importance;
 mod kept;
 mod lob_drape;
 mod ood;
@@ -30,5 +31,6 @@ pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         ReproduceName::SimPipeline => pipeline::run(args, quiet),
         ReproduceName::LobDrape => lob_drape::run(args, quiet),
         ReproduceName::Robust => robust::run(args, quiet),
+        ReproduceName::ParameterImportance => importance::run(args, quiet),
     }
 }
