@@ -66,12 +66,20 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Say why a run was stopped, or how close it came to its limits.
     Explain(ExplainArgs),
+    /// Make one HTML file of a run: replay in space, joints, limits, rope, times.
+    Report(ReportArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
     /// Measure how fast this machine runs a part of the system.
     Bench(BenchArgs),
     /// Make a result of the paper again, on simulated ropes.
     Reproduce(ReproduceArgs),
+    /// Say whether this machine is fit to drive an arm, and what to do where not.
+    Doctor(DoctorArgs),
+    /// Write man pages, one for each command.
+    Man(ManArgs),
+    /// Print the script by which a shell completes `wag`.
+    Completions(CompletionsArgs),
     /// Run one of the processes in the foreground (what `wag` itself starts).
     #[command(hide = true)]
     Process(ProcessArgs),
@@ -435,6 +443,16 @@ pub struct ExplainArgs {
     pub run: PathBuf,
 }
 
+/// Arguments of `wag report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Run folder.
+    pub run: PathBuf,
+    /// The report; default: report.html in the run folder.
+    #[arg(long, value_name = "FILE.html")]
+    pub out: Option<PathBuf>,
+}
+
 /// Arguments of `wag score`.
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
@@ -531,6 +549,39 @@ pub enum ReproduceName {
     Robust,
     /// Error of strikes planned with only some parameters identified.
     ParameterImportance,
+}
+
+/// Arguments of `wag doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Address or name of an arm's controller to ask too; nothing of it is changed.
+    #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
+    pub address: Option<IpAddr>,
+    /// Command port.
+    #[arg(long, default_value_t = 502)]
+    pub command_port: u16,
+    /// Report port with joint states.
+    #[arg(long, default_value_t = 30000)]
+    pub report_port: u16,
+    /// Report port with the arm's status.
+    #[arg(long, default_value_t = 30002)]
+    pub status_port: u16,
+}
+
+/// Arguments of `wag man`.
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// Folder for the pages; made if it does not exist.
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+}
+
+/// Arguments of `wag completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// Shell.
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
 }
 
 /// Arguments of `wag process`.

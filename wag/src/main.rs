@@ -23,11 +23,13 @@ mod output;
 
 mod cli;
 mod command;
+mod doctor;
 mod failure;
 mod files;
 mod pipeline;
 mod progress;
 mod recording;
+mod report;
 mod session;
 mod table;
 

@@ -9,6 +9,7 @@ use crate::files;
 use crate::pipeline::{self, ArmAddress, ArmLink, CalmInput, Film, RunFolder, Shot};
 use crate::progress::Stage;
 use crate::recording::{CYCLES_FILE, explain_stop};
+use crate::report;
 use crate::session::{Session, watch_interrupts};
 use anyhow::{Context, anyhow, bail};
 use hil_tests::render::Appearance;
@@ -25,6 +26,7 @@ use shared_types::ipc::message::{
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
 use shared_types::{JointTrajectory, Limits, MotionTier, Plan, RopeEstimate, StereoCamera};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Speed of moves between poses, as a part of the fastest move.
@@ -93,7 +95,17 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     if !quiet {
         show(&record);
     }
+    keep_report(folder.path(), quiet);
     Ok(Some(serde_json::to_value(&record).or_failed()?))
+}
+
+/// The run as a page to look at. Without it the run is as good as before.
+fn keep_report(run: &Path, quiet: bool) {
+    match report::write(run, None) {
+        Ok(written) if !quiet => println!("report: {}", written.path.display()),
+        Ok(_) => {}
+        Err(reason) => tracing::warn!("no report was written: {reason:#}"),
+    }
 }
 
 /// The whole throw; each line hands the next what it found.

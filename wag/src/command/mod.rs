@@ -5,15 +5,18 @@ mod bench;
 pub mod check;
 mod demo;
 mod demo_summary;
+mod doctor;
 mod explain;
 mod identify;
 mod latency;
+mod manual;
 mod network;
 pub mod plan;
 mod process;
 mod reach_picture;
 mod record;
 mod replay;
+mod report;
 mod reproduce;
 mod rig;
 mod score;
@@ -42,6 +45,7 @@ fn results(command: &Command) -> Vec<&Path> {
             PlanCommand::Strike(args) | PlanCommand::Lob(args) | PlanCommand::Drape(args),
         ) => &[Some(&args.out), args.csv.as_deref(), args.reach.as_deref()],
         Command::Latency(args) => &[args.response.as_deref()],
+        Command::Report(args) => &[args.out.as_deref()],
         _ => &[],
     };
     named.iter().flatten().copied().collect()
@@ -70,9 +74,13 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Record(args) => record::run(args, quiet),
         Command::Replay(args) => replay::run(args, quiet),
         Command::Explain(args) => explain::run(args, quiet),
+        Command::Report(args) => report::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Reproduce(args) => reproduce::run(args, quiet),
+        Command::Doctor(args) => doctor::run(args, quiet),
+        Command::Man(args) => manual::man(args, quiet),
+        Command::Completions(args) => Ok(manual::completions(args)),
         Command::Process(args) => process::run(args).map(|()| None),
     }
 }

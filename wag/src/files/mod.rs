@@ -10,7 +10,7 @@ mod rope;
 pub use arm_response::{read_arm_response, read_excitation, write_arm_response};
 pub use atomic::{check_writable, write_atomic, write_json};
 pub use limits::{default_limits, read_limits};
-pub use motion::{read_joints, read_pose, write_joints};
+pub use motion::{JointsCsv, read_joints, read_pose, write_joints};
 pub use rope::{read_posterior, read_rope, write_rope_estimate};
 
 use anyhow::Context;

@@ -1,0 +1,214 @@
+"use strict";
+// Arm, pole, rope and target in WebGL: cylinders, balls and lines, nothing more.
+
+const VERTEX = `
+attribute vec3 place; attribute vec3 normal;
+uniform mat4 model; uniform mat4 camera; varying vec3 out_normal;
+void main() {
+  out_normal = mat3(model) * normal;
+  gl_Position = camera * model * vec4(place, 1.0);
+}`;
+const FRAGMENT = `
+precision mediump float;
+uniform vec3 colour; uniform float lit; varying vec3 out_normal;
+void main() {
+  float light = 1.0;
+  if (lit > 0.5) {
+    vec3 n = normalize(out_normal);
+    light = 0.45 + 0.4 * max(dot(n, vec3(0.3, -0.6, 0.74)), 0.0)
+          + 0.15 * max(dot(n, vec3(-0.7, 0.5, 0.5)), 0.0);
+  }
+  gl_FragColor = vec4(colour * light, 1.0);
+}`;
+
+/** Unit cylinder along z from 0 to 1, radius 1: place and normal of each corner. */
+function cylinder(sides) {
+  const out = [];
+  for (let i = 0; i < sides; i++) {
+    const [a, b] = [i, i + 1].map((k) => (2 * Math.PI * k) / sides);
+    const corner = (t, z) => out.push(Math.cos(t), Math.sin(t), z, Math.cos(t), Math.sin(t), 0);
+    corner(a, 0); corner(b, 0); corner(b, 1);
+    corner(a, 0); corner(b, 1); corner(a, 1);
+  }
+  return out;
+}
+
+/** Unit ball. */
+function ball(rings, sides) {
+  const out = [];
+  const corner = (i, k) => {
+    const [t, u] = [(Math.PI * i) / rings, (2 * Math.PI * k) / sides];
+    const p = [Math.sin(t) * Math.cos(u), Math.sin(t) * Math.sin(u), Math.cos(t)];
+    out.push(...p, ...p);
+  };
+  for (let i = 0; i < rings; i++) {
+    for (let k = 0; k < sides; k++) {
+      corner(i, k); corner(i + 1, k); corner(i + 1, k + 1);
+      corner(i, k); corner(i + 1, k + 1); corner(i, k + 1);
+    }
+  }
+  return out;
+}
+
+const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const unit = (a) => { const l = Math.hypot(...a) || 1; return a.map((v) => v / l); };
+
+/** Column-major product of two 4x4 matrices. */
+function times(a, b) {
+  const out = new Float32Array(16);
+  for (let c = 0; c < 4; c++) {
+    for (let r = 0; r < 4; r++) {
+      for (let k = 0; k < 4; k++) out[4 * c + r] += a[4 * k + r] * b[4 * c + k];
+    }
+  }
+  return out;
+}
+
+/** World to clip space for an eye that looks at a point, z up. */
+function cameraMatrix(eye, at, aspect) {
+  const f = unit(minus(at, eye)), s = unit(cross(f, [0, 0, 1])), u = cross(s, f);
+  const look = [s[0], u[0], -f[0], 0, s[1], u[1], -f[1], 0, s[2], u[2], -f[2], 0,
+    -dot(s, eye), -dot(u, eye), dot(f, eye), 1];
+  const near = 0.05, far = 30, g = 1 / Math.tan(0.35);
+  // A narrow window still shows the whole width.
+  const gx = aspect < 1 ? g : g / aspect, gy = aspect < 1 ? g * aspect : g;
+  const project = [gx, 0, 0, 0, 0, gy, 0, 0, 0, 0, (far + near) / (near - far), -1,
+    0, 0, (2 * far * near) / (near - far), 0];
+  return times(project, look);
+}
+
+/** Places of a flat row of tenths of a millimetre, in metres. */
+function points(flat) {
+  const out = [];
+  for (let i = 0; i + 2 < flat.length; i += 3) out.push([flat[i] / 1e4, flat[i + 1] / 1e4, flat[i + 2] / 1e4]);
+  return out;
+}
+
+class View {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.turn = -1.15; this.tilt = 0.22; this.far = 3.1; this.at = [0.45, 0, 0.12];
+    const gl = canvas.getContext("webgl", { antialias: true, preserveDrawingBuffer: true });
+    this.gl = gl;
+    if (!gl) return;
+    const shader = (kind, text) => {
+      const s = gl.createShader(kind);
+      gl.shaderSource(s, text); gl.compileShader(s);
+      return s;
+    };
+    const program = gl.createProgram();
+    gl.attachShader(program, shader(gl.VERTEX_SHADER, VERTEX));
+    gl.attachShader(program, shader(gl.FRAGMENT_SHADER, FRAGMENT));
+    gl.linkProgram(program); gl.useProgram(program);
+    this.place = { model: gl.getUniformLocation(program, "model"), camera: gl.getUniformLocation(program, "camera"),
+      colour: gl.getUniformLocation(program, "colour"), lit: gl.getUniformLocation(program, "lit") };
+    this.corners = [gl.getAttribLocation(program, "place"), gl.getAttribLocation(program, "normal")];
+    this.corners.forEach((c) => gl.enableVertexAttribArray(c));
+    gl.enable(gl.DEPTH_TEST);
+    this.cylinder = this.mesh(cylinder(20)); this.ball = this.mesh(ball(12, 20));
+    this.line = this.mesh([]);
+    this.listen();
+  }
+
+  mesh(numbers) {
+    const buffer = this.gl.createBuffer();
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, buffer);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, new Float32Array(numbers), this.gl.STATIC_DRAW);
+    return { buffer, count: numbers.length / 6 };
+  }
+
+  listen() {
+    const c = this.canvas;
+    let held = null;
+    c.addEventListener("pointerdown", (e) => { held = [e.clientX, e.clientY]; c.setPointerCapture(e.pointerId); });
+    c.addEventListener("pointermove", (e) => {
+      if (!held) return;
+      this.turn -= (e.clientX - held[0]) * 0.008;
+      this.tilt = Math.min(1.5, Math.max(-0.4, this.tilt + (e.clientY - held[1]) * 0.006));
+      held = [e.clientX, e.clientY];
+      this.draw();
+    });
+    for (const end of ["pointerup", "pointercancel"]) c.addEventListener(end, () => { held = null; });
+    c.addEventListener("wheel", (e) => {
+      e.preventDefault();
+      this.far = Math.min(8, Math.max(0.6, this.far * Math.exp(e.deltaY * 0.001)));
+      this.draw();
+    }, { passive: false });
+    addEventListener("resize", () => this.draw());
+  }
+
+  paint(mesh, model, colour, kind, lit) {
+    const gl = this.gl;
+    gl.bindBuffer(gl.ARRAY_BUFFER, mesh.buffer);
+    gl.vertexAttribPointer(this.corners[0], 3, gl.FLOAT, false, 24, 0);
+    gl.vertexAttribPointer(this.corners[1], 3, gl.FLOAT, false, 24, 12);
+    gl.uniformMatrix4fv(this.place.model, false, model);
+    gl.uniform3fv(this.place.colour, colour);
+    gl.uniform1f(this.place.lit, lit ? 1 : 0);
+    gl.drawArrays(kind, 0, mesh.count);
+  }
+
+  sphere(p, radius, colour) {
+    this.paint(this.ball, new Float32Array([radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, ...p, 1]),
+      colour, this.gl.TRIANGLES, true);
+  }
+
+  rod(a, b, radius, colour) {
+    const along = minus(b, a);
+    if (Math.hypot(...along) < 1e-5) return;
+    const z = unit(along), x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z)), y = cross(z, x);
+    const s = (v) => v.map((n) => n * radius);
+    this.paint(this.cylinder, new Float32Array([...s(x), 0, ...s(y), 0, ...along, 0, ...a, 1]),
+      colour, this.gl.TRIANGLES, true);
+  }
+
+  way(places, colour, kind) {
+    const gl = this.gl;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.line.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(places.flatMap((p) => [...p, 0, 0, 1])), gl.DYNAMIC_DRAW);
+    this.line.count = places.length;
+    this.paint(this.line, new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), colour, kind, false);
+  }
+
+  /** Shows a frame of a scene. */
+  show(scene, frame) { this.scene = scene; this.frame = frame; this.draw(); }
+
+  draw() {
+    const gl = this.gl, scene = this.scene;
+    if (!gl || !scene) return;
+    const scale = Math.min(devicePixelRatio || 1, 2), c = this.canvas;
+    const [w, h] = [Math.max(1, c.clientWidth * scale), Math.max(1, c.clientHeight * scale)].map(Math.round);
+    if (c.width !== w || c.height !== h) { c.width = w; c.height = h; }
+    gl.viewport(0, 0, w, h);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    const eye = [this.at[0] + this.far * Math.cos(this.tilt) * Math.cos(this.turn),
+      this.at[1] + this.far * Math.cos(this.tilt) * Math.sin(this.turn), this.at[2] + this.far * Math.sin(this.tilt)];
+    gl.uniformMatrix4fv(this.place.camera, false, cameraMatrix(eye, this.at, w / h));
+    const grid = [];
+    for (let i = -10; i <= 10; i++) {
+      grid.push([i / 5, -2, -0.4], [i / 5, 2, -0.4], [-2, i / 5, -0.4], [2, i / 5, -0.4]);
+    }
+    this.way(grid, [0.55, 0.58, 0.62], gl.LINES);
+    this.rod([0, 0, -0.4], [0, 0, 0], 0.08, [0.5, 0.52, 0.55]);
+    const arm = points(scene.arm[this.frame] || []), last = arm.length - 1;
+    for (let i = 0; i < last; i++) {
+      const pole = i === last - 1;
+      this.rod(arm[i], arm[i + 1], pole ? 0.008 : 0.055 - 0.003 * i, pole ? [0.2, 0.2, 0.22] : [0.86, 0.88, 0.9]);
+      if (!pole) this.sphere(arm[i + 1], 0.058 - 0.003 * i, [0.35, 0.37, 0.4]);
+    }
+    const rope = points(scene.rope[this.frame] || []);
+    for (let i = 0; i + 1 < rope.length; i++) {
+      this.rod(rope[i], rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2]);
+      this.sphere(rope[i + 1], i + 2 === rope.length ? scene.radii_m[1] : scene.radii_m[0],
+        i + 2 === rope.length ? [0.25, 0.7, 0.2] : [0.72, 0.38, 0.2]);
+    }
+    const tips = scene.rope.slice(0, this.frame + 1).map((f) => points(f.slice(-3))[0]).filter(Boolean);
+    if (tips.length > 1) this.way(tips, [0.2, 0.62, 0.16], gl.LINE_STRIP);
+    const planned = points(scene.planned_tip);
+    if (planned.length > 1) this.way(planned, [0.85, 0.55, 0.05], gl.LINE_STRIP);
+    if (scene.target_m) this.sphere(scene.target_m, 0.02, [0.86, 0.1, 0.3]);
+  }
+}

@@ -1,0 +1,82 @@
+//! `wag man` and `wag completions`: the command line, told to `man` and to shells.
+
+use crate::cli::{Cli, CompletionsArgs, ManArgs};
+use crate::failure::{OrInput, Outcome};
+use crate::{files, output};
+use anyhow::Context;
+use clap::CommandFactory;
+use clap_mangen::Man;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// One page for `wag` and one for each of its commands, as `wag-sim-rope.1`.
+pub fn man(args: &ManArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let mut wag = Cli::command().disable_help_subcommand(true);
+    wag.build();
+    std::fs::create_dir_all(&args.folder)
+        .with_context(|| format!("cannot make folder `{}`", args.folder.display()))
+        .or_input()?;
+    let mut pages = Vec::new();
+    write_pages(&wag, &args.folder, &mut pages).or_input()?;
+    if !quiet {
+        println!(
+            "{} pages in `{}`; read one with `man -l {}`",
+            pages.len(),
+            args.folder.display(),
+            args.folder.join("wag.1").display()
+        );
+    }
+    Ok(Some(
+        json!({ "ok": true, "command": "man", "pages": pages }),
+    ))
+}
+
+fn write_pages(
+    command: &clap::Command,
+    folder: &Path,
+    pages: &mut Vec<PathBuf>,
+) -> anyhow::Result<()> {
+    let man = Man::new(command.clone());
+    let path = folder.join(man.get_filename());
+    let mut page = Vec::new();
+    man.render(&mut page)?;
+    files::write_atomic(&path, &page)?;
+    pages.push(path);
+    for sub in command.get_subcommands().filter(|sub| !sub.is_hide_set()) {
+        write_pages(sub, folder, pages)?;
+    }
+    Ok(())
+}
+
+/// The script a shell completes `wag` by, on standard output.
+pub fn completions(args: &CompletionsArgs) -> Option<Value> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "wag", &mut script);
+    output::data(&script);
+    Some(json!({ "ok": true, "command": "completions", "shell": args.shell.to_string() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_has_a_page_and_what_is_hidden_has_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("new/man1");
+        let args = ManArgs {
+            folder: folder.clone(),
+        };
+        let said = man(&args, true).unwrap().unwrap();
+        let pages = said["pages"].as_array().unwrap().len();
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), pages);
+        let page = std::fs::read_to_string(folder.join("wag-sim-rope.1")).unwrap();
+        assert!(
+            page.contains("wag sim rope") || page.contains("wag\\-sim\\-rope"),
+            "{page}"
+        );
+        assert!(page.contains("fps"), "{page}");
+        assert!(folder.join("wag-report.1").is_file());
+        assert!(!folder.join("wag-process.1").exists());
+    }
+}

@@ -1,0 +1,285 @@
+//! `wag report`: one file, whose numbers are those of the run's own files, in which
+//! nothing of the run is markup, and which is the same every time.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use serde_json::{Value, json};
+use shared_types::plan::{START_POSE, trajectory_hash_hex};
+use shared_types::{JointTrajectory, JointVector, kinematics};
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// A name and a text that would do harm as markup.
+const HOSTILE: &str = "<script>alert(1)<!--";
+const CLOSE: &str = "</script><script>alert(2)</script>&amp;";
+const ROPE: &str = "links = 22\nlength_m = 0.5\njoint_damping_nms_per_rad = 0.02\n\
+    joint_stiffness_nm_per_rad = 0.2\nradius_m = 0.008\nmass_per_length_kg_per_m = 0.05\n\
+    lead_mass_kg = 0.08\nlead_radius_m = 0.03\nlink_extra_scale = 1.0\n\
+    [interval_90]\nlength_m = [4.9e-1, 5.1e-1]\n";
+
+fn wag(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(args)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn throw() -> JointTrajectory {
+    let mut end = START_POSE;
+    end[5] -= 0.4;
+    end[1] -= 0.1;
+    JointTrajectory::new(
+        &[0.0, 0.5, 1.0],
+        &[START_POSE, (START_POSE + end) * 0.5, end],
+    )
+    .unwrap()
+}
+
+/// The measured arm is behind its setpoints by this (s).
+const LAG_S: f64 = 0.02;
+/// The run's clock at the begin of the throw (s).
+const BEGIN_S: f64 = 12.5;
+
+fn write_motion(run: &Path, motion: &JointTrajectory) {
+    let mut cycles = String::from(
+        "cycle,deadline_s,mode,fault,sent,wake_late_us,compute_us,send_us,reply_us,missed,dropped,trajectory_s,\
+         q1_c,q2_c,q3_c,q4_c,q5_c,q6_c,q7_c\n",
+    );
+    let numbers = |q: JointVector| q.iter().map(|v| format!(",{v:.9}")).collect::<String>();
+    for cycle in 0..300_u32 {
+        let t = f64::from(cycle) * 0.004;
+        let (mode, on, q) = if t <= 1.0 {
+            ("Streaming", t, motion.state_at(t).q)
+        } else {
+            ("Idle", -1.0, motion.end())
+        };
+        let late = 10 + cycle % 50;
+        let deadline = BEGIN_S + t;
+        writeln!(
+            cycles,
+            "{cycle},{deadline:.6},{mode},None,1,{late}.0,20.0,60.0,90.0,0,0,{on:.6}{}",
+            numbers(q)
+        )
+        .unwrap();
+    }
+    fs::write(run.join("cycles.csv"), cycles).unwrap();
+    let mut joints = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
+    for sample in 0..500_u32 {
+        let t = f64::from(sample) * 0.005 - 0.5;
+        let q = motion.state_at((t - LAG_S).clamp(0.0, 1.0)).q;
+        writeln!(joints, "{:.6}{}", BEGIN_S + t, numbers(q)).unwrap();
+    }
+    fs::write(run.join("joints.csv"), joints).unwrap();
+}
+
+/// A run whose every text tries to get out of its place.
+fn hostile_run(folder: &Path) -> PathBuf {
+    let run = folder.join(HOSTILE);
+    fs::create_dir(&run).unwrap();
+    let motion = throw();
+    write_motion(&run, &motion);
+    fs::write(run.join("params.toml"), ROPE).unwrap();
+    let rope: Value = serde_json::to_value(
+        toml::from_str::<toml::Table>(ROPE.split("[interval").next().unwrap()).unwrap(),
+    )
+    .unwrap();
+    let put = |name: &str, value: &Value| fs::write(run.join(name), value.to_string()).unwrap();
+    put(
+        "plan.json",
+        &json!({
+            "version": CLOSE, "seed": 5, "task": "strike", "target_m": [0.9, 0.1, 0.0],
+            "rope": rope, "trajectory": motion, "predicted_error_m": 0.0125,
+            "predicted_time_s": 0.9, "fitness": -1.0, "simulations": 1, "resampled": 0,
+            "margins": [], "trajectory_sha256": trajectory_hash_hex(&motion),
+        }),
+    );
+    put(
+        "summary.json",
+        &json!({
+            "ok": true, "command": CLOSE, "seed": 5, "error": HOSTILE, "warnings": [CLOSE],
+            "target_m": [0.9, 0.1, 0.0], "true_tip_target_distance_m": 0.031,
+            "score": { "closest_m": 0.028, "interval_m": [0.02, 0.04] },
+            "truth": { "rope": { "length_m": 0.503 } },
+        }),
+    );
+    let mut png = png::Encoder::new(fs::File::create(run.join("throw.png")).unwrap(), 64, 32);
+    png.set_color(png::ColorType::Rgb);
+    let pixels: Vec<u8> = (0..64 * 32 * 3_u32).map(|i| (i % 251) as u8).collect();
+    png.write_header()
+        .unwrap()
+        .write_image_data(&pixels)
+        .unwrap();
+    run
+}
+
+/// The data of a report, and everything else of the page.
+fn parts(html: &str) -> (Value, String) {
+    let open = "<script type=\"application/json\" id=\"data\">";
+    let (before, rest) = html.split_once(open).unwrap();
+    let (data, after) = rest.split_once("</script>").unwrap();
+    (
+        serde_json::from_str(data).unwrap(),
+        format!("{before}{after}"),
+    )
+}
+
+#[test]
+fn a_report_tells_the_runs_numbers_and_does_no_harm() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = hostile_run(dir.path());
+    let out = dir.path().join("r.html");
+    let made = wag(&[
+        "report",
+        run.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+        "--json",
+    ]);
+    assert!(made.status.success(), "{made:?}");
+    let html = fs::read_to_string(&out).unwrap();
+    let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(said["bytes"], html.len());
+    assert!(html.len() < 1_000_000, "{}", html.len());
+
+    let (data, page) = parts(&html);
+    for word in ["alert(", "<!--"] {
+        assert!(!page.contains(word), "`{word}` stands in the page itself");
+    }
+    assert_eq!(html.matches("<script").count(), 2);
+    assert!(
+        !html
+            .replace("http://www.w3.org/2000/svg", "")
+            .contains("http:")
+    );
+    assert!(!html.contains("https:"));
+    assert_eq!(data["run"], HOSTILE);
+    assert_eq!(data["summary"]["warnings"][0], CLOSE);
+
+    assert_eq!(data["error"]["planned_m"], 0.0125);
+    assert_eq!(data["error"]["true_m"], 0.031);
+    assert_eq!(data["error"]["camera_interval_m"], json!([0.02, 0.04]));
+    let length = &data["rope"][1];
+    assert_eq!(length["label"], "length");
+    assert_eq!(length["interval_90"], json!([0.49, 0.51]));
+    assert_eq!(length["truth"], 0.503);
+    let wake = &data["latency"][0];
+    assert_eq!(
+        (&wake["cycles"], &wake["max_us"]),
+        (&json!(251), &json!(59.0))
+    );
+    let missing = data["missing"].to_string();
+    assert!(
+        missing.contains("cycles.bin") && missing.contains("wiggle.png"),
+        "{missing}"
+    );
+    let url = data["pictures"][0]["url"].as_str().unwrap();
+    assert!(url.starts_with("data:image/jpeg;base64,"));
+
+    // The same bytes again.
+    let again = dir.path().join("again.html");
+    assert!(
+        wag(&[
+            "report",
+            run.to_str().unwrap(),
+            "--out",
+            again.to_str().unwrap()
+        ])
+        .status
+        .success()
+    );
+    assert_eq!(fs::read(&again).unwrap(), html.into_bytes());
+}
+
+#[test]
+fn the_replay_is_the_measured_arm_with_the_rope_on_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = hostile_run(dir.path());
+    assert!(wag(&["report", run.to_str().unwrap()]).status.success());
+    let html = fs::read_to_string(run.join("report.html")).unwrap();
+    let (data, _) = parts(&html);
+    let scene = &data["scenes"][0];
+    assert_eq!(data["scenes"].as_array().unwrap().len(), 1);
+    assert_eq!(scene["name"], "throw");
+    let at = |frames: &Value, frame: usize, point: usize| -> [f64; 3] {
+        [0, 1, 2].map(|axis| frames[frame][3 * point + axis].as_f64().unwrap() * 1e-4)
+    };
+    let (from_s, period_s) = (
+        scene["from_s"].as_f64().unwrap(),
+        scene["period_s"].as_f64().unwrap(),
+    );
+    let count = scene["arm"].as_array().unwrap().len();
+    assert_eq!(count, scene["rope"].as_array().unwrap().len());
+    for frame in [0, 30, count / 2, count - 30] {
+        let t = from_s + period_s * frame as f64;
+        let q = throw().state_at((t - LAG_S).clamp(0.0, 1.0)).q;
+        let (end, _) = kinematics::attach_pose(&q);
+        let shown = at(&scene["arm"], frame, 8);
+        let clamp = at(&scene["rope"], frame, 0);
+        for axis in 0..3 {
+            assert!(
+                (shown[axis] - end[axis]).abs() < 1e-3,
+                "{frame}: {shown:?} {end}"
+            );
+            assert!(
+                (clamp[axis] - shown[axis]).abs() < 1e-3,
+                "{frame}: {clamp:?} {shown:?}"
+            );
+        }
+    }
+    // The rope is as long as it was identified, and it moves.
+    let (first, last) = (at(&scene["rope"], 0, 22), at(&scene["rope"], count - 1, 22));
+    let hangs = at(&scene["rope"], 0, 0)[2] - first[2];
+    assert!((0.49..0.56).contains(&hangs), "{hangs}");
+    assert!((last[0] - first[0]).abs() > 0.03, "{first:?} {last:?}");
+    // Planned and measured joint 6 differ by what the arm is late.
+    let joints = &scene["joints"];
+    assert_eq!(joints["wanted_is"], "planned");
+    let times: Vec<f64> = serde_json::from_value(joints["t_s"].clone()).unwrap();
+    for (i, t) in times.iter().enumerate().step_by(40) {
+        let wanted = joints["wanted"][5][i].as_f64().unwrap();
+        let measured = joints["measured"][5][i].as_f64().unwrap();
+        assert!((wanted - throw().state_at(*t).q[5]).abs() < 2e-5);
+        let late = throw().state_at((t - LAG_S).max(0.0)).q[5];
+        assert!((measured - late).abs() < 2e-3, "{t}: {measured} {late}");
+    }
+}
+
+#[test]
+fn what_is_no_run_or_is_damaged_is_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = dir.path().join("empty");
+    fs::create_dir(&empty).unwrap();
+    let refused = |run: &Path, word: &str| {
+        let output = wag(&["report", run.to_str().unwrap()]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(word) && said.lines().count() == 1, "{said}");
+        assert!(!run.join("report.html").exists());
+    };
+    refused(&dir.path().join("none"), "is no folder");
+    refused(&empty, "no run folder");
+    for (file, text, word) in [
+        ("summary.json", "{", "summary.json"),
+        ("cycles.csv", "a,b\n1,2\n", "cycles.csv"),
+        ("cycles.bin", "nothing", "cycles.bin"),
+        ("params.toml", "links = 0", "params.toml"),
+        ("plan.json", "{}", "plan.json"),
+        ("joints.csv", "t\n", "joints.csv"),
+        ("wiggle.png", "no picture", "wiggle.png"),
+    ] {
+        let run = hostile_run(&{
+            let folder = dir.path().join(file.replace('.', "-"));
+            fs::create_dir(&folder).unwrap();
+            folder
+        });
+        fs::write(run.join(file), text).unwrap();
+        refused(&run, word);
+    }
+}
