@@ -13,7 +13,7 @@ use shared_types::rope::ROPE_PARAMETERS;
 use shared_types::{RopeParams, Task};
 
 /// Random parameter sets per rope and condition; the paper has 10.
-pub const DRAWS: usize = 4;
+const DRAWS: usize = 4;
 /// Sets drawn at most to find those: the target may be out of a random rope's reach.
 const ATTEMPTS: u64 = 40;
 /// Keeps the random parameters apart from the ropes thrown.
@@ -23,8 +23,8 @@ const OTHER: u64 = 0x0072_6e64_0000;
 const LENGTH: usize = 1;
 const LEAD_MASS: usize = 6;
 
-/// What is identified, in the order of [`ImportanceTrial::partly_m`]; the rest is random.
-pub const CONDITIONS: [&[usize]; 4] = [&[LENGTH, LEAD_MASS], &[LENGTH], &[LEAD_MASS], &[]];
+/// What is identified, in the order of `ImportanceTrial::partly_m`; the rest is random.
+const CONDITIONS: [&[usize]; 4] = [&[LENGTH, LEAD_MASS], &[LENGTH], &[LEAD_MASS], &[]];
 
 /// One rope and target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,7 +35,8 @@ pub struct ImportanceTrial {
     pub target_m: [f64; 3],
     /// Error with all parameters identified (m).
     pub identified_m: f64,
-    /// Errors with some, by [`CONDITIONS`] and draw (m).
+    /// Errors with length and lead mass identified, with length, with lead mass, with
+    /// none; by draw (m).
     pub partly_m: [Vec<f64>; CONDITIONS.len()],
 }
 
