@@ -19,7 +19,7 @@ fn main() {
     };
     let folder = Path::new(folder);
     let camera = load_camera(&folder.join("camera.toml")).expect("camera");
-    let mut source = open_video(folder).expect("video");
+    let mut source = open_video(folder, None).expect("video");
     let options = ScoreOptions::default();
     let score = score(&mut source, &camera, rgb(tip), rgb(target), &options).expect("score");
     println!(

@@ -53,7 +53,7 @@ fn main() {
     let clamp = ClampPath::from_pose_csv(&folder.join("pose.csv")).expect("pose");
     let (shape, truth) = read_npy(&folder.join("nodes_left_px.npy"));
     let start = Instant::now();
-    let mut source = open_video(folder).expect("video");
+    let mut source = open_video(folder, None).expect("video");
     let frames = read_left(&mut source).expect("frames");
     let per_frame = |d: std::time::Duration| d.as_secs_f64() * 1e3 / frames.len() as f64;
     println!("decode {:.2} ms a frame", per_frame(start.elapsed()));

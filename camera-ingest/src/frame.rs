@@ -4,6 +4,8 @@
 //! of chroma values for two pixels of a row. Full-range BT.601 throughout, for
 //! YUYV and JPEG alike.
 
+use std::io::Cursor;
+
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
@@ -27,6 +29,19 @@ pub enum FrameError {
     /// The JPEG cannot be decoded.
     #[error("JPEG does not decode: {0}")]
     Jpeg(String),
+    /// The PNG cannot be decoded.
+    #[error("PNG does not decode: {0}")]
+    Png(String),
+    /// Another size than the frames before.
+    #[error(
+        "it is {}x{} px, the first one {}x{}", found[0], found[1], expected[0], expected[1]
+    )]
+    Size {
+        /// Width of both eyes and height of this frame.
+        found: [usize; 2],
+        /// Those of the first one.
+        expected: [usize; 2],
+    },
     /// Not two eyes side by side.
     #[error("a width of {0} px is no side-by-side pair with 4:2:2 chroma (must divide by 4)")]
     Width(usize),
@@ -157,6 +172,41 @@ impl StereoFrame {
         let frame = planes(&packed, size, size[0], stamp_ns, sequence);
         Ok(Self(frame))
     }
+
+    /// From a PNG, grey or colour; transparency is ignored. Chroma is kept as the
+    /// mean of two neighbours.
+    ///
+    /// # Errors
+    /// The PNG is damaged or its width is no side-by-side pair.
+    pub fn from_png(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
+        let fail = |e: png::DecodingError| FrameError::Png(e.to_string());
+        let mut decoder = png::Decoder::new(Cursor::new(bytes));
+        decoder.set_transformations(png::Transformations::normalize_to_color8());
+        let mut reader = decoder.read_info().map_err(fail)?;
+        let mut pixels = vec![
+            0;
+            reader
+                .output_buffer_size()
+                .ok_or_else(|| FrameError::Png("it is too large".to_owned()))?
+        ];
+        let info = reader.next_frame(&mut pixels).map_err(fail)?;
+        let size_px = [info.width as usize, info.height as usize];
+        check_width(size_px[0])?;
+        let samples = info.color_type.samples();
+        let packed: Vec<u8> = pixels[..info.buffer_size()]
+            .chunks_exact(samples)
+            .flat_map(|pixel| {
+                let rgb = if samples < 3 {
+                    [pixel[0]; 3]
+                } else {
+                    [pixel[0], pixel[1], pixel[2]]
+                };
+                rounded(ycc_from_rgb(rgb))
+            })
+            .collect();
+        let frame = planes(&packed, size_px, size_px[0], stamp_ns, sequence);
+        Ok(Self(frame))
+    }
 }
 
 /// Packed Y, Cb, Cr of every pixel, and width and height.
@@ -233,19 +283,22 @@ fn blank(width_px: usize, height_px: usize, stamp_ns: u64, sequence: u64) -> Eye
 
 /// RGB of a full-range BT.601 colour.
 #[must_use]
+pub fn rgb_from_ycc([y, cb, cr]: [f32; 3]) -> [u8; 3] {
+    let (b, r) = (cb - 128.0, cr - 128.0);
+    rounded([
+        y + 1.402 * r,
+        y - 0.344_136 * b - 0.714_136 * r,
+        y + 1.772 * b,
+    ])
+}
+
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "clamped to 0..255 first"
 )]
-pub fn rgb_from_ycc([y, cb, cr]: [f32; 3]) -> [u8; 3] {
-    let (b, r) = (cb - 128.0, cr - 128.0);
-    [
-        y + 1.402 * r,
-        y - 0.344_136 * b - 0.714_136 * r,
-        y + 1.772 * b,
-    ]
-    .map(|c| c.round().clamp(0.0, 255.0) as u8)
+fn rounded(channels: [f32; 3]) -> [u8; 3] {
+    channels.map(|c| c.round().clamp(0.0, 255.0) as u8)
 }
 
 /// Full-range BT.601 `[Y, Cb, Cr]` of an RGB colour.

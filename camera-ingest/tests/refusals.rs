@@ -130,7 +130,7 @@ fn a_truncated_video() {
     let bytes = std::fs::read(folder.join("video.avi")).unwrap();
     let frame = bodies(&bytes)[123].clone();
     let path = written("cut", &bytes[..frame.start + 1000]);
-    let error = open_video(&path).unwrap_err().to_string();
+    let error = open_video(&path, None).unwrap_err().to_string();
     std::fs::remove_file(&path).unwrap();
     assert!(
         error.contains("frame 123 ends beyond the file") && error.contains("copy it again"),
@@ -159,7 +159,7 @@ fn corrupted_pictures() {
         let mut bytes = whole.clone();
         damage(&mut bytes);
         let path = written(name, &bytes);
-        let mut video = open_video(&path).unwrap();
+        let mut video = open_video(&path, None).unwrap();
         assert!(video.read_left(16).is_ok(), "{name}");
         let read = video.read_left(17).map(|_| ());
         std::fs::remove_file(&path).unwrap();

@@ -12,7 +12,7 @@ mod recording;
 
 use std::path::Path;
 
-use camera_ingest::source::{FrameSource, YuyvSource};
+use camera_ingest::source::FrameSource;
 use camera_ingest::track::TrackOptions;
 use camera_ingest::{ScoreOptions, load_camera, open_video, score, track};
 use recording::{Wiggle, folder, quantile, read_npy};
@@ -94,7 +94,7 @@ fn scores_the_throw_within_six_millimetres() {
     let colour =
         |key: &str| -> [u8; 3] { serde_json::from_value(truth["colours"][key].clone()).unwrap() };
     let score = score(
-        &mut open_video(&folder).unwrap(),
+        &mut open_video(&folder, None).unwrap(),
         &camera,
         colour("lead_rgb"),
         colour("target_rgb"),
@@ -151,8 +151,8 @@ fn calibration_puts_true_nodes_on_their_pixels() {
 #[test]
 fn the_uncompressed_sample_shows_the_video() {
     let Some(folder) = folder("a2") else { return };
-    let mut raw = YuyvSource::open(&folder.join("sample_1344x376.yuyv"), [1344, 376], 1).unwrap();
-    let mut video = open_video(&folder).unwrap();
+    let mut raw = open_video(&folder.join("sample_1344x376.yuyv"), Some(60.0)).unwrap();
+    let mut video = open_video(&folder, None).unwrap();
     assert_eq!((raw.len(), video.len()), (4, 400));
     for (sample, frame) in [0, 133, 266, 399].into_iter().enumerate() {
         let (a, b) = (raw.read(sample).unwrap().0, video.read(frame).unwrap().0);

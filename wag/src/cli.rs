@@ -70,6 +70,9 @@ pub enum Command {
     Report(ReportArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
+    /// Find or check where the camera stands.
+    #[command(subcommand)]
+    Calib(CalibCommand),
     /// Measure how fast this machine runs a part of the system.
     Bench(BenchArgs),
     /// Make a result of the paper again, on simulated ropes.
@@ -279,9 +282,13 @@ pub struct MotionArgs {
 /// Arguments of `wag track`.
 #[derive(Debug, Args)]
 pub struct TrackArgs {
-    /// AVI file, or folder with video.avi and timestamps.csv.
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
+    /// JPEG pictures, and timestamps.csv.
     #[arg(long)]
     pub video: PathBuf,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz)]
+    pub fps: Option<f64>,
     /// Camera calibration and place.
     #[arg(long)]
     pub camera: PathBuf,
@@ -291,7 +298,7 @@ pub struct TrackArgs {
     /// Keypoints per frame.
     #[arg(long, default_value_t = 20)]
     pub keypoints: usize,
-    /// Contact sheet with the keypoints drawn in (PNG).
+    /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
     #[arg(long)]
     pub overlay: Option<PathBuf>,
     /// Keypoints (JSON).
@@ -303,7 +310,7 @@ pub struct TrackArgs {
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub struct ObservationArgs {
-    /// AVI file, or folder with video.avi and timestamps.csv.
+    /// Recording as `wag track` takes it.
     #[arg(long)]
     pub video: Option<PathBuf>,
     /// Keypoints as written by `wag track`.
@@ -331,6 +338,9 @@ pub struct IdentifyArgs {
     /// Observation.
     #[command(flatten)]
     pub observation: ObservationArgs,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz, requires = "video")]
+    pub fps: Option<f64>,
     /// Camera calibration and place.
     #[arg(long)]
     pub camera: PathBuf,
@@ -456,9 +466,13 @@ pub struct ReportArgs {
 /// Arguments of `wag score`.
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
-    /// AVI file, or folder with video.avi and timestamps.csv.
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
+    /// JPEG pictures, and timestamps.csv.
     #[arg(long)]
     pub video: PathBuf,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz)]
+    pub fps: Option<f64>,
     /// Camera calibration and place.
     #[arg(long)]
     pub camera: PathBuf,
@@ -468,6 +482,61 @@ pub struct ScoreArgs {
     /// Colour of the target, R,G,B from 0 to 255.
     #[arg(long)]
     pub target_rgb: Colour,
+}
+
+/// Where the camera stands.
+#[derive(Debug, Subcommand)]
+pub enum CalibCommand {
+    /// Find the camera's place in the world and write it into a camera.toml.
+    Extrinsics(ExtrinsicsArgs),
+    /// Compare the place in camera.toml with what the camera sees.
+    Check(CalibCheckArgs),
+}
+
+/// What the camera is shown.
+#[derive(Debug, Args)]
+pub struct ShownArgs {
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
+    /// JPEG pictures, and timestamps.csv.
+    #[arg(long)]
+    pub video: PathBuf,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz)]
+    pub fps: Option<f64>,
+    /// Camera calibration; its place may be wrong.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Printed ChArUco board that hangs still (board.toml).
+    #[arg(long, conflicts_with_all = ["lead", "lead_rgb"], required_unless_present = "lead")]
+    pub board: Option<PathBuf>,
+    /// The arm shows its lead: CSV with columns frame,x,y,z (m, world).
+    #[arg(long, requires = "lead_rgb")]
+    pub lead: Option<PathBuf>,
+    /// Colour of that lead, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub lead_rgb: Option<Colour>,
+}
+
+/// Arguments of `wag calib extrinsics`.
+#[derive(Debug, Args)]
+pub struct ExtrinsicsArgs {
+    /// What the camera is shown.
+    #[command(flatten)]
+    pub shown: ShownArgs,
+    /// The camera's settings with the place found (TOML).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// Arguments of `wag calib check`.
+#[derive(Debug, Args)]
+pub struct CalibCheckArgs {
+    /// What the camera is shown.
+    #[command(flatten)]
+    pub shown: ShownArgs,
+    /// Largest residual that passes (px, RMS over both eyes).
+    #[arg(long, default_value_t = 2.0)]
+    pub limit_px: f64,
 }
 
 /// Arguments of `wag bench`.
@@ -488,6 +557,9 @@ pub struct BenchArgs {
     /// `rt`: core of the control loop; default: the last one.
     #[arg(long)]
     pub cpu: Option<usize>,
+    /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
+    #[arg(long)]
+    pub video: Option<PathBuf>,
 }
 
 /// Benchmarks known by name.
@@ -501,6 +573,8 @@ pub enum BenchName {
     Identify,
     /// Planning: time of one throw of each task, and what it is spent on.
     Plan,
+    /// Tracking: time of each stage per frame, and memory, on a recorded wiggle.
+    Track,
 }
 
 /// Arguments of `wag reproduce`.
@@ -617,6 +691,14 @@ pub enum ProcessName {
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
+}
+
+/// A frame rate (Hz).
+fn rate_hz(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(rate) if (0.1..=10_000.0).contains(&rate) => Ok(rate),
+        _ => Err("a frame rate is a number from 0.1 to 10000, a second".to_owned()),
+    }
 }
 
 /// A mass (kg).

@@ -15,7 +15,7 @@ use crate::whole_file::write_whole;
 use std::path::{Path, PathBuf};
 
 pub use factory::{VideoMode, write_factory_conf};
-pub use settings::{write_camera_toml, write_extrinsics};
+pub use settings::{placed_camera_toml, write_camera_toml};
 use shared_types::StereoCamera;
 
 /// Why a calibration cannot be used.

@@ -121,32 +121,31 @@ pub fn write_camera_toml(
             rotation: rows(r),
         },
     };
-    write(path, &settings)
+    write_text(path, &text(path, &settings)?)
 }
 
 fn rows(r: &Matrix3<f64>) -> [[f64; 3]; 3] {
     core::array::from_fn(|row| core::array::from_fn(|col| r[(row, col)]))
 }
 
-fn write(path: &Path, settings: &CameraSettings) -> Result<(), CalibError> {
-    let text = toml::to_string(settings).map_err(|e| CalibError::Settings {
+fn text(path: &Path, settings: &CameraSettings) -> Result<String, CalibError> {
+    toml::to_string(settings).map_err(|e| CalibError::Settings {
         path: path.to_owned(),
         reason: e.to_string(),
-    })?;
-    write_text(path, &text)
+    })
 }
 
-/// Writes the settings of `from` with another place of the camera; calibration
-/// files stay where they are.
+/// The text of a `camera.toml` for `path`: the settings of `from` with another place
+/// of the camera. Calibration files stay where they are.
 ///
 /// # Errors
-/// `from` cannot be read or `path` not be written.
-pub fn write_extrinsics(
+/// `from` cannot be read, or there is no folder for `path`.
+pub fn placed_camera_toml(
     path: &Path,
     from: &Path,
     r_w_cam: &Matrix3<f64>,
     p_w_cam_m: &Vector3<f64>,
-) -> Result<(), CalibError> {
+) -> Result<String, CalibError> {
     let mut settings = read(from)?;
     let folder = |p: &Path| {
         let parent = p.parent().filter(|f| !f.as_os_str().is_empty());
@@ -165,5 +164,5 @@ pub fn write_extrinsics(
         position_m: (*p_w_cam_m).into(),
         rotation: rows(r_w_cam),
     };
-    write(path, &settings)
+    text(path, &settings)
 }

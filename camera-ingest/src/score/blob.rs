@@ -44,8 +44,23 @@ pub(super) struct Blob {
     pub(super) centre: [f64; 2],
     /// Sum of coverage (px).
     pub(super) area_px: f64,
+    /// Variances `uu`, `uv`, `vv` of its pixels (px^2).
+    spread: [f64; 3],
     /// Long over short axis.
     pub(super) stretch: f64,
+}
+
+impl Blob {
+    /// How far it reaches from its centre along a direction: the radius of a disc, more
+    /// along motion blur (px).
+    pub(super) fn reach_px(&self, [u, v]: [f64; 2]) -> f64 {
+        let [uu, uv, vv] = self.spread;
+        let square = u * u + v * v;
+        // A disc's variance along any axis is a quarter of its radius squared.
+        2.0 * ((uu * u * u + 2.0 * uv * u * v + vv * v * v) / square.max(1e-12))
+            .max(0.0)
+            .sqrt()
+    }
 }
 
 impl BlobMap {
@@ -143,6 +158,7 @@ impl BlobMap {
         Blob {
             centre,
             area_px: 2.0 * sum,
+            spread,
             stretch: ((middle + half) / (middle - half).max(1e-3)).sqrt(),
         }
     }

@@ -13,11 +13,12 @@ mod tests;
 
 use blob::chroma_of_rgb;
 use nalgebra::Vector3;
-use path::{LocalPath, Sighting};
-use scene::{Scene, Target};
+use path::{LocalPath, Sighting, mark_small};
+use scene::{Scene, Target, blob_error, read_sized};
 use serde::Serialize;
 use shared_types::StereoCamera;
 
+use crate::calib::extrinsics::Sighted;
 use crate::source::{FrameSource, SourceError};
 
 /// What a caller may choose.
@@ -49,7 +50,7 @@ impl Default for ScoreOptions {
 pub struct Score {
     /// Least distance between the centres of tip and target (m).
     pub closest_m: f64,
-    /// Two standard errors below and above (m).
+    /// What two standard errors of tip and target allow, least and most (m).
     pub interval_m: [f64; 2],
     /// When it was, from the first frame's start of exposure (s).
     pub time_s: f64,
@@ -75,11 +76,13 @@ pub enum ScoreError {
     },
     /// Frames differ from the camera's size.
     #[error(
-        "score: the video is {found:?} px per eye, the camera's mode gives {expected:?}; is the \
+        "score: frame {frame} is {found:?} px per eye, the camera's mode gives {expected:?}; is the \
          `mode` in camera.toml the one recorded?"
     )]
     Size {
-        /// Size of the video.
+        /// Index of the frame.
+        frame: usize,
+        /// Its size.
         found: [usize; 2],
         /// The camera's.
         expected: [usize; 2],
@@ -145,14 +148,15 @@ pub fn score(
     let mut sightings = Vec::new();
     let mut start_ns = 0;
     for index in 0..frames {
-        let frame = source.read(index)?;
+        let frame = read_sized(source, index, camera)?;
         if index == 0 {
             start_ns = frame.0.stamp_ns;
         }
         let since_s = frame.0.stamp_ns.saturating_sub(start_ns) as f64 * 1e-9;
         let near = sightings.last().copied();
-        if let Some(pair) = scene.tip([&frame.left(), &frame.right()], tip_rgb, near, since_s) {
-            sightings.push(pair);
+        let eyes = [&frame.left(), &frame.right()];
+        if let Some(tip) = scene.tip(eyes, tip_rgb, &target, near, since_s) {
+            sightings.push(tip);
         }
     }
     if sightings.len() < LEAST_SIGHTINGS {
@@ -162,7 +166,36 @@ pub fn score(
             least: LEAST_SIGHTINGS,
         });
     }
+    mark_small(&mut sightings);
     Ok(closest(&sightings, &target, camera))
+}
+
+/// Where both eyes see a coloured lead that the arm shows at known places:
+/// `(frame, place in the world in m)`. Frames in which it is not seen are left
+/// out. The camera's place does not matter.
+///
+/// # Errors
+/// Unreadable frames, a frame that does not exist, or a colour without chroma.
+pub fn sight_lead(
+    source: &mut dyn FrameSource,
+    camera: &StereoCamera,
+    rgb: [u8; 3],
+    shown: &[(usize, Vector3<f64>)],
+    options: &ScoreOptions,
+) -> Result<Vec<Sighted>, ScoreError> {
+    let [cb, cr] = chroma_of_rgb(rgb);
+    if cb.hypot(cr) < LEAST_CHROMA {
+        return Err(ScoreError::Grey { what: "lead", rgb });
+    }
+    let scene = Scene::learn(source, camera, options)?;
+    let mut sighted = Vec::new();
+    for &(frame, p_w_m) in shown {
+        let both = read_sized(source, frame, camera)?;
+        if let Some(pixels) = scene.largest([&both.left(), &both.right()], rgb) {
+            sighted.push(Sighted { p_w_m, pixels });
+        }
+    }
+    Ok(sighted)
 }
 
 /// Minimises the distance over continuous time.
@@ -171,7 +204,7 @@ fn closest(sightings: &[Sighting], target: &Target, camera: &StereoCamera) -> Sc
     let mut tip_path = Vec::new();
     let mut best: Option<(f64, f64, LocalPath)> = None;
     for index in 0..sightings.len() {
-        let Some(path) = LocalPath::around(sightings, index) else {
+        let Some(path) = LocalPath::around(sightings, index, blob_error(camera)) else {
             continue;
         };
         tip_path.push((path.t_s, to_world(path.at(path.t_s)).into()));
@@ -188,26 +221,40 @@ fn closest(sightings: &[Sighting], target: &Target, camera: &StereoCamera) -> Sc
             }
         }
     }
-    let (closest_m, time_s, error_m) = best.map_or((f64::INFINITY, 0.0, 0.0), |(d, t, path)| {
-        let tip = path.at(t);
-        let tip_depth_error = tip.z * tip.z * path.inverse_depth_error;
-        // Only the part of the depth error along the line tip-target counts to
-        // first order; a small floor stands for the sideways error.
-        let along = ((tip - target.point_c).z / d.max(1e-6)).abs().max(0.3);
-        (
-            d,
-            t,
-            along * tip_depth_error.hypot(target.depth_error_m) + 0.002,
-        )
-    });
+    let (closest_m, time_s, interval_m) = best.map_or(
+        (f64::INFINITY, 0.0, [0.0, f64::INFINITY]),
+        |(d, t, path)| (d, t, interval(&path, t, target)),
+    );
     Score {
         closest_m,
-        interval_m: [
-            (closest_m - 2.0 * error_m).max(0.0),
-            closest_m + 2.0 * error_m,
-        ],
+        interval_m,
         time_s,
         target_m: to_world(target.point_c).into(),
         tip_path,
     }
+}
+
+/// Least and largest distance of any two places within two standard errors of tip and
+/// target (m). The errors are large along the line of sight and small across it.
+fn interval(path: &LocalPath, t_s: f64, target: &Target) -> [f64; 2] {
+    /// What the calibration leaves across the line of sight (m).
+    const ACROSS_M: f64 = 0.002;
+    /// Part of its radius by which light from one side shifts a ball's centre.
+    const SHADED: f64 = 0.1;
+    let tip = path.at(t_s);
+    let error = path.error_at(t_s);
+    let sight = tip.normalize();
+    let along_error_m = (tip.z * tip.norm() * error.inverse_depth).hypot(target.depth_error_m);
+    let across_error_m = (error.across * tip.z)
+        .hypot(ACROSS_M)
+        .hypot(SHADED * path.radius_m);
+    let between = tip - target.point_c;
+    let along_m = between.dot(&sight).abs();
+    let across_m = (between.norm_squared() - along_m * along_m).max(0.0).sqrt();
+    let at = |sign: f64| {
+        (along_m + sign * 2.0 * along_error_m)
+            .max(0.0)
+            .hypot((across_m + sign * 2.0 * across_error_m).max(0.0))
+    };
+    [at(-1.0), at(1.0)]
 }

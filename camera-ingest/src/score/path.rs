@@ -3,7 +3,9 @@
 //! Along the image the sightings are good (a few mm), in depth they are not
 //! (65 mm a pixel at 1.7 m). So the image path is a cubic over 5 frames, the
 //! inverse depth - proportional to disparity - a quadratic over 11 frames with
-//! Cauchy weights against half-hidden leads.
+//! Cauchy weights against half-hidden leads. Sightings known to be cut by something
+//! else hardly count: the path goes on from the clear ones around them, and its error
+//! grows with the way to them.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -16,102 +18,228 @@ pub(super) struct Sighting {
     pub(super) ray: [f64; 2],
     /// `1/z` (1/m).
     pub(super) inverse_depth: f64,
+    /// Area as large as it was seen, at its depth (m^2).
+    pub(super) area_m2: f64,
+    /// Radius of a disc of the area seen (px).
+    pub(super) radius_px: f64,
+    /// How many times less sure it is than a clear one: 1, more if it is cut.
+    pub(super) doubt: f64,
 }
 
-/// Frames for the image path and for the depth.
+impl Sighting {
+    /// Notes that a part of it may be hidden: its centre may be off by a good part of
+    /// its radius, where a clear one's is off by a tenth of a pixel or two.
+    pub(super) fn cut(&mut self) {
+        /// A small blob's centre is no better known when it is cut.
+        const LEAST: f64 = 3.0;
+        self.doubt = self.radius_px.max(LEAST);
+    }
+}
+
+/// Clear frames for the image path and for the depth.
 const IMAGE_FRAMES: usize = 5;
 const DEPTH_FRAMES: usize = 11;
+/// A sighting smaller than this part of those around it is cut.
+const LEAST_AREA: f64 = 0.8;
+
+/// Marks sightings as cut whose area is smaller than that of the ones around them.
+pub(super) fn mark_small(sightings: &mut [Sighting]) {
+    let areas: Vec<f64> = sightings.iter().map(|s| s.area_m2).collect();
+    for (index, sighting) in sightings.iter_mut().enumerate() {
+        let from = index.saturating_sub(DEPTH_FRAMES / 2);
+        let to = (index + DEPTH_FRAMES / 2 + 1).min(areas.len());
+        let mut around = areas[from..to].to_vec();
+        around.sort_by(f64::total_cmp);
+        if sighting.area_m2 < LEAST_AREA * around[around.len() / 2] {
+            sighting.cut();
+        }
+    }
+}
 
 /// Smooth path around one sighting.
 #[derive(Debug, Clone)]
 pub(super) struct LocalPath {
     /// Time about which the polynomials are written (s).
     pub(super) t_s: f64,
-    ray: [Vec<f64>; 2],
-    inverse_depth: Vec<f64>,
-    /// Standard error of the inverse depth (1/m).
-    pub(super) inverse_depth_error: f64,
+    /// Usual radius of what was seen (m).
+    pub(super) radius_m: f64,
+    ray: [Fit; 2],
+    inverse_depth: Fit,
+}
+
+/// Standard errors of a place on the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PathError {
+    /// Across the line of sight, as a part of the depth.
+    pub(super) across: f64,
+    /// Of the inverse depth (1/m).
+    pub(super) inverse_depth: f64,
 }
 
 impl LocalPath {
-    /// Fits around sighting `index`; `None` with fewer than four sightings.
-    pub(super) fn around(sightings: &[Sighting], index: usize) -> Option<Self> {
+    /// Fits around sighting `index`; `None` with fewer than four sightings. `least` are
+    /// the errors of a clear sighting at best: few may happen to agree better.
+    pub(super) fn around(sightings: &[Sighting], index: usize, least: PathError) -> Option<Self> {
         if sightings.len() < 4 {
             return None;
         }
         let t_s = sightings[index].t_s;
-        let near = |count: usize| {
-            let count = count.min(sightings.len());
-            let from = index.saturating_sub(count / 2).min(sightings.len() - count);
-            &sightings[from..from + count]
-        };
-        let axis = |k: usize| -> Option<Vec<f64>> {
-            let points: Vec<(f64, f64)> = near(IMAGE_FRAMES)
+        let points = |count: usize, value: fn(&Sighting) -> f64| -> Vec<Point> {
+            window(sightings, index, count)
                 .iter()
-                .map(|s| (s.t_s - t_s, s.ray[k]))
-                .collect();
-            Some(fit(&points, 3, 1e-3)?.0)
+                .map(|s| Point {
+                    t_s: s.t_s - t_s,
+                    value: value(s),
+                    doubt: s.doubt,
+                })
+                .collect()
         };
-        let points: Vec<(f64, f64)> = near(DEPTH_FRAMES)
+        let mut areas_m2: Vec<f64> = window(sightings, index, DEPTH_FRAMES)
             .iter()
-            .map(|s| (s.t_s - t_s, s.inverse_depth))
+            .map(|s| s.area_m2)
             .collect();
-        let (inverse_depth, spread) = fit(&points, 2, 0.004)?;
+        areas_m2.sort_by(f64::total_cmp);
         Some(Self {
             t_s,
-            ray: [axis(0)?, axis(1)?],
-            inverse_depth,
-            // Three coefficients from so many frames.
-            inverse_depth_error: spread * (3.0 / points.len() as f64).sqrt(),
+            radius_m: (areas_m2[areas_m2.len() / 2] / std::f64::consts::PI).sqrt(),
+            ray: [
+                fit(&points(IMAGE_FRAMES, |s| s.ray[0]), 3, 1e-3, least.across)?,
+                fit(&points(IMAGE_FRAMES, |s| s.ray[1]), 3, 1e-3, least.across)?,
+            ],
+            inverse_depth: fit(
+                &points(DEPTH_FRAMES, |s| s.inverse_depth),
+                2,
+                0.004,
+                least.inverse_depth,
+            )?,
         })
     }
 
     /// Point in the left optical frame (m).
     pub(super) fn at(&self, t_s: f64) -> Vector3<f64> {
         let dt = t_s - self.t_s;
-        let value = |c: &[f64]| c.iter().rev().fold(0.0, |sum, c| sum * dt + c);
-        let z = 1.0 / value(&self.inverse_depth).max(1e-3);
-        Vector3::new(value(&self.ray[0]) * z, value(&self.ray[1]) * z, z)
+        let z = 1.0 / self.inverse_depth.value(dt).max(1e-3);
+        Vector3::new(self.ray[0].value(dt) * z, self.ray[1].value(dt) * z, z)
+    }
+
+    /// How sure [`Self::at`] is.
+    pub(super) fn error_at(&self, t_s: f64) -> PathError {
+        let dt = t_s - self.t_s;
+        PathError {
+            across: self.ray[0].error(dt).hypot(self.ray[1].error(dt)),
+            inverse_depth: self.inverse_depth.error(dt),
+        }
     }
 }
 
-/// Polynomial with Cauchy weights; coefficients from the constant up, and the
-/// weighted standard deviation of the residuals. `least_scale` keeps the
-/// weights sane when the fit is perfect.
-fn fit(points: &[(f64, f64)], degree: usize, least_scale: f64) -> Option<(Vec<f64>, f64)> {
-    let degree = degree.min(points.len().checked_sub(2)?);
+/// The sightings nearest to `index` of which `count` are clear, or all there are
+/// within twice as many.
+fn window(sightings: &[Sighting], index: usize, count: usize) -> &[Sighting] {
+    let clear = |s: &&Sighting| s.doubt <= 1.0;
+    let (mut from, mut to) = (index, index + 1);
+    let enough =
+        |part: &[Sighting]| part.iter().filter(clear).count() >= count || part.len() >= 2 * count;
+    while !enough(&sightings[from..to]) && to - from < sightings.len() {
+        // The nearer of the two next ones, in time.
+        let before = from
+            .checked_sub(1)
+            .map(|i| sightings[index].t_s - sightings[i].t_s);
+        let after = sightings.get(to).map(|s| s.t_s - sightings[index].t_s);
+        if after.is_none_or(|after| before.is_some_and(|before| before < after)) {
+            from -= 1;
+        } else {
+            to += 1;
+        }
+    }
+    &sightings[from..to]
+}
+
+/// A value at a time relative to the middle of a window.
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    t_s: f64,
+    value: f64,
+    doubt: f64,
+}
+
+/// A polynomial and the covariance of its coefficients.
+#[derive(Debug, Clone)]
+struct Fit {
+    /// Time unit of the coefficients (s).
+    unit_s: f64,
+    /// From the constant up.
+    coefficients: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Fit {
+    fn powers(&self, dt: f64) -> DVector<f64> {
+        powers(dt / self.unit_s, self.coefficients.len())
+    }
+
+    fn value(&self, dt: f64) -> f64 {
+        self.coefficients.dot(&self.powers(dt))
+    }
+
+    fn error(&self, dt: f64) -> f64 {
+        let powers = self.powers(dt);
+        powers.dot(&(&self.covariance * &powers)).max(0.0).sqrt()
+    }
+}
+
+fn powers(x: f64, count: usize) -> DVector<f64> {
+    DVector::from_iterator(
+        count,
+        std::iter::successors(Some(1.0), |p| Some(p * x)).take(count),
+    )
+}
+
+/// Polynomial with Cauchy weights. `least_scale` keeps the weights sane when the fit
+/// is perfect, `least_error` its covariance.
+fn fit(points: &[Point], degree: usize, least_scale: f64, least_error: f64) -> Option<Fit> {
+    let count = degree.min(points.len().checked_sub(2)?) + 1;
     // Time in units of the window, for the sake of the matrix.
-    let unit = points.iter().map(|p| p.0.abs()).fold(1e-6, f64::max);
-    let mut weights = vec![1.0; points.len()];
+    let unit_s = points.iter().map(|p| p.t_s.abs()).fold(1e-6, f64::max);
+    let rows: Vec<DVector<f64>> = points
+        .iter()
+        .map(|p| powers(p.t_s / unit_s, count))
+        .collect();
+    let mut weights: Vec<f64> = points.iter().map(|p| 1.0 / p.doubt).collect();
     let mut result = None;
     for _ in 0..12 {
-        let a = DMatrix::from_fn(points.len(), degree + 1, |r, c| {
-            weights[r] * (points[r].0 / unit).powi(i32::try_from(c).unwrap_or(0))
-        });
-        let b = DVector::from_fn(points.len(), |r, _| weights[r] * points[r].1);
-        let x = a.svd(true, true).solve(&b, 1e-12).ok()?;
+        let a = DMatrix::from_fn(points.len(), count, |r, c| weights[r] * rows[r][c]);
+        let b = DVector::from_fn(points.len(), |r, _| weights[r] * points[r].value);
+        let inverse = (a.transpose() * &a).pseudo_inverse(1e-12).ok()?;
+        let coefficients = a.svd(true, true).solve(&b, 1e-12).ok()?;
+        // In units of a clear sighting's error.
         let residual: Vec<f64> = points
             .iter()
-            .map(|(t, y)| y - x.iter().rev().fold(0.0, |s, c| s * t / unit + c))
+            .zip(&rows)
+            .map(|(p, row)| (p.value - coefficients.dot(row)) / p.doubt)
             .collect();
         let mut sorted: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
         sorted.sort_by(f64::total_cmp);
         let scale = (1.4826 * sorted[sorted.len() / 2]).max(least_scale);
-        for (w, r) in weights.iter_mut().zip(&residual) {
-            *w = (1.0 / (1.0 + (r / (2.0 * scale)).powi(2))).sqrt();
-        }
-        let total: f64 = weights.iter().map(|w| w * w).sum();
-        let square: f64 = weights
+        let trust: Vec<f64> = residual
+            .iter()
+            .map(|r| (1.0 / (1.0 + (r / (2.0 * scale)).powi(2))).sqrt())
+            .collect();
+        let square: f64 = trust
             .iter()
             .zip(&residual)
             .map(|(w, r)| (w * r).powi(2))
             .sum();
-        let coefficients = x
-            .iter()
-            .zip(0..)
-            .map(|(c, power)| c / unit.powi(power))
-            .collect();
-        result = Some((coefficients, (square / total).sqrt()));
+        let total: f64 = trust.iter().map(|w| w * w).sum();
+        // Coefficients take their share of the scatter away.
+        let freedom = (total - count as f64).max(1.0);
+        for ((w, t), p) in weights.iter_mut().zip(&trust).zip(points) {
+            *w = t / p.doubt;
+        }
+        result = Some(Fit {
+            unit_s,
+            coefficients,
+            covariance: inverse * (square / freedom).max(least_error * least_error),
+        });
     }
     result
 }
@@ -119,6 +247,11 @@ fn fit(points: &[(f64, f64)], degree: usize, least_scale: f64) -> Option<(Vec<f6
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const LEAST: PathError = PathError {
+        across: 5e-4,
+        inverse_depth: 3e-3,
+    };
 
     #[test]
     fn the_path_of_a_parabola_survives_an_outlier() {
@@ -137,17 +270,55 @@ mod tests {
                     t_s,
                     ray: [x, y],
                     inverse_depth,
+                    area_m2: 1e-3,
+                    radius_px: 6.0,
+                    doubt: 1.0,
                 }
             })
             .collect();
         sightings[6].inverse_depth += 0.08;
-        let path = LocalPath::around(&sightings, 7).unwrap();
+        let path = LocalPath::around(&sightings, 7, LEAST).unwrap();
         let (x, y, w) = truth(0.12);
         let p = path.at(0.12);
         assert!(
             (p - Vector3::new(x / w, y / w, 1.0 / w)).norm() < 0.004,
             "{p}"
         );
-        assert!(LocalPath::around(&sightings[..3], 1).is_none());
+        assert!(LocalPath::around(&sightings[..3], 1, LEAST).is_none());
+    }
+    #[test]
+    fn cut_sightings_are_bridged_and_make_the_path_less_sure() {
+        let along = |t: f64| 0.1 + 2.0 * t + 3.0 * t * t;
+        let clear: Vec<Sighting> = (0..15)
+            .map(|i| {
+                let t_s = f64::from(i) / 60.0;
+                Sighting {
+                    t_s,
+                    ray: [along(t_s), 0.2],
+                    inverse_depth: 0.6,
+                    area_m2: 1e-3,
+                    radius_px: 6.0,
+                    doubt: 1.0,
+                }
+            })
+            .collect();
+        let mut half = clear.clone();
+        for sighting in &mut half[6..9] {
+            sighting.ray[0] += 0.02;
+            sighting.inverse_depth += 0.05;
+            sighting.area_m2 /= 2.0;
+        }
+        let t_s = 7.0 / 60.0;
+        let whole = LocalPath::around(&clear, 7, LEAST).unwrap();
+        let misled = LocalPath::around(&half, 7, LEAST).unwrap();
+        assert!((misled.at(t_s) - whole.at(t_s)).norm() > 0.02);
+        mark_small(&mut half);
+        let cut: Vec<usize> = (0..15).filter(|&i| half[i].doubt > 1.0).collect();
+        assert_eq!(cut, [6, 7, 8]);
+        let bridged = LocalPath::around(&half, 7, LEAST).unwrap();
+        let off_m = (bridged.at(t_s) - whole.at(t_s)).norm();
+        assert!(off_m < 0.006, "{off_m} m");
+        let (sure, unsure) = (whole.error_at(t_s), bridged.error_at(t_s));
+        assert!(unsure.across > 1.1 * sure.across, "{sure:?} {unsure:?}");
     }
 }

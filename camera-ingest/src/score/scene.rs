@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use shared_types::StereoCamera;
 
 use super::blob::{Behind, Blob, BlobMap, chroma_of_rgb};
-use super::path::Sighting;
+use super::path::{PathError, Sighting};
 use super::{ScoreError, ScoreOptions};
-use crate::frame::EyeFrame;
+use crate::frame::{EyeFrame, StereoFrame};
 use crate::source::FrameSource;
 
 /// The still scene of both eyes.
@@ -29,6 +29,55 @@ struct Pair {
 pub(super) struct Target {
     pub(super) point_c: Vector3<f64>,
     pub(super) depth_error_m: f64,
+    /// Its image in both eyes.
+    blobs: [Blob; 2],
+}
+
+impl Target {
+    /// The tip's image touches the target's: one may cover a part of the other.
+    fn touches(&self, tip: &Pair) -> bool {
+        /// The chroma that two pixels share.
+        const RIM_PX: f64 = 1.0;
+        [tip.left, tip.right].iter().zip(&self.blobs).any(|(a, b)| {
+            let apart = [a.centre[0] - b.centre[0], a.centre[1] - b.centre[1]];
+            let reach_px = a.reach_px(apart) + b.reach_px(apart);
+            apart[0].hypot(apart[1]) < reach_px + RIM_PX
+        })
+    }
+}
+
+/// Standard errors of a clear blob's place: its centre is good to a tenth of a pixel or
+/// two in each eye.
+pub(super) fn blob_error(camera: &StereoCamera) -> PathError {
+    /// What both eyes share: light, lens, blur (px).
+    const TOGETHER_PX: f64 = 0.2;
+    /// What each eye has of its own: noise (px).
+    const APART_PX: f64 = 0.1;
+    let baseline_m = camera.t_right_left_m.x.abs();
+    PathError {
+        across: TOGETHER_PX / camera.left.fx,
+        inverse_depth: APART_PX * std::f64::consts::SQRT_2 / (camera.left.fx * baseline_m),
+    }
+}
+
+/// One frame, of the camera's size.
+pub(super) fn read_sized(
+    source: &mut dyn FrameSource,
+    index: usize,
+    camera: &StereoCamera,
+) -> Result<StereoFrame, ScoreError> {
+    let frame = source.read(index)?;
+    let found = [frame.0.width_px / 2, frame.0.height_px];
+    let expected = [camera.width_px as usize, camera.height_px as usize];
+    if found == expected {
+        Ok(frame)
+    } else {
+        Err(ScoreError::Size {
+            frame: index,
+            found,
+            expected,
+        })
+    }
 }
 
 impl<'a> Scene<'a> {
@@ -40,14 +89,9 @@ impl<'a> Scene<'a> {
         let chosen = crate::track::spread(source.len(), options.background_frames.max(3));
         let (mut left, mut right) = (Vec::new(), Vec::new());
         for &index in &chosen {
-            let frame = source.read(index)?;
+            let frame = read_sized(source, index, camera)?;
             left.push(frame.left());
             right.push(frame.right());
-        }
-        let found = [left[0].width_px, left[0].height_px];
-        let expected = [camera.width_px as usize, camera.height_px as usize];
-        if found != expected {
-            return Err(ScoreError::Size { found, expected });
         }
         let median = |frames: &[EyeFrame]| crate::track::median_frame(frames);
         Ok(Self {
@@ -101,14 +145,25 @@ impl<'a> Scene<'a> {
             seen: 0,
             least: 1,
         })?;
-        let z = pair.point_c.z;
-        // A still blob's centre is good to a tenth of a pixel in each eye.
-        let disparity_error_px = 0.1 * std::f64::consts::SQRT_2;
-        let px_m = self.camera.left.fx * self.camera.t_right_left_m.x.abs();
         Ok(Target {
             point_c: pair.point_c,
-            depth_error_m: z * z / px_m * disparity_error_px,
+            depth_error_m: pair.point_c.z.powi(2) * blob_error(self.camera).inverse_depth,
+            blobs: [pair.left, pair.right],
         })
+    }
+
+    /// Raw pixels of the largest blob of a colour that both eyes see.
+    pub(super) fn largest(&self, eyes: [&EyeFrame; 2], rgb: [u8; 3]) -> Option<[[f64; 2]; 2]> {
+        let pairs = self.pairs_in(eyes, rgb).into_iter();
+        let largest = pairs.max_by(|a, b| a.left.area_px.total_cmp(&b.left.area_px))?;
+        Some([largest.left.centre, largest.right.centre])
+    }
+
+    fn pairs_in(&self, eyes: [&EyeFrame; 2], rgb: [u8; 3]) -> Vec<Pair> {
+        let blobs = |k: usize| {
+            BlobMap::new(eyes[k], chroma_of_rgb(rgb), Behind::Scene(&self.eyes[k])).blobs()
+        };
+        self.pairs(&blobs(0), &blobs(1))
     }
 
     /// The tip in one frame, nearest to where it was if there is a choice.
@@ -116,13 +171,11 @@ impl<'a> Scene<'a> {
         &self,
         eyes: [&EyeFrame; 2],
         rgb: [u8; 3],
+        target: &Target,
         before: Option<Sighting>,
         since_s: f64,
     ) -> Option<Sighting> {
-        let blobs = |k: usize| {
-            BlobMap::new(eyes[k], chroma_of_rgb(rgb), Behind::Scene(&self.eyes[k])).blobs()
-        };
-        let pairs = self.pairs(&blobs(0), &blobs(1));
+        let pairs = self.pairs_in(eyes, rgb);
         let away = |p: &Pair| match before {
             // Large and near: a stray pixel far off must not win.
             Some(b) => {
@@ -135,11 +188,19 @@ impl<'a> Scene<'a> {
             .into_iter()
             .min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let row = f64::midpoint(pair.left.centre[1], pair.right.centre[1]);
-        Some(Sighting {
+        let m_per_px = pair.point_c.z / self.camera.left.fx;
+        let mut sighting = Sighting {
             t_s: since_s + self.camera.row_time_s(row),
             ray: self.camera.left.undistort(pair.left.centre),
             inverse_depth: 1.0 / pair.point_c.z,
-        })
+            area_m2: pair.left.area_px * m_per_px * m_per_px,
+            radius_px: (pair.left.area_px / std::f64::consts::PI).sqrt(),
+            doubt: 1.0,
+        };
+        if target.touches(&pair) {
+            sighting.cut();
+        }
+        Some(sighting)
     }
 }
 

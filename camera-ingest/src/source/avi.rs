@@ -7,6 +7,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::stamps::{self, Stamp};
 use super::{FrameSource, SourceError, read_bytes};
 use crate::frame::{EyeFrame, FrameError, StereoFrame};
 
@@ -22,12 +23,6 @@ pub struct AviSource {
     stamps: Vec<Stamp>,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Stamp {
-    sequence: u64,
-    stamp_ns: u64,
-}
-
 impl AviSource {
     /// Opens a file; times come from `timestamps` or else from the header's
     /// frame rate.
@@ -38,13 +33,8 @@ impl AviSource {
         let bytes = read_bytes(path)?;
         let (frame_us, chunks) = walk(path, &bytes)?;
         let stamps = match timestamps {
-            Some(csv) => read_stamps(csv, chunks.len())?,
-            None => (0..chunks.len() as u64)
-                .map(|i| Stamp {
-                    sequence: i,
-                    stamp_ns: i * u64::from(frame_us) * 1000,
-                })
-                .collect(),
+            Some(csv) => stamps::read(csv, chunks.len())?,
+            None => stamps::even(chunks.len(), f64::from(frame_us) * 1e3),
         };
         Ok(Self {
             path: path.to_owned(),
@@ -53,9 +43,14 @@ impl AviSource {
             stamps,
         })
     }
-}
 
-impl AviSource {
+    /// The same frames at another rate than the header's.
+    #[must_use]
+    pub fn at_rate(mut self, rate_hz: f64) -> Self {
+        self.stamps = stamps::even(self.chunks.len(), 1e9 / rate_hz);
+        self
+    }
+
     fn decode<T>(
         &self,
         index: usize,
@@ -150,56 +145,6 @@ fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceErr
         (Some(us), false) if us > 0 => Ok((us, frames)),
         (_, true) => Err(fail("no video frames in it".to_owned(), REMEDY)),
         _ => Err(fail("the header has no frame rate".to_owned(), REMEDY)),
-    }
-}
-
-/// Rows `frame,sequence,monotonic_ns`, one a frame.
-fn read_stamps(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SourceError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
-    let fail = |line: usize, reason: String| SourceError::Timestamps {
-        path: path.to_owned(),
-        line,
-        reason,
-    };
-    let mut stamps: Vec<Stamp> = Vec::new();
-    for (index, row) in text.lines().enumerate().skip(1) {
-        if row.trim().is_empty() {
-            continue;
-        }
-        let numbers: Vec<u64> = row
-            .split(',')
-            .map(|c| c.trim().parse())
-            .collect::<Result<_, _>>()
-            .map_err(|e| {
-                fail(
-                    index + 1,
-                    format!("{row:?} is not three whole numbers ({e})"),
-                )
-            })?;
-        let [frame, sequence, stamp_ns] = numbers[..] else {
-            return Err(fail(index + 1, format!("{} columns", numbers.len())));
-        };
-        if frame != stamps.len() as u64 {
-            return Err(fail(
-                index + 1,
-                format!("frame {frame} where {} is due", stamps.len()),
-            ));
-        }
-        if stamps.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
-            return Err(fail(index + 1, "times do not increase".to_owned()));
-        }
-        stamps.push(Stamp { sequence, stamp_ns });
-    }
-    if stamps.len() == frames {
-        Ok(stamps)
-    } else {
-        Err(fail(
-            stamps.len() + 1,
-            format!("{} rows, but the video has {frames} frames", stamps.len()),
-        ))
     }
 }
 

@@ -5,11 +5,14 @@
 //! the whole recording before it starts.
 
 mod avi;
+mod images;
+mod stamps;
 mod yuyv;
 
 use std::path::{Path, PathBuf};
 
 pub use avi::AviSource;
+pub use images::ImageSource;
 pub use yuyv::YuyvSource;
 
 use crate::frame::{EyeFrame, FrameError, StereoFrame};
@@ -57,6 +60,14 @@ pub enum SourceError {
         /// Number of frames.
         len: usize,
     },
+    /// Nothing tells when the frames were taken, or two things do.
+    #[error("video {path}: {reason}")]
+    Times {
+        /// File or folder concerned.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
     /// `timestamps.csv` does not fit the video.
     #[error(
         "timestamps {path}, line {line}: {reason}; expected rows `frame,sequence,monotonic_ns`"
@@ -72,7 +83,7 @@ pub enum SourceError {
 }
 
 /// A recording of side-by-side frames.
-pub trait FrameSource {
+pub trait FrameSource: std::fmt::Debug {
     /// Number of frames.
     fn len(&self) -> usize;
 
@@ -113,19 +124,63 @@ impl FrameSource for Vec<StereoFrame> {
     }
 }
 
-/// Opens an AVI file, or a folder with `video.avi` and perhaps
-/// `timestamps.csv`.
+impl FrameSource for Box<dyn FrameSource> {
+    fn len(&self) -> usize {
+        (**self).len()
+    }
+
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        (**self).read(index)
+    }
+
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        (**self).read_left(index)
+    }
+}
+
+/// Opens a recording by what it is: a folder with `video.avi` and perhaps
+/// `timestamps.csv`, a folder of pictures ([`ImageSource`]), a raw file
+/// `NAME_WIDTHxHEIGHT.yuyv` ([`YuyvSource`]), or else an AVI file.
+///
+/// `rate_hz` is the frame rate of a recording without times; of an AVI it takes the
+/// place of the header's. It must be positive.
 ///
 /// # Errors
-/// A file is missing, truncated or of another kind.
-pub fn open_video(path: &Path) -> Result<AviSource, SourceError> {
+/// A file is missing, truncated or of another kind; nothing tells when the frames
+/// were taken, or both a CSV and `rate_hz` do.
+pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn FrameSource>, SourceError> {
     if path.is_dir() {
-        let stamps = path.join("timestamps.csv");
-        let stamps = stamps.exists().then_some(stamps);
-        AviSource::open(&path.join("video.avi"), stamps.as_deref())
-    } else {
-        AviSource::open(path, None)
+        let video = path.join("video.avi");
+        if !video.exists() {
+            return Ok(Box::new(ImageSource::open(path, rate_hz)?));
+        }
+        let csv = path.join("timestamps.csv");
+        if !csv.exists() {
+            return open_film(&video, rate_hz);
+        }
+        if let Some(hz) = rate_hz {
+            return Err(SourceError::Times {
+                path: video,
+                reason: stamps::twice(&csv, hz),
+            });
+        }
+        return Ok(Box::new(AviSource::open(&video, Some(&csv))?));
     }
+    let raw = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("yuyv"));
+    if raw {
+        return Ok(Box::new(YuyvSource::open_named(path, rate_hz)?));
+    }
+    open_film(path, rate_hz)
+}
+
+fn open_film(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn FrameSource>, SourceError> {
+    let film = AviSource::open(path, None)?;
+    Ok(Box::new(match rate_hz {
+        Some(hz) => film.at_rate(hz),
+        None => film,
+    }))
 }
 
 /// Decodes the left eye of every frame.

@@ -1,17 +1,20 @@
 //! Raw V4L2 `YUYV` frames one after the other, without any header.
 
+use std::fs::File;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-use super::{FrameSource, SourceError, read_bytes};
+use super::stamps::{self, Stamp};
+use super::{FrameSource, SourceError};
 use crate::frame::StereoFrame;
 
-/// A raw file held in memory.
+/// A raw file, read frame by frame: a minute of it does not fit into memory.
 #[derive(Debug)]
 pub struct YuyvSource {
     path: PathBuf,
-    bytes: Vec<u8>,
+    file: File,
     size_px: [usize; 2],
-    frame_ns: u64,
+    stamps: Vec<Stamp>,
 }
 
 impl YuyvSource {
@@ -21,51 +24,150 @@ impl YuyvSource {
     /// # Errors
     /// No such file, or its length is no multiple of a frame.
     pub fn open(path: &Path, size_px: [usize; 2], frame_ns: u64) -> Result<Self, SourceError> {
-        let bytes = read_bytes(path)?;
-        let frame = size_px[0] * size_px[1] * 2;
-        if frame == 0 || bytes.is_empty() || !bytes.len().is_multiple_of(frame) {
-            return Err(SourceError::Container {
-                path: path.to_owned(),
-                reason: format!(
-                    "{} bytes are no whole number of {}x{} YUYV frames ({frame} bytes each)",
-                    bytes.len(),
-                    size_px[0],
-                    size_px[1]
-                ),
-                remedy: "give the size of both eyes together, or copy the file again",
-            });
-        }
+        let (file, frames) = whole_frames(path, size_px)?;
+        #[allow(clippy::cast_precision_loss, reason = "far less than 2^53 ns")]
+        let frame_ns = frame_ns as f64;
         Ok(Self {
             path: path.to_owned(),
-            bytes,
+            file,
             size_px,
-            frame_ns,
+            stamps: stamps::even(frames, frame_ns),
         })
+    }
+
+    /// Opens a raw file whose name tells its size, as `wiggle_1344x376.yuyv`. Its
+    /// times come from the CSV of the same name beside it (`wiggle_1344x376.csv`)
+    /// or else from `rate_hz`.
+    ///
+    /// # Errors
+    /// No size in the name, no times, no such file, or a length that does not fit.
+    pub fn open_named(path: &Path, rate_hz: Option<f64>) -> Result<Self, SourceError> {
+        let size_px = size_in_name(path).ok_or_else(|| SourceError::Container {
+            path: path.to_owned(),
+            reason: "its name does not end in the size of both eyes together, as in \
+                     `wiggle_1344x376.yuyv`"
+                .to_owned(),
+            remedy: "rename it",
+        })?;
+        let (file, frames) = whole_frames(path, size_px)?;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            size_px,
+            stamps: stamps::beside(path, &path.with_extension("csv"), rate_hz, frames)?,
+        })
+    }
+}
+
+/// `[1344, 376]` of `wiggle_1344x376.yuyv`.
+fn size_in_name(path: &Path) -> Option<[usize; 2]> {
+    let stem = path.file_stem()?.to_str()?;
+    let (width, height) = stem.rsplit('_').next()?.split_once('x')?;
+    // As large as any camera's, so that no product of them overflows.
+    let side = |text: &str| {
+        let px = text.parse().ok()?;
+        (1..=16_384).contains(&px).then_some(px)
+    };
+    Some([side(width)?, side(height)?])
+}
+
+/// The file, and how many frames are in it.
+fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), SourceError> {
+    let io = |source| SourceError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let file = File::open(path).map_err(io)?;
+    let bytes = file.metadata().map_err(io)?.len();
+    let frame = (size_px[0] * size_px[1] * 2) as u64;
+    let frames = bytes.checked_div(frame).unwrap_or(0);
+    match usize::try_from(frames) {
+        Ok(count) if count > 0 && frames * frame == bytes => Ok((file, count)),
+        _ => Err(SourceError::Container {
+            path: path.to_owned(),
+            reason: format!(
+                "{bytes} bytes are no whole number of {}x{} YUYV frames ({frame} bytes each)",
+                size_px[0], size_px[1]
+            ),
+            remedy: "give the size of both eyes together, or copy the file again",
+        }),
     }
 }
 
 impl FrameSource for YuyvSource {
     fn len(&self) -> usize {
-        self.bytes.len() / (self.size_px[0] * self.size_px[1] * 2)
+        self.stamps.len()
     }
 
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        let frame = self.size_px[0] * self.size_px[1] * 2;
-        let body = self
-            .bytes
-            .get(index * frame..(index + 1) * frame)
+        let stamp = self
+            .stamps
+            .get(index)
             .ok_or_else(|| SourceError::OutOfRange {
                 path: self.path.clone(),
                 frame: index,
-                len: self.bytes.len() / frame,
+                len: self.stamps.len(),
             })?;
-        let sequence = index as u64;
-        StereoFrame::from_yuyv(body, self.size_px, sequence * self.frame_ns, sequence).map_err(
+        let mut bytes = vec![0; self.size_px[0] * self.size_px[1] * 2];
+        let at = index as u64 * bytes.len() as u64;
+        self.file
+            .read_exact_at(&mut bytes, at)
+            .map_err(|source| SourceError::Io {
+                path: self.path.clone(),
+                source,
+            })?;
+        StereoFrame::from_yuyv(&bytes, self.size_px, stamp.stamp_ns, stamp.sequence).map_err(
             |source| SourceError::Frame {
                 path: self.path.clone(),
                 frame: index,
                 source,
             },
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_tells_the_size() {
+        let size = |name: &str| size_in_name(Path::new(name));
+        assert_eq!(size("sample_1344x376.yuyv"), Some([1344, 376]));
+        assert_eq!(size("a/b_c/2560x720.yuyv"), Some([2560, 720]));
+        for name in ["sample.yuyv", "a_1344.yuyv", "a_0x2.yuyv", "a_99999x2.yuyv"] {
+            assert_eq!(size(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn frames_have_the_times_beside_them_and_damage_is_named() {
+        let folder = std::env::temp_dir().join(format!("yuyv-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let (raw, csv) = (folder.join("r_8x2.yuyv"), folder.join("r_8x2.csv"));
+        std::fs::write(&raw, (0..64).collect::<Vec<u8>>()).unwrap();
+        let open = |rate_hz| YuyvSource::open_named(&raw, rate_hz);
+        let untimed = open(None).unwrap_err().to_string();
+        assert!(untimed.contains("r_8x2.csv"), "{untimed}");
+        let mut even = open(Some(50.0)).unwrap();
+        assert_eq!(even.len(), 2);
+        let second = even.read(1).unwrap().0;
+        assert_eq!((second.stamp_ns, second.luma[0]), (20_000_000, 32));
+        assert!(matches!(
+            even.read(2),
+            Err(SourceError::OutOfRange { len: 2, .. })
+        ));
+        std::fs::write(&csv, "frame,sequence,monotonic_ns\n0,5,100\n1,7,250\n").unwrap();
+        let timed = open(None).unwrap().read(1).unwrap().0;
+        assert_eq!((timed.stamp_ns, timed.sequence), (250, 7));
+        let twice = open(Some(50.0)).unwrap_err().to_string();
+        assert!(twice.contains("leave out the frame rate"), "{twice}");
+        // The file gets shorter while it is open.
+        std::fs::write(&raw, [0; 40]).unwrap();
+        let torn = even.read(1).unwrap_err().to_string();
+        assert!(torn.contains("r_8x2.yuyv"), "{torn}");
+        let uneven = open(None).unwrap_err().to_string();
+        assert!(uneven.contains("40 bytes"), "{uneven}");
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

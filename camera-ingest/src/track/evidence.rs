@@ -127,9 +127,56 @@ struct Limits {
     off2: f32,
 }
 
+/// Pixels of a part of a row, channel by channel: what is seen, in the background's
+/// light, and what is behind.
+#[derive(Debug, Default)]
+struct Row {
+    seen: [Vec<f32>; 3],
+    empty: [Vec<f32>; 3],
+}
+
+impl Row {
+    fn fill(
+        &mut self,
+        frame: &EyeFrame,
+        empty: &EyeFrame,
+        gain: f32,
+        v: usize,
+        [from, to]: [usize; 2],
+    ) {
+        let inverse_gain = 1.0 / gain;
+        let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
+        let (row, half) = (v * frame.width_px, v * (frame.width_px / 2));
+        let luma = |plane: &[u8], out: &mut Vec<f32>, scale: f32| {
+            let pixels = plane[row + from..row + to].iter();
+            out.clear();
+            out.extend(pixels.map(|y| f32::from(*y) * scale));
+        };
+        luma(&frame.luma, &mut self.seen[0], inverse_gain);
+        luma(&empty.luma, &mut self.empty[0], 1.0);
+        let planes = [(&frame.cb, &empty.cb), (&frame.cr, &empty.cr)];
+        for (k, (seen, behind)) in planes.into_iter().enumerate() {
+            let samples = (from..to).map(|u| half + u / 2);
+            let (out, out_behind) = (&mut self.seen[k + 1], &mut self.empty[k + 1]);
+            out.clear();
+            out.extend(samples.clone().map(|c| light(seen[c])));
+            out_behind.clear();
+            out_behind.extend(samples.map(|c| f32::from(behind[c])));
+        }
+    }
+}
+
 impl Matter<'_> {
     /// Coverage of one pixel: the best over the shades looked for.
-    fn of_pixel(&self, seen: Colour, empty: Colour, shades: &[Colour], limits: Limits) -> f32 {
+    #[inline]
+    fn of_pixel(
+        &self,
+        seen: Colour,
+        empty: Colour,
+        shades: &[Colour],
+        rival: Option<Colour>,
+        limits: Limits,
+    ) -> f32 {
         let difference: Colour = core::array::from_fn(|k| seen[k] - empty[k]);
         let dd: f32 = difference.iter().map(|d| d * d).sum();
         // Part of a mixture with `pure`, and the squared distance from the
@@ -154,7 +201,7 @@ impl Matter<'_> {
             least_off = least_off.min(off);
         }
         // Against a rival of the same colour this does nothing.
-        self.rival.map_or(best, |rival| {
+        rival.map_or(best, |rival| {
             let off = mixture(&rival).1;
             let n = limits.noise2;
             best * ((2.0 * off + n) / (off + least_off + n)).min(1.0)
@@ -181,30 +228,49 @@ impl Matter<'_> {
                 [y * s, 128.0 + (cb - 128.0) * s, 128.0 + (cr - 128.0) * s]
             })
             .collect();
-        let inverse_gain = 1.0 / self.gain;
-        let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
-        let empty = &self.background.image;
         let width = window.u1 - window.u0;
         let mut values = vec![0.0; width * (window.v1 - window.v0)];
+        let mut row = Row::default();
         for (v, &[from, to]) in (window.v0..window.v1).zip(&band.columns) {
-            let row = v * frame.width_px;
-            let half = v * (frame.width_px / 2);
+            if from >= to {
+                continue;
+            }
+            row.fill(frame, &self.background.image, self.gain, v, [from, to]);
             let start = (v - window.v0) * width;
-            for u in from..to {
-                let (y, c) = (row + u, half + u / 2);
-                let seen = [
-                    f32::from(frame.luma[y]) * inverse_gain,
-                    light(frame.cb[c]),
-                    light(frame.cr[c]),
-                ];
-                let behind = [empty.luma[y], empty.cb[c], empty.cr[c]].map(f32::from);
-                values[start + u - window.u0] = self.of_pixel(seen, behind, &shades, limits);
+            let out = &mut values[start + from - window.u0..start + to - window.u0];
+            // The usual numbers of shades as constants: the loops over them unroll, and
+            // several pixels are worked on at once.
+            match (&shades[..], self.rival) {
+                ([a], None) => self.fill(&row, &[*a], None, limits, out),
+                ([a, b, c], Some(rival)) => {
+                    self.fill(&row, &[*a, *b, *c], Some(rival), limits, out);
+                }
+                ([a, b, c], None) => self.fill(&row, &[*a, *b, *c], None, limits, out),
+                (all, rival) => self.fill(&row, all, rival, limits, out),
             }
         }
         Coverage {
             window,
             width,
             values,
+        }
+    }
+
+    #[inline(always)]
+    fn fill(
+        &self,
+        row: &Row,
+        shades: &[Colour],
+        rival: Option<Colour>,
+        limits: Limits,
+        out: &mut [f32],
+    ) {
+        let count = out.len();
+        let [y, cb, cr] = [0, 1, 2].map(|k| &row.seen[k][..count]);
+        let [ey, ecb, ecr] = [0, 1, 2].map(|k| &row.empty[k][..count]);
+        for i in 0..count {
+            let (seen, empty) = ([y[i], cb[i], cr[i]], [ey[i], ecb[i], ecr[i]]);
+            out[i] = self.of_pixel(seen, empty, shades, rival, limits);
         }
     }
 }
@@ -240,17 +306,31 @@ impl Coverage {
     #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
     pub(super) fn centroid(&self, centre: [f64; 2], radius_px: f64) -> (f64, [f64; 2]) {
         let (mut sum, mut u_sum, mut v_sum) = (0.0, 0.0, 0.0);
-        for (index, &value) in self.values.iter().enumerate() {
-            let u = (self.window.u0 + index % self.width) as f64;
-            let v = (self.window.v0 + index / self.width) as f64;
-            // A soft edge of one pixel keeps the centroid a smooth function
-            // of the window's place.
-            let inside = radius_px + 0.5 - (u - centre[0]).hypot(v - centre[1]);
-            if inside > 0.0 {
-                let w = f64::from(value) * inside.min(1.0);
-                sum += w;
-                u_sum += w * u;
-                v_sum += w * v;
+        // What lies beyond this on one axis has no weight; nor has what is not covered.
+        let reach = radius_px + 1.0;
+        for (row, v) in self
+            .values
+            .chunks_exact(self.width.max(1))
+            .zip(self.window.v0..)
+        {
+            let dv = v as f64 - centre[1];
+            if dv.abs() > reach {
+                continue;
+            }
+            for (&value, u) in row.iter().zip(self.window.u0..) {
+                let du = u as f64 - centre[0];
+                if value <= 0.0 || du.abs() > reach {
+                    continue;
+                }
+                // A soft edge of one pixel keeps the centroid a smooth function
+                // of the window's place.
+                let inside = radius_px + 0.5 - du.hypot(dv);
+                if inside > 0.0 {
+                    let w = f64::from(value) * inside.min(1.0);
+                    sum += w;
+                    u_sum += w * u as f64;
+                    v_sum += w * v as f64;
+                }
             }
         }
         if sum > 1e-6 {

@@ -61,7 +61,7 @@ impl Wiggle {
         let folder = folder(name)?;
         let (shape, truth) = read_npy(&folder.join("nodes_left_px.npy"));
         let pixel = |p: &[f32]| [f64::from(p[0]), f64::from(p[1])];
-        let mut video = open_video(&folder).unwrap();
+        let mut video = open_video(&folder, None).unwrap();
         let count = most.min(video.len());
         Some(Self {
             frames: (0..count).map(|i| video.read(i).unwrap().left()).collect(),

@@ -66,7 +66,7 @@ fn observe(
         )));
     };
     let stage = Stage::begin("track", quiet);
-    let tracked = track_video(video, camera, &args.motion, KEYPOINTS, &stage)?.result;
+    let tracked = track_video((video, args.fps), camera, &args.motion, KEYPOINTS, &stage)?.result;
     stage.done(&format!("{} frames", tracked.track.frames.len()));
     let appearance = Appearance {
         rope_radius_m: Some(tracked.appearance.rope_radius_m),

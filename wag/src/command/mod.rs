@@ -2,6 +2,7 @@
 
 mod area;
 mod bench;
+mod calib;
 pub mod check;
 mod demo;
 mod demo_summary;
@@ -26,7 +27,7 @@ mod track;
 mod wiggle;
 mod wiggle_design;
 
-use crate::cli::{Cli, Command, PlanCommand, SimCommand};
+use crate::cli::{CalibCommand, Cli, Command, PlanCommand, SimCommand};
 use crate::failure::{OrInput, Outcome};
 use serde_json::Value;
 use shared_types::Task;
@@ -41,6 +42,7 @@ fn results(command: &Command) -> Vec<&Path> {
         Command::Wiggle(args) => &[args.csv.as_deref()],
         Command::Track(args) => &[Some(&args.out), args.overlay.as_deref()],
         Command::Identify(args) => &[Some(&args.out)],
+        Command::Calib(CalibCommand::Extrinsics(args)) => &[Some(&args.out)],
         Command::Plan(
             PlanCommand::Strike(args) | PlanCommand::Lob(args) | PlanCommand::Drape(args),
         ) => &[Some(&args.out), args.csv.as_deref(), args.reach.as_deref()],
@@ -76,6 +78,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Explain(args) => explain::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
+        Command::Calib(command) => calib::run(command, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Reproduce(args) => reproduce::run(args, quiet),
         Command::Doctor(args) => doctor::run(args, quiet),

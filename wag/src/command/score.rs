@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
     let camera = load_camera(&args.camera).or_input()?;
-    let mut video = open_video(&args.video).or_input()?;
+    let mut video = open_video(&args.video, args.fps).or_input()?;
     let stage = Stage::begin("score", quiet);
     let found = score(
         &mut video,

@@ -5,13 +5,14 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
 use anyhow::{Context, anyhow};
-use camera_ingest::overlay::keypoint_sheet;
+use camera_ingest::film::keypoint_film;
+use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::source::read_left;
 use camera_ingest::{
     ClampPath, EyeFrame, TrackOptions, TrackResult, load_camera, open_video, track,
 };
 use serde_json::{Value, json};
-use shared_types::StereoCamera;
+use shared_types::{KeypointTrack, StereoCamera};
 use std::path::Path;
 
 /// Pictures in a contact sheet, and how many stand in a row.
@@ -38,9 +39,9 @@ pub struct TrackedVideo {
     pub result: TrackResult,
 }
 
-/// Tracks the rope through a video.
+/// Tracks the rope through a video, given with the frame rate it does not tell.
 pub fn track_video(
-    video: &Path,
+    (video, rate_hz): (&Path, Option<f64>),
     camera: &StereoCamera,
     motion: &MotionArgs,
     keypoints: usize,
@@ -48,7 +49,7 @@ pub fn track_video(
 ) -> Outcome<TrackedVideo> {
     let clamp = clamp_path(motion).or_input()?;
     stage.say("reading frames");
-    let frames = read_left(&mut open_video(video).or_input()?).or_input()?;
+    let frames = read_left(&mut open_video(video, rate_hz).or_input()?).or_input()?;
     stage.say(format!("tracking through {} frames", frames.len()));
     let options = TrackOptions {
         keypoints,
@@ -58,6 +59,23 @@ pub fn track_video(
         .with_context(|| format!("video `{}`", video.display()))
         .or_failed()?;
     Ok(TrackedVideo { frames, result })
+}
+
+/// A film for a name that ends in `.avi`, else a contact sheet.
+fn overlay(
+    path: &Path,
+    frames: &[EyeFrame],
+    track: &KeypointTrack,
+) -> Result<Vec<u8>, OverlayError> {
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("avi"))
+    {
+        return keypoint_film(frames, track);
+    }
+    let step = frames.len().div_ceil(SHEET.0).max(1);
+    let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
+    keypoint_sheet(frames, track, &chosen, SHEET.1)?.to_png()
 }
 
 pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
@@ -70,16 +88,18 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     let camera = load_camera(&args.camera).or_input()?;
     let stage = Stage::begin("track", quiet);
-    let tracked = track_video(&args.video, &camera, &args.motion, args.keypoints, &stage)?;
+    let tracked = track_video(
+        (&args.video, args.fps),
+        &camera,
+        &args.motion,
+        args.keypoints,
+        &stage,
+    )?;
     let (frames, result) = (&tracked.frames, &tracked.result);
     files::write_json(&args.out, &result.track).or_failed()?;
     if let Some(path) = &args.overlay {
-        let step = frames.len().div_ceil(SHEET.0).max(1);
-        let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
-        let sheet = keypoint_sheet(frames, &result.track, &chosen, SHEET.1)
-            .and_then(|sheet| sheet.to_png())
+        files::write_atomic(path, &overlay(path, frames, &result.track).or_failed()?)
             .or_failed()?;
-        files::write_atomic(path, &sheet).or_failed()?;
     }
     let lost = result.track.frames.iter().filter(|f| f.lost).count();
     let line = format!("{} frames, rope lost in {lost}", result.track.frames.len());

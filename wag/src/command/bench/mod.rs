@@ -9,6 +9,7 @@ mod plan;
 mod rope;
 mod rt;
 mod spent;
+mod track;
 
 use crate::cli::{BenchArgs, BenchName};
 use crate::failure::Outcome;
@@ -21,5 +22,6 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         BenchName::Rt => rt::run(args, quiet),
         BenchName::Identify => identify::run(args, quiet),
         BenchName::Plan => plan::run(args, quiet),
+        BenchName::Track => track::run(args, quiet),
     }
 }

@@ -1,0 +1,113 @@
+//! When each frame of a recording was taken: a CSV beside it, or an even rate.
+
+use std::path::Path;
+
+use super::SourceError;
+
+/// Number and time of one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Stamp {
+    pub(super) sequence: u64,
+    pub(super) stamp_ns: u64,
+}
+
+/// `frames` stamps, one every `frame_ns`, the first at 0.
+pub(super) fn even(frames: usize, frame_ns: f64) -> Vec<Stamp> {
+    (0..frames as u64)
+        .map(|sequence| Stamp {
+            sequence,
+            #[allow(
+                clippy::cast_precision_loss,
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a recording is short, and its times are positive"
+            )]
+            stamp_ns: (sequence as f64 * frame_ns).round() as u64,
+        })
+        .collect()
+}
+
+/// Stamps of a recording that does not carry any: from `csv` if it is there, else
+/// even ones at `rate_hz`.
+///
+/// # Errors
+/// Neither is known, or both; or the CSV does not fit.
+pub(super) fn beside(
+    recording: &Path,
+    csv: &Path,
+    rate_hz: Option<f64>,
+    frames: usize,
+) -> Result<Vec<Stamp>, SourceError> {
+    let times = |reason: String| SourceError::Times {
+        path: recording.to_owned(),
+        reason,
+    };
+    match (csv.exists(), rate_hz) {
+        (true, None) => read(csv, frames),
+        (false, Some(hz)) => Ok(even(frames, 1e9 / hz)),
+        (true, Some(hz)) => Err(times(twice(csv, hz))),
+        (false, None) => Err(times(format!(
+            "nothing tells when its frames were taken; give the frame rate, or put {} there with \
+             rows `frame,sequence,monotonic_ns`",
+            csv.display()
+        ))),
+    }
+}
+
+/// The frame rate is told twice.
+pub(super) fn twice(csv: &Path, rate_hz: f64) -> String {
+    format!(
+        "{} tells when its frames were taken; leave out the frame rate of {rate_hz} a second",
+        csv.display()
+    )
+}
+
+/// Rows `frame,sequence,monotonic_ns`, one a frame.
+pub(super) fn read(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SourceError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    let fail = |line: usize, reason: String| SourceError::Timestamps {
+        path: path.to_owned(),
+        line,
+        reason,
+    };
+    let mut stamps: Vec<Stamp> = Vec::new();
+    for (index, row) in text.lines().enumerate().skip(1) {
+        if row.trim().is_empty() {
+            continue;
+        }
+        let numbers: Vec<u64> = row
+            .split(',')
+            .map(|c| c.trim().parse())
+            .collect::<Result<_, _>>()
+            .map_err(|e| {
+                fail(
+                    index + 1,
+                    format!("{row:?} is not three whole numbers ({e})"),
+                )
+            })?;
+        let [frame, sequence, stamp_ns] = numbers[..] else {
+            return Err(fail(index + 1, format!("{} columns", numbers.len())));
+        };
+        if frame != stamps.len() as u64 {
+            return Err(fail(
+                index + 1,
+                format!("frame {frame} where {} is due", stamps.len()),
+            ));
+        }
+        if stamps.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
+            return Err(fail(index + 1, "times do not increase".to_owned()));
+        }
+        stamps.push(Stamp { sequence, stamp_ns });
+    }
+    if stamps.len() == frames {
+        Ok(stamps)
+    } else {
+        Err(fail(
+            stamps.len() + 1,
+            format!("{} rows, but the video has {frames} frames", stamps.len()),
+        ))
+    }
+}

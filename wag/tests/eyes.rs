@@ -1,0 +1,396 @@
+//! What the eyes' commands read and write, from files to files.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::cast_precision_loss,
+    reason = "tests may fail loudly"
+)]
+
+#[path = "../../camera-ingest/tests/printed_board/mod.rs"]
+mod printed_board;
+
+use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
+use camera_ingest::frame::StereoFrame;
+use camera_ingest::{ClampPath, FrameSource, TrackOptions, load_camera, open_video, track};
+use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
+use hil_tests::rig::CameraConfig;
+use nalgebra::{Rotation3, Vector3};
+use serde_json::Value;
+use shared_types::plan::START_POSE;
+use shared_types::{KeypointTrack, StereoCamera};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Frames of a recording that are enough to follow the rope.
+const FRAMES: usize = 120;
+
+fn wag(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wag"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+/// Runs a command that must succeed; what `--json` prints.
+fn done(folder: &Path, args: &[&str]) -> Value {
+    let output = wag(folder, args);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "wag {}: {said}", args.join(" "));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Runs a command that must fail with an exit code; its error.
+fn refused(folder: &Path, code: i32, args: &[&str]) -> String {
+    let output = wag(folder, args);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "wag {args:?}: {said}");
+    said
+}
+
+/// A recorded wiggle; `None`, said aloud, where the data are not there.
+fn recording(name: &str) -> Option<PathBuf> {
+    let shared = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared"));
+    let folder = shared.join("data/wiggle").join(name);
+    if !folder.exists() {
+        println!("skipped: {} not found", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+fn yuyv(frame: &StereoFrame) -> Vec<u8> {
+    let chroma = frame.0.cb.iter().zip(&frame.0.cr);
+    let pairs = frame.0.luma.chunks_exact(2).zip(chroma);
+    pairs
+        .flat_map(|(y, (cb, cr))| [y[0], *cb, y[1], *cr])
+        .collect()
+}
+
+/// Bodies of the first pictures of an AVI.
+fn jpegs(avi: &[u8], count: usize) -> Vec<&[u8]> {
+    let word = |at: usize| u32::from_le_bytes(avi[at..at + 4].try_into().unwrap()) as usize;
+    let mut at = avi.windows(4).position(|w| w == b"movi").unwrap() + 4;
+    let mut bodies = Vec::new();
+    while bodies.len() < count {
+        assert_eq!(&avi[at..at + 4], b"00dc");
+        let size = word(at + 4);
+        bodies.push(&avi[at + 8..at + 8 + size]);
+        at += 8 + size + size % 2;
+    }
+    bodies
+}
+
+/// The beginning of a recording as a folder of JPEGs and as one raw file, with all
+/// that a command wants beside it.
+fn excerpt(from: &Path) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    for name in ["camera.toml", "camera.conf", "pose.csv"] {
+        fs::copy(from.join(name), at(name)).unwrap();
+    }
+    let stamps = fs::read_to_string(from.join("timestamps.csv")).unwrap();
+    let rows: Vec<&str> = stamps.lines().take(FRAMES + 1).collect();
+    fs::write(at("timestamps.csv"), rows.join("\n")).unwrap();
+    fs::write(at("raw_1344x376.csv"), rows.join("\n")).unwrap();
+    let avi = fs::read(from.join("video.avi")).unwrap();
+    let mut raw = Vec::new();
+    for (index, jpeg) in jpegs(&avi, FRAMES).into_iter().enumerate() {
+        fs::write(at(&format!("f{index:04}.jpg")), jpeg).unwrap();
+        raw.extend(yuyv(&StereoFrame::from_jpeg(jpeg, 0, 0).unwrap()));
+    }
+    fs::write(at("raw_1344x376.yuyv"), raw).unwrap();
+    dir
+}
+
+/// Keypoints of the beginning of a recording, by the library from the film.
+fn keypoints(from: &Path) -> KeypointTrack {
+    let camera = load_camera(&from.join("camera.toml")).unwrap();
+    let clamp = ClampPath::from_pose_csv(&from.join("pose.csv")).unwrap();
+    let mut video = open_video(from, None).unwrap();
+    let frames: Vec<_> = (0..FRAMES).map(|i| video.read_left(i).unwrap()).collect();
+    let options = TrackOptions {
+        keypoints: 20,
+        ..TrackOptions::default()
+    };
+    track(&frames, &camera, &clamp, &options).unwrap().track
+}
+
+#[test]
+fn pictures_and_raw_files_are_tracked_like_the_film() {
+    let Some(from) = recording("a1") else { return };
+    let dir = excerpt(&from);
+    // A picture beside the frames would be one of them.
+    fs::create_dir(dir.path().join("drawn")).unwrap();
+    let expected = keypoints(&from);
+    let track = |video: &str, overlay: &str| {
+        let args = [
+            "track",
+            "--json",
+            "--video",
+            video,
+            "--camera",
+            "camera.toml",
+        ];
+        let more = [
+            "--pose",
+            "pose.csv",
+            "--overlay",
+            overlay,
+            "--out",
+            "k.json",
+        ];
+        let report = done(dir.path(), &[args, more].concat());
+        assert_eq!(report["frames"], FRAMES);
+        let text = fs::read_to_string(dir.path().join("k.json")).unwrap();
+        serde_json::from_str::<KeypointTrack>(&text).unwrap()
+    };
+    assert!(track("raw_1344x376.yuyv", "drawn/film.avi") == expected);
+    assert!(track(".", "drawn/sheet.png") == expected);
+    let film = open_video(&dir.path().join("drawn/film.avi"), None).unwrap();
+    assert_eq!(film.len(), FRAMES);
+    let sheet = fs::read(dir.path().join("drawn/sheet.png")).unwrap();
+    assert!(sheet.starts_with(b"\x89PNG"));
+
+    let report = done(
+        dir.path(),
+        &["bench", "track", "--quick", "--json", "--video", "."],
+    );
+    assert_eq!(report["command"], "bench track");
+    assert_eq!(report["frames"], FRAMES);
+    assert_eq!(
+        (&report["limit_ms"], &report["limit_mb"]),
+        (&3.0.into(), &400.0.into())
+    );
+    let number = |path: &str| {
+        let number = report.pointer(path).and_then(Value::as_f64);
+        let number = number.unwrap_or_else(|| panic!("no number at {path} in {report}"));
+        assert!(number.is_finite() && number >= 0.0, "{path} is {number}");
+        number
+    };
+    let together = number("/together_cpu_ms");
+    assert!(together >= number("/decoding_cpu_ms").max(number("/tracking_cpu_ms")));
+    assert_eq!(report["within_limit"], together <= 3.0);
+    for stage in ["background", "first_frame", "following"] {
+        assert!(number(&format!("/stages_wall_ms/{stage}")) > 0.0);
+    }
+    // The frames alone: luma and chroma of one eye.
+    let frames_mb = (FRAMES * 672 * 376 * 2) as f64 / 1e6;
+    let peak_mb = number("/peak_memory_mb");
+    assert!(
+        (frames_mb..frames_mb + 200.0).contains(&peak_mb),
+        "{peak_mb} MB"
+    );
+    number("/lost_part");
+
+    let own = [
+        "--camera",
+        "camera.toml",
+        "--pose",
+        "pose.csv",
+        "--out",
+        "k2.json",
+    ];
+    let told = |code: i32, args: &[&str]| refused(dir.path(), code, &[args, &own].concat());
+    let twice = told(2, &["track", "--video", ".", "--fps", "60"]);
+    assert!(twice.contains("leave out the frame rate"), "{twice}");
+    fs::rename(dir.path().join("f0100.jpg"), dir.path().join("kept")).unwrap();
+    let rows = told(2, &["track", "--video", "."]);
+    assert!(
+        rows.contains("timestamps.csv") && rows.contains("119"),
+        "{rows}"
+    );
+    fs::remove_file(dir.path().join("timestamps.csv")).unwrap();
+    let untimed = told(2, &["track", "--video", "."]);
+    assert!(untimed.contains("give the frame rate"), "{untimed}");
+    let rate = told(2, &["track", "--video", ".", "--fps", "0"]);
+    assert!(rate.contains("--fps"), "{rate}");
+    fs::copy(
+        dir.path().join("raw_1344x376.yuyv"),
+        dir.path().join("raw.yuyv"),
+    )
+    .unwrap();
+    let unnamed = told(2, &["track", "--video", "raw.yuyv", "--fps", "60"]);
+    assert!(
+        unnamed.contains("raw.yuyv") && unnamed.contains("name"),
+        "{unnamed}"
+    );
+    assert!(!dir.path().join("k2.json").exists());
+}
+
+/// A camera's settings, thought to stand elsewhere, and some frames of it.
+fn film_of(frames: &[StereoFrame], camera: &StereoCamera, mode: VideoMode) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let raw: Vec<u8> = frames.iter().flat_map(yuyv).collect();
+    let size = format!("{}x{}", 2 * camera.width_px, camera.height_px);
+    fs::write(at(&format!("film_{size}.yuyv")), raw).unwrap();
+    write_factory_conf(&at("sn.conf"), camera, mode).unwrap();
+    let turned = StereoCamera {
+        r_right_left: camera.r_right_left.transpose(),
+        ..camera.clone()
+    };
+    write_factory_conf(&at("turned.conf"), &turned, mode).unwrap();
+    let elsewhere = StereoCamera {
+        p_w_cam_m: camera.p_w_cam_m + Vector3::new(0.01, 0.0, 0.0),
+        ..camera.clone()
+    };
+    let conf = Path::new("sn.conf");
+    write_camera_toml(&at("thought.toml"), &elsewhere, mode, conf).unwrap();
+    let conf = Path::new("turned.conf");
+    write_camera_toml(&at("turned.toml"), camera, mode, conf).unwrap();
+    dir
+}
+
+/// How far a camera found stands from the true one (m, degrees).
+fn off(found: &Path, truth: &StereoCamera) -> (f64, f64) {
+    let found = load_camera(found).unwrap();
+    let turn = Rotation3::from_matrix_unchecked(found.r_w_cam.transpose() * truth.r_w_cam);
+    let away_m = (found.p_w_cam_m - truth.p_w_cam_m).norm();
+    println!(
+        "{:.2} mm and {:.3} degrees off",
+        1e3 * away_m,
+        turn.angle().to_degrees()
+    );
+    (away_m, turn.angle().to_degrees())
+}
+
+#[test]
+fn a_board_tells_where_the_camera_stands() {
+    let (board, truth) = (printed_board::board(), printed_board::camera());
+    let frames = printed_board::film(&board, &truth, 1);
+    let dir = film_of(&frames, &truth, VideoMode::Hd);
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("board.toml"), toml::to_string(&board).unwrap()).unwrap();
+    let mut other = board.clone();
+    other.dictionary = "DICT_9X9".to_owned();
+    fs::write(at("other.toml"), toml::to_string(&other).unwrap()).unwrap();
+
+    let shown = [
+        "--video",
+        "film_2560x720.yuyv",
+        "--fps",
+        "30",
+        "--board",
+        "board.toml",
+    ];
+    let args = ["calib", "extrinsics", "--json", "--camera", "thought.toml"];
+    let report = done(
+        dir.path(),
+        &[&args, &shown[..], &["--out", "found.toml"]].concat(),
+    );
+    let (away_m, away_degrees) = off(&at("found.toml"), &truth);
+    assert!(away_m <= 0.003 && away_degrees <= 0.2);
+    assert!(
+        report["residual"]["rms_px"].as_f64().unwrap() < 0.3,
+        "{report}"
+    );
+    assert!(report["position_error_m"].as_f64().unwrap() > 0.0);
+
+    let check = ["calib", "check", "--json", "--camera"];
+    let report = done(
+        dir.path(),
+        &[&check[..], &["found.toml"], &shown[..]].concat(),
+    );
+    assert!(
+        report["residual"]["rms_px"].as_f64().unwrap() < 0.3,
+        "{report}"
+    );
+    let shifted = refused(
+        dir.path(),
+        1,
+        &[&check[..], &["thought.toml"], &shown[..]].concat(),
+    );
+    assert!(shifted.contains("wag calib extrinsics"), "{shifted}");
+    let turned = refused(
+        dir.path(),
+        1,
+        &[&check[..], &["turned.toml"], &shown[..]].concat(),
+    );
+    assert!(turned.contains("sign is wrong"), "{turned}");
+
+    let film = [
+        "--video",
+        "film_2560x720.yuyv",
+        "--fps",
+        "30",
+        "--out",
+        "no.toml",
+    ];
+    let args = [&args[..], &film].concat();
+    let told = |code: i32, more: &[&str]| refused(dir.path(), code, &[&args, more].concat());
+    let board = told(2, &["--board", "other.toml"]);
+    assert!(
+        board.contains("other.toml") && board.contains("DICT_9X9"),
+        "{board}"
+    );
+    let nothing = told(2, &[]);
+    assert!(nothing.contains("--board"), "{nothing}");
+    let colourless = told(2, &["--lead", "shown.csv"]);
+    assert!(colourless.contains("--lead-rgb"), "{colourless}");
+    fs::write(at("shown.csv"), "frame,x,y,z\n7,0,0,0\n").unwrap();
+    let beyond = told(2, &["--lead", "shown.csv", "--lead-rgb", "240,150,30"]);
+    assert!(
+        beyond.contains("shown.csv") && beyond.contains("frame 7"),
+        "{beyond}"
+    );
+    fs::write(at("shown.csv"), "frame,x,y,z\n0,0,nan,0\n").unwrap();
+    let nan = told(2, &["--lead", "shown.csv", "--lead-rgb", "240,150,30"]);
+    assert!(nan.contains("shown.csv") && nan.contains("finite"), "{nan}");
+    assert!(!at("no.toml").exists());
+}
+
+#[test]
+fn the_lead_at_known_places_tells_where_the_camera_stands() {
+    let camera = CameraConfig::default().stereo_camera();
+    let appearance = Appearance::from_seed(4);
+    let shape = RopeShape {
+        radius_m: 0.005,
+        lead_radius_m: 0.015,
+    };
+    let mut renderer = Renderer::new(&camera, shape, appearance, 1.6, 4);
+    let resting = ScenePose {
+        q: START_POSE,
+        nodes: Vec::new(),
+    };
+    let (mut frames, mut rows) = (Vec::new(), "frame,x,y,z\n".to_owned());
+    for index in 0..14_u32 {
+        let i = f64::from(index);
+        let p = Vector3::new(
+            0.75 + 0.3 * (2.4 * i).cos(),
+            -0.25 + 0.035 * i,
+            0.15 + 0.3 * (2.4 * i).sin(),
+        );
+        renderer.place_target(Some(p));
+        let mut bytes = vec![0; renderer.frame_bytes()];
+        renderer.render(std::slice::from_ref(&resting), u64::from(index), &mut bytes);
+        let size = [2 * camera.width_px as usize, camera.height_px as usize];
+        frames.push(StereoFrame::from_yuyv(&bytes, size, 0, 0).unwrap());
+        rows += &format!("{index},{},{},{}\n", p.x, p.y, p.z);
+    }
+    let dir = film_of(&frames, &camera, VideoMode::Vga);
+    fs::write(dir.path().join("shown.csv"), rows).unwrap();
+    let colour = appearance.target_rgb.map(|c| c.to_string()).join(",");
+    let film = [
+        "--video",
+        "film_1344x376.yuyv",
+        "--fps",
+        "30",
+        "--camera",
+        "thought.toml",
+    ];
+    let shown = ["--lead", "shown.csv", "--lead-rgb", &colour];
+    let command = ["calib", "extrinsics", "--json", "--out", "found.toml"];
+    let report = done(dir.path(), &[&command[..], &film, &shown].concat());
+    println!("{report}");
+    let (away_m, away_degrees) = off(&dir.path().join("found.toml"), &camera);
+    assert!(away_m <= 0.01 && away_degrees <= 0.5);
+    let seen = report["residual"]["points"].as_u64().unwrap();
+    assert!(seen >= 12, "{report}");
+    // Grey is no colour to be found by.
+    let grey = ["--lead", "shown.csv", "--lead-rgb", "120,120,120"];
+    let grey = refused(dir.path(), 1, &[&command[..], &film, &grey].concat());
+    assert!(grey.contains("grey"), "{grey}");
+}
