@@ -19,8 +19,8 @@ const BEFORE_S: f64 = 0.2;
 const AFTER_S: f64 = 0.8;
 /// Longest motion that is shown (s); of a longer one, its begin.
 const LONGEST_S: f64 = 15.0;
-/// Step of the simulation (s).
-const STEP_S: f64 = 5e-4;
+/// Step of the simulation of a throw, and of calmer motions (s).
+const STEP_S: (f64, f64) = (5e-4, 1e-3);
 /// Points of a joint's curve.
 const CURVE_POINTS: usize = 400;
 /// Samples the measured motion needs.
@@ -68,8 +68,9 @@ pub fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> anyhow::Re
     // The simulator's clock begins with the first frame.
     let shifted: Vec<f64> = times_s.iter().map(|t| t + BEFORE_S).collect();
     let on_film = MeasuredArm::new(&shifted, &q).context("the joints of a motion")?;
+    let step_s = if plan.is_some() { STEP_S.0 } else { STEP_S.1 };
     let rope = match known.rope {
-        Some(rope) => simulate(rope, &on_film, frames)?,
+        Some(rope) => simulate(rope, &on_film, frames, step_s)?,
         None => Vec::new(),
     };
     let planned_tip = match plan {
@@ -151,9 +152,10 @@ fn simulate(
     rope: &RopeParams,
     motion: &dyn AttachMotion,
     frames: FrameTimes,
+    step_s: f64,
 ) -> anyhow::Result<Vec<Vec<i32>>> {
     let options = SimOptions {
-        step_s: STEP_S,
+        step_s,
         precision: Precision::F64,
         start: Start::Equilibrium,
         frames,
@@ -183,7 +185,7 @@ fn planned_tip(plan: &Plan, until_s: f64) -> anyhow::Result<Vec<i32>> {
         count: frame_count(until_s),
     };
     let arm = PlannedArm::new(plan.trajectory);
-    let rope = simulate(&plan.rope, &arm, frames)?;
+    let rope = simulate(&plan.rope, &arm, frames, STEP_S.0)?;
     Ok(rope
         .iter()
         .flat_map(|nodes| nodes[nodes.len().saturating_sub(3)..].to_vec())
