@@ -1,6 +1,6 @@
 //! Whether a machine is fit to drive an arm: what is found, what it means, and what
-//! to do about it. Reading is one thing ([`facts`], [`line`]), judging another
-//! ([`judge`]).
+//! to do about it. Reading is one thing ([`mod@facts`], [`mod@line`]), judging another
+//! ([`mod@judge`]).
 
 mod facts;
 mod judge;
