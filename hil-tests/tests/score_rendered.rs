@@ -115,8 +115,10 @@ fn intervals_hold_the_truth_where_lead_and_target_cover_each_other() {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
     let config = CameraConfig::default();
     let camera = config.stereo_camera();
+    // The first were looked at while the intervals were made, the others were not.
+    let seeds = if long { 3000..3020 } else { 100..102 };
     let (mut held, mut refused, mut errors_m, mut widths_m) = (0, 0, Vec::new(), Vec::new());
-    for seed in 100..if long { 120 } else { 102 } {
+    for seed in seeds {
         let appearance = Appearance::from_seed(seed);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let shape = RopeShape {
