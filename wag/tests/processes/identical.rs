@@ -284,7 +284,9 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     let met: Vec<_> = causes.iter().map(|c| (c.fault(), c.motion_id)).collect();
     assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
     let flown = of_the_throw(&cycles);
-    let sent: BTreeSet<_> = flown.iter().map(|r| wire_bits(&r.q_c)).collect();
+    // One that the loop was held up with is held back, by design.
+    let went = flown.iter().filter(|r| r.send_ns > 0);
+    let sent: BTreeSet<_> = went.map(|r| wire_bits(&r.q_c)).collect();
     let missing = sent.difference(&arrived(&arm, began)).count();
     assert_eq!(missing, 0, "setpoints that never reached the arm");
     flown
