@@ -104,15 +104,15 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         }
     }
 
-    /// Sleeps until the deadline, or until it is time to rehearse; then at most
-    /// half of that time goes by before the rehearsal, or there is none.
+    /// Sleeps until the deadline, or until it is time to rehearse; woken with less
+    /// than a fifth of that time left, it does without.
     fn wait_until(&mut self, deadline_ns: u64) {
         let Some(rehearsal) = &mut self.rehearsal else {
             return self.clock.sleep_until(deadline_ns);
         };
         let ahead_ns = rehearsal.ahead_ns;
         self.clock.sleep_until(deadline_ns.saturating_sub(ahead_ns));
-        let latest_ns = deadline_ns.saturating_sub(ahead_ns / 2);
+        let latest_ns = deadline_ns.saturating_sub(ahead_ns / 5);
         if self.clock.now_ns() < latest_ns {
             let (operator, guardian) = (self.boards.operator(), self.boards.guardian());
             rehearsal.cycle(deadline_ns, operator, guardian);

@@ -29,7 +29,7 @@ impl Default for RealTimeSettings {
             cpu: None,
             lock_memory: true,
             require: false,
-            rehearse_us: 200,
+            rehearse_us: 300,
         }
     }
 }

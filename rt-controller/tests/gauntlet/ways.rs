@@ -173,7 +173,8 @@ fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
                 bench.recover();
                 bench.hold();
                 bench.begin(motion, MotionTier::Throw, 30);
-                assert!(bench.mode().is_moving(), "{code:?}");
+                let stopped_by = bench.last_cause;
+                assert!(bench.mode().is_moving(), "{code:?}: {stopped_by:?}");
                 bench.last_cause = FaultCode::None;
                 spoil(bench);
                 bench.until_still();
