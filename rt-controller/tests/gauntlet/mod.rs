@@ -218,12 +218,15 @@ impl<'w> Bench<'w> {
         report
     }
 
-    /// Lets the arm's thread catch up; in the loop no time passes meanwhile.
+    /// Lets the arm's thread catch up, and the system deliver its answers; in the loop
+    /// no time passes meanwhile.
     fn wait_for_the_arm(&mut self) {
+        const PAUSE: Duration = Duration::from_micros(50);
         let began = Instant::now();
+        std::thread::sleep(PAUSE);
         while self.linked() && !self.arm.is_done_with(self.asked) {
             assert!(began.elapsed() < Duration::from_secs(20), "no answer");
-            std::thread::sleep(Duration::from_micros(50));
+            std::thread::sleep(PAUSE);
         }
     }
 
