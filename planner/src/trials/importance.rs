@@ -1,16 +1,15 @@
 //! Which identified parameters matter: strikes planned with some of them identified and
 //! the others random, thrown with the true rope.
 
+use super::strike_case::{StrikeCase, strike_trials};
 use super::thrower::Thrower;
 use super::{TrialError, TrialRig, trial_rope};
 use crate::process::PlannerConfig;
-use crate::ropes::random_strike_target;
 use crate::sysid::IdentifyOptions;
-use crate::tasks::{Belief, PlanError, PlanOptions};
-use crate::workers::map_in_order;
+use crate::tasks::{Belief, PlanError};
 use serde::{Deserialize, Serialize};
+use shared_types::RopeParams;
 use shared_types::rope::ROPE_PARAMETERS;
-use shared_types::{RopeParams, Task};
 
 /// Random parameter sets per rope and condition; the paper has 10.
 const DRAWS: usize = 4;
@@ -70,43 +69,18 @@ fn errors_with(
     Ok(errors_m)
 }
 
-fn trial(
-    rig: &TrialRig,
-    config: &PlannerConfig,
-    options: &IdentifyOptions,
-    seed: u64,
-    index: u64,
-) -> Result<ImportanceTrial, TrialError> {
-    let truth = trial_rope(seed, index);
-    let target_m = random_strike_target((seed << 32) ^ index);
-    let filmed = rig.film(&truth, seed, index)?;
-    let found = rig.fit(&filmed, index, options)?.params;
-    let task = config.task(Task::Strike, target_m);
-    let thrower = Thrower {
-        task: &*task,
-        options: PlanOptions {
-            seed: seed ^ index,
-            threads: 1,
-            ..config.search
-        },
-        truth,
-    };
-    let planned = || -> Result<ImportanceTrial, PlanError> {
-        let whole = thrower.plan(&found, 1, Belief::default())?;
-        let mut partly_m = [const { Vec::new() }; CONDITIONS.len()];
-        for (errors_m, identified) in partly_m.iter_mut().zip(CONDITIONS) {
-            *errors_m = errors_with(&thrower, &found, identified, seed.wrapping_add(index))?;
-        }
-        Ok(ImportanceTrial {
-            index,
-            target_m,
-            identified_m: thrower.throw(&whole)?.error_m,
-            partly_m,
-        })
-    };
-    planned().map_err(|source| TrialError::Plan {
-        index,
-        source: Box::new(source),
+fn trial(case: &StrikeCase<'_>, seed: u64) -> Result<ImportanceTrial, PlanError> {
+    let (thrower, found) = (&case.thrower, &case.found.params);
+    let whole = thrower.plan(found, 1, Belief::default())?;
+    let mut partly_m = [const { Vec::new() }; CONDITIONS.len()];
+    for (errors_m, identified) in partly_m.iter_mut().zip(CONDITIONS) {
+        *errors_m = errors_with(thrower, found, identified, seed.wrapping_add(case.index))?;
+    }
+    Ok(ImportanceTrial {
+        index: case.index,
+        target_m: case.target_m,
+        identified_m: thrower.throw(&whole)?.error_m,
+        partly_m,
     })
 }
 
@@ -122,15 +96,9 @@ pub fn importance_trials(
     seed: u64,
     indices: &[u64],
 ) -> Result<Vec<ImportanceTrial>, TrialError> {
-    let alone = IdentifyOptions {
-        threads: 1,
-        ..*options
-    };
-    map_in_order(indices, options.threads, |index| {
-        trial(rig, config, &alone, seed, *index)
+    strike_trials(rig, config, options, seed, indices, |case| {
+        trial(case, seed)
     })
-    .into_iter()
-    .collect()
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod lob_drape;
 mod outside;
 mod pipeline;
 mod robust;
+mod strike_case;
 mod summary;
 mod thrower;
 mod wiggles;

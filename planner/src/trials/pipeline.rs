@@ -1,15 +1,13 @@
 //! The paper's simulated pipeline: strikes planned with true, identified and random
 //! parameters, thrown with the true rope.
 
-use super::thrower::{Strikes, Thrower};
+use super::strike_case::{StrikeCase, strike_trials};
+use super::thrower::Strikes;
 use super::{TrialError, TrialRig, trial_rope};
 use crate::process::PlannerConfig;
-use crate::ropes::random_strike_target;
 use crate::sysid::IdentifyOptions;
-use crate::tasks::{Belief, PlanError, PlanOptions};
-use crate::workers::map_in_order;
+use crate::tasks::{Belief, PlanError};
 use serde::{Deserialize, Serialize};
-use shared_types::Task;
 use shared_types::rope::ROPE_PARAMETERS;
 
 /// Keeps the ropes planned for at random apart from those thrown.
@@ -39,54 +37,27 @@ pub struct PipelineTrial {
     pub random: Strikes,
 }
 
-fn trial(
-    rig: &TrialRig,
-    config: &PlannerConfig,
-    options: &IdentifyOptions,
-    seed: u64,
-    index: u64,
-) -> Result<PipelineTrial, TrialError> {
-    let truth = trial_rope(seed, index);
-    let target_m = random_strike_target((seed << 32) ^ index);
-    let filmed = rig.film(&truth, seed, index)?;
-    let found = rig.fit(&filmed, index, options)?.params;
-    let task = config.task(Task::Strike, target_m);
-    let thrower = Thrower {
-        task: &*task,
-        options: PlanOptions {
-            seed: seed ^ index,
-            threads: 1,
-            ..config.search
-        },
-        truth,
+fn trial(case: &StrikeCase<'_>, seed: u64) -> Result<PipelineTrial, PlanError> {
+    let (thrower, found) = (&case.thrower, case.found.params);
+    let truth = thrower.truth;
+    let once = thrower.plan(&truth, 1, Belief::default())?;
+    let true_rope = thrower.throw(&once)?;
+    // A further search begins only where the first was not good enough.
+    let true_rope_longer = if once.error_m <= thrower.options.good_enough_m {
+        true_rope
+    } else {
+        thrower.throw(&thrower.plan(&truth, SEARCHES, Belief::default())?)?
     };
-    let planned = || -> Result<PipelineTrial, PlanError> {
-        let once = thrower.plan(&truth, 1, Belief::default())?;
-        let true_rope = thrower.throw(&once)?;
-        // A further search begins only where the first was not good enough.
-        let true_rope_longer = if once.error_m <= thrower.options.good_enough_m {
-            true_rope
-        } else {
-            thrower.throw(&thrower.plan(&truth, SEARCHES, Belief::default())?)?
-        };
-        Ok(PipelineTrial {
-            index,
-            target_m,
-            truth: truth.to_array(),
-            found: found.to_array(),
-            true_rope,
-            true_rope_longer,
-            identified: thrower.throw(&thrower.plan(&found, SEARCHES, Belief::default())?)?,
-            random: thrower.throw(&thrower.plan(
-                &trial_rope(seed ^ OTHER, index),
-                1,
-                Belief::default(),
-            )?)?,
-        })
-    };
-    planned().map_err(|source| TrialError::Plan {
-        index,
-        source: Box::new(source),
+    let other = trial_rope(seed ^ OTHER, case.index);
+    Ok(PipelineTrial {
+        index: case.index,
+        target_m: case.target_m,
+        truth: truth.to_array(),
+        found: found.to_array(),
+        true_rope,
+        true_rope_longer,
+        identified: thrower.throw(&thrower.plan(&found, SEARCHES, Belief::default())?)?,
+        random: thrower.throw(&thrower.plan(&other, 1, Belief::default())?)?,
     })
 }
 
@@ -102,15 +73,9 @@ pub fn pipeline_trials(
     seed: u64,
     indices: &[u64],
 ) -> Result<Vec<PipelineTrial>, TrialError> {
-    let alone = IdentifyOptions {
-        threads: 1,
-        ..*options
-    };
-    map_in_order(indices, options.threads, |index| {
-        trial(rig, config, &alone, seed, *index)
+    strike_trials(rig, config, options, seed, indices, |case| {
+        trial(case, seed)
     })
-    .into_iter()
-    .collect()
 }
 
 /// How errors spread (m).

@@ -1,15 +1,14 @@
 //! Strikes planned for one identified rope beside strikes planned for every rope it might
 //! be, and whether the forecast holds.
 
-use super::thrower::{Strikes, Thrower};
-use super::{TrialError, TrialRig, trial_rope};
+use super::strike_case::{StrikeCase, strike_trials};
+use super::thrower::Strikes;
+use super::{TrialError, TrialRig};
 use crate::process::PlannerConfig;
-use crate::ropes::random_strike_target;
 use crate::sysid::IdentifyOptions;
-use crate::tasks::{Belief, PlanError, PlanOptions};
-use crate::workers::map_in_order;
+use crate::tasks::{Belief, PlanError};
 use serde::{Deserialize, Serialize};
-use shared_types::{ErrorForecast, RopeParams, Task};
+use shared_types::ErrorForecast;
 
 /// Ropes that a robust plan is optimised over, and that a forecast is made with.
 const OPTIMISED: usize = 8;
@@ -51,47 +50,22 @@ pub struct RobustTrial {
     pub robust: Foreseen,
 }
 
-fn trial(
-    rig: &TrialRig,
-    config: &PlannerConfig,
-    options: &IdentifyOptions,
-    seed: u64,
-    index: u64,
-) -> Result<RobustTrial, TrialError> {
-    let truth = trial_rope(seed, index);
-    let target_m = random_strike_target((seed << 32) ^ index);
-    let filmed = rig.film(&truth, seed, index)?;
-    let found = rig.fit(&filmed, index, options)?;
-    let task = config.task(Task::Strike, target_m);
-    let thrower = Thrower {
-        task: &*task,
-        options: PlanOptions {
-            seed: seed ^ index,
-            threads: 1,
-            ..config.search
-        },
-        truth,
-    };
-    let rope: RopeParams = found.params;
+fn trial(case: &StrikeCase<'_>) -> Result<RobustTrial, PlanError> {
+    let (thrower, found) = (&case.thrower, &case.found);
     let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
-        let drawn = Belief::drawn(&rope, &found.posterior, optimised, FORECAST, seed ^ index);
-        let planned = thrower.plan(&rope, SEARCHES, drawn)?;
+        let seed = thrower.options.seed;
+        let drawn = Belief::drawn(&found.params, &found.posterior, optimised, FORECAST, seed);
+        let planned = thrower.plan(&found.params, SEARCHES, drawn)?;
         Ok(Foreseen {
             strike: thrower.throw(&planned)?,
             forecast: planned.forecast,
         })
     };
-    let both = || -> Result<RobustTrial, PlanError> {
-        Ok(RobustTrial {
-            index,
-            target_m,
-            plain: foreseen(0)?,
-            robust: foreseen(OPTIMISED)?,
-        })
-    };
-    both().map_err(|source| TrialError::Plan {
-        index,
-        source: Box::new(source),
+    Ok(RobustTrial {
+        index: case.index,
+        target_m: case.target_m,
+        plain: foreseen(0)?,
+        robust: foreseen(OPTIMISED)?,
     })
 }
 
@@ -107,15 +81,7 @@ pub fn robust_trials(
     seed: u64,
     indices: &[u64],
 ) -> Result<Vec<RobustTrial>, TrialError> {
-    let alone = IdentifyOptions {
-        threads: 1,
-        ..*options
-    };
-    map_in_order(indices, options.threads, |index| {
-        trial(rig, config, &alone, seed, *index)
-    })
-    .into_iter()
-    .collect()
+    strike_trials(rig, config, options, seed, indices, trial)
 }
 
 #[cfg(test)]
