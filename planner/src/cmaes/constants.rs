@@ -1,4 +1,9 @@
 //! Strategy constants that follow from dimension and population.
+//!
+//! Learning rates of the covariance and weights are those of the tutorial, table 1. The
+//! step size follows the package `cma` 4: its path is never forgotten faster than by half
+//! in a generation, and the damping grows further with the parents, without which a large
+//! population steps past the basins of a rugged landscape.
 
 /// Weights and learning rates (tutorial, table 1).
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +34,12 @@ pub struct StrategyConstants {
     reason = "dimensions and populations are far below 2^52"
 )]
 impl StrategyConstants {
+    /// Largest learning rate of the step-size path.
+    const C_SIGMA_MAX: f64 = 0.5;
+    /// Damping by the number of parents in many dimensions; it falls to half of this in
+    /// nine, to at least 1.
+    const PARENT_DAMPING: f64 = 3.0;
+
     /// Constants for `n` coordinates and `population` candidates (at least 4).
     #[must_use]
     pub fn new(n: usize, population: usize) -> Self {
@@ -46,7 +57,7 @@ impl StrategyConstants {
         let (sum_negative, mu_eff_negative) = mass(&negative);
 
         let c_c = (4.0 + mu_eff / nf) / (nf + 4.0 + 2.0 * mu_eff / nf);
-        let c_1 = 2.0 / ((nf + 1.3).powi(2) + mu_eff);
+        let c_1 = (lambda / 6.0).min(1.0) * 2.0 / ((nf + 1.3).powi(2) + mu_eff);
         let c_mu = (1.0 - c_1)
             .min(2.0 * (0.25 + mu_eff + 1.0 / mu_eff - 2.0) / ((nf + 2.0).powi(2) + mu_eff));
         // Scale of the negative weights, equations 50 to 53.
@@ -64,8 +75,10 @@ impl StrategyConstants {
             })
             .collect();
 
-        let c_sigma = (mu_eff + 2.0) / (nf + mu_eff + 5.0);
-        let d_sigma = 1.0 + 2.0 * (((mu_eff - 1.0) / (nf + 1.0)).sqrt() - 1.0).max(0.0) + c_sigma;
+        let c_sigma = ((mu_eff + 2.0) / (nf + mu_eff + 3.0)).min(Self::C_SIGMA_MAX);
+        let inner = (Self::PARENT_DAMPING * (1.0 - 0.5f64.powf(nf / 9.0))).max(1.0);
+        let crowd = inner * ((mu_eff - 1.0) / (nf + 1.0)).sqrt();
+        let d_sigma = 1.0 + 2.0 * (crowd - 1.0).max(0.0) + c_sigma;
         Self {
             weights,
             parents,
