@@ -1,13 +1,12 @@
 //! From camera frames to rope keypoints and to the score of a throw.
 //!
-//! Reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
+//! Takes frames from a camera ([`live`]), reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
 //! in the left eye ([`mod@track`]), measures tip and target in stereo ([`mod@score`]),
 //! draws what it found ([`overlay`], [`film`]) and says when a rope hangs still
 //! ([`still`]).
 //!
 //! It is *not* the place for rope physics, identification or planning: it
 //! knows pixels, cameras and colours only.
-#![forbid(unsafe_code)]
 #![cfg_attr(
     test,
     allow(
@@ -22,6 +21,7 @@
 pub mod calib;
 pub mod film;
 pub mod frame;
+pub mod live;
 pub mod overlay;
 pub mod process;
 pub mod score;

@@ -47,6 +47,8 @@ pub enum Command {
     Sim(SimCommand),
     /// Write the wiggle as joint positions, or execute it on an arm.
     Wiggle(WiggleArgs),
+    /// Record a stereo camera as a raw film that `wag track` and `wag score` read.
+    Film(FilmArgs),
     /// Follow the rope through a video.
     Track(TrackArgs),
     /// Find the rope parameters from a video or from keypoints.
@@ -277,6 +279,52 @@ pub struct MotionArgs {
     /// Attach-frame pose: CSV with columns t,x,y,z,qw,qx,qy,qz; t = 0 is the first frame.
     #[arg(long)]
     pub pose: Option<PathBuf>,
+}
+
+/// Arguments of `wag film`.
+#[derive(Debug, Args)]
+pub struct FilmArgs {
+    /// The camera, /dev/videoN.
+    #[arg(long)]
+    pub device: PathBuf,
+    /// Picture size of an eye: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
+    #[arg(long, value_enum, default_value_t = ModeName::Vga)]
+    pub mode: ModeName,
+    /// Frames per second.
+    #[arg(long, default_value_t = 60)]
+    pub fps: u32,
+    /// Frames to record.
+    #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..=36_000))]
+    pub frames: u64,
+    /// The camera's ordinary control for gain.
+    #[arg(long)]
+    pub gain: Option<i32>,
+    /// Exposure in the sensor's own units; ends automatic exposure (ZED only).
+    #[arg(long)]
+    pub exposure_raw: Option<u32>,
+    /// Gain in the sensor's own units (ZED only).
+    #[arg(long, requires = "exposure_raw")]
+    pub sensor_gain_raw: Option<u32>,
+    /// Beginning of the files' names: NAME_WIDTHxHEIGHT.yuyv and .csv.
+    #[arg(long, value_name = "NAME")]
+    pub out: PathBuf,
+}
+
+/// Picture sizes of a stereo camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ModeName {
+    /// 672x376.
+    #[value(name = "VGA")]
+    Vga,
+    /// 1280x720.
+    #[value(name = "HD")]
+    Hd,
+    /// 1920x1080.
+    #[value(name = "FHD")]
+    FullHd,
+    /// 2208x1242.
+    #[value(name = "2K")]
+    TwoK,
 }
 
 /// Arguments of `wag track`.
@@ -681,6 +729,8 @@ pub enum ProcessName {
     RtController,
     /// Stops the arm when the controller is lost.
     Guardian,
+    /// A stereo camera's frames into shared memory.
+    Camera,
     /// Camera frames to keypoints.
     CameraIngest,
     /// Identification and planning.

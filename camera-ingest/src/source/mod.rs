@@ -9,6 +9,7 @@ mod images;
 mod stamps;
 mod yuyv;
 
+use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
 pub use avi::AviSource;
@@ -149,6 +150,14 @@ impl FrameSource for Box<dyn FrameSource> {
 /// A file is missing, truncated or of another kind; nothing tells when the frames
 /// were taken, or both a CSV and `rate_hz` do.
 pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn FrameSource>, SourceError> {
+    let device = |m: std::fs::Metadata| m.file_type().is_char_device();
+    if std::fs::metadata(path).is_ok_and(device) {
+        return Err(SourceError::Container {
+            path: path.to_owned(),
+            reason: "it is a device, no recording".to_owned(),
+            remedy: "record a camera first, with `wag film`",
+        });
+    }
     if path.is_dir() {
         let video = path.join("video.avi");
         if !video.exists() {

@@ -8,6 +8,7 @@ mod demo;
 mod demo_summary;
 mod doctor;
 mod explain;
+mod film;
 mod identify;
 mod latency;
 mod manual;
@@ -40,6 +41,7 @@ fn results(command: &Command) -> Vec<&Path> {
         Command::Sim(SimCommand::Rope(args)) => &[Some(&args.out)],
         Command::Sim(SimCommand::Throw(args)) => &[Some(&args.out)],
         Command::Wiggle(args) => &[args.csv.as_deref()],
+        Command::Film(args) => &[Some(&args.out)],
         Command::Track(args) => &[Some(&args.out), args.overlay.as_deref()],
         Command::Identify(args) => &[Some(&args.out)],
         Command::Calib(CalibCommand::Extrinsics(args)) => &[Some(&args.out)],
@@ -65,6 +67,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Sim(SimCommand::Rope(args)) => sim::rope(args, quiet),
         Command::Sim(SimCommand::Throw(args)) => sim::throw(args, quiet),
         Command::Wiggle(args) => wiggle::run(args, quiet),
+        Command::Film(args) => film::run(args, quiet),
         Command::Track(args) => track::run(args, quiet),
         Command::Identify(args) => identify::run(args, quiet),
         Command::Plan(PlanCommand::Strike(args)) => plan::run(Task::Strike, args, quiet),

@@ -51,7 +51,10 @@ pub fn run(args: &ProcessArgs) -> Outcome {
     watch_interrupts().or_failed()?;
     let end_within = match args.name {
         ProcessName::RtController | ProcessName::Guardian => BRAKE_WITHIN,
-        ProcessName::Rig | ProcessName::CameraIngest | ProcessName::Planner => END_WITHIN,
+        ProcessName::Rig
+        | ProcessName::Camera
+        | ProcessName::CameraIngest
+        | ProcessName::Planner => END_WITHIN,
     };
     watch_parent(args.parent, end_within).or_failed()?;
     let stop = interrupted();
@@ -67,6 +70,7 @@ pub fn run(args: &ProcessArgs) -> Outcome {
         ProcessName::Guardian => {
             rt_controller::guardian::run(&read(args).or_input()?, stop).or_failed()
         }
+        ProcessName::Camera => camera_ingest::live::run(&read(args).or_input()?, stop).or_failed(),
         ProcessName::CameraIngest => {
             camera_ingest::process::run(&read(args).or_input()?, stop).or_failed()
         }

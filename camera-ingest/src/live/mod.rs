@@ -1,0 +1,201 @@
+//! A stereo camera that runs: UVC through V4L2, side-by-side YUYV in buffers that the
+//! driver fills and this process maps.
+//!
+//! The driver fills whatever buffers it has and drops frames when it has none: a slow
+//! reader loses frames, which are counted, and never slows the camera.
+
+mod abi;
+mod camera;
+mod device;
+mod exposure;
+mod kernel;
+mod publish;
+mod record;
+#[cfg(test)]
+mod tests;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+pub use camera::{LiveCamera, LiveFrame};
+pub use publish::{CameraConfig, PublishError, run};
+pub use record::{RecordError, Recorded, record};
+use serde::{Deserialize, Serialize};
+
+use crate::calib::VideoMode;
+use exposure::Sensor;
+
+/// How a camera is to run. TOML form: keys as the fields.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LiveSettings {
+    /// Device, `/dev/videoN`.
+    pub device: PathBuf,
+    /// Picture size.
+    pub mode: VideoMode,
+    /// Frames per second.
+    pub rate_hz: u32,
+    /// The camera's ordinary control for gain; without it, it stays as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<i32>,
+    /// Exposure in the sensor's own units, which ends automatic exposure; ZED only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_raw: Option<u32>,
+    /// Gain in the sensor's own units; only beside `exposure_raw`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor_gain_raw: Option<u32>,
+}
+
+impl LiveSettings {
+    /// Width of both eyes together and height (px).
+    #[must_use]
+    pub fn size_px(&self) -> [usize; 2] {
+        let (width_px, height_px) = self.mode.size_px();
+        [2 * width_px as usize, height_px as usize]
+    }
+
+    /// Bytes of one frame.
+    #[must_use]
+    pub fn frame_bytes(&self) -> usize {
+        let [width_px, height_px] = self.size_px();
+        2 * width_px * height_px
+    }
+}
+
+impl LiveSettings {
+    /// What the sensors are to be set to, or what is out of range.
+    fn sensor(&self) -> Result<Option<Sensor>, String> {
+        if !(1..=240).contains(&self.rate_hz) {
+            return Err(format!("rate_hz is {}, it must be 1 to 240", self.rate_hz));
+        }
+        let Some(exposure_raw) = self.exposure_raw else {
+            return match self.sensor_gain_raw {
+                None => Ok(None),
+                Some(_) => Err(
+                    "sensor_gain_raw needs exposure_raw beside it: automatic exposure would \
+                     change both"
+                        .to_owned(),
+                ),
+            };
+        };
+        let sensor = Sensor {
+            exposure_raw,
+            gain_raw: self.sensor_gain_raw,
+        };
+        sensor.check(self.rate_hz)?;
+        Ok(Some(sensor))
+    }
+}
+
+/// Frames that a camera took and nobody got, by reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Losses {
+    /// Left out of the driver's count: no buffer was free, or the bus was too slow.
+    pub missed: u64,
+    /// Marked as damaged by the driver.
+    pub damaged: u64,
+    /// Of another length than a frame has.
+    pub short: u64,
+    /// With a time stamp that was not later than the one before.
+    pub unordered: u64,
+}
+
+impl Losses {
+    /// All together.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.missed + self.damaged + self.short + self.unordered
+    }
+
+    /// Those after `before`.
+    #[must_use]
+    fn since(&self, before: Self) -> Self {
+        Self {
+            missed: self.missed - before.missed,
+            damaged: self.damaged - before.damaged,
+            short: self.short - before.short,
+            unordered: self.unordered - before.unordered,
+        }
+    }
+}
+
+/// Why a camera gives no frames.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// It cannot be opened, or is no camera.
+    #[error("camera {device}: {reason}; {remedy}")]
+    Unfit {
+        /// Device concerned.
+        device: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The driver granted something else than was asked.
+    #[error("camera {device}: {what}: {asked} asked for, {granted} granted; {remedy}")]
+    Granted {
+        /// Device concerned.
+        device: PathBuf,
+        /// What was asked for.
+        what: &'static str,
+        /// What was wanted.
+        asked: String,
+        /// What the driver gives.
+        granted: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A setting is out of range or not to be had from this camera.
+    #[error("camera {device}: {reason}")]
+    Setting {
+        /// Device concerned.
+        device: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
+    /// It is gone.
+    #[error("camera {device} was unplugged after {frames} frames; look at plug, cable and power")]
+    Unplugged {
+        /// Device concerned.
+        device: PathBuf,
+        /// Good frames so far.
+        frames: u64,
+    },
+    /// No good frame for too long.
+    #[error(
+        "camera {device}: no good frame for {waited_ms} ms (after {frames} good ones; {} missed, {} \
+         damaged, {} short, {} out of order); look at cable and USB port", losses.missed,
+        losses.damaged, losses.short, losses.unordered
+    )]
+    Silent {
+        /// Device concerned.
+        device: PathBuf,
+        /// How long was waited.
+        waited_ms: u128,
+        /// Good frames so far.
+        frames: u64,
+        /// What was lost so far.
+        losses: Losses,
+    },
+    /// The system refused something that should go.
+    #[error("camera {device}: {what} failed: {source}")]
+    System {
+        /// Device concerned.
+        device: PathBuf,
+        /// What was tried.
+        what: &'static str,
+        /// The system's reason.
+        source: io::Error,
+    },
+}
+
+impl LiveError {
+    fn system(device: &Path, what: &'static str, source: io::Error) -> Self {
+        Self::System {
+            device: device.to_owned(),
+            what,
+            source,
+        }
+    }
+}

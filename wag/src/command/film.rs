@@ -1,0 +1,69 @@
+//! `wag film`: a stretch of a stereo camera's frames as a raw film.
+
+use crate::cli::{FilmArgs, ModeName};
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::progress::Stage;
+use crate::session::{interrupted, watch_interrupts};
+use camera_ingest::calib::VideoMode;
+use camera_ingest::live::{LiveCamera, LiveError, LiveSettings, record};
+use serde_json::{Value, json};
+
+impl From<ModeName> for VideoMode {
+    fn from(name: ModeName) -> Self {
+        match name {
+            ModeName::Vga => Self::Vga,
+            ModeName::Hd => Self::Hd,
+            ModeName::FullHd => Self::FullHd,
+            ModeName::TwoK => Self::TwoK,
+        }
+    }
+}
+
+/// A camera that cannot be had as asked is a wrong input; one that ends is a failure.
+fn failure(error: LiveError) -> Failure {
+    match error {
+        LiveError::Unplugged { .. } | LiveError::Silent { .. } | LiveError::System { .. } => {
+            Failure::failed(error)
+        }
+        LiveError::Unfit { .. } | LiveError::Granted { .. } | LiveError::Setting { .. } => {
+            Failure::input(error)
+        }
+    }
+}
+
+pub fn run(args: &FilmArgs, quiet: bool) -> Outcome<Option<Value>> {
+    watch_interrupts().or_failed()?;
+    let settings = LiveSettings {
+        device: args.device.clone(),
+        mode: args.mode.into(),
+        rate_hz: args.fps,
+        gain: args.gain,
+        exposure_raw: args.exposure_raw,
+        sensor_gain_raw: args.sensor_gain_raw,
+    };
+    let mut camera = LiveCamera::open(settings).map_err(failure)?;
+    let stage = Stage::begin("film", quiet);
+    let told = |frames: u64| {
+        if frames.is_multiple_of(30) {
+            stage.say(format!("{frames} of {} frames", args.frames));
+        }
+    };
+    let made = record(&mut camera, args.frames, &args.out, interrupted(), told).or_failed()?;
+    let lost = made.losses;
+    let seconds = stage.done(&format!("{} frames, {} lost", made.frames, lost.total()));
+    if !quiet {
+        println!(
+            "`{}`, times in `{}`; {} missed, {} damaged, {} short, {} out of order",
+            made.film.display(),
+            made.times.display(),
+            lost.missed,
+            lost.damaged,
+            lost.short,
+            lost.unordered
+        );
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "film", "film": made.film, "times": made.times,
+        "frames": made.frames, "losses": lost, "seconds": seconds,
+    })))
+}
