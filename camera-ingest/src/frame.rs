@@ -98,13 +98,19 @@ impl EyeFrame {
         }
     }
 
-    /// Left eye of a side-by-side JPEG.
+    /// Left eye of a side-by-side JPEG. `room` holds the decoded picture meanwhile;
+    /// whoever keeps it from frame to frame spares the system new pages for each.
     ///
     /// # Errors
     /// As [`StereoFrame::from_jpeg`].
-    pub fn left_from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        let (packed, size) = decode(bytes)?;
-        Ok(planes(&packed, size, size[0] / 2, stamp_ns, sequence))
+    pub(crate) fn left_from_jpeg(
+        bytes: &[u8],
+        stamp_ns: u64,
+        sequence: u64,
+        room: &mut Vec<u8>,
+    ) -> Result<Self, FrameError> {
+        let size = decode(bytes, room)?;
+        Ok(planes(room, size, size[0] / 2, stamp_ns, sequence))
     }
 
     /// Packed RGB, 3 bytes a pixel.
@@ -168,7 +174,8 @@ impl StereoFrame {
     /// # Errors
     /// The JPEG is damaged or its width is no side-by-side pair.
     pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        let (packed, size) = decode(bytes)?;
+        let mut packed = Vec::new();
+        let size = decode(bytes, &mut packed)?;
         let frame = planes(&packed, size, size[0], stamp_ns, sequence);
         Ok(Self(frame))
     }
@@ -209,8 +216,8 @@ impl StereoFrame {
     }
 }
 
-/// Packed Y, Cb, Cr of every pixel, and width and height.
-fn decode(bytes: &[u8]) -> Result<(Vec<u8>, [usize; 2]), FrameError> {
+/// Packed Y, Cb, Cr of every pixel into `packed`; width and height.
+fn decode(bytes: &[u8], packed: &mut Vec<u8>) -> Result<[usize; 2], FrameError> {
     // Asking for YCbCr spares a colour conversion we would only undo.
     let options = DecoderOptions::new_fast()
         .jpeg_set_out_colorspace(ColorSpace::YCbCr)
@@ -224,15 +231,16 @@ fn decode(bytes: &[u8]) -> Result<(Vec<u8>, [usize; 2]), FrameError> {
     }
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::Jpeg(format!("{e:?}"));
-    let packed = decoder.decode().map_err(jpeg)?;
-    let (width_px, height_px) = decoder
-        .dimensions()
-        .ok_or_else(|| FrameError::Jpeg("no dimensions".to_owned()))?;
+    decoder.decode_headers().map_err(jpeg)?;
+    let none = || FrameError::Jpeg("no dimensions".to_owned());
+    let (width_px, height_px) = decoder.dimensions().ok_or_else(none)?;
     check_width(width_px)?;
+    packed.resize(decoder.output_buffer_size().ok_or_else(none)?, 0);
     if packed.len() != width_px * height_px * 3 {
         return Err(FrameError::Jpeg("not a colour picture".to_owned()));
     }
-    Ok((packed, [width_px, height_px]))
+    decoder.decode_into(packed).map_err(jpeg)?;
+    Ok([width_px, height_px])
 }
 
 /// The first `columns` columns of a packed picture.

@@ -22,12 +22,15 @@ use crate::source::open_video;
 const PATIENCE: Duration = Duration::from_millis(20);
 const FRAME_NS: u64 = 16_666_667;
 
+/// A driver's change of what is asked.
+type Grant = fn(&mut abi::PixFormat);
+
 /// The driver's side.
 #[derive(Debug)]
 struct Driver {
     capabilities: u32,
     /// Changes what is granted.
-    grant: fn(&mut abi::PixFormat),
+    grant: Grant,
     granted_rate: Option<[u32; 2]>,
     granted_buffers: u32,
     refuse: Option<(&'static str, i32)>,
@@ -345,7 +348,7 @@ fn unplugging_and_silence_are_told_apart() {
 
 #[test]
 fn what_the_driver_grants_is_checked() {
-    let grants: [(fn(&mut abi::PixFormat), &str); 4] = [
+    let grants: [(Grant, &str); 4] = [
         (|p| p.width = 672, "672x376 YUYV"),
         (|p| p.pixelformat = u32::from_le_bytes(*b"MJPG"), "MJPG"),
         (|p| p.bytesperline += 64, "rows of 2752 bytes"),

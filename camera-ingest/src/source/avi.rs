@@ -21,6 +21,8 @@ pub struct AviSource {
     bytes: Vec<u8>,
     chunks: Vec<Range<usize>>,
     stamps: Vec<Stamp>,
+    /// For decoding.
+    room: Vec<u8>,
 }
 
 impl AviSource {
@@ -41,6 +43,7 @@ impl AviSource {
             bytes,
             chunks,
             stamps,
+            room: Vec::new(),
         })
     }
 
@@ -52,9 +55,9 @@ impl AviSource {
     }
 
     fn decode<T>(
-        &self,
+        &mut self,
         index: usize,
-        decode: impl Fn(&[u8], u64, u64) -> Result<T, FrameError>,
+        decode: impl Fn(&[u8], u64, u64, &mut Vec<u8>) -> Result<T, FrameError>,
     ) -> Result<T, SourceError> {
         let (Some(range), Some(stamp)) = (self.chunks.get(index), self.stamps.get(index)) else {
             return Err(SourceError::OutOfRange {
@@ -64,7 +67,8 @@ impl AviSource {
             });
         };
         let jpeg = &self.bytes[range.clone()];
-        decode(jpeg, stamp.stamp_ns, stamp.sequence).map_err(|source| SourceError::Frame {
+        let frame = decode(jpeg, stamp.stamp_ns, stamp.sequence, &mut self.room);
+        frame.map_err(|source| SourceError::Frame {
             path: self.path.clone(),
             frame: index,
             source,
@@ -78,7 +82,9 @@ impl FrameSource for AviSource {
     }
 
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        self.decode(index, StereoFrame::from_jpeg)
+        self.decode(index, |jpeg, stamp_ns, sequence, _room| {
+            StereoFrame::from_jpeg(jpeg, stamp_ns, sequence)
+        })
     }
 
     fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {

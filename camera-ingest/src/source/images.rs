@@ -109,7 +109,9 @@ fn stereo(kind: Kind, bytes: &[u8], stamp: Stamp) -> Result<StereoFrame, FrameEr
 fn left(kind: Kind, bytes: &[u8], stamp: Stamp) -> Result<EyeFrame, FrameError> {
     match kind {
         Kind::Png => stereo(kind, bytes, stamp).map(|frame| frame.left()),
-        Kind::Jpeg => EyeFrame::left_from_jpeg(bytes, stamp.stamp_ns, stamp.sequence),
+        Kind::Jpeg => {
+            EyeFrame::left_from_jpeg(bytes, stamp.stamp_ns, stamp.sequence, &mut Vec::new())
+        }
     }
 }
 

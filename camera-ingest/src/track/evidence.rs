@@ -308,6 +308,7 @@ impl Coverage {
         let (mut sum, mut u_sum, mut v_sum) = (0.0, 0.0, 0.0);
         // What lies beyond this on one axis has no weight; nor has what is not covered.
         let reach = radius_px + 1.0;
+        let within = (radius_px - 0.5).max(0.0).powi(2);
         for (row, v) in self
             .values
             .chunks_exact(self.width.max(1))
@@ -323,8 +324,13 @@ impl Coverage {
                     continue;
                 }
                 // A soft edge of one pixel keeps the centroid a smooth function
-                // of the window's place.
-                let inside = radius_px + 0.5 - du.hypot(dv);
+                // of the window's place; only there the distance must be known.
+                let square = du * du + dv * dv;
+                let inside = if square < within {
+                    1.0
+                } else {
+                    radius_px + 0.5 - du.hypot(dv)
+                };
                 if inside > 0.0 {
                     let w = f64::from(value) * inside.min(1.0);
                     sum += w;

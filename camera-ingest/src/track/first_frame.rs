@@ -183,6 +183,16 @@ fn disc(centre: [f64; 2], radius_px: f64, window: Window) -> impl Iterator<Item 
     })
 }
 
+/// Colour of a pixel in the background's light.
+pub(super) fn colour_at(frame: &EyeFrame, gain: f32, u: usize, v: usize) -> Colour {
+    let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
+    [
+        y / gain,
+        128.0 + (cb - 128.0) / gain,
+        128.0 + (cr - 128.0) / gain,
+    ]
+}
+
 /// Median colour of some pixels in the background's light, and the median
 /// distance from it.
 pub(super) fn colour_of(
@@ -190,16 +200,7 @@ pub(super) fn colour_of(
     gain: f32,
     pixels: impl Iterator<Item = [usize; 2]>,
 ) -> (Colour, f32) {
-    let colours: Vec<Colour> = pixels
-        .map(|[u, v]| {
-            let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
-            [
-                y / gain,
-                128.0 + (cb - 128.0) / gain,
-                128.0 + (cr - 128.0) / gain,
-            ]
-        })
-        .collect();
+    let colours: Vec<Colour> = pixels.map(|[u, v]| colour_at(frame, gain, u, v)).collect();
     if colours.is_empty() {
         return ([128.0; 3], 0.0);
     }
@@ -225,38 +226,51 @@ pub(super) fn colour_of(
 /// Pixels that differ from the background, smoothed over 3x3 pixels.
 fn moving(frame: &EyeFrame, background: &Background, gain: f32) -> Vec<bool> {
     let (width, height) = (frame.width_px, frame.height_px);
-    let square: Vec<f32> = (0..width * height)
-        .map(|at| {
-            let (u, v) = (at % width, at / width);
-            let (i, b) = (frame.ycc(u, v), background.image.ycc(u, v));
-            let mut sum = (f32::from(i[0]) / gain - f32::from(b[0])).powi(2);
-            for k in 1..3 {
-                sum += ((f32::from(i[k]) - 128.0) / gain + 128.0 - f32::from(b[k])).powi(2);
-            }
-            sum
-        })
-        .collect();
+    let square = squares(frame, &background.image, gain);
     let threshold = 9.0 * (MASK_NOISE * background.noise).max(MASK_LEAST).powi(2);
-    (0..width * height)
-        .map(|at| {
-            let (u, v) = (at % width, at / width);
-            if u == 0 || v == 0 || u + 1 == width || v + 1 == height {
-                return false;
-            }
-            let sum: f32 = (v - 1..=v + 1)
-                .map(|y| {
-                    square[y * width + u - 1..=y * width + u + 1]
-                        .iter()
-                        .sum::<f32>()
-                })
-                .sum();
-            sum > threshold
-        })
-        .collect()
+    // Sums of three along the rows, then of three rows; the border is never moving.
+    let mut threes = vec![0.0; width * height];
+    for (row, out) in square.chunks(width).zip(threes.chunks_mut(width)) {
+        for (near, out) in row.windows(3).zip(&mut out[1..]) {
+            *out = near[0] + near[1] + near[2];
+        }
+    }
+    let mut mask = vec![false; width * height];
+    for v in 1..height - 1 {
+        let row = |v: usize| &threes[v * width..(v + 1) * width];
+        let (above, here, below) = (row(v - 1), row(v), row(v + 1));
+        for u in 1..width - 1 {
+            mask[v * width + u] = above[u] + here[u] + below[u] > threshold;
+        }
+    }
+    mask
+}
+
+/// Squared distance of every pixel's colour, in the background's light, from the
+/// background.
+fn squares(frame: &EyeFrame, empty: &EyeFrame, gain: f32) -> Vec<f32> {
+    let chroma =
+        |seen: u8, empty: u8| ((f32::from(seen) - 128.0) / gain + 128.0 - f32::from(empty)).powi(2);
+    let mut out = vec![0.0; frame.luma.len()];
+    let luma = frame.luma.chunks_exact(2).zip(empty.luma.chunks_exact(2));
+    let blue = frame.cb.iter().zip(&empty.cb);
+    let red = frame.cr.iter().zip(&empty.cr);
+    for (pair, ((y, ey), (b, r))) in out.chunks_exact_mut(2).zip(luma.zip(blue.zip(red))) {
+        let (b, r) = (chroma(*b.0, *b.1), chroma(*r.0, *r.1));
+        for k in 0..2 {
+            pair[k] = (f32::from(y[k]) / gain - f32::from(ey[k])).powi(2) + b + r;
+        }
+    }
+    out
 }
 
 /// Mask with the pole and what holds it taken out of reach.
-#[allow(clippy::cast_precision_loss, reason = "pixel indices")]
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "pixel indices, clamped to the image"
+)]
 fn ground(
     mask: &[bool],
     width: usize,
@@ -266,21 +280,25 @@ fn ground(
 ) -> Vec<Ground> {
     let behind = |d: f64| camera.project_left(&(clamp.p_w_m + clamp.pole_w * d));
     let reach = POLE_HALF_WIDTH_M * plane.px_per_m;
+    let on = |&on: &bool| if on { Ground::On } else { Ground::Off };
+    let mut ground: Vec<Ground> = mask.iter().map(on).collect();
     // Begin where the half-circle around the pole's start ends at the clamp.
-    let ends = behind(POLE_HALF_WIDTH_M + 0.004).zip(behind(POLE_LENGTH_M));
-    mask.iter()
-        .enumerate()
-        .map(|(at, &on)| {
-            let p = [(at % width) as f64, (at / width) as f64];
-            if ends.is_some_and(|(a, b)| distance_to_segment(p, a, b) < reach) {
-                Ground::Blocked
-            } else if on {
-                Ground::On
-            } else {
-                Ground::Off
+    let Some((a, b)) = behind(POLE_HALF_WIDTH_M + 0.004).zip(behind(POLE_LENGTH_M)) else {
+        return ground;
+    };
+    let range = |k: usize, size: usize| {
+        let low = (a[k].min(b[k]) - reach).max(0.0) as usize;
+        let high = (a[k].max(b[k]) + reach).max(0.0) as usize + 1;
+        low.min(size)..high.min(size)
+    };
+    for v in range(1, mask.len() / width) {
+        for u in range(0, width) {
+            if distance_to_segment([u as f64, v as f64], a, b) < reach {
+                ground[v * width + u] = Ground::Blocked;
             }
-        })
-        .collect()
+        }
+    }
+    ground
 }
 
 fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {

@@ -130,10 +130,17 @@ fn box_sums(row: &[f64], reach: f64, out: &mut [f64]) {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "sample counts are small")]
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "sample counts are small and positive"
+)]
 fn row_centroid(row: &[f64], centre: f64, reach: f64) -> f64 {
     let (mut sum, mut moment) = (0.0, 0.0);
-    for (lane, value) in row.iter().enumerate() {
+    let from = (centre - reach - 1.0).max(0.0) as usize;
+    let to = (centre + reach + 2.0).max(0.0) as usize;
+    for (lane, value) in row.iter().enumerate().take(to).skip(from) {
         let inside = reach + 0.5 - (lane as f64 - centre).abs();
         if inside > 0.0 {
             let w = value * inside.min(1.0);

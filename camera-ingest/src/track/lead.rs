@@ -9,7 +9,7 @@
 
 use super::background::Background;
 use super::evidence::Colour;
-use super::first_frame::colour_of;
+use super::first_frame::{colour_at, colour_of};
 use super::geodesic::Geodesic;
 use crate::frame::EyeFrame;
 
@@ -175,7 +175,10 @@ impl Search<'_> {
         let limit = ROPE_COLOUR + 2.0 * rope.scatter;
         let mut lengths: Vec<f64> = reached
             .iter()
-            .filter(|r| distance(self.colour(std::iter::once(r.0)).0, rope.colour) < limit)
+            .filter(|r| {
+                let (u, v) = (r.0 % self.frame.width_px, r.0 / self.frame.width_px);
+                distance(colour_at(self.frame, self.gain, u, v), rope.colour) < limit
+            })
             .map(|r| r.1)
             .collect();
         lengths.sort_by(f64::total_cmp);

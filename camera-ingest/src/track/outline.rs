@@ -4,6 +4,7 @@
 //! does not move with the light. Motion blur widens it evenly.
 
 use super::background::Background;
+use super::evidence::Window;
 use crate::frame::EyeFrame;
 
 /// Rays from the centre.
@@ -12,6 +13,8 @@ const RAYS: usize = 40;
 const STEP_PX: f64 = 0.5;
 /// Edges of the rope are smeared this far into the outline beside it (px).
 const MARGIN_PX: f64 = 0.7;
+/// Rays reach this many radii, and the blur.
+const RAY_RADII: f64 = 1.7;
 /// Part of the free rays that must agree on the circle.
 const LEAST_RAYS: f64 = 0.5;
 
@@ -59,18 +62,22 @@ impl Contrast<'_> {
     }
 
     /// Contrast at a raw pixel, bilinear; the border's value outside the image.
+    pub(super) fn at(&self, place: [f64; 2]) -> f64 {
+        self.bilinear(place, |u, v| self.pixel(u, v))
+    }
+
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         clippy::cast_precision_loss,
         reason = "clamped to the image first"
     )]
-    pub(super) fn at(&self, [u, v]: [f64; 2]) -> f64 {
+    fn bilinear(&self, [u, v]: [f64; 2], pixel: impl Fn(usize, usize) -> f64) -> f64 {
         let u = u.clamp(0.0, (self.frame.width_px - 1) as f64);
         let v = v.clamp(0.0, (self.frame.height_px - 1) as f64);
         let (i, j) = (u as usize, v as usize);
         let (a, b) = (u - i as f64, v - j as f64);
-        let row = |y: usize| (1.0 - a) * self.pixel(i, y) + a * self.pixel(i + 1, y);
+        let row = |y: usize| (1.0 - a) * pixel(i, y) + a * pixel(i + 1, y);
         (1.0 - b) * row(j) + b * row(j + 1)
     }
 
@@ -84,8 +91,9 @@ impl Contrast<'_> {
             .collect();
         let enough = LEAST_RAYS * free.len() as f64;
         let mut circle = guess;
+        let patch = Patch::around(self, guess.centre, RAY_RADII * guess.radius_px + blur_px);
         for _ in 0..3 {
-            let edges = self.edges(&free, circle.centre, guess.radius_px, blur_px);
+            let edges = patch.edges(&free, circle.centre, guess.radius_px, blur_px);
             circle = robust_circle(&edges, enough)?;
             let least = 0.65 * guess.radius_px;
             let most = 1.4 * guess.radius_px + blur_px / 2.0;
@@ -133,6 +141,40 @@ impl Contrast<'_> {
             start - (last as f64 + part) * STEP_PX + expected.radius_px,
         ))
     }
+}
+
+/// Contrast around a place, computed once for rays that cross each other.
+struct Patch<'a> {
+    contrast: &'a Contrast<'a>,
+    window: Window,
+    values: Vec<f64>,
+}
+
+impl<'a> Patch<'a> {
+    fn around(contrast: &'a Contrast<'a>, centre: [f64; 2], reach_px: f64) -> Self {
+        let window = Window::around(std::iter::once(centre), reach_px, contrast.frame);
+        let values = (window.v0..window.v1)
+            .flat_map(|v| (window.u0..window.u1).map(move |u| contrast.pixel(u, v)))
+            .collect();
+        Self {
+            contrast,
+            window,
+            values,
+        }
+    }
+
+    fn pixel(&self, u: usize, v: usize) -> f64 {
+        let w = self.window;
+        if (w.u0..w.u1).contains(&u) && (w.v0..w.v1).contains(&v) {
+            self.values[(v - w.v0) * (w.u1 - w.u0) + u - w.u0]
+        } else {
+            self.contrast.pixel(u, v)
+        }
+    }
+
+    fn at(&self, place: [f64; 2]) -> f64 {
+        self.contrast.bilinear(place, |u, v| self.pixel(u, v))
+    }
 
     /// Places on rays where the contrast falls below half of the inside's.
     #[allow(
@@ -148,8 +190,8 @@ impl Contrast<'_> {
         radius_px: f64,
         blur_px: f64,
     ) -> Vec<[f64; 2]> {
-        let floor = 3.0 * f64::from(self.background.noise);
-        let samples = ((1.7 * radius_px + blur_px) / STEP_PX) as usize;
+        let floor = 3.0 * f64::from(self.contrast.background.noise);
+        let samples = ((RAY_RADII * radius_px + blur_px) / STEP_PX) as usize;
         let inside = (0.3 * radius_px / STEP_PX) as usize..=(0.75 * radius_px / STEP_PX) as usize;
         rays_rad
             .iter()
