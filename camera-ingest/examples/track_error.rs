@@ -69,7 +69,7 @@ fn main() {
         per_frame(t.first_frame),
         per_frame(t.follow)
     );
-    println!("{:?}", result.appearance);
+    println!("{:?}\n{:?}", result.appearance, result.clamp);
     println!("lost {:.1} %", 100.0 * result.track.lost_part());
     let error = |frame: usize, node: usize| -> f64 {
         let at = (frame * shape[1] + node) * 2;

@@ -349,6 +349,38 @@ fn without_width_or_colour_to_go_by_the_lead_is_the_free_end() {
     assert_small(errors(&recording, &result, 0..100));
 }
 
+/// The same path, told `late_s` later and `aside_m` further to the right.
+fn moved(path: &ClampPath, late_s: f64, aside_m: f64) -> ClampPath {
+    let samples = path.samples().iter().map(|s| ClampSample {
+        t_s: s.t_s + late_s,
+        p_w_m: s.p_w_m + Vector3::new(aside_m, 0.0, 0.0),
+        ..*s
+    });
+    ClampPath::new(samples.collect()).unwrap()
+}
+
+#[test]
+fn a_clock_and_a_clamp_that_are_off_are_told() {
+    let colours = [[190.0, 60.0, 40.0], [40.0, 60.0, 170.0]];
+    let mut recording = record(&SWAY, 150, colours, 0..0);
+    let path = recording.clamp.clone();
+    for (late_s, aside_m) in [(0.0, 0.0), (0.008, 0.002), (-0.012, -0.002)] {
+        recording.clamp = moved(&path, late_s, aside_m);
+        let found = follow(&recording).clamp.unwrap();
+        println!("{late_s} s, {aside_m} m: {found:?}");
+        // A path told late makes the film early.
+        let off_s = (found.time_offset_s + late_s).abs();
+        let off_m = (found.aside_m + aside_m).abs();
+        assert!(off_s < 2.0 * found.time_std_s + 5e-4, "{found:?}");
+        assert!(off_m < 2.0 * found.aside_std_m + 5e-4, "{found:?}");
+        assert!(
+            found.time_std_s < 3e-3 && found.aside_std_m < 2e-3,
+            "{found:?}"
+        );
+        assert!(found.frames > 100, "{found:?}");
+    }
+}
+
 #[test]
 fn no_rope_is_an_error_that_says_so() {
     let motion = Motion {

@@ -11,6 +11,7 @@ use super::lateral::{Across, Search, measure};
 use super::lead;
 use super::outline::{Circle, Contrast, RopeEnd};
 use super::plane::{Point, RopePlane};
+use super::timing::{SeenClamp, seen_clamp};
 use crate::frame::EyeFrame;
 
 /// Nodes of the tracked curve.
@@ -95,6 +96,8 @@ pub(super) struct State {
     /// Something that looks like the rope or its lead is so near that one may
     /// have been taken for the other.
     pub(super) ambiguous: bool,
+    /// The clamp as the rope below it shows it.
+    pub(super) clamp: Option<SeenClamp>,
 }
 
 impl State {
@@ -238,6 +241,7 @@ impl Follower<'_> {
             confidence,
             lost,
             ambiguous,
+            clamp: seen_clamp(&found, first),
         }
     }
 

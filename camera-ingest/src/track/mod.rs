@@ -21,6 +21,7 @@ mod lead;
 mod outline;
 mod plane;
 mod pursuit;
+mod timing;
 
 use std::time::{Duration, Instant};
 
@@ -33,6 +34,7 @@ use outline::{Circle, Contrast};
 use plane::RopePlane;
 use shared_types::keypoints::{MAX_KEYPOINTS, TrackedFrame};
 use shared_types::{KeypointTrack, StereoCamera};
+pub use timing::ClampFit;
 
 use crate::frame::EyeFrame;
 
@@ -74,6 +76,9 @@ pub struct TrackResult {
     pub appearance: RopeAppearance,
     /// Per frame: part of the rope's coverage not found (0 = all seen).
     pub residual: Vec<f64>,
+    /// Whether the film bears out time and place of the clamp; `None` where the clamp
+    /// hardly moves or the rope below it is seen too seldom.
+    pub clamp: Option<ClampFit>,
     /// Where the time went.
     pub times: TrackTimes,
 }
@@ -203,6 +208,12 @@ pub fn track(
             first: states.iter().position(|s| s.lost).unwrap_or(0),
         });
     }
+    let seen: Vec<_> = states
+        .iter()
+        .filter(|s| !s.lost && !s.ambiguous)
+        .filter_map(|s| Some((s.t_s, s.clamp?)))
+        .collect();
+    let clamp = timing::fit(&seen, 1.0 / plane.px_per_m, |t_s| follower.clamp_at(t_s));
     let tracked = states
         .iter()
         .map(|s| keypoints(s, &plane, options.keypoints))
@@ -212,6 +223,7 @@ pub fn track(
             keypoints: options.keypoints,
             frames: tracked,
         },
+        clamp,
         residual: states.iter().map(|s| 1.0 - s.score()).collect(),
         appearance: RopeAppearance {
             rope_radius_m: follower.model.rope_radius_m,
@@ -305,6 +317,7 @@ fn learn<'a>(
         confidence: vec![1.0; NODES],
         lost: false,
         ambiguous: false,
+        clamp: None,
     };
     let contrast = Contrast {
         frame,

@@ -195,6 +195,7 @@ impl Pursuit<'_> {
             confidence: vec![1.0; NODES],
             lost: false,
             ambiguous: false,
+            clamp: None,
         };
         let found = self.measured(frame, t_s, &resting);
         let off = (length(&found.curve) / known_m - 1.0).abs();

@@ -8,6 +8,7 @@ use anyhow::{Context, anyhow};
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::source::read_left;
+use camera_ingest::track::ClampFit;
 use camera_ingest::{
     ClampPath, EyeFrame, TrackOptions, TrackResult, load_camera, open_video, track,
 };
@@ -78,6 +79,19 @@ fn overlay(
     keypoint_sheet(frames, track, &chosen, SHEET.1)?.to_png()
 }
 
+/// What the film says about time and place of the clamp.
+fn said(clamp: &ClampFit) -> String {
+    format!(
+        "the film is {:.1} ± {:.1} ms behind the motion given for the clamp; the clamp is seen \
+         {:.1} ± {:.1} mm to the right of where it should be ({} frames)",
+        clamp.time_offset_s * 1e3,
+        clamp.time_std_s * 1e3,
+        clamp.aside_m * 1e3,
+        clamp.aside_std_m * 1e3,
+        clamp.frames
+    )
+}
+
 pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     if !(2..=shared_types::keypoints::MAX_KEYPOINTS).contains(&args.keypoints) {
         return Err(Failure::input(anyhow!(
@@ -105,6 +119,9 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     let line = format!("{} frames, rope lost in {lost}", result.track.frames.len());
     let seconds = stage.done(&line);
     if !quiet {
+        if let Some(clamp) = result.clamp {
+            println!("{}", said(&clamp));
+        }
         println!("keypoints written to `{}`", args.out.display());
     }
     Ok(Some(json!({
@@ -112,5 +129,9 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
         "lost": lost, "seconds": seconds,
         "rope_radius_m": result.appearance.rope_radius_m,
         "lead_radius_m": result.appearance.lead_radius_m,
+        "clamp": result.clamp.map(|c| json!({
+            "time_offset_s": c.time_offset_s, "time_std_s": c.time_std_s,
+            "aside_m": c.aside_m, "aside_std_m": c.aside_std_m, "frames": c.frames,
+        })),
     })))
 }
