@@ -145,12 +145,16 @@ impl Driver {
 }
 
 /// The camera's end of it.
-#[derive(Debug, Clone, Default)]
-struct Fake(Rc<RefCell<Driver>>);
+#[derive(Debug, Default)]
+struct Fake {
+    driver: Rc<RefCell<Driver>>,
+    /// What lay in the buffer that was taken last.
+    taken: Vec<u8>,
+}
 
 impl Device for Fake {
     fn identity(&mut self) -> io::Result<Identity> {
-        let driver = self.0.borrow();
+        let driver = self.driver.borrow();
         driver.refused("identity")?;
         Ok(Identity {
             driver: "fakevideo".to_owned(),
@@ -160,7 +164,7 @@ impl Device for Fake {
     }
 
     fn set_format(&mut self, format: abi::PixFormat) -> io::Result<abi::PixFormat> {
-        let mut driver = self.0.borrow_mut();
+        let mut driver = self.driver.borrow_mut();
         driver.refused("format")?;
         let mut granted = abi::PixFormat {
             bytesperline: 2 * format.width,
@@ -173,45 +177,47 @@ impl Device for Fake {
     }
 
     fn set_rate(&mut self, _timeperframe: [u32; 2]) -> io::Result<Option<[u32; 2]>> {
-        Ok(self.0.borrow().granted_rate)
+        Ok(self.driver.borrow().granted_rate)
     }
 
     fn map_buffers(&mut self, _count: u32) -> io::Result<u32> {
-        self.0.borrow().refused("buffers")?;
-        Ok(self.0.borrow().granted_buffers)
+        self.driver.borrow().refused("buffers")?;
+        Ok(self.driver.borrow().granted_buffers)
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {
-        let mut driver = self.0.borrow_mut();
+        let mut driver = self.driver.borrow_mut();
         assert!(!driver.queued.contains(&index), "queued twice");
         driver.queued.push_back(index);
         Ok(())
     }
 
     fn dequeue(&mut self) -> io::Result<Filled> {
-        let mut driver = self.0.borrow_mut();
+        let mut driver = self.driver.borrow_mut();
         match driver.filled.pop_front() {
-            Some(filled) => Ok(filled),
+            Some(filled) => {
+                self.taken.clone_from(&driver.memory[filled.index as usize]);
+                Ok(filled)
+            }
             None if driver.gone => Err(io::Error::from_raw_os_error(libc::ENODEV)),
             None => Err(io::ErrorKind::WouldBlock.into()),
         }
     }
 
-    fn bytes(&self, index: u32) -> &[u8] {
-        let memory = self.0.borrow().memory[index as usize].clone();
-        Box::leak(memory.into_boxed_slice())
+    fn bytes(&self, _index: u32) -> &[u8] {
+        &self.taken
     }
 
     fn stream(&mut self, on: bool) -> io::Result<()> {
-        self.0.borrow().refused("stream")?;
-        self.0.borrow_mut().streams = on;
+        self.driver.borrow().refused("stream")?;
+        self.driver.borrow_mut().streams = on;
         Ok(())
     }
 
     fn wait(&self, timeout: Duration) -> io::Result<bool> {
-        if self.0.borrow().runs {
+        if self.driver.borrow().runs {
             std::thread::sleep(Duration::from_millis(1));
-            self.0.borrow_mut().shoot();
+            self.driver.borrow_mut().shoot();
             return Ok(true);
         }
         std::thread::sleep(timeout);
@@ -224,7 +230,7 @@ impl Device for Fake {
 
     fn extension(&mut self, place: [u8; 2], query: u8, data: &mut [u8]) -> io::Result<()> {
         assert_eq!(place, [4, 2]);
-        self.0.borrow_mut().unit(query, data)
+        self.driver.borrow_mut().unit(query, data)
     }
 }
 
@@ -245,8 +251,8 @@ fn camera(
     change: impl FnOnce(&mut Driver),
 ) -> (Result<LiveCamera, LiveError>, Rc<RefCell<Driver>>) {
     let fake = Fake::default();
-    change(&mut fake.0.borrow_mut());
-    let driver = Rc::clone(&fake.0);
+    change(&mut fake.driver.borrow_mut());
+    let driver = Rc::clone(&fake.driver);
     (LiveCamera::start(settings, Box::new(fake)), driver)
 }
 
@@ -535,6 +541,15 @@ fn a_recording_reads_back_as_it_was_seen() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
 }
 
+/// Tells somebody to stop when it goes, even in a panic.
+struct Tell<'a>(&'a AtomicBool);
+
+impl Drop for Tell<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 #[test]
 fn frames_are_published_until_told_to_stop() {
     let domain = format!("live-test-{}", std::process::id());
@@ -546,6 +561,7 @@ fn frames_are_published_until_told_to_stop() {
             let bus = Bus::join(&domain).unwrap();
             let frames = bus.frame_subscriber().unwrap();
             ready.send(()).unwrap();
+            let _told = Tell(&stop);
             let (mut seen, began) = (Vec::new(), Instant::now());
             while seen.len() < 3 && began.elapsed() < Duration::from_secs(10) {
                 let Some(sample) = frames.receive().unwrap() else {
@@ -558,7 +574,6 @@ fn frames_are_published_until_told_to_stop() {
                 assert!(sample.payload().iter().all(|b| *b == low));
                 seen.push((header.sequence, header.stamp_ns));
             }
-            stop.store(true, Ordering::Relaxed);
             seen
         });
         wait_ready.recv().unwrap();
