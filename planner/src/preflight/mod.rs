@@ -4,15 +4,18 @@
 //! The limits of [`Limits`] bound the curve itself, and the controller refuses a plan
 //! that breaks one. The arm sees setpoints only, one per cycle, and has rules of its own:
 //! joint range (C23), joint speed (C24), tool speed (C60), self collision (C22), safety
-//! boundary (C35). They are judged here on the setpoints as they will stand on the wire.
+//! boundary (C35). They are judged here on the setpoints as they will stand on the wire,
+//! or, by velocities, on the motion that follows from them.
 
 mod rules;
 mod setpoints;
+mod velocity;
 
 pub use rules::{Fence, FenceError, JudgedArm, Rule, RuleMargin};
 
+use rules::Step;
 use setpoints::setpoints;
-use shared_types::{JointTrajectory, Limits};
+use shared_types::{JointTrajectory, Limits, WireMode};
 
 /// Everything the arm judges, in the order in which it does.
 #[must_use]
@@ -23,11 +26,28 @@ pub fn arm_margins(
 ) -> Vec<RuleMargin> {
     let mut margins = arm.rules(limits);
     let mut before = None;
-    for (time_s, q) in setpoints(trajectory, limits.period_s()) {
-        let before_q = before.replace(q).unwrap_or(q);
+    let mut judge = |time_s: f64, step: &mut Step| {
+        step.before = before.replace(step.setpoint).unwrap_or(step.setpoint);
         for margin in &mut margins {
-            let found = margin.rule.value(&before_q, &q, limits, arm);
+            let found = margin.rule.value(step, limits, arm);
             margin.meet(found, time_s);
+        }
+    };
+    match arm.wire {
+        WireMode::ServoPosition => {
+            for (time_s, setpoint) in setpoints(trajectory, limits.period_s()) {
+                judge(time_s, &mut Step::at(setpoint));
+            }
+        }
+        WireMode::JointVelocity => {
+            for cycle in velocity::cycles(trajectory, limits) {
+                let mut step = Step {
+                    q: cycle.q,
+                    astray_rad: cycle.astray_rad,
+                    ..Step::at(cycle.planned)
+                };
+                judge(cycle.time_s, &mut step);
+            }
         }
     }
     margins

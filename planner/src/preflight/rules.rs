@@ -1,6 +1,7 @@
 //! The rules of the arm, one by one.
 
 use crate::collide::ArmShape;
+use control_core::control::Thresholds;
 use nalgebra::Vector3;
 use serde::Serialize;
 use shared_types::{JOINTS, JointVector, Limits, WireMode, kinematics};
@@ -14,12 +15,39 @@ const SPEED_SLACK: f64 = 1e-3;
 /// Longest way of the tool from one setpoint to the next that the vendor advises (m); the
 /// controller stops at it.
 const STEP_MAX_M: f64 = 0.010;
-/// How far joints may be beyond the plan when velocities are sent (rad): the firmware's
-/// ramps round corners off, and the position loop brings them back.
-const VELOCITY_STRAY_RAD: f64 = 0.015;
-/// How much that may close the gap between links, and move the tool (m).
-const VELOCITY_GAP_M: f64 = 0.003;
-const VELOCITY_STRAY_M: f64 = 0.015;
+/// How far joints may be from where the model of the arm has them when velocities are sent
+/// (rad), what that may take from the gap between links and move the tool (m). The arm's
+/// clock is not ours, so a ramp may begin a cycle later.
+const VELOCITY_STRAY_RAD: f64 = 0.004;
+const VELOCITY_GAP_M: f64 = 0.0015;
+const VELOCITY_STRAY_M: f64 = 0.004;
+/// What of the controller's largest tracking error a plan may use by velocities.
+const ASTRAY_PART: f64 = 0.92;
+
+/// One cycle as it is judged.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// Setpoint of the cycle before (rad).
+    pub(super) before: JointVector,
+    /// Setpoint (rad).
+    pub(super) setpoint: JointVector,
+    /// Where the arm has its joints (rad).
+    pub(super) q: JointVector,
+    /// How far they are from what was asked of them (rad).
+    pub(super) astray_rad: f64,
+}
+
+impl Step {
+    /// Joints that are where they are asked to be.
+    pub(super) fn at(setpoint: JointVector) -> Self {
+        Self {
+            before: setpoint,
+            setpoint,
+            q: setpoint,
+            astray_rad: 0.0,
+        }
+    }
+}
 
 /// A box that the tool must stay in, as the arm's safety boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -108,6 +136,8 @@ pub enum Rule {
     SafetyBoundary,
     /// Way of the tool in one cycle (m).
     StepLength,
+    /// Joints off the plan, more than their delay explains (rad); by velocities only.
+    Tracking,
 }
 
 impl Rule {
@@ -120,7 +150,7 @@ impl Rule {
             Self::JointSpeed => Some(24),
             Self::SafetyBoundary => Some(35),
             Self::ToolSpeed => Some(60),
-            Self::StepLength => None,
+            Self::StepLength | Self::Tracking => None,
         }
     }
 
@@ -134,6 +164,7 @@ impl Rule {
             Self::SelfCollision => "gap between links",
             Self::SafetyBoundary => "tool inside the boundary",
             Self::StepLength => "tool step per cycle",
+            Self::Tracking => "joints off the plan",
         }
     }
 
@@ -141,7 +172,7 @@ impl Rule {
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
-            Self::JointRange => "rad",
+            Self::JointRange | Self::Tracking => "rad",
             Self::JointSpeed => "rad/s",
             Self::ToolSpeed => "m/s",
             Self::SelfCollision | Self::SafetyBoundary | Self::StepLength => "m",
@@ -153,15 +184,15 @@ impl Rule {
         matches!(self, Self::SelfCollision | Self::SafetyBoundary)
     }
 
-    /// Its value for a setpoint that follows another.
-    pub(super) fn value(
-        self,
-        before: &JointVector,
-        q: &JointVector,
-        limits: &Limits,
-        arm: &JudgedArm,
-    ) -> f64 {
-        let way_m = || (tool(q, limits) - tool(before, limits)).norm();
+    /// Its value in one cycle.
+    pub(super) fn value(self, step: &Step, limits: &Limits, arm: &JudgedArm) -> f64 {
+        let Step {
+            before,
+            setpoint,
+            q,
+            astray_rad,
+        } = step;
+        let way_m = || (tool(setpoint, limits) - tool(before, limits)).norm();
         match self {
             Self::JointRange => (0..JOINTS)
                 .map(|j| {
@@ -171,7 +202,7 @@ impl Rule {
                 .fold(f64::NEG_INFINITY, f64::max),
             // Where joints differ, the one with the least left counts.
             Self::JointSpeed => {
-                let speed = |j: usize| (q[j] - before[j]).abs() / limits.period_s();
+                let speed = |j: usize| (setpoint[j] - before[j]).abs() / limits.period_s();
                 let part = |j: usize| speed(j) / limits.velocity_max_rad_s[j];
                 let worst = (0..JOINTS).max_by(|a, b| part(*a).total_cmp(&part(*b)));
                 worst.map_or(0.0, |j| part(j) * limits.velocity_max_rad_s[0])
@@ -182,6 +213,7 @@ impl Rule {
             Self::SafetyBoundary => arm
                 .fence
                 .map_or(f64::INFINITY, |f| f.inside_m(&tool(q, limits))),
+            Self::Tracking => *astray_rad,
         }
     }
 }
@@ -280,6 +312,10 @@ impl JudgedArm {
                 step,
                 RuleMargin::new(Rule::JointRange, -VELOCITY_STRAY_RAD),
                 RuleMargin::new(Rule::SelfCollision, VELOCITY_GAP_M),
+                RuleMargin::new(
+                    Rule::Tracking,
+                    ASTRAY_PART * Thresholds::strict().tracking_error_max_rad,
+                ),
             ],
         };
         if self.fence.is_some() {

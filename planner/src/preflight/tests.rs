@@ -55,7 +55,7 @@ fn margins_are_told_where_they_are_least() {
 /// Velocities keep a distance from what only the position is judged by.
 #[test]
 fn by_velocities_the_end_of_the_range_is_kept_clear_of() {
-    let near = swing(3, 1.527 - 0.01, 4.0);
+    let near = swing(3, 1.527 - 0.003, 4.0);
     assert_eq!(stop(&near, &JudgedArm::default()), None);
     let wire = WireMode::JointVelocity;
     let arm = JudgedArm {
@@ -63,7 +63,7 @@ fn by_velocities_the_end_of_the_range_is_kept_clear_of() {
         ..JudgedArm::default()
     };
     assert_eq!(stop(&near, &arm), Some(23));
-    assert_eq!(stop(&swing(3, 1.527 - 0.02, 4.0), &arm), None);
+    assert_eq!(stop(&swing(3, 1.527 - 0.006, 4.0), &arm), None);
 }
 
 #[test]
