@@ -1,7 +1,7 @@
 //! From a rope and a task to a throw: searches, polish, choice among the finalists.
 
 use super::finalists::Finalist;
-use super::robust::{forecast, search_around};
+use super::robust::{forecast, least_risk, search_around};
 use super::setup::{Count, Setup};
 use super::{Belief, PlanError, PlanOptions, PlanProgress, ThrowOutcome, ThrowTask, check_reach};
 use crate::response::Following;
@@ -77,19 +77,20 @@ pub fn plan_throw(
             break;
         }
     }
-    let mut chosen = finalists
-        .into_iter()
-        .next()
-        .ok_or(PlanError::OnlyCollisions {
-            simulations: count.simulations,
-        })?;
-    if !request.belief.optimised.is_empty() && !count.interrupted {
-        let (found, simulations) = search_around(&setup, &request.belief, &chosen, progress)?;
-        count.simulations += simulations;
-        if let Some(f) = setup.finalists(found, &mut count)?.into_iter().next() {
-            chosen = f;
+    let is_robust = !request.belief.optimised.is_empty() && !count.interrupted;
+    let chosen = if is_robust {
+        let (around, simulations) = least_risk(&setup, &request.belief, finalists)?;
+        count.add(simulations);
+        match around {
+            Some(around) => Some(setup.robust(around, &mut count, progress)?),
+            None => None,
         }
-    }
+    } else {
+        finalists.into_iter().next()
+    };
+    let chosen = chosen.ok_or(PlanError::OnlyCollisions {
+        simulations: count.simulations,
+    })?;
     setup.finish(chosen, count)
 }
 
@@ -118,6 +119,19 @@ fn check_options(options: &PlanOptions) -> Result<(), PlanError> {
 }
 
 impl Setup<'_> {
+    /// The throw near a finalist that has the least risk over the believed ropes.
+    fn robust(
+        &self,
+        around: Finalist,
+        count: &mut Count,
+        progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+    ) -> Result<Finalist, PlanError> {
+        let (found, simulations) = search_around(self, &self.request.belief, &around, progress)?;
+        count.simulations += simulations;
+        let best = self.finalists(found, count)?.into_iter().next();
+        Ok(best.unwrap_or(around))
+    }
+
     /// The prediction comes from double precision at half the step.
     fn finish(&self, chosen: Finalist, mut count: Count) -> Result<Planned, PlanError> {
         let trajectory = chosen.trajectory;

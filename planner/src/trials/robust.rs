@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use shared_types::ErrorForecast;
 
 /// Ropes that a robust plan is optimised over, and that a forecast is made with.
-const OPTIMISED: usize = 8;
+const OPTIMISED: usize = 16;
 const FORECAST: usize = 64;
 /// Searches of a plan.
 const SEARCHES: usize = 3;
@@ -46,7 +46,7 @@ pub struct RobustTrial {
     pub target_m: [f64; 3],
     /// Planned with the identified parameters.
     pub plain: Foreseen,
-    /// Planned with eight ropes of the posterior.
+    /// Planned with sixteen ropes of the posterior.
     pub robust: Foreseen,
 }
 

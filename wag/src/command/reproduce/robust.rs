@@ -3,6 +3,7 @@
 //! where the forecasts had them.
 
 use super::kept::{Sequence, kept_trials};
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::{OrInput, Outcome};
@@ -81,8 +82,23 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     })?;
     let rows = [
         row(&trials, "for the identified rope", |t| t.plain),
-        row(&trials, "for eight it might be", |t| t.robust),
+        row(&trials, "for sixteen it might be", |t| t.robust),
     ];
+    let curve = |row: &Row, of: fn(&RobustTrial) -> Foreseen| Curve {
+        name: row.planned.to_owned(),
+        values: trials
+            .iter()
+            .map(|t| 100.0 * of(t).strike.error_m)
+            .collect(),
+        paper: None,
+    };
+    let picture = Picture {
+        name: "robust",
+        axis: "distance of tip and target (cm)",
+        seed: args.seed,
+        curves: vec![curve(&rows[0], |t| t.plain), curve(&rows[1], |t| t.robust)],
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let seconds = stage.done(&format!("{} ropes", trials.len()));
     if !quiet {
         print(&rows);
@@ -90,7 +106,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(json!({
         "ok": true, "command": "reproduce robust", "version": shared_types::VERSION,
         "seed": args.seed, "method": method, "ropes": trials.len(), "seconds": seconds,
-        "rows": rows, "out": args.out,
+        "rows": rows, "out": args.out, "picture": picture,
     })))
 }
 
