@@ -647,7 +647,8 @@ pub struct ReproduceArgs {
     /// phi-train).
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// Result file (JSON); a run that was broken off goes on from it.
+    /// Result file (JSON); a run that was broken off goes on from it. A picture of the
+    /// result (SVG) is drawn beside it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

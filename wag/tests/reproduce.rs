@@ -46,6 +46,8 @@ fn trials_are_kept_and_gone_on_with() {
     let both = run("2", "3");
     assert_eq!(both["command"], "reproduce sysid");
     assert_eq!(both["summary"]["parameters"].as_array().unwrap().len(), 9);
+    let picture = std::fs::read_to_string(dir.path().join("sysid.svg")).unwrap();
+    assert!(picture.contains("sysid, seed 3") && picture.contains("joint stiffness"));
     let methods = |kept: &Value| -> Vec<String> {
         let trials = kept["trials"].as_array().unwrap();
         let name = |t: &Value| t["method"].as_str().unwrap().to_owned();

@@ -1,6 +1,7 @@
 //! `wag reproduce motion-fidelity`: ropes from outside the model class, identified from
 //! one noisy wiggle, compared in a throw.
 
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::{Failure, OrInput, Outcome};
@@ -84,12 +85,28 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
             100.0 * random_m
         );
     }
+    let curve = |name: &str, paper, of: fn(&FidelityRow) -> f64| Curve {
+        name: name.to_owned(),
+        values: rows.iter().map(|r| 100.0 * of(r)).collect(),
+        paper,
+    };
+    let picture = Picture {
+        name: "motion-fidelity",
+        axis: "mean distance per frame (cm); dashed: the paper's",
+        seed: args.seed,
+        curves: vec![
+            curve("identified", Some(5.4), |r| r.distance_m),
+            curve("middle of the ranges", None, |r| r.middle_distance_m),
+            curve("random ropes", None, |r| r.random_distance_m),
+        ],
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let value = json!({
         "ok": true, "command": "reproduce motion-fidelity", "version": shared_types::VERSION,
         "seed": args.seed, "method": options.method, "seconds": seconds,
         "frequency_correlation": correlation, "distance_m": distance_m,
         "middle_distance_m": middle_m, "random_correlation": random,
-        "random_distance_m": random_m, "ropes": rows, "out": args.out,
+        "random_distance_m": random_m, "ropes": rows, "out": args.out, "picture": picture,
     });
     if let Some(path) = &args.out {
         files::write_json(path, &value).or_failed()?;

@@ -2,6 +2,7 @@
 //! and the others random, beside the paper's table.
 
 use super::kept::{Sequence, kept_trials};
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::{OrInput, Outcome};
@@ -23,12 +24,21 @@ struct Row {
     paper_cm: [f64; 2],
 }
 
-fn rows(trials: &[ImportanceTrial]) -> Vec<Row> {
-    let row = |identified, errors_m: Vec<f64>, paper_cm| Row {
-        identified,
-        throws: errors_m.len(),
-        error: Spread::of(errors_m),
-        paper_cm,
+/// The conditions, with their errors (cm) as curves.
+fn rows(trials: &[ImportanceTrial]) -> Vec<(Row, Curve)> {
+    let row = |identified: &'static str, errors_m: Vec<f64>, paper_cm: [f64; 2]| {
+        let curve = Curve {
+            name: identified.to_owned(),
+            values: errors_m.iter().map(|e| 100.0 * e).collect(),
+            paper: Some(paper_cm[0]),
+        };
+        let row = Row {
+            identified,
+            throws: errors_m.len(),
+            error: Spread::of(errors_m),
+            paper_cm,
+        };
+        (row, curve)
     };
     let partly = |condition: usize| {
         let of = |t: &ImportanceTrial| t.partly_m.get(condition).cloned().unwrap_or_default();
@@ -65,7 +75,14 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     let trials = kept_trials(&sequence, args, &stage, |batch| {
         importance_trials(&rig, &config, &options, args.seed, batch).or_failed()
     })?;
-    let rows = rows(&trials);
+    let (rows, curves): (Vec<Row>, Vec<Curve>) = rows(&trials).into_iter().unzip();
+    let picture = Picture {
+        name: "parameter-importance",
+        axis: "distance of tip and target (cm); dashed: the paper's mean",
+        seed: args.seed,
+        curves,
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let seconds = stage.done(&format!("{} ropes", trials.len()));
     if !quiet {
         print(&rows);
@@ -73,7 +90,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(json!({
         "ok": true, "command": "reproduce parameter-importance",
         "version": shared_types::VERSION, "seed": args.seed, "method": method,
-        "ropes": trials.len(), "seconds": seconds, "rows": rows, "out": args.out,
+        "ropes": trials.len(), "seconds": seconds, "rows": rows, "out": args.out, "picture": picture,
     })))
 }
 

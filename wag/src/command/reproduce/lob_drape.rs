@@ -2,6 +2,7 @@
 //! ropes, judged in simulation with the true ones, beside the paper's table.
 
 use super::kept::{Sequence, kept_trials};
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::{OrInput, Outcome};
@@ -73,6 +74,29 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         lob_drape_trials(&rig, &config, &scene, &options, args.seed, batch).or_failed()
     })?;
     let s = summarise(&trials);
+    let curve = |name: &str, paper, of: fn(&LobDrapeTrial) -> Option<f64>| Curve {
+        name: name.to_owned(),
+        // A rope without a throw never comes near.
+        values: trials
+            .iter()
+            .map(|t| of(t).map_or(f64::INFINITY, |m| 100.0 * m))
+            .collect(),
+        paper,
+    };
+    let picture = Picture {
+        name: "lob-drape",
+        axis: "distance (cm); dashed: the paper's mean of drapes",
+        seed: args.seed,
+        curves: vec![
+            curve("lob: closest approach", None, |t| {
+                t.lob.as_ref().map(|l| l.error_m)
+            }),
+            curve("drape: middle of the rope from the edge", Some(4.6), |t| {
+                t.drape.as_ref().map(|d| d.error_m)
+            }),
+        ],
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let seconds = stage.done(&format!("{} ropes", trials.len()));
     if !quiet {
         print(&trials, &s);
@@ -81,7 +105,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         "ok": true, "command": "reproduce lob-drape", "version": shared_types::VERSION,
         "seed": args.seed, "method": method, "ropes": trials.len(), "seconds": seconds,
         "lob_hit": s.hit, "lob_hit_and_stay": s.hit_and_stay, "draped": s.draped,
-        "midpoint_m": s.midpoint_m, "trials": trials, "out": args.out,
+        "midpoint_m": s.midpoint_m, "trials": trials, "out": args.out, "picture": picture,
     })))
 }
 

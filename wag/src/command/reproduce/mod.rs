@@ -8,6 +8,7 @@ mod importance;
 mod kept;
 mod lob_drape;
 mod ood;
+mod picture;
 mod pipeline;
 mod robust;
 mod setup;

@@ -5,6 +5,7 @@
 
 use super::ROPES;
 use super::kept::trials;
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::Outcome;
@@ -42,6 +43,21 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         all.into_iter().partition(|t| t.index.is_multiple_of(2));
     let scores = |trials: &[Trial]| trials.iter().map(|t| t.novelty).collect::<Vec<f64>>();
     let area = area_under_curve(&scores(&outside), &scores(&inside));
+    let curve = |name: &str, values| Curve {
+        name: name.to_owned(),
+        values,
+        paper: None,
+    };
+    let picture = Picture {
+        name: "sysid-ood",
+        axis: "score of the novelty",
+        seed: args.seed,
+        curves: vec![
+            curve("ropes of the ranges", scores(&inside)),
+            curve("chains and ropes beyond the ranges", scores(&outside)),
+        ],
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let (found, false_alarms) = (taken_for_outside(&outside), taken_for_outside(&inside));
     let seconds = stage.done(&format!("{} ropes", inside.len() + outside.len()));
     if !quiet {
@@ -57,6 +73,6 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         "ok": true, "command": "reproduce sysid-ood", "version": shared_types::VERSION,
         "seed": args.seed, "method": options.method, "ropes_inside": inside.len(),
         "ropes_outside": outside.len(), "area_under_curve": area, "found": found,
-        "false_alarms": false_alarms, "seconds": seconds, "out": args.out,
+        "false_alarms": false_alarms, "seconds": seconds, "out": args.out, "picture": picture,
     })))
 }

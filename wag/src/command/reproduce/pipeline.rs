@@ -2,6 +2,7 @@
 //! parameters and thrown with the true rope, beside the paper's table.
 
 use super::kept::{Sequence, kept_trials};
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::{OrInput, Outcome};
@@ -23,6 +24,15 @@ struct Row {
     simulations: f64,
     /// Median, smallest, greatest and mean of the paper (cm).
     paper_cm: Option<[f64; 4]>,
+}
+
+/// Errors of one row (cm).
+fn curve(trials: &[PipelineTrial], row: &Row, of: fn(&PipelineTrial) -> Strikes) -> Curve {
+    Curve {
+        name: row.planned_with.to_owned(),
+        values: trials.iter().map(|t| 100.0 * of(t).error_m).collect(),
+        paper: row.paper_cm.map(|[median, ..]| median),
+    }
 }
 
 fn row(
@@ -89,6 +99,18 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
             Some([12.8, 0.14, 104.3, 16.3]),
         ),
     ];
+    let picture = Picture {
+        name: "sim-pipeline",
+        axis: "distance of tip and target (cm); dashed: the paper's median",
+        seed: args.seed,
+        curves: vec![
+            curve(&trials, &rows[0], |t| t.true_rope),
+            curve(&trials, &rows[1], |t| t.true_rope_longer),
+            curve(&trials, &rows[2], |t| t.identified),
+            curve(&trials, &rows[3], |t| t.random),
+        ],
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let seconds = stage.done(&format!("{} ropes", trials.len()));
     if !quiet {
         print(&rows);
@@ -96,7 +118,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(json!({
         "ok": true, "command": "reproduce sim-pipeline", "version": shared_types::VERSION,
         "seed": args.seed, "method": method, "ropes": trials.len(), "seconds": seconds,
-        "rows": rows, "out": args.out,
+        "rows": rows, "out": args.out, "picture": picture,
     })))
 }
 

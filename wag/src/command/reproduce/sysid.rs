@@ -3,6 +3,7 @@
 
 use super::ROPES;
 use super::kept::trials;
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
 use crate::failure::Outcome;
@@ -26,6 +27,26 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         &stage,
     )?;
     let summary = summarise(&all);
+    let curves = summary.parameters.iter().zip(RANGES).enumerate();
+    let picture = Picture {
+        name: "sysid",
+        axis: "absolute error, part of the parameter's range (%); dashed: the paper's mean",
+        seed: args.seed,
+        curves: curves
+            .map(|(at, (row, range))| {
+                let part = 100.0 / (range.max - range.min);
+                Curve {
+                    name: row.label.clone(),
+                    values: all
+                        .iter()
+                        .map(|t| part * (t.found[at] - t.truth[at]).abs())
+                        .collect(),
+                    paper: Some(part * row.paper),
+                }
+            })
+            .collect(),
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let seconds = stage.done(&format!("{} ropes", all.len()));
     if !quiet {
         print(&summary);
@@ -33,7 +54,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(json!({
         "ok": true, "command": "reproduce sysid", "version": shared_types::VERSION,
         "seed": args.seed, "method": options.method, "ropes": all.len(), "seconds": seconds,
-        "out": args.out, "summary": summary,
+        "out": args.out, "picture": picture, "summary": summary,
     })))
 }
 

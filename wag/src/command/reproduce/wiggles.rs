@@ -5,6 +5,7 @@
 //! one wiggle only, so that a fast search proposes the start for all.
 
 use super::kept::{Sequence, kept_trials};
+use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::{MethodName, ReproduceArgs};
 use crate::failure::{Failure, OrInput, Outcome};
@@ -25,6 +26,16 @@ const BATCH: usize = 8;
 /// Wiggles, and columns of the table with that of the names.
 const WIGGLES: usize = 9;
 const COLUMNS: usize = WIGGLES + 1;
+
+/// Mean over the parameters of a trial's errors, part of their ranges (%).
+#[allow(clippy::cast_precision_loss, reason = "nine parameters")]
+fn mean_error_percent(trial: &Trial) -> f64 {
+    let parts = RANGES.iter().zip(trial.found.iter().zip(&trial.truth));
+    let sum: f64 = parts
+        .map(|(range, (found, truth))| (found - truth).abs() / (range.max - range.min))
+        .sum();
+    100.0 * sum / RANGES.len() as f64
+}
 
 pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     if args.method == MethodName::Nn || args.model.is_some() {
@@ -70,6 +81,18 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     if !quiet {
         print(&wiggles, &summaries);
     }
+    let curve = |(wiggle, trials): (&AblatedWiggle, &[Trial])| Curve {
+        name: wiggle.name.clone(),
+        values: trials.iter().map(mean_error_percent).collect(),
+        paper: None,
+    };
+    let picture = Picture {
+        name: "wiggle-ablation",
+        axis: "mean error of the nine parameters, part of their ranges (%)",
+        seed: args.seed,
+        curves: wiggles.iter().zip(all.chunks(each)).map(curve).collect(),
+    };
+    let picture = picture.write(args.out.as_deref())?;
     let rows: Vec<Value> = wiggles
         .iter()
         .zip(&summaries)
@@ -78,7 +101,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(json!({
         "ok": true, "command": "reproduce wiggle-ablation", "version": shared_types::VERSION,
         "seed": args.seed, "method": options.method, "ropes_each": ropes, "seconds": seconds,
-        "out": args.out, "wiggles": rows,
+        "out": args.out, "picture": picture, "wiggles": rows,
     })))
 }
 
