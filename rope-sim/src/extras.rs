@@ -1,5 +1,5 @@
-//! What a rope may have beyond the paper's nine parameters: air drag and a rest
-//! curvature. Off by default.
+//! What a rope may have beyond the paper's nine parameters: air drag, a rest curvature
+//! and mass that is uneven along it. Off by default.
 
 /// Drag of still air on the links and the lead, quadratic in the speed.
 ///
@@ -27,6 +27,11 @@ pub struct RopeExtras {
     /// link's frame, the same all along: every joint, the first included, rests
     /// turned by `exp(curvature s)`. Zero is a straight rope.
     pub rest_curvature_per_m: [f64; 3],
+    /// Unevenness of the rope's mass: mass per length goes in a straight line from
+    /// `1 - mass_slope` times its mean at the clamp to `1 + mass_slope` times at the free
+    /// end, from -0.95 to 0.95. Zero is an even rope. Sizes and the links' inertia about
+    /// their centres stay.
+    pub mass_slope: f64,
 }
 
 impl RopeExtras {
@@ -34,12 +39,19 @@ impl RopeExtras {
     pub const NONE: Self = Self {
         air_drag: None,
         rest_curvature_per_m: [0.0; 3],
+        mass_slope: 0.0,
     };
 
     /// Whether this is the plain rope of nine parameters.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
+    }
+
+    /// Mass of a link, counted from the clamp, as a multiple of the mean of `links` of them.
+    pub(crate) fn mass_factor(&self, link: u32, links: u32) -> f64 {
+        let place = (f64::from(link) + 0.5) / f64::from(links);
+        1.0 + self.mass_slope * (2.0 * place - 1.0)
     }
 
     /// First unusable number: its field, value, and what it must be.
@@ -51,6 +63,9 @@ impl RopeExtras {
                 value,
                 "must be a number of at most 1000 rad/m",
             ));
+        }
+        if !(-0.95..=0.95).contains(&self.mass_slope) {
+            return Some(("mass_slope", self.mass_slope, "must be from -0.95 to 0.95"));
         }
         let drag = self.air_drag?;
         [

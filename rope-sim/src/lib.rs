@@ -10,7 +10,7 @@
 //! Optimisers, file formats of plans and the arm's own dynamics are not here.
 //!
 //! [`roll_out_in`] adds obstacles with friction and a domino ([`Scene`]), [`RopeExtras`]
-//! air drag and a rest curvature.
+//! air drag, a rest curvature and uneven mass.
 //!
 //! Errors at the default step of 0.5 ms are below 0.3 mm at the tip in ordinary
 //! motions and grow in violent whips of stiff, hardly damped ropes.
@@ -51,6 +51,7 @@ mod scheme;
 pub mod sensitivity;
 mod state;
 mod surroundings;
+mod uneven;
 #[cfg(test)]
 mod verification;
 mod watch;

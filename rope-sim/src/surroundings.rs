@@ -1,4 +1,5 @@
-//! What a group of ropes meets besides gravity: obstacles, air, its own rest shape.
+//! What a group of ropes meets besides gravity: obstacles, air, its own rest shape and
+//! unevenness.
 
 use crate::algebra::Quat;
 use crate::base_path::BasePath;
@@ -13,13 +14,15 @@ use crate::load::{LinkLoads, Load, Loads, Unloaded};
 use crate::scene::{ContactSummary, DominoOutcome};
 use crate::scheme::Scheme;
 use crate::state::{Link, RopeLanes};
+use crate::uneven::UnevenLanes;
 use nalgebra::{UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 
-/// Obstacles, air and rest shape of a group, with the loads of the current step.
+/// Obstacles, air, rest shape and unevenness of a group, with the loads of the current step.
 pub(crate) struct Around<V> {
     pub(crate) contacts: Contacts<V>,
     drag: Option<DragLanes<V>>,
+    uneven: Option<UnevenLanes<V>>,
     rest_turn: Quat<V>,
     is_curved: bool,
     nodes: Vec<Node<V>>,
@@ -40,26 +43,30 @@ impl<V: Lanes> Loads<V> for Around<V> {
 }
 
 impl<V: Lanes> Around<V> {
-    /// Air and rest shape of `ropes`, one per lane, among `contacts`.
+    /// Air, rest shape and unevenness of `ropes`, one per lane, among `contacts`.
     #[inline(always)]
     pub(crate) fn new(contacts: Contacts<V>, ropes: &[(&RopeParams, RopeExtras)]) -> Self {
+        let links = ropes.first().map_or(0, |(r, _)| r.links as usize);
         let mut drag = DragLanes::none();
+        let mut uneven = UnevenLanes::even(links);
         let mut rest_turn = Quat::identity();
         for lane in 0..V::COUNT {
             let Some((rope, extras)) = ropes.get(lane).or_else(|| ropes.last()) else {
                 continue;
             };
             drag.set(lane, rope, extras);
+            uneven.set(lane, rope, extras);
             let curvature = Vector3::from(extras.rest_curvature_per_m);
             let q = UnitQuaternion::from_scaled_axis(curvature * rope.link_length_m());
             rest_turn.set(lane, [q.w, q.i, q.j, q.k]);
         }
-        let links = ropes.first().map_or(0, |(r, _)| r.links as usize);
         let any_drag = ropes.iter().any(|(_, e)| e.air_drag.is_some());
+        let any_uneven = ropes.iter().any(|(_, e)| e.mass_slope.abs() > 0.0);
         let bends = |c: &f64| c.abs() > 0.0;
         Self {
             contacts,
             drag: any_drag.then_some(drag),
+            uneven: any_uneven.then_some(uneven),
             rest_turn,
             is_curved: ropes
                 .iter()
@@ -97,7 +104,8 @@ impl<V: Lanes> Around<V> {
         let in_contact = self.contacts.is_engaged();
         self.steps += 1;
         let look = self.steps.is_multiple_of(LOOK_PERIOD);
-        if !(in_contact || self.is_curved || self.drag.is_some()) {
+        let loaded = self.drag.is_some() || self.uneven.is_some();
+        if !(in_contact || self.is_curved || loaded) {
             let report = step(links, scratch, rope, &attach.dynamics, scheme, &Unloaded);
             if look {
                 self.look(links, rope, attach, arm);
@@ -110,6 +118,7 @@ impl<V: Lanes> Around<V> {
         predicted(&mut self.nodes, links, rope, attach, scheme);
         self.loads.clear();
         self.add_drag(links, rope, scheme);
+        self.add_unevenness(links, scheme);
         if in_contact {
             let predicted = Predicted {
                 links,
@@ -139,6 +148,15 @@ impl<V: Lanes> Around<V> {
         }
         if let Some(node) = self.nodes.last() {
             self.loads.add(links.len() - 1, &drag.on_lead(node, scheme));
+        }
+    }
+
+    #[inline(always)]
+    fn add_unevenness(&mut self, links: &[Link<V>], scheme: &Scheme<V>) {
+        let Some(uneven) = &self.uneven else { return };
+        for (index, (link, node)) in links.iter().zip(&self.nodes).enumerate() {
+            let load = uneven.on_link(index, link, node.span, scheme);
+            self.loads.add(index, &load);
         }
     }
 }

@@ -63,6 +63,7 @@ fn extras(index: usize) -> RopeExtras {
     RopeExtras {
         air_drag,
         rest_curvature_per_m: [0.0, if index % 4 == 2 { 1.5 } else { 0.0 }, 0.0],
+        mass_slope: if index % 5 == 3 { 0.4 } else { 0.0 },
     }
 }
 

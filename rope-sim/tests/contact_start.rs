@@ -22,7 +22,7 @@ fn rope() -> RopeParams {
     RopeParams::from_array([22.0, 0.55, 0.01, 0.05, 0.005, 0.06, 0.06, 0.02, 0.8])
 }
 
-/// A curved rope that starts in equilibrium stays there.
+/// A curved rope, the heavier the farther out, that starts in equilibrium stays there.
 #[test]
 fn a_curved_rope_starts_at_rest() {
     let rope = rope();
@@ -32,6 +32,7 @@ fn a_curved_rope_starts_at_rest() {
     };
     let extras = RopeExtras {
         rest_curvature_per_m: [1.0, 2.0, 0.5],
+        mass_slope: 0.7,
         ..RopeExtras::NONE
     };
     let candidate = Candidate::new(&rope, &still).with_extras(extras);

@@ -633,7 +633,7 @@ pub struct ReproduceArgs {
     pub name: ReproduceName,
     /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
     /// each wiggle, for lob-drape its own 24, for robust 200,
-    /// for parameter-importance 30
+    /// for parameter-importance 30, for sensitivity-maps 8
     /// (motion-fidelity has its own).
     #[arg(long)]
     pub ropes: Option<u64>,
@@ -643,6 +643,9 @@ pub struct ReproduceArgs {
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,
+    /// Threads; the result does not depend on them. Default: those of the configuration, 2.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
     /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
     /// phi-train).
     #[arg(long, value_name = "FILE")]
@@ -672,6 +675,8 @@ pub enum ReproduceName {
     Robust,
     /// Error of strikes planned with only some parameters identified.
     ParameterImportance,
+    /// What in a film the network's answer hangs on, parameter by parameter.
+    SensitivityMaps,
 }
 
 /// Arguments of `wag doctor`.

@@ -129,6 +129,34 @@ fn every_wiggle_of_the_ablation_identifies_a_rope() {
     }
 }
 
+/// One film: what tells the length is in the picture, what tells the link extra scale is
+/// nowhere.
+#[test]
+fn sensitivity_maps_are_drawn_for_every_parameter() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("maps.json");
+    let path = path.to_str().unwrap();
+    let maps = ["reproduce", "sensitivity-maps", "--ropes", "1"];
+    let rest = ["--seed", "5", "--json", "--out", path];
+    let told = report(&[&maps[..], &rest].concat());
+    let rows = told["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 9);
+    let mean = |i: usize| rows[i]["mean_per_m"].as_f64().unwrap();
+    assert!(mean(1) > 4.0 * mean(8), "{rows:?}");
+    for row in rows {
+        assert!(
+            (0.0..6.7).contains(&row["peak_s"].as_f64().unwrap()),
+            "{row}"
+        );
+    }
+    assert_eq!(told["map"]["values"][0].as_array().unwrap().len(), 50 * 12);
+    let drawn = std::fs::read_to_string(dir.path().join("maps.svg")).unwrap();
+    assert_eq!(drawn.matches("class=\"map\"").count(), 9);
+    assert!(drawn.contains("seed 5") && drawn.contains("lead mass"));
+    let refused = wag(&[&maps[..], &["--method", "cmaes"]].concat());
+    assert_eq!(refused.status.code(), Some(2));
+}
+
 #[test]
 fn bench_identify_prints_every_method() {
     let report = report(&["bench", "identify", "--quick", "--json"]);

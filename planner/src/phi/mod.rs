@@ -15,6 +15,8 @@ mod net;
 mod probe;
 #[cfg(feature = "network")]
 mod propose;
+#[cfg(feature = "network")]
+mod sensitivity;
 
 #[cfg(feature = "network")]
 pub use estimate::{NetworkError, identify_by_network};
@@ -26,6 +28,8 @@ pub use metadata::{
 pub use net::{PhiNet, PredictError, Prediction, RawOutputs};
 #[cfg(feature = "network")]
 pub use propose::{HybridError, identify_with_network, proposal};
+#[cfg(feature = "network")]
+pub use sensitivity::{MOMENT_FRAMES, SensitivityMap};
 
 pub use probe::{PARITY, difference, probe};
 

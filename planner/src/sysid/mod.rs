@@ -322,12 +322,15 @@ pub fn identify_from(
         fit
     };
     let found = novelty(&fit);
-    Ok(task.estimate(&fit, found, "hybrid-wide", account.simulations))
+    Ok(task.estimate(&fit, found, WIDE, account.simulations))
 }
 
 /// About how many steps a refinement takes, and a fast search with it.
 const REFINE_STEPS: usize = 12;
 const HYBRID_STEPS: usize = 30;
+/// Method of an estimate whose rope looked like none of the ranges and was searched for
+/// again beyond them.
+pub const WIDE: &str = "hybrid-wide";
 /// Name of a fast search, refined.
 const SEARCHED: &str = "hybrid-search";
 

@@ -2,7 +2,7 @@
 //! motion it was not identified from?
 //!
 //! Truth comes from outside the model class: more links than the ranges have, air drag,
-//! a rest curvature. As in the paper, a throw is compared by the correlation of Fourier
+//! uneven mass, a rest curvature. As in the paper, a throw is compared by the correlation of Fourier
 //! spectra and by the mean distance of points of the rope per frame.
 
 use super::{KEYPOINTS, TrialError, TrialRig, trial_rope};
@@ -60,6 +60,7 @@ struct Kind {
     radius_m: f64,
     mass_per_length_kg_per_m: f64,
     curvature_per_m: f64,
+    mass_slope: f64,
 }
 
 /// A rope with physics beyond the nine parameters.
@@ -99,6 +100,7 @@ impl FidelityConfig {
                     lead_coefficient: air.lead_coefficient,
                 }),
                 rest_curvature_per_m: [0.0, kind.curvature_per_m, 0.0],
+                mass_slope: kind.mass_slope,
             },
         };
         self.ropes
@@ -321,6 +323,7 @@ mod tests {
         for rope in ropes {
             assert!(rope.params.validate().is_ok() && rope.params.links > 26);
             assert!(rope.extras.air_drag.is_some(), "{rope:?}");
+            assert!(rope.extras.mass_slope.abs() >= 0.1, "{rope:?}");
         }
     }
 }

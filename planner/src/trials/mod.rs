@@ -8,6 +8,8 @@ mod lob_drape;
 mod outside;
 mod pipeline;
 mod robust;
+#[cfg(feature = "network")]
+mod sensitivity;
 mod strike_case;
 mod summary;
 mod thrower;
@@ -19,6 +21,8 @@ pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
 pub use outside::{area_under_curve, outside_rope};
 pub use pipeline::{PipelineTrial, Spread, pipeline_trials};
 pub use robust::{Foreseen, RobustTrial, robust_trials};
+#[cfg(feature = "network")]
+pub use sensitivity::{SensitivityTrial, sensitivity_trials};
 pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
 pub use thrower::Strikes;
 pub use wiggles::{AblatedWiggle, ablated_wiggles};

@@ -8,7 +8,6 @@
 //! those of small angles, and gravity's part is kept positive: block tridiagonal with
 //! scalar couplings.
 
-use super::weights_nm;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 
@@ -29,6 +28,7 @@ struct Chain {
 /// Attitudes of the links (scalar first), found from those in `start`.
 pub(super) fn hanging(
     rope: &RopeParams,
+    weight_nm: Vec<f64>,
     curvature_per_m: Vector3<f64>,
     r_attach: &Matrix3<f64>,
     start: &[[f64; 4]],
@@ -36,7 +36,7 @@ pub(super) fn hanging(
     let rotation = Rotation3::from_matrix_unchecked(*r_attach);
     let chain = Chain {
         stiffness_nm: rope.joint_stiffness_nm_per_rad,
-        weight_nm: weights_nm(rope),
+        weight_nm,
         attach: UnitQuaternion::from_rotation_matrix(&rotation),
         rest_turn: UnitQuaternion::from_scaled_axis(curvature_per_m * rope.link_length_m()),
     };
@@ -155,7 +155,7 @@ fn down(q: &UnitQuaternion<f64>) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{hanging_links, hanging_straight};
+    use super::super::{hanging_links, hanging_straight, weights_nm};
     use super::*;
     use crate::extras::RopeExtras;
 
@@ -177,7 +177,8 @@ mod tests {
 
     #[test]
     fn no_curvature_is_the_plane_curve() {
-        let straight = hanging_straight(&rope(), &attach());
+        let weight_nm = weights_nm(&rope(), &RopeExtras::NONE);
+        let straight = hanging_straight(&rope(), &weight_nm, &attach());
         let almost = curved([1e-12, 0.0, 0.0]);
         for (a, b) in straight.iter().zip(&almost) {
             let same: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();

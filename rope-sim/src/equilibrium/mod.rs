@@ -24,16 +24,21 @@ pub(crate) fn hanging_links(
     extras: &RopeExtras,
     r_attach: &Matrix3<f64>,
 ) -> Vec<[f64; 4]> {
-    let straight = hanging_straight(rope, r_attach);
+    let weight_nm = weights_nm(rope, extras);
+    let straight = hanging_straight(rope, &weight_nm, r_attach);
     let curvature = Vector3::from(extras.rest_curvature_per_m);
     if curvature == Vector3::zeros() {
         straight
     } else {
-        curved::hanging(rope, curvature, r_attach, &straight)
+        curved::hanging(rope, weight_nm, curvature, r_attach, &straight)
     }
 }
 
-fn hanging_straight(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[f64; 4]> {
+fn hanging_straight(
+    rope: &RopeParams,
+    weight_nm: &[f64],
+    r_attach: &Matrix3<f64>,
+) -> Vec<[f64; 4]> {
     let rotation = nalgebra::Rotation3::from_matrix_unchecked(*r_attach);
     let attach = UnitQuaternion::from_rotation_matrix(&rotation);
     let out: Vector3<f64> = -r_attach.column(2);
@@ -43,7 +48,7 @@ fn hanging_straight(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[f64; 4]>
     let axis = Vector3::new(-out.y, out.x, 0.0)
         .try_normalize(1e-12)
         .map_or(Vector3::x_axis(), nalgebra::Unit::new_unchecked);
-    hanging_angles(rope, tilt_rad)
+    hanging_angles(rope, weight_nm, tilt_rad)
         .into_iter()
         .map(|psi| {
             let q = UnitQuaternion::from_axis_angle(&axis, tilt_rad - psi) * attach;
@@ -54,14 +59,13 @@ fn hanging_straight(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[f64; 4]>
 
 /// Angles of the links from straight down (rad) below an attach frame tilted by
 /// `tilt_rad` from 0 to pi.
-fn hanging_angles(rope: &RopeParams, tilt_rad: f64) -> Vec<f64> {
+fn hanging_angles(rope: &RopeParams, weight: &[f64], tilt_rad: f64) -> Vec<f64> {
     let n = rope.links as usize;
     let k = rope.joint_stiffness_nm_per_rad;
-    let weight = weights_nm(rope);
     let mut psi = vec![0.0; n];
-    let mut value = energy(&psi, tilt_rad, k, &weight);
+    let mut value = energy(&psi, tilt_rad, k, weight);
     for _ in 0..MAX_ITERATIONS {
-        let direction = newton_direction(&psi, tilt_rad, k, &weight);
+        let direction = newton_direction(&psi, tilt_rad, k, weight);
         let largest = direction.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
         if largest < 1e-13 {
             break;
@@ -73,7 +77,7 @@ fn hanging_angles(rope: &RopeParams, tilt_rad: f64) -> Vec<f64> {
                 .zip(&direction)
                 .map(|(p, d)| p + fraction * d)
                 .collect();
-            let next_value = energy(&next, tilt_rad, k, &weight);
+            let next_value = energy(&next, tilt_rad, k, weight);
             if next_value <= value + 1e-15 * value.abs() || fraction < 1e-6 {
                 (psi, value) = (next, next_value);
                 break;
@@ -85,13 +89,19 @@ fn hanging_angles(rope: &RopeParams, tilt_rad: f64) -> Vec<f64> {
 }
 
 /// What hangs on each link, times its length (N m).
-fn weights_nm(rope: &RopeParams) -> Vec<f64> {
-    (1..=rope.links)
+fn weights_nm(rope: &RopeParams, extras: &RopeExtras) -> Vec<f64> {
+    let mut beyond_kg = rope.lead_mass_kg;
+    let mut weights: Vec<f64> = (0..rope.links)
+        .rev()
         .map(|link| {
-            let beyond = rope.link_mass_kg() * (f64::from(rope.links - link) + 0.5);
-            GRAVITY_M_S2 * rope.link_length_m() * (beyond + rope.lead_mass_kg)
+            let mass_kg = rope.link_mass_kg() * extras.mass_factor(link, rope.links);
+            let carried_kg = beyond_kg + 0.5 * mass_kg;
+            beyond_kg += mass_kg;
+            GRAVITY_M_S2 * rope.link_length_m() * carried_kg
         })
-        .collect()
+        .collect();
+    weights.reverse();
+    weights
 }
 
 fn energy(psi: &[f64], tilt_rad: f64, k: f64, weight: &[f64]) -> f64 {
@@ -142,14 +152,20 @@ mod tests {
     fn torque_balances_at_every_joint() {
         let rope = rope();
         let tilt = 1.1;
-        let psi = hanging_angles(&rope, tilt);
+        let extras = RopeExtras {
+            mass_slope: 0.6,
+            ..RopeExtras::NONE
+        };
+        let psi = hanging_angles(&rope, &weights_nm(&rope, &extras), tilt);
         let (s, m) = (rope.link_length_m(), rope.link_mass_kg());
         let mut above = tilt;
         for i in 0..psi.len() {
             // Moment of everything beyond joint i about it, by its lever arms.
             let mut x = 0.0;
             let mut moment = 0.0;
-            for p in &psi[i..] {
+            for (link, p) in (0_u32..).zip(&psi).skip(i) {
+                let place = (f64::from(link) + 0.5) / f64::from(rope.links);
+                let m = m * (1.0 + 0.6 * (2.0 * place - 1.0));
                 moment += m * GRAVITY_M_S2 * (x + 0.5 * s * p.sin());
                 x += s * p.sin();
             }
@@ -185,9 +201,12 @@ mod tests {
             joint_stiffness_nm_per_rad: 0.0,
             ..rope()
         };
-        assert!(hanging_angles(&limp, 2.0).iter().all(|p| p.abs() < 1e-9));
+        let angles = |rope: &RopeParams, tilt| {
+            hanging_angles(rope, &weights_nm(rope, &RopeExtras::NONE), tilt)
+        };
+        assert!(angles(&limp, 2.0).iter().all(|p| p.abs() < 1e-9));
         for tilt in [0.0, 2.0, 3.1] {
-            assert!(hanging_angles(&rope(), tilt).iter().all(|p| p.is_finite()));
+            assert!(angles(&rope(), tilt).iter().all(|p| p.is_finite()));
         }
     }
 }

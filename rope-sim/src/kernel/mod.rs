@@ -152,7 +152,7 @@ pub(crate) fn centripetal<V: Lanes>(link: &Link<V>, span: Vec3<V>, scheme: &Sche
 
 /// Acceleration that holds up against gravity and the side push (m/s²).
 #[inline(always)]
-fn up<V: Lanes>() -> Vec3<V> {
+pub(crate) fn up<V: Lanes>() -> Vec3<V> {
     let push = -side_push_m_s2::<V>();
     Vec3::splat(push, push, GRAVITY_M_S2)
 }

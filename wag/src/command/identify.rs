@@ -139,6 +139,11 @@ fn print_remarks(estimate: &RopeEstimate) {
             estimate.novelty.reasons.join("; ")
         );
     }
+    if estimate.method.as_str() == planner::sysid::WIDE {
+        println!("it was fitted again, by a search that knows no ranges");
+    } else if estimate.novelty.is_outside() {
+        println!("--method hybrid fits it again by a search that knows no ranges");
+    }
 }
 
 /// The planner's name of a method.

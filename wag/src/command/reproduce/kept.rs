@@ -15,8 +15,9 @@ use shared_types::ipc::message::Progress;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// Trials made between two writes of the file.
+/// Trials made between two writes of the file, at least, and by each thread.
 const BATCH: usize = 16;
+const EACH: usize = 4;
 
 /// The file of one result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -133,7 +134,7 @@ pub(super) fn trials(
         name,
         method: format!("{:?}", options.method).to_lowercase(),
         count,
-        batch: BATCH,
+        batch: BATCH.max(EACH * options.threads),
         told: (|t: &Trial| t.residual_px, "ropes, residual px"),
     };
     kept_trials(&sequence, args, stage, |batch| {

@@ -11,6 +11,8 @@ mod ood;
 mod picture;
 mod pipeline;
 mod robust;
+mod sensitivity;
+mod sensitivity_picture;
 mod setup;
 mod sysid;
 mod wiggles;
@@ -33,5 +35,6 @@ pub fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         ReproduceName::LobDrape => lob_drape::run(args, quiet),
         ReproduceName::Robust => robust::run(args, quiet),
         ReproduceName::ParameterImportance => importance::run(args, quiet),
+        ReproduceName::SensitivityMaps => sensitivity::run(args, quiet),
     }
 }

@@ -28,6 +28,7 @@ impl Setup {
             options: IdentifyOptions {
                 method,
                 seed: args.seed,
+                threads: args.threads.map_or(config.identify.threads, usize::from),
                 ..config.identify
             },
             config,

@@ -21,8 +21,8 @@ use shared_types::rope::RANGES;
 
 /// Ropes identified with each wiggle.
 const ROPES: u64 = 24;
-/// Trials made between two writes of the file.
-const BATCH: usize = 8;
+/// Trials made between two writes of the file, by each thread.
+const EACH: usize = 4;
 /// Wiggles, and columns of the table with that of the names.
 const WIGGLES: usize = 9;
 const COLUMNS: usize = WIGGLES + 1;
@@ -61,7 +61,7 @@ pub(super) fn run(args: &ReproduceArgs, quiet: bool) -> Outcome<Option<Value>> {
         name: "wiggle-ablation",
         method: format!("{:?}, {ropes} ropes", options.method).to_lowercase(),
         count: ropes * wiggles.len() as u64,
-        batch: BATCH,
+        batch: EACH * options.threads.max(1),
         told: (|t: &Trial| t.residual_px, "ropes, residual px"),
     };
     // Wiggle by wiggle; a trial's own index is that of the rope.
