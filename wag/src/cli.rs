@@ -1,11 +1,20 @@
 //! The command line.
 
+mod eyes;
+mod results;
+mod values;
+
+pub use eyes::*;
+pub use results::*;
+pub use values::{Point, seed};
+
+use values::{host, mass_kg, rate_hz};
+
 use crate::command::check::CheckArgs;
 use crate::command::plan::PlanArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::net::{IpAddr, ToSocketAddrs};
+use std::net::IpAddr;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 /// Identify a rope from one wiggle, plan a throw, execute it.
 #[derive(Debug, Parser)]
@@ -281,79 +290,6 @@ pub struct MotionArgs {
     pub pose: Option<PathBuf>,
 }
 
-/// Arguments of `wag film`.
-#[derive(Debug, Args)]
-pub struct FilmArgs {
-    /// The camera, /dev/videoN.
-    #[arg(long)]
-    pub device: PathBuf,
-    /// Picture size of an eye: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
-    #[arg(long, value_enum, default_value_t = ModeName::Vga)]
-    pub mode: ModeName,
-    /// Frames per second.
-    #[arg(long, default_value_t = 60)]
-    pub fps: u32,
-    /// Frames to record.
-    #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..=36_000))]
-    pub frames: u64,
-    /// The camera's ordinary control for gain.
-    #[arg(long)]
-    pub gain: Option<i32>,
-    /// Exposure in the sensor's own units; ends automatic exposure (ZED only).
-    #[arg(long)]
-    pub exposure_raw: Option<u32>,
-    /// Gain in the sensor's own units (ZED only).
-    #[arg(long, requires = "exposure_raw")]
-    pub sensor_gain_raw: Option<u32>,
-    /// Beginning of the files' names: NAME_WIDTHxHEIGHT.yuyv and .csv.
-    #[arg(long, value_name = "NAME")]
-    pub out: PathBuf,
-}
-
-/// Picture sizes of a stereo camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ModeName {
-    /// 672x376.
-    #[value(name = "VGA")]
-    Vga,
-    /// 1280x720.
-    #[value(name = "HD")]
-    Hd,
-    /// 1920x1080.
-    #[value(name = "FHD")]
-    FullHd,
-    /// 2208x1242.
-    #[value(name = "2K")]
-    TwoK,
-}
-
-/// Arguments of `wag track`.
-#[derive(Debug, Args)]
-pub struct TrackArgs {
-    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
-    /// JPEG pictures, and timestamps.csv.
-    #[arg(long)]
-    pub video: PathBuf,
-    /// Frames per second, for a recording that does not tell its frames' times.
-    #[arg(long, value_parser = rate_hz)]
-    pub fps: Option<f64>,
-    /// Camera calibration and place.
-    #[arg(long)]
-    pub camera: PathBuf,
-    /// Motion of the clamp.
-    #[command(flatten)]
-    pub motion: MotionArgs,
-    /// Keypoints per frame.
-    #[arg(long, default_value_t = 20)]
-    pub keypoints: usize,
-    /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
-    #[arg(long)]
-    pub overlay: Option<PathBuf>,
-    /// Keypoints (JSON).
-    #[arg(long)]
-    pub out: PathBuf,
-}
-
 /// Where the observation of a wiggle comes from.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
@@ -511,174 +447,6 @@ pub struct ReportArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `wag score`.
-#[derive(Debug, Args)]
-pub struct ScoreArgs {
-    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
-    /// JPEG pictures, and timestamps.csv.
-    #[arg(long)]
-    pub video: PathBuf,
-    /// Frames per second, for a recording that does not tell its frames' times.
-    #[arg(long, value_parser = rate_hz)]
-    pub fps: Option<f64>,
-    /// Camera calibration and place.
-    #[arg(long)]
-    pub camera: PathBuf,
-    /// Colour of the tip, R,G,B from 0 to 255.
-    #[arg(long)]
-    pub tip_rgb: Colour,
-    /// Colour of the target, R,G,B from 0 to 255.
-    #[arg(long)]
-    pub target_rgb: Colour,
-}
-
-/// Where the camera stands.
-#[derive(Debug, Subcommand)]
-pub enum CalibCommand {
-    /// Find the camera's place in the world and write it into a camera.toml.
-    Extrinsics(ExtrinsicsArgs),
-    /// Compare the place in camera.toml with what the camera sees.
-    Check(CalibCheckArgs),
-}
-
-/// What the camera is shown.
-#[derive(Debug, Args)]
-pub struct ShownArgs {
-    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
-    /// JPEG pictures, and timestamps.csv.
-    #[arg(long)]
-    pub video: PathBuf,
-    /// Frames per second, for a recording that does not tell its frames' times.
-    #[arg(long, value_parser = rate_hz)]
-    pub fps: Option<f64>,
-    /// Camera calibration; its place may be wrong.
-    #[arg(long)]
-    pub camera: PathBuf,
-    /// Printed ChArUco board that hangs still (board.toml).
-    #[arg(long, conflicts_with_all = ["lead", "lead_rgb"], required_unless_present = "lead")]
-    pub board: Option<PathBuf>,
-    /// The arm shows its lead: CSV with columns frame,x,y,z (m, world).
-    #[arg(long, requires = "lead_rgb")]
-    pub lead: Option<PathBuf>,
-    /// Colour of that lead, R,G,B from 0 to 255.
-    #[arg(long)]
-    pub lead_rgb: Option<Colour>,
-}
-
-/// Arguments of `wag calib extrinsics`.
-#[derive(Debug, Args)]
-pub struct ExtrinsicsArgs {
-    /// What the camera is shown.
-    #[command(flatten)]
-    pub shown: ShownArgs,
-    /// The camera's settings with the place found (TOML).
-    #[arg(long)]
-    pub out: PathBuf,
-}
-
-/// Arguments of `wag calib check`.
-#[derive(Debug, Args)]
-pub struct CalibCheckArgs {
-    /// What the camera is shown.
-    #[command(flatten)]
-    pub shown: ShownArgs,
-    /// Largest residual that passes (px, RMS over both eyes).
-    #[arg(long, default_value_t = 2.0)]
-    pub limit_px: f64,
-}
-
-/// Arguments of `wag bench`.
-#[derive(Debug, Args)]
-pub struct BenchArgs {
-    /// What to measure.
-    #[arg(value_enum)]
-    pub name: BenchName,
-    /// Few candidates, once each: seconds instead of a minute, rough figures.
-    #[arg(long)]
-    pub quick: bool,
-    /// Seed of the ropes and motions.
-    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
-    pub seed: u64,
-    /// `rt`: time of each contender (s).
-    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
-    pub seconds: u32,
-    /// `rt`: core of the control loop; default: the last one.
-    #[arg(long)]
-    pub cpu: Option<usize>,
-    /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
-    #[arg(long)]
-    pub video: Option<PathBuf>,
-}
-
-/// Benchmarks known by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BenchName {
-    /// The rope simulator: kernels, jobs, scaling.
-    Rope,
-    /// The control loop: wake-up error beside `cyclictest`, times within a cycle.
-    Rt,
-    /// Identification: time of each method.
-    Identify,
-    /// Planning: time of one throw of each task, and what it is spent on.
-    Plan,
-    /// Tracking: time of each stage per frame, and memory, on a recorded wiggle.
-    Track,
-}
-
-/// Arguments of `wag reproduce`.
-#[derive(Debug, Args)]
-pub struct ReproduceArgs {
-    /// Which result.
-    #[arg(value_enum)]
-    pub name: ReproduceName,
-    /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
-    /// each wiggle, for lob-drape its own 24, for robust 200,
-    /// for parameter-importance 30, for sensitivity-maps 8
-    /// (motion-fidelity has its own).
-    #[arg(long)]
-    pub ropes: Option<u64>,
-    /// Seed of the ropes, the films and the searches.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Method.
-    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
-    pub method: MethodName,
-    /// Threads; the result does not depend on them. Default: those of the configuration, 2.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
-    /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
-    /// phi-train).
-    #[arg(long, value_name = "FILE")]
-    pub model: Option<PathBuf>,
-    /// Result file (JSON); a run that was broken off goes on from it. A picture of the
-    /// result (SVG) is drawn beside it.
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-}
-
-/// Results known by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ReproduceName {
-    /// Errors of identified parameters (the paper's in-domain table) and coverage.
-    Sysid,
-    /// Telling ropes outside the parameter ranges from those inside.
-    SysidOod,
-    /// Errors of identified parameters with each of the paper's nine wiggles.
-    WiggleAblation,
-    /// Motion of an identified rope in a throw it was not identified from.
-    MotionFidelity,
-    /// Error of planned strikes: true, identified and random parameters.
-    SimPipeline,
-    /// Success of lobs and drapes planned with identified parameters.
-    LobDrape,
-    /// Strikes planned for every rope it might be, beside plain ones, and their forecasts.
-    Robust,
-    /// Error of strikes planned with only some parameters identified.
-    ParameterImportance,
-    /// What in a film the network's answer hangs on, parameter by parameter.
-    SensitivityMaps,
-}
-
 /// Arguments of `wag doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
@@ -743,83 +511,9 @@ pub enum ProcessName {
     Planner,
 }
 
-/// A seed.
-pub fn seed(text: &str) -> Result<u64, String> {
-    text.parse()
-        .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
-}
-
-/// A frame rate (Hz).
-fn rate_hz(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(rate) if (0.1..=10_000.0).contains(&rate) => Ok(rate),
-        _ => Err("a frame rate is a number from 0.1 to 10000, a second".to_owned()),
-    }
-}
-
-/// A mass (kg).
-fn mass_kg(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(mass) if mass > 0.0 && f64::is_finite(mass) => Ok(mass),
-        _ => Err("a mass is a number above 0, in kg".to_owned()),
-    }
-}
-
-/// An address, or a name that has one; version 4 is what an arm speaks.
-fn host(text: &str) -> Result<IpAddr, String> {
-    if let Ok(address) = text.parse() {
-        return Ok(address);
-    }
-    let found: Vec<IpAddr> = (text, 0u16)
-        .to_socket_addrs()
-        .map_err(|e| format!("`{text}` is no address and has none ({e})"))?
-        .map(|socket| socket.ip())
-        .collect();
-    let first = found.iter().find(|ip| ip.is_ipv4()).or(found.first());
-    first
-        .copied()
-        .ok_or_else(|| format!("`{text}` has no address"))
-}
-
-/// Three finite numbers `x,y,z`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point(pub [f64; 3]);
-
-impl FromStr for Point {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` must be three finite numbers x,y,z");
-        let numbers: Vec<f64> = text
-            .split(',')
-            .map(|t| t.trim().parse().map_err(|_e| wrong()))
-            .collect::<Result<_, _>>()?;
-        let point: [f64; 3] = numbers.try_into().map_err(|_e| wrong())?;
-        if point.iter().all(|v| v.is_finite()) {
-            Ok(Self(point))
-        } else {
-            Err(wrong())
-        }
-    }
-}
-
-/// A colour `R,G,B`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Colour(pub [u8; 3]);
-
-impl FromStr for Colour {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` must be three whole numbers R,G,B from 0 to 255");
-        let numbers: Vec<u8> = text
-            .split(',')
-            .map(|t| t.trim().parse().map_err(|_e| wrong()))
-            .collect::<Result<_, _>>()?;
-        numbers.try_into().map(Self).map_err(|_e| wrong())
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::values::Colour;
     use super::*;
     use clap::CommandFactory;
 

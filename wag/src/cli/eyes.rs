@@ -1,0 +1,155 @@
+//! Arguments of what looks: film, track, score, calib.
+
+use super::MotionArgs;
+use super::values::{Colour, rate_hz};
+use clap::{Args, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Arguments of `wag film`.
+#[derive(Debug, Args)]
+pub struct FilmArgs {
+    /// The camera, /dev/videoN.
+    #[arg(long)]
+    pub device: PathBuf,
+    /// Picture size of an eye: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
+    #[arg(long, value_enum, default_value_t = ModeName::Vga)]
+    pub mode: ModeName,
+    /// Frames per second.
+    #[arg(long, default_value_t = 60)]
+    pub fps: u32,
+    /// Frames to record.
+    #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..=36_000))]
+    pub frames: u64,
+    /// The camera's ordinary control for gain.
+    #[arg(long)]
+    pub gain: Option<i32>,
+    /// Exposure in the sensor's own units; ends automatic exposure (ZED only).
+    #[arg(long)]
+    pub exposure_raw: Option<u32>,
+    /// Gain in the sensor's own units (ZED only).
+    #[arg(long, requires = "exposure_raw")]
+    pub sensor_gain_raw: Option<u32>,
+    /// Beginning of the files' names: NAME_WIDTHxHEIGHT.yuyv and .csv.
+    #[arg(long, value_name = "NAME")]
+    pub out: PathBuf,
+}
+
+/// Picture sizes of a stereo camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ModeName {
+    /// 672x376.
+    #[value(name = "VGA")]
+    Vga,
+    /// 1280x720.
+    #[value(name = "HD")]
+    Hd,
+    /// 1920x1080.
+    #[value(name = "FHD")]
+    FullHd,
+    /// 2208x1242.
+    #[value(name = "2K")]
+    TwoK,
+}
+
+/// Arguments of `wag track`.
+#[derive(Debug, Args)]
+pub struct TrackArgs {
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
+    /// JPEG pictures, and timestamps.csv.
+    #[arg(long)]
+    pub video: PathBuf,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz)]
+    pub fps: Option<f64>,
+    /// Camera calibration and place.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Motion of the clamp.
+    #[command(flatten)]
+    pub motion: MotionArgs,
+    /// Keypoints per frame.
+    #[arg(long, default_value_t = 20)]
+    pub keypoints: usize,
+    /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
+    #[arg(long)]
+    pub overlay: Option<PathBuf>,
+    /// Keypoints (JSON).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// Arguments of `wag score`.
+#[derive(Debug, Args)]
+pub struct ScoreArgs {
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
+    /// JPEG pictures, and timestamps.csv.
+    #[arg(long)]
+    pub video: PathBuf,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz)]
+    pub fps: Option<f64>,
+    /// Camera calibration and place.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Colour of the tip, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub tip_rgb: Colour,
+    /// Colour of the target, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub target_rgb: Colour,
+}
+
+/// Where the camera stands.
+#[derive(Debug, Subcommand)]
+pub enum CalibCommand {
+    /// Find the camera's place in the world and write it into a camera.toml.
+    Extrinsics(ExtrinsicsArgs),
+    /// Compare the place in camera.toml with what the camera sees.
+    Check(CalibCheckArgs),
+}
+
+/// What the camera is shown.
+#[derive(Debug, Args)]
+pub struct ShownArgs {
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
+    /// JPEG pictures, and timestamps.csv.
+    #[arg(long)]
+    pub video: PathBuf,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz)]
+    pub fps: Option<f64>,
+    /// Camera calibration; its place may be wrong.
+    #[arg(long)]
+    pub camera: PathBuf,
+    /// Printed ChArUco board that hangs still (board.toml).
+    #[arg(long, conflicts_with_all = ["lead", "lead_rgb"], required_unless_present = "lead")]
+    pub board: Option<PathBuf>,
+    /// The arm shows its lead: CSV with columns frame,x,y,z (m, world).
+    #[arg(long, requires = "lead_rgb")]
+    pub lead: Option<PathBuf>,
+    /// Colour of that lead, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub lead_rgb: Option<Colour>,
+}
+
+/// Arguments of `wag calib extrinsics`.
+#[derive(Debug, Args)]
+pub struct ExtrinsicsArgs {
+    /// What the camera is shown.
+    #[command(flatten)]
+    pub shown: ShownArgs,
+    /// The camera's settings with the place found (TOML).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+/// Arguments of `wag calib check`.
+#[derive(Debug, Args)]
+pub struct CalibCheckArgs {
+    /// What the camera is shown.
+    #[command(flatten)]
+    pub shown: ShownArgs,
+    /// Largest residual that passes (px, RMS over both eyes).
+    #[arg(long, default_value_t = 2.0)]
+    pub limit_px: f64,
+}

@@ -1,0 +1,79 @@
+//! Values on the command line, with what they may be.
+
+use std::net::{IpAddr, ToSocketAddrs};
+use std::str::FromStr;
+
+/// A seed.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
+}
+
+/// A frame rate (Hz).
+pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(rate) if (0.1..=10_000.0).contains(&rate) => Ok(rate),
+        _ => Err("a frame rate is a number from 0.1 to 10000, a second".to_owned()),
+    }
+}
+
+/// A mass (kg).
+pub(super) fn mass_kg(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(mass) if mass > 0.0 && f64::is_finite(mass) => Ok(mass),
+        _ => Err("a mass is a number above 0, in kg".to_owned()),
+    }
+}
+
+/// An address, or a name that has one; version 4 is what an arm speaks.
+pub(super) fn host(text: &str) -> Result<IpAddr, String> {
+    if let Ok(address) = text.parse() {
+        return Ok(address);
+    }
+    let found: Vec<IpAddr> = (text, 0u16)
+        .to_socket_addrs()
+        .map_err(|e| format!("`{text}` is no address and has none ({e})"))?
+        .map(|socket| socket.ip())
+        .collect();
+    let first = found.iter().find(|ip| ip.is_ipv4()).or(found.first());
+    first
+        .copied()
+        .ok_or_else(|| format!("`{text}` has no address"))
+}
+
+/// Three finite numbers `x,y,z`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point(pub [f64; 3]);
+
+impl FromStr for Point {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` must be three finite numbers x,y,z");
+        let numbers: Vec<f64> = text
+            .split(',')
+            .map(|t| t.trim().parse().map_err(|_e| wrong()))
+            .collect::<Result<_, _>>()?;
+        let point: [f64; 3] = numbers.try_into().map_err(|_e| wrong())?;
+        if point.iter().all(|v| v.is_finite()) {
+            Ok(Self(point))
+        } else {
+            Err(wrong())
+        }
+    }
+}
+
+/// A colour `R,G,B`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Colour(pub [u8; 3]);
+
+impl FromStr for Colour {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` must be three whole numbers R,G,B from 0 to 255");
+        let numbers: Vec<u8> = text
+            .split(',')
+            .map(|t| t.trim().parse().map_err(|_e| wrong()))
+            .collect::<Result<_, _>>()?;
+        numbers.try_into().map(Self).map_err(|_e| wrong())
+    }
+}
