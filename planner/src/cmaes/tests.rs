@@ -48,10 +48,9 @@ fn options(n: usize, mean: f64, std_dev: f64, seed: u64) -> CmaOptions {
 #[test]
 fn unimodal_functions_converge_with_usual_counts() {
     type Case = (&'static str, fn(&[f64]) -> f64, [usize; 2]);
-    let cases: [Case; 3] = [
+    let cases: [Case; 2] = [
         ("sphere", sphere, [1_800, 4_000]),
         ("ellipsoid", ellipsoid, [6_000, 21_000]),
-        ("rosenbrock", rosenbrock, [9_000, 40_000]),
     ];
     for (name, f, budgets) in cases {
         for (n, budget) in [9usize, 21].into_iter().zip(budgets) {
@@ -61,6 +60,26 @@ fn unimodal_functions_converge_with_usual_counts() {
                 assert!(evaluations < budget, "{name} {n}: {evaluations}");
             }
         }
+    }
+}
+
+/// In many dimensions the function has a second minimum, about 4 above the first, in
+/// which one search of twenty ends; of twenty searches at most three may.
+#[test]
+fn rosenbrock_is_solved_but_for_its_second_minimum() {
+    for (n, budget) in [(9usize, 9_000), (21, 40_000)] {
+        let mut solved = 0;
+        for seed in 0..20 {
+            let (search, evaluations) = run(options(n, 0.3, 0.5, seed), rosenbrock);
+            assert!(evaluations < budget, "{n}, seed {seed}: {evaluations}");
+            let found = search.best().unwrap().fitness;
+            if search.stop() == Some(StopReason::FitnessTarget) {
+                solved += 1;
+            } else {
+                assert!((found - 4.0).abs() < 0.1, "{n}, seed {seed}: {found}");
+            }
+        }
+        assert!(solved >= 17, "{n}: {solved}");
     }
 }
 

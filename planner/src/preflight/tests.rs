@@ -63,7 +63,7 @@ fn by_velocities_the_end_of_the_range_is_kept_clear_of() {
         ..JudgedArm::default()
     };
     assert_eq!(stop(&near, &arm), Some(23));
-    assert_eq!(stop(&swing(3, 1.527 - 0.006, 4.0), &arm), None);
+    assert_eq!(stop(&swing(3, 1.527 - 0.012, 4.0), &arm), None);
 }
 
 #[test]
