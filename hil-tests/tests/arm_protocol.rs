@@ -8,7 +8,7 @@
 )]
 
 use hil_tests::arm::fault::{FaultKind, PortSet};
-use hil_tests::arm::{ArmConfig, ArmStartError, Fault, SimulatedArm, Trigger, clock};
+use hil_tests::arm::{ArmConfig, ArmEvent, ArmStartError, Fault, SimulatedArm, Trigger, clock};
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -260,6 +260,23 @@ fn as_many_clients_as_a_real_arm_takes() {
     }
 }
 
+/// Injects a fault and waits until it has begun, however late the arm's thread gets to run.
+fn begin(arm: &SimulatedArm, fault: Fault) {
+    arm.inject(fault);
+    let begun = |event: &ArmEvent| match event {
+        ArmEvent::Fault { kind, begins, .. } => *begins && *kind == fault.kind,
+        _ => false,
+    };
+    for _ in 0..100 {
+        let events = arm.events().since(MonotonicNs(0));
+        if events.iter().any(|e| begun(&e.event)) {
+            return wait_s(0.1);
+        }
+        wait_s(0.05);
+    }
+    panic!("{:?} did not begin within 5 s", fault.kind);
+}
+
 /// The same faults as in virtual time, over real sockets.
 #[test]
 fn faults_of_the_wire_reach_the_sockets() {
@@ -280,16 +297,18 @@ fn faults_of_the_wire_reach_the_sockets() {
 
     let ports = PortSet::All;
     let mut reports = connect(arm.ports().reports[0]);
-    arm.inject(fault(FaultKind::ConnectionReset { ports }, None));
-    wait_s(0.1);
     let mut byte = [0; 2048];
+    // Something has come: the arm has taken the connection up, so that the fault meets it.
+    assert!(reports.read(&mut byte).unwrap() > 0);
+    begin(&arm, fault(FaultKind::ConnectionReset { ports }, None));
     let error = client.stream.read(&mut byte).unwrap_err();
     assert_eq!(error.kind(), std::io::ErrorKind::ConnectionReset);
     while reports.read(&mut byte).is_ok() {}
 
     let mut client = Client::new(&arm);
-    arm.inject(fault(FaultKind::HalfOpen { ports }, None));
-    wait_s(0.1);
+    // Answered: this one is taken up, too.
+    client.state();
+    begin(&arm, fault(FaultKind::HalfOpen { ports }, None));
     let timeout = Some(Duration::from_millis(200));
     client.stream.set_read_timeout(timeout).unwrap();
     client.stream.write_all(&[0, 1, 0, 2, 0, 1, 13]).unwrap();
