@@ -13,8 +13,8 @@ use shared_types::{JointTrajectory, JointVector, Limits, MonotonicNs, RopeParams
 use std::time::Duration;
 
 /// Time allowed for planning before the move begins (s); longer after a plan
-/// that came too late.
-const PLANNING_S: [f64; 3] = [2.0, 4.0, 8.0];
+/// that came too late. The rope sways down meanwhile: to wait spoils nothing.
+const PLANNING_S: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
 /// From the call to the first setpoint, on average (s): half a turn of the
 /// controller's relay and half a cycle.
 const HANDOVER_S: f64 = 0.005;
