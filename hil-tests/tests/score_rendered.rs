@@ -14,6 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared_types::StereoCamera;
 use shared_types::plan::START_POSE;
+use std::num::NonZeroUsize;
 
 /// Frames of a throw; the tip passes the target in the middle of them.
 const FRAMES: u32 = 18;
@@ -110,50 +111,82 @@ impl Throw {
     }
 }
 
+/// Scores of the throws of one set of colours.
+#[derive(Default)]
+struct Scores {
+    held: usize,
+    refused: usize,
+    errors_m: Vec<f64>,
+    widths_m: Vec<f64>,
+}
+
+/// Renders and scores the throws of one seed.
+fn scores_of(seed: u64, config: &CameraConfig) -> Scores {
+    let camera = config.stereo_camera();
+    let appearance = Appearance::from_seed(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let shape = RopeShape {
+        radius_m: 0.005,
+        lead_radius_m: rng.random_range(0.015..0.045),
+    };
+    let mut renderer = Renderer::new(&camera, shape, appearance, config.noise_levels, seed);
+    let mut scores = Scores::default();
+    for index in 0..THROWS {
+        let throw = Throw::random(&mut rng, 1.0 / config.frame_rate_hz);
+        let mut film = throw.film(&mut renderer, config, &camera);
+        let truth_m = throw.closest_m(f64::from(FRAMES) / config.frame_rate_hz);
+        let options = ScoreOptions::default();
+        let colours = (appearance.lead_rgb, appearance.target_rgb);
+        let found = match score(&mut film, &camera, colours.0, colours.1, &options) {
+            Ok(found) => found,
+            Err(error) => {
+                println!("seed {seed} throw {index}: {error}");
+                scores.refused += 1;
+                continue;
+            }
+        };
+        let holds = (found.interval_m[0]..=found.interval_m[1]).contains(&truth_m);
+        println!(
+            "seed {seed} throw {index}: {:.1} mm, truth {:.1} mm, interval {:.1} to {:.1} mm{}",
+            1e3 * found.closest_m,
+            1e3 * truth_m,
+            1e3 * found.interval_m[0],
+            1e3 * found.interval_m[1],
+            if holds { "" } else { ": missed" }
+        );
+        scores.held += usize::from(holds);
+        scores.errors_m.push((found.closest_m - truth_m).abs());
+        scores
+            .widths_m
+            .push(found.interval_m[1] - found.interval_m[0]);
+    }
+    scores
+}
+
 #[test]
 fn intervals_hold_the_truth_where_lead_and_target_cover_each_other() {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
     let config = CameraConfig::default();
-    let camera = config.stereo_camera();
     // The first were looked at while the intervals were made, the others were not.
-    let seeds = if long { 3000..3020 } else { 100..102 };
-    let (mut held, mut refused, mut errors_m, mut widths_m) = (0, 0, Vec::new(), Vec::new());
-    for seed in seeds {
-        let appearance = Appearance::from_seed(seed);
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let shape = RopeShape {
-            radius_m: 0.005,
-            lead_radius_m: rng.random_range(0.015..0.045),
+    let seeds: Vec<u64> = if long { 3000..3020 } else { 100..102 }.collect();
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let scores: Vec<Scores> = std::thread::scope(|scope| {
+        let share = |seeds: &[u64]| -> Vec<Scores> {
+            seeds.iter().map(|seed| scores_of(*seed, &config)).collect()
         };
-        let mut renderer = Renderer::new(&camera, shape, appearance, config.noise_levels, seed);
-        for index in 0..THROWS {
-            let throw = Throw::random(&mut rng, 1.0 / config.frame_rate_hz);
-            let mut film = throw.film(&mut renderer, &config, &camera);
-            let truth_m = throw.closest_m(f64::from(FRAMES) / config.frame_rate_hz);
-            let options = ScoreOptions::default();
-            let colours = (appearance.lead_rgb, appearance.target_rgb);
-            let found = match score(&mut film, &camera, colours.0, colours.1, &options) {
-                Ok(found) => found,
-                Err(error) => {
-                    println!("seed {seed} throw {index}: {error}");
-                    refused += 1;
-                    continue;
-                }
-            };
-            let holds = (found.interval_m[0]..=found.interval_m[1]).contains(&truth_m);
-            println!(
-                "seed {seed} throw {index}: {:.1} mm, truth {:.1} mm, interval {:.1} to {:.1} mm{}",
-                1e3 * found.closest_m,
-                1e3 * truth_m,
-                1e3 * found.interval_m[0],
-                1e3 * found.interval_m[1],
-                if holds { "" } else { ": missed" }
-            );
-            held += usize::from(holds);
-            errors_m.push((found.closest_m - truth_m).abs());
-            widths_m.push(found.interval_m[1] - found.interval_m[0]);
-        }
-    }
+        let workers: Vec<_> = seeds
+            .chunks(seeds.len().div_ceil(threads))
+            .map(|seeds| scope.spawn(move || share(seeds)))
+            .collect();
+        workers
+            .into_iter()
+            .flat_map(|w| w.join().unwrap())
+            .collect()
+    });
+    let held: usize = scores.iter().map(|s| s.held).sum();
+    let refused: usize = scores.iter().map(|s| s.refused).sum();
+    let mut errors_m: Vec<f64> = scores.iter().flat_map(|s| s.errors_m.clone()).collect();
+    let mut widths_m: Vec<f64> = scores.iter().flat_map(|s| s.widths_m.clone()).collect();
     let count = errors_m.len();
     for values in [&mut errors_m, &mut widths_m] {
         values.sort_by(f64::total_cmp);

@@ -17,7 +17,15 @@ pub(super) struct Finalist {
     pub(super) score: f64,
     /// Part of the ropes compared with which the task succeeds.
     successes: f64,
+    /// Whether outcome, score and successes come from double precision at half the step.
+    is_exact: bool,
 }
+
+/// Finalists of one search whose own rope is simulated again exactly: as many as a
+/// processor's double precision simulates at once.
+const LOOKED_AT_AGAIN: usize = 8;
+/// Of these, how many at most are judged exactly with all ropes.
+const JUDGED_EXACTLY: usize = 3;
 
 impl Setup<'_> {
     /// The best of a search with all ropes; the best of those polished.
@@ -64,11 +72,63 @@ impl Setup<'_> {
         points: Vec<Point>,
         count: &mut Count,
     ) -> Result<Vec<Finalist>, PlanError> {
+        let mut out = self.judged(points, false, count)?;
+        out.sort_by(|a, b| a.score.total_cmp(&b.score));
+        Ok(out)
+    }
+
+    /// Judges the best again exactly, until the best is one that was.
+    ///
+    /// Whether a domino falls can hang on the arithmetic: a throw for which it does is
+    /// not one to make.
+    pub(super) fn confirm(
+        &self,
+        finalists: &mut Vec<Finalist>,
+        count: &mut Count,
+    ) -> Result<(), PlanError> {
+        let (rope, exact) = (&self.request.rope, self.judging.exact());
+        let again = finalists.iter_mut().take(LOOKED_AT_AGAIN);
+        let mut again: Vec<_> = again.filter(|f| !f.is_exact).collect();
+        let throws: Vec<_> = again.iter().map(|f| (rope, &f.trajectory)).collect();
+        let outcomes = exact.run(&throws)?;
+        count.add(throws.len());
+        for (finalist, outcome) in again.iter_mut().zip(&outcomes) {
+            if !(outcome.finite && self.task.judge(rope, outcome).success) {
+                finalist.score += 1.0;
+            }
+        }
+        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        for _ in 0..JUDGED_EXACTLY {
+            if finalists.first().is_none_or(|best| best.is_exact) {
+                return Ok(());
+            }
+            let best = finalists.remove(0);
+            let again = self.judged(vec![(best.x, best.trajectory)], true, count)?;
+            for finalist in again {
+                let before = |other: &Finalist| other.score.total_cmp(&finalist.score).is_le();
+                let at = finalists.partition_point(before);
+                finalists.insert(at, finalist);
+            }
+        }
+        Ok(())
+    }
+
+    /// Throws observed to the end with all ropes, without those that let the arm collide.
+    fn judged(
+        &self,
+        points: Vec<Point>,
+        is_exact: bool,
+        count: &mut Count,
+    ) -> Result<Vec<Finalist>, PlanError> {
         let throws: Vec<_> = points
             .iter()
             .flat_map(|(_, t)| self.ropes.iter().map(move |rope| (rope, t)))
             .collect();
-        let mut outcomes = self.judging.run(&throws)?;
+        let mut outcomes = if is_exact {
+            self.judging.exact().run(&throws)?
+        } else {
+            self.judging.run(&throws)?
+        };
         count.add(throws.len());
         let mut out = Vec::new();
         for (x, trajectory) in points {
@@ -76,9 +136,12 @@ impl Setup<'_> {
             if !own[0].finite || own[0].contacts.pole_robot > 0 {
                 continue;
             }
-            out.push(self.finalist(x, trajectory, own));
+            let finalist = self.finalist(x, trajectory, own);
+            out.push(Finalist {
+                is_exact,
+                ..finalist
+            });
         }
-        out.sort_by(|a, b| a.score.total_cmp(&b.score));
         Ok(out)
     }
 
@@ -101,6 +164,7 @@ impl Setup<'_> {
             trajectory,
             score: (squares / count).sqrt() + contacts + (1.0 - successes),
             successes,
+            is_exact: false,
             outcome: outcomes.into_iter().next().unwrap_or_default(),
         }
     }

@@ -5,7 +5,9 @@
 //! how far the domino tilts, how long the tip has lain on the board at the end, and how
 //! near the target it lies then, which is what leaves room for an error of the rope.
 
-use super::{PlanarScene, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward, verdict};
+use super::{
+    PlanarScene, Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward, verdict,
+};
 use crate::collide::Block;
 use crate::trajopt::PolePose;
 use nalgebra::Vector3;
@@ -61,7 +63,11 @@ impl Default for LobConfig {
                 observed_s: 3.0,
                 contact_tail_s: 0.7,
                 contact_period_s: 0.025,
-                stop_success_part: Some(0.5),
+                stop_success_part: Some(0.4),
+                robustness: Robustness {
+                    finalists: 8,
+                    ..Robustness::default()
+                },
                 ..ThrowConfig::default()
             },
             dwell_per_s: 0.3,

@@ -72,6 +72,9 @@ pub fn plan_throw(
         let found = setup.search(round, &mut count, progress)?;
         finalists.extend(setup.compare(found, &mut count)?);
         finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        if !setup.task.polishes() {
+            setup.confirm(&mut finalists, &mut count)?;
+        }
         let good = finalists.first().is_some_and(|f| setup.is_good(f));
         if count.interrupted || good {
             break;

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
 use shared_types::rope::ROPE_PARAMETERS;
 
-/// Random parameter sets per rope and condition; the paper has 10.
-const DRAWS: usize = 4;
+/// Random parameter sets per rope and condition, as many as the paper has.
+const DRAWS: usize = 10;
 /// Sets drawn at most to find those: the target may be out of a random rope's reach.
 const ATTEMPTS: u64 = 40;
 /// Keeps the random parameters apart from the ropes thrown.

@@ -15,7 +15,10 @@ const PATIENCE: Duration = Duration::from_secs(300);
 /// One demo at a time: each wants the whole machine, in real time.
 static MACHINE: Mutex<()> = Mutex::new(());
 /// What a demo says that gave up because other programs kept the machine busy.
-const TOO_BUSY: [&str; 2] = ["on this machine; stop other programs", "no camera frame arrived"];
+const TOO_BUSY: [&str; 2] = [
+    "on this machine; stop other programs",
+    "no camera frame arrived",
+];
 
 /// A demo that streams a trajectory of `tier` right now, and its folder in `into`.
 ///
