@@ -162,6 +162,9 @@ impl Default for ThrowConfig {
 pub struct PlanOptions {
     /// Which joints move.
     pub dimensions: Dimensions,
+    /// Most by which a segment's duration is stretched or shrunk (1); 1 keeps the
+    /// waypoints' times, as the paper does.
+    pub segment_stretch_max: f64,
     /// Candidates per generation (paper: 60).
     pub population: usize,
     /// Most generations of one search; the task's own number if left out.
@@ -188,6 +191,7 @@ impl Default for PlanOptions {
     fn default() -> Self {
         Self {
             dimensions: Dimensions::Planar,
+            segment_stretch_max: 1.0,
             population: 60,
             generations: None,
             searches: 3,

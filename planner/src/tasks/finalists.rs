@@ -43,7 +43,7 @@ impl Setup<'_> {
             let points: Vec<Vec<f64>> = best.map(|f| f.x.clone()).collect();
             let frames = FrameTimes::NONE;
             let motion = self.simulator.motion(&self.space.decode(&self.start)?)?;
-            let motion_s = motion.duration_s();
+            let motion_s = motion.duration_s().max(self.simulator.motion_s_min);
             let work = Polish {
                 space: &self.space,
                 screen: &self.screen,

@@ -115,6 +115,13 @@ fn check_options(options: &PlanOptions) -> Result<(), PlanError> {
             "above 0 and at most 0.005 s",
         );
     }
+    if !(1.0..=2.0).contains(&options.segment_stretch_max) {
+        return refuse(
+            "segment_stretch_max",
+            options.segment_stretch_max,
+            "from 1 to 2",
+        );
+    }
     if options.generations == Some(0) {
         return refuse("generations", 0.0, "1 or more");
     }

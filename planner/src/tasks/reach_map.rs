@@ -16,7 +16,7 @@ use rand_distr::StandardNormal;
 use rope_sim::{
     Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start, Watch, roll_out,
 };
-use shared_types::{JointTrajectory, Limits, RopeParams};
+use shared_types::{JointTrajectory, JointVector, Limits, RopeParams};
 use std::collections::BTreeMap;
 
 /// Edge of a cell (m).
@@ -68,18 +68,16 @@ impl ReachMap {
             start: start_pose_for([1.0, 0.0, 0.0]),
             dimensions: Dimensions::Planar,
             times_s: config.waypoint_times_s,
+            stretch_max: 1.0,
         };
         let screen = Screen::new(space.clone(), limits.clone(), config.clearance)?;
-        let joints = space.dimensions.joints();
-        let std_dev_rad: Vec<f64> = (0..WAYPOINTS)
-            .flat_map(|_| joints.iter().map(|&j| config.std_dev_rad[j]))
-            .collect();
+        let std_dev = space.std_dev(&JointVector(config.std_dev_rad));
         let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x4ea_c400);
         let mut archive: BTreeMap<Cell, Kept> = BTreeMap::new();
         let mut throws = 0;
         for _ in 0..ROUNDS {
             let points: Vec<Vec<f64>> = (0..THROWS)
-                .filter_map(|_| draw(&space, &screen, &std_dev_rad, &archive, &mut rng))
+                .filter_map(|_| draw(&space, &screen, &std_dev, &archive, &mut rng))
                 .collect();
             let paths = tip_paths(rope, &space, config, &points, threads)?;
             throws += u32::try_from(points.len()).unwrap_or(u32::MAX);
@@ -152,7 +150,7 @@ impl ReachMap {
 fn draw(
     space: &WaypointSpace,
     screen: &Screen,
-    std_dev_rad: &[f64],
+    std_dev: &[f64],
     archive: &BTreeMap<Cell, Kept>,
     rng: &mut ChaCha12Rng,
 ) -> Option<Vec<f64>> {
@@ -169,11 +167,7 @@ fn draw(
         .map(|_| {
             let moved =
                 |(m, s): (&f64, &f64)| m + spread * s * rng.sample::<f64, _>(StandardNormal);
-            middle
-                .iter()
-                .zip(std_dev_rad)
-                .map(moved)
-                .collect::<Vec<f64>>()
+            middle.iter().zip(std_dev).map(moved).collect::<Vec<f64>>()
         })
         .find(|x| screen.accepts(x))
 }

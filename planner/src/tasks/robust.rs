@@ -93,7 +93,7 @@ pub(super) fn search_around(
         population: POPULATION,
         generations: GENERATIONS,
         seed: setup.request.options.seed ^ 0x0b57,
-        std_dev_rad: setup.std_dev_rad.iter().map(|s| s * SPREAD).collect(),
+        std_dev: setup.std_dev.iter().map(|s| s * SPREAD).collect(),
         draws_max: setup.task.config().draws_max,
         stop_below_m: None,
         stop_success_part: None,

@@ -7,7 +7,7 @@ use super::{
 use crate::trajopt::{
     Found, Screen, SearchOptions, Valued, WAYPOINTS, WaypointSpace, reach_pose, search,
 };
-use shared_types::{JointTrajectory, RopeParams};
+use shared_types::{JointTrajectory, JointVector, RopeParams};
 use std::ops::ControlFlow;
 
 /// A point of the search's space with its trajectory.
@@ -20,7 +20,7 @@ pub(super) struct Setup<'a> {
     pub(super) space: WaypointSpace,
     pub(super) screen: Screen,
     pub(super) bounds: (Vec<f64>, Vec<f64>),
-    pub(super) std_dev_rad: Vec<f64>,
+    pub(super) std_dev: Vec<f64>,
     pub(super) simulator: ThrowSimulator,
     /// The same with the step of the generations.
     searching: ThrowSimulator,
@@ -64,6 +64,7 @@ impl<'a> Setup<'a> {
             start: start_pose_for(task.target_m()),
             dimensions: request.options.dimensions,
             times_s: config.waypoint_times_s,
+            stretch_max: request.options.segment_stretch_max,
         };
         let screen = Screen::new(space.clone(), request.limits.clone(), config.clearance)?;
         let simulator = ThrowSimulator {
@@ -78,12 +79,9 @@ impl<'a> Setup<'a> {
             tail_s: config.observed_s,
             ..simulator.clone()
         };
-        let joints = space.dimensions.joints();
         Ok(Self {
             bounds: space.bounds(&request.limits),
-            std_dev_rad: (0..WAYPOINTS)
-                .flat_map(|_| joints.iter().map(|&j| config.std_dev_rad[j]))
-                .collect(),
+            std_dev: space.std_dev(&JointVector(config.std_dev_rad)),
             start: start_point(task, &request.rope, &space, &screen),
             ropes: config.robustness.variants(&request.rope),
             space,
@@ -128,7 +126,7 @@ impl<'a> Setup<'a> {
             population: options.population,
             generations: options.generations.unwrap_or(config.generations),
             seed: options.seed.wrapping_add((round as u64) << 40),
-            std_dev_rad: self.std_dev_rad.clone(),
+            std_dev: self.std_dev.clone(),
             draws_max: config.draws_max,
             stop_below_m: options.stop_below_m,
             stop_success_part: config.stop_success_part,
@@ -175,7 +173,7 @@ fn start_point(
         return resting;
     }
     let joints = space.dimensions.joints();
-    let wanted: Vec<f64> = poses
+    let mut wanted: Vec<f64> = poses
         .iter()
         .scan(space.start, |from, pose| {
             *from = reach_pose(from, *pose);
@@ -183,6 +181,7 @@ fn start_point(
         })
         .flat_map(|q| joints.iter().map(move |&j| q[j]))
         .collect();
+    wanted.resize(resting.len(), 0.0);
     (0..PARTS)
         .map(|i| 1.0 - f64::from(i) / f64::from(PARTS))
         .map(|part| {

@@ -2,7 +2,7 @@
 
 use super::{PlanOptions, ThrowConfig, ThrowOutcome, ThrowSimulator};
 use crate::collide::{Block, Scene as Surroundings};
-use crate::trajopt::PolePose;
+use crate::trajopt::{PolePose, WAYPOINTS};
 use rope_sim::{Precision, Scene, Watch};
 use shared_types::{Condition, RopeParams, Verdict};
 
@@ -92,6 +92,8 @@ pub fn simulator_for(
         watch: task.watch(rope),
         scene: task.scene(),
         keep_clear: task.keep_clear(),
+        // Longer throws than these times are among the candidates of free times only.
+        motion_s_min: config.waypoint_times_s[WAYPOINTS - 1] * options.segment_stretch_max,
         tail_s: config.tail_s,
         contact_tail_s: config.contact_tail_s,
         step_s: options.step_s,

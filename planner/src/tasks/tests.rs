@@ -241,3 +241,34 @@ fn lobs_and_drapes_are_judged_by_their_conditions() {
     outcome.watched.dwell = Some(stay(None));
     assert_eq!(met(&drape.judge(&rope, &outcome))[..2], [false, false]);
 }
+
+#[test]
+fn free_times_stay_within_their_range_and_the_plan_within_every_limit() {
+    let (task, mut r) = (strike([0.95, 0.25, 0.1]), request());
+    r.options.segment_stretch_max = 1.3;
+    let planned = plan_throw(&task, &r, &mut go_on).unwrap();
+    assert!(planned.error_m < 5e-4, "{}", planned.error_m);
+    assert!(r.limits.worst_violation(&planned.trajectory).is_none());
+    let durations = |times_s: &[f64]| times_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>();
+    let mut fixed_s = vec![0.0];
+    fixed_s.extend(task.config().waypoint_times_s);
+    let stretches: Vec<f64> = durations(planned.trajectory.times_s())
+        .iter()
+        .zip(durations(&fixed_s))
+        .map(|(is, was)| is / was)
+        .collect();
+    let within = 1.0 / 1.3 - 1e-9..=1.3 + 1e-9;
+    assert!(
+        stretches.iter().all(|s| within.contains(s)),
+        "{stretches:?}"
+    );
+    assert!(
+        stretches.iter().any(|s| (s - 1.0).abs() > 0.01),
+        "{stretches:?}"
+    );
+    for refused in [0.5, 2.5, f64::NAN] {
+        r.options.segment_stretch_max = refused;
+        let error = plan_throw(&task, &r, &mut go_on).unwrap_err();
+        assert!(error.to_string().contains("segment_stretch_max"), "{error}");
+    }
+}

@@ -47,6 +47,8 @@ pub struct ThrowSimulator {
     pub scene: Scene,
     /// What arm and pole must not touch.
     pub keep_clear: Vec<Block>,
+    /// Time allowed for the motion, whatever a throw's own (s).
+    pub motion_s_min: f64,
     /// Time simulated after the motion's end (s).
     pub tail_s: f64,
     /// Time after the motion's end in which contacts with the arm are looked for (s).
@@ -114,7 +116,7 @@ impl ThrowSimulator {
             .map(|(_, command)| self.motion(command))
             .collect::<Result<Vec<_>, _>>()?;
         let motion_s = motions.iter().map(JointTrajectory::duration_s);
-        let motion_s = motion_s.fold(0.0, f64::max);
+        let motion_s = motion_s.fold(self.motion_s_min, f64::max);
         let arms: Vec<PlannedArm> = motions.iter().map(|m| PlannedArm::new(*m)).collect();
         let candidates: Vec<Candidate<'_>> = throws
             .iter()

@@ -148,7 +148,9 @@ impl Polish<'_> {
 
     /// Slopes of the tip's place at its closest, one column per coordinate.
     fn slopes(&self, points: &[&[f64]]) -> Result<Vec<Option<DMatrix<f64>>>, PlanError> {
-        let n = self.space.dimensions.count();
+        // Neighbours with other times would be simulated in other steps, and differ by
+        // more than the slope: the times stay as they were found.
+        let (n, all_coordinates) = (self.space.dimensions.count(), self.space.count());
         let bases = self.motions(points)?;
         let mut moved = Vec::with_capacity(points.len() * n);
         for x in points {
@@ -185,7 +187,10 @@ impl Polish<'_> {
                     (0..n).map(|i| s.closest(i).map(|a| a.tip_m)).collect();
                 // A neighbour that comes closest elsewhere says nothing.
                 let known = columns.iter().any(Option::is_some);
-                known.then(|| DMatrix::from_fn(3, n, |row, k| columns[k].map_or(0.0, |c| c[row])))
+                let slope = |row: usize, k: usize| {
+                    columns.get(k).copied().flatten().map_or(0.0, |c| c[row])
+                };
+                known.then(|| DMatrix::from_fn(3, all_coordinates, slope))
             })
             .collect())
     }

@@ -1,7 +1,7 @@
 //! Rejection of candidates that the arm may not execute.
 //!
 //! The limits are those of [`Limits`], checked on exact extrema of the spline.
-//! Because the knot times are fixed, a candidate's second derivatives are one
+//! Where the knot times are fixed, a candidate's second derivatives are one
 //! small matrix times its knots; a rejected draw costs well under a microsecond.
 
 use super::decode::{WAYPOINTS, WaypointSpace};
@@ -44,8 +44,9 @@ pub struct Screen {
     space: WaypointSpace,
     limits: Limits,
     clearance: Clearance,
-    /// Second derivatives at the knots from positions at the knots.
-    curvature: Matrix4<f64>,
+    /// Second derivatives at the knots from positions at the knots; by candidate where
+    /// the times are free.
+    curvature: Option<Matrix4<f64>>,
 }
 
 /// One joint of a candidate: knots and second derivatives there.
@@ -64,8 +65,10 @@ impl Screen {
         limits: Limits,
         clearance: Clearance,
     ) -> Result<Self, shared_types::TrajectoryError> {
-        space.decode(&space.resting())?;
-        let curvature = curvature_matrix(&space.knot_times_s());
+        let resting = space.resting();
+        space.decode(&resting)?;
+        let curvature =
+            (!space.is_timed()).then(|| curvature_matrix(&space.knot_times_s(&resting)));
         Ok(Self {
             space,
             limits,
@@ -78,14 +81,15 @@ impl Screen {
     #[must_use]
     pub fn accepts(&self, x: &[f64]) -> bool {
         let knots = self.space.knots(x);
+        let times = self.space.knot_times_s(x);
+        let curvature = self.curvature.unwrap_or_else(|| curvature_matrix(&times));
         let splines: [JointSpline; JOINTS] = core::array::from_fn(|j| {
             let q = Vector4::from_fn(|i, _| knots[i][j]);
             JointSpline {
-                m: self.curvature * q,
+                m: curvature * q,
                 q,
             }
         });
-        let times = self.space.knot_times_s();
         let moved = self.space.dimensions.joints();
         if !moved
             .iter()
@@ -220,13 +224,14 @@ mod tests {
     use shared_types::limits::{LimitKind, LimitsSpec};
     use shared_types::plan::START_POSE;
 
-    fn screen(tcp_speed: f64) -> Screen {
+    fn screen(tcp_speed: f64, stretch_max: f64) -> Screen {
         let mut spec = LimitsSpec::from(Limits::default());
         spec.tcp_speed_max_m_s = tcp_speed;
         let space = WaypointSpace {
             start: START_POSE,
             dimensions: Dimensions::Full,
             times_s: [0.45, 0.80, 1.15],
+            stretch_max,
         };
         let limits = Limits::try_from(spec).unwrap();
         Screen::new(space, limits, Clearance::default()).unwrap()
@@ -239,11 +244,18 @@ mod tests {
         let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(4);
         let mut seen = [0; 2];
         for round in 0..3000 {
-            let s = screen(if round % 2 == 0 { 1.2 } else { 9.0 });
+            let stretch_max = if round % 3 == 0 { 1.4 } else { 1.0 };
+            let s = screen(if round % 2 == 0 { 1.2 } else { 9.0 }, stretch_max);
             let mut x = s.space.resting();
             let spread = rng.random_range(0.05..0.8);
-            for v in &mut x {
-                *v += spread * rng.random_range(-1.0..1.0);
+            let waypoints = s.space.dimensions.count();
+            for (i, v) in x.iter_mut().enumerate() {
+                let most = if i < waypoints {
+                    spread
+                } else {
+                    stretch_max.ln()
+                };
+                *v += most * rng.random_range(-1.0..1.0);
             }
             let trajectory = s.space.decode(&x).unwrap();
             let worst = s.limits.worst_violation(&trajectory);
@@ -257,7 +269,9 @@ mod tests {
             {
                 // Only the scene can be the reason.
                 let low = (0..=200).any(|k| {
-                    let q = trajectory.state_at(f64::from(k) * 1.15 / 200.0).q;
+                    let q = trajectory
+                        .state_at(f64::from(k) * trajectory.duration_s() / 200.0)
+                        .q;
                     let (p, r) = kinematics::flange_pose(&q);
                     let end = p + r * Vector3::new(0.0, 0.0, POLE_LENGTH_M);
                     !s.clear(&p) || !s.clear(&end)
@@ -272,7 +286,7 @@ mod tests {
 
     #[test]
     fn floor_and_column_are_kept_clear() {
-        let s = screen(9.0);
+        let s = screen(9.0, 1.0);
         assert!(!s.clear(&Vector3::new(0.5, 0.0, -0.72)));
         assert!(!s.clear(&Vector3::new(0.12, 0.0, -0.2)));
         assert!(s.clear(&Vector3::new(0.2, 0.0, -0.2)));

@@ -18,8 +18,8 @@ pub struct SearchOptions {
     pub generations: usize,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Deviation of the first generation per coordinate (rad).
-    pub std_dev_rad: Vec<f64>,
+    /// Deviation of the first generation per coordinate, in its unit.
+    pub std_dev: Vec<f64>,
     /// Draws of one candidate before it is pulled towards the mean.
     pub draws_max: usize,
     /// Error that is good enough to stop (m).
@@ -84,7 +84,7 @@ pub fn search(
 ) -> Result<SearchResult, PlanError> {
     let mut strategy = CmaEs::new(CmaOptions {
         mean: options.start.clone(),
-        std_dev: options.std_dev_rad.clone(),
+        std_dev: options.std_dev.clone(),
         lower: bounds.0,
         upper: bounds.1,
         integers: Vec::new(),

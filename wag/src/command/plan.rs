@@ -39,6 +39,10 @@ pub struct PlanArgs {
     /// Seed of the search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
+    /// Search the durations of the throw's segments too: each up to this many times as
+    /// long or as short as configured (1 to 2). 1 keeps them; default: the configuration.
+    #[arg(long, value_name = "FACTOR")]
+    pub segment_stretch: Option<f64>,
     /// The plan (JSON).
     #[arg(long)]
     pub out: PathBuf,
@@ -285,6 +289,9 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         limits: limits.clone(),
         options: PlanOptions {
             seed: args.seed,
+            segment_stretch_max: args
+                .segment_stretch
+                .unwrap_or(config.search.segment_stretch_max),
             ..config.search
         },
         belief,
