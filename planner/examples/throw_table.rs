@@ -1,7 +1,7 @@
 //! Plans throws for random ropes and prints how well they do.
 //!
 //! `throw_table [--task strike|lob|drape] [--ropes 20] [--seed 900] [--searches 1]
-//! [--config FILE] [--full 0] [--speed 1.2] [--verbose 1]`
+//! [--config FILE] [--full 0] [--stretch 1] [--speed 1.2] [--verbose 1]`
 //!
 //! Errors are given for the rope planned for, as the root mean square over ropes off by
 //! what identification leaves open, and as the part of those that succeeds.
@@ -86,6 +86,7 @@ fn main() {
                 } else {
                     Dimensions::Planar
                 },
+                segment_stretch_max: number("stretch", 1.0),
                 seed,
                 searches: number("searches", 1),
                 threads: number("threads", 2),
