@@ -5,11 +5,10 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::pipeline::RunFolder;
 use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
 use crate::session::{interrupted, watch_interrupts};
-use anyhow::{Context, anyhow};
-use rt_controller::ControllerConfig;
+use crate::watch::domain_of_run;
+use anyhow::anyhow;
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
-use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -91,17 +90,8 @@ fn chosen_domain(args: &RecordArgs) -> Outcome<String> {
     }
 }
 
-/// The domain a run's controller was configured with.
-fn domain_of_run(run: &Path) -> anyhow::Result<String> {
-    let path = run.join("config").join("rt-controller.toml");
-    let text = crate::files::read_text(&path)
-        .with_context(|| format!("`{}` is no run folder with a controller", run.display()))?;
-    let config: ControllerConfig =
-        toml::from_str(&text).with_context(|| format!("`{}`", path.display()))?;
-    Ok(config.domain)
-}
-
-fn those_that_run(domains: &[String]) -> String {
+/// Which controllers there are, in words.
+pub fn those_that_run(domains: &[String]) -> String {
     if domains.is_empty() {
         "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned()
     } else {
