@@ -63,8 +63,6 @@ function jitter(histograms, missed) {
 function draw(s) {
   byId("title").textContent = s.title;
   byId("note").textContent = s.note;
-  const tip = s.rope.slice(-3);
-  tips = tip.length ? [...tips, tip].slice(-TIPS_MAX) : [];
   view.show({ arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
   byId("viewnote").textContent = `Drag to turn, wheel or two fingers to come nearer. Rope: ${s.rope_is || "none"}.` +
     (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
@@ -78,6 +76,8 @@ function draw(s) {
 let newest = null;
 function show(s) {
   if (s.jitter) jitter(s.jitter, s.missed);
+  const tip = s.rope.slice(-3);
+  tips = tip.length ? [...tips, tip].slice(-TIPS_MAX) : [];
   if (!newest) requestAnimationFrame(() => { const s = newest; newest = null; draw(s); });
   newest = s;
   watched.states++;

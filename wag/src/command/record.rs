@@ -90,8 +90,7 @@ fn chosen_domain(args: &RecordArgs) -> Outcome<String> {
     }
 }
 
-/// Which controllers there are, in words.
-pub fn those_that_run(domains: &[String]) -> String {
+fn those_that_run(domains: &[String]) -> String {
     if domains.is_empty() {
         "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned()
     } else {

@@ -2,6 +2,7 @@
 //! where the camera stands.
 
 use crate::files;
+use anyhow::Context;
 use camera_ingest::load_camera;
 use rt_controller::ControllerConfig;
 use shared_types::{Plan, RopeParams, StereoCamera};
@@ -13,7 +14,6 @@ const FILES: [&str; 3] = ["params.toml", "plan.json", "camera.toml"];
 
 /// The domain that a run's controller was configured with.
 pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
-    use anyhow::Context;
     let path = run.join("config").join("rt-controller.toml");
     let text = files::read_text(&path)
         .with_context(|| format!("`{}` is no run folder with a controller", run.display()))?;

@@ -24,9 +24,9 @@ use attached::{Attached, Seen, newest_domain};
 use http::Site;
 use jitter::Jitter;
 use rope::FollowingRope;
+use shared_types::MotionTier;
 use shared_types::ipc::ControllerMode;
-use shared_types::{FaultCode, MotionTier};
-use snapshot::{ControllerView, Snapshot, StopView};
+use snapshot::{ControllerView, Snapshot, StopView, note_stop};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
@@ -282,9 +282,9 @@ impl Watcher {
             };
         };
         let facts = attached.controller.as_ref().map(|c| &c.facts);
-        let folder = facts.and_then(|facts| facts.folder());
+        let folder = facts.and_then(|facts| facts.folder()?.file_name());
         snapshot.title = match folder {
-            Some(folder) => format!("{} (domain {})", folder.display(), attached.domain),
+            Some(name) => format!("{} (domain {})", name.display(), attached.domain),
             None => format!("domain {}", attached.domain),
         };
         if !seen.alive {
@@ -322,46 +322,5 @@ impl Watcher {
             snapshot.jitter = Some(self.jitter.histograms());
         }
         snapshot
-    }
-}
-
-/// Keeps the newest stop: a code that is latched, and that it was once.
-fn note_stop(stop: &mut Option<StopView>, raw: u16, cycle: u64) {
-    let code = FaultCode::from_raw(raw).unwrap_or_default();
-    match stop {
-        Some(known) if code == FaultCode::None => known.latched = false,
-        Some(known) if known.latched && known.code == code => {}
-        _ if code == FaultCode::None => {}
-        _ => {
-            *stop = Some(StopView {
-                code,
-                words: code.explain(),
-                cycle,
-                latched: true,
-            });
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_stop_is_kept_after_it_was_acknowledged_and_until_the_next() {
-        let mut stop = None;
-        note_stop(&mut stop, 0, 1);
-        assert!(stop.is_none());
-        for (raw, cycle) in [(1, 10), (1, 11), (0, 12)] {
-            note_stop(&mut stop, raw, cycle);
-        }
-        let kept = stop.clone().unwrap();
-        assert_eq!(
-            (kept.code, kept.cycle, kept.latched),
-            (FaultCode::OperatorStop, 10, false)
-        );
-        note_stop(&mut stop, 1, 20);
-        let again = stop.unwrap();
-        assert_eq!((again.cycle, again.latched), (20, true));
     }
 }

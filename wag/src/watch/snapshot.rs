@@ -66,3 +66,44 @@ pub struct StopView {
     /// Whether it is still latched.
     pub latched: bool,
 }
+
+/// Keeps the newest stop: a code that is latched, and that it was once.
+pub fn note_stop(stop: &mut Option<StopView>, raw: u16, cycle: u64) {
+    let code = FaultCode::from_raw(raw).unwrap_or_default();
+    match stop {
+        Some(known) if code == FaultCode::None => known.latched = false,
+        Some(known) if known.latched && known.code == code => {}
+        _ if code == FaultCode::None => {}
+        _ => {
+            *stop = Some(StopView {
+                code,
+                words: code.explain(),
+                cycle,
+                latched: true,
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_is_kept_after_it_was_acknowledged_and_until_the_next() {
+        let mut stop = None;
+        note_stop(&mut stop, 0, 1);
+        assert!(stop.is_none());
+        for (raw, cycle) in [(1, 10), (1, 11), (0, 12)] {
+            note_stop(&mut stop, raw, cycle);
+        }
+        let kept = stop.clone().unwrap();
+        assert_eq!(
+            (kept.code, kept.cycle, kept.latched),
+            (FaultCode::OperatorStop, 10, false)
+        );
+        note_stop(&mut stop, 1, 20);
+        let again = stop.unwrap();
+        assert_eq!((again.cycle, again.latched), (20, true));
+    }
+}
