@@ -13,7 +13,7 @@ use values::{host, mass_kg, rate_hz};
 use crate::command::check::CheckArgs;
 use crate::command::plan::PlanArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
 /// Identify a rope from one wiggle, plan a throw, execute it.
@@ -71,6 +71,8 @@ pub enum Command {
     Throw(ThrowArgs),
     /// Measure how late everything is: the control loop, each joint, the camera.
     Latency(LatencyArgs),
+    /// Serve a page that shows a running run: arm, rope, camera, control loop.
+    Watch(WatchArgs),
     /// Attach to a running controller and record every one of its cycles.
     Record(RecordArgs),
     /// Step the controller's core over a recorded run again and compare every bit.
@@ -418,6 +420,31 @@ pub struct RecordArgs {
     /// Folder for the run; it must not exist. Default: runs/TIME-record.
     #[arg(long)]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `wag watch`.
+#[derive(Debug, Args)]
+#[command(after_help = "EXAMPLES:\n  \
+    wag watch                       whichever run began last, then the next\n  \
+    wag watch runs/NAME             a run that is under way\n  \
+    wag watch --domain cell-1       a controller or camera that runs as a daemon\n\n\
+    The address it prints holds a secret: whoever knows it can look on and stop the arm.\n\
+    From another machine: ssh -L PORT:127.0.0.1:PORT HOST, then the same address.")]
+pub struct WatchArgs {
+    /// Run folder of a running command. Default: the controller that started last, and
+    /// after its end the next.
+    #[arg(conflicts_with = "domain")]
+    pub run: Option<PathBuf>,
+    /// Shared-memory domain of a controller or a camera, whether it runs yet or not.
+    #[arg(long)]
+    pub domain: Option<String>,
+    /// Address and port of the page; port 0 takes any free one. Anything but loopback
+    /// lets other machines look on and stop the arm, without encryption.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:0")]
+    pub bind: SocketAddr,
+    /// Stop after this long (s); default: on Ctrl-C.
+    #[arg(long)]
+    pub seconds: Option<f64>,
 }
 
 /// Arguments of `wag replay`.

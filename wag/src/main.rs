@@ -32,6 +32,7 @@ mod recording;
 mod report;
 mod session;
 mod table;
+mod watch;
 
 use clap::Parser;
 use std::io::IsTerminal;

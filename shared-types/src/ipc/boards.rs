@@ -129,6 +129,39 @@ impl StateReader {
     }
 }
 
+/// Sees whether somebody has the operator's place, without taking it.
+pub struct OperatorReader {
+    beats: Slots<OperatorBeat>,
+}
+
+impl core::fmt::Debug for OperatorReader {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("OperatorReader").finish_non_exhaustive()
+    }
+}
+
+impl OperatorReader {
+    /// Opens the heartbeat of a running controller's operator.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`] when there is no controller in this domain.
+    pub fn open(bus: &Bus) -> Result<Self, IpcError> {
+        let reader = opened(bus, OPERATOR)?
+            .reader_builder()
+            .create()
+            .map_err(open_error(OPERATOR))?;
+        Ok(Self {
+            beats: Slots::read(reader, OPERATOR)?,
+        })
+    }
+
+    /// The newest heartbeat. Its count stands still when there is no operator.
+    #[must_use]
+    pub fn newest(&self) -> OperatorBeat {
+        self.beats.newest()
+    }
+}
+
 /// The operator's end: proves that somebody watches, and can stop the arm.
 #[derive(Debug)]
 pub struct OperatorEnd {
@@ -241,8 +274,10 @@ mod tests {
         assert_eq!(reader.get(), state);
         let mut operator = OperatorEnd::take(&bus).unwrap();
         assert!(OperatorEnd::take(&bus).is_err(), "one operator only");
+        let watcher = OperatorReader::open(&bus).unwrap();
         operator.beat();
         operator.stop();
+        assert_eq!(watcher.newest(), controller.operator());
         assert_eq!(
             (controller.operator().count, controller.operator().stop),
             (2, 1)

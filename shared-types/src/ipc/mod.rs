@@ -42,7 +42,7 @@ mod slots;
 mod sweep;
 
 #[cfg(feature = "std")]
-pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, StateReader};
+pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, OperatorReader, StateReader};
 #[cfg(feature = "std")]
 pub use bus::{
     Bus, ChunkPublisher, ChunkSubscriber, CyclePublisher, CycleSubscriber, FramePublisher,

@@ -43,7 +43,10 @@ pub(super) struct Slots<T: Beat> {
 }
 
 impl<T: Beat> Slots<T> {
-    fn read(reader: Reader<Transport, Key>, name: &'static str) -> Result<Self, IpcError> {
+    pub(super) fn read(
+        reader: Reader<Transport, Key>,
+        name: &'static str,
+    ) -> Result<Self, IpcError> {
         let entries: Result<_, _> = (0..SLOTS).map(|k| reader.entry(&Key(k))).collect();
         Ok(Self {
             entries: entries.map_err(open_error(name))?,

@@ -114,7 +114,7 @@ function replay() {
     scene = data.scenes[index];
     slider.max = scene.arm.length - 1;
     [...byId("scenes").children].forEach((b, i) => b.setAttribute("aria-pressed", String(i === index)));
-    byId("viewnote").textContent = "Drag to turn, wheel to come nearer. " +
+    byId("viewnote").textContent = "Drag to turn, wheel or two fingers to come nearer. " +
       (scene.rope.length ? "The rope is the identified one, simulated under the joints of the run from hanging still. Green: way of the tip. " : "") +
       (scene.planned_tip.length ? "Orange: way of the tip as planned." : "") +
       (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");

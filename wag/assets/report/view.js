@@ -87,10 +87,10 @@ function points(flat) {
 }
 
 class View {
-  constructor(canvas) {
+  constructor(canvas, antialias = true) {
     this.canvas = canvas;
     this.turn = -1.15; this.tilt = 0.22; this.far = 3.1; this.at = [0.45, 0, 0.12];
-    const gl = canvas.getContext("webgl", { antialias: true, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl", { antialias, preserveDrawingBuffer: true });
     this.gl = gl;
     if (!gl) return;
     const shader = (kind, text) => {
@@ -108,6 +108,8 @@ class View {
     this.corners.forEach((c) => gl.enableVertexAttribArray(c));
     gl.enable(gl.DEPTH_TEST);
     this.cylinder = this.mesh(cylinder(20)); this.ball = this.mesh(ball(12, 20));
+    // A rope's corners are small and many.
+    this.thin = this.mesh(cylinder(8)); this.bead = this.mesh(ball(4, 8));
     this.line = this.mesh([]);
     this.listen();
   }
@@ -119,23 +121,36 @@ class View {
     return { buffer, count: numbers.length / 6 };
   }
 
+  /** Comes nearer or goes farther away. */
+  near(factor) {
+    this.far = Math.min(8, Math.max(0.6, this.far * factor));
+    this.draw();
+  }
+
+  /** One pointer turns, two come nearer; so does the wheel. */
   listen() {
-    const c = this.canvas;
-    let held = null;
-    c.addEventListener("pointerdown", (e) => { held = [e.clientX, e.clientY]; c.setPointerCapture(e.pointerId); });
+    const c = this.canvas, held = new Map();
+    c.addEventListener("pointerdown", (e) => { held.set(e.pointerId, [e.clientX, e.clientY]); c.setPointerCapture(e.pointerId); });
     c.addEventListener("pointermove", (e) => {
-      if (!held) return;
-      this.turn -= (e.clientX - held[0]) * 0.008;
-      this.tilt = Math.min(1.5, Math.max(-0.4, this.tilt + (e.clientY - held[1]) * 0.006));
-      held = [e.clientX, e.clientY];
-      this.draw();
+      const before = held.get(e.pointerId), now = [e.clientX, e.clientY];
+      if (!before) return;
+      held.set(e.pointerId, now);
+      if (held.size === 1) {
+        this.turn -= (now[0] - before[0]) * 0.008;
+        this.tilt = Math.min(1.5, Math.max(-0.4, this.tilt + (now[1] - before[1]) * 0.006));
+        this.draw();
+      } else if (held.size === 2) {
+        const other = [...held].find(([id]) => id !== e.pointerId)[1];
+        const apart = (p) => Math.max(10, Math.hypot(p[0] - other[0], p[1] - other[1]));
+        this.near(apart(before) / apart(now));
+      }
     });
-    for (const end of ["pointerup", "pointercancel"]) c.addEventListener(end, () => { held = null; });
-    c.addEventListener("wheel", (e) => {
-      e.preventDefault();
-      this.far = Math.min(8, Math.max(0.6, this.far * Math.exp(e.deltaY * 0.001)));
-      this.draw();
-    }, { passive: false });
+    for (const end of ["pointerup", "pointercancel"]) c.addEventListener(end, (e) => held.delete(e.pointerId));
+    // One finger scrolls the page, two are the view's.
+    for (const kind of ["touchstart", "touchmove"]) {
+      c.addEventListener(kind, (e) => { if (e.touches.length > 1) e.preventDefault(); }, { passive: false });
+    }
+    c.addEventListener("wheel", (e) => { e.preventDefault(); this.near(Math.exp(e.deltaY * 0.001)); }, { passive: false });
     addEventListener("resize", () => this.draw());
   }
 
@@ -150,17 +165,17 @@ class View {
     gl.drawArrays(kind, 0, mesh.count);
   }
 
-  sphere(p, radius, colour) {
-    this.paint(this.ball, new Float32Array([radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, ...p, 1]),
+  sphere(p, radius, colour, mesh = this.ball) {
+    this.paint(mesh, new Float32Array([radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, ...p, 1]),
       colour, this.gl.TRIANGLES, true);
   }
 
-  rod(a, b, radius, colour) {
+  rod(a, b, radius, colour, mesh = this.cylinder) {
     const along = minus(b, a);
     if (Math.hypot(...along) < 1e-5) return;
     const z = unit(along), x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z)), y = cross(z, x);
     const s = (v) => v.map((n) => n * radius);
-    this.paint(this.cylinder, new Float32Array([...s(x), 0, ...s(y), 0, ...along, 0, ...a, 1]),
+    this.paint(mesh, new Float32Array([...s(x), 0, ...s(y), 0, ...along, 0, ...a, 1]),
       colour, this.gl.TRIANGLES, true);
   }
 
@@ -201,11 +216,11 @@ class View {
     }
     const rope = points(scene.rope[this.frame] || []);
     for (let i = 0; i + 1 < rope.length; i++) {
-      this.rod(rope[i], rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2]);
-      this.sphere(rope[i + 1], i + 2 === rope.length ? scene.radii_m[1] : scene.radii_m[0],
-        i + 2 === rope.length ? [0.25, 0.7, 0.2] : [0.72, 0.38, 0.2]);
+      this.rod(rope[i], rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2], this.thin);
+      if (i + 2 < rope.length) this.sphere(rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2], this.bead);
     }
-    const tips = scene.rope.slice(0, this.frame + 1).map((f) => points(f.slice(-3))[0]).filter(Boolean);
+    if (rope.length) this.sphere(rope[rope.length - 1], scene.radii_m[1], [0.25, 0.7, 0.2]);
+    const tips = (scene.tips || scene.rope.slice(0, this.frame + 1)).map((f) => points(f.slice(-3))[0]).filter(Boolean);
     if (tips.length > 1) this.way(tips, [0.2, 0.62, 0.16], gl.LINE_STRIP);
     const planned = points(scene.planned_tip);
     if (planned.length > 1) this.way(planned, [0.85, 0.55, 0.05], gl.LINE_STRIP);

@@ -25,6 +25,7 @@ mod score;
 mod sim;
 mod throw;
 mod track;
+mod watch;
 mod wiggle;
 mod wiggle_design;
 
@@ -76,6 +77,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Check(args) => check::run(args, quiet),
         Command::Throw(args) => throw::run(args, quiet),
         Command::Latency(args) => latency::run(args, quiet),
+        Command::Watch(args) => watch::run(args, quiet),
         Command::Record(args) => record::run(args, quiet),
         Command::Replay(args) => replay::run(args, quiet),
         Command::Explain(args) => explain::run(args, quiet),

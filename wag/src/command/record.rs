@@ -5,11 +5,10 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::pipeline::RunFolder;
 use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
 use crate::session::{interrupted, watch_interrupts};
-use anyhow::{Context, anyhow};
-use rt_controller::ControllerConfig;
+use crate::watch::domain_of_run;
+use anyhow::anyhow;
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
-use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -89,16 +88,6 @@ fn chosen_domain(args: &RecordArgs) -> Outcome<String> {
             Err(Failure::failed(anyhow!("{}", those_that_run(&all))))
         }
     }
-}
-
-/// The domain a run's controller was configured with.
-fn domain_of_run(run: &Path) -> anyhow::Result<String> {
-    let path = run.join("config").join("rt-controller.toml");
-    let text = crate::files::read_text(&path)
-        .with_context(|| format!("`{}` is no run folder with a controller", run.display()))?;
-    let config: ControllerConfig =
-        toml::from_str(&text).with_context(|| format!("`{}`", path.display()))?;
-    Ok(config.domain)
 }
 
 fn those_that_run(domains: &[String]) -> String {

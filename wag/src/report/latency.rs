@@ -27,7 +27,8 @@ pub fn histograms(rows: &[&CycleRow]) -> Vec<Histogram> {
     .collect()
 }
 
-fn histogram(name: &'static str, mut times_us: Vec<f64>) -> Option<Histogram> {
+/// One histogram; none of no times.
+pub fn histogram(name: &'static str, mut times_us: Vec<f64>) -> Option<Histogram> {
     times_us.sort_by(f64::total_cmp);
     let max_us = *times_us.last()?;
     let upto_us: Vec<f64> = (0..BINS)

@@ -14,6 +14,11 @@ mod read;
 mod replay;
 mod rope;
 
+pub use data::Histogram;
+pub use latency::histogram;
+pub use page::{PLOTS, STYLE, VIEW};
+pub use replay::{arm_points, tenths_mm};
+
 use crate::files;
 use anyhow::ensure;
 use page::SIZE_MAX_BYTES;

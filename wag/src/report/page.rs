@@ -6,9 +6,12 @@ use super::data::ReportData;
 pub const SIZE_MAX_BYTES: usize = 6_000_000;
 
 const PAGE: &str = include_str!("../../assets/report/page.html");
-const STYLE: &str = include_str!("../../assets/report/style.css");
-const VIEW: &str = include_str!("../../assets/report/view.js");
-const PLOTS: &str = include_str!("../../assets/report/plots.js");
+/// Colours and layout, shared with the live page.
+pub const STYLE: &str = include_str!("../../assets/report/style.css");
+/// Arm, rope and target in space, shared with the live page.
+pub const VIEW: &str = include_str!("../../assets/report/view.js");
+/// Curves, histograms, tables, shared with the live page.
+pub const PLOTS: &str = include_str!("../../assets/report/plots.js");
 const SCRIPT: &str = include_str!("../../assets/report/report.js");
 
 /// The whole page. The parts of the program go in first and the run's data last, so

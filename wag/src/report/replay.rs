@@ -131,13 +131,14 @@ fn moved(
     (times_s, q, false)
 }
 
+/// A place as the page reads it (0.1 mm).
 #[allow(clippy::cast_possible_truncation, reason = "saturating")]
-fn tenths_mm(p: &Vector3<f64>) -> [i32; 3] {
+pub fn tenths_mm(p: &Vector3<f64>) -> [i32; 3] {
     [0, 1, 2].map(|axis| (p[axis] * 1e4).round() as i32)
 }
 
-/// Base, origins of the joints, end of the pole.
-fn arm_points(q: &JointVector) -> Vec<i32> {
+/// Base, origins of the joints, end of the pole (0.1 mm).
+pub fn arm_points(q: &JointVector) -> Vec<i32> {
     let origins = kinematics::link_poses(q).map(|(p, _)| p);
     let (tip, _) = kinematics::attach_pose(q);
     std::iter::once(Vector3::zeros())

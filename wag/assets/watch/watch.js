@@ -1,0 +1,128 @@
+// Shows the newest state and the newest picture; never keeps a queue of either.
+
+const byId = (id) => document.getElementById(id);
+// Twenty-five times a second also without a graphics card: smooth edges cost half of that.
+const view = new View(byId("view"), false);
+const TIPS_MAX = 150;
+const WORDS = { stop: "Stop", disarm: "Disarm", acknowledge: "Acknowledge" };
+const words = (name) => String(name).replaceAll("_", " ");
+/** What a test may read. */
+const watched = { states: 0, drawn: 0, pictures: 0, last: null };
+let tips = [], shownAsks = "", shownController = "";
+
+function controller(c) {
+  // Rows that stay the same are not laid out anew.
+  const now = JSON.stringify({ ...c, cycle: 0 });
+  if (now === shownController) {
+    if (c) byId("controller").rows[6].cells[1].textContent = c.cycle;
+    return;
+  }
+  shownController = now;
+  if (!c) return fill(byId("controller"), [["controller", "none"]]);
+  const stop = c.stop ? `${words(c.stop.code)} in cycle ${c.stop.cycle}${c.stop.latched ? ", latched" : ", acknowledged"}: ${c.stop.words}` : "none since this page looks";
+  fill(byId("controller"), [["controller", c.alive ? "running" : "silent"], ["mode", words(c.mode)], ["armed for", c.tier ? words(c.tier) : "nothing"],
+    ["operator", c.operator ? "present" : "none"], ["last stop", stop],
+    ["real-time priority and locked memory", c.real_time ? "yes" : "no"], ["cycle", String(c.cycle)]]);
+}
+
+async function ask(name, button) {
+  button.disabled = true;
+  byId("answer").textContent = `${WORDS[name]}: asked`;
+  try {
+    const answer = await fetch("ask/" + name, { method: "POST" });
+    byId("answer").textContent = `${WORDS[name]}: ${await answer.text()}`;
+  } catch {
+    byId("answer").textContent = `${WORDS[name]}: this page lost its server; use the emergency stop`;
+  }
+  button.disabled = false;
+}
+
+/** The stop button is always there; any other only while it may be used. */
+function asks(list) {
+  const able = list.filter(([name, objection]) => name === "stop" || !objection);
+  const now = JSON.stringify(list);
+  if (now === shownAsks) return;
+  shownAsks = now;
+  byId("asks").replaceChildren(...able.map(([name, objection]) => {
+    const button = make("button", { type: "button", id: name }, WORDS[name]);
+    button.disabled = Boolean(objection);
+    button.addEventListener("click", () => ask(name, button));
+    return button;
+  }));
+  byId("asknote").textContent = list.filter(([, objection]) => objection)
+    .map(([name, objection]) => `${WORDS[name]}: ${objection}`).join(" · ");
+}
+
+function jitter(histograms, missed) {
+  byId("loopnote").textContent = `The last ten seconds. Missed since this page looks: ${missed}.`;
+  byId("jitter").replaceChildren(...histograms.map((h) => make("figure", {}, bars(h),
+    make("figcaption", {}, `${h.name}: half at most ${h.p50_us.toFixed(0)} µs, 99 % at most ` +
+      `${h.p99_us.toFixed(0)} µs, the longest ${h.max_us.toFixed(0)} µs`))));
+}
+
+function draw(s) {
+  byId("title").textContent = s.title;
+  byId("note").textContent = s.note;
+  view.show({ arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
+  byId("viewnote").textContent = `Drag to turn, wheel or two fingers to come nearer. Rope: ${s.rope_is || "none"}.` +
+    (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
+  controller(s.controller);
+  asks(s.asks);
+  byId("eye").hidden = !s.camera && !watched.pictures;
+  watched.drawn++;
+}
+
+/** Draws once for each frame of the screen, the newest state only. */
+let newest = null;
+function show(s) {
+  if (s.jitter) jitter(s.jitter, s.missed);
+  const tip = s.rope.slice(-3);
+  tips = tip.length ? [...tips, tip].slice(-TIPS_MAX) : [];
+  if (!newest) requestAnimationFrame(() => { const s = newest; newest = null; draw(s); });
+  newest = s;
+  watched.states++;
+  watched.last = s;
+}
+
+/** Draws what a picture's header tells over it. */
+function over(c, o) {
+  const at = ([u, v]) => [(u + 0.5) / o.scale, (v + 0.5) / o.scale];
+  c.fillStyle = "#ffd400";
+  for (const p of o.rope) c.fillRect(at(p)[0] - 1.5, at(p)[1] - 1.5, 3, 3);
+  if (!o.keypoints.length) return;
+  c.strokeStyle = o.lost ? "#ff0000" : "#00ffff"; c.fillStyle = "#ff00ff"; c.lineWidth = 1.5;
+  c.beginPath();
+  for (const p of o.keypoints) c.lineTo(...at(p));
+  c.stroke();
+  for (const p of o.keypoints) c.fillRect(at(p)[0] - 2, at(p)[1] - 2, 4, 4);
+}
+
+/** Fetches one picture after the other, the next only when this one is drawn. */
+async function pictures() {
+  const canvas = byId("picture");
+  let seen = 0;
+  for (;;) {
+    const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+    if (document.hidden || !(watched.last && watched.last.camera)) { await wait(300); continue; }
+    try {
+      const answer = await fetch("picture?after=" + seen);
+      if (answer.status !== 200) { await wait(answer.status === 204 ? 0 : 1000); continue; }
+      seen = Number(answer.headers.get("X-Number"));
+      const o = JSON.parse(answer.headers.get("X-Over"));
+      const image = await createImageBitmap(await answer.blob());
+      if (canvas.width !== image.width) canvas.width = image.width;
+      if (canvas.height !== image.height) canvas.height = image.height;
+      const c = canvas.getContext("2d");
+      c.drawImage(image, 0, 0);
+      image.close();
+      over(c, o);
+      byId("picturenote").textContent = o.caption;
+      watched.pictures++;
+    } catch { await wait(1000); }
+  }
+}
+
+const events = new EventSource("state");
+events.onmessage = (e) => show(JSON.parse(e.data));
+events.onerror = () => { byId("note").textContent = "this page lost its server; what it shows is old, and its buttons do nothing"; };
+pictures();

@@ -1,0 +1,338 @@
+//! The camera's left eye as JPEGs, at no more than 15 a second, and the keypoints over
+//! those frames they were found in.
+//!
+//! Keypoints come after the film they belong to. The JPEGs of the last seconds are kept
+//! for them, so that the tracked film can be shown once, in its own pace, before the
+//! live picture goes on.
+
+use anyhow::ensure;
+use serde::Serialize;
+use shared_types::StereoCamera;
+use shared_types::ipc::{Bus, FrameHeader, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
+use shared_types::keypoints::KeypointFrame;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Least time between two pictures.
+const PERIOD: Duration = Duration::from_micros(66_700);
+/// Widest picture; larger ones are made smaller (pixels).
+const WIDTH_MAX_PX: usize = 960;
+const QUALITY: u8 = 70;
+/// Most bytes of JPEGs kept for keypoints to come.
+const KEPT_MAX_BYTES: usize = 12_000_000;
+/// A keypoint frame belongs to a JPEG whose stamp is as near as this (ns).
+const SAME_FRAME_NS: u64 = 1_000_000;
+
+/// A picture for the page.
+#[derive(Debug)]
+pub struct Picture {
+    /// The left eye.
+    pub jpeg: Arc<[u8]>,
+    /// What is drawn over it, as JSON on one line.
+    pub over: String,
+}
+
+/// What is drawn over a picture.
+#[derive(Debug, Serialize)]
+struct Over {
+    /// What the picture is.
+    caption: &'static str,
+    /// Pixels of the camera for one of the picture.
+    scale: usize,
+    /// Tracked keypoints, raw pixels of the camera.
+    keypoints: Vec<[f32; 2]>,
+    /// Whether the rope was lost in this frame.
+    lost: bool,
+    /// The simulated rope as the camera would see it, raw pixels of the camera.
+    rope: Vec<[i32; 2]>,
+}
+
+#[derive(Debug)]
+struct Kept {
+    stamp_ns: u64,
+    scale: usize,
+    jpeg: Arc<[u8]>,
+}
+
+/// The camera of a domain.
+#[derive(Debug)]
+pub struct Film {
+    frames: FrameSubscriber,
+    keypoints: KeypointSubscriber,
+    kept: VecDeque<Kept>,
+    kept_bytes: usize,
+    /// Tracked frames still to be shown.
+    tracked: VecDeque<KeypointFrame>,
+    last: Option<Instant>,
+    /// When the last frame came.
+    pub seen: Option<Instant>,
+}
+
+impl Film {
+    /// Listens in a domain.
+    pub fn open(bus: &Bus) -> anyhow::Result<Self> {
+        Ok(Self {
+            frames: bus.frame_subscriber()?,
+            keypoints: bus.keypoint_subscriber()?,
+            kept: VecDeque::new(),
+            kept_bytes: 0,
+            tracked: VecDeque::new(),
+            last: None,
+            seen: None,
+        })
+    }
+
+    /// Takes in what has come. Makes the next picture if it is `wanted` and time for
+    /// one; `rope` is drawn over a live picture where the camera's place is known.
+    pub fn turn(
+        &mut self,
+        wanted: bool,
+        camera: Option<&StereoCamera>,
+        rope: &[nalgebra::Vector3<f64>],
+    ) -> anyhow::Result<Option<Picture>> {
+        while let Some(found) = self.keypoints.receive()? {
+            if self.at(found.stamp_ns).is_some() {
+                self.tracked.push_back(*found);
+            }
+        }
+        // Only the newest frame is looked at; the others go back to the camera at once.
+        let mut newest = None;
+        while let Some(frame) = self.frames.receive()? {
+            newest = Some(frame);
+        }
+        if newest.is_some() {
+            self.seen = Some(Instant::now());
+        }
+        let due = self.last.is_none_or(|at| at.elapsed() >= PERIOD);
+        let Some(frame) = newest.filter(|_| wanted && due) else {
+            return Ok(None);
+        };
+        self.last = Some(Instant::now());
+        let head = *frame.user_header();
+        if head.pixel_format != PIXEL_FORMAT_YUYV {
+            return Ok(None);
+        }
+        let live = encode(frame.payload(), head)?;
+        drop(frame);
+        let picture = match self.next_tracked() {
+            Some(tracked) => tracked,
+            None => Picture {
+                jpeg: Arc::clone(&live.jpeg),
+                over: serde_json::to_string(&Over {
+                    caption: if rope.is_empty() || camera.is_none() {
+                        "camera, live"
+                    } else {
+                        "camera, live; dots: the identified rope, simulated"
+                    },
+                    scale: live.scale,
+                    keypoints: Vec::new(),
+                    lost: false,
+                    rope: camera.map_or_else(Vec::new, |camera| projected(camera, rope)),
+                })?,
+            },
+        };
+        self.keep(live);
+        Ok(Some(picture))
+    }
+
+    fn at(&self, stamp_ns: u64) -> Option<&Kept> {
+        self.kept
+            .iter()
+            .find(|kept| kept.stamp_ns.abs_diff(stamp_ns) <= SAME_FRAME_NS)
+    }
+
+    /// The next frame of the tracked film with its keypoints.
+    fn next_tracked(&mut self) -> Option<Picture> {
+        while let Some(frame) = self.tracked.pop_front() {
+            if let Some(kept) = self.at(frame.stamp_ns) {
+                let count = (frame.count as usize).min(frame.points_px.len());
+                let over = Over {
+                    caption: "the wiggle as filmed, with the keypoints found in it",
+                    scale: kept.scale,
+                    keypoints: frame.points_px[..count].to_vec(),
+                    lost: frame.lost != 0,
+                    rope: Vec::new(),
+                };
+                return Some(Picture {
+                    jpeg: Arc::clone(&kept.jpeg),
+                    over: serde_json::to_string(&over).ok()?,
+                });
+            }
+        }
+        None
+    }
+
+    fn keep(&mut self, picture: Kept) {
+        self.kept_bytes += picture.jpeg.len();
+        self.kept.push_back(picture);
+        while self.kept_bytes > KEPT_MAX_BYTES
+            && let Some(oldest) = self.kept.pop_front()
+        {
+            self.kept_bytes -= oldest.jpeg.len();
+        }
+    }
+}
+
+fn encode(pixels: &[u8], head: FrameHeader) -> anyhow::Result<Kept> {
+    let size = [head.width_px as usize, head.height_px as usize];
+    let scale = (size[0] / 2).div_ceil(WIDTH_MAX_PX).max(1);
+    let [width, height] = [size[0] / 2, size[1]].map(|px| px.div_ceil(scale));
+    let mut jpeg = Vec::new();
+    let mut encoder = jpeg_encoder::Encoder::new(&mut jpeg, QUALITY);
+    encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_2_1);
+    encoder.encode(
+        &left_eye(pixels, size, scale)?,
+        u16::try_from(width)?,
+        u16::try_from(height)?,
+        jpeg_encoder::ColorType::Ycbcr,
+    )?;
+    Ok(Kept {
+        stamp_ns: head.stamp_ns,
+        scale,
+        jpeg: jpeg.into(),
+    })
+}
+
+/// Left eye of a side-by-side YUYV frame as packed YCbCr, which a JPEG holds anyway:
+/// of every `scale` pixels and rows the first.
+fn left_eye(pixels: &[u8], [width, height]: [usize; 2], scale: usize) -> anyhow::Result<Vec<u8>> {
+    ensure!(
+        width > 0 && height > 0 && width % 4 == 0 && pixels.len() == width * height * 2,
+        "a frame of {width}x{height} has {} bytes",
+        pixels.len()
+    );
+    let mut out = Vec::with_capacity((width / 2 / scale + 1) * (height / scale + 1) * 3);
+    for row in pixels.chunks_exact(width * 2).step_by(scale) {
+        for u in (0..width / 2).step_by(scale) {
+            let quad = &row[u / 2 * 4..][..4];
+            out.extend_from_slice(&[quad[u % 2 * 2], quad[1], quad[3]]);
+        }
+    }
+    Ok(out)
+}
+
+/// Nodes of a rope as the left eye sees them; those it does not see are left out.
+fn projected(camera: &StereoCamera, rope: &[nalgebra::Vector3<f64>]) -> Vec<[i32; 2]> {
+    rope.iter()
+        .filter_map(|node| camera.project_left(node))
+        .filter(|pixel| camera.contains(*pixel))
+        .map(|pixel| {
+            #[allow(clippy::cast_possible_truncation, reason = "inside the picture")]
+            pixel.map(|x| x.round() as i32)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_types::ipc::DomainSweep;
+
+    const SIZE: [u32; 2] = [64, 16];
+
+    fn frame(number: u64) -> (FrameHeader, Vec<u8>) {
+        let header = FrameHeader {
+            pixel_format: PIXEL_FORMAT_YUYV,
+            sequence: number,
+            stamp_ns: number * 20_000_000,
+            width_px: SIZE[0],
+            height_px: SIZE[1],
+            ..FrameHeader::default()
+        };
+        (header, vec![128; (SIZE[0] * SIZE[1] * 2) as usize])
+    }
+
+    #[test]
+    fn pictures_are_live_until_keypoints_of_a_kept_frame_come() {
+        let domain = format!("test_film_{}", std::process::id());
+        let _sweep = DomainSweep::new(&domain);
+        let bus = Bus::join(&domain).unwrap();
+        let camera = bus.frame_publisher(1 << 16).unwrap();
+        let tracker = bus.keypoint_publisher().unwrap();
+        let mut film = Film::open(&bus).unwrap();
+        let publish = |number: u64| {
+            let (header, bytes) = frame(number);
+            let mut sample = camera.loan_slice_uninit(bytes.len()).unwrap();
+            *sample.user_header_mut() = header;
+            sample.write_from_slice(&bytes).send().unwrap();
+        };
+        publish(1);
+        assert!(
+            film.turn(false, None, &[]).unwrap().is_none(),
+            "nobody looks"
+        );
+        publish(2);
+        let live = film.turn(true, None, &[]).unwrap().unwrap();
+        assert!(live.over.contains("live") && live.jpeg.starts_with(&[0xff, 0xd8]));
+        publish(3);
+        assert!(film.turn(true, None, &[]).unwrap().is_none(), "too soon");
+        let mut found = KeypointFrame {
+            sequence: 2,
+            stamp_ns: 40_000_000,
+            count: 2,
+            lost: 0,
+            points_px: [[0.0; 2]; shared_types::keypoints::MAX_KEYPOINTS],
+            confidence: [1.0; shared_types::keypoints::MAX_KEYPOINTS],
+        };
+        found.points_px[1] = [7.0, 9.0];
+        tracker.send_copy(found).unwrap();
+        // One of a frame that was never shown.
+        tracker
+            .send_copy(KeypointFrame {
+                stamp_ns: 1,
+                ..found
+            })
+            .unwrap();
+        std::thread::sleep(PERIOD);
+        publish(4);
+        let tracked = film.turn(true, None, &[]).unwrap().unwrap();
+        assert!(
+            tracked.over.contains("[[0.0,0.0],[7.0,9.0]]"),
+            "{}",
+            tracked.over
+        );
+        assert_eq!(tracked.jpeg, live.jpeg);
+        std::thread::sleep(PERIOD);
+        publish(5);
+        assert!(
+            film.turn(true, None, &[])
+                .unwrap()
+                .unwrap()
+                .over
+                .contains("live")
+        );
+    }
+
+    #[test]
+    fn the_left_eye_is_cut_out_pixel_by_pixel() {
+        // Two rows of eight pixels: luma counts, chroma tells the eye.
+        let pair = |y: u8, eye: u8| [y, 100 + eye, y + 1, 200 + eye];
+        let row = |y: u8| [pair(y, 0), pair(y + 2, 0), pair(y + 4, 1), pair(y + 6, 1)].concat();
+        let frame = [row(0), row(10)].concat();
+        let pixel = |y: u8| [y, 100, 200];
+        let whole = [0, 1, 2, 3, 10, 11, 12, 13].map(pixel).concat();
+        assert_eq!(left_eye(&frame, [8, 2], 1).unwrap(), whole);
+        assert_eq!(
+            left_eye(&frame, [8, 2], 2).unwrap(),
+            [0, 2].map(pixel).concat()
+        );
+        assert!(left_eye(&frame[1..], [8, 2], 1).is_err());
+    }
+
+    #[test]
+    fn what_is_kept_is_bounded() {
+        let domain = format!("test_kept_{}", std::process::id());
+        let _sweep = DomainSweep::new(&domain);
+        let mut film = Film::open(&Bus::join(&domain).unwrap()).unwrap();
+        for stamp_ns in 0..40 {
+            film.keep(Kept {
+                stamp_ns,
+                scale: 1,
+                jpeg: vec![0; 1_000_000].into(),
+            });
+        }
+        assert_eq!((film.kept.len(), film.kept_bytes), (12, 12_000_000));
+        assert_eq!(film.kept.back().unwrap().stamp_ns, 39);
+    }
+}

@@ -1,0 +1,204 @@
+//! What a real browser makes of the report and of the live page, without a network.
+//! Where there is no Chromium, these say so and pass; the server's tests always run.
+
+use super::chromium::Chromium;
+use super::client::Watch;
+use super::fake::{Fake, run_folder};
+use serde_json::{Value, json};
+use shared_types::plan::START_POSE;
+use shared_types::rope::RANGES;
+use shared_types::{JointTrajectory, RopeParams};
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+use std::sync::atomic::Ordering;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// One browser at a time: each draws with the processor.
+static SCREEN: Mutex<()> = Mutex::new(());
+
+/// Largest report (bytes), so that it can be sent by mail.
+const REPORT_MAX_BYTES: u64 = 6_000_000;
+
+/// Of the canvas: pixels drawn, pixels in the rope's colour, and their mean place.
+const DRAWN: &str = "(() => {
+  const c = document.getElementById('view'), g = c.getContext('webgl');
+  const p = new Uint8Array(c.width * c.height * 4);
+  g.readPixels(0, 0, c.width, c.height, g.RGBA, g.UNSIGNED_BYTE, p);
+  let drawn = 0, rope = 0, x = 0, y = 0;
+  for (let i = 0; i < p.length; i += 4) {
+    if (!p[i + 3]) continue;
+    drawn++;
+    if (p[i] > 2 * p[i + 2] && p[i + 1] > 0.4 * p[i]) {
+      rope++; x += (i / 4) % c.width; y += Math.floor(i / 4 / c.width);
+    }
+  }
+  return [drawn, rope, x / rope, y / rope];
+})()";
+
+fn drawn(page: &mut Chromium) -> [f64; 4] {
+    let value = page.value(DRAWN);
+    [0, 1, 2, 3].map(|i| value[i].as_f64().unwrap_or(0.0))
+}
+
+/// A short throw as a run folder holds it.
+fn throw_folder(run: &Path) {
+    let mut end = START_POSE;
+    end[5] -= 0.9;
+    end[1] -= 0.4;
+    let throw = JointTrajectory::new(
+        &[0.0, 0.5, 1.0],
+        &[START_POSE, (START_POSE + end) * 0.5, end],
+    )
+    .unwrap();
+    let mut cycles = String::from(
+        "cycle,deadline_s,mode,fault,sent,wake_late_us,compute_us,send_us,reply_us,missed,dropped,trajectory_s,\
+         q1_c,q2_c,q3_c,q4_c,q5_c,q6_c,q7_c\n",
+    );
+    for cycle in 0..250_u32 {
+        let t = f64::from(cycle) * 0.004;
+        let late = 10 + cycle % 50;
+        write!(
+            cycles,
+            "{cycle},{t:.6},Streaming,None,1,{late}.0,20.0,60.0,90.0,0,0,{t:.6}"
+        )
+        .unwrap();
+        for q in throw.state_at(t).q.iter() {
+            write!(cycles, ",{q:.9}").unwrap();
+        }
+        cycles.push('\n');
+    }
+    std::fs::write(run.join("cycles.csv"), cycles).unwrap();
+    let rope = RopeParams::from_array(RANGES.map(|r| 0.5 * (r.min + r.max)));
+    std::fs::write(run.join("params.toml"), toml::to_string(&rope).unwrap()).unwrap();
+    let summary = json!({ "ok": true, "command": "throw", "target_m": [0.9, 0.1, 0.2] });
+    std::fs::write(run.join("summary.json"), summary.to_string()).unwrap();
+}
+
+#[test]
+fn a_report_is_drawn_its_slider_moves_the_rope_and_two_fingers_come_nearer() {
+    let _screen = SCREEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(mut page) = Chromium::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    throw_folder(dir.path());
+    let made = Command::new(env!("CARGO_BIN_EXE_wag"))
+        .arg("report")
+        .arg(dir.path())
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{made:?}");
+    let file = dir.path().join("report.html");
+    assert!(file.metadata().unwrap().len() < REPORT_MAX_BYTES);
+    page.open(&format!("file://{}", file.display()));
+    let before = drawn(&mut page);
+    assert!(before[0] > 3000.0 && before[1] > 50.0, "{before:?}");
+    page.value(
+        "(() => { const t = document.getElementById('time'); t.value = t.max;
+         t.dispatchEvent(new Event('input')); })()",
+    );
+    let after = drawn(&mut page);
+    let moved = (after[2] - before[2]).hypot(after[3] - before[3]);
+    assert!(after[1] > 50.0 && moved > 5.0, "{before:?} {after:?}");
+    pinch(&mut page);
+    let near = drawn(&mut page);
+    assert!(near[1] > 1.5 * after[1], "{after:?} {near:?}");
+    page.picture("report-test.png");
+    assert_eq!(page.errors, Vec::<String>::new());
+    let own = |url: &String| url.starts_with("file://") || url.starts_with("data:");
+    assert!(page.requests.iter().all(own), "{:?}", page.requests);
+}
+
+/// Two fingers on the view move apart.
+fn pinch(page: &mut Chromium) {
+    page.call(
+        "Emulation.setTouchEmulationEnabled",
+        &json!({ "enabled": true, "maxTouchPoints": 2 }),
+    );
+    let place = page.value(
+        "(() => { const c = document.getElementById('view'); c.scrollIntoView({ block: 'center' });
+         const r = c.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()",
+    );
+    let [x, y] = [0, 1].map(|i| place[i].as_f64().unwrap());
+    let fingers = |apart: f64| json!([{ "x": x - apart, "y": y, "id": 0 }, { "x": x + apart, "y": y, "id": 1 }]);
+    let mut touch = |kind: &str, points: Value| {
+        page.call(
+            "Input.dispatchTouchEvent",
+            &json!({ "type": kind, "touchPoints": points }),
+        );
+    };
+    touch("touchStart", fingers(40.0));
+    for apart in [50.0, 60.0, 70.0, 80.0] {
+        touch("touchMove", fingers(apart));
+    }
+    touch("touchEnd", json!([]));
+}
+
+#[test]
+fn the_live_page_follows_a_run_and_stops_it() {
+    let _screen = SCREEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(mut page) = Chromium::start() else {
+        return;
+    };
+    let long = std::env::var_os("WAG_LONG_TESTS").is_some();
+    let fake = Fake::start(&format!("watch-page-{}", std::process::id()));
+    let dir = tempfile::tempdir().unwrap();
+    run_folder(dir.path(), &fake.domain);
+    let watch = Watch::start(&[dir.path().to_str().unwrap()]);
+    page.open(&watch.url);
+    page.until(
+        "the rope",
+        "watched.last !== null && watched.last.rope.length > 30",
+    );
+    page.until("a picture", "watched.pictures > 3");
+    let counts = |page: &mut Chromium| {
+        ["watched.states", "watched.drawn"].map(|count| page.value(count).as_f64().unwrap())
+    };
+    let (began, first) = (Instant::now(), counts(&mut page));
+    let before = drawn(&mut page);
+    let span = Duration::from_secs(if long { 600 } else { 3 });
+    let mut most_mb = 0_f64;
+    let mut moved = 0_f64;
+    while began.elapsed() < span {
+        std::thread::sleep(Duration::from_millis(if long { 2000 } else { 300 }));
+        let now = drawn(&mut page);
+        moved = moved.max((now[2] - before[2]).hypot(now[3] - before[3]));
+        most_mb = most_mb.max(watch.resident_mb());
+    }
+    let (last, span_s) = (counts(&mut page), began.elapsed().as_secs_f64());
+    let [told_hz, drawn_hz] = [0, 1].map(|i| (last[i] - first[i]) / span_s);
+    eprintln!(
+        "told {told_hz:.1} times a second, drew {drawn_hz:.1} in {span_s:.0} s, at most {most_mb:.1} MB"
+    );
+    assert!(
+        before[0] > 3000.0 && before[1] > 50.0 && moved > 2.0,
+        "{before:?}, moved {moved}"
+    );
+    assert!(most_mb < 150.0, "{most_mb} MB");
+    assert!(told_hz >= 10.0, "{told_hz} states a second");
+    // How fast a processor draws is no matter of the program; that it keeps up is, alone.
+    assert!(
+        drawn_hz >= if long { 10.0 } else { 1.0 },
+        "drew {drawn_hz} a second"
+    );
+    assert_eq!(page.value("document.getElementById('picture').width"), 128);
+    // Without an operator there is nothing but the stop, and the page says why.
+    assert_eq!(
+        page.value("document.querySelectorAll('#asks button').length"),
+        1
+    );
+    let why = page.value("document.getElementById('asknote').textContent");
+    assert!(why.as_str().unwrap().contains("no operator"), "{why}");
+    page.value("document.getElementById('stop').click()");
+    page.until(
+        "the stop",
+        "document.getElementById('answer').textContent === 'Stop: done'",
+    );
+    assert_eq!(fake.wires.stops.load(Ordering::SeqCst), 1);
+    page.picture("watch-test.png");
+    assert_eq!(page.errors, Vec::<String>::new());
+    let own = |url: &String| url.starts_with(&watch.url) || url.starts_with("data:");
+    assert!(page.requests.iter().all(own), "{:?}", page.requests);
+}

@@ -1,0 +1,168 @@
+//! A `wag watch` as a process, and requests to it byte by byte.
+
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A watcher that ends when dropped.
+pub(crate) struct Watch {
+    process: Child,
+    /// The page's address.
+    pub(crate) url: String,
+}
+
+/// An answer.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) status: u16,
+    pub(crate) head: String,
+    pub(crate) body: Vec<u8>,
+}
+
+impl Watch {
+    pub(crate) fn start(args: &[&str]) -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_wag"))
+            .args(["watch", "--json"])
+            .args(args)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut text = String::new();
+        let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
+        while !text.ends_with("}\n") {
+            text.push_str(&lines.next().unwrap().unwrap());
+            text.push('\n');
+        }
+        let told: Value = serde_json::from_str(&text).unwrap();
+        Self {
+            process,
+            url: told["url"].as_str().unwrap().to_owned(),
+        }
+    }
+
+    /// `127.0.0.1:PORT`.
+    pub(crate) fn host(&self) -> &str {
+        self.url.split('/').nth(2).unwrap()
+    }
+
+    /// `/TOKEN/`.
+    pub(crate) fn home(&self) -> &str {
+        &self.url["http://".len() + self.host().len()..]
+    }
+
+    pub(crate) fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(self.host()).unwrap();
+        stream
+            .set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
+        stream
+    }
+
+    /// Sends these bytes; reads one answer.
+    pub(crate) fn raw(&self, text: &str) -> Answer {
+        let mut stream = self.connect();
+        // A refused request may be cut short by its answer.
+        let _ = stream.write_all(text.as_bytes());
+        read_answer(&mut BufReader::new(stream))
+    }
+
+    /// A request as a page of this server makes it.
+    pub(crate) fn ask(&self, method: &str, path: &str) -> Answer {
+        let (home, host) = (self.home(), self.host());
+        self.raw(&format!(
+            "{method} {home}{path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n\r\n"
+        ))
+    }
+
+    /// Follows the state.
+    pub(crate) fn states(&self) -> States {
+        let mut stream = self.connect();
+        let (home, host) = (self.home(), self.host());
+        write!(stream, "GET {home}state HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        let mut reader = BufReader::new(stream);
+        assert!(head(&mut reader).contains("text/event-stream"));
+        States(reader)
+    }
+
+    /// Resident memory of the process (MB).
+    pub(crate) fn resident_mb(&self) -> f64 {
+        let status =
+            std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap();
+        let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap();
+        line.split_whitespace()
+            .nth(1)
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
+            / 1e3
+    }
+
+    /// Ends it as Ctrl-C does; its exit code.
+    pub(crate) fn end(mut self) -> Option<i32> {
+        let pid = rustix::process::Pid::from_child(&self.process);
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+        self.process.wait().unwrap().code()
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A stream of states.
+pub(crate) struct States(BufReader<TcpStream>);
+
+impl States {
+    pub(crate) fn next(&mut self) -> Value {
+        loop {
+            let mut line = String::new();
+            assert!(self.0.read_line(&mut line).unwrap() > 0, "the stream ended");
+            if let Some(state) = line.strip_prefix("data: ") {
+                return serde_json::from_str(state).unwrap();
+            }
+        }
+    }
+
+    /// The first state that is as wanted.
+    pub(crate) fn until(&mut self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+        let began = Instant::now();
+        loop {
+            let state = self.next();
+            if wanted(&state) {
+                return state;
+            }
+            assert!(began.elapsed() < Duration::from_secs(30), "{what}: {state}");
+        }
+    }
+}
+
+fn head(reader: &mut BufReader<TcpStream>) -> String {
+    let mut head = String::new();
+    while !head.ends_with("\r\n\r\n") {
+        assert!(
+            reader.read_line(&mut head).unwrap() > 0,
+            "no answer: {head}"
+        );
+    }
+    head
+}
+
+pub(crate) fn read_answer(reader: &mut BufReader<TcpStream>) -> Answer {
+    let head = head(reader);
+    let length = head
+        .lines()
+        .find_map(|l| l.strip_prefix("Content-Length: "));
+    let mut body = vec![0; length.unwrap().parse().unwrap()];
+    reader.read_exact(&mut body).unwrap();
+    Answer {
+        status: head.split(' ').nth(1).unwrap().parse().unwrap(),
+        head,
+        body,
+    }
+}

@@ -1,0 +1,220 @@
+//! The server: who is let in, and that nobody holds others up.
+
+use super::client::{Watch, read_answer};
+use super::fake::{Fake, run_folder};
+use std::io::{BufReader, Write};
+use std::net::TcpStream;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+fn domain(tag: &str) -> String {
+    format!("watch-{tag}-{}", std::process::id())
+}
+
+#[test]
+fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
+    let watch = Watch::start(&["--domain", &domain("strange")]);
+    let (home, host) = (watch.home(), watch.host());
+    let port = host.rsplit_once(':').unwrap().1;
+    let get = |path: &str, lines: &str| watch.raw(&format!("GET {path} HTTP/1.1\r\n{lines}\r\n"));
+    let own = format!("Host: {host}\r\n");
+    let page = get(home, &own);
+    assert_eq!(page.status, 200);
+    assert!(String::from_utf8_lossy(&page.body).contains("watch.js"));
+    for line in ["default-src 'none'", "no-store", "nosniff", "no-referrer"] {
+        assert!(page.head.contains(line), "{line}: {}", page.head);
+    }
+    assert!(!page.head.to_lowercase().contains("cookie"));
+    // No token, a wrong one, the token elsewhere.
+    let wrong = format!("/{}x/", &home[1..home.len() - 2]);
+    for path in [
+        "/",
+        "/state",
+        "/watch.js",
+        "/picture",
+        &wrong,
+        &format!("/state?{}", &home[1..]),
+    ] {
+        assert_eq!(get(path, &own).status, 403, "{path}");
+    }
+    // The token, from another page or under another name.
+    for foreign in ["http://evil.example", "null", "https://127.0.0.1"] {
+        let lines = format!("{own}Origin: {foreign}\r\n");
+        assert_eq!(get(home, &lines).status, 403, "Origin {foreign}");
+        let stop = watch.raw(&format!("POST {home}ask/stop HTTP/1.1\r\n{lines}\r\n"));
+        assert_eq!(stop.status, 403, "Origin {foreign}");
+    }
+    for foreign in ["evil.example", &format!("evil.example:{port}"), "10.1.2.3"] {
+        assert_eq!(
+            get(home, &format!("Host: {foreign}\r\n")).status,
+            403,
+            "Host {foreign}"
+        );
+    }
+    assert_eq!(
+        get(home, &format!("Host: localhost:{port}\r\n")).status,
+        200
+    );
+    assert_eq!(watch.ask("GET", "nothing").status, 404);
+    assert_eq!(watch.ask("POST", "ask/move").status, 404);
+    assert_eq!(watch.ask("GET", "ask/stop").status, 405);
+    assert_eq!(watch.ask("DELETE", "state").status, 405);
+    assert_eq!(get(&home[..home.len() - 1], &own).status, 308);
+    // Too much.
+    let long = format!("{own}X: {}\r\n", "x".repeat(100_000));
+    assert_eq!(get(home, &long).status, 431);
+    let body = format!("POST {home}ask/stop HTTP/1.1\r\n{own}Content-Length: 1000000000\r\n\r\nx");
+    assert_eq!(watch.raw(&body).status, 413);
+    assert_eq!(watch.raw("\u{0}\u{1}\r\n\r\n").status, 400);
+    assert_eq!(watch.end(), Some(0));
+}
+
+#[test]
+fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
+    let fake = Fake::start(&domain("ask"));
+    let watch = Watch::start(&["--domain", &fake.domain]);
+    let mut states = watch.states();
+    states.until("a streaming controller", |s| {
+        s["controller"]["mode"] == "streaming"
+    });
+    let began = Instant::now();
+    let stopped = watch.ask("POST", "ask/stop");
+    let took = began.elapsed();
+    assert_eq!(stopped.status, 200, "{stopped:?}");
+    assert_eq!(fake.wires.stops.load(Ordering::SeqCst), 1);
+    assert!(took < Duration::from_secs(3), "{took:?}");
+    let state = states.until("the stop", |s| s["controller"]["stop"]["latched"] == true);
+    assert_eq!(state["controller"]["stop"]["code"], "operator_stop");
+    assert!(
+        state["controller"]["stop"]["words"]
+            .as_str()
+            .unwrap()
+            .contains("asked for a stop")
+    );
+    assert_eq!(state["asks"][0], serde_json::json!(["stop", null]));
+    assert_eq!(
+        state["asks"][2],
+        serde_json::json!(["acknowledge", "there is no operator"])
+    );
+    for path in ["ask/acknowledge", "ask/disarm"] {
+        let refused = watch.ask("POST", path);
+        assert_eq!(refused.status, 409);
+        assert_eq!(refused.body, b"there is no operator");
+    }
+    assert_eq!(fake.wires.acknowledgements.load(Ordering::SeqCst), 0);
+    fake.operate(true);
+    states.until("the operator", |s| s["controller"]["operator"] == true);
+    assert_eq!(watch.ask("POST", "ask/acknowledge").status, 200);
+    assert_eq!(fake.wires.acknowledgements.load(Ordering::SeqCst), 1);
+    states.until("the acknowledgement", |s| {
+        s["controller"]["stop"]["latched"] == false
+    });
+    fake.operate(false);
+    states.until("no operator", |s| s["controller"]["operator"] == false);
+}
+
+#[test]
+fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
+    let name = domain("next");
+    let dir = tempfile::tempdir().unwrap();
+    run_folder(dir.path(), &name);
+    let watch = Watch::start(&[dir.path().to_str().unwrap()]);
+    let mut states = watch.states();
+    let before = states.next();
+    assert!(before["controller"].is_null());
+    assert!(
+        before["note"]
+            .as_str()
+            .unwrap()
+            .contains("no controller runs yet")
+    );
+    assert_eq!(watch.ask("POST", "ask/stop").body, b"no controller runs");
+    for run in 0..2 {
+        let fake = Fake::start(&name);
+        let state = states.until("the run", |s| {
+            s["arm"].as_array().unwrap().len() == 27 && s["rope"].as_array().unwrap().len() > 30
+        });
+        assert_eq!(
+            state["rope_is"], "the identified rope, simulated",
+            "run {run}"
+        );
+        drop(fake);
+        let over = states.until("its end", |s| s["controller"].is_null());
+        assert!(over["note"].as_str().unwrap().contains("has ended"));
+        assert_eq!(
+            over["arm"].as_array().unwrap().len(),
+            27,
+            "it stays in view"
+        );
+    }
+    assert_eq!(watch.end(), Some(0));
+    let left: Vec<_> = std::fs::read_dir("/dev/shm")
+        .unwrap()
+        .flatten()
+        .map(|f| f.file_name())
+        .collect();
+    assert!(
+        left.iter().all(|f| !f.to_string_lossy().contains(&name)),
+        "{left:?}"
+    );
+}
+
+#[test]
+fn readers_that_never_read_hold_nobody_up() {
+    let fake = Fake::start(&domain("slow"));
+    let watch = Watch::start(&["--domain", &fake.domain]);
+    let (home, host) = (watch.home(), watch.host());
+    // Ten that follow and never read, ten that never end their question.
+    let mut idle: Vec<TcpStream> = (0..20).map(|_| watch.connect()).collect();
+    for (k, stream) in idle.iter_mut().enumerate() {
+        let whole = format!("GET {home}state HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        let sent = if k % 2 == 0 { whole.len() } else { 20 };
+        stream.write_all(&whole.as_bytes()[..sent]).unwrap();
+    }
+    let mut states = watch.states();
+    states.until("a controller", |s| !s["controller"].is_null());
+    let (began, mut count, mut cycles) = (Instant::now(), 0, Vec::new());
+    let span_s = 3.0;
+    while began.elapsed().as_secs_f64() < span_s {
+        cycles.push(states.next()["controller"]["cycle"].as_u64().unwrap());
+        count += 1;
+    }
+    let rate_hz = f64::from(count) / began.elapsed().as_secs_f64();
+    assert!(rate_hz >= 10.0, "{rate_hz} Hz");
+    assert!(cycles.is_sorted(), "{cycles:?}");
+    // One that comes late gets the newest, not what it missed.
+    std::thread::sleep(Duration::from_millis(500));
+    let mut late = watch.states();
+    assert!(late.next()["controller"]["cycle"].as_u64() > cycles.last().copied());
+    // Pictures, one after the other on one connection, never the same twice.
+    let stream = watch.connect();
+    let mut reader = BufReader::new(stream.try_clone().unwrap());
+    let (mut seen, began, mut pictures) = (0_u64, Instant::now(), 0);
+    while began.elapsed() < Duration::from_secs(2) {
+        write!(
+            &stream,
+            "GET {home}picture?after={seen} HTTP/1.1\r\nHost: {host}\r\n\r\n"
+        )
+        .unwrap();
+        let answer = read_answer(&mut reader);
+        if answer.status == 204 {
+            continue;
+        }
+        assert_eq!((answer.status, &answer.body[..2]), (200, &[0xff, 0xd8][..]));
+        let number = answer
+            .head
+            .lines()
+            .find_map(|l| l.strip_prefix("X-Number: "))
+            .unwrap();
+        assert!(
+            number.parse::<u64>().unwrap() > seen,
+            "{number} after {seen}"
+        );
+        seen = number.parse().unwrap();
+        pictures += 1;
+    }
+    assert!((4..=32).contains(&pictures), "{pictures} pictures in 2 s");
+    let resident_mb = watch.resident_mb();
+    assert!(resident_mb < 150.0, "{resident_mb} MB");
+    assert_eq!(watch.ask("POST", "ask/stop").status, 200);
+}
