@@ -86,30 +86,47 @@ impl Setup<'_> {
         finalists: &mut Vec<Finalist>,
         count: &mut Count,
     ) -> Result<(), PlanError> {
-        let (rope, exact) = (&self.request.rope, self.judging.exact());
-        let again = finalists.iter_mut().take(LOOKED_AT_AGAIN);
-        let mut again: Vec<_> = again.filter(|f| !f.is_exact).collect();
-        let throws: Vec<_> = again.iter().map(|f| (rope, &f.trajectory)).collect();
-        let outcomes = exact.run(&throws)?;
-        count.add(throws.len());
-        for (finalist, outcome) in again.iter_mut().zip(&outcomes) {
-            if !(outcome.finite && self.task.judge(rope, outcome).success) {
-                finalist.score += 1.0;
-            }
+        if finalists.first().is_none_or(|best| best.is_exact) {
+            return Ok(());
         }
-        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
-        for _ in 0..JUDGED_EXACTLY {
+        self.look_again(finalists, count)?;
+        for _ in 1..JUDGED_EXACTLY {
             if finalists.first().is_none_or(|best| best.is_exact) {
                 return Ok(());
             }
             let best = finalists.remove(0);
-            let again = self.judged(vec![(best.x, best.trajectory)], true, count)?;
-            for finalist in again {
-                let before = |other: &Finalist| other.score.total_cmp(&finalist.score).is_le();
-                let at = finalists.partition_point(before);
-                finalists.insert(at, finalist);
+            finalists.extend(self.judged(vec![(best.x, best.trajectory)], true, count)?);
+            finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        }
+        Ok(())
+    }
+
+    /// Throws the best few again exactly with the rope planned for, which demotes those
+    /// that fail, and the very best with all ropes. At once: these are two full batches.
+    fn look_again(
+        &self,
+        finalists: &mut Vec<Finalist>,
+        count: &mut Count,
+    ) -> Result<(), PlanError> {
+        let (rope, others) = (&self.request.rope, &self.ropes[1..]);
+        let seen = finalists.len().min(LOOKED_AT_AGAIN);
+        let mut throws: Vec<_> = finalists[..seen]
+            .iter()
+            .map(|f| (rope, &f.trajectory))
+            .collect();
+        throws.extend(others.iter().map(|rope| (rope, &finalists[0].trajectory)));
+        let mut outcomes = self.judging.exact().run(&throws)?;
+        count.add(throws.len());
+        let of_others = outcomes.split_off(seen);
+        for (finalist, outcome) in finalists.iter_mut().zip(&outcomes).skip(1) {
+            if !(outcome.finite && self.task.judge(rope, outcome).success) {
+                finalist.score += 1.0;
             }
         }
+        let best = finalists.remove(0);
+        let own = outcomes.into_iter().take(1).chain(of_others).collect();
+        finalists.extend(self.finalist((best.x, best.trajectory), own, true));
+        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
         Ok(())
     }
 
@@ -130,27 +147,24 @@ impl Setup<'_> {
             self.judging.run(&throws)?
         };
         count.add(throws.len());
-        let mut out = Vec::new();
-        for (x, trajectory) in points {
-            let own: Vec<ThrowOutcome> = outcomes.drain(..self.ropes.len()).collect();
-            if !own[0].finite || own[0].contacts.pole_robot > 0 {
-                continue;
-            }
-            let finalist = self.finalist(x, trajectory, own);
-            out.push(Finalist {
-                is_exact,
-                ..finalist
-            });
-        }
-        Ok(out)
+        let mut of_one = || outcomes.drain(..self.ropes.len()).collect();
+        Ok(points
+            .into_iter()
+            .filter_map(|point| self.finalist(point, of_one(), is_exact))
+            .collect())
     }
 
+    /// A throw with its outcomes, one per rope; none if it lets the arm collide.
     fn finalist(
         &self,
-        x: Vec<f64>,
-        trajectory: JointTrajectory,
+        (x, trajectory): Point,
         outcomes: Vec<ThrowOutcome>,
-    ) -> Finalist {
+        is_exact: bool,
+    ) -> Option<Finalist> {
+        let own = outcomes.first()?;
+        if !own.finite || own.contacts.pole_robot > 0 {
+            return None;
+        }
         #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
         let count = outcomes.len().max(1) as f64;
         let squares: f64 = outcomes.iter().map(|o| self.task.error_m(o).powi(2)).sum();
@@ -159,14 +173,14 @@ impl Setup<'_> {
         #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
         let successes = good.count() as f64 / count;
         let contacts = self.task.config().weights.contacts(&outcomes[0].contacts);
-        Finalist {
+        Some(Finalist {
             x,
             trajectory,
             score: (squares / count).sqrt() + contacts + (1.0 - successes),
             successes,
-            is_exact: false,
+            is_exact,
             outcome: outcomes.into_iter().next().unwrap_or_default(),
-        }
+        })
     }
 
     /// Whether no further search is needed.
