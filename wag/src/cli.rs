@@ -1,10 +1,12 @@
 //! The command line.
 
 mod eyes;
+mod ledger;
 mod results;
 mod values;
 
 pub use eyes::*;
+pub use ledger::*;
 pub use results::*;
 pub use values::{Point, seed};
 
@@ -81,6 +83,8 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Make one HTML file of a run: replay in space, joints, limits, rope, times.
     Report(ReportArgs),
+    /// List runs, compare two of them, make one again.
+    Ledger(LedgerArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
     /// Find or check where the camera stands.
@@ -406,7 +410,11 @@ pub struct LatencyArgs {
 
 /// Arguments of `wag record`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct RecordArgs {
+    /// What to do instead.
+    #[command(subcommand)]
+    pub instead: Option<RecordCommand>,
     /// Run folder of a running command; its controller is recorded.
     #[arg(conflicts_with = "domain")]
     pub run: Option<PathBuf>,
@@ -447,10 +455,26 @@ pub struct WatchArgs {
     pub seconds: Option<f64>,
 }
 
+/// `wag record ...`
+#[derive(Debug, Subcommand)]
+pub enum RecordCommand {
+    /// Make a run.mcap whole whose recorder was killed: at most its last second is
+    /// missing then. A whole file stays as it is.
+    Recover(RecoverArgs),
+}
+
+/// Arguments of `wag record recover`.
+#[derive(Debug, Args)]
+pub struct RecoverArgs {
+    /// The file.
+    #[arg(value_name = "FILE.mcap")]
+    pub file: PathBuf,
+}
+
 /// Arguments of `wag replay`.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// Run folder, or its file cycles.bin.
+    /// Run folder, or its file cycles.bin or run.mcap.
     pub run: PathBuf,
     /// First cycle to compare; the core is stepped from the keyframe before.
     #[arg(long, default_value_t = 0)]
@@ -460,7 +484,7 @@ pub struct ReplayArgs {
 /// Arguments of `wag explain`.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
-    /// Run folder, or its file cycles.bin.
+    /// Run folder, or its file cycles.bin or run.mcap.
     pub run: PathBuf,
 }
 
@@ -536,6 +560,8 @@ pub enum ProcessName {
     CameraIngest,
     /// Identification and planning.
     Planner,
+    /// Records a run as one file.
+    Recorder,
 }
 
 #[cfg(test)]

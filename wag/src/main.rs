@@ -26,6 +26,8 @@ mod command;
 mod doctor;
 mod failure;
 mod files;
+mod ledger;
+mod mcap_file;
 mod pipeline;
 mod progress;
 mod recording;

@@ -71,6 +71,7 @@ fn prepare() -> tempfile::TempDir {
         "RIFF but not really, and long enough for a header",
     );
     put("empty.bin", "");
+    fs::write(dir.path().join("bare.mcap"), b"\x89MCAP0\r\n").unwrap();
     put("cut.bin", "WAGR\u{1}\0\u{1}\0");
     put("other.bin", &format!("WAGR\u{9}{}", "\0".repeat(40)));
     put("camera.toml", "calibration = \"none.conf\"\n");
@@ -118,6 +119,27 @@ const CASES: &[Case] = &[
         &["cut.bin", "cut off", "first chunk"],
     ),
     (&["replay", "other.bin"], 2, &["other.bin", "layout 9"]),
+    (&["replay", "bare.mcap"], 2, &["bare.mcap", "/wag/replay"]),
+    (&["record", "recover"], 2, &["FILE.mcap"]),
+    (&["record", "recover", "none.mcap"], 2, &["none.mcap"]),
+    (&["record", "recover", "."], 2, &["`.`"]),
+    (
+        &["record", "recover", "notvideo.avi"],
+        2,
+        &["notvideo.avi", "no MCAP file"],
+    ),
+    (&["ledger"], 2, &["runs"]),
+    (&["ledger", "none"], 2, &["none"]),
+    (&["ledger", ".", "--csv", "none/a.csv"], 2, &["none/a.csv"]),
+    (&["ledger", "--result", "great"], 2, &["great", "broken"]),
+    (&["ledger", "compare", "."], 2, &["SECOND"]),
+    (
+        &["ledger", "compare", ".", "none"],
+        2,
+        &["none", "run folder"],
+    ),
+    (&["ledger", "rerun", "."], 2, &["command.json"]),
+    (&["ledger", "rerun", "none"], 2, &["none", "run folder"]),
     (&["explain", "none.run"], 2, &["none.run", "does not exist"]),
     (&["explain", "."], 2, &["no run folder", "cycles.bin"]),
     (&["explain", "empty.bin"], 2, &["empty.bin", "is empty"]),

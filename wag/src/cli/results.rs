@@ -17,7 +17,7 @@ pub struct BenchArgs {
     /// Seed of the ropes and motions.
     #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
-    /// `rt`: time of each contender (s).
+    /// `rt`, `record`: time of each contender (s).
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     pub seconds: u32,
     /// `rt`: core of the control loop; default: the last one.
@@ -39,6 +39,8 @@ pub enum BenchName {
     Identify,
     /// Planning: time of one throw of each task, and what it is spent on.
     Plan,
+    /// Recording: times within a control cycle without and with the recorder.
+    Record,
     /// Tracking: time of each stage per frame, and memory, on a recorded wiggle.
     Track,
 }

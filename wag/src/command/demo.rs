@@ -6,12 +6,12 @@ use super::plan::{clear_of_arm, describe, planner_config, warnings, write_trajec
 use crate::cli::{DemoArgs, TaskName};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::pipeline::{self, ArmAddress, ArmLink, CalmInput, Film, RunFolder, Shot};
+use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder, Shot};
 use crate::progress::Stage;
 use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::report;
 use crate::session::{Session, watch_interrupts};
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow};
 use hil_tests::render::Appearance;
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
@@ -83,9 +83,12 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let result = throw_once(&folder, &mut session, &mut record, &rig, quiet);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
-    let kept = session.recorder.write(folder.path(), record.epoch_ns());
+    let kept = session
+        .recorder
+        .write(folder.path(), record.first_frame_ns());
     record.recording.clone_from(&session.recorded);
     explain_stop(folder.path(), quiet);
+    record.epoch_ns = record.first_frame_ns();
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
     files::write_json(&folder.file("summary.json"), &record).or_failed()?;
     result
@@ -96,6 +99,7 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
         show(&record);
     }
     keep_report(folder.path(), quiet);
+    session.finish_run_file().or_failed()?;
     Ok(Some(serde_json::to_value(&record).or_failed()?))
 }
 
@@ -163,8 +167,10 @@ impl<'a> Demo<'a> {
         let limits = files::default_limits()?;
         let calibration = rig_config.stereo_camera();
         pipeline::write_calibration(folder, &calibration)?;
+        let target_m = Some(record.target_m);
+        pipeline::start_recorder(session, folder, &limits, Some(&calibration), target_m)?;
         let rig = pipeline::start_rig(session, folder, rig_config)?;
-        let address = arm_ports(session, &rig)?;
+        let address = pipeline::arm_ports(session, &rig)?;
         let camera = pipeline::start_camera(session, folder)?;
         let planner = pipeline::start_planner(session, folder, &settings)?;
         let arm = pipeline::start_controller(session, folder, &limits, address)?;
@@ -380,13 +386,5 @@ impl<'a> Demo<'a> {
             RigEvent::Failed { message } => Err(anyhow!(message)),
             truth => self.record.set_truth(&truth),
         }
-    }
-}
-
-fn arm_ports(session: &mut Session, rig: &RpcClient<RigRpc>) -> anyhow::Result<ArmAddress> {
-    match session.ask(rig, &RigRequest::Ports, Duration::from_secs(5), |_| ())? {
-        RigEvent::Ports { command, reports } => Ok(ArmAddress::of_rig(command, reports)),
-        RigEvent::Failed { message } => Err(anyhow!(message)),
-        other => bail!("the rig answered with {other:?}"),
     }
 }

@@ -91,6 +91,8 @@ pub struct DemoRecord {
     planned_tip_target_distance_m: Option<f64>,
     /// Distance measured by the stereo camera (m).
     stereo_tip_target_distance_m: Option<f64>,
+    /// Instant that times in the run's files count from (CLOCK_MONOTONIC, ns).
+    pub epoch_ns: u64,
     /// Wall time of the whole demo (s).
     pub wall_s: f64,
     /// Wall time of the stages (s).
@@ -127,6 +129,7 @@ impl DemoRecord {
             true_tip_target_distance_m: None,
             planned_tip_target_distance_m: None,
             stereo_tip_target_distance_m: None,
+            epoch_ns: 0,
             wall_s: 0.0,
             stages: StageTimes::default(),
             wiggle: None,
@@ -146,7 +149,7 @@ impl DemoRecord {
 
     /// Instant that times in recorded files count from (CLOCK_MONOTONIC, ns):
     /// the wiggle's first frame.
-    pub fn epoch_ns(&self) -> u64 {
+    pub fn first_frame_ns(&self) -> u64 {
         self.wiggle.map_or(0, |w| w.first_stamp_ns)
     }
 

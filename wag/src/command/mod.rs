@@ -11,6 +11,7 @@ mod explain;
 mod film;
 mod identify;
 mod latency;
+mod ledger;
 mod manual;
 mod network;
 pub mod plan;
@@ -51,6 +52,7 @@ fn results(command: &Command) -> Vec<&Path> {
         ) => &[Some(&args.out), args.csv.as_deref(), args.reach.as_deref()],
         Command::Latency(args) => &[args.response.as_deref()],
         Command::Report(args) => &[args.out.as_deref()],
+        Command::Ledger(args) => &[args.csv.as_deref()],
         _ => &[],
     };
     named.iter().flatten().copied().collect()
@@ -82,6 +84,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Replay(args) => replay::run(args, quiet),
         Command::Explain(args) => explain::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
+        Command::Ledger(args) => ledger::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),
         Command::Calib(command) => calib::run(command, quiet),
         Command::Bench(args) => bench::run(args, quiet),

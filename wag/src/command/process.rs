@@ -6,6 +6,7 @@
 use crate::cli::{ProcessArgs, ProcessName};
 use crate::failure::{OrInput, Outcome};
 use crate::files;
+use crate::mcap_file;
 use crate::session::{interrupted, watch_interrupts};
 use anyhow::Context;
 use shared_types::ipc::DomainSweep;
@@ -18,6 +19,8 @@ const PARENT_EVERY: Duration = Duration::from_millis(100);
 const END_WITHIN: Duration = Duration::from_millis(1200);
 /// The same where an arm may have to be braked first.
 const BRAKE_WITHIN: Duration = Duration::from_millis(4500);
+/// The same where a file must be finished.
+const FINISH_WITHIN: Duration = Duration::from_secs(19);
 
 /// Sets the stop flag when the parent is gone, and ends the process if it does
 /// not manage to end itself.
@@ -51,6 +54,7 @@ pub fn run(args: &ProcessArgs) -> Outcome {
     watch_interrupts().or_failed()?;
     let end_within = match args.name {
         ProcessName::RtController | ProcessName::Guardian => BRAKE_WITHIN,
+        ProcessName::Recorder => FINISH_WITHIN,
         ProcessName::Rig
         | ProcessName::Camera
         | ProcessName::CameraIngest
@@ -75,5 +79,6 @@ pub fn run(args: &ProcessArgs) -> Outcome {
             camera_ingest::process::run(&read(args).or_input()?, stop).or_failed()
         }
         ProcessName::Planner => planner::process::run(&read(args).or_input()?, stop).or_failed(),
+        ProcessName::Recorder => mcap_file::run(&read(args).or_input()?, stop).or_failed(),
     }
 }

@@ -1,7 +1,8 @@
 //! `wag record`: attaches to a running controller and records its cycles.
 
-use crate::cli::RecordArgs;
+use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::failure::{Failure, OrInput, Outcome};
+use crate::mcap_file;
 use crate::pipeline::RunFolder;
 use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
 use crate::session::{interrupted, watch_interrupts};
@@ -12,7 +13,32 @@ use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+/// `wag record recover`: a file without its end becomes a whole one.
+fn recover(args: &RecoverArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let found = mcap_file::recover(&args.file).or_input()?;
+    if !quiet {
+        let file = args.file.display();
+        if found.was_whole {
+            println!(
+                "`{file}` is whole: {} messages, {} s",
+                found.messages, found.span_s
+            );
+        } else {
+            println!(
+                "`{file}` is whole again: {} messages, {} s; left out: {} damaged chunks, {} bytes at the end",
+                found.messages, found.span_s, found.damaged, found.cut_bytes
+            );
+        }
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "record recover", "file": args.file, "recovered": found,
+    })))
+}
+
 pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
+    if let Some(RecordCommand::Recover(args)) = &args.instead {
+        return recover(args, quiet);
+    }
     if args.seconds.is_some_and(|s| !s.is_finite() || s <= 0.0) {
         return Err(Failure::input(anyhow!(
             "--seconds must be a number above zero"

@@ -67,11 +67,13 @@ pub fn drive(
         Ok(value) => value.clone(),
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
     };
+    summary["epoch_ns"] = json!(epoch_ns);
     summary["recording"] = json!(session.recorded);
     explain_stop(folder.path(), quiet);
     files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
     let value = result.or_failed()?;
     kept.or_failed()?;
+    session.finish_run_file().or_failed()?;
     if !quiet {
         println!("done; run folder: {}", folder.path().display());
     }
@@ -95,6 +97,7 @@ fn stream(
         joints: arm.report_port,
         status: [arm.status_port; 2],
     };
+    pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::start_controller(session, folder, limits, address)?;
     let warnings = pipeline::acquire(session, &link)?;
     for warning in &warnings {

@@ -1,8 +1,9 @@
 //! Starting the processes of a session and connecting to them.
 
 use super::{ArmLink, RunFolder, STARTUP};
+use crate::mcap_file::{RUN_FILE, RecorderConfig};
 use crate::session::{ProcessSpec, Session};
-use anyhow::Context;
+use anyhow::{Context, anyhow, bail};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::process::CameraConfig;
 use hil_tests::rig::RigConfig;
@@ -10,12 +11,14 @@ use planner::process::PlannerConfig;
 use rt_controller::ControllerConfig;
 use rt_controller::set_up::OnDifference;
 use shared_types::ipc::message::{
-    CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigRequest, RigRpc,
+    CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigEvent, RigRequest,
+    RigRpc,
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::{Limits, StereoCamera};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::Path;
+use std::time::Duration;
 
 const CONTROLLER: &str = include_str!("../../../configs/rt/controller.toml");
 const RIG: &str = include_str!("../../../configs/rig/demo.toml");
@@ -52,6 +55,41 @@ pub fn write_calibration(folder: &RunFolder, camera: &StereoCamera) -> anyhow::R
         VideoMode::Vga,
         Path::new("camera.conf"),
     )?;
+    Ok(())
+}
+
+/// Most pictures a second in the recording of a run: half of what the camera gives,
+/// because each costs milliseconds of a core.
+const PICTURES_HZ: f64 = 30.0;
+
+/// Starts the process that records the run; what `camera` and `target_m` are is told
+/// in it, where there are any.
+pub fn start_recorder(
+    session: &mut Session,
+    folder: &RunFolder,
+    limits: &Limits,
+    camera: Option<&StereoCamera>,
+    target_m: Option<[f64; 3]>,
+) -> anyhow::Result<()> {
+    let file = folder.file(RUN_FILE);
+    let config = folder.config(
+        "recorder",
+        &RecorderConfig {
+            domain: folder.domain.clone(),
+            file: file.clone(),
+            run: folder.path().to_owned(),
+            pictures_hz: PICTURES_HZ,
+            target_m,
+            limits: limits.clone(),
+            camera: camera.cloned(),
+        },
+    )?;
+    let spec = ProcessSpec {
+        name: "recorder",
+        config,
+        holds_arm: false,
+    };
+    session.record_run(&spec, &file);
     Ok(())
 }
 
@@ -132,6 +170,15 @@ impl ArmAddress {
             joints,
             status: [rich, normal],
         }
+    }
+}
+
+/// Where the arm of a rig listens.
+pub fn arm_ports(session: &mut Session, rig: &RpcClient<RigRpc>) -> anyhow::Result<ArmAddress> {
+    match session.ask(rig, &RigRequest::Ports, Duration::from_secs(5), |_| ())? {
+        RigEvent::Ports { command, reports } => Ok(ArmAddress::of_rig(command, reports)),
+        RigEvent::Failed { message } => Err(anyhow!(message)),
+        other => bail!("the rig answered with {other:?}"),
     }
 }
 

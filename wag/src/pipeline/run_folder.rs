@@ -1,6 +1,7 @@
 //! The folder of one run: results, configurations as used, logs.
 
 use crate::failure::{Failure, OrInput, Outcome};
+use crate::ledger::{COMMAND_FILE, CommandLine};
 use anyhow::{Context, anyhow};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -35,10 +36,13 @@ impl RunFolder {
                 })
                 .or_input()?;
         }
-        Ok(Self {
+        let folder = Self {
             path,
             domain: format!("run-{}", std::process::id()),
-        })
+        };
+        let command = CommandLine::of_this_program(SystemTime::now());
+        crate::files::write_json(&folder.file(COMMAND_FILE), &command).or_failed()?;
+        Ok(folder)
     }
 
     /// Refuses a folder that is there already; results are never mixed.
@@ -85,6 +89,12 @@ impl Drop for RunFolder {
             let _ = std::fs::remove_file(cycles);
         }
         // Removes empty folders only.
+        let files = |folder: &Path| folder.read_dir().map_or(0, Iterator::count);
+        let only_command =
+            files(&self.path) == 3 && files(&self.path.join("config")) + files(&self.log()) == 0;
+        if only_command {
+            let _ = std::fs::remove_file(self.file(COMMAND_FILE));
+        }
         for folder in [self.path.join("config"), self.log(), self.path.clone()] {
             let _ = std::fs::remove_dir(folder);
         }

@@ -1,6 +1,7 @@
 //! Where a recording lies.
 
 use super::CYCLES_FILE;
+use crate::mcap_file::{RUN_FILE, is_mcap, replay_bytes};
 use anyhow::{Context, ensure};
 use std::path::Path;
 
@@ -12,19 +13,28 @@ pub fn read_recording(run: &Path) -> anyhow::Result<Vec<u8>> {
         run.display()
     );
     let file = if run.is_dir() {
-        run.join(CYCLES_FILE)
+        // Either will do; the smaller one is read sooner.
+        [CYCLES_FILE, RUN_FILE]
+            .map(|name| run.join(name))
+            .into_iter()
+            .find(|file| file.is_file())
+            .with_context(|| {
+                format!(
+                    "`{}` is no run folder with a recording: it holds neither {CYCLES_FILE} nor {RUN_FILE}",
+                    run.display()
+                )
+            })?
     } else {
         run.to_owned()
     };
-    ensure!(
-        file.is_file(),
-        "`{}` is no run folder with a recording: it holds no {CYCLES_FILE}",
-        run.display()
-    );
-    std::fs::read(&file).with_context(|| {
+    let bytes = std::fs::read(&file).with_context(|| {
         format!(
             "cannot read `{}`; check its permissions and the memory of this machine",
             file.display()
         )
-    })
+    })?;
+    if is_mcap(&bytes) {
+        return replay_bytes(&bytes).with_context(|| format!("`{}`", file.display()));
+    }
+    Ok(bytes)
 }

@@ -91,6 +91,9 @@ pub struct Histogram {
 pub struct Scene {
     /// Name for people.
     pub name: String,
+    /// Begin of the motion on the run's clock (s).
+    #[serde(skip)]
+    pub begin_s: f64,
     /// Time of the first frame on the motion's clock (s).
     pub from_s: f64,
     /// Time between frames (s).

@@ -21,6 +21,7 @@ pub use replay::{arm_points, tenths_mm};
 
 use crate::files;
 use anyhow::ensure;
+use data::Scene;
 use page::SIZE_MAX_BYTES;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +37,14 @@ pub struct Written {
     pub bytes: usize,
     /// What the run folder does not hold.
     pub missing: Vec<String>,
+}
+
+/// The motions of a run folder with the identified rope simulated on them.
+///
+/// # Errors
+/// The run is no folder of a run, or one of its files is wrong.
+pub fn scenes(run: &Path) -> anyhow::Result<Vec<Scene>> {
+    Ok(read::read_run(run)?.scenes)
 }
 
 /// Makes the report of a run folder and writes it to `out`, by default into the

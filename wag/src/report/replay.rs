@@ -78,6 +78,7 @@ pub fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> anyhow::Re
         None => Vec::new(),
     };
     Ok(Scene {
+        begin_s,
         from_s: -BEFORE_S,
         period_s: frames.period_s,
         arm: (0..frames.count)

@@ -1,7 +1,7 @@
 //! The session a command works in: shared memory, supervised processes, the
 //! operator's heartbeat, the recorder, and what to show meanwhile.
 
-use super::{DeadMan, ProcessSpec, Recorder, Supervisor};
+use super::{DeadMan, ProcessSpec, Recorder, RunFile, Supervisor};
 use crate::recording::{RecordingReport, RecordingThread};
 use anyhow::{Context, anyhow, bail};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
@@ -50,6 +50,7 @@ pub struct Session {
     recording: Option<RecordingThread>,
     /// What became of the recording of control cycles, once the session ended.
     pub recorded: Option<RecordingReport>,
+    run_file: Option<RunFile>,
     bus: Bus,
     _sweep: DomainSweep,
     domain: String,
@@ -72,6 +73,7 @@ impl Session {
             recorder: Recorder::open(&bus)?,
             recording: None,
             recorded: None,
+            run_file: None,
             bus,
             _sweep: DomainSweep::new(domain),
             domain: domain.to_owned(),
@@ -85,6 +87,20 @@ impl Session {
     pub fn record_cycles(&mut self, path: &Path) -> anyhow::Result<()> {
         self.recording = Some(RecordingThread::start(&self.domain, path)?);
         Ok(())
+    }
+
+    /// Starts the process that records the whole run in `path`; call it before the
+    /// controller is started.
+    pub fn record_run(&mut self, spec: &ProcessSpec, path: &Path) {
+        self.run_file = Some(RunFile::start(spec, path, &self.log_folder));
+    }
+
+    /// Finishes the file of the run, once all results lie in the run folder.
+    ///
+    /// # Errors
+    /// The recorder was lost on the way.
+    pub fn finish_run_file(&mut self) -> anyhow::Result<()> {
+        self.run_file.take().map_or(Ok(()), RunFile::finish)
     }
 
     /// Makes standard input the operator's dead-man switch, held from now on.
@@ -113,6 +129,9 @@ impl Session {
             }
         }
         self.recorder.drain()?;
+        if let Some(file) = &mut self.run_file {
+            file.watch();
+        }
         if self.committed {
             self.supervisor.check_arm()?;
         } else {

@@ -3,9 +3,11 @@
 mod dead_man;
 mod live;
 mod recorder;
+mod run_file;
 mod supervisor;
 
 use dead_man::DeadMan;
 pub use live::{Session, interrupted, watch_interrupts};
 pub use recorder::Recorder;
+use run_file::RunFile;
 pub use supervisor::{ProcessSpec, Supervisor};

@@ -105,13 +105,7 @@ impl Supervisor {
                 .try_wait()
                 .context("cannot watch a child process")?
             {
-                return Err(anyhow!(
-                    "the {} process {}{} (log: `{}`)",
-                    running.name,
-                    describe(status),
-                    last_words(&running.log),
-                    running.log.display()
-                ));
+                return Err(bad_end(running, &describe(status)));
             }
         }
         Ok(())
@@ -121,12 +115,30 @@ impl Supervisor {
     /// arm, then the others, each time last started first.
     pub fn stop(&mut self) {
         let (arm, others) = self.children.drain(..).partition(|child| child.holds_arm);
-        end_together(arm, BRAKE_GRACE);
-        end_together(others, GRACE);
+        // How they end does not matter any more.
+        let _ = end_together(arm, BRAKE_GRACE);
+        let _ = end_together(others, GRACE);
+    }
+
+    /// Asks every child to end and gives them `grace` to finish their work. Fails
+    /// when one of them did not.
+    pub fn finish(&mut self, grace: Duration) -> anyhow::Result<()> {
+        end_together(self.children.drain(..).collect(), grace)
     }
 }
 
-fn end_together(mut children: Vec<Running>, grace: Duration) {
+/// Why a child that has ended, or had to be ended, is not what was wished for.
+fn bad_end(running: &Running, how: &str) -> anyhow::Error {
+    anyhow!(
+        "the {} process {how}{} (log: `{}`)",
+        running.name,
+        last_words(&running.log),
+        running.log.display()
+    )
+}
+
+/// Ends all of them, whatever happens; the error is the first bad end.
+fn end_together(mut children: Vec<Running>, grace: Duration) -> anyhow::Result<()> {
     for running in children.iter_mut().rev() {
         if matches!(running.child.try_wait(), Ok(None))
             && let Some(pid) = i32::try_from(running.child.id())
@@ -137,6 +149,7 @@ fn end_together(mut children: Vec<Running>, grace: Duration) {
         }
     }
     let asked = Instant::now();
+    let mut first_bad = Ok(());
     for mut running in children.into_iter().rev() {
         loop {
             match running.child.try_wait() {
@@ -147,12 +160,18 @@ fn end_together(mut children: Vec<Running>, grace: Duration) {
                     tracing::warn!(name = running.name, "did not end in time and is killed");
                     let _ = running.child.kill();
                     let _ = running.child.wait();
+                    first_bad = first_bad.and(Err(bad_end(&running, "did not end in time")));
+                    break;
+                }
+                Ok(Some(status)) if !status.success() => {
+                    first_bad = first_bad.and(Err(bad_end(&running, &describe(status))));
                     break;
                 }
                 Ok(Some(_)) | Err(_) => break,
             }
         }
     }
+    first_bad
 }
 
 impl Drop for Supervisor {

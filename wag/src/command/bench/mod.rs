@@ -6,6 +6,7 @@
 mod identify;
 mod machine;
 mod plan;
+mod record;
 mod rope;
 mod rt;
 mod spent;
@@ -22,6 +23,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         BenchName::Rt => rt::run(args, quiet),
         BenchName::Identify => identify::run(args, quiet),
         BenchName::Plan => plan::run(args, quiet),
+        BenchName::Record => record::run(args, quiet),
         BenchName::Track => track::run(args, quiet),
     }
 }

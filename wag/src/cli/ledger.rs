@@ -1,0 +1,61 @@
+//! Arguments of `wag ledger`.
+
+use super::values::seed;
+use crate::ledger::RunResult;
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+/// Arguments of `wag ledger`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct LedgerArgs {
+    /// What to do instead of listing.
+    #[command(subcommand)]
+    pub instead: Option<LedgerCommand>,
+    /// Run folders, or folders of them; default: runs.
+    #[arg(value_name = "FOLDER")]
+    pub places: Vec<PathBuf>,
+    /// Only runs that ended so.
+    #[arg(long, value_enum)]
+    pub result: Option<RunResult>,
+    /// Only runs of this command, as `demo`.
+    #[arg(long, value_name = "NAME")]
+    pub command: Option<String>,
+    /// Only runs of this seed.
+    #[arg(long, value_name = "SEED", allow_negative_numbers = true, value_parser = seed)]
+    pub seed_is: Option<u64>,
+    /// Only runs of the plan whose hash begins so.
+    #[arg(long, value_name = "HASH")]
+    pub plan: Option<String>,
+    /// Write the list as CSV too.
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+}
+
+/// `wag ledger ...`
+#[derive(Debug, Subcommand)]
+pub enum LedgerCommand {
+    /// Say in which values two runs differ.
+    Compare(LedgerCompareArgs),
+    /// Print the command line that makes a run once more, in a new folder.
+    Rerun(LedgerRerunArgs),
+}
+
+/// Arguments of `wag ledger compare`.
+#[derive(Debug, Args)]
+pub struct LedgerCompareArgs {
+    /// Run folder.
+    pub first: PathBuf,
+    /// Run folder to compare with it.
+    pub second: PathBuf,
+}
+
+/// Arguments of `wag ledger rerun`.
+#[derive(Debug, Args)]
+pub struct LedgerRerunArgs {
+    /// Run folder.
+    pub run: PathBuf,
+    /// Execute it. An arm that is no simulation asks again whether its area is clear.
+    #[arg(long)]
+    pub go: bool,
+}

@@ -1,0 +1,128 @@
+//! `wag ledger`: runs listed, compared, made again.
+
+use crate::cli::{LedgerArgs, LedgerCommand, LedgerCompareArgs, LedgerRerunArgs};
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::files;
+use crate::ledger::{self, CommandLine, Entry, RUNS, quoted};
+use crate::table;
+use anyhow::{Context, anyhow};
+use serde_json::{Value, json};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+pub fn run(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
+    match &args.instead {
+        Some(LedgerCommand::Compare(args)) => compare(args, quiet),
+        Some(LedgerCommand::Rerun(args)) => rerun(args, quiet),
+        None => list(args, quiet),
+    }
+}
+
+fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let places = if args.places.is_empty() {
+        vec![PathBuf::from(RUNS)]
+    } else {
+        args.places.clone()
+    };
+    let mut entries = ledger::find(&places).or_input()?;
+    let plan = args.plan.as_ref().map(|hash| hash.to_lowercase());
+    entries.retain(|e| {
+        args.result.is_none_or(|result| e.result == result)
+            && args
+                .command
+                .as_deref()
+                .is_none_or(|c| e.command() == Some(c))
+            && args.seed_is.is_none_or(|seed| e.seed == Some(seed))
+            && plan.as_deref().is_none_or(|hash| {
+                e.plan_sha256
+                    .as_ref()
+                    .is_some_and(|found| found.starts_with(hash))
+            })
+    });
+    if let Some(path) = &args.csv {
+        let text = ledger::csv(&entries).or_failed()?;
+        files::write_atomic(path, &text).or_failed()?;
+    }
+    if !quiet {
+        println!("{}", ledger::table(&entries));
+        for entry in &entries {
+            for problem in &entry.problems {
+                println!("{}: {problem}", entry.run.display());
+            }
+        }
+        println!("{} runs", entries.len());
+    }
+    Ok(Some(
+        json!({ "ok": true, "command": "ledger", "runs": entries, "csv": args.csv }),
+    ))
+}
+
+fn known(run: &Path) -> Outcome<Entry> {
+    if run.is_dir() {
+        Ok(ledger::read(run))
+    } else {
+        Err(Failure::input(anyhow!(
+            "`{}` is no folder; name a run folder",
+            run.display()
+        )))
+    }
+}
+
+fn compare(args: &LedgerCompareArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let (first, second) = (known(&args.first)?, known(&args.second)?);
+    let found = ledger::compare(&first, &second).or_failed()?;
+    if !quiet {
+        let rows = found.iter().map(|d| {
+            let by =
+                d.by.map_or_else(|| "-".to_owned(), |by| format!("{by:+.4e}"));
+            [
+                d.what.clone(),
+                d.first.to_string(),
+                d.second.to_string(),
+                by,
+            ]
+        });
+        println!(
+            "{}",
+            table::numbers(["value", "first", "second", "by"], 0, rows)
+        );
+        println!("{} differences", found.len());
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "ledger compare", "first": first, "second": second, "differences": found,
+    })))
+}
+
+fn rerun(args: &LedgerRerunArgs, quiet: bool) -> Outcome<Option<Value>> {
+    known(&args.run)?;
+    let line = CommandLine::read(&args.run).or_input()?;
+    let mut again = line.again();
+    if args.go {
+        if quiet && !again.iter().any(|word| word == "--json") {
+            again.push("--json".to_owned());
+        }
+        let program = std::env::current_exe()
+            .context("cannot find this program's own file")
+            .or_failed()?;
+        // Comes back only when it could not be started: what it prints and how it
+        // ends are its own.
+        let reason = Command::new(program)
+            .args(&again)
+            .current_dir(&line.working_directory)
+            .exec();
+        return Err(Failure::failed(anyhow!(reason).context(format!(
+            "cannot run `wag {}` in `{}`",
+            quoted(&again),
+            line.working_directory.display()
+        ))));
+    }
+    if !quiet {
+        let folder = line.working_directory.display().to_string();
+        println!("cd {} && wag {}", quoted(&[folder]), quoted(&again));
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "ledger rerun", "run": args.run, "arguments": again,
+        "working_directory": line.working_directory, "version": line.version,
+    })))
+}

@@ -1,0 +1,171 @@
+//! What comes from shared memory, as messages.
+
+use super::calibration::CAMERA_FRAME;
+use super::clock::time;
+use super::scene::colour;
+use super::urdf::joint_name;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord, JointReport};
+use shared_types::keypoints::KeypointFrame;
+use shared_types::{FaultCode, JOINTS, JointVector};
+
+/// Levels of `foxglove.Log`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    Info = 2,
+    Error = 4,
+}
+
+/// A tenth of a microradian or a micrometre is less than anything here is known to;
+/// the exact bits are in the recording for replay.
+pub fn round(value: f64) -> f64 {
+    (value * 1e7).round() / 1e7
+}
+
+/// Angles that are no numbers are left out, as the schema has it.
+fn joints(at_ns: u64, q: &JointVector, qd: Option<&JointVector>) -> Value {
+    let joints: Vec<Value> = (0..JOINTS)
+        .map(|i| {
+            let mut joint = json!({ "name": joint_name(i) });
+            if q[i].is_finite() {
+                joint["position"] = round(q[i]).into();
+            }
+            if let Some(qd) = qd.filter(|qd| qd[i].is_finite()) {
+                joint["velocity"] = round(qd[i]).into();
+            }
+            joint
+        })
+        .collect();
+    json!({ "timestamp": time(at_ns), "joints": joints })
+}
+
+/// Measured joints.
+pub fn measured(at_ns: u64, report: &JointReport) -> Value {
+    joints(at_ns, &report.q, Some(&report.qd))
+}
+
+/// Commanded joints.
+pub fn commanded(at_ns: u64, cycle: &CycleRecord) -> Value {
+    joints(at_ns, &cycle.q_c, None)
+}
+
+/// Figures of a cycle.
+pub fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
+    let us = |ns: u32| f64::from(ns) / 1e3;
+    let mut message = json!({
+        "timestamp": time(at_ns),
+        "cycle": c.cycle,
+        "mode": format!("{:?}", ControllerMode::from_raw(c.mode)),
+        "fault": format!("{:?}", FaultCode::from_raw(c.fault).unwrap_or_default()),
+        "sent": c.sent != 0,
+        "wake_late_us": us(c.wake_late_ns),
+        "compute_us": us(c.compute_ns),
+        "send_us": us(c.send_ns),
+        "reply_us": us(c.reply_ns),
+        "missed": c.missed,
+        "dropped": c.dropped,
+        "path_rate": if c.path_rate.is_finite() { round(c.path_rate) } else { 0.0 },
+    });
+    // Negative while nothing runs.
+    if c.trajectory_s >= 0.0 {
+        message["trajectory_s"] = round(c.trajectory_s).into();
+    }
+    message
+}
+
+/// A line of the log.
+pub fn log(at_ns: u64, level: Level, text: &str) -> Value {
+    json!({
+        "timestamp": time(at_ns), "level": level as u32, "message": text,
+        "name": "rt-controller", "file": "", "line": 0,
+    })
+}
+
+/// Why the arm was stopped, in a sentence or two.
+pub fn cause(record: &CauseRecord) -> String {
+    let fault = record.fault();
+    let mut text = format!("stopped in cycle {}: {fault:?}", record.cycle);
+    if record.arm_error != 0 {
+        text.push_str(&format!(", arm error C{}", record.arm_error));
+    }
+    if record.limit.joint != 0 {
+        text.push_str(&format!(", joint {}", record.limit.joint));
+    }
+    if record.limit.limit.abs() > 0.0 {
+        text.push_str(&format!(
+            ", {:.4} where {:.4} is allowed",
+            record.limit.value, record.limit.limit
+        ));
+    }
+    format!("{text}; {}", fault.explain())
+}
+
+/// The camera's left eye.
+pub fn image(at_ns: u64, jpeg: &[u8]) -> Value {
+    json!({
+        "timestamp": time(at_ns), "frame_id": CAMERA_FRAME, "data": STANDARD.encode(jpeg), "format": "jpeg",
+    })
+}
+
+/// Keypoints: a line along the rope; nothing where it was lost. A pixel's centre is
+/// a whole number here and half a pixel farther in the viewers' count.
+pub fn keypoints(at_ns: u64, frame: &KeypointFrame) -> Value {
+    let points: Vec<Value> = frame
+        .points_px
+        .iter()
+        .take(frame.count as usize)
+        .filter(|[u, v]| frame.lost == 0 && u.is_finite() && v.is_finite())
+        .map(|[u, v]| json!({ "x": round(f64::from(*u) + 0.5), "y": round(f64::from(*v) + 0.5) }))
+        .collect();
+    // Single points, then the line through them.
+    let drawn = |kind: u32, thickness: f64| {
+        json!({
+            "timestamp": time(at_ns), "type": kind, "points": points, "outline_colors": [],
+            "outline_color": colour([1.0, 0.6, 0.0, 1.0]), "fill_color": colour([1.0, 0.6, 0.0, 1.0]),
+            "thickness": thickness, "metadata": [],
+        })
+    };
+    json!({ "circles": [], "points": [drawn(1, 4.0), drawn(3, 1.0)], "texts": [] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_number_is_left_out() {
+        let mut report = JointReport::default();
+        report.q[2] = f64::NAN;
+        report.q[3] = 0.123_456_789;
+        let message = measured(1_500_000_000, &report);
+        assert_eq!(message["timestamp"]["nsec"], 500_000_000);
+        assert!(message["joints"][2].get("position").is_none());
+        assert_eq!(message["joints"][3]["position"], 0.123_456_8);
+        let resting = CycleRecord {
+            trajectory_s: -1.0,
+            ..CycleRecord::default()
+        };
+        assert!(cycle(0, &resting).get("trajectory_s").is_none());
+    }
+
+    #[test]
+    fn a_lost_rope_has_no_points() {
+        let mut frame = KeypointFrame {
+            sequence: 0,
+            stamp_ns: 0,
+            count: 2,
+            lost: 0,
+            points_px: [[3.0, 4.0]; 32],
+            confidence: [1.0; 32],
+        };
+        let points = |frame: &KeypointFrame| keypoints(0, frame)["points"][0]["points"].clone();
+        assert_eq!(
+            points(&frame),
+            json!([{ "x": 3.5, "y": 4.5 }, { "x": 3.5, "y": 4.5 }])
+        );
+        frame.lost = 1;
+        assert_eq!(points(&frame), json!([]));
+    }
+}

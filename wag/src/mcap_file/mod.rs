@@ -1,0 +1,27 @@
+//! `run.mcap`: a run in one file that Foxglove, rerun and PlotJuggler show.
+//!
+//! A process of its own writes it while the run goes on. It only listens, with low
+//! priority: it can lose records of its own and never slow the controller or the
+//! camera. The file grows by whole chunks, so that of a killed recorder's file
+//! everything but the last second is there and [`recover()`] makes it whole.
+
+mod calibration;
+mod channel;
+mod clock;
+mod image;
+mod messages;
+mod read;
+mod recorder;
+mod recover;
+mod results;
+mod scene;
+mod schema;
+mod urdf;
+mod writer;
+
+pub use read::{is_mcap, replay_bytes};
+pub use recorder::{RecorderConfig, run};
+pub use recover::recover;
+
+/// File of a run folder that holds the whole run.
+pub const RUN_FILE: &str = "run.mcap";

@@ -1,0 +1,142 @@
+//! Reading a file, whole or not.
+
+use super::channel::Channel;
+use anyhow::{bail, ensure};
+use mcap::MAGIC;
+use mcap::read::ChunkReader;
+use mcap::records::{Record, op};
+use rt_controller::recording::chunk::{self, Front};
+
+/// Opcode and length.
+const FRONT_LEN: usize = 9;
+
+/// What was met on the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Walked {
+    /// Chunks whose checksum or inside is wrong; nothing of them is told.
+    pub damaged_chunks: u32,
+    /// The data ended where they should.
+    pub whole: bool,
+    /// Bytes behind the last record that could be read, when they did not.
+    pub cut_bytes: usize,
+}
+
+/// Whether bytes begin like an MCAP file.
+pub fn is_mcap(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+/// The record at the front of `rest` as opcode, body and length; `None` when it is cut
+/// off.
+fn front(rest: &[u8]) -> Option<(u8, &[u8], usize)> {
+    let (opcode, after) = rest.split_first()?;
+    let len = usize::try_from(u64::from_le_bytes(*after.first_chunk()?)).ok()?;
+    let end = FRONT_LEN.checked_add(len)?;
+    Some((*opcode, rest.get(FRONT_LEN..end)?, end))
+}
+
+/// Whether the lengths within an attachment fit into it; the library takes that for
+/// granted.
+fn is_attachment(body: &[u8]) -> bool {
+    let u32_at = |at: usize| {
+        let bytes = body.get(at..)?.first_chunk()?;
+        usize::try_from(u32::from_le_bytes(*bytes)).ok()
+    };
+    let end = || {
+        let media = 20usize.checked_add(u32_at(16)?)?;
+        let data = media.checked_add(4)?.checked_add(u32_at(media)?)?;
+        let len = u64::from_le_bytes(*body.get(data..)?.first_chunk()?);
+        data.checked_add(8 + 4)?
+            .checked_add(usize::try_from(len).ok()?)
+    };
+    end().is_some_and(|end| end == body.len())
+}
+
+/// Hands schemas, channels, messages, attachments and metadata to `each` in the order
+/// of the file.
+///
+/// # Errors
+/// The bytes are no MCAP file, or `each` fails.
+pub fn walk(
+    bytes: &[u8],
+    mut each: impl FnMut(&Record<'_>) -> anyhow::Result<()>,
+) -> anyhow::Result<Walked> {
+    ensure!(
+        is_mcap(bytes),
+        "this is no MCAP file: it does not begin like one"
+    );
+    let mut rest = &bytes[MAGIC.len()..];
+    let mut walked = Walked::default();
+    while let Some((opcode, body, len)) = front(rest) {
+        rest = &rest[len..];
+        match opcode {
+            op::DATA_END => {
+                walked.whole = true;
+                return Ok(walked);
+            }
+            op::CHUNK => match inside(body) {
+                Some(records) => records.iter().try_for_each(&mut each)?,
+                None => walked.damaged_chunks += 1,
+            },
+            op::ATTACHMENT if !is_attachment(body) => walked.damaged_chunks += 1,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT | op::METADATA => {
+                match mcap::parse_record(opcode, body) {
+                    Ok(record) => each(&record)?,
+                    Err(_wrong) => walked.damaged_chunks += 1,
+                }
+            }
+            _ => {}
+        }
+    }
+    walked.cut_bytes = rest.len();
+    Ok(walked)
+}
+
+/// All records of a chunk; `None` unless all of them are right.
+fn inside(body: &[u8]) -> Option<Vec<Record<'_>>> {
+    let Ok(Record::Chunk { header, data }) = mcap::parse_record(op::CHUNK, body) else {
+        return None;
+    };
+    let reader = ChunkReader::new(header, &data).ok()?;
+    let records: Vec<Record<'_>> = reader
+        .map(|record| record.map(Record::into_owned))
+        .collect::<Result<_, _>>()
+        .ok()?;
+    let allowed = |r: &Record<'_>| {
+        matches!(
+            r,
+            Record::Schema { .. } | Record::Channel(_) | Record::Message { .. }
+        )
+    };
+    records.iter().all(allowed).then_some(records)
+}
+
+/// The exact recording of the control cycles in a file: the bytes of `cycles.bin`.
+pub fn replay_bytes(bytes: &[u8]) -> anyhow::Result<Vec<u8>> {
+    let mut id = None;
+    let mut out = Vec::new();
+    walk(bytes, |record| {
+        match record {
+            Record::Channel(channel) if channel.topic == Channel::Replay.topic() => {
+                id = Some(channel.id);
+            }
+            Record::Message { header, data } if Some(header.channel_id) == id => {
+                // As `cycles.bin` does, from the first keyframe on.
+                let begins =
+                    matches!(chunk::read(data), Front::Chunk { header, .. } if header.keyframe);
+                if begins || !out.is_empty() {
+                    out.extend_from_slice(data);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    if id.is_none() {
+        bail!(
+            "the MCAP file holds no channel `{}`: it was not recorded by this program",
+            Channel::Replay.topic()
+        );
+    }
+    Ok(out)
+}

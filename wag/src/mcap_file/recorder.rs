@@ -1,0 +1,360 @@
+//! The process that writes the file: it subscribes, writes what comes, and finishes
+//! the file when it is told to end or its parent is gone.
+
+use super::calibration::{calibration, place};
+use super::channel::Channel;
+use super::clock::Clock;
+use super::image::left_jpeg;
+use super::messages::{self, Level};
+use super::results::Results;
+use super::scene::{arm_frames, room};
+use super::urdf::urdf;
+use super::writer::McapFile;
+use anyhow::Context;
+use rt_controller::recording::{Item, LogReader, Read};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use shared_types::ipc::{
+    Bus, ChunkSubscriber, ControllerMode, CycleRecord, CycleSubscriber, FrameHeader,
+    FrameSubscriber, IpcError, JointReport, JointSubscriber, KeypointSubscriber,
+};
+use shared_types::{FaultCode, Limits, StereoCamera};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Pause between two looks.
+const TURN: Duration = Duration::from_millis(10);
+/// Pause between two looks at the run folder.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+/// Below everything that moves an arm.
+const NICE: i32 = 5;
+/// As much as waits for a subscriber at most.
+const BUFFER: usize = 1024;
+/// A picture that is older is left out, so that a machine that is too slow for all of
+/// it records everything else.
+const PICTURE_LATE_NS: u64 = 150_000_000;
+/// Frames of the arm's links per second.
+const FRAMES_HZ: f64 = 50.0;
+
+/// What to record, and into what.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecorderConfig {
+    /// Shared-memory domain.
+    pub domain: String,
+    /// The file; it must not exist.
+    pub file: PathBuf,
+    /// Run folder whose results are taken in.
+    pub run: PathBuf,
+    /// Most pictures a second; each takes milliseconds to compress.
+    pub pictures_hz: f64,
+    /// Target (m).
+    pub target_m: Option<[f64; 3]>,
+    /// Limits of the arm.
+    pub limits: Limits,
+    /// The camera, where there is one.
+    pub camera: Option<StereoCamera>,
+}
+
+/// Lets one through per period of its own time.
+#[derive(Debug)]
+struct Thinned {
+    period_ns: u64,
+    next_ns: u64,
+}
+
+impl Thinned {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturating"
+    )]
+    fn at(rate_hz: f64) -> Self {
+        Self {
+            period_ns: (1e9 / rate_hz) as u64,
+            next_ns: 0,
+        }
+    }
+
+    fn takes(&mut self, stamp_ns: u64) -> bool {
+        if stamp_ns < self.next_ns {
+            return false;
+        }
+        // Keeps the rhythm, and finds it again after a pause.
+        let slack_ns = self.period_ns / 4;
+        let due_ns = self.next_ns + self.period_ns;
+        self.next_ns = due_ns.max((stamp_ns + self.period_ns).saturating_sub(slack_ns));
+        true
+    }
+}
+
+/// Connections to everything worth keeping.
+struct Ports {
+    chunks: ChunkSubscriber,
+    cycles: CycleSubscriber,
+    joints: JointSubscriber,
+    keypoints: KeypointSubscriber,
+    frames: FrameSubscriber,
+}
+
+impl Ports {
+    fn open(bus: &Bus) -> Result<Self, IpcError> {
+        Ok(Self {
+            chunks: bus.chunk_subscriber()?,
+            cycles: bus.cycle_subscriber()?,
+            joints: bus.joint_subscriber()?,
+            keypoints: bus.keypoint_subscriber()?,
+            frames: bus.frame_subscriber()?,
+        })
+    }
+}
+
+/// Hands what has arrived to `take`, a whole buffer at most: on a machine that is too
+/// slow there is always more.
+fn each<T, E: std::error::Error + Send + Sync + 'static>(
+    receive: impl Fn() -> Result<Option<T>, E>,
+    mut take: impl FnMut(T) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    for _ in 0..BUFFER {
+        let sample = receive().context("cannot receive records from shared memory")?;
+        let Some(sample) = sample else {
+            break;
+        };
+        take(sample)?;
+    }
+    Ok(())
+}
+
+/// A recording under way.
+struct Recording {
+    file: McapFile,
+    clock: Clock,
+    mode: Option<u8>,
+    fault: u16,
+    arm: Thinned,
+    pictures: Thinned,
+    next_frame: Option<u64>,
+    frames_lost: u64,
+    pictures_late: u64,
+    next_cycle: Option<u64>,
+    cycles_lost: u64,
+}
+
+impl Recording {
+    fn begin(config: &RecorderConfig) -> anyhow::Result<Self> {
+        let clock = Clock::compare();
+        let mut file = McapFile::create(&config.file)?;
+        let at_ns = clock.now_ns();
+        file.metadata(
+            "wag",
+            &[
+                ("version", shared_types::VERSION.to_owned()),
+                ("domain", config.domain.clone()),
+                ("wall_minus_monotonic_ns", clock.ahead_ns().to_string()),
+                ("pictures_hz", config.pictures_hz.to_string()),
+            ],
+        )?;
+        let arm = urdf(&config.limits);
+        file.attach(at_ns, "robot.urdf", "application/xml", arm.as_bytes())?;
+        file.json(Channel::Scene, at_ns, &room(at_ns, config.target_m))?;
+        if let Some(camera) = &config.camera {
+            let sees = calibration(at_ns, camera);
+            file.json(Channel::Calibration, at_ns, &sees)?;
+            let stands = json!({ "transforms": [place(at_ns, camera)] });
+            file.json(Channel::Frames, at_ns, &stands)?;
+        }
+        Ok(Self {
+            file,
+            clock,
+            mode: None,
+            fault: 0,
+            arm: Thinned::at(FRAMES_HZ),
+            pictures: Thinned::at(config.pictures_hz),
+            next_frame: None,
+            frames_lost: 0,
+            pictures_late: 0,
+            next_cycle: None,
+            cycles_lost: 0,
+        })
+    }
+
+    /// Takes in what has arrived.
+    fn drain(&mut self, ports: &Ports) -> anyhow::Result<()> {
+        // The exact recording first: the rest can be made from it.
+        each(|| ports.chunks.receive(), |chunk| self.chunk(&chunk))?;
+        each(|| ports.cycles.receive(), |cycle| self.cycle(&cycle))?;
+        each(|| ports.joints.receive(), |report| self.report(&report))?;
+        each(
+            || ports.keypoints.receive(),
+            |frame| {
+                let at_ns = self.clock.wall_ns(frame.stamp_ns);
+                let message = messages::keypoints(at_ns, &frame);
+                self.file.json(Channel::Keypoints, at_ns, &message)
+            },
+        )?;
+        each(
+            || ports.frames.receive(),
+            |frame| self.frame(frame.user_header(), &frame),
+        )
+    }
+
+    fn log(&mut self, at_ns: u64, level: Level, text: &str) -> anyhow::Result<()> {
+        let message = messages::log(at_ns, level, text);
+        self.file.json(Channel::Log, at_ns, &message)
+    }
+
+    fn chunk(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+        self.file
+            .bytes(Channel::Replay, self.clock.now_ns(), bytes)?;
+        for read in LogReader::open(bytes).into_iter().flatten() {
+            if let Read::Item(Item::Cause(cause)) = read {
+                let at_ns = self.clock.wall_ns(cause.stamp_ns);
+                self.log(at_ns, Level::Error, &messages::cause(&cause))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn cycle(&mut self, cycle: &CycleRecord) -> anyhow::Result<()> {
+        let at_ns = self.clock.wall_ns(cycle.deadline_ns);
+        if let Some(expected) = self.next_cycle {
+            self.cycles_lost += cycle.cycle.saturating_sub(expected);
+        }
+        self.next_cycle = Some(cycle.cycle + 1);
+        self.file
+            .json(Channel::Cycles, at_ns, &messages::cycle(at_ns, cycle))?;
+        if cycle.sent != 0 {
+            let message = messages::commanded(at_ns, cycle);
+            self.file.json(Channel::Commanded, at_ns, &message)?;
+        }
+        if self.mode != Some(cycle.mode) {
+            let now = ControllerMode::from_raw(cycle.mode);
+            self.log(at_ns, Level::Info, &format!("mode {now:?}"))?;
+            self.mode = Some(cycle.mode);
+        }
+        if self.fault != cycle.fault {
+            let fault = FaultCode::from_raw(cycle.fault).unwrap_or_default();
+            let level = if fault == FaultCode::None {
+                Level::Info
+            } else {
+                Level::Error
+            };
+            self.log(
+                at_ns,
+                level,
+                &format!("fault {fault:?}: {}", fault.explain()),
+            )?;
+            self.fault = cycle.fault;
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, report: &JointReport) -> anyhow::Result<()> {
+        let at_ns = self.clock.wall_ns(report.stamp_ns);
+        self.file
+            .json(Channel::Measured, at_ns, &messages::measured(at_ns, report))?;
+        if self.arm.takes(report.stamp_ns)
+            && let Some(frames) = arm_frames(at_ns, &report.q)
+        {
+            self.file.json(Channel::Frames, at_ns, &frames)?;
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self, header: &FrameHeader, pixels: &[u8]) -> anyhow::Result<()> {
+        if let Some(expected) = self.next_frame {
+            self.frames_lost += header.sequence.saturating_sub(expected);
+        }
+        self.next_frame = Some(header.sequence + 1);
+        if !self.pictures.takes(header.stamp_ns) {
+            return Ok(());
+        }
+        let age_ns = self
+            .clock
+            .now_ns()
+            .saturating_sub(self.clock.wall_ns(header.stamp_ns));
+        if age_ns > PICTURE_LATE_NS {
+            self.pictures_late += 1;
+            return Ok(());
+        }
+        match left_jpeg(header, pixels) {
+            Ok(jpeg) => {
+                let at_ns = self.clock.wall_ns(header.stamp_ns);
+                self.file
+                    .json(Channel::Image, at_ns, &messages::image(at_ns, &jpeg))
+            }
+            Err(reason) => {
+                tracing::warn!("a picture is not recorded: {reason:#}");
+                Ok(())
+            }
+        }
+    }
+
+    fn finish(mut self, results: &mut Results) -> anyhow::Result<()> {
+        results.look(&mut self.file, self.clock)?;
+        results.simulate(&mut self.file, self.clock)?;
+        self.file.metadata(
+            "recorder",
+            &[
+                ("cycles_lost", self.cycles_lost.to_string()),
+                ("frames_lost", self.frames_lost.to_string()),
+                ("pictures_left_out", self.pictures_late.to_string()),
+            ],
+        )?;
+        self.file.finish()
+    }
+}
+
+/// Records until `stop` is set; then finishes the file.
+///
+/// # Errors
+/// Shared memory cannot be joined, or the disk takes nothing any more; what is in the
+/// file by then can be recovered.
+pub fn run(config: &RecorderConfig, stop: &AtomicBool) -> anyhow::Result<()> {
+    if let Err(reason) = rustix::process::nice(NICE) {
+        tracing::warn!(%reason, "the recorder runs with ordinary priority");
+    }
+    anyhow::ensure!(
+        config.pictures_hz.is_finite() && config.pictures_hz > 0.0,
+        "pictures_hz must be a number above zero, found {}",
+        config.pictures_hz
+    );
+    let bus = Bus::join(&config.domain)?;
+    let ports = Ports::open(&bus)?;
+    // Its appearance tells the parent that nothing is missed from here on.
+    let mut recording = Recording::begin(config)?;
+    let mut results = Results::of(&config.run);
+    let mut looked = Instant::now();
+    loop {
+        // Looked at before draining: what came before the wish to stop is kept.
+        let last = stop.load(Ordering::SeqCst);
+        recording.drain(&ports)?;
+        if last {
+            return recording.finish(&mut results);
+        }
+        if looked.elapsed() >= LOOK_EVERY {
+            results.look(&mut recording.file, recording.clock)?;
+            looked = Instant::now();
+        }
+        recording.file.turn()?;
+        std::thread::sleep(TURN);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_the_frames_of_a_jittering_camera_are_taken() {
+        let mut thinned = Thinned::at(30.0);
+        let taken = (0..600u64)
+            .map(|n| 5_000_000_000 + n * 16_666_667 + (n * 7_919 % 3_000_000))
+            .filter(|stamp| thinned.takes(*stamp))
+            .count();
+        assert!((295..=305).contains(&taken), "{taken}");
+        assert!(thinned.takes(60_000_000_000));
+        assert!(!thinned.takes(60_010_000_000));
+    }
+}

@@ -1,0 +1,138 @@
+//! An MCAP file that grows by whole chunks.
+
+use super::channel::Channel;
+use super::schema::schema;
+use anyhow::Context;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, Compression, WriteOptions, Writer};
+use serde_json::Value;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What is not in the file yet is lost when the recorder is killed; a chunk is
+/// closed this often.
+const FLUSH_EVERY: Duration = Duration::from_millis(400);
+/// A chunk that has grown this long is closed at once (bytes).
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// A file under way.
+pub struct McapFile {
+    writer: Writer<File>,
+    ids: Vec<u16>,
+    sequences: Vec<u32>,
+    flushed: Instant,
+}
+
+/// Options of every file written here.
+pub fn options() -> WriteOptions {
+    WriteOptions::new()
+        .library(format!("wag {}", shared_types::VERSION))
+        .profile("")
+        .compression(Some(Compression::Lz4))
+        .chunk_size(Some(CHUNK_BYTES))
+        // A chunk goes into the file in one piece when it is closed, not bit by bit.
+        .disable_seeking(true)
+}
+
+impl McapFile {
+    /// Creates `path`, which must not exist, with every channel.
+    pub fn create(path: &Path) -> anyhow::Result<Self> {
+        let fail = || format!("cannot write `{}`", path.display());
+        let file = File::options()
+            .write(true)
+            .create_new(true)
+            .open(path)
+            .with_context(fail)?;
+        let mut writer = options().create(file).with_context(fail)?;
+        let mut ids = Vec::new();
+        for channel in Channel::ALL {
+            let schema_id = match channel.schema() {
+                Some(name) => {
+                    writer.add_schema(name, "jsonschema", schema(name).to_string().as_bytes())?
+                }
+                None => 0,
+            };
+            ids.push(writer.add_channel(
+                schema_id,
+                channel.topic(),
+                channel.encoding(),
+                &BTreeMap::new(),
+            )?);
+        }
+        Ok(Self {
+            writer,
+            ids,
+            sequences: vec![0; Channel::ALL.len()],
+            flushed: Instant::now(),
+        })
+    }
+
+    /// Adds a JSON message of the instant `at_ns` (wall clock).
+    pub fn json(&mut self, channel: Channel, at_ns: u64, message: &Value) -> anyhow::Result<()> {
+        self.bytes(channel, at_ns, message.to_string().as_bytes())
+    }
+
+    /// Adds a message of the instant `at_ns` (wall clock).
+    pub fn bytes(&mut self, channel: Channel, at_ns: u64, data: &[u8]) -> anyhow::Result<()> {
+        let place = channel as usize;
+        let header = MessageHeader {
+            channel_id: self.ids[place],
+            sequence: self.sequences[place],
+            log_time: at_ns,
+            publish_time: at_ns,
+        };
+        self.sequences[place] = self.sequences[place].wrapping_add(1);
+        self.writer.write_to_known_channel(&header, data)?;
+        Ok(())
+    }
+
+    /// Attaches a file.
+    pub fn attach(
+        &mut self,
+        at_ns: u64,
+        name: &str,
+        media_type: &str,
+        data: &[u8],
+    ) -> anyhow::Result<()> {
+        self.writer.attach(&Attachment {
+            log_time: at_ns,
+            create_time: at_ns,
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+            data: Cow::Borrowed(data),
+        })?;
+        Ok(())
+    }
+
+    /// Adds a table of texts.
+    pub fn metadata(&mut self, name: &str, entries: &[(&str, String)]) -> anyhow::Result<()> {
+        let metadata = entries
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), value.clone()))
+            .collect();
+        self.writer.write_metadata(&Metadata {
+            name: name.to_owned(),
+            metadata,
+        })?;
+        Ok(())
+    }
+
+    /// Closes the chunk when it is time.
+    pub fn turn(&mut self) -> anyhow::Result<()> {
+        if self.flushed.elapsed() >= FLUSH_EVERY {
+            self.writer.flush()?;
+            self.flushed = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// Writes indexes and footer.
+    pub fn finish(mut self) -> anyhow::Result<()> {
+        self.writer.finish()?;
+        self.writer.into_inner().sync_all()?;
+        Ok(())
+    }
+}

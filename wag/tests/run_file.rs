@@ -1,0 +1,260 @@
+//! The file of a run: it opens with any reader, replays to the bit, and survives the
+//! death of its recorder, which stops no motion.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests may fail loudly"
+)]
+
+use mcap::{MessageStream, Summary};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Runs a wiggle on a simulated arm; `during` sees the run folder and the process.
+fn wiggle(run: &Path, during: impl FnOnce(&Path, u32)) -> Output {
+    let mut rig = Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(["rig", "--command-port", "0", "--report-ports", "0,0,0,0"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(rig.stdout.take().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    let ports: Vec<&str> = line
+        .split(|c: char| !c.is_ascii_digit())
+        .filter(|p| p.len() >= 4)
+        .collect();
+    let child = Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(["wiggle", "--arm", "127.0.0.1", "--command-port", ports[0]])
+        .args([
+            "--report-port",
+            ports[1],
+            "--status-port",
+            ports[3],
+            "--out",
+        ])
+        .arg(run)
+        .current_dir(run.parent().unwrap())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    during(run, child.id());
+    let output = child.wait_with_output().unwrap();
+    end(rig);
+    output
+}
+
+fn end(mut process: Child) {
+    let _ = process.kill();
+    let _ = process.wait();
+}
+
+fn wag(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wag"))
+        .args(args)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn json(args: &[&str]) -> Value {
+    let output = wag(&[args, &["--json"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "wag {}: {said}", args.join(" "));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Messages of each topic; all JSON must parse.
+fn topics(bytes: &[u8]) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    for message in MessageStream::new(bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.message_encoding == "json" {
+            serde_json::from_slice::<Value>(&message.data).unwrap();
+        }
+        *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
+    }
+    counts
+}
+
+/// The published Python reader agrees, where there is one.
+fn python_agrees(file: &Path) {
+    let Some(python) = std::env::var_os("WAG_SDK_PYTHON") else {
+        eprintln!("skipped: WAG_SDK_PYTHON does not name a Python with mcap and jsonschema");
+        return;
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../.ci/validate-mcap");
+    let output = Command::new(python)
+        .args([script.as_ref(), file.as_os_str()])
+        .args([
+            "/arm/measured",
+            "/arm/commanded",
+            "/controller/cycles",
+            "/tf",
+            "/scene",
+        ])
+        .args(["/log", "/wag/replay", "/wag/summary"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}
+
+#[test]
+fn a_run_lies_in_one_file_that_replays_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run");
+    let output = wiggle(&run, |_, _| ());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let file = run.join("run.mcap");
+    let bytes = fs::read(&file).unwrap();
+    let summary = Summary::read(&bytes).unwrap().unwrap();
+    assert_eq!(summary.attachment_indexes.len(), 1);
+    let counts = topics(&bytes);
+    println!("{} bytes, {counts:?}", bytes.len());
+    // The file is the longer one by what came while the controller ended.
+    let kept = fs::read_to_string(run.join("cycles.csv")).unwrap();
+    let kept = kept.lines().count() as u64 - 1;
+    let more = counts["/controller/cycles"].checked_sub(kept);
+    assert!(
+        more.is_some_and(|n| n < 500),
+        "{kept} cycles kept, {counts:?}"
+    );
+    assert!(
+        counts["/arm/measured"] > 1000 && counts["/tf"] > 200,
+        "{counts:?}"
+    );
+    assert_eq!(counts["/wag/summary"], 1);
+    python_agrees(&file);
+    // The same recording, whichever file it is read from.
+    let of = |path: &Path| json(&["replay", &path.display().to_string()])["replay"].clone();
+    let from_file = of(&file);
+    assert_eq!(from_file["differing_bytes"], 0, "{from_file}");
+    assert_eq!(from_file, of(&run));
+    fs::remove_file(run.join("cycles.bin")).unwrap();
+    assert_eq!(from_file, of(&run));
+    let told = json(&["record", "recover", &file.display().to_string()]);
+    assert_eq!(told["recovered"]["was_whole"], true);
+    assert_eq!(fs::read(&file).unwrap(), bytes);
+    ledger_knows(folder.path(), &run);
+}
+
+/// The run is listed, told how it was made, and a broken folder beside it hides nothing.
+fn ledger_knows(runs: &Path, run: &Path) {
+    fs::create_dir(runs.join("broken")).unwrap();
+    let csv = runs.join("runs.csv").display().to_string();
+    let told = json(&["ledger", &runs.display().to_string(), "--csv", &csv]);
+    let listed = told["runs"].as_array().unwrap();
+    assert_eq!(listed.len(), 2, "{told:#}");
+    assert_eq!(listed[0]["result"], "broken");
+    assert_eq!(listed[1]["result"], "ok");
+    assert_eq!(listed[1]["arguments"][0], "wiggle");
+    assert_eq!(fs::read_to_string(&csv).unwrap().lines().count(), 3);
+    let only = json(&["ledger", &runs.display().to_string(), "--result", "ok"]);
+    assert_eq!(only["runs"].as_array().unwrap().len(), 1);
+    let run = run.display().to_string();
+    let again = json(&["ledger", "rerun", &run]);
+    let words: Vec<&str> = again["arguments"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|w| w.as_str().unwrap())
+        .collect();
+    assert_eq!(words[..2], ["wiggle", "--arm"]);
+    assert!(
+        !words.contains(&"--out") && !words.contains(&run.as_str()),
+        "{words:?}"
+    );
+    let same = json(&["ledger", "compare", &run, &run]);
+    assert_eq!(same["differences"], Value::Array(Vec::new()));
+    // The arm is gone by now: making the run again fails as it would by hand.
+    let gone = wag(&["ledger", "rerun", &run, "--go"]);
+    let said = String::from_utf8_lossy(&gone.stderr);
+    assert_eq!(gone.status.code(), Some(1), "{said}");
+    assert_eq!(
+        fs::read_dir(runs.join("runs")).unwrap().count(),
+        1,
+        "where it was made"
+    );
+}
+
+/// Process number of the recorder that `parent` started.
+fn recorder_of(parent: u32) -> Option<u32> {
+    fs::read_dir("/proc").unwrap().flatten().find_map(|entry| {
+        let pid: u32 = entry.file_name().to_str()?.parse().ok()?;
+        let line = fs::read_to_string(entry.path().join("cmdline")).ok()?;
+        let words: Vec<&str> = line.split('\0').collect();
+        let is_recorder = words.get(1..3) == Some(&["process", "recorder"]);
+        (is_recorder && words.contains(&parent.to_string().as_str())).then_some(pid)
+    })
+}
+
+#[test]
+fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run");
+    let mut killed_ns = 0;
+    let output = wiggle(&run, |run, pid| {
+        let began = Instant::now();
+        let cycles = run.join("cycles.bin");
+        // Well into the motion.
+        while fs::metadata(&cycles).map_or(0, |m| m.len()) < 1_000_000 {
+            assert!(began.elapsed() < Duration::from_secs(60), "nothing moves");
+            sleep(Duration::from_millis(10));
+        }
+        let recorder = recorder_of(pid).expect("there is a recorder").to_string();
+        killed_ns = std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .unwrap()
+            .as_nanos();
+        let status = Command::new("kill")
+            .args(["-9", &recorder])
+            .status()
+            .unwrap();
+        assert!(status.success());
+    });
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    for words in [
+        "the run goes on",
+        "killed by signal 9",
+        "wag record recover",
+    ] {
+        assert!(said.contains(words), "`{words}` is not in: {said}");
+    }
+    let told: Value = serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(told["ok"], true, "the motion was finished");
+
+    let file = run.join("run.mcap");
+    let name = file.display().to_string();
+    assert!(!matches!(
+        Summary::read(&fs::read(&file).unwrap()),
+        Ok(Some(_))
+    ));
+    // Reading commands take it as it is.
+    assert_eq!(json(&["replay", &name])["replay"]["differing_bytes"], 0);
+    let found = json(&["record", "recover", &name])["recovered"].clone();
+    assert_eq!(
+        (&found["was_whole"], &found["damaged"]),
+        (&Value::from(false), &Value::from(0))
+    );
+    let bytes = fs::read(&file).unwrap();
+    let summary = Summary::read(&bytes).unwrap().unwrap();
+    let last_ns = u128::from(summary.stats.unwrap().message_end_time);
+    let missing_ms = killed_ns.saturating_sub(last_ns) / 1_000_000;
+    println!("{missing_ms} ms before the kill are missing, {found}");
+    assert!(missing_ms < 1000, "{missing_ms} ms are missing");
+    assert!(topics(&bytes)["/controller/cycles"] > 500);
+}
