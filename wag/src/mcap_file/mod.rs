@@ -1,8 +1,8 @@
 //! `run.mcap`: a run in one file that Foxglove, rerun and PlotJuggler show.
 //!
 //! A process of its own writes it while the run goes on. It only listens, with low
-//! priority: it can lose records of its own and never slow the controller or the
-//! camera. The file grows by whole chunks, so that of a killed recorder's file
+//! priority: it loses records of its own where it is slow and holds neither the
+//! controller nor the camera up. The file grows by whole chunks, so that of a killed recorder's file
 //! everything but the last second is there and [`recover()`] makes it whole.
 
 mod calibration;
