@@ -63,7 +63,7 @@ impl Default for LobConfig {
                 observed_s: 3.0,
                 contact_tail_s: 0.7,
                 contact_period_s: 0.025,
-                stop_success_part: Some(0.4),
+                stop_success_part: Some(0.3),
                 robustness: Robustness {
                     finalists: 8,
                     ..Robustness::default()
