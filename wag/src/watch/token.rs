@@ -49,7 +49,8 @@ mod tests {
     fn every_server_has_its_own_and_only_the_whole_word_counts() {
         let (one, other) = (Token::draw().unwrap(), Token::draw().unwrap());
         assert_eq!(one.as_str().len(), 22);
-        assert!(one.is(&one.as_str().to_owned()));
+        let said = one.as_str().to_owned();
+        assert!(one.is(&said));
         assert!(!one.is(other.as_str()));
         for wrong in ["", &one.as_str()[1..], &format!("{}x", one.as_str())] {
             assert!(!one.is(wrong), "{wrong}");
