@@ -1,10 +1,12 @@
 //! The command line.
 
+mod config;
 mod eyes;
 mod ledger;
 mod results;
 mod values;
 
+pub use config::*;
 pub use eyes::*;
 pub use ledger::*;
 pub use results::*;
@@ -94,6 +96,9 @@ pub enum Command {
     Bench(BenchArgs),
     /// Make a result of the paper again, on simulated ropes.
     Reproduce(ReproduceArgs),
+    /// Show or check which configuration holds here: built in, site, rig, run.
+    #[command(subcommand)]
+    Config(ConfigCommand),
     /// Say whether this machine is fit to drive an arm, and what to do where not.
     Doctor(DoctorArgs),
     /// Write man pages, one for each command.

@@ -23,6 +23,7 @@ mod output;
 
 mod cli;
 mod command;
+mod config;
 mod doctor;
 mod failure;
 mod files;

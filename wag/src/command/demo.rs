@@ -2,8 +2,9 @@
 //! bottom as the data flows.
 
 use super::demo_summary::{DemoRecord, show};
-use super::plan::{clear_of_arm, describe, planner_config, warnings, write_trajectory_csv};
+use super::plan::{clear_of_arm, describe, warnings, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
+use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder, Shot};
@@ -120,7 +121,7 @@ fn throw_once(
     rig: &RigConfig,
     quiet: bool,
 ) -> anyhow::Result<()> {
-    let mut settings = planner_config(None)?;
+    let mut settings = config::here::<PlannerConfig>(None)?;
     settings.identify.camera_position_std_m = CAMERA_STD;
     settings.identify.camera_look_at_std_m = CAMERA_STD;
     settings.identify.camera_roll_std_rad = CAMERA_STD;
@@ -164,7 +165,7 @@ impl<'a> Demo<'a> {
         rig_config: &RigConfig,
     ) -> anyhow::Result<Self> {
         let stage = Stage::begin("start", quiet);
-        let limits = files::default_limits()?;
+        let limits = files::read_limits(None)?;
         let calibration = rig_config.stereo_camera();
         pipeline::write_calibration(folder, &calibration)?;
         let target_m = Some(record.target_m);

@@ -1,9 +1,9 @@
 //! `wag identify`: rope parameters from a video or from keypoints.
 
 use super::network::{asks_network, network_for_camera, no_model_without_network};
-use super::plan::planner_config;
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName, MotionArgs};
+use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
@@ -14,6 +14,7 @@ use camera_ingest::load_camera;
 use comfy_table::Table;
 use planner::observation::ObservedPoints;
 use planner::phi::{NetworkError, identify_by_network, proposal};
+use planner::process::PlannerConfig;
 use planner::sysid::{
     Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify_from,
 };
@@ -165,7 +166,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         .transpose()?;
     let camera = load_camera(&args.camera).or_input()?;
     let motion = attach_motion(&args.motion).or_input()?;
-    let config = planner_config(None).or_failed()?;
+    let config = config::here::<PlannerConfig>(None).or_input()?;
     crate::session::watch_interrupts().or_failed()?;
     let (track, appearance) = observe(args, &camera, quiet)?;
     let stage = Stage::begin("identify", quiet);

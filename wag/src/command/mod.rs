@@ -4,6 +4,7 @@ mod area;
 mod bench;
 mod calib;
 pub mod check;
+mod config;
 mod demo;
 mod demo_summary;
 mod doctor;
@@ -89,6 +90,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Calib(command) => calib::run(command, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Reproduce(args) => reproduce::run(args, quiet),
+        Command::Config(command) => config::run(command, quiet),
         Command::Doctor(args) => doctor::run(args, quiet),
         Command::Man(args) => manual::man(args, quiet),
         Command::Completions(args) => Ok(manual::completions(args)),

@@ -2,6 +2,7 @@
 
 use super::reach_picture;
 use crate::cli::{Point, seed};
+use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
@@ -64,18 +65,6 @@ pub struct PlanArgs {
     /// Draw which targets this rope reaches (SVG), and refuse one that it does not.
     #[arg(long, value_name = "FILE")]
     pub reach: Option<PathBuf>,
-}
-
-const PLANNER: &str = include_str!("../../../configs/planner/planner.toml");
-
-/// The planner's configuration: a file, or the built-in one.
-pub fn planner_config(path: Option<&Path>) -> anyhow::Result<PlannerConfig> {
-    match path {
-        None => toml::from_str(PLANNER)
-            .context("the built-in `configs/planner/planner.toml` is damaged"),
-        Some(path) => toml::from_str(&files::read_text(path)?)
-            .with_context(|| format!("planner file `{}`", path.display())),
-    }
 }
 
 /// A task that the demo's rig has no scene for.
@@ -275,7 +264,7 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     clear_of_arm(args.target.0).or_input()?;
     let limits = files::read_limits(args.limits.as_deref()).or_input()?;
-    let config = planner_config(args.config.as_deref()).or_input()?;
+    let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
     let belief = belief(args).or_input()?;
     let response = args.arm_response.as_deref().map(files::read_arm_response);
     let response = response.transpose().or_input()?;
@@ -368,10 +357,5 @@ mod tests {
         for free in [[1.0, 0.0, 0.4], [0.85, 0.3, -0.1], [1.05, -0.3, 0.6]] {
             assert!(clear_of_arm(free).is_ok(), "{free:?}");
         }
-    }
-
-    #[test]
-    fn the_shipped_file_says_what_the_defaults_are() {
-        assert_eq!(planner_config(None).unwrap(), PlannerConfig::default());
     }
 }

@@ -1,13 +1,15 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
 use super::area::require_clear_area;
-use super::plan::{planner_config, write_trajectory_csv};
+use super::plan::write_trajectory_csv;
 use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
+use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use anyhow::anyhow;
+use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use serde_json::{Value, json};
 
@@ -22,7 +24,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     require_clear_area(&args.arm, "WIGGLE", quiet)?;
     let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
-    let config = planner_config(None).or_failed()?.wiggle;
+    let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;
     if let Some(path) = &args.csv {
         write_trajectory_csv(path, &trajectory, &limits).or_failed()?;

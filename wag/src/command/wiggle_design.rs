@@ -1,7 +1,8 @@
 //! `wag wiggle --evaluate` and `--optimise`: what a wiggle can tell about ropes.
 
-use super::plan::{planner_config, write_trajectory_csv};
+use super::plan::write_trajectory_csv;
 use crate::cli::WiggleArgs;
+use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
@@ -9,6 +10,7 @@ use crate::session::interrupted;
 use crate::table::numbers;
 use anyhow::anyhow;
 use planner::filming::side_camera;
+use planner::process::PlannerConfig;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
 use planner::wiggle_design::{DesignError, JudgedWiggle, judge, optimise};
 use serde_json::{Value, json};
@@ -40,7 +42,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
         )));
     }
     let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
-    let config = planner_config(None).or_failed()?;
+    let config = config::here::<PlannerConfig>(None).or_input()?;
     let camera = side_camera();
     let threads = config.identify.threads;
     let judged = |wiggle: &WiggleConfig| {

@@ -1,24 +1,17 @@
-//! Limits of the arm: the built-in xArm 7 file or one of the user's.
+//! Limits of the arm: the built-in ones, or what holds here.
 
-use super::read_text;
-use anyhow::Context;
+use crate::config;
 use shared_types::Limits;
 use std::path::Path;
 
-const XARM7: &str = include_str!("../../../configs/robot/xarm7.toml");
-
-/// The limits shipped in `configs/robot/xarm7.toml`.
+/// The limits shipped in `configs/robot/xarm7.toml`, whatever this machine's folders say.
 pub fn default_limits() -> anyhow::Result<Limits> {
-    toml::from_str(XARM7).context("the built-in `configs/robot/xarm7.toml` is damaged")
+    config::built_in()
 }
 
-/// Limits from `path`, or the built-in ones.
+/// The limits that hold here, with the file `path` over those of site and rig.
 pub fn read_limits(path: Option<&Path>) -> anyhow::Result<Limits> {
-    match path {
-        None => default_limits(),
-        Some(path) => toml::from_str(&read_text(path)?)
-            .with_context(|| format!("limits file `{}`", path.display())),
-    }
+    config::here(path)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Starting the processes of a session and connecting to them.
 
 use super::{ArmLink, RunFolder, STARTUP};
+use crate::config;
 use crate::mcap_file::{RUN_FILE, RecorderConfig};
 use crate::session::{ProcessSpec, Session};
 use anyhow::{Context, anyhow, bail};
@@ -20,16 +21,9 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::Path;
 use std::time::Duration;
 
-const CONTROLLER: &str = include_str!("../../../configs/rt/controller.toml");
-const RIG: &str = include_str!("../../../configs/rig/demo.toml");
-
-/// The set-up of a rig: a file of the user's, or the shipped one.
+/// The set-up of a rig that holds here, with a file of the user's over it.
 pub fn shipped_rig(path: Option<&Path>) -> anyhow::Result<RigConfig> {
-    match path {
-        None => Ok(toml::from_str(RIG)?),
-        Some(path) => toml::from_str(&crate::files::read_text(path)?)
-            .with_context(|| format!("rig file `{}`", path.display())),
-    }
+    config::here(path)
 }
 
 /// The demo's rig: a set-up with this run's domain and seed, free ports, a target.
@@ -200,13 +194,13 @@ pub fn start_controller(
     session.connect(&ControllerRequest::Status, STARTUP)
 }
 
-/// The shipped file with this run's domain, arm and limits.
+/// What holds here with this run's domain, arm and limits.
 fn controller_config(
     folder: &RunFolder,
     limits: &Limits,
     arm: ArmAddress,
 ) -> anyhow::Result<ControllerConfig> {
-    let shipped: ControllerConfig = toml::from_str(CONTROLLER)?;
+    let shipped: ControllerConfig = config::here(None)?;
     let mut config = ControllerConfig {
         domain: folder.domain.clone(),
         arm: arm.ip,
@@ -240,9 +234,9 @@ mod tests {
 
     #[test]
     fn the_shipped_files_say_what_the_defaults_are() {
-        let controller: ControllerConfig = toml::from_str(CONTROLLER).unwrap();
+        let controller: ControllerConfig = config::built_in().unwrap();
         assert_eq!(controller, ControllerConfig::default());
-        let rig: RigConfig = toml::from_str(RIG).unwrap();
+        let rig: RigConfig = config::built_in().unwrap();
         let default = RigConfig::default();
         assert_eq!(rig.camera, default.camera);
         assert!(

@@ -26,6 +26,7 @@ impl RunFolder {
             }
         };
         Self::refuse_existing(&path)?;
+        crate::config::check_here().or_input()?;
         for folder in ["config", "log"] {
             std::fs::create_dir_all(path.join(folder))
                 .with_context(|| {

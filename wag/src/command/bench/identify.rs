@@ -4,11 +4,12 @@ use super::machine::Machine;
 use super::spent::least;
 use crate::cli::BenchArgs;
 use crate::command::network::{network, with_network};
-use crate::command::plan::planner_config;
+use crate::config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
 use crate::table::numbers;
 use planner::filming::Filmed;
+use planner::process::PlannerConfig;
 use planner::sysid::{IdentifyOptions, Method};
 use planner::trials::{TrialRig, trial_rope};
 use serde::Serialize;
@@ -63,7 +64,7 @@ fn measure(
 }
 
 pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let config = planner_config(None).or_failed()?;
+    let config = config::built_in::<PlannerConfig>().or_failed()?;
     let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
     with_network(&mut rig, Method::Hybrid, None)?;
     let machine = Machine::here();

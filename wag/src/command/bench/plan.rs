@@ -3,7 +3,7 @@
 use super::machine::Machine;
 use super::spent::least;
 use crate::cli::BenchArgs;
-use crate::command::plan::planner_config;
+use crate::config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
 use crate::table::numbers;
@@ -95,7 +95,7 @@ fn measure(
 }
 
 pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let config = planner_config(None).or_failed()?;
+    let config = config::built_in::<PlannerConfig>().or_failed()?;
     let stage = Stage::begin("bench", quiet);
     let rows = TASKS
         .into_iter()

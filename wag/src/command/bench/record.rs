@@ -6,7 +6,7 @@
 
 use super::machine::Machine;
 use crate::cli::BenchArgs;
-use crate::command::plan::planner_config;
+use crate::config;
 use crate::failure::{OrInput, Outcome};
 use crate::files;
 use crate::mcap_file::RUN_FILE;
@@ -16,6 +16,7 @@ use crate::session::{Session, watch_interrupts};
 use crate::table;
 use anyhow::{Context, ensure};
 use hil_tests::rig::RigConfig;
+use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -47,7 +48,11 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let room = tempfile::tempdir().or_failed()?;
     let folder = RunFolder::create(Some(&room.path().join("run")), "bench")?;
     let limits = files::default_limits().or_failed()?;
-    let motion = wiggle(&planner_config(None).or_failed()?.wiggle, &limits).or_failed()?;
+    let motion = wiggle(
+        &config::built_in::<PlannerConfig>().or_failed()?.wiggle,
+        &limits,
+    )
+    .or_failed()?;
     let rig = pipeline::shipped_rig(None).or_input()?;
     let rig = pipeline::rig_config(&folder, &rig, args.seed, TARGET_M);
     let pairs = if args.quick {

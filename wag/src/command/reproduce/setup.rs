@@ -3,7 +3,7 @@
 use crate::cli::ReproduceArgs;
 use crate::command::identify::method_of;
 use crate::command::network::with_network;
-use crate::command::plan::planner_config;
+use crate::config;
 use crate::failure::{OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::sysid::IdentifyOptions;
@@ -19,7 +19,7 @@ pub(super) struct Setup {
 impl Setup {
     pub fn new(args: &ReproduceArgs) -> Outcome<Self> {
         let method = method_of(args.method);
-        let config = planner_config(None).or_failed()?;
+        let config = config::built_in::<PlannerConfig>().or_failed()?;
         let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
         with_network(&mut rig, method, args.model.as_deref())?;
         crate::session::watch_interrupts().or_failed()?;

@@ -1,0 +1,46 @@
+//! Arguments of `wag config`.
+
+use crate::config::Kind;
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+/// `wag config ...`
+#[derive(Debug, Subcommand)]
+pub enum ConfigCommand {
+    /// Print what holds here: the built-in values, and over them those of the site, of
+    /// the rig, and of FILE.
+    Show(ConfigShowArgs),
+    /// Check every file of the site and of the rig, or FILE over them.
+    Check(ConfigCheckArgs),
+}
+
+/// Arguments of `wag config show`.
+#[derive(Debug, Args)]
+#[command(after_help = "LAYERS, the later over the earlier:\n  \
+    built in   the files in configs/ that this program was built with\n  \
+    site       planner.toml, limits.toml, rt-controller.toml, rig.toml in /etc/wag\n  \
+    rig        the same in the folder that WAG_CONFIG names, else in ~/.config/wag\n  \
+    run        the file named on the command line, as --config FILE of `wag plan`\n\n\
+    A file says only what differs from the layers below it.")]
+pub struct ConfigShowArgs {
+    /// What is configured.
+    #[arg(value_enum)]
+    pub kind: Kind,
+    /// A file laid over all, as a run would name it.
+    #[arg(value_name = "FILE")]
+    pub run: Option<PathBuf>,
+    /// Say of every value which file it comes from.
+    #[arg(long)]
+    pub origin: bool,
+}
+
+/// Arguments of `wag config check`.
+#[derive(Debug, Args)]
+pub struct ConfigCheckArgs {
+    /// What is configured; default: everything.
+    #[arg(value_enum)]
+    pub kind: Option<Kind>,
+    /// A file laid over all, as a run would name it.
+    #[arg(value_name = "FILE")]
+    pub run: Option<PathBuf>,
+}

@@ -1,0 +1,87 @@
+//! `wag config`: which configuration holds here, and which file says so.
+
+use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
+use crate::config::{Folders, Kind, Layers};
+use crate::failure::{Failure, OrInput, Outcome};
+use crate::table;
+use anyhow::anyhow;
+use serde_json::{Value, json};
+
+pub fn run(command: &ConfigCommand, quiet: bool) -> Outcome<Option<Value>> {
+    match command {
+        ConfigCommand::Show(args) => show(args, quiet),
+        ConfigCommand::Check(args) => check(args, quiet),
+    }
+}
+
+fn files_of(layers: &Layers) -> Vec<Value> {
+    layers
+        .layers()
+        .iter()
+        .map(|layer| json!({ "layer": layer.name, "file": layer.path }))
+        .collect()
+}
+
+fn show(args: &ConfigShowArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let folders = Folders::here().or_input()?;
+    let layers = Layers::read(args.kind, &folders, args.run.as_deref()).or_input()?;
+    let told = layers.told();
+    if !quiet && args.origin {
+        let rows = told.iter().map(|t| {
+            [
+                t.key.clone(),
+                t.value.to_string(),
+                t.layer.name.to_owned(),
+                t.layer.path.display().to_string(),
+            ]
+        });
+        println!(
+            "{}",
+            table::numbers(["key", "value", "layer", "file"], 3, rows)
+        );
+    } else if !quiet {
+        print!("{}", toml::to_string(&layers.merged()).or_failed()?);
+    }
+    let values: Vec<Value> = told
+        .iter()
+        .map(|t| {
+            json!({
+                "key": t.key,
+                "value": t.value,
+                "layer": t.layer.name,
+                "file": t.layer.path,
+            })
+        })
+        .collect();
+    Ok(Some(json!({
+        "kind": args.kind.name(),
+        "layers": files_of(&layers),
+        "values": values,
+    })))
+}
+
+fn check(args: &ConfigCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let folders = Folders::here().or_input()?;
+    let kinds = args.kind.map_or(Kind::ALL.to_vec(), |kind| vec![kind]);
+    let (mut checked, mut wrong) = (Vec::new(), Vec::new());
+    for kind in kinds {
+        match Layers::read(kind, &folders, args.run.as_deref()) {
+            Ok(layers) => {
+                let files: Vec<String> = layers
+                    .layers()
+                    .iter()
+                    .map(|layer| format!("{} ({})", layer.name, layer.path.display()))
+                    .collect();
+                if !quiet {
+                    println!("✔ {:10} {}", kind.name(), files.join(", "));
+                }
+                checked.push(json!({ "kind": kind.name(), "layers": files_of(&layers) }));
+            }
+            Err(error) => wrong.push(format!("{error:#}")),
+        }
+    }
+    if wrong.is_empty() {
+        return Ok(Some(json!({ "ok": true, "checked": checked })));
+    }
+    Err(Failure::input(anyhow!("{}", wrong.join("; "))))
+}

@@ -1,0 +1,107 @@
+//! The kinds of configuration, and what is built in of each.
+
+use hil_tests::rig::RigConfig;
+use planner::process::PlannerConfig;
+use rt_controller::config::ControllerConfig;
+use serde::de::DeserializeOwned;
+use shared_types::Limits;
+
+/// What a file configures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// The planner: searches, fitness weights, identification, the wiggle.
+    Planner,
+    /// What the arm may do.
+    Limits,
+    /// The controller: real-time set-up, monitors, guardian.
+    Controller,
+    /// The simulated rig: camera, arm lag, noise.
+    Rig,
+}
+
+/// A type that a kind's file is read into.
+pub trait Configured: DeserializeOwned {
+    /// Its kind.
+    const KIND: Kind;
+}
+
+impl Configured for PlannerConfig {
+    const KIND: Kind = Kind::Planner;
+}
+
+impl Configured for Limits {
+    const KIND: Kind = Kind::Limits;
+}
+
+impl Configured for ControllerConfig {
+    const KIND: Kind = Kind::Controller;
+}
+
+impl Configured for RigConfig {
+    const KIND: Kind = Kind::Rig;
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Planner, Self::Limits, Self::Controller, Self::Rig];
+
+    /// Its name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Planner => "planner",
+            Self::Limits => "limits",
+            Self::Controller => "controller",
+            Self::Rig => "rig",
+        }
+    }
+
+    /// Its file in a site's or a rig's folder.
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::Planner => "planner.toml",
+            Self::Limits => "limits.toml",
+            Self::Controller => "rt-controller.toml",
+            Self::Rig => "rig.toml",
+        }
+    }
+
+    /// Where its built-in text is in the sources.
+    pub fn built_in_path(self) -> &'static str {
+        match self {
+            Self::Planner => "configs/planner/planner.toml",
+            Self::Limits => "configs/robot/xarm7.toml",
+            Self::Controller => "configs/rt/controller.toml",
+            Self::Rig => "configs/rig/demo.toml",
+        }
+    }
+
+    /// Its built-in text.
+    pub fn built_in(self) -> &'static str {
+        match self {
+            Self::Planner => include_str!("../../../configs/planner/planner.toml"),
+            Self::Limits => include_str!("../../../configs/robot/xarm7.toml"),
+            Self::Controller => include_str!("../../../configs/rt/controller.toml"),
+            Self::Rig => include_str!("../../../configs/rig/demo.toml"),
+        }
+    }
+
+    /// Whether a table can be read as this kind.
+    pub fn accepts(self, table: toml::Table) -> Result<(), toml::de::Error> {
+        match self {
+            Self::Planner => table.try_into::<PlannerConfig>().map(drop),
+            Self::Limits => table.try_into::<Limits>().map(drop),
+            Self::Controller => table.try_into::<ControllerConfig>().map(drop),
+            Self::Rig => table.try_into::<RigConfig>().map(drop),
+        }
+    }
+
+    /// What is wrong with a text of this kind by itself: such an error knows its line.
+    pub fn refusal_of(self, text: &str) -> Option<toml::de::Error> {
+        match self {
+            Self::Planner => toml::from_str::<PlannerConfig>(text).err(),
+            Self::Limits => toml::from_str::<Limits>(text).err(),
+            Self::Controller => toml::from_str::<ControllerConfig>(text).err(),
+            Self::Rig => toml::from_str::<RigConfig>(text).err(),
+        }
+    }
+}

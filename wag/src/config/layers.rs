@@ -1,0 +1,302 @@
+//! Reading layers, laying one over the other, and telling which said what.
+
+use super::kind::{Configured, Kind};
+use super::nearest::suggestion;
+use crate::files::read_text;
+use anyhow::{Context, anyhow, bail};
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Folder of a whole site's files.
+const SITE: &str = "/etc/wag";
+/// Environment variable that names the folder of a rig's files.
+pub const RIG_FOLDER: &str = "WAG_CONFIG";
+
+/// Where files of a site and of a rig are looked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Folders {
+    /// The site's.
+    pub site: Option<PathBuf>,
+    /// The rig's.
+    pub rig: Option<PathBuf>,
+}
+
+impl Folders {
+    /// No folders: what is built in.
+    pub const NONE: Self = Self {
+        site: None,
+        rig: None,
+    };
+
+    /// Those of this machine and user: `/etc/wag`, and the folder named by `WAG_CONFIG`,
+    /// else `wag` in the user's folder of configurations.
+    pub fn here() -> anyhow::Result<Self> {
+        let set = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty());
+        let rig = match set(RIG_FOLDER).map(PathBuf::from) {
+            Some(named) if !named.is_dir() => bail!(
+                "{RIG_FOLDER} names `{}`, which is no folder; correct or unset it",
+                named.display()
+            ),
+            Some(named) => Some(named),
+            None => set("XDG_CONFIG_HOME")
+                .map(PathBuf::from)
+                .or_else(|| set("HOME").map(|home| Path::new(&home).join(".config")))
+                .map(|folder| folder.join("wag")),
+        };
+        Ok(Self {
+            site: Some(PathBuf::from(SITE)),
+            rig,
+        })
+    }
+}
+
+/// One layer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// `built in`, `site`, `rig` or `run`.
+    pub name: &'static str,
+    /// Its file.
+    pub path: PathBuf,
+    table: Table,
+}
+
+/// The layers of one kind, the strongest last.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layers {
+    /// What they configure.
+    pub kind: Kind,
+    layers: Vec<Layer>,
+}
+
+/// One value that holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told<'a> {
+    /// Tables and key, with dots.
+    pub key: String,
+    /// The value.
+    pub value: Value,
+    /// The layer that says so.
+    pub layer: &'a Layer,
+}
+
+impl Layers {
+    /// Reads the layers that are there. A site's and a rig's file may be missing, the
+    /// run's may not.
+    ///
+    /// # Errors
+    /// A file that cannot be read or says what its kind does not know: with its name.
+    pub fn read(kind: Kind, folders: &Folders, run: Option<&Path>) -> anyhow::Result<Self> {
+        let built_in = Layer {
+            name: "built in",
+            path: PathBuf::from(kind.built_in_path()),
+            table: toml::from_str(kind.built_in())
+                .with_context(|| format!("the built-in `{}` is damaged", kind.built_in_path()))?,
+        };
+        let mut out = Self {
+            kind,
+            layers: vec![built_in],
+        };
+        for (name, folder) in [("site", &folders.site), ("rig", &folders.rig)] {
+            let file = folder.as_ref().map(|folder| folder.join(kind.file()));
+            if let Some(path) = file.filter(|path| path.exists()) {
+                out.add(name, &path)?;
+            }
+        }
+        if let Some(path) = run {
+            out.add("run", path)?;
+        }
+        Ok(out)
+    }
+
+    /// Lays a file over what is there, which it must fit.
+    fn add(&mut self, name: &'static str, path: &Path) -> anyhow::Result<()> {
+        let file = || format!("{} file `{}`", self.kind.name(), path.display());
+        let text = read_text(path)?;
+        let table: Table = toml::from_str(&text).with_context(file)?;
+        let layer = Layer {
+            name,
+            path: path.to_owned(),
+            table,
+        };
+        let mut merged = self.merged();
+        lay_over(&mut merged, &layer.table);
+        if let Err(refusal) = self.kind.accepts(merged) {
+            // Alone it may lack what lower layers say; where it is refused for the same
+            // reason, that refusal knows the line.
+            let alone = self.kind.refusal_of(&text);
+            let located = alone.filter(|alone| alone.message() == refusal.message());
+            let refusal = located.unwrap_or(refusal).to_string();
+            let refusal = match suggestion(&refusal) {
+                Some(suggestion) => anyhow!("{}; {suggestion}", refusal.trim_end()),
+                None => anyhow!("{}", refusal.trim_end()),
+            };
+            return Err(refusal.context(file()));
+        }
+        self.layers.push(layer);
+        Ok(())
+    }
+
+    /// All layers, the strongest last.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// What holds.
+    pub fn merged(&self) -> Table {
+        let mut out = Table::new();
+        for layer in &self.layers {
+            lay_over(&mut out, &layer.table);
+        }
+        out
+    }
+
+    /// What holds, as the type of its kind.
+    pub fn get<T: Configured>(&self) -> anyhow::Result<T> {
+        self.merged()
+            .try_into()
+            .with_context(|| format!("{} configuration", self.kind.name()))
+    }
+
+    /// Every value that holds, with the layer it comes from.
+    pub fn told(&self) -> Vec<Told<'_>> {
+        let mut leaves = Vec::new();
+        collect(&self.merged(), &mut Vec::new(), &mut leaves);
+        leaves
+            .into_iter()
+            .filter_map(|(keys, value)| {
+                let says = |layer: &&Layer| at(&layer.table, &keys).is_some();
+                let layer = self.layers.iter().rev().find(says)?;
+                let key = keys.join(".");
+                Some(Told { key, value, layer })
+            })
+            .collect()
+    }
+}
+
+/// Values of `upper` in place of those of `lower`, table by table; a list is one value.
+fn lay_over(lower: &mut Table, upper: &Table) {
+    for (key, value) in upper {
+        match (lower.get_mut(key), value) {
+            (Some(Value::Table(below)), Value::Table(above)) => lay_over(below, above),
+            _ => {
+                lower.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+fn collect(table: &Table, keys: &mut Vec<String>, leaves: &mut Vec<(Vec<String>, Value)>) {
+    for (key, value) in table {
+        keys.push(key.clone());
+        match value {
+            Value::Table(inner) => collect(inner, keys, leaves),
+            leaf => leaves.push((keys.clone(), leaf.clone())),
+        }
+        keys.pop();
+    }
+}
+
+fn at<'a>(table: &'a Table, keys: &[String]) -> Option<&'a Value> {
+    let (last, tables) = keys.split_last()?;
+    let within = tables
+        .iter()
+        .try_fold(table, |t, key| t.get(key)?.as_table());
+    within?.get(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use planner::process::PlannerConfig;
+    use shared_types::Limits;
+
+    /// A site's and a rig's folder with these planner files.
+    fn folders(site: &str, rig: &str) -> (tempfile::TempDir, Folders) {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = |name: &str, text: &str| {
+            let folder = dir.path().join(name);
+            std::fs::create_dir(&folder).unwrap();
+            if !text.is_empty() {
+                std::fs::write(folder.join("planner.toml"), text).unwrap();
+            }
+            Some(folder)
+        };
+        let folders = Folders {
+            site: folder("site", site),
+            rig: folder("rig", rig),
+        };
+        (dir, folders)
+    }
+
+    #[test]
+    fn each_layer_changes_what_it_says_and_nothing_else() {
+        let (dir, folders) = folders(
+            "[search]\npopulation = 40\nsearches = 2\n",
+            "[search]\npopulation = 50\n[lob.throw]\ntail_s = 1.25\n",
+        );
+        let run = dir.path().join("mine.toml");
+        std::fs::write(&run, "[search]\nsearches = 5\n").unwrap();
+        let layers = Layers::read(Kind::Planner, &folders, Some(&run)).unwrap();
+        let config: PlannerConfig = layers.get().unwrap();
+        let mut expected = PlannerConfig::default();
+        expected.search.population = 50;
+        expected.search.searches = 5;
+        expected.lob.throw.tail_s = 1.25;
+        assert_eq!(config, expected);
+
+        let told = layers.told();
+        let layer_of = |key: &str| told.iter().find(|t| t.key == key).unwrap().layer.name;
+        assert_eq!(layer_of("search.population"), "rig");
+        assert_eq!(layer_of("search.searches"), "run");
+        assert_eq!(layer_of("lob.throw.tail_s"), "rig");
+        assert_eq!(layer_of("lob.throw.observed_s"), "built in");
+    }
+
+    #[test]
+    fn nothing_but_what_is_built_in_are_the_defaults() {
+        for kind in Kind::ALL {
+            Layers::read(kind, &Folders::NONE, None).unwrap();
+        }
+        let planner = Layers::read(Kind::Planner, &Folders::NONE, None).unwrap();
+        let config: PlannerConfig = planner.get().unwrap();
+        assert_eq!(config, PlannerConfig::default());
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_file_line_and_the_nearest_name() {
+        let (_dir, folders) = folders("", "[search]\npopulaton = 40\n");
+        let error = Layers::read(Kind::Planner, &folders, None).unwrap_err();
+        let said = format!("{error:#}");
+        for part in [
+            "rig/planner.toml",
+            "line 2",
+            "populaton",
+            "did you mean `population`?",
+        ] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    }
+
+    #[test]
+    fn the_layer_that_breaks_a_limit_is_named_not_the_one_below() {
+        let (dir, folders) = folders("[search]\npopulation = 40\n", "");
+        let run = dir.path().join("run.toml");
+        std::fs::write(&run, "[search]\npopulation = \"many\"\n").unwrap();
+        let error = Layers::read(Kind::Planner, &folders, Some(&run)).unwrap_err();
+        assert!(format!("{error:#}").contains("run.toml"), "{error:#}");
+        let gone = dir.path().join("gone.toml");
+        assert!(Layers::read(Kind::Planner, &folders, Some(&gone)).is_err());
+    }
+
+    #[test]
+    fn one_limit_may_be_lowered_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let run = dir.path().join("slow.toml");
+        std::fs::write(&run, "tcp_speed_max_m_s = 0.5\n").unwrap();
+        let layers = Layers::read(Kind::Limits, &Folders::NONE, Some(&run)).unwrap();
+        let limits: Limits = layers.get().unwrap();
+        assert!((limits.tcp_speed_max_m_s - 0.5).abs() < 1e-12);
+        let built_in: Limits = super::super::built_in().unwrap();
+        assert_eq!(limits.velocity_max_rad_s, built_in.velocity_max_rad_s);
+    }
+}
