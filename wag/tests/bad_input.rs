@@ -75,7 +75,8 @@ fn prepare() -> tempfile::TempDir {
     put("cut.bin", "WAGR\u{1}\0\u{1}\0");
     put("other.bin", &format!("WAGR\u{9}{}", "\0".repeat(40)));
     put("camera.toml", "calibration = \"none.conf\"\n");
-    put("limits.toml", "rate_hz = 250\n");
+    put("limits.toml", "rate_hz = -250\n");
+    put("slip.toml", "tcp_sped_max_m_s = 0.5\n");
     put(
         "faults.toml",
         "[[fault]]\nat_s = 1\nkind = \"joint_stuck\"\njoint = 9\n",
@@ -640,8 +641,25 @@ const CASES: &[Case] = &[
             "p.json",
         ],
         2,
-        &["limits.toml", "missing field"],
+        &["limits.toml", "rate_hz"],
     ),
+    (
+        &["config", "check", "limits", "limits.toml"],
+        2,
+        &["limits.toml", "rate_hz"],
+    ),
+    (
+        &["config", "check", "limits", "slip.toml"],
+        2,
+        &["slip.toml", "line 1", "did you mean `tcp_speed_max_m_s`?"],
+    ),
+    (
+        &["config", "show", "planner", "none.toml"],
+        2,
+        &["none.toml", "cannot read"],
+    ),
+    (&["config", "show", "camera"], 2, &["camera", "planner"]),
+    (&["config"], 2, &["Usage"]),
     (
         &[
             "plan",

@@ -4,7 +4,7 @@ use super::{ArmLink, RunFolder, STARTUP};
 use crate::config;
 use crate::mcap_file::{RUN_FILE, RecorderConfig};
 use crate::session::{ProcessSpec, Session};
-use anyhow::{Context, anyhow, bail};
+use anyhow::{anyhow, bail};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::process::CameraConfig;
 use hil_tests::rig::RigConfig;
