@@ -177,12 +177,11 @@ fn the_live_page_follows_a_run_and_stops_it() {
         "{before:?}, moved {moved}"
     );
     assert!(most_mb < 150.0, "{most_mb} MB");
-    assert!(told_hz >= 10.0, "{told_hz} states a second");
-    // How fast a processor draws is no matter of the program; that it keeps up is, alone.
-    assert!(
-        drawn_hz >= if long { 10.0 } else { 1.0 },
-        "drew {drawn_hz} a second"
-    );
+    // How fast a busy processor tells and draws is no matter of the program; that it does
+    // is. The long run is for a machine of its own.
+    let [told_wanted_hz, drawn_wanted_hz] = if long { [10.0, 10.0] } else { [2.0, 1.0] };
+    assert!(told_hz >= told_wanted_hz, "{told_hz} states a second");
+    assert!(drawn_hz >= drawn_wanted_hz, "drew {drawn_hz} a second");
     assert_eq!(page.value("document.getElementById('picture').width"), 128);
     // Without an operator there is nothing but the stop, and the page says why.
     assert_eq!(
