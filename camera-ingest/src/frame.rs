@@ -6,6 +6,8 @@
 
 use std::io::Cursor;
 
+use crate::vectors::widest;
+
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
@@ -258,15 +260,27 @@ fn planes(
         .cb
         .chunks_exact_mut(half)
         .zip(frame.cr.chunks_exact_mut(half));
-    for ((row, luma), (cb, cr)) in rows.zip(frame.luma.chunks_exact_mut(columns)).zip(chroma) {
-        let pairs = luma.chunks_exact_mut(2).zip(cb.iter_mut().zip(cr));
-        for (six, (pair, (cb, cr))) in row.chunks_exact(6).zip(pairs) {
-            (pair[0], pair[1]) = (six[0], six[3]);
-            *cb = six[1].midpoint(six[4]);
-            *cr = six[2].midpoint(six[5]);
-        }
-    }
+    let luma = frame.luma.chunks_exact_mut(columns);
+    widest(
+        #[inline(always)]
+        || {
+            for ((row, luma), (cb, cr)) in rows.zip(luma).zip(chroma) {
+                unpack(row, luma, cb, cr);
+            }
+        },
+    );
     frame
+}
+
+/// A row of packed pixels into its planes.
+#[inline(always)]
+fn unpack(row: &[u8], luma: &mut [u8], cb: &mut [u8], cr: &mut [u8]) {
+    let pairs = luma.chunks_exact_mut(2).zip(cb.iter_mut().zip(cr));
+    for (six, (pair, (cb, cr))) in row.chunks_exact(6).zip(pairs) {
+        (pair[0], pair[1]) = (six[0], six[3]);
+        *cb = six[1].midpoint(six[4]);
+        *cr = six[2].midpoint(six[5]);
+    }
 }
 
 fn check_width(width_px: usize) -> Result<(), FrameError> {

@@ -2,7 +2,8 @@
 //!
 //! Takes frames from a camera ([`live`]), reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
 //! in the left eye ([`mod@track`]), measures tip and target in stereo ([`mod@score`]),
-//! draws what it found ([`overlay`], [`film`]) and says when a rope hangs still
+//! lets learned models stand in for parts of it (feature `learned`), draws what it found
+//! ([`overlay`], [`film`]) and says when a rope hangs still
 //! ([`still`]).
 //!
 //! It is *not* the place for rope physics, identification or planning: it
@@ -21,6 +22,8 @@
 pub mod calib;
 pub mod film;
 pub mod frame;
+#[cfg(feature = "learned")]
+pub mod learned;
 pub mod live;
 pub mod overlay;
 pub mod process;
@@ -28,10 +31,13 @@ pub mod score;
 pub mod source;
 pub mod still;
 pub mod track;
+mod vectors;
 mod whole_file;
 
 pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
 pub use score::{Score, ScoreError, ScoreOptions, score};
 pub use source::{FrameSource, SourceError, open_video};
-pub use track::{ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track};
+pub use track::{
+    ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track, track_with,
+};

@@ -11,6 +11,7 @@ use camera_ingest::frame::ycc_from_rgb;
 use camera_ingest::track::{ClampSample, TrackOptions};
 use camera_ingest::{ClampPath, EyeFrame, TrackResult, track};
 use nalgebra::{Matrix3, Vector3};
+use shared_types::keypoints::TrackedFrame;
 use shared_types::{Intrinsics, Shutter, StereoCamera};
 use std::ops::Range;
 
@@ -297,6 +298,24 @@ fn a_rope_that_is_still_for_most_of_the_recording() {
     let result = follow(&recording);
     assert_looks(&result, RADII_M);
     assert_small(errors(&recording, &result, 0..150));
+}
+
+#[test]
+fn a_rope_thinner_than_two_pixels_is_not_taken_for_a_hidden_one() {
+    let motion = Motion {
+        still_s: 0.3,
+        clamp_m: 0.06,
+        tip_rad: 1.0,
+    };
+    let colours = [[60.0, 90.0, 160.0], [235.0, 140.0, 40.0]];
+    let radii_m = [0.0015, 0.035];
+    let recording = record_sizes(&motion, 150, colours, radii_m, radii_m[0], 0..0);
+    let result = follow(&recording);
+    assert_small(errors(&recording, &result, 0..150));
+    let lost = result.track.frames.iter().filter(|f| f.lost).count();
+    let doubted = |f: &&TrackedFrame| f.confidence.iter().all(|c| *c <= 0.5);
+    let doubtful = result.track.frames.iter().filter(doubted).count();
+    assert_eq!((lost, doubtful), (0, 0));
 }
 
 /// Moves a fat rope by more than its width, too.

@@ -3,7 +3,7 @@
 //! with confidence.
 //!
 //! Of each recording the first two seconds are used; all of it with
-//! `WAG_LONG_TESTS=1`, but for the second rope (see `docs/src/eyes.md`).
+//! `WAG_LONG_TESTS=1`.
 #![allow(
     missing_docs,
     clippy::unwrap_used,
@@ -22,14 +22,20 @@ mod recording;
 
 use std::sync::OnceLock;
 
+use alter::SecondRope;
 use camera_ingest::track;
-use camera_ingest::track::TrackOptions;
+use camera_ingest::track::{TrackError, TrackOptions};
 use recording::{Wiggle, quantile};
 
 /// Frames of a recording that are used.
 const SHORT: usize = 120;
 /// A node that is further off is wrong (px).
 const WRONG_PX: f64 = 20.0;
+
+/// All frames, and more that can go wrong.
+fn long() -> bool {
+    std::env::var_os("WAG_LONG_TESTS").is_some()
+}
 
 /// A recording and how well it is tracked as it is.
 struct Clean {
@@ -42,8 +48,7 @@ struct Clean {
 fn clean() -> &'static [Clean] {
     static CLEAN: OnceLock<Vec<Clean>> = OnceLock::new();
     CLEAN.get_or_init(|| {
-        let whole = std::env::var_os("WAG_LONG_TESTS").is_some();
-        let most = if whole { usize::MAX } else { SHORT };
+        let most = if long() { usize::MAX } else { SHORT };
         let read = |name| {
             let wiggle = Wiggle::read_first(name, most)?;
             Some(Clean {
@@ -67,11 +72,15 @@ struct Outcome {
 }
 
 fn outcome(wiggle: &Wiggle) -> Outcome {
+    tried(wiggle).unwrap()
+}
+
+fn tried(wiggle: &Wiggle) -> Result<Outcome, TrackError> {
     let options = TrackOptions {
         keypoints: wiggle.nodes(),
         ..TrackOptions::default()
     };
-    let result = track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options).unwrap();
+    let result = track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options)?;
     let errors = wiggle.errors(&result);
     let frames = &result.track.frames;
     let kept: Vec<f64> = errors
@@ -88,18 +97,21 @@ fn outcome(wiggle: &Wiggle) -> Outcome {
             }
         }
     }
-    Outcome {
+    Ok(Outcome {
         error_px: [0.5, 0.95].map(|q| quantile(&kept, q)),
         lost: frames.iter().filter(|f| f.lost).count(),
         wrong,
-    }
+    })
 }
 
 /// Twice the error of the clean recording at most, or lost; nothing wrong with
 /// confidence. At most so many frames may be given up.
 fn assert_bears_on(clean: &Clean, what: &str, most_lost: usize, altered: &Wiggle) {
+    assert_kept(clean, what, most_lost, &outcome(altered));
+}
+
+fn assert_kept(clean: &Clean, what: &str, most_lost: usize, after: &Outcome) {
     let (name, before) = (clean.name, &clean.outcome);
-    let after = outcome(altered);
     println!(
         "{name}, {what}: {:.2?} -> {:.2?} px, {} lost, {} wrong",
         before.error_px,
@@ -187,6 +199,28 @@ fn mirrored_and_turned_cameras() {
     assert_bears("turned", 0, Wiggle::turned);
 }
 
+/// Offsets, sides and phases of the second rope.
+fn second_ropes() -> Vec<SecondRope> {
+    let ropes = |aways_px: &[f64], rate_hz, phase_rad| -> Vec<SecondRope> {
+        let rope = |away_px: &f64| SecondRope {
+            away_px: *away_px,
+            rate_hz,
+            phase_rad,
+        };
+        aways_px.iter().map(rope).collect()
+    };
+    if !long() {
+        return ropes(&[110.0, -90.0, 60.0, -60.0, 75.0], 0.9, 0.0);
+    }
+    let mut all = ropes(&[60.0, 80.0, 110.0, -40.0, -60.0, -90.0, -120.0], 0.9, 0.0);
+    for phase_rad in [1.3, 3.6] {
+        all.extend(ropes(&[45.0, 100.0, -50.0, -75.0, -105.0], 0.8, phase_rad));
+    }
+    all
+}
+
+/// Twice the error of the clean recording at most, or lost, or all of it refused; nothing
+/// wrong with confidence.
 #[test]
 fn a_second_rope_moves_beside() {
     for clean in clean() {
@@ -195,9 +229,17 @@ fn a_second_rope_moves_beside() {
         } else {
             [[124, 85, 60], [31, 30, 26]]
         };
-        for away_px in [110.0, -90.0] {
-            let altered = clean.wiggle.clone().shortened(SHORT).doubled(away_px, rgb);
-            assert_bears_on(clean, "a second rope", 20, &altered);
+        for second in &second_ropes() {
+            let what = format!("{second:?}");
+            let altered = clean.wiggle.clone().doubled(*second, rgb);
+            match tried(&altered) {
+                Err(TrackError::MostlyLost { lost, frames, .. }) => {
+                    println!("{}, {what}: {lost} of {frames} lost, refused", clean.name);
+                    // It is seldom in the way.
+                    assert!(second.away_px.abs() < 90.0, "{}, {what}", clean.name);
+                }
+                other => assert_kept(clean, &what, altered.frames.len(), &other.unwrap()),
+            }
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod board;
 pub mod extrinsics;
 mod factory;
 mod ini;
+mod models;
 mod settings;
 mod yaml;
 
@@ -15,6 +16,7 @@ use crate::whole_file::write_whole;
 use std::path::{Path, PathBuf};
 
 pub use factory::{VideoMode, write_factory_conf};
+pub use models::{ModelFiles, load_model_files};
 pub use settings::{placed_camera_toml, write_camera_toml};
 use shared_types::StereoCamera;
 
@@ -187,6 +189,9 @@ mod tests {
             line.contains("line 7") && line.contains("garbage"),
             "{line}"
         );
+        let unknown = format!("{SETTINGS}\n[models]\nsegmentor = \"rope.onnx\"\n");
+        let unknown = message("models", CONF, &unknown);
+        assert!(unknown.contains("segmentor"), "{unknown}");
         let mode = message("hd", CONF, &SETTINGS.replace("VGA", "HD"));
         assert!(mode.contains("LEFT_CAM_HD"), "{mode}");
         let scaled = message("scaled", CONF, &SETTINGS.replace("[1, 0, 0]", "[2, 0, 0]"));

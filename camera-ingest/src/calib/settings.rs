@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use shared_types::{Shutter, StereoCamera};
 
 use super::factory::{Eyes, VideoMode};
-use super::{CalibError, read_text, write_text};
+use super::{CalibError, ModelFiles, read_text, write_text};
 
 /// The file's fields.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -24,6 +24,8 @@ pub(super) struct CameraSettings {
     #[serde(default)]
     line_time_s: f64,
     extrinsics: Extrinsics,
+    #[serde(default, skip_serializing_if = "ModelFiles::none")]
+    pub(super) models: ModelFiles,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -120,6 +122,7 @@ pub fn write_camera_toml(
             position_m: camera.p_w_cam_m.into(),
             rotation: rows(r),
         },
+        models: ModelFiles::default(),
     };
     write_text(path, &text(path, &settings)?)
 }
@@ -159,6 +162,7 @@ pub fn placed_camera_toml(
     if here != there {
         settings.calibration = there.join(&settings.calibration);
         settings.calibration_right = settings.calibration_right.map(|p| there.join(p));
+        settings.models = settings.models.within(&there);
     }
     settings.extrinsics = Extrinsics {
         position_m: (*p_w_cam_m).into(),

@@ -24,8 +24,11 @@ pub(super) fn chroma_of_rgb(rgb: [u8; 3]) -> Chroma {
 /// What a frame's chroma is compared with.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Behind<'a> {
-    /// The scene without the blob (for what moves).
-    Scene(&'a EyeFrame),
+    /// The scene without the blob (for what moves), and what most of it looks like.
+    ///
+    /// A change towards the colour is not enough: where something of the opposite hue
+    /// goes away, plain plaster is such a change.
+    Scene { scene: &'a EyeFrame, middle: Chroma },
     /// One chroma everywhere (for what stands still).
     Flat(Chroma),
 }
@@ -69,11 +72,14 @@ impl BlobMap {
         let values = (0..frame.cb.len())
             .map(|at| {
                 let seen = sample(frame.cb[at], frame.cr[at]);
-                let empty = match behind {
-                    Behind::Scene(scene) => sample(scene.cb[at], scene.cr[at]),
-                    Behind::Flat(chroma) => chroma,
-                };
-                coverage(seen, empty, wanted)
+                match behind {
+                    Behind::Scene { scene, middle } => {
+                        let empty = sample(scene.cb[at], scene.cr[at]);
+                        let changed = coverage(seen, empty, wanted);
+                        changed.min(coverage(seen, middle, wanted))
+                    }
+                    Behind::Flat(middle) => coverage(seen, middle, wanted),
+                }
             })
             .collect();
         Self {
@@ -207,7 +213,11 @@ mod tests {
                 ) = (mix(0), mix(1));
             }
         }
-        for behind in [Behind::Scene(&empty), Behind::Flat([0.0, 0.0])] {
+        let still = Behind::Scene {
+            scene: &empty,
+            middle: [0.0, 0.0],
+        };
+        for behind in [still, Behind::Flat([0.0, 0.0])] {
             let blobs = BlobMap::new(&frame, wanted, behind).blobs();
             assert_eq!(blobs.len(), 1);
             let off = (blobs[0].centre[0] - truth[0]).hypot(blobs[0].centre[1] - truth[1]);
@@ -215,10 +225,6 @@ mod tests {
             assert!((blobs[0].area_px / (std::f64::consts::PI * 49.0) - 1.0).abs() < 0.05);
         }
         let other = chroma_of_rgb([26, 191, 64]);
-        assert!(
-            BlobMap::new(&frame, other, Behind::Scene(&empty))
-                .blobs()
-                .is_empty()
-        );
+        assert!(BlobMap::new(&frame, other, still).blobs().is_empty());
     }
 }

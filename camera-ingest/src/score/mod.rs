@@ -146,13 +146,14 @@ pub fn score(
     let scene = Scene::learn(source, camera, options)?;
     let target = scene.target(target_rgb)?;
     let mut sightings = Vec::new();
-    let mut start_ns = 0;
+    let (mut start_ns, mut end_s) = (0, 0.0);
     for index in 0..frames {
         let frame = read_sized(source, index, camera)?;
         if index == 0 {
             start_ns = frame.0.stamp_ns;
         }
         let since_s = frame.0.stamp_ns.saturating_sub(start_ns) as f64 * 1e-9;
+        end_s = since_s;
         let near = sightings.last().copied();
         let eyes = [&frame.left(), &frame.right()];
         if let Some(tip) = scene.tip(eyes, tip_rgb, &target, near, since_s) {
@@ -167,7 +168,7 @@ pub fn score(
         });
     }
     mark_small(&mut sightings);
-    Ok(closest(&sightings, &target, camera))
+    Ok(closest(&sightings, end_s, &target, camera))
 }
 
 /// Where both eyes see a coloured lead that the arm shows at known places:
@@ -198,8 +199,8 @@ pub fn sight_lead(
     Ok(sighted)
 }
 
-/// Minimises the distance over continuous time.
-fn closest(sightings: &[Sighting], target: &Target, camera: &StereoCamera) -> Score {
+/// Minimises the distance over continuous time; the last frame began at `end_s`.
+fn closest(sightings: &[Sighting], end_s: f64, target: &Target, camera: &StereoCamera) -> Score {
     let to_world = |p: Vector3<f64>| camera.p_w_cam_m + camera.r_w_cam * p;
     let mut tip_path = Vec::new();
     let mut best: Option<(f64, f64, LocalPath)> = None;
@@ -223,7 +224,11 @@ fn closest(sightings: &[Sighting], target: &Target, camera: &StereoCamera) -> Sc
     }
     let (closest_m, time_s, interval_m) = best.map_or(
         (f64::INFINITY, 0.0, [0.0, f64::INFINITY]),
-        |(d, t, path)| (d, t, interval(&path, t, target)),
+        |(d, t, path)| {
+            let [low_m, high_m] = interval(&path, t, target);
+            let nearer_m = path.speed_at(t) * unseen_s(sightings, t, end_s, camera);
+            (d, t, [(low_m - nearer_m).max(0.0), high_m])
+        },
     );
     Score {
         closest_m,
@@ -231,6 +236,17 @@ fn closest(sightings: &[Sighting], target: &Target, camera: &StereoCamera) -> Sc
         time_s,
         target_m: to_world(target.point_c).into(),
         tip_path,
+    }
+}
+
+/// How long the film goes on without the tip where it was nearest when it was first or
+/// last seen (s): it may have come nearer unseen. Zero where the way goes on.
+fn unseen_s(sightings: &[Sighting], nearest_s: f64, end_s: f64, camera: &StereoCamera) -> f64 {
+    let bottom = f64::from(camera.height_px);
+    match sightings {
+        [first, ..] if nearest_s <= first.t_s => (first.t_s - camera.row_time_s(bottom)).max(0.0),
+        [.., last] if nearest_s >= last.t_s => (end_s - last.t_s).max(0.0),
+        _ => 0.0,
     }
 }
 

@@ -122,6 +122,12 @@ impl LocalPath {
         Vector3::new(self.ray[0].value(dt) * z, self.ray[1].value(dt) * z, z)
     }
 
+    /// Speed on the path (m/s).
+    pub(super) fn speed_at(&self, t_s: f64) -> f64 {
+        const STEP_S: f64 = 1e-3;
+        (self.at(t_s + STEP_S) - self.at(t_s - STEP_S)).norm() / (2.0 * STEP_S)
+    }
+
     /// How sure [`Self::at`] is.
     pub(super) fn error_at(&self, t_s: f64) -> PathError {
         let dt = t_s - self.t_s;

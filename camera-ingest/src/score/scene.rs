@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use shared_types::StereoCamera;
 
-use super::blob::{Behind, Blob, BlobMap, chroma_of_rgb};
+use super::blob::{Behind, Blob, BlobMap, Chroma, chroma_of_rgb};
 use super::path::{PathError, Sighting};
 use super::{ScoreError, ScoreOptions};
 use crate::frame::{EyeFrame, StereoFrame};
@@ -14,6 +14,8 @@ pub(super) struct Scene<'a> {
     camera: &'a StereoCamera,
     options: &'a ScoreOptions,
     eyes: [EyeFrame; 2],
+    /// What most of each eye's scene looks like.
+    middles: [Chroma; 2],
 }
 
 /// A pair of blobs that can be one thing.
@@ -93,11 +95,12 @@ impl<'a> Scene<'a> {
             left.push(frame.left());
             right.push(frame.right());
         }
-        let median = |frames: &[EyeFrame]| crate::track::median_frame(frames);
+        let eyes = [left, right].map(|frames| crate::track::median_frame(&frames));
         Ok(Self {
             camera,
             options,
-            eyes: [median(&left), median(&right)],
+            middles: [0, 1].map(|k: usize| middle_chroma(&eyes[k])),
+            eyes,
         })
     }
 
@@ -129,13 +132,13 @@ impl<'a> Scene<'a> {
 
     /// The target in the still scene: the largest round blob of its colour.
     pub(super) fn target(&self, rgb: [u8; 3]) -> Result<Target, ScoreError> {
-        let blobs = |eye: &EyeFrame| -> Vec<Blob> {
-            let behind = Behind::Flat(middle_chroma(eye));
-            let mut blobs = BlobMap::new(eye, chroma_of_rgb(rgb), behind).blobs();
+        let blobs = |k: usize| -> Vec<Blob> {
+            let behind = Behind::Flat(self.middles[k]);
+            let mut blobs = BlobMap::new(&self.eyes[k], chroma_of_rgb(rgb), behind).blobs();
             blobs.retain(|b| b.stretch < 1.5);
             blobs
         };
-        let (left, right) = (blobs(&self.eyes[0]), blobs(&self.eyes[1]));
+        let (left, right) = (blobs(0), blobs(1));
         let best = self
             .pairs(&left, &right)
             .into_iter()
@@ -161,7 +164,11 @@ impl<'a> Scene<'a> {
 
     fn pairs_in(&self, eyes: [&EyeFrame; 2], rgb: [u8; 3]) -> Vec<Pair> {
         let blobs = |k: usize| {
-            BlobMap::new(eyes[k], chroma_of_rgb(rgb), Behind::Scene(&self.eyes[k])).blobs()
+            let behind = Behind::Scene {
+                scene: &self.eyes[k],
+                middle: self.middles[k],
+            };
+            BlobMap::new(eyes[k], chroma_of_rgb(rgb), behind).blobs()
         };
         self.pairs(&blobs(0), &blobs(1))
     }
@@ -205,7 +212,7 @@ impl<'a> Scene<'a> {
 }
 
 /// Median chroma of an image: what most of the scene looks like.
-fn middle_chroma(eye: &EyeFrame) -> [f64; 2] {
+fn middle_chroma(eye: &EyeFrame) -> Chroma {
     let median = |plane: &[u8]| -> f64 {
         let mut values: Vec<u8> = plane.iter().step_by(31).copied().collect();
         let middle = values.len() / 2;

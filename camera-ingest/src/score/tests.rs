@@ -95,6 +95,45 @@ fn a_straight_flight_is_measured_between_frames() {
 }
 
 #[test]
+fn a_thing_of_the_opposite_hue_that_goes_away_is_no_tip() {
+    /// Its chroma points away from the tip's, as a blue rope's from an orange lead's.
+    const ROPE_RGB: [u8; 3] = [20, 120, 220];
+    let camera = camera();
+    let rope = (0..20).map(|i| {
+        let at = Vector3::new(-0.25, 0.0, 0.3 + 0.02 * f64::from(i));
+        (at, ROPE_RGB)
+    });
+    let mut frames: Vec<StereoFrame> = (0..30)
+        .map(|i| {
+            let seen_s = i as f64 / FPS + camera.row_time_s(0.0);
+            let mut balls = vec![(TARGET.into(), TARGET_RGB), (tip(seen_s), TIP_RGB)];
+            // It hangs there most of the time, so that it counts as the scene behind.
+            if !(10..20).contains(&i) {
+                balls.extend(rope.clone());
+            }
+            frame(i, &balls)
+        })
+        .collect();
+    let options = ScoreOptions::default();
+    let score = score(&mut frames, &camera, TIP_RGB, TARGET_RGB, &options).unwrap();
+    assert!((score.closest_m - 0.05).abs() < 0.002, "{score:?}");
+    assert!((score.time_s - 0.25).abs() < 0.003, "{score:?}");
+}
+
+#[test]
+fn a_tip_lost_on_its_way_to_the_target_may_have_come_nearer() {
+    let mut frames = throw(TARGET);
+    let seen = frames.len() * 2 / 5;
+    for (index, hidden) in frames.iter_mut().enumerate().skip(seen) {
+        *hidden = frame(index, &[(TARGET.into(), TARGET_RGB)]);
+    }
+    let options = ScoreOptions::default();
+    let score = score(&mut frames, &camera(), TIP_RGB, TARGET_RGB, &options).unwrap();
+    assert!(score.closest_m > 0.06, "{score:?}");
+    assert!(score.interval_m[0] < 0.05, "{score:?}");
+}
+
+#[test]
 fn what_cannot_be_scored_says_why() {
     let options = ScoreOptions::default();
     let run = |frames: &mut Vec<StereoFrame>, tip, target| -> String {

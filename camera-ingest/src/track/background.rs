@@ -1,6 +1,9 @@
 //! The scene without the rope, and how noisy it is.
 
+use std::ops::Range;
+
 use crate::frame::EyeFrame;
+use crate::vectors::widest;
 
 /// Median image and the noise about it.
 #[derive(Debug, Clone)]
@@ -29,6 +32,28 @@ impl Background {
         };
         let noise = noise_about(&image, &frames[chosen[chosen.len() / 2]]);
         Self { image, noise }
+    }
+
+    /// Renews some rows: their median over some frames.
+    pub(super) fn renew(&mut self, frames: &[EyeFrame], rows: Range<usize>) {
+        let renew = |plane: fn(&mut EyeFrame) -> &mut Vec<u8>,
+                     seen: fn(&EyeFrame) -> &Vec<u8>,
+                     image: &mut EyeFrame,
+                     width: usize| {
+            let part = rows.start * width..rows.end * width;
+            let planes: Vec<&[u8]> = frames.iter().map(|f| &seen(f)[part.clone()]).collect();
+            plane(image)[part].copy_from_slice(&medians(&planes));
+        };
+        let image = &mut self.image;
+        let width = image.width_px;
+        renew(|f| &mut f.luma, |f| &f.luma, image, width);
+        renew(|f| &mut f.cb, |f| &f.cb, image, width / 2);
+        renew(|f| &mut f.cr, |f| &f.cr, image, width / 2);
+    }
+
+    /// Measures the noise anew, about a frame.
+    pub(super) fn measure_noise(&mut self, frame: &EyeFrame) {
+        self.noise = noise_about(&self.image, frame);
     }
 
     /// Brightness of a frame relative to the background (automatic exposure
@@ -117,19 +142,24 @@ pub(super) fn frames_by_motion(frames: &[EyeFrame], count: usize) -> Vec<usize> 
 }
 
 /// Part of the pixels that changed by more than noise, on every fourth row.
-fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
+pub(super) fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
     /// Grey levels, for the sum of two pixels.
     const THRESHOLD: u16 = 40;
     let (mut count, mut all) = (0_u32, 0_u32);
     let rows = |f: &EyeFrame| f.width_px * 4;
-    for (row_a, row_b) in a.luma.chunks(rows(a)).zip(b.luma.chunks(rows(b))) {
-        let (row_a, row_b) = (&row_a[..a.width_px], &row_b[..b.width_px]);
-        for (p, q) in row_a.chunks_exact(2).zip(row_b.chunks_exact(2)) {
-            let sum = |x: &[u8]| u16::from(x[0]) + u16::from(x[1]);
-            count += u32::from(sum(p).abs_diff(sum(q)) > THRESHOLD);
-            all += 1;
-        }
-    }
+    widest(
+        #[inline(always)]
+        || {
+            for (row_a, row_b) in a.luma.chunks(rows(a)).zip(b.luma.chunks(rows(b))) {
+                let (row_a, row_b) = (&row_a[..a.width_px], &row_b[..b.width_px]);
+                for (p, q) in row_a.chunks_exact(2).zip(row_b.chunks_exact(2)) {
+                    let sum = |x: &[u8]| u16::from(x[0]) + u16::from(x[1]);
+                    count += u32::from(sum(p).abs_diff(sum(q)) > THRESHOLD);
+                    all += 1;
+                }
+            }
+        },
+    );
     f64::from(count) / f64::from(all.max(1))
 }
 

@@ -139,6 +139,18 @@ impl ClampPath {
         &self.samples
     }
 
+    /// The same path with its times from another zero, `zero_s` on this one's clock.
+    #[must_use]
+    pub fn since(&self, zero_s: f64) -> Self {
+        let samples = self.samples.iter().map(|s| ClampSample {
+            t_s: s.t_s - zero_s,
+            ..*s
+        });
+        Self {
+            samples: samples.collect(),
+        }
+    }
+
     /// Pose at a time, linear between samples, the end poses outside.
     #[must_use]
     pub fn at(&self, t_s: f64) -> ClampSample {

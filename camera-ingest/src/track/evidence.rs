@@ -8,6 +8,7 @@
 
 use super::background::Background;
 use crate::frame::EyeFrame;
+use crate::vectors::widest;
 
 /// Colour in full-range BT.601 `[Y, Cb, Cr]`.
 pub(super) type Colour = [f32; 3];
@@ -133,9 +134,12 @@ struct Limits {
 struct Row {
     seen: [Vec<f32>; 3],
     empty: [Vec<f32>; 3],
+    /// Pixels before the part, of which a chroma sample covers two.
+    before: usize,
 }
 
 impl Row {
+    #[inline(always)]
     fn fill(
         &mut self,
         frame: &EyeFrame,
@@ -146,29 +150,37 @@ impl Row {
     ) {
         let inverse_gain = 1.0 / gain;
         let light = |c: u8| 128.0 + (f32::from(c) - 128.0) * inverse_gain;
-        let (row, half) = (v * frame.width_px, v * (frame.width_px / 2));
+        let (first, last) = (from / 2, to.div_ceil(2));
+        self.before = from - 2 * first;
+        let row = v * frame.width_px;
         let luma = |plane: &[u8], out: &mut Vec<f32>, scale: f32| {
-            let pixels = plane[row + from..row + to].iter();
-            out.clear();
-            out.extend(pixels.map(|y| f32::from(*y) * scale));
+            let pixels = &plane[row + 2 * first..row + 2 * last];
+            out.resize(pixels.len(), 0.0);
+            for (out, y) in out.iter_mut().zip(pixels) {
+                *out = f32::from(*y) * scale;
+            }
         };
         luma(&frame.luma, &mut self.seen[0], inverse_gain);
         luma(&empty.luma, &mut self.empty[0], 1.0);
         let planes = [(&frame.cb, &empty.cb), (&frame.cr, &empty.cr)];
         for (k, (seen, behind)) in planes.into_iter().enumerate() {
-            let samples = (from..to).map(|u| half + u / 2);
+            let samples = row / 2 + first..row / 2 + last;
             let (out, out_behind) = (&mut self.seen[k + 1], &mut self.empty[k + 1]);
-            out.clear();
-            out.extend(samples.clone().map(|c| light(seen[c])));
-            out_behind.clear();
-            out_behind.extend(samples.map(|c| f32::from(behind[c])));
+            out.resize(2 * samples.len(), 0.0);
+            out_behind.resize(2 * samples.len(), 0.0);
+            for (pair, c) in out.chunks_exact_mut(2).zip(&seen[samples.clone()]) {
+                pair.fill(light(*c));
+            }
+            for (pair, c) in out_behind.chunks_exact_mut(2).zip(&behind[samples]) {
+                pair.fill(f32::from(*c));
+            }
         }
     }
 }
 
 impl Matter<'_> {
     /// Coverage of one pixel: the best over the shades looked for.
-    #[inline]
+    #[inline(always)]
     fn of_pixel(
         &self,
         seen: Colour,
@@ -231,24 +243,29 @@ impl Matter<'_> {
         let width = window.u1 - window.u0;
         let mut values = vec![0.0; width * (window.v1 - window.v0)];
         let mut row = Row::default();
-        for (v, &[from, to]) in (window.v0..window.v1).zip(&band.columns) {
-            if from >= to {
-                continue;
-            }
-            row.fill(frame, &self.background.image, self.gain, v, [from, to]);
-            let start = (v - window.v0) * width;
-            let out = &mut values[start + from - window.u0..start + to - window.u0];
-            // The usual numbers of shades as constants: the loops over them unroll, and
-            // several pixels are worked on at once.
-            match (&shades[..], self.rival) {
-                ([a], None) => self.fill(&row, &[*a], None, limits, out),
-                ([a, b, c], Some(rival)) => {
-                    self.fill(&row, &[*a, *b, *c], Some(rival), limits, out);
+        widest(
+            #[inline(always)]
+            || {
+                for (v, &[from, to]) in (window.v0..window.v1).zip(&band.columns) {
+                    if from >= to {
+                        continue;
+                    }
+                    row.fill(frame, &self.background.image, self.gain, v, [from, to]);
+                    let start = (v - window.v0) * width;
+                    let out = &mut values[start + from - window.u0..start + to - window.u0];
+                    // The usual numbers of shades as constants: the loops over them unroll,
+                    // and several pixels are worked on at once.
+                    match (&shades[..], self.rival) {
+                        ([a], None) => self.fill(&row, &[*a], None, limits, out),
+                        ([a, b, c], Some(rival)) => {
+                            self.fill(&row, &[*a, *b, *c], Some(rival), limits, out);
+                        }
+                        ([a, b, c], None) => self.fill(&row, &[*a, *b, *c], None, limits, out),
+                        (all, rival) => self.fill(&row, all, rival, limits, out),
+                    }
                 }
-                ([a, b, c], None) => self.fill(&row, &[*a, *b, *c], None, limits, out),
-                (all, rival) => self.fill(&row, all, rival, limits, out),
-            }
-        }
+            },
+        );
         Coverage {
             window,
             width,
@@ -266,8 +283,9 @@ impl Matter<'_> {
         out: &mut [f32],
     ) {
         let count = out.len();
-        let [y, cb, cr] = [0, 1, 2].map(|k| &row.seen[k][..count]);
-        let [ey, ecb, ecr] = [0, 1, 2].map(|k| &row.empty[k][..count]);
+        let part = row.before..row.before + count;
+        let [y, cb, cr] = [0, 1, 2].map(|k| &row.seen[k][part.clone()]);
+        let [ey, ecb, ecr] = [0, 1, 2].map(|k| &row.empty[k][part.clone()]);
         for i in 0..count {
             let (seen, empty) = ([y[i], cb[i], cr[i]], [ey[i], ecb[i], ecr[i]]);
             out[i] = self.of_pixel(seen, empty, shades, rival, limits);
@@ -300,6 +318,55 @@ impl Coverage {
             &self.values[at + self.width..at + self.width + 2],
         );
         (1.0 - b) * ((1.0 - a) * top[0] + a * top[1]) + b * ((1.0 - a) * bottom[0] + a * bottom[1])
+    }
+
+    /// Largest sum over a square of the area of a disc of `radius_px`, its centre within
+    /// `reach_px` of `centre` on either axis, without what lies within `clear_px` of it.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "pixel counts are small and positive"
+    )]
+    pub(super) fn most_beside(
+        &self,
+        centre: [f64; 2],
+        clear_px: f64,
+        radius_px: f64,
+        reach_px: f64,
+    ) -> f64 {
+        let side = ((radius_px * std::f64::consts::PI.sqrt()).round() as usize).max(1);
+        let near = self.window;
+        let far = reach_px + side as f64 / 2.0;
+        let within = |x: usize, k: usize| (x as f64 - centre[k]).abs() <= far;
+        // Sums over the squares' columns, row by row the oldest going and the newest coming.
+        let mut columns = vec![0.0_f64; self.width];
+        let value = |u: usize, v: usize| -> f64 {
+            let (du, dv) = (u as f64 - centre[0], v as f64 - centre[1]);
+            if !within(u, 0) || du * du + dv * dv <= clear_px * clear_px {
+                return 0.0;
+            }
+            f64::from(self.values[(v - near.v0) * self.width + u - near.u0])
+        };
+        let rows: Vec<usize> = (near.v0..near.v1).filter(|v| within(*v, 1)).collect();
+        let mut most: f64 = 0.0;
+        for (count, &v) in rows.iter().enumerate() {
+            for (u, sum) in (near.u0..near.u1).zip(&mut columns) {
+                *sum += value(u, v);
+                if count >= side {
+                    *sum -= value(u, v - side);
+                }
+            }
+            let mut sum = 0.0;
+            for at in 0..columns.len() {
+                sum += columns[at];
+                if at >= side {
+                    sum -= columns[at - side];
+                }
+                most = most.max(sum);
+            }
+        }
+        most
     }
 
     /// Sum and centroid within `radius_px` of a raw pixel.

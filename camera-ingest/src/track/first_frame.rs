@@ -10,6 +10,7 @@ use super::clamp::ClampSample;
 use super::evidence::{Colour, Matter, Window};
 use super::geodesic::{Geodesic, Ground, depth_px};
 use super::lead::{self, TooShort};
+use super::models::{FirstMask, FirstScene, ModelError, check_count};
 use super::plane::{Point, RopePlane};
 use crate::frame::EyeFrame;
 
@@ -47,12 +48,26 @@ pub(super) struct FirstLook {
 }
 
 /// Why nothing was found.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum NotFound {
     /// The clamp's pixel lies outside the image.
     ClampOutside([f64; 2]),
     /// Nothing long enough hangs on the clamp; longest way (m).
     NothingHangs(f64),
+    /// A learned model gave no mask.
+    NoMask(ModelError),
+}
+
+/// Where the rope is looked for.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) background: &'a Background,
+    pub(super) camera: &'a StereoCamera,
+    pub(super) plane: &'a RopePlane,
+    /// The clamp in this frame.
+    pub(super) clamp: ClampSample,
+    /// Where the lead's centre is, if somebody knows (raw pixel).
+    pub(super) lead_px: Option<[f64; 2]>,
 }
 
 /// Finds rope and lead in a frame, in which they hang still unless the rope's
@@ -65,12 +80,17 @@ pub(super) enum NotFound {
 )]
 pub(super) fn find(
     frame: &EyeFrame,
-    background: &Background,
-    camera: &StereoCamera,
-    plane: &RopePlane,
-    clamp: &ClampSample,
+    place: &Place<'_>,
+    masker: &mut dyn FirstMask,
     length_m: Option<[f64; 2]>,
 ) -> Result<FirstLook, NotFound> {
+    let Place {
+        background,
+        camera,
+        plane,
+        clamp,
+        lead_px,
+    } = place;
     let gain = background.gain(frame);
     let width = frame.width_px;
     let clamp_px = camera
@@ -79,7 +99,17 @@ pub(super) fn find(
         .ok_or(NotFound::ClampOutside(
             camera.project_left(&clamp.p_w_m).unwrap_or([f64::NAN; 2]),
         ))?;
-    let mask = moving(frame, background, gain);
+    let scene = FirstScene {
+        frame,
+        empty: &background.image,
+        gain,
+        noise: background.noise,
+        clamp_px,
+        lead_px: *lead_px,
+    };
+    let mut mask = masker.mask(&scene).map_err(NotFound::NoMask)?;
+    check_count("pixels of a mask", mask.len(), frame.luma.len()).map_err(NotFound::NoMask)?;
+    clear_border(&mut mask, width);
     let depth = depth_px(&mask, width);
     let ground = ground(&mask, width, camera, plane, clamp);
     let image_scale = width as f64 / 672.0;
@@ -223,11 +253,22 @@ pub(super) fn colour_of(
     (centre, spread)
 }
 
+/// What follows looks at the neighbours of every pixel of the mask.
+fn clear_border(mask: &mut [bool], width: usize) {
+    let last = mask.len() - width;
+    mask[..width].fill(false);
+    mask[last..].fill(false);
+    for row in mask.chunks_mut(width) {
+        row[0] = false;
+        row[width - 1] = false;
+    }
+}
+
 /// Pixels that differ from the background, smoothed over 3x3 pixels.
-fn moving(frame: &EyeFrame, background: &Background, gain: f32) -> Vec<bool> {
-    let (width, height) = (frame.width_px, frame.height_px);
-    let square = squares(frame, &background.image, gain);
-    let threshold = 9.0 * (MASK_NOISE * background.noise).max(MASK_LEAST).powi(2);
+pub(super) fn moving(scene: &FirstScene<'_>) -> Vec<bool> {
+    let (width, height) = (scene.frame.width_px, scene.frame.height_px);
+    let square = squares(scene.frame, scene.empty, scene.gain);
+    let threshold = 9.0 * (MASK_NOISE * scene.noise).max(MASK_LEAST).powi(2);
     // Sums of three along the rows, then of three rows; the border is never moving.
     let mut threes = vec![0.0; width * height];
     for (row, out) in square.chunks(width).zip(threes.chunks_mut(width)) {

@@ -22,7 +22,7 @@ pub(super) const RANGE_PX: f64 = 12.0;
 const WIDE_RANGE_PX: f64 = 32.0;
 /// Strength of smoothing against weights of at most 1: features longer than
 /// about a sixth of the rope pass.
-const SMOOTHING: f64 = 10.0;
+pub(super) const SMOOTHING: f64 = 10.0;
 /// Length may differ from the first frame's by this part.
 const LENGTH_TOLERANCE: f64 = 0.04;
 /// The clamp hides the rope's first part (m).
@@ -30,18 +30,28 @@ const HIDDEN_BY_CLAMP_M: f64 = 0.007;
 /// Coverage below which a node counts as not seen.
 const LEAST_COVERAGE: f64 = 0.2;
 /// Weight that keeps an unseen node near its prediction.
-const UNSEEN_WEIGHT: f64 = 1e-3;
+pub(super) const UNSEEN_WEIGHT: f64 = 1e-3;
 /// Part of the lead's area that must be seen.
-const LEAST_LEAD: f64 = 0.35;
+pub(super) const LEAST_LEAD: f64 = 0.35;
 /// Mean coverage below which the rope is lost.
-const LOST_BELOW: f64 = 0.3;
+pub(super) const LOST_BELOW: f64 = 0.3;
 /// Ropes of a larger radius show a lit and a dark side (px).
 const FAT_ROPE_PX: f64 = 2.2;
 /// Weight of clamp and lead against a node's.
-const ANCHOR: f64 = 50.0;
+pub(super) const ANCHOR: f64 = 50.0;
+/// What looks like the rope is noticed this far beside it (px).
+const NOTICE_PX: f64 = 24.0;
 /// Coverage of something beside the rope that can be taken for it.
 const RIVAL: f64 = 0.6;
-/// Part of the nodes beside which a rival makes a frame ambiguous.
+/// Part of the lead's area that, seen in one place beside it, can be another lead.
+const RIVAL_LEAD: f64 = 0.5;
+/// Coverage from which a node is seen for sure.
+pub(super) const SEEN: f64 = 0.5;
+/// Part of the coverage of most nodes below which one may be covered by something; a thin
+/// rope in motion is seen less everywhere.
+const UNSEEN: f64 = 0.5;
+/// Part of the nodes beside which a rival makes a frame ambiguous, and of nodes in a row
+/// not seen that makes the rope hidden in part.
 const RIVALS: f64 = 0.12;
 /// Part of the search range in which the lead is looked for first.
 const NEAR: f64 = 0.3;
@@ -93,6 +103,8 @@ pub(super) struct State {
     /// Coverage found at each node, 0 to 1.
     pub(super) confidence: Vec<f64>,
     pub(super) lost: bool,
+    /// A good part of it is covered by something, or leaves the picture.
+    pub(super) hidden: bool,
     /// Something that looks like the rope or its lead is so near that one may
     /// have been taken for the other.
     pub(super) ambiguous: bool,
@@ -114,6 +126,18 @@ pub(super) struct Follower<'a> {
     pub(super) plane: &'a RopePlane,
     pub(super) background: &'a Background,
     pub(super) model: RopeModel,
+}
+
+/// Nodes in a row that something may cover: seen far less than most of the rope is.
+fn longest_unseen(nodes: &[Across]) -> usize {
+    let mut seen: Vec<f64> = nodes.iter().map(|node| node.confidence).collect();
+    seen.sort_by(f64::total_cmp);
+    let least = UNSEEN * seen.get(seen.len() / 2).copied().unwrap_or(0.0);
+    nodes
+        .split(|node| node.confidence >= least)
+        .map(<[Across]>::len)
+        .max()
+        .unwrap_or(0)
 }
 
 impl Follower<'_> {
@@ -215,6 +239,7 @@ impl Follower<'_> {
         let rivals = found[first..=last].iter();
         let rivals = rivals.filter(|node| node.rival > RIVAL).count();
         let ambiguous = lead_rival || rivals as f64 > RIVALS * NODES as f64;
+        let hidden = longest_unseen(&found[first..=last]) as f64 > RIVALS * NODES as f64;
         let mut confidence: Vec<f64> = found.iter().map(|node| node.confidence).collect();
         let at_end = if lead.is_some() {
             lead_seen
@@ -240,6 +265,7 @@ impl Follower<'_> {
             curve,
             confidence,
             lost,
+            hidden,
             ambiguous,
             clamp: seen_clamp(&found, first),
         }
@@ -261,12 +287,15 @@ impl Follower<'_> {
             .map(|(v, n)| (v[0] * n[0] + v[1] * n[1]).abs() * exposure)
             .collect();
         let pixels: Vec<[f64; 2]> = curve.iter().map(|p| self.plane.to_pixel(*p)).collect();
-        let reach_px = range_px + 4.0;
+        let notice_px = range_px.max(NOTICE_PX);
+        let reach_px = notice_px + 4.0;
         let window = Window::around(pixels.iter().copied(), reach_px, frame);
         let band = Band::along(&pixels, reach_px, window);
         let coverage = self.rope_matter(gain).coverage_of(frame, window, &band);
         let search = Search {
             range_px,
+            notice_px,
+            lead_radius_px: self.model.lead_radius_m * self.plane.px_per_m,
             rope_radius_px: self.model.rope_radius_m * self.plane.px_per_m,
             usual_coverage: self.model.usual_coverage,
             blur_px: &blur,
@@ -275,7 +304,7 @@ impl Follower<'_> {
     }
 
     /// Length to be used where `measured` was found.
-    fn plausible_length(&self, measured: f64, lead_found: bool) -> f64 {
+    pub(super) fn plausible_length(&self, measured: f64, lead_found: bool) -> f64 {
         let tolerance = if lead_found { LENGTH_TOLERANCE } else { 0.0 };
         measured.clamp(
             self.model.length_m * (1.0 - tolerance),
@@ -363,7 +392,7 @@ impl Follower<'_> {
             gain,
         };
         let blends_in = self.model.lead_blends_in();
-        let around = coverage.centroid(centre, tight + range_px).0 - area;
+        let other = coverage.most_beside(centre, tight, radius, 1.5 * range_px);
         let rope = self.rope_at_lead(predicted);
         if blends_in {
             // A centroid would creep up the rope.
@@ -376,7 +405,7 @@ impl Follower<'_> {
         LeadFound {
             centre: (seen > LEAST_LEAD).then(|| self.plane.point_at(centre)),
             seen,
-            rival: !blends_in && around > RIVAL * whole,
+            rival: !blends_in && other > RIVAL_LEAD * whole,
         }
     }
 }
@@ -405,6 +434,6 @@ fn blend(curve: &mut [Point], shift: Point, factor: impl Fn(f64) -> f64) {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
+pub(super) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }

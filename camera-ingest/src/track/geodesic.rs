@@ -1,8 +1,5 @@
 //! Shortest ways over a mask, and how deep inside it a pixel lies.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 /// What a pixel is to a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ground {
@@ -18,6 +15,55 @@ pub(super) enum Ground {
 const GAP_FACTOR: u32 = 6;
 /// Straight and diagonal step in tenths of a pixel.
 const STEP: [u32; 2] = [10, 14];
+
+/// Pixels in order of cost, those of one cost in order of place. Costs are small whole
+/// numbers and none is further ahead of the least than the dearest step.
+struct Queue {
+    /// Pixels of one cost each; the least cost is `cost`.
+    ahead: Vec<Vec<usize>>,
+    cost: u32,
+    /// Those of the least cost, the first one last.
+    now: Vec<usize>,
+    waiting: usize,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Self {
+            ahead: vec![Vec::new(); (GAP_FACTOR * STEP[1] + 1) as usize],
+            cost: 0,
+            now: Vec::new(),
+            waiting: 0,
+        }
+    }
+}
+
+impl Queue {
+    fn push(&mut self, cost: u32, at: usize) {
+        let ring = self.ahead.len();
+        self.ahead[cost as usize % ring].push(at);
+        self.waiting += 1;
+    }
+
+    fn pop(&mut self) -> Option<(u32, usize)> {
+        while self.now.is_empty() {
+            if self.waiting == 0 {
+                return None;
+            }
+            let ring = self.ahead.len();
+            // What has this cost now; nothing can be added to it any more, for every step
+            // costs something.
+            let least = self.ahead.iter().cycle().skip(self.cost as usize % ring);
+            let steps = least.take_while(|pixels| pixels.is_empty()).count();
+            self.cost += u32::try_from(steps).unwrap_or(0);
+            let found = &mut self.ahead[self.cost as usize % ring];
+            std::mem::swap(&mut self.now, found);
+            self.now.sort_unstable_by(|a, b| b.cmp(a));
+        }
+        self.waiting -= 1;
+        self.now.pop().map(|at| (self.cost, at))
+    }
+}
 
 /// Shortest paths from one pixel to all reachable ones.
 pub(super) struct Geodesic {
@@ -49,11 +95,11 @@ impl Geodesic {
         // Length of the gap a path is in; `first` while it has met no mask yet.
         let mut gap = vec![0_u32; n];
         let mut first = vec![false; n];
-        let mut heap = BinaryHeap::new();
         out.cost[start] = 0;
         first[start] = true;
-        heap.push(Reverse((0_u32, start)));
-        while let Some(Reverse((cost, at))) = heap.pop() {
+        let mut queue = Queue::default();
+        queue.push(0, start);
+        while let Some((cost, at)) = queue.pop() {
             if cost > out.cost[at] {
                 continue;
             }
@@ -79,7 +125,7 @@ impl Geodesic {
                 }
                 gap[next] = open;
                 first[next] = is_first;
-                heap.push(Reverse((cost + price, next)));
+                queue.push(cost + price, next);
             }
         }
         out
@@ -139,11 +185,10 @@ pub(super) fn depth_px(mask: &[bool], width: usize) -> Vec<f32> {
             *out = if on { FAR } else { 0 };
         }
     }
+    // Most of an image is not mask.
+    let on: Vec<usize> = (0..d.len()).filter(|at| d[*at] != 0).collect();
     let offsets = BACK.map(|(dx, dy, step)| ((-dy) as usize * wide, dx as isize, step));
     let mut relax = |at: usize, forth: bool| {
-        if d[at] == 0 {
-            return;
-        }
         for (up, along, step) in offsets {
             let beyond = if forth {
                 (at - up).wrapping_add_signed(along)
@@ -153,9 +198,8 @@ pub(super) fn depth_px(mask: &[bool], width: usize) -> Vec<f32> {
             d[at] = d[at].min(d[beyond] + step);
         }
     };
-    let inside = wide * 2..wide * (rows + 2);
-    inside.clone().for_each(|at| relax(at, true));
-    inside.rev().for_each(|at| relax(at, false));
+    on.iter().for_each(|at| relax(*at, true));
+    on.iter().rev().for_each(|at| relax(*at, false));
     let inner = d.chunks(wide).skip(2).take(rows);
     #[allow(clippy::cast_precision_loss, reason = "distances are small")]
     inner

@@ -7,6 +7,7 @@
 use super::curve::{add, normals, scale};
 use super::evidence::Coverage;
 use super::plane::{Point, RopePlane};
+use crate::vectors::widest;
 
 /// Distance of samples along a normal (px).
 const STEP_PX: f64 = 0.5;
@@ -26,6 +27,10 @@ pub(super) struct Search<'a> {
     pub(super) rope_radius_px: f64,
     /// Coverage of a fully visible rope, relative to its whole width.
     pub(super) usual_coverage: f64,
+    /// What looks like the rope is noticed this far to either side (px).
+    pub(super) notice_px: f64,
+    /// Apparent radius of the lead (px).
+    pub(super) lead_radius_px: f64,
     /// Motion blur across the curve, per node (px).
     pub(super) blur_px: &'a [f64],
 }
@@ -37,7 +42,7 @@ pub(super) struct Across {
     pub(super) point: Point,
     /// Coverage there relative to a fully visible rope, 0 to 1.
     pub(super) confidence: f64,
-    /// Coverage of the best other place on the same normal, clear of this one.
+    /// Coverage of the best place on the same normal that is not the rope.
     pub(super) rival: f64,
 }
 
@@ -58,14 +63,14 @@ pub(super) fn measure(
     let half = (search.range_px / STEP_PX).round() as usize;
     let lanes = 2 * half + 1;
     let step_m = STEP_PX / plane.px_per_m;
-    let across = normals(curve);
+    let normal = normals(curve);
     let offset = |lane: f64| (lane - half as f64) * step_m;
     let spacing_px = super::curve::length(curve) / (curve.len() - 1) as f64 * plane.px_per_m;
 
     // Raw samples, and their sums over the rope's blurred width.
     let mut samples = vec![0.0; curve.len() * lanes];
     let mut seen = vec![0.0; curve.len() * lanes];
-    for (node, (p, n)) in curve.iter().zip(&across).enumerate() {
+    for (node, (p, n)) in curve.iter().zip(&normal).enumerate() {
         let row = &mut samples[node * lanes..(node + 1) * lanes];
         for (lane, sample) in row.iter_mut().enumerate() {
             let at = add(*p, scale(*n, offset(lane as f64)));
@@ -86,26 +91,96 @@ pub(super) fn measure(
         1.0 - seen[node * lanes + lane] + OFFSET_PRICE * away * away + outside
     };
     let best = viterbi(curve.len(), lanes, price);
-    (0..curve.len())
+    let mut found: Vec<Across> = (0..curve.len())
         .map(|node| {
             let lane = best[node];
             let row = &samples[node * lanes..(node + 1) * lanes];
             let reach = (search.rope_radius_px + search.blur_px[node] / 2.0 + 1.0) / STEP_PX;
             let centre = row_centroid(row, row_centroid(row, lane as f64, reach), reach);
-            // Beside the rope's own blurred image.
-            let clear = (2.0 * reach).ceil() as usize + 2;
-            let others = &seen[node * lanes..(node + 1) * lanes];
-            let rival = others[..lane.saturating_sub(clear)]
-                .iter()
-                .chain(&others[(lane + clear).min(lanes)..])
-                .fold(0.0, |most: f64, s| most.max(*s));
             Across {
-                point: add(curve[node], scale(across[node], offset(centre))),
+                point: add(curve[node], scale(normal[node], offset(centre))),
                 confidence: seen[node * lanes + lane],
-                rival,
+                rival: 0.0,
             }
         })
-        .collect()
+        .collect();
+    let rivals = Beside {
+        places: found
+            .iter()
+            .map(|node| plane.to_pixel(node.point))
+            .collect(),
+        coverage,
+        search,
+    };
+    for (node, across) in found.iter_mut().enumerate() {
+        let row = &samples[node * lanes..(node + 1) * lanes];
+        let ends = [0.0, (lanes - 1) as f64]
+            .map(|lane| plane.to_pixel(add(curve[node], scale(normal[node], offset(lane)))));
+        across.rival = rivals.best(node, row, ends);
+    }
+    found
+}
+
+/// What lies beside the rope found.
+struct Beside<'a> {
+    /// Pixels of the rope's nodes.
+    places: Vec<[f64; 2]>,
+    coverage: &'a Coverage,
+    search: &'a Search<'a>,
+}
+
+impl Beside<'_> {
+    /// Coverage of the best place across a node that is not the rope, relative to a fully
+    /// visible rope. `row` are the samples between the pixels `ends`; beyond them a step
+    /// is a pixel.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "sample counts are small and positive"
+    )]
+    fn best(&self, node: usize, row: &[f64], ends: [[f64; 2]; 2]) -> f64 {
+        let search = self.search;
+        let inner = search.range_px.round() as usize;
+        let half = search.notice_px.round().max(search.range_px) as usize;
+        let per_px = (1.0 / STEP_PX) as usize;
+        let place = |lane: usize| -> [f64; 2] {
+            let part = (lane as f64 - half as f64) / (2.0 * search.range_px) + 0.5;
+            [0, 1].map(|k| ends[0][k] + part * (ends[1][k] - ends[0][k]))
+        };
+        let samples: Vec<f64> = (0..=2 * half)
+            .map(|lane| {
+                if lane.abs_diff(half) <= inner {
+                    row[(lane + inner - half) * per_px]
+                } else {
+                    f64::from(self.coverage.at(place(lane)))
+                }
+            })
+            .collect();
+        let reach = search.rope_radius_px + search.blur_px[node] / 2.0;
+        let mut seen = vec![0.0; samples.len()];
+        box_sums(&samples, reach, &mut seen);
+        let full = 2.0 * search.rope_radius_px * search.usual_coverage;
+        let clear_px = 2.0 * reach + 3.0;
+        let mut most: f64 = 0.0;
+        for (lane, seen) in seen.iter().enumerate() {
+            if *seen > most * full && self.is_beside(place(lane), clear_px) {
+                most = seen / full;
+            }
+        }
+        most.min(1.0)
+    }
+
+    /// Clear of every part of the rope and of its lead.
+    fn is_beside(&self, place: [f64; 2], clear_px: f64) -> bool {
+        let away = |p: &[f64; 2]| (p[0] - place[0]).powi(2) + (p[1] - place[1]).powi(2);
+        let from_lead = clear_px + self.search.lead_radius_px;
+        self.places.iter().all(|p| away(p) > clear_px * clear_px)
+            && self
+                .places
+                .last()
+                .is_none_or(|p| away(p) > from_lead * from_lead)
+    }
 }
 
 /// Sums over `centre - reach ..= centre + reach`, ends counted in part.
@@ -152,37 +227,60 @@ fn row_centroid(row: &[f64], centre: f64, reach: f64) -> f64 {
 }
 
 /// Cheapest lane per node under a quadratic price on jumps.
-#[allow(clippy::cast_precision_loss, reason = "sample counts are small")]
 fn viterbi(nodes: usize, lanes: usize, price: impl Fn(usize, usize) -> f64) -> Vec<usize> {
-    let mut cost: Vec<f64> = (0..lanes).map(|lane| price(0, lane)).collect();
+    let prices: Vec<f64> = (0..nodes * lanes)
+        .map(|i| price(i / lanes, i % lanes))
+        .collect();
+    // No way comes from beyond the first or the last lane.
+    let mut cost = vec![f64::INFINITY; lanes + 2 * JUMP_MAX];
+    cost[JUMP_MAX..JUMP_MAX + lanes].copy_from_slice(&prices[..lanes]);
     let mut from = vec![0_usize; nodes * lanes];
-    let mut next = vec![0.0; lanes];
-    for node in 1..nodes {
-        for lane in 0..lanes {
-            let low = lane.saturating_sub(JUMP_MAX);
-            let high = (lane + JUMP_MAX).min(lanes - 1);
-            let (mut least, mut origin) = (f64::INFINITY, lane);
-            for (before, c) in cost.iter().enumerate().take(high + 1).skip(low) {
-                let jump = before as f64 - lane as f64;
-                let total = c + JUMP_PRICE * jump * jump;
-                if total < least {
-                    (least, origin) = (total, before);
+    let mut least = vec![0.0; lanes];
+    widest(
+        #[inline(always)]
+        || {
+            let rows = prices
+                .chunks_exact(lanes)
+                .zip(from.chunks_exact_mut(lanes))
+                .skip(1);
+            for (price, jump) in rows {
+                cheapest(&cost, &mut least, jump);
+                for ((cost, least), price) in cost[JUMP_MAX..].iter_mut().zip(&least).zip(price) {
+                    *cost = least + price;
                 }
             }
-            next[lane] = least + price(node, lane);
-            from[node * lanes + lane] = origin;
-        }
-        std::mem::swap(&mut cost, &mut next);
-    }
+        },
+    );
+    let cost = &cost[JUMP_MAX..];
     let mut lane = (0..lanes)
         .min_by(|&a, &b| cost[a].total_cmp(&cost[b]))
         .unwrap_or(lanes / 2);
     let mut best = vec![lane; nodes];
     for node in (1..nodes).rev() {
-        lane = from[node * lanes + lane];
+        lane = lane + from[node * lanes + lane] - JUMP_MAX;
         best[node - 1] = lane;
     }
     best
+}
+
+/// Least cost of coming to every lane, and from how many lanes on, less [`JUMP_MAX`]. Jump
+/// by jump, so that many lanes are worked on at once.
+#[allow(clippy::cast_precision_loss, reason = "sample counts are small")]
+#[inline(always)]
+fn cheapest(cost: &[f64], least: &mut [f64], jump: &mut [usize]) {
+    least.fill(f64::INFINITY);
+    jump.fill(JUMP_MAX);
+    for offset in 0..=2 * JUMP_MAX {
+        let far = offset as f64 - JUMP_MAX as f64;
+        let extra = JUMP_PRICE * far * far;
+        let ways = least.iter_mut().zip(jump.iter_mut()).zip(&cost[offset..]);
+        for ((least, jump), before) in ways {
+            let total = before + extra;
+            let better = total < *least;
+            *least = if better { total } else { *least };
+            *jump = if better { offset } else { *jump };
+        }
+    }
 }
 
 #[cfg(test)]

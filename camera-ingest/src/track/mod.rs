@@ -10,6 +10,7 @@
 
 mod appearance;
 mod background;
+mod by_points;
 mod clamp;
 mod curve;
 mod evidence;
@@ -18,9 +19,12 @@ mod follow;
 mod geodesic;
 mod lateral;
 mod lead;
+mod models;
+mod one_pass;
 mod outline;
 mod plane;
 mod pursuit;
+mod refusal;
 mod timing;
 
 use std::time::{Duration, Instant};
@@ -28,11 +32,15 @@ use std::time::{Duration, Instant};
 pub use appearance::RopeAppearance;
 use background::{Background, frames_by_motion};
 pub use clamp::{ClampError, ClampPath, ClampSample};
-use first_frame::{FirstLook, NotFound};
+use first_frame::{FirstLook, Place};
 use follow::{Follower, NODES, RopeModel, State};
+pub use models::{FirstMask, FirstScene, ModelError, Models, Moving, PointTracker, SeenPoint};
+pub use one_pass::OnePass;
 use outline::{Circle, Contrast};
 use plane::RopePlane;
-use shared_types::keypoints::{MAX_KEYPOINTS, TrackedFrame};
+pub use refusal::TrackError;
+use refusal::check;
+use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 pub use timing::ClampFit;
 
@@ -45,6 +53,9 @@ pub struct TrackOptions {
     pub keypoints: usize,
     /// Frames for the median background.
     pub background_frames: usize,
+    /// Where the lead's centre hangs in the first frame, if somebody knows (raw pixel
+    /// of the left eye): a hint for a learned mask.
+    pub lead_px: Option<[f64; 2]>,
 }
 
 impl Default for TrackOptions {
@@ -52,6 +63,7 @@ impl Default for TrackOptions {
         Self {
             keypoints: 24,
             background_frames: 31,
+            lead_px: None,
         }
     }
 }
@@ -83,75 +95,6 @@ pub struct TrackResult {
     pub times: TrackTimes,
 }
 
-/// Why a recording cannot be tracked.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TrackError {
-    /// Too few frames, or too many or few keypoints.
-    #[error("tracking: {what} is {found}, it must be {least} to {most}")]
-    Range {
-        /// `frames` or an option's name.
-        what: &'static str,
-        /// Number given.
-        found: usize,
-        /// Least allowed.
-        least: usize,
-        /// Most allowed.
-        most: usize,
-    },
-    /// Frames differ from the camera's size.
-    #[error(
-        "tracking: frame {frame} is {found:?} px, the camera's mode gives {expected:?} px per eye; \
-         is the `mode` in camera.toml the one recorded?"
-    )]
-    Size {
-        /// Index of the frame.
-        frame: usize,
-        /// Its size.
-        found: [usize; 2],
-        /// The camera's.
-        expected: [usize; 2],
-    },
-    /// Times of the frames do not increase.
-    #[error("tracking: the time stamp of frame {frame} is not later than the one before")]
-    Times {
-        /// Index of the frame.
-        frame: usize,
-    },
-    /// The clamp cannot be seen.
-    #[error(
-        "tracking: in the first frame (frame 0) the clamp should be at pixel ({u:.0}, {v:.0}), outside the \
-         image; check the camera's extrinsics and the clamp's path"
-    )]
-    ClampOutside {
-        /// Pixel column.
-        u: f64,
-        /// Pixel row.
-        v: f64,
-    },
-    /// No rope in the first frame.
-    #[error(
-        "tracking: nothing long enough hangs on the clamp in the first frame (frame 0; longest {longest_m:.3} \
-         m); the rope must hang still at first, move later, and differ from what is behind it"
-    )]
-    NoRope {
-        /// Longest moving thing that hangs on the clamp (m).
-        longest_m: f64,
-    },
-    /// The rope cannot be followed.
-    #[error(
-        "tracking: the rope is lost in {lost} of {frames} frames, first in frame {first}; does it \
-         leave the image, or does something cover it?"
-    )]
-    MostlyLost {
-        /// Frames in which it is lost.
-        lost: usize,
-        /// All frames.
-        frames: usize,
-        /// First frame in which it is lost, from 0.
-        first: usize,
-    },
-}
-
 /// Follows the rope through a recording.
 ///
 /// `frames` are left-eye images, the first with the rope hanging still; time 0
@@ -166,6 +109,20 @@ pub fn track(
     camera: &StereoCamera,
     clamp: &ClampPath,
     options: &TrackOptions,
+) -> Result<TrackResult, TrackError> {
+    track_with(frames, camera, clamp, options, &mut Models::default())
+}
+
+/// As [`track()`], with learned models in the place of its parts.
+///
+/// # Errors
+/// As [`track()`], or a model that gives no answer.
+pub fn track_with(
+    frames: &[EyeFrame],
+    camera: &StereoCamera,
+    clamp: &ClampPath,
+    options: &TrackOptions,
+    models: &mut Models<'_>,
 ) -> Result<TrackResult, TrackError> {
     check(frames, camera, options)?;
     let times_s: Vec<f64> = frames
@@ -183,23 +140,27 @@ pub fn track(
         u: f64::NAN,
         v: f64::NAN,
     })?;
-    let look = first_frame::find(
-        &frames[0],
-        &background,
+    let place = Place {
+        background: &background,
         camera,
-        &plane,
-        &clamp.at(0.0),
-        None,
-    )
-    .map_err(|e| match e {
-        NotFound::ClampOutside([u, v]) => TrackError::ClampOutside { u, v },
-        NotFound::NothingHangs(longest_m) => TrackError::NoRope { longest_m },
-    })?;
+        plane: &plane,
+        clamp: clamp.at(0.0),
+        lead_px: options.lead_px,
+    };
+    let mut built_in = Moving;
+    let masker = match &mut models.first_mask {
+        Some(learned) => &mut **learned,
+        None => &mut built_in as &mut dyn FirstMask,
+    };
+    let look = first_frame::find(&frames[0], &place, masker, None)?;
     let (follower, first) = learn(&frames[0], camera, clamp, &plane, &background, &look);
     let first_time = start.elapsed();
 
     let start = Instant::now();
-    let states = pursuit::pursue(&follower, frames, &times_s, first);
+    let states = match &mut models.point_tracker {
+        Some(tracker) => by_points::follow(&follower, frames, &times_s, first, &mut **tracker)?,
+        None => pursuit::pursue(&follower, frames, &times_s, first),
+    };
     let lost = states.iter().filter(|s| s.lost).count();
     if lost * 2 > states.len() {
         return Err(TrackError::MostlyLost {
@@ -241,43 +202,6 @@ pub fn track(
     })
 }
 
-fn check(
-    frames: &[EyeFrame],
-    camera: &StereoCamera,
-    options: &TrackOptions,
-) -> Result<(), TrackError> {
-    let range = |what, found, least, most| {
-        if (least..=most).contains(&found) {
-            Ok(())
-        } else {
-            Err(TrackError::Range {
-                what,
-                found,
-                least,
-                most,
-            })
-        }
-    };
-    range("frames", frames.len(), 8, usize::MAX)?;
-    range("keypoints", options.keypoints, 2, MAX_KEYPOINTS)?;
-    range("background_frames", options.background_frames, 3, 255)?;
-    let expected = [camera.width_px as usize, camera.height_px as usize];
-    for (frame, f) in frames.iter().enumerate() {
-        let found = [f.width_px, f.height_px];
-        if found != expected {
-            return Err(TrackError::Size {
-                frame,
-                found,
-                expected,
-            });
-        }
-        if frame > 0 && f.stamp_ns <= frames[frame - 1].stamp_ns {
-            return Err(TrackError::Times { frame });
-        }
-    }
-    Ok(())
-}
-
 /// `count` indices spread over `0..len`.
 pub(crate) fn spread(len: usize, count: usize) -> Vec<usize> {
     let count = count.min(len);
@@ -316,6 +240,7 @@ fn learn<'a>(
         velocity: vec![[0.0; 2]; NODES],
         confidence: vec![1.0; NODES],
         lost: false,
+        hidden: false,
         ambiguous: false,
         clamp: None,
     };

@@ -1,4 +1,5 @@
 //! What goes wrong with recordings, done to good ones.
+#![allow(dead_code, reason = "not every test file uses everything")]
 
 use super::Wiggle;
 use camera_ingest::EyeFrame;
@@ -14,18 +15,22 @@ fn byte(x: f64) -> u8 {
     x.round().clamp(0.0, 255.0) as u8
 }
 
+/// How another rope swings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SecondRope {
+    /// Its clamp, to the right of the first one's (px).
+    pub(crate) away_px: f64,
+    pub(crate) rate_hz: f64,
+    /// Where it begins.
+    pub(crate) phase_rad: f64,
+}
+
 impl Wiggle {
     fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         let mut at = 0..;
         self.frames.retain(|_| wanted(at.next().unwrap()));
         let mut at = 0..;
         self.truth.retain(|_| wanted(at.next().unwrap()));
-    }
-
-    /// The first `count` frames.
-    pub(crate) fn shortened(mut self, count: usize) -> Self {
-        self.keep(|i| i < count);
-        self
     }
 
     /// A part of the frames is missing, here and there.
@@ -96,13 +101,15 @@ impl Wiggle {
     }
 
     /// A second rope of the same colours swings beside the first one, held by
-    /// something else `away_px` to the side.
-    pub(crate) fn doubled(mut self, away_px: f64, rgb: [[u8; 3]; 2]) -> Self {
+    /// something else.
+    pub(crate) fn doubled(mut self, second: SecondRope, rgb: [[u8; 3]; 2]) -> Self {
         let [rope, lead] = rgb.map(ycc_from_rgb);
+        let away_px = second.away_px;
         let start = self.truth[0].clone();
         let last = start.len() - 1;
         for (i, frame) in self.frames.iter_mut().enumerate() {
-            let swing = 0.5 * (std::f64::consts::TAU * 0.9 * i as f64 / 60.0).sin();
+            let turns = second.rate_hz * i as f64 / 60.0;
+            let swing = 0.5 * (std::f64::consts::TAU * turns + second.phase_rad).sin();
             let points: Vec<[f64; 2]> = start
                 .iter()
                 .map(|p| {

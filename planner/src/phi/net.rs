@@ -8,15 +8,13 @@ use crate::observation::{
 };
 use crate::sysid::Observation;
 use crate::wiggle::wiggle;
-use ort::environment::Environment;
+use onnx_session::ort;
 use ort::session::Session;
-use ort::session::builder::GraphOptimizationLevel;
 use ort::value::TensorRef;
 use rope_sim::PlannedArm;
 use shared_types::Limits;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
-use std::sync::OnceLock;
 
 /// What the network makes of one observation.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,34 +78,6 @@ impl core::fmt::Debug for PhiNet {
     }
 }
 
-/// The runtime of this process, or why there is none.
-fn runtime() -> Result<Environment, String> {
-    static RUNTIME: OnceLock<Result<Environment, String>> = OnceLock::new();
-    RUNTIME
-        .get_or_init(|| match std::env::var_os("ORT_DYLIB_PATH") {
-            Some(path) => {
-                let named = |error: &dyn core::fmt::Display| {
-                    format!("ORT_DYLIB_PATH={}: {error}", path.to_string_lossy())
-                };
-                let builder = ort::init_from(&path).map_err(|e| named(&e))?;
-                builder.build().map_err(|e| named(&e))
-            }
-            None => embedded(),
-        })
-        .clone()
-}
-
-#[cfg(feature = "embedded-runtime")]
-fn embedded() -> Result<Environment, String> {
-    ort::set_api(ort_tract::api());
-    ort::init().build().map_err(|error| error.to_string())
-}
-
-#[cfg(not(feature = "embedded-runtime"))]
-fn embedded() -> Result<Environment, String> {
-    Err("this build has no embedded runtime: set ORT_DYLIB_PATH to an ONNX Runtime library".into())
-}
-
 /// The wiggle that the network was trained on, as the camera sees it.
 fn plane_of(metadata: &PhiMetadata) -> Result<ViewPlane, String> {
     let wiggle = wiggle(&metadata.wiggle, &Limits::default());
@@ -147,13 +117,7 @@ impl PhiNet {
             name: name.to_owned(),
             reason,
         };
-        let environment = runtime().map_err(failed)?;
-        let session = Session::builder(&environment)
-            .map_err(|e| failed(e.to_string()))?
-            .with_optimization_level(GraphOptimizationLevel::Level3)
-            .map_err(|e| failed(e.to_string()))?
-            .commit_from_memory(bytes)
-            .map_err(|e| failed(e.to_string()))?;
+        let session = onnx_session::open(bytes).map_err(|e| failed(e.to_string()))?;
         let plane = plane_of(&metadata).map_err(|reason| ModelError::Unfit {
             name: name.to_owned(),
             reason,

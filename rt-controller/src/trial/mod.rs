@@ -325,11 +325,13 @@ mod tests {
             let times = trial.slice(Duration::from_millis(400)).unwrap();
             assert!(times.len() > 3, "{}", times.len());
             for t in &times {
-                assert!(
-                    t.receive_ns > 0 && t.compute_ns > 0 && t.send_ns > 0,
-                    "{t:?}"
-                );
+                // On a busy machine a setpoint may grow too old before it is sent, and is
+                // held back.
+                let old = t.wake_ns + t.receive_ns + t.compute_ns > 200_000;
+                let sent = t.send_ns > 0 || old;
+                assert!(t.receive_ns > 0 && t.compute_ns > 0 && sent, "{t:?}");
             }
+            assert!(times.iter().any(|t| t.send_ns > 0), "{times:?}");
         }
     }
 }

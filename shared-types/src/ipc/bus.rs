@@ -37,6 +37,11 @@ const CYCLES: &str = "wag/v1/controller/cycles";
 const JOINTS: &str = "wag/v1/controller/joints";
 const RECORDING: &str = "wag/v1/controller/recording";
 
+/// The run that a record belongs to, its recorder, a page that looks on, the one that works
+/// on frames or previews them, and a recorder that joined late, with its exact recording.
+const SUBSCRIBERS: usize = 6;
+/// Processes that have opened a service.
+const NODES: usize = 10;
 /// Frames a slow subscriber may lag behind before it loses the oldest.
 const FRAME_BUFFER: usize = 16;
 /// Keypoint frames kept for a subscriber: a whole wiggle and more.
@@ -134,8 +139,8 @@ impl Bus {
             .publish_subscribe::<[u8]>()
             .user_header::<FrameHeader>()
             .max_publishers(1)
-            .max_subscribers(4)
-            .max_nodes(8)
+            .max_subscribers(SUBSCRIBERS)
+            .max_nodes(NODES)
             .subscriber_max_buffer_size(FRAME_BUFFER)
             .subscriber_max_borrowed_samples(2)
             .history_size(0)
@@ -177,8 +182,8 @@ impl Bus {
         self.service(name)?
             .publish_subscribe::<T>()
             .max_publishers(1)
-            .max_subscribers(4)
-            .max_nodes(8)
+            .max_subscribers(SUBSCRIBERS)
+            .max_nodes(NODES)
             .subscriber_max_buffer_size(buffer)
             .subscriber_max_borrowed_samples(2)
             .history_size(0)
@@ -266,8 +271,8 @@ impl Bus {
         self.service(RECORDING)?
             .publish_subscribe::<[u8]>()
             .max_publishers(1)
-            .max_subscribers(3)
-            .max_nodes(8)
+            .max_subscribers(SUBSCRIBERS)
+            .max_nodes(NODES)
             .subscriber_max_buffer_size(CHUNK_BUFFER)
             .subscriber_max_borrowed_samples(1)
             .history_size(0)

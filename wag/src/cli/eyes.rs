@@ -1,7 +1,7 @@
 //! Arguments of what looks: film, track, score, calib.
 
 use super::MotionArgs;
-use super::values::{Colour, rate_hz};
+use super::values::{Colour, Pixel, rate_hz};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -70,12 +70,32 @@ pub struct TrackArgs {
     /// Keypoints per frame.
     #[arg(long, default_value_t = 20)]
     pub keypoints: usize,
+    /// Learned models.
+    #[command(flatten)]
+    pub models: ModelArgs,
     /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
     #[arg(long)]
     pub overlay: Option<PathBuf>,
     /// Keypoints (JSON).
     #[arg(long)]
     pub out: PathBuf,
+}
+
+/// Learned models in the place of parts of the tracker.
+#[derive(Debug, Args)]
+pub struct ModelArgs {
+    /// ONNX segmenter for the first frame's mask, instead of the one camera.toml names
+    /// or the built-in one.
+    #[arg(long, value_name = "ONNX")]
+    pub segmenter: Option<PathBuf>,
+    /// ONNX point tracker for following the rope, instead of the one camera.toml names
+    /// or the built-in one.
+    #[arg(long, value_name = "ONNX")]
+    pub tracker: Option<PathBuf>,
+    /// Where the lead's centre hangs in the first frame of the left eye (pixel U,V): a
+    /// prompt for the segmenter.
+    #[arg(long, value_name = "U,V")]
+    pub lead_px: Option<Pixel>,
 }
 
 /// Arguments of `wag score`.

@@ -26,6 +26,9 @@ pub struct BenchArgs {
     /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
     #[arg(long)]
     pub video: Option<PathBuf>,
+    /// `track`: the tracker that sees every frame once, in its order.
+    #[arg(long)]
+    pub live: bool,
 }
 
 /// Benchmarks known by name.

@@ -41,6 +41,24 @@ pub(super) fn host(text: &str) -> Result<IpAddr, String> {
         .ok_or_else(|| format!("`{text}` has no address"))
 }
 
+/// A pixel `U,V`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pixel(pub [f64; 2]);
+
+impl FromStr for Pixel {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` must be two finite numbers U,V, none below 0");
+        let numbers: Vec<f64> = text
+            .split(',')
+            .map(|t| t.trim().parse().map_err(|_e| wrong()))
+            .collect::<Result<_, _>>()?;
+        let pixel: [f64; 2] = numbers.try_into().map_err(|_e| wrong())?;
+        let inside = pixel.iter().all(|x| x.is_finite() && *x >= 0.0);
+        inside.then_some(Self(pixel)).ok_or_else(wrong)
+    }
+}
+
 /// Three finite numbers `x,y,z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point(pub [f64; 3]);

@@ -1,5 +1,6 @@
 //! `wag identify`: rope parameters from a video or from keypoints.
 
+use super::learned::Learned;
 use super::network::{asks_network, network_for_camera, no_model_without_network};
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName, MotionArgs};
@@ -67,7 +68,9 @@ fn observe(
         )));
     };
     let stage = Stage::begin("track", quiet);
-    let tracked = track_video((video, args.fps), camera, &args.motion, KEYPOINTS, &stage)?.result;
+    let mut learned = Learned::load(None, &args.camera, camera)?;
+    let eyes = (camera, &mut learned);
+    let tracked = track_video((video, args.fps), eyes, &args.motion, KEYPOINTS, &stage)?.result;
     stage.done(&format!("{} frames", tracked.track.frames.len()));
     let appearance = Appearance {
         rope_radius_m: Some(tracked.appearance.rope_radius_m),

@@ -2,7 +2,8 @@
 
 use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::failure::{Failure, OrInput, Outcome};
-use crate::mcap_file;
+use crate::files;
+use crate::mcap_file::{self, RUN_FILE, RecorderConfig, RunFileThread};
 use crate::pipeline::RunFolder;
 use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
 use crate::session::{interrupted, watch_interrupts};
@@ -47,6 +48,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(out) = &args.out {
         RunFolder::refuse_existing(out)?;
     }
+    let limits = files::read_limits(args.limits.as_deref()).or_input()?;
     let domain = chosen_domain(args)?;
     // Goes last, so that no file of the domain stays when this was its last user.
     let _sweep = DomainSweep::new(&domain);
@@ -55,6 +57,8 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
     let thread = RecordingThread::start(&domain, &folder.file(CYCLES_FILE)).or_failed()?;
+    let config = RecorderConfig::of_run(&domain, folder.path(), &limits);
+    let file = RunFileThread::start(config).or_failed()?;
     if !quiet {
         println!(
             "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",
@@ -70,17 +74,24 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
         std::thread::sleep(Duration::from_millis(20));
     }
     let report = thread.finish();
-    judge(&report, &domain).map_err(Failure::failed)?;
+    if let Err(nothing) = judge(&report, &domain) {
+        drop(file);
+        // An empty folder goes by itself.
+        let _ = std::fs::remove_file(folder.file(RUN_FILE));
+        return Err(Failure::failed(nothing));
+    }
     let explanation = keep_cause(folder.path());
     let summary = json!({
         "ok": report.chunks > 0, "command": "record", "run": folder.path(), "domain": domain,
         "recording": report, "explanation": explanation,
     });
-    crate::files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
+    files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
+    let written = file.finish();
     disk(&report).map_err(Failure::failed)?;
+    written.or_failed()?;
     if !quiet {
         println!(
-            "{:.1} MB; read it with `wag explain {}`",
+            "{:.1} MB; read it with `wag explain {}`, or look at its {RUN_FILE}",
             report.bytes as f64 / 1e6,
             folder.path().display()
         );

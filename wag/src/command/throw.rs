@@ -2,6 +2,7 @@
 
 use super::area::require_clear_area;
 use super::check::read_plan;
+use super::dry_run;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
@@ -33,15 +34,7 @@ pub fn drive(
         )));
     }
     if arm.dry_run {
-        if !quiet {
-            println!(
-                "dry run: the {name} keeps all limits and would run {:.2} s; nothing was connected",
-                trajectory.duration_s()
-            );
-        }
-        return Ok(Some(
-            json!({ "dry_run": true, "duration_s": trajectory.duration_s() }),
-        ));
+        return dry_run::tell(arm, limits, trajectory, name, quiet).map(Some);
     }
     if arm.address.is_none() {
         return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));

@@ -1,5 +1,6 @@
 //! `wag track`: keypoints of the rope from a video file.
 
+use super::learned::{Learned, classify};
 use crate::cli::{MotionArgs, TrackArgs};
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
@@ -10,7 +11,7 @@ use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::source::read_left;
 use camera_ingest::track::ClampFit;
 use camera_ingest::{
-    ClampPath, EyeFrame, TrackOptions, TrackResult, load_camera, open_video, track,
+    ClampPath, EyeFrame, TrackOptions, TrackResult, load_camera, open_video, track_with,
 };
 use serde_json::{Value, json};
 use shared_types::{KeypointTrack, StereoCamera};
@@ -40,10 +41,11 @@ pub struct TrackedVideo {
     pub result: TrackResult,
 }
 
-/// Tracks the rope through a video, given with the frame rate it does not tell.
+/// Tracks the rope through a video, given with the frame rate it does not tell, with
+/// learned models where there are any.
 pub fn track_video(
     (video, rate_hz): (&Path, Option<f64>),
-    camera: &StereoCamera,
+    (camera, learned): (&StereoCamera, &mut Learned),
     motion: &MotionArgs,
     keypoints: usize,
     stage: &Stage,
@@ -54,11 +56,11 @@ pub fn track_video(
     stage.say(format!("tracking through {} frames", frames.len()));
     let options = TrackOptions {
         keypoints,
+        lead_px: learned.lead_px(),
         ..TrackOptions::default()
     };
-    let result = track(&frames, camera, &clamp, &options)
-        .with_context(|| format!("video `{}`", video.display()))
-        .or_failed()?;
+    let result = track_with(&frames, camera, &clamp, &options, &mut learned.models())
+        .map_err(|error| classify(error, video))?;
     Ok(TrackedVideo { frames, result })
 }
 
@@ -101,10 +103,11 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
         )));
     }
     let camera = load_camera(&args.camera).or_input()?;
+    let mut learned = Learned::load(Some(&args.models), &args.camera, &camera)?;
     let stage = Stage::begin("track", quiet);
     let tracked = track_video(
         (&args.video, args.fps),
-        &camera,
+        (&camera, &mut learned),
         &args.motion,
         args.keypoints,
         &stage,
@@ -126,7 +129,7 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     Ok(Some(json!({
         "ok": true, "command": "track", "out": args.out, "frames": result.track.frames.len(),
-        "lost": lost, "seconds": seconds,
+        "lost": lost, "seconds": seconds, "models": learned.report(),
         "rope_radius_m": result.appearance.rope_radius_m,
         "lead_radius_m": result.appearance.lead_radius_m,
         "clamp": result.clamp.map(|c| json!({

@@ -16,12 +16,14 @@ mod recover;
 mod results;
 mod scene;
 mod schema;
+mod thread;
 mod urdf;
 mod writer;
 
 pub use read::{is_mcap, replay_bytes};
 pub use recorder::{RecorderConfig, run};
 pub use recover::recover;
+pub use thread::RunFileThread;
 
 /// File of a run folder that holds the whole run.
 pub const RUN_FILE: &str = "run.mcap";

@@ -1,6 +1,7 @@
 //! The process that writes the file: it subscribes, writes what comes, and finishes
 //! the file when it is told to end or its parent is gone.
 
+use super::RUN_FILE;
 use super::calibration::{calibration, place};
 use super::channel::Channel;
 use super::clock::Clock;
@@ -19,7 +20,7 @@ use shared_types::ipc::{
     FrameSubscriber, IpcError, JointReport, JointSubscriber, KeypointSubscriber,
 };
 use shared_types::{FaultCode, Limits, StereoCamera};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -34,8 +35,16 @@ const BUFFER: usize = 1024;
 /// A picture that is older is left out, so that a machine that is too slow for all of
 /// it records everything else.
 const PICTURE_LATE_NS: u64 = 150_000_000;
+/// Frames looked at, and pictures compressed, before everything else is looked at again:
+/// while a slow machine compresses one picture the next frame comes, without end.
+const FRAMES_AT_ONCE: usize = 16;
+const PICTURES_AT_ONCE: usize = 1;
 /// Frames of the arm's links per second.
 const FRAMES_HZ: f64 = 50.0;
+
+/// Most pictures a second in the recording of a run: half of what the camera gives,
+/// because each costs milliseconds of a core.
+const PICTURES_HZ: f64 = 30.0;
 
 /// What to record, and into what.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +64,22 @@ pub struct RecorderConfig {
     pub limits: Limits,
     /// The camera, where there is one.
     pub camera: Option<StereoCamera>,
+}
+
+impl RecorderConfig {
+    /// Records the run of a folder; the camera and the target are told in it where they
+    /// are known.
+    pub fn of_run(domain: &str, run: &Path, limits: &Limits) -> Self {
+        Self {
+            domain: domain.to_owned(),
+            file: run.join(RUN_FILE),
+            run: run.to_owned(),
+            pictures_hz: PICTURES_HZ,
+            target_m: None,
+            limits: limits.clone(),
+            camera: None,
+        }
+    }
 }
 
 /// Lets one through per period of its own time.
@@ -193,10 +218,23 @@ impl Recording {
                 self.file.json(Channel::Keypoints, at_ns, &message)
             },
         )?;
-        each(
-            || ports.frames.receive(),
-            |frame| self.frame(frame.user_header(), &frame),
-        )
+        Ok(())
+    }
+
+    /// Takes in frames that have arrived, and compresses `most` of them.
+    fn pictures(&mut self, ports: &Ports, most: usize) -> anyhow::Result<()> {
+        let mut compressed = 0;
+        for _ in 0..FRAMES_AT_ONCE {
+            let frame = ports.frames.receive();
+            let Some(frame) = frame.context("cannot receive frames from shared memory")? else {
+                break;
+            };
+            compressed += usize::from(self.frame(frame.user_header(), &frame)?);
+            if compressed >= most {
+                break;
+            }
+        }
+        Ok(())
     }
 
     fn log(&mut self, at_ns: u64, level: Level, text: &str) -> anyhow::Result<()> {
@@ -262,13 +300,14 @@ impl Recording {
         Ok(())
     }
 
-    fn frame(&mut self, header: &FrameHeader, pixels: &[u8]) -> anyhow::Result<()> {
+    /// Records a frame; whether it was compressed.
+    fn frame(&mut self, header: &FrameHeader, pixels: &[u8]) -> anyhow::Result<bool> {
         if let Some(expected) = self.next_frame {
             self.frames_lost += header.sequence.saturating_sub(expected);
         }
         self.next_frame = Some(header.sequence + 1);
         if !self.pictures.takes(header.stamp_ns) {
-            return Ok(());
+            return Ok(false);
         }
         let age_ns = self
             .clock
@@ -276,19 +315,19 @@ impl Recording {
             .saturating_sub(self.clock.wall_ns(header.stamp_ns));
         if age_ns > PICTURE_LATE_NS {
             self.pictures_late += 1;
-            return Ok(());
+            return Ok(false);
         }
         match left_jpeg(header, pixels) {
             Ok(jpeg) => {
                 let at_ns = self.clock.wall_ns(header.stamp_ns);
                 self.file
-                    .json(Channel::Image, at_ns, &messages::image(at_ns, &jpeg))
+                    .json(Channel::Image, at_ns, &messages::image(at_ns, &jpeg))?;
             }
             Err(reason) => {
                 tracing::warn!("a picture is not recorded: {reason:#}");
-                Ok(())
             }
         }
+        Ok(true)
     }
 
     fn finish(mut self, results: &mut Results) -> anyhow::Result<()> {
@@ -330,6 +369,12 @@ pub fn run(config: &RecorderConfig, stop: &AtomicBool) -> anyhow::Result<()> {
         // Looked at before draining: what came before the wish to stop is kept.
         let last = stop.load(Ordering::SeqCst);
         recording.drain(&ports)?;
+        let most = if last {
+            FRAMES_AT_ONCE
+        } else {
+            PICTURES_AT_ONCE
+        };
+        recording.pictures(&ports, most)?;
         if last {
             return recording.finish(&mut results);
         }
@@ -345,6 +390,43 @@ pub fn run(config: &RecorderConfig, stop: &AtomicBool) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_types::ipc::{DomainSweep, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV};
+
+    #[test]
+    fn frames_that_never_end_do_not_keep_it_from_the_rest() {
+        let folder = tempfile::tempdir().unwrap();
+        let domain = format!("pictures-{}", std::process::id());
+        let _sweep = DomainSweep::new(&domain);
+        let bus = Bus::join(&domain).unwrap();
+        let camera = bus.frame_publisher(64 * 16 * 2).unwrap();
+        let ports = Ports::open(&bus).unwrap();
+        let config = RecorderConfig::of_run(&domain, folder.path(), &Limits::default());
+        let mut recording = Recording::begin(&config).unwrap();
+        // Far in the future, so that none of them is late.
+        let begin_ns = recording.clock.now_ns();
+        let mut sequence = 0;
+        // As many as come while a slow machine compresses: there is always one more.
+        let mut send = || {
+            let mut frame = camera.loan_slice(64 * 16 * 2).unwrap();
+            *frame.user_header_mut() = FrameHeader {
+                version: PAYLOAD_VERSION,
+                pixel_format: PIXEL_FORMAT_YUYV,
+                sequence,
+                stamp_ns: begin_ns + sequence * 100_000_000,
+                width_px: 64,
+                height_px: 16,
+            };
+            frame.send().unwrap();
+            sequence += 1;
+        };
+        for _ in 0..8 {
+            send();
+        }
+        recording.pictures(&ports, 1).unwrap();
+        assert_eq!(recording.next_frame, Some(1), "one, then the rest");
+        recording.pictures(&ports, FRAMES_AT_ONCE).unwrap();
+        assert_eq!(recording.next_frame, Some(8));
+    }
 
     #[test]
     fn half_of_the_frames_of_a_jittering_camera_are_taken() {

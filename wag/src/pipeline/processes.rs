@@ -2,7 +2,7 @@
 
 use super::{ArmLink, RunFolder, STARTUP};
 use crate::config;
-use crate::mcap_file::{RUN_FILE, RecorderConfig};
+use crate::mcap_file::RecorderConfig;
 use crate::session::{ProcessSpec, Session};
 use anyhow::{anyhow, bail};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
@@ -52,10 +52,6 @@ pub fn write_calibration(folder: &RunFolder, camera: &StereoCamera) -> anyhow::R
     Ok(())
 }
 
-/// Most pictures a second in the recording of a run: half of what the camera gives,
-/// because each costs milliseconds of a core.
-const PICTURES_HZ: f64 = 30.0;
-
 /// Starts the process that records the run; what `camera` and `target_m` are is told
 /// in it, where there are any.
 pub fn start_recorder(
@@ -65,19 +61,13 @@ pub fn start_recorder(
     camera: Option<&StereoCamera>,
     target_m: Option<[f64; 3]>,
 ) -> anyhow::Result<()> {
-    let file = folder.file(RUN_FILE);
-    let config = folder.config(
-        "recorder",
-        &RecorderConfig {
-            domain: folder.domain.clone(),
-            file: file.clone(),
-            run: folder.path().to_owned(),
-            pictures_hz: PICTURES_HZ,
-            target_m,
-            limits: limits.clone(),
-            camera: camera.cloned(),
-        },
-    )?;
+    let config = RecorderConfig {
+        target_m,
+        camera: camera.cloned(),
+        ..RecorderConfig::of_run(&folder.domain, folder.path(), limits)
+    };
+    let file = config.file.clone();
+    let config = folder.config("recorder", &config)?;
     let spec = ProcessSpec {
         name: "recorder",
         config,

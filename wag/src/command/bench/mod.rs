@@ -4,6 +4,7 @@
 //! is 0 whatever the figures are.
 
 mod identify;
+mod live;
 mod machine;
 mod plan;
 mod record;

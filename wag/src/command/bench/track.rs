@@ -96,6 +96,9 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         ))
     })?;
     let (mut video, camera, clamp) = recording(folder)?;
+    if args.live {
+        return super::live::run(folder, (&mut video, camera, &clamp), quiet);
+    }
     let stage = Stage::begin("bench", quiet);
     let mut least = Pass::over(&mut video, &camera, &clamp)?;
     let peak_mb = peak_mb();

@@ -7,6 +7,7 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::pipeline::{self, ArmAddress, RunFolder};
 use crate::progress::Stage;
+use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::{Session, watch_interrupts};
 use anyhow::anyhow;
 use planner::response::excitation::sweep;
@@ -73,6 +74,9 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "latency")?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
+    session
+        .record_cycles(&folder.file(CYCLES_FILE))
+        .or_failed()?;
     if args.arm.dead_man {
         session.hold_dead_man(quiet).or_failed()?;
     }
@@ -88,8 +92,10 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
     session.end(result.is_ok());
     let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
     let kept = session.recorder.write(folder.path(), epoch_ns);
+    explain_stop(folder.path(), quiet);
     result.or_failed()?;
     kept.or_failed()?;
+    session.finish_run_file().or_failed()?;
     let recorder = &mut session.recorder;
     let reports = core::mem::take(&mut recorder.joints);
     Ok(Evidence {
@@ -135,6 +141,7 @@ fn stream(
         joints: args.arm.report_port,
         status: [args.arm.status_port; 2],
     };
+    pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::start_controller(session, folder, limits, address)?;
     for warning in pipeline::acquire(session, &link)? {
         tracing::warn!("{warning}");

@@ -1,0 +1,44 @@
+//! `[models]` in `camera.toml`: learned models that stand in for parts of the tracker.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{CalibError, settings};
+
+/// ONNX files; what is not named is built in.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFiles {
+    /// For the mask of the first frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub segmenter: Option<PathBuf>,
+    /// For following points from frame to frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracker: Option<PathBuf>,
+}
+
+impl ModelFiles {
+    /// Everything is built in.
+    pub(super) fn none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// With the paths taken relative to a folder.
+    pub(super) fn within(self, folder: &Path) -> Self {
+        let within = |path: Option<PathBuf>| path.map(|p| folder.join(p));
+        Self {
+            segmenter: within(self.segmenter),
+            tracker: within(self.tracker),
+        }
+    }
+}
+
+/// The models that a `camera.toml` names, relative to its folder.
+///
+/// # Errors
+/// The file is missing or malformed.
+pub fn load_model_files(path: &Path) -> Result<ModelFiles, CalibError> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    Ok(settings::read(path)?.models.within(folder))
+}

@@ -1,0 +1,67 @@
+//! Opens ONNX graphs in the runtime of this process.
+//!
+//! A process may have one runtime only, whoever asks first: the native ONNX Runtime
+//! library that `ORT_DYLIB_PATH` names, else the embedded one in pure Rust (feature
+//! `embedded-runtime`). What a graph means is its users' business.
+
+use std::sync::OnceLock;
+
+pub use ort;
+use ort::environment::Environment;
+use ort::session::Session;
+use ort::session::builder::GraphOptimizationLevel;
+
+/// Why a graph is not opened.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OpenError {
+    /// There is no runtime.
+    #[error("{0}")]
+    NoRuntime(String),
+    /// The runtime does not take the graph.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// The runtime of this process, or why there is none.
+fn runtime() -> Result<Environment, OpenError> {
+    static RUNTIME: OnceLock<Result<Environment, String>> = OnceLock::new();
+    RUNTIME
+        .get_or_init(|| match std::env::var_os("ORT_DYLIB_PATH") {
+            Some(path) => {
+                let named = |error: &dyn core::fmt::Display| {
+                    format!("ORT_DYLIB_PATH={}: {error}", path.to_string_lossy())
+                };
+                let builder = ort::init_from(&path).map_err(|e| named(&e))?;
+                builder.build().map_err(|e| named(&e))
+            }
+            None => embedded(),
+        })
+        .clone()
+        .map_err(OpenError::NoRuntime)
+}
+
+#[cfg(feature = "embedded-runtime")]
+fn embedded() -> Result<Environment, String> {
+    ort::set_api(ort_tract::api());
+    ort::init().build().map_err(|error| error.to_string())
+}
+
+#[cfg(not(feature = "embedded-runtime"))]
+fn embedded() -> Result<Environment, String> {
+    Err("this build has no embedded runtime: set ORT_DYLIB_PATH to an ONNX Runtime library".into())
+}
+
+/// Opens a graph from the bytes of its file.
+///
+/// # Errors
+/// No runtime, or one that does not take these bytes.
+pub fn open(bytes: &[u8]) -> Result<Session, OpenError> {
+    let refused = |reason: String| OpenError::Refused(reason);
+    let environment = runtime()?;
+    Session::builder(&environment)
+        .map_err(|e| refused(e.to_string()))?
+        .with_optimization_level(GraphOptimizationLevel::Level3)
+        .map_err(|e| refused(e.to_string()))?
+        .commit_from_memory(bytes)
+        .map_err(|e| refused(e.to_string()))
+}

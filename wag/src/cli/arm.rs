@@ -1,0 +1,134 @@
+//! The commands that move an arm, and the one that simulates it.
+
+use super::values::{host, seed};
+use clap::Args;
+use std::net::IpAddr;
+use std::path::PathBuf;
+
+/// How to reach an arm.
+#[derive(Debug, Args)]
+pub struct ArmArgs {
+    /// Address or name of the arm's controller.
+    #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
+    pub address: Option<IpAddr>,
+    /// Command port.
+    #[arg(long, default_value_t = 502)]
+    pub command_port: u16,
+    /// Report port with joint states (250 Hz).
+    #[arg(long, default_value_t = 30000)]
+    pub report_port: u16,
+    /// Report port with the arm's status (5 Hz); both kinds will do.
+    #[arg(long, default_value_t = 30002)]
+    pub status_port: u16,
+    /// The area is clear and the emergency stop is in reach. Asked for at any
+    /// address that is not this machine unless given here.
+    #[arg(long, alias = "confirm")]
+    pub yes: bool,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Check the motion against the limits and stop there: connects to nothing,
+    /// needs no --arm.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Use standard input as a dead-man switch: the arm moves only until Enter is
+    /// pressed or standard input ends.
+    #[arg(long)]
+    pub dead_man: bool,
+}
+
+/// Arguments of `wag wiggle`.
+#[derive(Debug, Args)]
+pub struct WiggleArgs {
+    /// Say how well ropes of the ranges could be known from it, and from the paper's.
+    #[arg(long)]
+    pub evaluate: bool,
+    /// Search the most telling wiggle within the limits and say how well it does.
+    #[arg(long)]
+    pub optimise: bool,
+    /// Seed of the ropes a wiggle is judged by.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+    /// Arm to execute it on.
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder for the run; it must not exist. Default: runs/TIME-wiggle.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `wag throw`.
+#[derive(Debug, Args)]
+pub struct ThrowArgs {
+    /// The plan.
+    pub plan: PathBuf,
+    /// Arm to execute it on.
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder for the run; it must not exist. Default: runs/TIME-throw.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `wag latency`.
+#[derive(Debug, Args)]
+pub struct LatencyArgs {
+    /// Arm to move: one joint after the other, small and ever faster.
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder of a recorded run to read instead.
+    #[arg(long, conflicts_with_all = ["address", "joints", "excitation", "seed", "out"])]
+    pub run: Option<PathBuf>,
+    /// Joints to move (1 to 7); default: all.
+    #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=7))]
+    pub joints: Vec<u8>,
+    /// Shape of the motion (TOML); default: the built-in one. In its pose the tool is
+    /// far from the axes of joints 1 and 3, which the allowed tool speed then keeps
+    /// too slow to be measured: `pose_rad` names another.
+    #[arg(long, value_name = "FILE")]
+    pub excitation: Option<PathBuf>,
+    /// Seed of the phases the motion begins with; default: the motion's own.
+    #[arg(long, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: Option<u64>,
+    /// Folder for the run; it must not exist. Default: runs/TIME-latency.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// The arm's response (TOML). Default: arm-response.toml in the run folder, where
+    /// one that is there already is kept.
+    #[arg(long)]
+    pub response: Option<PathBuf>,
+}
+
+/// Arguments of `wag rig`.
+#[derive(Debug, Args)]
+pub struct RigArgs {
+    /// Address to listen on. Anything but loopback lets others drive the simulated arm.
+    #[arg(long, default_value = "127.0.0.1")]
+    pub bind: IpAddr,
+    /// Command port; 0 takes any free one.
+    #[arg(long, default_value_t = 502)]
+    pub command_port: u16,
+    /// Report ports in the place of 30000,30001,30002,30003; 0 takes any free one.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 1,
+        default_value = "30000,30001,30002,30003"
+    )]
+    pub report_ports: Vec<u16>,
+    /// Script of faults to inject; configs/rig/faults.toml shows every kind.
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<PathBuf>,
+    /// Rope on the pole; `random` draws one from the seed. Default: no rope.
+    #[arg(long, value_name = "FILE|random")]
+    pub rope: Option<String>,
+    /// Publish the simulated camera in this shared-memory domain (needs --rope).
+    #[arg(long, value_name = "DOMAIN")]
+    pub camera: Option<String>,
+    /// Seed of the hidden rope and the noise.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+}

@@ -1,0 +1,98 @@
+//! The commands that look at one run.
+
+use clap::{Args, Subcommand};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// Arguments of `wag record`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct RecordArgs {
+    /// What to do instead.
+    #[command(subcommand)]
+    pub instead: Option<RecordCommand>,
+    /// Run folder of a running command; its controller is recorded.
+    #[arg(conflicts_with = "domain")]
+    pub run: Option<PathBuf>,
+    /// Shared-memory domain of the controller, as in its configuration, whether it
+    /// runs yet or not. Default: that of the only controller that runs.
+    #[arg(long)]
+    pub domain: Option<String>,
+    /// Stop after this long (s); default: on Ctrl-C.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+    /// Limits of the arm, told in the recording; default: those that hold here.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Folder for the run; it must not exist. Default: runs/TIME-record.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// `wag record ...`
+#[derive(Debug, Subcommand)]
+pub enum RecordCommand {
+    /// Make a run.mcap whole whose recorder was killed: at most its last second is
+    /// missing then. A whole file stays as it is.
+    Recover(RecoverArgs),
+}
+
+/// Arguments of `wag record recover`.
+#[derive(Debug, Args)]
+pub struct RecoverArgs {
+    /// The file.
+    #[arg(value_name = "FILE.mcap")]
+    pub file: PathBuf,
+}
+
+/// Arguments of `wag watch`.
+#[derive(Debug, Args)]
+#[command(after_help = "EXAMPLES:\n  \
+    wag watch                       whichever run began last, then the next\n  \
+    wag watch runs/NAME             a run that is under way\n  \
+    wag watch --domain cell-1       a controller or camera that runs as a daemon\n\n\
+    The address it prints holds a secret: whoever knows it can look on and stop the arm.\n\
+    From another machine: ssh -L PORT:127.0.0.1:PORT HOST, then the same address.")]
+pub struct WatchArgs {
+    /// Run folder of a running command. Default: the controller that started last, and
+    /// after its end the next.
+    #[arg(conflicts_with = "domain")]
+    pub run: Option<PathBuf>,
+    /// Shared-memory domain of a controller or a camera, whether it runs yet or not.
+    #[arg(long)]
+    pub domain: Option<String>,
+    /// Address and port of the page; port 0 takes any free one. Anything but loopback
+    /// lets other machines look on and stop the arm, without encryption.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:0")]
+    pub bind: SocketAddr,
+    /// Stop after this long (s); default: on Ctrl-C.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+}
+
+/// Arguments of `wag replay`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// Run folder, or its file cycles.bin or run.mcap.
+    pub run: PathBuf,
+    /// First cycle to compare; the core is stepped from the keyframe before.
+    #[arg(long, default_value_t = 0)]
+    pub from_cycle: u64,
+}
+
+/// Arguments of `wag explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// Run folder, or its file cycles.bin or run.mcap.
+    pub run: PathBuf,
+}
+
+/// Arguments of `wag report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Run folder.
+    pub run: PathBuf,
+    /// The report; default: report.html in the run folder.
+    #[arg(long, value_name = "FILE.html")]
+    pub out: Option<PathBuf>,
+}

@@ -1,0 +1,75 @@
+//! What a motion on an arm would do, told without one.
+
+use crate::cli::ArmArgs;
+use crate::config;
+use crate::failure::{Failure, OrInput, Outcome};
+use anyhow::anyhow;
+use planner::preflight::{JudgedArm, arm_margins, first_stop};
+use rt_controller::ControllerConfig;
+use serde_json::{Value, json};
+use shared_types::limits::Margin;
+use shared_types::{JointTrajectory, Limits};
+
+/// Tells step by step what `wag` would do with a trajectory that keeps the limits.
+///
+/// # Errors
+/// The arm, as delivered, would stop by a rule of its own.
+pub fn tell(
+    arm: &ArmArgs,
+    limits: &Limits,
+    trajectory: &JointTrajectory,
+    name: &str,
+    quiet: bool,
+) -> Outcome<Value> {
+    let wire = config::here::<ControllerConfig>(None).or_input()?.wire;
+    let judge = JudgedArm {
+        wire,
+        ..JudgedArm::default()
+    };
+    let judged = arm_margins(trajectory, limits, &judge);
+    if let Some(stop) = first_stop(&judged) {
+        let by = stop.rule.code().map_or_else(
+            || "the controller".to_owned(),
+            |code| format!("the arm, with C{code}"),
+        );
+        return Err(Failure::failed(anyhow!(
+            "dry run: the {name} keeps the limits but would be stopped by {by}: {}",
+            stop.describe()
+        )));
+    }
+    let margins = limits.margins(trajectory);
+    let tightest = margins.iter().min_by(|a, b| a.left.total_cmp(&b.left));
+    let duration_s = trajectory.duration_s();
+    if !quiet {
+        let address = arm
+            .address
+            .map_or_else(|| "the arm named with --arm".to_owned(), |a| a.to_string());
+        let start: Vec<String> = trajectory
+            .start()
+            .iter()
+            .map(|q| format!("{q:.3}"))
+            .collect();
+        println!(
+            "dry run: nothing is connected, nothing moves. Without --dry-run wag would\n  \
+             1. ask whether the area is clear, unless --yes says so or the arm is simulated\n  \
+             2. connect to {address} (ports {}, {}, {}), read its settings and compare them with the limits\n  \
+             3. move it at set-up speed to the start pose {} rad\n  \
+             4. arm it for one {name} and send it for {duration_s:.2} s, {:.0} setpoints a second\n  \
+             5. disarm it, and keep the record of every cycle in the run's folder",
+            arm.command_port,
+            arm.report_port,
+            arm.status_port,
+            start.join(", "),
+            1.0 / limits.period_s(),
+        );
+        println!(
+            "All {} limits are kept, and the arm would not stop. Tightest: {}.",
+            margins.len(),
+            tightest.map_or_else(String::new, Margin::describe)
+        );
+    }
+    Ok(json!({
+        "dry_run": true, "duration_s": duration_s, "start_rad": trajectory.start(), "wire": wire,
+        "tightest": tightest,
+    }))
+}

@@ -1,0 +1,75 @@
+//! The recorder as a thread, for a command that does nothing but record.
+
+use super::recorder::{RecorderConfig, run};
+use anyhow::{Context, anyhow};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Pause between two looks whether it has begun.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// A recording under way; dropping it finishes the file.
+#[derive(Debug)]
+pub struct RunFileThread {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<anyhow::Result<()>>>,
+}
+
+impl RunFileThread {
+    /// Begins to record. Returns when nothing can be missed any more.
+    ///
+    /// # Errors
+    /// Shared memory cannot be joined or the file cannot be written.
+    pub fn start(config: RecorderConfig) -> anyhow::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let file = config.file.clone();
+        let thread = std::thread::Builder::new()
+            .name("run-file".to_owned())
+            .spawn(move || run(&config, &stopped))
+            .context("cannot start the recording thread")?;
+        while !file.exists() && !thread.is_finished() {
+            std::thread::sleep(LOOK);
+        }
+        let started = Self {
+            stop,
+            thread: Some(thread),
+        };
+        // The file appears once everything is connected; without it there is a reason.
+        if file.exists() {
+            Ok(started)
+        } else {
+            started.finish()?;
+            Err(anyhow!(
+                "the recording of `{}` ended at once",
+                file.display()
+            ))
+        }
+    }
+
+    /// Ends the recording once everything that has come is written.
+    ///
+    /// # Errors
+    /// The file could not be written; what is in it can be recovered.
+    pub fn finish(mut self) -> anyhow::Result<()> {
+        self.end()
+    }
+
+    fn end(&mut self) -> anyhow::Result<()> {
+        self.stop.store(true, Ordering::SeqCst);
+        let ended = self.thread.take().map(JoinHandle::join);
+        ended.map_or(Ok(()), |result| {
+            result.map_err(|_panic| anyhow!("the recording thread broke down"))?
+        })
+    }
+}
+
+impl Drop for RunFileThread {
+    fn drop(&mut self) {
+        if let Err(reason) = self.end() {
+            tracing::warn!("the recording is not whole: {reason:#}");
+        }
+    }
+}
