@@ -7,96 +7,14 @@
     reason = "tests may fail loudly"
 )]
 
+mod support;
+
 use serde_json::Value;
 use std::fs;
-use std::io::Read;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-
-fn wag(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
-    command
-        .args(args)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// A rig that told its ports as JSON, which is all it ever prints there.
-struct Rig {
-    process: Child,
-    told: Value,
-}
-
-impl Rig {
-    fn start(more: &[&str]) -> Self {
-        let free = [
-            "rig",
-            "--json",
-            "--command-port",
-            "0",
-            "--report-ports",
-            "0,0,0,0",
-        ];
-        let mut process = wag(&[&free, more].concat()).spawn().unwrap();
-        // The object ends with a brace at the begin of a line.
-        let (mut text, mut byte) = (Vec::new(), [0]);
-        while !text.ends_with(b"\n}\n") {
-            process
-                .stdout
-                .as_mut()
-                .unwrap()
-                .read_exact(&mut byte)
-                .unwrap();
-            text.push(byte[0]);
-        }
-        Self {
-            process,
-            told: serde_json::from_slice(&text).unwrap(),
-        }
-    }
-
-    fn port(&self, report: Option<usize>) -> String {
-        match report {
-            None => self.told["command_port"].to_string(),
-            Some(n) => self.told["report_ports"][n].to_string(),
-        }
-    }
-
-    /// Ends it as Ctrl-C does; returns its exit code and what else it printed.
-    fn end(mut self) -> (Option<i32>, String) {
-        let pid = self.process.id().to_string();
-        assert!(
-            Command::new("kill")
-                .args(["-INT", &pid])
-                .status()
-                .unwrap()
-                .success()
-        );
-        let mut rest = String::new();
-        self.process
-            .stdout
-            .take()
-            .unwrap()
-            .read_to_string(&mut rest)
-            .unwrap();
-        (self.process.wait().unwrap().code(), rest)
-    }
-}
-
-impl Drop for Rig {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
+use support::{Rig, said, wag};
 
 fn shared_memory_of(domain: &str) -> Vec<String> {
     let prefix = format!("wag_{domain}_");
@@ -122,9 +40,7 @@ fn a_second_rig_in_a_domain_says_so_and_an_ended_one_leaves_nothing() {
         "random",
         "--camera",
         &domain,
-    ])
-    .output()
-    .unwrap();
+    ]);
     assert_eq!(second.status.code(), Some(1), "{}", said(&second));
     assert!(
         said(&second).contains(&domain) && said(&second).contains("in use by another rig"),
@@ -154,21 +70,7 @@ fn a_recorder_finds_the_controller_of_a_run_and_names_those_that_run() {
     let folder = tempfile::tempdir().unwrap();
     let (run, late) = (folder.path().join("run"), folder.path().join("late"));
     let rig = Rig::start(&[]);
-    let wiggle = wag(&[
-        "wiggle",
-        "--arm",
-        "localhost",
-        "--command-port",
-        &rig.port(None),
-        "--report-port",
-        &rig.port(Some(0)),
-        "--status-port",
-        &rig.port(Some(2)),
-        "--out",
-        run.to_str().unwrap(),
-    ])
-    .spawn()
-    .unwrap();
+    let wiggle = rig.wiggle(&run);
     recording(&run);
     let domain = format!("run-{}", wiggle.id());
     let nobody = format!("nobody-{}", std::process::id());
@@ -180,9 +82,7 @@ fn a_recorder_finds_the_controller_of_a_run_and_names_those_that_run() {
         "0.1",
         "--out",
         late.to_str().unwrap(),
-    ])
-    .output()
-    .unwrap();
+    ]);
     assert_eq!(lost.status.code(), Some(1), "{}", said(&lost));
     assert!(said(&lost).contains(&domain), "{}", said(&lost));
     assert!(!late.exists(), "nothing recorded, nothing left");
@@ -196,9 +96,7 @@ fn a_recorder_finds_the_controller_of_a_run_and_names_those_that_run() {
         "--json",
         "--out",
         late.to_str().unwrap(),
-    ])
-    .output()
-    .unwrap();
+    ]);
     assert!(found.status.success(), "{}", said(&found));
     let told: Value = serde_json::from_slice(&found.stdout).unwrap();
     assert_eq!(told["domain"], domain.as_str());
@@ -212,10 +110,10 @@ fn a_recorder_finds_the_controller_of_a_run_and_names_those_that_run() {
         !log.contains("WARN stopped") && !log.contains("OperatorStop"),
         "{log}"
     );
-    let replay = wag(&["replay", run.to_str().unwrap()]).output().unwrap();
+    let replay = wag(&["replay", run.to_str().unwrap()]);
     let text = String::from_utf8(replay.stdout).unwrap();
     assert!(text.contains("and 0 stops"), "{text}");
-    let gone = wag(&["record", run.to_str().unwrap()]).output().unwrap();
+    let gone = wag(&["record", run.to_str().unwrap()]);
     assert_eq!(gone.status.code(), Some(1), "{}", said(&gone));
     assert!(
         said(&gone).contains("does not run any more"),

@@ -8,86 +8,14 @@
     reason = "tests may fail loudly"
 )]
 
+mod support;
+
 use serde_json::Value;
 use std::fs;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-
-/// A simulated arm; it ends with the test.
-struct Rig {
-    process: Child,
-    /// Command port and the four report ports.
-    ports: Vec<String>,
-}
-
-impl Rig {
-    fn start(faults: Option<&Path>) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
-        command.args(["rig", "--command-port", "0", "--report-ports", "0,0,0,0"]);
-        if let Some(path) = faults {
-            command.arg("--faults").arg(path);
-        }
-        let mut process = command
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stdout.take().unwrap())
-            .read_line(&mut line)
-            .unwrap();
-        let ports = line
-            .split(|c: char| !c.is_ascii_digit())
-            .filter(|p| p.len() >= 4)
-            .map(str::to_owned)
-            .collect();
-        Self { process, ports }
-    }
-
-    fn wiggle(&self, run: &Path) -> Child {
-        Command::new(env!("CARGO_BIN_EXE_wag"))
-            .args(["wiggle", "--arm", "127.0.0.1"])
-            .args(["--command-port", &self.ports[0]])
-            .args(["--report-port", &self.ports[1]])
-            .args(["--status-port", &self.ports[3]])
-            .arg("--out")
-            .arg(run)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
-    }
-}
-
-impl Drop for Rig {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-fn wag(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(args)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap()
-}
-
-fn json(args: &[&str]) -> Value {
-    let output = wag(&[args, &["--json"]].concat());
-    assert!(
-        output.status.success(),
-        "wag {}: {}",
-        args.join(" "),
-        String::from_utf8_lossy(&output.stderr)
-    );
-    serde_json::from_slice(&output.stdout).unwrap()
-}
+use support::{Rig, json, said, wag};
 
 /// Replays a run and returns how many cycles were compared.
 fn replays_exactly(run: &str) -> u64 {
@@ -106,11 +34,11 @@ fn a_stopped_run_is_explained_and_replays_to_the_bit() {
     let faults = folder.path().join("faults.toml");
     let script = "[[fault]]\non = \"setpoint:700\"\nkind = \"raise_error\"\ncode = 31\n";
     fs::write(&faults, script).unwrap();
-    let rig = Rig::start(Some(&faults));
+    let rig = Rig::start(&["--faults", &faults.display().to_string()]);
     let path = folder.path().join("run");
     let run = path.display().to_string();
     let output = rig.wiggle(&path).wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("STOPPED: ArmError"), "{said}");
 
@@ -142,7 +70,7 @@ fn a_changed_file_is_noticed(run: &Path) {
     flipped[whole.len() / 2] ^= 1;
     fs::write(&file, flipped).unwrap();
     let output = wag(&["replay", &name]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("damaged"), "{said}");
     fs::write(&file, &whole[..whole.len() * 2 / 3]).unwrap();
@@ -154,17 +82,13 @@ fn a_changed_file_is_noticed(run: &Path) {
 #[test]
 fn a_whole_run_shows_its_margins_and_a_recorder_may_join_late() {
     let folder = tempfile::tempdir().unwrap();
-    let rig = Rig::start(None);
+    let rig = Rig::start(&[]);
     let path = folder.path().join("run");
     let wiggle = rig.wiggle(&path);
     let late = folder.path().join("late").display().to_string();
     attach_late(&path, wiggle.id(), &late);
     let output = wiggle.wait_with_output().unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", said(&output));
     let run = path.display().to_string();
     assert!(replays_exactly(&run) > 1000);
     let told = json(&["explain", &run]);
@@ -184,6 +108,14 @@ fn a_whole_run_shows_its_margins_and_a_recorder_may_join_late() {
     assert_eq!(found["differing_bytes"], 0, "{found}");
     assert!(found["first_cycle"].as_u64().unwrap() > 1, "{found}");
     assert!(found["cycles"].as_u64().unwrap() > 100, "{found}");
+    // The same cycles, and what a viewer needs, lie in the file of the run.
+    let file = format!("{late}/run.mcap");
+    let told = json(&["replay", &file]);
+    let found = &told["replay"];
+    assert_eq!(found["differing_bytes"], 0, "{found}");
+    assert!(found["cycles"].as_u64().unwrap() > 100, "{found}");
+    let told = json(&["record", "recover", &file]);
+    assert_eq!(told["recovered"]["was_whole"], true, "{told}");
 }
 
 /// Records one and a half seconds of a run under way.
@@ -206,7 +138,7 @@ fn attach_late(run: &Path, pid: u32, out: &str) {
         "--out",
         out,
     ]);
-    let said = String::from_utf8_lossy(&output.stderr);
+    let said = said(&output);
     assert!(output.status.success(), "{said}");
 }
 
@@ -224,7 +156,11 @@ fn a_recorder_without_a_controller_says_so() {
         "--out",
         &out,
     ]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("no controller runs"), "{said}");
+    assert!(
+        !Path::new(&out).exists(),
+        "nothing recorded is nothing to keep"
+    );
 }

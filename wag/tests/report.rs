@@ -7,13 +7,15 @@
     reason = "tests may fail loudly"
 )]
 
+mod support;
+
 use serde_json::{Value, json};
 use shared_types::plan::{START_POSE, trajectory_hash_hex};
 use shared_types::{JointTrajectory, JointVector, kinematics};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use support::wag;
 
 /// A name and a text that would do harm as markup.
 const HOSTILE: &str = "<script>alert(1)<!--";
@@ -22,14 +24,6 @@ const ROPE: &str = "links = 22\nlength_m = 0.5\njoint_damping_nms_per_rad = 0.02
     joint_stiffness_nm_per_rad = 0.2\nradius_m = 0.008\nmass_per_length_kg_per_m = 0.05\n\
     lead_mass_kg = 0.08\nlead_radius_m = 0.03\nlink_extra_scale = 1.0\n\
     [interval_90]\nlength_m = [4.9e-1, 5.1e-1]\n";
-
-fn wag(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(args)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap()
-}
 
 fn throw() -> JointTrajectory {
     let mut end = START_POSE;

@@ -6,20 +6,14 @@
     reason = "tests may fail loudly"
 )]
 
-use serde_json::Value;
-use std::process::{Command, Output};
+mod support;
 
-fn wag(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(args)
-        .output()
-        .unwrap()
-}
+use serde_json::Value;
+use support::{said, wag};
 
 fn report(args: &[&str]) -> Value {
     let output = wag(args);
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{error}");
+    assert!(output.status.success(), "{}", said(&output));
     serde_json::from_slice(&output.stdout).expect("standard output is JSON")
 }
 

@@ -7,72 +7,24 @@
     reason = "tests may fail loudly"
 )]
 
+mod support;
+
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+use support::{Rig, json, said, wag};
 
 /// Runs a wiggle on a simulated arm; `during` sees the run folder and the process.
 fn wiggle(run: &Path, during: impl FnOnce(&Path, u32)) -> Output {
-    let mut rig = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(["rig", "--command-port", "0", "--report-ports", "0,0,0,0"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(rig.stdout.take().unwrap())
-        .read_line(&mut line)
-        .unwrap();
-    let ports: Vec<&str> = line
-        .split(|c: char| !c.is_ascii_digit())
-        .filter(|p| p.len() >= 4)
-        .collect();
-    let child = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(["wiggle", "--arm", "127.0.0.1", "--command-port", ports[0]])
-        .args([
-            "--report-port",
-            ports[1],
-            "--status-port",
-            ports[3],
-            "--out",
-        ])
-        .arg(run)
-        .current_dir(run.parent().unwrap())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let rig = Rig::start(&[]);
+    let child = rig.wiggle(run);
     during(run, child.id());
-    let output = child.wait_with_output().unwrap();
-    end(rig);
-    output
-}
-
-fn end(mut process: Child) {
-    let _ = process.kill();
-    let _ = process.wait();
-}
-
-fn wag(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(args)
-        .stdin(Stdio::null())
-        .output()
-        .unwrap()
-}
-
-fn json(args: &[&str]) -> Value {
-    let output = wag(&[args, &["--json"]].concat());
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "wag {}: {said}", args.join(" "));
-    serde_json::from_slice(&output.stdout).unwrap()
+    child.wait_with_output().unwrap()
 }
 
 /// Messages of each topic; all JSON must parse.
@@ -107,7 +59,7 @@ fn python_agrees(file: &Path) {
         .args(["/log", "/wag/replay", "/wag/summary"])
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
+    let said = said(&output);
     assert!(output.status.success(), "{said}");
 }
 
@@ -116,7 +68,7 @@ fn a_run_lies_in_one_file_that_replays_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     let output = wiggle(&run, |_, _| ());
-    let said = String::from_utf8_lossy(&output.stderr);
+    let said = said(&output);
     assert!(output.status.success(), "{said}");
     let file = run.join("run.mcap");
     let bytes = fs::read(&file).unwrap();
@@ -181,7 +133,7 @@ fn ledger_knows(runs: &Path, run: &Path) {
     assert_eq!(same["differences"], Value::Array(Vec::new()));
     // The arm is gone by now: making the run again fails as it would by hand.
     let gone = wag(&["ledger", "rerun", &run, "--go"]);
-    let said = String::from_utf8_lossy(&gone.stderr);
+    let said = said(&gone);
     assert_eq!(gone.status.code(), Some(1), "{said}");
     assert_eq!(
         fs::read_dir(runs.join("runs")).unwrap().count(),
@@ -225,7 +177,7 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
             .unwrap();
         assert!(status.success());
     });
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     for words in [
         "the run goes on",

@@ -7,30 +7,11 @@
     reason = "tests may fail loudly"
 )]
 
-use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+mod support;
 
-/// `wag rig` on free ports, and these: commands, then the four reports.
-fn rig() -> (Child, Vec<String>) {
-    let mut rig = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(["rig", "--command-port", "0", "--report-ports", "0,0,0,0"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(rig.stdout.take().unwrap())
-        .read_line(&mut line)
-        .unwrap();
-    let ports: Vec<String> = line
-        .split(|c: char| !c.is_ascii_digit())
-        .filter(|p| p.len() >= 4)
-        .map(str::to_owned)
-        .collect();
-    assert_eq!(ports.len(), 5, "unexpected greeting: {line}");
-    (rig, ports)
-}
+use std::path::Path;
+use std::process::Command;
+use support::Rig;
 
 /// Two clients of the vendor's SDK: one streams, the other watches, then stops it.
 const TWO_CLIENTS: &str = r"
@@ -69,7 +50,8 @@ fn two_clients_of_the_vendor_sdk_share_the_simulated_arm() {
         println!("skipped: WAG_SDK_PYTHON does not name a Python with xarm-python-sdk installed");
         return;
     };
-    let (mut rig, ports) = rig();
+    let rig = Rig::start(&[]);
+    let ports = rig.ports();
     let output = Command::new(python)
         .args([
             "-c",
@@ -81,8 +63,7 @@ fn two_clients_of_the_vendor_sdk_share_the_simulated_arm() {
         ])
         .output()
         .unwrap();
-    rig.kill().unwrap();
-    rig.wait().unwrap();
+    drop(rig);
     let said = String::from_utf8_lossy(&output.stdout);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("both agree"), "{said}\n{errors}");
@@ -99,7 +80,8 @@ fn the_vendor_sdk_accepts_the_simulated_arm() {
         println!("skipped: WAG_SDK_PYTHON does not name a Python with xarm-python-sdk installed");
         return;
     };
-    let (mut rig, ports) = rig();
+    let rig = Rig::start(&[]);
+    let ports = rig.ports();
     let reports = ports[2..].join(",");
     let output = Command::new(python)
         .arg(&check)
@@ -112,8 +94,7 @@ fn the_vendor_sdk_accepts_the_simulated_arm() {
         ])
         .output()
         .unwrap();
-    rig.kill().unwrap();
-    rig.wait().unwrap();
+    drop(rig);
     let said = String::from_utf8_lossy(&output.stdout);
     println!("{said}");
     assert!(

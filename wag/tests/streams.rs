@@ -147,6 +147,11 @@ fn a_dry_run_needs_no_arm_and_connects_to_nothing() {
         let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(told["ok"], true, "{told}");
     }
+    let output = wag(dir.path(), &["wiggle", "--dry-run"]).output().unwrap();
+    let page = String::from_utf8_lossy(&output.stdout).into_owned();
+    for words in ["nothing moves", "250 setpoints a second", "Tightest: "] {
+        assert!(page.contains(words), "`{words}` is not in\n{page}");
+    }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 

@@ -97,6 +97,11 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
     }
     let high = told["command_to_target"]["interval_s"][1].as_f64().unwrap();
     assert!(high > 0.0 && high < 0.02, "{high}");
+    for file in ["cycles.bin", "run.mcap"] {
+        let file = run.join(file).display().to_string();
+        let told = parsed(&wag(&["replay", "--json", &file]));
+        assert_eq!(told["replay"]["differing_bytes"], 0, "{file}");
+    }
     report(
         "over sockets",
         &check(&run.join("arm-response.toml"), &secrets),
