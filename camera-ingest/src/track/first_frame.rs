@@ -8,7 +8,7 @@ use shared_types::StereoCamera;
 use super::background::Background;
 use super::clamp::ClampSample;
 use super::evidence::{Colour, Matter, Window};
-use super::geodesic::{Geodesic, Ground, depth_px};
+use super::geodesic::{Depth, Geodesic, Ground};
 use super::lead::{self, TooShort};
 use super::models::{FirstMask, FirstScene, ModelError, check_count};
 use super::plane::{Point, RopePlane};
@@ -28,11 +28,6 @@ const POLE_HALF_WIDTH_M: f64 = 0.035;
 pub(super) const LEAD_FULL: f32 = 0.6;
 /// Shades of the lead (see [`Matter::shades`]).
 pub(super) const LEAD_SHADES: [f32; 3] = [1.0, 0.65, 0.4];
-/// Threshold of the moving mask in units of the image noise.
-const MASK_NOISE: f32 = 2.5;
-/// Least threshold (grey levels): reflected light and compression stay below.
-const MASK_LEAST: f32 = 6.0;
-
 /// What was found.
 #[derive(Debug, Clone)]
 pub(super) struct FirstLook {
@@ -110,7 +105,7 @@ pub(super) fn find(
     let mut mask = masker.mask(&scene).map_err(NotFound::NoMask)?;
     check_count("pixels of a mask", mask.len(), frame.luma.len()).map_err(NotFound::NoMask)?;
     clear_border(&mut mask, width);
-    let depth = depth_px(&mask, width);
+    let depth = Depth::of(&mask, width);
     let ground = ground(&mask, width, camera, plane, clamp);
     let image_scale = width as f64 / 672.0;
     let start = clamp_px[1].round() as usize * width + clamp_px[0].round() as usize;
@@ -126,14 +121,14 @@ pub(super) fn find(
         background,
         gain,
         mask: &mask,
-        depth_px: &depth,
+        depth: &depth,
         ways: &ways,
         px_per_m: plane.px_per_m,
         length_m: length_m.unwrap_or([lead::LEAST_ROPE_M, f64::INFINITY]),
     }
     .best()
     .map_err(|TooShort(longest_m)| NotFound::NothingHangs(longest_m))?;
-    let lead_radius_px = f64::from(depth[at]);
+    let lead_radius_px = f64::from(depth.px(at));
     let pixels = ways.path_to(at);
     // Colour of the rope: its middle part, away from clamp and lead.
     let middle = &pixels[pixels.len() / 6..pixels.len() * 3 / 4];
@@ -146,7 +141,8 @@ pub(super) fn find(
     let seen_radius_px = (lead_radius_px - MASK_GROWS_PX).max(1.0);
     let (lead, mut lead_px) = lead_place(frame, background, gain, rope, centre, seen_radius_px);
     let on_way = pixels.len() / 2;
-    let rope_px = f64::from(depth[pixels[on_way][1] as usize * width + pixels[on_way][0] as usize]);
+    let rope_px =
+        f64::from(depth.px(pixels[on_way][1] as usize * width + pixels[on_way][0] as usize));
     if lead::blends_in(lead.0, rope, lead_radius_px / rope_px.max(1.0)) {
         lead_px = centre;
     }
@@ -262,47 +258,6 @@ fn clear_border(mask: &mut [bool], width: usize) {
         row[0] = false;
         row[width - 1] = false;
     }
-}
-
-/// Pixels that differ from the background, smoothed over 3x3 pixels.
-pub(super) fn moving(scene: &FirstScene<'_>) -> Vec<bool> {
-    let (width, height) = (scene.frame.width_px, scene.frame.height_px);
-    let square = squares(scene.frame, scene.empty, scene.gain);
-    let threshold = 9.0 * (MASK_NOISE * scene.noise).max(MASK_LEAST).powi(2);
-    // Sums of three along the rows, then of three rows; the border is never moving.
-    let mut threes = vec![0.0; width * height];
-    for (row, out) in square.chunks(width).zip(threes.chunks_mut(width)) {
-        for (near, out) in row.windows(3).zip(&mut out[1..]) {
-            *out = near[0] + near[1] + near[2];
-        }
-    }
-    let mut mask = vec![false; width * height];
-    for v in 1..height - 1 {
-        let row = |v: usize| &threes[v * width..(v + 1) * width];
-        let (above, here, below) = (row(v - 1), row(v), row(v + 1));
-        for u in 1..width - 1 {
-            mask[v * width + u] = above[u] + here[u] + below[u] > threshold;
-        }
-    }
-    mask
-}
-
-/// Squared distance of every pixel's colour, in the background's light, from the
-/// background.
-fn squares(frame: &EyeFrame, empty: &EyeFrame, gain: f32) -> Vec<f32> {
-    let chroma =
-        |seen: u8, empty: u8| ((f32::from(seen) - 128.0) / gain + 128.0 - f32::from(empty)).powi(2);
-    let mut out = vec![0.0; frame.luma.len()];
-    let luma = frame.luma.chunks_exact(2).zip(empty.luma.chunks_exact(2));
-    let blue = frame.cb.iter().zip(&empty.cb);
-    let red = frame.cr.iter().zip(&empty.cr);
-    for (pair, ((y, ey), (b, r))) in out.chunks_exact_mut(2).zip(luma.zip(blue.zip(red))) {
-        let (b, r) = (chroma(*b.0, *b.1), chroma(*r.0, *r.1));
-        for k in 0..2 {
-            pair[k] = (f32::from(y[k]) / gain - f32::from(ey[k])).powi(2) + b + r;
-        }
-    }
-    out
 }
 
 /// Mask with the pole and what holds it taken out of reach.

@@ -68,16 +68,34 @@ impl Queue {
 /// Shortest paths from one pixel to all reachable ones.
 pub(super) struct Geodesic {
     width: usize,
-    /// Cost of the best path; `u32::MAX` where unreachable.
-    cost: Vec<u32>,
-    /// Length of the best path (tenths of a pixel).
-    length: Vec<u32>,
-    before: Vec<u32>,
+    /// Number of every pixel among those found, which are few; 0 where unreachable. With a
+    /// border of one pixel.
+    number: Vec<u32>,
+    /// The first one stands for all unreachable pixels.
+    found: Vec<Found>,
+}
+
+/// The best path to a pixel.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    cost: u32,
+    /// Length of it (tenths of a pixel).
+    length: u32,
+    /// Place of the pixel before; `u32::MAX` at the start.
+    before: u32,
+    /// Length of the gap it is in.
+    gap: u32,
+    /// It has met no mask yet.
+    first: bool,
 }
 
 impl Geodesic {
     /// Dijkstra over the 8-neighbourhood. Gaps in the mask may be `gap_px` long,
     /// the first one, at the start, `first_gap_px`.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "an image has < 2^32 pixels"
+    )]
     pub(super) fn from(
         start: usize,
         ground: &[Ground],
@@ -85,66 +103,102 @@ impl Geodesic {
         gap_px: u32,
         first_gap_px: u32,
     ) -> Self {
-        let n = ground.len();
+        let nothing = Found {
+            cost: u32::MAX,
+            length: 0,
+            before: u32::MAX,
+            gap: 0,
+            first: false,
+        };
+        // With a border, so that every pixel has all its neighbours.
+        let wide = width + 2;
+        let mut fenced = vec![Ground::Blocked; wide * (ground.len() / width + 2)];
+        let inner = fenced.chunks_exact_mut(wide).skip(1);
+        for (out, row) in inner.zip(ground.chunks_exact(width)) {
+            out[1..=width].copy_from_slice(row);
+        }
+        let ground = fenced;
         let mut out = Self {
             width,
-            cost: vec![u32::MAX; n],
-            length: vec![0; n],
-            before: vec![u32::MAX; n],
+            number: vec![0; ground.len()],
+            found: vec![nothing],
         };
-        // Length of the gap a path is in; `first` while it has met no mask yet.
-        let mut gap = vec![0_u32; n];
-        let mut first = vec![false; n];
-        out.cost[start] = 0;
-        first[start] = true;
+        let start = out.place(start);
+        out.number[start] = 1;
+        out.found.push(Found {
+            cost: 0,
+            first: true,
+            ..nothing
+        });
         let mut queue = Queue::default();
         queue.push(0, start);
         while let Some((cost, at)) = queue.pop() {
-            if cost > out.cost[at] {
+            let here = out.found[out.number[at] as usize];
+            if cost > here.cost {
                 continue;
             }
-            for (next, diagonal) in neighbours(at, width, n / width) {
-                let step = STEP[usize::from(diagonal)];
+            let [straight, diagonal] = STEP;
+            let (above, below) = (at - wide, at + wide);
+            for (next, step) in [
+                (above - 1, diagonal),
+                (above, straight),
+                (above + 1, diagonal),
+                (at - 1, straight),
+                (at + 1, straight),
+                (below - 1, diagonal),
+                (below, straight),
+                (below + 1, diagonal),
+            ] {
                 let (price, open, is_first) = match ground[next] {
                     Ground::Blocked => continue,
                     Ground::On => (step, 0, false),
-                    Ground::Off => (step * GAP_FACTOR, gap[at] + step, first[at]),
+                    Ground::Off => (step * GAP_FACTOR, here.gap + step, here.first),
                 };
                 let limit = if is_first { first_gap_px } else { gap_px } * STEP[0];
-                if open > limit || cost + price >= out.cost[next] {
+                let number = out.number[next] as usize;
+                if open > limit || cost + price >= out.found[number].cost {
                     continue;
                 }
-                out.cost[next] = cost + price;
-                out.length[next] = out.length[at] + step;
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    reason = "an image has < 2^32 pixels"
-                )]
-                {
-                    out.before[next] = at as u32;
+                let better = Found {
+                    cost: cost + price,
+                    length: here.length + step,
+                    before: at as u32,
+                    gap: open,
+                    first: is_first,
+                };
+                if number == 0 {
+                    out.number[next] = out.found.len() as u32;
+                    out.found.push(better);
+                } else {
+                    out.found[number] = better;
                 }
-                gap[next] = open;
-                first[next] = is_first;
-                queue.push(cost + price, next);
+                queue.push(better.cost, next);
             }
         }
         out
     }
 
+    /// Place of a pixel among all with their border.
+    fn place(&self, at: usize) -> usize {
+        at + 2 * (at / self.width) + self.width + 3
+    }
+
     /// Length of the way to a pixel (px), `None` if there is none.
     pub(super) fn length_px(&self, at: usize) -> Option<f64> {
-        (self.cost[at] != u32::MAX).then(|| f64::from(self.length[at]) / 10.0)
+        let number = self.number[self.place(at)] as usize;
+        (number > 0).then(|| f64::from(self.found[number].length) / 10.0)
     }
 
     /// Pixels from the start to `at` as `[u, v]`.
     #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
-    pub(super) fn path_to(&self, mut at: usize) -> Vec<[f64; 2]> {
+    pub(super) fn path_to(&self, at: usize) -> Vec<[f64; 2]> {
+        let (mut place, wide) = (self.place(at), self.width + 2);
         let mut path = Vec::new();
         loop {
-            path.push([(at % self.width) as f64, (at / self.width) as f64]);
-            match self.before[at] {
+            path.push([(place % wide - 1) as f64, (place / wide - 1) as f64]);
+            match self.found[self.number[place] as usize].before {
                 u32::MAX => break,
-                before => at = before as usize,
+                before => place = before as usize,
             }
         }
         path.reverse();
@@ -152,60 +206,72 @@ impl Geodesic {
     }
 }
 
-fn neighbours(at: usize, width: usize, height: usize) -> impl Iterator<Item = (usize, bool)> {
-    let (u, v) = (at % width, at / width);
-    (v.saturating_sub(1)..=(v + 1).min(height - 1)).flat_map(move |y| {
-        (u.saturating_sub(1)..=(u + 1).min(width - 1)).filter_map(move |x| {
-            let next = y * width + x;
-            (next != at).then_some((next, x != u && y != v))
-        })
-    })
+/// How deep inside a mask its pixels lie.
+pub(super) struct Depth {
+    width: usize,
+    /// Fifths of a pixel, with a border of two pixels.
+    fifths: Vec<i32>,
 }
 
-/// Distance of every mask pixel to the nearest pixel off the mask (px), by the
-/// two-pass 5-7-11 chamfer (within 2 % of the Euclidean distance).
-#[allow(clippy::cast_sign_loss, reason = "offsets back are not positive")]
-pub(super) fn depth_px(mask: &[bool], width: usize) -> Vec<f32> {
-    const FAR: i32 = 1 << 28;
-    const BACK: [(i32, i32, i32); 8] = [
-        (-1, 0, 5),
-        (0, -1, 5),
-        (-1, -1, 7),
-        (1, -1, 7),
-        (-2, -1, 11),
-        (2, -1, 11),
-        (-1, -2, 11),
-        (1, -2, 11),
-    ];
-    // With a border of two pixels: what lies beyond the image is not mask.
-    let (wide, rows) = (width + 4, mask.len() / width);
-    let mut d = vec![0_i32; wide * (rows + 4)];
-    for (row, out) in mask.chunks(width).zip(d.chunks_mut(wide).skip(2)) {
-        for (&on, out) in row.iter().zip(&mut out[2..]) {
-            *out = if on { FAR } else { 0 };
+/// Columns on either side of a row, and rows above and below all.
+const BORDER: usize = 2;
+
+impl Depth {
+    /// Distance of every mask pixel to the nearest pixel off the mask, by the two-pass
+    /// 5-7-11 chamfer (within 2 % of the Euclidean distance). What lies beyond the image is
+    /// not mask.
+    #[allow(clippy::cast_sign_loss, reason = "offsets back are not positive")]
+    pub(super) fn of(mask: &[bool], width: usize) -> Self {
+        const FAR: i32 = 1 << 28;
+        const BACK: [(i32, i32, i32); 8] = [
+            (-1, 0, 5),
+            (0, -1, 5),
+            (-1, -1, 7),
+            (1, -1, 7),
+            (-2, -1, 11),
+            (2, -1, 11),
+            (-1, -2, 11),
+            (1, -2, 11),
+        ];
+        /// Pixels passed over at once where none is mask: most of an image.
+        const CHUNK: usize = 16;
+        let (wide, rows) = (width + 2 * BORDER, mask.len() / width);
+        let mut d = vec![0_i32; wide * (rows + 2 * BORDER)];
+        let mut on = Vec::new();
+        for (row, line) in (BORDER..).zip(mask.chunks_exact(width)) {
+            for (chunk, pixels) in line.chunks(CHUNK).enumerate() {
+                if pixels.iter().fold(false, |any, on| any | on) {
+                    let first = row * wide + BORDER + chunk * CHUNK;
+                    on.extend((first..).zip(pixels).filter(|x| *x.1).map(|x| x.0));
+                }
+            }
         }
+        for at in &on {
+            d[*at] = FAR;
+        }
+        let offsets = BACK.map(|(dx, dy, step)| ((-dy) as usize * wide, dx as isize, step));
+        let mut relax = |at: usize, forth: bool| {
+            for (up, along, step) in offsets {
+                let beyond = if forth {
+                    (at - up).wrapping_add_signed(along)
+                } else {
+                    (at + up).wrapping_add_signed(-along)
+                };
+                d[at] = d[at].min(d[beyond] + step);
+            }
+        };
+        on.iter().for_each(|at| relax(*at, true));
+        on.iter().rev().for_each(|at| relax(*at, false));
+        Self { width, fifths: d }
     }
-    // Most of an image is not mask.
-    let on: Vec<usize> = (0..d.len()).filter(|at| d[*at] != 0).collect();
-    let offsets = BACK.map(|(dx, dy, step)| ((-dy) as usize * wide, dx as isize, step));
-    let mut relax = |at: usize, forth: bool| {
-        for (up, along, step) in offsets {
-            let beyond = if forth {
-                (at - up).wrapping_add_signed(along)
-            } else {
-                (at + up).wrapping_add_signed(-along)
-            };
-            d[at] = d[at].min(d[beyond] + step);
-        }
-    };
-    on.iter().for_each(|at| relax(*at, true));
-    on.iter().rev().for_each(|at| relax(*at, false));
-    let inner = d.chunks(wide).skip(2).take(rows);
+
+    /// Distance of a pixel (px).
     #[allow(clippy::cast_precision_loss, reason = "distances are small")]
-    inner
-        .flat_map(|row| &row[2..2 + width])
-        .map(|x| *x as f32 / 5.0)
-        .collect()
+    pub(super) fn px(&self, at: usize) -> f32 {
+        let (u, v) = (at % self.width, at / self.width);
+        let wide = self.width + 2 * BORDER;
+        self.fifths[(v + BORDER) * wide + u + BORDER] as f32 / 5.0
+    }
 }
 
 #[cfg(test)]
@@ -238,6 +304,24 @@ mod tests {
     }
 
     #[test]
+    fn ways_over_open_ground_go_straight_and_diagonally() {
+        let (width, height) = (11, 9);
+        let ground = vec![Ground::On; width * height];
+        let (u0, v0) = (5, 4);
+        let ways = Geodesic::from(v0 * width + u0, &ground, width, 0, 0);
+        for at in 0..width * height {
+            let (along, down) = ((at % width).abs_diff(u0), (at / width).abs_diff(v0));
+            let (far, near) = (along.max(down), along.min(down));
+            let wanted = (far - near) as f64 + 1.4 * near as f64;
+            assert!((ways.length_px(at).unwrap() - wanted).abs() < 1e-9, "{at}");
+            let path = ways.path_to(at);
+            assert_eq!(path.len(), far + 1);
+            assert_eq!(path[0], [u0 as f64, v0 as f64]);
+            assert_eq!(path[far], [(at % width) as f64, (at / width) as f64]);
+        }
+    }
+
+    #[test]
     fn depth_of_a_disc_is_its_radius() {
         let width = 41;
         // Nearest pixel off the disc: (9, 8) away, at sqrt(145) = 12.04 px.
@@ -247,12 +331,9 @@ mod tests {
                 x.hypot(y) <= 12.0
             })
             .collect();
-        let depth = depth_px(&mask, width);
-        assert!(
-            (depth[20 * width + 20] - 12.04).abs() < 0.25,
-            "{}",
-            depth[20 * width + 20]
-        );
-        assert_eq!(depth[0], 0.0);
+        let depth = Depth::of(&mask, width);
+        let middle = depth.px(20 * width + 20);
+        assert!((middle - 12.04).abs() < 0.25, "{middle}");
+        assert_eq!(depth.px(0), 0.0);
     }
 }

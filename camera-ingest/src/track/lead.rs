@@ -10,7 +10,7 @@
 use super::background::Background;
 use super::evidence::Colour;
 use super::first_frame::{colour_at, colour_of};
-use super::geodesic::Geodesic;
+use super::geodesic::{Depth, Geodesic};
 use crate::frame::EyeFrame;
 
 /// What is rope whatever follows: this part of the way from the clamp (m).
@@ -40,8 +40,8 @@ pub(super) struct Search<'a> {
     pub(super) background: &'a Background,
     pub(super) gain: f32,
     pub(super) mask: &'a [bool],
-    /// Distance to the mask's edge (px).
-    pub(super) depth_px: &'a [f32],
+    /// Distance to the mask's edge.
+    pub(super) depth: &'a Depth,
     pub(super) ways: &'a Geodesic,
     pub(super) px_per_m: f64,
     /// Least and greatest length of the way to the lead (m).
@@ -119,7 +119,7 @@ impl Search<'_> {
         [at - width, at, at + width]
             .into_iter()
             .flat_map(|row| row - 1..=row + 1)
-            .all(|near| self.depth_px[near] <= self.depth_px[at])
+            .all(|near| self.depth.px(near) <= self.depth.px(at))
     }
 
     /// Colour and half-width of the rope, from its first part.
@@ -128,7 +128,7 @@ impl Search<'_> {
             (SURELY_ROPE_M[0]..=SURELY_ROPE_M[1]).contains(&length_m)
         };
         let first: Vec<usize> = ridges.iter().filter(near).map(|r| r.0).collect();
-        let mut depths: Vec<f32> = first.iter().map(|&at| self.depth_px[at]).collect();
+        let mut depths: Vec<f32> = first.iter().map(|&at| self.depth.px(at)).collect();
         depths.sort_by(f32::total_cmp);
         let depth_px = *depths.get(depths.len() / 2)?;
         let (colour, scatter) = self.colour(first.into_iter());
@@ -141,7 +141,7 @@ impl Search<'_> {
 
     /// First sign: doublings of the rope's width, less what may be ragged.
     fn fatter(&self, at: usize, rope: &Rope) -> f64 {
-        let sure_px = (self.depth_px[at] - RAGGED_PX).max(rope.depth_px);
+        let sure_px = (self.depth.px(at) - RAGGED_PX).max(rope.depth_px);
         f64::from(sure_px / rope.depth_px).log2()
     }
 
@@ -149,7 +149,7 @@ impl Search<'_> {
     /// of a shadow on the background, 0 where it is one of them.
     fn unlike(&self, at: usize, rope: &Rope) -> f64 {
         let width = self.frame.width_px;
-        let reach = (self.depth_px[at] / 2.0 - 0.5).max(0.0);
+        let reach = (self.depth.px(at) / 2.0 - 0.5).max(0.0);
         let (u, v) = (at % width, at / width);
         let near = |x: usize| x.saturating_sub(reach as usize)..=x + reach as usize;
         let inside = near(v).flat_map(|y| near(u).map(move |x| y * width + x));

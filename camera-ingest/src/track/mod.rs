@@ -20,6 +20,7 @@ mod geodesic;
 mod lateral;
 mod lead;
 mod models;
+mod moving;
 mod one_pass;
 mod outline;
 mod plane;

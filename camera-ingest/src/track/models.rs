@@ -5,7 +5,7 @@
 //! ([`Moving`], the pursuit) knows the scene without rope; what is learned may
 //! look at pictures only.
 
-use super::first_frame::moving;
+use super::moving::moving;
 use crate::frame::EyeFrame;
 
 /// Why a learned model gives no answer.

@@ -163,15 +163,20 @@ impl<'a> Patch<'a> {
         }
     }
 
+    #[inline]
     fn pixel(&self, u: usize, v: usize) -> f64 {
         let w = self.window;
-        if (w.u0..w.u1).contains(&u) && (w.v0..w.v1).contains(&v) {
-            self.values[(v - w.v0) * (w.u1 - w.u0) + u - w.u0]
+        // Before the window these are huge.
+        let (x, y) = (u.wrapping_sub(w.u0), v.wrapping_sub(w.v0));
+        let width = w.u1 - w.u0;
+        if x < width && y < w.v1 - w.v0 {
+            self.values[y * width + x]
         } else {
             self.contrast.pixel(u, v)
         }
     }
 
+    #[inline]
     fn at(&self, place: [f64; 2]) -> f64 {
         self.contrast.bilinear(place, |u, v| self.pixel(u, v))
     }
@@ -198,17 +203,26 @@ impl<'a> Patch<'a> {
             .filter_map(|ray_rad| {
                 let (sin, cos) = ray_rad.sin_cos();
                 let place = |k: f64| [centre[0] + k * STEP_PX * cos, centre[1] + k * STEP_PX * sin];
-                let profile: Vec<f64> = (0..=samples).map(|k| self.at(place(k as f64))).collect();
-                let inner = profile.get(inside.clone())?;
-                let level = inner.iter().sum::<f64>() / inner.len() as f64;
+                let at = |k: usize| self.at(place(k as f64));
+                if *inside.end() > samples {
+                    return None;
+                }
+                let sum: f64 = inside.clone().map(at).sum();
+                let level = sum / inside.clone().count() as f64;
                 if level < 2.0 * floor {
                     return None;
                 }
                 let half = level / 2.0;
-                let first = (*inside.end()..samples).find(|&k| profile[k + 1] < half)?;
-                let fall = profile[first] - profile[first + 1];
+                // From the inside outwards: the first place that is followed by less.
+                let mut before = at(*inside.end());
+                let (first, [here, next]) = (*inside.end()..samples).find_map(|k| {
+                    let after = at(k + 1);
+                    let here = std::mem::replace(&mut before, after);
+                    (after < half).then_some((k, [here, after]))
+                })?;
+                let fall = here - next;
                 let part = if fall > 1e-9 {
-                    (profile[first] - half) / fall
+                    (here - half) / fall
                 } else {
                     0.5
                 };
