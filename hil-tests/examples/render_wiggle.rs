@@ -14,55 +14,18 @@
 
 use camera_ingest::StereoFrame;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
-use hil_tests::hidden::hidden_rope;
-use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
 use hil_tests::rig::{CameraConfig, Resolution};
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
-use rope_sim::LiveRope;
-use shared_types::kinematics::{FrameMotion, attach_motion};
-use shared_types::plan::START_POSE;
-use shared_types::{JointState, JointVector, StereoCamera};
+use hil_tests::wiggle_film::{WiggleFilm, attach};
+use nalgebra::{Rotation3, UnitQuaternion};
+use shared_types::StereoCamera;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-const RATE_HZ: f64 = 60.0;
-const AMPLITUDE_DEG: f64 = 16.5;
-const FREQUENCY_HZ: f64 = 1.3;
-const DURATION_S: f64 = 5.6;
-const RAMP_S: f64 = 2.8;
-const PHYSICS_STEP_S: f64 = 1e-4;
 /// Frames written as PNG.
 const PICTURES: usize = 8;
-
-/// Quintic step from 0 to 1, flat at both ends.
-fn smooth_step(x: f64) -> f64 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * x * (10.0 + x * (6.0 * x - 15.0))
-}
-
-/// Joints of the shipped wiggle: a sine of joint 6, faded in and out, from
-/// t = 0 with the rope hanging still.
-fn joints(t_s: f64) -> JointVector {
-    let fade = smooth_step(t_s / RAMP_S) * smooth_step((DURATION_S - t_s) / RAMP_S);
-    let swing = (core::f64::consts::TAU * FREQUENCY_HZ * t_s).sin();
-    let mut q = START_POSE;
-    q[5] += AMPLITUDE_DEG.to_radians() * swing * fade;
-    q
-}
-
-/// The attach frame with velocities and accelerations by central differences.
-fn attach(t_s: f64) -> FrameMotion {
-    const H: f64 = 1e-3;
-    let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
-    attach_motion(&JointState {
-        q: now,
-        qd: (after - before).map(|d| d / (2.0 * H)),
-        qdd: (after + before - now - now).map(|d| d / (H * H)),
-    })
-}
 
 struct Arguments {
     out: PathBuf,
@@ -143,52 +106,31 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_factory_conf(&out.join("camera.conf"), &camera, mode)?;
     let toml = out.join("camera.toml");
     write_camera_toml(&toml, &camera, mode, Path::new("camera.conf"))?;
-    write_pose(&out.join("pose.csv"), frames as f64 / RATE_HZ + 0.1)?;
+    write_pose(
+        &out.join("pose.csv"),
+        frames as f64 / settings.frame_rate_hz + 0.1,
+    )?;
 
-    let (mut rope, colours) = (hidden_rope(seed), Appearance::from_seed(seed));
-    if let Some([radius_m, lead_radius_m]) = radii_m {
-        (rope.radius_m, rope.lead_radius_m) = (radius_m, lead_radius_m);
-    }
-    let mut renderer = Renderer::new(&camera, RopeShape::from(&rope), colours, 1.6, seed);
-    renderer.place_target(Some(Vector3::new(1.10, 0.0, 0.45)));
-    let mut live = LiveRope::new(&rope, &attach(0.0), PHYSICS_STEP_S)?;
-    let mut pose_at = |t_s: f64| {
-        live.advance(&attach, t_s);
-        ScenePose {
-            q: joints(t_s),
-            nodes: live.nodes().to_vec(),
-        }
-    };
-
+    let film = WiggleFilm::new(&settings, seed, radii_m, 0.0)?;
+    let (rope, colours) = (film.rope, film.appearance);
     let mut video = BufWriter::new(File::create(out.join("video.yuyv"))?);
     let mut stamps = String::from("frame,sequence,monotonic_ns\n");
     let (mut nodes_px, mut nodes_m) = (Vec::new(), Vec::new());
-    let mut pixels = vec![0; renderer.frame_bytes()];
-    let mut drawing = std::time::Duration::ZERO;
-    for frame in 0..frames {
-        let start_s = frame as f64 / RATE_HZ;
-        let eighth = |i: usize| start_s + camera.exposure_s * (i as f64 + 0.5) / 8.0;
-        let all: Vec<_> = (0..8).map(|i| pose_at(eighth(i))).collect();
-        // Enough of the eight poses for the motion in this frame.
-        let every = (8 / renderer.sub_frames(&all[0], &all[7]).min(8)).max(1);
-        let poses: Vec<_> = all.iter().skip(every / 2).step_by(every).cloned().collect();
-        let began = std::time::Instant::now();
-        renderer.render(&poses, frame as u64, &mut pixels);
-        drawing += began.elapsed();
-        video.write_all(&pixels)?;
-        let _ = writeln!(stamps, "{frame},{frame},{}", (start_s * 1e9).round());
-        let middle: Vec<_> = (0..all[0].nodes.len())
-            .map(|i| (all[3].nodes[i] + all[4].nodes[i]) / 2.0)
-            .collect();
-        nodes_px.push(
-            middle
+    for (index, frame) in film.take(frames).enumerate() {
+        video.write_all(&frame.yuyv)?;
+        let _ = writeln!(stamps, "{index},{index},{}", (frame.start_s * 1e9).round());
+        let pixels = frame.nodes.iter().map(|p| camera.project_left(p));
+        nodes_px.push(pixels.collect::<Vec<_>>());
+        nodes_m.push(
+            frame
+                .nodes
                 .iter()
-                .map(|p| camera.project_left(p))
+                .map(|p| [p.x, p.y, p.z])
                 .collect::<Vec<_>>(),
         );
-        nodes_m.push(middle.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
-        if frame % (frames / PICTURES).max(1) == 0 {
-            save_png(&out.join(format!("frame_{frame:04}.png")), &pixels, &camera)?;
+        if index % (frames / PICTURES).max(1) == 0 {
+            let picture = out.join(format!("frame_{index:04}.png"));
+            save_png(&picture, &frame.yuyv, &camera)?;
         }
     }
     video.flush()?;
@@ -198,10 +140,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         "nodes_left_px": nodes_px, "nodes_world_m": nodes_m,
     });
     fs::write(out.join("truth.json"), serde_json::to_string(&truth)?)?;
-    let per_frame_ms = drawing.as_secs_f64() * 1e3 / frames as f64;
-    println!(
-        "{frames} frames in {}, {per_frame_ms:.2} ms each to draw",
-        out.display()
-    );
+    println!("{frames} frames in {}", out.display());
     Ok(())
 }

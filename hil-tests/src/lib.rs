@@ -16,3 +16,4 @@ pub mod hidden;
 pub mod render;
 pub mod rig;
 pub mod virtual_rig;
+pub mod wiggle_film;

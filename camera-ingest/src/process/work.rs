@@ -189,17 +189,16 @@ fn write_strobe(
 ) -> Result<(), Failure> {
     let start = MonotonicNs(recording.first_stamp_ns());
     let until_s = closest_s.map_or(1.4, |t| t + 0.02);
-    let mut moving = Vec::new();
+    let mut frames = Vec::new();
     for i in 0..recording.len() {
-        let left = recording.read(i)?.left();
-        if MonotonicNs(left.stamp_ns).since_s(start) > until_s {
-            break;
-        }
-        moving.push(left);
+        frames.push(recording.read(i)?.left());
     }
-    let scene = still_scene(&moving)?;
+    // What comes after the strike shows what the arm covered before it.
+    let scene = still_scene(&frames)?;
+    let until = |f: &&EyeFrame| MonotonicNs(f.stamp_ns).since_s(start) <= until_s;
+    let moving: Vec<&EyeFrame> = frames.iter().take_while(until).collect();
     let step = moving.len().div_ceil(STROBES).max(1);
-    let chosen: Vec<&EyeFrame> = moving.iter().rev().step_by(step).collect();
+    let chosen: Vec<&EyeFrame> = moving.into_iter().rev().step_by(step).collect();
     strobe(&scene, &chosen)?.write_png(path)?;
     Ok(())
 }

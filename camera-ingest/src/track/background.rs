@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::covered;
 use crate::frame::EyeFrame;
 use crate::vectors::widest;
 
@@ -32,6 +33,15 @@ impl Background {
         };
         let noise = noise_about(&image, &frames[chosen[chosen.len() / 2]]);
         Self { image, noise }
+    }
+
+    /// Per-pixel median over the chosen frames, without what covers the scene in most.
+    pub(super) fn uncovered(frames: &[EyeFrame], chosen: &[usize]) -> Self {
+        let mut background = Self::median(frames, chosen);
+        let lit = |i: &usize| (&frames[*i], background.gain(&frames[*i]));
+        let lit: Vec<_> = chosen.iter().map(lit).collect();
+        covered::uncover(&mut background.image, &lit);
+        background
     }
 
     /// Renews some rows: their median over some frames.

@@ -117,6 +117,10 @@ pub(super) struct Matter<'a> {
     /// Colour of what touches it and must not be taken for it: the rope where
     /// the lead is looked for.
     pub(super) rival: Option<Colour>,
+    /// How far the chroma of a pixel may be off its luma, as a part of the contrast: two
+    /// pixels share a chroma sample, so what is a few pixels wide has edges of the right
+    /// brightness and another saturation.
+    pub(super) smear: f32,
 }
 
 /// Squares of the grey levels at which evidence fades.
@@ -126,6 +130,8 @@ struct Limits {
     noise2: f32,
     /// Distance from the line between them.
     off2: f32,
+    /// The same, as a part of the squared contrast in chroma.
+    smear2: f32,
 }
 
 /// Pixels of a part of a row, channel by channel: what is seen, in the background's
@@ -193,7 +199,7 @@ impl Matter<'_> {
         let dd: f32 = difference.iter().map(|d| d * d).sum();
         // Part of a mixture with `pure`, and the squared distance from the
         // nearest such mixture.
-        let mixture = |pure: &Colour| -> (f32, f32) {
+        let mixture = |pure: &Colour| -> (f32, f32, f32) {
             let (mut dot, mut rr) = (0.0, 0.0);
             for k in 0..3 {
                 let r = pure[k] - empty[k];
@@ -204,12 +210,14 @@ impl Matter<'_> {
             // the noise in the denominator lets it fade to 0 instead of
             // exploding.
             let a = (dot / (rr + limits.noise2)).clamp(0.0, 1.2);
-            (a, (dd - 2.0 * a * dot + a * a * rr).max(0.0))
+            let luma = pure[0] - empty[0];
+            let off2 = limits.off2 + limits.smear2 * (rr - luma * luma);
+            (a, (dd - 2.0 * a * dot + a * a * rr).max(0.0), off2)
         };
         let (mut best, mut least_off) = (0.0_f32, f32::INFINITY);
         for shade in shades {
-            let (a, off) = mixture(shade);
-            best = best.max((a / self.full).min(1.2) * limits.off2 / (limits.off2 + off));
+            let (a, off, off2) = mixture(shade);
+            best = best.max((a / self.full).min(1.2) * off2 / (off2 + off));
             least_off = least_off.min(off);
         }
         // Against a rival of the same colour this does nothing.
@@ -231,6 +239,7 @@ impl Matter<'_> {
         let limits = Limits {
             noise2,
             off2: noise2.max(4.0 * self.scatter * self.scatter),
+            smear2: self.smear * self.smear,
         };
         let shades: Vec<Colour> = self
             .shades

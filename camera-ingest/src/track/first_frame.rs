@@ -189,6 +189,7 @@ fn lead_place(
             full: LEAD_FULL,
             shades: &LEAD_SHADES,
             rival: Some(rope.0),
+            smear: 0.0,
         };
         centre = matter
             .coverage(frame, window)

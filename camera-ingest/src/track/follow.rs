@@ -37,6 +37,9 @@ pub(super) const LEAST_LEAD: f64 = 0.35;
 pub(super) const LOST_BELOW: f64 = 0.3;
 /// Ropes of a larger radius show a lit and a dark side (px).
 const FAT_ROPE_PX: f64 = 2.2;
+/// How far the chroma of a thinner rope's pixels may be off (part of its contrast): one
+/// pixel on the rope and one beside it share a sample.
+const SMEAR: f32 = 0.5;
 /// Weight of clamp and lead against a node's.
 pub(super) const ANCHOR: f64 = 50.0;
 /// What looks like the rope is noticed this far beside it (px).
@@ -329,6 +332,7 @@ impl Follower<'_> {
             full,
             shades,
             rival: None,
+            smear: if fat { 0.0 } else { SMEAR },
         }
     }
 
@@ -341,6 +345,7 @@ impl Follower<'_> {
             full: LEAD_FULL,
             shades: &LEAD_SHADES,
             rival: Some(self.model.rope.0),
+            smear: 0.0,
         }
     }
 

@@ -12,6 +12,7 @@ mod appearance;
 mod background;
 mod by_points;
 mod clamp;
+mod covered;
 mod curve;
 mod evidence;
 mod first_frame;
@@ -132,7 +133,7 @@ pub fn track_with(
         .collect();
     let start = Instant::now();
     let background =
-        Background::median(frames, &frames_by_motion(frames, options.background_frames));
+        Background::uncovered(frames, &frames_by_motion(frames, options.background_frames));
     let background_time = start.elapsed();
 
     let start = Instant::now();
@@ -294,6 +295,11 @@ fn keypoints(state: &State, plane: &RopePlane, count: usize) -> TrackedFrame {
             .collect(),
         lost: state.lost,
     }
+}
+
+/// The scene behind what moves in some frames, of which `count` at most are looked at.
+pub(crate) fn uncovered_scene(frames: &[EyeFrame], count: usize) -> EyeFrame {
+    Background::uncovered(frames, &frames_by_motion(frames, count)).image
 }
 
 /// Per-pixel median of some frames.

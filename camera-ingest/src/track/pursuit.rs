@@ -30,8 +30,10 @@ const SAME_PX: f64 = 5.0;
 const BLIND: f64 = 4.0;
 /// A lead further than this from the tracked one is another one (px).
 const OTHER_PX: f64 = 15.0;
-/// Part of a fully visible rope's coverage that a rope found anew must have.
+/// Part of the coverage that the rope had of late that a rope found anew must have.
 const LEAST_FOUND: f64 = 0.6;
+/// Clear frames that tell how well the rope is seen of late.
+const LATE_FRAMES: usize = 61;
 /// Part of the length by which a rope found anew may differ.
 const LENGTH_TOLERANCE: f64 = 0.06;
 /// Ways over pixels are longer than the rope by up to this factor.
@@ -57,6 +59,7 @@ pub(super) fn pursue(
         usual_step_s: usual_step(times_s),
         states: vec![first],
         doubt: None,
+        seen: Vec::new(),
     };
     for index in 1..frames.len() {
         pursuit.go_on(index);
@@ -88,6 +91,8 @@ struct Pursuit<'a> {
     usual_step_s: f64,
     states: Vec<State>,
     doubt: Option<Doubt>,
+    /// How well the rope was seen in frames that were clear and not in doubt.
+    seen: Vec<f64>,
 }
 
 impl Pursuit<'_> {
@@ -111,6 +116,9 @@ impl Pursuit<'_> {
                 torn: false,
             });
             doubt.clear_since = if clear { index } else { index + 1 };
+        }
+        if self.doubt.is_none() {
+            self.seen.push(state.score());
         }
         // While two ropes cross, looking anew would tell no more.
         let look =
@@ -276,8 +284,17 @@ impl Pursuit<'_> {
         };
         let found = self.measured(frame, t_s, &resting);
         let off = (length(&found.curve) / known_m - 1.0).abs();
-        let fits = off < LENGTH_TOLERANCE && found.score() > LEAST_FOUND && is_clear(&found);
+        let fits = off < LENGTH_TOLERANCE
+            && found.score() > LEAST_FOUND * self.usually_seen()
+            && is_clear(&found);
         fits.then_some(found)
+    }
+
+    /// How well the rope was seen of late: a thin one, or a fast one, is seen less.
+    fn usually_seen(&self) -> f64 {
+        let mut late = self.seen[self.seen.len().saturating_sub(LATE_FRAMES)..].to_vec();
+        late.sort_by(f64::total_cmp);
+        late.get(late.len() / 2).copied().unwrap_or(1.0)
     }
 
     /// A curve found roughly, measured twice: the first time pulls it near.
@@ -325,6 +342,7 @@ pub(super) fn look(
             two_ropes: false,
             torn: false,
         }),
+        seen: Vec::new(),
     };
     Look {
         found: pursuit.find(0),

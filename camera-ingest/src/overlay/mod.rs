@@ -1,5 +1,9 @@
 //! Pictures for people: keypoints over frames, and the strobe picture of a throw.
 
+mod strobe;
+
+pub use strobe::{still_scene, strobe};
+
 use crate::whole_file::write_whole;
 use std::path::{Path, PathBuf};
 
@@ -235,57 +239,6 @@ pub fn keypoint_sheet(
     contact_sheet(&pictures, columns)
 }
 
-/// The still scene behind what moves: median of some frames of one size.
-///
-/// # Errors
-/// No frames, or sizes differ.
-pub fn still_scene(frames: &[EyeFrame]) -> Result<EyeFrame, OverlayError> {
-    let first = frames
-        .first()
-        .ok_or(OverlayError::Input("no frames for a still scene"))?;
-    let size = |f: &EyeFrame| (f.width_px, f.height_px);
-    if frames.iter().any(|f| size(f) != size(first)) {
-        return Err(OverlayError::Input("the frames differ in size"));
-    }
-    Ok(crate::track::median_frame(frames))
-}
-
-/// Strobe picture: over the first frame, every pixel shows the chosen frame
-/// that differs most from `background` there.
-///
-/// # Errors
-/// No frames, or sizes differ.
-pub fn strobe(background: &EyeFrame, frames: &[&EyeFrame]) -> Result<Picture, OverlayError> {
-    if frames.is_empty() {
-        return Err(OverlayError::Input("no frames for a strobe picture"));
-    }
-    if frames
-        .iter()
-        .any(|f| f.luma.len() != background.luma.len() || f.width_px != background.width_px)
-    {
-        return Err(OverlayError::Input("the frames differ in size"));
-    }
-    let mut picture = Picture::of(background);
-    for v in 0..background.height_px {
-        for u in 0..background.width_px {
-            let empty = background.ycc(u, v);
-            let far = |f: &&&EyeFrame| -> u32 {
-                let c = f.ycc(u, v);
-                (0..3).map(|k| u32::from(c[k].abs_diff(empty[k]))).sum()
-            };
-            // A threshold keeps the noise of many frames out of still places.
-            if let Some(best) = frames.iter().max_by_key(far)
-                && far(&best) > 30
-            {
-                let rgb = crate::frame::rgb_from_ycc(best.ycc(u, v).map(f32::from));
-                let at = (v * background.width_px + u) * 3;
-                picture.rgb[at..at + 3].copy_from_slice(&rgb);
-            }
-        }
-    }
-    Ok(picture)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,24 +253,6 @@ mod tests {
             cb: vec![128; 16],
             cr: vec![128; 16],
         }
-    }
-
-    #[test]
-    fn strobe_keeps_the_pixel_that_differs_most() {
-        let (background, mut a, mut b) = (grey(100), grey(100), grey(100));
-        a.luma[9] = 200;
-        b.luma[9] = 150;
-        b.luma[20] = 10;
-        let picture = strobe(&background, &[&a, &b]).unwrap();
-        assert_eq!(picture.rgb[27], 200);
-        assert_eq!(picture.rgb[60], 10);
-        assert_eq!(picture.rgb[0], 100);
-        assert!(strobe(&background, &[]).is_err());
-        assert_eq!(
-            still_scene(&[a, b, background.clone()]).unwrap().luma[20],
-            100
-        );
-        assert!(still_scene(&[]).is_err());
     }
 
     #[test]

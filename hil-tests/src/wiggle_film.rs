@@ -1,0 +1,148 @@
+//! A wiggle as the rig's camera sees it, rendered without processes, threads and clocks:
+//! the same film whatever else the machine does.
+
+use crate::hidden::hidden_rope;
+use crate::render::{Appearance, Renderer, RopeShape, ScenePose};
+use crate::rig::CameraConfig;
+use nalgebra::Vector3;
+use rope_sim::{LiveRope, SimulateError};
+use shared_types::kinematics::{FrameMotion, attach_motion};
+use shared_types::plan::START_POSE;
+use shared_types::{JointState, JointVector, RopeParams, StereoCamera};
+
+const AMPLITUDE_RAD: f64 = 0.288;
+const FREQUENCY_HZ: f64 = 1.3;
+const DURATION_S: f64 = 5.6;
+const RAMP_S: f64 = 2.8;
+const PHYSICS_STEP_S: f64 = 1e-4;
+/// Poses computed per exposure; as many of them are drawn as the motion needs.
+const POSES: usize = 8;
+/// Where the target hangs (m).
+const TARGET_M: [f64; 3] = [1.10, 0.0, 0.45];
+
+/// Quintic step from 0 to 1, flat at both ends.
+fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * x * (10.0 + x * (6.0 * x - 15.0))
+}
+
+/// Joints of the shipped wiggle (rad) at a time (s): a sine of joint 6, faded in and out,
+/// from t = 0 with the rope hanging still.
+#[must_use]
+pub fn joints(t_s: f64) -> JointVector {
+    let fade = smooth_step(t_s / RAMP_S) * smooth_step((DURATION_S - t_s) / RAMP_S);
+    let swing = (core::f64::consts::TAU * FREQUENCY_HZ * t_s).sin();
+    let mut q = START_POSE;
+    q[5] += AMPLITUDE_RAD * swing * fade;
+    q
+}
+
+/// The attach frame at a time (s), with velocities and accelerations by central
+/// differences.
+#[must_use]
+pub fn attach(t_s: f64) -> FrameMotion {
+    const H: f64 = 1e-3;
+    let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
+    attach_motion(&JointState {
+        q: now,
+        qd: (after - before).map(|d| d / (2.0 * H)),
+        qdd: (after + before - now - now).map(|d| d / (H * H)),
+    })
+}
+
+/// One frame of the film.
+#[derive(Debug)]
+pub struct Frame {
+    /// Start of exposure (s).
+    pub start_s: f64,
+    /// Both eyes side by side, packed YUYV.
+    pub yuyv: Vec<u8>,
+    /// Nodes of the rope in the middle of the exposure (world, m), clamp first.
+    pub nodes: Vec<Vector3<f64>>,
+}
+
+/// A film being rendered; its frames come in order.
+#[derive(Debug)]
+pub struct WiggleFilm {
+    /// The rope in it.
+    pub rope: RopeParams,
+    /// Its colours.
+    pub appearance: Appearance,
+    camera: StereoCamera,
+    frame_rate_hz: f64,
+    late_s: f64,
+    renderer: Renderer,
+    live: LiveRope,
+    next: u64,
+}
+
+impl WiggleFilm {
+    /// Rope and colours are the seed's; two radii replace the rope's and its lead's (m).
+    /// The first frame's exposure begins `late_s` after the wiggle does (earlier: negative);
+    /// the rope hangs still in it.
+    ///
+    /// # Errors
+    /// The rope cannot be simulated.
+    pub fn new(
+        config: &CameraConfig,
+        seed: u64,
+        radii_m: Option<[f64; 2]>,
+        late_s: f64,
+    ) -> Result<Self, SimulateError> {
+        let camera = config.stereo_camera();
+        let (mut rope, appearance) = (hidden_rope(seed), Appearance::from_seed(seed));
+        if let Some([radius_m, lead_radius_m]) = radii_m {
+            (rope.radius_m, rope.lead_radius_m) = (radius_m, lead_radius_m);
+        }
+        let shape = RopeShape::from(&rope);
+        let mut renderer = Renderer::new(&camera, shape, appearance, config.noise_levels, seed);
+        renderer.place_target(Some(TARGET_M.into()));
+        Ok(Self {
+            live: LiveRope::new(&rope, &attach(late_s), PHYSICS_STEP_S)?,
+            rope,
+            appearance,
+            camera,
+            frame_rate_hz: config.frame_rate_hz,
+            late_s,
+            renderer,
+            next: 0,
+        })
+    }
+
+    fn pose(&mut self, t_s: f64) -> ScenePose {
+        // The simulation counts from the first frame on, whose rope hangs still.
+        let first_s = self.late_s;
+        let clamp = |since_s: f64| attach(first_s + since_s);
+        self.live.advance(&clamp, t_s - first_s);
+        ScenePose {
+            q: joints(t_s),
+            nodes: self.live.nodes().to_vec(),
+        }
+    }
+}
+
+impl Iterator for WiggleFilm {
+    type Item = Frame;
+
+    /// The next frame; there is always one.
+    #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
+    fn next(&mut self) -> Option<Frame> {
+        let start_s = self.late_s + self.next as f64 / self.frame_rate_hz;
+        let exposure_s = self.camera.exposure_s;
+        let part = |i: usize| start_s + exposure_s * (i as f64 + 0.5) / POSES as f64;
+        let all: Vec<_> = (0..POSES).map(|i| self.pose(part(i))).collect();
+        let needed = self.renderer.sub_frames(&all[0], &all[POSES - 1]);
+        let every = (POSES / needed.min(POSES)).max(1);
+        let drawn: Vec<_> = all.iter().skip(every / 2).step_by(every).cloned().collect();
+        let mut yuyv = vec![0; self.renderer.frame_bytes()];
+        self.renderer.render(&drawn, self.next, &mut yuyv);
+        self.next += 1;
+        let (before, after) = (&all[POSES / 2 - 1].nodes, &all[POSES / 2].nodes);
+        let nodes = before.iter().zip(after).map(|(a, b)| (a + b) / 2.0);
+        Some(Frame {
+            start_s,
+            yuyv,
+            nodes: nodes.collect(),
+        })
+    }
+}
