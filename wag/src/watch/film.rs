@@ -4,7 +4,11 @@
 //! Keypoints come after the film they belong to. The JPEGs of the last seconds are kept
 //! for them, so that the tracked film can be shown once, in its own pace, before the
 //! live picture goes on.
+//!
+//! Where a preview follows the rope as the frames come, the live picture is shown one
+//! picture later, with the keypoints that were found in it meanwhile.
 
+use super::preview::Heard;
 use anyhow::ensure;
 use serde::Serialize;
 use shared_types::StereoCamera;
@@ -23,6 +27,8 @@ const QUALITY: u8 = 70;
 const KEPT_MAX_BYTES: usize = 12_000_000;
 /// A keypoint frame belongs to a JPEG whose stamp is as near as this (ns).
 const SAME_FRAME_NS: u64 = 1_000_000;
+/// A picture that waited longer for its keypoints is not shown any more (ns).
+const OLD_NS: u64 = 500_000_000;
 
 /// A picture for the page.
 #[derive(Debug)]
@@ -37,10 +43,10 @@ pub struct Picture {
 #[derive(Debug, Serialize)]
 struct Over {
     /// What the picture is.
-    caption: &'static str,
+    caption: String,
     /// Pixels of the camera for one of the picture.
     scale: usize,
-    /// Tracked keypoints, raw pixels of the camera.
+    /// Keypoints found in it, raw pixels of the camera.
     keypoints: Vec<[f32; 2]>,
     /// Whether the rope was lost in this frame.
     lost: bool,
@@ -48,11 +54,18 @@ struct Over {
     rope: Vec<[i32; 2]>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Kept {
     stamp_ns: u64,
     scale: usize,
     jpeg: Arc<[u8]>,
+}
+
+/// A live picture, and the simulated rope as the camera would see it at that time.
+#[derive(Debug, Clone)]
+struct Live {
+    picture: Kept,
+    rope: Vec<[i32; 2]>,
 }
 
 /// The camera of a domain.
@@ -64,6 +77,12 @@ pub struct Film {
     kept_bytes: usize,
     /// Tracked frames still to be shown.
     tracked: VecDeque<KeypointFrame>,
+    /// What a preview tells.
+    pub preview: Heard,
+    /// The picture that waits for its keypoints.
+    waits: Option<Live>,
+    /// A preview is wished for, but there is no calibration for it.
+    pub lacks_calibration: bool,
     last: Option<Instant>,
     /// When the last frame came.
     pub seen: Option<Instant>,
@@ -78,6 +97,9 @@ impl Film {
             kept: VecDeque::new(),
             kept_bytes: 0,
             tracked: VecDeque::new(),
+            preview: Heard::open(bus)?,
+            waits: None,
+            lacks_calibration: false,
             last: None,
             seen: None,
         })
@@ -96,6 +118,7 @@ impl Film {
                 self.tracked.push_back(*found);
             }
         }
+        self.preview.listen()?;
         // Only the newest frame is looked at; the others go back to the camera at once.
         let mut newest = None;
         while let Some(frame) = self.frames.receive()? {
@@ -113,27 +136,51 @@ impl Film {
         if head.pixel_format != PIXEL_FORMAT_YUYV {
             return Ok(None);
         }
-        let live = encode(frame.payload(), head)?;
-        drop(frame);
-        let picture = match self.next_tracked() {
-            Some(tracked) => tracked,
-            None => Picture {
-                jpeg: Arc::clone(&live.jpeg),
-                over: serde_json::to_string(&Over {
-                    caption: if rope.is_empty() || camera.is_none() {
-                        "camera, live"
-                    } else {
-                        "camera, live; dots: the identified rope, simulated"
-                    },
-                    scale: live.scale,
-                    keypoints: Vec::new(),
-                    lost: false,
-                    rope: camera.map_or_else(Vec::new, |camera| projected(camera, rope)),
-                })?,
-            },
+        let live = Live {
+            picture: encode(frame.payload(), head)?,
+            rope: camera.map_or_else(Vec::new, |camera| projected(camera, rope)),
         };
-        self.keep(live);
-        Ok(Some(picture))
+        drop(frame);
+        self.keep(live.picture.clone());
+        let tracked = self.next_tracked();
+        // One that nobody asked for in time is old.
+        let waited = self.waits.replace(live.clone());
+        let waited = waited.filter(|l| head.stamp_ns.abs_diff(l.picture.stamp_ns) < OLD_NS);
+        let shown = match tracked {
+            Some(tracked) => Some(tracked),
+            None if self.preview.is_there() => waited.map(|l| self.show(l)).transpose()?,
+            None => Some(self.show(live)?),
+        };
+        Ok(shown)
+    }
+
+    /// A live picture with everything that is known to be in it.
+    fn show(&self, Live { picture, rope }: Live) -> anyhow::Result<Picture> {
+        let mut caption = "camera, live".to_owned();
+        if !rope.is_empty() {
+            caption += "; dots: the identified rope, simulated";
+        }
+        let found = self.preview.words();
+        let lacks = self.lacks_calibration.then(|| {
+            "no preview: there is no camera.toml in the run folder, name one with --camera"
+                .to_owned()
+        });
+        if let Some(words) = found.or(lacks) {
+            caption += "; ";
+            caption += &words;
+        }
+        let found = self.preview.near(picture.stamp_ns);
+        let over = Over {
+            caption,
+            scale: picture.scale,
+            keypoints: found.map_or_else(Vec::new, |f| f.points().to_vec()),
+            lost: found.is_some_and(|f| f.lost != 0),
+            rope,
+        };
+        Ok(Picture {
+            jpeg: picture.jpeg,
+            over: serde_json::to_string(&over)?,
+        })
     }
 
     fn at(&self, stamp_ns: u64) -> Option<&Kept> {
@@ -148,7 +195,7 @@ impl Film {
             if let Some(kept) = self.at(frame.stamp_ns) {
                 let count = (frame.count as usize).min(frame.points_px.len());
                 let over = Over {
-                    caption: "the wiggle as filmed, with the keypoints found in it",
+                    caption: "the wiggle as filmed, with the keypoints found in it".to_owned(),
                     scale: kept.scale,
                     keypoints: frame.points_px[..count].to_vec(),
                     lost: frame.lost != 0,
@@ -227,7 +274,7 @@ fn projected(camera: &StereoCamera, rope: &[nalgebra::Vector3<f64>]) -> Vec<[i32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::ipc::DomainSweep;
+    use shared_types::ipc::{DomainSweep, PreviewFrame, PreviewState};
 
     const SIZE: [u32; 2] = [64, 16];
 
@@ -301,6 +348,48 @@ mod tests {
                 .unwrap()
                 .over
                 .contains("live")
+        );
+    }
+
+    #[test]
+    fn with_a_preview_each_picture_waits_for_its_own_keypoints() {
+        let domain = format!("test_film_preview_{}", std::process::id());
+        let _sweep = DomainSweep::new(&domain);
+        let bus = Bus::join(&domain).unwrap();
+        let camera = bus.frame_publisher(1 << 16).unwrap();
+        let preview = bus.preview_publisher().unwrap();
+        let mut film = Film::open(&bus).unwrap();
+        let mut turn = |number: u64, found: Option<f32>| {
+            std::thread::sleep(PERIOD);
+            let (header, bytes) = frame(number);
+            let mut sample = camera.loan_slice_uninit(bytes.len()).unwrap();
+            *sample.user_header_mut() = header;
+            sample.write_from_slice(&bytes).send().unwrap();
+            let picture = film.turn(true, None, &[]).unwrap();
+            if let Some(u) = found {
+                let mut told = PreviewFrame {
+                    state: PreviewState::Following as u8,
+                    count: 1,
+                    stamp_ns: header.stamp_ns,
+                    ..PreviewFrame::default()
+                };
+                told.points_px[0][0] = u;
+                preview.send_copy(told).unwrap();
+            }
+            picture.map_or_else(String::new, |picture| picture.over)
+        };
+        assert!(
+            turn(1, Some(11.0)).contains("\"keypoints\":[]"),
+            "no preview"
+        );
+        // Frames are 20 ms apart by their stamps, so that every other one is far.
+        let first_with = turn(11, Some(12.0));
+        assert!(first_with.contains("[[11.0,0.0]]"), "{first_with}");
+        assert!(first_with.contains("the preview's keypoints"));
+        assert!(turn(21, None).contains("[[12.0,0.0]]"));
+        assert!(
+            turn(31, None).contains("\"keypoints\":[]"),
+            "it skipped one"
         );
     }
 
