@@ -129,7 +129,10 @@ fn tell(found: &PreviewFrame, [width_px, height_px]: [u32; 2]) {
             "{words}: packed YUYV of {}x{height_px} px is expected",
             2 * width_px
         ),
-        _ => tracing::info!(frame = found.sequence, "{words}"),
+        PreviewState::NoCamera | PreviewState::NoArm => tracing::warn!("{words}"),
+        PreviewState::Looking | PreviewState::Following => {
+            tracing::info!(frame = found.sequence, "{words}");
+        }
     }
 }
 

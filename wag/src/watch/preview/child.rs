@@ -61,7 +61,7 @@ impl PreviewChild {
             (self.view, self.begun, self.runs) = (wanted, None, false);
         }
         if let Err(reason) = self.process.check() {
-            tracing::warn!("the preview is started again: {reason:#}");
+            tracing::warn!("the preview ended: {reason:#}");
             self.process.stop();
             self.runs = false;
         }
