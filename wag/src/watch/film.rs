@@ -8,11 +8,11 @@
 //! Where a preview follows the rope as the frames come, the live picture is shown one
 //! picture later, with the keypoints that were found in it meanwhile.
 
+use super::picture::{Jpeg, encode, projected};
 use super::preview::Heard;
-use anyhow::ensure;
 use serde::Serialize;
 use shared_types::StereoCamera;
-use shared_types::ipc::{Bus, FrameHeader, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
+use shared_types::ipc::{Bus, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
 use shared_types::keypoints::KeypointFrame;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,9 +20,6 @@ use std::time::{Duration, Instant};
 
 /// Least time between two pictures.
 const PERIOD: Duration = Duration::from_micros(66_700);
-/// Widest picture; larger ones are made smaller (pixels).
-const WIDTH_MAX_PX: usize = 960;
-const QUALITY: u8 = 70;
 /// Most bytes of JPEGs kept for keypoints to come.
 const KEPT_MAX_BYTES: usize = 12_000_000;
 /// A keypoint frame belongs to a JPEG whose stamp is as near as this (ns).
@@ -54,17 +51,10 @@ struct Over {
     rope: Vec<[i32; 2]>,
 }
 
-#[derive(Debug, Clone)]
-struct Kept {
-    stamp_ns: u64,
-    scale: usize,
-    jpeg: Arc<[u8]>,
-}
-
 /// A live picture, and the simulated rope as the camera would see it at that time.
 #[derive(Debug, Clone)]
 struct Live {
-    picture: Kept,
+    picture: Jpeg,
     rope: Vec<[i32; 2]>,
 }
 
@@ -73,7 +63,7 @@ struct Live {
 pub struct Film {
     frames: FrameSubscriber,
     keypoints: KeypointSubscriber,
-    kept: VecDeque<Kept>,
+    kept: VecDeque<Jpeg>,
     kept_bytes: usize,
     /// Tracked frames still to be shown.
     tracked: VecDeque<KeypointFrame>,
@@ -178,12 +168,12 @@ impl Film {
             rope,
         };
         Ok(Picture {
-            jpeg: picture.jpeg,
+            jpeg: picture.bytes,
             over: serde_json::to_string(&over)?,
         })
     }
 
-    fn at(&self, stamp_ns: u64) -> Option<&Kept> {
+    fn at(&self, stamp_ns: u64) -> Option<&Jpeg> {
         self.kept
             .iter()
             .find(|kept| kept.stamp_ns.abs_diff(stamp_ns) <= SAME_FRAME_NS)
@@ -202,7 +192,7 @@ impl Film {
                     rope: Vec::new(),
                 };
                 return Some(Picture {
-                    jpeg: Arc::clone(&kept.jpeg),
+                    jpeg: Arc::clone(&kept.bytes),
                     over: serde_json::to_string(&over).ok()?,
                 });
             }
@@ -210,71 +200,21 @@ impl Film {
         None
     }
 
-    fn keep(&mut self, picture: Kept) {
-        self.kept_bytes += picture.jpeg.len();
+    fn keep(&mut self, picture: Jpeg) {
+        self.kept_bytes += picture.bytes.len();
         self.kept.push_back(picture);
         while self.kept_bytes > KEPT_MAX_BYTES
             && let Some(oldest) = self.kept.pop_front()
         {
-            self.kept_bytes -= oldest.jpeg.len();
+            self.kept_bytes -= oldest.bytes.len();
         }
     }
-}
-
-fn encode(pixels: &[u8], head: FrameHeader) -> anyhow::Result<Kept> {
-    let size = [head.width_px as usize, head.height_px as usize];
-    let scale = (size[0] / 2).div_ceil(WIDTH_MAX_PX).max(1);
-    let [width, height] = [size[0] / 2, size[1]].map(|px| px.div_ceil(scale));
-    let mut jpeg = Vec::new();
-    let mut encoder = jpeg_encoder::Encoder::new(&mut jpeg, QUALITY);
-    encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_2_1);
-    encoder.encode(
-        &left_eye(pixels, size, scale)?,
-        u16::try_from(width)?,
-        u16::try_from(height)?,
-        jpeg_encoder::ColorType::Ycbcr,
-    )?;
-    Ok(Kept {
-        stamp_ns: head.stamp_ns,
-        scale,
-        jpeg: jpeg.into(),
-    })
-}
-
-/// Left eye of a side-by-side YUYV frame as packed YCbCr, which a JPEG holds anyway:
-/// of every `scale` pixels and rows the first.
-fn left_eye(pixels: &[u8], [width, height]: [usize; 2], scale: usize) -> anyhow::Result<Vec<u8>> {
-    ensure!(
-        width > 0 && height > 0 && width % 4 == 0 && pixels.len() == width * height * 2,
-        "a frame of {width}x{height} has {} bytes",
-        pixels.len()
-    );
-    let mut out = Vec::with_capacity((width / 2 / scale + 1) * (height / scale + 1) * 3);
-    for row in pixels.chunks_exact(width * 2).step_by(scale) {
-        for u in (0..width / 2).step_by(scale) {
-            let quad = &row[u / 2 * 4..][..4];
-            out.extend_from_slice(&[quad[u % 2 * 2], quad[1], quad[3]]);
-        }
-    }
-    Ok(out)
-}
-
-/// Nodes of a rope as the left eye sees them; those it does not see are left out.
-fn projected(camera: &StereoCamera, rope: &[nalgebra::Vector3<f64>]) -> Vec<[i32; 2]> {
-    rope.iter()
-        .filter_map(|node| camera.project_left(node))
-        .filter(|pixel| camera.contains(*pixel))
-        .map(|pixel| {
-            #[allow(clippy::cast_possible_truncation, reason = "inside the picture")]
-            pixel.map(|x| x.round() as i32)
-        })
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::ipc::{DomainSweep, PreviewFrame, PreviewState};
+    use shared_types::ipc::{DomainSweep, FrameHeader, PreviewFrame, PreviewState};
 
     const SIZE: [u32; 2] = [64, 16];
 
@@ -394,31 +334,15 @@ mod tests {
     }
 
     #[test]
-    fn the_left_eye_is_cut_out_pixel_by_pixel() {
-        // Two rows of eight pixels: luma counts, chroma tells the eye.
-        let pair = |y: u8, eye: u8| [y, 100 + eye, y + 1, 200 + eye];
-        let row = |y: u8| [pair(y, 0), pair(y + 2, 0), pair(y + 4, 1), pair(y + 6, 1)].concat();
-        let frame = [row(0), row(10)].concat();
-        let pixel = |y: u8| [y, 100, 200];
-        let whole = [0, 1, 2, 3, 10, 11, 12, 13].map(pixel).concat();
-        assert_eq!(left_eye(&frame, [8, 2], 1).unwrap(), whole);
-        assert_eq!(
-            left_eye(&frame, [8, 2], 2).unwrap(),
-            [0, 2].map(pixel).concat()
-        );
-        assert!(left_eye(&frame[1..], [8, 2], 1).is_err());
-    }
-
-    #[test]
     fn what_is_kept_is_bounded() {
         let domain = format!("test_kept_{}", std::process::id());
         let _sweep = DomainSweep::new(&domain);
         let mut film = Film::open(&Bus::join(&domain).unwrap()).unwrap();
         for stamp_ns in 0..40 {
-            film.keep(Kept {
+            film.keep(Jpeg {
                 stamp_ns,
                 scale: 1,
-                jpeg: vec![0; 1_000_000].into(),
+                bytes: vec![0; 1_000_000].into(),
             });
         }
         assert_eq!((film.kept.len(), film.kept_bytes), (12, 12_000_000));

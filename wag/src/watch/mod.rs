@@ -12,6 +12,7 @@ mod http;
 mod jitter;
 mod newest;
 mod page;
+mod picture;
 mod preview;
 mod rope;
 mod snapshot;

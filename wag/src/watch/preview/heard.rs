@@ -5,11 +5,11 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// As many frames as are kept to find one's keypoints.
-const KEPT: usize = 64;
+const KEPT: usize = 256;
 /// A preview that told nothing for so long is gone.
 const SILENCE: Duration = Duration::from_millis(1500);
-/// Frames are counted over this time.
-const WINDOW: Duration = Duration::from_secs(1);
+/// Frames are counted over this time (ns).
+const WINDOW_NS: u64 = 1_000_000_000;
 /// Keypoints may be of a frame so much earlier or later than a picture (ns): the next one
 /// of a camera with 50 or more a second.
 const NEAR_NS: u64 = 20_000_000;
@@ -19,8 +19,6 @@ const NEAR_NS: u64 = 20_000_000;
 pub struct Heard {
     port: PreviewSubscriber,
     kept: VecDeque<PreviewFrame>,
-    /// When frames were told of within the last second.
-    times: VecDeque<Instant>,
     last: Option<Instant>,
 }
 
@@ -30,7 +28,6 @@ impl Heard {
         Ok(Self {
             port: bus.preview_subscriber()?,
             kept: VecDeque::new(),
-            times: VecDeque::new(),
             last: None,
         })
     }
@@ -40,17 +37,11 @@ impl Heard {
         while let Some(told) = self.port.receive()? {
             self.put(*told, Instant::now());
         }
-        while self.times.front().is_some_and(|at| at.elapsed() > WINDOW) {
-            self.times.pop_front();
-        }
         Ok(())
     }
 
     fn put(&mut self, told: PreviewFrame, at: Instant) {
         self.last = Some(at);
-        if told.state() != PreviewState::NoCamera {
-            self.times.push_back(at);
-        }
         self.kept.push_back(told);
         if self.kept.len() > KEPT {
             self.kept.pop_front();
@@ -75,13 +66,19 @@ impl Heard {
         let newest = self.kept.back().filter(|_| self.is_there())?;
         Some(match newest.state() {
             PreviewState::Following if newest.lost == 0 => {
-                let rate_hz = self.times.len();
+                let rate_hz = self.rate_hz(newest.stamp_ns);
                 let took_ms = f64::from(self.usual_us()) / 1e3;
                 format!("line: the preview's keypoints, {rate_hz} a second, {took_ms:.1} ms each")
             }
             PreviewState::Following => "the preview has lost the rope".to_owned(),
             state => format!("the preview {}", state.words()),
         })
+    }
+
+    /// Frames looked at in the second up to this one.
+    fn rate_hz(&self, until_ns: u64) -> usize {
+        let newer = |told: &&PreviewFrame| told.stamp_ns.saturating_add(WINDOW_NS) > until_ns;
+        self.kept.iter().filter(newer).count()
     }
 
     /// Median time spent on a frame (µs).
