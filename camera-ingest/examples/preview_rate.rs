@@ -4,7 +4,7 @@
 use std::error::Error;
 use std::time::{Duration, Instant};
 
-use shared_types::ipc::{Bus, PreviewFrame, PreviewState};
+use shared_types::ipc::{Bus, DomainSweep, PreviewFrame, PreviewState};
 
 /// Silence that ends the count.
 const SILENCE: Duration = Duration::from_secs(3);
@@ -19,6 +19,7 @@ fn quantile(sorted: &[u32], percent: usize) -> f64 {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let domain = std::env::args().nth(1).ok_or("name a domain")?;
+    let _sweep = DomainSweep::new(&domain);
     let bus = Bus::join(&domain)?;
     let previews = bus.preview_subscriber()?;
     let (mut told, mut heard): (Vec<PreviewFrame>, _) = (Vec::new(), Instant::now());

@@ -279,7 +279,9 @@ fn rehearse(demo: &mut Ends, run: &Path) -> Option<Heard> {
     if !config.exists() {
         return None;
     }
-    let bus = Bus::join(&format!("run-{}", demo.0.id())).unwrap();
+    let domain = format!("run-{}", demo.0.id());
+    let _sweep = DomainSweep::new(&domain);
+    let bus = Bus::join(&domain).unwrap();
     let mut stand = Stand {
         demo,
         previews: bus.preview_subscriber().unwrap(),
