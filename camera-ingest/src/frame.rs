@@ -115,6 +115,34 @@ impl EyeFrame {
         Ok(planes(room, size, size[0] / 2, stamp_ns, sequence))
     }
 
+    /// Left eye of side-by-side V4L2 `YUYV`, rows without padding; `size_px` is that of
+    /// both eyes.
+    ///
+    /// # Errors
+    /// As [`StereoFrame::from_yuyv`].
+    pub fn left_from_yuyv(
+        bytes: &[u8],
+        size_px: [usize; 2],
+        stamp_ns: u64,
+        sequence: u64,
+    ) -> Result<Self, FrameError> {
+        check_yuyv(bytes, size_px)?;
+        let [width_px, height_px] = size_px;
+        let mut frame = blank(width_px / 2, height_px, stamp_ns, sequence);
+        let rows = bytes.chunks_exact(2 * width_px);
+        let left = rows.flat_map(|row| row[..width_px].chunks_exact(4));
+        frame.fill(left);
+        Ok(frame)
+    }
+
+    /// Takes in packed pairs of pixels, row after row.
+    fn fill<'a>(&mut self, quads: impl Iterator<Item = &'a [u8]>) {
+        let pairs = self.luma.chunks_exact_mut(2);
+        for (quad, (pair, (cb, cr))) in quads.zip(pairs.zip(self.cb.iter_mut().zip(&mut self.cr))) {
+            (pair[0], *cb, pair[1], *cr) = (quad[0], quad[1], quad[2], quad[3]);
+        }
+    }
+
     /// Packed RGB, 3 bytes a pixel.
     #[must_use]
     pub fn to_rgb(&self) -> Vec<u8> {
@@ -149,25 +177,9 @@ impl StereoFrame {
         stamp_ns: u64,
         sequence: u64,
     ) -> Result<Self, FrameError> {
-        check_width(width_px)?;
-        let expected = width_px * height_px * 2;
-        if bytes.len() != expected || expected == 0 {
-            return Err(FrameError::Length {
-                width_px,
-                height_px,
-                expected,
-                found: bytes.len(),
-            });
-        }
+        check_yuyv(bytes, [width_px, height_px])?;
         let mut frame = blank(width_px, height_px, stamp_ns, sequence);
-        for (quad, (pair, (cb, cr))) in bytes.chunks_exact(4).zip(
-            frame
-                .luma
-                .chunks_exact_mut(2)
-                .zip(frame.cb.iter_mut().zip(&mut frame.cr)),
-        ) {
-            (pair[0], *cb, pair[1], *cr) = (quad[0], quad[1], quad[2], quad[3]);
-        }
+        frame.fill(bytes.chunks_exact(4));
         Ok(Self(frame))
     }
 
@@ -291,6 +303,21 @@ fn check_width(width_px: usize) -> Result<(), FrameError> {
     }
 }
 
+/// Bytes and size of packed `YUYV` fit each other.
+fn check_yuyv(bytes: &[u8], [width_px, height_px]: [usize; 2]) -> Result<(), FrameError> {
+    check_width(width_px)?;
+    let expected = width_px * height_px * 2;
+    if bytes.len() != expected || expected == 0 {
+        return Err(FrameError::Length {
+            width_px,
+            height_px,
+            expected,
+            found: bytes.len(),
+        });
+    }
+    Ok(())
+}
+
 fn blank(width_px: usize, height_px: usize, stamp_ns: u64, sequence: u64) -> EyeFrame {
     EyeFrame {
         stamp_ns,
@@ -347,6 +374,11 @@ mod tests {
             (vec![1, 9], vec![7, 15])
         );
         assert_eq!(frame.0.ycc(3, 1), [14, 13, 15]);
+        assert_eq!(
+            EyeFrame::left_from_yuyv(&bytes, [4, 2], 7, 3),
+            Ok(frame.left())
+        );
+        assert!(EyeFrame::left_from_yuyv(&bytes[1..], [4, 2], 7, 3).is_err());
         assert_eq!((frame.0.stamp_ns, frame.0.sequence), (7, 3));
     }
 

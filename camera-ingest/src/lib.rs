@@ -3,7 +3,7 @@
 //! Takes frames from a camera ([`live`]), reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
 //! in the left eye ([`mod@track`]), measures tip and target in stereo ([`mod@score`]),
 //! lets learned models stand in for parts of it (feature `learned`), draws what it found
-//! ([`overlay`], [`film`]) and says when a rope hangs still
+//! ([`overlay`], [`film`]), follows the rope while it films ([`preview`]) and says when a rope hangs still
 //! ([`still`]).
 //!
 //! It is *not* the place for rope physics, identification or planning: it
@@ -26,6 +26,7 @@ pub mod frame;
 pub mod learned;
 pub mod live;
 pub mod overlay;
+pub mod preview;
 pub mod process;
 pub mod score;
 pub mod source;

@@ -349,6 +349,8 @@ pub enum ProcessName {
     Camera,
     /// Camera frames to keypoints.
     CameraIngest,
+    /// Keypoints of the rope while it is filmed, to look at.
+    Preview,
     /// Identification and planning.
     Planner,
     /// Records a run as one file.

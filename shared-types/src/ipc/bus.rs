@@ -2,6 +2,7 @@
 
 use super::IpcError;
 use super::payload::{CycleRecord, FrameHeader, JointReport};
+use super::preview::PreviewFrame;
 use crate::keypoints::KeypointFrame;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
@@ -18,6 +19,10 @@ pub type FrameSubscriber = Subscriber<Transport, [u8], FrameHeader>;
 pub type KeypointPublisher = Publisher<Transport, KeypointFrame, ()>;
 /// Receives keypoints.
 pub type KeypointSubscriber = Subscriber<Transport, KeypointFrame, ()>;
+/// Publishes what the live preview sees.
+pub type PreviewPublisher = Publisher<Transport, PreviewFrame, ()>;
+/// Receives what the live preview sees.
+pub type PreviewSubscriber = Subscriber<Transport, PreviewFrame, ()>;
 /// Publishes cycle records.
 pub type CyclePublisher = Publisher<Transport, CycleRecord, ()>;
 /// Receives cycle records.
@@ -33,6 +38,7 @@ pub type ChunkSubscriber = Subscriber<Transport, [u8], ()>;
 
 const FRAMES: &str = "wag/v1/camera/frames";
 const KEYPOINTS: &str = "wag/v1/camera/keypoints";
+const PREVIEW: &str = "wag/v1/camera/preview";
 const CYCLES: &str = "wag/v1/controller/cycles";
 const JOINTS: &str = "wag/v1/controller/joints";
 const RECORDING: &str = "wag/v1/controller/recording";
@@ -46,6 +52,8 @@ const NODES: usize = 10;
 const FRAME_BUFFER: usize = 16;
 /// Keypoint frames kept for a subscriber: a whole wiggle and more.
 const KEYPOINT_BUFFER: usize = 1024;
+/// Previews kept for a subscriber: a second of them. Who comes late wants the newest.
+const PREVIEW_BUFFER: usize = 64;
 /// Cycle records and joint reports kept for a subscriber: four seconds.
 const RECORD_BUFFER: usize = 1024;
 /// Chunks of a recording kept for a subscriber, ten to the second: twelve seconds.
@@ -215,6 +223,31 @@ impl Bus {
             .buffer_size(KEYPOINT_BUFFER)
             .create()
             .map_err(open_error(KEYPOINTS))
+    }
+
+    /// Publishes what the live preview sees. One per domain.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`], for instance when another preview runs.
+    pub fn preview_publisher(&self) -> Result<PreviewPublisher, IpcError> {
+        let service = self.records::<PreviewFrame>(PREVIEW, PREVIEW_BUFFER)?;
+        service
+            .publisher_builder()
+            .create()
+            .map_err(open_error(PREVIEW))
+    }
+
+    /// Receives what the live preview sees; a slow reader loses the oldest.
+    ///
+    /// # Errors
+    /// [`IpcError::Open`].
+    pub fn preview_subscriber(&self) -> Result<PreviewSubscriber, IpcError> {
+        let service = self.records::<PreviewFrame>(PREVIEW, PREVIEW_BUFFER)?;
+        service
+            .subscriber_builder()
+            .buffer_size(PREVIEW_BUFFER)
+            .create()
+            .map_err(open_error(PREVIEW))
     }
 
     /// Publishes cycle records. One per domain; the relay thread's.

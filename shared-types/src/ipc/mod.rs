@@ -10,6 +10,7 @@
 //! |---|---|---|
 //! | [`Bus::frame_publisher`] | camera -> tracker, recorder | pub-sub of bytes, [`FrameHeader`] |
 //! | [`Bus::keypoint_publisher`] | tracker -> planner, recorder | pub-sub |
+//! | [`Bus::preview_publisher`] | live preview -> whoever looks on | pub-sub |
 //! | [`Bus::cycle_publisher`] | controller's relay -> recorder | pub-sub |
 //! | [`Bus::joint_publisher`] | controller's relay -> recorder | pub-sub |
 //! | [`Bus::chunk_publisher`] | controller's relay -> recorder | pub-sub of bytes: every cycle's inputs and answers |
@@ -35,6 +36,8 @@ mod input;
 pub mod message;
 mod payload;
 #[cfg(feature = "std")]
+mod preview;
+#[cfg(feature = "std")]
 pub mod rpc;
 #[cfg(feature = "std")]
 mod slots;
@@ -47,6 +50,7 @@ pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, OperatorReader, Sta
 pub use bus::{
     Bus, ChunkPublisher, ChunkSubscriber, CyclePublisher, CycleSubscriber, FramePublisher,
     FrameSubscriber, JointPublisher, JointSubscriber, KeypointPublisher, KeypointSubscriber,
+    PreviewPublisher, PreviewSubscriber,
 };
 pub use cause::{CauseRecord, LimitBroken, RunCounts};
 #[cfg(feature = "std")]
@@ -60,5 +64,7 @@ pub use payload::{
     ControllerMode, ControllerState, CycleRecord, FrameHeader, GuardianBeat, JointReport,
     OperatorBeat, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
+#[cfg(feature = "std")]
+pub use preview::{PreviewFrame, PreviewState};
 #[cfg(feature = "std")]
 pub use sweep::DomainSweep;

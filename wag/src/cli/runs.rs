@@ -50,7 +50,8 @@ pub struct RecoverArgs {
 #[command(after_help = "EXAMPLES:\n  \
     wag watch                       whichever run began last, then the next\n  \
     wag watch runs/NAME             a run that is under way\n  \
-    wag watch --domain cell-1       a controller or camera that runs as a daemon\n\n\
+    wag watch --domain cell-1       a controller or camera that runs as a daemon\n  \
+    wag watch --preview             with the rope's keypoints as the frames come\n\n\
     The address it prints holds a secret: whoever knows it can look on and stop the arm.\n\
     From another machine: ssh -L PORT:127.0.0.1:PORT HOST, then the same address.")]
 pub struct WatchArgs {
@@ -65,6 +66,14 @@ pub struct WatchArgs {
     /// lets other machines look on and stop the arm, without encryption.
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:0")]
     pub bind: SocketAddr,
+    /// Follow the rope in the camera's frames as they come and draw its keypoints. A
+    /// process of the lowest priority does it, on one core, as long as this page is
+    /// served. Without this none runs.
+    #[arg(long)]
+    pub preview: bool,
+    /// Calibration for the preview; default: camera.toml in the run folder.
+    #[arg(long, value_name = "camera.toml", requires = "preview")]
+    pub camera: Option<PathBuf>,
     /// Stop after this long (s); default: on Ctrl-C.
     #[arg(long)]
     pub seconds: Option<f64>,

@@ -21,6 +21,8 @@ const END_WITHIN: Duration = Duration::from_millis(1200);
 const BRAKE_WITHIN: Duration = Duration::from_millis(4500);
 /// The same where a file must be finished.
 const FINISH_WITHIN: Duration = Duration::from_secs(19);
+/// The lowest priority there is.
+const LOWEST: i32 = 19;
 
 /// Sets the stop flag when the parent is gone, and ends the process if it does
 /// not manage to end itself.
@@ -50,6 +52,13 @@ fn read<T: serde::de::DeserializeOwned>(args: &ProcessArgs) -> anyhow::Result<T>
         .with_context(|| format!("configuration `{}`", args.config.display()))
 }
 
+/// Everything else goes first: what this process makes is only looked at.
+fn give_way() {
+    if let Err(reason) = rustix::process::nice(LOWEST) {
+        tracing::warn!(%reason, "the preview runs with ordinary priority");
+    }
+}
+
 pub fn run(args: &ProcessArgs) -> Outcome {
     watch_interrupts().or_failed()?;
     let end_within = match args.name {
@@ -58,6 +67,7 @@ pub fn run(args: &ProcessArgs) -> Outcome {
         ProcessName::Rig
         | ProcessName::Camera
         | ProcessName::CameraIngest
+        | ProcessName::Preview
         | ProcessName::Planner => END_WITHIN,
     };
     watch_parent(args.parent, end_within).or_failed()?;
@@ -77,6 +87,10 @@ pub fn run(args: &ProcessArgs) -> Outcome {
         ProcessName::Camera => camera_ingest::live::run(&read(args).or_input()?, stop).or_failed(),
         ProcessName::CameraIngest => {
             camera_ingest::process::run(&read(args).or_input()?, stop).or_failed()
+        }
+        ProcessName::Preview => {
+            give_way();
+            camera_ingest::preview::run(&read(args).or_input()?, stop).or_failed()
         }
         ProcessName::Planner => planner::process::run(&read(args).or_input()?, stop).or_failed(),
         ProcessName::Recorder => mcap_file::run(&read(args).or_input()?, stop).or_failed(),

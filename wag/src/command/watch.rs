@@ -4,8 +4,9 @@ use crate::cli::WatchArgs;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::output;
 use crate::session::{interrupted, watch_interrupts};
-use crate::watch::{Wanted, Watcher, domain_of_run};
+use crate::watch::{PreviewChild, Wanted, Watcher, domain_of_run};
 use anyhow::anyhow;
+use camera_ingest::load_camera;
 use serde_json::{Value, json};
 use shared_types::ipc::IpcError;
 use std::sync::atomic::Ordering;
@@ -25,13 +26,19 @@ pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
         (None, Some(domain)) => Wanted::Domain(domain.clone(), None),
         (None, None) => Wanted::Newest,
     };
+    if let Some(camera) = &args.camera {
+        load_camera(camera).or_input()?;
+    }
     watch_interrupts().or_failed()?;
-    let (mut watcher, url) = Watcher::start(wanted, args.bind).map_err(|error| {
-        match error.downcast_ref::<IpcError>() {
-            Some(IpcError::Domain { .. }) => Failure::input(error),
-            _ => Failure::failed(error),
-        }
-    })?;
+    let preview = args.preview.then(|| PreviewChild::new(args.camera.clone()));
+    let preview = preview.transpose().or_failed()?;
+    let (mut watcher, url) =
+        Watcher::start(wanted, args.bind, preview).map_err(|error| {
+            match error.downcast_ref::<IpcError>() {
+                Some(IpcError::Domain { .. }) => Failure::input(error),
+                _ => Failure::failed(error),
+            }
+        })?;
     // Whatever happens here may wait; what is watched may not.
     let _ = rustix::process::nice(NICE);
     let began = Instant::now();

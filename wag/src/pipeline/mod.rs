@@ -16,8 +16,8 @@ pub use calm::{CalmInput, Calmed, calm};
 pub use lag::joint_lag_s;
 pub use observe::{Film, Shot, film_during};
 pub use processes::{
-    ArmAddress, arm_ports, rig_config, shipped_rig, start_camera, start_controller, start_planner,
-    start_recorder, start_rig, write_calibration,
+    ArmAddress, arm_ports, preview_spec, rig_config, shipped_rig, start_camera, start_controller,
+    start_planner, start_recorder, start_rig, write_calibration,
 };
 pub use run_folder::RunFolder;
 pub use stages::{Tracked, identify, plan_strike, score, track, wait_still};

@@ -2,10 +2,12 @@
 
 use super::{ArmLink, RunFolder, STARTUP};
 use crate::config;
+use crate::files;
 use crate::mcap_file::RecorderConfig;
 use crate::session::{ProcessSpec, Session};
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
+use camera_ingest::preview::PreviewConfig;
 use camera_ingest::process::CameraConfig;
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
@@ -109,6 +111,20 @@ pub fn start_camera(
         holds_arm: false,
     })?;
     session.connect(&CameraRequest::Ping, STARTUP)
+}
+
+/// The live preview of a domain's rope, to be started by whoever shows it; its
+/// configuration goes into `folder`.
+pub fn preview_spec(folder: &Path, domain: &str, camera: &Path) -> anyhow::Result<ProcessSpec> {
+    let config = PreviewConfig::new(domain, camera.to_owned());
+    let path = folder.join("preview.toml");
+    let text = toml::to_string(&config).context("configuration of preview")?;
+    files::write_atomic(&path, text.as_bytes())?;
+    Ok(ProcessSpec {
+        name: "preview",
+        config: path,
+        holds_arm: false,
+    })
 }
 
 /// Starts the planner.

@@ -49,6 +49,12 @@ impl Facts {
         self.folder.as_deref()
     }
 
+    /// The file of the camera's calibration, where it lies in the folder.
+    pub fn camera_file(&self) -> Option<PathBuf> {
+        self.camera.as_ref()?;
+        Some(self.folder.as_ref()?.join("camera.toml"))
+    }
+
     /// Reads what has changed. Files are written whole or not at all; one that is there
     /// and wrong counts as not there.
     pub fn look(&mut self) {

@@ -4,11 +4,15 @@
 //! Keypoints come after the film they belong to. The JPEGs of the last seconds are kept
 //! for them, so that the tracked film can be shown once, in its own pace, before the
 //! live picture goes on.
+//!
+//! Where a preview follows the rope as the frames come, the live picture is shown one
+//! picture later, with the keypoints that were found in it meanwhile.
 
-use anyhow::ensure;
+use super::picture::{Jpeg, encode, projected};
+use super::preview::Heard;
 use serde::Serialize;
 use shared_types::StereoCamera;
-use shared_types::ipc::{Bus, FrameHeader, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
+use shared_types::ipc::{Bus, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
 use shared_types::keypoints::KeypointFrame;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -16,13 +20,12 @@ use std::time::{Duration, Instant};
 
 /// Least time between two pictures.
 const PERIOD: Duration = Duration::from_micros(66_700);
-/// Widest picture; larger ones are made smaller (pixels).
-const WIDTH_MAX_PX: usize = 960;
-const QUALITY: u8 = 70;
 /// Most bytes of JPEGs kept for keypoints to come.
 const KEPT_MAX_BYTES: usize = 12_000_000;
 /// A keypoint frame belongs to a JPEG whose stamp is as near as this (ns).
 const SAME_FRAME_NS: u64 = 1_000_000;
+/// A picture that waited longer for its keypoints is not shown any more (ns).
+const OLD_NS: u64 = 500_000_000;
 
 /// A picture for the page.
 #[derive(Debug)]
@@ -37,10 +40,10 @@ pub struct Picture {
 #[derive(Debug, Serialize)]
 struct Over {
     /// What the picture is.
-    caption: &'static str,
+    caption: String,
     /// Pixels of the camera for one of the picture.
     scale: usize,
-    /// Tracked keypoints, raw pixels of the camera.
+    /// Keypoints found in it, raw pixels of the camera.
     keypoints: Vec<[f32; 2]>,
     /// Whether the rope was lost in this frame.
     lost: bool,
@@ -48,11 +51,11 @@ struct Over {
     rope: Vec<[i32; 2]>,
 }
 
-#[derive(Debug)]
-struct Kept {
-    stamp_ns: u64,
-    scale: usize,
-    jpeg: Arc<[u8]>,
+/// A live picture, and the simulated rope as the camera would see it at that time.
+#[derive(Debug, Clone)]
+struct Live {
+    picture: Jpeg,
+    rope: Vec<[i32; 2]>,
 }
 
 /// The camera of a domain.
@@ -60,10 +63,16 @@ struct Kept {
 pub struct Film {
     frames: FrameSubscriber,
     keypoints: KeypointSubscriber,
-    kept: VecDeque<Kept>,
+    kept: VecDeque<Jpeg>,
     kept_bytes: usize,
     /// Tracked frames still to be shown.
     tracked: VecDeque<KeypointFrame>,
+    /// What a preview tells.
+    pub preview: Heard,
+    /// The picture that waits for its keypoints.
+    waits: Option<Live>,
+    /// A preview is wished for, but there is no calibration for it.
+    pub lacks_calibration: bool,
     last: Option<Instant>,
     /// When the last frame came.
     pub seen: Option<Instant>,
@@ -78,6 +87,9 @@ impl Film {
             kept: VecDeque::new(),
             kept_bytes: 0,
             tracked: VecDeque::new(),
+            preview: Heard::open(bus)?,
+            waits: None,
+            lacks_calibration: false,
             last: None,
             seen: None,
         })
@@ -96,6 +108,7 @@ impl Film {
                 self.tracked.push_back(*found);
             }
         }
+        self.preview.listen()?;
         // Only the newest frame is looked at; the others go back to the camera at once.
         let mut newest = None;
         while let Some(frame) = self.frames.receive()? {
@@ -113,30 +126,54 @@ impl Film {
         if head.pixel_format != PIXEL_FORMAT_YUYV {
             return Ok(None);
         }
-        let live = encode(frame.payload(), head)?;
-        drop(frame);
-        let picture = match self.next_tracked() {
-            Some(tracked) => tracked,
-            None => Picture {
-                jpeg: Arc::clone(&live.jpeg),
-                over: serde_json::to_string(&Over {
-                    caption: if rope.is_empty() || camera.is_none() {
-                        "camera, live"
-                    } else {
-                        "camera, live; dots: the identified rope, simulated"
-                    },
-                    scale: live.scale,
-                    keypoints: Vec::new(),
-                    lost: false,
-                    rope: camera.map_or_else(Vec::new, |camera| projected(camera, rope)),
-                })?,
-            },
+        let live = Live {
+            picture: encode(frame.payload(), head)?,
+            rope: camera.map_or_else(Vec::new, |camera| projected(camera, rope)),
         };
-        self.keep(live);
-        Ok(Some(picture))
+        drop(frame);
+        self.keep(live.picture.clone());
+        let tracked = self.next_tracked();
+        // One that nobody asked for in time is old.
+        let waited = self.waits.replace(live.clone());
+        let waited = waited.filter(|l| head.stamp_ns.abs_diff(l.picture.stamp_ns) < OLD_NS);
+        let shown = match tracked {
+            Some(tracked) => Some(tracked),
+            None if self.preview.is_there() => waited.map(|l| self.show(l)).transpose()?,
+            None => Some(self.show(live)?),
+        };
+        Ok(shown)
     }
 
-    fn at(&self, stamp_ns: u64) -> Option<&Kept> {
+    /// A live picture with everything that is known to be in it.
+    fn show(&self, Live { picture, rope }: Live) -> anyhow::Result<Picture> {
+        let mut caption = "camera, live".to_owned();
+        if !rope.is_empty() {
+            caption += "; dots: the identified rope, simulated";
+        }
+        let found = self.preview.words();
+        let lacks = self.lacks_calibration.then(|| {
+            "no preview: there is no camera.toml in the run folder, name one with --camera"
+                .to_owned()
+        });
+        if let Some(words) = found.or(lacks) {
+            caption += "; ";
+            caption += &words;
+        }
+        let found = self.preview.near(picture.stamp_ns);
+        let over = Over {
+            caption,
+            scale: picture.scale,
+            keypoints: found.map_or_else(Vec::new, |f| f.points().to_vec()),
+            lost: found.is_some_and(|f| f.lost != 0),
+            rope,
+        };
+        Ok(Picture {
+            jpeg: picture.bytes,
+            over: serde_json::to_string(&over)?,
+        })
+    }
+
+    fn at(&self, stamp_ns: u64) -> Option<&Jpeg> {
         self.kept
             .iter()
             .find(|kept| kept.stamp_ns.abs_diff(stamp_ns) <= SAME_FRAME_NS)
@@ -148,14 +185,14 @@ impl Film {
             if let Some(kept) = self.at(frame.stamp_ns) {
                 let count = (frame.count as usize).min(frame.points_px.len());
                 let over = Over {
-                    caption: "the wiggle as filmed, with the keypoints found in it",
+                    caption: "the wiggle as filmed, with the keypoints found in it".to_owned(),
                     scale: kept.scale,
                     keypoints: frame.points_px[..count].to_vec(),
                     lost: frame.lost != 0,
                     rope: Vec::new(),
                 };
                 return Some(Picture {
-                    jpeg: Arc::clone(&kept.jpeg),
+                    jpeg: Arc::clone(&kept.bytes),
                     over: serde_json::to_string(&over).ok()?,
                 });
             }
@@ -163,71 +200,21 @@ impl Film {
         None
     }
 
-    fn keep(&mut self, picture: Kept) {
-        self.kept_bytes += picture.jpeg.len();
+    fn keep(&mut self, picture: Jpeg) {
+        self.kept_bytes += picture.bytes.len();
         self.kept.push_back(picture);
         while self.kept_bytes > KEPT_MAX_BYTES
             && let Some(oldest) = self.kept.pop_front()
         {
-            self.kept_bytes -= oldest.jpeg.len();
+            self.kept_bytes -= oldest.bytes.len();
         }
     }
-}
-
-fn encode(pixels: &[u8], head: FrameHeader) -> anyhow::Result<Kept> {
-    let size = [head.width_px as usize, head.height_px as usize];
-    let scale = (size[0] / 2).div_ceil(WIDTH_MAX_PX).max(1);
-    let [width, height] = [size[0] / 2, size[1]].map(|px| px.div_ceil(scale));
-    let mut jpeg = Vec::new();
-    let mut encoder = jpeg_encoder::Encoder::new(&mut jpeg, QUALITY);
-    encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_2_1);
-    encoder.encode(
-        &left_eye(pixels, size, scale)?,
-        u16::try_from(width)?,
-        u16::try_from(height)?,
-        jpeg_encoder::ColorType::Ycbcr,
-    )?;
-    Ok(Kept {
-        stamp_ns: head.stamp_ns,
-        scale,
-        jpeg: jpeg.into(),
-    })
-}
-
-/// Left eye of a side-by-side YUYV frame as packed YCbCr, which a JPEG holds anyway:
-/// of every `scale` pixels and rows the first.
-fn left_eye(pixels: &[u8], [width, height]: [usize; 2], scale: usize) -> anyhow::Result<Vec<u8>> {
-    ensure!(
-        width > 0 && height > 0 && width % 4 == 0 && pixels.len() == width * height * 2,
-        "a frame of {width}x{height} has {} bytes",
-        pixels.len()
-    );
-    let mut out = Vec::with_capacity((width / 2 / scale + 1) * (height / scale + 1) * 3);
-    for row in pixels.chunks_exact(width * 2).step_by(scale) {
-        for u in (0..width / 2).step_by(scale) {
-            let quad = &row[u / 2 * 4..][..4];
-            out.extend_from_slice(&[quad[u % 2 * 2], quad[1], quad[3]]);
-        }
-    }
-    Ok(out)
-}
-
-/// Nodes of a rope as the left eye sees them; those it does not see are left out.
-fn projected(camera: &StereoCamera, rope: &[nalgebra::Vector3<f64>]) -> Vec<[i32; 2]> {
-    rope.iter()
-        .filter_map(|node| camera.project_left(node))
-        .filter(|pixel| camera.contains(*pixel))
-        .map(|pixel| {
-            #[allow(clippy::cast_possible_truncation, reason = "inside the picture")]
-            pixel.map(|x| x.round() as i32)
-        })
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::ipc::DomainSweep;
+    use shared_types::ipc::{DomainSweep, FrameHeader, PreviewFrame, PreviewState};
 
     const SIZE: [u32; 2] = [64, 16];
 
@@ -305,19 +292,45 @@ mod tests {
     }
 
     #[test]
-    fn the_left_eye_is_cut_out_pixel_by_pixel() {
-        // Two rows of eight pixels: luma counts, chroma tells the eye.
-        let pair = |y: u8, eye: u8| [y, 100 + eye, y + 1, 200 + eye];
-        let row = |y: u8| [pair(y, 0), pair(y + 2, 0), pair(y + 4, 1), pair(y + 6, 1)].concat();
-        let frame = [row(0), row(10)].concat();
-        let pixel = |y: u8| [y, 100, 200];
-        let whole = [0, 1, 2, 3, 10, 11, 12, 13].map(pixel).concat();
-        assert_eq!(left_eye(&frame, [8, 2], 1).unwrap(), whole);
-        assert_eq!(
-            left_eye(&frame, [8, 2], 2).unwrap(),
-            [0, 2].map(pixel).concat()
+    fn with_a_preview_each_picture_waits_for_its_own_keypoints() {
+        let domain = format!("test_film_preview_{}", std::process::id());
+        let _sweep = DomainSweep::new(&domain);
+        let bus = Bus::join(&domain).unwrap();
+        let camera = bus.frame_publisher(1 << 16).unwrap();
+        let preview = bus.preview_publisher().unwrap();
+        let mut film = Film::open(&bus).unwrap();
+        let mut turn = |number: u64, found: Option<f32>| {
+            std::thread::sleep(PERIOD);
+            let (header, bytes) = frame(number);
+            let mut sample = camera.loan_slice_uninit(bytes.len()).unwrap();
+            *sample.user_header_mut() = header;
+            sample.write_from_slice(&bytes).send().unwrap();
+            let picture = film.turn(true, None, &[]).unwrap();
+            if let Some(u) = found {
+                let mut told = PreviewFrame {
+                    state: PreviewState::Following as u8,
+                    count: 1,
+                    stamp_ns: header.stamp_ns,
+                    ..PreviewFrame::default()
+                };
+                told.points_px[0][0] = u;
+                preview.send_copy(told).unwrap();
+            }
+            picture.map_or_else(String::new, |picture| picture.over)
+        };
+        assert!(
+            turn(1, Some(11.0)).contains("\"keypoints\":[]"),
+            "no preview"
         );
-        assert!(left_eye(&frame[1..], [8, 2], 1).is_err());
+        // Frames are 20 ms apart by their stamps, so that every other one is far.
+        let first_with = turn(11, Some(12.0));
+        assert!(first_with.contains("[[11.0,0.0]]"), "{first_with}");
+        assert!(first_with.contains("the preview's keypoints"));
+        assert!(turn(21, None).contains("[[12.0,0.0]]"));
+        assert!(
+            turn(31, None).contains("\"keypoints\":[]"),
+            "it skipped one"
+        );
     }
 
     #[test]
@@ -326,10 +339,10 @@ mod tests {
         let _sweep = DomainSweep::new(&domain);
         let mut film = Film::open(&Bus::join(&domain).unwrap()).unwrap();
         for stamp_ns in 0..40 {
-            film.keep(Kept {
+            film.keep(Jpeg {
                 stamp_ns,
                 scale: 1,
-                jpeg: vec![0; 1_000_000].into(),
+                bytes: vec![0; 1_000_000].into(),
             });
         }
         assert_eq!((film.kept.len(), film.kept_bytes), (12, 12_000_000));

@@ -12,11 +12,14 @@ mod http;
 mod jitter;
 mod newest;
 mod page;
+mod picture;
+mod preview;
 mod rope;
 mod snapshot;
 mod token;
 
 pub use facts::domain_of_run;
+pub use preview::PreviewChild;
 
 use crate::report::{arm_points, tenths_mm};
 use ask::{Ask, Asked, Open, Present, hand_over};
@@ -68,6 +71,8 @@ pub struct Watcher {
     searched: Option<Instant>,
     histograms_at: Option<Instant>,
     present: Present,
+    /// The preview of the rope, where it is wished for.
+    preview: Option<PreviewChild>,
     /// When the last turn was due.
     turned: Instant,
 }
@@ -77,7 +82,11 @@ impl Watcher {
     ///
     /// # Errors
     /// Nothing can be listened to there, or the domain cannot be joined.
-    pub fn start(wanted: Wanted, bind: SocketAddr) -> anyhow::Result<(Self, String)> {
+    pub fn start(
+        wanted: Wanted,
+        bind: SocketAddr,
+        preview: Option<PreviewChild>,
+    ) -> anyhow::Result<(Self, String)> {
         let (sender, asks) = mpsc::channel();
         let attached = match &wanted {
             Wanted::Newest => None,
@@ -97,6 +106,7 @@ impl Watcher {
             searched: None,
             histograms_at: None,
             present: Present::default(),
+            preview,
             turned: Instant::now(),
         };
         Ok((watcher, url))
@@ -187,7 +197,27 @@ impl Watcher {
             self.attached = None;
             return self.snapshot(None);
         }
+        if search {
+            self.keep_preview();
+        }
         self.snapshot(seen)
+    }
+
+    /// Lets the preview look at what is attached.
+    fn keep_preview(&mut self) {
+        let Some(preview) = &mut self.preview else {
+            return;
+        };
+        let attached = self.attached.as_mut();
+        let controller = attached.as_ref().and_then(|a| a.controller.as_ref());
+        let camera = controller.and_then(|c| c.facts.camera_file());
+        let domain = attached.as_ref().map(|a| a.domain.as_str());
+        let film = attached.as_ref().and_then(|a| a.film.as_ref());
+        let there = film.is_some_and(|film| film.preview.is_there());
+        preview.keep(domain, camera.as_deref(), there);
+        if let Some(film) = attached.and_then(|a| a.film.as_mut()) {
+            film.lacks_calibration = preview.lacks_camera();
+        }
     }
 
     /// A controller came: nothing of the one before counts for it.

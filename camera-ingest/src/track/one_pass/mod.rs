@@ -19,6 +19,7 @@ use super::refusal::{TrackError, check_frame, check_keypoints};
 use super::{keypoints, learn};
 use crate::frame::EyeFrame;
 use following::Following;
+use nalgebra::Vector3;
 use scene::Scene;
 use shared_types::StereoCamera;
 use shared_types::keypoints::TrackedFrame;
@@ -93,6 +94,8 @@ pub struct OnePass {
     scene: Option<Scene>,
     stage: Stage,
     newest: Newest,
+    /// The next frame is to be the one from which the rope is learnt.
+    rest_is_next: bool,
 }
 
 impl OnePass {
@@ -108,6 +111,7 @@ impl OnePass {
             scene: None,
             stage: Stage::Scene,
             newest: Newest::default(),
+            rest_is_next: false,
         })
     }
 
@@ -138,12 +142,46 @@ impl OnePass {
         }))
     }
 
+    /// Forgets scene and rope: the next frame is the first one again.
+    pub fn begin_anew(&mut self) {
+        self.scene = None;
+        self.stage = Stage::Scene;
+        self.newest = Newest::default();
+    }
+
+    /// Forgets the rope: it is learnt from the next frame, moving or not. `clamp` need
+    /// reach back no further than to that frame then.
+    pub fn learn_anew(&mut self) {
+        self.stage = Stage::Scene;
+        self.rest_is_next = true;
+    }
+
+    /// Whether the scene without rope is known.
+    #[must_use]
+    pub fn knows_scene(&self) -> bool {
+        self.scene.as_ref().and_then(Scene::background).is_some()
+    }
+
+    /// How far a point in the world is from the plane in which the rope is followed (m);
+    /// `None` while it is not.
+    #[must_use]
+    pub fn off_plane_m(&self, p_w_m: &Vector3<f64>) -> Option<f64> {
+        let Stage::Following(following) = &self.stage else {
+            return None;
+        };
+        let plane = &following.rope.plane;
+        Some(plane.off_m(&self.camera.to_left(p_w_m)))
+    }
+
     fn go_on(&mut self, stage: Stage, clamp: &ClampPath) -> Stage {
         let Newest { frame, count, .. } = &self.newest;
         let Some(frame) = frame else {
             return stage;
         };
         let scene = self.scene.get_or_insert_with(|| Scene::new(frame.clone()));
+        if std::mem::take(&mut self.rest_is_next) {
+            scene.rest_in(frame, *count);
+        }
         if !matches!(stage, Stage::Following(_)) {
             scene.watch(frame, *count);
         }

@@ -63,6 +63,12 @@ impl Scene {
         &self.rest
     }
 
+    /// From now on the rope is to be found where it is in this frame, the `index`-th.
+    pub(super) fn rest_in(&mut self, frame: &EyeFrame, index: u64) {
+        self.rest.clone_from(frame);
+        self.quiet = (frame.clone(), index);
+    }
+
     /// The scene without rope, once there is one.
     pub(super) fn background(&self) -> Option<&Background> {
         self.whole.then_some(&self.background)

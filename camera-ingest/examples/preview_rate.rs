@@ -1,0 +1,66 @@
+//! What a running preview does, until it has been silent for three seconds:
+//! `preview_rate DOMAIN` prints its rate, its time per frame and its states.
+
+use std::error::Error;
+use std::time::{Duration, Instant};
+
+use shared_types::ipc::{Bus, DomainSweep, PreviewFrame, PreviewState};
+
+/// Silence that ends the count.
+const SILENCE: Duration = Duration::from_secs(3);
+
+/// The value below which a part of the sorted ones lies.
+fn quantile(sorted: &[u32], percent: usize) -> f64 {
+    let at = sorted.len().saturating_sub(1) * percent / 100;
+    sorted
+        .get(at)
+        .map_or(f64::NAN, |us| f64::from(*us) / 1000.0)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let domain = std::env::args().nth(1).ok_or("name a domain")?;
+    let _sweep = DomainSweep::new(&domain);
+    let bus = Bus::join(&domain)?;
+    let previews = bus.preview_subscriber()?;
+    let (mut told, mut heard): (Vec<PreviewFrame>, _) = (Vec::new(), Instant::now());
+    while heard.elapsed() < SILENCE || told.is_empty() {
+        while let Some(found) = previews.receive()? {
+            heard = Instant::now();
+            told.push(*found);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    told.retain(|t| t.state() != PreviewState::NoCamera);
+    let (Some(first), Some(last)) = (told.first(), told.last()) else {
+        return Err("no frame was looked at".into());
+    };
+    let span_s = (last.stamp_ns - first.stamp_ns) as f64 * 1e-9;
+    println!(
+        "{span_s:.1} s: looked at {}, {:.1} a second, skipped {}, began anew {} times",
+        told.len(),
+        told.len() as f64 / span_s,
+        last.skipped - first.skipped,
+        last.restarts
+    );
+    for (state, lost) in [
+        (PreviewState::NoArm, false),
+        (PreviewState::Looking, false),
+        (PreviewState::Following, false),
+        (PreviewState::Following, true),
+    ] {
+        let those = told
+            .iter()
+            .filter(|t| t.state() == state && (t.lost != 0) == lost);
+        let mut took: Vec<u32> = those.map(|t| t.took_us).collect();
+        took.sort_unstable();
+        println!(
+            "{state:?}{}: {} frames; half {:.2} ms, 99 % {:.2} ms, at most {:.2} ms",
+            if lost { ", lost" } else { "" },
+            took.len(),
+            quantile(&took, 50),
+            quantile(&took, 99),
+            quantile(&took, 100)
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,200 @@
+//! The live preview: follows the rope while frames come, and publishes where it is.
+//!
+//! One thread at the lowest priority that looks at the newest frame and lets all others
+//! pass. It copies a frame's left eye out and gives the frame back before it begins to
+//! work, so that it holds none; nobody waits for it. What comes of it is for eyes only:
+//! identification uses the film and its two passes.
+
+mod arm;
+mod step;
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+use shared_types::ipc::{
+    Bus, FrameHeader, FrameSubscriber, IpcError, JointSubscriber, PIXEL_FORMAT_YUYV, PreviewFrame,
+    PreviewPublisher, PreviewState,
+};
+
+use crate::calib::{CalibError, load_camera};
+use crate::frame::EyeFrame;
+use crate::track::{TrackError, TrackOptions};
+pub use step::Preview;
+
+/// Pause between two looks for a frame.
+const TURN: Duration = Duration::from_millis(2);
+/// Time without frames after which the camera counts as gone, and between two signs of
+/// life then.
+const SILENCE: Duration = Duration::from_millis(500);
+
+/// Configuration of the process. TOML form: keys as the fields.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PreviewConfig {
+    /// Shared-memory domain.
+    pub domain: String,
+    /// The camera's calibration and place, `camera.toml`.
+    pub camera: PathBuf,
+    /// Keypoints per frame, clamp and lead centre included (2 to 32).
+    #[serde(default = "usual_keypoints")]
+    pub keypoints: usize,
+}
+
+fn usual_keypoints() -> usize {
+    TrackOptions::default().keypoints
+}
+
+impl PreviewConfig {
+    /// The usual one for a camera.
+    #[must_use]
+    pub fn new(domain: &str, camera: PathBuf) -> Self {
+        Self {
+            domain: domain.to_owned(),
+            camera,
+            keypoints: usual_keypoints(),
+        }
+    }
+}
+
+/// Why the preview did not start or did not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum PreviewError {
+    /// Without a calibration nothing can be followed.
+    #[error(transparent)]
+    Calibration(#[from] CalibError),
+    /// Too many or few keypoints.
+    #[error(transparent)]
+    Keypoints(#[from] TrackError),
+    /// Shared memory failed.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+}
+
+/// Runs until `stop` is set.
+///
+/// # Errors
+/// No calibration, a bad number of keypoints, or shared memory that cannot be used.
+pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError> {
+    let camera = load_camera(&config.camera)?;
+    let eye_px = [camera.width_px, camera.height_px];
+    let mut preview = Preview::new(camera, config.keypoints)?;
+    let bus = Bus::join(&config.domain)?;
+    let ports = Ports::open(&bus)?;
+    tracing::info!(domain = config.domain, "preview is ready");
+    let (mut heard, mut state) = (Instant::now(), None);
+    while !stop.load(Ordering::Relaxed) {
+        let found = match ports.newest()? {
+            Some(Arrived::Left(frame)) => {
+                heard = Instant::now();
+                ports.take_joints(&mut preview)?;
+                preview.see(frame)
+            }
+            Some(Arrived::Unfit(head)) => {
+                heard = Instant::now();
+                preview.unfit(head.sequence, head.stamp_ns)
+            }
+            None => {
+                // Reports would pile up and be lost.
+                ports.take_joints(&mut preview)?;
+                if heard.elapsed() < SILENCE {
+                    std::thread::sleep(TURN);
+                    continue;
+                }
+                heard = Instant::now();
+                preview.without_camera()
+            }
+        };
+        if state != Some(found.state()) {
+            state = Some(found.state());
+            tell(&found, eye_px);
+        }
+        ports.publish(&PreviewFrame {
+            took_us: match found.state() {
+                PreviewState::NoCamera => 0,
+                _ => u32::try_from(heard.elapsed().as_micros()).unwrap_or(u32::MAX),
+            },
+            ..found
+        })?;
+    }
+    Ok(())
+}
+
+/// Says in the log what it does or waits for from now on.
+fn tell(found: &PreviewFrame, [width_px, height_px]: [u32; 2]) {
+    let words = found.state().words();
+    match found.state() {
+        PreviewState::Unfit => tracing::warn!(
+            "{words}: packed YUYV of {}x{height_px} px is expected",
+            2 * width_px
+        ),
+        PreviewState::NoCamera | PreviewState::NoArm => tracing::warn!("{words}"),
+        PreviewState::Looking | PreviewState::Following => {
+            tracing::info!(frame = found.sequence, "{words}");
+        }
+    }
+}
+
+/// What a newest frame is.
+enum Arrived {
+    Left(EyeFrame),
+    Unfit(FrameHeader),
+}
+
+/// The connections.
+struct Ports {
+    frames: FrameSubscriber,
+    joints: JointSubscriber,
+    out: PreviewPublisher,
+}
+
+fn transfer<E: std::fmt::Debug>(service: &'static str) -> impl Fn(E) -> IpcError {
+    move |e| IpcError::Transfer {
+        service,
+        reason: format!("{e:?}"),
+    }
+}
+
+impl Ports {
+    fn open(bus: &Bus) -> Result<Self, IpcError> {
+        Ok(Self {
+            out: bus.preview_publisher()?,
+            frames: bus.frame_subscriber()?,
+            joints: bus.joint_subscriber()?,
+        })
+    }
+
+    /// The left eye of the newest frame; all frames have gone back to the camera then.
+    fn newest(&self) -> Result<Option<Arrived>, IpcError> {
+        let failed = transfer("wag/v1/camera/frames");
+        let mut newest = None;
+        while let Some(sample) = self.frames.receive().map_err(&failed)? {
+            newest = Some(sample);
+        }
+        Ok(newest.map(|sample| {
+            let head = *sample.user_header();
+            let size = [head.width_px as usize, head.height_px as usize];
+            let left = (head.pixel_format == PIXEL_FORMAT_YUYV).then(|| {
+                EyeFrame::left_from_yuyv(sample.payload(), size, head.stamp_ns, head.sequence)
+            });
+            match left {
+                Some(Ok(frame)) => Arrived::Left(frame),
+                Some(Err(_)) | None => Arrived::Unfit(head),
+            }
+        }))
+    }
+
+    fn take_joints(&self, preview: &mut Preview) -> Result<(), IpcError> {
+        let failed = transfer("wag/v1/controller/joints");
+        while let Some(report) = self.joints.receive().map_err(&failed)? {
+            preview.report(report.stamp_ns, &report.q);
+        }
+        Ok(())
+    }
+
+    fn publish(&self, found: &PreviewFrame) -> Result<(), IpcError> {
+        let sent = self.out.send_copy(*found);
+        sent.map_err(transfer("wag/v1/camera/preview")).map(|_| ())
+    }
+}
