@@ -295,15 +295,8 @@ pub struct DoctorArgs {
     /// Address or name of an arm's controller to ask too; nothing of it is changed.
     #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
     pub address: Option<IpAddr>,
-    /// Command port.
-    #[arg(long, default_value_t = 502)]
-    pub command_port: u16,
-    /// Report port with joint states.
-    #[arg(long, default_value_t = 30000)]
-    pub report_port: u16,
-    /// Report port with the arm's status.
-    #[arg(long, default_value_t = 30002)]
-    pub status_port: u16,
+    #[command(flatten)]
+    pub ports: ArmPorts,
 }
 
 /// Arguments of `wag man`.

@@ -27,6 +27,7 @@ mod outline;
 mod plane;
 mod pursuit;
 mod refusal;
+mod sight;
 mod timing;
 
 use std::time::{Duration, Instant};

@@ -18,6 +18,7 @@ use super::first_frame::Place;
 use super::follow::{Follower, NODES, RANGE_PX, SEEN, State};
 use super::models::Moving;
 use super::plane::Point;
+use super::sight::Sight;
 use crate::frame::EyeFrame;
 
 /// A step longer than so many usual ones is a gap.
@@ -32,8 +33,6 @@ const BLIND: f64 = 4.0;
 const OTHER_PX: f64 = 15.0;
 /// Part of the coverage that the rope had of late that a rope found anew must have.
 const LEAST_FOUND: f64 = 0.6;
-/// Clear frames that tell how well the rope is seen of late.
-const LATE_FRAMES: usize = 61;
 /// Part of the length by which a rope found anew may differ.
 const LENGTH_TOLERANCE: f64 = 0.06;
 /// Ways over pixels are longer than the rope by up to this factor.
@@ -59,7 +58,7 @@ pub(super) fn pursue(
         usual_step_s: usual_step(times_s),
         states: vec![first],
         doubt: None,
-        seen: Vec::new(),
+        sight: Sight::default(),
     };
     for index in 1..frames.len() {
         pursuit.go_on(index);
@@ -91,8 +90,7 @@ struct Pursuit<'a> {
     usual_step_s: f64,
     states: Vec<State>,
     doubt: Option<Doubt>,
-    /// How well the rope was seen in frames that were clear and not in doubt.
-    seen: Vec<f64>,
+    sight: Sight,
 }
 
 impl Pursuit<'_> {
@@ -118,7 +116,7 @@ impl Pursuit<'_> {
             doubt.clear_since = if clear { index } else { index + 1 };
         }
         if self.doubt.is_none() {
-            self.seen.push(state.score());
+            self.sight.note(&state);
         }
         // While two ropes cross, looking anew would tell no more.
         let look =
@@ -148,6 +146,7 @@ impl Pursuit<'_> {
         let since = doubt.since;
         doubt.clear_since = index;
         self.states[index] = found;
+        let mut clear = true;
         for earlier in (since..index).rev() {
             let later = &self.states[earlier + 1];
             let back = self.back(earlier, later);
@@ -155,11 +154,12 @@ impl Pursuit<'_> {
                 return;
             }
             // The way back begins where the rope was found; but it may go wrong as
-            // the way forth did.
+            // the way forth did, though not where nothing like the rope is near.
+            clear &= is_clear(&back);
             self.states[earlier] = back;
         }
         if let Some(doubt) = &mut self.doubt {
-            doubt.torn = true;
+            doubt.torn |= !clear;
         }
     }
 
@@ -285,16 +285,9 @@ impl Pursuit<'_> {
         let found = self.measured(frame, t_s, &resting);
         let off = (length(&found.curve) / known_m - 1.0).abs();
         let fits = off < LENGTH_TOLERANCE
-            && found.score() > LEAST_FOUND * self.usually_seen()
+            && found.score() > LEAST_FOUND * self.sight.usual()
             && is_clear(&found);
         fits.then_some(found)
-    }
-
-    /// How well the rope was seen of late: a thin one, or a fast one, is seen less.
-    fn usually_seen(&self) -> f64 {
-        let mut late = self.seen[self.seen.len().saturating_sub(LATE_FRAMES)..].to_vec();
-        late.sort_by(f64::total_cmp);
-        late.get(late.len() / 2).copied().unwrap_or(1.0)
     }
 
     /// A curve found roughly, measured twice: the first time pulls it near.
@@ -322,12 +315,13 @@ pub(super) struct Look {
 }
 
 /// Looks for the rope in a frame as if nothing were known; `tracked` is where it is
-/// taken to be.
+/// taken to be, `sight` how well it was seen before.
 pub(super) fn look(
     follower: &Follower<'_>,
     (frame, t_s): (&EyeFrame, f64),
     usual_step_s: f64,
     tracked: Option<&State>,
+    sight: &Sight,
 ) -> Look {
     let mut pursuit = Pursuit {
         follower,
@@ -342,7 +336,7 @@ pub(super) fn look(
             two_ropes: false,
             torn: false,
         }),
-        seen: Vec::new(),
+        sight: sight.clone(),
     };
     Look {
         found: pursuit.find(0),

@@ -5,12 +5,9 @@ use clap::Args;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
-/// How to reach an arm.
+/// Ports of an arm's controller.
 #[derive(Debug, Args)]
-pub struct ArmArgs {
-    /// Address or name of the arm's controller.
-    #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
-    pub address: Option<IpAddr>,
+pub struct ArmPorts {
     /// Command port.
     #[arg(long, default_value_t = 502)]
     pub command_port: u16,
@@ -20,6 +17,16 @@ pub struct ArmArgs {
     /// Report port with the arm's status (5 Hz); both kinds will do.
     #[arg(long, default_value_t = 30002)]
     pub status_port: u16,
+}
+
+/// How to reach an arm.
+#[derive(Debug, Args)]
+pub struct ArmArgs {
+    /// Address or name of the arm's controller.
+    #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
+    pub address: Option<IpAddr>,
+    #[command(flatten)]
+    pub ports: ArmPorts,
     /// The area is clear and the emergency stop is in reach. Asked for at any
     /// address that is not this machine unless given here.
     #[arg(long, alias = "confirm")]

@@ -14,8 +14,12 @@ pub fn run(args: &DoctorArgs, quiet: bool) -> Outcome<Option<Value>> {
     let mut findings = judge(&facts);
     findings.push(network_finding());
     if let Some(ip) = args.address {
-        let ports = [args.report_port, args.status_port];
-        findings.extend(judge_line(&ArmLine::measure(ip, args.command_port, &ports)));
+        let ports = [args.ports.report_port, args.ports.status_port];
+        findings.extend(judge_line(&ArmLine::measure(
+            ip,
+            args.ports.command_port,
+            &ports,
+        )));
     }
     let failed = findings
         .iter()

@@ -56,9 +56,9 @@ pub fn tell(
              3. move it at set-up speed to the start pose {} rad\n  \
              4. arm it for one {name} and send it for {duration_s:.2} s, {:.0} setpoints a second\n  \
              5. disarm it, and keep the record of every cycle in the run's folder",
-            arm.command_port,
-            arm.report_port,
-            arm.status_port,
+            arm.ports.command_port,
+            arm.ports.report_port,
+            arm.ports.status_port,
             start.join(", "),
             1.0 / limits.period_s(),
         );

@@ -86,9 +86,9 @@ fn stream(
     let address = arm.address.ok_or_else(|| anyhow!("no arm named"))?;
     let address = ArmAddress {
         ip: address,
-        command: arm.command_port,
-        joints: arm.report_port,
-        status: [arm.status_port; 2],
+        command: arm.ports.command_port,
+        joints: arm.ports.report_port,
+        status: [arm.ports.status_port; 2],
     };
     pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::start_controller(session, folder, limits, address)?;

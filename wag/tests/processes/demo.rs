@@ -1,6 +1,7 @@
 //! Processes of a whole demo killed while the arm moves.
 
-use super::shell::{process_of, recorded, said, send, until, wag};
+use super::shell::{process_of, recorded, said, send, until};
+use crate::support::command;
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
 use shared_types::{FaultCode, MotionTier, Plan};
@@ -27,7 +28,7 @@ const TOO_BUSY: [&str; 2] = [
 fn demo_in(into: &Path, tier: MotionTier) -> (Child, PathBuf) {
     for attempt in 0..3 {
         let run = into.join(format!("run-{attempt}"));
-        let mut child = wag(&["demo", "--seed", "4", "--json", "--out"])
+        let mut child = command(&["demo", "--seed", "4", "--json", "--out"])
             .arg(&run)
             .spawn()
             .unwrap();

@@ -12,3 +12,5 @@ mod demo;
 mod identical;
 mod operator;
 mod shell;
+#[path = "../support/mod.rs"]
+mod support;

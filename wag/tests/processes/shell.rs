@@ -1,11 +1,12 @@
 //! `wag` as its users start it, the arm it drives, and what it recorded.
 
+use crate::support::command;
 use hil_tests::arm::{ArmConfig, SimulatedArm};
 use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::{CauseRecord, CycleRecord};
 use shared_types::plan::START_POSE;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 /// An arm in this process, at the start pose.
@@ -19,20 +20,10 @@ pub fn arm() -> SimulatedArm {
     .unwrap()
 }
 
-pub fn wag(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
-    command
-        .args(args)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
 /// `wag wiggle` on that arm, into `run`.
 pub fn wiggle(arm: &SimulatedArm, run: &Path, more: &[&str]) -> Command {
     let [joints, _, rich, _] = arm.ports().reports;
-    let mut command = wag(&["wiggle", "--arm", "127.0.0.1", "--json"]);
+    let mut command = command(&["wiggle", "--arm", "127.0.0.1", "--json"]);
     command
         .args(["--command-port", &arm.ports().command.to_string()])
         .args(["--report-port", &joints.to_string()])

@@ -5,6 +5,7 @@ use super::super::curve::{norm, sub};
 use super::super::follow::State;
 use super::super::plane::Point;
 use super::super::pursuit::{GAP, LOOK_EVERY, Look, confirmed, distrust, is_clear, look, same};
+use super::super::sight::Sight;
 use super::scene::Scene;
 use super::{Newest, Rope};
 use shared_types::StereoCamera;
@@ -31,6 +32,7 @@ pub(super) struct Following {
     /// In the newest frame; times since the rope hung still.
     pub(super) state: State,
     doubt: Option<Doubt>,
+    sight: Sight,
     /// Where it was found anew in the newest frame, to be confirmed in the next one.
     found: Option<State>,
     /// Frames in a row in which it is lost.
@@ -51,6 +53,7 @@ impl Following {
                 two_ropes: false,
                 agreed: 1,
             }),
+            sight: Sight::default(),
             found: None,
             lost_frames: 0,
         }
@@ -86,11 +89,20 @@ impl Following {
                 agreed: 0,
             });
         }
+        if self.doubt.is_none() {
+            self.sight.note(&state);
+        }
         // While two ropes cross, looking anew would tell no more.
         let due = self.doubt.is_some_and(|d| newest.count >= d.next_look);
         let before = self.found.take();
         if before.is_some() || due && (!state.ambiguous || state.lost) {
-            let Look { found, two_ropes } = look(&follower, now, newest.usual_step_s, Some(&state));
+            let Look { found, two_ropes } = look(
+                &follower,
+                now,
+                newest.usual_step_s,
+                Some(&state),
+                &self.sight,
+            );
             if let Some(doubt) = &mut self.doubt {
                 doubt.two_ropes |= two_ropes;
                 doubt.next_look = newest.count + LOOK_EVERY as u64;

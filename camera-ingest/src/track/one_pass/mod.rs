@@ -16,6 +16,7 @@ use super::models::Moving;
 use super::plane::RopePlane;
 use super::pursuit::{confirmed, look};
 use super::refusal::{TrackError, check_frame, check_keypoints};
+use super::sight::Sight;
 use super::{keypoints, learn};
 use crate::frame::EyeFrame;
 use following::Following;
@@ -278,7 +279,7 @@ impl OnePass {
         }
         let clamp = clamp.since(rope.rest_s);
         let follower = rope.follower(&self.camera, &clamp, background);
-        let Some(found) = look(&follower, now, *usual_step_s, None).found else {
+        let Some(found) = look(&follower, now, *usual_step_s, None, &Sight::default()).found else {
             // The scene may have been poor when the rope was learnt.
             return Stage::Scene;
         };

@@ -99,7 +99,7 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
     let recorder = &mut session.recorder;
     let reports = core::mem::take(&mut recorder.joints);
     Ok(Evidence {
-        source: format!("arm {address}:{}", args.arm.command_port),
+        source: format!("arm {address}:{}", args.arm.ports.command_port),
         folder: folder.path().to_owned(),
         cycles: core::mem::take(&mut recorder.cycles),
         has_targets: reports.iter().any(|r| r.arm_clock != 0),
@@ -137,9 +137,9 @@ fn stream(
     let stage = Stage::begin("bring-up", quiet);
     let address = ArmAddress {
         ip,
-        command: args.arm.command_port,
-        joints: args.arm.report_port,
-        status: [args.arm.status_port; 2],
+        command: args.arm.ports.command_port,
+        joints: args.arm.ports.report_port,
+        status: [args.arm.ports.status_port; 2],
     };
     pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::start_controller(session, folder, limits, address)?;
