@@ -212,8 +212,8 @@ mod tests {
     use super::*;
     use crate::track::background::Background;
 
-    const WIDTH: usize = 96;
-    const HEIGHT: usize = 64;
+    const WIDTH: usize = 192;
+    const HEIGHT: usize = 128;
 
     /// A textured wall, a still post, and a shaded disc about a column.
     fn frame(centre_u: f64) -> EyeFrame {
@@ -271,7 +271,8 @@ mod tests {
     fn a_fat_thing_that_hardly_moves_is_taken_away() {
         // 14: no place is always covered. 7: the middle is.
         for amplitude_px in [14.0, 7.0] {
-            assert!(wrong(&scene_of(amplitude_px)) <= 8, "{amplitude_px} px");
+            let wrong = wrong(&scene_of(amplitude_px));
+            assert!(wrong <= 8, "{amplitude_px} px: {wrong} places");
         }
     }
 
