@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_covers_a_place_mostly_is_not_the_scene_if_its_shading_changes() {
+    fn what_covers_a_place_mostly_is_not_the_scene() {
         // 24 columns wide, moving by one a frame: column 23 is covered in 24 of 32 frames.
         let shade = |i: usize| 180 + 2 * (i as u8);
         let frames: Vec<_> = (0..32).map(|i| bar(i, 24, shade(i))).collect();

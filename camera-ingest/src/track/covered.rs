@@ -2,9 +2,8 @@
 //!
 //! A fat lead on a heavy rope hardly moves: the median over frames shows the lead, not
 //! what is behind it. Such a place has shown two colours, and the scene's is the one that
-//! goes on beside the place. What is covered in every frame is
-//! known only by what lies around it: it is filled from there, as far as it looks like
-//! what was taken away.
+//! goes on beside the place. What is covered in every frame is known only by what lies
+//! around it: it is filled from there, as far as it looks like what was taken away.
 
 use std::collections::VecDeque;
 
