@@ -6,10 +6,11 @@
 
 use super::curve::{add, length, resample, scale, smooth, sub};
 use super::follow::{
-    ANCHOR, Follower, LEAST_LEAD, LOST_BELOW, NODES, SMOOTHING, State, UNSEEN_WEIGHT, mean,
+    ANCHOR, Follower, LEAST_LEAD, LOST_BELOW, NODES, SMOOTHING, UNSEEN_WEIGHT, mean,
 };
 use super::models::{ModelError, PointTracker, SeenPoint, check_count};
 use super::plane::Point;
+use super::state::State;
 use crate::frame::EyeFrame;
 
 /// Points asked for where the tracker follows any number.

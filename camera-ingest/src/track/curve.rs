@@ -23,6 +23,14 @@ pub(super) fn length(points: &[Point]) -> f64 {
     points.windows(2).map(|w| norm(sub(w[1], w[0]))).sum()
 }
 
+/// Whether it turns back on itself from one point to the next.
+pub(super) fn folds(points: &[Point]) -> bool {
+    points.windows(3).any(|w| {
+        let (a, b) = (sub(w[1], w[0]), sub(w[2], w[1]));
+        a[0] * b[0] + a[1] * b[1] < 0.0
+    })
+}
+
 /// `count` points equally spaced in arc length over the first `total` of the
 /// polyline; beyond its end it goes on straight.
 #[allow(clippy::cast_precision_loss, reason = "point counts are small")]
@@ -132,6 +140,16 @@ mod tests {
         assert_eq!(resample(&bent, 2.0, 5)[3], [1.0, 0.5]);
         assert_eq!(resample(&bent, 3.0, 4)[3], [1.0, 2.0]);
         assert!((length(&bent) - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_fold_turns_by_more_than_a_right_angle() {
+        let turned = |by_deg: f64| {
+            let (s, c) = by_deg.to_radians().sin_cos();
+            [[-1.0, 0.0], [0.0, 0.0], [c, s], [2.0 * c, 2.0 * s]]
+        };
+        assert!(!folds(&turned(89.0)) && !folds(&turned(-89.0)));
+        assert!(folds(&turned(91.0)) && folds(&turned(180.0)));
     }
 
     #[test]

@@ -4,14 +4,15 @@ use shared_types::StereoCamera;
 
 use super::background::Background;
 use super::clamp::ClampPath;
-use super::curve::{add, length, norm, normals, resample, scale, smooth, sub};
+use super::curve::{add, folds, length, norm, normals, resample, scale, smooth, sub};
 use super::evidence::{Band, Colour, Coverage, Matter, Window};
 use super::first_frame::{LEAD_FULL, LEAD_SHADES};
 use super::lateral::{Across, Search, measure};
 use super::lead;
 use super::outline::{Circle, Contrast, RopeEnd};
 use super::plane::{Point, RopePlane};
-use super::timing::{SeenClamp, seen_clamp};
+use super::state::State;
+use super::timing::seen_clamp;
 use crate::frame::EyeFrame;
 
 /// Nodes of the tracked curve.
@@ -95,33 +96,6 @@ impl RopeModel {
     }
 }
 
-/// The rope in one frame.
-#[derive(Debug, Clone)]
-pub(super) struct State {
-    pub(super) t_s: f64,
-    /// Uniform in arc length, clamp first, lead centre last (m).
-    pub(super) curve: Vec<Point>,
-    /// Velocity of the nodes (m/s).
-    pub(super) velocity: Vec<Point>,
-    /// Coverage found at each node, 0 to 1.
-    pub(super) confidence: Vec<f64>,
-    pub(super) lost: bool,
-    /// A good part of it is covered by something, or leaves the picture.
-    pub(super) hidden: bool,
-    /// Something that looks like the rope or its lead is so near that one may
-    /// have been taken for the other.
-    pub(super) ambiguous: bool,
-    /// The clamp as the rope below it shows it.
-    pub(super) clamp: Option<SeenClamp>,
-}
-
-impl State {
-    /// Mean coverage along the curve.
-    pub(super) fn score(&self) -> f64 {
-        mean(&self.confidence)
-    }
-}
-
 /// Everything that stays the same from frame to frame.
 pub(super) struct Follower<'a> {
     pub(super) camera: &'a StereoCamera,
@@ -172,11 +146,15 @@ impl Follower<'_> {
         blend(&mut predicted, miss, |part| (1.0 - 2.0 * part).max(0.0));
         let gain = self.background.gain(frame);
         let state = self.locate(frame, gain, t_s, &predicted, before, RANGE_PX);
-        if state.score() >= LOST_BELOW {
+        let lost = state.score() < LOST_BELOW;
+        if !lost && !state.hidden {
             return state;
         }
+        // What is covered stays unseen; what moved otherwise than predicted, as after
+        // missing frames, is seen whole further off.
         let wide = self.locate(frame, gain, t_s, &predicted, before, WIDE_RANGE_PX);
-        if wide.score() > state.score() {
+        let whole = !wide.hidden && !wide.ambiguous;
+        if wide.score() > state.score() && (lost || whole) {
             wide
         } else {
             state
@@ -242,7 +220,9 @@ impl Follower<'_> {
         let rivals = found[first..=last].iter();
         let rivals = rivals.filter(|node| node.rival > RIVAL).count();
         let ambiguous = lead_rival || rivals as f64 > RIVALS * NODES as f64;
-        let hidden = longest_unseen(&found[first..=last]) as f64 > RIVALS * NODES as f64;
+        let unseen = longest_unseen(&found[first..=last]) as f64 > RIVALS * NODES as f64;
+        // No rope turns back on itself within a node: some of it was not measured.
+        let hidden = unseen || folds(&curve);
         let mut confidence: Vec<f64> = found.iter().map(|node| node.confidence).collect();
         let at_end = if lead.is_some() {
             lead_seen

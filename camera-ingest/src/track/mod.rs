@@ -8,6 +8,7 @@
 //! the lead. After a gap, a loss, or when something like the rope came near, the
 //! rope is looked for anew and followed back to where both ways agree.
 
+mod anew;
 mod appearance;
 mod background;
 mod by_points;
@@ -28,7 +29,9 @@ mod plane;
 mod pursuit;
 mod refusal;
 mod sight;
+mod state;
 mod timing;
+mod ways;
 
 use std::time::{Duration, Instant};
 
@@ -36,7 +39,7 @@ pub use appearance::RopeAppearance;
 use background::{Background, frames_by_motion};
 pub use clamp::{ClampError, ClampPath, ClampSample};
 use first_frame::{FirstLook, Place};
-use follow::{Follower, NODES, RopeModel, State};
+use follow::{Follower, NODES, RopeModel};
 pub use models::{FirstMask, FirstScene, ModelError, Models, Moving, PointTracker, SeenPoint};
 pub use one_pass::OnePass;
 use outline::{Circle, Contrast};
@@ -45,6 +48,7 @@ pub use refusal::TrackError;
 use refusal::check;
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
+use state::State;
 pub use timing::ClampFit;
 
 use crate::frame::EyeFrame;
@@ -237,16 +241,10 @@ fn learn<'a>(
         },
     };
     let smooth = curve::smooth(&look.path, &vec![0.05; look.path.len()], 20.0);
-    let mut state = State {
-        t_s: -1e-3,
-        curve: curve::resample(&smooth, curve::length(&smooth), NODES),
-        velocity: vec![[0.0; 2]; NODES],
-        confidence: vec![1.0; NODES],
-        lost: false,
-        hidden: false,
-        ambiguous: false,
-        clamp: None,
-    };
+    let mut state = State::resting(
+        -1e-3,
+        curve::resample(&smooth, curve::length(&smooth), NODES),
+    );
     let contrast = Contrast {
         frame,
         background,

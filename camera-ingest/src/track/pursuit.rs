@@ -12,37 +12,17 @@
 
 use std::ops::Range;
 
-use super::curve::{add, length, norm, resample, scale, smooth, sub};
-use super::first_frame;
-use super::first_frame::Place;
-use super::follow::{Follower, NODES, RANGE_PX, SEEN, State};
-use super::models::Moving;
-use super::plane::Point;
+use super::anew::{Anew, GAP, LOOK_EVERY, Look, SAME_PX};
+use super::follow::Follower;
 use super::sight::Sight;
+use super::state::State;
+use super::ways::{Ways, between};
 use crate::frame::EyeFrame;
 
-/// A step longer than so many usual ones is a gap.
-pub(super) const GAP: f64 = 3.5;
-/// Frames between two looks while in doubt.
-pub(super) const LOOK_EVERY: usize = 8;
-/// Curves whose nodes lie within this of each other are the same (px).
-const SAME_PX: f64 = 5.0;
-/// The same where nobody saw the rope: so many times as far.
-const BLIND: f64 = 4.0;
-/// A lead further than this from the tracked one is another one (px).
-const OTHER_PX: f64 = 15.0;
-/// Part of the coverage that the rope had of late that a rope found anew must have.
-const LEAST_FOUND: f64 = 0.6;
-/// Part of the length by which a rope found anew may differ.
-const LENGTH_TOLERANCE: f64 = 0.06;
-/// Ways over pixels are longer than the rope by up to this factor.
-const WAY_FACTOR: f64 = 1.15;
 /// Frames before something was noticed that are in doubt, too.
 const UNNOTICED: usize = 2;
 /// Clear frames in a row in which no rope can go far from another one.
 const UNSEEN_RUN: usize = 3;
-/// Confidence of what is in doubt, at most.
-const DOUBTFUL: f64 = 0.5;
 
 /// The rope in every frame, from its state in the first one.
 pub(super) fn pursue(
@@ -72,7 +52,10 @@ pub(super) fn pursue(
 /// Frames that are not known to show the tracked rope.
 #[derive(Debug, Clone, Copy)]
 struct Doubt {
+    /// Never the first frame, in which the rope was found at rest.
     since: usize,
+    /// The first frame that was not clear; those before were taken for clear.
+    noticed: usize,
     /// From here on every frame was clear; only these are proven when the rope is found.
     clear_since: usize,
     next_look: usize,
@@ -99,7 +82,7 @@ impl Pursuit<'_> {
         let before = &self.states[index - 1];
         let state = self.follower.step(frame, t_s, before);
         let gap = t_s - before.t_s > GAP * self.usual_step_s;
-        let clear = is_clear(&state);
+        let clear = state.is_clear();
         if gap || !clear {
             let doubt = self.doubt.get_or_insert(Doubt {
                 // What is noticed now may have come a moment ago.
@@ -108,6 +91,7 @@ impl Pursuit<'_> {
                 } else {
                     index
                 },
+                noticed: index,
                 clear_since: index,
                 next_look: index,
                 two_ropes: false,
@@ -137,7 +121,7 @@ impl Pursuit<'_> {
         };
         let Some(doubt) = &mut self.doubt else { return };
         let limit_m = SAME_PX / self.follower.plane.px_per_m;
-        if near(&found.curve, &self.states[index].curve, limit_m) {
+        if found.near(&self.states[index], limit_m) {
             let doubt = *doubt;
             self.doubt = None;
             self.settle(doubt, index);
@@ -146,20 +130,19 @@ impl Pursuit<'_> {
         let since = doubt.since;
         doubt.clear_since = index;
         self.states[index] = found;
-        let mut clear = true;
-        for earlier in (since..index).rev() {
+        // The frame before the doubt is not to be mended, but the way back may lead to it.
+        for earlier in (since - 1..index).rev() {
             let later = &self.states[earlier + 1];
             let back = self.back(earlier, later);
-            if self.same(&back.curve, &self.states[earlier].curve) {
+            if back.near(&self.states[earlier], limit_m) {
                 return;
             }
-            // The way back begins where the rope was found; but it may go wrong as
-            // the way forth did, though not where nothing like the rope is near.
-            clear &= is_clear(&back);
-            self.states[earlier] = back;
+            if earlier >= since {
+                self.states[earlier] = back;
+            }
         }
         if let Some(doubt) = &mut self.doubt {
-            doubt.torn |= !clear;
+            doubt.torn = true;
         }
     }
 
@@ -176,34 +159,49 @@ impl Pursuit<'_> {
         let mut torn = doubt.torn.then_some(doubt.clear_since);
         let mut later = self.states[proven_at].clone();
         let same_m = SAME_PX / self.follower.plane.px_per_m;
+        let mut ways = Ways::Same;
         for index in (doubt.since..proven_at).rev() {
             later = self.back(index, &later);
+            ways = Ways::of(&self.states[index], &later, same_m);
             let state = &mut self.states[index];
-            let apart_m = |node: usize| norm(sub(later.curve[node], state.curve[node]));
-            let unseen = |node: usize| {
-                state.hidden && state.confidence[node].min(later.confidence[node]) < SEEN
-            };
-            let far_m = |node: usize| if unseen(node) { BLIND * same_m } else { same_m };
-            if (0..NODES).any(|node| apart_m(node) > far_m(node)) {
-                torn = torn.max(Some(index + 1));
-                break;
+            match ways {
+                Ways::Same if state.hidden => {
+                    // What nobody saw is known the better the nearer in time it was seen.
+                    let part =
+                        (index + 1 - doubt.since) as f64 / (proven_at + 1 - doubt.since) as f64;
+                    between(state, &later, part, same_m);
+                }
+                Ways::Same => {}
+                Ways::Close => {
+                    between(state, &later, 0.5, same_m);
+                }
+                Ways::Mistaken => {
+                    state.clone_from(&later);
+                    state.distrust();
+                }
+                // Nothing was noticed yet: these frames were taken for good.
+                Ways::Blind if index < doubt.noticed => {
+                    self.give_up(doubt.since..index + 1, false);
+                    break;
+                }
+                Ways::Blind | Ways::Apart => {
+                    torn = torn.max(Some(index + 1));
+                    break;
+                }
             }
-            if state.hidden {
-                let sure = (0..NODES).all(|node| apart_m(node) <= same_m);
-                // What nobody saw is known the better the nearer in time it was seen.
-                let part = (index + 1 - doubt.since) as f64 / (proven_at + 1 - doubt.since) as f64;
-                for (forth, back) in state.curve.iter_mut().zip(&later.curve) {
-                    *forth = add(*forth, scale(sub(*back, *forth), part));
-                }
-                if !sure {
-                    distrust(state);
-                }
+        }
+        if matches!(ways, Ways::Mistaken | Ways::Close) {
+            // They have yet to meet: before the doubt at the latest.
+            later = self.back(doubt.since - 1, &later);
+            ways = Ways::of(&self.states[doubt.since - 1], &later, same_m);
+            if ways != Ways::Same {
+                torn = torn.max(Some(doubt.clear_since));
             }
         }
         let open = doubt.since..doubt.clear_since.max(doubt.since);
         let (mut run, mut longest_run) = (0, 0);
         for state in &self.states[open.clone()] {
-            run = if is_clear(state) { run + 1 } else { 0 };
+            run = if state.is_clear() { run + 1 } else { 0 };
             longest_run = longest_run.max(run);
         }
         if let Some(end) = torn {
@@ -216,7 +214,7 @@ impl Pursuit<'_> {
     /// Nobody knows what these frames show; with `lost` it is not the rope, most likely.
     fn give_up(&mut self, open: Range<usize>, lost: bool) {
         for state in &mut self.states[open] {
-            distrust(state);
+            state.distrust();
             state.lost |= lost;
         }
     }
@@ -224,171 +222,33 @@ impl Pursuit<'_> {
     /// The rope found anew in a frame, its velocity from where it is found in
     /// the next one.
     fn find_moving(&mut self, index: usize) -> Option<State> {
-        let next = index + 1;
-        let dt = self.times_s.get(next)? - self.times_s[index];
-        let mut here = self.find(index)?;
-        if dt > GAP * self.usual_step_s {
+        let next_s = *self.times_s.get(index + 1)?;
+        let here = self.find(index)?;
+        if next_s - here.t_s > GAP * self.usual_step_s {
             return None;
         }
-        let there = self.find(next)?;
-        here.velocity = speeds(&here, &there, dt);
-        // Measured again, now with the blur it has, and found where it must be.
-        let forth = self
-            .follower
-            .step(&self.frames[next], self.times_s[next], &here);
-        self.same(&forth.curve, &there.curve).then_some(here)
+        let there = self.find(index + 1)?;
+        let next = (&self.frames[index + 1], next_s);
+        let [here, _] = self.anew().confirmed(next, here, &there)?;
+        Some(here)
     }
 
     /// The rope found from the clamp in one frame.
     fn find(&mut self, index: usize) -> Option<State> {
-        let (frame, t_s) = (&self.frames[index], self.times_s[index]);
-        let follower = self.follower;
-        let known_m = follower.model.length_m;
-        let middle_s = follower
-            .camera
-            .row_time_s(f64::from(follower.camera.height_px) / 2.0);
-        let place = Place {
-            background: follower.background,
-            camera: follower.camera,
-            plane: follower.plane,
-            clamp: follower.clamp.at(t_s + middle_s),
-            lead_px: None,
-        };
-        let look = first_frame::find(
-            frame,
-            &place,
-            &mut Moving,
-            Some([known_m * (1.0 - LENGTH_TOLERANCE), known_m * WAY_FACTOR]),
-        )
-        .ok()?;
-        if !look.sole {
-            let tracked = self.states.last().map(|s| s.curve[NODES - 1]);
-            let other = tracked
-                .zip(look.path.last())
-                .is_some_and(|(a, b)| norm(sub(a, *b)) * follower.plane.px_per_m > OTHER_PX);
-            if let Some(doubt) = &mut self.doubt {
-                doubt.two_ropes |= other;
-            }
-            return None;
+        let now = (&self.frames[index], self.times_s[index]);
+        let Look { found, two_ropes } = self.anew().look(now, self.states.last());
+        if let Some(doubt) = &mut self.doubt {
+            doubt.two_ropes |= two_ropes;
         }
-        let curve = smooth(&look.path, &vec![0.05; look.path.len()], 20.0);
-        let resting = State {
-            t_s: t_s - self.usual_step_s,
-            curve: resample(&curve, length(&curve), NODES),
-            velocity: vec![[0.0; 2]; NODES],
-            confidence: vec![1.0; NODES],
-            lost: false,
-            hidden: false,
-            ambiguous: false,
-            clamp: None,
-        };
-        let found = self.measured(frame, t_s, &resting);
-        let off = (length(&found.curve) / known_m - 1.0).abs();
-        let fits = off < LENGTH_TOLERANCE
-            && found.score() > LEAST_FOUND * self.sight.usual()
-            && is_clear(&found);
-        fits.then_some(found)
+        found
     }
 
-    /// A curve found roughly, measured twice: the first time pulls it near.
-    fn measured(&self, frame: &EyeFrame, t_s: f64, rough: &State) -> State {
-        let gain = self.follower.background.gain(frame);
-        let locate = |curve: &[Point]| {
-            self.follower
-                .locate(frame, gain, t_s, curve, rough, RANGE_PX)
-        };
-        locate(&locate(&rough.curve).curve)
-    }
-
-    fn same(&self, a: &[Point], b: &[Point]) -> bool {
-        near(a, b, SAME_PX / self.follower.plane.px_per_m)
-    }
-}
-
-/// What looking anew gives.
-#[derive(Debug)]
-pub(super) struct Look {
-    /// The rope at rest where it was found.
-    pub(super) found: Option<State>,
-    /// More than one thing could be the rope, the more likely one not the tracked one.
-    pub(super) two_ropes: bool,
-}
-
-/// Looks for the rope in a frame as if nothing were known; `tracked` is where it is
-/// taken to be, `sight` how well it was seen before.
-pub(super) fn look(
-    follower: &Follower<'_>,
-    (frame, t_s): (&EyeFrame, f64),
-    usual_step_s: f64,
-    tracked: Option<&State>,
-    sight: &Sight,
-) -> Look {
-    let mut pursuit = Pursuit {
-        follower,
-        frames: std::slice::from_ref(frame),
-        times_s: &[t_s],
-        usual_step_s,
-        states: tracked.cloned().into_iter().collect(),
-        doubt: Some(Doubt {
-            since: 0,
-            clear_since: 0,
-            next_look: 0,
-            two_ropes: false,
-            torn: false,
-        }),
-        sight: sight.clone(),
-    };
-    Look {
-        found: pursuit.find(0),
-        two_ropes: pursuit.doubt.is_some_and(|doubt| doubt.two_ropes),
-    }
-}
-
-/// The rope in a frame, found in it (`there`) and in the one before (`here`), if a step
-/// from the one leads to the other.
-pub(super) fn confirmed(
-    follower: &Follower<'_>,
-    (frame, t_s): (&EyeFrame, f64),
-    usual_step_s: f64,
-    mut here: State,
-    there: &State,
-) -> Option<State> {
-    let dt = t_s - here.t_s;
-    if dt > GAP * usual_step_s {
-        return None;
-    }
-    here.velocity = speeds(&here, there, dt);
-    let forth = follower.step(frame, t_s, &here);
-    same(follower, &forth, there).then_some(forth)
-}
-
-/// Velocities of the nodes between two states `dt` apart (m/s).
-fn speeds(here: &State, there: &State, dt: f64) -> Vec<Point> {
-    there
-        .curve
-        .iter()
-        .zip(&here.curve)
-        .map(|(a, b)| scale(sub(*a, *b), 1.0 / dt))
-        .collect()
-}
-
-/// Whether two states have the rope in the same place.
-pub(super) fn same(follower: &Follower<'_>, a: &State, b: &State) -> bool {
-    near(&a.curve, &b.curve, SAME_PX / follower.plane.px_per_m)
-}
-
-fn near(a: &[Point], b: &[Point], limit_m: f64) -> bool {
-    a.iter().zip(b).all(|(a, b)| norm(sub(*a, *b)) < limit_m)
-}
-
-/// Seen in all its length, and nothing like it near.
-pub(super) fn is_clear(state: &State) -> bool {
-    !state.lost && !state.hidden && !state.ambiguous
-}
-
-pub(super) fn distrust(state: &mut State) {
-    for confidence in &mut state.confidence {
-        *confidence = confidence.min(DOUBTFUL);
+    fn anew(&self) -> Anew<'_> {
+        Anew {
+            follower: self.follower,
+            usual_step_s: self.usual_step_s,
+            sight: &self.sight,
+        }
     }
 }
 

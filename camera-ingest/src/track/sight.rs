@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::follow::State;
+use super::state::State;
 
 /// Frames that tell.
 const LATE_FRAMES: usize = 61;

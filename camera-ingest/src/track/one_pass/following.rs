@@ -1,11 +1,11 @@
 //! A rope that was found once, frame by frame.
 
+use super::super::anew::{Anew, GAP, LOOK_EVERY, Look};
 use super::super::clamp::ClampPath;
 use super::super::curve::{norm, sub};
-use super::super::follow::State;
 use super::super::plane::Point;
-use super::super::pursuit::{GAP, LOOK_EVERY, Look, confirmed, distrust, is_clear, look, same};
 use super::super::sight::Sight;
+use super::super::state::State;
 use super::scene::Scene;
 use super::{Newest, Rope};
 use shared_types::StereoCamera;
@@ -82,7 +82,7 @@ impl Following {
         let before_s = self.state.t_s;
         let mut state = follower.step(frame, t_s, &self.state);
         let gap = t_s - before_s > GAP * newest.usual_step_s;
-        if gap || !is_clear(&state) {
+        if gap || !state.is_clear() {
             self.doubt.get_or_insert(Doubt {
                 next_look: newest.count,
                 two_ropes: false,
@@ -96,13 +96,12 @@ impl Following {
         let due = self.doubt.is_some_and(|d| newest.count >= d.next_look);
         let before = self.found.take();
         if before.is_some() || due && (!state.ambiguous || state.lost) {
-            let Look { found, two_ropes } = look(
-                &follower,
-                now,
-                newest.usual_step_s,
-                Some(&state),
-                &self.sight,
-            );
+            let anew = Anew {
+                follower: &follower,
+                usual_step_s: newest.usual_step_s,
+                sight: &self.sight,
+            };
+            let Look { found, two_ropes } = anew.look(now, Some(&state));
             if let Some(doubt) = &mut self.doubt {
                 doubt.two_ropes |= two_ropes;
                 doubt.next_look = newest.count + LOOK_EVERY as u64;
@@ -110,8 +109,8 @@ impl Following {
             match (before, found) {
                 (None, found) => self.found = found,
                 (Some(before), Some(found)) => {
-                    let sure = confirmed(&follower, now, newest.usual_step_s, before, &found);
-                    let agrees = sure.as_ref().map(|sure| same(&follower, sure, &state));
+                    let sure = anew.confirmed(now, before, &found).map(|[_, sure]| sure);
+                    let agrees = sure.as_ref().map(|sure| anew.same(sure, &state));
                     self.settle(agrees);
                     if let (Some(sure), Some(false)) = (sure, agrees) {
                         state = sure;
@@ -121,7 +120,7 @@ impl Following {
             }
         }
         if let Some(doubt) = self.doubt.filter(|d| d.agreed == 0 || d.two_ropes) {
-            distrust(&mut state);
+            state.distrust();
             state.lost |= doubt.two_ropes;
         }
         self.lost_frames = if state.lost { self.lost_frames + 1 } else { 0 };

@@ -9,14 +9,15 @@
 mod following;
 mod scene;
 
+use super::anew::Anew;
 use super::clamp::ClampPath;
 use super::first_frame::{self, FirstLook, Place};
-use super::follow::{Follower, RopeModel, State};
+use super::follow::{Follower, RopeModel};
 use super::models::Moving;
 use super::plane::RopePlane;
-use super::pursuit::{confirmed, look};
 use super::refusal::{TrackError, check_frame, check_keypoints};
 use super::sight::Sight;
+use super::state::State;
 use super::{keypoints, learn};
 use crate::frame::EyeFrame;
 use following::Following;
@@ -279,15 +280,20 @@ impl OnePass {
         }
         let clamp = clamp.since(rope.rest_s);
         let follower = rope.follower(&self.camera, &clamp, background);
-        let Some(found) = look(&follower, now, *usual_step_s, None, &Sight::default()).found else {
+        let anew = Anew {
+            follower: &follower,
+            usual_step_s: *usual_step_s,
+            sight: &Sight::default(),
+        };
+        let Some(found) = anew.look(now, None).found else {
             // The scene may have been poor when the rope was learnt.
             return Stage::Scene;
         };
         let Some(before) = before else {
             return Stage::Known(rope, Some(found));
         };
-        match confirmed(&follower, now, *usual_step_s, before, &found) {
-            Some(state) => Stage::Following(Box::new(Following::begin(*rope, state, *count))),
+        match anew.confirmed(now, before, &found) {
+            Some([_, state]) => Stage::Following(Box::new(Following::begin(*rope, state, *count))),
             None => Stage::Scene,
         }
     }
