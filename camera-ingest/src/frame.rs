@@ -100,6 +100,16 @@ impl EyeFrame {
         }
     }
 
+    /// One eye's picture by itself.
+    ///
+    /// # Errors
+    /// As [`StereoFrame::from_jpeg`].
+    pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
+        let mut packed = Vec::new();
+        let size = decode(bytes, &mut packed)?;
+        Ok(planes(&packed, size, size[0], stamp_ns, sequence))
+    }
+
     /// Left eye of a side-by-side JPEG. `room` holds the decoded picture meanwhile;
     /// whoever keeps it from frame to frame spares the system new pages for each.
     ///
@@ -188,10 +198,7 @@ impl StereoFrame {
     /// # Errors
     /// The JPEG is damaged or its width is no side-by-side pair.
     pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        let mut packed = Vec::new();
-        let size = decode(bytes, &mut packed)?;
-        let frame = planes(&packed, size, size[0], stamp_ns, sequence);
-        Ok(Self(frame))
+        EyeFrame::from_jpeg(bytes, stamp_ns, sequence).map(Self)
     }
 
     /// From a PNG, grey or colour; transparency is ignored. Chroma is kept as the

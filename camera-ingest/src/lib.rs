@@ -38,7 +38,7 @@ mod whole_file;
 pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
 pub use score::{Score, ScoreError, ScoreOptions, score};
-pub use source::{FrameSource, SourceError, open_video};
+pub use source::{FrameSource, SourceError, StereoSource, open_video};
 pub use track::{
     ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track, track_with,
 };

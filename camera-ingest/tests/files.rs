@@ -9,7 +9,7 @@
 
 use camera_ingest::calib::CalibError;
 use camera_ingest::film::keypoint_film;
-use camera_ingest::source::{AviSource, FrameSource};
+use camera_ingest::source::{AviSource, FrameSource, StereoSource};
 use camera_ingest::{EyeFrame, load_camera};
 use nalgebra::Vector3;
 use shared_types::keypoints::TrackedFrame;

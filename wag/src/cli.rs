@@ -207,9 +207,23 @@ pub struct SimThrowArgs {
     pub out: PathBuf,
 }
 
-/// How the rope's clamp moved.
+/// Camera and motion of a recorded wiggle; a run's file tells both itself.
 #[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
+pub struct SceneArgs {
+    /// Camera calibration and place (camera.toml); of a run's file, that of the run.
+    #[arg(long)]
+    pub camera: Option<PathBuf>,
+    /// Motion of the clamp.
+    #[command(flatten)]
+    pub motion: MotionArgs,
+    /// Of a run's file: which motion that was streamed to the arm, from 1, the wiggle.
+    #[arg(long, value_name = "N")]
+    pub part: Option<usize>,
+}
+
+/// How the rope's clamp moved; a run's file tells it itself.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
 pub struct MotionArgs {
     /// Measured joints: CSV with columns t,q1..q7 (s, rad); t = 0 is the first frame.
     #[arg(long)]
@@ -217,6 +231,13 @@ pub struct MotionArgs {
     /// Attach-frame pose: CSV with columns t,x,y,z,qw,qx,qy,qz; t = 0 is the first frame.
     #[arg(long)]
     pub pose: Option<PathBuf>,
+}
+
+impl MotionArgs {
+    /// Whether one is named.
+    pub const fn is_given(&self) -> bool {
+        self.joints.is_some() || self.pose.is_some()
+    }
 }
 
 /// Where the observation of a wiggle comes from.
@@ -254,12 +275,9 @@ pub struct IdentifyArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz, requires = "video")]
     pub fps: Option<f64>,
-    /// Camera calibration and place.
-    #[arg(long)]
-    pub camera: PathBuf,
-    /// Motion of the clamp.
+    /// Camera and motion.
     #[command(flatten)]
-    pub motion: MotionArgs,
+    pub scene: SceneArgs,
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
     pub method: MethodName,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::extrinsics::Sighted;
 use crate::frame::EyeFrame;
-use crate::source::{FrameSource, SourceError};
+use crate::source::{SourceError, StereoSource};
 
 /// Corners both eyes must see for a picture to count.
 const LEAST_CORNERS: usize = 6;
@@ -130,7 +130,7 @@ impl Board {
     /// A frame is damaged, or the board is in none of them.
     pub fn look(
         &self,
-        source: &mut dyn FrameSource,
+        source: &mut dyn StereoSource,
         frames: usize,
     ) -> Result<Vec<Sighted>, BoardError> {
         let detector = self.detector().map_err(|reason| BoardError::File {

@@ -1,7 +1,7 @@
 //! Frames kept in memory for tracking or scoring.
 
 use crate::frame::{EyeFrame, StereoFrame};
-use crate::source::{FrameSource, SourceError};
+use crate::source::{FrameSource, SourceError, StereoSource};
 use shared_types::ipc::message::CameraEvent;
 use std::path::PathBuf;
 
@@ -113,6 +113,12 @@ impl FrameSource for Recording {
         self.count()
     }
 
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        self.read(index).map(|frame| frame.left())
+    }
+}
+
+impl StereoSource for Recording {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
         let frame = match &self.frames {
             Frames::Both(v) => v.get(index),

@@ -5,7 +5,7 @@ use super::{answer, failed};
 use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
-use crate::source::FrameSource;
+use crate::source::{FrameSource, StereoSource};
 use crate::track::{ClampPath, TrackOptions, TrackResult, track as track_frames};
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{

@@ -19,7 +19,7 @@ use serde::Serialize;
 use shared_types::StereoCamera;
 
 use crate::calib::extrinsics::Sighted;
-use crate::source::{FrameSource, SourceError};
+use crate::source::{SourceError, StereoSource};
 
 /// What a caller may choose.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,7 +124,7 @@ const STEPS_PER_FRAME: i32 = 64;
 /// # Errors
 /// Unreadable frames, colours without chroma, or tip or target not seen.
 pub fn score(
-    source: &mut dyn FrameSource,
+    source: &mut dyn StereoSource,
     camera: &StereoCamera,
     tip_rgb: [u8; 3],
     target_rgb: [u8; 3],
@@ -178,7 +178,7 @@ pub fn score(
 /// # Errors
 /// Unreadable frames, a frame that does not exist, or a colour without chroma.
 pub fn sight_lead(
-    source: &mut dyn FrameSource,
+    source: &mut dyn StereoSource,
     camera: &StereoCamera,
     rgb: [u8; 3],
     shown: &[(usize, Vector3<f64>)],

@@ -7,7 +7,7 @@ use super::blob::{Behind, Blob, BlobMap, Chroma, chroma_of_rgb};
 use super::path::{PathError, Sighting};
 use super::{ScoreError, ScoreOptions};
 use crate::frame::{EyeFrame, StereoFrame};
-use crate::source::FrameSource;
+use crate::source::StereoSource;
 
 /// The still scene of both eyes.
 pub(super) struct Scene<'a> {
@@ -64,7 +64,7 @@ pub(super) fn blob_error(camera: &StereoCamera) -> PathError {
 
 /// One frame, of the camera's size.
 pub(super) fn read_sized(
-    source: &mut dyn FrameSource,
+    source: &mut dyn StereoSource,
     index: usize,
     camera: &StereoCamera,
 ) -> Result<StereoFrame, ScoreError> {
@@ -84,7 +84,7 @@ pub(super) fn read_sized(
 
 impl<'a> Scene<'a> {
     pub(super) fn learn(
-        source: &mut dyn FrameSource,
+        source: &mut dyn StereoSource,
         camera: &'a StereoCamera,
         options: &'a ScoreOptions,
     ) -> Result<Self, ScoreError> {

@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::stamps::{self, Stamp};
-use super::{FrameSource, SourceError, read_bytes};
+use super::{FrameSource, SourceError, StereoSource, read_bytes};
 use crate::frame::{EyeFrame, FrameError, StereoFrame};
 
 const REMEDY: &str = "record side-by-side Motion-JPEG into an AVI, or convert to it";
@@ -81,14 +81,16 @@ impl FrameSource for AviSource {
         self.chunks.len()
     }
 
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        self.decode(index, EyeFrame::left_from_jpeg)
+    }
+}
+
+impl StereoSource for AviSource {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
         self.decode(index, |jpeg, stamp_ns, sequence, _room| {
             StereoFrame::from_jpeg(jpeg, stamp_ns, sequence)
         })
-    }
-
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
-        self.decode(index, EyeFrame::left_from_jpeg)
     }
 }
 

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::stamps::{self, Stamp};
-use super::{FrameSource, SourceError, read_bytes};
+use super::{FrameSource, SourceError, StereoSource, read_bytes};
 use crate::frame::{EyeFrame, FrameError, StereoFrame};
 
 const REMEDY: &str = "export the recording again, one picture a frame";
@@ -120,15 +120,17 @@ impl FrameSource for ImageSource {
         self.files.len()
     }
 
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        let frame = self.decode(index, stereo)?;
-        self.check_size(index, [frame.0.width_px, frame.0.height_px])?;
-        Ok(frame)
-    }
-
     fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
         let frame = self.decode(index, left)?;
         self.check_size(index, [2 * frame.width_px, frame.height_px])?;
+        Ok(frame)
+    }
+}
+
+impl StereoSource for ImageSource {
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        let frame = self.decode(index, stereo)?;
+        self.check_size(index, [frame.0.width_px, frame.0.height_px])?;
         Ok(frame)
     }
 }

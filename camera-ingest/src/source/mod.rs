@@ -9,6 +9,7 @@ mod images;
 mod stamps;
 mod yuyv;
 
+use std::io::Read;
 use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
@@ -83,7 +84,7 @@ pub enum SourceError {
     },
 }
 
-/// A recording of side-by-side frames.
+/// A recording of the left eye, and perhaps of the right one.
 pub trait FrameSource: std::fmt::Debug {
     /// Number of frames.
     fn len(&self) -> usize;
@@ -93,19 +94,20 @@ pub trait FrameSource: std::fmt::Debug {
         self.len() == 0
     }
 
+    /// Decodes the left eye of one frame.
+    ///
+    /// # Errors
+    /// The frame does not exist or is damaged.
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError>;
+}
+
+/// A recording of side-by-side frames.
+pub trait StereoSource: FrameSource {
     /// Decodes one frame.
     ///
     /// # Errors
     /// The frame does not exist or is damaged.
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError>;
-
-    /// Decodes the left eye of one frame.
-    ///
-    /// # Errors
-    /// The frame does not exist or is damaged.
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
-        self.read(index).map(|frame| frame.left())
-    }
 }
 
 /// Frames that are in memory already.
@@ -114,6 +116,12 @@ impl FrameSource for Vec<StereoFrame> {
         Vec::len(self)
     }
 
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        self.read(index).map(|frame| frame.left())
+    }
+}
+
+impl StereoSource for Vec<StereoFrame> {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
         self.get(index)
             .cloned()
@@ -125,17 +133,19 @@ impl FrameSource for Vec<StereoFrame> {
     }
 }
 
-impl FrameSource for Box<dyn FrameSource> {
+impl FrameSource for Box<dyn StereoSource> {
     fn len(&self) -> usize {
         (**self).len()
     }
 
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        (**self).read(index)
-    }
-
     fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
         (**self).read_left(index)
+    }
+}
+
+impl StereoSource for Box<dyn StereoSource> {
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        (**self).read(index)
     }
 }
 
@@ -149,13 +159,21 @@ impl FrameSource for Box<dyn FrameSource> {
 /// # Errors
 /// A file is missing, truncated or of another kind; nothing tells when the frames
 /// were taken, or both a CSV and `rate_hz` do.
-pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn FrameSource>, SourceError> {
+pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSource>, SourceError> {
     let device = |m: std::fs::Metadata| m.file_type().is_char_device();
     if std::fs::metadata(path).is_ok_and(device) {
         return Err(SourceError::Container {
             path: path.to_owned(),
             reason: "it is a device, no recording".to_owned(),
             remedy: "record a camera first, with `wag film`",
+        });
+    }
+    if let Some(path) = run_file(path) {
+        return Err(SourceError::Container {
+            path,
+            reason: "it is a run's file, which holds the left eye only".to_owned(),
+            remedy: "use the recording of both eyes; `wag track` and `wag identify` take a \
+                     run's file",
         });
     }
     if path.is_dir() {
@@ -184,7 +202,22 @@ pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn FrameSour
     open_film(path, rate_hz)
 }
 
-fn open_film(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn FrameSource>, SourceError> {
+/// The run's file (MCAP) that a path names, or that lies in a folder without any video.
+#[must_use]
+pub fn run_file(path: &Path) -> Option<PathBuf> {
+    const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
+    let path = match path.is_dir() {
+        true if path.join("video.avi").exists() => return None,
+        true => path.join("run.mcap"),
+        false => path.to_owned(),
+    };
+    let mut front = [0; MAGIC.len()];
+    let mut file = std::fs::File::open(&path).ok()?;
+    file.read_exact(&mut front).ok()?;
+    (front == *MAGIC).then_some(path)
+}
+
+fn open_film(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSource>, SourceError> {
     let film = AviSource::open(path, None)?;
     Ok(Box::new(match rate_hz {
         Some(hz) => film.at_rate(hz),

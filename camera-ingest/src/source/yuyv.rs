@@ -5,8 +5,8 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use super::stamps::{self, Stamp};
-use super::{FrameSource, SourceError};
-use crate::frame::StereoFrame;
+use super::{FrameSource, SourceError, StereoSource};
+use crate::frame::{EyeFrame, FrameError, StereoFrame};
 
 /// A raw file, read frame by frame: a minute of it does not fit into memory.
 #[derive(Debug)]
@@ -94,35 +94,54 @@ fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), Sourc
     }
 }
 
-impl FrameSource for YuyvSource {
-    fn len(&self) -> usize {
-        self.stamps.len()
-    }
-
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+impl YuyvSource {
+    /// One frame's bytes, read by `decode`.
+    fn decode<T>(
+        &self,
+        index: usize,
+        decode: impl FnOnce(&[u8], [usize; 2], Stamp) -> Result<T, FrameError>,
+    ) -> Result<T, SourceError> {
+        let path = || self.path.clone();
         let stamp = self
             .stamps
             .get(index)
             .ok_or_else(|| SourceError::OutOfRange {
-                path: self.path.clone(),
+                path: path(),
                 frame: index,
                 len: self.stamps.len(),
             })?;
         let mut bytes = vec![0; self.size_px[0] * self.size_px[1] * 2];
         let at = index as u64 * bytes.len() as u64;
-        self.file
-            .read_exact_at(&mut bytes, at)
-            .map_err(|source| SourceError::Io {
-                path: self.path.clone(),
-                source,
-            })?;
-        StereoFrame::from_yuyv(&bytes, self.size_px, stamp.stamp_ns, stamp.sequence).map_err(
-            |source| SourceError::Frame {
-                path: self.path.clone(),
-                frame: index,
-                source,
-            },
-        )
+        let read = self.file.read_exact_at(&mut bytes, at);
+        read.map_err(|source| SourceError::Io {
+            path: path(),
+            source,
+        })?;
+        decode(&bytes, self.size_px, *stamp).map_err(|source| SourceError::Frame {
+            path: path(),
+            frame: index,
+            source,
+        })
+    }
+}
+
+impl FrameSource for YuyvSource {
+    fn len(&self) -> usize {
+        self.stamps.len()
+    }
+
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+        self.decode(index, |bytes, size_px, stamp| {
+            EyeFrame::left_from_yuyv(bytes, size_px, stamp.stamp_ns, stamp.sequence)
+        })
+    }
+}
+
+impl StereoSource for YuyvSource {
+    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
+        self.decode(index, |bytes, size_px, stamp| {
+            StereoFrame::from_yuyv(bytes, size_px, stamp.stamp_ns, stamp.sequence)
+        })
     }
 }
 

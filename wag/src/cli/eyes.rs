@@ -1,6 +1,6 @@
 //! Arguments of what looks: film, track, score, calib.
 
-use super::MotionArgs;
+use super::SceneArgs;
 use super::values::{Colour, Pixel, rate_hz};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -54,19 +54,16 @@ pub enum ModeName {
 /// Arguments of `wag track`.
 #[derive(Debug, Args)]
 pub struct TrackArgs {
-    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
-    /// JPEG pictures, and timestamps.csv.
+    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, folder with video.avi or with PNG or JPEG
+    /// pictures, and timestamps.csv, or a run: its folder or run.mcap.
     #[arg(long)]
     pub video: PathBuf,
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera calibration and place.
-    #[arg(long)]
-    pub camera: PathBuf,
-    /// Motion of the clamp.
+    /// Camera and motion.
     #[command(flatten)]
-    pub motion: MotionArgs,
+    pub scene: SceneArgs,
     /// Keypoints per frame.
     #[arg(long, default_value_t = 20)]
     pub keypoints: usize,

@@ -1,9 +1,10 @@
 //! `wag identify`: rope parameters from a video or from keypoints.
 
+use super::filmed::{ClampMotion, Filmed};
 use super::learned::Learned;
 use super::network::{asks_network, network_for_camera, no_model_without_network};
 use super::track::track_video;
-use crate::cli::{IdentifyArgs, MethodName, MotionArgs};
+use crate::cli::{IdentifyArgs, MethodName};
 use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
@@ -11,7 +12,6 @@ use crate::progress::Stage;
 use crate::session::interrupted;
 use crate::table;
 use anyhow::{Context, anyhow};
-use camera_ingest::load_camera;
 use comfy_table::Table;
 use planner::observation::ObservedPoints;
 use planner::phi::{NetworkError, identify_by_network, proposal};
@@ -19,7 +19,6 @@ use planner::process::PlannerConfig;
 use planner::sysid::{
     Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify_from,
 };
-use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::rope::{Ambiguity, RANGES};
@@ -30,53 +29,49 @@ use std::sync::atomic::Ordering;
 /// Keypoints per frame when a video is given.
 const KEYPOINTS: usize = 24;
 
-/// The attach frame's motion from joints or from its pose.
-fn attach_motion(motion: &MotionArgs) -> anyhow::Result<Box<dyn AttachMotion>> {
-    match (&motion.joints, &motion.pose) {
-        (Some(path), _) => {
-            let csv = files::read_joints(path)?;
-            let arm = MeasuredArm::new(&csv.times_s, &csv.q)
-                .with_context(|| format!("`{}`", path.display()))?;
-            Ok(Box::new(arm))
-        }
-        (None, Some(path)) => {
-            let track = PoseTrack::new(&files::read_pose(path)?)
-                .with_context(|| format!("`{}`", path.display()))?;
-            Ok(Box::new(track))
-        }
-        (None, None) => Err(anyhow!("name the clamp's motion with --joints or --pose")),
-    }
+/// Keypoints, what the picture says of sizes, the camera and the clamp's motion.
+struct Observed {
+    track: KeypointTrack,
+    appearance: Appearance,
+    camera: StereoCamera,
+    motion: ClampMotion,
 }
 
-/// Keypoints and what the picture says of sizes.
-fn observe(
-    args: &IdentifyArgs,
-    camera: &StereoCamera,
-    quiet: bool,
-) -> Outcome<(KeypointTrack, Appearance)> {
+fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
         let fail = || format!("keypoints `{}`", path.display());
         let track: KeypointTrack = serde_json::from_str(&files::read_text(path).or_input()?)
             .with_context(fail)
             .or_input()?;
         track.validate().with_context(fail).or_input()?;
-        return Ok((track, Appearance::default()));
+        return Ok(Observed {
+            track,
+            appearance: Appearance::default(),
+            camera: args.scene.camera().or_input()?,
+            motion: ClampMotion::read(&args.scene.motion).or_input()?,
+        });
     }
     let Some(video) = &args.observation.video else {
         return Err(Failure::input(anyhow!(
             "name the observation with --video or --keypoints"
         )));
     };
+    let mut filmed = Filmed::open(video, args.fps, &args.scene)?;
     let stage = Stage::begin("track", quiet);
-    let mut learned = Learned::load(None, &args.camera, camera)?;
-    let eyes = (camera, &mut learned);
-    let tracked = track_video((video, args.fps), eyes, &args.motion, KEYPOINTS, &stage)?.result;
+    let file = args.scene.camera.as_deref();
+    let mut learned = Learned::load(None, file, &filmed.camera)?;
+    let tracked = track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?.result;
     stage.done(&format!("{} frames", tracked.track.frames.len()));
     let appearance = Appearance {
         rope_radius_m: Some(tracked.appearance.rope_radius_m),
         lead_radius_m: Some(tracked.appearance.lead_radius_m),
     };
-    Ok((tracked.track, appearance))
+    Ok(Observed {
+        track: tracked.track,
+        appearance,
+        camera: filmed.camera,
+        motion: filmed.motion,
+    })
 }
 
 fn classify(error: IdentifyError) -> Failure {
@@ -167,18 +162,17 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let net = asks_network(method)
         .then(|| network_for_camera(model))
         .transpose()?;
-    let camera = load_camera(&args.camera).or_input()?;
-    let motion = attach_motion(&args.motion).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
     crate::session::watch_interrupts().or_failed()?;
-    let (track, appearance) = observe(args, &camera, quiet)?;
+    let observed = observe(args, quiet)?;
+    let motion = observed.motion.attach().or_input()?;
     let stage = Stage::begin("identify", quiet);
     let observation = Observation {
-        track: &track,
+        track: &observed.track,
         points: ObservedPoints::ArcLength,
-        camera: &camera,
+        camera: &observed.camera,
         motion: motion.as_ref(),
-        appearance,
+        appearance: observed.appearance,
     };
     let options = IdentifyOptions {
         method,

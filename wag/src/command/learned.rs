@@ -73,8 +73,13 @@ impl Learned {
     ///
     /// # Errors
     /// Why a file is refused.
-    pub fn load(args: Option<&ModelArgs>, file: &Path, camera: &StereoCamera) -> Outcome<Self> {
-        let files = load_model_files(file).or_input()?;
+    pub fn load(
+        args: Option<&ModelArgs>,
+        file: Option<&Path>,
+        camera: &StereoCamera,
+    ) -> Outcome<Self> {
+        let files = file.map(load_model_files).transpose().or_input()?;
+        let files = files.unwrap_or_default();
         let named = |pick: fn(&ModelArgs) -> &Option<PathBuf>| args.and_then(|a| pick(a).clone());
         let segmenter = named(|a| &a.segmenter).or(files.segmenter);
         let tracker = named(|a| &a.tracker).or(files.tracker);

@@ -11,6 +11,7 @@ mod doctor;
 mod dry_run;
 mod explain;
 mod film;
+mod filmed;
 mod identify;
 mod latency;
 mod learned;

@@ -1,37 +1,22 @@
-//! `wag track`: keypoints of the rope from a video file.
+//! `wag track`: keypoints of the rope from a recording.
 
+use super::filmed::Filmed;
 use super::learned::{Learned, classify};
-use crate::cli::{MotionArgs, TrackArgs};
+use crate::cli::TrackArgs;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
-use camera_ingest::source::read_left;
 use camera_ingest::track::ClampFit;
-use camera_ingest::{
-    ClampPath, EyeFrame, TrackOptions, TrackResult, load_camera, open_video, track_with,
-};
+use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_with};
 use serde_json::{Value, json};
-use shared_types::{KeypointTrack, StereoCamera};
+use shared_types::KeypointTrack;
 use std::path::Path;
 
 /// Pictures in a contact sheet, and how many stand in a row.
 const SHEET: (usize, usize) = (12, 3);
-
-/// The clamp's motion from joints or from the attach frame's pose.
-pub fn clamp_path(motion: &MotionArgs) -> anyhow::Result<ClampPath> {
-    match (&motion.joints, &motion.pose) {
-        (Some(path), _) => {
-            let csv = files::read_joints(path)?;
-            let samples: Vec<_> = csv.times_s.into_iter().zip(csv.q).collect();
-            ClampPath::from_joints(&samples).with_context(|| format!("`{}`", path.display()))
-        }
-        (None, Some(path)) => Ok(ClampPath::from_pose_csv(path)?),
-        (None, None) => Err(anyhow!("name the clamp's motion with --joints or --pose")),
-    }
-}
 
 /// A tracked video with its frames.
 pub struct TrackedVideo {
@@ -41,26 +26,25 @@ pub struct TrackedVideo {
     pub result: TrackResult,
 }
 
-/// Tracks the rope through a video, given with the frame rate it does not tell, with
-/// learned models where there are any.
+/// Tracks the rope through a film, with learned models where there are any.
 pub fn track_video(
-    (video, rate_hz): (&Path, Option<f64>),
-    (camera, learned): (&StereoCamera, &mut Learned),
-    motion: &MotionArgs,
+    filmed: &mut Filmed,
+    learned: &mut Learned,
     keypoints: usize,
     stage: &Stage,
 ) -> Outcome<TrackedVideo> {
-    let clamp = clamp_path(motion).or_input()?;
+    let clamp = filmed.motion.clamp_path().or_input()?;
     stage.say("reading frames");
-    let frames = read_left(&mut open_video(video, rate_hz).or_input()?).or_input()?;
+    let frames = filmed.frames()?;
     stage.say(format!("tracking through {} frames", frames.len()));
     let options = TrackOptions {
         keypoints,
         lead_px: learned.lead_px(),
         ..TrackOptions::default()
     };
-    let result = track_with(&frames, camera, &clamp, &options, &mut learned.models())
-        .map_err(|error| classify(error, video))?;
+    let models = &mut learned.models();
+    let result = track_with(&frames, &filmed.camera, &clamp, &options, models)
+        .map_err(|error| classify(error, &filmed.path))?;
     Ok(TrackedVideo { frames, result })
 }
 
@@ -102,16 +86,11 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
             shared_types::keypoints::MAX_KEYPOINTS
         )));
     }
-    let camera = load_camera(&args.camera).or_input()?;
-    let mut learned = Learned::load(Some(&args.models), &args.camera, &camera)?;
+    let mut filmed = Filmed::open(&args.video, args.fps, &args.scene)?;
+    let file = args.scene.camera.as_deref();
+    let mut learned = Learned::load(Some(&args.models), file, &filmed.camera)?;
     let stage = Stage::begin("track", quiet);
-    let tracked = track_video(
-        (&args.video, args.fps),
-        (&camera, &mut learned),
-        &args.motion,
-        args.keypoints,
-        &stage,
-    )?;
+    let tracked = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
     let (frames, result) = (&tracked.frames, &tracked.result);
     files::write_json(&args.out, &result.track).or_failed()?;
     if let Some(path) = &args.overlay {

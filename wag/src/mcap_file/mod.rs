@@ -8,6 +8,7 @@
 mod calibration;
 mod channel;
 mod clock;
+mod film;
 mod image;
 mod messages;
 mod read;
@@ -20,6 +21,7 @@ mod thread;
 mod urdf;
 mod writer;
 
+pub use film::RunFilm;
 pub use read::{is_mcap, replay_bytes};
 pub use recorder::{RecorderConfig, run};
 pub use recover::recover;

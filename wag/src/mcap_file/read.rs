@@ -3,12 +3,15 @@
 use super::channel::Channel;
 use anyhow::{bail, ensure};
 use mcap::MAGIC;
-use mcap::read::ChunkReader;
 use mcap::records::{Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use rt_controller::recording::chunk::{self, Front};
 
 /// Opcode and length.
 const FRONT_LEN: usize = 9;
+/// Longest chunk, compressed or not (bytes); a longer one is damaged. The library
+/// believes what a length says, and a wrong one would take all memory.
+const LONGEST: usize = 1 << 28;
 
 /// What was met on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -68,13 +71,14 @@ pub fn walk(
     let mut rest = &bytes[MAGIC.len()..];
     let mut walked = Walked::default();
     while let Some((opcode, body, len)) = front(rest) {
+        let record = &rest[..len];
         rest = &rest[len..];
         match opcode {
             op::DATA_END => {
                 walked.whole = true;
                 return Ok(walked);
             }
-            op::CHUNK => match inside(body) {
+            op::CHUNK => match inside(record) {
                 Some(records) => records.iter().try_for_each(&mut each)?,
                 None => walked.damaged_chunks += 1,
             },
@@ -92,23 +96,37 @@ pub fn walk(
     Ok(walked)
 }
 
-/// All records of a chunk; `None` unless all of them are right.
-fn inside(body: &[u8]) -> Option<Vec<Record<'_>>> {
-    let Ok(Record::Chunk { header, data }) = mcap::parse_record(op::CHUNK, body) else {
-        return None;
-    };
-    let reader = ChunkReader::new(header, &data).ok()?;
-    let records: Vec<Record<'_>> = reader
-        .map(|record| record.map(Record::into_owned))
-        .collect::<Result<_, _>>()
-        .ok()?;
+/// All records of a chunk record; `None` unless all of them are right.
+fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(LONGEST);
+    let mut reader = LinearReader::new_with_options(options);
+    let (mut rest, mut records) = (chunk, Vec::new());
+    while let Some(event) = reader.next_event() {
+        match event.ok()? {
+            LinearReadEvent::ReadRequest(_) if rest.is_empty() => break,
+            LinearReadEvent::ReadRequest(most) => {
+                let (now, later) = rest.split_at(most.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                records.push(mcap::parse_record(opcode, data).ok()?.into_owned());
+            }
+        }
+    }
     let allowed = |r: &Record<'_>| {
         matches!(
             r,
             Record::Schema { .. } | Record::Channel(_) | Record::Message { .. }
         )
     };
-    records.iter().all(allowed).then_some(records)
+    // A chunk that is cut off tells none.
+    (!records.is_empty() && records.iter().all(allowed)).then_some(records)
 }
 
 /// The exact recording of the control cycles in a file: the bytes of `cycles.bin`.

@@ -5,6 +5,7 @@ use super::RUN_FILE;
 use super::calibration::{calibration, place};
 use super::channel::Channel;
 use super::clock::Clock;
+use super::film::CAMERA;
 use super::image::left_jpeg;
 use super::messages::{self, Level};
 use super::results::Results;
@@ -184,6 +185,8 @@ impl Recording {
         file.attach(at_ns, "robot.urdf", "application/xml", arm.as_bytes())?;
         file.json(Channel::Scene, at_ns, &room(at_ns, config.target_m))?;
         if let Some(camera) = &config.camera {
+            let text = serde_json::to_string(camera)?;
+            file.metadata(CAMERA[0], &[(CAMERA[1], text)])?;
             let sees = calibration(at_ns, camera);
             file.json(Channel::Calibration, at_ns, &sees)?;
             let stands = json!({ "transforms": [place(at_ns, camera)] });

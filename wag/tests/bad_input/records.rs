@@ -18,6 +18,43 @@ pub(crate) const CASES: &[Case] = &[
     ),
     (&["replay", "other.bin"], 2, &["other.bin", "layout 9"]),
     (&["replay", "bare.mcap"], 2, &["bare.mcap", "/wag/replay"]),
+    (
+        &["track", "--video", "bare.mcap", "--out", "k.json"],
+        2,
+        &["bare.mcap", "no motion"],
+    ),
+    (
+        &["identify", "--video", "bare.mcap", "--out", "r.toml"],
+        2,
+        &["bare.mcap", "no motion"],
+    ),
+    (
+        &[
+            "track",
+            "--video",
+            "bare.mcap",
+            "--fps",
+            "60",
+            "--out",
+            "k.json",
+        ],
+        2,
+        &["bare.mcap", "--fps"],
+    ),
+    (
+        &[
+            "track", "--video", "v.avi", "--part", "1", "--out", "k.json",
+        ],
+        2,
+        &["v.avi", "--part"],
+    ),
+    (
+        &[
+            "track", "--video", "v.avi", "--pose", "pose.csv", "--out", "k.json",
+        ],
+        2,
+        &["--camera"],
+    ),
     (&["record", "recover"], 2, &["FILE.mcap"]),
     (&["record", "recover", "none.mcap"], 2, &["none.mcap"]),
     (&["record", "recover", "."], 2, &["`.`"]),

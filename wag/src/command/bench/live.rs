@@ -4,7 +4,7 @@ use super::machine::Machine;
 use super::spent::least;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
-use camera_ingest::source::{FrameSource, read_left};
+use camera_ingest::source::{StereoSource, read_left};
 use camera_ingest::track::OnePass;
 use camera_ingest::{ClampPath, TrackOptions};
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ fn quantile(sorted: &[f64], part: f64) -> f64 {
 /// Times of a recording's frames, decoding left out.
 pub(super) fn run(
     folder: &Path,
-    (video, camera, clamp): (&mut dyn FrameSource, StereoCamera, &ClampPath),
+    (video, camera, clamp): (&mut dyn StereoSource, StereoCamera, &ClampPath),
     quiet: bool,
 ) -> Outcome<Option<Value>> {
     let stage = Stage::begin("bench", quiet);

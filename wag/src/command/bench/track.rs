@@ -4,12 +4,12 @@
 use super::machine::Machine;
 use super::spent::{Spent, least};
 use crate::cli::{BenchArgs, MotionArgs};
-use crate::command::track::clamp_path;
+use crate::command::filmed::ClampMotion;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::progress::Stage;
 use crate::table::numbers;
 use anyhow::anyhow;
-use camera_ingest::source::{FrameSource, read_left};
+use camera_ingest::source::{FrameSource, StereoSource, read_left};
 use camera_ingest::{ClampPath, TrackOptions, load_camera, open_video, track};
 use serde_json::{Map, Value, json};
 use shared_types::StereoCamera;
@@ -44,7 +44,7 @@ impl Pass {
     /// Reads and tracks a recording; the frames are gone afterwards, so that a second
     /// pass takes no more memory than the first.
     fn over(
-        video: &mut dyn FrameSource,
+        video: &mut dyn StereoSource,
         camera: &StereoCamera,
         clamp: &ClampPath,
     ) -> Outcome<Self> {
@@ -77,14 +77,15 @@ impl Pass {
 }
 
 /// What is measured with: `video.avi`, `camera.toml` and the clamp's motion.
-fn recording(folder: &Path) -> Outcome<(Box<dyn FrameSource>, StereoCamera, ClampPath)> {
+fn recording(folder: &Path) -> Outcome<(Box<dyn StereoSource>, StereoCamera, ClampPath)> {
     let joints = folder.join("joints.csv");
     let motion = MotionArgs {
         pose: (!joints.exists()).then(|| folder.join("pose.csv")),
         joints: joints.exists().then_some(joints),
     };
     let camera = load_camera(&folder.join("camera.toml")).or_input()?;
-    let clamp = clamp_path(&motion).or_input()?;
+    let motion = ClampMotion::read(&motion).or_input()?;
+    let clamp = motion.clamp_path().or_input()?;
     Ok((open_video(folder, None).or_input()?, camera, clamp))
 }
 
