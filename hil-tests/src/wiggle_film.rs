@@ -15,7 +15,7 @@ const FREQUENCY_HZ: f64 = 1.3;
 const DURATION_S: f64 = 5.6;
 const RAMP_S: f64 = 2.8;
 const PHYSICS_STEP_S: f64 = 1e-4;
-/// Poses computed per exposure; as many of them are drawn as the motion needs.
+/// Poses computed per exposure of a row; as many of them are drawn as the motion needs.
 const POSES: usize = 8;
 /// Where the target hangs (m).
 const TARGET_M: [f64; 3] = [1.10, 0.0, 0.45];
@@ -57,7 +57,8 @@ pub struct Frame {
     pub start_s: f64,
     /// Both eyes side by side, packed YUYV.
     pub yuyv: Vec<u8>,
-    /// Nodes of the rope in the middle of the exposure (world, m), clamp first.
+    /// Nodes of the rope in the middle of the exposure of the row that shows them (world,
+    /// m), clamp first.
     pub nodes: Vec<Vector3<f64>>,
 }
 
@@ -109,6 +110,31 @@ impl WiggleFilm {
         })
     }
 
+    /// A node's place in the middle of the exposure of the row that shows it; `all` lie
+    /// evenly over the frame's time.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "poses are few"
+    )]
+    fn as_seen(&self, all: &[ScenePose], node: usize) -> Vector3<f64> {
+        let at = |t_s: f64| {
+            let place = t_s / self.camera.frame_time_s() * all.len() as f64 - 0.5;
+            let place = place.clamp(0.0, (all.len() - 1) as f64);
+            let before = (place as usize).min(all.len().saturating_sub(2));
+            let [a, b] = [before, (before + 1).min(all.len() - 1)].map(|i| all[i].nodes[node]);
+            a + (b - a) * (place - before as f64)
+        };
+        let mut row = f64::from(self.camera.height_px) / 2.0;
+        // A node moves far less than a row in a row's time.
+        for _ in 0..4 {
+            let seen = self.camera.project_left(&at(self.camera.row_time_s(row)));
+            row = seen.map_or(row, |[_, v]| v);
+        }
+        at(self.camera.row_time_s(row))
+    }
+
     fn pose(&mut self, t_s: f64) -> ScenePose {
         // The simulation counts from the first frame on, whose rope hangs still.
         let first_s = self.late_s;
@@ -125,20 +151,25 @@ impl Iterator for WiggleFilm {
     type Item = Frame;
 
     /// The next frame; there is always one.
-    #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "frames and poses are few"
+    )]
     fn next(&mut self) -> Option<Frame> {
         let start_s = self.late_s + self.next as f64 / self.frame_rate_hz;
-        let exposure_s = self.camera.exposure_s;
-        let part = |i: usize| start_s + exposure_s * (i as f64 + 0.5) / POSES as f64;
-        let all: Vec<_> = (0..POSES).map(|i| self.pose(part(i))).collect();
-        let needed = self.renderer.sub_frames(&all[0], &all[POSES - 1]);
-        let every = (POSES / needed.min(POSES)).max(1);
+        let frame_s = self.camera.frame_time_s();
+        let poses = (POSES as f64 * frame_s / self.camera.exposure_s).ceil() as usize;
+        let part = |i: usize| start_s + frame_s * (i as f64 + 0.5) / poses as f64;
+        let all: Vec<_> = (0..poses).map(|i| self.pose(part(i))).collect();
+        let needed = self.renderer.sub_frames(&all[0], &all[poses - 1]);
+        let every = (poses / needed.min(poses)).max(1);
         let drawn: Vec<_> = all.iter().skip(every / 2).step_by(every).cloned().collect();
         let mut yuyv = vec![0; self.renderer.frame_bytes()];
         self.renderer.render(&drawn, self.next, &mut yuyv);
         self.next += 1;
-        let (before, after) = (&all[POSES / 2 - 1].nodes, &all[POSES / 2].nodes);
-        let nodes = before.iter().zip(after).map(|(a, b)| (a + b) / 2.0);
+        let nodes = (0..all[0].nodes.len()).map(|node| self.as_seen(&all, node));
         Some(Frame {
             start_s,
             yuyv,

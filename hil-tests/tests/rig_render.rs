@@ -147,6 +147,56 @@ fn blob(full: &Picture, empty: &Picture, near: [f64; 2], reach: usize) -> [f64; 
 }
 
 #[test]
+fn a_rolling_shutter_shows_each_row_at_its_own_time() {
+    let config = CameraConfig {
+        line_time_s: 26.1e-6,
+        ..CameraConfig::default()
+    };
+    let camera = config.stereo_camera();
+    let mut renderer = renderer(&camera, 0.0);
+    // Sideways at 3 m/s: 9 px during a row's exposure, 25 px from the first row to the last.
+    let at = |t_s: f64| pose(3.0 * t_s - 0.03);
+    let frame_s = camera.frame_time_s();
+    let count = renderer.sub_frames(&at(0.0), &at(frame_s));
+    let poses: Vec<_> = (0..count)
+        .map(|i| at(frame_s * (i as f64 + 0.5) / count as f64))
+        .collect();
+    let empty = Picture::both(&mut renderer, &camera, &[without_rope()]);
+    let full = Picture::both(&mut renderer, &camera, &poses);
+    for (v, t_s) in (130..300)
+        .step_by(10)
+        .map(|v| (v, camera.row_time_s(v as f64)))
+    {
+        for side in 0..2 {
+            let pixels = at(t_s)
+                .nodes
+                .iter()
+                .map(|p| project(&camera, side, p))
+                .collect::<Vec<_>>();
+            let crossed = pixels[2..21]
+                .windows(2)
+                .find(|w| w[0][1] <= v as f64 && v as f64 <= w[1][1]);
+            let Some([a, b]) = crossed.map(|w| [w[0], w[1]]) else {
+                continue;
+            };
+            let want = a[0] + (b[0] - a[0]) * (v as f64 - a[1]) / (b[1] - a[1]);
+            let (mut weight, mut moment) = (0.0, 0.0);
+            for u in want as usize - 16..want as usize + 17 {
+                let w = full[side].covered(&empty[side], u, v);
+                weight += w;
+                moment += w * u as f64;
+            }
+            let error = moment / weight - want;
+            assert!(
+                error.abs() < 0.5,
+                "eye {side} row {v}: off by {error:.2} px"
+            );
+            assert!(weight > 2.5, "eye {side} row {v}: {weight} px");
+        }
+    }
+}
+
+#[test]
 fn motion_blur_spreads_evenly_about_the_middle_of_the_exposure() {
     let camera = CameraConfig::default().stereo_camera();
     let mut renderer = renderer(&camera, 0.0);

@@ -97,7 +97,7 @@ impl Throw {
         (0..FRAMES)
             .map(|index| {
                 let start_s = f64::from(index) / config.frame_rate_hz;
-                let at = |part: f64| self.pose(start_s + config.exposure_s * part);
+                let at = |part: f64| self.pose(start_s + camera.frame_time_s() * part);
                 let count = renderer.sub_frames(&at(0.0), &at(1.0));
                 let poses: Vec<ScenePose> = (0..count)
                     .map(|i| at((i as f64 + 0.5) / count as f64))
@@ -163,16 +163,15 @@ fn scores_of(seed: u64, config: &CameraConfig) -> Scores {
     scores
 }
 
-#[test]
-fn intervals_hold_the_truth_where_lead_and_target_cover_each_other() {
+/// Renders and scores throws of many colours.
+fn assert_intervals_hold(config: &CameraConfig) {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
-    let config = CameraConfig::default();
     // The first were looked at while the intervals were made, the others were not.
     let seeds: Vec<u64> = if long { 3000..3020 } else { 100..102 }.collect();
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let scores: Vec<Scores> = std::thread::scope(|scope| {
         let share = |seeds: &[u64]| -> Vec<Scores> {
-            seeds.iter().map(|seed| scores_of(*seed, &config)).collect()
+            seeds.iter().map(|seed| scores_of(*seed, config)).collect()
         };
         let workers: Vec<_> = seeds
             .chunks(seeds.len().div_ceil(threads))
@@ -204,4 +203,17 @@ fn intervals_hold_the_truth_where_lead_and_target_cover_each_other() {
     assert!(held as f64 >= 0.9 * count as f64, "{held} of {count}");
     assert!(refused * 10 <= count, "{refused} refused");
     assert!(error_m < 0.015 && width_m < 0.06);
+}
+
+#[test]
+fn intervals_hold_the_truth_where_lead_and_target_cover_each_other() {
+    assert_intervals_hold(&CameraConfig::default());
+}
+
+#[test]
+fn intervals_hold_the_truth_where_rows_are_exposed_one_after_the_other() {
+    assert_intervals_hold(&CameraConfig {
+        line_time_s: 26.1e-6,
+        ..CameraConfig::default()
+    });
 }

@@ -150,6 +150,12 @@ impl StereoCamera {
         self.exposure_s / 2.0 + self.line_time_s * v.clamp(0.0, f64::from(self.height_px))
     }
 
+    /// Time from the start of the first row's exposure to the end of the last one's (s).
+    #[must_use]
+    pub fn frame_time_s(&self) -> f64 {
+        self.exposure_s + self.line_time_s * f64::from(self.height_px.saturating_sub(1))
+    }
+
     /// Ray through a raw left pixel in the world: (origin in m, unit direction).
     #[must_use]
     pub fn left_ray(&self, pixel: [f64; 2]) -> (Vector3<f64>, Vector3<f64>) {

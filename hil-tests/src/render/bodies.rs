@@ -50,6 +50,8 @@ const ARM_STEP_PX: f64 = 1.0;
 /// sub-frames in it.
 #[derive(Debug)]
 pub(super) struct Spell {
+    /// Sub-frames before it.
+    pub(super) first: usize,
     pub(super) arm: Strokes,
     pub(super) target: Strokes,
     pub(super) ropes: Vec<Strokes>,
@@ -74,9 +76,15 @@ pub(super) fn spells(
         }
         near
     };
+    let mut next = 0;
+    let mut first_of = |spell: &[ScenePose]| {
+        next += spell.len();
+        next - spell.len()
+    };
     poses
         .chunk_by(together)
         .map(|spell| Spell {
+            first: first_of(spell),
             arm: arm_strokes(eye, &spell[spell.len() / 2].q),
             target: target_m
                 .into_iter()

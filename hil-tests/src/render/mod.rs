@@ -8,7 +8,8 @@
 //! adds vignetting and noise. Cost follows the pixels that change.
 //!
 //! Simplified: spheres project as circles (true within 0.4 px), no cast shadows
-//! of moving things, all rows exposed together, blur averaged in video levels.
+//! of moving things, blur averaged in video levels. With a rolling shutter a row shows the
+//! sub-frames of its own exposure.
 
 mod appearance;
 mod backdrop;
@@ -18,6 +19,7 @@ mod eye;
 mod layer;
 mod scene;
 mod sensor;
+mod shutter;
 mod stroke;
 mod texture;
 

@@ -7,12 +7,13 @@ use super::colour::Ycc;
 use super::eye::{Eye, Vignette};
 use super::layer::{RowLayer, composite};
 use super::sensor::{Sensor, pack_yuyv};
+use super::shutter::RowTimes;
 use nalgebra::Vector3;
 use shared_types::StereoCamera;
 
 /// Motion in the picture that one sub-frame may skip (px).
 const SUB_FRAME_STEP_PX: f64 = 1.0;
-/// Most sub-frames averaged over one exposure.
+/// Most sub-frames averaged over a row's exposure.
 const MAX_SUB_FRAMES: usize = 12;
 
 /// Draws frames of one camera looking at one rig.
@@ -22,6 +23,7 @@ pub struct Renderer {
     rope: RopeShape,
     appearance: Appearance,
     sensor: Sensor,
+    rows: RowTimes,
     target_m: Option<Vector3<f64>>,
     size_px: (usize, usize),
 }
@@ -58,6 +60,7 @@ impl Renderer {
             rope,
             appearance,
             sensor: Sensor::new(noise_levels, size_px.0 * 4, seed),
+            rows: RowTimes::of(camera),
             target_m: None,
             size_px,
         }
@@ -74,11 +77,13 @@ impl Renderer {
         self.target_m = target_m;
     }
 
-    /// Sub-frames that show the motion from `start` to `end` of an exposure
-    /// without gaps: about one per pixel of the fastest node, at least one.
+    /// Sub-frames that show the motion from `start` to `end` of a frame, from the first
+    /// row's opening to the last row's end, without gaps: about one per pixel of the
+    /// fastest node, at least one.
     #[must_use]
     #[allow(
         clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
         clippy::cast_sign_loss,
         reason = "saturates, then clamped"
     )]
@@ -89,11 +94,13 @@ impl Renderer {
             Some((a[0] - b[0]).hypot(a[1] - b[1]))
         });
         let most_px = moved.fold(0.0, f64::max);
-        ((most_px / SUB_FRAME_STEP_PX).ceil() as usize).clamp(1, MAX_SUB_FRAMES)
+        let most = (MAX_SUB_FRAMES as f64 * self.rows.exposures()).ceil() as usize;
+        ((most_px / SUB_FRAME_STEP_PX).ceil() as usize).clamp(1, most)
     }
 
-    /// Draws frame `sequence` as YUYV (left eye, then right, in each row): the
-    /// mean of `poses`, which lie evenly over the exposure.
+    /// Draws frame `sequence` as YUYV (left eye, then right, in each row): in each row
+    /// the mean of those of `poses` that its exposure meets. They lie evenly over the
+    /// time from the first row's opening to the last row's end.
     ///
     /// `out` must hold [`Renderer::frame_bytes`] bytes; only that many are drawn.
     pub fn render(&mut self, poses: &[ScenePose], sequence: u64, out: &mut [u8]) {
@@ -112,6 +119,7 @@ impl Renderer {
                 canvas.draw_row(
                     v,
                     &spells,
+                    |i| self.rows.weight(v, i, poses.len()),
                     &mut row[side * width * 2..(side + 1) * width * 2],
                 );
             }
@@ -139,31 +147,43 @@ impl EyeCanvas {
         }
     }
 
-    /// Draws row `v` of this eye: the room, and over it the mean of all
-    /// sub-frames where any of them has something.
+    /// Draws row `v` of this eye: the room, and over it the mean of the sub-frames,
+    /// each with its weight in this row, where any of them has something.
     #[allow(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn draw_row(&mut self, v: usize, spells: &[Spell], out: &mut [u8]) {
+    fn draw_row(
+        &mut self,
+        v: usize,
+        spells: &[Spell],
+        weight_of: impl Fn(usize) -> f32,
+        out: &mut [u8],
+    ) {
         let width = self.eye.size_px().0;
         out.copy_from_slice(&self.room_yuyv[v * width * 2..(v + 1) * width * 2]);
         let (mut from, mut to) = (width, 0);
-        let mut count = 0;
+        let mut total = 0.0;
         for spell in spells {
+            let weights = spell.first..spell.first + spell.ropes.len();
+            let still: f32 = weights.clone().map(&weight_of).sum();
+            if still <= 0.0 {
+                continue;
+            }
+            total += still;
             spell.arm.draw_row(v, &mut self.arm);
             spell.target.draw_row(v, &mut self.target);
             // What stands still counts once, with the weight of the whole spell;
-            let weight = spell.ropes.len();
             for (low, high) in apart(self.arm.used(), self.target.used()) {
-                self.add_still(v, (low, high), weight as f32);
+                self.add_still(v, (low, high), still);
                 (from, to) = (from.min(low), to.max(high));
             }
             // each rope adds only what it changes.
-            for rope in &spell.ropes {
-                rope.draw_row(v, &mut self.rope);
-                let (low, high) = self.rope.used();
-                self.add_rope(v, (low, high));
-                (from, to) = (from.min(low), to.max(high));
+            for (rope, weight) in spell.ropes.iter().zip(weights.map(&weight_of)) {
+                if weight > 0.0 {
+                    rope.draw_row(v, &mut self.rope);
+                    let (low, high) = self.rope.used();
+                    self.add_rope(v, (low, high), weight);
+                    (from, to) = (from.min(low), to.max(high));
+                }
             }
-            count += weight;
         }
         if from >= to {
             return;
@@ -171,7 +191,7 @@ impl EyeCanvas {
         // Chroma belongs to pairs of pixels.
         let (from, to) = (from & !1, ((to + 1) & !1).min(width));
         let room = &self.room[v * width..(v + 1) * width];
-        let share = 1.0 / count as f32;
+        let share = 1.0 / total;
         for u in from..to {
             // Light was gathered before the lens dims it; the room's is dimmed.
             let dim = self.vignette.at(u as f32, v as f32) * share;
@@ -201,15 +221,15 @@ impl EyeCanvas {
         }
     }
 
-    /// Adds what the rope changes against arm, target and room.
-    fn add_rope(&mut self, v: usize, (low, high): (usize, usize)) {
+    /// Adds what the rope changes against arm, target and room, `weight` times.
+    fn add_rope(&mut self, v: usize, (low, high): (usize, usize), weight: f32) {
         for u in low..high {
             if self.rope.cell(u).cover > 0.0 {
                 let behind = self.behind(u, v);
                 let without = composite([&self.arm, &self.target], u, behind);
                 let with = composite([&self.arm, &self.target, &self.rope], u, behind);
                 for i in 0..3 {
-                    self.sum[u][i] += with[i] - without[i];
+                    self.sum[u][i] += (with[i] - without[i]) * weight;
                 }
             }
         }

@@ -26,8 +26,11 @@ pub struct CameraConfig {
     pub resolution: Resolution,
     /// Frames per second.
     pub frame_rate_hz: f64,
-    /// Exposure of a frame, all rows together (s).
+    /// Exposure of a row (s).
     pub exposure_s: f64,
+    /// Time from one row to the next (s); 0 exposes all rows together. A ZED 2 takes
+    /// 26.1 µs in VGA and 15.7 µs in HD at 60 frames per second.
+    pub line_time_s: f64,
     /// Distance between the eyes (m).
     pub baseline_m: f64,
     /// Left optical centre in the world (m).
@@ -47,6 +50,7 @@ impl Default for CameraConfig {
             resolution: Resolution::Vga,
             frame_rate_hz: 60.0,
             exposure_s: 0.004,
+            line_time_s: 0.0,
             baseline_m: 0.12,
             position_m: [0.72, -1.40, 0.14],
             tilt_up_rad: 0.0,
@@ -84,9 +88,13 @@ impl CameraConfig {
             t_right_left_m: Vector3::new(self.baseline_m, 1e-4, -2e-4),
             r_w_cam: tilt.matrix() * looking_along_y,
             p_w_cam_m: Vector3::from(self.position_m),
-            shutter: Shutter::Global,
+            shutter: if self.line_time_s > 0.0 {
+                Shutter::Rolling
+            } else {
+                Shutter::Global
+            },
             exposure_s: self.exposure_s,
-            line_time_s: 0.0,
+            line_time_s: self.line_time_s,
         }
     }
 }

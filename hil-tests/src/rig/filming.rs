@@ -46,10 +46,10 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
     while !stop.load(Ordering::Acquire) {
         let opens = shutter.opens();
         let arrives = opens.plus_s(config.camera.latency_s);
-        if !record.wait_for(opens.plus_s(camera.exposure_s), PATIENCE) {
+        if !record.wait_for(opens.plus_s(camera.frame_time_s()), PATIENCE) {
             continue;
         }
-        let Some(poses) = expose(record, &renderer, opens, camera.exposure_s) else {
+        let Some(poses) = expose(record, &renderer, opens, camera.frame_time_s()) else {
             // Before the first moment, or so late that it is forgotten.
             shutter.sequence += 1;
             continue;
@@ -97,21 +97,21 @@ impl Shutter {
     }
 }
 
-/// Poses spread evenly over the exposure, as many as the motion needs.
+/// Poses spread evenly over the frame's time, as many as the motion needs.
 #[allow(clippy::cast_precision_loss, reason = "a dozen sub-frames")]
 fn expose(
     record: &Record,
     renderer: &Renderer,
     opens: MonotonicNs,
-    exposure_s: f64,
+    frame_time_s: f64,
 ) -> Option<Vec<ScenePose>> {
     let first = record.pose_at(opens)?;
-    let last = record.pose_at(opens.plus_s(exposure_s))?;
+    let last = record.pose_at(opens.plus_s(frame_time_s))?;
     let count = renderer.sub_frames(&first, &last);
     (0..count)
         .map(|i| {
             let middle = (i as f64 + 0.5) / count as f64;
-            record.pose_at(opens.plus_s(exposure_s * middle))
+            record.pose_at(opens.plus_s(frame_time_s * middle))
         })
         .collect()
 }
