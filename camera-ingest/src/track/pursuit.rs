@@ -81,7 +81,7 @@ impl Pursuit<'_> {
         let (frame, t_s) = (&self.frames[index], self.times_s[index]);
         let before = &self.states[index - 1];
         let state = self.follower.step(frame, t_s, before);
-        let gap = t_s - before.t_s > GAP * self.usual_step_s;
+        let gap = self.is_gap(index);
         let clear = state.is_clear();
         if gap || !clear {
             let doubt = self.doubt.get_or_insert(Doubt {
@@ -111,6 +111,11 @@ impl Pursuit<'_> {
         }
     }
 
+    /// Frames are missing before this one.
+    fn is_gap(&self, index: usize) -> bool {
+        self.times_s[index] - self.times_s[index - 1] > GAP * self.usual_step_s
+    }
+
     /// Looks for the rope in this frame and the next as if nothing were known.
     fn look_anew(&mut self, index: usize) {
         if let Some(doubt) = &mut self.doubt {
@@ -130,8 +135,10 @@ impl Pursuit<'_> {
         let since = doubt.since;
         doubt.clear_since = index;
         self.states[index] = found;
-        // The frame before the doubt is not to be mended, but the way back may lead to it.
-        for earlier in (since - 1..index).rev() {
+        // The frame before the doubt is not to be mended, but the way back may lead to it;
+        // over missing frames it would only be guessed.
+        let first = if self.is_gap(since) { since } else { since - 1 };
+        for earlier in (first..index).rev() {
             let later = &self.states[earlier + 1];
             let back = self.back(earlier, later);
             if back.near(&self.states[earlier], limit_m) {
@@ -159,10 +166,12 @@ impl Pursuit<'_> {
         let mut torn = doubt.torn.then_some(doubt.clear_since);
         let mut later = self.states[proven_at].clone();
         let same_m = SAME_PX / self.follower.plane.px_per_m;
-        let mut ways = Ways::Same;
+        // The way back has gone its own way; they must meet before the doubt at the latest.
+        let mut parted = false;
         for index in (doubt.since..proven_at).rev() {
             later = self.back(index, &later);
-            ways = Ways::of(&self.states[index], &later, same_m);
+            let ways = Ways::of(&self.states[index], &later, same_m);
+            parted = ways == Ways::Mistaken || parted && ways != Ways::Same;
             let state = &mut self.states[index];
             match ways {
                 Ways::Same if state.hidden => {
@@ -179,22 +188,24 @@ impl Pursuit<'_> {
                     state.clone_from(&later);
                     state.distrust();
                 }
-                // Nothing was noticed yet: these frames were taken for good.
+                // Nothing was noticed yet: these frames were taken for good. Where the
+                // ways had parted after them, nobody knows which is right, and the frames
+                // stay in doubt.
                 Ways::Blind if index < doubt.noticed => {
                     self.give_up(doubt.since..index + 1, false);
+                    parted = false;
                     break;
                 }
                 Ways::Blind | Ways::Apart => {
                     torn = torn.max(Some(index + 1));
+                    parted = false;
                     break;
                 }
             }
         }
-        if matches!(ways, Ways::Mistaken | Ways::Close) {
-            // They have yet to meet: before the doubt at the latest.
+        if parted && !self.is_gap(doubt.since) {
             later = self.back(doubt.since - 1, &later);
-            ways = Ways::of(&self.states[doubt.since - 1], &later, same_m);
-            if ways != Ways::Same {
+            if Ways::of(&self.states[doubt.since - 1], &later, same_m) != Ways::Same {
                 torn = torn.max(Some(doubt.clear_since));
             }
         }
