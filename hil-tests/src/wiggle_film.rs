@@ -164,8 +164,10 @@ impl Iterator for WiggleFilm {
         let part = |i: usize| start_s + frame_s * (i as f64 + 0.5) / poses as f64;
         let all: Vec<_> = (0..poses).map(|i| self.pose(part(i))).collect();
         let needed = self.renderer.sub_frames(&all[0], &all[poses - 1]);
-        let every = (poses / needed.min(poses)).max(1);
-        let drawn: Vec<_> = all.iter().skip(every / 2).step_by(every).cloned().collect();
+        let drawn = needed.min(poses);
+        // Even over the frame's time, within half of a pose's.
+        let middle = |i: usize| (2 * i + 1) * poses / (2 * drawn);
+        let drawn: Vec<_> = (0..drawn).map(|i| all[middle(i)].clone()).collect();
         let mut yuyv = vec![0; self.renderer.frame_bytes()];
         self.renderer.render(&drawn, self.next, &mut yuyv);
         self.next += 1;

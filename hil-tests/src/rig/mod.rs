@@ -88,12 +88,15 @@ pub enum RigError {
 }
 
 /// Refuses settings no thread could work with.
-fn check(config: &RigConfig) -> Result<(), RigError> {
+///
+/// # Errors
+/// [`RigError::Config`]: the first number that makes no rig, and its limits.
+pub fn check(config: &RigConfig) -> Result<(), RigError> {
     let camera = &config.camera;
     // The last row is exposed before the next frame begins.
     let rows = f64::from(camera.stereo_camera().height_px - 1);
     let spare_s = 1.0 / camera.frame_rate_hz - camera.exposure_s;
-    let longest_line_s = (spare_s / rows).max(0.0);
+    let longest_line_s = (spare_s / rows * 1e9).floor().max(0.0) / 1e9;
     let bounds = [
         ("camera.frame_rate_hz", camera.frame_rate_hz, 1.0, 200.0),
         ("camera.exposure_s", camera.exposure_s, 1e-5, 0.1),

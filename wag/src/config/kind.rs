@@ -1,9 +1,10 @@
 //! The kinds of configuration, and what is built in of each.
 
-use hil_tests::rig::RigConfig;
+use hil_tests::rig::{RigConfig, check};
 use planner::process::PlannerConfig;
 use rt_controller::config::ControllerConfig;
 use serde::de::DeserializeOwned;
+use serde::de::Error as _;
 use shared_types::Limits;
 
 /// What a file configures.
@@ -91,7 +92,9 @@ impl Kind {
             Self::Planner => table.try_into::<PlannerConfig>().map(drop),
             Self::Limits => table.try_into::<Limits>().map(drop),
             Self::Controller => table.try_into::<ControllerConfig>().map(drop),
-            Self::Rig => table.try_into::<RigConfig>().map(drop),
+            Self::Rig => table
+                .try_into::<RigConfig>()
+                .and_then(|rig| check(&rig).map_err(toml::de::Error::custom)),
         }
     }
 
