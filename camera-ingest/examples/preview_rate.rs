@@ -1,5 +1,6 @@
 //! What a running preview does, until it has been silent for three seconds:
-//! `preview_rate DOMAIN` prints its rate, its time per frame and its states.
+//! `preview_rate DOMAIN` prints its rate, its time per frame, its states and
+//! when it had lost the rope.
 
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -61,6 +62,21 @@ fn main() -> Result<(), Box<dyn Error>> {
             quantile(&took, 99),
             quantile(&took, 100)
         );
+    }
+    // Where it was lost, from the first frame looked at.
+    let lost = |t: &PreviewFrame| t.lost != 0;
+    for span in told.chunk_by(|a, b| lost(a) == lost(b)) {
+        if let [begin, .., end] = span
+            && lost(begin)
+        {
+            let since_s = |t: &PreviewFrame| (t.stamp_ns - first.stamp_ns) as f64 * 1e-9;
+            println!(
+                "lost from {:.2} to {:.2} s, {} frames",
+                since_s(begin),
+                since_s(end),
+                span.len()
+            );
+        }
     }
     Ok(())
 }
