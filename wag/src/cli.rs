@@ -16,7 +16,7 @@ pub use results::*;
 pub use runs::*;
 pub use values::{Point, seed};
 
-use values::{host, mass_kg, rate_hz};
+use values::{host, mass_kg, offset_ms, rate_hz};
 
 use crate::command::check::CheckArgs;
 use crate::command::plan::PlanArgs;
@@ -210,15 +210,19 @@ pub struct SimThrowArgs {
 /// Camera and motion of a recorded wiggle; a run's file tells both itself.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// Camera calibration and place (camera.toml); of a run's file, that of the run.
+    /// Camera calibration and place (camera.toml); default for a run: the one in its file.
     #[arg(long)]
     pub camera: Option<PathBuf>,
     /// Motion of the clamp.
     #[command(flatten)]
     pub motion: MotionArgs,
-    /// Of a run's file: which motion that was streamed to the arm, from 1, the wiggle.
-    #[arg(long, value_name = "N")]
+    /// Which of a run's motions that were streamed to the arm; default: 1, the wiggle. A
+    /// demo's second one calms the rope, its third is the throw.
+    #[arg(long, value_name = "N", requires = "video")]
     pub part: Option<usize>,
+    /// How far the film's times are behind the motion's, as `wag track` says (ms).
+    #[arg(long, value_name = "MS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = offset_ms)]
+    pub film_late_ms: f64,
 }
 
 /// How the rope's clamp moved; a run's file tells it itself.
@@ -226,6 +230,7 @@ pub struct SceneArgs {
 #[group(multiple = false)]
 pub struct MotionArgs {
     /// Measured joints: CSV with columns t,q1..q7 (s, rad); t = 0 is the first frame.
+    /// Default for a run: those in its file.
     #[arg(long)]
     pub joints: Option<PathBuf>,
     /// Attach-frame pose: CSV with columns t,x,y,z,qw,qx,qy,qz; t = 0 is the first frame.

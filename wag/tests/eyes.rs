@@ -220,6 +220,33 @@ fn pictures_and_raw_files_are_tracked_like_the_film() {
     assert!(!dir.path().join("k2.json").exists());
 }
 
+#[test]
+fn a_film_on_another_clock_is_told_and_put_right() {
+    let Some(from) = recording("a1") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| from.join(name).display().to_string();
+    let late = |late_ms: &str| {
+        let (camera, pose) = (path("camera.toml"), path("pose.csv"));
+        let video = from.display().to_string();
+        let files = ["--video", &video, "--camera", &camera, "--pose", &pose];
+        let own = ["--film-late-ms", late_ms, "--out", "k.json"];
+        let report = done(
+            dir.path(),
+            &[&["track", "--json"][..], &files, &own].concat(),
+        );
+        let number = |name: &str| report["clamp"][name].as_f64().unwrap();
+        (number("time_offset_s"), number("time_std_s"))
+    };
+    // It is not late in truth: what is taken out too much is missing.
+    let (offset_s, std_s) = late("25");
+    assert!(
+        (offset_s + 0.025).abs() < 3.0 * std_s && std_s < 0.004,
+        "{offset_s} {std_s}"
+    );
+    let (offset_s, std_s) = late("0");
+    assert!(offset_s.abs() < 3.0 * std_s, "{offset_s} {std_s}");
+}
+
 /// A camera's settings, thought to stand elsewhere, and some frames of it.
 fn film_of(frames: &[StereoFrame], camera: &StereoCamera, mode: VideoMode) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();

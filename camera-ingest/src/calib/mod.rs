@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 pub use factory::{VideoMode, write_factory_conf};
 pub use models::{ModelFiles, load_model_files};
-pub use settings::{placed_camera_toml, write_camera_toml};
+pub use settings::{check_camera, placed_camera_toml, write_camera_toml};
 use shared_types::StereoCamera;
 
 /// Why a calibration cannot be used.

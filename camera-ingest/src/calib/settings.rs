@@ -49,30 +49,63 @@ pub(super) fn read(path: &Path) -> Result<CameraSettings, CalibError> {
     Ok(settings)
 }
 
-impl CameraSettings {
-    fn check(&self) -> Result<(), String> {
-        // 0.2 s is longer than any frame of any mode.
-        for (name, value) in [
-            ("exposure_s", self.exposure_s),
-            ("line_time_s", self.line_time_s),
-        ] {
-            if !(0.0..=0.2).contains(&value) {
-                return Err(format!("{name} = {value} must lie in 0 to 0.2 s"));
-            }
+/// Times of the shutter (exposure, row to row, s) and the camera's place make sense.
+fn check_place(times_s: [f64; 2], r: &Matrix3<f64>, position_m: &[f64; 3]) -> Result<(), String> {
+    // 0.2 s is longer than any frame of any mode.
+    for (name, value) in ["exposure_s", "line_time_s"].into_iter().zip(times_s) {
+        if !(0.0..=0.2).contains(&value) {
+            return Err(format!("{name} = {value} must lie in 0 to 0.2 s"));
         }
-        let r = self.rotation();
-        let off = (r * r.transpose() - Matrix3::identity()).norm();
-        if !(off < 1e-3 && r.determinant() > 0.0) {
+    }
+    let off = (r * r.transpose() - Matrix3::identity()).norm();
+    if !(off < 1e-3 && r.determinant() > 0.0) {
+        return Err(format!(
+            "extrinsics.rotation is no rotation matrix (R R^T differs from 1 by {off:.2e}, \
+             determinant {:.3}); give the 3x3 rows of camera to world",
+            r.determinant()
+        ));
+    }
+    if position_m.iter().any(|v| !v.is_finite()) {
+        return Err("extrinsics.position_m must be finite (m)".to_owned());
+    }
+    Ok(())
+}
+
+/// Whether a camera that was not read by [`super::load_camera`] can be one.
+///
+/// # Errors
+/// What cannot be: size, focal lengths, distortion, place or times.
+pub fn check_camera(camera: &StereoCamera) -> Result<(), String> {
+    let sizes = [camera.width_px, camera.height_px];
+    if sizes.iter().any(|px| !(16..=10_000).contains(px)) {
+        return Err(format!("an eye of {} x {} px", sizes[0], sizes[1]));
+    }
+    for eye in [&camera.left, &camera.right] {
+        let focal = [eye.fx, eye.fy];
+        let rest = [eye.cx, eye.cy].into_iter().chain(eye.distortion);
+        if !focal.iter().all(|f| f.is_finite() && *f > 1.0) || !rest.into_iter().all(f64::is_finite)
+        {
             return Err(format!(
-                "extrinsics.rotation is no rotation matrix (R R^T differs from 1 by {off:.2e}, \
-                 determinant {:.3}); give the 3x3 rows of camera to world",
-                r.determinant()
+                "focal lengths {focal:?} px, or a number that is none"
             ));
         }
-        if self.extrinsics.position_m.iter().any(|v| !v.is_finite()) {
-            return Err("extrinsics.position_m must be finite (m)".to_owned());
-        }
-        Ok(())
+    }
+    let r = &camera.r_right_left;
+    let apart = camera.t_right_left_m.norm();
+    if !((r * r.transpose() - Matrix3::identity()).norm() < 1e-3 && apart.is_finite()) {
+        return Err("the right eye's place is none".to_owned());
+    }
+    let times_s = [camera.exposure_s, camera.line_time_s];
+    check_place(times_s, &camera.r_w_cam, &camera.p_w_cam_m.into())
+}
+
+impl CameraSettings {
+    fn check(&self) -> Result<(), String> {
+        check_place(
+            [self.exposure_s, self.line_time_s],
+            &self.rotation(),
+            &self.extrinsics.position_m,
+        )
     }
 
     fn rotation(&self) -> Matrix3<f64> {

@@ -157,8 +157,8 @@ impl StereoSource for Box<dyn StereoSource> {
 /// place of the header's. It must be positive.
 ///
 /// # Errors
-/// A file is missing, truncated or of another kind; nothing tells when the frames
-/// were taken, or both a CSV and `rate_hz` do.
+/// A file is missing, truncated or of another kind, or a run's file, which has one eye
+/// only; nothing tells when the frames were taken, or both a CSV and `rate_hz` do.
 pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSource>, SourceError> {
     let device = |m: std::fs::Metadata| m.file_type().is_char_device();
     if std::fs::metadata(path).is_ok_and(device) {
@@ -211,6 +211,10 @@ pub fn run_file(path: &Path) -> Option<PathBuf> {
         true => path.join("run.mcap"),
         false => path.to_owned(),
     };
+    // Reading from a device would begin to film.
+    if !path.is_file() {
+        return None;
+    }
     let mut front = [0; MAGIC.len()];
     let mut file = std::fs::File::open(&path).ok()?;
     file.read_exact(&mut front).ok()?;

@@ -17,6 +17,14 @@ pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
     }
 }
 
+/// How far two clocks may be apart (ms).
+pub(super) fn offset_ms(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(offset) if (-1000.0..=1000.0).contains(&offset) => Ok(offset),
+        _ => Err("an offset of clocks is a number from -1000 to 1000, in ms".to_owned()),
+    }
+}
+
 /// A mass (kg).
 pub(super) fn mass_kg(text: &str) -> Result<f64, String> {
     match text.parse() {

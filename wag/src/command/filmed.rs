@@ -1,9 +1,9 @@
 //! What films a rope: its pictures, the camera, and how the clamp moved meanwhile.
 
-use crate::cli::{MotionArgs, SceneArgs};
+use crate::cli::SceneArgs;
 use crate::failure::{OrInput, Outcome};
 use crate::files::{self, JointsCsv};
-use crate::mcap_file::RunFilm;
+use crate::mcap_file::{RUN_FILE, RunFilm};
 use anyhow::{Context, anyhow, ensure};
 use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
@@ -13,10 +13,18 @@ use std::path::{Path, PathBuf};
 
 const NO_MOTION: &str = "name the clamp's motion with --joints or --pose";
 
-/// How the clamp moved; t = 0 is the first frame.
+/// How the clamp moved, on the film's clock: t = 0 is the first frame.
 #[derive(Debug)]
-pub enum ClampMotion {
-    /// Measured joints, and the file that tells them.
+pub struct ClampMotion {
+    told: Told,
+    /// How late the film's times are on the motion's (s).
+    late_s: f64,
+}
+
+/// Who tells the motion.
+#[derive(Debug)]
+enum Told {
+    /// Measured joints, and the file they are from.
     Joints(PathBuf, JointsCsv),
     /// The file of the attach frame's poses.
     Pose(PathBuf),
@@ -24,36 +32,50 @@ pub enum ClampMotion {
 
 impl ClampMotion {
     /// What the command line names.
-    pub fn read(motion: &MotionArgs) -> anyhow::Result<Self> {
-        match (&motion.joints, &motion.pose) {
-            (Some(path), _) => Ok(Self::Joints(path.clone(), files::read_joints(path)?)),
-            (None, Some(path)) => Ok(Self::Pose(path.clone())),
-            (None, None) => Err(anyhow!(NO_MOTION)),
+    pub fn read(scene: &SceneArgs) -> anyhow::Result<Self> {
+        let told = match (&scene.motion.joints, &scene.motion.pose) {
+            (Some(path), _) => Told::Joints(path.clone(), files::read_joints(path)?),
+            (None, Some(path)) => Told::Pose(path.clone()),
+            (None, None) => return Err(anyhow!(NO_MOTION)),
+        };
+        Ok(Self::late(told, scene))
+    }
+
+    fn late(told: Told, scene: &SceneArgs) -> Self {
+        Self {
+            told,
+            late_s: scene.film_late_ms * 1e-3,
         }
     }
 
     /// For the tracker.
     pub fn clamp_path(&self) -> anyhow::Result<ClampPath> {
-        match self {
-            Self::Joints(path, csv) => {
+        let path = match &self.told {
+            Told::Joints(path, csv) => {
                 let samples: Vec<_> = csv.times_s.iter().copied().zip(csv.q.clone()).collect();
-                ClampPath::from_joints(&samples).with_context(|| format!("`{}`", path.display()))
+                ClampPath::from_joints(&samples).with_context(|| format!("`{}`", path.display()))?
             }
-            Self::Pose(path) => Ok(ClampPath::from_pose_csv(path)?),
-        }
+            Told::Pose(path) => ClampPath::from_pose_csv(path)?,
+        };
+        Ok(path.since(-self.late_s))
     }
 
     /// For the simulator.
     pub fn attach(&self) -> anyhow::Result<Box<dyn AttachMotion>> {
-        match self {
-            Self::Joints(path, csv) => {
-                let arm = MeasuredArm::new(&csv.times_s, &csv.q)
+        match &self.told {
+            Told::Joints(path, csv) => {
+                let times_s: Vec<f64> = csv.times_s.iter().map(|t| t + self.late_s).collect();
+                let arm = MeasuredArm::new(&times_s, &csv.q)
                     .with_context(|| format!("`{}`", path.display()))?;
                 Ok(Box::new(arm))
             }
-            Self::Pose(path) => {
-                let track = PoseTrack::new(&files::read_pose(path)?)
-                    .with_context(|| format!("`{}`", path.display()))?;
+            Told::Pose(path) => {
+                let mut rows = files::read_pose(path)?;
+                for row in &mut rows {
+                    row.t_s += self.late_s;
+                }
+                let track =
+                    PoseTrack::new(&rows).with_context(|| format!("`{}`", path.display()))?;
                 Ok(Box::new(track))
             }
         }
@@ -70,16 +92,39 @@ pub struct Filmed {
     pub camera: StereoCamera,
     /// The clamp's motion.
     pub motion: ClampMotion,
+    /// What is missing or damaged.
+    pub warnings: Vec<String>,
+}
+
+/// The run's file, if `video` is one or a run's folder; it may be damaged, or not there.
+fn run_of(video: &Path) -> Option<PathBuf> {
+    if video.is_dir() {
+        let file = video.join(RUN_FILE);
+        let run = [RUN_FILE, "cycles.bin", "command.json"].map(|name| video.join(name));
+        let is_run = run.iter().any(|path| path.try_exists().unwrap_or(true));
+        return (is_run && !video.join("video.avi").exists()).then_some(file);
+    }
+    let named = video.extension().is_some_and(|e| e == "mcap");
+    named.then(|| video.to_owned()).or_else(|| run_file(video))
 }
 
 impl Filmed {
     /// Opens a recording given with the frame rate it does not tell. A run's file tells
     /// camera and motion itself; what the command line names goes first.
     pub fn open(video: &Path, rate_hz: Option<f64>, scene: &SceneArgs) -> Outcome<Self> {
-        if let Some(path) = run_file(video) {
-            return Self::of_run(&path, rate_hz, scene).or_input();
+        // Named alone it is meant for a run: say so if it is not there.
+        if scene.camera.is_none() && !scene.motion.is_given() {
+            std::fs::metadata(video)
+                .with_context(|| {
+                    let name = video.display();
+                    format!("cannot read `{name}`; check the path and its permissions")
+                })
+                .or_input()?;
         }
-        Self::of_video(video, rate_hz, scene).or_input()
+        match run_of(video) {
+            Some(path) => Self::of_run(&path, rate_hz, scene).or_input(),
+            None => Self::of_video(video, rate_hz, scene).or_input(),
+        }
     }
 
     fn of_video(video: &Path, rate_hz: Option<f64>, scene: &SceneArgs) -> anyhow::Result<Self> {
@@ -92,9 +137,10 @@ impl Filmed {
         ensure!(scene.motion.is_given(), NO_MOTION);
         Ok(Self {
             camera: scene.camera()?,
-            motion: ClampMotion::read(&scene.motion)?,
+            motion: ClampMotion::read(scene)?,
             source: Box::new(open_video(video, rate_hz)?),
             path: video.to_owned(),
+            warnings: Vec::new(),
         })
     }
 
@@ -107,7 +153,13 @@ impl Filmed {
         let part = RunFilm::read(path)?.part(scene.part.unwrap_or(1))?;
         let camera = match (&scene.camera, &part.camera) {
             (Some(file), _) => load_camera(file)?,
-            (None, Some(camera)) => camera.clone(),
+            (None, Some(Ok(camera))) => camera.clone(),
+            (None, Some(Err(reason))) => {
+                return Err(anyhow!(
+                    "the camera in the run's file `{}` is none: {reason}; name another with --camera",
+                    path.display()
+                ));
+            }
             (None, None) => {
                 return Err(anyhow!(
                     "the run's file `{}` does not tell its camera: name it with --camera",
@@ -116,16 +168,24 @@ impl Filmed {
             }
         };
         let motion = if scene.motion.is_given() {
-            ClampMotion::read(&scene.motion)?
+            ClampMotion::read(scene)?
         } else {
-            ClampMotion::Joints(path.to_owned(), part.joints.clone())
+            ClampMotion::late(Told::Joints(path.to_owned(), part.joints.clone()), scene)
         };
         Ok(Self {
+            warnings: part.warnings.clone(),
             source: Box::new(part),
             path: path.to_owned(),
             camera,
             motion,
         })
+    }
+
+    /// Tells a person what is missing or damaged.
+    pub fn warn(&self) {
+        for warning in &self.warnings {
+            eprintln!("warning: {warning}");
+        }
     }
 
     /// Its frames, in memory.

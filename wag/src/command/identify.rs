@@ -19,6 +19,7 @@ use planner::process::PlannerConfig;
 use planner::sysid::{
     Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify_from,
 };
+use rope_sim::AttachMotion;
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::rope::{Ambiguity, RANGES};
@@ -34,11 +35,15 @@ struct Observed {
     track: KeypointTrack,
     appearance: Appearance,
     camera: StereoCamera,
-    motion: ClampMotion,
+    motion: Box<dyn AttachMotion>,
+    warnings: Vec<String>,
 }
 
 fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
+        let camera = args.scene.camera().or_input()?;
+        let motion = ClampMotion::read(&args.scene).or_input()?;
+        let motion = motion.attach().or_input()?;
         let fail = || format!("keypoints `{}`", path.display());
         let track: KeypointTrack = serde_json::from_str(&files::read_text(path).or_input()?)
             .with_context(fail)
@@ -47,8 +52,9 @@ fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
         return Ok(Observed {
             track,
             appearance: Appearance::default(),
-            camera: args.scene.camera().or_input()?,
-            motion: ClampMotion::read(&args.scene.motion).or_input()?,
+            camera,
+            motion,
+            warnings: Vec::new(),
         });
     }
     let Some(video) = &args.observation.video else {
@@ -57,6 +63,9 @@ fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
         )));
     };
     let mut filmed = Filmed::open(video, args.fps, &args.scene)?;
+    filmed.warn();
+    // Before the long work: what the simulator needs of the motion.
+    let motion = filmed.motion.attach().or_input()?;
     let stage = Stage::begin("track", quiet);
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(None, file, &filmed.camera)?;
@@ -70,7 +79,8 @@ fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
         track: tracked.track,
         appearance,
         camera: filmed.camera,
-        motion: filmed.motion,
+        motion,
+        warnings: filmed.warnings,
     })
 }
 
@@ -165,13 +175,12 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let config = config::here::<PlannerConfig>(None).or_input()?;
     crate::session::watch_interrupts().or_failed()?;
     let observed = observe(args, quiet)?;
-    let motion = observed.motion.attach().or_input()?;
     let stage = Stage::begin("identify", quiet);
     let observation = Observation {
         track: &observed.track,
         points: ObservedPoints::ArcLength,
         camera: &observed.camera,
-        motion: motion.as_ref(),
+        motion: observed.motion.as_ref(),
         appearance: observed.appearance,
     };
     let options = IdentifyOptions {
@@ -210,7 +219,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
         "method": estimate.method, "posterior": estimate.posterior,
         "circumstances": estimate.circumstances, "novelty": estimate.novelty,
-        "out_of_distribution": estimate.novelty.is_outside(),
+        "out_of_distribution": estimate.novelty.is_outside(), "warnings": observed.warnings,
     })))
 }
 

@@ -13,6 +13,7 @@ use camera_ingest::track::ClampFit;
 use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_with};
 use serde_json::{Value, json};
 use shared_types::KeypointTrack;
+use shared_types::keypoints::TrackedFrame;
 use std::path::Path;
 
 /// Pictures in a contact sheet, and how many stand in a row.
@@ -65,6 +66,9 @@ fn overlay(
     keypoint_sheet(frames, track, &chosen, SHEET.1)?.to_png()
 }
 
+/// Clocks so many standard errors apart are not together.
+const FAR_STDS: f64 = 4.0;
+
 /// What the film says about time and place of the clamp.
 fn said(clamp: &ClampFit) -> String {
     format!(
@@ -87,6 +91,7 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
         )));
     }
     let mut filmed = Filmed::open(&args.video, args.fps, &args.scene)?;
+    filmed.warn();
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(Some(&args.models), file, &filmed.camera)?;
     let stage = Stage::begin("track", quiet);
@@ -97,18 +102,34 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
         files::write_atomic(path, &overlay(path, frames, &result.track).or_failed()?)
             .or_failed()?;
     }
-    let lost = result.track.frames.iter().filter(|f| f.lost).count();
-    let line = format!("{} frames, rope lost in {lost}", result.track.frames.len());
-    let seconds = stage.done(&line);
+    let count = result.track.frames.len();
+    let frames_in = |wanted: fn(&TrackedFrame) -> bool| {
+        result.track.frames.iter().filter(|f| wanted(f)).count()
+    };
+    let lost = frames_in(|f| f.lost);
+    let doubted = frames_in(|f| !f.lost && f.confidence.iter().all(|c| *c <= 0.5));
+    let seconds = stage.done(&format!(
+        "{count} frames, rope lost in {lost}, in doubt in {doubted}"
+    ));
+    if lost + doubted > count * 4 / 5 {
+        let doubt = "the rope was hardly ever seen for sure: look at an overlay, and whether \
+                     camera and motion are those of this film";
+        eprintln!("warning: {doubt}");
+        filmed.warnings.push(doubt.to_owned());
+    }
     if !quiet {
         if let Some(clamp) = result.clamp {
             println!("{}", said(&clamp));
+            if clamp.time_offset_s.abs() > FAR_STDS * clamp.time_std_s {
+                let late_ms = args.scene.film_late_ms + clamp.time_offset_s * 1e3;
+                println!("--film-late-ms {late_ms:.1} takes that out of the times");
+            }
         }
         println!("keypoints written to `{}`", args.out.display());
     }
     Ok(Some(json!({
-        "ok": true, "command": "track", "out": args.out, "frames": result.track.frames.len(),
-        "lost": lost, "seconds": seconds, "models": learned.report(),
+        "ok": true, "command": "track", "out": args.out, "frames": count,
+        "lost": lost, "doubted": doubted, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),
         "rope_radius_m": result.appearance.rope_radius_m,
         "lead_radius_m": result.appearance.lead_radius_m,
         "clamp": result.clamp.map(|c| json!({

@@ -2,12 +2,13 @@
 //! on the pictures' clock.
 
 use super::channel::Channel;
-use super::read::walk;
+use super::read::{Walked, walk};
 use super::urdf::joint_name;
 use crate::files::JointsCsv;
 use anyhow::{Context, anyhow, bail, ensure};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use camera_ingest::calib::check_camera;
 use camera_ingest::{EyeFrame, FrameSource, SourceError};
 use mcap::records::Record;
 use serde::Deserialize;
@@ -20,6 +21,12 @@ use std::path::{Path, PathBuf};
 pub const CAMERA: [&str; 2] = ["camera", "json"];
 /// Joints are taken from so much before the first picture to so much after the last (ns).
 const MARGIN_NS: u64 = 500_000_000;
+/// A longer time without a record means that some are missing (ns).
+const GAP_NS: u64 = 250_000_000;
+/// Fewest joint reports that tell a motion.
+const LEAST_JOINTS: usize = 8;
+/// Most pictures that are taken into memory (bytes): an hour of them.
+const MOST_BYTES: usize = 2 << 30;
 
 /// One picture, compressed.
 #[derive(Debug, Clone)]
@@ -33,10 +40,26 @@ struct Picture {
 pub struct RunFilm {
     path: PathBuf,
     pictures: Vec<Picture>,
-    camera: Option<StereoCamera>,
+    picture_bytes: usize,
+    /// The camera, or why what the file tells is none.
+    camera: Option<Result<StereoCamera, String>>,
     joints: Vec<(u64, JointVector)>,
-    /// Begin and end of each streamed motion (ns).
-    streamed: Vec<[u64; 2]>,
+    /// The motions that were streamed.
+    streamed: Vec<Streamed>,
+    /// When the last cycle was, and whether it streamed.
+    last_cycle: Option<(u64, bool)>,
+    walked: Walked,
+}
+
+/// A motion that was streamed to the arm.
+#[derive(Debug, Clone, Copy)]
+struct Streamed {
+    begin_ns: u64,
+    end_ns: u64,
+    /// The cycles before it are there.
+    from_its_begin: bool,
+    /// And those after it.
+    to_its_end: bool,
 }
 
 /// Pictures of one motion, the first before it begins.
@@ -44,10 +67,12 @@ pub struct RunFilm {
 pub struct RunPart {
     path: PathBuf,
     pictures: Vec<Picture>,
-    /// The camera, where the file tells it.
-    pub camera: Option<StereoCamera>,
+    /// The camera, where the file tells it, or why what it tells is none.
+    pub camera: Option<Result<StereoCamera, String>>,
     /// Measured joints; t = 0 is the first picture.
     pub joints: JointsCsv,
+    /// What is missing or damaged.
+    pub warnings: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -70,6 +95,14 @@ struct JointsMessage {
 #[derive(Deserialize)]
 struct CycleMessage {
     mode: String,
+}
+
+/// What can be seen with; a reason, if nothing can.
+fn camera_of(text: Option<&String>) -> Result<StereoCamera, String> {
+    let text = text.ok_or("the table is empty")?;
+    let camera: StereoCamera = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    check_camera(&camera)?;
+    Ok(camera)
 }
 
 impl JointsMessage {
@@ -96,9 +129,12 @@ impl RunFilm {
         let mut film = Self {
             path: path.to_owned(),
             pictures: Vec::new(),
+            picture_bytes: 0,
             camera: None,
             joints: Vec::new(),
             streamed: Vec::new(),
+            last_cycle: None,
+            walked: Walked::default(),
         };
         film.take_in(&bytes).with_context(fail)?;
         Ok(film)
@@ -106,22 +142,20 @@ impl RunFilm {
 
     fn take_in(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let mut topics = BTreeMap::new();
-        let mut streaming = false;
-        walk(bytes, |record| {
+        self.walked = walk(bytes, |record| {
             match record {
                 Record::Channel(channel) => {
                     topics.insert(channel.id, channel.topic.clone());
                 }
                 Record::Metadata(table) if table.name == CAMERA[0] => {
-                    let text = table.metadata.get(CAMERA[1]).context("no camera told")?;
-                    self.camera = Some(serde_json::from_str(text).context("the camera")?);
+                    self.camera = Some(camera_of(table.metadata.get(CAMERA[1])));
                 }
                 Record::Message { header, data } => {
                     let Some(topic) = topics.get(&header.channel_id) else {
                         return Ok(());
                     };
                     let at_ns = header.log_time;
-                    self.message(topic, at_ns, data, &mut streaming)
+                    self.message(topic, at_ns, data)
                         .with_context(|| format!("channel `{topic}`, time {at_ns} ns"))?;
                 }
                 _ => {}
@@ -129,16 +163,12 @@ impl RunFilm {
             Ok(())
         })?;
         self.pictures.sort_by_key(|picture| picture.stamp_ns);
+        self.joints.sort_by_key(|(at_ns, _)| *at_ns);
+        self.joints.dedup_by_key(|(at_ns, _)| *at_ns);
         Ok(())
     }
 
-    fn message(
-        &mut self,
-        topic: &str,
-        at_ns: u64,
-        data: &[u8],
-        streaming: &mut bool,
-    ) -> anyhow::Result<()> {
+    fn message(&mut self, topic: &str, at_ns: u64, data: &[u8]) -> anyhow::Result<()> {
         if topic == Channel::Image.topic() {
             let image: ImageMessage = serde_json::from_slice(data)?;
             ensure!(
@@ -149,73 +179,151 @@ impl RunFilm {
             let jpeg = STANDARD
                 .decode(image.data)
                 .map_err(|error| anyhow!("a picture is no base64: {error}"))?;
+            self.picture_bytes += jpeg.len();
+            ensure!(
+                self.picture_bytes <= MOST_BYTES,
+                "the pictures take more than {} MB",
+                MOST_BYTES >> 20
+            );
             self.pictures.push(Picture {
                 stamp_ns: at_ns,
                 jpeg,
             });
         } else if topic == Channel::Measured.topic() {
             let told: JointsMessage = serde_json::from_slice(data)?;
-            let later = self.joints.last().is_none_or(|(last, _)| at_ns > *last);
-            self.joints
-                .extend(told.vector().filter(|_| later).map(|q| (at_ns, q)));
+            self.joints.extend(told.vector().map(|q| (at_ns, q)));
         } else if topic == Channel::Cycles.topic() {
             let cycle: CycleMessage = serde_json::from_slice(data)?;
-            let was = std::mem::replace(
-                streaming,
+            self.cycle(
+                at_ns,
                 cycle.mode == format!("{:?}", ControllerMode::Streaming),
             );
-            match self.streamed.last_mut() {
-                Some([_, end]) if *streaming && was => *end = at_ns,
-                _ if *streaming => self.streamed.push([at_ns; 2]),
-                _ => {}
-            }
         }
         Ok(())
+    }
+
+    /// Takes note of a control cycle.
+    fn cycle(&mut self, at_ns: u64, streams: bool) {
+        let before = self
+            .last_cycle
+            .filter(|(last_ns, _)| at_ns.saturating_sub(*last_ns) < GAP_NS);
+        match (before, self.streamed.last_mut()) {
+            (Some((_, true)), Some(motion)) => {
+                motion.end_ns = if streams { at_ns } else { motion.end_ns };
+                motion.to_its_end = !streams;
+            }
+            _ if streams => self.streamed.push(Streamed {
+                begin_ns: at_ns,
+                end_ns: at_ns,
+                from_its_begin: before.is_some(),
+                to_its_end: false,
+            }),
+            _ => {}
+        }
+        self.last_cycle = Some((at_ns, streams));
+    }
+
+    /// What is missing of a motion's pictures, first to last, and of the whole file.
+    fn warnings(&self, number: usize, motion: Streamed, pictures: &[Picture]) -> Vec<String> {
+        let name = self.path.display();
+        let mut warnings = Vec::new();
+        let Walked {
+            damaged_chunks,
+            whole,
+            ..
+        } = self.walked;
+        if damaged_chunks > 0 {
+            warnings.push(format!(
+                "run file `{name}`: {damaged_chunks} damaged chunks are left out, and motions \
+                 may be counted wrongly"
+            ));
+        }
+        if !whole {
+            warnings.push(format!("run file `{name}` breaks off before its end"));
+        }
+        if !motion.to_its_end {
+            warnings.push(format!(
+                "run file `{name}`: the end of motion {number} is missing"
+            ));
+        }
+        let missing_ns: u64 = pictures
+            .windows(2)
+            .map(|pair| pair[1].stamp_ns - pair[0].stamp_ns)
+            .filter(|step_ns| *step_ns > GAP_NS)
+            .sum();
+        if missing_ns > 0 {
+            warnings.push(format!(
+                "run file `{name}`: pictures of {:.1} s of motion {number} are missing",
+                since_s(missing_ns, 0)
+            ));
+        }
+        warnings
     }
 
     /// Pictures of the `number`-th streamed motion, from 1.
     ///
     /// # Errors
     /// There is no such motion, or no pictures of it.
-    pub fn part(self, number: usize) -> anyhow::Result<RunPart> {
+    pub fn part(mut self, number: usize) -> anyhow::Result<RunPart> {
         let count = self.streamed.len();
         let name = self.path.display();
+        let broken = match self.walked {
+            Walked {
+                damaged_chunks: 1..,
+                ..
+            } => "; damaged chunks are left out",
+            Walked { whole: false, .. } => "; the file breaks off before its end",
+            _ => "",
+        };
         ensure!(
             count > 0,
             "run file `{name}`: no motion was streamed to the arm while it was recorded, so \
-             no wiggle is in it"
+             no wiggle is in it{broken}"
         );
-        let Some([begin_ns, end_ns]) = number.checked_sub(1).and_then(|i| self.streamed.get(i))
-        else {
-            bail!("run file `{name}`: --part is {number}, but must be from 1 to {count}");
+        let Some(motion) = number.checked_sub(1).and_then(|i| self.streamed.get(i)) else {
+            bail!(
+                "run file `{name}`: --part is {number}, but {count} motions were streamed to the \
+                 arm{broken}"
+            );
         };
+        let motion = *motion;
+        ensure!(
+            motion.from_its_begin,
+            "run file `{name}`: the beginning of motion {number} is missing, in which the rope \
+             hangs still"
+        );
         let first = self
             .pictures
             .iter()
-            .rposition(|picture| picture.stamp_ns <= *begin_ns)
+            .rposition(|picture| picture.stamp_ns <= motion.begin_ns)
+            .filter(|first| motion.begin_ns - self.pictures[*first].stamp_ns < GAP_NS)
             .with_context(|| {
-                format!("run file `{name}`: no picture was recorded before motion {number} began")
+                format!(
+                    "run file `{name}`: no picture is there from just before motion {number} \
+                     began, when the rope hung still"
+                )
             })?;
-        let pictures: Vec<Picture> = self.pictures[first..]
+        let count = self.pictures[first..]
             .iter()
-            .take_while(|picture| picture.stamp_ns <= *end_ns)
-            .cloned()
-            .collect();
+            .take_while(|picture| picture.stamp_ns <= motion.end_ns)
+            .count();
+        let pictures: Vec<Picture> = self.pictures.drain(first..first + count).collect();
         let (zero_ns, last_ns) = match &pictures[..] {
             [first, .., last] => (first.stamp_ns, last.stamp_ns),
             _ => bail!("run file `{name}`: no pictures were recorded during motion {number}"),
         };
-        let around = self
-            .joints
-            .iter()
-            .filter(|(t, _)| (zero_ns.saturating_sub(MARGIN_NS)..=last_ns + MARGIN_NS).contains(t));
+        let span = zero_ns.saturating_sub(MARGIN_NS)..=last_ns.saturating_add(MARGIN_NS);
+        let around = self.joints.iter().filter(|(t, _)| span.contains(t));
         let (times_s, q): (Vec<f64>, Vec<JointVector>) =
             around.map(|(t, q)| (since_s(*t, zero_ns), *q)).unzip();
         ensure!(
-            times_s.len() >= 2,
-            "run file `{name}`: the arm told no joints during motion {number}"
+            times_s.len() >= LEAST_JOINTS,
+            "run file `{name}`: the arm told its joints {} times during motion {number}, but \
+             {LEAST_JOINTS} are needed at least",
+            times_s.len()
         );
         Ok(RunPart {
+            warnings: self.warnings(number, motion, &pictures),
             path: self.path,
             pictures,
             camera: self.camera,

@@ -30,6 +30,17 @@ fn frames(camera: &CameraConfig) -> Vec<Frame> {
 /// A run's file: still, the wiggle, still, a motion that no picture shows. `camera` is
 /// told only where it is wanted.
 fn write(path: &Path, camera: &CameraConfig, frames: &[Frame], tell_camera: bool) {
+    write_part(path, camera, frames, tell_camera, -100..900);
+}
+
+/// The same with some control cycles only.
+fn write_part(
+    path: &Path,
+    camera: &CameraConfig,
+    frames: &[Frame],
+    tell_camera: bool,
+    cycles: std::ops::Range<i32>,
+) {
     let mut file = McapFile::create(path).unwrap();
     let sees = camera.stereo_camera();
     if tell_camera {
@@ -37,7 +48,7 @@ fn write(path: &Path, camera: &CameraConfig, frames: &[Frame], tell_camera: bool
         file.metadata(CAMERA[0], &[(CAMERA[1], text)]).unwrap();
     }
     let clock = Clock::compare();
-    for cycle in -100..900_i32 {
+    for cycle in cycles {
         let t_s = f64::from(cycle) * 4e-3;
         let now_ns = clock.wall_ns(at_ns(t_s));
         let streams = (0.0..=WIGGLE_S).contains(&t_s) || t_s > 3.2;
@@ -82,7 +93,8 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
     let filmed = frames(&config);
     write(&path, &config, &filmed, true);
     let mut part = RunFilm::read(&path).unwrap().part(1).unwrap();
-    let camera = part.camera.clone().unwrap();
+    let camera = part.camera.clone().unwrap().unwrap();
+    assert_eq!(part.warnings, Vec::<String>::new());
     assert_eq!(camera, config.stereo_camera());
     // From the last picture before it begins to the last one while it goes on.
     let shown: Vec<&Frame> = {
@@ -134,9 +146,17 @@ fn what_a_file_does_not_hold_is_said() {
         let part = RunFilm::read(&path).unwrap().part(number);
         part.unwrap_err().to_string()
     };
-    assert!(refused(0).contains("from 1 to 2"), "{}", refused(0));
+    assert!(refused(0).contains("2 motions"), "{}", refused(0));
     assert!(refused(3).contains("--part is 3"), "{}", refused(3));
     assert!(refused(1).contains("no picture"), "{}", refused(1));
+    std::fs::remove_file(&path).unwrap();
+    // The wiggle begins before anything was recorded.
+    write_part(&path, &config, &[], false, 100..900);
+    assert!(
+        refused(1).contains("beginning of motion 1"),
+        "{}",
+        refused(1)
+    );
     std::fs::write(&path, b"words").unwrap();
     let error = format!("{:#}", RunFilm::read(&path).unwrap_err());
     assert!(
@@ -159,6 +179,8 @@ fn a_damaged_file_is_read_as_far_as_it_is_whole() {
         RunFilm::read(&path).map(|film| film.pictures.len())
     };
     assert_eq!(pictures(&whole).unwrap(), frames.len());
+    let part = RunFilm::read(&path).unwrap().part(1).unwrap();
+    assert!(part.warnings.is_empty(), "{:?}", part.warnings);
     // Cut off: what came before is there.
     let mut seen = 0;
     for tenth in 1..10 {
@@ -166,6 +188,12 @@ fn a_damaged_file_is_read_as_far_as_it_is_whole() {
         assert!((seen..=frames.len()).contains(&count));
         seen = count;
     }
+    std::fs::write(&path, &whole[..whole.len() * 19 / 20]).unwrap();
+    let part = RunFilm::read(&path).unwrap().part(1).unwrap();
+    let [said] = &part.warnings[..] else {
+        panic!("{:?}", part.warnings)
+    };
+    assert!(said.contains("breaks off"), "{said}");
     // A wrong byte costs a chunk at most, or the file is refused; nothing panics.
     for k in 0..200 {
         let mut bytes = whole.clone();

@@ -9,8 +9,8 @@ use rt_controller::recording::chunk::{self, Front};
 
 /// Opcode and length.
 const FRONT_LEN: usize = 9;
-/// Longest chunk, compressed or not (bytes); a longer one is damaged. The library
-/// believes what a length says, and a wrong one would take all memory.
+/// Longest chunk, uncompressed (bytes); a longer one is damaged. The library believes
+/// what a length says, and a wrong one would take all memory.
 const LONGEST: usize = 1 << 28;
 
 /// What was met on the way.
@@ -96,15 +96,22 @@ pub fn walk(
     Ok(walked)
 }
 
-/// All records of a chunk record; `None` unless all of them are right.
+/// Bytes in which a chunk tells how long its records are together.
+const UNCOMPRESSED_LEN: std::ops::Range<usize> = FRONT_LEN + 16..FRONT_LEN + 24;
+
+/// All records of a chunk record; `None` unless all of them are there and right.
 fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
+    let told = u64::from_le_bytes(*chunk.get(UNCOMPRESSED_LEN)?.first_chunk()?);
+    // Nobody writes an empty one.
+    let told = usize::try_from(told).ok()?;
+    (1..=LONGEST).contains(&told).then_some(())?;
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(LONGEST);
     let mut reader = LinearReader::new_with_options(options);
-    let (mut rest, mut records) = (chunk, Vec::new());
+    let (mut rest, mut records, mut len) = (chunk, Vec::new(), 0);
     while let Some(event) = reader.next_event() {
         match event.ok()? {
             LinearReadEvent::ReadRequest(_) if rest.is_empty() => break,
@@ -115,6 +122,11 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
                 rest = later;
             }
             LinearReadEvent::Record { data, opcode } => {
+                // A chunk without a checksum may hold more than it tells.
+                len += FRONT_LEN + data.len();
+                if len > told {
+                    return None;
+                }
                 records.push(mcap::parse_record(opcode, data).ok()?.into_owned());
             }
         }
@@ -125,8 +137,7 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
             Record::Schema { .. } | Record::Channel(_) | Record::Message { .. }
         )
     };
-    // A chunk that is cut off tells none.
-    (!records.is_empty() && records.iter().all(allowed)).then_some(records)
+    (len == told && records.iter().all(allowed)).then_some(records)
 }
 
 /// The exact recording of the control cycles in a file: the bytes of `cycles.bin`.
@@ -157,4 +168,53 @@ pub fn replay_bytes(bytes: &[u8]) -> anyhow::Result<Vec<u8>> {
         );
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mcap_file::writer::options;
+    use mcap::records::MessageHeader;
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+
+    #[test]
+    fn a_chunk_without_a_checksum_holds_no_more_than_it_tells() {
+        let file = Cursor::new(Vec::new());
+        let options = options().calculate_chunk_crcs(false).disable_seeking(false);
+        let mut writer = options.create(file).unwrap();
+        let channel_id = writer
+            .add_channel(0, "/zeros", "", &BTreeMap::new())
+            .unwrap();
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time: 1,
+            publish_time: 1,
+        };
+        for _ in 0..50 {
+            writer.write_to_known_channel(&header, &[0; 4000]).unwrap();
+        }
+        writer.finish().unwrap();
+        let mut bytes = writer.into_inner().into_inner();
+        let read = |bytes: &[u8]| {
+            let mut messages = 0;
+            let walked = walk(bytes, |record| {
+                messages += usize::from(matches!(record, Record::Message { .. }));
+                Ok(())
+            });
+            (messages, walked.unwrap().damaged_chunks)
+        };
+        assert_eq!(read(&bytes), (50, 0));
+        // The chunk comes right after the header record.
+        let mut at = MAGIC.len();
+        while bytes[at] != op::CHUNK {
+            at += front(&bytes[at..]).unwrap().2;
+        }
+        let told = at + UNCOMPRESSED_LEN.start..at + UNCOMPRESSED_LEN.end;
+        for wrong in [1_u64 << 40, 100_000, 0] {
+            bytes[told.clone()].copy_from_slice(&wrong.to_le_bytes());
+            assert_eq!(read(&bytes), (0, 1), "{wrong}");
+        }
+    }
 }

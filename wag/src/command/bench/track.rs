@@ -3,7 +3,7 @@
 
 use super::machine::Machine;
 use super::spent::{Spent, least};
-use crate::cli::{BenchArgs, MotionArgs};
+use crate::cli::{BenchArgs, MotionArgs, SceneArgs};
 use crate::command::filmed::ClampMotion;
 use crate::failure::{Failure, OrInput, Outcome};
 use crate::progress::Stage;
@@ -79,12 +79,17 @@ impl Pass {
 /// What is measured with: `video.avi`, `camera.toml` and the clamp's motion.
 fn recording(folder: &Path) -> Outcome<(Box<dyn StereoSource>, StereoCamera, ClampPath)> {
     let joints = folder.join("joints.csv");
-    let motion = MotionArgs {
-        pose: (!joints.exists()).then(|| folder.join("pose.csv")),
-        joints: joints.exists().then_some(joints),
+    let scene = SceneArgs {
+        camera: None,
+        motion: MotionArgs {
+            pose: (!joints.exists()).then(|| folder.join("pose.csv")),
+            joints: joints.exists().then_some(joints),
+        },
+        part: None,
+        film_late_ms: 0.0,
     };
     let camera = load_camera(&folder.join("camera.toml")).or_input()?;
-    let motion = ClampMotion::read(&motion).or_input()?;
+    let motion = ClampMotion::read(&scene).or_input()?;
     let clamp = motion.clamp_path().or_input()?;
     Ok((open_video(folder, None).or_input()?, camera, clamp))
 }
