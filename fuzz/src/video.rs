@@ -1,6 +1,6 @@
 //! Films: the container and the pictures inside.
 
-use camera_ingest::source::{AviSource, FrameSource};
+use camera_ingest::source::{AviSource, FrameSource, StereoSource};
 use std::sync::OnceLock;
 use tempfile::TempDir;
 
