@@ -166,7 +166,8 @@ impl Pursuit<'_> {
         let mut torn = doubt.torn.then_some(doubt.clear_since);
         let mut later = self.states[proven_at].clone();
         let same_m = SAME_PX / self.follower.plane.px_per_m;
-        // The way back has gone its own way; they must meet before the doubt at the latest.
+        // Whether the way back parted from the way forth; then both must meet before the
+        // doubt at the latest.
         let mut parted = false;
         for index in (doubt.since..proven_at).rev() {
             later = self.back(index, &later);

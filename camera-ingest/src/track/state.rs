@@ -62,7 +62,7 @@ impl State {
 
     /// Whether every node is within a distance of the other's.
     pub(super) fn near(&self, other: &Self, limit_m: f64) -> bool {
-        let nodes = self.curve.iter().zip(&other.curve);
-        nodes.into_iter().all(|(a, b)| norm(sub(*a, *b)) < limit_m)
+        let mut nodes = self.curve.iter().zip(&other.curve);
+        nodes.all(|(a, b)| norm(sub(*a, *b)) < limit_m)
     }
 }

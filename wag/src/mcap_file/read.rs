@@ -102,9 +102,11 @@ const UNCOMPRESSED_LEN: std::ops::Range<usize> = FRONT_LEN + 16..FRONT_LEN + 24;
 /// All records of a chunk record; `None` unless all of them are there and right.
 fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
     let told = u64::from_le_bytes(*chunk.get(UNCOMPRESSED_LEN)?.first_chunk()?);
-    // Nobody writes an empty one.
     let told = usize::try_from(told).ok()?;
-    (1..=LONGEST).contains(&told).then_some(())?;
+    // Nobody writes an empty one.
+    if told == 0 || told > LONGEST {
+        return None;
+    }
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)
