@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use shared_types::{JointTrajectory, KeypointTrack, Plan, RopeEstimate, RopeParams};
+use arm_model::{JointTrajectory};
+use shared_types::{KeypointTrack, Plan, RopeEstimate, RopeParams};
 
 /// What can be read can be written and read again.
 fn json<T: Serialize + DeserializeOwned>(text: &str) -> Option<T> {
@@ -42,7 +43,7 @@ fn finite(trajectory: &JointTrajectory) {
 
 /// The files as we write them.
 pub fn seeds() -> Vec<Vec<u8>> {
-    let pose = shared_types::plan::START_POSE;
+    let pose = arm_model::joint::START_POSE;
     let trajectory = JointTrajectory::new(&[0.0, 0.5, 1.0], &[pose, pose * 0.9, pose]).unwrap();
     vec![
         serde_json::to_vec(&trajectory).unwrap(),

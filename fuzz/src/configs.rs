@@ -1,7 +1,7 @@
 //! Configuration: the controller's, and the limits.
 
 use rt_controller::ControllerConfig;
-use shared_types::{ArmResponse, Limits};
+use arm_model::{ArmResponse, Limits};
 
 /// Reads `data` as each kind; what passes its checks resolves, and what was read
 /// can be written and read again.

@@ -3,7 +3,7 @@
 use rt_controller::control::record::record_input;
 use rt_controller::control::{ControlState, CycleInput, Thresholds};
 use rt_controller::recording::{ChunkWriter, LogReader, Read, RecordedCycle, Snapshot, replay};
-use shared_types::Limits;
+use arm_model::Limits;
 
 /// Bytes of a chunk's header; its checksum is over the first of them and the items.
 const HEADER_LEN: usize = 24;

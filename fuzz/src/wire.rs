@@ -10,7 +10,7 @@ use rt_controller::xarm::{
     ArmVersion, Command, Firmware, FrameReader, JointQuery, Protocol, ReplyData, ReportReader,
     StateRequest, Status,
 };
-use shared_types::JointVector;
+use arm_model::JointVector;
 
 /// Commands whose replies carry something.
 fn asked() -> Vec<Command> {

@@ -4,11 +4,12 @@
 use crate::hidden::hidden_rope;
 use crate::render::{Appearance, Renderer, RopeShape, ScenePose};
 use crate::rig::CameraConfig;
+use arm_model::joint::START_POSE;
+use arm_model::kinematics::{FrameMotion, attach_motion};
+use arm_model::{JointState, JointVector};
 use nalgebra::Vector3;
 use rope_sim::{LiveRope, SimulateError};
-use shared_types::kinematics::{FrameMotion, attach_motion};
-use shared_types::plan::START_POSE;
-use shared_types::{JointState, JointVector, RopeParams, StereoCamera};
+use shared_types::{RopeParams, StereoCamera};
 
 const AMPLITUDE_RAD: f64 = 0.288;
 const FREQUENCY_HZ: f64 = 1.3;

@@ -7,6 +7,7 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::JointVector;
 use hil_tests::arm::fault::{FaultKind, PortSet};
 use hil_tests::arm::{ArmConfig, ArmEvent, ArmStartError, Fault, SimulatedArm, Trigger, clock};
 use rand::seq::IndexedRandom;
@@ -18,7 +19,7 @@ use rt_controller::xarm::{
     ArmState, Command, ErrorCode, FrameReader, JointQuery, Mode, Protocol, ReplyData, ReportReader,
     StateRequest, Status,
 };
-use shared_types::{JointVector, MonotonicNs};
+use shared_types::MonotonicNs;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpStream};
 use std::time::Duration;

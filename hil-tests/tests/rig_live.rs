@@ -7,6 +7,7 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
 use camera_ingest::StereoFrame;
 use hil_tests::arm::clock;
 use hil_tests::rig::{self, RigConfig};
@@ -17,7 +18,6 @@ use shared_types::StereoCamera;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, FrameHeader, IpcError};
-use shared_types::plan::START_POSE;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -7,13 +7,13 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
+use arm_model::kinematics::attach_pose;
 use camera_ingest::StereoFrame;
 use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
 use hil_tests::rig::CameraConfig;
 use nalgebra::Vector3;
 use shared_types::StereoCamera;
-use shared_types::kinematics::attach_pose;
-use shared_types::plan::START_POSE;
 
 const ROPE: RopeShape = RopeShape {
     radius_m: 0.006,

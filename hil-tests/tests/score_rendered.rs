@@ -6,6 +6,7 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
 use camera_ingest::{ScoreOptions, StereoFrame, score};
 use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
 use hil_tests::rig::CameraConfig;
@@ -13,7 +14,6 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared_types::StereoCamera;
-use shared_types::plan::START_POSE;
 use std::num::NonZeroUsize;
 
 /// Frames of a throw; the tip passes the target in the middle of them.

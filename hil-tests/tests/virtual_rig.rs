@@ -6,12 +6,13 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::arm::{ArmConfig, FaultScript};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlSettings, Motion, Thresholds};
 use shared_types::ipc::ControllerMode;
-use shared_types::plan::START_POSE;
-use shared_types::{FaultCode, JointTrajectory, JointVector, Limits, WireMode};
+use shared_types::{FaultCode, WireMode};
 
 /// A swing of three joints from `from` and back, 1.5 s.
 fn swing(from: JointVector) -> Motion {

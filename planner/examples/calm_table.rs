@@ -4,12 +4,13 @@
 //! rope is given the least damping of the ranges.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use planner::calm::{CalmConfig, CalmRequest, calm, sway_after};
 use planner::ropes::random_rope;
 use planner::tasks::start_pose_for;
 use planner::wiggle::{WiggleConfig, wiggle};
-use shared_types::plan::START_POSE;
-use shared_types::{JointTrajectory, JointVector, Limits, RopeParams};
+use shared_types::RopeParams;
 use std::time::Instant;
 
 /// Turns of joint 1 towards the target (degrees).

@@ -3,11 +3,12 @@
 //! `stop_at [SEED]`. See `docs/src/adding-a-task.md`.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
+use arm_model::Limits;
 use planner::ropes::random_rope;
 use planner::tasks::{
     Belief, PlanOptions, PlanRequest, ThrowConfig, ThrowOutcome, ThrowTask, plan_throw, verdict,
 };
-use shared_types::{Limits, RopeParams, Verdict};
+use shared_types::{RopeParams, Verdict};
 use std::ops::ControlFlow;
 
 /// Distance and speed at which a tip can be caught.

@@ -12,14 +12,15 @@
     reason = "an example may stop with a message"
 )]
 
+use arm_model::Limits;
+use arm_model::limits::LimitsSpec;
 use planner::process::PlannerConfig;
 use planner::ropes::{random_rope, random_strike_target};
 use planner::tasks::{
     Belief, PlanOptions, PlanRequest, Robustness, ThrowSimulator, plan_throw, simulator_for,
 };
 use planner::trajopt::Dimensions;
-use shared_types::limits::LimitsSpec;
-use shared_types::{Limits, Task};
+use shared_types::Task;
 use std::ops::ControlFlow;
 use std::time::Instant;
 

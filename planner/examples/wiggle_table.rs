@@ -2,10 +2,11 @@
 //! wiggles: `wiggle_table [ropes]`.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
+use arm_model::Limits;
 use planner::collide::Scene;
 use planner::ropes::random_rope;
 use planner::wiggle::{WiggleConfig, clearance, wiggle};
-use shared_types::{Limits, RopeParams};
+use shared_types::RopeParams;
 
 fn main() {
     let count = std::env::args()

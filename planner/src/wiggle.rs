@@ -5,14 +5,15 @@
 //! at 60 frames a second, the last part of them at rest.
 
 use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m};
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, FrameTimes, Outcome, PlannedArm, Precision, SimOptions, SimulateError, Start, Watch,
     roll_out,
 };
 use serde::{Deserialize, Serialize};
-use shared_types::plan::START_POSE;
-use shared_types::{JointTrajectory, JointVector, Limits, RopeParams, TrajectoryError};
+use shared_types::RopeParams;
 
 /// Joint that oscillates, 0-based: joint 6.
 const JOINT: usize = 5;

@@ -6,9 +6,10 @@ use crate::collide::Scene;
 use crate::ropes::random_rope;
 use crate::sysid::{IdentifyError, WiggleInformation, information};
 use crate::wiggle::{WiggleConfig, WiggleError, clearance, wiggle};
+use arm_model::Limits;
 use rope_sim::PlannedArm;
 use serde::{Deserialize, Serialize};
-use shared_types::{Limits, RopeParams, StereoCamera};
+use shared_types::{RopeParams, StereoCamera};
 use std::ops::ControlFlow;
 
 /// Ropes a wiggle is judged by.

@@ -10,6 +10,7 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::{JointTrajectory, Limits};
 use planner::filming::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::observation::ObservedPoints;
 use planner::ropes::random_rope;
@@ -18,9 +19,7 @@ use planner::trials::{TrialRig, outside_rope, summarise, trial_rope};
 use planner::wiggle::{WiggleConfig, wiggle};
 use rope_sim::{PlannedArm, PoseRow, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
-use shared_types::{
-    Intrinsics, JointTrajectory, KeypointTrack, Limits, RopeParams, Shutter, StereoCamera,
-};
+use shared_types::{Intrinsics, KeypointTrack, RopeParams, Shutter, StereoCamera};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -207,8 +206,7 @@ fn the_estimate_does_not_depend_on_threads() {
 fn useless_films_are_refused_with_the_reason() {
     let camera = side_camera();
     let arm = wiggling_arm();
-    let short =
-        PlannedArm::new(JointTrajectory::hold(shared_types::plan::START_POSE, 2.0).unwrap());
+    let short = PlannedArm::new(JointTrajectory::hold(arm_model::joint::START_POSE, 2.0).unwrap());
     let timing = FilmTiming {
         frames: 200,
         ..FilmTiming::default()

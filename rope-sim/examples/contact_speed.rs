@@ -10,13 +10,13 @@
     reason = "a measuring program may stop loudly"
 )]
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, Kernel, Obstacle, Placement, Precision, Scene, Shape,
     SimOptions, Start, Watch, roll_out_in_with,
 };
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 const KERNELS: [Kernel; 4] = [
     Kernel::Avx512F32,

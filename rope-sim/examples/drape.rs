@@ -1,12 +1,12 @@
 //! Lays a rope over a wall with a moving arm's end and prints what came of it.
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, Obstacle, Precision, Scene, SimOptions, Start, Watch,
     roll_out_in,
 };
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 /// Middle of the wall's top edge (m).
 const TARGET_M: [f64; 3] = [0.75, 0.0, 0.30];

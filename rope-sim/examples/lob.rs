@@ -1,13 +1,13 @@
 //! Lobs the lead onto a board with a domino on it, many times a little differently, in
 //! single and in double precision, and prints what came of it.
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, Domino, FrameTimes, Obstacle, Outcome, Precision, Rollout, Scene,
     SimOptions, SimulateError, Start, Watch, roll_out_in,
 };
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 /// Middle of the board's upper face (m).
 const TARGET_M: [f64; 3] = [0.85, 0.0, 0.20];

@@ -7,8 +7,8 @@
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::Knot;
 use crate::lanes::{LaneTask, Lanes};
-use shared_types::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X, POLE_LENGTH_M};
-use shared_types::{JOINTS, JointState};
+use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X, POLE_LENGTH_M};
+use arm_model::{JOINTS, JointState};
 
 /// Attach frames for the joint states, in double precision.
 pub(crate) struct ArmKnots<'a> {
@@ -177,7 +177,7 @@ impl<V: Lanes> Frame<V> {
     }
 }
 
-/// Attach frame at the pole's end, as `shared_types::kinematics::attach_motion`.
+/// Attach frame at the pole's end, as `arm_model::kinematics::attach_motion`.
 #[inline(always)]
 fn attach_frame<V: Lanes>(joints: &JointLanes<V>) -> Frame<V> {
     let mut frame = Frame::world();
@@ -275,8 +275,8 @@ fn doubled<V: Lanes>(sin: V, cos: V) -> (V, V) {
 mod tests {
     use super::*;
     use crate::Kernel;
-    use shared_types::JointVector;
-    use shared_types::kinematics::attach_motion;
+    use arm_model::JointVector;
+    use arm_model::kinematics::attach_motion;
 
     fn states() -> Vec<JointState> {
         let wave = |i: usize, joint: usize, scale: f64| {

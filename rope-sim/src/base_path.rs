@@ -10,9 +10,9 @@
 use crate::arm_knots::ArmKnots;
 use crate::motion::AttachMotion;
 use crate::rollout::Precision;
+use arm_model::JointState;
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
-use shared_types::JointState;
-use shared_types::kinematics::FrameMotion;
 
 /// Longest time between exact evaluations of the attach motion (s).
 const KNOT_S: f64 = 0.004;
@@ -291,7 +291,7 @@ fn quintics(a: &Knot, b: &Knot, length_s: f64) -> [[f64; 6]; CHANNELS] {
 mod tests {
     use super::*;
     use crate::PlannedArm;
-    use shared_types::{JointTrajectory, JointVector};
+    use arm_model::{JointTrajectory, JointVector};
 
     fn arm() -> PlannedArm {
         let waypoints = [

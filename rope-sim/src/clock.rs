@@ -8,9 +8,9 @@ use crate::base_path::{BasePath, CHANNELS, Interval, attitude};
 use crate::lanes::Lanes;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{BaseLanes, RopeLanes};
+use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 /// One lane's place on its path.
 struct Cursor<'a> {

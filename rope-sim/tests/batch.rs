@@ -8,6 +8,8 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::JointVector;
+use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rope_sim::{
@@ -15,9 +17,8 @@ use rope_sim::{
     PoseRow, PoseTrack, Precision, Rollout, SimOptions, SimulateError, Start, Watch, roll_out,
     roll_out_with,
 };
-use shared_types::kinematics::FrameMotion;
+use shared_types::RopeParams;
 use shared_types::rope::{RANGES, RopeError};
-use shared_types::{JointVector, RopeParams};
 
 /// Shakes along x with a constant acceleration that flips at every `period_s / 2`.
 #[derive(Debug, Clone)]

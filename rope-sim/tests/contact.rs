@@ -10,6 +10,7 @@
 
 mod scenes;
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -19,7 +20,6 @@ use rope_sim::{
 };
 use scenes::{G_M_S2, Still, WALL_HALF_M, Whip, alone, options, random_rope, simulate};
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 fn rope() -> RopeParams {
     RopeParams::from_array([22.0, 0.55, 0.02, 0.1, 0.005, 0.06, 0.12, 0.03, 0.8])

@@ -10,6 +10,7 @@
 
 mod scenes;
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -20,7 +21,6 @@ use rope_sim::{
 };
 use scenes::{Still, WALL_HALF_M, Whip, alone, options, random_rope, simulate};
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 /// A wall with a floor beside it, a pole, and a domino.
 fn crowded() -> Scene {

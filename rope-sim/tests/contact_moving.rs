@@ -10,6 +10,8 @@
 
 mod scenes;
 
+use arm_model::JOINTS;
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use rope_sim::sensitivity::{Difference, Direction, Family, sensitivities_in};
 use rope_sim::{
@@ -17,8 +19,7 @@ use rope_sim::{
     Precision, RopeExtras, Scene, Shape, Start, roll_out_in,
 };
 use scenes::{G_M_S2, alone, options, simulate};
-use shared_types::kinematics::FrameMotion;
-use shared_types::{JOINTS, RopeParams};
+use shared_types::RopeParams;
 
 const LINK: usize = 5;
 

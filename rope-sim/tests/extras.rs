@@ -10,6 +10,7 @@
 
 mod scenes;
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
     AirDrag, AttachMotion, Candidate, Domino, Outcome, Precision, RopeExtras, Scene, Start,
@@ -17,7 +18,6 @@ use rope_sim::{
 };
 use scenes::{G_M_S2, Still, options};
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 
 /// One rigid link with a lead: a pendulum.
 fn pendulum() -> RopeParams {

@@ -78,7 +78,7 @@ fn max_tip_difference_mm(a: &Rollout, b: &Rollout) -> f64 {
 #[test]
 fn the_flings_are_as_violent_as_stated() {
     let population = population();
-    let peak = |fling: &Fling, of: fn(&shared_types::kinematics::FrameMotion) -> f64| {
+    let peak = |fling: &Fling, of: fn(&arm_model::kinematics::FrameMotion) -> f64| {
         (0..=1500)
             .map(|i| of(&fling.at(f64::from(i) * 1e-3)))
             .fold(0.0, f64::max)

@@ -11,12 +11,12 @@
 #[path = "support/family.rs"]
 mod family;
 
+use arm_model::kinematics::FrameMotion;
 use family::{TARGET, largest, numbers, options, rope, throw};
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::sensitivity::{Beside, Difference, Direction, Family, sensitivities, sensitivity};
 use rope_sim::{AttachMotion, Candidate, FrameTimes, Precision, Rollout, SimOptions, roll_out};
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 use shared_types::rope::ROPE_PARAMETERS;
 
 const LENGTH: usize = 1;

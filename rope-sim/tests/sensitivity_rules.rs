@@ -11,6 +11,7 @@
 #[path = "support/family.rs"]
 mod family;
 
+use arm_model::kinematics::FrameMotion;
 use family::{largest, numbers, options, rope, throw};
 use nalgebra::Vector3;
 use rope_sim::sensitivity::{
@@ -18,7 +19,6 @@ use rope_sim::sensitivity::{
 };
 use rope_sim::{AttachMotion, Candidate, Outcome, SimOptions, SimulateError, Start, roll_out};
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 use shared_types::rope::RopeError;
 
 const LENGTH: usize = 1;

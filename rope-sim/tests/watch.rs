@@ -8,13 +8,14 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::kinematics::FrameMotion;
+use arm_model::{JointTrajectory, JointVector};
 use nalgebra::{Quaternion, Rotation2, UnitQuaternion, Vector2, Vector3};
 use rope_sim::{
     AttachMotion, BoxRegion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions,
     Start, Watch, roll_out,
 };
-use shared_types::kinematics::FrameMotion;
-use shared_types::{JointTrajectory, JointVector, RopeParams};
+use shared_types::RopeParams;
 
 const G: f64 = 9.81;
 const HORIZON_S: f64 = 0.9;

@@ -4,11 +4,12 @@
 //! `drive DOMAIN [REPEATS]`; the operator's heartbeat beats in a thread. The
 //! last motion is a fast throw that takes 97 % of the tool's speed limit.
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, IpcError, OperatorEnd};
-use shared_types::plan::{START_POSE, trajectory_hash};
-use shared_types::{JointTrajectory, JointVector};
+use shared_types::plan::trajectory_hash;
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,7 +79,7 @@ fn throw() -> Result<JointTrajectory, Box<dyn Error>> {
         let step_s = f64::from(hundredths) / 100.0;
         let times_s = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
         let throw = JointTrajectory::new(&times_s, &poses)?;
-        let limits = shared_types::Limits::default();
+        let limits = arm_model::Limits::default();
         let within = limits.worst_violation(&throw).is_none();
         if within && limits.tcp_margin(&throw).left > 0.03 {
             println!("throw: {}", limits.tcp_margin(&throw).describe());

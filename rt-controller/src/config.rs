@@ -6,8 +6,9 @@ use crate::guardian::GuardianSettings;
 use crate::os::RealTimeSettings;
 use crate::set_up::OnDifference;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
+use arm_model::Limits;
 use serde::{Deserialize, Serialize};
-use shared_types::{Limits, WireMode};
+use shared_types::WireMode;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 

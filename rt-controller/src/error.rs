@@ -11,7 +11,7 @@ pub enum ControllerError {
     Config(#[from] ConfigError),
     /// The rehearsal's motion is refused.
     #[error("the motion of the rehearsal is refused, which is a defect: {0}")]
-    Rehearsal(#[from] shared_types::TrajectoryError),
+    Rehearsal(#[from] arm_model::TrajectoryError),
     /// Shared memory does not work.
     #[error(transparent)]
     Ipc(#[from] IpcError),

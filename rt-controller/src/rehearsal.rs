@@ -16,10 +16,11 @@ use crate::control::{
     ControlSettings, ControlState, CycleInput, LinkInput, Motion, Order, Thresholds,
 };
 use crate::xarm::Status;
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use core::hint::black_box;
+use shared_types::WireMode;
 use shared_types::ipc::{ControllerMode, GuardianBeat, JointReport, OperatorBeat};
-use shared_types::plan::START_POSE;
-use shared_types::{JointTrajectory, JointVector, Limits, TrajectoryError, WireMode};
 
 /// Joint 7 to and fro by this (rad): in a pause of a second it never gets farther
 /// than one setpoint may go.

@@ -9,8 +9,8 @@ use crate::clock_map::ClockMap;
 use crate::os::schedule::set_fifo;
 use crate::report_stream::{BrokenReports, ReportSink, ReportStream};
 use crate::xarm::report::{ForceReport, MAX_REPORT_LEN, REALTIME_REPORT_LEN, RealtimeReport};
+use arm_model::JointVector;
 use rtrb::Producer;
-use shared_types::JointVector;
 use shared_types::ipc::{JointReport, PAYLOAD_VERSION};
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -136,8 +136,8 @@ fn real(frame: &[u8], arrival_ns: u64) -> Option<JointReport> {
 mod tests {
     use super::*;
     use crate::xarm::{ArmState, Mode, TcpPose};
+    use arm_model::JointState;
     use rtrb::{Consumer, RingBuffer};
-    use shared_types::JointState;
 
     fn sink() -> (JointSink, Consumer<JointReport>) {
         let (to_loop, taken) = RingBuffer::new(4);

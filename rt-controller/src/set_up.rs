@@ -13,9 +13,9 @@ use crate::xarm::{
     ArmState, ArmVersion, Command, ErrorCode, Firmware, JointQuery, Mode, ReplyData, ReportReader,
     StateRequest, TcpPose, VersionError,
 };
+use arm_model::{JointVector, Limits};
 use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
-use shared_types::{JointVector, Limits};
 use std::io::Read;
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};

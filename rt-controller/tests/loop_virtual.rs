@@ -7,15 +7,16 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::Limits;
+use arm_model::joint::START_POSE;
 use rt_controller::control::{ControlEvent, ControlState, Order, Thresholds};
 use rt_controller::os::Clock;
 use rt_controller::ports::{Mail, RelayPorts, rings};
 use rt_controller::rehearsal::Rehearsal;
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::sim::IdealArm;
+use shared_types::FaultCode;
 use shared_types::ipc::{Bus, ControllerBoards, CycleRecord};
-use shared_types::plan::START_POSE;
-use shared_types::{FaultCode, Limits};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;

@@ -12,10 +12,11 @@
 
 mod gauntlet;
 
+use arm_model::Limits;
 use gauntlet::Watch;
 use rt_controller::rehearsal::Rehearsal;
+use shared_types::WireMode;
 use shared_types::ipc::{GuardianBeat, OperatorBeat};
-use shared_types::{Limits, WireMode};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

@@ -7,6 +7,8 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointState, JointTrajectory, JointVector};
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::ThresholdSettings;
 use rt_controller::guardian::GuardianSettings;
@@ -20,8 +22,8 @@ use rt_controller::{ControllerConfig, run};
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, ControllerMode, IpcError, OperatorEnd};
-use shared_types::plan::{START_POSE, trajectory_hash};
-use shared_types::{FaultCode, JointState, JointTrajectory, JointVector, MotionTier};
+use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, MotionTier};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -463,7 +465,7 @@ fn motions_need_an_arming_and_plans_come_in_time() {
 fn another_commander_or_another_tool_is_a_refusal_that_says_what() {
     let arm = SmallArm::start(START_POSE);
     let mut config = config(&format!("test_refusals_{}", std::process::id()), &arm);
-    let mut spec = shared_types::LimitsSpec::from(shared_types::Limits::default());
+    let mut spec = arm_model::LimitsSpec::from(arm_model::Limits::default());
     spec.tcp_speed_max_m_s = 1.0;
     config.limits = Some(spec.try_into().unwrap());
     let mut running = Running::start(config.clone());

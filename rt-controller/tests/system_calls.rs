@@ -18,6 +18,8 @@
 mod counter;
 mod gauntlet;
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, Limits};
 use counter::Calls;
 use gauntlet::Watch;
 use gauntlet::arm::EchoArm;
@@ -31,8 +33,7 @@ use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, JointReport, OperatorEnd, StateReader,
 };
-use shared_types::plan::START_POSE;
-use shared_types::{Arming, JointTrajectory, Limits, MotionTier};
+use shared_types::{Arming, MotionTier};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;

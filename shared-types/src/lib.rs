@@ -2,8 +2,7 @@
 //!
 //! Data flows one way through the house: camera -> keypoints -> parameters ->
 //! plan -> setpoints -> record. This crate holds the types that cross a door
-//! between two of those rooms, the arm's kinematics and limits that three rooms
-//! share, and the shared-memory services ([`ipc`]) through which processes meet.
+//! between two of those rooms and the shared-memory services ([`ipc`]) through which processes meet.
 //!
 //! It is *not* a place for algorithms of one room only, for files, or for
 //! sockets.
@@ -30,41 +29,29 @@ extern crate alloc;
 
 #[cfg(feature = "std")]
 pub mod camera;
-pub mod exact;
 pub mod fault;
 pub mod ipc;
-pub mod joint;
 #[cfg(feature = "std")]
 pub mod keypoints;
-pub mod kinematics;
-pub mod limits;
 #[cfg(feature = "std")]
 pub mod plan;
-#[cfg(feature = "std")]
-pub mod response;
 #[cfg(feature = "std")]
 pub mod rope;
 pub mod tier;
 pub mod time;
-pub mod trajectory;
 pub mod wire;
 
 #[cfg(feature = "std")]
 pub use camera::{Intrinsics, Shutter, StereoCamera};
 pub use fault::FaultCode;
-pub use joint::{JOINTS, JointState, JointVector};
 #[cfg(feature = "std")]
 pub use keypoints::{KeypointFrame, KeypointTrack};
-pub use limits::{Limits, LimitsSpec};
 #[cfg(feature = "std")]
 pub use plan::{Condition, ErrorForecast, LimitedBy, Plan, Task, Verdict};
-#[cfg(feature = "std")]
-pub use response::{ArmResponse, JointResponse, TrackingLag};
 #[cfg(feature = "std")]
 pub use rope::{RopeEstimate, RopeParams};
 pub use tier::{Arming, MotionTier};
 pub use time::MonotonicNs;
-pub use trajectory::{JointTrajectory, TrajectoryError};
 pub use wire::WireMode;
 
 /// Version of this build, written into every result file.

@@ -1,9 +1,8 @@
 //! A planned throw, as written to `plan.json` and sent to the controller.
 
-use crate::joint::JointVector;
-use crate::limits::Margin;
 use crate::rope::RopeParams;
-use crate::trajectory::JointTrajectory;
+use arm_model::limits::Margin;
+use arm_model::trajectory::JointTrajectory;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -152,13 +151,10 @@ pub fn trajectory_hash_hex(trajectory: &JointTrajectory) -> String {
         .collect()
 }
 
-/// Start pose of wiggle and throws: pole straight down in front of the robot
-/// (rad).
-pub const START_POSE: JointVector = JointVector([0.0, 0.8, 0.0, 2.4, 0.0, 1.6, 0.0]);
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::joint::{JointVector, START_POSE};
 
     #[test]
     fn hash_sees_every_waypoint() {

@@ -10,6 +10,7 @@
 #[path = "../../camera-ingest/tests/printed_board/mod.rs"]
 mod printed_board;
 
+use arm_model::joint::START_POSE;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::frame::StereoFrame;
 use camera_ingest::{ClampPath, FrameSource, TrackOptions, load_camera, open_video, track};
@@ -17,7 +18,6 @@ use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
 use hil_tests::rig::CameraConfig;
 use nalgebra::{Rotation3, Vector3};
 use serde_json::Value;
-use shared_types::plan::START_POSE;
 use shared_types::{KeypointTrack, StereoCamera};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -7,10 +7,11 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::Limits;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use planner::trials::{TrialRig, outside_rope, trial_rope};
 use planner::wiggle::{WiggleConfig, wiggle};
-use shared_types::{Limits, RopeParams};
+use shared_types::RopeParams;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;

@@ -9,6 +9,7 @@
 
 mod support;
 
+use arm_model::JointVector;
 use hil_tests::hidden::hidden_rope;
 use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
 use rustix::process::{Pid, Signal, kill_process};
@@ -16,7 +17,7 @@ use serde_json::Value;
 use shared_types::ipc::{
     Bus, DomainSweep, JointReport, JointSubscriber, PreviewFrame, PreviewState, PreviewSubscriber,
 };
-use shared_types::{JointVector, MonotonicNs, StereoCamera};
+use shared_types::{MonotonicNs, StereoCamera};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;

@@ -9,9 +9,10 @@
 
 mod support;
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, kinematics};
 use serde_json::{Value, json};
-use shared_types::plan::{START_POSE, trajectory_hash_hex};
-use shared_types::{JointTrajectory, JointVector, kinematics};
+use shared_types::plan::trajectory_hash_hex;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -5,9 +5,10 @@
 
 use std::collections::VecDeque;
 
+use arm_model::JointVector;
+use arm_model::kinematics::attach_pose;
 use nalgebra::Vector3;
-use shared_types::kinematics::attach_pose;
-use shared_types::{JointVector, MonotonicNs};
+use shared_types::MonotonicNs;
 
 use crate::track::{ClampError, ClampPath, ClampSample};
 

@@ -1,8 +1,9 @@
 //! What the preview makes of frames and poses as they come: no clock, no shared memory.
 
+use arm_model::JointVector;
+use shared_types::StereoCamera;
 use shared_types::ipc::{PreviewFrame, PreviewState};
 use shared_types::keypoints::TrackedFrame;
-use shared_types::{JointVector, StereoCamera};
 
 use super::arm::{Arm, Knot};
 use crate::frame::EyeFrame;

@@ -1,8 +1,8 @@
 //! The stepping logic on frames drawn from formulas.
 
 use super::*;
+use arm_model::joint::START_POSE;
 use nalgebra::{Matrix3, Vector3};
-use shared_types::plan::START_POSE;
 use shared_types::{Intrinsics, Shutter};
 
 const WIDTH: usize = 672;

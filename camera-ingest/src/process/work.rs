@@ -7,13 +7,14 @@ use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
 use crate::track::{ClampPath, TrackOptions, TrackResult, track as track_frames};
+use arm_model::JointVector;
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
 };
 use shared_types::ipc::rpc::Call;
 use shared_types::keypoints::{KeypointFrame, MAX_KEYPOINTS, TrackedFrame};
-use shared_types::{JointVector, MonotonicNs, StereoCamera};
+use shared_types::{MonotonicNs, StereoCamera};
 use std::path::Path;
 use std::time::Instant;
 

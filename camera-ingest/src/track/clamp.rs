@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use arm_model::JointVector;
+use arm_model::kinematics::attach_pose;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use shared_types::JointVector;
-use shared_types::kinematics::attach_pose;
 
 /// Why a path of the clamp is refused.
 #[derive(Debug, thiserror::Error)]

@@ -3,9 +3,9 @@
 //! Links are capsules around the vendor's collision meshes (1305 arms, link
 //! frames, m). Link pairs closer than two apart always touch and are left out.
 
+use arm_model::{JOINTS, JointVector, kinematics};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use shared_types::{JOINTS, JointVector, kinematics};
 
 /// A rounded stick in a link's frame; link 0 is the base.
 struct Capsule {
@@ -176,9 +176,9 @@ fn segment_distance([p1, q1]: &Segment, [p2, q2]: &Segment) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::Limits;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-    use shared_types::Limits;
 
     /// The vendor's zero pose is free, its smallest gap 11 mm.
     #[test]

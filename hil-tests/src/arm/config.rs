@@ -6,11 +6,11 @@ use super::firmware::Firmware;
 use super::joint::JointDynamics;
 use super::pacer::Intake;
 use super::start_error::ArmStartError;
+use arm_model::{JOINTS, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{COMMAND_PORT, REPORT_PORTS};
 use serde::{Deserialize, Serialize};
-use shared_types::{JOINTS, JointVector, Limits};
 use std::net::{IpAddr, Ipv4Addr};
 
 /// How a joint follows its setpoint: silence, then a second-order lag.

@@ -1,8 +1,9 @@
 //! What happened inside the arm, for tests and logs.
 
 use super::fault::FaultKind;
+use arm_model::JointVector;
 use rt_controller::xarm::{ArmState, ErrorCode, Mode};
-use shared_types::{JointVector, MonotonicNs};
+use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -1,6 +1,7 @@
 //! True motion of the simulated joints over the last seconds.
 
-use shared_types::{JointState, JointVector, MonotonicNs};
+use arm_model::{JointState, JointVector};
+use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

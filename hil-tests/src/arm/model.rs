@@ -16,10 +16,11 @@ use super::pacer::Pacer;
 use super::reference::{Move, Reference, Task};
 use super::servo::ServoStream;
 use super::setpoint_check::SetpointLimits;
+use arm_model::{JOINTS, JointState, JointVector, Limits};
 use rt_controller::xarm::{
     ArmState, Command, CommandError, ErrorCode, Mode, Register, ReplyData, Status, TcpPose,
 };
-use shared_types::{JOINTS, JointState, JointVector, Limits, MonotonicNs};
+use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 
 mod answer;

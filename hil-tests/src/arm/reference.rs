@@ -4,8 +4,9 @@
 //! velocity commands and stops are made here.
 
 use super::velocity::VelocityRamp;
+use arm_model::{JOINTS, JointVector, Limits};
 use rt_controller::xarm::Register;
-use shared_types::{JOINTS, JointVector, Limits, MonotonicNs};
+use shared_types::MonotonicNs;
 
 /// A straight joint motion with a trapezoidal speed of its fastest joint.
 #[derive(Debug, Clone, Copy)]

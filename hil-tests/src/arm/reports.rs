@@ -2,12 +2,12 @@
 
 use super::firmware::Firmware;
 use super::model::ArmModel;
+use arm_model::{JOINTS, JointState, kinematics};
 use rt_controller::xarm::TcpPose;
 use rt_controller::xarm::report::{
     BasicReport, ForceReport, MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport, RealtimeReport,
     RichReport,
 };
-use shared_types::{JOINTS, JointState, kinematics};
 
 /// One of the four report ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

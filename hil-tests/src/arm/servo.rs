@@ -11,8 +11,9 @@
 
 use super::pacer::{Intake, Pacer};
 use super::setpoint_check::{SetpointLimits, Step};
+use arm_model::JointVector;
 use rt_controller::xarm::ErrorCode;
-use shared_types::{JointVector, MonotonicNs};
+use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 
 /// Time that a step counts for at least (s): 250 Hz.
@@ -132,8 +133,8 @@ impl ServoStream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::{Limits, kinematics};
     use nalgebra::Vector3;
-    use shared_types::{Limits, kinematics};
 
     const MS: u64 = 1_000_000;
     /// Flange 0.66 m from joint 1's axis.

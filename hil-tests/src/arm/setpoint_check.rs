@@ -1,9 +1,9 @@
 //! What the controller checks a setpoint against.
 
 use super::collision::self_clearance_m;
+use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use nalgebra::Vector3;
 use rt_controller::xarm::ErrorCode;
-use shared_types::{JOINTS, JointVector, Limits, kinematics};
 
 /// Part of a limit that rounding to the wire's f32 may exceed it by.
 const ROUNDING: f64 = 1e-3;

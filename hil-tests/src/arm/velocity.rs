@@ -1,7 +1,8 @@
 //! Joint velocity commands: towards a velocity with the firmware's own jerk and
 //! acceleration.
 
-use shared_types::{JOINTS, JointVector, Limits, MonotonicNs};
+use arm_model::{JOINTS, JointVector, Limits};
+use shared_types::MonotonicNs;
 
 /// Jerk of velocity commands, fixed in the firmware (rad/s³). The vendor's
 /// largest joint jerk; clients cannot change it.

@@ -5,9 +5,10 @@ use super::colour::ycc;
 use super::eye::Eye;
 use super::stroke::{Material, Stroke, Strokes};
 use crate::rig::body::{ArmBody, FLOOR_Z_M};
+use arm_model::JointVector;
+use arm_model::kinematics::attach_pose;
 use nalgebra::Vector3;
-use shared_types::kinematics::attach_pose;
-use shared_types::{JointVector, RopeParams};
+use shared_types::RopeParams;
 
 /// Radius of the target ball (m).
 const TARGET_RADIUS_M: f64 = 0.02;

@@ -1,8 +1,8 @@
 //! The rig's solid bodies: arm and pole as capsules, the column under the arm.
 
+use arm_model::JointVector;
+use arm_model::kinematics::{POLE_LENGTH_M, link_poses};
 use nalgebra::{Matrix3, Vector3};
-use shared_types::JointVector;
-use shared_types::kinematics::{POLE_LENGTH_M, link_poses};
 
 /// Radius of the pole on the flange (m).
 pub const POLE_RADIUS_M: f64 = 0.008;
@@ -135,8 +135,8 @@ fn column_distance_m(p: &Vector3<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::kinematics::attach_pose;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
+    use arm_model::kinematics::attach_pose;
 
     fn straight(from: Vector3<f64>, to: Vector3<f64>) -> Vec<Vector3<f64>> {
         (0..=20)

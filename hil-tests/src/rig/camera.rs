@@ -102,8 +102,8 @@ impl CameraConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::kinematics::attach_pose;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
+    use arm_model::kinematics::attach_pose;
 
     /// Inside both pictures with `radius_m` to spare.
     fn seen(camera: &StereoCamera, p: Vector3<f64>, radius_m: f64) -> bool {

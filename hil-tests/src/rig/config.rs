@@ -4,9 +4,10 @@ use super::camera::CameraConfig;
 use crate::arm::{ArmConfig, FaultScript, Firmware, Intake, JointLag, Obstacle};
 use crate::hidden::hidden_rope;
 use crate::render::Appearance;
+use arm_model::joint::START_POSE;
+use arm_model::{JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::plan::START_POSE;
-use shared_types::{JOINTS, JointVector, Limits, RopeParams, StereoCamera};
+use shared_types::{RopeParams, StereoCamera};
 use std::net::IpAddr;
 
 /// Set-up of the simulated rig. Every key has a default; `seed` alone gives a

@@ -4,9 +4,10 @@ use super::RigError;
 use super::body::ArmBody;
 use super::record::{Moment, Record};
 use crate::arm::{JointSample, MotionHistory, clock};
+use arm_model::kinematics::{FrameMotion, attach_motion};
+use arm_model::{JointState, JointVector};
 use rope_sim::LiveRope;
-use shared_types::kinematics::{FrameMotion, attach_motion};
-use shared_types::{JointState, JointVector, MonotonicNs, RopeParams};
+use shared_types::{MonotonicNs, RopeParams};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Step of the rope's integration (s).
@@ -150,7 +151,7 @@ impl JointPiece {
 mod tests {
     use super::*;
     use crate::hidden::hidden_rope;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
 
     #[test]
     fn a_piece_meets_its_ends_and_reproduces_a_quintic() {

@@ -2,8 +2,9 @@
 //! camera, tips for the truth.
 
 use crate::render::ScenePose;
+use arm_model::JointVector;
 use nalgebra::Vector3;
-use shared_types::{JointVector, MonotonicNs};
+use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;

@@ -25,6 +25,7 @@ use crate::arm::{
     ArmConfig, ArmEndpoint, ArmEvent, ConnectRefused, Fault, JointSample, ReportKind, Service,
     TimedEvent,
 };
+use arm_model::{JointVector, Limits};
 use feeds::Feed;
 use network::Network;
 use rt_controller::control::record::record_input;
@@ -40,7 +41,7 @@ use shared_types::ipc::{
     CauseRecord, ControllerMode, CycleRecord, GuardianBeat, InputRecord, OperatorBeat,
     PAYLOAD_VERSION, Reports, RunCounts,
 };
-use shared_types::{JointVector, Limits, MonotonicNs, WireMode};
+use shared_types::{MonotonicNs, WireMode};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;

@@ -1,9 +1,9 @@
 //! What goes wrong with the arm itself.
 
 use super::bench::{Bench, CYCLE_S, entry};
+use arm_model::JointVector;
 use hil_tests::arm::{ArmConfig, ConnectRefused, Obstacle, Service};
 use rt_controller::xarm::{Command, Mode, Status, TcpPose};
-use shared_types::JointVector;
 
 #[test]
 fn errors_stops_and_drives_latch_as_on_the_real_arm() {

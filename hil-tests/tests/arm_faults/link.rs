@@ -1,9 +1,9 @@
 //! What goes wrong between client and arm.
 
 use super::bench::{Bench, CYCLE_S, entry};
+use arm_model::JointVector;
 use hil_tests::arm::{Closing, ConnectRefused, ReportKind, Service};
 use rt_controller::xarm::{Command, Mode, Status};
-use shared_types::JointVector;
 
 #[test]
 fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {

@@ -2,8 +2,9 @@
 
 use super::judge::silenced;
 use super::stage::{Stage, WIRES, config, mid_throw};
+use arm_model::Limits;
 use shared_types::ipc::{CauseRecord, ControllerMode};
-use shared_types::{FaultCode, Limits, MonotonicNs, WireMode};
+use shared_types::{FaultCode, MonotonicNs, WireMode};
 
 /// A throw that the arm ends by an error of its own: nothing is sent any more.
 fn ended_by_the_arm(wire: WireMode, kind: &str, code: u8) -> (Stage, CauseRecord) {

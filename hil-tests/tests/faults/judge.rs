@@ -2,10 +2,11 @@
 
 use super::limits;
 use super::stage::Stage;
+use arm_model::{JointTrajectory, JointVector};
 use rt_controller::control::reaction::Path;
 use rt_controller::control::{ControlEvent, Motion, Order};
 use shared_types::ipc::{CauseRecord, ControllerMode};
-use shared_types::{FaultCode, JointTrajectory, JointVector, MonotonicNs};
+use shared_types::{FaultCode, MonotonicNs};
 
 /// Speed under which the arm stands (rad/s).
 const STANDING_RAD_S: f64 = 1e-3;

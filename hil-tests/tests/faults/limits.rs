@@ -4,8 +4,9 @@
 //! setpoints were for, and over those at which they reached the arm.
 
 use super::stage::Stage;
+use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use rt_controller::control::ControlEvent;
-use shared_types::{JOINTS, JointVector, Limits, MonotonicNs, WireMode, kinematics};
+use shared_types::{MonotonicNs, WireMode};
 
 /// Smallest time between two setpoints (s): 0.8 of a cycle.
 const GAP_MIN_S: f64 = 0.0032;

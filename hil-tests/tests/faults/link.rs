@@ -2,9 +2,10 @@
 
 use super::judge::{silenced, stopped};
 use super::stage::{Stage, WIRES, entry, mid_throw};
+use arm_model::{JointVector, Limits, kinematics};
 use hil_tests::arm::ArmEvent;
 use rt_controller::xarm::{ArmState, Command, Register, StateRequest};
-use shared_types::{FaultCode, JointVector, Limits, MonotonicNs, WireMode, kinematics};
+use shared_types::{FaultCode, MonotonicNs, WireMode};
 
 /// From an unanswered setpoint to the cause (s): two cycles, and one until a
 /// setpoint meets the fault.

@@ -2,13 +2,14 @@
 
 use super::limits;
 use super::stage::{Stage, WIRES};
+use arm_model::limits::LimitsSpec;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::reaction::Path;
 use rt_controller::control::{ControlEvent, Motion, Order};
 use shared_types::ipc::ControllerMode;
-use shared_types::limits::LimitsSpec;
-use shared_types::{FaultCode, JointTrajectory, JointVector, Limits, MonotonicNs, WireMode};
+use shared_types::{FaultCode, MonotonicNs, WireMode};
 
 /// Limits that a throw of each wire uses fully. An arm that follows velocities
 /// makes its own jerk and cannot follow steps of the full acceleration closely.

@@ -3,6 +3,8 @@
 
 use super::judge::{nod, slowed};
 use super::stage::{Stage, WIRES, config};
+use arm_model::joint::START_POSE;
+use arm_model::{JointVector, Limits};
 use hil_tests::arm::JointSample;
 use rt_controller::control::{ControlState, Motion, Order, Thresholds};
 use rt_controller::os::Clock;
@@ -12,8 +14,7 @@ use rt_controller::transport::sim::IdealArm;
 use rt_controller::xarm::{ArmState, Command, StateRequest};
 use shared_types::ipc::{Bus, ControllerBoards, JointReport, OperatorEnd, StateReader};
 use shared_types::ipc::{ControllerMode, PAYLOAD_VERSION};
-use shared_types::plan::START_POSE;
-use shared_types::{Arming, FaultCode, JointVector, Limits, MotionTier, WireMode};
+use shared_types::{Arming, FaultCode, MotionTier, WireMode};
 use std::cell::Cell;
 use std::rc::Rc;
 

@@ -1,13 +1,12 @@
 //! A rig on which a fast throw is about to run, by either wire.
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::arm::{ArmConfig, ArmEvent, FaultScript};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlEvent, ControlSettings, Motion, Order, Thresholds};
 use shared_types::ipc::{ControllerMode, CycleRecord};
-use shared_types::plan::START_POSE;
-use shared_types::{
-    Arming, JointTrajectory, JointVector, Limits, MonotonicNs, MotionTier, WireMode,
-};
+use shared_types::{Arming, MonotonicNs, MotionTier, WireMode};
 
 /// Both ways setpoints travel.
 pub(crate) const WIRES: [WireMode; 2] = [WireMode::ServoPosition, WireMode::JointVelocity];

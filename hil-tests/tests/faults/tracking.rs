@@ -45,7 +45,7 @@ fn fault_20_a_joint_that_sticks_in_a_slow_motion_is_named_too() {
         let from = stage.rig.commanded();
         let mut to = from;
         (to[0], to[6]) = (to[0] + 0.1, to[6] + 0.1);
-        let slow = shared_types::JointTrajectory::new(&[0.0, 2.0], &[from, to]).unwrap();
+        let slow = arm_model::JointTrajectory::new(&[0.0, 2.0], &[from, to]).unwrap();
         stage
             .rig
             .start(rt_controller::control::Motion::Spline(slow));

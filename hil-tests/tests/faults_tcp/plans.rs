@@ -1,12 +1,14 @@
 //! Plans that must not run: from elsewhere, damaged, out of limits, too late.
 
 use super::stand::{Stand, execute, swing};
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::Bus;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
-use shared_types::plan::{START_POSE, trajectory_hash};
-use shared_types::{FaultCode, JointTrajectory, JointVector, MotionTier};
+use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, MotionTier};
 use std::time::Duration;
 
 /// The controller's service, for requests that no proper program would make.

@@ -144,7 +144,7 @@ fn fault_29_without_a_guardian_nothing_begins_and_what_moves_is_slowed_to_rest()
 
 /// The setpoints of the last motion of a flight: time on its path (bits), joints.
 fn throw_of(flight: &Flight) -> BTreeMap<u64, [u64; 7]> {
-    let bits = |q: &shared_types::JointVector| core::array::from_fn(|j| q[j].to_bits());
+    let bits = |q: &arm_model::JointVector| core::array::from_fn(|j| q[j].to_bits());
     flight
         .cycles
         .iter()

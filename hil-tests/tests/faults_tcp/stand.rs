@@ -2,6 +2,8 @@
 
 use super::child::{Process, Role};
 use super::flight::Flight;
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector};
 use hil_tests::arm::{ArmConfig, FaultScript, SimulatedArm, clock};
 use rt_controller::ControllerConfig;
 use rt_controller::config::{Profile, ThresholdSettings};
@@ -11,8 +13,8 @@ use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
-use shared_types::plan::{START_POSE, trajectory_hash};
-use shared_types::{FaultCode, JointTrajectory, JointVector, MonotonicNs, MotionTier, WireMode};
+use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 

@@ -8,14 +8,14 @@
     reason = "a test and an example use this, each a part of it, and may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::arm::{ArmConfig, FaultScript};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlState, Motion, Thresholds};
 use rt_controller::point_to_point::plan_move;
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use shared_types::ipc::ControllerMode;
-use shared_types::plan::START_POSE;
-use shared_types::{JointTrajectory, JointVector, Limits};
 use std::collections::BTreeMap;
 
 /// Pause from fault to fault (s).

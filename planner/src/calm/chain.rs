@@ -2,9 +2,9 @@
 //! joints, a hold, then the move.
 
 use super::{CalmError, CalmRequest};
+use arm_model::kinematics::{FrameMotion, attach_motion, link_motions};
+use arm_model::{JOINTS, JointState, JointTrajectory, JointVector};
 use rope_sim::{AttachMotion, MeasuredArm};
-use shared_types::kinematics::{FrameMotion, attach_motion, link_motions};
-use shared_types::{JOINTS, JointState, JointTrajectory, JointVector};
 
 /// Largest distance of a joint from the commanded start pose (rad): above what
 /// gravity and encoders leave, below what matters to the rope.

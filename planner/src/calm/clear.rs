@@ -2,8 +2,9 @@
 
 use super::sway::{Sway, SwaySimulator};
 use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m, tool_contacts};
+use arm_model::JointTrajectory;
 use nalgebra::Vector3;
-use shared_types::{JointTrajectory, RopeParams};
+use shared_types::RopeParams;
 
 /// Nearest approaches during a move and the sway after it.
 #[derive(Debug, Clone, Copy)]

@@ -16,14 +16,15 @@ mod sway;
 #[cfg(test)]
 mod tests;
 
+use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use chain::Prelude;
 use descent::Calmest;
 use rope_sim::sensitivity::SensitivityError;
 use rope_sim::{MotionError, SimulateError};
 use serde::{Deserialize, Serialize};
 use shape::MoveShape;
+use shared_types::RopeParams;
 use shared_types::rope::RopeError;
-use shared_types::{JointTrajectory, JointVector, Limits, RopeParams, TrajectoryError};
 use sway::{Sway, SwaySimulator};
 
 /// Parts of the offsets found that are tried, largest first: where limits or

@@ -1,6 +1,6 @@
 //! Shape of the move: a smooth step from start to end with offsets on its knots.
 
-use shared_types::{JointTrajectory, JointVector, TrajectoryError};
+use arm_model::{JointTrajectory, JointVector, TrajectoryError};
 
 /// Joints that are offset, 0-based. With the pole down, joint 1 moves the rope's
 /// upper end across the arm's plane and joint 6 within it; together they reach

@@ -2,13 +2,14 @@
 
 use super::CalmError;
 use super::chain::Prelude;
+use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use rope_sim::sensitivity::{Beside, Difference, Direction, sensitivity};
 use rope_sim::{
     Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, Watch,
     roll_out,
 };
-use shared_types::{JointTrajectory, RopeParams};
+use shared_types::RopeParams;
 
 /// Time after the move in which sway is looked for (s): one period of the
 /// slowest pendulum of the parameter ranges, 0.6 Hz.

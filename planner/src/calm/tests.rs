@@ -1,13 +1,13 @@
 use super::*;
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
+use arm_model::joint::START_POSE;
+use arm_model::kinematics::attach_pose;
+use arm_model::limits::LimitsSpec;
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out,
 };
-use shared_types::kinematics::attach_pose;
-use shared_types::limits::LimitsSpec;
-use shared_types::plan::START_POSE;
 
 /// Damping, stiffness and turn of joint 1 (degrees); the rest is drawn.
 const ROPES: [(f64, f64, f64); 6] = [

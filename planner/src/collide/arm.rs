@@ -2,9 +2,9 @@
 
 use super::ContactCounts;
 use super::capsule::{Capsule, box_distance_m};
+use arm_model::JointVector;
+use arm_model::kinematics::{self, POLE_LENGTH_M};
 use nalgebra::Vector3;
-use shared_types::JointVector;
-use shared_types::kinematics::{self, POLE_LENGTH_M};
 
 /// Radius of the pole (m).
 const POLE_RADIUS_M: f64 = 0.008;
@@ -183,7 +183,7 @@ pub fn tool_contacts(arm: &ArmShape, scene: &Scene) -> ContactCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
 
     fn contacts(q: [f64; 7]) -> ContactCounts {
         tool_contacts(&ArmShape::at(&JointVector(q)), &Scene::default())

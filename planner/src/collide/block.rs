@@ -61,9 +61,9 @@ pub fn block_contacts(arm: &ArmShape, blocks: &[Block]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::joint::START_POSE;
+    use arm_model::kinematics;
     use nalgebra::{UnitQuaternion, Vector3};
-    use shared_types::kinematics;
-    use shared_types::plan::START_POSE;
 
     #[test]
     fn the_gap_is_the_smallest_over_the_axis() {

@@ -125,8 +125,8 @@ pub fn rope_clearance_m(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::kinematics;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
+    use arm_model::kinematics;
 
     fn straight(from: Vector3<f64>, direction: Vector3<f64>) -> Vec<Vector3<f64>> {
         (0..=20)

@@ -2,9 +2,10 @@ use super::noise::TrackingNoise;
 use super::*;
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
+use arm_model::{JointTrajectory, Limits};
 use nalgebra::Vector3;
 use rope_sim::PlannedArm;
-use shared_types::{JointTrajectory, Limits, Shutter};
+use shared_types::Shutter;
 
 fn arm() -> PlannedArm {
     PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
@@ -163,7 +164,7 @@ fn tracking_errors_have_the_size_and_correlation_asked_for() {
 #[test]
 fn errors_lie_along_and_across_the_rope() {
     let (rope, camera) = (random_rope(6), side_camera());
-    let hold = JointTrajectory::hold(shared_types::plan::START_POSE, 3.0).unwrap();
+    let hold = JointTrajectory::hold(arm_model::joint::START_POSE, 3.0).unwrap();
     let arm = PlannedArm::new(hold);
     let look = |noise: &FilmNoise| film(&rope, &arm, &camera, 9, &short(), noise).unwrap();
     let plain = look(&FilmNoise::default());

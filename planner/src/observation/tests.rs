@@ -2,9 +2,10 @@ use super::*;
 use crate::filming::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
+use arm_model::{JointTrajectory, Limits};
 use nalgebra::{Matrix3, Vector3};
 use rope_sim::PlannedArm;
-use shared_types::{Intrinsics, JointTrajectory, Limits, RopeParams, Shutter};
+use shared_types::{Intrinsics, RopeParams, Shutter};
 
 fn arm() -> PlannedArm {
     PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
@@ -206,7 +207,7 @@ fn useless_recordings_are_refused_with_the_reason() {
     let mut bad = track;
     bad.frames[3].points.pop();
     assert!(matches!(look(&bad, &camera), ObserveError::Keypoints(_)));
-    let hold = JointTrajectory::hold(shared_types::plan::START_POSE, 3.0).unwrap();
+    let hold = JointTrajectory::hold(arm_model::joint::START_POSE, 3.0).unwrap();
     assert!(matches!(
         ViewPlane::of_motion(&PlannedArm::new(hold), 3.0),
         Err(ObserveError::NoWiggle { .. })

@@ -8,11 +8,11 @@ use crate::observation::{
 };
 use crate::sysid::Observation;
 use crate::wiggle::wiggle;
+use arm_model::Limits;
 use onnx_session::ort;
 use ort::session::Session;
 use ort::value::TensorRef;
 use rope_sim::PlannedArm;
-use shared_types::Limits;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
 

@@ -13,9 +13,10 @@ mod velocity;
 
 pub use rules::{Fence, FenceError, JudgedArm, Rule, RuleMargin};
 
+use arm_model::{JointTrajectory, Limits};
 use rules::Step;
 use setpoints::setpoints;
-use shared_types::{JointTrajectory, Limits, WireMode};
+use shared_types::WireMode;
 
 /// Everything the arm judges, in the order in which it does.
 #[must_use]

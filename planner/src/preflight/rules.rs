@@ -1,10 +1,11 @@
 //! The rules of the arm, one by one.
 
 use crate::collide::ArmShape;
+use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use control_core::control::Thresholds;
 use nalgebra::Vector3;
 use serde::Serialize;
-use shared_types::{JOINTS, JointVector, Limits, WireMode, kinematics};
+use shared_types::WireMode;
 
 /// How far outside its range a streamed position is still taken (rad): 0.1 deg, as the
 /// vendor's SDK tests it.

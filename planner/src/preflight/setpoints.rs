@@ -1,6 +1,6 @@
 //! The setpoints of a plan as they stand on the wire.
 
-use shared_types::{JointTrajectory, JointVector};
+use arm_model::{JointTrajectory, JointVector};
 
 /// One setpoint per cycle (s, rad): the first is the start, the last the end.
 pub(super) fn setpoints(

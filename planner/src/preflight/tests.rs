@@ -1,6 +1,7 @@
 use super::*;
-use shared_types::plan::START_POSE;
-use shared_types::{JointVector, WireMode};
+use arm_model::JointVector;
+use arm_model::joint::START_POSE;
+use shared_types::WireMode;
 
 fn swing(joint: usize, by_rad: f64, in_s: f64) -> JointTrajectory {
     let mut end = START_POSE;
@@ -44,7 +45,7 @@ fn margins_are_told_where_they_are_least() {
         &JudgedArm::default(),
     );
     let tool = margins.iter().find(|m| m.rule == Rule::ToolSpeed).unwrap();
-    let radius_m = shared_types::kinematics::flange_pose(&START_POSE)
+    let radius_m = arm_model::kinematics::flange_pose(&START_POSE)
         .0
         .xy()
         .norm();

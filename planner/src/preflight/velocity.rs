@@ -5,10 +5,10 @@
 //! where the plan turns hard, and the controller's position loop brings it back. The plan
 //! is run here against that, cycle by cycle, with the controller's own position loop.
 
+use arm_model::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use control_core::control::brake::brake_with_jerk;
 use control_core::control::velocity_wire::VelocityWire;
 use control_core::control::{ArmCommand, Thresholds};
-use shared_types::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use std::collections::VecDeque;
 
 /// Jerk with which the arm changes its velocity (rad/s³): the vendor's largest, which
@@ -135,7 +135,7 @@ fn outside_rad(q: &JointVector, poses: &VecDeque<JointVector>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
 
     fn swing(by_rad: f64, in_s: f64) -> JointTrajectory {
         let mut end = START_POSE;

@@ -13,6 +13,7 @@ use crate::observation::ObservedPoints;
 use crate::phi::{HybridError, PhiNet, PredictError, identify_with_network};
 use crate::sysid::{self, Appearance, FitProgress, IdentifyOptions, Observation};
 use crate::tasks::{Belief, PlanError, PlanOptions, PlanRequest, plan_throw};
+use arm_model::JointVector;
 use collect::Collector;
 pub use config::PlannerConfig;
 use rope_sim::MeasuredArm;
@@ -21,7 +22,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{Bus, IpcError};
-use shared_types::{JointVector, MonotonicNs, RopeEstimate, Task};
+use shared_types::{MonotonicNs, RopeEstimate, Task};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -110,7 +110,7 @@ fn most_agreed(brackets: &[[f64; 2]]) -> Option<([f64; 2], usize)> {
 mod tests {
     use super::*;
     use crate::response::{Sample, Setpoint};
-    use shared_types::JointVector;
+    use arm_model::JointVector;
 
     /// Setpoints every 4 ms with a ripple of 1 ms, reports every 4.1 ms, taken
     /// 2.3 ms after sending; every 20th late by 9 ms.

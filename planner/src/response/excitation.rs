@@ -5,13 +5,13 @@
 //! acceleration, jerk and tool speed that may be used allows, so that every
 //! frequency is as loud as it can safely be. One joint moves at a time.
 
+use arm_model::kinematics::{POLE_LENGTH_M, tool_speed_m_s};
+use arm_model::response::Excitation;
+use arm_model::trajectory::MAX_WAYPOINTS;
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shared_types::kinematics::{POLE_LENGTH_M, tool_speed_m_s};
-use shared_types::response::Excitation;
-use shared_types::trajectory::MAX_WAYPOINTS;
-use shared_types::{JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};
 
 /// Part of a sweep over which it fades in, and out again.
 const FADE_PART: f64 = 0.1;

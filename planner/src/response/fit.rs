@@ -11,8 +11,8 @@
 use super::lag::Lag;
 use super::noise::Noise;
 use super::window::Window;
+use arm_model::response::{Estimate, TrackingLag};
 use nalgebra::{Matrix4, Vector4};
-use shared_types::response::{Estimate, TrackingLag};
 
 /// Parameters: dead time (s), logarithms of natural frequency (rad/s) and
 /// damping ratio, offset (rad).

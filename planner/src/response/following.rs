@@ -6,8 +6,8 @@
 
 use super::lag::Lag;
 use super::window::Window;
-use shared_types::trajectory::MAX_WAYPOINTS;
-use shared_types::{ArmResponse, JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};
+use arm_model::trajectory::MAX_WAYPOINTS;
+use arm_model::{ArmResponse, JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};
 
 /// Joints that move by less stand still (rad).
 const STILL_RAD: f64 = 1e-9;
@@ -130,8 +130,8 @@ fn knots_s(end_s: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::plan::START_POSE;
-    use shared_types::response::{Estimate, JointResponse, NotExcited, TrackingLag};
+    use arm_model::joint::START_POSE;
+    use arm_model::response::{Estimate, JointResponse, NotExcited, TrackingLag};
 
     fn response(joints: &[(usize, f64, f64)]) -> ArmResponse {
         let known = |value: f64| Estimate {

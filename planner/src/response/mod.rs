@@ -22,9 +22,9 @@ mod window;
 
 pub use following::{FollowError, Following};
 
+use arm_model::response::{Estimate, JointResponse, NotExcited, TrackingLag};
+use arm_model::{JOINTS, JointVector};
 use fit::Fit;
-use shared_types::response::{Estimate, JointResponse, NotExcited, TrackingLag};
-use shared_types::{JOINTS, JointVector};
 use window::Window;
 
 /// Smallest travel a joint must be told to make (rad).

@@ -4,10 +4,10 @@
 use super::excitation::sweep;
 use super::lag::Lag;
 use super::*;
+use arm_model::Limits;
+use arm_model::response::Excitation;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shared_types::Limits;
-use shared_types::response::Excitation;
 
 /// Pause between two sweeps (s).
 const PAUSE_S: f64 = 0.6;

@@ -2,8 +2,9 @@
 
 use crate::collide::ContactCounts;
 use crate::trajopt::{Clearance, Dimensions, WAYPOINTS};
+use arm_model::JOINTS;
 use serde::{Deserialize, Serialize};
-use shared_types::{JOINTS, RopeParams};
+use shared_types::RopeParams;
 
 /// Weights of the fitness terms that all tasks share. The paper gives the terms, not
 /// the weights.

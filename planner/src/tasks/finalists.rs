@@ -3,8 +3,8 @@
 use super::setup::{Count, Point, Setup};
 use super::{PlanError, ThrowOutcome};
 use crate::trajopt::{Found, Polish, polish};
+use arm_model::JointTrajectory;
 use rope_sim::FrameTimes;
-use shared_types::JointTrajectory;
 
 /// A throw that is compared at the end.
 #[derive(Debug, Clone)]

@@ -32,9 +32,9 @@ pub use throw::{ThrowOutcome, ThrowSimulator};
 
 use crate::cmaes::CmaError;
 use crate::response::FollowError;
+use arm_model::TrajectoryError;
 use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
-use shared_types::TrajectoryError;
 use shared_types::rope::RopeError;
 
 /// How far a search has come, told after every generation.

@@ -5,11 +5,10 @@ use super::robust::{forecast, least_risk, search_around};
 use super::setup::{Count, Setup};
 use super::{Belief, PlanError, PlanOptions, PlanProgress, ThrowOutcome, ThrowTask, check_reach};
 use crate::response::Following;
-use shared_types::limits::LimitKind;
+use arm_model::limits::LimitKind;
+use arm_model::{JointTrajectory, Limits};
 use shared_types::plan::trajectory_hash_hex;
-use shared_types::{
-    ErrorForecast, JointTrajectory, LimitedBy, Limits, Plan, RopeParams, Task, VERSION, Verdict,
-};
+use shared_types::{ErrorForecast, LimitedBy, Plan, RopeParams, Task, VERSION, Verdict};
 use std::ops::ControlFlow;
 
 /// A throw to plan.

@@ -1,8 +1,8 @@
 //! Start pose of a throw and the bounds of what a tip can reach.
 
 use super::PlanError;
-use shared_types::JointVector;
-use shared_types::plan::START_POSE;
+use arm_model::JointVector;
+use arm_model::joint::START_POSE;
 
 /// Height of the shoulder, the common point of joints 1 to 3 (m).
 const SHOULDER_Z_M: f64 = 0.267;
@@ -76,7 +76,7 @@ fn nearest(rho: f64, [x, y, z]: [f64; 3], rho_max: f64, radius_max: f64) -> [f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::kinematics;
+    use arm_model::kinematics;
 
     #[test]
     fn the_start_pose_turns_the_plane_to_the_target() {

@@ -8,6 +8,7 @@
 use super::{PlanError, ThrowConfig, start_pose_for};
 use crate::collide::{ArmShape, RopeShape, Scene as Surroundings, rope_contacts};
 use crate::trajopt::{Dimensions, Screen, WAYPOINTS, WaypointSpace};
+use arm_model::{JointTrajectory, JointVector, Limits};
 use nalgebra::Vector3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -16,7 +17,7 @@ use rand_distr::StandardNormal;
 use rope_sim::{
     Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start, Watch, roll_out,
 };
-use shared_types::{JointTrajectory, JointVector, Limits, RopeParams};
+use shared_types::RopeParams;
 use std::collections::BTreeMap;
 
 /// Edge of a cell (m).

@@ -4,7 +4,8 @@ use super::finalists::Finalist;
 use super::setup::{Point, Setup};
 use super::{Belief, PlanError, PlanProgress, ThrowOutcome};
 use crate::trajopt::{SearchOptions, Valued, search};
-use shared_types::{ErrorForecast, JointTrajectory, RopeParams};
+use arm_model::JointTrajectory;
+use shared_types::{ErrorForecast, RopeParams};
 use std::ops::ControlFlow;
 
 /// Part of the ropes whose errors a robust plan looks at once more: the worst fifth.

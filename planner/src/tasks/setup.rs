@@ -7,7 +7,8 @@ use super::{
 use crate::trajopt::{
     Found, Screen, SearchOptions, Valued, WAYPOINTS, WaypointSpace, reach_pose, search,
 };
-use shared_types::{JointTrajectory, JointVector, RopeParams};
+use arm_model::{JointTrajectory, JointVector};
+use shared_types::RopeParams;
 use std::ops::ControlFlow;
 
 /// A point of the search's space with its trajectory.

@@ -1,8 +1,9 @@
 use super::*;
 use crate::collide::ContactCounts;
 use crate::ropes::random_rope;
+use arm_model::Limits;
 use setup::Setup;
-use shared_types::{Limits, Plan, Task};
+use shared_types::{Plan, Task};
 use std::ops::ControlFlow;
 
 fn strike(target_m: [f64; 3]) -> Strike {

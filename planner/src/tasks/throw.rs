@@ -7,12 +7,13 @@ use crate::collide::{
 };
 use crate::response::Following;
 use crate::workers::map_in_order;
+use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, ContactSummary, DominoOutcome, FrameTimes, Outcome, PlannedArm, Precision, Rollout,
     Scene, SimOptions, Start, Watch, Watched, roll_out_in,
 };
-use shared_types::{JointTrajectory, RopeParams};
+use shared_types::RopeParams;
 
 /// What one simulated throw did.
 #[derive(Debug, Clone, PartialEq, Default)]

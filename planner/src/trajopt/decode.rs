@@ -1,7 +1,7 @@
 //! From search coordinates to joint trajectories.
 
+use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use serde::{Deserialize, Serialize};
-use shared_types::{JointTrajectory, JointVector, Limits, TrajectoryError};
 
 /// Free waypoints of a throw (paper: three).
 pub const WAYPOINTS: usize = 3;
@@ -144,7 +144,7 @@ impl WaypointSpace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
 
     #[test]
     fn coordinates_land_on_their_joints_and_waypoints() {

@@ -1,7 +1,7 @@
 //! Poses of the pole in the plane of joints 2, 4 and 6, and the joints that reach them.
 
+use arm_model::{JointVector, kinematics};
 use nalgebra::{Matrix3, Vector3};
-use shared_types::{JointVector, kinematics};
 
 /// Where the pole's end is and where the pole points, in the vertical plane through the
 /// base axis that joint 1 has turned to.
@@ -86,7 +86,7 @@ pub fn reach_pose(start: &JointVector, wanted: PolePose) -> JointVector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
 
     #[test]
     fn poses_in_reach_are_reached_in_any_plane() {

@@ -10,12 +10,13 @@ use super::decode::WaypointSpace;
 use super::screen::Screen;
 use crate::response::Following;
 use crate::tasks::PlanError;
+use arm_model::JointTrajectory;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rope_sim::sensitivity::{Beside, Difference, Direction, Family, sensitivities};
 use rope_sim::{AttachMotion, Candidate, ClosestApproach, PlannedArm, SimOptions};
-use shared_types::{JointTrajectory, RopeParams};
+use shared_types::RopeParams;
 
 /// Step of a coordinate for slopes (rad): it moves the tip by a hundred times the
 /// rounding of single precision.

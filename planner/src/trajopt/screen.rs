@@ -5,9 +5,9 @@
 //! small matrix times its knots; a rejected draw costs well under a microsecond.
 
 use super::decode::{WAYPOINTS, WaypointSpace};
+use arm_model::kinematics::{self, POLE_LENGTH_M};
+use arm_model::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use nalgebra::{Matrix4, Vector3, Vector4};
-use shared_types::kinematics::{self, POLE_LENGTH_M};
-use shared_types::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 
 /// Distances the tool keeps from the scene (m).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -64,7 +64,7 @@ impl Screen {
         space: WaypointSpace,
         limits: Limits,
         clearance: Clearance,
-    ) -> Result<Self, shared_types::TrajectoryError> {
+    ) -> Result<Self, arm_model::TrajectoryError> {
         let resting = space.resting();
         space.decode(&resting)?;
         let curvature =
@@ -220,9 +220,9 @@ fn curvature_matrix(times: &[f64; 4]) -> Matrix4<f64> {
 mod tests {
     use super::*;
     use crate::trajopt::Dimensions;
+    use arm_model::joint::START_POSE;
+    use arm_model::limits::{LimitKind, LimitsSpec};
     use rand::{RngExt, SeedableRng};
-    use shared_types::limits::{LimitKind, LimitsSpec};
-    use shared_types::plan::START_POSE;
 
     fn screen(tcp_speed: f64, stretch_max: f64) -> Screen {
         let mut spec = LimitsSpec::from(Limits::default());

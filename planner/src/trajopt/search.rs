@@ -4,7 +4,7 @@ use super::decode::WaypointSpace;
 use super::screen::Screen;
 use crate::cmaes::{CmaEs, CmaOptions, StopReason, StopRules};
 use crate::tasks::{PlanError, PlanProgress};
-use shared_types::JointTrajectory;
+use arm_model::JointTrajectory;
 use std::ops::ControlFlow;
 
 /// Size and spread of a search.

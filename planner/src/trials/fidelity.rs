@@ -8,13 +8,14 @@
 use super::{KEYPOINTS, TrialError, TrialRig, trial_rope};
 use crate::filming::{FilmTiming, Filmed, RopeFilm, project};
 use crate::sysid::IdentifyOptions;
+use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use rope_sim::{
     AirDrag, AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, RopeExtras, SimOptions,
     SimulateError, Start, Watch, roll_out,
 };
 use serde::{Deserialize, Serialize};
-use shared_types::{JointTrajectory, RopeParams};
+use shared_types::RopeParams;
 
 /// Frames a second and duration of the compared motion (s).
 const RATE_HZ: f64 = 60.0;

@@ -7,8 +7,9 @@ use crate::tasks::{
     Belief, PlanError, PlanOptions, PlanRequest, ThrowSimulator, plan_throw, simulator_for,
 };
 use crate::workers::map_in_order;
+use arm_model::Limits;
 use serde::{Deserialize, Serialize};
-use shared_types::{Limits, RopeParams, Task, Verdict};
+use shared_types::{RopeParams, Task, Verdict};
 use std::ops::ControlFlow;
 
 /// Ropes of the comparison. TOML form: keys as the fields.

@@ -40,10 +40,11 @@ use crate::sysid::{FitProgress, IdentifyError, IdentifyOptions, Observation, ide
 use crate::tasks::PlanError;
 use crate::wiggle::{WiggleConfig, WiggleError, wiggle};
 use crate::workers::map_in_order;
+use arm_model::Limits;
 use rope_sim::{PlannedArm, SimulateError};
 use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
-use shared_types::{Limits, RopeEstimate, RopeParams, StereoCamera};
+use shared_types::{RopeEstimate, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
 #[cfg(feature = "network")]
 use std::sync::{Arc, Mutex, PoisonError};

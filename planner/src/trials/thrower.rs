@@ -4,8 +4,9 @@ use crate::tasks::{
     Belief, PlanError, PlanOptions, PlanRequest, Planned, ThrowSimulator, ThrowTask, plan_throw,
     simulator_for,
 };
+use arm_model::{JointTrajectory, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::{JointTrajectory, Limits, RopeParams};
+use shared_types::RopeParams;
 use std::ops::ControlFlow;
 
 /// What one strike did.

@@ -9,11 +9,11 @@
 
 use super::{TrialError, TrialRig};
 use crate::wiggle::{WiggleConfig, WiggleError, unlimited};
+use arm_model::{JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rope_sim::PlannedArm;
 use shared_types::rope::ROPE_PARAMETERS;
-use shared_types::{JointTrajectory, JointVector, Limits};
 
 /// Amplitude (degrees), frequency (Hz) and the paper's errors, order of its table:
 /// "Wiggle Study: Mean Absolute Error across wiggle variants", columns 1 to 6.

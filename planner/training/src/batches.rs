@@ -9,13 +9,14 @@ use crate::pool::Pool;
 use crate::principal::PRINCIPAL;
 use crate::ratios::{RATIOS, log_ratios};
 use crate::standard::Standard;
+use arm_model::Limits;
 use planner::filming::{FilmNoise, FilmTiming, project, side_camera};
 use planner::observation::{FeatureDefinition, ViewPlane, WIDTHS, WiggleFeatures, observe};
 use planner::wiggle::wiggle;
 use rand::RngExt;
 use rope_sim::PlannedArm;
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
-use shared_types::{Limits, RopeParams, StereoCamera};
+use shared_types::{RopeParams, StereoCamera};
 use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Films that mean film, scales and principal components are measured on.

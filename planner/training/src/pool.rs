@@ -10,13 +10,14 @@ use crate::TrainingError;
 use crate::config::DataConfig;
 use crate::files::{read, write_whole};
 use crate::hypercube::{Hypercube, Share};
+use arm_model::Limits;
 use planner::filming::{KeypointLayout, RecordOptions, RopeFilm, record};
 use planner::observation::ObservedPoints;
 use planner::phi::hex;
 use planner::wiggle::wiggle;
 use rope_sim::PlannedArm;
 use sha2::{Digest, Sha256};
-use shared_types::{Limits, RopeParams};
+use shared_types::RopeParams;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 

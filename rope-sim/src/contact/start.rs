@@ -6,9 +6,10 @@ use crate::algebra::Vec3;
 use crate::clock::BaseState;
 use crate::domino::DominoLanes;
 use crate::scene::{Scene, SceneBody, SceneError};
+use arm_model::JOINTS;
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use shared_types::kinematics::FrameMotion;
-use shared_types::{JOINTS, RopeParams};
+use shared_types::RopeParams;
 
 /// Depth at the start that is still a touch (m). Contacts push it out at once.
 const TOUCH_M: f64 = 1e-3;

@@ -12,9 +12,10 @@ use crate::scene::{ContactSummary, DominoOutcome, Scene, SceneError};
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{Link, RopeLanes};
 use crate::surroundings::Around;
+use arm_model::JOINTS;
+use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
-use shared_types::kinematics::FrameMotion;
-use shared_types::{JOINTS, RopeParams};
+use shared_types::RopeParams;
 
 /// What moves, at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]

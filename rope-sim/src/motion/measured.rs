@@ -1,8 +1,8 @@
 //! The arm as its joint encoders reported it.
 
 use super::{AttachMotion, MotionError, check_times};
-use shared_types::kinematics::{FrameMotion, attach_motion, link_motions};
-use shared_types::{JOINTS, JointState, JointVector};
+use arm_model::kinematics::{FrameMotion, attach_motion, link_motions};
+use arm_model::{JOINTS, JointState, JointVector};
 
 /// Knot spacing of the fitted spline (s): short enough for the arm's bandwidth,
 /// long enough that encoder noise does not become acceleration.

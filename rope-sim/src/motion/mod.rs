@@ -13,9 +13,9 @@ pub use measured::MeasuredArm;
 pub use planned::PlannedArm;
 pub use pose_track::{PoseRow, PoseTrack};
 
+use arm_model::kinematics::FrameMotion;
+use arm_model::{JOINTS, JointState};
 use nalgebra::Vector3;
-use shared_types::kinematics::FrameMotion;
-use shared_types::{JOINTS, JointState};
 
 /// Motion of the attach frame A in the world: pose and its exact first two
 /// derivatives. The rope at rest leaves A along its -z axis.

@@ -1,8 +1,8 @@
 //! The arm following a planned joint trajectory exactly.
 
 use super::AttachMotion;
-use shared_types::kinematics::{FrameMotion, attach_motion, link_motions};
-use shared_types::{JOINTS, JointState, JointTrajectory};
+use arm_model::kinematics::{FrameMotion, attach_motion, link_motions};
+use arm_model::{JOINTS, JointState, JointTrajectory};
 
 /// Attach frame at the pole's end of an arm that follows a trajectory exactly. It
 /// holds still before the start and after the end.
@@ -51,7 +51,7 @@ impl AttachMotion for PlannedArm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::JointVector;
+    use arm_model::JointVector;
 
     #[test]
     fn derivatives_are_those_of_the_pose() {

@@ -1,8 +1,8 @@
 //! Attach frame from sampled poses, joined by a C2 spline.
 
 use super::{AttachMotion, MotionError, check_times};
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use shared_types::kinematics::FrameMotion;
 
 /// One row of a pose table: time, origin, attitude of the attach frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

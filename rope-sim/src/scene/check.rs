@@ -1,8 +1,8 @@
 //! Scenes that cannot be simulated, and why.
 
 use super::{Domino, Obstacle, Placement, Scene, Shape};
+use arm_model::JOINTS;
 use nalgebra::Vector3;
-use shared_types::JOINTS;
 
 impl Scene {
     /// # Errors

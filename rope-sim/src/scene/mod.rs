@@ -43,7 +43,7 @@ pub enum Placement {
     /// Fixed in a link of the arm; needs a motion that knows its arm, see
     /// [`crate::AttachMotion::arm_links`].
     ArmLink {
-        /// Link 1 to 7; its frame is as in `shared_types::kinematics::link_motions`.
+        /// Link 1 to 7; its frame is as in `arm_model::kinematics::link_motions`.
         link: usize,
         /// Pose in the link's frame.
         pose: Isometry3<f64>,

@@ -6,7 +6,8 @@ use crate::base_path::BasePath;
 use crate::frames::FrameTimes;
 use crate::group::{GroupTask, Member, MemberResult};
 use crate::lanes::Kernel;
-use shared_types::{JointTrajectory, JointVector, RopeParams};
+use arm_model::{JointTrajectory, JointVector};
+use shared_types::RopeParams;
 
 fn ropes(count: usize) -> Vec<RopeParams> {
     let base = RopeParams::from_array([20.0, 0.55, 0.01, 0.2, 0.006, 0.06, 0.06, 0.03, 1.0]);

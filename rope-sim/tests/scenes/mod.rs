@@ -5,6 +5,7 @@
     reason = "every test file compiles its own copy"
 )]
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +14,6 @@ use rope_sim::{
     Watch, roll_out_in,
 };
 use shared_types::RopeParams;
-use shared_types::kinematics::FrameMotion;
 use shared_types::rope::RANGES;
 
 pub const G_M_S2: f64 = 9.81;

@@ -1,8 +1,9 @@
 //! A throw whose slopes are looked at.
 
+use arm_model::{JointTrajectory, JointVector};
 use rope_sim::sensitivity::Sensitivity;
 use rope_sim::{FrameTimes, PlannedArm, Precision, SimOptions, Start, Watch};
-use shared_types::{JointTrajectory, JointVector, RopeParams};
+use shared_types::RopeParams;
 
 /// Where the lead is watched (m).
 pub(crate) const TARGET: [f64; 3] = [0.45, 0.1, 0.05];

@@ -1,10 +1,10 @@
 //! Random three-dimensional flings of an attach frame on a lever.
 
+use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::AttachMotion;
-use shared_types::kinematics::FrameMotion;
 
 /// Distance of the attach point from the fixed point it turns about (m).
 const LEVER_M: f64 = 0.45;

@@ -12,8 +12,9 @@ use crate::control::limiter::{Allowance, Limiter};
 use crate::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
 use alloc::format;
 use alloc::string::{String, ToString};
+use arm_model::{JOINTS, JointVector, Limits};
 use rsruckig::prelude::*;
-use shared_types::{FaultCode, JOINTS, JointVector, Limits};
+use shared_types::FaultCode;
 
 /// Speed is reduced by this factor until the tool speed holds.
 const SLOWER: f64 = 0.85;
@@ -165,8 +166,8 @@ fn generate(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::joint::START_POSE;
     use proptest::prelude::*;
-    use shared_types::plan::START_POSE;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]

@@ -77,7 +77,7 @@ impl Fields {
         });
     }
 
-    fn joints(&mut self, name: &str, values: &shared_types::JointVector) {
+    fn joints(&mut self, name: &str, values: &arm_model::JointVector) {
         for (j, value) in values.iter().enumerate() {
             self.real(&format!("{name}[{}]", j + 1), *value);
         }

@@ -24,6 +24,7 @@ use crate::set_up::OnDifference;
 use crate::transport::tcp::{LinkSettings, TcpLink};
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
+use arm_model::Limits;
 pub use latency::Latencies;
 use recording::RecordingFeed;
 use shared_types::ipc::message::{ControllerEvent, ControllerRpc};
@@ -31,7 +32,7 @@ use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
     Bus, ControllerMode, CyclePublisher, CycleRecord, JointPublisher, JointReport,
 };
-use shared_types::{FaultCode, Limits, MonotonicNs, MotionTier, WireMode};
+use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};

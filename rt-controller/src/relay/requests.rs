@@ -10,10 +10,11 @@ use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
 use crate::transport::tcp::TcpLink;
 use crate::transport::wire::backend;
+use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{Arming, FaultCode, JointTrajectory, JointVector, MotionTier};
+use shared_types::{Arming, FaultCode, MotionTier};
 use std::collections::VecDeque;
 use std::time::Instant;
 

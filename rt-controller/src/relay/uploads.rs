@@ -6,9 +6,10 @@
 //! when it is there or that it did not come in time.
 
 use super::answers::{ControllerCall, answer, refuse};
+use arm_model::JointTrajectory;
+use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerEvent;
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, JointTrajectory};
 use std::time::{Duration, Instant};
 
 /// Longest time from an announcement to the plan.
@@ -107,7 +108,7 @@ impl Uploads {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::plan::START_POSE;
+    use arm_model::joint::START_POSE;
 
     fn plan(by_rad: f64) -> (JointTrajectory, Hash) {
         let mut end = START_POSE;

@@ -4,7 +4,7 @@
 use super::{ArmTransport, LinkGone, Sent};
 use crate::control::LinkInput;
 use crate::xarm::{Command, Status};
-use shared_types::JointVector;
+use arm_model::JointVector;
 
 /// An arm that is always where it was told to be.
 #[derive(Debug, Default)]

@@ -290,7 +290,7 @@ mod tests {
     use super::*;
     use crate::os::now_ns;
     use crate::xarm::{Reply, ReplyData, StateRequest};
-    use shared_types::JointVector;
+    use arm_model::JointVector;
     use std::io::Read;
     use std::net::TcpListener;
 

@@ -78,7 +78,7 @@ pub const fn backend(wire: WireMode) -> &'static dyn WireBackend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::JointVector;
+    use arm_model::JointVector;
 
     #[test]
     fn each_wire_carries_its_own_commands_only() {

@@ -18,13 +18,14 @@ use crate::rehearsal::{Rehearsal, patient, report, swinging};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::{LinkSettings, TcpLink};
 use answerer::Answerer;
+use arm_model::joint::START_POSE;
+use arm_model::{JointVector, Limits, TrajectoryError};
 pub use bare::bare_slice;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,
 };
-use shared_types::plan::START_POSE;
-use shared_types::{FaultCode, JointVector, Limits, MonotonicNs, TrajectoryError};
+use shared_types::{FaultCode, MonotonicNs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;

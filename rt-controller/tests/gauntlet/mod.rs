@@ -6,6 +6,8 @@ pub(crate) mod arm;
 pub(crate) mod ways;
 
 use arm::{EchoArm, Manners};
+use arm_model::joint::START_POSE;
+use arm_model::{JointVector, Limits, LimitsSpec};
 use rt_controller::control::{
     ControlEvent, ControlSettings, ControlState, Motion, Order, Thresholds,
 };
@@ -17,8 +19,7 @@ use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, GuardianBeat, GuardianEnd, JointReport,
     OperatorEnd,
 };
-use shared_types::plan::START_POSE;
-use shared_types::{Arming, FaultCode, JointVector, Limits, LimitsSpec, MotionTier, WireMode};
+use shared_types::{Arming, FaultCode, MotionTier, WireMode};
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::rc::Rc;

@@ -2,15 +2,13 @@
 
 use super::arm::{EchoArm, Manners};
 use super::{Bench, Watch};
+use arm_model::joint::START_POSE;
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, LimitsSpec};
 use rt_controller::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
 use rt_controller::control::{Motion, Order};
 use rt_controller::point_to_point::plan_move;
 use shared_types::ipc::ControllerMode;
-use shared_types::plan::START_POSE;
-use shared_types::{
-    Arming, FaultCode, JOINTS, JointTrajectory, JointVector, Limits, LimitsSpec, MotionTier,
-    WireMode,
-};
+use shared_types::{Arming, FaultCode, MotionTier, WireMode};
 use std::collections::BTreeSet;
 
 /// A way to a fault.

@@ -8,6 +8,8 @@
     reason = "tests and an example use this, each a part of it, and may fail loudly"
 )]
 
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::record_input;
@@ -18,8 +20,6 @@ use rt_controller::point_to_point::plan_move;
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use rt_controller::xarm::Status;
 use shared_types::ipc::{ControllerMode, JointReport, PAYLOAD_VERSION};
-use shared_types::plan::START_POSE;
-use shared_types::{JointTrajectory, JointVector, Limits};
 use std::ops::Range;
 
 /// One cycle.

@@ -5,7 +5,7 @@
 //! [`InputRecord`] serialises with postcard; files add their own CRC.
 
 use super::payload::{GuardianBeat, JointReport, OperatorBeat};
-use crate::joint::JointVector;
+use arm_model::joint::JointVector;
 #[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -4,12 +4,12 @@ use super::payload::ControllerMode;
 use super::rpc::Rpc;
 use crate::camera::StereoCamera;
 use crate::fault::FaultCode;
-use crate::joint::JointVector;
-use crate::limits::Limits;
 use crate::plan::Plan;
 use crate::rope::{RopeEstimate, RopeParams};
 use crate::tier::MotionTier;
-use crate::trajectory::JointTrajectory;
+use arm_model::joint::JointVector;
+use arm_model::limits::Limits;
+use arm_model::trajectory::JointTrajectory;
 use serde::{Deserialize, Serialize};
 
 /// Apparent sizes and colours of rope and lead in a picture.

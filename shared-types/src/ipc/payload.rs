@@ -1,7 +1,7 @@
 //! Fixed-layout payloads. Every one starts with [`PAYLOAD_VERSION`]; service
 //! names carry the version too, so that old readers never see new layouts.
 
-use crate::joint::JointVector;
+use arm_model::joint::JointVector;
 #[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};

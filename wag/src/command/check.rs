@@ -4,14 +4,15 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::table;
 use anyhow::{Context, anyhow, ensure};
+use arm_model::JointTrajectory;
+use arm_model::limits::{LimitKind, Margin};
 use clap::{Args, ValueEnum};
 use comfy_table::Table;
 use planner::collide::{ArmShape, Scene, tool_contacts};
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
 use serde_json::{Value, json};
-use shared_types::limits::{LimitKind, Margin};
 use shared_types::plan::trajectory_hash_hex;
-use shared_types::{JointTrajectory, Plan, WireMode};
+use shared_types::{Plan, WireMode};
 use std::path::{Path, PathBuf};
 
 /// How setpoints reach the arm, by name.

@@ -13,6 +13,7 @@ use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::report;
 use crate::session::{Session, watch_interrupts};
 use anyhow::{Context, anyhow};
+use arm_model::{JointTrajectory, Limits};
 use hil_tests::render::Appearance;
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
@@ -26,7 +27,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
-use shared_types::{JointTrajectory, Limits, MotionTier, Plan, RopeEstimate, StereoCamera};
+use shared_types::{MotionTier, Plan, RopeEstimate, StereoCamera};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

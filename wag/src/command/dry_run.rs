@@ -4,11 +4,11 @@ use crate::cli::ArmArgs;
 use crate::config;
 use crate::failure::{Failure, OrInput, Outcome};
 use anyhow::anyhow;
+use arm_model::limits::Margin;
+use arm_model::{JointTrajectory, Limits};
 use planner::preflight::{JudgedArm, arm_margins, first_stop};
 use rt_controller::ControllerConfig;
 use serde_json::{Value, json};
-use shared_types::limits::Margin;
-use shared_types::{JointTrajectory, Limits};
 
 /// Tells step by step what `wag` would do with a trajectory that keeps the limits.
 ///

@@ -8,6 +8,7 @@ use crate::files;
 use crate::progress::Stage;
 use crate::session::interrupted;
 use anyhow::{Context, anyhow, bail};
+use arm_model::{JointTrajectory, JointVector, Limits, kinematics};
 use clap::Args;
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
@@ -17,7 +18,7 @@ use planner::tasks::{
 };
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
-use shared_types::{JointTrajectory, JointVector, Limits, Plan, Task, kinematics};
+use shared_types::{Plan, Task};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;

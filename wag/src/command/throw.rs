@@ -11,8 +11,9 @@ use crate::progress::Stage;
 use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::{Session, watch_interrupts};
 use anyhow::anyhow;
+use arm_model::{JointTrajectory, Limits};
 use serde_json::{Value, json};
-use shared_types::{JointTrajectory, Limits, MotionTier};
+use shared_types::MotionTier;
 use std::path::Path;
 
 /// Part of the arm's speed limits used for the move to the start pose.

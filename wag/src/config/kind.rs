@@ -1,11 +1,11 @@
 //! The kinds of configuration, and what is built in of each.
 
+use arm_model::Limits;
 use hil_tests::rig::{RigConfig, check};
 use planner::process::PlannerConfig;
 use rt_controller::config::ControllerConfig;
 use serde::de::DeserializeOwned;
 use serde::de::Error as _;
-use shared_types::Limits;
 
 /// What a file configures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

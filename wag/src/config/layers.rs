@@ -207,8 +207,8 @@ fn at<'a>(table: &'a Table, keys: &[String]) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::Limits;
     use planner::process::PlannerConfig;
-    use shared_types::Limits;
 
     /// A site's and a rig's folder with these planner files.
     fn folders(site: &str, rig: &str) -> (tempfile::TempDir, Folders) {

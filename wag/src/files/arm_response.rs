@@ -2,8 +2,8 @@
 
 use super::{read_text, write_atomic};
 use anyhow::Context;
-use shared_types::ArmResponse;
-use shared_types::response::Excitation;
+use arm_model::ArmResponse;
+use arm_model::response::Excitation;
 use std::path::Path;
 
 /// Writes a measured response.
@@ -32,8 +32,8 @@ pub fn read_excitation(path: &Path) -> anyhow::Result<Excitation> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::JOINTS;
-    use shared_types::response::{JointResponse, NotExcited};
+    use arm_model::JOINTS;
+    use arm_model::response::{JointResponse, NotExcited};
 
     #[test]
     fn a_response_can_be_read_as_it_was_written() {

@@ -1,7 +1,7 @@
 //! Limits of the arm: the built-in ones, or what holds here.
 
 use crate::config;
-use shared_types::Limits;
+use arm_model::Limits;
 use std::path::Path;
 
 /// The limits shipped in `configs/robot/xarm7.toml`, whatever this machine's folders say.

@@ -1,8 +1,8 @@
 //! Joint and pose motion as CSV files.
 
 use anyhow::{Context, bail, ensure};
+use arm_model::{JOINTS, JointVector};
 use rope_sim::PoseRow;
-use shared_types::{JOINTS, JointVector};
 use std::path::Path;
 
 /// Joint samples: times (s) and positions (rad).

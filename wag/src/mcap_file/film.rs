@@ -6,14 +6,15 @@ use super::read::{Walked, walk};
 use super::urdf::joint_name;
 use crate::files::JointsCsv;
 use anyhow::{Context, anyhow, bail, ensure};
+use arm_model::{JOINTS, JointVector};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use camera_ingest::calib::check_camera;
 use camera_ingest::{EyeFrame, FrameSource, SourceError};
 use mcap::records::Record;
 use serde::Deserialize;
+use shared_types::StereoCamera;
 use shared_types::ipc::ControllerMode;
-use shared_types::{JOINTS, JointVector, StereoCamera};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

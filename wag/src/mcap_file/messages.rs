@@ -4,12 +4,13 @@ use super::calibration::CAMERA_FRAME;
 use super::clock::time;
 use super::scene::colour;
 use super::urdf::joint_name;
+use arm_model::{JOINTS, JointVector};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
+use shared_types::FaultCode;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord, JointReport};
 use shared_types::keypoints::KeypointFrame;
-use shared_types::{FaultCode, JOINTS, JointVector};
 
 /// Levels of `foxglove.Log`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

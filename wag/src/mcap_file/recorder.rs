@@ -13,6 +13,7 @@ use super::scene::{arm_frames, room};
 use super::urdf::urdf;
 use super::writer::McapFile;
 use anyhow::Context;
+use arm_model::Limits;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -20,7 +21,7 @@ use shared_types::ipc::{
     Bus, ChunkSubscriber, ControllerMode, CycleRecord, CycleSubscriber, FrameHeader,
     FrameSubscriber, IpcError, JointReport, JointSubscriber, KeypointSubscriber,
 };
-use shared_types::{FaultCode, Limits, StereoCamera};
+use shared_types::{FaultCode, StereoCamera};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

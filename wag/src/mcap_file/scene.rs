@@ -6,10 +6,10 @@
 use super::clock::time;
 use super::messages::round;
 use super::urdf::{BASE, POLE_END, link_name};
+use arm_model::kinematics::{JOINT_ORIGIN_M, POLE_LENGTH_M, attach_pose, link_poses};
+use arm_model::{JOINTS, JointVector};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
-use shared_types::kinematics::{JOINT_ORIGIN_M, POLE_LENGTH_M, attach_pose, link_poses};
-use shared_types::{JOINTS, JointVector};
 
 const ARM_DIAMETER_M: f64 = 0.08;
 const POLE_DIAMETER_M: f64 = 0.016;

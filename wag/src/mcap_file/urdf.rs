@@ -1,7 +1,7 @@
 //! The arm as URDF, from the kinematics this program computes with.
 
-use shared_types::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X, POLE_LENGTH_M};
-use shared_types::{JOINTS, Limits};
+use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X, POLE_LENGTH_M};
+use arm_model::{JOINTS, Limits};
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;
 
@@ -55,8 +55,8 @@ pub fn urdf(limits: &Limits) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::{JointVector, kinematics};
     use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-    use shared_types::{JointVector, kinematics};
 
     fn numbers(text: &str, key: &str) -> Vec<f64> {
         let after = text.split(&format!("{key}=\"")).nth(1).unwrap();

@@ -2,12 +2,13 @@
 
 use crate::session::Session;
 use anyhow::{anyhow, bail, ensure};
+use arm_model::{JointTrajectory, JointVector};
+use shared_types::MotionTier;
 use shared_types::ipc::message::{
     ControllerEvent, ControllerRequest, ControllerRpc, LatencyReport,
 };
 use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::plan::trajectory_hash;
-use shared_types::{JointTrajectory, JointVector, MotionTier};
 use std::time::Duration;
 
 /// A connection to the controller.

@@ -6,10 +6,11 @@ use super::observe::Film;
 use crate::progress::Stage;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
+use arm_model::{JointTrajectory, JointVector, Limits};
 use rustix::time::{ClockId, clock_gettime};
 use shared_types::ipc::message::{CalmOrder, PlannerEvent, PlannerRequest, PlannerRpc};
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::{JointTrajectory, JointVector, Limits, MonotonicNs, RopeParams};
+use shared_types::{MonotonicNs, RopeParams};
 use std::time::Duration;
 
 /// Time allowed for planning before the move begins (s); longer after a plan

@@ -4,7 +4,7 @@ use super::arm::{ArmLink, MotionSpan, execute};
 use crate::progress::Stage;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
-use shared_types::JointTrajectory;
+use arm_model::JointTrajectory;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc};
 use shared_types::ipc::rpc::RpcClient;
 use std::time::Duration;

@@ -6,6 +6,7 @@ use crate::files;
 use crate::mcap_file::RecorderConfig;
 use crate::session::{ProcessSpec, Session};
 use anyhow::{Context, anyhow, bail};
+use arm_model::Limits;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::preview::PreviewConfig;
 use camera_ingest::process::CameraConfig;
@@ -13,12 +14,12 @@ use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use rt_controller::ControllerConfig;
 use rt_controller::set_up::OnDifference;
+use shared_types::StereoCamera;
 use shared_types::ipc::message::{
     CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigEvent, RigRequest,
     RigRpc,
 };
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::{Limits, StereoCamera};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::Path;
 use std::time::Duration;

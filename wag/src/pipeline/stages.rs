@@ -98,7 +98,7 @@ pub fn track(
 fn film_joints(
     session: &mut Session,
     film: &Film,
-) -> anyhow::Result<Vec<(u64, shared_types::JointVector)>> {
+) -> anyhow::Result<Vec<(u64, arm_model::JointVector)>> {
     session.recorder.drain()?;
     let end_ns = film.first_stamp_ns + u64::from(film.frames + film.dropped) * 16_800_000;
     let joints = session.recorder.joints_between(

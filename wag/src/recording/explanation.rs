@@ -361,9 +361,9 @@ fn latest(flight: &Flight, stamp_ns: u64) -> Option<Late> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::{JointVector, Limits};
     use rt_controller::control::{ControlSettings, Thresholds};
     use shared_types::ipc::LimitBroken;
-    use shared_types::{JointVector, Limits};
 
     const PERIOD_NS: u64 = 4_000_000;
 

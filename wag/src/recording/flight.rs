@@ -1,10 +1,11 @@
 //! A recording as a row of moments: what a person wants to know of each cycle.
 
+use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use rt_controller::control::{ControlSettings, ControlState};
 use rt_controller::recording::{Item, LogError, LogReader, Read, RecordedCycle};
 use serde::Serialize;
 use shared_types::ipc::{CauseRecord, ControllerMode, OrderKind};
-use shared_types::{JOINTS, JointVector, Limits, MonotonicNs, MotionTier, kinematics};
+use shared_types::{MonotonicNs, MotionTier};
 
 /// Setpoints farther apart than this say nothing about speed (s).
 const APART_MAX_S: f64 = 0.1;

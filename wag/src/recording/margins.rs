@@ -1,8 +1,8 @@
 //! How close a run came to its limits.
 
 use super::flight::{Flight, Moment, WorstJoint};
+use arm_model::JOINTS;
 use serde::Serialize;
-use shared_types::JOINTS;
 
 /// How close the run came to one limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,10 +1,10 @@
 //! What a report holds, as the page's script reads it.
 
 use crate::recording::Explanation;
+use arm_model::JOINTS;
+use arm_model::limits::Margin;
 use serde::Serialize;
 use serde_json::Value;
-use shared_types::JOINTS;
-use shared_types::limits::Margin;
 
 /// Everything in a report.
 #[derive(Debug, Serialize)]

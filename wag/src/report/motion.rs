@@ -1,8 +1,8 @@
 //! Control cycles of a run, and the motions in them.
 
 use anyhow::{Context, ensure};
+use arm_model::JointVector;
 use serde::Deserialize;
-use shared_types::JointVector;
 use std::path::Path;
 
 /// Mode of the cycles of a motion that was asked for; moves to a start pose are

@@ -4,12 +4,13 @@ use super::data::{Joints, Scene};
 use super::motion::CycleRow;
 use crate::files::JointsCsv;
 use anyhow::Context;
+use arm_model::{JOINTS, JointVector, kinematics};
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome, PlannedArm, Precision, SimOptions,
     Start, Watch, roll_out,
 };
-use shared_types::{JOINTS, JointVector, Plan, RopeParams, kinematics};
+use shared_types::{Plan, RopeParams};
 
 /// Frames per second.
 const RATE_HZ: f64 = 60.0;

@@ -3,11 +3,12 @@
 
 use crate::files;
 use anyhow::Context;
+use arm_model::JointVector;
 use shared_types::ipc::{
     Bus, CycleRecord, CycleSubscriber, IpcError, JointReport, JointSubscriber, KeypointSubscriber,
 };
 use shared_types::keypoints::{KeypointFrame, KeypointTrack, TrackedFrame};
-use shared_types::{FaultCode, JointVector, MonotonicNs};
+use shared_types::{FaultCode, MonotonicNs};
 use std::fmt::Write;
 use std::path::Path;
 

@@ -1,8 +1,9 @@
 //! A known rope simulated under the joints as they are measured, a little behind them.
 
+use arm_model::kinematics::{FrameMotion, attach_motion};
+use arm_model::{JointState, JointVector};
 use rope_sim::LiveRope;
-use shared_types::kinematics::{FrameMotion, attach_motion};
-use shared_types::{JointState, JointVector, RopeParams};
+use shared_types::RopeParams;
 
 /// Step of the simulation (s).
 const STEP_S: f64 = 1e-3;
@@ -143,10 +144,10 @@ impl Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::joint::START_POSE;
     use rope_sim::{
         Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out,
     };
-    use shared_types::plan::START_POSE;
     use shared_types::rope::RANGES;
 
     fn rope() -> RopeParams {

@@ -2,11 +2,11 @@
 //! the run it recorded.
 
 use super::{Errors, report, secret_lags};
+use arm_model::{ArmResponse, JOINTS};
 use hil_tests::arm::{ArmConfig, JointLag, SimulatedArm};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use shared_types::{ArmResponse, JOINTS};
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -10,11 +10,11 @@
 mod command;
 mod virtual_time;
 
+use arm_model::JOINTS;
+use arm_model::response::TrackingLag;
 use hil_tests::arm::JointLag;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use shared_types::JOINTS;
-use shared_types::response::TrackingLag;
 
 /// A secret for each joint, anywhere in what is plausible for such arms.
 fn secret_lags(rng: &mut ChaCha8Rng) -> [JointLag; JOINTS] {
@@ -38,7 +38,7 @@ struct Errors {
 
 impl Errors {
     fn of(found: &TrackingLag, secret: &JointLag) -> Self {
-        let exactly = |value| shared_types::response::Estimate {
+        let exactly = |value| arm_model::response::Estimate {
             value,
             interval: [value; 2],
         };

@@ -3,6 +3,8 @@
 //! its own, encoder steps and f32.
 
 use super::{Errors, report, secret_lags};
+use arm_model::response::{Excitation, JointResponse, NotExcited};
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits};
 use hil_tests::arm::{ArmConfig, ArmModel};
 use planner::response::delay::command_to_target;
 use planner::response::excitation::sweep;
@@ -11,8 +13,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::clock_map::ClockMap;
 use rt_controller::xarm::{Command, Mode, StateRequest};
-use shared_types::response::{Excitation, JointResponse, NotExcited};
-use shared_types::{JOINTS, JointTrajectory, JointVector, Limits, MonotonicNs};
+use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 
 const SEEDS: u64 = 20;

@@ -4,10 +4,11 @@
 use super::chromium::Chromium;
 use super::client::Watch;
 use super::fake::{Fake, run_folder};
+use arm_model::JointTrajectory;
+use arm_model::joint::START_POSE;
 use serde_json::{Value, json};
-use shared_types::plan::START_POSE;
+use shared_types::RopeParams;
 use shared_types::rope::RANGES;
-use shared_types::{JointTrajectory, RopeParams};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;

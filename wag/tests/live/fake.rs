@@ -1,14 +1,15 @@
 //! A controller and a camera as shared memory shows them, without an arm.
 
+use arm_model::JointVector;
+use arm_model::joint::START_POSE;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, ControllerState, CycleRecord, DomainSweep, FrameHeader,
     JointReport, OperatorEnd, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
-use shared_types::plan::START_POSE;
 use shared_types::rope::RANGES;
-use shared_types::{FaultCode, JointVector, MonotonicNs, MotionTier, RopeParams};
+use shared_types::{FaultCode, MonotonicNs, MotionTier, RopeParams};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

@@ -10,10 +10,10 @@
 mod preflight;
 mod response;
 
+use arm_model::{JointTrajectory, Limits};
 use hil_tests::arm::{ArmConfig, ArmEvent};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlSettings, Motion};
-use shared_types::{JointTrajectory, Limits};
 
 /// Runs longer checks.
 fn long_tests() -> bool {

@@ -3,6 +3,8 @@
 //! again. `WAG_LONG_TESTS=1` makes 24 throws of the full search instead of 3 small ones.
 
 use super::{long_tests, run};
+use arm_model::response::{Estimate, JointResponse, TrackingLag};
+use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
 use hil_tests::arm::{ArmConfig, JointLag};
 use hil_tests::virtual_rig::VirtualRig;
 use planner::response::Following;
@@ -12,8 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
 use rt_controller::control::Thresholds;
-use shared_types::response::{Estimate, JointResponse, TrackingLag};
-use shared_types::{ArmResponse, JOINTS, JointTrajectory, Limits, RopeParams};
+use shared_types::RopeParams;
 use std::ops::ControlFlow;
 
 /// Joints that are late by 10 to 40 ms in slow motion.

@@ -3,6 +3,8 @@
 
 use super::shell::{arm, read, send, until};
 use crate::support::command;
+use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector, Limits};
 use camera_ingest::process::CameraConfig;
 use hil_tests::arm::{ArmEvent, SimulatedArm};
 use planner::process::PlannerConfig;
@@ -17,10 +19,8 @@ use shared_types::ipc::{
     Bus, CauseRecord, ChunkSubscriber, ControllerMode, CycleRecord, DomainSweep, OperatorEnd,
     StateReader,
 };
-use shared_types::plan::{START_POSE, trajectory_hash};
-use shared_types::{
-    FaultCode, JointTrajectory, JointVector, Limits, MonotonicNs, MotionTier, RopeParams,
-};
+use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, MonotonicNs, MotionTier, RopeParams};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Child;

@@ -1,10 +1,10 @@
 //! `wag` as its users start it, the arm it drives, and what it recorded.
 
 use crate::support::command;
+use arm_model::joint::START_POSE;
 use hil_tests::arm::{ArmConfig, SimulatedArm};
 use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::{CauseRecord, CycleRecord};
-use shared_types::plan::START_POSE;
 use std::path::Path;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};

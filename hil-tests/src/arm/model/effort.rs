@@ -3,7 +3,7 @@
 //! a reader of reports sees them move with the arm.
 
 use super::ArmModel;
-use shared_types::JointVector;
+use arm_model::JointVector;
 
 /// Inertia seen by each joint (kg m²).
 const INERTIA_KG_M2: JointVector = JointVector([1.5, 1.5, 0.6, 0.6, 0.2, 0.15, 0.05]);

@@ -3,8 +3,9 @@
 use super::{ALL_JOINTS, ArmModel, CURRENT_SPIKE_S, Phase};
 use crate::arm::event::ArmEvent;
 use crate::arm::firmware::Firmware;
+use arm_model::JOINTS;
 use rt_controller::xarm::{ArmState, ErrorCode, Mode};
-use shared_types::{JOINTS, MonotonicNs};
+use shared_types::MonotonicNs;
 
 impl ArmModel {
     /// Raises an error: the arm brakes, drops its buffer and goes to state 4 and

@@ -1,8 +1,8 @@
 //! Registers without a typed command.
 
 use super::ArmModel;
+use arm_model::kinematics::JOINT_QUARTER_TURNS_X;
 use rt_controller::xarm::Register;
-use shared_types::kinematics::JOINT_QUARTER_TURNS_X;
 
 /// Distances of the vendor's table, modified convention: d and a of each joint
 /// (mm).

@@ -1,9 +1,9 @@
 //! What each request does to the controller.
 
 use super::*;
+use arm_model::kinematics;
 use rt_controller::xarm::JointQuery;
 use rt_controller::xarm::reply::Text;
-use shared_types::kinematics;
 
 /// Version text of a real arm before its firmware: 7 axes, type 7, 1305 arm.
 const MODEL: &str = "7,7,XS1305,AC1304,v";

@@ -1,9 +1,9 @@
 //! Configuration that clients may change, and what the controller saves of it.
 
 use crate::arm::config::ArmConfig;
+use arm_model::JOINTS;
 use nalgebra::Vector3;
 use rt_controller::xarm::{Register, TcpPose};
-use shared_types::JOINTS;
 
 /// Bytes of the reply to register 53.
 const REDUCED_STATE_LEN: usize = 79;

@@ -14,7 +14,7 @@ use control_core::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use control_core::xarm::{Command, Protocol};
 use core::alloc::{GlobalAlloc, Layout};
 use core::sync::atomic::{AtomicUsize, Ordering};
-use shared_types::{JointVector, Limits};
+use arm_model::{JointVector, Limits};
 
 const PERIOD_NS: u64 = 4_000_000;
 const POSE: JointVector = JointVector([0.0, -0.3, 0.0, 0.8, 0.0, 1.1, 0.0]);

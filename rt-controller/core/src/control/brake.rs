@@ -7,7 +7,8 @@
 
 use super::finding::Finding;
 use super::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
-use shared_types::{FaultCode, JOINTS, JointState, Limits, exact};
+use arm_model::{JOINTS, JointState, Limits, exact};
+use shared_types::FaultCode;
 
 /// Brake of all joints from `from` to rest with the jerk of motions the
 /// controller makes itself. RT-safe.
@@ -136,8 +137,8 @@ fn brake_axis(start: AxisState, acceleration_max: f64, jerk_max: f64) -> AxisPha
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::JointVector;
     use proptest::prelude::*;
-    use shared_types::JointVector;
 
     proptest! {
         #[test]

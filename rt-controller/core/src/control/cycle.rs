@@ -15,11 +15,12 @@ use super::stopping::Stop;
 use super::velocity_wire::VelocityWire;
 use crate::xarm::Status;
 use alloc::boxed::Box;
+use arm_model::{JointState, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
     CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts,
 };
-use shared_types::{FaultCode, JointState, JointVector, Limits, MonotonicNs, MotionTier, WireMode};
+use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
 
 #[derive(Debug)]
 pub(super) struct Running {
@@ -279,7 +280,7 @@ impl ControlState {
     )]
     fn missed(&self, input: &CycleInput) -> u32 {
         let gap_s = MonotonicNs(input.deadline_ns).since_s(MonotonicNs(self.sent_ns));
-        let cycles = shared_types::exact::round(gap_s / self.period_s()) as u32;
+        let cycles = arm_model::exact::round(gap_s / self.period_s()) as u32;
         input.missed.max(cycles.saturating_sub(1))
     }
 

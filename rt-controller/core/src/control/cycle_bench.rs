@@ -6,9 +6,9 @@ use crate::control::limiter::{Allowance, Limiter};
 use crate::control::{LinkInput, Thresholds};
 use crate::point_to_point::plan_move;
 use crate::xarm::StateRequest;
-use shared_types::JointTrajectory;
+use arm_model::JointTrajectory;
+use arm_model::joint::START_POSE;
 use shared_types::ipc::{JointReport, OperatorBeat};
-use shared_types::plan::START_POSE;
 
 pub(super) const PERIOD_NS: u64 = 4_000_000;
 

@@ -4,11 +4,11 @@ use super::bench::{Bench, go, swing};
 use super::*;
 use crate::control::exchange::Order;
 use crate::control::limiter::Limiter;
+use arm_model::JointTrajectory;
+use arm_model::joint::START_POSE;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
-use shared_types::JointTrajectory;
 use shared_types::ipc::{JointReport, OperatorBeat, Reports};
-use shared_types::plan::START_POSE;
 
 #[test]
 fn a_trajectory_is_streamed_at_its_planned_times() {

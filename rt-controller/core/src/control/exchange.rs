@@ -3,8 +3,9 @@
 use super::motion::Motion;
 use crate::xarm::{StateRequest, Status};
 use alloc::boxed::Box;
+use arm_model::JointVector;
 use shared_types::ipc::{CauseRecord, CycleRecord, GuardianBeat, OperatorBeat, Reports};
-use shared_types::{Arming, FaultCode, JointVector};
+use shared_types::{Arming, FaultCode};
 
 /// What the relay asks of the cycle.
 #[derive(Debug, Clone, PartialEq)]

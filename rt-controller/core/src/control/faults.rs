@@ -8,8 +8,9 @@ use super::mode::{Trigger, next_mode};
 use super::reaction::{Path, Reaction, reaction};
 use super::stopping::{StopFrom, choose_stop};
 use crate::xarm::StateRequest;
+use arm_model::{JOINTS, JointState, kinematics};
 use shared_types::ipc::{CauseRecord, ControllerMode, PAYLOAD_VERSION};
-use shared_types::{FaultCode, JOINTS, JointState, MonotonicNs, WireMode, kinematics};
+use shared_types::{FaultCode, MonotonicNs, WireMode};
 
 impl ControlState {
     /// Meets a fault by the table in [`reaction`]; the first cause is kept.

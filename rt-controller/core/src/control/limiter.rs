@@ -12,9 +12,10 @@
 )]
 
 use super::finding::Finding;
+use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use shared_types::{FaultCode, JOINTS, JointVector, Limits, kinematics};
+use shared_types::FaultCode;
 
 /// Relative slack.
 const RELATIVE: f64 = 1e-9;
@@ -227,8 +228,8 @@ fn tcp(q: &JointVector, limits: &Limits) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::JointTrajectory;
-    use shared_types::plan::START_POSE;
+    use arm_model::JointTrajectory;
+    use arm_model::joint::START_POSE;
 
     const PERIOD_S: f64 = 0.004;
     const STREAMED: Allowance = Allowance {

@@ -1,9 +1,9 @@
 //! What the arm is told to follow: an uploaded spline or a planned move.
 
 use super::phases::PhasedMotion;
+use arm_model::{JointState, JointTrajectory, JointVector};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::ControllerMode;
-use shared_types::{JointState, JointTrajectory, JointVector};
 
 /// A whole motion, complete before it begins; nothing is computed or fetched
 /// for it on the way except its value at an instant.

@@ -10,8 +10,9 @@ use super::monitor::Monitor;
 use super::motion::Motion;
 use super::velocity_wire::VelocityWire;
 use alloc::boxed::Box;
+use arm_model::{JointState, JointVector};
 use shared_types::ipc::{CauseRecord, ControllerMode};
-use shared_types::{Arming, FaultCode, JointState, JointVector, MonotonicNs, MotionTier};
+use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier};
 
 /// Starts closer than this are equal (rad); a larger difference would be a jump.
 const START_TOLERANCE_RAD: f64 = 1e-9;

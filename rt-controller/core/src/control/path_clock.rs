@@ -11,8 +11,8 @@
 )]
 
 use super::motion::Motion;
+use arm_model::JointState;
 use serde::{Deserialize, Serialize};
-use shared_types::JointState;
 
 /// A slow-down to rest along the path. RT-safe.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -55,8 +55,8 @@ impl SlowDown {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::JointTrajectory;
-    use shared_types::plan::START_POSE;
+    use arm_model::JointTrajectory;
+    use arm_model::joint::START_POSE;
 
     #[test]
     fn the_rate_falls_smoothly_and_half_the_time_is_spent_on_the_path() {

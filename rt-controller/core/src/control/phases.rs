@@ -4,8 +4,8 @@
 //! before it is needed, copied without allocation and evaluated in bounded
 //! time at any instant.
 
+use arm_model::{JOINTS, JointState, JointVector};
 use serde::{Deserialize, Serialize};
-use shared_types::{JOINTS, JointState, JointVector};
 
 /// Most phases of one joint: seven of a point-to-point profile.
 pub const MAX_PHASES: usize = 7;
@@ -101,7 +101,7 @@ impl AxisPhases {
 
 /// When the velocity `qd + qdd t + jerk t²/2` is zero (s); NaN where it never is.
 fn turning_points(at: AxisState, jerk: f64) -> [f64; 2] {
-    let root = shared_types::exact::sqrt(at.qdd * at.qdd - 2.0 * jerk * at.qd);
+    let root = arm_model::exact::sqrt(at.qdd * at.qdd - 2.0 * jerk * at.qd);
     let far = -(at.qdd + root.copysign(at.qdd));
     [far / jerk, 2.0 * at.qd / far]
 }

@@ -9,11 +9,12 @@ use crate::control::record::{record_input, restore_input};
 use crate::control::{ArmCodes, LinkInput, Order, Thresholds};
 use crate::overrun::min_gap_ns;
 use crate::point_to_point::plan_move;
+use arm_model::joint::START_POSE;
+use arm_model::{JOINTS, JointTrajectory, kinematics};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use shared_types::Arming;
 use shared_types::ipc::{GuardianBeat, InputRecord, JointReport, OperatorBeat, Reports};
-use shared_types::plan::START_POSE;
-use shared_types::{Arming, JOINTS, JointTrajectory, kinematics};
 
 const PERIOD_NS: u64 = 4_000_000;
 const PERIOD_S: f64 = 0.004;

@@ -5,8 +5,8 @@ use super::*;
 use crate::control::Thresholds;
 use crate::control::exchange::Order;
 use crate::control::limiter::Limiter;
+use arm_model::joint::START_POSE;
 use shared_types::ipc::{JointReport, Reports};
-use shared_types::plan::START_POSE;
 
 /// Spoils the reports of a swing from its begin and gives the cause.
 fn swing_with(mut spoil: impl FnMut(usize, &mut JointReport)) -> Vec<ControlEvent> {

@@ -7,8 +7,8 @@ use super::cycle::{ControlState, Running};
 use super::motion::Motion;
 use super::settings::ControlSettings;
 use alloc::boxed::Box;
+use arm_model::Limits;
 use serde::{Deserialize, Serialize};
-use shared_types::Limits;
 
 /// The running motion without its content.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]

@@ -16,8 +16,8 @@ use super::motion::Motion;
 use super::path_clock::SlowDown;
 use super::phases::PhasedMotion;
 use super::reaction::Path;
+use arm_model::{JointState, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::{JointState, Limits};
 
 /// Durations of slow-downs that are tried (s).
 const SLOW_S: [f64; 4] = [0.12, 0.24, 0.48, 0.96];

@@ -13,8 +13,8 @@
 )]
 
 use super::exchange::ArmCommand;
+use arm_model::{JOINTS, JointState, JointVector, Limits, kinematics};
 use serde::{Deserialize, Serialize};
-use shared_types::{JOINTS, JointState, JointVector, Limits, kinematics};
 
 /// Gain of the position loop (1/s): slow beside the arm's own response, so that
 /// its lag cannot make the loop swing.
@@ -84,8 +84,8 @@ impl VelocityWire {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::joint::START_POSE;
     use rand::{RngExt, SeedableRng};
-    use shared_types::plan::START_POSE;
 
     fn velocity(command: ArmCommand) -> JointVector {
         match command {

@@ -1,6 +1,6 @@
 //! Checked cursors over byte slices, in the byte orders of this protocol.
 
-use shared_types::{JOINTS, JointVector};
+use arm_model::{JOINTS, JointVector};
 
 /// Why a frame could not be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

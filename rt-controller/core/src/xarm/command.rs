@@ -4,7 +4,7 @@ use super::bytes::{ByteWriter, EmitError};
 use super::pose::TcpPose;
 use super::register::Register;
 use super::status::Mode;
-use shared_types::JointVector;
+use arm_model::JointVector;
 
 mod parse;
 

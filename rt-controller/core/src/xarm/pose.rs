@@ -1,8 +1,8 @@
 //! Pose of the tool centre point as the arm writes it.
 
 use super::bytes::{ByteReader, ByteWriter, EmitError};
+use arm_model::kinematics;
 use nalgebra::{Matrix3, Vector3};
-use shared_types::kinematics;
 
 /// A pose in the arm's base frame: position and fixed-axis roll, pitch, yaw
 /// (`R = Rz Ry Rx`).

@@ -5,7 +5,7 @@ use super::command::{Command, JointQuery};
 use super::frame::{self, Reply};
 use super::pose::TcpPose;
 use super::status::ArmState;
-use shared_types::JointVector;
+use arm_model::JointVector;
 
 /// Bytes of a version or serial number text on the wire.
 pub const TEXT_LEN: usize = 40;

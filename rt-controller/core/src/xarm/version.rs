@@ -5,9 +5,9 @@
 //! `7,7,XS1305,AC1304,v2.7.1`.
 
 use super::report::REALTIME_REPORT_LEN;
+use arm_model::{JointVector, Limits};
 use core::fmt;
 use core::ops::RangeInclusive;
-use shared_types::{JointVector, Limits};
 
 /// Number of a firmware release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -7,6 +7,7 @@ use crate::config;
 use crate::failure::{OrInput, Outcome};
 use crate::progress::Stage;
 use crate::table::numbers;
+use arm_model::Limits;
 use planner::process::PlannerConfig;
 use planner::ropes::random_rope;
 use planner::tasks::{
@@ -14,7 +15,7 @@ use planner::tasks::{
 };
 use serde::Serialize;
 use serde_json::{Value, json};
-use shared_types::{Limits, Task};
+use shared_types::Task;
 use std::ops::ControlFlow;
 
 /// Longest wall time wanted of one plan on two cores (s), and the target (m).

@@ -15,13 +15,14 @@ use crate::progress::Stage;
 use crate::session::{Session, watch_interrupts};
 use crate::table;
 use anyhow::{Context, ensure};
+use arm_model::{JointTrajectory, Limits};
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use serde::Serialize;
 use serde_json::{Value, json};
+use shared_types::MotionTier;
 use shared_types::ipc::{ControllerMode, CycleRecord};
-use shared_types::{JointTrajectory, Limits, MotionTier};
 
 /// Part of the arm's speed limits used between two wiggles.
 const MOVE_SPEED: f64 = 0.1;

@@ -10,10 +10,11 @@ use crate::progress::Stage;
 use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::{Session, watch_interrupts};
 use anyhow::anyhow;
+use arm_model::response::Excitation;
+use arm_model::{JOINTS, JointTrajectory, Limits};
 use planner::response::excitation::sweep;
 use serde_json::{Value, json};
-use shared_types::response::Excitation;
-use shared_types::{JOINTS, JointTrajectory, Limits, MotionTier};
+use shared_types::MotionTier;
 use std::net::IpAddr;
 use std::time::Duration;
 

@@ -13,13 +13,14 @@ use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::progress::Stage;
 use anyhow::{Context, anyhow};
+use arm_model::response::Excitation;
+use arm_model::{ArmResponse, JOINTS, JointResponse};
 use planner::response::delay::{TargetDelay, command_to_target};
 use planner::response::{Recording, Sample, Setpoint, identify};
 use rt_controller::relay::Latencies;
 use serde_json::Value;
+use shared_types::MonotonicNs;
 use shared_types::ipc::{CycleRecord, JointReport};
-use shared_types::response::Excitation;
-use shared_types::{ArmResponse, JOINTS, JointResponse, MonotonicNs};
 use std::path::PathBuf;
 
 /// File written into the run folder.

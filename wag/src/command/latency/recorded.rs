@@ -4,7 +4,7 @@
 use super::Evidence;
 use crate::files;
 use anyhow::{Context, anyhow, ensure};
-use shared_types::JOINTS;
+use arm_model::JOINTS;
 use shared_types::ipc::{CycleRecord, JointReport};
 use std::path::Path;
 

@@ -2,11 +2,11 @@
 
 use super::{Evidence, Findings, known_joints};
 use crate::table;
+use arm_model::JointResponse;
+use arm_model::response::{Estimate, NotExcited, TrackingLag};
 use comfy_table::Table;
 use serde_json::{Value, json};
-use shared_types::JointResponse;
 use shared_types::ipc::message::{LatencyReport, Percentiles};
-use shared_types::response::{Estimate, NotExcited, TrackingLag};
 use std::path::Path;
 
 fn loop_table(report: &LatencyReport) -> Table {

@@ -10,12 +10,13 @@ use crate::progress::Stage;
 use crate::session::interrupted;
 use crate::table::numbers;
 use anyhow::{Context, anyhow};
+use arm_model::{JointTrajectory, Limits};
 use planner::process::PlannerConfig;
 use planner::tasks::{Belief, PlanOptions, PlanRequest, plan_throw};
 use planner::trials::{FidelityConfig, FidelityRow, middle_rope};
 use serde_json::{Value, json};
+use shared_types::Task;
 use shared_types::ipc::message::Progress;
-use shared_types::{JointTrajectory, Limits, Task};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 

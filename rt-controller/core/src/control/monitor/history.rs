@@ -5,8 +5,9 @@
     reason = "arithmetic of float vectors only; integers use wrapping calls"
 )]
 
+use arm_model::{JOINTS, JointVector};
 use serde::{Deserialize, Serialize};
-use shared_types::{JOINTS, JointVector, MonotonicNs};
+use shared_types::MonotonicNs;
 
 /// Setpoints remembered: 0.256 s at 250 Hz; no window may be longer than
 /// [`TRACKING_WINDOW_MAX_MS`](crate::control::settings::TRACKING_WINDOW_MAX_MS).

@@ -11,11 +11,12 @@ use super::exchange::{CycleInput, LinkInput};
 use super::finding::Finding;
 use super::reaction::{Path, reaction};
 use super::settings::ControlSettings;
+use arm_model::{JointVector, Limits};
 use history::Commanded;
 use reports::ReportWatch;
 use serde::{Deserialize, Serialize};
+use shared_types::FaultCode;
 use shared_types::ipc::{ControllerMode, JointReport, RunCounts};
-use shared_types::{FaultCode, JointVector, Limits};
 
 /// Reports lag behind a change of mode by up to 0.2 s (field experience with
 /// the vendor's SDK), so state, mode and codes count only this long after

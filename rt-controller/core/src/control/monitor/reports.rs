@@ -10,9 +10,10 @@ use super::history::Commanded;
 use crate::clock_map::CLOCK_ANEW;
 use crate::control::finding::Finding;
 use crate::control::settings::Thresholds;
+use arm_model::{JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::JointReport;
-use shared_types::{FaultCode, JOINTS, JointVector, Limits, MonotonicNs};
+use shared_types::{FaultCode, MonotonicNs};
 
 /// A stamp farther than this from the arrival needs a new map of the arm's clock
 /// (ns); less may be a receiver that was held up.

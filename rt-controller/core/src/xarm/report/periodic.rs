@@ -5,7 +5,7 @@ use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError};
 use crate::xarm::error_code::ErrorCode;
 use crate::xarm::pose::TcpPose;
 use crate::xarm::status::{ArmState, Mode};
-use shared_types::{JOINTS, JointVector};
+use arm_model::{JOINTS, JointVector};
 
 /// Bytes common to the three reports.
 const BASIC_LEN: usize = 87;

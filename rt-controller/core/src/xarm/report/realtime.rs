@@ -5,7 +5,7 @@ use super::{ReportTooShort, check_len, emit_state, parse_state};
 use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError};
 use crate::xarm::pose::TcpPose;
 use crate::xarm::status::{ArmState, Mode};
-use shared_types::{JointState, JointVector};
+use arm_model::{JointState, JointVector};
 
 /// Bytes of a report of port 30000, firmware 2.1 to 2.7.
 pub const REALTIME_REPORT_LEN: usize = 784;

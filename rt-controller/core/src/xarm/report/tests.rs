@@ -1,8 +1,8 @@
 use super::*;
 use crate::xarm::error_code::ErrorCode;
 use crate::xarm::pose::TcpPose;
+use arm_model::{JointState, JointVector};
 use proptest::prelude::*;
-use shared_types::{JointState, JointVector};
 
 fn joints(from: f64) -> JointVector {
     JointVector(core::array::from_fn(|i| from + 0.125 * i as f64))

@@ -1,14 +1,15 @@
 //! The ropes and motions that are simulated, all drawn from one seed.
 
+use arm_model::trajectory::TrajectoryError;
+use arm_model::{JointTrajectory, JointVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, Kernel, Obstacle, PlannedArm, Precision, Rollout, Scene,
     Shape, SimOptions, SimulateError, Start, Watch, roll_out_in_with,
 };
+use shared_types::RopeParams;
 use shared_types::rope::RANGES;
-use shared_types::trajectory::TrajectoryError;
-use shared_types::{JointTrajectory, JointVector, RopeParams};
 
 /// Links of a typical rope.
 pub const LINKS: u32 = 22;

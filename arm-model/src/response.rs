@@ -32,8 +32,8 @@
 
 mod file;
 
+use crate::joint::START_POSE;
 use crate::joint::{JOINTS, JointVector};
-use crate::plan::START_POSE;
 use file::ArmResponseForm;
 use serde::{Deserialize, Serialize};
 

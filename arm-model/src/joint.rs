@@ -126,3 +126,7 @@ impl JointState {
         self.q.is_finite() && self.qd.is_finite() && self.qdd.is_finite()
     }
 }
+
+/// Start pose of wiggle and throws: pole straight down in front of the robot
+/// (rad).
+pub const START_POSE: JointVector = JointVector([0.0, 0.8, 0.0, 2.4, 0.0, 1.6, 0.0]);
