@@ -14,13 +14,14 @@ pub use eyes::*;
 pub use ledger::*;
 pub use results::*;
 pub use runs::*;
-pub use values::{Point, seed};
+pub use values::Point;
 
 use values::{host, mass_kg, offset_ms, rate_hz};
 
 use crate::command::check::CheckArgs;
 use crate::command::plan::PlanArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use cli_output::seed;
 use std::net::IpAddr;
 use std::path::PathBuf;
 

@@ -1,7 +1,8 @@
 //! The commands that move an arm, and the one that simulates it.
 
-use super::values::{host, seed};
+use super::values::host;
 use clap::Args;
+use cli_output::seed;
 use std::net::IpAddr;
 use std::path::PathBuf;
 

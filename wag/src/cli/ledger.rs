@@ -1,8 +1,8 @@
 //! Arguments of `wag ledger`.
 
-use super::values::seed;
 use crate::ledger::RunResult;
 use clap::{Args, Subcommand};
+use cli_output::seed;
 use std::path::PathBuf;
 
 /// Arguments of `wag ledger`.

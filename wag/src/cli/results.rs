@@ -1,8 +1,8 @@
 //! Arguments of what measures: bench, reproduce.
 
 use super::MethodName;
-use super::values::seed;
 use clap::{Args, ValueEnum};
+use cli_output::seed;
 use std::path::PathBuf;
 
 /// Arguments of `wag bench`.

@@ -3,12 +3,6 @@
 use std::net::{IpAddr, ToSocketAddrs};
 use std::str::FromStr;
 
-/// A seed.
-pub fn seed(text: &str) -> Result<u64, String> {
-    text.parse()
-        .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
-}
-
 /// A frame rate (Hz).
 pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
     match text.parse() {

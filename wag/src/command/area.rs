@@ -2,8 +2,8 @@
 //! clear.
 
 use crate::cli::ArmArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use anyhow::anyhow;
+use cli_output::{Failure, OrInput, Outcome};
 use std::io::{BufRead, IsTerminal, Write, stdin, stdout};
 use std::net::IpAddr;
 

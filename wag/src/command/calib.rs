@@ -2,9 +2,7 @@
 //! the arm shows at known places.
 
 use crate::cli::{CalibCheckArgs, CalibCommand, ExtrinsicsArgs, ShownArgs};
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
 use anyhow::{Context, anyhow};
 use camera_ingest::calib::board::{Board, BoardError};
 use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
@@ -12,6 +10,8 @@ use camera_ingest::calib::placed_camera_toml;
 use camera_ingest::score::sight_lead;
 use camera_ingest::source::FrameSource;
 use camera_ingest::{ScoreOptions, load_camera, open_video};
+use cli_output::Stage;
+use cli_output::{Failure, OrInput, Outcome};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use shared_types::StereoCamera;

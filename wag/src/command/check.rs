@@ -1,12 +1,12 @@
 //! `wag check`: preflight of a plan.
 
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::table;
 use anyhow::{Context, anyhow, ensure};
 use arm_model::JointTrajectory;
 use arm_model::limits::{LimitKind, Margin};
 use clap::{Args, ValueEnum};
+use cli_output::table;
+use cli_output::{Failure, OrInput, Outcome};
 use comfy_table::Table;
 use planner::collide::{ArmShape, Scene, tool_contacts};
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};

@@ -2,9 +2,9 @@
 
 use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
 use crate::config::{Folders, Kind, Layers};
-use crate::failure::{Failure, OrInput, Outcome};
-use crate::table;
 use anyhow::anyhow;
+use cli_output::table;
+use cli_output::{Failure, OrInput, Outcome};
 use serde_json::{Value, json};
 
 pub fn run(command: &ConfigCommand, quiet: bool) -> Outcome<Option<Value>> {

@@ -2,8 +2,8 @@
 
 use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
 use crate::recording::RecordingReport;
-use crate::table;
 use anyhow::bail;
+use cli_output::table;
 use comfy_table::Table;
 use serde::Serialize;
 use shared_types::ipc::message::{LatencyReport, Percentiles, RigEvent, ScoreResult};

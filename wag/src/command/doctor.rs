@@ -3,9 +3,9 @@
 use super::network::network;
 use crate::cli::DoctorArgs;
 use crate::doctor::{ArmLine, Facts, Finding, Verdict, judge, judge_line};
-use crate::failure::{Failure, Outcome};
-use crate::{output, table};
 use anyhow::anyhow;
+use cli_output::{Failure, Outcome};
+use cli_output::{output, table};
 use serde_json::{Value, json};
 use std::path::Path;
 

@@ -2,10 +2,10 @@
 
 use crate::cli::ArmArgs;
 use crate::config;
-use crate::failure::{Failure, OrInput, Outcome};
 use anyhow::anyhow;
 use arm_model::limits::Margin;
 use arm_model::{JointTrajectory, Limits};
+use cli_output::{Failure, OrInput, Outcome};
 use planner::preflight::{JudgedArm, arm_margins, first_stop};
 use rt_controller::ControllerConfig;
 use serde_json::{Value, json};

@@ -1,9 +1,9 @@
 //! `wag explain`: why a run was stopped, or how close it came to its limits.
 
 use crate::cli::ExplainArgs;
-use crate::failure::{OrInput, Outcome};
 use crate::recording::{Flight, explain, read_recording, show};
 use anyhow::Context;
+use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
 
 pub fn run(args: &ExplainArgs, quiet: bool) -> Outcome<Option<Value>> {

@@ -1,11 +1,11 @@
 //! `wag film`: a stretch of a stereo camera's frames as a raw film.
 
 use crate::cli::{FilmArgs, ModeName};
-use crate::failure::{Failure, OrInput, Outcome};
-use crate::progress::Stage;
-use crate::session::{interrupted, watch_interrupts};
 use camera_ingest::calib::VideoMode;
 use camera_ingest::live::{LiveCamera, LiveError, LiveSettings, record};
+use cli_output::Stage;
+use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{interrupted, watch_interrupts};
 use serde_json::{Value, json};
 
 impl From<ModeName> for VideoMode {

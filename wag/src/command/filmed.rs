@@ -1,12 +1,12 @@
 //! What films a rope: its pictures, the camera, and how the clamp moved meanwhile.
 
 use crate::cli::SceneArgs;
-use crate::failure::{OrInput, Outcome};
 use crate::files::{self, JointsCsv};
 use crate::mcap_file::{RUN_FILE, RunFilm};
 use anyhow::{Context, anyhow, ensure};
 use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
+use cli_output::{OrInput, Outcome};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};

@@ -6,12 +6,12 @@ use super::network::{asks_network, network_for_camera, no_model_without_network}
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName};
 use crate::config;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
-use crate::session::interrupted;
-use crate::table;
 use anyhow::{Context, anyhow};
+use cli_output::Stage;
+use cli_output::interrupted;
+use cli_output::table;
+use cli_output::{Failure, OrInput, Outcome};
 use comfy_table::Table;
 use planner::observation::ObservedPoints;
 use planner::phi::{NetworkError, identify_by_network, proposal};
@@ -173,7 +173,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         .then(|| network_for_camera(model))
         .transpose()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
-    crate::session::watch_interrupts().or_failed()?;
+    cli_output::watch_interrupts().or_failed()?;
     let observed = observe(args, quiet)?;
     let stage = Stage::begin("identify", quiet);
     let observation = Observation {

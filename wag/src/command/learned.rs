@@ -1,12 +1,12 @@
 //! Learned models in the place of the tracker's parts.
 
 use crate::cli::ModelArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use anyhow::anyhow;
 use camera_ingest::TrackError;
 use camera_ingest::calib::load_model_files;
 use camera_ingest::learned::{OnnxSegmenter, OnnxTracker};
 use camera_ingest::track::{ModelError, Models};
+use cli_output::{Failure, OrInput, Outcome};
 use serde_json::{Value, json};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
 //! `wag ledger`: runs listed, compared, made again.
 
 use crate::cli::{LedgerArgs, LedgerCommand, LedgerCompareArgs, LedgerRerunArgs};
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::ledger::{self, CommandLine, Entry, RUNS, quoted};
-use crate::table;
 use anyhow::{Context, anyhow};
+use cli_output::table;
+use cli_output::{Failure, OrInput, Outcome};
 use serde_json::{Value, json};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};

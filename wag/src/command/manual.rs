@@ -1,11 +1,12 @@
 //! `wag man` and `wag completions`: the command line, told to `man` and to shells.
 
 use crate::cli::{Cli, CompletionsArgs, ManArgs};
-use crate::failure::{OrInput, Outcome};
-use crate::{files, output};
+use crate::files;
 use anyhow::Context;
 use clap::CommandFactory;
 use clap_mangen::Man;
+use cli_output::output;
+use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

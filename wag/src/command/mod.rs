@@ -35,7 +35,7 @@ mod wiggle;
 mod wiggle_design;
 
 use crate::cli::{CalibCommand, Cli, Command, PlanCommand, SimCommand};
-use crate::failure::{OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use serde_json::Value;
 use shared_types::Task;
 use std::path::Path;

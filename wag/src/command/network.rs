@@ -1,7 +1,7 @@
 //! The network that reads rope parameters: the one inside this program, or a file.
 
-use crate::failure::{Failure, Outcome};
 use anyhow::anyhow;
+use cli_output::{Failure, Outcome};
 use planner::observation::{ObserveError, ObservedPoints};
 use planner::phi::{ModelError, PhiNet};
 use planner::sysid::Method;

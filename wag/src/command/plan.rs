@@ -1,15 +1,16 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
 use super::reach_picture;
-use crate::cli::{Point, seed};
+use crate::cli::Point;
 use crate::config;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
-use crate::session::interrupted;
 use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, JointVector, Limits, kinematics};
 use clap::Args;
+use cli_output::Stage;
+use cli_output::interrupted;
+use cli_output::seed;
+use cli_output::{Failure, OrInput, Outcome};
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
 use planner::response::Following;
@@ -272,7 +273,7 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(path) = &args.reach {
         reach(path, args, &limits, &config.strike, quiet)?;
     }
-    crate::session::watch_interrupts().or_failed()?;
+    cli_output::watch_interrupts().or_failed()?;
     let stage = Stage::begin("plan", quiet);
     let request = PlanRequest {
         rope,

@@ -4,11 +4,11 @@
 //! A process ends in order on SIGTERM, SIGINT, or when its parent is gone.
 
 use crate::cli::{ProcessArgs, ProcessName};
-use crate::failure::{OrInput, Outcome};
 use crate::files;
 use crate::mcap_file;
-use crate::session::{interrupted, watch_interrupts};
 use anyhow::Context;
+use cli_output::{OrInput, Outcome};
+use cli_output::{interrupted, watch_interrupts};
 use shared_types::ipc::DomainSweep;
 use std::sync::atomic::Ordering;
 use std::time::Duration;

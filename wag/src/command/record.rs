@@ -1,14 +1,14 @@
 //! `wag record`: attaches to a running controller and records its cycles.
 
 use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use crate::mcap_file::{self, RUN_FILE, RecorderConfig, RunFileThread};
 use crate::pipeline::RunFolder;
 use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
-use crate::session::{interrupted, watch_interrupts};
 use crate::watch::domain_of_run;
 use anyhow::anyhow;
+use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{interrupted, watch_interrupts};
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::sync::atomic::Ordering;

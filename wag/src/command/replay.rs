@@ -2,9 +2,9 @@
 //! compares every record, bit by bit.
 
 use crate::cli::ReplayArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::recording::{Flight, explain, read_recording};
 use anyhow::{Context, anyhow};
+use cli_output::{Failure, OrInput, Outcome};
 use rt_controller::recording::{Gap, Replay, replay};
 use serde_json::{Value, json};
 

@@ -1,8 +1,8 @@
 //! `wag report`: a run as one HTML file.
 
 use crate::cli::ReportArgs;
-use crate::failure::{OrInput, Outcome};
 use crate::report;
+use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
 
 pub fn run(args: &ReportArgs, quiet: bool) -> Outcome<Option<Value>> {

@@ -1,11 +1,11 @@
 //! `wag rig`: the simulated xArm 7 as a server.
 
 use crate::cli::RigArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::output;
-use crate::session::{interrupted, watch_interrupts};
 use anyhow::anyhow;
+use cli_output::output;
+use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{interrupted, watch_interrupts};
 use hil_tests::arm::{ArmConfig, ArmPorts, FaultScript, SimulatedArm};
 use hil_tests::rig::{RigConfig, run_announced};
 use serde_json::{Value, json};

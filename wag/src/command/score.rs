@@ -1,10 +1,10 @@
 //! `wag score`: closest approach of tip and target from stereo video.
 
 use crate::cli::ScoreArgs;
-use crate::failure::{OrInput, Outcome};
-use crate::progress::Stage;
 use anyhow::Context;
 use camera_ingest::{ScoreOptions, load_camera, open_video, score};
+use cli_output::Stage;
+use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
 
 pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {

@@ -1,9 +1,9 @@
 //! `wag sim`: rope simulation from files to files.
 
 use crate::cli::{PrecisionName, SimRopeArgs, SimThrowArgs};
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
 use anyhow::{Context, anyhow, ensure};
+use cli_output::{Failure, OrInput, Outcome};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome as SimOutcome, PoseTrack, Precision,
     Rollout, SimOptions, Start, Watch, roll_out,

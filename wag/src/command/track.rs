@@ -3,14 +3,14 @@
 use super::filmed::Filmed;
 use super::learned::{Learned, classify};
 use crate::cli::TrackArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
 use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
 use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_with};
+use cli_output::Stage;
+use cli_output::{Failure, OrInput, Outcome};
 use serde_json::{Value, json};
 use shared_types::KeypointTrack;
 use shared_types::keypoints::TrackedFrame;

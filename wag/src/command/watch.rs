@@ -1,12 +1,12 @@
 //! `wag watch`: a page in the browser that shows what runs.
 
 use crate::cli::WatchArgs;
-use crate::failure::{Failure, OrInput, Outcome};
-use crate::output;
-use crate::session::{interrupted, watch_interrupts};
 use crate::watch::{PreviewChild, Wanted, Watcher, domain_of_run};
 use anyhow::anyhow;
 use camera_ingest::load_camera;
+use cli_output::output;
+use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{interrupted, watch_interrupts};
 use serde_json::{Value, json};
 use shared_types::ipc::IpcError;
 use std::sync::atomic::Ordering;

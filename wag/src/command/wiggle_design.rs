@@ -3,12 +3,12 @@
 use super::plan::write_trajectory_csv;
 use crate::cli::WiggleArgs;
 use crate::config;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
-use crate::session::interrupted;
-use crate::table::numbers;
 use anyhow::anyhow;
+use cli_output::Stage;
+use cli_output::interrupted;
+use cli_output::table::numbers;
+use cli_output::{Failure, OrInput, Outcome};
 use planner::filming::side_camera;
 use planner::process::PlannerConfig;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
@@ -48,7 +48,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     let judged = |wiggle: &WiggleConfig| {
         judge(wiggle, &limits, &camera, args.seed, true, threads).map_err(classify)
     };
-    crate::session::watch_interrupts().or_failed()?;
+    cli_output::watch_interrupts().or_failed()?;
     let mut rows: Vec<(&'static str, JudgedWiggle)> = vec![
         ("configured", judged(&config.wiggle)?),
         ("paper", judged(&papers(&config.wiggle))?),

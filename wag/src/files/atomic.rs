@@ -85,7 +85,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
 fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
     match Target::of(path)? {
         Target::StandardOutput => {
-            crate::output::data(bytes);
+            cli_output::output::data(bytes);
             Ok(())
         }
         Target::Stream(real) => {

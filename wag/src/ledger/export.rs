@@ -1,7 +1,7 @@
 //! Runs as a table for people and as CSV.
 
 use super::{Entry, RunResult};
-use crate::table;
+use cli_output::table;
 use comfy_table::Table;
 use shared_types::rope::RANGES;
 

@@ -3,10 +3,10 @@
 
 use super::arm::{ArmLink, execute};
 use super::observe::Film;
-use crate::progress::Stage;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
 use arm_model::{JointTrajectory, JointVector, Limits};
+use cli_output::Stage;
 use rustix::time::{ClockId, clock_gettime};
 use shared_types::ipc::message::{CalmOrder, PlannerEvent, PlannerRequest, PlannerRpc};
 use shared_types::ipc::rpc::RpcClient;

@@ -1,10 +1,10 @@
 //! Filming a motion: the camera records while the arm streams.
 
 use super::arm::{ArmLink, MotionSpan, execute};
-use crate::progress::Stage;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
 use arm_model::JointTrajectory;
+use cli_output::Stage;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc};
 use shared_types::ipc::rpc::RpcClient;
 use std::time::Duration;

@@ -1,8 +1,8 @@
 //! The folder of one run: results, configurations as used, logs.
 
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::ledger::{COMMAND_FILE, CommandLine};
 use anyhow::{Context, anyhow};
+use cli_output::{Failure, OrInput, Outcome};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 

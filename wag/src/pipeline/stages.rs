@@ -2,9 +2,9 @@
 //! scoring.
 
 use super::observe::Film;
-use crate::progress::Stage;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
+use cli_output::Stage;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, IdentifyRequest, PlannerEvent, PlannerRequest,
     PlannerRpc, RopeAppearance, ScoreResult, StrikeOrder,

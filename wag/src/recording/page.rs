@@ -3,7 +3,7 @@
 use super::explanation::{Explanation, Late, Row, Stop};
 use super::flight::WorstJoint;
 use super::margins::Margin;
-use crate::table;
+use cli_output::table;
 use comfy_table::Table;
 use std::fmt::Write;
 

@@ -3,25 +3,13 @@
 
 use super::{DeadMan, ProcessSpec, Recorder, RunFile, Supervisor};
 use crate::recording::{RecordingReport, RecordingThread};
-use anyhow::{Context, anyhow, bail};
+use anyhow::{anyhow, bail};
+use cli_output::interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// Lets Ctrl-C and SIGTERM end the command in order instead of at once.
-pub fn watch_interrupts() -> anyhow::Result<()> {
-    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst))
-        .context("cannot watch for Ctrl-C")
-}
-
-/// The flag that Ctrl-C and SIGTERM set.
-pub fn interrupted() -> &'static AtomicBool {
-    &INTERRUPTED
-}
 
 /// Errors of a wait: either the transport's or what the session noticed.
 #[derive(Debug)]
@@ -137,7 +125,7 @@ impl Session {
         } else {
             self.supervisor.check()?;
         }
-        if INTERRUPTED.load(Ordering::SeqCst) {
+        if interrupted().load(Ordering::SeqCst) {
             bail!("interrupted; the arm was told to stop and all processes were ended");
         }
         Ok(())

@@ -7,7 +7,7 @@ mod run_file;
 mod supervisor;
 
 use dead_man::DeadMan;
-pub use live::{Session, interrupted, watch_interrupts};
+pub use live::Session;
 pub use recorder::Recorder;
 use run_file::RunFile;
 pub use supervisor::{ProcessSpec, Supervisor};

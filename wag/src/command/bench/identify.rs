@@ -1,13 +1,13 @@
 //! `wag bench identify`: time to identify one rope, by method, on all cores.
 
-use super::machine::Machine;
 use super::spent::least;
 use crate::cli::BenchArgs;
 use crate::command::network::{network, with_network};
 use crate::config;
-use crate::failure::{OrInput, Outcome};
-use crate::progress::Stage;
-use crate::table::numbers;
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{OrInput, Outcome};
 use planner::filming::Filmed;
 use planner::process::PlannerConfig;
 use planner::sysid::{IdentifyOptions, Method};

@@ -1,12 +1,12 @@
 //! `wag bench track --live`: time per frame of the tracker that sees each frame once.
 
-use super::machine::Machine;
 use super::spent::least;
-use crate::failure::{OrInput, Outcome};
-use crate::progress::Stage;
 use camera_ingest::source::{StereoSource, read_left};
 use camera_ingest::track::OnePass;
 use camera_ingest::{ClampPath, TrackOptions};
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
 use shared_types::StereoCamera;
 use std::path::Path;

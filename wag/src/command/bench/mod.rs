@@ -5,7 +5,6 @@
 
 mod identify;
 mod live;
-mod machine;
 mod plan;
 mod record;
 mod rope;
@@ -14,7 +13,7 @@ mod spent;
 mod track;
 
 use crate::cli::{BenchArgs, BenchName};
-use crate::failure::Outcome;
+use cli_output::Outcome;
 use serde_json::Value;
 
 /// Runs a benchmark. The value is what `--json` prints.

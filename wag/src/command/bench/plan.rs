@@ -1,13 +1,13 @@
 //! `wag bench plan`: time to plan one throw of each task, and what it is spent on.
 
-use super::machine::Machine;
 use super::spent::least;
 use crate::cli::BenchArgs;
 use crate::config;
-use crate::failure::{OrInput, Outcome};
-use crate::progress::Stage;
-use crate::table::numbers;
 use arm_model::Limits;
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::ropes::random_rope;
 use planner::tasks::{

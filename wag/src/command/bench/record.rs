@@ -4,18 +4,19 @@
 //! time with the recorder beside it (without, with, with, without, ...), while the
 //! simulated camera publishes. Both see the same machine and the same load.
 
-use super::machine::Machine;
 use crate::cli::BenchArgs;
 use crate::config;
-use crate::failure::{OrInput, Outcome};
 use crate::files;
 use crate::mcap_file::RUN_FILE;
 use crate::pipeline::{self, ArmLink, RunFolder};
-use crate::progress::Stage;
-use crate::session::{Session, watch_interrupts};
-use crate::table;
+use crate::session::Session;
 use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table;
+use cli_output::watch_interrupts;
+use cli_output::{OrInput, Outcome};
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;

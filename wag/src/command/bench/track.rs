@@ -1,16 +1,16 @@
 //! `wag bench track`: time per frame of each stage of tracking a recorded wiggle, on
 //! one core, and the memory it takes.
 
-use super::machine::Machine;
 use super::spent::{Spent, least};
 use crate::cli::{BenchArgs, MotionArgs, SceneArgs};
 use crate::command::filmed::ClampMotion;
-use crate::failure::{Failure, OrInput, Outcome};
-use crate::progress::Stage;
-use crate::table::numbers;
 use anyhow::anyhow;
 use camera_ingest::source::{FrameSource, StereoSource, read_left};
 use camera_ingest::{ClampPath, TrackOptions, load_camera, open_video, track};
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{Failure, OrInput, Outcome};
 use serde_json::{Map, Value, json};
 use shared_types::StereoCamera;
 use std::path::Path;

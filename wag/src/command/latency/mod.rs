@@ -9,12 +9,12 @@ mod recorded;
 mod show;
 
 use crate::cli::LatencyArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
 use anyhow::{Context, anyhow};
 use arm_model::response::Excitation;
 use arm_model::{ArmResponse, JOINTS, JointResponse};
+use cli_output::Stage;
+use cli_output::{Failure, OrInput, Outcome};
 use planner::response::delay::{TargetDelay, command_to_target};
 use planner::response::{Recording, Sample, Setpoint, identify};
 use rt_controller::relay::Latencies;

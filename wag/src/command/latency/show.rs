@@ -1,9 +1,9 @@
 //! The result for people and for programs.
 
 use super::{Evidence, Findings, known_joints};
-use crate::table;
 use arm_model::JointResponse;
 use arm_model::response::{Estimate, NotExcited, TrackingLag};
+use cli_output::table;
 use comfy_table::Table;
 use serde_json::{Value, json};
 use shared_types::ipc::message::{LatencyReport, Percentiles};

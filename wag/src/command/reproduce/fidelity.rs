@@ -4,13 +4,13 @@
 use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
-use crate::session::interrupted;
-use crate::table::numbers;
 use anyhow::{Context, anyhow};
 use arm_model::{JointTrajectory, Limits};
+use cli_output::Stage;
+use cli_output::interrupted;
+use cli_output::table::numbers;
+use cli_output::{Failure, OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::tasks::{Belief, PlanOptions, PlanRequest, plan_throw};
 use planner::trials::{FidelityConfig, FidelityRow, middle_rope};

@@ -1,11 +1,11 @@
 //! Trials kept in a file, so that none is made twice.
 
 use crate::cli::ReproduceArgs;
-use crate::failure::{Failure, OrInput, Outcome};
 use crate::files;
-use crate::progress::Stage;
-use crate::session::interrupted;
 use anyhow::{Context, anyhow};
+use cli_output::Stage;
+use cli_output::interrupted;
+use cli_output::{Failure, OrInput, Outcome};
 use planner::sysid::IdentifyOptions;
 use planner::trials::{Trial, TrialRig, run};
 use serde::de::DeserializeOwned;

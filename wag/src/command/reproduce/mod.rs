@@ -18,7 +18,7 @@ mod sysid;
 mod wiggles;
 
 use crate::cli::{ReproduceArgs, ReproduceName};
-use crate::failure::Outcome;
+use cli_output::Outcome;
 use serde_json::Value;
 
 /// Ropes of a result of identification.

@@ -8,8 +8,8 @@ use super::kept::trials;
 use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::ReproduceArgs;
-use crate::failure::Outcome;
-use crate::progress::Stage;
+use cli_output::Outcome;
+use cli_output::Stage;
 use planner::trials::{Trial, area_under_curve, outside_rope, trial_rope};
 use serde_json::{Value, json};
 

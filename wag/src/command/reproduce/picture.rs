@@ -1,8 +1,8 @@
 //! A result as a picture: how many trials lie below each value, and what the paper has.
 
-use crate::failure::{OrInput, Outcome};
 use crate::files;
 use anyhow::anyhow;
+use cli_output::{OrInput, Outcome};
 use plotters::prelude::*;
 use shared_types::VERSION;
 use std::path::{Path, PathBuf};

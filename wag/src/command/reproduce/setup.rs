@@ -4,7 +4,7 @@ use crate::cli::ReproduceArgs;
 use crate::command::identify::method_of;
 use crate::command::network::with_network;
 use crate::config;
-use crate::failure::{OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::sysid::IdentifyOptions;
 use planner::trials::TrialRig;
@@ -22,7 +22,7 @@ impl Setup {
         let config = config::built_in::<PlannerConfig>().or_failed()?;
         let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
         with_network(&mut rig, method, args.model.as_deref())?;
-        crate::session::watch_interrupts().or_failed()?;
+        cli_output::watch_interrupts().or_failed()?;
         Ok(Self {
             rig,
             options: IdentifyOptions {

@@ -8,10 +8,10 @@ use super::kept::{Sequence, kept_trials};
 use super::picture::{Curve, Picture};
 use super::setup::Setup;
 use crate::cli::{MethodName, ReproduceArgs};
-use crate::failure::{Failure, OrInput, Outcome};
-use crate::progress::Stage;
-use crate::table::numbers;
 use anyhow::anyhow;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{Failure, OrInput, Outcome};
 use planner::trials::{
     AblatedWiggle, SysidSummary, Trial, TrialRig, ablated_wiggles, run as trials, summarise,
     trial_rope,

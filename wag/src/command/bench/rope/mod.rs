@@ -7,10 +7,10 @@ mod report;
 mod scaling;
 mod workload;
 
-use super::machine::Machine;
 use crate::cli::BenchArgs;
-use crate::failure::{OrInput, Outcome};
-use crate::progress::Stage;
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::{OrInput, Outcome};
 use serde::Serialize;
 use serde_json::Value;
 use workload::Workload;

@@ -2,7 +2,7 @@
 
 use super::Report;
 use super::jobs::JobRow;
-use crate::table::numbers;
+use cli_output::table::numbers;
 
 impl Report {
     /// Prints all tables on standard output.

@@ -9,10 +9,10 @@ mod cyclictest;
 mod load;
 mod report;
 
-use super::machine::Machine;
 use crate::cli::BenchArgs;
-use crate::failure::{Failure, OrInput, Outcome};
-use crate::progress::Stage;
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::{Failure, OrInput, Outcome};
 use cyclictest::{Cyclictest, CyclictestError};
 use load::Load;
 use report::{Beside, Percentiles, Report};

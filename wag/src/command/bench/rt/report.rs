@@ -1,7 +1,7 @@
 //! The figures of the real-time benchmark.
 
-use crate::command::bench::machine::Machine;
-use crate::table::numbers;
+use cli_output::Machine;
+use cli_output::table::numbers;
 use serde::Serialize;
 
 /// Our wake-up error may be this many times that of `cyclictest`.

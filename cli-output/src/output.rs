@@ -9,16 +9,24 @@ use std::fmt;
 use std::io::{self, ErrorKind, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// As the standard one, without its panic.
+#[macro_export]
 macro_rules! print {
     ($($arg:tt)*) => { $crate::output::text(format_args!($($arg)*)) };
 }
+/// As the standard one, without its panic.
+#[macro_export]
 macro_rules! println {
     () => { $crate::output::text(format_args!("\n")) };
     ($($arg:tt)*) => { $crate::output::line(format_args!($($arg)*)) };
 }
+/// As the standard one, without its panic.
+#[macro_export]
 macro_rules! eprint {
     ($($arg:tt)*) => { $crate::output::aside(format_args!($($arg)*)) };
 }
+/// As the standard one, without its panic.
+#[macro_export]
 macro_rules! eprintln {
     ($($arg:tt)*) => { $crate::output::aside(format_args!("{}\n", format_args!($($arg)*))) };
 }

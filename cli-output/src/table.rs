@@ -53,7 +53,7 @@ pub fn number(value: f64, std_dev: Option<f64>) -> String {
 
 /// A standard deviation, or that the observation says nothing.
 pub fn std_dev(value: Option<f64>) -> String {
-    value.map_or_else(|| "not seen".to_owned(), |s| number(s, Some(s)))
+    value.map_or_else(|| "not identifiable".to_owned(), |s| number(s, Some(s)))
 }
 
 #[cfg(test)]
@@ -68,6 +68,6 @@ mod tests {
         assert_eq!(number(23.0, None), "23.00");
         assert_eq!(number(12_345.6, Some(250.0)), "12346");
         assert_eq!(number(0.0, None), "0.0");
-        assert_eq!(std_dev(None), "not seen");
+        assert_eq!(std_dev(None), "not identifiable");
     }
 }

@@ -1,0 +1,34 @@
+//! What the project's command-line programs share: text and JSON on the standard
+//! streams, tables, progress, failures with their exit codes.
+//!
+//! `#[macro_use] extern crate cli_output;` puts this crate's `print!`, `println!`,
+//! `eprint!` and `eprintln!` in the place of the standard ones.
+//!
+//! Exit codes: 0 done, 1 ran and failed, 2 bad usage or input.
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        reason = "tests may fail loudly"
+    )
+)]
+
+// First: its macros stand for the standard ones everywhere below.
+#[macro_use]
+pub mod output;
+
+mod failure;
+mod interrupt;
+mod machine;
+mod program;
+mod progress;
+pub mod table;
+
+pub use failure::{Failure, OrInput, Outcome};
+pub use interrupt::{interrupted, watch_interrupts};
+pub use machine::Machine;
+pub use program::{finish, refuse_usage, seed, start_logging};
+pub use progress::Stage;

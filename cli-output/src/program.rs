@@ -1,0 +1,84 @@
+//! How a program begins and ends: its log, a wrong command line, its exit code.
+
+use crate::{Outcome, output};
+use serde_json::{Value, json};
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::prelude::*;
+
+/// A seed on the command line.
+///
+/// # Errors
+/// What a seed is.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
+}
+
+/// Prints what `--json` asks for, and why the command failed; returns the exit code.
+pub fn finish(outcome: Outcome<Option<Value>>, json: bool) -> ExitCode {
+    let code = match outcome {
+        Ok(result) => {
+            if let Some(value) = result.filter(|_| json) {
+                output::object(&value);
+            }
+            0
+        }
+        Err(failure) => {
+            if json {
+                output::object(&json!({ "ok": false, "error": failure.to_string() }));
+            }
+            eprintln!("error: {failure}");
+            failure.exit_code()
+        }
+    };
+    ExitCode::from(match output::failure() {
+        Some(reason) => {
+            eprintln!("error: cannot write to standard output: {reason}");
+            code.max(1)
+        }
+        None => code,
+    })
+}
+
+/// Help, version or a wrong command line; `--json` counts even there.
+pub fn refuse_usage(error: &clap::Error) -> ExitCode {
+    let text = error.render();
+    if !error.use_stderr() {
+        print!("{text}");
+        return ExitCode::SUCCESS;
+    }
+    if std::env::args_os().any(|arg| arg == "--json") {
+        let text = text.to_string();
+        let said = text.trim().strip_prefix("error: ").unwrap_or(&text);
+        output::object(&json!({ "ok": false, "error": said }));
+    }
+    if std::io::stderr().is_terminal() {
+        eprint!("{}", text.ansi());
+    } else {
+        eprint!("{text}");
+    }
+    ExitCode::from(2)
+}
+
+/// Logs to standard error; `WAG_LOG` sets the filter (`debug`, `planner=trace`).
+pub fn start_logging(verbose: u8) {
+    let default = match verbose {
+        0 => "warn,iceoryx2=error,tract_onnx=error",
+        1 => "info,iceoryx2=error,tract_onnx=error",
+        _ => "debug",
+    };
+    let filter: Targets = std::env::var("WAG_LOG")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or_else(|| default.parse().unwrap_or_default());
+    tracing_subscriber::registry()
+        .with(filter)
+        .with(
+            tracing_subscriber::fmt::layer()
+                .with_writer(std::io::stderr)
+                .with_ansi(std::io::stderr().is_terminal()),
+        )
+        .init();
+}
