@@ -2,12 +2,12 @@
 //! bottom as the data flows.
 
 use super::demo_summary::{DemoRecord, show};
+use super::explain::explain_stop;
 use super::plan::{clear_of_arm, describe, warnings, write_trajectory_csv};
 use crate::cli::{DemoArgs, TaskName};
 use crate::config;
 use crate::files;
 use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder, Shot};
-use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::report;
 use crate::session::Session;
 use anyhow::{Context, anyhow};
@@ -22,6 +22,7 @@ use planner::tasks::check_reach;
 use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use run_log::CYCLES_FILE;
 use serde_json::Value;
 use shared_types::ipc::message::{
     CameraRpc, PlannerRpc, RigEvent, RigRequest, RigRpc, ScoreResult, StrikeOrder,

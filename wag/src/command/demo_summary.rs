@@ -1,10 +1,10 @@
 //! What a demo keeps and shows: every stage's figures, and the truth apart.
 
 use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
-use crate::recording::RecordingReport;
 use anyhow::bail;
 use cli_output::table;
 use comfy_table::Table;
+use run_log::RecordingReport;
 use serde::Serialize;
 use shared_types::ipc::message::{LatencyReport, Percentiles, RigEvent, ScoreResult};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};

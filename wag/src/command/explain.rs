@@ -1,10 +1,11 @@
 //! `wag explain`: why a run was stopped, or how close it came to its limits.
 
 use crate::cli::ExplainArgs;
-use crate::recording::{Flight, explain, read_recording, show};
 use anyhow::Context;
 use cli_output::{OrInput, Outcome};
+use run_log::{Flight, explain, keep_cause, read_recording, show};
 use serde_json::{Value, json};
+use std::path::Path;
 
 pub fn run(args: &ExplainArgs, quiet: bool) -> Outcome<Option<Value>> {
     let bytes = read_recording(&args.run).or_input()?;
@@ -18,4 +19,14 @@ pub fn run(args: &ExplainArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(
         json!({ "ok": true, "command": "explain", "run": args.run, "explanation": found }),
     ))
+}
+
+/// Keeps the explanation of a run that was stopped and shows it, unless `quiet`.
+pub fn explain_stop(run: &Path, quiet: bool) {
+    if let Some(found) = keep_cause(run)
+        && found.stopped
+        && !quiet
+    {
+        eprint!("{}", show(&found));
+    }
 }

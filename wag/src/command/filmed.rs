@@ -2,12 +2,12 @@
 
 use crate::cli::SceneArgs;
 use crate::files::{self, JointsCsv};
-use crate::mcap_file::{RUN_FILE, RunFilm};
 use anyhow::{Context, anyhow, ensure};
 use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
 use cli_output::{OrInput, Outcome};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
+use run_log::{RUN_FILE, RunFilm};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 

@@ -139,7 +139,7 @@ pub fn write_trajectory_csv(
         let t = f64::from(i) * period_s;
         (t, trajectory.state_at(t).q)
     });
-    files::write_joints(path, rows)
+    Ok(files::write_joints(path, rows)?)
 }
 
 /// Bad requests are the caller's; everything else is a failure of the work.

@@ -5,7 +5,7 @@
 
 use crate::cli::{ProcessArgs, ProcessName};
 use crate::files;
-use crate::mcap_file;
+use crate::session::simulated_rope;
 use anyhow::Context;
 use cli_output::{OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
@@ -93,6 +93,8 @@ pub fn run(args: &ProcessArgs) -> Outcome {
             camera_ingest::preview::run(&read(args).or_input()?, stop).or_failed()
         }
         ProcessName::Planner => planner::process::run(&read(args).or_input()?, stop).or_failed(),
-        ProcessName::Recorder => mcap_file::run(&read(args).or_input()?, stop).or_failed(),
+        ProcessName::Recorder => {
+            run_log::record(&read(args).or_input()?, simulated_rope, stop).or_failed()
+        }
     }
 }

@@ -2,13 +2,16 @@
 
 use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::files;
-use crate::mcap_file::{self, RUN_FILE, RecorderConfig, RunFileThread};
 use crate::pipeline::RunFolder;
-use crate::recording::{CYCLES_FILE, RecordingReport, RecordingThread, keep_cause};
+use crate::session::simulated_rope;
 use crate::watch::domain_of_run;
 use anyhow::anyhow;
 use cli_output::{Failure, OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
+use run_log::{
+    CYCLES_FILE, RUN_FILE, RecorderConfig, RecordingReport, RecordingThread, RunFileThread,
+    keep_cause,
+};
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::sync::atomic::Ordering;
@@ -16,7 +19,7 @@ use std::time::{Duration, Instant};
 
 /// `wag record recover`: a file without its end becomes a whole one.
 fn recover(args: &RecoverArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let found = mcap_file::recover(&args.file).or_input()?;
+    let found = run_log::recover(&args.file).or_input()?;
     if !quiet {
         let file = args.file.display();
         if found.was_whole {
@@ -58,7 +61,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
     let thread = RecordingThread::start(&domain, &folder.file(CYCLES_FILE)).or_failed()?;
     let config = RecorderConfig::of_run(&domain, folder.path(), &limits);
-    let file = RunFileThread::start(config).or_failed()?;
+    let file = RunFileThread::start(config, simulated_rope).or_failed()?;
     if !quiet {
         println!(
             "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",

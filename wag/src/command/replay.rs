@@ -2,10 +2,10 @@
 //! compares every record, bit by bit.
 
 use crate::cli::ReplayArgs;
-use crate::recording::{Flight, explain, read_recording};
 use anyhow::{Context, anyhow};
 use cli_output::{Failure, OrInput, Outcome};
 use rt_controller::recording::{Gap, Replay, replay};
+use run_log::{Flight, explain, read_recording};
 use serde_json::{Value, json};
 
 pub fn run(args: &ReplayArgs, quiet: bool) -> Outcome<Option<Value>> {

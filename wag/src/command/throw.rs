@@ -3,16 +3,17 @@
 use super::area::require_clear_area;
 use super::check::read_plan;
 use super::dry_run;
+use super::explain::explain_stop;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::files;
 use crate::pipeline::{self, ArmAddress, RunFolder};
-use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::Session;
 use anyhow::anyhow;
 use arm_model::{JointTrajectory, Limits};
 use cli_output::Stage;
 use cli_output::watch_interrupts;
 use cli_output::{Failure, OrInput, Outcome};
+use run_log::CYCLES_FILE;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 use std::path::Path;

@@ -90,7 +90,9 @@ pub fn read(run: &Path) -> Entry {
     let mut damage = Vec::new();
     let summary = part(run, "summary.json", &mut damage, json);
     let plan = part(run, "plan.json", &mut damage, read_plan);
-    let rope = part(run, "params.toml", &mut damage, files::read_rope);
+    let rope = part(run, "params.toml", &mut damage, |path| {
+        Ok(files::read_rope(path)?)
+    });
     let cause = part(run, "cause.json", &mut damage, json).unwrap_or_default();
     let line = part(run, super::COMMAND_FILE, &mut damage, |_| {
         CommandLine::read(run)

@@ -3,7 +3,6 @@
 use super::{ArmLink, RunFolder, STARTUP};
 use crate::config;
 use crate::files;
-use crate::mcap_file::RecorderConfig;
 use crate::session::{ProcessSpec, Session};
 use anyhow::{Context, anyhow, bail};
 use arm_model::Limits;
@@ -14,6 +13,7 @@ use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use rt_controller::ControllerConfig;
 use rt_controller::set_up::OnDifference;
+use run_log::RecorderConfig;
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{
     CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigEvent, RigRequest,

@@ -85,7 +85,7 @@ impl RunFolder {
 /// tells nothing and is in the way of the next try.
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        let cycles = self.file(crate::recording::CYCLES_FILE);
+        let cycles = self.file(run_log::CYCLES_FILE);
         if cycles.metadata().is_ok_and(|file| file.len() == 0) {
             let _ = std::fs::remove_file(cycles);
         }
@@ -111,7 +111,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("run");
         let folder = RunFolder::create(Some(&out), "test").unwrap();
-        std::fs::write(folder.file(crate::recording::CYCLES_FILE), "").unwrap();
+        std::fs::write(folder.file(run_log::CYCLES_FILE), "").unwrap();
         assert!(out.join("log").is_dir());
         drop(folder);
         assert!(!out.exists());

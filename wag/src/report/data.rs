@@ -1,8 +1,8 @@
 //! What a report holds, as the page's script reads it.
 
-use crate::recording::Explanation;
 use arm_model::JOINTS;
 use arm_model::limits::Margin;
+use run_log::Explanation;
 use serde::Serialize;
 use serde_json::Value;
 

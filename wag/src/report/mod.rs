@@ -14,14 +14,13 @@ mod read;
 mod replay;
 mod rope;
 
-pub use data::Histogram;
+pub use data::{Histogram, Scene};
 pub use latency::histogram;
 pub use page::{PLOTS, STYLE, VIEW};
 pub use replay::{arm_points, tenths_mm};
 
 use crate::files;
 use anyhow::ensure;
-use data::Scene;
 use page::SIZE_MAX_BYTES;
 use std::path::{Path, PathBuf};
 

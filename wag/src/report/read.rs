@@ -6,8 +6,8 @@ use super::replay::{Known, scene};
 use super::{latency, pictures, rope};
 use crate::command::check::read_plan;
 use crate::files;
-use crate::recording::{CYCLES_FILE, Flight, explain, show};
 use anyhow::{Context, ensure};
+use run_log::{CYCLES_FILE, Flight, explain, show};
 use serde_json::Value;
 use std::path::Path;
 

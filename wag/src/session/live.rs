@@ -2,9 +2,9 @@
 //! operator's heartbeat, the recorder, and what to show meanwhile.
 
 use super::{DeadMan, ProcessSpec, Recorder, RunFile, Supervisor};
-use crate::recording::{RecordingReport, RecordingThread};
 use anyhow::{anyhow, bail};
 use cli_output::interrupted;
+use run_log::{RecordingReport, RecordingThread};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};

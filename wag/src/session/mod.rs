@@ -10,4 +10,5 @@ use dead_man::DeadMan;
 pub use live::Session;
 pub use recorder::Recorder;
 use run_file::RunFile;
+pub use run_file::simulated_rope;
 pub use supervisor::{ProcessSpec, Supervisor};

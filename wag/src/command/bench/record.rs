@@ -7,7 +7,6 @@
 use crate::cli::BenchArgs;
 use crate::config;
 use crate::files;
-use crate::mcap_file::RUN_FILE;
 use crate::pipeline::{self, ArmLink, RunFolder};
 use crate::session::Session;
 use anyhow::{Context, ensure};
@@ -20,6 +19,7 @@ use cli_output::{OrInput, Outcome};
 use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
+use run_log::RUN_FILE;
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared_types::MotionTier;

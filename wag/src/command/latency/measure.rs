@@ -3,9 +3,9 @@
 use super::Evidence;
 use crate::cli::LatencyArgs;
 use crate::command::area::require_clear_area;
+use crate::command::explain::explain_stop;
 use crate::files;
 use crate::pipeline::{self, ArmAddress, RunFolder};
-use crate::recording::{CYCLES_FILE, explain_stop};
 use crate::session::Session;
 use anyhow::anyhow;
 use arm_model::response::Excitation;
@@ -14,6 +14,7 @@ use cli_output::Stage;
 use cli_output::watch_interrupts;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::response::excitation::sweep;
+use run_log::CYCLES_FILE;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 use std::net::IpAddr;

@@ -60,7 +60,7 @@ impl<T: Serialize + DeserializeOwned> Kept<T> {
     }
 
     fn write(&self, path: Option<&PathBuf>) -> anyhow::Result<()> {
-        path.map_or(Ok(()), |path| files::write_json(path, self))
+        path.map_or(Ok(()), |path| Ok(files::write_json(path, self)?))
     }
 }
 

@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 use shared_types::StereoCamera;
 
 /// Optical frame of the left eye.
-pub const CAMERA_FRAME: &str = "camera_left";
+pub(super) const CAMERA_FRAME: &str = "camera_left";
 
 /// `foxglove.CameraCalibration` of the left eye.
-pub fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {
+pub(super) fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {
     let eye = &camera.left;
     let (cx, cy) = (eye.cx, eye.cy);
     json!({
@@ -24,7 +24,7 @@ pub fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {
 }
 
 /// Its place in the world.
-pub fn place(at_ns: u64, camera: &StereoCamera) -> Value {
+pub(super) fn place(at_ns: u64, camera: &StereoCamera) -> Value {
     transform(
         at_ns,
         BASE,

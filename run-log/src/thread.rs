@@ -1,7 +1,7 @@
 //! The thread that writes a recording.
 
-use super::writer::{ChunkFile, WriteCounts};
-use anyhow::{Context, anyhow};
+use crate::chunk_file::{ChunkFile, WriteCounts};
+use crate::{Error, Result};
 use shared_types::ipc::{Bus, ChunkSubscriber};
 use std::fs::File;
 use std::path::Path;
@@ -27,12 +27,15 @@ pub struct RecordingThread {
 impl RecordingThread {
     /// Begins to record what the controller of `domain` publishes, now or later.
     /// Returns when nothing can be missed any more.
-    pub fn start(domain: &str, path: &Path) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// The file cannot be written, or shared memory cannot be joined.
+    pub fn start(domain: &str, path: &Path) -> Result<Self> {
         let file = File::options()
             .write(true)
             .create_new(true)
             .open(path)
-            .with_context(|| format!("cannot write `{}`", path.display()))?;
+            .map_err(Error::write(path))?;
         let stop = Arc::new(AtomicBool::new(false));
         let (ready, wait) = mpsc::channel();
         let (domain, stopped) = (domain.to_owned(), Arc::clone(&stop));
@@ -55,9 +58,11 @@ impl RecordingThread {
         let thread = std::thread::Builder::new()
             .name("recording".to_owned())
             .spawn(body)
-            .context("cannot start the recording thread")?;
+            .map_err(|reason| {
+                Error::Recorder(format!("cannot start the recording thread: {reason}"))
+            })?;
         wait.recv()
-            .map_err(|_gone| anyhow!("the recording thread ended at once"))??;
+            .map_err(|_gone| Error::Recorder("the recording thread ended at once".to_owned()))??;
         Ok(Self {
             stop,
             thread: Some(thread),

@@ -1,7 +1,7 @@
 //! Whole-file writes: a temporary file beside the target, then a rename. What is
 //! no regular file (a device, a pipe) is written to as it is.
 
-use anyhow::{Context, anyhow};
+use crate::{Error, Result};
 use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::PermissionsExt;
@@ -69,17 +69,13 @@ fn temporary(path: &Path) -> io::Result<NamedTempFile> {
         .map_err(|e| io::Error::from(e.kind()))
 }
 
-fn cannot_write(path: &Path) -> String {
-    format!(
-        "cannot write `{}`; check that its folder exists and is writable",
-        path.display()
-    )
-}
-
 /// Writes `bytes` to `path` so that a reader sees the old or the new file,
 /// never a part of one. Links stay links, permissions stay as they are.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    put(path, bytes).with_context(|| cannot_write(path))
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
+    put(path, bytes).map_err(Error::write(path))
 }
 
 fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -107,20 +103,24 @@ fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Finds out before any work whether its result can be written to `path`.
-pub fn check_writable(path: &Path) -> anyhow::Result<()> {
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn check_writable(path: &Path) -> Result<()> {
     let tried = match Target::of(path) {
         // A pipe without a reader would block here; a device answers when written.
         Ok(Target::StandardOutput | Target::Stream(_)) => Ok(()),
         Ok(Target::File(real, _)) => temporary(&real).map(drop),
         Err(e) => Err(e),
     };
-    tried
-        .map_err(|e| anyhow!(e))
-        .with_context(|| cannot_write(path))
+    tried.map_err(Error::write(path))
 }
 
 /// Writes `value` as indented JSON with a final newline.
-pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> anyhow::Result<()> {
+///
+/// # Errors
+/// The value is none that JSON knows, or [`Error::Write`].
+pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<()> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
     write_atomic(path, text.as_bytes())
@@ -139,7 +139,8 @@ mod tests {
         let path = dir.path().join("a.json");
         write_json(&path, &[1, 2]).unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "[\n  1,\n  2\n]\n");
-        let error = write_atomic(&dir.path().join("none/b"), b"x").unwrap_err();
+        let error =
+            anyhow::Error::from(write_atomic(&dir.path().join("none/b"), b"x").unwrap_err());
         assert!(error.to_string().contains("none/b"), "{error}");
         assert!(!format!("{error:#}").contains("at path"), "{error:#}");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
@@ -196,11 +197,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         check_writable(&dir.path().join("new")).unwrap();
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
-        let said = format!("{:#}", check_writable(dir.path()).unwrap_err());
+        let said = format!(
+            "{:#}",
+            anyhow::Error::from(check_writable(dir.path()).unwrap_err())
+        );
         assert!(said.contains("directory"), "{said}");
         let said = format!(
             "{:#}",
-            check_writable(&dir.path().join("none/a.csv")).unwrap_err()
+            anyhow::Error::from(check_writable(&dir.path().join("none/a.csv")).unwrap_err())
         );
         assert!(
             said.contains("none/a.csv") && !said.contains("at path"),

@@ -1,7 +1,8 @@
 //! `rope.toml`: nine parameters, with their uncertainty when they were identified.
 
 use super::{read_text, write_atomic};
-use anyhow::Context;
+use crate::Result;
+use crate::error::At;
 use shared_types::rope::{RANGES, RopeEstimate, RopeParams, RopePosterior};
 use std::fmt::Write;
 use std::path::Path;
@@ -11,30 +12,39 @@ const BESIDE: [&str; 4] = ["uncertainty", "interval_90", "fit", "posterior"];
 
 /// Reads the nine parameters; the tables of an identified rope are allowed and left
 /// alone, any other unknown key is refused.
-pub fn read_rope(path: &Path) -> anyhow::Result<RopeParams> {
+///
+/// # Errors
+/// The file cannot be read, or a value is missing or out of range.
+pub fn read_rope(path: &Path) -> Result<RopeParams> {
     let fail = || format!("rope file `{}`", path.display());
-    let mut table: toml::Table = toml::from_str(&read_text(path)?).with_context(fail)?;
+    let mut table: toml::Table = toml::from_str(&read_text(path)?).at(fail)?;
     for beside in BESIDE {
         table.remove(beside);
     }
-    let rope: RopeParams = table.try_into().with_context(fail)?;
-    rope.validate().with_context(fail)?;
+    let rope: RopeParams = table.try_into().at(fail)?;
+    rope.validate().at(fail)?;
     Ok(rope)
 }
 
 /// Reads what was left open when the rope was identified; `None` for a rope that was
 /// not.
-pub fn read_posterior(path: &Path) -> anyhow::Result<Option<RopePosterior>> {
+///
+/// # Errors
+/// The file cannot be read, or its table is not as it should be.
+pub fn read_posterior(path: &Path) -> Result<Option<RopePosterior>> {
     let fail = || format!("rope file `{}`, table `posterior`", path.display());
-    let mut table: toml::Table = toml::from_str(&read_text(path)?).with_context(fail)?;
+    let mut table: toml::Table = toml::from_str(&read_text(path)?).at(fail)?;
     let Some(posterior) = table.remove("posterior") else {
         return Ok(None);
     };
-    Ok(Some(posterior.try_into().with_context(fail)?))
+    Ok(Some(posterior.try_into().at(fail)?))
 }
 
 /// Writes an identified rope.
-pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> anyhow::Result<()> {
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> Result<()> {
     let mut text = format!(
         "# Rope parameters identified by wag {}; SI units, radians.\n",
         shared_types::VERSION
@@ -152,7 +162,7 @@ mod tests {
         let good = toml::to_string(&estimate().params).unwrap();
         let refused = |text: &str| {
             std::fs::write(&path, text).unwrap();
-            format!("{:#}", read_rope(&path).unwrap_err())
+            format!("{:#}", anyhow::Error::from(read_rope(&path).unwrap_err()))
         };
         let missing = refused(&good.replace("length_m = 0.55\n", ""));
         assert!(

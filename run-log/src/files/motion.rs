@@ -1,8 +1,8 @@
 //! Joint and pose motion as CSV files.
 
-use anyhow::{Context, bail, ensure};
+use crate::error::At;
+use crate::{Error, Result};
 use arm_model::{JOINTS, JointVector};
-use rope_sim::PoseRow;
 use std::path::Path;
 
 /// Joint samples: times (s) and positions (rad).
@@ -16,56 +16,65 @@ pub struct JointsCsv {
 
 /// Reads a CSV whose first columns are those of `header`, all numbers finite
 /// and the first one increasing.
-fn read_table(path: &Path, header: &[&str]) -> anyhow::Result<Vec<Vec<f64>>> {
+fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
     let name = path.display();
+    let wrong = |problem: String| Error::Table {
+        path: path.to_owned(),
+        problem,
+    };
+    let file = std::fs::File::open(path).map_err(Error::read(path))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .from_path(path)
-        .with_context(|| format!("cannot read `{name}`; check the path and its permissions"))?;
+        .from_reader(file);
     let found = reader
         .headers()
-        .with_context(|| format!("`{name}` is not a CSV file"))?
+        .at(|| format!("`{name}` is not a CSV file"))?
         .clone();
     let matches = found.len() >= header.len() && header.iter().zip(&found).all(|(a, b)| *a == b);
-    ensure!(
-        matches,
-        "`{name}`: the first line must name the columns {}, found {}",
-        header.join(","),
-        found.iter().collect::<Vec<_>>().join(",")
-    );
+    if !matches {
+        return Err(wrong(format!(
+            ": the first line must name the columns {}, found {}",
+            header.join(","),
+            found.iter().collect::<Vec<_>>().join(",")
+        )));
+    }
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let line = i + 2;
-        let record = record.with_context(|| format!("`{name}` line {line}"))?;
+        let record = record.at(|| format!("`{name}` line {line}"))?;
         let mut row = Vec::with_capacity(header.len());
         for (column, text) in header.iter().zip(&record) {
             match text.parse::<f64>() {
                 Ok(v) if v.is_finite() => row.push(v),
-                _ => bail!(
-                    "`{name}` line {line}, column `{column}`: `{text}` is not a finite number"
-                ),
+                _ => {
+                    return Err(wrong(format!(
+                        " line {line}, column `{column}`: `{text}` is not a finite number"
+                    )));
+                }
             }
         }
-        if let Some(before) = rows.last() {
-            ensure!(
-                row[0] > before[0],
-                "`{name}` line {line}: time {} s does not come after {} s",
-                row[0],
-                before[0]
-            );
+        if let Some(before) = rows.last().filter(|before| row[0] <= before[0]) {
+            return Err(wrong(format!(
+                " line {line}: time {} s does not come after {} s",
+                row[0], before[0]
+            )));
         }
         rows.push(row);
     }
-    ensure!(
-        rows.len() >= 2,
-        "`{name}` needs at least two rows of numbers, found {}",
-        rows.len()
-    );
+    if rows.len() < 2 {
+        return Err(wrong(format!(
+            " needs at least two rows of numbers, found {}",
+            rows.len()
+        )));
+    }
     Ok(rows)
 }
 
 /// Reads `t,q1..q7` (s, rad).
-pub fn read_joints(path: &Path) -> anyhow::Result<JointsCsv> {
+///
+/// # Errors
+/// The file cannot be read, or a line of it is wrong.
+pub fn read_joints(path: &Path) -> Result<JointsCsv> {
     let rows = read_table(path, &["t", "q1", "q2", "q3", "q4", "q5", "q6", "q7"])?;
     Ok(JointsCsv {
         times_s: rows.iter().map(|r| r[0]).collect(),
@@ -77,10 +86,10 @@ pub fn read_joints(path: &Path) -> anyhow::Result<JointsCsv> {
 }
 
 /// Writes `t,q1..q7` (s, rad).
-pub fn write_joints(
-    path: &Path,
-    samples: impl Iterator<Item = (f64, JointVector)>,
-) -> anyhow::Result<()> {
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_joints(path: &Path, samples: impl Iterator<Item = (f64, JointVector)>) -> Result<()> {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
     for (t, q) in samples {
         text.push_str(&format!("{t:.6}"));
@@ -92,21 +101,39 @@ pub fn write_joints(
     super::write_atomic(path, text.as_bytes())
 }
 
+/// A pose of the attach frame in the world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseSample {
+    /// Time (s).
+    pub t_s: f64,
+    /// Origin (m).
+    pub p_m: [f64; 3],
+    /// Unit quaternion w, x, y, z.
+    pub q_wxyz: [f64; 4],
+}
+
 /// Reads `t,x,y,z,qw,qx,qy,qz` (s, m, unit quaternion of the attach frame).
-pub fn read_pose(path: &Path) -> anyhow::Result<Vec<PoseRow>> {
+///
+/// # Errors
+/// The file cannot be read, or a line of it is wrong.
+pub fn read_pose(path: &Path) -> Result<Vec<PoseSample>> {
     let rows = read_table(path, &["t", "x", "y", "z", "qw", "qx", "qy", "qz"])?;
     for (i, r) in rows.iter().enumerate() {
         let norm = r[4..8].iter().map(|v| v * v).sum::<f64>().sqrt();
-        ensure!(
-            (norm - 1.0).abs() < 1e-3,
-            "`{}` line {}: quaternion qw,qx,qy,qz has length {norm:.4}, but must have length 1",
-            path.display(),
-            i + 2
-        );
+        let is_unit = (norm - 1.0).abs() < 1e-3;
+        if !is_unit {
+            return Err(Error::Table {
+                path: path.to_owned(),
+                problem: format!(
+                    " line {}: quaternion qw,qx,qy,qz has length {norm:.4}, but must have length 1",
+                    i + 2
+                ),
+            });
+        }
     }
     Ok(rows
         .iter()
-        .map(|r| PoseRow {
+        .map(|r| PoseSample {
             t_s: r[0],
             p_m: [r[1], r[2], r[3]],
             q_wxyz: [r[4], r[5], r[6], r[7]],
@@ -124,7 +151,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("j.csv");
         std::fs::write(&path, text).unwrap();
-        format!("{:#}", read_joints(&path).unwrap_err())
+        format!("{:#}", anyhow::Error::from(read_joints(&path).unwrap_err()))
     }
 
     #[test]

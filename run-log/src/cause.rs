@@ -1,6 +1,6 @@
 //! What a run folder keeps of the reasons for a stop.
 
-use super::{CAUSE_FILE, CYCLES_FILE, Explanation, Flight, explain, show};
+use super::{CAUSE_FILE, CYCLES_FILE, Explanation, Flight, explain};
 use crate::files;
 use std::path::Path;
 
@@ -17,14 +17,4 @@ pub fn keep_cause(run: &Path) -> Option<Explanation> {
         tracing::warn!(%reason, "the cause of the stop could not be kept");
     }
     Some(found)
-}
-
-/// Keeps the explanation of a run that was stopped and shows it, unless `quiet`.
-pub fn explain_stop(run: &Path, quiet: bool) {
-    if let Some(found) = keep_cause(run)
-        && found.stopped
-        && !quiet
-    {
-        eprint!("{}", show(&found));
-    }
 }

@@ -23,7 +23,7 @@ pub struct WriteCounts {
 
 /// A file that grows by whole chunks, from the first keyframe on.
 #[derive(Debug)]
-pub struct ChunkFile {
+pub(crate) struct ChunkFile {
     file: File,
     next_sequence: Option<u32>,
     /// What became of the chunks so far.
@@ -32,7 +32,7 @@ pub struct ChunkFile {
 
 impl ChunkFile {
     /// Appends to an empty file.
-    pub fn new(file: File) -> Self {
+    pub(crate) fn new(file: File) -> Self {
         Self {
             file,
             next_sequence: None,
@@ -41,7 +41,7 @@ impl ChunkFile {
     }
 
     /// Appends a chunk. What cannot be written is counted.
-    pub fn put(&mut self, bytes: &[u8]) {
+    pub(crate) fn put(&mut self, bytes: &[u8]) {
         let Front::Chunk { header, .. } = chunk::read(bytes) else {
             self.counts.lost_chunks += 1;
             return;

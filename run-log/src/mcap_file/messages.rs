@@ -14,14 +14,14 @@ use shared_types::keypoints::KeypointFrame;
 
 /// Levels of `foxglove.Log`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Level {
+pub(super) enum Level {
     Info = 2,
     Error = 4,
 }
 
 /// A tenth of a microradian or a micrometre is less than anything here is known to;
 /// the exact bits are in the recording for replay.
-pub fn round(value: f64) -> f64 {
+pub(super) fn round(value: f64) -> f64 {
     (value * 1e7).round() / 1e7
 }
 
@@ -43,17 +43,17 @@ fn joints(at_ns: u64, q: &JointVector, qd: Option<&JointVector>) -> Value {
 }
 
 /// Measured joints.
-pub fn measured(at_ns: u64, report: &JointReport) -> Value {
+pub(super) fn measured(at_ns: u64, report: &JointReport) -> Value {
     joints(at_ns, &report.q, Some(&report.qd))
 }
 
 /// Commanded joints.
-pub fn commanded(at_ns: u64, cycle: &CycleRecord) -> Value {
+pub(super) fn commanded(at_ns: u64, cycle: &CycleRecord) -> Value {
     joints(at_ns, &cycle.q_c, None)
 }
 
 /// Figures of a cycle.
-pub fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
+pub(super) fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
     let us = |ns: u32| f64::from(ns) / 1e3;
     let mut message = json!({
         "timestamp": time(at_ns),
@@ -77,7 +77,7 @@ pub fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
 }
 
 /// A line of the log.
-pub fn log(at_ns: u64, level: Level, text: &str) -> Value {
+pub(super) fn log(at_ns: u64, level: Level, text: &str) -> Value {
     json!({
         "timestamp": time(at_ns), "level": level as u32, "message": text,
         "name": "rt-controller", "file": "", "line": 0,
@@ -85,7 +85,7 @@ pub fn log(at_ns: u64, level: Level, text: &str) -> Value {
 }
 
 /// Why the arm was stopped, in a sentence or two.
-pub fn cause(record: &CauseRecord) -> String {
+pub(super) fn cause(record: &CauseRecord) -> String {
     let fault = record.fault();
     let mut text = format!("stopped in cycle {}: {fault:?}", record.cycle);
     if record.arm_error != 0 {
@@ -104,7 +104,7 @@ pub fn cause(record: &CauseRecord) -> String {
 }
 
 /// The camera's left eye.
-pub fn image(at_ns: u64, jpeg: &[u8]) -> Value {
+pub(super) fn image(at_ns: u64, jpeg: &[u8]) -> Value {
     json!({
         "timestamp": time(at_ns), "frame_id": CAMERA_FRAME, "data": STANDARD.encode(jpeg), "format": "jpeg",
     })
@@ -112,7 +112,7 @@ pub fn image(at_ns: u64, jpeg: &[u8]) -> Value {
 
 /// Keypoints: a line along the rope; nothing where it was lost. A pixel's centre is
 /// a whole number here and half a pixel farther in the viewers' count.
-pub fn keypoints(at_ns: u64, frame: &KeypointFrame) -> Value {
+pub(super) fn keypoints(at_ns: u64, frame: &KeypointFrame) -> Value {
     let points: Vec<Value> = frame
         .points_px
         .iter()

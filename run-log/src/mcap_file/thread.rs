@@ -1,7 +1,8 @@
 //! The recorder as a thread, for a command that does nothing but record.
 
 use super::recorder::{RecorderConfig, run};
-use anyhow::{Context, anyhow};
+use super::results::SimulateRope;
+use crate::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -14,7 +15,7 @@ const LOOK: Duration = Duration::from_millis(5);
 #[derive(Debug)]
 pub struct RunFileThread {
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<anyhow::Result<()>>>,
+    thread: Option<JoinHandle<Result<()>>>,
 }
 
 impl RunFileThread {
@@ -22,14 +23,16 @@ impl RunFileThread {
     ///
     /// # Errors
     /// Shared memory cannot be joined or the file cannot be written.
-    pub fn start(config: RecorderConfig) -> anyhow::Result<Self> {
+    pub fn start(config: RecorderConfig, simulate: SimulateRope) -> Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let file = config.file.clone();
         let thread = std::thread::Builder::new()
             .name("run-file".to_owned())
-            .spawn(move || run(&config, &stopped))
-            .context("cannot start the recording thread")?;
+            .spawn(move || run(&config, simulate, &stopped))
+            .map_err(|reason| {
+                Error::Recorder(format!("cannot start the recording thread: {reason}"))
+            })?;
         while !file.exists() && !thread.is_finished() {
             std::thread::sleep(LOOK);
         }
@@ -42,10 +45,10 @@ impl RunFileThread {
             Ok(started)
         } else {
             started.finish()?;
-            Err(anyhow!(
+            Err(Error::Recorder(format!(
                 "the recording of `{}` ended at once",
                 file.display()
-            ))
+            )))
         }
     }
 
@@ -53,15 +56,16 @@ impl RunFileThread {
     ///
     /// # Errors
     /// The file could not be written; what is in it can be recovered.
-    pub fn finish(mut self) -> anyhow::Result<()> {
+    pub fn finish(mut self) -> Result<()> {
         self.end()
     }
 
-    fn end(&mut self) -> anyhow::Result<()> {
+    fn end(&mut self) -> Result<()> {
         self.stop.store(true, Ordering::SeqCst);
         let ended = self.thread.take().map(JoinHandle::join);
         ended.map_or(Ok(()), |result| {
-            result.map_err(|_panic| anyhow!("the recording thread broke down"))?
+            result
+                .map_err(|_panic| Error::Recorder("the recording thread broke down".to_owned()))?
         })
     }
 }

@@ -5,7 +5,7 @@ use super::channel::Channel;
 use super::clock::{Clock, time};
 use super::scene::rope;
 use super::writer::McapFile;
-use crate::{files, report};
+use crate::{Result, files};
 use serde_json::{Value, json};
 use shared_types::MonotonicNs;
 use std::path::{Path, PathBuf};
@@ -19,16 +19,33 @@ const FILES: [(&str, Channel, &str); 3] = [
     ("summary.json", Channel::Summary, "summary"),
 ];
 
+/// The identified rope, simulated on one motion of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RopeMotion {
+    /// Time of the first frame on the run's clock (s).
+    pub begin_s: f64,
+    /// Time between frames (s).
+    pub period_s: f64,
+    /// Each frame: x, y, z of the rope's nodes in the world frame (0.1 mm).
+    pub nodes: Vec<Vec<i32>>,
+    /// Radius of the rope and of its lead (m).
+    pub radii_m: [f64; 2],
+}
+
+/// Simulates the rope of a finished run folder; this crate must not depend on a simulator.
+pub type SimulateRope =
+    fn(&Path) -> std::result::Result<Vec<RopeMotion>, Box<dyn std::error::Error + Send + Sync>>;
+
 /// Results of a run folder, each taken in once.
 #[derive(Debug)]
-pub struct Results {
+pub(super) struct Results {
     run: PathBuf,
     taken: [bool; FILES.len()],
 }
 
 impl Results {
     /// Those of `run`, none of them yet.
-    pub fn of(run: &Path) -> Self {
+    pub(super) fn of(run: &Path) -> Self {
         Self {
             run: run.to_owned(),
             taken: [false; FILES.len()],
@@ -36,7 +53,7 @@ impl Results {
     }
 
     /// Takes in what has appeared.
-    pub fn look(&mut self, file: &mut McapFile, clock: Clock) -> anyhow::Result<()> {
+    pub(super) fn look(&mut self, file: &mut McapFile, clock: Clock) -> Result<()> {
         for ((name, channel, field), taken) in FILES.into_iter().zip(&mut self.taken) {
             let path = self.run.join(name);
             if *taken || !path.is_file() {
@@ -56,25 +73,30 @@ impl Results {
     }
 
     /// The identified rope on the motions of the run, once its figures are there.
-    pub fn simulate(&self, file: &mut McapFile, clock: Clock) -> anyhow::Result<()> {
+    pub(super) fn simulate(
+        &self,
+        file: &mut McapFile,
+        clock: Clock,
+        simulate: SimulateRope,
+    ) -> Result<()> {
         let Ok(summary) = read(&self.run.join("summary.json")) else {
             return Ok(());
         };
         let Some(epoch_ns) = summary["epoch_ns"].as_u64() else {
             return Ok(());
         };
-        let scenes = match report::scenes(&self.run) {
-            Ok(scenes) => scenes,
+        let motions = match simulate(&self.run) {
+            Ok(motions) => motions,
             Err(reason) => {
                 tracing::warn!("no rope in the recording: {reason:#}");
                 return Ok(());
             }
         };
-        for scene in scenes {
-            for (index, nodes) in scene.rope.iter().enumerate().step_by(ROPE_EVERY) {
-                let t_s = scene.begin_s + scene.from_s + index as f64 * scene.period_s;
+        for motion in motions {
+            for (index, nodes) in motion.nodes.iter().enumerate().step_by(ROPE_EVERY) {
+                let t_s = motion.begin_s + index as f64 * motion.period_s;
                 let at_ns = clock.wall_ns(MonotonicNs(epoch_ns).plus_s(t_s).0);
-                file.json(Channel::Rope, at_ns, &rope(at_ns, nodes, scene.radii_m))?;
+                file.json(Channel::Rope, at_ns, &rope(at_ns, nodes, motion.radii_m))?;
             }
         }
         Ok(())
@@ -82,7 +104,7 @@ impl Results {
 }
 
 /// A JSON or TOML file as JSON.
-fn read(path: &Path) -> anyhow::Result<Value> {
+fn read(path: &Path) -> Result<Value> {
     let text = files::read_text(path)?;
     Ok(if path.extension().is_some_and(|e| e == "toml") {
         serde_json::to_value(toml::from_str::<toml::Table>(&text)?)?

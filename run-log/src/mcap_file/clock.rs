@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 /// How far the wall clock was ahead of CLOCK_MONOTONIC when the file was begun.
 /// Later steps of the wall clock do not matter.
 #[derive(Debug, Clone, Copy)]
-pub struct Clock {
+pub(super) struct Clock {
     ahead_ns: u64,
 }
 
@@ -18,7 +18,7 @@ fn read_ns(clock: ClockId) -> u64 {
 
 impl Clock {
     /// Compares both clocks.
-    pub fn compare() -> Self {
+    pub(super) fn compare() -> Self {
         let wall_ns = read_ns(ClockId::Realtime);
         Self {
             ahead_ns: wall_ns.saturating_sub(read_ns(ClockId::Monotonic)),
@@ -26,22 +26,22 @@ impl Clock {
     }
 
     /// Wall clock minus CLOCK_MONOTONIC (ns).
-    pub const fn ahead_ns(self) -> u64 {
+    pub(super) const fn ahead_ns(self) -> u64 {
         self.ahead_ns
     }
 
     /// Wall time of an instant of CLOCK_MONOTONIC (ns).
-    pub const fn wall_ns(self, monotonic_ns: u64) -> u64 {
+    pub(super) const fn wall_ns(self, monotonic_ns: u64) -> u64 {
         monotonic_ns.saturating_add(self.ahead_ns)
     }
 
     /// Wall time now (ns).
-    pub fn now_ns(self) -> u64 {
+    pub(super) fn now_ns(self) -> u64 {
         self.wall_ns(read_ns(ClockId::Monotonic))
     }
 }
 
 /// A wall time as messages hold it.
-pub fn time(wall_ns: u64) -> Value {
+pub(super) fn time(wall_ns: u64) -> Value {
     json!({ "sec": wall_ns / 1_000_000_000, "nsec": wall_ns % 1_000_000_000 })
 }

@@ -22,7 +22,7 @@ const ROPE: [f64; 4] = [0.1, 0.5, 0.9, 1.0];
 const LEAD: [f64; 4] = [0.95, 0.75, 0.1, 1.0];
 
 /// A colour with its opacity.
-pub fn colour([r, g, b, a]: [f64; 4]) -> Value {
+pub(super) fn colour([r, g, b, a]: [f64; 4]) -> Value {
     json!({ "r": r, "g": g, "b": b, "a": a })
 }
 
@@ -39,7 +39,7 @@ fn pose(at: &Isometry3<f64>) -> Value {
 }
 
 /// A place from an origin (m) and an attitude.
-pub fn placed(p_m: &Vector3<f64>, r: &Matrix3<f64>) -> Isometry3<f64> {
+pub(super) fn placed(p_m: &Vector3<f64>, r: &Matrix3<f64>) -> Isometry3<f64> {
     let rotation = Rotation3::from_matrix_unchecked(*r);
     Isometry3::from_parts(
         Translation3::from(*p_m),
@@ -48,7 +48,7 @@ pub fn placed(p_m: &Vector3<f64>, r: &Matrix3<f64>) -> Isometry3<f64> {
 }
 
 /// One `foxglove.FrameTransform`.
-pub fn transform(at_ns: u64, parent: &str, child: &str, place: Isometry3<f64>) -> Value {
+pub(super) fn transform(at_ns: u64, parent: &str, child: &str, place: Isometry3<f64>) -> Value {
     json!({
         "timestamp": time(at_ns), "parent_frame_id": parent, "child_frame_id": child,
         "translation": vector(&place.translation.vector), "rotation": quaternion(&place.rotation),
@@ -56,7 +56,7 @@ pub fn transform(at_ns: u64, parent: &str, child: &str, place: Isometry3<f64>) -
 }
 
 /// Places of all links and of the pole's end; `None` when an angle is no number.
-pub fn arm_frames(at_ns: u64, q: &JointVector) -> Option<Value> {
+pub(super) fn arm_frames(at_ns: u64, q: &JointVector) -> Option<Value> {
     if !q.is_finite() {
         return None;
     }
@@ -104,7 +104,7 @@ fn rod(to_m: &Vector3<f64>, diameter_m: f64, rgba: [f64; 4]) -> Value {
 }
 
 /// Arm, pole and, where there is one, the target.
-pub fn room(at_ns: u64, target_m: Option<[f64; 3]>) -> Value {
+pub(super) fn room(at_ns: u64, target_m: Option<[f64; 3]>) -> Value {
     let mut entities = Vec::new();
     let origins = JOINT_ORIGIN_M.map(Vector3::from);
     for (i, to_m) in origins.iter().enumerate() {
@@ -138,7 +138,7 @@ pub fn room(at_ns: u64, target_m: Option<[f64; 3]>) -> Value {
 }
 
 /// The rope's nodes (tenths of a millimetre, three by three) and its lead.
-pub fn rope(at_ns: u64, nodes: &[i32], [radius_m, lead_radius_m]: [f64; 2]) -> Value {
+pub(super) fn rope(at_ns: u64, nodes: &[i32], [radius_m, lead_radius_m]: [f64; 2]) -> Value {
     let points: Vec<Vector3<f64>> = nodes
         .chunks_exact(3)
         .map(|p| Vector3::new(p[0], p[1], p[2]).map(|v| f64::from(v) * 1e-4))

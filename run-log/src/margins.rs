@@ -25,7 +25,7 @@ pub struct Margin {
 
 /// The smallest margins of a run, in a fixed order. Speeds count always, what
 /// matters only to a moving arm only while it moves.
-pub fn smallest_margins(flight: &Flight) -> Vec<Margin> {
+pub(crate) fn smallest_margins(flight: &Flight) -> Vec<Margin> {
     let t = &flight.settings.thresholds;
     let ms = |ns: u64| ns as f64 / 1e6;
     let moving = |m: &&Moment| m.mode.is_moving();

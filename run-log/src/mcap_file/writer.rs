@@ -2,7 +2,8 @@
 
 use super::channel::Channel;
 use super::schema::schema;
-use anyhow::Context;
+use crate::error::At;
+use crate::{Error, Result};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use serde_json::Value;
@@ -19,6 +20,10 @@ const FLUSH_EVERY: Duration = Duration::from_millis(400);
 const CHUNK_BYTES: u64 = 1 << 20;
 
 /// A file under way.
+#[allow(
+    missing_debug_implementations,
+    reason = "the library's writer has none"
+)]
 pub struct McapFile {
     writer: Writer<File>,
     ids: Vec<u16>,
@@ -27,7 +32,7 @@ pub struct McapFile {
 }
 
 /// Options of every file written here.
-pub fn options() -> WriteOptions {
+pub(super) fn options() -> WriteOptions {
     WriteOptions::new()
         .library(format!("wag {}", shared_types::VERSION))
         .profile("")
@@ -39,14 +44,14 @@ pub fn options() -> WriteOptions {
 
 impl McapFile {
     /// Creates `path`, which must not exist, with every channel.
-    pub fn create(path: &Path) -> anyhow::Result<Self> {
-        let fail = || format!("cannot write `{}`", path.display());
+    pub fn create(path: &Path) -> Result<Self> {
         let file = File::options()
             .write(true)
             .create_new(true)
             .open(path)
-            .with_context(fail)?;
-        let mut writer = options().create(file).with_context(fail)?;
+            .map_err(Error::write(path))?;
+        let cannot = || format!("cannot write `{}`", path.display());
+        let mut writer = options().create(file).at(cannot)?;
         let mut ids = Vec::new();
         for channel in Channel::ALL {
             let schema_id = match channel.schema() {
@@ -71,12 +76,12 @@ impl McapFile {
     }
 
     /// Adds a JSON message of the instant `at_ns` (wall clock).
-    pub fn json(&mut self, channel: Channel, at_ns: u64, message: &Value) -> anyhow::Result<()> {
+    pub fn json(&mut self, channel: Channel, at_ns: u64, message: &Value) -> Result<()> {
         self.bytes(channel, at_ns, message.to_string().as_bytes())
     }
 
     /// Adds a message of the instant `at_ns` (wall clock).
-    pub fn bytes(&mut self, channel: Channel, at_ns: u64, data: &[u8]) -> anyhow::Result<()> {
+    pub fn bytes(&mut self, channel: Channel, at_ns: u64, data: &[u8]) -> Result<()> {
         let place = channel as usize;
         let header = MessageHeader {
             channel_id: self.ids[place],
@@ -90,13 +95,7 @@ impl McapFile {
     }
 
     /// Attaches a file.
-    pub fn attach(
-        &mut self,
-        at_ns: u64,
-        name: &str,
-        media_type: &str,
-        data: &[u8],
-    ) -> anyhow::Result<()> {
+    pub fn attach(&mut self, at_ns: u64, name: &str, media_type: &str, data: &[u8]) -> Result<()> {
         self.writer.attach(&Attachment {
             log_time: at_ns,
             create_time: at_ns,
@@ -108,7 +107,7 @@ impl McapFile {
     }
 
     /// Adds a table of texts.
-    pub fn metadata(&mut self, name: &str, entries: &[(&str, String)]) -> anyhow::Result<()> {
+    pub fn metadata(&mut self, name: &str, entries: &[(&str, String)]) -> Result<()> {
         let metadata = entries
             .iter()
             .map(|(key, value)| ((*key).to_owned(), value.clone()))
@@ -121,7 +120,7 @@ impl McapFile {
     }
 
     /// Closes the chunk when it is time.
-    pub fn turn(&mut self) -> anyhow::Result<()> {
+    pub fn turn(&mut self) -> Result<()> {
         if self.flushed.elapsed() >= FLUSH_EVERY {
             self.writer.flush()?;
             self.flushed = Instant::now();
@@ -130,9 +129,9 @@ impl McapFile {
     }
 
     /// Writes indexes and footer.
-    pub fn finish(mut self) -> anyhow::Result<()> {
+    pub fn finish(mut self) -> Result<()> {
         self.writer.finish()?;
-        self.writer.into_inner().sync_all()?;
-        Ok(())
+        let synced = self.writer.into_inner().sync_all();
+        Ok(synced.map_err(mcap::McapError::from)?)
     }
 }

@@ -1,7 +1,7 @@
 //! Reading a file, whole or not.
 
 use super::channel::Channel;
-use anyhow::{bail, ensure};
+use crate::{Error, Result};
 use mcap::MAGIC;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -60,14 +60,13 @@ fn is_attachment(body: &[u8]) -> bool {
 ///
 /// # Errors
 /// The bytes are no MCAP file, or `each` fails.
-pub fn walk(
+pub(super) fn walk(
     bytes: &[u8],
-    mut each: impl FnMut(&Record<'_>) -> anyhow::Result<()>,
-) -> anyhow::Result<Walked> {
-    ensure!(
-        is_mcap(bytes),
-        "this is no MCAP file: it does not begin like one"
-    );
+    mut each: impl FnMut(&Record<'_>) -> Result<()>,
+) -> Result<Walked> {
+    if !is_mcap(bytes) {
+        return Err(Error::NotMcap);
+    }
     let mut rest = &bytes[MAGIC.len()..];
     let mut walked = Walked::default();
     while let Some((opcode, body, len)) = front(rest) {
@@ -143,7 +142,10 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
 }
 
 /// The exact recording of the control cycles in a file: the bytes of `cycles.bin`.
-pub fn replay_bytes(bytes: &[u8]) -> anyhow::Result<Vec<u8>> {
+///
+/// # Errors
+/// [`Error::NotMcap`], [`Error::NoChannel`].
+pub fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut id = None;
     let mut out = Vec::new();
     walk(bytes, |record| {
@@ -164,10 +166,7 @@ pub fn replay_bytes(bytes: &[u8]) -> anyhow::Result<Vec<u8>> {
         Ok(())
     })?;
     if id.is_none() {
-        bail!(
-            "the MCAP file holds no channel `{}`: it was not recorded by this program",
-            Channel::Replay.topic()
-        );
+        return Err(Error::NoChannel(Channel::Replay.topic()));
     }
     Ok(out)
 }

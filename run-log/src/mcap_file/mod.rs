@@ -21,11 +21,14 @@ mod thread;
 mod urdf;
 mod writer;
 
-pub use film::RunFilm;
-pub use read::{is_mcap, replay_bytes};
-pub use recorder::{RecorderConfig, run};
-pub use recover::recover;
+pub use channel::Channel;
+pub use film::{RunFilm, RunPart};
+pub use read::{Walked, is_mcap, replay_bytes};
+pub use recorder::{RecorderConfig, run as record};
+pub use recover::{Recovered, recover};
+pub use results::{RopeMotion, SimulateRope};
 pub use thread::RunFileThread;
+pub use writer::McapFile;
 
 /// File of a run folder that holds the whole run.
 pub const RUN_FILE: &str = "run.mcap";

@@ -4,8 +4,9 @@
 use super::channel::Channel;
 use super::read::{Walked, walk};
 use super::urdf::joint_name;
+use crate::error::At;
 use crate::files::JointsCsv;
-use anyhow::{Context, anyhow, bail, ensure};
+use crate::{Error, Result};
 use arm_model::{JOINTS, JointVector};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -19,15 +20,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Table of texts that holds the camera, and its only entry.
-pub const CAMERA: [&str; 2] = ["camera", "json"];
+pub(super) const CAMERA: [&str; 2] = ["camera", "json"];
 /// Joints are taken from so much before the first picture to so much after the last (ns).
 const MARGIN_NS: u64 = 500_000_000;
 /// A longer time without a record means that some are missing (ns).
 const GAP_NS: u64 = 250_000_000;
 /// Fewest joint reports that tell a motion.
-const LEAST_JOINTS: usize = 8;
+const MIN_JOINTS: usize = 8;
 /// Most pictures that are taken into memory (bytes): an hour of them.
-const MOST_BYTES: usize = 2 << 30;
+const MAX_BYTES: usize = 2 << 30;
 
 /// One picture, compressed.
 #[derive(Debug, Clone)]
@@ -43,7 +44,7 @@ pub struct RunFilm {
     pictures: Vec<Picture>,
     picture_bytes: usize,
     /// The camera, or why what the file tells is none.
-    camera: Option<Result<StereoCamera, String>>,
+    camera: Option<std::result::Result<StereoCamera, String>>,
     joints: Vec<(u64, JointVector)>,
     /// The motions that were streamed.
     streamed: Vec<Streamed>,
@@ -69,7 +70,7 @@ pub struct RunPart {
     path: PathBuf,
     pictures: Vec<Picture>,
     /// The camera, where the file tells it, or why what it tells is none.
-    pub camera: Option<Result<StereoCamera, String>>,
+    pub camera: Option<std::result::Result<StereoCamera, String>>,
     /// Measured joints; t = 0 is the first picture.
     pub joints: JointsCsv,
     /// What is missing or damaged.
@@ -99,7 +100,7 @@ struct CycleMessage {
 }
 
 /// What can be seen with; a reason, if nothing can.
-fn camera_of(text: Option<&String>) -> Result<StereoCamera, String> {
+fn camera_of(text: Option<&String>) -> std::result::Result<StereoCamera, String> {
     let text = text.ok_or("the table is empty")?;
     let camera: StereoCamera = serde_json::from_str(text).map_err(|error| error.to_string())?;
     check_camera(&camera)?;
@@ -124,9 +125,9 @@ impl RunFilm {
     /// # Errors
     /// It cannot be read, is no MCAP file, or a message in it is not as this program
     /// writes it.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
+    pub fn read(path: &Path) -> Result<Self> {
         let fail = || format!("run file `{}`", path.display());
-        let bytes = std::fs::read(path).with_context(fail)?;
+        let bytes = std::fs::read(path).map_err(Error::read(path)).at(fail)?;
         let mut film = Self {
             path: path.to_owned(),
             pictures: Vec::new(),
@@ -137,11 +138,11 @@ impl RunFilm {
             last_cycle: None,
             walked: Walked::default(),
         };
-        film.take_in(&bytes).with_context(fail)?;
+        film.take_in(&bytes).at(fail)?;
         Ok(film)
     }
 
-    fn take_in(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+    fn take_in(&mut self, bytes: &[u8]) -> Result<()> {
         let mut topics = BTreeMap::new();
         self.walked = walk(bytes, |record| {
             match record {
@@ -157,7 +158,7 @@ impl RunFilm {
                     };
                     let at_ns = header.log_time;
                     self.message(topic, at_ns, data)
-                        .with_context(|| format!("channel `{topic}`, time {at_ns} ns"))?;
+                        .at(|| format!("channel `{topic}`, time {at_ns} ns"))?;
                 }
                 _ => {}
             }
@@ -169,23 +170,25 @@ impl RunFilm {
         Ok(())
     }
 
-    fn message(&mut self, topic: &str, at_ns: u64, data: &[u8]) -> anyhow::Result<()> {
+    fn message(&mut self, topic: &str, at_ns: u64, data: &[u8]) -> Result<()> {
         if topic == Channel::Image.topic() {
             let image: ImageMessage = serde_json::from_slice(data)?;
-            ensure!(
-                image.format == "jpeg",
-                "a picture is `{}`, not jpeg",
-                image.format
-            );
+            if image.format != "jpeg" {
+                return Err(Error::Picture(format!(
+                    "a picture is `{}`, not jpeg",
+                    image.format
+                )));
+            }
             let jpeg = STANDARD
                 .decode(image.data)
-                .map_err(|error| anyhow!("a picture is no base64: {error}"))?;
+                .map_err(|error| Error::Picture(format!("a picture is no base64: {error}")))?;
             self.picture_bytes += jpeg.len();
-            ensure!(
-                self.picture_bytes <= MOST_BYTES,
-                "the pictures take more than {} MB",
-                MOST_BYTES >> 20
-            );
+            if self.picture_bytes > MAX_BYTES {
+                return Err(Error::Picture(format!(
+                    "the pictures take more than {} MB",
+                    MAX_BYTES >> 20
+                )));
+            }
             self.pictures.push(Picture {
                 stamp_ns: at_ns,
                 jpeg,
@@ -265,9 +268,13 @@ impl RunFilm {
     ///
     /// # Errors
     /// There is no such motion, or no pictures of it.
-    pub fn part(mut self, number: usize) -> anyhow::Result<RunPart> {
+    pub fn part(mut self, number: usize) -> Result<RunPart> {
         let count = self.streamed.len();
-        let name = self.path.display();
+        let path = self.path.clone();
+        let missing = |problem: String| Error::Film {
+            path: path.clone(),
+            problem,
+        };
         let broken = match self.walked {
             Walked {
                 damaged_chunks: 1..,
@@ -276,33 +283,33 @@ impl RunFilm {
             Walked { whole: false, .. } => "; the file breaks off before its end",
             _ => "",
         };
-        ensure!(
-            count > 0,
-            "run file `{name}`: no motion was streamed to the arm while it was recorded, so \
-             no wiggle is in it{broken}"
-        );
+        if count == 0 {
+            return Err(missing(format!(
+                "no motion was streamed to the arm while it was recorded, so no wiggle is in \
+                 it{broken}"
+            )));
+        }
         let Some(motion) = number.checked_sub(1).and_then(|i| self.streamed.get(i)) else {
-            bail!(
-                "run file `{name}`: --part is {number}, but {count} motions were streamed to the \
-                 arm{broken}"
-            );
+            return Err(missing(format!(
+                "--part is {number}, but {count} motions were streamed to the arm{broken}"
+            )));
         };
         let motion = *motion;
-        ensure!(
-            motion.from_its_begin,
-            "run file `{name}`: the beginning of motion {number} is missing, in which the rope \
-             hangs still"
-        );
+        if !motion.from_its_begin {
+            return Err(missing(format!(
+                "the beginning of motion {number} is missing, in which the rope hangs still"
+            )));
+        }
         let first = self
             .pictures
             .iter()
             .rposition(|picture| picture.stamp_ns <= motion.begin_ns)
             .filter(|first| motion.begin_ns - self.pictures[*first].stamp_ns < GAP_NS)
-            .with_context(|| {
-                format!(
-                    "run file `{name}`: no picture is there from just before motion {number} \
-                     began, when the rope hung still"
-                )
+            .ok_or_else(|| {
+                missing(format!(
+                    "no picture is there from just before motion {number} began, when the rope \
+                     hung still"
+                ))
             })?;
         let count = self.pictures[first..]
             .iter()
@@ -311,18 +318,23 @@ impl RunFilm {
         let pictures: Vec<Picture> = self.pictures.drain(first..first + count).collect();
         let (zero_ns, last_ns) = match &pictures[..] {
             [first, .., last] => (first.stamp_ns, last.stamp_ns),
-            _ => bail!("run file `{name}`: no pictures were recorded during motion {number}"),
+            _ => {
+                return Err(missing(format!(
+                    "no pictures were recorded during motion {number}"
+                )));
+            }
         };
         let span = zero_ns.saturating_sub(MARGIN_NS)..=last_ns.saturating_add(MARGIN_NS);
         let around = self.joints.iter().filter(|(t, _)| span.contains(t));
         let (times_s, q): (Vec<f64>, Vec<JointVector>) =
             around.map(|(t, q)| (since_s(*t, zero_ns), *q)).unzip();
-        ensure!(
-            times_s.len() >= LEAST_JOINTS,
-            "run file `{name}`: the arm told its joints {} times during motion {number}, but \
-             {LEAST_JOINTS} are needed at least",
-            times_s.len()
-        );
+        if times_s.len() < MIN_JOINTS {
+            return Err(missing(format!(
+                "the arm reported its joints {} times during motion {number}, but {MIN_JOINTS} \
+                 are needed at least",
+                times_s.len()
+            )));
+        }
         Ok(RunPart {
             warnings: self.warnings(number, motion, &pictures),
             path: self.path,
@@ -350,7 +362,7 @@ impl FrameSource for RunPart {
         self.pictures.len()
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> std::result::Result<EyeFrame, SourceError> {
         let path = || self.path.clone();
         let picture = self
             .pictures

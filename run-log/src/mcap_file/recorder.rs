@@ -8,11 +8,11 @@ use super::clock::Clock;
 use super::film::CAMERA;
 use super::image::left_jpeg;
 use super::messages::{self, Level};
-use super::results::Results;
+use super::results::{Results, SimulateRope};
 use super::scene::{arm_frames, room};
 use super::urdf::urdf;
 use super::writer::McapFile;
-use anyhow::Context;
+use crate::{Error, Result};
 use arm_model::Limits;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde::{Deserialize, Serialize};
@@ -126,7 +126,7 @@ struct Ports {
 }
 
 impl Ports {
-    fn open(bus: &Bus) -> Result<Self, IpcError> {
+    fn open(bus: &Bus) -> std::result::Result<Self, IpcError> {
         Ok(Self {
             chunks: bus.chunk_subscriber()?,
             cycles: bus.cycle_subscriber()?,
@@ -137,14 +137,18 @@ impl Ports {
     }
 }
 
+fn cannot_receive(reason: impl std::error::Error) -> Error {
+    Error::Recorder(format!("cannot receive from shared memory: {reason}"))
+}
+
 /// Hands what has arrived to `take`, a whole buffer at most: on a machine that is too
 /// slow there is always more.
-fn each<T, E: std::error::Error + Send + Sync + 'static>(
-    receive: impl Fn() -> Result<Option<T>, E>,
-    mut take: impl FnMut(T) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
+fn each<T, E: std::error::Error>(
+    receive: impl Fn() -> std::result::Result<Option<T>, E>,
+    mut take: impl FnMut(T) -> Result<()>,
+) -> Result<()> {
     for _ in 0..BUFFER {
-        let sample = receive().context("cannot receive records from shared memory")?;
+        let sample = receive().map_err(cannot_receive)?;
         let Some(sample) = sample else {
             break;
         };
@@ -169,7 +173,7 @@ struct Recording {
 }
 
 impl Recording {
-    fn begin(config: &RecorderConfig) -> anyhow::Result<Self> {
+    fn begin(config: &RecorderConfig) -> Result<Self> {
         let clock = Clock::compare();
         let mut file = McapFile::create(&config.file)?;
         let at_ns = clock.now_ns();
@@ -209,7 +213,7 @@ impl Recording {
     }
 
     /// Takes in what has arrived.
-    fn drain(&mut self, ports: &Ports) -> anyhow::Result<()> {
+    fn drain(&mut self, ports: &Ports) -> Result<()> {
         // The exact recording first: the rest can be made from it.
         each(|| ports.chunks.receive(), |chunk| self.chunk(&chunk))?;
         each(|| ports.cycles.receive(), |cycle| self.cycle(&cycle))?;
@@ -226,11 +230,11 @@ impl Recording {
     }
 
     /// Takes in frames that have arrived, and compresses `most` of them.
-    fn pictures(&mut self, ports: &Ports, most: usize) -> anyhow::Result<()> {
+    fn pictures(&mut self, ports: &Ports, most: usize) -> Result<()> {
         let mut compressed = 0;
         for _ in 0..FRAMES_AT_ONCE {
             let frame = ports.frames.receive();
-            let Some(frame) = frame.context("cannot receive frames from shared memory")? else {
+            let Some(frame) = frame.map_err(cannot_receive)? else {
                 break;
             };
             compressed += usize::from(self.frame(frame.user_header(), &frame)?);
@@ -241,12 +245,12 @@ impl Recording {
         Ok(())
     }
 
-    fn log(&mut self, at_ns: u64, level: Level, text: &str) -> anyhow::Result<()> {
+    fn log(&mut self, at_ns: u64, level: Level, text: &str) -> Result<()> {
         let message = messages::log(at_ns, level, text);
         self.file.json(Channel::Log, at_ns, &message)
     }
 
-    fn chunk(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+    fn chunk(&mut self, bytes: &[u8]) -> Result<()> {
         self.file
             .bytes(Channel::Replay, self.clock.now_ns(), bytes)?;
         for read in LogReader::open(bytes).into_iter().flatten() {
@@ -258,7 +262,7 @@ impl Recording {
         Ok(())
     }
 
-    fn cycle(&mut self, cycle: &CycleRecord) -> anyhow::Result<()> {
+    fn cycle(&mut self, cycle: &CycleRecord) -> Result<()> {
         let at_ns = self.clock.wall_ns(cycle.deadline_ns);
         if let Some(expected) = self.next_cycle {
             self.cycles_lost += cycle.cycle.saturating_sub(expected);
@@ -292,7 +296,7 @@ impl Recording {
         Ok(())
     }
 
-    fn report(&mut self, report: &JointReport) -> anyhow::Result<()> {
+    fn report(&mut self, report: &JointReport) -> Result<()> {
         let at_ns = self.clock.wall_ns(report.stamp_ns);
         self.file
             .json(Channel::Measured, at_ns, &messages::measured(at_ns, report))?;
@@ -305,7 +309,7 @@ impl Recording {
     }
 
     /// Records a frame; whether it was compressed.
-    fn frame(&mut self, header: &FrameHeader, pixels: &[u8]) -> anyhow::Result<bool> {
+    fn frame(&mut self, header: &FrameHeader, pixels: &[u8]) -> Result<bool> {
         if let Some(expected) = self.next_frame {
             self.frames_lost += header.sequence.saturating_sub(expected);
         }
@@ -334,9 +338,9 @@ impl Recording {
         Ok(true)
     }
 
-    fn finish(mut self, results: &mut Results) -> anyhow::Result<()> {
+    fn finish(mut self, results: &mut Results, simulate: SimulateRope) -> Result<()> {
         results.look(&mut self.file, self.clock)?;
-        results.simulate(&mut self.file, self.clock)?;
+        results.simulate(&mut self.file, self.clock, simulate)?;
         self.file.metadata(
             "recorder",
             &[
@@ -349,20 +353,22 @@ impl Recording {
     }
 }
 
-/// Records until `stop` is set; then finishes the file.
+/// Records until `stop` is set; then finishes the file, with the rope that `simulate`
+/// makes of the run's results.
 ///
 /// # Errors
 /// Shared memory cannot be joined, or the disk takes nothing any more; what is in the
 /// file by then can be recovered.
-pub fn run(config: &RecorderConfig, stop: &AtomicBool) -> anyhow::Result<()> {
+pub fn run(config: &RecorderConfig, simulate: SimulateRope, stop: &AtomicBool) -> Result<()> {
     if let Err(reason) = rustix::process::nice(NICE) {
         tracing::warn!(%reason, "the recorder runs with ordinary priority");
     }
-    anyhow::ensure!(
-        config.pictures_hz.is_finite() && config.pictures_hz > 0.0,
-        "pictures_hz must be a number above zero, found {}",
-        config.pictures_hz
-    );
+    if !(config.pictures_hz.is_finite() && config.pictures_hz > 0.0) {
+        return Err(Error::Recorder(format!(
+            "pictures_hz must be a number above zero, found {}",
+            config.pictures_hz
+        )));
+    }
     let bus = Bus::join(&config.domain)?;
     let ports = Ports::open(&bus)?;
     // Its appearance tells the parent that nothing is missed from here on.
@@ -380,7 +386,7 @@ pub fn run(config: &RecorderConfig, stop: &AtomicBool) -> anyhow::Result<()> {
         };
         recording.pictures(&ports, most)?;
         if last {
-            return recording.finish(&mut results);
+            return recording.finish(&mut results, simulate);
         }
         if looked.elapsed() >= LOOK_EVERY {
             results.look(&mut recording.file, recording.clock)?;

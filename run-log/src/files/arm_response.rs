@@ -1,13 +1,17 @@
 //! `arm-response.toml`: how an arm follows its setpoints.
 
 use super::{read_text, write_atomic};
-use anyhow::Context;
+use crate::Result;
+use crate::error::At;
 use arm_model::ArmResponse;
 use arm_model::response::Excitation;
 use std::path::Path;
 
 /// Writes a measured response.
-pub fn write_arm_response(path: &Path, response: &ArmResponse) -> anyhow::Result<()> {
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_arm_response(path: &Path, response: &ArmResponse) -> Result<()> {
     let text = format!(
         "# How an arm follows its setpoints, measured by wag {}: dead time, then a\n\
          # second-order lag of gain one. SI units; intervals hold the truth in 95 of\n\
@@ -19,14 +23,20 @@ pub fn write_arm_response(path: &Path, response: &ArmResponse) -> anyhow::Result
 }
 
 /// Reads a measured response.
-pub fn read_arm_response(path: &Path) -> anyhow::Result<ArmResponse> {
-    toml::from_str(&read_text(path)?).with_context(|| format!("arm response `{}`", path.display()))
+///
+/// # Errors
+/// The file cannot be read or is not as it should be.
+pub fn read_arm_response(path: &Path) -> Result<ArmResponse> {
+    toml::from_str(&read_text(path)?).at(|| format!("arm response `{}`", path.display()))
 }
 
 /// Reads the sweep an arm is to be measured with; keys left out keep their
 /// defaults.
-pub fn read_excitation(path: &Path) -> anyhow::Result<Excitation> {
-    toml::from_str(&read_text(path)?).with_context(|| format!("excitation `{}`", path.display()))
+///
+/// # Errors
+/// The file cannot be read or is not as it should be.
+pub fn read_excitation(path: &Path) -> Result<Excitation> {
+    toml::from_str(&read_text(path)?).at(|| format!("excitation `{}`", path.display()))
 }
 
 #[cfg(test)]
@@ -59,7 +69,10 @@ mod tests {
         assert_eq!(e.highest_hz, 10.0);
         assert_eq!(e.duration_s, Excitation::default().duration_s);
         std::fs::write(&path, "loudness = 11\n").unwrap();
-        let said = format!("{:#}", read_excitation(&path).unwrap_err());
+        let said = format!(
+            "{:#}",
+            anyhow::Error::from(read_excitation(&path).unwrap_err())
+        );
         assert!(
             said.contains("sweep.toml") && said.contains("loudness"),
             "{said}"

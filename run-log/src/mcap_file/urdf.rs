@@ -6,22 +6,22 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;
 
 /// Frame of the arm's base, the world.
-pub const BASE: &str = "base";
+pub(super) const BASE: &str = "base";
 /// Frame at the pole's end.
-pub const POLE_END: &str = "pole_end";
+pub(super) const POLE_END: &str = "pole_end";
 
 /// Name of joint `i` (0-based).
-pub fn joint_name(i: usize) -> String {
+pub(super) fn joint_name(i: usize) -> String {
     format!("joint{}", i + 1)
 }
 
 /// Name of the link that joint `i` (0-based) turns.
-pub fn link_name(i: usize) -> String {
+pub(super) fn link_name(i: usize) -> String {
     format!("link{}", i + 1)
 }
 
 /// Links, joints and limits; without meshes, which belong to the arm's maker.
-pub fn urdf(limits: &Limits) -> String {
+pub(super) fn urdf(limits: &Limits) -> String {
     let mut text =
         format!("<?xml version=\"1.0\"?>\n<robot name=\"xarm7\">\n  <link name=\"{BASE}\"/>\n");
     let mut parent = BASE.to_owned();
@@ -67,7 +67,7 @@ mod tests {
     /// Reads the text as a viewer would and walks down the chain.
     #[test]
     fn a_reader_of_the_text_gets_the_same_pole_end() {
-        let text = urdf(&crate::files::default_limits().unwrap());
+        let text = urdf(&Limits::default());
         for q in [
             [0.0; 7],
             [0.1, -0.2, 0.3, 0.4, 0.5, 0.6, 0.7],

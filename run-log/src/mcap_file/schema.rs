@@ -311,7 +311,7 @@ const MESSAGES: &[(&str, Fields)] = &[
 ];
 
 /// The schema of a message, other messages in it written out in place.
-pub fn schema(name: &str) -> Value {
+pub(super) fn schema(name: &str) -> Value {
     let fields = MESSAGES
         .iter()
         .find(|(n, _)| *n == name)

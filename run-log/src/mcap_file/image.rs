@@ -2,7 +2,7 @@
 //!
 //! Left only: the rope is tracked in it, and the right eye would double the file.
 
-use anyhow::{Context, ensure};
+use crate::{Error, Result};
 use jpeg_encoder::{Encoder, ImageBuffer, JpegColorType, SamplingFactor};
 use shared_types::ipc::{FrameHeader, PIXEL_FORMAT_YUYV};
 
@@ -40,26 +40,30 @@ impl ImageBuffer for LeftEye<'_> {
 }
 
 /// The left eye of a side-by-side frame.
-pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8]) -> anyhow::Result<Vec<u8>> {
-    let too_large = "the frame is too large for a JPEG";
-    let width = u16::try_from(header.width_px / 2).context(too_large)?;
-    let height = u16::try_from(header.height_px).context(too_large)?;
-    ensure!(
-        header.pixel_format == PIXEL_FORMAT_YUYV
-            && header.width_px.is_multiple_of(4)
-            && yuyv.len() == 4 * usize::from(width) * usize::from(height),
-        "the frame is no YUYV of {} x {} px",
-        header.width_px,
-        header.height_px
-    );
+pub(super) fn left_jpeg(header: &FrameHeader, yuyv: &[u8]) -> Result<Vec<u8>> {
+    let too_large = |_| Error::Picture("the frame is too large for a JPEG".to_owned());
+    let width = u16::try_from(header.width_px / 2).map_err(too_large)?;
+    let height = u16::try_from(header.height_px).map_err(too_large)?;
+    let is_yuyv = header.pixel_format == PIXEL_FORMAT_YUYV
+        && header.width_px.is_multiple_of(4)
+        && yuyv.len() == 4 * usize::from(width) * usize::from(height);
+    if !is_yuyv {
+        return Err(Error::Picture(format!(
+            "the frame is no YUYV of {} x {} px",
+            header.width_px, header.height_px
+        )));
+    }
     let mut jpeg = Vec::new();
     let mut encoder = Encoder::new(&mut jpeg, QUALITY);
     encoder.set_sampling_factor(SamplingFactor::F_2_1);
-    encoder.encode_image(LeftEye {
+    let eye = LeftEye {
         yuyv,
         width,
         height,
-    })?;
+    };
+    encoder
+        .encode_image(eye)
+        .map_err(|reason| Error::Picture(reason.to_string()))?;
     Ok(jpeg)
 }
 
