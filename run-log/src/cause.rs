@@ -1,6 +1,6 @@
 //! What a run folder keeps of the reasons for a stop.
 
-use super::{CAUSE_FILE, CYCLES_FILE, Explanation, Flight, explain};
+use super::{CAUSE_FILE, Explanation, Run, explain};
 use crate::files;
 use std::path::Path;
 
@@ -8,9 +8,7 @@ use std::path::Path;
 /// `cause.json` when the arm was stopped. `None` when there is no recording to
 /// explain; that never spoils the run itself.
 pub fn keep_cause(run: &Path) -> Option<Explanation> {
-    let bytes = std::fs::read(run.join(CYCLES_FILE)).ok()?;
-    let flight = Flight::read(&bytes).ok()?;
-    let found = explain(&flight);
+    let found = explain(&Run::open(run).ok()?.log().ok()?);
     if found.stopped
         && let Err(reason) = files::write_json(&run.join(CAUSE_FILE), &found)
     {

@@ -1,6 +1,6 @@
 //! Why the arm was stopped, or how close it came to it.
 
-use super::flight::{Flight, Moment, WorstJoint};
+use super::cycle_sample::{CycleSample, RunLog, WorstJoint};
 use super::margins::{Margin, smallest_margins};
 use rt_controller::xarm::ErrorCode;
 use serde::Serialize;
@@ -142,16 +142,16 @@ pub struct Row {
 }
 
 /// Explains a recording.
-pub fn explain(flight: &Flight) -> Explanation {
-    let (ends, stops): (Vec<_>, Vec<_>) = flight.causes.iter().partition(|c| is_orderly_end(c));
+pub fn explain(log: &RunLog) -> Explanation {
+    let (ends, stops): (Vec<_>, Vec<_>) = log.causes.iter().partition(|c| is_orderly_end(c));
     Explanation {
         stopped: !stops.is_empty(),
-        cycles: flight.moments.len(),
-        duration_s: flight.duration_s(),
-        stops: stops.into_iter().map(|c| stop(flight, c)).collect(),
+        cycles: log.samples.len(),
+        duration_s: log.duration_s(),
+        stops: stops.into_iter().map(|c| stop(log, c)).collect(),
         ended_in_order: !ends.is_empty(),
-        margins: smallest_margins(flight),
-        flaws: flight.flaws.clone(),
+        margins: smallest_margins(log),
+        flaws: log.flaws.clone(),
     }
 }
 
@@ -161,15 +161,15 @@ fn is_orderly_end(cause: &CauseRecord) -> bool {
     cause.fault() == FaultCode::OperatorStop && cause.mode_then() == ControllerMode::Idle
 }
 
-fn stop(flight: &Flight, cause: &CauseRecord) -> Stop {
+fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
     let code = cause.fault();
     let (what, remedy) = code
         .explain()
         .split_once("; ")
         .unwrap_or((code.explain(), ""));
-    let arm_error = arm_error(flight, cause);
-    let rest_ns = flight
-        .moments
+    let arm_error = arm_error(log, cause);
+    let rest_ns = log
+        .samples
         .iter()
         .find(|m| m.cycle == cause.rest_cycle)
         .map_or(cause.stamp_ns, |m| m.deadline_ns);
@@ -183,18 +183,18 @@ fn stop(flight: &Flight, cause: &CauseRecord) -> Stop {
         arm_error_meaning: (arm_error != 0).then(|| ErrorCode(arm_error).to_string()),
         arm_warning: cause.arm_warning,
         cycle: cause.cycle,
-        time_s: flight.time_s(cause.stamp_ns),
+        time_s: log.time_s(cause.stamp_ns),
         mode: cause.mode_then(),
         tier: MotionTier::from_raw(cause.tier).map(tier_name),
         motion: Some(cause.motion_id).filter(|id| *id != 0),
         motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),
         met: met(cause.path),
         arm_asked_to_stop: cause.stop_arm != 0,
-        rest_after_s: flight.time_s(rest_ns) - flight.time_s(cause.stamp_ns),
+        rest_after_s: log.time_s(rest_ns) - log.time_s(cause.stamp_ns),
         broken: broken(cause),
-        latest: latest(flight, cause.stamp_ns),
+        latest: latest(log, cause.stamp_ns),
         counts: cause.counts,
-        around: around(flight, cause.stamp_ns),
+        around: around(log, cause.stamp_ns),
     }
 }
 
@@ -208,12 +208,11 @@ const fn tier_name(tier: MotionTier) -> &'static str {
 
 /// The core knows the arm's code only if the arm had said it by then; five times
 /// a second it does.
-fn arm_error(flight: &Flight, cause: &CauseRecord) -> u8 {
+fn arm_error(log: &RunLog, cause: &CauseRecord) -> u8 {
     if cause.arm_error != 0 {
         return cause.arm_error;
     }
-    flight
-        .moments
+    log.samples
         .iter()
         .filter(|m| (0.0..=CODE_WITHIN_MS).contains(&since_ms(m, cause.stamp_ns)))
         .find_map(|m| m.arm_error)
@@ -271,36 +270,36 @@ const fn unit(code: FaultCode, joint: u32) -> &'static str {
     }
 }
 
-fn since_ms(moment: &Moment, stamp_ns: u64) -> f64 {
-    shared_types::MonotonicNs(moment.deadline_ns).since_s(shared_types::MonotonicNs(stamp_ns)) * 1e3
+fn since_ms(sample: &CycleSample, stamp_ns: u64) -> f64 {
+    shared_types::MonotonicNs(sample.deadline_ns).since_s(shared_types::MonotonicNs(stamp_ns)) * 1e3
 }
 
-fn around(flight: &Flight, stamp_ns: u64) -> Vec<Row> {
+fn around(log: &RunLog, stamp_ns: u64) -> Vec<Row> {
     let mut from_ms = BEGIN_MS;
     let mut rows = Vec::new();
     for until_ms in ROWS_MS {
         // Deadlines lie on a grid of whole milliseconds, give or take rounding.
-        let within = |m: &&Moment| {
+        let within = |m: &&CycleSample| {
             let at_ms = since_ms(m, stamp_ns) - 0.5;
             at_ms > from_ms && at_ms <= until_ms
         };
-        let covered: Vec<&Moment> = flight.moments.iter().filter(within).collect();
+        let covered: Vec<&CycleSample> = log.samples.iter().filter(within).collect();
         rows.extend(row(until_ms, &covered));
         from_ms = until_ms;
     }
     rows
 }
 
-fn row(until_ms: f64, moments: &[&Moment]) -> Option<Row> {
-    let last = moments.last()?;
-    let worst = |of: fn(&Moment) -> WorstJoint| {
-        moments
+fn row(until_ms: f64, samples: &[&CycleSample]) -> Option<Row> {
+    let last = samples.last()?;
+    let worst = |of: fn(&CycleSample) -> WorstJoint| {
+        samples
             .iter()
             .map(|m| of(m))
-            .max_by(|a, b| a.part().total_cmp(&b.part()))
+            .max_by(|a, b| a.fraction().total_cmp(&b.fraction()))
             .unwrap_or_default()
     };
-    let most = |of: fn(&Moment) -> f64| moments.iter().map(|m| of(m)).fold(0.0, f64::max);
+    let most = |of: fn(&CycleSample) -> f64| samples.iter().map(|m| of(m)).fold(0.0, f64::max);
     Some(Row {
         until_ms,
         mode: last.mode,
@@ -311,28 +310,28 @@ fn row(until_ms: f64, moments: &[&Moment]) -> Option<Row> {
         tool_m_s: most(|m| m.tool_m_s),
         tool_max_m_s: last.tool_max_m_s,
         link_ms: most(|m| m.link_ms),
-        report_ms: moments
+        report_ms: samples
             .iter()
             .filter_map(|m| m.report_ms)
             .max_by(f64::total_cmp),
-        missed: moments.iter().map(|m| m.missed).sum(),
-        late_ms: moments
+        missed: samples.iter().map(|m| m.missed).sum(),
+        late_ms: samples
             .iter()
             .filter_map(|m| m.late_ms)
             .max_by(f64::total_cmp),
     })
 }
 
-fn planned_after_ms(after: &Moment, before: &Moment) -> f64 {
+fn planned_after_ms(after: &CycleSample, before: &CycleSample) -> f64 {
     use shared_types::MonotonicNs as At;
     At(after.planned_ns).since_s(At(before.planned_ns)) * 1e3
 }
 
 /// The setpoint of the second before the stop that was sent latest, and the one
 /// after it.
-fn latest(flight: &Flight, stamp_ns: u64) -> Option<Late> {
-    let sent: Vec<(&Moment, f64)> = flight
-        .moments
+fn latest(log: &RunLog, stamp_ns: u64) -> Option<Late> {
+    let sent: Vec<(&CycleSample, f64)> = log
+        .samples
         .iter()
         .filter(|m| (BEGIN_MS..=0.5).contains(&since_ms(m, stamp_ns)))
         .filter_map(|m| Some((m, m.late_ms?)))
@@ -341,20 +340,20 @@ fn latest(flight: &Flight, stamp_ns: u64) -> Option<Late> {
         .iter()
         .enumerate()
         .max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))?;
-    let (moment, late_ms) = sent[at];
+    let (sample, late_ms) = sent[at];
     let next = sent.get(at + 1);
     Some(Late {
-        cycle: moment.cycle,
+        cycle: sample.cycle,
         late_ms,
         next_covered_ms: next.map(|(after, _)| {
-            if moment.trajectory_s >= 0.0 && after.trajectory_s >= moment.trajectory_s {
-                1e3 * (after.trajectory_s - moment.trajectory_s)
+            if sample.trajectory_s >= 0.0 && after.trajectory_s >= sample.trajectory_s {
+                1e3 * (after.trajectory_s - sample.trajectory_s)
             } else {
-                since_ms(after, moment.deadline_ns)
+                since_ms(after, sample.deadline_ns)
             }
         }),
         next_came_after_ms: next
-            .map(|(after, late)| planned_after_ms(after, moment) + late - late_ms),
+            .map(|(after, late)| planned_after_ms(after, sample) + late - late_ms),
     })
 }
 
@@ -367,8 +366,8 @@ mod tests {
 
     const PERIOD_NS: u64 = 4_000_000;
 
-    fn moment(cycle: u64) -> Moment {
-        Moment {
+    fn sample(cycle: u64) -> CycleSample {
+        CycleSample {
             cycle,
             deadline_ns: cycle * PERIOD_NS,
             planned_ns: cycle * PERIOD_NS,
@@ -392,9 +391,9 @@ mod tests {
         }
     }
 
-    fn flight(causes: Vec<CauseRecord>) -> Flight {
-        Flight {
-            moments: (1..=700).map(moment).collect(),
+    fn log(causes: Vec<CauseRecord>) -> RunLog {
+        RunLog {
+            samples: (1..=700).map(sample).collect(),
             causes,
             limits: Limits::default(),
             settings: ControlSettings::from(Thresholds::strict()),
@@ -423,7 +422,7 @@ mod tests {
 
     #[test]
     fn a_stop_is_told_with_its_numbers_and_its_surroundings() {
-        let found = explain(&flight(vec![cause()]));
+        let found = explain(&log(vec![cause()]));
         assert!(found.stopped && !found.ended_in_order);
         let stop = &found.stops[0];
         let broken = stop.broken.as_ref().unwrap();
@@ -460,7 +459,7 @@ mod tests {
             cycle: 690,
             ..cause()
         };
-        let found = explain(&flight(vec![end]));
+        let found = explain(&log(vec![end]));
         assert!(!found.stopped && found.ended_in_order && found.stops.is_empty());
         let page = super::super::show(&found);
         assert!(
@@ -471,6 +470,6 @@ mod tests {
             mode: ControllerMode::Streaming as u8,
             ..end
         };
-        assert!(explain(&flight(vec![moving])).stopped);
+        assert!(explain(&log(vec![moving])).stopped);
     }
 }

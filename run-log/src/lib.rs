@@ -35,27 +35,27 @@
 
 mod cause;
 mod chunk_file;
+mod cycle_sample;
 mod error;
 mod explanation;
 pub mod files;
-mod flight;
-mod folder;
 mod margins;
 mod mcap_file;
 mod page;
+mod run;
 mod thread;
 
 pub use cause::keep_cause;
+pub use cycle_sample::{CycleSample, RunLog, WorstJoint};
 pub use error::{Error, Result};
 pub use explanation::{Broken, Explanation, Late, Row, Stop, explain};
-pub use flight::{Flight, Moment, WorstJoint};
-pub use folder::read_recording;
 pub use margins::Margin;
 pub use mcap_file::{
     Channel, McapFile, RUN_FILE, RecorderConfig, Recovered, RopeMotion, RunFileThread, RunFilm,
     RunPart, SimulateRope, Walked, is_mcap, record, recover, replay_bytes,
 };
 pub use page::show;
+pub use run::{Cycles, Run};
 pub use thread::{RecordingReport, RecordingThread};
 
 /// File of a run folder that holds its control cycles.

@@ -1,6 +1,6 @@
 //! How close a run came to its limits.
 
-use super::flight::{Flight, Moment, WorstJoint};
+use super::cycle_sample::{CycleSample, RunLog, WorstJoint};
 use arm_model::JOINTS;
 use serde::Serialize;
 
@@ -25,12 +25,12 @@ pub struct Margin {
 
 /// The smallest margins of a run, in a fixed order. Speeds count always, what
 /// matters only to a moving arm only while it moves.
-pub(crate) fn smallest_margins(flight: &Flight) -> Vec<Margin> {
-    let t = &flight.settings.thresholds;
+pub(crate) fn smallest_margins(log: &RunLog) -> Vec<Margin> {
+    let t = &log.settings.thresholds;
     let ms = |ns: u64| ns as f64 / 1e6;
-    let moving = |m: &&Moment| m.mode.is_moving();
-    let joint = |what, unit, of: fn(&Moment) -> WorstJoint| {
-        worst(flight, what, unit, flight.moments.iter(), move |m| {
+    let moving = |m: &&CycleSample| m.mode.is_moving();
+    let joint = |what, unit, of: fn(&CycleSample) -> WorstJoint| {
+        worst(log, what, unit, log.samples.iter(), move |m| {
             let w = of(m);
             (Some(w.joint).filter(|j| *j > 0), w.value.abs(), w.limit)
         })
@@ -40,35 +40,35 @@ pub(crate) fn smallest_margins(flight: &Flight) -> Vec<Margin> {
     [
         joint("joint speed", "rad/s", |m| m.speed),
         joint("joint acceleration", "rad/s²", |m| m.acceleration),
-        worst(flight, "tool speed", "m/s", flight.moments.iter(), |m| {
+        worst(log, "tool speed", "m/s", log.samples.iter(), |m| {
             (None, m.tool_m_s, m.tool_max_m_s)
         }),
         worst(
-            flight,
+            log,
             "joint range",
             "rad from its middle",
-            flight.moments.iter(),
-            |m| range(flight, m),
+            log.samples.iter(),
+            |m| range(log, m),
         ),
         worst(
-            flight,
+            log,
             "unanswered setpoint",
             "ms",
-            flight.moments.iter(),
+            log.samples.iter(),
             move |m| (None, m.link_ms, link_ms),
         ),
         worst(
-            flight,
+            log,
             "age of joint reports, moving",
             "ms",
-            flight.moments.iter().filter(moving),
+            log.samples.iter().filter(moving),
             move |m| (None, m.report_ms.unwrap_or(0.0), report_ms),
         ),
         worst(
-            flight,
+            log,
             "cycles missed at once, moving",
             "cycles",
-            flight.moments.iter().filter(moving),
+            log.samples.iter().filter(moving),
             move |m| (None, f64::from(m.missed), missed),
         ),
     ]
@@ -78,17 +78,17 @@ pub(crate) fn smallest_margins(flight: &Flight) -> Vec<Margin> {
 }
 
 fn worst<'a>(
-    flight: &Flight,
+    log: &RunLog,
     what: &'static str,
     unit: &'static str,
-    moments: impl Iterator<Item = &'a Moment>,
-    measure: impl Fn(&Moment) -> (Option<usize>, f64, f64),
+    samples: impl Iterator<Item = &'a CycleSample>,
+    measure: impl Fn(&CycleSample) -> (Option<usize>, f64, f64),
 ) -> Option<Margin> {
     let part = |(_, value, limit): (Option<usize>, f64, f64)| {
         if limit > 0.0 { value / limit } else { 0.0 }
     };
-    let moment = moments.max_by(|a, b| part(measure(a)).total_cmp(&part(measure(b))))?;
-    let (joint, value, limit) = measure(moment);
+    let sample = samples.max_by(|a, b| part(measure(a)).total_cmp(&part(measure(b))))?;
+    let (joint, value, limit) = measure(sample);
     Some(Margin {
         what,
         unit,
@@ -96,21 +96,21 @@ fn worst<'a>(
         value,
         limit,
         part: part((joint, value, limit)),
-        time_s: flight.time_s(moment.deadline_ns),
+        time_s: log.time_s(sample.deadline_ns),
     })
 }
 
 /// The joint nearest to an end of its range, as its distance from the middle.
-fn range(flight: &Flight, moment: &Moment) -> (Option<usize>, f64, f64) {
-    let limits = &flight.limits;
+fn range(log: &RunLog, sample: &CycleSample) -> (Option<usize>, f64, f64) {
+    let limits = &log.limits;
     // A pose is known only when setpoints were ever sent.
-    if moment.speed.joint == 0 {
+    if sample.speed.joint == 0 {
         return (None, 0.0, 0.0);
     }
     (0..JOINTS)
         .map(|j| {
             let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
-            let off = (moment.q_c[j] - (low + high) / 2.0).abs();
+            let off = (sample.q_c[j] - (low + high) / 2.0).abs();
             (Some(j + 1), off, (high - low) / 2.0)
         })
         .max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))

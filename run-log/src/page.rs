@@ -1,7 +1,7 @@
 //! An explanation as one page of text.
 
+use super::cycle_sample::WorstJoint;
 use super::explanation::{Explanation, Late, Row, Stop};
-use super::flight::WorstJoint;
 use super::margins::Margin;
 use cli_output::table;
 use comfy_table::Table;
@@ -172,7 +172,7 @@ fn percent(worst: &WorstJoint) -> String {
     if worst.joint == 0 {
         return "-".to_owned();
     }
-    format!("{:.0} % J{}", 100.0 * worst.part(), worst.joint)
+    format!("{:.0} % J{}", 100.0 * worst.fraction(), worst.joint)
 }
 
 fn around(rows: &[Row]) -> Table {

@@ -2,6 +2,7 @@
 //! on the pictures' clock.
 
 use super::channel::Channel;
+use super::messages::mode_name;
 use super::read::{Walked, walk};
 use super::urdf::joint_name;
 use crate::error::At;
@@ -198,10 +199,7 @@ impl RunFilm {
             self.joints.extend(told.vector().map(|q| (at_ns, q)));
         } else if topic == Channel::Cycles.topic() {
             let cycle: CycleMessage = serde_json::from_slice(data)?;
-            self.cycle(
-                at_ns,
-                cycle.mode == format!("{:?}", ControllerMode::Streaming),
-            );
+            self.cycle(at_ns, cycle.mode == mode_name(ControllerMode::Streaming));
         }
         Ok(())
     }

@@ -1,18 +1,14 @@
 //! `wag explain`: why a run was stopped, or how close it came to its limits.
 
 use crate::cli::ExplainArgs;
-use anyhow::Context;
 use cli_output::{OrInput, Outcome};
-use run_log::{Flight, explain, keep_cause, read_recording, show};
+use run_log::{Run, explain, keep_cause, show};
 use serde_json::{Value, json};
 use std::path::Path;
 
 pub fn run(args: &ExplainArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let bytes = read_recording(&args.run).or_input()?;
-    let flight = Flight::read(&bytes)
-        .with_context(|| format!("`{}`", args.run.display()))
-        .or_input()?;
-    let found = explain(&flight);
+    let run = Run::open(&args.run).or_input()?;
+    let found = explain(&run.log().or_input()?);
     if !quiet {
         print!("{}", show(&found));
     }

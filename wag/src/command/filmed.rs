@@ -7,7 +7,7 @@ use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
 use cli_output::{OrInput, Outcome};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
-use run_log::{RUN_FILE, RunFilm};
+use run_log::{RUN_FILE, Run};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 
@@ -150,7 +150,7 @@ impl Filmed {
             "--fps is for recordings without times, but the run's file `{}` has them",
             path.display()
         );
-        let part = RunFilm::read(path)?.part(scene.part.unwrap_or(1))?;
+        let part = Run::film(path)?.part(scene.part.unwrap_or(1))?;
         let camera = match (&scene.camera, &part.camera) {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),

@@ -5,17 +5,17 @@ use crate::cli::ReplayArgs;
 use anyhow::{Context, anyhow};
 use cli_output::{Failure, OrInput, Outcome};
 use rt_controller::recording::{Gap, Replay, replay};
-use run_log::{Flight, explain, read_recording};
+use run_log::{Run, explain};
 use serde_json::{Value, json};
 
 pub fn run(args: &ReplayArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let bytes = read_recording(&args.run).or_input()?;
-    let found = replay(&bytes, args.from_cycle)
+    let run = Run::open(&args.run).or_input()?;
+    let found = replay(run.recording(), args.from_cycle)
         .with_context(|| format!("`{}`", args.run.display()))
         .or_input()?;
     // The end of a controller at rest is recorded as a stop, but is none.
-    let stops = Flight::read(&bytes).map_or(found.causes, |flight| {
-        let stops = explain(&flight).stops;
+    let stops = run.log().map_or(found.causes, |log| {
+        let stops = explain(&log).stops;
         let compared = stops.iter().filter(|s| s.cycle >= found.first_cycle);
         compared.count() as u64
     });

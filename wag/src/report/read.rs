@@ -7,7 +7,7 @@ use super::{latency, pictures, rope};
 use crate::command::check::read_plan;
 use crate::files;
 use anyhow::{Context, ensure};
-use run_log::{CYCLES_FILE, Flight, explain, show};
+use run_log::{CYCLES_FILE, RunLog, explain, show};
 use serde_json::Value;
 use std::path::Path;
 
@@ -58,8 +58,8 @@ pub fn read_run(run: &Path) -> anyhow::Result<ReportData> {
         .map(|path| read_cycles(&path))
         .transpose()?
         .unwrap_or_default();
-    let flight = bin.map(|path| read_flight(&path)).transpose()?;
-    let explanation = flight.as_ref().map(explain);
+    let log = bin.map(|path| read_log(&path)).transpose()?;
+    let explanation = log.as_ref().map(explain);
     let motions = motions(&rows);
     let known = Known {
         joints: joints.as_ref(),
@@ -117,10 +117,10 @@ fn read_json(path: &Path) -> anyhow::Result<Value> {
         .with_context(|| format!("`{}` is no JSON", path.display()))
 }
 
-fn read_flight(path: &Path) -> anyhow::Result<Flight> {
+fn read_log(path: &Path) -> anyhow::Result<RunLog> {
     let fail = || format!("recording `{}`", path.display());
     let bytes = std::fs::read(path).with_context(fail)?;
-    Flight::read(&bytes).with_context(fail)
+    RunLog::read(&bytes).with_context(fail)
 }
 
 fn pair(value: &Value) -> Option<[f64; 2]> {

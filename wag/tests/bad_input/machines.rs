@@ -90,7 +90,11 @@ pub(crate) const CASES: &[Case] = &[
         2,
         &["none", "does not exist"],
     ),
-    (&["latency", "--run", "."], 2, &["cycles.csv"]),
+    (
+        &["latency", "--run", "."],
+        2,
+        &["no run folder", "cycles.bin"],
+    ),
     (
         &["latency", "--run", ".", "--arm", "127.0.0.1"],
         2,

@@ -5,7 +5,6 @@
 //! one. The delays go into `arm-response.toml`, for plans to be made through.
 
 mod measure;
-mod recorded;
 mod show;
 
 use crate::cli::LatencyArgs;
@@ -18,10 +17,11 @@ use cli_output::{Failure, OrInput, Outcome};
 use planner::response::delay::{TargetDelay, command_to_target};
 use planner::response::{Recording, Sample, Setpoint, identify};
 use rt_controller::relay::Latencies;
+use run_log::{Cycles, Run};
 use serde_json::Value;
 use shared_types::MonotonicNs;
 use shared_types::ipc::{CycleRecord, JointReport};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// File written into the run folder.
 const RESPONSE_FILE: &str = "arm-response.toml";
@@ -58,7 +58,7 @@ pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let evidence = match (&args.arm.address, &args.run) {
         (_, None) if args.arm.dry_run => return measure::dry_run(args, quiet).map(Some),
         (Some(_), None) => measure::measure(args, quiet)?,
-        (None, Some(run)) => recorded::read(run).or_input()?,
+        (None, Some(run)) => recorded(run).or_input()?,
         _ => {
             return Err(Failure::input(anyhow!(
                 "say what to measure: --arm ADDR moves an arm (start `wag rig` for a simulated one), --run RUN reads a recorded run"
@@ -86,12 +86,41 @@ pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
     Ok(Some(value))
 }
 
-/// Where the response goes: a file that was named, or the run folder's own. What a
-/// folder holds already was measured with the arm's own targets at hand and is
-/// never replaced by what its tables say.
+/// Where the response goes: a file that was named, or the run folder's own, which is
+/// never replaced.
 fn response_path(args: &LatencyArgs, evidence: &Evidence) -> Option<PathBuf> {
     let own = || Some(evidence.folder.join(RESPONSE_FILE)).filter(|path| !path.exists());
     args.response.clone().or_else(own)
+}
+
+/// A recorded run as evidence.
+///
+/// # Errors
+/// The run holds no recording, or a file of it is damaged.
+fn recorded(run: &Path) -> anyhow::Result<Evidence> {
+    let Cycles { cycles, joints } = Run::open(run)?.cycles()?;
+    Ok(Evidence {
+        source: format!("run {}", run.display()),
+        folder: run.to_owned(),
+        cycles,
+        has_targets: joints.iter().any(|r| r.arm_clock != 0),
+        reports: joints,
+        excitation: None,
+        camera_offset_s: camera_offset_s(&run.join("params.toml"))?,
+    })
+}
+
+/// The offset that `wag identify` and `wag demo` leave in their result (s).
+fn camera_offset_s(path: &Path) -> anyhow::Result<Option<f64>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let table: toml::Table = toml::from_str(&files::read_text(path)?)
+        .with_context(|| format!("`{}`", path.display()))?;
+    Ok(table
+        .get("fit")
+        .and_then(|fit| fit.get("time_offset_s"))
+        .and_then(toml::Value::as_float))
 }
 
 fn examine(evidence: &Evidence, quiet: bool) -> Outcome<Findings> {

@@ -1,4 +1,4 @@
-//! A recording as a row of moments: what a person wants to know of each cycle.
+//! A recording as a row of samples: what a person wants to know of each cycle.
 
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use rt_controller::control::{ControlSettings, ControlState};
@@ -23,7 +23,7 @@ pub struct WorstJoint {
 
 impl WorstJoint {
     /// Part of the limit (0 to 1 and beyond).
-    pub fn part(&self) -> f64 {
+    pub fn fraction(&self) -> f64 {
         if self.limit > 0.0 {
             self.value.abs() / self.limit
         } else {
@@ -38,14 +38,14 @@ impl WorstJoint {
                 value: values[j],
                 limit: limits[j],
             })
-            .max_by(|a, b| a.part().total_cmp(&b.part()))
+            .max_by(|a, b| a.fraction().total_cmp(&b.fraction()))
             .unwrap_or_default()
     }
 }
 
 /// One cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct CycleSample {
     /// Number.
     pub cycle: u64,
     /// Instant its setpoint is for: the planned wake-up, or the real one where
@@ -83,9 +83,9 @@ pub struct Moment {
 
 /// A recording, read.
 #[derive(Debug)]
-pub struct Flight {
+pub struct RunLog {
     /// Every cycle that could be read.
-    pub moments: Vec<Moment>,
+    pub samples: Vec<CycleSample>,
     /// Every stop.
     pub causes: Vec<CauseRecord>,
     /// Limits of the run.
@@ -96,29 +96,29 @@ pub struct Flight {
     pub flaws: Vec<String>,
 }
 
-impl Flight {
+impl RunLog {
     /// Reads a recording.
     ///
     /// # Errors
     /// [`LogError`] when it is none; [`LogError::Foreign`] when it holds no
     /// keyframe this version can read.
     pub fn read(bytes: &[u8]) -> Result<Self, LogError> {
-        let mut flight = Self {
-            moments: Vec::new(),
+        let mut log = Self {
+            samples: Vec::new(),
             causes: Vec::new(),
             limits: Limits::default(),
             settings: ControlSettings::from(rt_controller::control::Thresholds::relaxed()),
             flaws: Vec::new(),
         };
         let mut known = false;
-        let mut eye = Eye::default();
+        let mut differentiator = Differentiator::default();
         for read in LogReader::open(bytes)? {
             match read {
-                Read::Flaw(flaw) => flight.flaws.push(flaw.to_string()),
-                Read::Item(Item::Cause(cause)) => flight.causes.push(*cause),
+                Read::Flaw(flaw) => log.flaws.push(flaw.to_string()),
+                Read::Item(Item::Cause(cause)) => log.causes.push(*cause),
                 Read::Item(Item::Cycle(cycle)) => {
-                    let moment = eye.see(&cycle, &flight.limits, &flight.settings);
-                    flight.moments.push(moment);
+                    let sample = differentiator.sample(&cycle, &log.limits, &log.settings);
+                    log.samples.push(sample);
                 }
                 Read::Item(Item::Keyframe(keyframe)) => {
                     let Some(state) = keyframe.state() else {
@@ -126,9 +126,9 @@ impl Flight {
                     };
                     // An arming from before the recording shows only here.
                     let tier = MotionTier::from_raw(state.summary().tier);
-                    eye.tier = tier.or(eye.tier);
+                    differentiator.tier = tier.or(differentiator.tier);
                     if !known {
-                        flight.take_settings(&state);
+                        log.take_settings(&state);
                         known = true;
                     }
                 }
@@ -136,7 +136,7 @@ impl Flight {
             }
         }
         if known {
-            Ok(flight)
+            Ok(log)
         } else {
             Err(LogError::Foreign)
         }
@@ -149,13 +149,13 @@ impl Flight {
 
     /// Seconds from the first cycle.
     pub fn time_s(&self, stamp_ns: u64) -> f64 {
-        let first = self.moments.first().map_or(stamp_ns, |m| m.deadline_ns);
+        let first = self.samples.first().map_or(stamp_ns, |m| m.deadline_ns);
         MonotonicNs(stamp_ns).since_s(MonotonicNs(first))
     }
 
     /// Seconds from the first to the last cycle.
     pub fn duration_s(&self) -> f64 {
-        self.moments
+        self.samples
             .last()
             .map_or(0.0, |m| self.time_s(m.deadline_ns))
     }
@@ -163,7 +163,7 @@ impl Flight {
 
 /// What is remembered from cycle to cycle to see speeds and ages.
 #[derive(Debug, Default)]
-struct Eye {
+struct Differentiator {
     before: Option<Sent>,
     report_ns: Option<u64>,
     tier: Option<MotionTier>,
@@ -179,13 +179,13 @@ struct Sent {
     tool_m: nalgebra::Vector3<f64>,
 }
 
-impl Eye {
-    fn see(
+impl Differentiator {
+    fn sample(
         &mut self,
         cycle: &RecordedCycle,
         limits: &Limits,
         settings: &ControlSettings,
-    ) -> Moment {
+    ) -> CycleSample {
         let (input, record) = (&cycle.input, &cycle.record);
         if OrderKind::from_raw(input.order.kind) == Some(OrderKind::Arm) {
             self.tier = MotionTier::from_raw(input.order.tier);
@@ -204,7 +204,7 @@ impl Eye {
             armed
         };
         let age_ms = |from_ns: u64| input.deadline_ns.saturating_sub(from_ns) as f64 / 1e6;
-        let mut moment = Moment {
+        let mut sample = CycleSample {
             cycle: record.cycle,
             deadline_ns: input.deadline_ns.saturating_add(input.late_ns.into()),
             planned_ns: input.deadline_ns,
@@ -224,21 +224,21 @@ impl Eye {
             arm_error: (input.codes.present != 0 && input.codes.error != 0)
                 .then_some(input.codes.error),
         };
-        self.speeds(&mut moment, record.sent != 0, limits);
-        moment
+        self.speeds(&mut sample, record.sent != 0, limits);
+        sample
     }
 
     /// Divided differences of the setpoints that were really sent.
-    fn speeds(&mut self, moment: &mut Moment, sent: bool, limits: &Limits) {
+    fn speeds(&mut self, sample: &mut CycleSample, sent: bool, limits: &Limits) {
         if !sent {
             self.before = None;
             return;
         }
-        let (p, r) = kinematics::flange_pose(&moment.q_c);
+        let (p, r) = kinematics::flange_pose(&sample.q_c);
         let mut now = Sent {
-            q: moment.q_c,
+            q: sample.q_c,
             moved: None,
-            at_ns: moment.deadline_ns,
+            at_ns: sample.deadline_ns,
             tool_m: p + r * limits.tcp_offset(),
         };
         if let Some(before) = self.before {
@@ -246,15 +246,15 @@ impl Eye {
             if step_s > 0.0 && step_s < APART_MAX_S {
                 let qd = (now.q - before.q) * (1.0 / step_s);
                 now.moved = Some((qd, step_s));
-                moment.speed = WorstJoint::of(&qd, &limits.velocity_max_rad_s);
+                sample.speed = WorstJoint::of(&qd, &limits.velocity_max_rad_s);
                 // Two mean speeds belong to the middles of their steps. What the arm
                 // did before the first setpoint is not known.
                 if let Some((qd_before, step_before_s)) = before.moved {
                     let apart_s = (step_s + step_before_s) / 2.0;
                     let qdd = (qd - qd_before) * (1.0 / apart_s);
-                    moment.acceleration = WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
+                    sample.acceleration = WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
                 }
-                moment.tool_m_s = (now.tool_m - before.tool_m).norm() / step_s;
+                sample.tool_m_s = (now.tool_m - before.tool_m).norm() / step_s;
             }
         }
         self.before = Some(now);
@@ -265,10 +265,10 @@ impl Eye {
 mod tests {
     use super::*;
 
-    fn sent(eye: &mut Eye, at_ms: u64, q1: f64) -> Moment {
+    fn sent(differentiator: &mut Differentiator, at_ms: u64, q1: f64) -> CycleSample {
         let mut q = JointVector::ZERO;
         q[0] = q1;
-        let mut moment = Moment {
+        let mut sample = CycleSample {
             cycle: at_ms / 4,
             deadline_ns: at_ms * 1_000_000,
             planned_ns: at_ms * 1_000_000,
@@ -286,8 +286,8 @@ mod tests {
             late_ms: Some(0.1),
             arm_error: None,
         };
-        eye.speeds(&mut moment, true, &Limits::default());
-        moment
+        differentiator.speeds(&mut sample, true, &Limits::default());
+        sample
     }
 
     /// q = a t²/2 from a start in motion, sampled with a cycle left out: the
@@ -299,17 +299,17 @@ mod tests {
             let t = ms as f64 * 1e-3;
             v0 * t + a * t * t / 2.0
         };
-        let mut eye = Eye::default();
-        let seen: Vec<Moment> = [0, 4, 8, 20, 24, 28]
+        let mut differentiator = Differentiator::default();
+        let seen: Vec<CycleSample> = [0, 4, 8, 20, 24, 28]
             .iter()
-            .map(|ms| sent(&mut eye, *ms, q(*ms)))
+            .map(|ms| sent(&mut differentiator, *ms, q(*ms)))
             .collect();
         assert_eq!(seen[0].speed, WorstJoint::default());
         assert_eq!(seen[1].acceleration, WorstJoint::default());
         assert!((seen[1].speed.value - (v0 + a * 0.002)).abs() < 1e-9);
-        for moment in &seen[2..] {
-            let found = moment.acceleration;
-            assert!((found.value - a).abs() < 1e-6, "{moment:?}");
+        for sample in &seen[2..] {
+            let found = sample.acceleration;
+            assert!((found.value - a).abs() < 1e-6, "{sample:?}");
         }
     }
 }
