@@ -32,7 +32,6 @@ pub mod ropes;
 pub mod sysid;
 pub mod tasks;
 pub mod trajopt;
-pub mod trials;
 pub mod wiggle;
 pub mod wiggle_design;
-mod workers;
+pub mod workers;

@@ -155,7 +155,7 @@ pub fn wiggle(config: &WiggleConfig, limits: &Limits) -> Result<JointTrajectory,
 }
 
 /// [`wiggle`] of an arm without limits: for simulations only.
-pub(crate) fn unlimited(config: &WiggleConfig) -> Result<JointTrajectory, WiggleError> {
+pub fn unlimited(config: &WiggleConfig) -> Result<JointTrajectory, WiggleError> {
     config.check()?;
     #[allow(
         clippy::cast_possible_truncation,

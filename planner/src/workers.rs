@@ -2,7 +2,7 @@
 
 /// Applies `f` to every item, in `threads` contiguous parts. The result does
 /// not depend on `threads`. A panic of `f` is passed on.
-pub(crate) fn map_in_order<T: Sync, R: Send>(
+pub fn map_in_order<T: Sync, R: Send>(
     items: &[T],
     threads: usize,
     f: impl Fn(&T) -> R + Sync,

@@ -97,10 +97,8 @@ pub enum Command {
     /// Find or check where the camera stands.
     #[command(subcommand)]
     Calib(CalibCommand),
-    /// Measure how fast this machine runs a part of the system.
+    /// Measure how punctual the controller is on this machine.
     Bench(BenchArgs),
-    /// Make a result of the paper again, on simulated ropes.
-    Reproduce(ReproduceArgs),
     /// Show or check which configuration holds here: built in, site, rig, run.
     #[command(subcommand)]
     Config(ConfigCommand),

@@ -27,18 +27,28 @@ mod config;
 mod doctor;
 mod files;
 mod ledger;
+mod moved;
 mod pipeline;
 mod report;
 mod session;
 mod watch;
 
 use clap::Parser;
+use cli_output::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,
-        Err(e) => return cli_output::refuse_usage(&e),
+        Err(e) => {
+            return match moved::replacement(std::env::args().skip(1)) {
+                Some(instead) if e.use_stderr() => {
+                    let json = std::env::args().any(|arg| arg == "--json");
+                    cli_output::finish(Err(Failure::input(anyhow::anyhow!(instead))), json)
+                }
+                _ => cli_output::refuse_usage(&e),
+            };
+        }
     };
     cli_output::start_logging(cli.verbose);
     cli_output::finish(command::run(&cli), cli.json)

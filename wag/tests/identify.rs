@@ -9,8 +9,10 @@
 
 use arm_model::Limits;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
-use planner::trials::{TrialRig, outside_rope, trial_rope};
+use planner::filming::{FilmTiming, KeypointLayout, Randomisation, film as film_rope, side_camera};
+use planner::ropes::{TRIAL_SALT, outside_rope, trial_rope};
 use planner::wiggle::{WiggleConfig, wiggle};
+use rope_sim::PlannedArm;
 use shared_types::RopeParams;
 use std::fmt::Write;
 use std::path::Path;
@@ -22,21 +24,28 @@ const SEED: u64 = 71;
 /// Films a rope's wiggle into keypoints, joints and camera of `folder`.
 fn film(rope: &RopeParams, index: u64, folder: &Path) {
     let config = WiggleConfig::default();
-    let rig = TrialRig::new(&config).unwrap();
-    let filmed = rig.film(rope, SEED, index).unwrap();
+    let motion = wiggle(&config, &Limits::default()).unwrap();
+    let camera = side_camera();
+    let filmed = film_rope(
+        rope,
+        &PlannedArm::new(motion.clone()),
+        &camera,
+        KeypointLayout::Uniform(24),
+        &FilmTiming::default(),
+        &Randomisation::default().draw(SEED ^ TRIAL_SALT, index),
+    )
+    .unwrap();
     let keypoints = serde_json::to_string(&filmed.track).unwrap();
     std::fs::write(folder.join("keypoints.json"), keypoints).unwrap();
     let conf = folder.join("camera.conf");
-    write_factory_conf(&conf, &rig.camera, VideoMode::Vga).unwrap();
-    let camera = folder.join("camera.toml");
+    write_factory_conf(&conf, &camera, VideoMode::Vga).unwrap();
     write_camera_toml(
+        &folder.join("camera.toml"),
         &camera,
-        &rig.camera,
         VideoMode::Vga,
         Path::new("camera.conf"),
     )
     .unwrap();
-    let motion = wiggle(&config, &Limits::default()).unwrap();
     let mut joints = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
     for i in 0..2000 {
         let t_s = f64::from(i) * 0.004;

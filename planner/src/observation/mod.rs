@@ -167,7 +167,7 @@ pub enum ObserveError {
     },
     /// The network reads link centres, which a camera does not show.
     #[error(
-        "the network reads the centres of the rope's links, which only simulated films show (wag reproduce sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
+        "the network reads the centres of the rope's links, which only simulated films show (experiments sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
     )]
     NeedsLinkCentres,
     /// The film shows link centres, the network reads keypoints uniform in arc length.

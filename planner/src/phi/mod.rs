@@ -15,8 +15,6 @@ mod net;
 mod probe;
 #[cfg(feature = "network")]
 mod propose;
-#[cfg(feature = "network")]
-mod sensitivity;
 
 #[cfg(feature = "network")]
 pub use estimate::{NetworkError, identify_by_network};
@@ -28,8 +26,6 @@ pub use metadata::{
 pub use net::{PhiNet, PredictError, Prediction, RawOutputs};
 #[cfg(feature = "network")]
 pub use propose::{HybridError, identify_with_network, proposal};
-#[cfg(feature = "network")]
-pub use sensitivity::{MOMENT_FRAMES, SensitivityMap};
 
 pub use probe::{PARITY, difference, probe};
 

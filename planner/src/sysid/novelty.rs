@@ -133,8 +133,7 @@ fn edges_of_ratios(x: &Point) -> Vec<Edge> {
 mod tests {
     use super::super::coordinates::point_of;
     use super::*;
-    use crate::ropes::random_rope;
-    use crate::trials::outside_rope;
+    use crate::ropes::{outside_rope, random_rope};
 
     fn worst(x: &Point) -> f64 {
         let edges = edges_in_m(x).into_iter().chain(edges_of_ratios(x));

@@ -24,7 +24,6 @@ mod reach_picture;
 mod record;
 mod replay;
 mod report;
-mod reproduce;
 mod rig;
 mod score;
 mod sim;
@@ -92,7 +91,6 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Score(args) => score::run(args, quiet),
         Command::Calib(command) => calib::run(command, quiet),
         Command::Bench(args) => bench::run(args, quiet),
-        Command::Reproduce(args) => reproduce::run(args, quiet),
         Command::Config(command) => config::run(command, quiet),
         Command::Doctor(args) => doctor::run(args, quiet),
         Command::Man(args) => manual::man(args, quiet),

@@ -5,9 +5,7 @@ use cli_output::{Failure, Outcome};
 use planner::observation::{ObserveError, ObservedPoints};
 use planner::phi::{ModelError, PhiNet};
 use planner::sysid::Method;
-use planner::trials::TrialRig;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
 
 /// The network of `model`, or the built-in one.
 ///
@@ -40,25 +38,6 @@ pub fn network_for_camera(model: Option<&Path>) -> Outcome<PhiNet> {
 /// Whether a method asks a network.
 pub fn asks_network(method: Method) -> bool {
     matches!(method, Method::Network | Method::Hybrid)
-}
-
-/// Gives a rig the network if the method asks one, and lets it film what the network
-/// reads.
-///
-/// # Errors
-/// As [`network`], or a model for a method that asks none.
-pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) -> Outcome {
-    no_model_without_network(method, model)?;
-    if asks_network(method) {
-        // A fit looks at keypoints as a camera gives them.
-        let net = match method {
-            Method::Network => network(model)?,
-            _ => network_for_camera(model)?,
-        };
-        rig.points = net.metadata().features.points;
-        rig.network = Some(Arc::new(Mutex::new(net)));
-    }
-    Ok(())
 }
 
 /// Refuses a model for a method that asks no network.

@@ -1,16 +1,10 @@
-//! `wag bench NAME`: how fast this machine runs a part of the system.
+//! `wag bench NAME`: how punctual the controller is on this machine.
 //!
 //! A benchmark measures and compares with limits; it does not judge: the exit code
 //! is 0 whatever the figures are.
 
-mod identify;
-mod live;
-mod plan;
 mod record;
-mod rope;
 mod rt;
-mod spent;
-mod track;
 
 use crate::cli::{BenchArgs, BenchName};
 use cli_output::Outcome;
@@ -19,11 +13,7 @@ use serde_json::Value;
 /// Runs a benchmark. The value is what `--json` prints.
 pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     match args.name {
-        BenchName::Rope => rope::run(args, quiet),
         BenchName::Rt => rt::run(args, quiet),
-        BenchName::Identify => identify::run(args, quiet),
-        BenchName::Plan => plan::run(args, quiet),
         BenchName::Record => record::run(args, quiet),
-        BenchName::Track => track::run(args, quiet),
     }
 }

@@ -1,0 +1,156 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use cli_output::seed;
+use planner::sysid::Method;
+use std::path::PathBuf;
+
+/// Reproduce a result of the paper, or measure how fast this machine runs a part of the
+/// system, on simulated ropes.
+#[derive(Debug, Parser)]
+#[command(
+    name = "experiments",
+    version,
+    after_help = "Exit codes: 0 done, 1 ran and failed, 2 bad usage or input."
+)]
+pub struct Cli {
+    /// Print one JSON object on standard output and nothing else there.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Log more to standard error (-v info, -vv debug).
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Measure how fast this machine runs a part of the system.
+    Bench(BenchArgs),
+    /// A result of the paper.
+    #[command(flatten)]
+    Result(ResultCommand),
+}
+
+/// Results known by name.
+#[derive(Debug, Subcommand)]
+pub enum ResultCommand {
+    /// Errors of identified parameters (the paper's in-domain table) and coverage.
+    Sysid(ResultArgs),
+    /// Telling ropes outside the parameter ranges from those inside.
+    SysidOod(ResultArgs),
+    /// Errors of identified parameters with each of the paper's nine wiggles.
+    WiggleAblation(ResultArgs),
+    /// Motion of an identified rope in a throw it was not identified from.
+    MotionFidelity(ResultArgs),
+    /// Error of planned strikes: true, identified and random parameters.
+    SimPipeline(ResultArgs),
+    /// Success of lobs and drapes planned with identified parameters.
+    LobDrape(ResultArgs),
+    /// Strikes planned for every rope it might be, beside plain ones, and their forecasts.
+    Robust(ResultArgs),
+    /// Error of strikes planned with only some parameters identified.
+    ParameterImportance(ResultArgs),
+    /// Sensitivity of the network's answer to each keypoint, parameter by parameter.
+    SensitivityMaps(ResultArgs),
+}
+
+/// Arguments of a result.
+#[derive(Debug, Args)]
+pub struct ResultArgs {
+    /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
+    /// each wiggle, for lob-drape its own 24, for robust 200,
+    /// for parameter-importance 30, for sensitivity-maps 8
+    /// (motion-fidelity has its own).
+    #[arg(long)]
+    pub ropes: Option<u64>,
+    /// Seed of the ropes, the films and the searches.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// Method.
+    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
+    pub method: MethodName,
+    /// Threads; the result does not depend on them. Default: those of the configuration, 2.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
+    /// phi-train).
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+    /// Result file (JSON); an interrupted run resumes from it. A picture of the result
+    /// (SVG) is drawn beside it.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// How to identify, as `wag identify --method`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    /// The network alone.
+    Nn,
+    /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
+    Cmaes,
+    /// A quick proposal of the network, or of a search where the film is
+    /// out of its distribution, then refined.
+    Hybrid,
+    /// A quick proposal of a search, then refined.
+    HybridSearch,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Nn => Self::Network,
+            MethodName::Cmaes => Self::Cmaes,
+            MethodName::Hybrid => Self::Hybrid,
+            MethodName::HybridSearch => Self::HybridSearch,
+        }
+    }
+}
+
+/// Arguments of `experiments bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// What to measure.
+    #[arg(value_enum)]
+    pub name: BenchName,
+    /// Few candidates, once each: seconds instead of a minute, rough figures.
+    #[arg(long)]
+    pub quick: bool,
+    /// Seed of the ropes and motions.
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
+    #[arg(long)]
+    pub video: Option<PathBuf>,
+    /// `track`: the online tracker, which sees every frame once, in order.
+    #[arg(long)]
+    pub live: bool,
+}
+
+/// Benchmarks known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BenchName {
+    /// The rope simulator: kernels, jobs, scaling.
+    Rope,
+    /// Identification: time of each method.
+    Identify,
+    /// Planning: time of one throw of each task, and what it is spent on.
+    Plan,
+    /// Tracking: time of each stage per frame, and memory, on a recorded wiggle.
+    Track,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_holds_together() {
+        Cli::command().debug_assert();
+    }
+}

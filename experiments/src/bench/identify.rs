@@ -1,0 +1,125 @@
+//! `experiments bench identify`: time to identify one rope, by method, on all cores.
+
+use super::spent::least;
+use crate::args::BenchArgs;
+use crate::network::{network, with_network};
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{OrInput, Outcome};
+use experiments::trials::{TrialRig, trial_rope};
+use planner::filming::Filmed;
+use planner::sysid::{IdentifyOptions, Method};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// One method's cost per rope, film making left out.
+#[derive(Debug, Serialize)]
+struct Row {
+    method: &'static str,
+    ropes: u64,
+    /// Mean over the ropes of the least time of several runs (s).
+    wall_s: f64,
+    cpu_s: f64,
+    /// Mean number of ropes simulated.
+    simulations: f64,
+    limit_wall_s: f64,
+    within_limit: bool,
+}
+
+/// Ropes and runs of each.
+fn extent(quick: bool) -> (u64, usize) {
+    if quick { (1, 1) } else { (5, 3) }
+}
+
+fn measure(
+    rig: &TrialRig,
+    args: &BenchArgs,
+    (method, limit_wall_s): (&'static str, f64),
+    mut identify: impl FnMut(&Filmed, u64) -> Outcome<f64>,
+) -> Outcome<Row> {
+    let (ropes, repeats) = extent(args.quick);
+    let (mut wall_s, mut cpu_s, mut simulations) = (0.0, 0.0, 0.0);
+    for index in 0..ropes {
+        let rope = trial_rope(args.seed, index);
+        let filmed = rig.film(&rope, args.seed, index).or_failed()?;
+        let (spent, simulated) = least(repeats, || identify(&filmed, index))?;
+        wall_s += spent.wall_s;
+        cpu_s += spent.cpu_s;
+        simulations += simulated;
+    }
+    #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
+    let count = ropes as f64;
+    Ok(Row {
+        method,
+        ropes,
+        wall_s: wall_s / count,
+        cpu_s: cpu_s / count,
+        simulations: simulations / count,
+        limit_wall_s,
+        within_limit: wall_s / count < limit_wall_s,
+    })
+}
+
+pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let config = crate::results::setup::built_in().or_failed()?;
+    let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
+    with_network(&mut rig, Method::Hybrid, None)?;
+    let machine = Machine::here();
+    let options = IdentifyOptions {
+        seed: args.seed,
+        threads: machine.cores,
+        ..config.identify
+    };
+    let stage = Stage::begin("identify", quiet);
+    let mut net = network(None)?;
+    let nn = measure(&rig, args, ("nn", 0.010), |filmed, _| {
+        // From keypoints to parameters; nothing is simulated.
+        net.look(&rig.observation(filmed)).or_failed()?;
+        Ok(0.0)
+    })?;
+    stage.say("network measured");
+    let fit = |options: IdentifyOptions| {
+        let rig = &rig;
+        move |filmed: &Filmed, index: u64| {
+            let found = rig.fit(filmed, index, &options).or_failed()?;
+            Ok(f64::from(found.simulations))
+        }
+    };
+    let hybrid = measure(&rig, args, ("hybrid", 2.0), fit(options))?;
+    stage.say("hybrid measured");
+    // Without its early stop and repeats: all the simulations of the paper.
+    let whole = IdentifyOptions {
+        method: Method::Cmaes,
+        early_stop: false,
+        repeats_max: 0,
+        ..options
+    };
+    let cmaes = measure(&rig, args, ("cmaes", 6.0), fit(whole))?;
+    stage.done("3 methods measured");
+    let rows = [nn, hybrid, cmaes];
+    if !quiet {
+        println!("{machine}\nseed {}", args.seed);
+        let lines = rows.iter().map(|row| {
+            [
+                row.method.to_owned(),
+                format!("{:.4}", row.wall_s),
+                format!("{:.4}", row.cpu_s),
+                format!("{:.0}", row.simulations),
+                format!("{} s kept: {}", row.limit_wall_s, row.within_limit),
+            ]
+        });
+        let header = [
+            "method",
+            "wall (s)",
+            "processor (s)",
+            "simulations",
+            "limit",
+        ];
+        println!("{}", numbers(header, 1, lines));
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "bench identify", "machine": machine, "seed": args.seed,
+        "quick": args.quick, "methods": rows,
+    })))
+}

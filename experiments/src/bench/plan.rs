@@ -1,0 +1,139 @@
+//! `experiments bench plan`: time to plan one throw of each task, and what it is spent on.
+
+use super::spent::least;
+use crate::args::BenchArgs;
+use arm_model::Limits;
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{OrInput, Outcome};
+use planner::process::PlannerConfig;
+use planner::ropes::random_rope;
+use planner::tasks::{
+    Belief, PlanOptions, PlanRequest, Planned, ThrowSimulator, plan_throw, simulator_for,
+};
+use serde::Serialize;
+use serde_json::{Value, json};
+use shared_types::Task;
+use std::ops::ControlFlow;
+
+/// Longest wall time wanted of one plan on two cores (s), and the target (m).
+const TASKS: [(Task, f64, [f64; 3]); 3] = [
+    (Task::Strike, 1.5, [1.0, 0.2, 0.3]),
+    (Task::Lob, 4.0, [0.85, 0.0, 0.20]),
+    (Task::Drape, 4.0, [0.75, 0.0, 0.30]),
+];
+/// Throws in a batch whose parts are timed.
+const BATCH: usize = 60;
+/// Longer than any throw: no instant to look for contacts but the first (s).
+const NEVER_S: f64 = 60.0;
+
+/// One task's cost.
+#[derive(Debug, Serialize)]
+struct Row {
+    task: &'static str,
+    wall_s: f64,
+    cpu_s: f64,
+    simulations: u32,
+    rollouts_per_s: f64,
+    /// Parts of the processor time: rope with its contacts, contacts with the arm, all
+    /// else (drawing, screening, learning, what finalists are observed longer and finer).
+    rope_part: f64,
+    contacts_part: f64,
+    search_part: f64,
+    limit_wall_s: f64,
+    within_limit: bool,
+}
+
+fn measure(
+    config: &PlannerConfig,
+    args: &BenchArgs,
+    (kind, limit_wall_s, target_m): (Task, f64, [f64; 3]),
+) -> Outcome<Row> {
+    let repeats = if args.quick { 1 } else { 3 };
+    let task = config.task(kind, target_m);
+    let request = PlanRequest {
+        rope: random_rope(args.seed),
+        limits: Limits::default(),
+        options: PlanOptions {
+            seed: args.seed,
+            searches: 1,
+            generations: args.quick.then_some(3),
+            ..config.search
+        },
+        belief: Belief::default(),
+        following: None,
+    };
+    let plan = || plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()));
+    let (whole, planned): (_, Planned) = least(repeats, plan).or_failed()?;
+    let throws = vec![(&request.rope, &planned.trajectory); BATCH];
+    let simulator = simulator_for(&*task, &request.rope, &request.options);
+    let blind = ThrowSimulator {
+        contact_period_s: NEVER_S,
+        ..simulator.clone()
+    };
+    let (both, _) = least(repeats, || simulator.run(&throws)).or_failed()?;
+    let (rope, _) = least(repeats, || blind.run(&throws)).or_failed()?;
+    let simulations = f64::from(planned.simulations);
+    #[allow(clippy::cast_precision_loss, reason = "a small count")]
+    let part = |cpu_s: f64| (cpu_s / BATCH as f64 * simulations / whole.cpu_s).clamp(0.0, 1.0);
+    let both_part = part(both.cpu_s);
+    // Both are measured, and noise may turn their order.
+    let rope_part = part(rope.cpu_s).min(both_part);
+    Ok(Row {
+        task: kind.name(),
+        wall_s: whole.wall_s,
+        cpu_s: whole.cpu_s,
+        simulations: planned.simulations,
+        rollouts_per_s: simulations / whole.wall_s,
+        rope_part,
+        contacts_part: both_part - rope_part,
+        search_part: 1.0 - both_part,
+        limit_wall_s,
+        within_limit: whole.wall_s < limit_wall_s,
+    })
+}
+
+pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let config = crate::results::setup::built_in().or_failed()?;
+    let stage = Stage::begin("bench", quiet);
+    let rows = TASKS
+        .into_iter()
+        .map(|task| measure(&config, args, task))
+        .collect::<Outcome<Vec<Row>>>()?;
+    stage.done("one search per task");
+    let machine = Machine::here();
+    if !quiet {
+        println!("{machine}\nseed {}", args.seed);
+        let percent = |part: f64| format!("{:.0} %", 100.0 * part);
+        let lines = rows.iter().map(|row| {
+            [
+                row.task.to_owned(),
+                format!("{:.2}", row.wall_s),
+                format!("{:.2}", row.cpu_s),
+                row.simulations.to_string(),
+                format!("{:.0}", row.rollouts_per_s),
+                percent(row.rope_part),
+                percent(row.contacts_part),
+                percent(row.search_part),
+                format!("{} s kept: {}", row.limit_wall_s, row.within_limit),
+            ]
+        });
+        let header = [
+            "task",
+            "wall (s)",
+            "processor (s)",
+            "simulations",
+            "rollouts a second",
+            "rope",
+            "contacts with the arm",
+            "search",
+            "limit",
+        ];
+        println!("{}", numbers(header, 1, lines));
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "bench plan", "machine": machine, "seed": args.seed,
+        "quick": args.quick, "tasks": rows,
+    })))
+}

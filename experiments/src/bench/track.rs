@@ -1,0 +1,155 @@
+//! `experiments bench track`: time per frame of each stage of tracking a recorded wiggle, on
+//! one core, and the memory it takes.
+
+use super::spent::{Spent, least};
+use crate::args::BenchArgs;
+use anyhow::{Context, anyhow};
+use camera_ingest::source::{FrameSource, StereoSource, read_left};
+use camera_ingest::{ClampPath, TrackOptions, load_camera, open_video, track};
+use cli_output::Machine;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{Failure, OrInput, Outcome};
+use run_log::files::read_joints;
+use serde_json::{Map, Value, json};
+use shared_types::StereoCamera;
+use std::path::Path;
+use std::time::Duration;
+
+/// Longest processor time wanted per frame, decoding included (ms).
+const LIMIT_MS: f64 = 3.0;
+/// Most memory wanted (MB, 10^6 bytes).
+const LIMIT_MB: f64 = 400.0;
+/// Parts of the tracker that it times itself.
+const STAGES: [&str; 3] = ["background", "first_frame", "following"];
+
+/// Most memory this process has held so far (MB); nothing where the system does
+/// not tell.
+fn peak_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024.0 / 1e6)
+}
+
+/// What one pass over a recording took.
+struct Pass {
+    decoding: Spent,
+    tracking: Spent,
+    stages: [Duration; 3],
+    lost_part: f64,
+}
+
+impl Pass {
+    /// Reads and tracks a recording; the frames are gone afterwards, so that a second
+    /// pass takes no more memory than the first.
+    fn over(
+        video: &mut dyn StereoSource,
+        camera: &StereoCamera,
+        clamp: &ClampPath,
+    ) -> Outcome<Self> {
+        let (decoding, frames) = least(1, || read_left(video)).or_input()?;
+        let options = TrackOptions::default();
+        let (tracking, result) =
+            least(1, || track(&frames, camera, clamp, &options)).or_failed()?;
+        let times = result.times;
+        Ok(Self {
+            decoding,
+            tracking,
+            stages: [times.background, times.first_frame, times.follow],
+            lost_part: result.track.lost_part(),
+        })
+    }
+
+    /// The smaller of both passes' times, each by itself.
+    fn or_less(self, other: &Self) -> Self {
+        let less = |a: Spent, b: Spent| Spent {
+            cpu_s: a.cpu_s.min(b.cpu_s),
+            wall_s: a.wall_s.min(b.wall_s),
+        };
+        Self {
+            decoding: less(self.decoding, other.decoding),
+            tracking: less(self.tracking, other.tracking),
+            stages: std::array::from_fn(|i| self.stages[i].min(other.stages[i])),
+            ..self
+        }
+    }
+}
+
+/// What is measured with: `video.avi`, `camera.toml` and the clamp's motion.
+fn recording(folder: &Path) -> Outcome<(Box<dyn StereoSource>, StereoCamera, ClampPath)> {
+    let joints = folder.join("joints.csv");
+    let clamp = if joints.exists() {
+        let csv = read_joints(&joints).or_input()?;
+        let samples: Vec<_> = csv.times_s.into_iter().zip(csv.q).collect();
+        ClampPath::from_joints(&samples)
+            .with_context(|| format!("`{}`", joints.display()))
+            .or_input()?
+    } else {
+        ClampPath::from_pose_csv(&folder.join("pose.csv")).or_input()?
+    };
+    let camera = load_camera(&folder.join("camera.toml")).or_input()?;
+    Ok((open_video(folder, None).or_input()?, camera, clamp))
+}
+
+pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let folder = args.video.as_ref().ok_or_else(|| {
+        Failure::input(anyhow!(
+            "`experiments bench track` needs a recorded wiggle: --video FOLDER with video.avi, \
+             camera.toml and pose.csv or joints.csv"
+        ))
+    })?;
+    let (mut video, camera, clamp) = recording(folder)?;
+    if args.live {
+        return super::live::run(folder, (&mut video, camera, &clamp), quiet);
+    }
+    let stage = Stage::begin("bench", quiet);
+    let mut least = Pass::over(&mut video, &camera, &clamp)?;
+    let peak_mb = peak_mb();
+    for _ in 1..if args.quick { 1 } else { 3 } {
+        least = least.or_less(&Pass::over(&mut video, &camera, &clamp)?);
+    }
+    let frames = video.len();
+    stage.done(&format!("{frames} frames"));
+    #[allow(clippy::cast_precision_loss, reason = "some hundred frames")]
+    let per_frame = |s: f64| 1e3 * s / frames as f64;
+    let together = Spent {
+        cpu_s: least.decoding.cpu_s + least.tracking.cpu_s,
+        wall_s: least.decoding.wall_s + least.tracking.wall_s,
+    };
+    let machine = Machine::here();
+    let stages: Map<String, Value> = STAGES
+        .iter()
+        .zip(least.stages)
+        .map(|(name, t)| ((*name).to_owned(), json!(per_frame(t.as_secs_f64()))))
+        .collect();
+    if !quiet {
+        println!("{machine}\n{frames} frames of `{}`", folder.display());
+        let ms = |s: f64| format!("{:.2}", per_frame(s));
+        let row = |name: &str, t: Spent| [name.to_owned(), ms(t.cpu_s), ms(t.wall_s)];
+        let mut rows = vec![row("decoding", least.decoding)];
+        for (name, t) in STAGES.iter().zip(least.stages) {
+            let name = format!("tracking: {}", name.replace('_', " "));
+            rows.push([name, String::new(), ms(t.as_secs_f64())]);
+        }
+        rows.push(row("tracking", least.tracking));
+        rows.push(row("together", together));
+        let header = ["stage", "processor (ms/frame)", "wall (ms/frame)"];
+        println!("{}", numbers(header, 0, rows));
+        println!("wanted: at most {LIMIT_MS} ms of processor time a frame");
+        if let Some(mb) = peak_mb {
+            println!("peak memory {mb:.0} MB (wanted: at most {LIMIT_MB} MB)");
+        }
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "bench track", "machine": machine, "video": folder,
+        "quick": args.quick, "frames": frames,
+        "decoding_cpu_ms": per_frame(least.decoding.cpu_s),
+        "tracking_cpu_ms": per_frame(least.tracking.cpu_s),
+        "together_cpu_ms": per_frame(together.cpu_s),
+        "together_wall_ms": per_frame(together.wall_s),
+        "stages_wall_ms": stages, "limit_ms": LIMIT_MS,
+        "within_limit": per_frame(together.cpu_s) <= LIMIT_MS,
+        "peak_memory_mb": peak_mb, "limit_mb": LIMIT_MB, "lost_part": least.lost_part,
+    })))
+}

@@ -1,0 +1,42 @@
+//! `experiments`: results of the paper and benchmarks, on simulated ropes.
+//!
+//! Exit codes: 0 done, 1 ran and failed, 2 bad usage or input.
+#![allow(
+    unreachable_pub,
+    reason = "in a binary `pub` means: for the rest of the program"
+)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        reason = "tests may fail loudly"
+    )
+)]
+
+// Its macros stand for the standard ones everywhere below.
+#[macro_use]
+extern crate cli_output;
+
+mod args;
+mod bench;
+mod network;
+mod results;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = match args::Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => return cli_output::refuse_usage(&e),
+    };
+    cli_output::start_logging(cli.verbose);
+    let outcome = match &cli.command {
+        args::Command::Bench(bench) => bench::run(bench, cli.json),
+        args::Command::Result(result) => results::run(result, cli.json),
+    };
+    cli_output::finish(outcome, cli.json)
+}

@@ -1,0 +1,57 @@
+//! The network that reads rope parameters: the one inside this program, or a file.
+
+use cli_output::{Failure, OrInput, Outcome};
+use experiments::trials::TrialRig;
+use planner::observation::{ObserveError, ObservedPoints};
+use planner::phi::PhiNet;
+use planner::sysid::Method;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+/// The network of `model`, or the built-in one.
+///
+/// # Errors
+/// Why it is refused: bad input for a file.
+pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
+    match model {
+        Some(path) => PhiNet::load(path).or_input(),
+        None => PhiNet::embedded().or_failed(),
+    }
+}
+
+/// [`network`] for what a camera sees.
+///
+/// # Errors
+/// As [`network`], or a network that reads what no camera shows.
+pub fn network_for_camera(model: Option<&Path>) -> Outcome<PhiNet> {
+    let net = network(model)?;
+    match net.metadata().features.points {
+        ObservedPoints::ArcLength => Ok(net),
+        ObservedPoints::LinkCentres => Err(Failure::input(ObserveError::NeedsLinkCentres)),
+    }
+}
+
+/// Gives a rig the network if the method asks one, and lets it film what the network
+/// reads.
+///
+/// # Errors
+/// As [`network`], a model for a method that asks none, or one that a fit cannot follow.
+pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) -> Outcome {
+    if !matches!(method, Method::Network | Method::Hybrid) {
+        return match model {
+            Some(path) => Err(Failure::input(anyhow::anyhow!(
+                "--model {} is for --method nn and hybrid only",
+                path.display()
+            ))),
+            None => Ok(()),
+        };
+    }
+    // A fit looks at keypoints as a camera gives them.
+    let net = match method {
+        Method::Network => network(model)?,
+        _ => network_for_camera(model)?,
+    };
+    rig.points = net.metadata().features.points;
+    rig.network = Some(Arc::new(Mutex::new(net)));
+    Ok(())
+}

@@ -1,0 +1,190 @@
+//! `experiments sensitivity-maps`: what in a film the network's answer hangs on, as the
+//! paper's activation maps show it: per parameter, the gradient of the answer over every
+//! keypoint at every moment.
+
+use super::checkpoint::{Sequence, checkpointed_trials};
+use super::sensitivity_picture::svg;
+use super::setup::Setup;
+use crate::args::{MethodName, ResultArgs};
+use crate::network::network_for_camera;
+use anyhow::anyhow;
+use cli_output::Stage;
+use cli_output::table::numbers;
+use cli_output::{Failure, OrInput, Outcome};
+use experiments::trials::{MOMENT_FRAMES, SensitivityMap, SensitivityTrial, sensitivity_trials};
+use planner::phi::PhiNet;
+use run_log::files;
+use serde::Serialize;
+use serde_json::{Value, json};
+use shared_types::rope::RANGES;
+
+/// Films averaged over; the paper shows one.
+const ROPES: u64 = 8;
+/// What the paper says of each parameter's map, order of [`RANGES`].
+const PAPER: [&str; 9] = [
+    "earlier", "earlier", "later", "later", "earlier", "later", "later", "earlier", "earlier",
+];
+
+/// One parameter's map in a few numbers.
+#[derive(Debug, Serialize)]
+struct Row {
+    parameter: &'static str,
+    /// Mean over all moments (parts of the range per metre).
+    mean_per_m: f64,
+    /// Middle of the moment that tells most (s).
+    peak_s: f64,
+    /// Time before which half of it lies (s).
+    half_before_s: f64,
+    /// Part of it in the last second of the film.
+    last_second: f64,
+    /// Keypoint that tells most, as a part of the rope's length from the clamp.
+    place: f64,
+    paper: &'static str,
+}
+
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "counts are small"
+)]
+fn rows(map: &SensitivityMap, moment_s: f64) -> Vec<Row> {
+    let most = |values: &[f64]| -> usize {
+        let largest = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]));
+        largest.unwrap_or_default()
+    };
+    RANGES
+        .iter()
+        .enumerate()
+        .map(|(parameter, range)| {
+            let over_time = map.over_time(parameter);
+            let total: f64 = over_time.iter().sum();
+            let mut before = 0.0;
+            let half = over_time.iter().position(|value| {
+                before += value;
+                before >= total / 2.0
+            });
+            let last = (1.0 / moment_s).round() as usize;
+            let end: f64 = over_time.iter().rev().take(last).sum();
+            let middle_s = |moment: usize| (moment as f64 + 0.5) * moment_s;
+            Row {
+                parameter: range.label,
+                mean_per_m: total / over_time.len().max(1) as f64,
+                peak_s: middle_s(most(&over_time)),
+                half_before_s: middle_s(half.unwrap_or_default()),
+                last_second: end / total.max(f64::MIN_POSITIVE),
+                place: most(&map.along_rope(parameter)) as f64 / (map.keypoints - 1) as f64,
+                paper: PAPER[parameter],
+            }
+        })
+        .collect()
+}
+
+/// Mean of the films' maps.
+#[allow(clippy::cast_precision_loss, reason = "some dozen films")]
+fn mean(trials: &[SensitivityTrial]) -> Option<SensitivityMap> {
+    let first = &trials.first()?.map;
+    let mut map = SensitivityMap::empty(first.moments, first.keypoints);
+    for trial in trials {
+        map.add(&trial.map);
+    }
+    let count = trials.len() as f32;
+    map.values.iter_mut().flatten().for_each(|v| *v /= count);
+    Some(map)
+}
+
+pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
+    if !matches!(args.method, MethodName::Hybrid | MethodName::Nn) {
+        return Err(Failure::input(anyhow!(
+            "these are maps of the network: leave out --method, or name nn"
+        )));
+    }
+    let model = args.model.as_deref();
+    let metadata = network_for_camera(model)?.metadata().clone();
+    let (rate_hz, weights) = (metadata.features.rate_hz, metadata.graph_sha256);
+    let Setup { rig, options, .. } = Setup::new(args)?;
+    let stage = Stage::begin("sensitivity-maps", quiet);
+    let sequence = Sequence {
+        name: "sensitivity-maps",
+        method: format!("network {weights}"),
+        count: args.ropes.unwrap_or(ROPES),
+        batch: options.threads.max(1),
+        told: (|t: &SensitivityTrial| largest(&t.map), "films, most per m"),
+    };
+    let network = || model.map_or_else(PhiNet::embedded, PhiNet::load);
+    let trials = checkpointed_trials(&sequence, args, &stage, |batch| {
+        sensitivity_trials(&rig, network, args.seed, batch, options.threads).or_failed()
+    })?;
+    let map = mean(&trials)
+        .ok_or_else(|| Failure::input(anyhow!("--ropes is 0, but must be 1 or more")))?;
+    #[allow(clippy::cast_precision_loss, reason = "8 is exact")]
+    let moment_s = MOMENT_FRAMES as f64 / rate_hz;
+    let rows = rows(&map, moment_s);
+    let seconds = stage.done(&format!("{} films", trials.len()));
+    let picture = args.out.as_ref().map(|path| path.with_extension("svg"));
+    if let Some(path) = &picture {
+        let drawn = svg(&map, moment_s, trials.len(), args.seed);
+        files::write_atomic(path, drawn.as_bytes()).or_failed()?;
+    }
+    if !quiet {
+        print(&rows);
+        if let Some(path) = &picture {
+            println!("drawn in `{}`", path.display());
+        }
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "sensitivity-maps", "version": shared_types::VERSION,
+        "seed": args.seed, "weights_sha256": weights, "films": trials.len(), "moment_s": moment_s, "seconds": seconds,
+        "rows": rows, "map": map, "out": args.out, "picture": picture,
+    })))
+}
+
+fn largest(map: &SensitivityMap) -> f64 {
+    f64::from(map.values.iter().flatten().copied().fold(0.0, f32::max))
+}
+
+fn print(rows: &[Row]) {
+    let lines = rows.iter().map(|row| {
+        [
+            row.parameter.to_owned(),
+            format!("{:.2}", row.mean_per_m),
+            format!("{:.1}", row.peak_s),
+            format!("{:.1}", row.half_before_s),
+            format!("{:.0}", 100.0 * row.last_second),
+            format!("{:.0}", 100.0 * row.place),
+            row.paper.to_owned(),
+        ]
+    });
+    let header = [
+        "parameter",
+        "range per metre",
+        "peak (s)",
+        "half before (s)",
+        "last second (%)",
+        "place on the rope (%)",
+        "paper's peak",
+    ];
+    println!("{}", numbers(header, 1, lines));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_is_told_by_where_it_is_largest() {
+        let mut map = SensitivityMap::empty(50, 4);
+        for moment in 0..50 {
+            map.values[1][moment * 4 + 2] = 1.0;
+        }
+        map.values[1][30 * 4 + 3] = 5.0;
+        let rows = rows(&map, 0.1);
+        let length = &rows[1];
+        assert_eq!(length.parameter, "length");
+        assert!((length.peak_s - 3.05).abs() < 1e-9, "{length:?}");
+        assert!((length.half_before_s - 2.75).abs() < 0.11, "{length:?}");
+        assert!((length.place - 2.0 / 3.0).abs() < 1e-9, "{length:?}");
+        assert!((0.17..0.20).contains(&length.last_second), "{length:?}");
+        assert!(rows[0].last_second < 1e-9, "{rows:?}");
+    }
+}
