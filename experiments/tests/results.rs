@@ -188,3 +188,20 @@ fn results_of_planning_are_whole_and_kept() {
         assert!(row["width_m"].as_f64().unwrap() > 0.0, "{row}");
     }
 }
+
+#[test]
+fn wrong_input_is_refused_with_the_reason() {
+    for (line, words) in [
+        ("wiggle-ablation --method nn", &["one wiggle only"][..]),
+        ("bench", &["NAME"]),
+        ("bench wibble", &["wibble", "possible values", "rope"]),
+        ("bench track", &["--video", "camera.toml"]),
+        ("bench track --video none", &["none"]),
+    ] {
+        let args: Vec<&str> = line.split_whitespace().collect();
+        let output = experiments(&args);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{line}: {said}");
+        assert!(words.iter().all(|w| said.contains(w)), "{line}: {said}");
+    }
+}

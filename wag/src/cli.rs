@@ -4,6 +4,7 @@ mod arm;
 mod config;
 mod eyes;
 mod ledger;
+mod plans;
 mod results;
 mod runs;
 mod values;
@@ -12,14 +13,13 @@ pub use arm::*;
 pub use config::*;
 pub use eyes::*;
 pub use ledger::*;
+pub use plans::*;
 pub use results::*;
 pub use runs::*;
 pub use values::Point;
 
 use values::{host, mass_kg, offset_ms, rate_hz};
 
-use crate::command::check::CheckArgs;
-use crate::command::plan::PlanArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
 use std::net::IpAddr;
@@ -69,7 +69,7 @@ pub enum Command {
     Film(FilmArgs),
     /// Follow the rope through a video.
     Track(TrackArgs),
-    /// Find the rope parameters from a video or from keypoints.
+    /// Identify the rope parameters from a video or from keypoints.
     Identify(IdentifyArgs),
     /// Plan a throw.
     #[command(subcommand)]
@@ -78,35 +78,35 @@ pub enum Command {
     Check(CheckArgs),
     /// Execute a plan on an arm, record it, measure latencies.
     Throw(ThrowArgs),
-    /// Measure how late everything is: the control loop, each joint, the camera.
+    /// Measure latencies: the control loop, each joint, the camera.
     Latency(LatencyArgs),
-    /// Serve a page that shows a running run: arm, rope, camera, control loop.
+    /// Live web view of a run: arm, rope, camera, control loop.
     Watch(WatchArgs),
     /// Attach to a running controller and record every one of its cycles.
     Record(RecordArgs),
-    /// Step the controller's core over a recorded run again and compare every bit.
+    /// Replay a recorded run through the controller's core, compared bit-exactly.
     Replay(ReplayArgs),
-    /// Say why a run was stopped, or how close it came to its limits.
+    /// Report why a run was stopped, or its margins to the limits.
     Explain(ExplainArgs),
-    /// Make one HTML file of a run: replay in space, joints, limits, rope, times.
+    /// Write a run as one HTML file: replay in space, joints, limits, rope, times.
     Report(ReportArgs),
-    /// List runs, compare two of them, make one again.
+    /// List runs, compare two of them, rerun one.
     Ledger(LedgerArgs),
     /// Measure the closest approach of tip and target in a stereo video.
     Score(ScoreArgs),
-    /// Find or check where the camera stands.
+    /// Estimate or check the camera's extrinsics.
     #[command(subcommand)]
     Calib(CalibCommand),
     /// Measure how punctual the controller is on this machine.
     Bench(BenchArgs),
-    /// Show or check which configuration holds here: built in, site, rig, run.
+    /// Show the effective configuration or check files: built in, site, rig, run.
     #[command(subcommand)]
     Config(ConfigCommand),
-    /// Say whether this machine is fit to drive an arm, and what to do where not.
+    /// Check whether this machine is fit to drive an arm, and how to fix what is not.
     Doctor(DoctorArgs),
     /// Write man pages, one for each command.
     Man(ManArgs),
-    /// Print the script by which a shell completes `wag`.
+    /// Print a shell completion script.
     Completions(CompletionsArgs),
     /// Run one of the processes in the foreground (what `wag` itself starts).
     #[command(hide = true)]
@@ -219,7 +219,7 @@ pub struct SceneArgs {
     /// demo's second one calms the rope, its third is the throw.
     #[arg(long, value_name = "N", requires = "video")]
     pub part: Option<usize>,
-    /// How far the film's times are behind the motion's, as `wag track` says (ms).
+    /// Delay of the film's clock against the motion's, as `wag track` reports it (ms).
     #[arg(long, value_name = "MS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = offset_ms)]
     pub film_late_ms: f64,
 }
@@ -263,8 +263,8 @@ pub enum MethodName {
     Nn,
     /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
     Cmaes,
-    /// A quick proposal of the network, or of a search where it knows no such film, then
-    /// refined.
+    /// A quick proposal of the network, or of a search where the film is
+    /// out of its distribution, then refined.
     Hybrid,
     /// A quick proposal of a search, then refined.
     HybridSearch,

@@ -48,10 +48,10 @@ pub struct ArmArgs {
 /// Arguments of `wag wiggle`.
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
-    /// Say how well ropes of the ranges could be known from it, and from the paper's.
+    /// Report how well it identifies ropes of the ranges, beside the paper's wiggle.
     #[arg(long)]
     pub evaluate: bool,
-    /// Search the most telling wiggle within the limits and say how well it does.
+    /// Search the most informative wiggle within the limits and report how well it does.
     #[arg(long)]
     pub optimise: bool,
     /// Seed of the ropes a wiggle is judged by.
@@ -84,7 +84,7 @@ pub struct ThrowArgs {
 /// Arguments of `wag latency`.
 #[derive(Debug, Args)]
 pub struct LatencyArgs {
-    /// Arm to move: one joint after the other, small and ever faster.
+    /// Arm to move: one joint after the other, a small sweep of rising frequency.
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder of a recorded run to read instead.

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 /// `wag config ...`
 #[derive(Debug, Subcommand)]
 pub enum ConfigCommand {
-    /// Print what holds here: the built-in values, and over them those of the site, of
-    /// the rig, and of FILE.
+    /// Print the effective configuration: the built-in values, overridden by those of the
+    /// site, of the rig, and of FILE.
     Show(ConfigShowArgs),
     /// Check every file of the site and of the rig, or FILE over them.
     Check(ConfigCheckArgs),
@@ -26,10 +26,10 @@ pub struct ConfigShowArgs {
     /// What is configured.
     #[arg(value_enum)]
     pub kind: Kind,
-    /// A file laid over all, as a run would name it.
+    /// A file that overrides all others, as a run would name it.
     #[arg(value_name = "FILE")]
     pub run: Option<PathBuf>,
-    /// Say of every value which file it comes from.
+    /// Show which file each value comes from.
     #[arg(long)]
     pub origin: bool,
 }
@@ -40,7 +40,7 @@ pub struct ConfigCheckArgs {
     /// What is configured; default: everything.
     #[arg(value_enum)]
     pub kind: Option<Kind>,
-    /// A file laid over all, as a run would name it.
+    /// A file that overrides all others, as a run would name it.
     #[arg(value_name = "FILE")]
     pub run: Option<PathBuf>,
 }

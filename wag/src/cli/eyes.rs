@@ -29,7 +29,7 @@ pub struct FilmArgs {
     /// Gain in the sensor's own units (ZED only).
     #[arg(long, requires = "exposure_raw")]
     pub sensor_gain_raw: Option<u32>,
-    /// Beginning of the files' names: NAME_WIDTHxHEIGHT.yuyv and .csv.
+    /// Prefix of the file names: NAME_WIDTHxHEIGHT.yuyv and .csv.
     #[arg(long, value_name = "NAME")]
     pub out: PathBuf,
 }
@@ -105,7 +105,7 @@ pub struct ScoreArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera calibration and place.
+    /// Camera calibration and extrinsics.
     #[arg(long)]
     pub camera: PathBuf,
     /// Colour of the tip, R,G,B from 0 to 255.
@@ -116,12 +116,12 @@ pub struct ScoreArgs {
     pub target_rgb: Colour,
 }
 
-/// Where the camera stands.
+/// The camera's extrinsics.
 #[derive(Debug, Subcommand)]
 pub enum CalibCommand {
-    /// Find the camera's place in the world and write it into a camera.toml.
+    /// Estimate the camera's extrinsics and write them into a camera.toml.
     Extrinsics(ExtrinsicsArgs),
-    /// Compare the place in camera.toml with what the camera sees.
+    /// Compare the extrinsics in camera.toml with what the camera sees.
     Check(CalibCheckArgs),
 }
 
@@ -135,7 +135,7 @@ pub struct ShownArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera calibration; its place may be wrong.
+    /// Camera calibration; its extrinsics may be wrong.
     #[arg(long)]
     pub camera: PathBuf,
     /// Printed ChArUco board that hangs still (board.toml).
@@ -155,7 +155,7 @@ pub struct ExtrinsicsArgs {
     /// What the camera is shown.
     #[command(flatten)]
     pub shown: ShownArgs,
-    /// The camera's settings with the place found (TOML).
+    /// The camera's settings with the estimated extrinsics (TOML).
     #[arg(long)]
     pub out: PathBuf,
 }

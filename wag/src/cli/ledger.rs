@@ -35,9 +35,9 @@ pub struct LedgerArgs {
 /// `wag ledger ...`
 #[derive(Debug, Subcommand)]
 pub enum LedgerCommand {
-    /// Say in which values two runs differ.
+    /// Show the values in which two runs differ.
     Compare(LedgerCompareArgs),
-    /// Print the command line that makes a run once more, in a new folder.
+    /// Print the command line that reruns a run into a new folder.
     Rerun(LedgerRerunArgs),
 }
 

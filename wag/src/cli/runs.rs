@@ -21,7 +21,7 @@ pub struct RecordArgs {
     /// Stop after this long (s); default: on Ctrl-C.
     #[arg(long)]
     pub seconds: Option<f64>,
-    /// Limits of the arm, told in the recording; default: those that hold here.
+    /// Limits of the arm, stored in the recording; default: the effective ones.
     #[arg(long)]
     pub limits: Option<PathBuf>,
     /// Folder for the run; it must not exist. Default: runs/TIME-record.
@@ -32,8 +32,8 @@ pub struct RecordArgs {
 /// `wag record ...`
 #[derive(Debug, Subcommand)]
 pub enum RecordCommand {
-    /// Make a run.mcap whole whose recorder was killed: at most its last second is
-    /// missing then. A whole file stays as it is.
+    /// Repair a run.mcap whose recorder was killed: at most its last second is
+    /// missing then. A complete file stays as it is.
     Recover(RecoverArgs),
 }
 
@@ -63,12 +63,12 @@ pub struct WatchArgs {
     #[arg(long)]
     pub domain: Option<String>,
     /// Address and port of the page; port 0 takes any free one. Anything but loopback
-    /// lets other machines look on and stop the arm, without encryption.
+    /// lets other machines watch and stop the arm, without encryption.
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:0")]
     pub bind: SocketAddr,
-    /// Follow the rope in the camera's frames as they come and draw its keypoints. A
-    /// process of the lowest priority does it, on one core, as long as this page is
-    /// served. Without this none runs.
+    /// Track the rope in the camera's frames online and draw its keypoints. A
+    /// process of the lowest priority does it, on one core, while this page is
+    /// served.
     #[arg(long)]
     pub preview: bool,
     /// Calibration for the preview; default: camera.toml in the run folder.

@@ -1,65 +1,17 @@
 //! `wag check`: preflight of a plan.
 
-use crate::files;
-use anyhow::{Context, anyhow, ensure};
+use crate::cli::{CheckArgs, WireName};
+use crate::files::{self, read_plan};
+use anyhow::{anyhow, ensure};
 use arm_model::JointTrajectory;
 use arm_model::limits::{LimitKind, Margin};
-use clap::{Args, ValueEnum};
 use cli_output::table;
 use cli_output::{Failure, OrInput, Outcome};
 use comfy_table::Table;
 use planner::collide::{ArmShape, Scene, tool_contacts};
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
 use serde_json::{Value, json};
-use shared_types::plan::trajectory_hash_hex;
-use shared_types::{Plan, WireMode};
-use std::path::{Path, PathBuf};
-
-/// How setpoints reach the arm, by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum WireName {
-    /// Joint positions, the arm's mode 1.
-    Servo,
-    /// Joint velocities, the arm's mode 4.
-    Velocity,
-}
-
-/// Arguments of `wag check`.
-#[derive(Debug, Args)]
-pub struct CheckArgs {
-    /// The plan.
-    pub plan: PathBuf,
-    /// Limits of the arm; default: the built-in xArm 7.
-    #[arg(long)]
-    pub limits: Option<PathBuf>,
-    /// How setpoints reach the arm.
-    #[arg(long, value_enum, default_value_t = WireName::Servo)]
-    pub wire: WireName,
-    /// Linear speed limit set in the arm, as a factor of 1 m/s (servo only).
-    #[arg(long, default_value_t = 1.2, value_name = "FACTOR")]
-    pub speed_factor: f64,
-    /// Safety boundary set in the arm: x-,x+,y-,y+,z-,z+ of the tool (m).
-    #[arg(
-        long,
-        value_delimiter = ',',
-        num_args = 1,
-        allow_hyphen_values = true,
-        value_name = "SIDES"
-    )]
-    pub fence: Option<Vec<f64>>,
-}
-
-/// Reads a plan and verifies that it is whole.
-pub fn read_plan(path: &Path) -> anyhow::Result<Plan> {
-    let fail = || format!("plan `{}`", path.display());
-    let plan: Plan = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
-    ensure!(
-        trajectory_hash_hex(&plan.trajectory) == plan.trajectory_sha256,
-        "plan `{}`: `trajectory_sha256` does not match the waypoints; the file was changed by hand or damaged, plan again",
-        path.display()
-    );
-    Ok(plan)
-}
+use shared_types::WireMode;
 
 fn kind_name(kind: LimitKind) -> &'static str {
     match kind {

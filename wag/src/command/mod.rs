@@ -3,7 +3,7 @@
 mod area;
 mod bench;
 mod calib;
-pub mod check;
+mod check;
 mod config;
 mod demo;
 mod demo_summary;
@@ -18,7 +18,7 @@ mod learned;
 mod ledger;
 mod manual;
 mod network;
-pub mod plan;
+mod plan;
 mod process;
 mod reach_picture;
 mod record;

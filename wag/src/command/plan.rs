@@ -1,15 +1,13 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
 use super::reach_picture;
-use crate::cli::Point;
+use crate::cli::PlanArgs;
 use crate::config;
 use crate::files;
 use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, JointVector, Limits, kinematics};
-use clap::Args;
 use cli_output::Stage;
 use cli_output::interrupted;
-use cli_output::seed;
 use cli_output::{Failure, OrInput, Outcome};
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
@@ -21,53 +19,8 @@ use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::{Plan, Task};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::Ordering;
-
-/// Arguments of `wag plan`.
-#[derive(Debug, Args)]
-pub struct PlanArgs {
-    /// Rope parameters.
-    #[arg(long)]
-    pub rope: PathBuf,
-    /// Target x,y,z in the arm's base frame (m).
-    #[arg(long, allow_hyphen_values = true)]
-    pub target: Point,
-    /// Limits of the arm; default: the built-in xArm 7.
-    #[arg(long)]
-    pub limits: Option<PathBuf>,
-    /// Tuned values of the planner (TOML); default: the built-in ones.
-    #[arg(long)]
-    pub config: Option<PathBuf>,
-    /// Seed of the search.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
-    pub seed: u64,
-    /// Search the durations of the throw's segments too: each up to this many times as
-    /// long or as short as configured (1 to 2). 1 keeps them; default: the configuration.
-    #[arg(long, value_name = "FACTOR")]
-    pub segment_stretch: Option<f64>,
-    /// The plan (JSON).
-    #[arg(long)]
-    pub out: PathBuf,
-    /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
-    #[arg(long)]
-    pub csv: Option<PathBuf>,
-    /// Write the plan even if the tip is predicted to miss the target by more than
-    /// 5 cm, or the task to fail.
-    #[arg(long)]
-    pub allow_miss: bool,
-    /// Plan for this many ropes drawn from what identification left open, and forecast
-    /// the error; 0 plans for the likeliest rope alone.
-    #[arg(long, default_value_t = 0, value_name = "K")]
-    pub robust: usize,
-    /// The arm's response as written by `wag latency` (TOML): the throw is planned for an
-    /// arm that follows its commands so, and its commands make up for it.
-    #[arg(long, value_name = "FILE")]
-    pub arm_response: Option<PathBuf>,
-    /// Draw which targets this rope reaches (SVG), and refuse one that it does not.
-    #[arg(long, value_name = "FILE")]
-    pub reach: Option<PathBuf>,
-}
 
 /// A task that the demo's rig has no scene for.
 pub fn not_there(task: &str) -> Failure {

@@ -1,11 +1,10 @@
 //! `wag throw`: execute a plan on an arm, once, open loop, with latencies.
 
 use super::area::require_clear_area;
-use super::check::read_plan;
 use super::dry_run;
 use super::explain::explain_stop;
 use crate::cli::{ArmArgs, ThrowArgs};
-use crate::files;
+use crate::files::{self, read_plan};
 use crate::pipeline::{self, ArmAddress, RunFolder};
 use crate::session::Session;
 use anyhow::anyhow;
@@ -21,15 +20,20 @@ use std::path::Path;
 /// Part of the arm's speed limits used for the move to the start pose.
 const MOVE_SPEED: f64 = 0.1;
 
-/// Moves to a trajectory's start and streams it; returns what was measured.
+/// Moves to a trajectory's start and streams it, armed for `tier`; returns what was
+/// measured.
 pub fn drive(
     arm: &ArmArgs,
     limits: &Limits,
     trajectory: &JointTrajectory,
     out: Option<&Path>,
-    name: &str,
+    tier: MotionTier,
     quiet: bool,
 ) -> Outcome<Option<Value>> {
+    let name = match tier {
+        MotionTier::Throw => "throw",
+        MotionTier::Wiggle | MotionTier::SetUp => "wiggle",
+    };
     if let Some(worst) = limits.worst_violation(trajectory) {
         return Err(Failure::input(anyhow!(
             "the {name} breaks a limit: {}",
@@ -51,10 +55,6 @@ pub fn drive(
     if arm.dead_man {
         session.hold_dead_man(quiet).or_failed()?;
     }
-    let tier = match name {
-        "throw" => MotionTier::Throw,
-        _ => MotionTier::Wiggle,
-    };
     let result = stream(&mut session, &folder, arm, limits, trajectory, tier, quiet);
     session.end(result.is_ok());
     let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
@@ -131,7 +131,7 @@ pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
         &limits,
         &plan.trajectory,
         args.out.as_deref(),
-        "throw",
+        MotionTier::Throw,
         quiet,
     )?;
     Ok(Some(

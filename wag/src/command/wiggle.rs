@@ -12,6 +12,7 @@ use cli_output::{Failure, OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use serde_json::{Value, json};
+use shared_types::MotionTier;
 
 pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     if args.evaluate || args.optimise {
@@ -42,7 +43,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             &limits,
             &trajectory,
             args.out.as_deref(),
-            "wiggle",
+            MotionTier::Wiggle,
             quiet,
         )?
     } else {

@@ -1,8 +1,8 @@
 //! One run, as far as its folder tells.
 
 use super::CommandLine;
-use crate::command::check::read_plan;
 use crate::files;
+use crate::files::read_plan;
 use anyhow::Context;
 use serde::Serialize;
 use serde_json::Value;

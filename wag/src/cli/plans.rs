@@ -1,0 +1,85 @@
+//! Arguments of `wag plan` and `wag check`.
+
+use super::Point;
+use clap::{Args, ValueEnum};
+use cli_output::seed;
+use std::path::PathBuf;
+
+/// Arguments of `wag plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// Rope parameters.
+    #[arg(long)]
+    pub rope: PathBuf,
+    /// Target x,y,z in the arm's base frame (m).
+    #[arg(long, allow_hyphen_values = true)]
+    pub target: Point,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Tuned values of the planner (TOML); default: the built-in ones.
+    #[arg(long)]
+    pub config: Option<PathBuf>,
+    /// Seed of the search.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// Search the durations of the throw's segments too: each up to this many times as
+    /// long or as short as configured (1 to 2). 1 keeps them; default: the configuration.
+    #[arg(long, value_name = "FACTOR")]
+    pub segment_stretch: Option<f64>,
+    /// The plan (JSON).
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+    /// Write the plan even if the tip is predicted to miss the target by more than
+    /// 5 cm, or the task to fail.
+    #[arg(long)]
+    pub allow_miss: bool,
+    /// Plan for this many ropes drawn from the posterior of identification, and forecast
+    /// the error; 0 plans for the most likely rope alone.
+    #[arg(long, default_value_t = 0, value_name = "K")]
+    pub robust: usize,
+    /// The arm's response as written by `wag latency` (TOML): the throw is planned for an
+    /// arm with this response, and its commands compensate for it.
+    #[arg(long, value_name = "FILE")]
+    pub arm_response: Option<PathBuf>,
+    /// Draw the reachable targets of this rope (SVG), and refuse one that is not.
+    #[arg(long, value_name = "FILE")]
+    pub reach: Option<PathBuf>,
+}
+
+/// How setpoints reach the arm, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum WireName {
+    /// Joint positions, the arm's mode 1.
+    Servo,
+    /// Joint velocities, the arm's mode 4.
+    Velocity,
+}
+
+/// Arguments of `wag check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The plan.
+    pub plan: PathBuf,
+    /// Limits of the arm; default: the built-in xArm 7.
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// How setpoints reach the arm.
+    #[arg(long, value_enum, default_value_t = WireName::Servo)]
+    pub wire: WireName,
+    /// Linear speed limit set in the arm, as a factor of 1 m/s (servo only).
+    #[arg(long, default_value_t = 1.2, value_name = "FACTOR")]
+    pub speed_factor: f64,
+    /// Safety boundary set in the arm: x-,x+,y-,y+,z-,z+ of the tool (m).
+    #[arg(
+        long,
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        value_name = "SIDES"
+    )]
+    pub fence: Option<Vec<f64>>,
+}
