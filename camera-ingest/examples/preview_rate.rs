@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (Some(first), Some(last)) = (told.first(), told.last()) else {
         return Err("no frame was looked at".into());
     };
-    let span_s = (last.stamp_ns - first.stamp_ns) as f64 * 1e-9;
+    let span_s = (last.rope.stamp_ns - first.rope.stamp_ns) as f64 * 1e-9;
     println!(
         "{span_s:.1} s: looked at {}, {:.1} a second, skipped {}, began anew {} times",
         told.len(),
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     ] {
         let those = told
             .iter()
-            .filter(|t| t.state() == state && (t.lost != 0) == lost);
+            .filter(|t| t.state() == state && t.rope.is_lost() == lost);
         let mut took: Vec<u32> = those.map(|t| t.took_us).collect();
         took.sort_unstable();
         println!(
@@ -64,12 +64,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     }
     // Where it was lost, from the first frame looked at.
-    let lost = |t: &PreviewFrame| t.lost != 0;
+    let lost = |t: &PreviewFrame| t.rope.is_lost();
     for span in told.chunk_by(|a, b| lost(a) == lost(b)) {
         if let [begin, .., end] = span
             && lost(begin)
         {
-            let since_s = |t: &PreviewFrame| (t.stamp_ns - first.stamp_ns) as f64 * 1e-9;
+            let since_s = |t: &PreviewFrame| (t.rope.stamp_ns - first.rope.stamp_ns) as f64 * 1e-9;
             println!(
                 "lost from {:.2} to {:.2} s, {} frames",
                 since_s(begin),

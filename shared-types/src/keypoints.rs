@@ -1,5 +1,6 @@
 //! Rope keypoints: pixels along the rope's centreline, frame by frame.
 
+use crate::MonotonicNs;
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +23,78 @@ pub struct KeypointFrame {
     pub points_px: [[f32; 2]; MAX_KEYPOINTS],
     /// Confidence of each point, 0 to 1.
     pub confidence: [f32; MAX_KEYPOINTS],
+}
+
+impl Default for KeypointFrame {
+    fn default() -> Self {
+        Self {
+            sequence: 0,
+            stamp_ns: 0,
+            count: 0,
+            lost: 0,
+            points_px: [[0.0; 2]; MAX_KEYPOINTS],
+            confidence: [0.0; MAX_KEYPOINTS],
+        }
+    }
+}
+
+impl KeypointFrame {
+    /// What the tracker found in the camera frame of this number and stamp (CLOCK_MONOTONIC
+    /// ns); of more than [`MAX_KEYPOINTS`] the first ones.
+    #[must_use]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "pixels and confidences need no more than single precision"
+    )]
+    pub fn new(sequence: u64, stamp_ns: u64, tracked: &TrackedFrame) -> Self {
+        let mut out = Self {
+            sequence,
+            stamp_ns,
+            lost: u32::from(tracked.lost),
+            ..Self::default()
+        };
+        let slots = out.points_px.iter_mut().zip(&mut out.confidence);
+        for ((slot, confidence), (p, c)) in
+            slots.zip(tracked.points.iter().zip(&tracked.confidence))
+        {
+            *slot = p.map(|v| v as f32);
+            *confidence = *c as f32;
+            out.count += 1;
+        }
+        out
+    }
+
+    /// Whether the rope was lost in this frame. RT-safe.
+    #[must_use]
+    pub const fn is_lost(&self) -> bool {
+        self.lost != 0
+    }
+
+    /// The keypoints, as many as are used, never more than there can be. RT-safe.
+    #[must_use]
+    pub fn points(&self) -> &[[f32; 2]] {
+        &self.points_px[..self.used()]
+    }
+
+    /// Their confidences. RT-safe.
+    #[must_use]
+    pub fn confidences(&self) -> &[f32] {
+        &self.confidence[..self.used()]
+    }
+
+    fn used(&self) -> usize {
+        usize::try_from(self.count).map_or(MAX_KEYPOINTS, |count| count.min(MAX_KEYPOINTS))
+    }
+
+    /// The same in a recording whose time 0 is `first_stamp_ns`.
+    fn tracked(&self, first_stamp_ns: u64) -> TrackedFrame {
+        TrackedFrame {
+            t_s: MonotonicNs(self.stamp_ns).since_s(MonotonicNs(first_stamp_ns)),
+            points: self.points().iter().map(|p| p.map(f64::from)).collect(),
+            confidence: self.confidences().iter().copied().map(f64::from).collect(),
+            lost: self.is_lost(),
+        }
+    }
 }
 
 /// One frame of a [`KeypointTrack`].
@@ -82,6 +155,16 @@ pub enum KeypointError {
 }
 
 impl KeypointTrack {
+    /// The track of published frames, time 0 at the first one; `None` without frames.
+    pub fn from_published<'a>(frames: impl IntoIterator<Item = &'a KeypointFrame>) -> Option<Self> {
+        let mut frames = frames.into_iter().peekable();
+        let (first_stamp_ns, keypoints) = frames.peek().map(|f| (f.stamp_ns, f.used()))?;
+        Some(Self {
+            keypoints,
+            frames: frames.map(|f| f.tracked(first_stamp_ns)).collect(),
+        })
+    }
+
     /// Checks sizes, numbers and order of time.
     ///
     /// # Errors
@@ -162,6 +245,26 @@ mod tests {
         let mut t = track();
         t.frames[0].points[0][1] = f64::NAN;
         assert_eq!(t.validate(), Err(KeypointError::BadNumber { frame: 0 }));
+    }
+
+    #[test]
+    fn a_track_that_was_published_comes_back() {
+        let published: Vec<KeypointFrame> = (0..)
+            .zip(&track().frames)
+            .map(|(i, f)| KeypointFrame::new(i, 7_000_000_000 + i * 500_000_000, f))
+            .collect();
+        assert_eq!(KeypointTrack::from_published(&published), Some(track()));
+        assert_eq!(KeypointTrack::from_published([]), None);
+    }
+
+    #[test]
+    fn a_count_beyond_the_points_there_are_is_cut() {
+        let damaged = KeypointFrame {
+            count: u32::MAX,
+            ..KeypointFrame::default()
+        };
+        assert_eq!(damaged.points().len(), MAX_KEYPOINTS);
+        assert_eq!(damaged.confidences().len(), MAX_KEYPOINTS);
     }
 
     #[test]

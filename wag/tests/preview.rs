@@ -133,14 +133,16 @@ impl Heard {
 
     /// Whether the arm moved in a frame.
     fn moves(&self, told: &PreviewFrame) -> bool {
-        let next = self.joints.partition_point(|r| r.stamp_ns < told.stamp_ns);
+        let next = self
+            .joints
+            .partition_point(|r| r.stamp_ns < told.rope.stamp_ns);
         let report = self.joints.get(next).or(self.joints.last());
         report.is_some_and(|report| report.qd.max_abs() > MOVES_RAD_S)
     }
 }
 
 fn is_followed(told: &PreviewFrame) -> bool {
-    told.state() == PreviewState::Following && told.lost == 0
+    told.state() == PreviewState::Following && !told.rope.is_lost()
 }
 
 /// The rope's true pixels at the frames' exposures: the hidden rope simulated under the
@@ -203,10 +205,10 @@ fn quantile(sorted: &[f64], part: f64) -> f64 {
 /// those of frames in motion (px).
 fn errors(camera: &StereoCamera, heard: &Heard, least: f32) -> [Vec<f64>; 2] {
     let frames: Vec<&PreviewFrame> = heard.told.iter().filter(|t| is_followed(t)).collect();
-    let stamps: Vec<u64> = frames.iter().map(|t| t.stamp_ns).collect();
+    let stamps: Vec<u64> = frames.iter().map(|t| t.rope.stamp_ns).collect();
     let mut out = [Vec::new(), Vec::new()];
     for (told, line) in frames.iter().zip(truth(camera, &heard.joints, &stamps)) {
-        let pairs = told.points().iter().zip(told.confidences());
+        let pairs = told.rope.points().iter().zip(told.rope.confidences());
         let sure = pairs.filter(|(_, confidence)| **confidence > least);
         let off = sure.map(|(p, _)| off_px(*p, &line));
         out[usize::from(heard.moves(told))].extend(off);

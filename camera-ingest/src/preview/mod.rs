@@ -131,7 +131,7 @@ fn tell(found: &PreviewFrame, [width_px, height_px]: [u32; 2]) {
         ),
         PreviewState::NoCamera | PreviewState::NoArm => tracing::warn!("{words}"),
         PreviewState::Looking | PreviewState::Following => {
-            tracing::info!(frame = found.sequence, "{words}");
+            tracing::info!(frame = found.rope.sequence, "{words}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use arm_model::JointVector;
 use shared_types::StereoCamera;
 use shared_types::ipc::{PreviewFrame, PreviewState};
-use shared_types::keypoints::TrackedFrame;
+use shared_types::keypoints::{KeypointFrame, TrackedFrame};
 
 use super::arm::{Arm, Knot};
 use crate::frame::EyeFrame;
@@ -96,28 +96,20 @@ impl Preview {
         let (sequence, stamp_ns) = (frame.sequence, frame.stamp_ns);
         self.count(sequence, stamp_ns);
         let (state, tracked) = self.track(frame);
-        PreviewFrame {
-            sequence,
-            stamp_ns,
-            ..self.told(state, tracked.as_ref())
-        }
+        self.told(state, sequence, stamp_ns, tracked.as_ref())
     }
 
     /// What to say while no frame comes.
     #[must_use]
     pub fn without_camera(&self) -> PreviewFrame {
-        self.told(PreviewState::NoCamera, None)
+        self.told(PreviewState::NoCamera, 0, 0, None)
     }
 
     /// A frame came that is none, or none of this camera.
     pub fn unfit(&mut self, sequence: u64, stamp_ns: u64) -> PreviewFrame {
         self.count(sequence, stamp_ns);
         self.begin_anew("the camera's frames do not fit its calibration");
-        PreviewFrame {
-            sequence,
-            stamp_ns,
-            ..self.told(PreviewState::Unfit, None)
-        }
+        self.told(PreviewState::Unfit, sequence, stamp_ns, None)
     }
 
     /// Counts a frame; a camera that began anew or paused shows something else now.
@@ -248,27 +240,26 @@ impl Preview {
         }
     }
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "pixels and confidences need no more than single precision"
-    )]
-    fn told(&self, state: PreviewState, tracked: Option<&TrackedFrame>) -> PreviewFrame {
-        let mut out = PreviewFrame {
+    fn told(
+        &self,
+        state: PreviewState,
+        sequence: u64,
+        stamp_ns: u64,
+        tracked: Option<&TrackedFrame>,
+    ) -> PreviewFrame {
+        let nothing = KeypointFrame {
+            sequence,
+            stamp_ns,
+            ..KeypointFrame::default()
+        };
+        PreviewFrame {
             state: state as u8,
             seen: self.seen,
             skipped: self.skipped,
             restarts: self.restarts,
+            rope: tracked.map_or(nothing, |t| KeypointFrame::new(sequence, stamp_ns, t)),
             ..PreviewFrame::default()
-        };
-        let Some(tracked) = tracked else { return out };
-        out.lost = u8::from(tracked.lost);
-        let slots = out.points_px.iter_mut().zip(&mut out.confidence);
-        for ((slot, sure), (p, c)) in slots.zip(tracked.points.iter().zip(&tracked.confidence)) {
-            *slot = p.map(|v| v as f32);
-            *sure = *c as f32;
-            out.count += 1;
         }
-        out
     }
 }
 

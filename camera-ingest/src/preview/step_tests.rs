@@ -121,10 +121,10 @@ fn hold(preview: &mut Preview, stamp_ns: u64, clamp: Vector3<f64>) {
 
 /// Mean distance of the keypoints from the true rope (px).
 fn off_px(found: &PreviewFrame, truth: &[[f64; 2]]) -> f64 {
-    let step = (NODES - 1) / (found.points().len() - 1);
-    let pairs = found.points().iter().zip(truth.iter().step_by(step));
+    let step = (NODES - 1) / (found.rope.points().len() - 1);
+    let pairs = found.rope.points().iter().zip(truth.iter().step_by(step));
     let off = pairs.map(|(p, t)| (f64::from(p[0]) - t[0]).hypot(f64::from(p[1]) - t[1]));
-    off.sum::<f64>() / found.points().len() as f64
+    off.sum::<f64>() / found.rope.points().len() as f64
 }
 
 /// Shows the frames of a swing; what was told of the last one, and the errors of all in
@@ -140,7 +140,7 @@ fn show(
         let seen_s = index as f64 * FRAME_NS as f64 * 1e-9 + 0.002;
         hold(preview, frame.stamp_ns + 2_000_000, swing.clamp(seen_s));
         last = preview.see(frame);
-        if last.state() == PreviewState::Following && last.lost == 0 {
+        if last.state() == PreviewState::Following && !last.rope.is_lost() {
             off.push(off_px(&last, &truth));
         }
     }
@@ -158,7 +158,7 @@ fn a_swinging_rope_is_followed_found_where_the_arm_goes_and_given_up_when_it_is_
     let (last, off) = show(&mut preview, &swing, 0..150);
     assert_eq!(last.state(), PreviewState::Following);
     assert_eq!((last.seen, last.skipped, last.restarts), (150, 0, 0));
-    assert_eq!(last.count, 21);
+    assert_eq!(last.rope.count, 21);
     assert!(off.len() > 60, "{} frames followed", off.len());
     let most = off.iter().copied().fold(0.0, f64::max);
     assert!(most < 2.0, "{most} px off");
@@ -176,10 +176,10 @@ fn a_swinging_rope_is_followed_found_where_the_arm_goes_and_given_up_when_it_is_
     let before = last.restarts;
     swing.hidden = true;
     let (gone, _) = show(&mut preview, &swing, 240..270);
-    assert_eq!((gone.state(), gone.lost), (PreviewState::Following, 1));
+    assert_eq!((gone.state(), gone.rope.lost), (PreviewState::Following, 1));
     let (gone, _) = show(&mut preview, &swing, 270..460);
     assert_eq!(gone.restarts, before + 1);
-    assert_eq!((gone.state(), gone.count), (PreviewState::Looking, 0));
+    assert_eq!((gone.state(), gone.rope.count), (PreviewState::Looking, 0));
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn frames_left_out_are_counted_and_do_not_stop_it() {
     let (last, off) = show(&mut preview, &swing, 300..301);
     assert_eq!((last.seen, last.skipped), (171, 130));
     assert_eq!(
-        (last.state(), last.restarts, last.lost),
+        (last.state(), last.restarts, last.rope.lost),
         (PreviewState::Following, 0, 0)
     );
     assert!(off[0] < 3.0, "{off:?}");
@@ -230,7 +230,7 @@ fn without_a_camera_or_an_arm_it_waits_and_says_so() {
     let found = preview.see(wall(0));
     assert_eq!((found.state(), found.seen), (PreviewState::NoArm, 1));
     assert_eq!(
-        (found.sequence, found.stamp_ns),
+        (found.rope.sequence, found.rope.stamp_ns),
         (0, wall(0).stamp_ns),
         "a frame that was looked at is named"
     );

@@ -13,7 +13,7 @@ use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
 };
 use shared_types::ipc::rpc::Call;
-use shared_types::keypoints::{KeypointFrame, MAX_KEYPOINTS, TrackedFrame};
+use shared_types::keypoints::KeypointFrame;
 use shared_types::{MonotonicNs, StereoCamera};
 use std::path::Path;
 use std::time::Instant;
@@ -94,28 +94,6 @@ fn clamp_path(joints: &[(u64, JointVector)], first_stamp_ns: u64) -> Result<Clam
     Ok(ClampPath::from_joints(&samples)?)
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "pixels and confidences need no more than single precision"
-)]
-fn payload(frame: &EyeFrame, tracked: &TrackedFrame) -> KeypointFrame {
-    let mut out = KeypointFrame {
-        sequence: frame.sequence,
-        stamp_ns: frame.stamp_ns,
-        count: 0,
-        lost: u32::from(tracked.lost),
-        points_px: [[0.0; 2]; MAX_KEYPOINTS],
-        confidence: [0.0; MAX_KEYPOINTS],
-    };
-    let slots = out.points_px.iter_mut().zip(&mut out.confidence);
-    for ((slot, confidence), (p, c)) in slots.zip(tracked.points.iter().zip(&tracked.confidence)) {
-        *slot = p.map(|v| v as f32);
-        *confidence = *c as f32;
-        out.count += 1;
-    }
-    out
-}
-
 fn publish(
     frames: &[EyeFrame],
     result: &TrackResult,
@@ -123,7 +101,8 @@ fn publish(
 ) -> Result<(), Failure> {
     for (frame, tracked) in frames.iter().zip(&result.track.frames) {
         let sample = publisher.loan_uninit().map_err(|e| format!("{e:?}"))?;
-        let sample = sample.write_payload(payload(frame, tracked));
+        let sample =
+            sample.write_payload(KeypointFrame::new(frame.sequence, frame.stamp_ns, tracked));
         sample.send().map_err(|e| format!("{e:?}"))?;
     }
     Ok(())

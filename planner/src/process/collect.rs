@@ -1,9 +1,8 @@
 //! Keypoint frames as they are published, kept until asked for.
 
 use super::PlannerProcessError;
-use shared_types::MonotonicNs;
 use shared_types::ipc::{Bus, IpcError, KeypointSubscriber};
-use shared_types::keypoints::{KeypointFrame, KeypointTrack, TrackedFrame};
+use shared_types::keypoints::{KeypointFrame, KeypointTrack};
 use std::collections::VecDeque;
 
 /// Most frames kept; older ones are forgotten.
@@ -56,35 +55,9 @@ impl Collector {
             wanted,
             first_stamp_ns,
         };
-        if found < wanted || wanted == 0 {
+        if found < wanted {
             return Err(missing);
         }
-        let keypoints = self.frames.get(start).map_or(0, |f| f.count as usize);
-        let frame = |k: &KeypointFrame| TrackedFrame {
-            t_s: MonotonicNs(k.stamp_ns).since_s(MonotonicNs(first_stamp_ns)),
-            points: k
-                .points_px
-                .iter()
-                .take(keypoints)
-                .map(|p| p.map(f64::from))
-                .collect(),
-            confidence: k
-                .confidence
-                .iter()
-                .take(keypoints)
-                .map(|c| f64::from(*c))
-                .collect(),
-            lost: k.lost != 0,
-        };
-        Ok(KeypointTrack {
-            keypoints,
-            frames: self
-                .frames
-                .iter()
-                .skip(start)
-                .take(wanted)
-                .map(frame)
-                .collect(),
-        })
+        KeypointTrack::from_published(self.frames.range(start..start + wanted)).ok_or(missing)
     }
 }

@@ -126,10 +126,9 @@ pub(super) fn image(at_ns: u64, jpeg: &[u8]) -> Value {
 /// a whole number here and half a pixel farther in the viewers' count.
 pub(super) fn keypoints(at_ns: u64, frame: &KeypointFrame) -> Value {
     let points: Vec<Value> = frame
-        .points_px
+        .points()
         .iter()
-        .take(frame.count as usize)
-        .filter(|[u, v]| frame.lost == 0 && u.is_finite() && v.is_finite())
+        .filter(|[u, v]| !frame.is_lost() && u.is_finite() && v.is_finite())
         .map(|[u, v]| json!({ "x": round(f64::from(*u) + 0.5), "y": round(f64::from(*v) + 0.5) }))
         .collect();
     // Single points, then the line through them.
@@ -166,12 +165,9 @@ mod tests {
     #[test]
     fn a_lost_rope_has_no_points() {
         let mut frame = KeypointFrame {
-            sequence: 0,
-            stamp_ns: 0,
             count: 2,
-            lost: 0,
             points_px: [[3.0, 4.0]; 32],
-            confidence: [1.0; 32],
+            ..KeypointFrame::default()
         };
         let points = |frame: &KeypointFrame| keypoints(0, frame)["points"][0]["points"].clone();
         assert_eq!(

@@ -1,7 +1,7 @@
 //! What the live preview of the rope publishes, frame by frame.
 
 use super::PAYLOAD_VERSION;
-use crate::keypoints::MAX_KEYPOINTS;
+use crate::keypoints::KeypointFrame;
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What the preview is doing. Numbers are part of the shared layout.
@@ -57,16 +57,8 @@ pub struct PreviewFrame {
     pub version: u32,
     /// Raw [`PreviewState`].
     pub state: u8,
-    /// 1 when the rope was lost in this frame.
-    pub lost: u8,
-    /// Keypoints used; none unless the rope is followed.
-    pub count: u8,
     /// Zero.
-    pub reserved: u8,
-    /// Sequence number of the camera frame.
-    pub sequence: u64,
-    /// Start of exposure of row 0 (CLOCK_MONOTONIC, ns).
-    pub stamp_ns: u64,
+    pub reserved: [u8; 3],
     /// Frames looked at since the process began.
     pub seen: u64,
     /// Frames of the camera that passed by meanwhile.
@@ -75,10 +67,8 @@ pub struct PreviewFrame {
     pub restarts: u32,
     /// Wall time spent on this frame (µs).
     pub took_us: u32,
-    /// Raw left-eye pixels `[u, v]`, clamp first, lead centre last.
-    pub points_px: [[f32; 2]; MAX_KEYPOINTS],
-    /// Confidence of each point, 0 to 1.
-    pub confidence: [f32; MAX_KEYPOINTS],
+    /// The camera frame, and the keypoints in it; none unless the rope is followed.
+    pub rope: KeypointFrame,
 }
 
 impl Default for PreviewFrame {
@@ -86,17 +76,12 @@ impl Default for PreviewFrame {
         Self {
             version: PAYLOAD_VERSION,
             state: PreviewState::NoCamera as u8,
-            lost: 0,
-            count: 0,
-            reserved: 0,
-            sequence: 0,
-            stamp_ns: 0,
+            reserved: [0; 3],
             seen: 0,
             skipped: 0,
             restarts: 0,
             took_us: 0,
-            points_px: [[0.0; 2]; MAX_KEYPOINTS],
-            confidence: [0.0; MAX_KEYPOINTS],
+            rope: KeypointFrame::default(),
         }
     }
 }
@@ -106,18 +91,6 @@ impl PreviewFrame {
     #[must_use]
     pub const fn state(&self) -> PreviewState {
         PreviewState::from_raw(self.state)
-    }
-
-    /// The keypoints, as many as are used, never more than there can be. RT-safe.
-    #[must_use]
-    pub fn points(&self) -> &[[f32; 2]] {
-        &self.points_px[..usize::from(self.count).min(MAX_KEYPOINTS)]
-    }
-
-    /// Their confidences. RT-safe.
-    #[must_use]
-    pub fn confidences(&self) -> &[f32] {
-        &self.confidence[..usize::from(self.count).min(MAX_KEYPOINTS)]
     }
 }
 
@@ -136,16 +109,6 @@ mod tests {
     }
 
     #[test]
-    fn a_count_beyond_the_points_there_are_is_cut() {
-        let damaged = PreviewFrame {
-            count: u8::MAX,
-            ..PreviewFrame::default()
-        };
-        assert_eq!(damaged.points().len(), MAX_KEYPOINTS);
-        assert_eq!(damaged.confidences().len(), MAX_KEYPOINTS);
-    }
-
-    #[test]
     fn one_publishes_many_receive_and_who_is_slow_loses_the_oldest() {
         let domain = format!("test_preview_{}", std::process::id());
         let _sweep = DomainSweep::new(&domain);
@@ -159,23 +122,22 @@ mod tests {
         for sequence in 0..200_u64 {
             let mut frame = PreviewFrame {
                 state: PreviewState::Following as u8,
-                count: 2,
-                sequence,
                 ..PreviewFrame::default()
             };
-            frame.points_px[1] = [sequence as f32, 0.5];
-            frame.confidence[1] = 0.25;
+            frame.rope.count = 2;
+            frame.rope.sequence = sequence;
+            frame.rope.points_px[1] = [sequence as f32, 0.5];
+            frame.rope.confidence[1] = 0.25;
             publisher.send_copy(frame).unwrap();
             assert_eq!(*quick.receive().unwrap().unwrap(), frame);
         }
-        let first = slow.receive().unwrap().unwrap();
+        let first = slow.receive().unwrap().unwrap().rope;
         assert!(first.sequence > 100, "{}", first.sequence);
         assert_eq!(first.points()[1], [first.sequence as f32, 0.5]);
         let mut last = first.sequence;
-        drop(first);
         while let Some(frame) = slow.receive().unwrap() {
-            assert_eq!(frame.sequence, last + 1);
-            last = frame.sequence;
+            assert_eq!(frame.rope.sequence, last + 1);
+            last = frame.rope.sequence;
         }
         assert_eq!(last, 199);
     }

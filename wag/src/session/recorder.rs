@@ -7,7 +7,7 @@ use arm_model::JointVector;
 use shared_types::ipc::{
     Bus, CycleRecord, CycleSubscriber, IpcError, JointReport, JointSubscriber, KeypointSubscriber,
 };
-use shared_types::keypoints::{KeypointFrame, KeypointTrack, TrackedFrame};
+use shared_types::keypoints::{KeypointFrame, KeypointTrack};
 use shared_types::{FaultCode, MonotonicNs};
 use std::fmt::Write;
 use std::path::Path;
@@ -74,28 +74,7 @@ impl Recorder {
 
     /// The keypoints as a track, time 0 at the first frame.
     pub fn track(&self) -> Option<KeypointTrack> {
-        let first = self.keypoints.first()?;
-        let count = first.count as usize;
-        let frame = |k: &KeypointFrame| TrackedFrame {
-            t_s: MonotonicNs(k.stamp_ns).since_s(MonotonicNs(first.stamp_ns)),
-            points: k
-                .points_px
-                .iter()
-                .take(count)
-                .map(|p| p.map(f64::from))
-                .collect(),
-            confidence: k
-                .confidence
-                .iter()
-                .take(count)
-                .map(|c| f64::from(*c))
-                .collect(),
-            lost: k.lost != 0,
-        };
-        Some(KeypointTrack {
-            keypoints: count,
-            frames: self.keypoints.iter().map(frame).collect(),
-        })
+        KeypointTrack::from_published(&self.keypoints)
     }
 
     /// Writes `joints.csv`, `cycles.csv` and `keypoints.json` into `folder`;

@@ -163,8 +163,8 @@ impl Film {
         let over = Over {
             caption,
             scale: picture.scale,
-            keypoints: found.map_or_else(Vec::new, |f| f.points().to_vec()),
-            lost: found.is_some_and(|f| f.lost != 0),
+            keypoints: found.map_or_else(Vec::new, |f| f.rope.points().to_vec()),
+            lost: found.is_some_and(|f| f.rope.is_lost()),
             rope,
         };
         Ok(Picture {
@@ -183,12 +183,11 @@ impl Film {
     fn next_tracked(&mut self) -> Option<Picture> {
         while let Some(frame) = self.tracked.pop_front() {
             if let Some(kept) = self.at(frame.stamp_ns) {
-                let count = (frame.count as usize).min(frame.points_px.len());
                 let over = Over {
                     caption: "the wiggle as filmed, with the keypoints found in it".to_owned(),
                     scale: kept.scale,
-                    keypoints: frame.points_px[..count].to_vec(),
-                    lost: frame.lost != 0,
+                    keypoints: frame.points().to_vec(),
+                    lost: frame.is_lost(),
                     rope: Vec::new(),
                 };
                 return Some(Picture {
@@ -258,9 +257,7 @@ mod tests {
             sequence: 2,
             stamp_ns: 40_000_000,
             count: 2,
-            lost: 0,
-            points_px: [[0.0; 2]; shared_types::keypoints::MAX_KEYPOINTS],
-            confidence: [1.0; shared_types::keypoints::MAX_KEYPOINTS],
+            ..KeypointFrame::default()
         };
         found.points_px[1] = [7.0, 9.0];
         tracker.send_copy(found).unwrap();
@@ -309,11 +306,11 @@ mod tests {
             if let Some(u) = found {
                 let mut told = PreviewFrame {
                     state: PreviewState::Following as u8,
-                    count: 1,
-                    stamp_ns: header.stamp_ns,
                     ..PreviewFrame::default()
                 };
-                told.points_px[0][0] = u;
+                told.rope.count = 1;
+                told.rope.stamp_ns = header.stamp_ns;
+                told.rope.points_px[0][0] = u;
                 preview.send_copy(told).unwrap();
             }
             picture.map_or_else(String::new, |picture| picture.over)

@@ -57,16 +57,16 @@ impl Heard {
     pub fn near(&self, stamp_ns: u64) -> Option<&PreviewFrame> {
         self.kept
             .iter()
-            .filter(|told| told.stamp_ns.abs_diff(stamp_ns) <= NEAR_NS)
-            .min_by_key(|told| told.stamp_ns.abs_diff(stamp_ns))
+            .filter(|told| told.rope.stamp_ns.abs_diff(stamp_ns) <= NEAR_NS)
+            .min_by_key(|told| told.rope.stamp_ns.abs_diff(stamp_ns))
     }
 
     /// What it does, in words; `None` where there is none.
     pub fn words(&self) -> Option<String> {
         let newest = self.kept.back().filter(|_| self.is_there())?;
         Some(match newest.state() {
-            PreviewState::Following if newest.lost == 0 => {
-                let rate_hz = self.rate_hz(newest.stamp_ns);
+            PreviewState::Following if !newest.rope.is_lost() => {
+                let rate_hz = self.rate_hz(newest.rope.stamp_ns);
                 let took_ms = f64::from(self.usual_us()) / 1e3;
                 format!("line: the preview's keypoints, {rate_hz} a second, {took_ms:.1} ms each")
             }
@@ -77,7 +77,7 @@ impl Heard {
 
     /// Frames looked at in the second up to this one.
     fn rate_hz(&self, until_ns: u64) -> usize {
-        let newer = |told: &&PreviewFrame| told.stamp_ns.saturating_add(WINDOW_NS) > until_ns;
+        let newer = |told: &&PreviewFrame| told.rope.stamp_ns.saturating_add(WINDOW_NS) > until_ns;
         self.kept.iter().filter(newer).count()
     }
 
@@ -92,14 +92,18 @@ impl Heard {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_types::KeypointFrame;
     use shared_types::ipc::DomainSweep;
 
     fn told(state: PreviewState, sequence: u64) -> PreviewFrame {
         PreviewFrame {
             state: state as u8,
-            count: 2,
-            sequence,
-            stamp_ns: sequence * 16_000_000,
+            rope: KeypointFrame {
+                count: 2,
+                sequence,
+                stamp_ns: sequence * 16_000_000,
+                ..KeypointFrame::default()
+            },
             took_us: 1200 + u32::try_from(sequence % 3).unwrap(),
             ..PreviewFrame::default()
         }
@@ -122,16 +126,13 @@ mod tests {
                 .unwrap();
         }
         heard.listen().unwrap();
-        let at = |sequence: u64| heard.near(sequence * 16_000_000).map(|t| t.sequence);
+        let at = |sequence: u64| heard.near(sequence * 16_000_000).map(|t| t.rope.sequence);
         assert_eq!((at(3), at(6), at(7)), (Some(3), Some(5), None));
         let words = heard.words().unwrap();
         assert!(words.contains("4 a second, 1.2 ms each"), "{words}");
-        preview
-            .send_copy(PreviewFrame {
-                lost: 1,
-                ..told(PreviewState::Following, 6)
-            })
-            .unwrap();
+        let mut lost = told(PreviewState::Following, 6);
+        lost.rope.lost = 1;
+        preview.send_copy(lost).unwrap();
         heard.listen().unwrap();
         assert_eq!(heard.words().unwrap(), "the preview has lost the rope");
         for sequence in 10..1000 {
