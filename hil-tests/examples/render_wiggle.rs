@@ -14,9 +14,9 @@
 
 use camera_ingest::StereoFrame;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
-use hil_tests::rig::{CameraConfig, Resolution};
-use hil_tests::wiggle_film::{WiggleFilm, attach};
 use nalgebra::{Rotation3, UnitQuaternion};
+use rig_sim::wiggle_film::{WiggleFilm, attach};
+use rig_sim::{CameraConfig, Resolution};
 use shared_types::StereoCamera;
 use std::error::Error;
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
-//! The simulated rig: an arm controller that speaks the real protocol, and what
-//! stands around it.
+//! What the tests of the whole system share: the controller and the simulated arm in
+//! virtual time.
 #![cfg_attr(
     test,
     allow(
@@ -11,9 +11,4 @@
     )
 )]
 
-pub mod arm;
-pub mod hidden;
-pub mod render;
-pub mod rig;
 pub mod virtual_rig;
-pub mod wiggle_film;

@@ -8,8 +8,6 @@
 )]
 
 use arm_model::JointVector;
-use hil_tests::arm::fault::{FaultKind, PortSet};
-use hil_tests::arm::{ArmConfig, ArmEvent, ArmStartError, Fault, SimulatedArm, Trigger, clock};
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,6 +21,8 @@ use shared_types::MonotonicNs;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpStream};
 use std::time::Duration;
+use xarm_sim::fault::{FaultKind, PortSet};
+use xarm_sim::{ArmConfig, ArmEvent, ArmStartError, Fault, SimulatedArm, Trigger, clock};
 
 fn start() -> SimulatedArm {
     start_at(JointVector::ZERO)

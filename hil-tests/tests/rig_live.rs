@@ -9,9 +9,8 @@
 
 use arm_model::joint::START_POSE;
 use camera_ingest::StereoFrame;
-use hil_tests::arm::clock;
-use hil_tests::rig::{self, RigConfig};
 use nalgebra::Vector3;
+use rig_sim::RigConfig;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
 use shared_types::StereoCamera;
@@ -22,6 +21,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use xarm_sim::clock;
 
 const PATIENCE: Duration = Duration::from_secs(20);
 const FRAMES: usize = 20;
@@ -99,7 +99,7 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
     let config = config();
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let rig = scope.spawn(|| rig::run(&config, &stop));
+        let rig = scope.spawn(|| rig_sim::run(&config, &stop));
         let bus = Bus::join(&config.domain).unwrap();
         let client = RpcClient::<RigRpc>::open(&bus).unwrap();
         let RigEvent::Ports { command, reports } = ask(&client, &RigRequest::Ports) else {
@@ -169,7 +169,7 @@ fn the_rope_swings_when_the_arm_moves() {
     config.camera.enabled = false;
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let rig = scope.spawn(|| rig::run(&config, &stop));
+        let rig = scope.spawn(|| rig_sim::run(&config, &stop));
         let client = RpcClient::<RigRpc>::open(&Bus::join(&config.domain).unwrap()).unwrap();
         let RigEvent::Ports { command: port, .. } = ask(&client, &RigRequest::Ports) else {
             panic!("no ports");
@@ -223,6 +223,6 @@ fn a_taken_port_is_named() {
         command_port: port,
         ..config()
     };
-    let error = rig::run(&config, &AtomicBool::new(false)).unwrap_err();
+    let error = rig_sim::run(&config, &AtomicBool::new(false)).unwrap_err();
     assert!(error.to_string().contains(&port.to_string()), "{error}");
 }

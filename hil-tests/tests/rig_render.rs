@@ -10,9 +10,9 @@
 use arm_model::joint::START_POSE;
 use arm_model::kinematics::attach_pose;
 use camera_ingest::StereoFrame;
-use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
-use hil_tests::rig::CameraConfig;
 use nalgebra::Vector3;
+use rig_sim::CameraConfig;
+use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
 use shared_types::StereoCamera;
 
 const ROPE: RopeShape = RopeShape {

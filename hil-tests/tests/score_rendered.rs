@@ -8,11 +8,11 @@
 
 use arm_model::joint::START_POSE;
 use camera_ingest::{ScoreOptions, StereoFrame, score};
-use hil_tests::render::{Appearance, Renderer, RopeShape, ScenePose};
-use hil_tests::rig::CameraConfig;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rig_sim::CameraConfig;
+use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
 use shared_types::StereoCamera;
 use std::num::NonZeroUsize;
 

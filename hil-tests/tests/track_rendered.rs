@@ -12,12 +12,12 @@
 
 use camera_ingest::track::{ClampPath, ClampSample, TrackOptions};
 use camera_ingest::{EyeFrame, StereoFrame, track};
-use hil_tests::hidden::hidden_rope;
-use hil_tests::rig::CameraConfig;
-use hil_tests::wiggle_film::{WiggleFilm, attach};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rig_sim::CameraConfig;
+use rig_sim::hidden::hidden_rope;
+use rig_sim::wiggle_film::{WiggleFilm, attach};
 use shared_types::StereoCamera;
 use std::num::NonZeroUsize;
 

@@ -8,11 +8,11 @@
 
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
-use hil_tests::arm::{ArmConfig, FaultScript};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlSettings, Motion, Thresholds};
 use shared_types::ipc::ControllerMode;
 use shared_types::{FaultCode, WireMode};
+use xarm_sim::{ArmConfig, FaultScript};
 
 /// A swing of three joints from `from` and back, 1.5 s.
 fn swing(from: JointVector) -> Motion {

@@ -10,7 +10,7 @@
 mod support;
 
 use arm_model::JointVector;
-use hil_tests::hidden::hidden_rope;
+use rig_sim::hidden::hidden_rope;
 use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -392,7 +392,7 @@ fn a_preview_alone_says_what_it_waits_for_and_needs_a_calibration() {
     let refused = process().output().unwrap();
     assert_eq!(refused.status.code(), Some(1), "{}", said(&refused));
     assert!(said(&refused).contains("camera.toml"), "{}", said(&refused));
-    let sees = hil_tests::rig::CameraConfig::default().stereo_camera();
+    let sees = rig_sim::CameraConfig::default().stereo_camera();
     let conf = folder.path().join("camera.conf");
     let mode = camera_ingest::calib::VideoMode::Vga;
     camera_ingest::calib::write_factory_conf(&conf, &sees, mode).unwrap();

@@ -2,7 +2,6 @@
 //! streams into frames, decode, drop and count what cannot be used.
 
 use super::network::{Network, VirtualStream};
-use crate::arm::{ReportKind, Service};
 use rt_controller::clock_map::ClockMap;
 use rt_controller::control::ArmCodes;
 use rt_controller::transport::ByteWire;
@@ -13,6 +12,7 @@ use shared_types::ipc::{JointReport, PAYLOAD_VERSION};
 use std::cell::RefCell;
 use std::io::ErrorKind;
 use std::rc::Rc;
+use xarm_sim::{ReportKind, Service};
 
 /// Pause before a lost stream is opened again (s).
 const RETRY_S: f64 = 0.2;

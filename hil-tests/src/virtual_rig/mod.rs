@@ -21,10 +21,6 @@ mod network;
 
 pub use network::VirtualStream;
 
-use crate::arm::{
-    ArmConfig, ArmEndpoint, ArmEvent, ConnectRefused, Fault, JointSample, ReportKind, Service,
-    TimedEvent,
-};
 use arm_model::{JointVector, Limits};
 use feeds::Feed;
 use network::Network;
@@ -45,6 +41,10 @@ use shared_types::{MonotonicNs, WireMode};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
+use xarm_sim::{
+    ArmConfig, ArmEndpoint, ArmEvent, ConnectRefused, Fault, JointSample, ReportKind, Service,
+    TimedEvent,
+};
 
 /// When a virtual rig is switched on.
 const START: MonotonicNs = MonotonicNs(1_000_000_000_000);

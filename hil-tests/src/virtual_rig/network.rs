@@ -1,12 +1,12 @@
 //! The cable between controller and arm, in virtual time.
 
-use crate::arm::{ArmEndpoint, Closing, ConnectRefused, JointSample, Service};
 use rt_controller::transport::ByteWire;
 use shared_types::MonotonicNs;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{Error, ErrorKind};
 use std::rc::Rc;
+use xarm_sim::{ArmEndpoint, Closing, ConnectRefused, JointSample, Service};
 
 /// The arm, the present, and what is under way between the two ends.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use super::bench::{Bench, CYCLE_S, entry};
 use arm_model::JointVector;
-use hil_tests::arm::{ArmConfig, ConnectRefused, Obstacle, Service};
 use rt_controller::xarm::{Command, Mode, Status, TcpPose};
+use xarm_sim::{ArmConfig, ConnectRefused, Obstacle, Service};
 
 #[test]
 fn errors_stops_and_drives_latch_as_on_the_real_arm() {
@@ -128,7 +128,7 @@ fn joints_lag_stick_and_lie() {
 #[test]
 fn a_clock_off_by_a_thousandth_is_counted() {
     let config = || ArmConfig {
-        intake: hil_tests::arm::Intake::Clock,
+        intake: xarm_sim::Intake::Clock,
         ..ArmConfig::default()
     };
     let run = |ppm: f64| {

@@ -1,10 +1,10 @@
 //! An arm in virtual time and a client of its command port.
 
 use arm_model::{JointState, JointVector};
-use hil_tests::arm::{ArmConfig, ArmEndpoint, ArmEvent, FaultScript, Service, TimedEvent};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, ErrorCode, FrameReader, Mode, Protocol, StateRequest};
 use shared_types::MonotonicNs;
+use xarm_sim::{ArmConfig, ArmEndpoint, ArmEvent, FaultScript, Service, TimedEvent};
 
 pub const START: MonotonicNs = MonotonicNs(7_000_000_000);
 pub const CYCLE_S: f64 = 0.004;

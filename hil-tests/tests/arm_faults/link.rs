@@ -2,8 +2,8 @@
 
 use super::bench::{Bench, CYCLE_S, entry};
 use arm_model::JointVector;
-use hil_tests::arm::{Closing, ConnectRefused, ReportKind, Service};
 use rt_controller::xarm::{Command, Mode, Status};
+use xarm_sim::{Closing, ConnectRefused, ReportKind, Service};
 
 #[test]
 fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {

@@ -1,9 +1,9 @@
 //! What goes wrong with the reports, and what firmware leaves out of them.
 
 use super::bench::{Bench, CYCLE_S, START, entry};
-use hil_tests::arm::{ArmConfig, Firmware, ReportKind, Service};
 use rt_controller::xarm::report::{RealtimeReport, RichReport};
 use rt_controller::xarm::{Command, Mode, Status};
+use xarm_sim::{ArmConfig, Firmware, ReportKind, Service};
 
 /// Real-time reports of a run with a fault at 0.5 s, as bytes, by arrival (ms).
 fn reports(kind: &str) -> Vec<(u64, Vec<u8>)> {

@@ -3,9 +3,9 @@
 use super::judge::{silenced, stopped};
 use super::stage::{Stage, WIRES, entry, mid_throw};
 use arm_model::{JointVector, Limits, kinematics};
-use hil_tests::arm::ArmEvent;
 use rt_controller::xarm::{ArmState, Command, Register, StateRequest};
 use shared_types::{FaultCode, MonotonicNs, WireMode};
+use xarm_sim::ArmEvent;
 
 /// From an unanswered setpoint to the cause (s): two cycles, and one until a
 /// setpoint meets the fault.

@@ -3,13 +3,13 @@
 use super::judge::{braked_and_stopped, slowed, stopped};
 use super::stage::{Stage, WIRES, config};
 use arm_model::{JointTrajectory, Limits};
-use hil_tests::arm::Intake;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::restore_input;
 use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
 use shared_types::ipc::CauseRecord;
 use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier, WireMode};
+use xarm_sim::Intake;
 
 const MS: u64 = 1_000_000;
 

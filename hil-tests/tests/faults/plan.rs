@@ -5,11 +5,11 @@ use super::limits;
 use super::stage::{Stage, WIRES};
 use arm_model::limits::{LimitKind, LimitsSpec};
 use arm_model::{JointTrajectory, JointVector, Limits};
-use hil_tests::arm::{Fault, FaultKind, Trigger};
 use rt_controller::control::Motion;
 use rt_controller::point_to_point::verify;
 use shared_types::plan::trajectory_hash;
 use shared_types::{FaultCode, MonotonicNs, WireMode};
+use xarm_sim::{Fault, FaultKind, Trigger};
 
 /// Half a degree and a little (rad).
 const BESIDE_RAD: f64 = 0.0088;

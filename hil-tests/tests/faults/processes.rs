@@ -5,7 +5,6 @@ use super::judge::{nod, slowed};
 use super::stage::{Stage, WIRES, config};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits};
-use hil_tests::arm::JointSample;
 use rt_controller::control::{ControlState, Motion, Order, Thresholds};
 use rt_controller::os::Clock;
 use rt_controller::ports::{Mail, rings};
@@ -17,6 +16,7 @@ use shared_types::ipc::{ControllerMode, PAYLOAD_VERSION};
 use shared_types::{Arming, FaultCode, MotionTier, WireMode};
 use std::cell::Cell;
 use std::rc::Rc;
+use xarm_sim::JointSample;
 
 /// The plan is resident: the one who made it may die, come back in the middle of
 /// the throw and want something else.

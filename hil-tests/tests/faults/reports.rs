@@ -2,9 +2,9 @@
 
 use super::judge::slowed;
 use super::stage::{Stage, WIRES, config, entry, mid_throw};
-use hil_tests::arm::Firmware;
 use rt_controller::xarm::version::{ArmVersion, VersionError};
 use shared_types::{FaultCode, MonotonicNs};
+use xarm_sim::Firmware;
 
 /// A slow-down leaves the planned path nowhere.
 fn assert_on_the_path(stage: &Stage) {

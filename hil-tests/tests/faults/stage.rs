@@ -2,11 +2,11 @@
 
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
-use hil_tests::arm::{ArmConfig, ArmEvent, FaultScript};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlEvent, ControlSettings, Motion, Order, Thresholds};
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{Arming, MonotonicNs, MotionTier, WireMode};
+use xarm_sim::{ArmConfig, ArmEvent, FaultScript};
 
 /// Both ways setpoints travel.
 pub(crate) const WIRES: [WireMode; 2] = [WireMode::ServoPosition, WireMode::JointVelocity];

@@ -2,9 +2,9 @@
 //! state.
 
 use super::stand::{Stand, at_speed};
-use hil_tests::arm::{ArmEvent, clock};
 use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerEvent;
+use xarm_sim::{ArmEvent, clock};
 
 /// Errors of the controller one after the other, each acknowledged.
 fn raised(name: &str, codes: &[u8], kind: impl Fn(u8) -> String) {

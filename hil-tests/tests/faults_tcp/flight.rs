@@ -1,10 +1,10 @@
 //! What a stand has recorded, and what must hold of every flight.
 
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
-use hil_tests::arm::{ArmEvent, JointSample, TimedEvent};
 use rt_controller::recording::RecordedCycle;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord};
 use shared_types::{FaultCode, MonotonicNs, WireMode};
+use xarm_sim::{ArmEvent, JointSample, TimedEvent};
 
 /// Speed under which the arm stands (rad/s).
 const STILL_RAD_S: f64 = 2e-3;

@@ -2,11 +2,11 @@
 //! replies in the wrong order or with bits set.
 
 use super::stand::{Stand, at_speed};
-use hil_tests::arm::{ArmConfig, ArmEvent};
 use rt_controller::ControllerConfig;
 use rt_controller::xarm::ArmState;
 use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerEvent;
+use xarm_sim::{ArmConfig, ArmEvent};
 
 /// The profile's own patience with the link: a silence of 100 ms, 25 setpoints.
 fn impatient(config: &mut ControllerConfig) {
@@ -39,7 +39,7 @@ fn fault_01_a_stall_of_190_ms_stops_without_a_burst() {
         .find(|e| matches!(e.event, ArmEvent::Fault { begins: true, .. }))
         .unwrap()
         .at;
-    let after = |e: &&hil_tests::arm::TimedEvent| (0.0..1.0).contains(&e.at.since_s(began));
+    let after = |e: &&xarm_sim::TimedEvent| (0.0..1.0).contains(&e.at.since_s(began));
     let late = flight.arm.iter().filter(after);
     let held = late
         .clone()

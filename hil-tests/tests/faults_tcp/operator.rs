@@ -2,10 +2,10 @@
 
 use super::child::{Process, Role};
 use super::stand::Stand;
-use hil_tests::arm::ArmConfig;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::{FaultCode, MotionTier};
 use std::time::Duration;
+use xarm_sim::ArmConfig;
 
 /// How a stop was met: braked in joint space, and the arm left ready.
 const BRAKED: (u8, u8) = (2, 0);

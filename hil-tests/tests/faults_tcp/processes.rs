@@ -3,12 +3,12 @@
 use super::child::{Process, Role};
 use super::flight::Flight;
 use super::stand::{PATIENCE, Stand, execute, patient, swing};
-use hil_tests::arm::{ArmConfig, ArmEvent, JointSample, SimulatedArm, TimedEvent, clock};
 use rt_controller::xarm::ArmState;
 use shared_types::ipc::message::ControllerEvent;
 use shared_types::{FaultCode, MonotonicNs, MotionTier};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+use xarm_sim::{ArmConfig, ArmEvent, JointSample, SimulatedArm, TimedEvent, clock};
 
 /// The arm's log is exact to a millisecond, its own step, and some.
 const LOG_STEP_S: f64 = 2e-3;

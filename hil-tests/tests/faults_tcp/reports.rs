@@ -2,12 +2,12 @@
 //! whose reports have another layout.
 
 use super::stand::{Stand, at_speed};
-use hil_tests::arm::{ArmConfig, Firmware};
 use rt_controller::ControllerConfig;
 use shared_types::FaultCode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
+use xarm_sim::{ArmConfig, Firmware};
 
 /// The profile's own patience with reports: 100 ms.
 fn impatient(config: &mut ControllerConfig) {

@@ -4,7 +4,6 @@ use super::child::{Process, Role};
 use super::flight::Flight;
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector};
-use hil_tests::arm::{ArmConfig, FaultScript, SimulatedArm, clock};
 use rt_controller::ControllerConfig;
 use rt_controller::config::{Profile, ThresholdSettings};
 use rt_controller::guardian::GuardianSettings;
@@ -17,6 +16,7 @@ use shared_types::plan::trajectory_hash;
 use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use xarm_sim::{ArmConfig, FaultScript, SimulatedArm, clock};
 
 /// Stands take turns: each has a control loop of its own to keep punctual.
 static TURNS: Mutex<()> = Mutex::new(());

@@ -10,13 +10,13 @@
 
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
-use hil_tests::arm::{ArmConfig, FaultScript};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlState, Motion, Thresholds};
 use rt_controller::point_to_point::plan_move;
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use shared_types::ipc::ControllerMode;
 use std::collections::BTreeMap;
+use xarm_sim::{ArmConfig, FaultScript};
 
 /// Pause from fault to fault (s).
 const FAULT_EVERY_S: f64 = 6.0;

@@ -6,8 +6,8 @@ use crate::mcap_file::image::left_jpeg;
 use crate::mcap_file::messages;
 use crate::mcap_file::writer::McapFile;
 use camera_ingest::{ClampPath, TrackOptions, track};
-use hil_tests::rig::CameraConfig;
-use hil_tests::wiggle_film::{Frame, WiggleFilm, joints};
+use rig_sim::CameraConfig;
+use rig_sim::wiggle_film::{Frame, WiggleFilm, joints};
 use shared_types::ipc::{CycleRecord, FrameHeader, JointReport, PIXEL_FORMAT_YUYV};
 
 /// Monotonic time at which the wiggle begins (ns).

@@ -15,13 +15,13 @@ use arm_model::{JointTrajectory, Limits};
 use cli_output::Stage;
 use cli_output::watch_interrupts;
 use cli_output::{Failure, OrInput, Outcome};
-use hil_tests::render::Appearance;
-use hil_tests::rig::RigConfig;
 use planner::process::PlannerConfig;
 use planner::tasks::check_reach;
 use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rig_sim::RigConfig;
+use rig_sim::render::Appearance;
 use run_log::CYCLES_FILE;
 use serde_json::Value;
 use shared_types::ipc::message::{

@@ -79,7 +79,7 @@ pub fn run(args: &ProcessArgs) -> Outcome {
         .and_then(toml::Value::as_str)
         .map(DomainSweep::new);
     match args.name {
-        ProcessName::Rig => hil_tests::rig::run(&read(args).or_input()?, stop).or_failed(),
+        ProcessName::Rig => rig_sim::run(&read(args).or_input()?, stop).or_failed(),
         ProcessName::RtController => rt_controller::run(read(args).or_input()?, stop).or_failed(),
         ProcessName::Guardian => {
             rt_controller::guardian::run(&read(args).or_input()?, stop).or_failed()

@@ -6,13 +6,13 @@ use anyhow::anyhow;
 use cli_output::output;
 use cli_output::{Failure, OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
-use hil_tests::arm::{ArmConfig, ArmPorts, FaultScript, SimulatedArm};
-use hil_tests::rig::{RigConfig, run_announced};
+use rig_sim::{RigConfig, run_announced};
 use serde_json::{Value, json};
 use shared_types::ipc::DomainSweep;
 use std::net::IpAddr;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use xarm_sim::{ArmConfig, ArmPorts, FaultScript, SimulatedArm};
 
 pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
     let faults = match &args.faults {

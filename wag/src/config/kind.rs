@@ -1,8 +1,8 @@
 //! The kinds of configuration, and what is built in of each.
 
 use arm_model::Limits;
-use hil_tests::rig::{RigConfig, check};
 use planner::process::PlannerConfig;
+use rig_sim::{RigConfig, check};
 use rt_controller::config::ControllerConfig;
 use serde::de::DeserializeOwned;
 use serde::de::Error as _;

@@ -3,12 +3,12 @@
 
 use super::{Errors, report, secret_lags};
 use arm_model::{ArmResponse, JOINTS};
-use hil_tests::arm::{ArmConfig, JointLag, SimulatedArm};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
+use xarm_sim::{ArmConfig, JointLag, SimulatedArm};
 
 /// Joints that are moved (1-based); the others rest.
 const MOVED: [usize; 3] = [1, 4, 6];

@@ -12,9 +12,9 @@ mod virtual_time;
 
 use arm_model::JOINTS;
 use arm_model::response::TrackingLag;
-use hil_tests::arm::JointLag;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use xarm_sim::JointLag;
 
 /// A secret for each joint, anywhere in what is plausible for such arms.
 fn secret_lags(rng: &mut ChaCha8Rng) -> [JointLag; JOINTS] {

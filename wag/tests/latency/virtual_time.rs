@@ -5,7 +5,6 @@
 use super::{Errors, report, secret_lags};
 use arm_model::response::{Excitation, JointResponse, NotExcited};
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits};
-use hil_tests::arm::{ArmConfig, ArmModel};
 use planner::response::delay::command_to_target;
 use planner::response::excitation::sweep;
 use planner::response::{Recording, Sample, Setpoint, identify};
@@ -15,6 +14,7 @@ use rt_controller::clock_map::ClockMap;
 use rt_controller::xarm::{Command, Mode, StateRequest};
 use shared_types::MonotonicNs;
 use std::collections::VecDeque;
+use xarm_sim::{ArmConfig, ArmModel};
 
 const SEEDS: u64 = 20;
 const START: MonotonicNs = MonotonicNs(5_000_000_000_000);

@@ -11,9 +11,9 @@ mod preflight;
 mod response;
 
 use arm_model::{JointTrajectory, Limits};
-use hil_tests::arm::{ArmConfig, ArmEvent};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlSettings, Motion};
+use xarm_sim::{ArmConfig, ArmEvent};
 
 /// Runs longer checks.
 fn long_tests() -> bool {

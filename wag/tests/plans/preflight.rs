@@ -5,13 +5,13 @@ use super::{arm_error, long_tests, run};
 use arm_model::joint::START_POSE;
 use arm_model::limits::{LimitKind, LimitsSpec};
 use arm_model::{JointTrajectory, JointVector, Limits, kinematics};
-use hil_tests::arm::ArmConfig;
 use planner::collide::ArmShape;
 use planner::preflight::{Fence, JudgedArm, arm_margins, first_stop};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::{ControlSettings, Thresholds};
 use shared_types::WireMode;
+use xarm_sim::ArmConfig;
 
 /// A plan and the safety boundary it is judged with, if any (mm: x+, x-, y+, y-, z+, z-).
 struct Case {

@@ -5,7 +5,6 @@
 use super::{long_tests, run};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
 use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
-use hil_tests::arm::{ArmConfig, JointLag};
 use hil_tests::virtual_rig::VirtualRig;
 use planner::response::Following;
 use planner::ropes::{random_rope, random_strike_target};
@@ -16,6 +15,7 @@ use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start,
 use rt_controller::control::Thresholds;
 use shared_types::RopeParams;
 use std::ops::ControlFlow;
+use xarm_sim::{ArmConfig, JointLag};
 
 /// Joints that are late by 10 to 40 ms in slow motion.
 fn late_joints(rng: &mut ChaCha8Rng) -> [JointLag; JOINTS] {

@@ -6,7 +6,6 @@ use crate::support::command;
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use camera_ingest::process::CameraConfig;
-use hil_tests::arm::{ArmEvent, SimulatedArm};
 use planner::process::PlannerConfig;
 use rt_controller::ControllerConfig;
 use rustix::process::Signal;
@@ -25,6 +24,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Child;
 use std::time::Duration;
+use xarm_sim::{ArmEvent, SimulatedArm};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Cycles of half the plan.
@@ -277,7 +277,7 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
         both_eyes: true,
     };
     let filmed = camera.call(&film).unwrap();
-    let began = hil_tests::arm::clock::now();
+    let began = xarm_sim::clock::now();
     play.throw(murder);
     drop((planned, filmed));
     let (cycles, causes, arm) = play.end();

@@ -1,12 +1,12 @@
 //! What the operator at the terminal can do: Ctrl-C, and the dead-man switch.
 
 use super::shell::{arm, recorded, said, send, until, wiggle};
-use hil_tests::arm::SimulatedArm;
 use rustix::process::Signal;
 use shared_types::FaultCode;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::Duration;
+use xarm_sim::SimulatedArm;
 
 /// Speed of a motion under way; the move to the pose before it is slower
 /// (rad/s).

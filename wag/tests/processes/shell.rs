@@ -2,12 +2,12 @@
 
 use crate::support::command;
 use arm_model::joint::START_POSE;
-use hil_tests::arm::{ArmConfig, SimulatedArm};
 use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::{CauseRecord, CycleRecord};
 use std::path::Path;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
+use xarm_sim::{ArmConfig, SimulatedArm};
 
 /// An arm in this process, at the start pose.
 pub fn arm() -> SimulatedArm {

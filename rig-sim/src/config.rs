@@ -1,0 +1,145 @@
+//! Set-up of the rig, as read from a file or made in code.
+
+use super::camera::CameraConfig;
+use crate::hidden::hidden_rope;
+use crate::render::Appearance;
+use arm_model::joint::START_POSE;
+use arm_model::{JOINTS, JointVector, Limits};
+use serde::{Deserialize, Serialize};
+use shared_types::{RopeParams, StereoCamera};
+use std::net::IpAddr;
+use xarm_sim::{ArmConfig, FaultScript, Firmware, Intake, JointLag, Obstacle};
+
+/// Set-up of the simulated rig. Every key has a default; `seed` alone gives a
+/// new rope, new colours and slightly different joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RigConfig {
+    /// Shared-memory domain the rig lives in.
+    pub domain: String,
+    /// Seed of rope, colours, joint lags and sensor noise.
+    pub seed: u64,
+    /// Address the arm listens on.
+    pub bind: IpAddr,
+    /// The arm's command port; 0 takes any free one.
+    pub command_port: u16,
+    /// The arm's report ports 30000, 30001, 30002, 30003; 0 takes any free one.
+    pub report_ports: [u16; 4],
+    /// How the joints follow setpoints.
+    pub lag: JointLag,
+    /// How each joint follows; left out, drawn from the seed around `lag`.
+    pub joint_lags: Option<[JointLag; JOINTS]>,
+    /// Firmware of the arm's controller.
+    pub firmware: Firmware,
+    /// What the controller's clock gains (µs/s).
+    pub clock_ppm: f64,
+    /// Whose clock paces setpoints.
+    pub intake: Intake,
+    /// What stands in the arm's way.
+    pub obstacles: Vec<Obstacle>,
+    /// Faults of arm and wire to inject.
+    pub faults: FaultScript,
+    /// Ranges, speeds and accelerations of the joints.
+    pub limits: Limits,
+    /// Pose at the start (rad).
+    pub initial_q: JointVector,
+    /// The rope; left out, it is drawn from the seed.
+    pub rope: Option<RopeParams>,
+    /// Colours; left out, they are drawn from the seed.
+    pub appearance: Option<Appearance>,
+    /// Centre of the target ball in the world (m); left out, there is none.
+    pub target_m: Option<[f64; 3]>,
+    /// The stereo camera.
+    pub camera: CameraConfig,
+}
+
+impl Default for RigConfig {
+    fn default() -> Self {
+        let arm = ArmConfig::default();
+        // Near the start pose, but not in it: the first thing to do is to move.
+        let mut initial_q = START_POSE;
+        initial_q[0] += 0.10;
+        initial_q[1] -= 0.15;
+        initial_q[5] -= 0.10;
+        Self {
+            domain: "rig".to_owned(),
+            seed: 0,
+            bind: arm.bind,
+            command_port: arm.command_port,
+            report_ports: arm.report_ports,
+            lag: arm.lag,
+            joint_lags: arm.joint_lags,
+            firmware: arm.firmware,
+            clock_ppm: arm.clock_ppm,
+            intake: arm.intake,
+            obstacles: arm.obstacles,
+            faults: arm.faults,
+            limits: arm.limits,
+            initial_q,
+            rope: None,
+            appearance: None,
+            target_m: None,
+            camera: CameraConfig::default(),
+        }
+    }
+}
+
+impl RigConfig {
+    /// The rope on the pole.
+    #[must_use]
+    pub fn rope(&self) -> RopeParams {
+        self.rope.unwrap_or_else(|| hidden_rope(self.seed))
+    }
+
+    /// Colours of rope, lead, target and wall.
+    #[must_use]
+    pub fn appearance(&self) -> Appearance {
+        self.appearance
+            .unwrap_or_else(|| Appearance::from_seed(self.seed))
+    }
+
+    /// The camera's exact calibration and place.
+    #[must_use]
+    pub fn stereo_camera(&self) -> StereoCamera {
+        self.camera.stereo_camera()
+    }
+
+    /// Set-up of the arm alone.
+    #[must_use]
+    pub fn arm(&self) -> ArmConfig {
+        ArmConfig {
+            bind: self.bind,
+            command_port: self.command_port,
+            report_ports: self.report_ports,
+            seed: self.seed,
+            lag: self.lag,
+            joint_lags: self.joint_lags,
+            firmware: self.firmware,
+            clock_ppm: self.clock_ppm,
+            intake: self.intake,
+            obstacles: self.obstacles.clone(),
+            faults: self.faults.clone(),
+            limits: self.limits.clone(),
+            initial_q: self.initial_q,
+            ..ArmConfig::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_names_only_what_differs_and_typos_are_refused() {
+        let text = "seed = 7\ncommand_port = 0\n[camera]\nenabled = false\n\
+                    [[faults]]\nat_s = 3\nkind = \"stall\"\nduration_s = 0.19";
+        let config: RigConfig = toml::from_str(text).unwrap();
+        assert_eq!((config.seed, config.camera.enabled), (7, false));
+        assert_eq!(config.initial_q, RigConfig::default().initial_q);
+        assert_eq!(config.rope(), hidden_rope(7));
+        assert!(toml::from_str::<RigConfig>("sed = 7").is_err());
+        let back: RigConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();
+        assert_eq!(back, config);
+    }
+}

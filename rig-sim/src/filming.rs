@@ -1,0 +1,158 @@
+//! The camera: takes frames at its own pace and publishes them late but with
+//! honest stamps, like a real one.
+
+use super::RigError;
+use super::config::RigConfig;
+use super::record::Record;
+use crate::render::{Renderer, RopeShape, ScenePose};
+use shared_types::MonotonicNs;
+use shared_types::ipc::{
+    Bus, FrameHeader, FramePublisher, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
+};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use xarm_sim::clock;
+
+const SERVICE: &str = "wag/v1/camera/frames";
+/// Delay beyond the camera's latency at which frames are dropped (s).
+const BACKLOG_S: f64 = 0.12;
+/// Longest sleep before `stop` is looked at again.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Films the record until `stop`.
+pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Result<(), RigError> {
+    let bus = Bus::join(&config.domain)?;
+    let camera = config.stereo_camera();
+    let mut renderer = Renderer::new(
+        &camera,
+        RopeShape::from(&config.rope()),
+        config.appearance(),
+        config.camera.noise_levels,
+        config.seed,
+    );
+    let publisher = bus.frame_publisher(renderer.frame_bytes())?;
+    let mut shutter = Shutter {
+        start: clock::now(),
+        period_s: 1.0 / config.camera.frame_rate_hz,
+        sequence: 0,
+    };
+    let blank = FrameHeader {
+        version: PAYLOAD_VERSION,
+        pixel_format: PIXEL_FORMAT_YUYV,
+        width_px: camera.width_px * 2,
+        height_px: camera.height_px,
+        ..FrameHeader::default()
+    };
+    while !stop.load(Ordering::Acquire) {
+        let opens = shutter.opens();
+        let arrives = opens.plus_s(config.camera.latency_s);
+        if !record.wait_for(opens.plus_s(camera.frame_time_s()), PATIENCE) {
+            continue;
+        }
+        let Some(poses) = expose(record, &renderer, opens, camera.frame_time_s()) else {
+            // Before the first moment, or so late that it is forgotten.
+            shutter.sequence += 1;
+            continue;
+        };
+        renderer.place_target(record.target_m());
+        let header = FrameHeader {
+            sequence: shutter.sequence,
+            stamp_ns: opens.0,
+            ..blank
+        };
+        publish(&publisher, header, &mut renderer, &poses, arrives)?;
+        shutter.next(clock::now(), config.camera.latency_s + BACKLOG_S);
+    }
+    Ok(())
+}
+
+/// When frames are taken.
+struct Shutter {
+    start: MonotonicNs,
+    period_s: f64,
+    sequence: u64,
+}
+
+impl Shutter {
+    /// Start of exposure of the frame at hand.
+    #[allow(clippy::cast_precision_loss, reason = "2^53 frames last for ages")]
+    fn opens(&self) -> MonotonicNs {
+        self.start.plus_s(self.sequence as f64 * self.period_s)
+    }
+
+    /// Goes on to the next frame, or, more than `backlog_s` late, to the first
+    /// one that is not: the frames between are dropped and leave a gap.
+    fn next(&mut self, now: MonotonicNs, backlog_s: f64) {
+        self.sequence += 1;
+        let first = self.sequence;
+        while now.since_s(self.opens()) > backlog_s {
+            self.sequence += 1;
+        }
+        if self.sequence > first {
+            tracing::warn!(
+                dropped = self.sequence - first,
+                "the simulated camera cannot keep up"
+            );
+        }
+    }
+}
+
+/// Poses spread evenly over the frame's time, as many as the motion needs.
+#[allow(clippy::cast_precision_loss, reason = "a dozen sub-frames")]
+fn expose(
+    record: &Record,
+    renderer: &Renderer,
+    opens: MonotonicNs,
+    frame_time_s: f64,
+) -> Option<Vec<ScenePose>> {
+    let first = record.pose_at(opens)?;
+    let last = record.pose_at(opens.plus_s(frame_time_s))?;
+    let count = renderer.sub_frames(&first, &last);
+    (0..count)
+        .map(|i| {
+            let middle = (i as f64 + 0.5) / count as f64;
+            record.pose_at(opens.plus_s(frame_time_s * middle))
+        })
+        .collect()
+}
+
+/// Draws straight into shared memory and sends, not before `arrives`.
+fn publish(
+    publisher: &FramePublisher,
+    header: FrameHeader,
+    renderer: &mut Renderer,
+    poses: &[ScenePose],
+    arrives: MonotonicNs,
+) -> Result<(), RigError> {
+    let failed = |reason: String| IpcError::Transfer {
+        service: SERVICE,
+        reason,
+    };
+    let mut frame = publisher
+        .loan_slice(renderer.frame_bytes())
+        .map_err(|e| failed(format!("{e:?}")))?;
+    *frame.user_header_mut() = header;
+    renderer.render(poses, header.sequence, frame.payload_mut());
+    clock::sleep_until(arrives);
+    frame.send().map_err(|e| failed(format!("{e:?}")))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_late_camera_drops_frames_and_keeps_its_beat() {
+        let mut shutter = Shutter {
+            start: MonotonicNs(1_000_000_000),
+            period_s: 0.01,
+            sequence: 0,
+        };
+        shutter.next(MonotonicNs(1_030_000_000), 0.1);
+        assert_eq!(shutter.sequence, 1);
+        shutter.next(MonotonicNs(1_255_000_000), 0.1);
+        assert_eq!(shutter.sequence, 16);
+        assert_eq!(shutter.opens(), MonotonicNs(1_160_000_000));
+    }
+}

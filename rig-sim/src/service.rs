@@ -1,0 +1,101 @@
+//! Answers about the rig: ports, target, truth.
+
+use super::RigError;
+use super::config::RigConfig;
+use super::record::Record;
+use nalgebra::Vector3;
+use shared_types::MonotonicNs;
+use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
+use shared_types::ipc::rpc::{Call, RpcServer};
+use shared_types::ipc::{Bus, IpcError};
+use std::time::Duration;
+use xarm_sim::ArmPorts;
+
+const PAUSE: Duration = Duration::from_millis(4);
+/// What the library says of a second server.
+const TOO_MANY_SERVERS: &str = "ExceedsMaxSupportedServers";
+/// How long a question about the very last moments waits for physics.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// The rig's end of its service; stays in the thread that opened it.
+pub(super) struct Service {
+    // Order matters: the server ends before its connection.
+    server: RpcServer<RigRpc>,
+    _bus: Bus,
+}
+
+impl Service {
+    /// Opens the service.
+    ///
+    /// # Errors
+    /// [`RigError::DomainInUse`] when another rig serves, [`RigError::Ipc`].
+    pub(super) fn open(domain: &str) -> Result<Self, RigError> {
+        let bus = Bus::join(domain)?;
+        let server = RpcServer::<RigRpc>::open(&bus).map_err(|error| match error {
+            IpcError::Open { ref reason, .. } if reason.contains(TOO_MANY_SERVERS) => {
+                RigError::DomainInUse {
+                    domain: domain.to_owned(),
+                }
+            }
+            other => other.into(),
+        })?;
+        Ok(Self { server, _bus: bus })
+    }
+
+    /// Serves until it is `over`.
+    pub(super) fn run(
+        &self,
+        config: &RigConfig,
+        ports: ArmPorts,
+        record: &Record,
+        over: impl Fn() -> bool,
+    ) -> Result<(), RigError> {
+        while !over() {
+            match self.server.receive() {
+                Ok(Some(call)) => reply(&call, &answer(&call.request, config, ports, record)),
+                Ok(None) => std::thread::sleep(PAUSE),
+                // One damaged question must not end the rig.
+                Err(error @ IpcError::Message { .. }) => tracing::warn!(%error, "question dropped"),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn reply(call: &Call<RigRpc>, event: &RigEvent) {
+    if let Err(error) = call.send(event) {
+        tracing::warn!(%error, "nobody took the answer");
+    }
+}
+
+fn answer(request: &RigRequest, config: &RigConfig, ports: ArmPorts, record: &Record) -> RigEvent {
+    match *request {
+        RigRequest::Ports => RigEvent::Ports {
+            command: ports.command,
+            reports: ports.reports,
+        },
+        RigRequest::PlaceTarget { target_m } => {
+            if !target_m.iter().all(|v| v.abs() < 10.0) {
+                return RigEvent::Failed {
+                    message: format!("target {target_m:?} does not lie within 10 m of the robot"),
+                };
+            }
+            record.place_target(Some(Vector3::from(target_m)));
+            RigEvent::Done
+        }
+        RigRequest::Truth { from_ns, to_ns } => {
+            record.wait_for(MonotonicNs(to_ns), PATIENCE);
+            match record.truth(MonotonicNs(from_ns), MonotonicNs(to_ns)) {
+                Ok(truth) => RigEvent::Truth {
+                    rope: config.rope(),
+                    closest_m: truth.closest_m,
+                    closest_ns: truth.closest_at.0,
+                    peak_tip_speed_m_s: truth.peak_tip_speed_m_s,
+                    touched: truth.touched,
+                },
+                Err(message) => RigEvent::Failed { message },
+            }
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! A wiggle as the rig's camera sees it, rendered without processes, threads and clocks:
+//! the same film whatever else the machine does.
+
+use crate::CameraConfig;
+use crate::hidden::hidden_rope;
+use crate::render::{Appearance, Renderer, RopeShape, ScenePose};
+use arm_model::joint::START_POSE;
+use arm_model::kinematics::{FrameMotion, attach_motion};
+use arm_model::{JointState, JointVector};
+use nalgebra::Vector3;
+use rope_sim::{LiveRope, SimulateError};
+use shared_types::{RopeParams, StereoCamera};
+
+const AMPLITUDE_RAD: f64 = 0.288;
+const FREQUENCY_HZ: f64 = 1.3;
+const DURATION_S: f64 = 5.6;
+const RAMP_S: f64 = 2.8;
+const PHYSICS_STEP_S: f64 = 1e-4;
+/// Poses computed per exposure of a row; as many of them are drawn as the motion needs.
+const POSES: usize = 8;
+/// Where the target hangs (m).
+const TARGET_M: [f64; 3] = [1.10, 0.0, 0.45];
+
+/// Quintic step from 0 to 1, flat at both ends.
+fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * x * (10.0 + x * (6.0 * x - 15.0))
+}
+
+/// Joints of the shipped wiggle (rad) at a time (s): a sine of joint 6, faded in and out,
+/// from t = 0 with the rope hanging still.
+#[must_use]
+pub fn joints(t_s: f64) -> JointVector {
+    let fade = smooth_step(t_s / RAMP_S) * smooth_step((DURATION_S - t_s) / RAMP_S);
+    let swing = (core::f64::consts::TAU * FREQUENCY_HZ * t_s).sin();
+    let mut q = START_POSE;
+    q[5] += AMPLITUDE_RAD * swing * fade;
+    q
+}
+
+/// The attach frame at a time (s), with velocities and accelerations by central
+/// differences.
+#[must_use]
+pub fn attach(t_s: f64) -> FrameMotion {
+    const H: f64 = 1e-3;
+    let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
+    attach_motion(&JointState {
+        q: now,
+        qd: (after - before).map(|d| d / (2.0 * H)),
+        qdd: (after + before - now - now).map(|d| d / (H * H)),
+    })
+}
+
+/// One frame of the film.
+#[derive(Debug)]
+pub struct Frame {
+    /// Start of exposure (s).
+    pub start_s: f64,
+    /// Both eyes side by side, packed YUYV.
+    pub yuyv: Vec<u8>,
+    /// Nodes of the rope in the middle of the exposure of the row that shows them (world,
+    /// m), clamp first.
+    pub nodes: Vec<Vector3<f64>>,
+}
+
+/// A film being rendered; its frames come in order.
+#[derive(Debug)]
+pub struct WiggleFilm {
+    /// The rope in it.
+    pub rope: RopeParams,
+    /// Its colours.
+    pub appearance: Appearance,
+    camera: StereoCamera,
+    frame_rate_hz: f64,
+    late_s: f64,
+    renderer: Renderer,
+    live: LiveRope,
+    next: u64,
+}
+
+impl WiggleFilm {
+    /// Rope and colours are the seed's; two radii replace the rope's and its lead's (m).
+    /// The first frame's exposure begins `late_s` after the wiggle does (earlier: negative);
+    /// the rope hangs still in it.
+    ///
+    /// # Errors
+    /// The rope cannot be simulated.
+    pub fn new(
+        config: &CameraConfig,
+        seed: u64,
+        radii_m: Option<[f64; 2]>,
+        late_s: f64,
+    ) -> Result<Self, SimulateError> {
+        let camera = config.stereo_camera();
+        let (mut rope, appearance) = (hidden_rope(seed), Appearance::from_seed(seed));
+        if let Some([radius_m, lead_radius_m]) = radii_m {
+            (rope.radius_m, rope.lead_radius_m) = (radius_m, lead_radius_m);
+        }
+        let shape = RopeShape::from(&rope);
+        let mut renderer = Renderer::new(&camera, shape, appearance, config.noise_levels, seed);
+        renderer.place_target(Some(TARGET_M.into()));
+        Ok(Self {
+            live: LiveRope::new(&rope, &attach(late_s), PHYSICS_STEP_S)?,
+            rope,
+            appearance,
+            camera,
+            frame_rate_hz: config.frame_rate_hz,
+            late_s,
+            renderer,
+            next: 0,
+        })
+    }
+
+    /// A node's place in the middle of the exposure of the row that shows it; `all` lie
+    /// evenly over the frame's time.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "poses are few"
+    )]
+    fn as_seen(&self, all: &[ScenePose], node: usize) -> Vector3<f64> {
+        let at = |t_s: f64| {
+            let place = t_s / self.camera.frame_time_s() * all.len() as f64 - 0.5;
+            let place = place.clamp(0.0, (all.len() - 1) as f64);
+            let before = (place as usize).min(all.len().saturating_sub(2));
+            let [a, b] = [before, (before + 1).min(all.len() - 1)].map(|i| all[i].nodes[node]);
+            a + (b - a) * (place - before as f64)
+        };
+        let mut row = f64::from(self.camera.height_px) / 2.0;
+        // A node moves far less than a row in a row's time.
+        for _ in 0..4 {
+            let seen = self.camera.project_left(&at(self.camera.row_time_s(row)));
+            row = seen.map_or(row, |[_, v]| v);
+        }
+        at(self.camera.row_time_s(row))
+    }
+
+    fn pose(&mut self, t_s: f64) -> ScenePose {
+        // The simulation counts from the first frame on, whose rope hangs still.
+        let first_s = self.late_s;
+        let clamp = |since_s: f64| attach(first_s + since_s);
+        self.live.advance(&clamp, t_s - first_s);
+        ScenePose {
+            q: joints(t_s),
+            nodes: self.live.nodes().to_vec(),
+        }
+    }
+}
+
+impl Iterator for WiggleFilm {
+    type Item = Frame;
+
+    /// The next frame; there is always one.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "frames and poses are few"
+    )]
+    fn next(&mut self) -> Option<Frame> {
+        let start_s = self.late_s + self.next as f64 / self.frame_rate_hz;
+        let frame_s = self.camera.frame_time_s();
+        let poses = (POSES as f64 * frame_s / self.camera.exposure_s).ceil() as usize;
+        let part = |i: usize| start_s + frame_s * (i as f64 + 0.5) / poses as f64;
+        let all: Vec<_> = (0..poses).map(|i| self.pose(part(i))).collect();
+        let needed = self.renderer.sub_frames(&all[0], &all[poses - 1]);
+        let drawn = needed.min(poses);
+        // Even over the frame's time, within half of a pose's.
+        let middle = |i: usize| (2 * i + 1) * poses / (2 * drawn);
+        let drawn: Vec<_> = (0..drawn).map(|i| all[middle(i)].clone()).collect();
+        let mut yuyv = vec![0; self.renderer.frame_bytes()];
+        self.renderer.render(&drawn, self.next, &mut yuyv);
+        self.next += 1;
+        let nodes = (0..all[0].nodes.len()).map(|node| self.as_seen(&all, node));
+        Some(Frame {
+            start_s,
+            yuyv,
+            nodes: nodes.collect(),
+        })
+    }
+}

@@ -1,0 +1,76 @@
+//! The report ports: a frame per period and client, or what the faults make of
+//! it.
+
+use super::ArmEndpoint;
+use super::client::{Client, Damage, Service};
+use crate::fault::FaultKind;
+use crate::reports::ReportKind;
+use rand::Rng;
+use shared_types::MonotonicNs;
+
+/// Offset of the time stamp in the real-time report (bytes).
+const STAMP: core::ops::Range<usize> = 4..12;
+
+impl ArmEndpoint {
+    /// Queues the reports that are due at `now`.
+    pub(super) fn publish(&mut self, now: MonotonicNs) {
+        let mut clients = core::mem::take(&mut self.clients);
+        for client in clients.values_mut() {
+            if let Service::Reports(kind) = client.service
+                && now >= client.due
+            {
+                self.publish_to(client, kind, now);
+            }
+        }
+        self.clients = clients;
+    }
+
+    fn publish_to(&mut self, client: &mut Client, kind: ReportKind, now: MonotonicNs) {
+        let period_s = self.model.clock().span_s(kind.period_s());
+        client.due = client.due.plus_s(period_s);
+        if client.due <= now {
+            client.due = now.plus_s(period_s);
+        }
+        let port = kind.index();
+        if self.is_dark() || self.faults.any(|f| stops(f, port)) {
+            return;
+        }
+        let frozen = self.faults.any(|f| freezes(f, port)) && !client.last_report.is_empty();
+        let mut frame = if frozen {
+            client.last_report.clone()
+        } else {
+            kind.frame(&self.model, client.firmware, client.counter)
+        };
+        if frozen && kind == ReportKind::Realtime {
+            frame[STAMP].copy_from_slice(&self.model.time_us().to_be_bytes());
+        }
+        client.counter = client.counter.wrapping_add(1);
+        client.last_report.clone_from(&frame);
+        if let Some(damage) = client.next_damage() {
+            self.spoil(&mut frame, damage, kind);
+        }
+        client.push(now, frame);
+    }
+
+    fn spoil(&mut self, frame: &mut Vec<u8>, damage: Damage, kind: ReportKind) {
+        match damage {
+            Damage::Torn { keep_bytes } => frame.truncate(keep_bytes),
+            Damage::Length { claim_bytes } => {
+                frame[..4].copy_from_slice(&claim_bytes.to_be_bytes());
+            }
+            Damage::Angle { joint, value } => {
+                let at = kind.joint_offset(joint);
+                frame[at..at + 4].copy_from_slice(&value.to_le_bytes());
+            }
+            Damage::Garbage => self.rng.fill_bytes(&mut frame[4..]),
+        }
+    }
+}
+
+fn stops(fault: &FaultKind, index: usize) -> bool {
+    matches!(fault, FaultKind::ReportStop { port } if port.covers(index))
+}
+
+fn freezes(fault: &FaultKind, index: usize) -> bool {
+    matches!(fault, FaultKind::ReportFreeze { port } if port.covers(index))
+}
