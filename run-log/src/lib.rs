@@ -43,6 +43,7 @@ mod margins;
 mod mcap_file;
 mod page;
 mod run;
+mod tables;
 mod thread;
 
 pub use cause::keep_cause;
@@ -56,6 +57,7 @@ pub use mcap_file::{
 };
 pub use page::show;
 pub use run::{Cycles, Run};
+pub use tables::{CYCLES_TABLE, JOINTS_TABLE, measured};
 pub use thread::{RecordingReport, RecordingThread};
 
 /// File of a run folder that holds its control cycles.

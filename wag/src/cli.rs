@@ -88,6 +88,9 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Report why a run was stopped, or its margins to the limits.
     Explain(ExplainArgs),
+    /// Write the recorded cycles and joints of a run as tables.
+    #[command(subcommand)]
+    Export(ExportCommand),
     /// Write a run as one HTML file: replay in space, joints, limits, rope, times.
     Report(ReportArgs),
     /// List runs, compare two of them, rerun one.

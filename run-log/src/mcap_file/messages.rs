@@ -53,7 +53,7 @@ pub(super) fn commanded(at_ns: u64, cycle: &CycleRecord) -> Value {
 }
 
 /// A mode as the file's messages name it.
-pub(super) const fn mode_name(mode: ControllerMode) -> &'static str {
+pub(crate) const fn mode_name(mode: ControllerMode) -> &'static str {
     match mode {
         ControllerMode::Offline => "Offline",
         ControllerMode::Idle => "Idle",

@@ -23,6 +23,7 @@ mod writer;
 
 pub use channel::Channel;
 pub use film::{RunFilm, RunPart};
+pub(crate) use messages::mode_name;
 pub use read::{Walked, is_mcap, replay_bytes};
 pub use recorder::{RecorderConfig, run as record};
 pub use recover::{Recovered, recover};

@@ -96,6 +96,23 @@ pub struct ExplainArgs {
     pub run: PathBuf,
 }
 
+/// `wag export ...`
+#[derive(Debug, Subcommand)]
+pub enum ExportCommand {
+    /// Control cycles and measured joints as cycles.csv and joints.csv.
+    Csv(ExportCsvArgs),
+}
+
+/// Arguments of `wag export csv`.
+#[derive(Debug, Args)]
+pub struct ExportCsvArgs {
+    /// Run folder, or its file cycles.bin or run.mcap.
+    pub run: PathBuf,
+    /// Folder for the tables, which must exist. Default: the run folder.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
 /// Arguments of `wag report`.
 #[derive(Debug, Args)]
 pub struct ReportArgs {

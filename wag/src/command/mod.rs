@@ -10,6 +10,7 @@ mod demo_summary;
 mod doctor;
 mod dry_run;
 mod explain;
+mod export;
 mod film;
 mod filmed;
 mod identify;
@@ -86,6 +87,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Record(args) => record::run(args, quiet),
         Command::Replay(args) => replay::run(args, quiet),
         Command::Explain(args) => explain::run(args, quiet),
+        Command::Export(command) => export::run(command, quiet),
         Command::Report(args) => report::run(args, quiet),
         Command::Ledger(args) => ledger::run(args, quiet),
         Command::Score(args) => score::run(args, quiet),

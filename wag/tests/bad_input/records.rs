@@ -67,6 +67,8 @@ pub(crate) const CASES: &[Case] = &[
     ("ledger compare . none", 2, &["none", "run folder"]),
     ("ledger rerun .", 2, &["command.json"]),
     ("ledger rerun none", 2, &["none", "run folder"]),
+    ("export csv none.run", 2, &["none.run", "does not exist"]),
+    ("export csv empty.bin", 2, &["empty.bin", "is empty"]),
     ("explain none.run", 2, &["none.run", "does not exist"]),
     ("explain .", 2, &["no run folder", "cycles.bin"]),
     ("explain empty.bin", 2, &["empty.bin", "is empty"]),
