@@ -3,18 +3,15 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_targets_charuco::{
-    CharucoBoardSpec, CharucoDetector, CharucoParams, GrayImageView, resolve_dictionary,
-};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::corners::CornerDetector;
 use super::extrinsics::Sighted;
-use crate::frame::EyeFrame;
 use crate::source::{SourceError, StereoSource};
 
 /// Corners both eyes must see for a picture to count.
-const LEAST_CORNERS: usize = 6;
+const MIN_CORNERS: usize = 6;
 
 /// Why a board cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +31,7 @@ pub enum BoardError {
     #[error(
         "the board was found by both eyes in none of {frames} frames (at best {most} corners, \
          {least} are needed); show it whole, flat and lit, and check rows, columns and dictionary",
-        least = LEAST_CORNERS
+        least = MIN_CORNERS
     )]
     NotFound {
         /// Frames looked at.
@@ -98,21 +95,13 @@ impl Board {
         Matrix3::from_fn(|row, column| self.pose.rotation[row][column])
     }
 
-    fn detector(&self) -> Result<CharucoDetector, String> {
+    fn detector(&self) -> Result<CornerDetector, String> {
         if !(self.square_m > 0.0 && self.marker_m > 0.0 && self.marker_m < self.square_m) {
             return Err(
                 "square_m and marker_m must be positive, the marker the smaller".to_owned(),
             );
         }
-        let dictionary = resolve_dictionary(&self.dictionary)
-            .ok_or_else(|| format!("dictionary {:?} is not known", self.dictionary))?;
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "only the ratio is used by the detector"
-        )]
-        let (square, ratio) = (self.square_m as f32, (self.marker_m / self.square_m) as f32);
-        let spec = CharucoBoardSpec::new(self.rows, self.columns, square, ratio, dictionary);
-        CharucoDetector::new(CharucoParams::for_board(spec)).map_err(|e| e.to_string())
+        CornerDetector::new(self)
     }
 
     /// Place of an inner corner in the world (m).
@@ -141,8 +130,8 @@ impl Board {
         let (mut seen, mut most) = (Vec::new(), 0);
         for &index in &chosen {
             let frame = source.read(index)?;
-            let left = corners(&detector, &frame.left());
-            let right = corners(&detector, &frame.right());
+            let left = detector.corners(&frame.left());
+            let right = detector.corners(&frame.right());
             let both: Vec<Sighted> = left
                 .iter()
                 .filter_map(|(id, pixel)| {
@@ -154,7 +143,7 @@ impl Board {
                 })
                 .collect();
             most = most.max(both.len());
-            if both.len() >= LEAST_CORNERS {
+            if both.len() >= MIN_CORNERS {
                 seen.extend(both);
             }
         }
@@ -166,23 +155,4 @@ impl Board {
         }
         Ok(seen)
     }
-}
-
-/// Corners in one eye's picture: id and raw pixel, integers at pixel centres.
-fn corners(detector: &CharucoDetector, eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
-    let view = GrayImageView {
-        width: eye.width_px,
-        height: eye.height_px,
-        data: &eye.luma,
-    };
-    // A miss is no error: the other frames may show the board.
-    detector.detect(&view).map_or_else(
-        |_miss| Vec::new(),
-        |found| {
-            let corners = found.corners.iter();
-            corners
-                .map(|c| (c.id, [f64::from(c.position.x), f64::from(c.position.y)]))
-                .collect()
-        },
-    )
 }

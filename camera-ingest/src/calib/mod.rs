@@ -5,6 +5,7 @@
 //! It is *not* the place for estimating lenses: those come from the files.
 
 pub mod board;
+mod corners;
 pub mod extrinsics;
 mod factory;
 mod ini;

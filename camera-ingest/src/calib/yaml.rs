@@ -9,8 +9,8 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
-use serde::Deserialize;
 use shared_types::Intrinsics;
+use yaml_rust2::{Yaml, YamlLoader};
 
 use super::factory::{Eyes, VideoMode};
 use super::{CalibError, read_text};
@@ -18,55 +18,13 @@ use super::{CalibError, read_text};
 /// Baselines of stereo cameras (m); outside it, lengths are no metres.
 const BASELINE_M: [f64; 2] = [0.005, 1.0];
 
-#[derive(Debug, Deserialize)]
-struct Matrix {
-    data: Vec<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-struct RosEye {
-    image_width: u32,
-    image_height: u32,
-    #[serde(default)]
-    distortion_model: String,
-    camera_matrix: Matrix,
-    distortion_coefficients: Matrix,
-    rectification_matrix: Matrix,
-    projection_matrix: Matrix,
-}
-
-#[derive(Debug, Default, Deserialize)]
-struct OpenCv {
-    #[serde(rename = "M1")]
-    m1: Option<Matrix>,
-    #[serde(rename = "D1")]
-    d1: Option<Matrix>,
-    #[serde(rename = "M2")]
-    m2: Option<Matrix>,
-    #[serde(rename = "D2")]
-    d2: Option<Matrix>,
-    #[serde(rename = "R")]
-    r: Option<Matrix>,
-    #[serde(rename = "T")]
-    t: Option<Matrix>,
-}
-
-/// What tells the two kinds apart.
-#[derive(Debug, Deserialize)]
-struct Kind {
-    #[serde(rename = "M1")]
-    m1: Option<Matrix>,
-    image_width: Option<u32>,
-}
-
 /// Reads a calibration; `right` names the right eye's ROS file, by default the
 /// left one's name with `left` replaced by `right`.
 pub(super) fn read(path: &Path, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, CalibError> {
     let file = YamlFile::open(path)?;
-    let kind: Kind = file.parse()?;
-    let eyes = if kind.m1.is_some() {
+    let eyes = if file.has("M1") {
         opencv(&file)?
-    } else if kind.image_width.is_some() {
+    } else if file.has("image_width") {
         ros(&file, right, mode)?
     } else {
         return Err(file.bad(
@@ -91,26 +49,26 @@ pub(super) fn read(path: &Path, right: Option<&Path>, mode: VideoMode) -> Result
 
 struct YamlFile {
     path: PathBuf,
-    text: String,
+    document: Yaml,
 }
 
 impl YamlFile {
     fn open(path: &Path) -> Result<Self, CalibError> {
-        // OpenCV begins with a directive and tags that YAML parsers refuse.
+        // OpenCV begins with a directive that YAML parsers refuse.
         let text = read_text(path)?
             .lines()
             .filter(|line| !line.starts_with("%YAML"))
-            .map(|line| line.replace("!!opencv-matrix", ""))
             .collect::<Vec<_>>()
             .join("\n");
-        Ok(Self {
+        let parsed = YamlLoader::load_from_str(&text);
+        let file = |document| Self {
             path: path.to_owned(),
-            text,
-        })
-    }
-
-    fn parse<'de, T: Deserialize<'de>>(&'de self) -> Result<T, CalibError> {
-        serde_saphyr::from_str(&self.text).map_err(|e| self.bad(&e.to_string()))
+            document,
+        };
+        match parsed.map(|documents| documents.into_iter().next()) {
+            Ok(document) => Ok(file(document.unwrap_or(Yaml::Null))),
+            Err(e) => Err(file(Yaml::Null).bad(&e.to_string())),
+        }
     }
 
     fn bad(&self, reason: &str) -> CalibError {
@@ -120,9 +78,39 @@ impl YamlFile {
         }
     }
 
-    fn numbers<const N: usize>(&self, name: &str, matrix: &Matrix) -> Result<[f64; N], CalibError> {
-        let found = matrix.data.len();
-        <[f64; N]>::try_from(matrix.data.clone())
+    fn has(&self, name: &str) -> bool {
+        !self.document[name].is_badvalue()
+    }
+
+    /// The field `name`, read by `what`.
+    fn field<'a, T>(
+        &'a self,
+        name: &str,
+        what: impl FnOnce(&'a Yaml) -> Option<T>,
+    ) -> Result<T, CalibError> {
+        if !self.has(name) {
+            return Err(self.bad(&format!("it has no `{name}`")));
+        }
+        what(&self.document[name])
+            .ok_or_else(|| self.bad(&format!("`{name}` is not of the expected kind")))
+    }
+
+    fn pixels(&self, name: &str) -> Result<u32, CalibError> {
+        self.field(name, |value| u32::try_from(value.as_i64()?).ok())
+    }
+
+    /// The numbers of a matrix, row by row.
+    fn matrix(&self, name: &str) -> Result<Vec<f64>, CalibError> {
+        self.field(name, |value| {
+            let numbers = value["data"].as_vec()?.iter();
+            numbers.map(number).collect()
+        })
+    }
+
+    fn numbers<const N: usize>(&self, name: &str) -> Result<[f64; N], CalibError> {
+        let data = self.matrix(name)?;
+        let found = data.len();
+        <[f64; N]>::try_from(data)
             .ok()
             .filter(|numbers| numbers.iter().all(|x| x.is_finite()))
             .ok_or_else(|| {
@@ -135,16 +123,14 @@ impl YamlFile {
     fn intrinsics(
         &self,
         [matrix_name, distortion_name]: [&str; 2],
-        matrix: &Matrix,
-        distortion: &Matrix,
     ) -> Result<Intrinsics, CalibError> {
-        let k: [f64; 9] = self.numbers(matrix_name, matrix)?;
+        let k: [f64; 9] = self.numbers(matrix_name)?;
         if !(k[0] > 0.0 && k[4] > 0.0) {
             return Err(self.bad(&format!(
                 "{matrix_name}: the focal lengths must be positive (px)"
             )));
         }
-        let d = &distortion.data;
+        let d = self.matrix(distortion_name)?;
         if d.iter().skip(5).any(|x| *x != 0.0) || d.iter().any(|x| !x.is_finite()) {
             return Err(self.bad(&format!(
                 "{distortion_name} has more than the five coefficients k1 k2 p1 p2 k3; calibrate \
@@ -175,65 +161,60 @@ fn ros(file: &YamlFile, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, C
         }
     };
     let other = YamlFile::open(&beside)?;
-    let (left, right): (RosEye, RosEye) = (file.parse()?, other.parse()?);
-    for (file, eye) in [(file, &left), (&other, &right)] {
+    for eye in [file, &other] {
         let (width, height) = mode.size_px();
-        if (eye.image_width, eye.image_height) != (width, height) {
-            return Err(file.bad(&format!(
+        let found = (eye.pixels("image_width")?, eye.pixels("image_height")?);
+        if found != (width, height) {
+            return Err(eye.bad(&format!(
                 "it is for {}x{} px, the mode `{}` has {width}x{height}",
-                eye.image_width,
-                eye.image_height,
+                found.0,
+                found.1,
                 mode.name()
             )));
         }
-        if !matches!(eye.distortion_model.as_str(), "" | "plumb_bob") {
-            return Err(file.bad(&format!(
-                "distortion_model `{}` is not read; calibrate with `plumb_bob`",
-                eye.distortion_model
+        let model = eye.document["distortion_model"].as_str().unwrap_or("");
+        if !matches!(model, "" | "plumb_bob") {
+            return Err(eye.bad(&format!(
+                "distortion_model `{model}` is not read; calibrate with `plumb_bob`"
             )));
         }
     }
     let names = ["camera_matrix", "distortion_coefficients"];
-    let turn = |file: &YamlFile, eye: &RosEye| -> Result<Matrix3<f64>, CalibError> {
-        let r: [f64; 9] = file.numbers("rectification_matrix", &eye.rectification_matrix)?;
+    let turn = |eye: &YamlFile| -> Result<Matrix3<f64>, CalibError> {
+        let r: [f64; 9] = eye.numbers("rectification_matrix")?;
         Ok(Matrix3::from_row_slice(&r))
     };
-    let (r_left, r_right) = (turn(file, &left)?, turn(&other, &right)?);
-    let p: [f64; 12] = other.numbers("projection_matrix", &right.projection_matrix)?;
+    let (r_left, r_right) = (turn(file)?, turn(&other)?);
+    let p: [f64; 12] = other.numbers("projection_matrix")?;
     let baseline = Vector3::new(-p[3] / p[0], 0.0, 0.0);
     Ok(Eyes {
-        left: file.intrinsics(names, &left.camera_matrix, &left.distortion_coefficients)?,
-        right: other.intrinsics(names, &right.camera_matrix, &right.distortion_coefficients)?,
+        left: file.intrinsics(names)?,
+        right: other.intrinsics(names)?,
         r_right_left: r_right.transpose() * r_left,
         t_right_left_m: r_right.transpose() * baseline,
     })
 }
 
 fn opencv(file: &YamlFile) -> Result<Eyes, CalibError> {
-    let all: OpenCv = file.parse()?;
-    let need = |name: &str, matrix: Option<Matrix>| {
-        matrix.ok_or_else(|| file.bad(&format!("it has no `{name}`")))
+    let beside = if file.has("R") && file.has("T") {
+        None
+    } else {
+        Some(YamlFile::open(&file.path.with_file_name("extrinsics.yml"))?)
     };
-    let (m1, d1) = (need("M1", all.m1)?, need("D1", all.d1)?);
-    let (m2, d2) = (need("M2", all.m2)?, need("D2", all.d2)?);
-    let (geometry, r, t) = match (all.r, all.t) {
-        (Some(r), Some(t)) => (None, r, t),
-        _ => {
-            let beside = YamlFile::open(&file.path.with_file_name("extrinsics.yml"))?;
-            let more: OpenCv = beside.parse()?;
-            let (Some(r), Some(t)) = (more.r, more.t) else {
-                return Err(beside.bad("it has no `R` and `T`"));
-            };
-            (Some(beside), r, t)
-        }
-    };
-    let geometry = geometry.as_ref().unwrap_or(file);
-    let r: [f64; 9] = geometry.numbers("R", &r)?;
-    let t: [f64; 3] = geometry.numbers("T", &t)?;
+    let geometry = beside.as_ref().unwrap_or(file);
+    let r: [f64; 9] = geometry.numbers("R")?;
+    let t: [f64; 3] = geometry.numbers("T")?;
     Ok(Eyes {
-        left: file.intrinsics(["M1", "D1"], &m1, &d1)?,
-        right: file.intrinsics(["M2", "D2"], &m2, &d2)?,
+        left: file.intrinsics(["M1", "D1"])?,
+        right: file.intrinsics(["M2", "D2"])?,
         r_right_left: Matrix3::from_row_slice(&r),
         t_right_left_m: -Vector3::from(t),
     })
+}
+
+/// A number, whole or not.
+fn number(value: &Yaml) -> Option<f64> {
+    #[allow(clippy::cast_precision_loss, reason = "pixels and metres are small")]
+    let whole = value.as_i64().map(|whole| whole as f64);
+    whole.or_else(|| value.as_f64())
 }

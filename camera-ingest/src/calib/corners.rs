@@ -1,0 +1,79 @@
+//! Finds a `ChArUco` board's corners in a picture, where the feature `calibration` is on:
+//! the detector is as much to build as the rest of this crate, and is needed when a camera
+//! is set up only.
+
+use super::board::Board;
+use crate::frame::EyeFrame;
+
+#[cfg(feature = "calibration")]
+pub(super) struct CornerDetector(calib_targets_charuco::CharucoDetector);
+
+#[cfg(feature = "calibration")]
+impl CornerDetector {
+    /// A detector of this board.
+    ///
+    /// # Errors
+    /// The dictionary is not known, or the board is none: as text.
+    pub(super) fn new(board: &Board) -> Result<Self, String> {
+        use calib_targets_charuco::{
+            CharucoBoardSpec, CharucoDetector, CharucoParams, resolve_dictionary,
+        };
+        let dictionary = resolve_dictionary(&board.dictionary)
+            .ok_or_else(|| format!("dictionary {:?} is not known", board.dictionary))?;
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "only the ratio is used by the detector"
+        )]
+        let (square, ratio) = (
+            board.square_m as f32,
+            (board.marker_m / board.square_m) as f32,
+        );
+        let spec = CharucoBoardSpec::new(board.rows, board.columns, square, ratio, dictionary);
+        let detector = CharucoDetector::new(CharucoParams::for_board(spec));
+        detector.map(Self).map_err(|e| e.to_string())
+    }
+
+    /// Corners in one eye's picture: id and raw pixel, integers at pixel centres.
+    pub(super) fn corners(&self, eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
+        let view = calib_targets_charuco::GrayImageView {
+            width: eye.width_px,
+            height: eye.height_px,
+            data: &eye.luma,
+        };
+        // A miss is no error: the other frames may show the board.
+        self.0.detect(&view).map_or_else(
+            |_miss| Vec::new(),
+            |found| {
+                let corners = found.corners.iter();
+                corners
+                    .map(|c| (c.id, [f64::from(c.position.x), f64::from(c.position.y)]))
+                    .collect()
+            },
+        )
+    }
+}
+
+/// Without the feature there is no detector.
+#[cfg(not(feature = "calibration"))]
+pub(super) enum CornerDetector {}
+
+#[cfg(not(feature = "calibration"))]
+impl CornerDetector {
+    /// Always refuses.
+    ///
+    /// # Errors
+    /// How a build with the detector is made.
+    pub(super) fn new(_board: &Board) -> Result<Self, String> {
+        Err(
+            "this build cannot find printed boards; build it with `cargo build --release -p wag \
+             --features calibration` (the Debian package has it), or show the lead instead \
+             (--lead, --lead-rgb)"
+                .to_owned(),
+        )
+    }
+
+    /// Corners in one eye's picture.
+    pub(super) fn corners(&self, _eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
+        match *self {}
+    }
+}
