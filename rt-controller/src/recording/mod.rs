@@ -1,4 +1,4 @@
-//! The flight recorder: everything every cycle was told and what it answered.
+//! The recorder of control cycles: every cycle's inputs and outputs.
 //!
 //! ```text
 //!  control loop --ring--> relay: items -> chunks --pub-sub--> recorder: file

@@ -55,15 +55,14 @@ fn verdict(found: &Replay) -> String {
 }
 
 fn show(found: &Replay, stops: u64) -> String {
+    let verdict = if found.differing_bytes == 0 {
+        "identical".to_owned()
+    } else {
+        format!("{} bytes differ", found.differing_bytes)
+    };
     let mut text = format!(
-        "cycles compared  {} ({} to {}), with {} whole states and {} stops\n\
-         differing bytes  {}\n",
-        found.cycles,
-        found.first_cycle,
-        found.last_cycle,
-        found.states,
-        stops,
-        found.differing_bytes
+        "{verdict:<16} {} cycles ({} to {}), with {} whole states and {} stops\n",
+        found.cycles, found.first_cycle, found.last_cycle, found.states, stops,
     );
     for gap in &found.gaps {
         text.push_str(&format!("gap              {}\n", describe(gap)));

@@ -85,7 +85,7 @@ fn json(path: &Path) -> anyhow::Result<Value> {
     serde_json::from_str(&files::read_text(path)?).context("this is no JSON")
 }
 
-/// Reads a run; whatever is wrong with it is told in it.
+/// Reads a run; whatever is wrong with it is reported in it.
 pub fn read(run: &Path) -> Entry {
     let mut damage = Vec::new();
     let summary = part(run, "summary.json", &mut damage, json);

@@ -13,7 +13,7 @@ pub use export::{csv, table};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 
-/// Where runs lie unless told otherwise.
+/// Where runs lie by default.
 pub const RUNS: &str = "runs";
 
 /// The runs in `places`: each is a run folder, or a folder of run folders. In order

@@ -39,7 +39,7 @@ pub struct RunFile {
 
 impl RunFile {
     /// Starts the process and waits until nothing can be missed any more. When it
-    /// cannot be had, that is known at once and told at the end.
+    /// cannot be had, that is known at once and reported at the end.
     pub fn start(spec: &ProcessSpec, path: &Path, log_folder: &Path) -> Self {
         let mut file = Self {
             process: Supervisor::default(),
@@ -89,8 +89,8 @@ impl RunFile {
     /// Lets the process finish the file, once all results lie in the run folder.
     pub fn finish(mut self) -> anyhow::Result<()> {
         let ended = self.process.finish(FINISH);
-        let told = self.lost.take().map_or(ended, Err);
-        told.with_context(|| {
+        let ended = self.lost.take().map_or(ended, Err);
+        ended.with_context(|| {
             let path = self.path.display();
             format!("the run is kept, but its file `{path}` is not whole; `wag record recover {path}` makes it so, without its end")
         })
@@ -99,7 +99,7 @@ impl RunFile {
 
 impl Drop for RunFile {
     fn drop(&mut self) {
-        // A run that failed has told so; its file is finished all the same.
+        // A run that failed has said so; its file is finished all the same.
         let _ = self.process.finish(FINISH);
     }
 }

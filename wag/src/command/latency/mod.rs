@@ -1,6 +1,6 @@
 //! `wag latency`: how late everything is, on an arm or from a recorded run.
 //!
-//! Three things are told: the control loop's own jitter, the delay from a
+//! Three things are reported: the control loop's own jitter, the delay from a
 //! setpoint to each joint's motion, and the camera's offset where a run holds
 //! one. The delays go into `arm-response.toml`, for plans to be made through.
 

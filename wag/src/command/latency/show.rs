@@ -101,7 +101,7 @@ pub(super) fn print(findings: &Findings, evidence: &Evidence, path: Option<&Path
             delay.seen
         ),
         None if evidence.has_targets => println!(
-            "From command to the arm's target: not told; its targets are not the setpoints it was sent."
+            "From command to the arm's target: not known; its targets are not the setpoints it was sent."
         ),
         None => println!("From command to the arm's target: not recorded."),
     }
