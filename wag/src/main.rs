@@ -29,9 +29,7 @@ mod files;
 mod ledger;
 mod moved;
 mod pipeline;
-mod report;
 mod session;
-mod watch;
 
 use clap::Parser;
 use cli_output::Failure;

@@ -8,7 +8,6 @@ use crate::cli::{DemoArgs, TaskName};
 use crate::config;
 use crate::files;
 use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder, Shot};
-use crate::report;
 use crate::session::Session;
 use anyhow::{Context, anyhow};
 use arm_model::{JointTrajectory, Limits};
@@ -32,6 +31,7 @@ use shared_types::rope::RANGES;
 use shared_types::{MotionTier, Plan, RopeEstimate, StereoCamera};
 use std::path::Path;
 use std::time::{Duration, Instant};
+use viewer::report;
 
 /// Speed of moves between poses, as a part of the fastest move.
 ///

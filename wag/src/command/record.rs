@@ -4,7 +4,6 @@ use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::files;
 use crate::pipeline::RunFolder;
 use crate::session::simulated_rope;
-use crate::watch::domain_of_run;
 use anyhow::anyhow;
 use cli_output::{Failure, OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
@@ -16,6 +15,7 @@ use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+use viewer::live::domain_of_run;
 
 /// `wag record recover`: a file without its end becomes a whole one.
 fn recover(args: &RecoverArgs, quiet: bool) -> Outcome<Option<Value>> {

@@ -1,9 +1,9 @@
 //! `wag report`: a run as one HTML file.
 
 use crate::cli::ReportArgs;
-use crate::report;
 use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
+use viewer::report;
 
 pub fn run(args: &ReportArgs, quiet: bool) -> Outcome<Option<Value>> {
     let written = report::write(&args.run, args.out.as_deref()).or_input()?;

@@ -1,19 +1,55 @@
 //! `wag watch`: a page in the browser that shows what runs.
 
 use crate::cli::WatchArgs;
-use crate::watch::{PreviewChild, Wanted, Watcher, domain_of_run};
-use anyhow::anyhow;
+use crate::pipeline::preview_spec;
+use crate::session::Supervisor;
+use anyhow::{Context, anyhow};
 use camera_ingest::load_camera;
 use cli_output::output;
 use cli_output::{Failure, OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
 use serde_json::{Value, json};
 use shared_types::ipc::IpcError;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
+use viewer::live::{PreviewChild, PreviewProcess, Wanted, Watcher, domain_of_run};
 
 /// How much sooner everything else gets a processor than this program.
 const NICE: i32 = 10;
+
+/// `wag process preview` as a child.
+#[derive(Debug)]
+struct Preview {
+    process: Supervisor,
+    /// Its configuration and log.
+    folder: tempfile::TempDir,
+}
+
+impl Preview {
+    fn new() -> anyhow::Result<Self> {
+        let folder = tempfile::Builder::new().prefix("wag-preview-").tempdir();
+        Ok(Self {
+            process: Supervisor::default(),
+            folder: folder.context("cannot make a folder for the preview's configuration")?,
+        })
+    }
+}
+
+impl PreviewProcess for Preview {
+    fn start(&mut self, domain: &str, camera: &Path) -> anyhow::Result<()> {
+        let spec = preview_spec(self.folder.path(), domain, camera)?;
+        self.process.start(&spec, self.folder.path())
+    }
+
+    fn check(&mut self) -> anyhow::Result<()> {
+        self.process.check()
+    }
+
+    fn stop(&mut self) {
+        self.process.stop();
+    }
+}
 
 pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
     if args.seconds.is_some_and(|s| !s.is_finite() || s <= 0.0) {
@@ -30,8 +66,8 @@ pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
         load_camera(camera).or_input()?;
     }
     watch_interrupts().or_failed()?;
-    let preview = args.preview.then(|| PreviewChild::new(args.camera.clone()));
-    let preview = preview.transpose().or_failed()?;
+    let process = args.preview.then(Preview::new).transpose().or_failed()?;
+    let preview = process.map(|p| PreviewChild::new(Box::new(p), args.camera.clone()));
     let (mut watcher, url) =
         Watcher::start(wanted, args.bind, preview).map_err(|error| {
             match error.downcast_ref::<IpcError>() {

@@ -1,10 +1,8 @@
 //! Files of people and runs, as this program reads them.
 
 mod limits;
-mod plan;
 
 pub use limits::{default_limits, read_limits};
-pub use plan::read_plan;
 pub use run_log::files::*;
 
 use rope_sim::PoseRow;

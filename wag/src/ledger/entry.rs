@@ -89,7 +89,7 @@ fn json(path: &Path) -> anyhow::Result<Value> {
 pub fn read(run: &Path) -> Entry {
     let mut damage = Vec::new();
     let summary = part(run, "summary.json", &mut damage, json);
-    let plan = part(run, "plan.json", &mut damage, read_plan);
+    let plan = part(run, "plan.json", &mut damage, |path| Ok(read_plan(path)?));
     let rope = part(run, "params.toml", &mut damage, |path| {
         Ok(files::read_rope(path)?)
     });

@@ -2,11 +2,11 @@
 //! nothing else: no motion is stopped for it.
 
 use super::{ProcessSpec, Supervisor};
-use crate::report;
 use anyhow::{Context, anyhow};
 use run_log::RopeMotion;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use viewer::report;
 
 /// How long it may take to begin.
 const BEGIN: Duration = Duration::from_secs(10);

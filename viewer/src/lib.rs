@@ -1,0 +1,16 @@
+//! What people look at: [`live`], a page in the browser that follows a running
+//! controller, and [`report`], a run as one HTML file. Both only read, but for the stop
+//! that somebody asks for on the live page.
+#![cfg_attr(
+    test,
+    allow(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::float_cmp,
+        reason = "tests may fail loudly"
+    )
+)]
+
+pub mod live;
+pub mod report;

@@ -1,0 +1,182 @@
+//! What a page may ask of the controller, and when.
+
+use anyhow::Context;
+use serde::Serialize;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
+use shared_types::ipc::rpc::{Pending, RpcClient};
+use shared_types::ipc::{Bus, ControllerMode};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// Longest wait for the controller's answer.
+const PATIENCE: Duration = Duration::from_secs(6);
+
+/// A wish. None of them can make the arm move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Ask {
+    /// Brake and latch.
+    Stop,
+    /// Withdraw the arming.
+    Disarm,
+    /// Accept the fault.
+    Acknowledge,
+}
+
+impl Ask {
+    /// All of them, in the order of the page's buttons.
+    pub(crate) const ALL: [Self; 3] = [Self::Stop, Self::Disarm, Self::Acknowledge];
+
+    /// As in an address.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Stop => "stop",
+            Self::Disarm => "disarm",
+            Self::Acknowledge => "acknowledge",
+        }
+    }
+
+    /// The one of this name.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|ask| ask.name() == name)
+    }
+
+    fn request(self) -> ControllerRequest {
+        match self {
+            Self::Stop => ControllerRequest::Stop,
+            Self::Disarm => ControllerRequest::Disarm,
+            Self::Acknowledge => ControllerRequest::Acknowledge,
+        }
+    }
+
+    /// Why it may not be asked for now; `None` when it may.
+    pub(crate) fn objection(self, now: &Present) -> Option<&'static str> {
+        let Some(mode) = now.mode else {
+            return Some("no controller runs");
+        };
+        let operated = || (!now.operator).then_some("there is no operator");
+        match self {
+            Self::Stop => None,
+            Self::Disarm => operated().or((!now.armed).then_some("nothing is armed")),
+            Self::Acknowledge => operated()
+                .or((mode != ControllerMode::Faulted).then_some("there is no fault to accept")),
+        }
+    }
+}
+
+/// What decides about wishes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Present {
+    /// The controller's mode, if there is a controller.
+    pub mode: Option<ControllerMode>,
+    /// Whether an operator's program gives signs of life.
+    pub operator: bool,
+    /// Whether motions are armed.
+    pub armed: bool,
+}
+
+/// A wish on its way, with the place for its answer.
+#[derive(Debug)]
+pub(crate) struct Asked {
+    /// What.
+    pub ask: Ask,
+    /// Where the answer goes.
+    pub reply: mpsc::Sender<Answer>,
+}
+
+/// What became of a wish.
+#[derive(Debug)]
+pub(crate) enum Answer {
+    /// It was done.
+    Done(&'static str),
+    /// It was not: one sentence.
+    Refused(String),
+}
+
+/// A wish that the controller has got.
+#[derive(Debug)]
+pub(crate) struct Open {
+    pending: Pending<ControllerRpc>,
+    // Its answers come through it.
+    _client: RpcClient<ControllerRpc>,
+    since: Instant,
+    reply: mpsc::Sender<Answer>,
+}
+
+/// Hands a wish to the controller; one that may not be asked for, or cannot be, is
+/// answered at once.
+pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: &Present) -> Option<Open> {
+    let sent = match (asked.ask.objection(now), bus) {
+        (Some(objection), _) => Err(anyhow::anyhow!(objection)),
+        (None, None) => Err(anyhow::anyhow!("no controller runs")),
+        (None, Some(bus)) => RpcClient::<ControllerRpc>::open(bus)
+            .and_then(|client| Ok((client.call(&asked.ask.request())?, client)))
+            .context("the controller cannot be asked; use the emergency stop"),
+    };
+    match sent {
+        Ok((pending, client)) => Some(Open {
+            pending,
+            _client: client,
+            since: Instant::now(),
+            reply: asked.reply,
+        }),
+        Err(error) => {
+            let _ = asked.reply.send(Answer::Refused(format!("{error:#}")));
+            None
+        }
+    }
+}
+
+impl Open {
+    /// Passes the answer on if it is there; whether the wish is still open.
+    pub(crate) fn is_open(&self) -> bool {
+        let answer = match self.pending.try_next() {
+            Ok(Some(ControllerEvent::Done)) => Answer::Done("done"),
+            Ok(Some(ControllerEvent::Refused { message, .. })) => Answer::Refused(message),
+            Ok(Some(ControllerEvent::Step { .. } | ControllerEvent::Started { .. })) => {
+                return true;
+            }
+            Ok(Some(other)) => Answer::Refused(format!("the controller answered {other:?}")),
+            Ok(None) if self.since.elapsed() < PATIENCE => return true,
+            Ok(None) => {
+                Answer::Refused("the controller did not answer; use the emergency stop".to_owned())
+            }
+            Err(error) => Answer::Refused(error.to_string()),
+        };
+        // The page may be gone by now.
+        let _ = self.reply.send(answer);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_needs_a_controller_only_and_everything_else_an_operator() {
+        let alone = Present {
+            mode: Some(ControllerMode::Faulted),
+            operator: false,
+            armed: true,
+        };
+        let operated = Present {
+            operator: true,
+            ..alone
+        };
+        for ask in Ask::ALL {
+            assert!(ask.objection(&Present::default()).is_some());
+            assert_eq!(Ask::named(ask.name()), Some(ask));
+            assert_eq!(ask.objection(&alone).is_none(), ask == Ask::Stop, "{ask:?}");
+            assert_eq!(ask.objection(&operated), None, "{ask:?}");
+        }
+        let still = Present {
+            mode: Some(ControllerMode::Idle),
+            operator: true,
+            armed: false,
+        };
+        assert!(Ask::Disarm.objection(&still).is_some());
+        assert!(Ask::Acknowledge.objection(&still).is_some());
+        assert_eq!(Ask::named("move"), None);
+    }
+}

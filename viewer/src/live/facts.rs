@@ -1,0 +1,131 @@
+//! What the folder of a running run tells: its rope once it is identified, the target,
+//! where the camera stands.
+
+use anyhow::Context;
+use camera_ingest::load_camera;
+use rt_controller::ControllerConfig;
+use run_log::files;
+use shared_types::{Plan, RopeParams, StereoCamera};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// Files that are looked at, in the order of [`Facts::stamps`].
+const FILES: [&str; 3] = ["params.toml", "plan.json", "camera.toml"];
+
+/// The domain that a run's controller was configured with.
+pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
+    let path = run.join("config").join("rt-controller.toml");
+    let text = files::read_text(&path)
+        .with_context(|| format!("`{}` is no run folder with a controller", run.display()))?;
+    let config: ControllerConfig =
+        toml::from_str(&text).with_context(|| format!("`{}`", path.display()))?;
+    Ok(config.domain)
+}
+
+/// Facts of one run folder, read again when a file changes.
+#[derive(Debug, Default)]
+pub(crate) struct Facts {
+    folder: Option<PathBuf>,
+    stamps: [Option<SystemTime>; 3],
+    identified: Option<RopeParams>,
+    plan: Option<Plan>,
+    /// The camera, where its calibration lies in the folder.
+    pub camera: Option<StereoCamera>,
+}
+
+impl Facts {
+    /// Of a folder, or of none.
+    pub(crate) fn of(folder: Option<PathBuf>) -> Self {
+        let mut facts = Self {
+            folder,
+            ..Self::default()
+        };
+        facts.look();
+        facts
+    }
+
+    /// The folder.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// The file of the camera's calibration, where it lies in the folder.
+    pub(crate) fn camera_file(&self) -> Option<PathBuf> {
+        self.camera.as_ref()?;
+        Some(self.folder.as_ref()?.join("camera.toml"))
+    }
+
+    /// Reads what has changed. Files are written whole or not at all; one that is there
+    /// and wrong counts as not there.
+    pub(crate) fn look(&mut self) {
+        let Some(folder) = &self.folder else { return };
+        for (file, stamp) in FILES.iter().zip(&mut self.stamps) {
+            let path = folder.join(file);
+            let now = path.metadata().and_then(|m| m.modified()).ok();
+            if now == *stamp {
+                continue;
+            }
+            *stamp = now;
+            match *file {
+                "params.toml" => self.identified = files::read_rope(&path).ok(),
+                "plan.json" => {
+                    let text = files::read_text(&path).ok();
+                    self.plan = text.and_then(|text| serde_json::from_str(&text).ok());
+                }
+                _ => self.camera = load_camera(&path).ok(),
+            }
+        }
+    }
+
+    /// The rope, and what it is called.
+    pub(crate) fn rope(&self) -> Option<(RopeParams, &'static str)> {
+        let planned = || Some((self.plan.as_ref()?.rope, "the plan's rope, simulated"));
+        self.identified
+            .map(|rope| (rope, "the identified rope, simulated"))
+            .or_else(planned)
+    }
+
+    /// Where the throw is to go (m).
+    pub(crate) fn target_m(&self) -> Option<[f64; 3]> {
+        self.plan.as_ref().map(|plan| plan.target_m)
+    }
+}
+
+/// The run folder of a controller that a command of `wag` started: its configuration
+/// lies in there. A daemon's lies elsewhere, and it has none.
+pub(crate) fn folder_of_process(pid: u32) -> Option<PathBuf> {
+    let process = PathBuf::from(format!("/proc/{pid}"));
+    let line = std::fs::read(process.join("cmdline")).ok()?;
+    let mut words = line.split(|byte| *byte == 0);
+    words.by_ref().find(|word| *word == b"--config")?;
+    let config = PathBuf::from(String::from_utf8(words.next()?.to_vec()).ok()?);
+    let config = process.join("cwd").read_link().ok()?.join(config);
+    let folder = config.parent()?;
+    (folder.file_name()? == "config").then(|| folder.parent().map(Path::to_owned))?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_types::rope::RANGES;
+
+    #[test]
+    fn files_count_as_soon_as_they_are_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut facts = Facts::of(Some(dir.path().to_owned()));
+        assert!(facts.rope().is_none() && facts.target_m().is_none());
+        let rope = RopeParams::from_array(RANGES.map(|r| r.min));
+        let text = toml::to_string(&rope).unwrap();
+        std::fs::write(dir.path().join("params.toml"), text).unwrap();
+        std::fs::write(dir.path().join("plan.json"), "{").unwrap();
+        facts.look();
+        assert_eq!(facts.rope().unwrap().0, rope);
+        assert!(facts.target_m().is_none());
+    }
+
+    #[test]
+    fn a_process_without_a_configuration_has_no_folder() {
+        assert_eq!(folder_of_process(std::process::id()), None);
+        assert_eq!(folder_of_process(u32::MAX), None);
+    }
+}

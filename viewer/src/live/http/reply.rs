@@ -1,0 +1,98 @@
+//! Writing answers.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::time::Duration;
+
+/// Said with every answer: kept nowhere, framed by nobody, loads nothing from elsewhere.
+const COMMON: &str = "Cache-Control: no-store\r\n\
+    X-Content-Type-Options: nosniff\r\n\
+    Referrer-Policy: no-referrer\r\n\
+    Cross-Origin-Resource-Policy: same-origin\r\n\
+    Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
+    connect-src 'self'; img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n";
+
+/// An answer of known length.
+#[derive(Debug)]
+pub(crate) struct Reply<'a> {
+    /// Status.
+    pub status: u16,
+    /// Type of the body.
+    pub kind: &'static str,
+    /// Further header lines, each with its end.
+    pub more: String,
+    /// Body.
+    pub body: &'a [u8],
+}
+
+impl<'a> Reply<'a> {
+    /// A whole answer of a type.
+    pub(crate) fn of(kind: &'static str, body: &'a [u8]) -> Self {
+        Self {
+            status: 200,
+            kind,
+            more: String::new(),
+            body,
+        }
+    }
+
+    /// A sentence with a status.
+    pub(crate) fn said(status: u16, text: &'a str) -> Self {
+        Self {
+            status,
+            ..Self::of("text/plain; charset=utf-8", text.as_bytes())
+        }
+    }
+
+    /// Writes it.
+    pub(crate) fn write(&self, mut to: &TcpStream, keep: bool) -> std::io::Result<()> {
+        let head = format!(
+            "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: {}\r\n{}{COMMON}\r\n",
+            self.status,
+            reason(self.status),
+            self.kind,
+            self.body.len(),
+            if keep { "keep-alive" } else { "close" },
+            self.more,
+        );
+        to.write_all(&[head.as_bytes(), self.body].concat())
+    }
+}
+
+/// The head of a stream of events without end.
+pub(crate) fn begin_events(mut to: &TcpStream) -> std::io::Result<()> {
+    let head = format!(
+        "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n{COMMON}\r\n"
+    );
+    to.write_all(head.as_bytes())
+}
+
+/// Ends a connection whose request was not read to its end, so that the answer is not
+/// lost with what still comes.
+pub(crate) fn end_unread(mut stream: &TcpStream) {
+    let _ = stream.shutdown(Shutdown::Write);
+    let _ = stream.set_read_timeout(Some(Duration::from_millis(100)));
+    let mut bin = [0; 4096];
+    for _ in 0..64 {
+        if !matches!(stream.read(&mut bin), Ok(n) if n > 0) {
+            return;
+        }
+    }
+}
+
+fn reason(status: u16) -> &'static str {
+    match status {
+        200 => "OK",
+        204 => "No Content",
+        308 => "Permanent Redirect",
+        400 => "Bad Request",
+        403 => "Forbidden",
+        404 => "Not Found",
+        405 => "Method Not Allowed",
+        409 => "Conflict",
+        413 => "Content Too Large",
+        431 => "Request Header Fields Too Large",
+        503 => "Service Unavailable",
+        _ => "Error",
+    }
+}

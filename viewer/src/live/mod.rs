@@ -1,0 +1,356 @@
+//! The live page of `wag watch`: it looks on, it never drives.
+//!
+//! One thread reads shared memory and makes the newest state and the newest picture;
+//! threads of the server hand them out, each page the newest whenever it is ready. A
+//! page can ask for a stop, and for what an operator's presence allows.
+
+mod ask;
+mod attached;
+mod facts;
+mod film;
+mod http;
+mod jitter;
+mod newest;
+mod page;
+mod picture;
+mod preview;
+mod rope;
+mod snapshot;
+mod token;
+
+pub use facts::domain_of_run;
+pub use preview::{PreviewChild, PreviewProcess};
+
+use crate::report::{arm_points, tenths_mm};
+use ask::{Ask, Asked, Open, Present, hand_over};
+use attached::{Attached, Seen, newest_domain};
+use http::Site;
+use jitter::Jitter;
+use rope::FollowingRope;
+use shared_types::MotionTier;
+use shared_types::ipc::ControllerMode;
+use snapshot::{ControllerView, Snapshot, StopView, note_stop};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::{Arc, mpsc};
+use std::time::{Duration, Instant};
+
+/// Time between two states while a page is open, and while none is.
+const TURN: Duration = Duration::from_millis(40);
+const TURN_ALONE: Duration = Duration::from_millis(200);
+/// Time between two looks for the answer to a wish.
+const ANSWERS: Duration = Duration::from_millis(5);
+/// Time between two looks for a controller, and at the run folder.
+const SEARCH: Duration = Duration::from_millis(500);
+/// Time between two histograms.
+const HISTOGRAMS: Duration = Duration::from_millis(500);
+
+/// What to watch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Wanted {
+    /// Whichever controller started last, one after the other.
+    Newest,
+    /// This domain, whether anything runs there yet or not; results are in the folder,
+    /// if it is known.
+    Domain(String, Option<PathBuf>),
+}
+
+/// The watcher: call [`Watcher::turn`] until it is enough.
+#[derive(Debug)]
+pub struct Watcher {
+    wanted: Wanted,
+    site: Arc<Site>,
+    asks: mpsc::Receiver<Asked>,
+    open: Vec<Open>,
+    attached: Option<Attached>,
+    jitter: Jitter,
+    rope: Option<(FollowingRope, &'static str)>,
+    stop: Option<StopView>,
+    /// What the last run left in view.
+    left: Snapshot,
+    searched: Option<Instant>,
+    histograms_at: Option<Instant>,
+    present: Present,
+    /// The preview of the rope, where it is wished for.
+    preview: Option<PreviewChild>,
+    /// When the last turn was due.
+    turned: Instant,
+}
+
+impl Watcher {
+    /// Begins to serve; returns the page's address.
+    ///
+    /// # Errors
+    /// Nothing can be listened to there, or the domain cannot be joined.
+    pub fn start(
+        wanted: Wanted,
+        bind: SocketAddr,
+        preview: Option<PreviewChild>,
+    ) -> anyhow::Result<(Self, String)> {
+        let (sender, asks) = mpsc::channel();
+        let attached = match &wanted {
+            Wanted::Newest => None,
+            Wanted::Domain(domain, _) => Some(Attached::join(domain)?),
+        };
+        let (url, site) = http::serve(bind, sender)?;
+        let watcher = Self {
+            wanted,
+            site,
+            asks,
+            open: Vec::new(),
+            attached,
+            jitter: Jitter::default(),
+            rope: None,
+            stop: None,
+            left: Snapshot::default(),
+            searched: None,
+            histograms_at: None,
+            present: Present::default(),
+            preview,
+            turned: Instant::now(),
+        };
+        Ok((watcher, url))
+    }
+
+    /// One turn: waits for wishes until it is time, then looks and shows.
+    pub fn turn(&mut self) -> anyhow::Result<()> {
+        let turn = if self.site.is_followed() || self.site.wants_pictures() {
+            TURN
+        } else {
+            TURN_ALONE
+        };
+        let until = self.turned + turn;
+        self.turned = Instant::now().max(until);
+        loop {
+            while let Ok(asked) = self.asks.try_recv() {
+                self.pass_on(asked);
+            }
+            self.open.retain(Open::is_open);
+            let Some(left) = until.checked_duration_since(Instant::now()) else {
+                break;
+            };
+            // A short wait where an answer is to come.
+            let wait = if self.open.is_empty() {
+                left
+            } else {
+                left.min(ANSWERS)
+            };
+            if let Ok(asked) = self.asks.recv_timeout(wait) {
+                self.pass_on(asked);
+            }
+        }
+        let search = self.searched.is_none_or(|at| at.elapsed() >= SEARCH);
+        if search {
+            self.searched = Some(Instant::now());
+        }
+        let snapshot = self.look(search);
+        if self.site.is_followed() {
+            self.site.state.put(serde_json::to_string(&snapshot)?);
+        }
+        self.left = snapshot;
+        Ok(())
+    }
+
+    fn pass_on(&mut self, asked: Asked) {
+        tracing::info!(ask = asked.ask.name(), "asked for by a page");
+        let bus = self.attached.as_ref().map(Attached::bus);
+        self.open.extend(hand_over(asked, bus, &self.present));
+    }
+
+    /// Looks at everything once.
+    fn look(&mut self, search: bool) -> Snapshot {
+        if self.attached.is_none() && search {
+            let domain = match &self.wanted {
+                Wanted::Newest => newest_domain(),
+                Wanted::Domain(domain, _) => Some(domain.clone()),
+            };
+            // One that ends between the two looks is no loss.
+            self.attached = domain.and_then(|domain| Attached::join(&domain).ok());
+        }
+        let run = match &self.wanted {
+            Wanted::Domain(_, run) => run.clone(),
+            Wanted::Newest => None,
+        };
+        let had = self
+            .attached
+            .as_ref()
+            .is_some_and(|a| a.controller.is_some());
+        let seen = self
+            .attached
+            .as_mut()
+            .and_then(|attached| attached.look(search, run.as_deref()));
+        match (had, seen) {
+            (false, Some(_)) => self.begin(),
+            (true, None) => self.end(),
+            _ => {}
+        }
+        self.present = Present {
+            mode: seen
+                .filter(|s| s.alive)
+                .map(|s| ControllerMode::from_raw(s.state.mode)),
+            operator: seen.is_some_and(|s| s.operator),
+            armed: seen.is_some_and(|s| s.state.tier != 0),
+        };
+        if let Err(error) = self.listen(search) {
+            tracing::warn!("connecting anew: {error:#}");
+            self.end();
+            self.attached = None;
+            return self.snapshot(None);
+        }
+        if search {
+            self.keep_preview();
+        }
+        self.snapshot(seen)
+    }
+
+    /// Lets the preview look at what is attached.
+    fn keep_preview(&mut self) {
+        let Some(preview) = &mut self.preview else {
+            return;
+        };
+        let attached = self.attached.as_mut();
+        let controller = attached.as_ref().and_then(|a| a.controller.as_ref());
+        let camera = controller.and_then(|c| c.facts.camera_file());
+        let domain = attached.as_ref().map(|a| a.domain.as_str());
+        let film = attached.as_ref().and_then(|a| a.film.as_ref());
+        let there = film.is_some_and(|film| film.preview.is_there());
+        preview.keep(domain, camera.as_deref(), there);
+        if let Some(film) = attached.and_then(|a| a.film.as_mut()) {
+            film.lacks_calibration = preview.lacks_camera();
+        }
+    }
+
+    /// A controller came: nothing of the one before counts for it.
+    fn begin(&mut self) {
+        self.jitter = Jitter::default();
+        self.rope = None;
+        self.stop = None;
+        self.left = Snapshot::default();
+        self.histograms_at = None;
+    }
+
+    /// The controller ended; the next may run elsewhere.
+    fn end(&mut self) {
+        self.present = Present::default();
+        if self.wanted == Wanted::Newest {
+            self.attached = None;
+        }
+    }
+
+    /// Takes in everything that has been published.
+    fn listen(&mut self, search: bool) -> anyhow::Result<()> {
+        let Some(attached) = &mut self.attached else {
+            return Ok(());
+        };
+        if let Some(controller) = attached.controller.as_mut().filter(|_| search) {
+            controller.facts.look();
+        }
+        let facts = attached.controller.as_ref().map(|c| &c.facts);
+        match facts.and_then(|facts| facts.rope()) {
+            Some((rope, name)) => {
+                if self.rope.as_ref().is_none_or(|(r, _)| *r.params() != rope) {
+                    self.rope = Some((FollowingRope::new(rope), name));
+                }
+            }
+            None => self.rope = None,
+        }
+        if let Some(cycles) = &attached.cycles {
+            while let Some(cycle) = cycles.receive()? {
+                self.jitter.add(&cycle);
+                note_stop(&mut self.stop, cycle.fault, cycle.cycle);
+            }
+        }
+        if let Some(joints) = &attached.joints {
+            while let Some(report) = joints.receive()? {
+                if let Some((rope, _)) = &mut self.rope {
+                    rope.report(report.stamp_ns, report.q);
+                }
+            }
+        }
+        let camera = facts.and_then(|facts| facts.camera.as_ref());
+        let nodes = self.rope.as_ref().map_or(&[][..], |(rope, _)| rope.nodes());
+        if let Some(film) = &mut attached.film
+            && let Some(picture) = film.turn(self.site.wants_pictures(), camera, nodes)?
+        {
+            self.site.pictures.put(picture);
+        }
+        Ok(())
+    }
+
+    fn snapshot(&mut self, seen: Option<Seen>) -> Snapshot {
+        let attached = self.attached.as_ref();
+        let film = attached.and_then(|a| a.film.as_ref());
+        let mut snapshot = Snapshot {
+            missed: self.jitter.missed,
+            camera: film
+                .and_then(|film| film.seen)
+                .is_some_and(|at| at.elapsed() < Duration::from_secs(1)),
+            asks: Ask::ALL
+                .map(|ask| (ask, ask.objection(&self.present)))
+                .to_vec(),
+            ..Snapshot::default()
+        };
+        let (Some(seen), Some(attached)) = (seen, attached) else {
+            // The last one stays in view, said to be over.
+            let left = std::mem::take(&mut self.left);
+            snapshot.title = match &self.wanted {
+                Wanted::Domain(domain, _) => format!("domain {domain}"),
+                Wanted::Newest => "no run".to_owned(),
+            };
+            snapshot.note = if left.arm.is_empty() {
+                "no controller runs yet; it is shown as soon as one does".to_owned()
+            } else {
+                "the run has ended; the next one is shown as soon as it begins".to_owned()
+            };
+            return Snapshot {
+                arm: left.arm,
+                rope: left.rope,
+                rope_is: left.rope_is,
+                radii_m: left.radii_m,
+                target_m: left.target_m,
+                ..snapshot
+            };
+        };
+        let facts = attached.controller.as_ref().map(|c| &c.facts);
+        let folder = facts.and_then(|facts| facts.folder()?.file_name());
+        snapshot.title = match folder {
+            Some(name) => format!("{} (domain {})", name.display(), attached.domain),
+            None => format!("domain {}", attached.domain),
+        };
+        if !seen.alive {
+            "the controller is silent: use the emergency stop".clone_into(&mut snapshot.note);
+        }
+        let state = &seen.state;
+        note_stop(&mut self.stop, state.fault, state.cycle);
+        let mode = ControllerMode::from_raw(state.mode);
+        snapshot.controller = Some(ControllerView {
+            mode,
+            tier: MotionTier::from_raw(state.tier),
+            real_time: state.real_time != 0,
+            cycle: state.cycle,
+            alive: seen.alive,
+            operator: seen.operator,
+            stop: self.stop.clone(),
+        });
+        if mode != ControllerMode::Offline && state.q.is_finite() {
+            snapshot.arm = arm_points(&state.q);
+        }
+        snapshot.target_m = facts.and_then(|facts| facts.target_m());
+        match &self.rope {
+            Some((rope, name)) => {
+                snapshot.rope = rope.nodes().iter().flat_map(tenths_mm).collect();
+                snapshot.rope_is = name;
+                snapshot.radii_m = [rope.params().radius_m, rope.params().lead_radius_m];
+            }
+            None => snapshot.rope_is = "no rope is identified yet",
+        }
+        if self
+            .histograms_at
+            .is_none_or(|at| at.elapsed() >= HISTOGRAMS)
+        {
+            self.histograms_at = Some(Instant::now());
+            snapshot.jitter = Some(self.jitter.histograms());
+        }
+        snapshot
+    }
+}

@@ -1,0 +1,137 @@
+//! What a report holds, as the page's script reads it.
+
+use arm_model::JOINTS;
+use arm_model::limits::Margin;
+use run_log::Explanation;
+use serde::Serialize;
+use serde_json::Value;
+
+/// Everything in a report.
+#[derive(Debug, Serialize)]
+pub(crate) struct ReportData {
+    /// Version of the program that made the report.
+    pub version: &'static str,
+    /// Name of the run folder.
+    pub run: String,
+    /// `summary.json`, without the long tables.
+    pub summary: Value,
+    /// Tip and target.
+    pub error: Errors,
+    /// The identified rope.
+    pub rope: Vec<RopeRow>,
+    /// Margins of the plan, as planned.
+    pub plan_margins: Vec<Margin>,
+    /// Limits used and stops, from the recording of control cycles.
+    pub explanation: Option<Explanation>,
+    /// The same stops as text, if there were any.
+    pub cause: Option<String>,
+    /// Times of the control loop.
+    pub latency: Vec<Histogram>,
+    /// Motions to look at.
+    pub scenes: Vec<Scene>,
+    /// Film with the rope drawn in.
+    pub pictures: Vec<Picture>,
+    /// What the folder does not hold.
+    pub missing: Vec<String>,
+}
+
+/// Distances of tip and target (m).
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct Errors {
+    /// Predicted by the planner.
+    pub planned_m: Option<f64>,
+    /// Expected over what is known of the rope, 90 %.
+    pub forecast_90_m: Option<[f64; 2]>,
+    /// The simulated rig's truth.
+    pub true_m: Option<f64>,
+    /// Measured by the camera.
+    pub camera_m: Option<f64>,
+    /// Interval of that.
+    pub camera_interval_m: Option<[f64; 2]>,
+}
+
+/// One parameter of the rope.
+#[derive(Debug, Serialize)]
+pub(crate) struct RopeRow {
+    /// Name for people.
+    pub label: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Identified value.
+    pub value: f64,
+    /// Interval that holds it with a probability of 90 %.
+    pub interval_90: Option<[f64; 2]>,
+    /// Range the simulated ropes are drawn from.
+    pub range: [f64; 2],
+    /// The hidden truth of a simulated rig.
+    pub truth: Option<f64>,
+}
+
+/// How often something took how long.
+#[derive(Debug, Serialize)]
+pub struct Histogram {
+    /// What.
+    pub name: &'static str,
+    /// Upper ends of the bins (µs); the last bin has none.
+    pub upto_us: Vec<f64>,
+    /// Cycles in each bin, one more than `upto_us`.
+    pub counts: Vec<usize>,
+    /// Cycles in all.
+    pub cycles: usize,
+    /// Half of them are at most this (µs).
+    pub p50_us: f64,
+    /// 99 % of them are at most this (µs).
+    pub p99_us: f64,
+    /// The longest (µs).
+    pub max_us: f64,
+}
+
+/// One motion: pictures of arm and rope, and its joints as numbers.
+#[derive(Debug, Serialize)]
+pub struct Scene {
+    /// Name for people.
+    pub name: String,
+    /// Begin of the motion on the run's clock (s).
+    #[serde(skip)]
+    pub begin_s: f64,
+    /// Time of the first frame on the motion's clock (s).
+    pub from_s: f64,
+    /// Time between frames (s).
+    pub period_s: f64,
+    /// Each frame: joints' origins from the base to the pole's end (0.1 mm).
+    pub arm: Vec<Vec<i32>>,
+    /// Each frame: the rope's nodes (0.1 mm); none when no rope is known.
+    pub rope: Vec<Vec<i32>>,
+    /// Planned way of the tip, at the same times (0.1 mm).
+    pub planned_tip: Vec<i32>,
+    /// Radius of the rope and of its lead (m).
+    pub radii_m: [f64; 2],
+    /// Target (m).
+    pub target_m: Option<[f64; 3]>,
+    /// Joints over time.
+    pub joints: Joints,
+}
+
+/// Joints over time; all series have the length of `t_s`.
+#[derive(Debug, Default, Serialize)]
+pub struct Joints {
+    /// What `wanted` is.
+    pub wanted_is: &'static str,
+    /// Time on the motion (s).
+    pub t_s: Vec<f64>,
+    /// Planned or commanded (rad), by joint.
+    pub wanted: [Vec<f64>; JOINTS],
+    /// Measured (rad), by joint.
+    pub measured: [Vec<f64>; JOINTS],
+}
+
+/// A picture.
+#[derive(Debug, Serialize)]
+pub(crate) struct Picture {
+    /// File it was made from.
+    pub file: &'static str,
+    /// What it shows.
+    pub title: &'static str,
+    /// JPEG as a data URL.
+    pub url: String,
+}

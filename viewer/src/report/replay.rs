@@ -1,0 +1,230 @@
+//! Motions to look at: the arm as measured, the identified rope simulated on it.
+
+use super::data::{Joints, Scene};
+use super::motion::CycleRow;
+use anyhow::Context;
+use arm_model::{JOINTS, JointVector, kinematics};
+use nalgebra::Vector3;
+use rope_sim::{
+    AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome, PlannedArm, Precision, SimOptions,
+    Start, Watch, roll_out,
+};
+use run_log::files::JointsCsv;
+use shared_types::{Plan, RopeParams};
+
+/// Frames per second.
+const RATE_HZ: f64 = 60.0;
+/// Shown before a motion (s).
+const BEFORE_S: f64 = 0.2;
+/// Shown after a motion (s).
+const AFTER_S: f64 = 0.8;
+/// Longest motion that is shown (s); of a longer one, its begin.
+const LONGEST_S: f64 = 15.0;
+/// Step of the simulation of a throw, and of calmer motions (s).
+const STEP_S: (f64, f64) = (5e-4, 1e-3);
+/// Points of a joint's curve.
+const CURVE_POINTS: usize = 400;
+/// Samples the measured motion needs.
+const SAMPLES_MIN: usize = 8;
+
+/// What is known of a run beside the motion itself.
+#[derive(Debug)]
+pub(crate) struct Known<'a> {
+    /// Measured joints on the run's clock.
+    pub joints: Option<&'a JointsCsv>,
+    /// The identified rope.
+    pub rope: Option<&'a RopeParams>,
+    /// The plan of the throw.
+    pub plan: Option<&'a Plan>,
+    /// Target (m).
+    pub target_m: Option<[f64; 3]>,
+}
+
+/// Which motions of `count` are the wiggle and the throw cannot be read from the
+/// cycles; the plan tells the throw by its duration, and what is first is the wiggle.
+fn name(index: usize, motion: &[CycleRow], plan: Option<&Plan>, has_rope: bool) -> String {
+    let duration_s = motion.last().map_or(0.0, |row| row.trajectory_s);
+    let is_throw = plan.is_some_and(|p| (p.trajectory.duration_s() - duration_s).abs() < 0.02);
+    match (is_throw, index, has_rope) {
+        (true, _, _) => "throw".to_owned(),
+        (false, 0, true) => "wiggle".to_owned(),
+        _ => format!("motion {}", index + 1),
+    }
+}
+
+/// The scene of one motion.
+pub(crate) fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> anyhow::Result<Scene> {
+    let name = name(index, motion, known.plan, known.rope.is_some());
+    let plan = known.plan.filter(|_| name == "throw");
+    let begin_s = motion[0].deadline_s - motion[0].trajectory_s;
+    let last = motion.last().unwrap_or(&motion[0]);
+    let until_s = (last.deadline_s - begin_s).min(LONGEST_S) + AFTER_S;
+    let (times_s, q, is_measured) = moved(motion, begin_s, until_s, known);
+    let arm = MeasuredArm::new(&times_s, &q).context("the joints of a motion")?;
+    let frames = FrameTimes {
+        first_s: 0.0,
+        period_s: 1.0 / RATE_HZ,
+        count: frame_count(BEFORE_S + until_s),
+    };
+    // The simulator's clock begins with the first frame.
+    let shifted: Vec<f64> = times_s.iter().map(|t| t + BEFORE_S).collect();
+    let on_film = MeasuredArm::new(&shifted, &q).context("the joints of a motion")?;
+    let step_s = if plan.is_some() { STEP_S.0 } else { STEP_S.1 };
+    let rope = match known.rope {
+        Some(rope) => simulate(rope, &on_film, frames, step_s)?,
+        None => Vec::new(),
+    };
+    let planned_tip = match plan {
+        Some(plan) => planned_tip(plan, until_s)?,
+        None => Vec::new(),
+    };
+    Ok(Scene {
+        begin_s,
+        from_s: -BEFORE_S,
+        period_s: frames.period_s,
+        arm: (0..frames.count)
+            .map(|i| arm_points(&on_film.joints_at(frames.time_s(i)).q))
+            .collect(),
+        rope,
+        planned_tip,
+        radii_m: known
+            .rope
+            .map_or([0.0; 2], |r| [r.radius_m, r.lead_radius_m]),
+        target_m: known.target_m,
+        joints: curves(motion, begin_s, plan, is_measured.then_some(&arm)),
+        name,
+    })
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a positive time of seconds"
+)]
+fn frame_count(span_s: f64) -> usize {
+    (span_s * RATE_HZ).floor() as usize + 1
+}
+
+/// Joints on the motion's clock: measured, or as commanded where nothing was
+/// measured; then they stand for the arm but are not called measured.
+fn moved(
+    motion: &[CycleRow],
+    begin_s: f64,
+    until_s: f64,
+    known: &Known<'_>,
+) -> (Vec<f64>, Vec<JointVector>, bool) {
+    if let Some(joints) = known.joints {
+        let (times_s, q): (Vec<f64>, Vec<JointVector>) = joints
+            .times_s
+            .iter()
+            .map(|t| t - begin_s)
+            .zip(joints.q.iter().copied())
+            .filter(|(t, _)| (-BEFORE_S..=until_s).contains(t))
+            .unzip();
+        if times_s.len() >= SAMPLES_MIN {
+            return (times_s, q, true);
+        }
+    }
+    let (times_s, q) = motion
+        .iter()
+        .map(|row| (row.deadline_s - begin_s, row.commanded()))
+        .filter(|(t, _)| *t <= until_s)
+        .unzip();
+    (times_s, q, false)
+}
+
+/// A place as the page reads it (0.1 mm).
+#[allow(clippy::cast_possible_truncation, reason = "saturating")]
+pub fn tenths_mm(p: &Vector3<f64>) -> [i32; 3] {
+    [0, 1, 2].map(|axis| (p[axis] * 1e4).round() as i32)
+}
+
+/// Base, origins of the joints, end of the pole (0.1 mm).
+pub fn arm_points(q: &JointVector) -> Vec<i32> {
+    let origins = kinematics::link_poses(q).map(|(p, _)| p);
+    let (tip, _) = kinematics::attach_pose(q);
+    std::iter::once(Vector3::zeros())
+        .chain(origins)
+        .chain([tip])
+        .flat_map(|p| tenths_mm(&p))
+        .collect()
+}
+
+/// Nodes of the rope in every frame, from hanging still in the first.
+fn simulate(
+    rope: &RopeParams,
+    motion: &dyn AttachMotion,
+    frames: FrameTimes,
+    step_s: f64,
+) -> anyhow::Result<Vec<Vec<i32>>> {
+    let options = SimOptions {
+        step_s,
+        precision: Precision::F64,
+        start: Start::Equilibrium,
+        frames,
+        watch: Watch::NOTHING,
+        horizon_s: frames.time_s(frames.count.saturating_sub(1)),
+        threads: 1,
+    };
+    let rollouts = roll_out(&[Candidate::new(rope, motion)], &options)?;
+    let Some(rollout) = rollouts.first().filter(|r| r.outcome != Outcome::Diverged) else {
+        return Ok(Vec::new());
+    };
+    let nodes = &rollout.nodes;
+    Ok((0..nodes.frames())
+        .map(|frame| {
+            (0..nodes.nodes())
+                .flat_map(|node| tenths_mm(&nodes.position(frame, node)))
+                .collect()
+        })
+        .collect())
+}
+
+/// The tip's way with the plan's own rope on the planned motion.
+fn planned_tip(plan: &Plan, until_s: f64) -> anyhow::Result<Vec<i32>> {
+    let frames = FrameTimes {
+        first_s: 0.0,
+        period_s: 1.0 / RATE_HZ,
+        count: frame_count(until_s),
+    };
+    let arm = PlannedArm::new(plan.trajectory);
+    let rope = simulate(&plan.rope, &arm, frames, STEP_S.0)?;
+    Ok(rope
+        .iter()
+        .flat_map(|nodes| nodes[nodes.len().saturating_sub(3)..].to_vec())
+        .collect())
+}
+
+/// Joints as wanted and as measured, at times that show their shape.
+fn curves(
+    motion: &[CycleRow],
+    begin_s: f64,
+    plan: Option<&Plan>,
+    measured: Option<&MeasuredArm>,
+) -> Joints {
+    let every = motion.len().div_ceil(CURVE_POINTS);
+    let mut joints = Joints {
+        wanted_is: if plan.is_some() {
+            "planned"
+        } else {
+            "commanded"
+        },
+        ..Joints::default()
+    };
+    // A hundredth of a milliradian is less than the arm reports.
+    let round = |v: f64| (v * 1e5).round() / 1e5;
+    for row in motion.iter().step_by(every) {
+        let t_s = row.deadline_s - begin_s;
+        if t_s > LONGEST_S {
+            break;
+        }
+        joints.t_s.push(round(t_s));
+        let wanted = plan.map_or_else(|| row.commanded(), |p| p.trajectory.state_at(t_s).q);
+        let seen = measured.map(|arm| arm.joints_at(t_s).q);
+        for j in 0..JOINTS {
+            joints.wanted[j].push(round(wanted[j]));
+            joints.measured[j].extend(seen.map(|q| round(q[j])));
+        }
+    }
+    joints
+}
