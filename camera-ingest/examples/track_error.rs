@@ -1,11 +1,7 @@
 //! Prints the tracker's error against the rendered recordings' exact truth:
 //! `track_error FOLDER [sheet.png [first last]]`; for a name that ends in `.avi` a
 //! film of the keypoints is written.
-#![allow(
-    clippy::expect_used,
-    clippy::cast_precision_loss,
-    reason = "a measuring tool may fail loudly"
-)]
+#![allow(clippy::expect_used, reason = "a measuring tool may fail loudly")]
 
 use std::path::Path;
 use std::time::Instant;

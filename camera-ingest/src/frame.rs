@@ -348,11 +348,6 @@ pub fn rgb_from_ycc([y, cb, cr]: [f32; 3]) -> [u8; 3] {
     ])
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to 0..255 first"
-)]
 fn rounded(channels: [f32; 3]) -> [u8; 3] {
     channels.map(|c| c.round().clamp(0.0, 255.0) as u8)
 }

@@ -8,16 +8,7 @@
 //!
 //! It is *not* the place for rope physics, identification or planning: it
 //! knows pixels, cameras and colours only.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod calib;
 pub mod film;

@@ -28,11 +28,6 @@ impl Region {
     /// Where a rope of `length_m` hanging on the clamp can be while it swings
     /// out by up to half its length; `None` when that is not in view.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the image first"
-    )]
     pub fn below_clamp(
         camera: &StereoCamera,
         p_w_clamp_m: &Vector3<f64>,
@@ -73,7 +68,6 @@ pub struct Motion {
 
 /// Compares two frames of one size within a region (cut to the image).
 #[must_use]
-#[allow(clippy::cast_precision_loss, reason = "pixel counts")]
 pub fn motion(a: &EyeFrame, b: &EyeFrame, region: Region) -> Motion {
     let width = a.width_px.min(b.width_px);
     let height = a.height_px.min(b.height_px);

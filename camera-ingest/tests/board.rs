@@ -1,5 +1,6 @@
 //! The camera's place from a rendered board.
-#![allow(missing_docs, clippy::unwrap_used, reason = "tests may fail loudly")]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 mod printed_board;
 

@@ -1,11 +1,7 @@
 //! Calibrations as YAML are read, films of keypoints written: files of other programs'
 //! kinds.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::float_cmp,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 use camera_ingest::calib::CalibError;
 use camera_ingest::film::keypoint_film;

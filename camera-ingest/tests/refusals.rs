@@ -1,12 +1,6 @@
 //! Videos that cannot be used are refused, with the frame and what to do.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 mod recording;
 

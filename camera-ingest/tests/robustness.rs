@@ -1,17 +1,8 @@
 //! The tracker on recordings to which something bad was done: it stays nearly as
 //! exact as on the good ones or says that it lost the rope, and is never wrong
 //! with confidence.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 #[path = "recording/alter.rs"]
 mod alter;

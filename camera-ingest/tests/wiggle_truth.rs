@@ -1,12 +1,6 @@
 //! The tracker and the scorer against rendered recordings with exact truth.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 mod recording;
 

@@ -5,16 +5,7 @@
 //! `eprint!` and `eprintln!` in the place of the standard ones.
 //!
 //! Exit codes: 0 done, 1 ran and failed, 2 bad usage or input.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 // First: its macros stand for the standard ones everywhere below.
 #[macro_use]

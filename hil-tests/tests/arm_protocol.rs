@@ -1,11 +1,6 @@
 //! The simulated arm over real sockets, as clients see it.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, reason = "tests compare exact numbers")]
 
 use arm_model::JointVector;
 use rand::seq::IndexedRandom;

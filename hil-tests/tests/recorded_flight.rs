@@ -1,10 +1,5 @@
 //! Ten minutes of core and simulated arm with faults, recorded, replay to the bit.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod flight;
 

@@ -1,11 +1,6 @@
 //! The whole rig in real time: frames flow, and the truth agrees with them.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 use arm_model::joint::START_POSE;
 use camera_ingest::StereoFrame;

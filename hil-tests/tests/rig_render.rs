@@ -1,11 +1,6 @@
 //! Pictures of the rig against the geometry they were drawn from.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 use arm_model::joint::START_POSE;
 use arm_model::kinematics::attach_pose;

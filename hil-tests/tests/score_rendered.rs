@@ -1,10 +1,6 @@
 //! The score of rendered throws whose tip passes through or close by the target: in the
 //! frames that matter, lead and target cover each other.
-#![allow(
-    clippy::unwrap_used,
-    clippy::cast_precision_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use arm_model::joint::START_POSE;
 use camera_ingest::{ScoreOptions, StereoFrame, score};

@@ -1,14 +1,8 @@
 //! The tracker on wiggles of the rig's ropes, thin ones above all: filmed well, by a machine
 //! with other work to do (frames are missing, some of them in a row), and with a shutter
 //! that exposes row after row.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 use camera_ingest::track::{ClampPath, ClampSample, TrackOptions};
 use camera_ingest::{EyeFrame, StereoFrame, track};

@@ -1,10 +1,5 @@
 //! Control core and simulated arm together in virtual time.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};

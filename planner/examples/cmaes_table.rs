@@ -1,10 +1,6 @@
 //! Runs the planner's CMA-ES on standard functions and prints one line per run, for
 //! `planner/checks/cmaes_peer.py` to compare with the package `cma`.
-#![allow(
-    clippy::expect_used,
-    clippy::cast_precision_loss,
-    reason = "an example may stop with a message"
-)]
+#![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
 use planner::cmaes::{CmaOptions, RestartRule, Restarted, StopReason};
 

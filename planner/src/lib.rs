@@ -7,17 +7,7 @@
 //! the arm follows its setpoints, and [`preflight`] says what it will make of a plan. [`filming`] makes recordings of known ropes with
 //! the errors of real ones. The physics is that of `rope-sim`.
 #![forbid(unsafe_code)]
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        clippy::cast_precision_loss,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod calm;
 pub mod cmaes;

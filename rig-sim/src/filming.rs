@@ -75,7 +75,6 @@ struct Shutter {
 
 impl Shutter {
     /// Start of exposure of the frame at hand.
-    #[allow(clippy::cast_precision_loss, reason = "2^53 frames last for ages")]
     fn opens(&self) -> MonotonicNs {
         self.start.plus_s(self.sequence as f64 * self.period_s)
     }
@@ -98,7 +97,6 @@ impl Shutter {
 }
 
 /// Poses spread evenly over the frame's time, as many as the motion needs.
-#[allow(clippy::cast_precision_loss, reason = "a dozen sub-frames")]
 fn expose(
     record: &Record,
     renderer: &Renderer,

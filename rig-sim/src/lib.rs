@@ -9,16 +9,7 @@
 //! physics has finished. Every stamp is CLOCK_MONOTONIC and true: a machine that
 //! cannot keep up sees later frames and dropped frames, never wrong ones.
 
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod body;
 mod camera;

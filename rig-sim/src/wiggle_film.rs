@@ -113,12 +113,6 @@ impl WiggleFilm {
 
     /// A node's place in the middle of the exposure of the row that shows it; `all` lie
     /// evenly over the frame's time.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss,
-        reason = "poses are few"
-    )]
     fn as_seen(&self, all: &[ScenePose], node: usize) -> Vector3<f64> {
         let at = |t_s: f64| {
             let place = t_s / self.camera.frame_time_s() * all.len() as f64 - 0.5;
@@ -152,12 +146,6 @@ impl Iterator for WiggleFilm {
     type Item = Frame;
 
     /// The next frame; there is always one.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss,
-        reason = "frames and poses are few"
-    )]
     fn next(&mut self) -> Option<Frame> {
         let start_s = self.late_s + self.next as f64 / self.frame_rate_hz;
         let frame_s = self.camera.frame_time_s();

@@ -105,7 +105,6 @@ impl NodeTrack {
 
     /// Writes one frame: the numbers of `lane`, node by node.
     #[inline(always)]
-    #[allow(clippy::cast_possible_truncation, reason = "the precision of the run")]
     fn put<V: Lanes>(&mut self, frame: usize, lane: usize, positions: &[Vec3<V>]) {
         let range = frame * self.nodes * 3..(frame + 1) * self.nodes * 3;
         match &mut self.numbers {
@@ -122,7 +121,6 @@ impl NodeTrack {
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "the precision of the run")]
     pub(crate) fn set(&mut self, frame: usize, node: usize, position_m: [f64; 3]) {
         let at = (frame * self.nodes + node) * 3;
         for (axis, x) in position_m.into_iter().enumerate() {
@@ -268,11 +266,6 @@ impl<V: Lanes> FrameRecorder<V> {
 }
 
 /// Steps of at most `step_s` that surely end before `wait_s` is over.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "rounds down; saturates where there is no end"
-)]
 fn whole_steps(wait_s: f64, step_s: f64) -> u64 {
     ((wait_s / step_s - 1e-6).max(0.0) as u64).min(u64::from(u32::MAX))
 }

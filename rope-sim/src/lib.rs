@@ -15,16 +15,7 @@
 //! Errors at the default step of 0.5 ms are below 0.3 mm at the tip in ordinary
 //! motions and grow in violent whips of stiff, hardly damped ropes.
 #![deny(unsafe_op_in_unsafe_fn)]
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 mod algebra;
 mod arm_knots;

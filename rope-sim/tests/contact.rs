@@ -1,12 +1,6 @@
 //! Contacts against formulas: depth of an impact, friction, walls that hold.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 mod scenes;
 

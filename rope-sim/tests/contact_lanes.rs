@@ -1,12 +1,6 @@
 //! A rope among obstacles is its own, whatever runs beside it.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 mod scenes;
 

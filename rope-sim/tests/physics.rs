@@ -1,12 +1,6 @@
 //! Behaviour that follows from mechanics alone.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 use arm_model::kinematics::FrameMotion;
 use arm_model::{JointTrajectory, JointVector};

@@ -1,12 +1,6 @@
 //! What slopes may be asked for, and which are refused or flagged.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 #[path = "support/family.rs"]
 mod family;

@@ -1,14 +1,7 @@
 //! Accuracy against reference trajectories made with other engines' dynamics and an
 //! implicit integrator of order five.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    missing_docs,
-    unreachable_pub,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, missing_docs, unreachable_pub, reason = "a test")]
 
 mod support;
 

@@ -1,12 +1,6 @@
 //! What is measured in the step, against dense recordings and formulas.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 use arm_model::kinematics::FrameMotion;
 use arm_model::{JointTrajectory, JointVector};

@@ -18,16 +18,7 @@
 //! It plans no throws and knows no rope: it takes finished motions, checks them
 //! against the limits, and streams them on time or stops. It is not a safety
 //! function; the emergency stop and the arm's own limits are.
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod arm_status;
 pub mod commander;

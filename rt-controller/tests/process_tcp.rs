@@ -1,11 +1,6 @@
 //! The whole controller process against a small arm on TCP: bring-up, move,
 //! trajectory, refusals, stop, acknowledgement, a lost arm, the end.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use arm_model::joint::START_POSE;
 use arm_model::{JointState, JointTrajectory, JointVector};

@@ -1,11 +1,6 @@
 //! A recording of ten minutes with faults replays to the bit; damage, losses
 //! and a changed byte are found; a replay may begin anywhere.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 #[path = "recording/random_run.rs"]
 mod random_run;

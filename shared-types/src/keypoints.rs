@@ -42,10 +42,6 @@ impl KeypointFrame {
     /// What the tracker found in the camera frame of this number and stamp (CLOCK_MONOTONIC
     /// ns); of more than [`MAX_KEYPOINTS`] the first ones.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "pixels and confidences need no more than single precision"
-    )]
     pub fn new(sequence: u64, stamp_ns: u64, tracked: &TrackedFrame) -> Self {
         let mut out = Self {
             sequence,
@@ -206,7 +202,6 @@ impl KeypointTrack {
 
     /// Part of the frames in which the rope was lost (0 to 1).
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
     pub fn lost_part(&self) -> f64 {
         let lost = self.frames.iter().filter(|f| f.lost).count();
         lost as f64 / self.frames.len().max(1) as f64

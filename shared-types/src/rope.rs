@@ -144,11 +144,6 @@ impl RopeParams {
 
     /// From nine values in the order of [`RANGES`]; links are rounded.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "saturating; validate() refuses what is not physical"
-    )]
     pub fn from_array(v: [f64; ROPE_PARAMETERS]) -> Self {
         Self {
             links: v[0].round() as u32,

@@ -19,10 +19,6 @@ pub struct MonotonicNs(pub u64);
 impl MonotonicNs {
     /// Seconds from `earlier` to `self`; negative when `self` is the earlier one.
     #[must_use]
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "spans of days stay below 2^53 ns"
-    )]
     pub fn since_s(self, earlier: Self) -> f64 {
         if self.0 >= earlier.0 {
             (self.0 - earlier.0) as f64 / NS_PER_S
@@ -33,11 +29,6 @@ impl MonotonicNs {
 
     /// This instant plus `span_s` seconds, saturating at the ends of the clock.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "float to integer casts saturate, which is what an out-of-range span should do"
-    )]
     pub fn plus_s(self, span_s: f64) -> Self {
         if span_s >= 0.0 {
             Self(self.0.saturating_add((span_s * NS_PER_S) as u64))

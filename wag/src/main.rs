@@ -6,16 +6,7 @@
     unreachable_pub,
     reason = "in a binary `pub` means: for the rest of the program"
 )]
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 // Its macros stand for the standard ones everywhere below.
 #[macro_use]

@@ -1,11 +1,6 @@
 //! Others find a running rig and a running controller: ports at once, one rig
 //! per domain, a recorder that needs no domain's name, nothing left behind.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod support;
 

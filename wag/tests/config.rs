@@ -1,10 +1,5 @@
 //! Configuration of a site's or a rig's folder, as users lay it over the built-in one.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,11 +1,5 @@
 //! What the eyes' commands read and write, from files to files.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 #[path = "../../camera-ingest/tests/printed_board/mod.rs"]
 mod printed_board;

@@ -28,7 +28,7 @@ fn film(rope: &RopeParams, index: u64, folder: &Path) {
     let camera = side_camera();
     let filmed = film_rope(
         rope,
-        &PlannedArm::new(motion.clone()),
+        &PlannedArm::new(motion),
         &camera,
         KeypointLayout::Uniform(24),
         &FilmTiming::default(),

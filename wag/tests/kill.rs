@@ -1,11 +1,6 @@
 //! Killing any process of a demo at a random moment: it is reported within
 //! three seconds, nothing is left running, and the next demo succeeds.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

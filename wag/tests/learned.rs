@@ -1,12 +1,6 @@
 //! Learned models for `wag track`: from the command line or `camera.toml`, told in the
 //! report, refused with a clear line.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_possible_truncation,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 #[path = "../../camera-ingest/tests/learned/onnx.rs"]
 mod onnx;

@@ -1,10 +1,5 @@
 //! `wag plan`: broken off, it leaves the best throw so far, marked as such.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;

@@ -1,12 +1,7 @@
 //! A run on the simulated arm is recorded; replay finds no difference, explain
 //! says why it was stopped or how close it came to its limits; a recorder may
 //! attach at any time.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod support;
 

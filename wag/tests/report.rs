@@ -1,11 +1,6 @@
 //! `wag report`: one file, whose numbers are those of the run's own files, in which
 //! nothing of the run is markup, and which is the same every time.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod support;
 

@@ -1,11 +1,6 @@
 //! The file of a run: it opens with any reader, replays to the bit, and survives the
 //! death of its recorder, which stops no motion.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod support;
 

@@ -1,11 +1,6 @@
 //! The vendor's own Python client against `wag rig`, by the conformance check
 //! that lies beside the checkout.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod support;
 

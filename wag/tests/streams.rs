@@ -1,11 +1,6 @@
 //! Where a command's words and results go: pipes that close, disks that are
 //! full, results to standard output, links and pipes in the place of files.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use std::fs::{self, File};
 use std::io::Read;

@@ -1,11 +1,6 @@
 //! From a rendered video of another simulator's rope (MuJoCo) to a fling: the identified
 //! rope moves like the true one in a motion it was not identified from.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use nalgebra::Vector3;
 use rope_sim::{
@@ -111,7 +106,6 @@ fn ropes_seen_in_videos_are_flung_like_the_true_ones() {
         let ratio_off = ratio(&found) / ratio(&truth) - 1.0;
         let (a, b) = (fling(&found), fling(&truth));
         let squares = a.iter().zip(&b).map(|(a, b)| (a - b).norm_squared());
-        #[allow(clippy::cast_precision_loss, reason = "a few hundred samples")]
         let off_m = (squares.sum::<f64>() / a.len() as f64).sqrt();
         let way = b.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
         println!(

@@ -31,11 +31,6 @@ impl ControllerClock {
 
     /// Its reading at `now` (µs).
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "never negative, and 2^53 µs are 285 years"
-    )]
     pub fn time_us(&self, now: MonotonicNs) -> u64 {
         self.reading(now).max(0.0) as u64
     }

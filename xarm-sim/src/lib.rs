@@ -20,16 +20,7 @@
 //! blended moves (24), inverse kinematics (43) and the TCP limit test (46).
 //! Reduced mode is stored and told, but limits nothing.
 
-#![cfg_attr(
-    test,
-    allow(
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::panic,
-        clippy::float_cmp,
-        reason = "tests may fail loudly"
-    )
-)]
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod clock;
 pub mod collision;

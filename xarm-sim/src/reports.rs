@@ -102,10 +102,6 @@ impl ReportKind {
 
 /// Writes fields of the rich report that its codec leaves zero, at the offsets
 /// of the vendor's SDK.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "f32 is what the wire holds"
-)]
 fn fill_in(bytes: &mut [u8], model: &ArmModel) {
     let settings = &model.settings;
     let mut put = |at: usize, field: &[u8]| {

@@ -28,12 +28,6 @@ pub(super) fn append_planes(frame: &EyeFrame, size: Size, out: &mut Vec<f32>) {
 }
 
 /// A plane scaled from one size to another, bilinear, borders continued.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel indices, clamped to the picture"
-)]
 pub(super) fn scaled(plane: &[f32], from: Size, to: Size) -> Vec<f32> {
     let axis = |k: usize| -> Vec<(usize, usize, f32)> {
         let last = from[k] - 1;
@@ -59,7 +53,6 @@ pub(super) fn scaled(plane: &[f32], from: Size, to: Size) -> Vec<f32> {
 
 /// Where a pixel of one picture lies in the same picture of another size; whole
 /// numbers are the pixels' centres.
-#[allow(clippy::cast_precision_loss, reason = "sizes of pictures")]
 pub(super) fn place_in(pixel: [f64; 2], from: Size, to: Size) -> [f64; 2] {
     core::array::from_fn(|k| (pixel[k] + 0.5) * to[k] as f64 / from[k] as f64 - 0.5)
 }

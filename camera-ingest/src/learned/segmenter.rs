@@ -59,10 +59,6 @@ impl OnnxSegmenter {
 }
 
 /// Clamp and lead as prompts, filled up to `count` with points that are none.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "pixels need no more than single precision"
-)]
 fn prompts(scene: &FirstScene<'_>, size: Size, count: Option<usize>) -> (Vec<f32>, Vec<f32>) {
     let known = [Some(scene.clamp_px), scene.lead_px];
     let known: Vec<[f64; 2]> = known.into_iter().flatten().collect();

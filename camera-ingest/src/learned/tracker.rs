@@ -83,11 +83,6 @@ impl OnnxTracker {
     }
 
     /// Follows points through the chunk of frames that begins at `start`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "pixels and frames of a chunk need no more than single precision"
-    )]
     fn look(
         &mut self,
         frames: &[EyeFrame],

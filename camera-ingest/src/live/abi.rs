@@ -44,10 +44,6 @@ pub(super) struct Request<T> {
 
 impl<T> Request<T> {
     /// `_IOR`, `_IOW` and `_IOWR` of `asm-generic/ioctl.h`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "the kernel keeps 14 bits for the size; the largest here is 208"
-    )]
     const fn new(direction: u32, group: u8, number: u8) -> Self {
         let size = size_of::<T>() as u32;
         Self {

@@ -198,7 +198,6 @@ impl Device for KernelDevice {
 
     fn stream(&mut self, on: bool) -> io::Result<()> {
         let request = if on { abi::STREAM_ON } else { abi::STREAM_OFF };
-        #[allow(clippy::cast_possible_wrap, reason = "it is 1")]
         self.ask(&request, &mut (abi::VIDEO_CAPTURE as i32))
     }
 

@@ -70,7 +70,6 @@ impl Picture {
     }
 
     /// Draws a cross of the given arm length.
-    #[allow(clippy::cast_possible_truncation, reason = "pixels of an image")]
     pub fn cross(&mut self, [u, v]: [f64; 2], arm_px: i64, colour: [u8; 3]) {
         let (u, v) = (u.round() as i64, v.round() as i64);
         for d in -arm_px..=arm_px {
@@ -80,11 +79,6 @@ impl Picture {
     }
 
     /// Draws a line one pixel wide.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "pixels of an image"
-    )]
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], colour: [u8; 3]) {
         let span = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
         if !span.is_finite() || span > 1e5 {
@@ -206,7 +200,6 @@ pub(crate) fn drawn(frame: &EyeFrame, tracked: &TrackedFrame) -> Picture {
 
 fn draw_rope(mut picture: Picture, tracked: &TrackedFrame, factor: usize) -> Picture {
     // The middle of pixel 0 stands for those of pixels 0 to factor - 1.
-    #[allow(clippy::cast_precision_loss, reason = "pixels of an image")]
     let small = |x: f64| (x + 0.5) / factor as f64 - 0.5;
     let points: Vec<[f64; 2]> = tracked.points.iter().map(|p| p.map(small)).collect();
     let line = if tracked.lost {

@@ -89,7 +89,6 @@ impl BlobMap {
     }
 
     /// Connected blobs, largest first, their centres refined to sub-pixel.
-    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
     pub(super) fn blobs(&self) -> Vec<Blob> {
         let mut seen = vec![false; self.values.len()];
         let mut found = Vec::new();
@@ -128,7 +127,6 @@ impl BlobMap {
 
     /// Centroid over the component grown by two pixels, so that the soft rim
     /// below the threshold counts, too.
-    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
     fn measure(&self, members: &[usize]) -> Blob {
         let height = self.values.len() / self.width;
         let (mut x0, mut y0, mut x1, mut y1) = (usize::MAX, usize::MAX, 0, 0);

@@ -16,12 +16,6 @@ pub(super) fn even(frames: usize, frame_ns: f64) -> Vec<Stamp> {
     (0..frames as u64)
         .map(|sequence| Stamp {
             sequence,
-            #[allow(
-                clippy::cast_precision_loss,
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a recording is short, and its times are positive"
-            )]
             stamp_ns: (sequence as f64 * frame_ns).round() as u64,
         })
         .collect()

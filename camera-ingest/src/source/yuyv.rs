@@ -25,7 +25,6 @@ impl YuyvSource {
     /// No such file, or its length is no multiple of a frame.
     pub fn open(path: &Path, size_px: [usize; 2], frame_ns: u64) -> Result<Self, SourceError> {
         let (file, frames) = whole_frames(path, size_px)?;
-        #[allow(clippy::cast_precision_loss, reason = "far less than 2^53 ns")]
         let frame_ns = frame_ns as f64;
         Ok(Self {
             path: path.to_owned(),

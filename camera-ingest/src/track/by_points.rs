@@ -89,12 +89,6 @@ fn state(follower: &Follower<'_>, seen: &[SeenPoint], t_s: f64, before: &State) 
 }
 
 /// Value at a node of the curve from values spread evenly along it.
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a place between the first and the last of a few values"
-)]
 fn between<T: Copy>(values: &[T], node: usize, mix: impl Fn(T, T, f64) -> T) -> T {
     let at = node as f64 * (values.len() - 1) as f64 / (NODES - 1) as f64;
     let left = (at as usize).min(values.len() - 2);

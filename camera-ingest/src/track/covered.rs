@@ -46,11 +46,6 @@ fn pair(frame: &EyeFrame, at: usize) -> Pair {
 pub(super) type Lit<'a> = (&'a EyeFrame, f32);
 
 /// A place of a frame in the scene's light.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "grey levels; casts saturate"
-)]
 fn lit_pair((frame, gain): Lit<'_>, at: usize) -> Pair {
     let [a, b, cb, cr] = pair(frame, at).map(f32::from);
     let luma = |y: f32| (y / gain).round() as u8;

@@ -33,7 +33,6 @@ pub(super) fn folds(points: &[Point]) -> bool {
 
 /// `count` points equally spaced in arc length over the first `total` of the
 /// polyline; beyond its end it goes on straight.
-#[allow(clippy::cast_precision_loss, reason = "point counts are small")]
 pub(super) fn resample(points: &[Point], total: f64, count: usize) -> Vec<Point> {
     let mut out = Vec::with_capacity(count);
     let (mut segment, mut start) = (0, 0.0);

@@ -24,12 +24,6 @@ pub(super) struct Window {
 
 impl Window {
     /// Smallest window around pixels with a margin, inside the image.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the image first"
-    )]
     pub(super) fn around(
         pixels: impl Iterator<Item = [f64; 2]>,
         margin_px: f64,
@@ -69,11 +63,6 @@ impl Band {
 
     /// What lies within `reach_px` of some pixels, on either axis. A rope's
     /// window is mostly empty of rope.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the window first"
-    )]
     pub(super) fn along(pixels: &[[f64; 2]], reach_px: f64, window: Window) -> Self {
         let mut columns = vec![[window.u1, window.u0]; window.v1 - window.v0];
         let bound = |x: f64, low: usize, high: usize| x.clamp(low as f64, high as f64) as usize;
@@ -304,12 +293,6 @@ impl Matter<'_> {
 
 impl Coverage {
     /// Value at a raw pixel, bilinear; 0 outside the window.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "checked against the window first"
-    )]
     pub(super) fn at(&self, [u, v]: [f64; 2]) -> f32 {
         let (x, y) = (u - self.window.u0 as f64, v - self.window.v0 as f64);
         let rows = self.window.v1 - self.window.v0;
@@ -331,12 +314,6 @@ impl Coverage {
 
     /// Largest sum over a square of the area of a disc of `radius_px`, its centre within
     /// `reach_px` of `centre` on either axis, without what lies within `clear_px` of it.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "pixel counts are small and positive"
-    )]
     pub(super) fn most_beside(
         &self,
         centre: [f64; 2],
@@ -379,7 +356,6 @@ impl Coverage {
     }
 
     /// Sum and centroid within `radius_px` of a raw pixel.
-    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
     pub(super) fn centroid(&self, centre: [f64; 2], radius_px: f64) -> (f64, [f64; 2]) {
         let (mut sum, mut u_sum, mut v_sum) = (0.0, 0.0, 0.0);
         // What lies beyond this on one axis has no weight; nor has what is not covered.

@@ -67,12 +67,6 @@ pub(super) struct Place<'a> {
 
 /// Finds rope and lead in a frame, in which they hang still unless the rope's
 /// length along the mask is known already to lie in `length_m`.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixels inside the image"
-)]
 pub(super) fn find(
     frame: &EyeFrame,
     place: &Place<'_>,
@@ -199,7 +193,6 @@ fn lead_place(
     (lead, centre)
 }
 
-#[allow(clippy::cast_precision_loss, reason = "pixel indices")]
 fn disc(centre: [f64; 2], radius_px: f64, window: Window) -> impl Iterator<Item = [usize; 2]> {
     (window.v0..window.v1).flat_map(move |v| {
         (window.u0..window.u1)
@@ -262,12 +255,6 @@ fn clear_border(mask: &mut [bool], width: usize) {
 }
 
 /// Mask with the pole and what holds it taken out of reach.
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "pixel indices, clamped to the image"
-)]
 fn ground(
     mask: &[bool],
     width: usize,

@@ -92,10 +92,6 @@ struct Found {
 impl Geodesic {
     /// Dijkstra over the 8-neighbourhood. Gaps in the mask may be `gap_px` long,
     /// the first one, at the start, `first_gap_px`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "an image has < 2^32 pixels"
-    )]
     pub(super) fn from(
         start: usize,
         ground: &[Ground],
@@ -190,7 +186,6 @@ impl Geodesic {
     }
 
     /// Pixels from the start to `at` as `[u, v]`.
-    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
     pub(super) fn path_to(&self, at: usize) -> Vec<[f64; 2]> {
         let (mut place, wide) = (self.place(at), self.width + 2);
         let mut path = Vec::new();
@@ -220,7 +215,6 @@ impl Depth {
     /// Distance of every mask pixel to the nearest pixel off the mask, by the two-pass
     /// 5-7-11 chamfer (within 2 % of the Euclidean distance). What lies beyond the image is
     /// not mask.
-    #[allow(clippy::cast_sign_loss, reason = "offsets back are not positive")]
     pub(super) fn of(mask: &[bool], width: usize) -> Self {
         const FAR: i32 = 1 << 28;
         const BACK: [(i32, i32, i32); 8] = [
@@ -266,7 +260,6 @@ impl Depth {
     }
 
     /// Distance of a pixel (px).
-    #[allow(clippy::cast_precision_loss, reason = "distances are small")]
     pub(super) fn px(&self, at: usize) -> f32 {
         let (u, v) = (at % self.width, at / self.width);
         let wide = self.width + 2 * BORDER;

@@ -48,12 +48,6 @@ pub(super) struct Across {
 
 /// Measures every node of `curve` along its normal. The first node (the clamp)
 /// is known; the range opens with the distance from it.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "sample counts are small and positive"
-)]
 pub(super) fn measure(
     curve: &[Point],
     plane: &RopePlane,
@@ -133,12 +127,6 @@ impl Beside<'_> {
     /// Coverage of the best place across a node that is not the rope, relative to a fully
     /// visible rope. `row` are the samples between the pixels `ends`; beyond them a step
     /// is a pixel.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "sample counts are small and positive"
-    )]
     fn best(&self, node: usize, row: &[f64], ends: [[f64; 2]; 2]) -> f64 {
         let search = self.search;
         let inner = search.range_px.round() as usize;
@@ -184,11 +172,6 @@ impl Beside<'_> {
 }
 
 /// Sums over `centre - reach ..= centre + reach`, ends counted in part.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "sample counts are small and positive"
-)]
 fn box_sums(row: &[f64], reach: f64, out: &mut [f64]) {
     let whole = reach.floor() as usize;
     let rest = reach - reach.floor();
@@ -205,12 +188,6 @@ fn box_sums(row: &[f64], reach: f64, out: &mut [f64]) {
     }
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "sample counts are small and positive"
-)]
 fn row_centroid(row: &[f64], centre: f64, reach: f64) -> f64 {
     let (mut sum, mut moment) = (0.0, 0.0);
     let from = (centre - reach - 1.0).max(0.0) as usize;
@@ -265,7 +242,6 @@ fn viterbi(nodes: usize, lanes: usize, price: impl Fn(usize, usize) -> f64) -> V
 
 /// Least cost of coming to every lane, and from how many lanes on, less [`JUMP_MAX`]. Jump
 /// by jump, so that many lanes are worked on at once.
-#[allow(clippy::cast_precision_loss, reason = "sample counts are small")]
 #[inline(always)]
 fn cheapest(cost: &[f64], least: &mut [f64], jump: &mut [usize]) {
     least.fill(f64::INFINITY);

@@ -105,7 +105,6 @@ impl Search<'_> {
         })
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "pixel indices")]
     fn distance_px(&self, a: usize, b: usize) -> f64 {
         let width = self.frame.width_px;
         let along = |x: usize, y: usize| x.abs_diff(y) as f64;

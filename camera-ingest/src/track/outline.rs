@@ -66,12 +66,6 @@ impl Contrast<'_> {
         self.bilinear(place, |u, v| self.pixel(u, v))
     }
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the image first"
-    )]
     fn bilinear(&self, [u, v]: [f64; 2], pixel: impl Fn(usize, usize) -> f64) -> f64 {
         let u = u.clamp(0.0, (self.frame.width_px - 1) as f64);
         let v = v.clamp(0.0, (self.frame.height_px - 1) as f64);
@@ -112,12 +106,6 @@ impl Contrast<'_> {
     /// the place where the contrast, followed out of the rope, falls to half.
     /// `None` when there is no rope before the expected centre or no end within
     /// `reach_px`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "sample counts are small and positive"
-    )]
     pub(super) fn free_end(
         &self,
         expected: Circle,
@@ -182,12 +170,6 @@ impl<'a> Patch<'a> {
     }
 
     /// Places on rays where the contrast falls below half of the inside's.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "sample counts are small and positive"
-    )]
     fn edges(
         &self,
         rays_rad: &[f64],

@@ -77,12 +77,6 @@ pub(super) fn seen_clamp(nodes: &[Across], first: usize) -> Option<SeenClamp> {
 }
 
 /// Place and direction of a parabola through a part of the nodes at the first one.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "some ten nodes"
-)]
 fn continued(nodes: &[Across], first: usize, part: f64) -> Option<(Point, Point)> {
     let end = first + (part * nodes.len() as f64).round() as usize;
     let clear: Vec<(f64, Point)> = nodes
@@ -134,7 +128,6 @@ pub(super) fn fit(
 }
 
 /// The fit to one of the two continuations.
-#[allow(clippy::cast_precision_loss, reason = "some hundred frames")]
 fn fit_part(
     seen: &[(f64, SeenClamp)],
     part: usize,
@@ -204,7 +197,6 @@ fn repeats(errors: &[f64]) -> f64 {
 }
 
 /// Root mean square of the clamp's way across the rope (m).
-#[allow(clippy::cast_precision_loss, reason = "some hundred frames")]
 fn motion_m(seen: &[(f64, SeenClamp)], told: &impl Fn(f64) -> Point) -> f64 {
     let places: Vec<f64> = seen.iter().map(|(t, _)| told(*t)[0]).collect();
     let count = places.len() as f64;

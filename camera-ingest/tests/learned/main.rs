@@ -1,15 +1,7 @@
 //! Learned models in the place of the tracker's parts, through the embedded runtime:
 //! small graphs that are written here.
-#![allow(
-    missing_docs,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(missing_docs, reason = "a test")]
 
 mod onnx;
 #[path = "../recording/mod.rs"]

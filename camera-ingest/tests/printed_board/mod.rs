@@ -1,11 +1,5 @@
 //! A printed board drawn in both eyes: the drawing knows nothing of the detector but
 //! the markers' bits.
-#![allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "pixels and squares are few"
-)]
 
 use calib_targets_charuco::resolve_dictionary;
 use camera_ingest::calib::board::{Board, BoardPose};

@@ -5,13 +5,8 @@
 //! setpoint that breaks a limit, rest, and no motion without acknowledgement.
 //! What must hold on a busy machine is asserted here; times are asserted in
 //! virtual time, except the guardian's.
-#![allow(
-    unreachable_pub,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(unreachable_pub, reason = "a test")]
 
 mod child;
 mod commander;

@@ -81,7 +81,6 @@ pub(super) fn least_sway(
 }
 
 /// Simulates `x` and its neighbours; `None` where the rope diverges.
-#[allow(clippy::cast_precision_loss, reason = "a few hundred residuals")]
 fn linearise(
     shape: &MoveShape,
     simulator: &SwaySimulator<'_>,

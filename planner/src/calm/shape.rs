@@ -18,12 +18,6 @@ pub(super) struct MoveShape {
 
 impl MoveShape {
     /// Knots about `knot_s` apart.
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few dozen knots"
-    )]
     pub(super) fn new(start: JointVector, end: JointVector, duration_s: f64, knot_s: f64) -> Self {
         let segments = ((duration_s / knot_s).round() as usize).max(2);
         let part = |i: usize| i as f64 / segments as f64;

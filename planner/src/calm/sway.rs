@@ -43,7 +43,6 @@ pub(super) struct SwaySlopes {
 
 impl Sway {
     /// Time of a frame of `nodes` after the start of the move (s).
-    #[allow(clippy::cast_precision_loss, reason = "a few hundred frames")]
     pub(super) fn time_s(frame: usize) -> f64 {
         frame as f64 * PERIOD_S
     }
@@ -64,11 +63,6 @@ pub(super) struct SwaySimulator<'a> {
 
 impl<'a> SwaySimulator<'a> {
     /// For moves that share duration and end pose with `plain`.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "positive counts of a few hundred"
-    )]
     pub(super) fn new(
         rope: &'a RopeParams,
         prelude: &'a Prelude,

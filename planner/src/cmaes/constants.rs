@@ -29,10 +29,6 @@ pub struct StrategyConstants {
     pub chi_n: f64,
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "dimensions and populations are far below 2^52"
-)]
 impl StrategyConstants {
     /// Largest learning rate of the step-size path.
     const C_SIGMA_MAX: f64 = 0.5;

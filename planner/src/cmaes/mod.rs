@@ -58,12 +58,6 @@ impl CmaOptions {
     /// An unbounded search with default stop rules and the tutorial's default
     /// population `4 + 3 ln n`.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "a dimension is small and positive"
-    )]
     pub fn unbounded(mean: Vec<f64>, std_dev: f64, seed: u64) -> Self {
         let n = mean.len();
         Self {

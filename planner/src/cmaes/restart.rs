@@ -125,12 +125,6 @@ impl Restarted {
         self.runs
     }
 
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "populations are small and positive"
-    )]
     fn restart(&mut self) -> Result<(), CmaError> {
         self.is_small = self.rule == RestartRule::Bipop && self.spent[1] < self.spent[0];
         let mut options = self.first.clone();

@@ -34,10 +34,6 @@ impl CmaEs {
     #[must_use]
     pub fn save(&self) -> SavedSearch {
         let words = self.rng.get_word_pos();
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "the two halves of the number"
-        )]
         let words = [(words >> 64) as u64, words as u64];
         SavedSearch {
             seed: self.options.seed,

@@ -5,12 +5,6 @@ use nalgebra::{DMatrix, DVector};
 
 impl CmaEs {
     /// Moves the distribution towards the better steps; `order` ranks them.
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_wrap,
-        clippy::cast_possible_truncation,
-        reason = "dimensions and generations are small"
-    )]
     pub(super) fn update(&mut self, order: &[usize]) {
         let n = self.mean.len();
         let nf = n as f64;

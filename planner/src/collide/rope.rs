@@ -37,7 +37,6 @@ fn spheres<'a>(
     nodes: &'a [Vector3<f64>],
 ) -> impl Iterator<Item = (Vector3<f64>, f64, f64)> + 'a {
     let last = nodes.len().saturating_sub(1);
-    #[allow(clippy::cast_precision_loss, reason = "node counts are small")]
     (1..nodes.len()).flat_map(move |i| {
         let arc = i as f64 * shape.link_length_m;
         let middle = (nodes[i - 1] + nodes[i]) / 2.0;

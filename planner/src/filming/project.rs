@@ -30,7 +30,6 @@ impl Default for FilmTiming {
 impl FilmTiming {
     /// Time from the first frame to the end of the last (s).
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
     pub fn duration_s(&self) -> f64 {
         self.frames as f64 / self.rate_hz
     }
@@ -67,7 +66,6 @@ pub fn project(
     let mut seen = vec![None; keypoints];
     let mut frames = Vec::with_capacity(timing.frames);
     for i in 0..timing.frames {
-        #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
         let t_s = i as f64 / timing.rate_hz;
         for (k, (row, seen)) in rows.iter_mut().zip(&mut seen).enumerate() {
             // The row decides when a point is exposed, and that where it is. The

@@ -140,12 +140,6 @@ impl RopeFilm {
     /// # Panics
     /// If there is no such keypoint, as indexing does.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the number of samples"
-    )]
     pub fn position(&self, time_s: f64, keypoint: usize) -> Vector3<f64> {
         let last = self.positions_m.len() / (3 * self.keypoints) - 1;
         let place = (time_s / self.period_s).clamp(0.0, last as f64);
@@ -179,11 +173,6 @@ pub fn record(
         .iter()
         .map(|rope| Candidate::new(rope, motion))
         .collect();
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a positive count of some thousand"
-    )]
     let count = (options.duration_s / options.period_s).floor() as usize + 1;
     let rollouts = roll_out(
         &candidates,
@@ -223,17 +212,9 @@ fn places(layout: KeypointLayout, links: u32) -> Vec<(usize, f32)> {
         KeypointLayout::LinkCentres => (0..links as usize).map(|link| (link, 0.5)).collect(),
         KeypointLayout::Uniform(keypoints) => (0..keypoints)
             .map(|k| {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    clippy::cast_precision_loss,
-                    reason = "keypoints and links are few"
-                )]
-                {
-                    let place = k as f64 / (keypoints.max(2) - 1) as f64 * f64::from(links);
-                    let node = (place as usize).min(links as usize - 1);
-                    (node, (place - node as f64) as f32)
-                }
+                let place = k as f64 / (keypoints.max(2) - 1) as f64 * f64::from(links);
+                let node = (place as usize).min(links as usize - 1);
+                (node, (place - node as f64) as f32)
             })
             .collect(),
     }

@@ -27,12 +27,6 @@ pub(super) struct Sway {
 
 impl Sway {
     /// At a time; before and after, the clamp stands.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the number of samples"
-    )]
     fn at(&self, time_s: f64) -> f64 {
         let last = self.forward_m.len() - 1;
         let place = (time_s / self.period_s).clamp(0.0, last as f64);
@@ -82,7 +76,6 @@ pub(super) fn delay_s(seen: &[[f64; 2]], sway: &Sway) -> Result<f64, ObserveErro
 
 /// Correlation of the two sways at a delay, and the seen one as a part of the known.
 fn fit(seen: &[[f64; 2]], sway: &Sway, delay_s: f64) -> (f64, f64) {
-    #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
     let count = seen.len().max(1) as f64;
     let (mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for [time_s, forward_m] in seen {

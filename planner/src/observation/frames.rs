@@ -58,7 +58,6 @@ impl FrameTable {
         let first_s = start_s + delay_s(&clamp, sway)?;
         let keypoints = seen[0].points.len();
         let mut next = 0;
-        #[allow(clippy::cast_precision_loss, reason = "frame counts are small")]
         let frames = (0..definition.frames)
             .map(|i| {
                 let t_s = first_s + i as f64 / definition.rate_hz;
@@ -83,11 +82,6 @@ impl FrameTable {
     }
 
     /// All channels, as the table in the module's documentation says.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "single precision is plenty for metres and radians"
-    )]
     pub(super) fn features(&self) -> Vec<f32> {
         let mut mean = [0.0; 2];
         let seen = self.seen().max(1) as f64;
@@ -157,12 +151,6 @@ fn see(
     let keypoints = definition.keypoints;
     let points = (0..keypoints)
         .map(|k| {
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                clippy::cast_precision_loss,
-                reason = "keypoint counts are small"
-            )]
             let (before, part) = {
                 let place = k as f64 / (keypoints - 1) as f64 * (whole.len() - 1) as f64;
                 let before = (place as usize).min(whole.len() - 2);
@@ -187,7 +175,6 @@ fn bridge(found: &[Option<[f64; 3]>]) -> Option<Vec<[f64; 3]>> {
         for i in 1..=gap {
             let before = *out.last()?;
             // Each step goes the same part of the way that is left.
-            #[allow(clippy::cast_precision_loss, reason = "two at most")]
             out.push(mix(before, *point, 1.0 / (gap + 2 - i) as f64));
         }
         out.push(*point);

@@ -7,11 +7,6 @@ pub(super) fn setpoints(
     trajectory: &JointTrajectory,
     period_s: f64,
 ) -> impl Iterator<Item = (f64, JointVector)> + '_ {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a trajectory lasts at most ten minutes"
-    )]
     let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
     (0..=cycles).map(move |k| {
         let time_s = f64::from(k) * period_s;
@@ -20,7 +15,6 @@ pub(super) fn setpoints(
 }
 
 /// The wire holds single precision.
-#[allow(clippy::cast_possible_truncation, reason = "that is the point")]
 fn on_the_wire(q: JointVector) -> JointVector {
     q.map(|v| f64::from(v as f32))
 }

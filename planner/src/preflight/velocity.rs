@@ -64,11 +64,6 @@ impl Ramp {
 pub(super) fn cycles(trajectory: &JointTrajectory, limits: &Limits) -> Vec<Cycle> {
     let period_s = limits.period_s();
     let window = window_cycles(period_s);
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a trajectory lasts at most ten minutes"
-    )]
     let count = ((trajectory.duration_s() + SETTLE_S) / period_s).ceil() as u32;
     let start = trajectory.start();
     let mut ramp = Ramp {
@@ -110,12 +105,6 @@ pub(super) fn cycles(trajectory: &JointTrajectory, limits: &Limits) -> Vec<Cycle
 }
 
 /// How many cycles the controller remembers what it asked for.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "a tenth of a second"
-)]
 fn window_cycles(period_s: f64) -> usize {
     (1e-9 * Thresholds::strict().tracking_window_ns as f64 / period_s).round() as usize
 }

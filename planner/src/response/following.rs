@@ -95,11 +95,6 @@ impl Following {
 
     /// What the arm is told, and when (s, rad).
     fn setpoints(&self, command: &JointTrajectory) -> Vec<(f64, JointVector)> {
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a trajectory lasts at most ten minutes"
-        )]
         let cycles = (command.duration_s() / self.period_s).ceil() as u32;
         (0..=cycles)
             .map(|k| f64::from(k) * self.period_s)
@@ -115,12 +110,6 @@ fn is_still(command: &JointTrajectory, joint: usize) -> bool {
 }
 
 fn knots_s(end_s: f64) -> Vec<f64> {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "at most a few hundred knots"
-    )]
     let segments = ((end_s / KNOT_S).ceil() as u32).clamp(1, MAX_WAYPOINTS as u32 - 1);
     (0..=segments)
         .map(|k| end_s * f64::from(k) / f64::from(segments))

@@ -88,7 +88,6 @@ fn spread_px2(
     apart.map_or(f64::INFINITY, |a| variance(&a))
 }
 
-#[allow(clippy::cast_precision_loss, reason = "a few hundred points")]
 fn variance(points: &[[f64; 2]]) -> f64 {
     let n = points.len() as f64;
     (0..2)

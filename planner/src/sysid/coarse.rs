@@ -90,11 +90,6 @@ impl<'a> Comparer<'a> {
     pub(super) fn compare(&self, points: &[Point]) -> Result<Vec<Compared>, IdentifyError> {
         // Lanes hold ropes of one count: few counts fill them.
         let (fewest, most) = link_range();
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a small positive number"
-        )]
         let links = |x: &Point| (x[LINKS].round().max(1.0) as u32).clamp(fewest, most);
         let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links(x))).collect();
         let rollouts = self.film.simulate(&ropes, Fidelity::Coarse)?;

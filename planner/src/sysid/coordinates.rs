@@ -130,11 +130,6 @@ pub(super) fn simulated_rope(x: &Point, links: u32) -> RopeParams {
 }
 
 /// Smallest and largest link count of the ranges.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a range of small positive numbers"
-)]
 pub(super) fn link_range() -> (u32, u32) {
     let range = RANGES[parameter::LINKS];
     (range.min as u32, range.max as u32)

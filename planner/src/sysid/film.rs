@@ -56,11 +56,9 @@ impl Grid {
         observation: &Observation<'_>,
         confidence_min: f64,
     ) -> Self {
-        #[allow(clippy::cast_precision_loss, reason = "keypoint counts are small")]
         let keypoints = observation.track.keypoints as f64;
         let sighting = |frame: &TrackedFrame, i: usize| {
             let (pixel, confidence) = (frame.points[i], frame.confidence[i]);
-            #[allow(clippy::cast_precision_loss, reason = "keypoint counts are small")]
             let along = match observation.points {
                 ObservedPoints::ArcLength => i as f64 / (keypoints - 1.0),
                 ObservedPoints::LinkCentres => (i as f64 + 0.5) / keypoints,
@@ -167,11 +165,6 @@ impl<'a> Film<'a> {
             Fidelity::Fine => (Precision::F64, self.step_s),
         };
         let period_s = sample_s(fidelity);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a positive count of about a thousand"
-        )]
         let count = (self.horizon_s / period_s).floor() as usize + 1;
         SimOptions {
             step_s,
@@ -227,12 +220,6 @@ pub(super) struct Instant {
 }
 
 impl Instant {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the sample count"
-    )]
     pub(super) fn new(time_s: f64, period_s: f64, samples: usize) -> Self {
         let last = samples - 1;
         let u = (time_s / period_s).clamp(0.0, last as f64);
@@ -251,12 +238,6 @@ impl Instant {
     }
 
     /// Point of the rope at a place along it, linear along the links.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the node count"
-    )]
     pub(super) fn position(&self, nodes: &NodeTrack, along: f64) -> Vector3<f64> {
         let last = nodes.nodes() - 1;
         let place = along * last as f64;

@@ -104,7 +104,6 @@ fn subtract(rows: &mut Rows, index: usize, before: usize, axis: usize, correlati
 }
 
 impl AxisNoise {
-    #[allow(clippy::cast_precision_loss, reason = "counts are small")]
     fn estimate(grid: &Grid, rows: &Rows, axis: usize) -> Self {
         let residual = |i: usize| rows[i].as_ref().map(|r| r[axis][RESIDUAL]);
         let mut sizes: Vec<f64> = (0..rows.len()).filter_map(residual).map(f64::abs).collect();

@@ -172,11 +172,6 @@ fn links_of(draws: &[Draw]) -> [f64; LINK_COUNTS] {
     let (low, _) = link_range();
     let mut out = [0.0; LINK_COUNTS];
     for d in draws {
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "one of the counts of the ranges"
-        )]
         let index = (d.values[0] - f64::from(low)).round() as usize;
         out[index.min(LINK_COUNTS - 1)] += d.weight;
     }
@@ -264,7 +259,6 @@ fn count_interval(probability: &[f64; LINK_COUNTS]) -> [f64; 2] {
         }
     }
     let (low, _) = link_range();
-    #[allow(clippy::cast_precision_loss, reason = "seven counts")]
     [first, last].map(|i| f64::from(low) + i as f64)
 }
 

@@ -85,11 +85,6 @@ pub(super) fn refine(
 }
 
 /// The link count nearest to a point's, within the ranges.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to a range of small positive numbers"
-)]
 fn likeliest_links(x: &Point) -> u32 {
     let (low, high) = link_range();
     x[LINKS].round().clamp(f64::from(low), f64::from(high)) as u32
@@ -97,7 +92,6 @@ fn likeliest_links(x: &Point) -> u32 {
 
 /// Spread of the gradient over the parts of the film, relative to what the normal
 /// equations expect, averaged over all directions.
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 fn disagreement(normal: &Normal, covariance: &Square) -> f64 {
     let parts = normal.parts.len() as f64;
     if parts < 3.0 {

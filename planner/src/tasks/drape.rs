@@ -192,7 +192,6 @@ impl ThrowTask for Drape {
             )
         });
         let missing = self.conditions(outcome).iter().filter(|c| !c.1).count();
-        #[allow(clippy::cast_precision_loss, reason = "at most four")]
         let missing = missing as f64;
         c.throw.weights.distance_per_m * (outcome.closest_m + hang_m)
             + c.arc_per_m * arc_m

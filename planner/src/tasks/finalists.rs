@@ -165,12 +165,10 @@ impl Setup<'_> {
         if !own.finite || own.contacts.pole_robot > 0 {
             return None;
         }
-        #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
         let count = outcomes.len().max(1) as f64;
         let squares: f64 = outcomes.iter().map(|o| self.task.error_m(o).powi(2)).sum();
         let good = self.ropes.iter().zip(&outcomes);
         let good = good.filter(|(rope, o)| o.finite && self.task.judge(rope, o).success);
-        #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
         let successes = good.count() as f64 / count;
         let contacts = self.task.config().weights.contacts(&outcomes[0].contacts);
         Some(Finalist {

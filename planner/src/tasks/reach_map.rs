@@ -187,11 +187,6 @@ fn tip_paths(
         .collect::<Result<Vec<_>, PlanError>>()?;
     let candidates: Vec<Candidate> = motions.iter().map(|m| Candidate::new(rope, m)).collect();
     let horizon_s = space.times_s[WAYPOINTS - 1] + config.tail_s;
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few hundred frames"
-    )]
     let count = (horizon_s / PERIOD_S).floor() as usize + 1;
     let options = SimOptions {
         step_s: STEP_S,
@@ -235,7 +230,6 @@ fn passed(
         let Some(tip) = nodes.last().filter(|tip| free && tip.x.is_finite()) else {
             break;
         };
-        #[allow(clippy::cast_possible_truncation, reason = "a few metres in cells")]
         let at = |v: f64| (v / CELL_M).floor() as i32;
         cells.push((at(tip.x), at(tip.z)));
     }

@@ -20,15 +20,8 @@ const GENERATIONS: usize = 20;
 /// Mean, and mean of the worst fifth (conditional value at risk) with its weight.
 fn risk(mut values: Vec<f64>) -> f64 {
     values.sort_by(|a, b| b.total_cmp(a));
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a handful of ropes"
-    )]
     let worst = (WORST_PART * values.len() as f64).ceil() as usize;
     let mean = |v: &[f64]| {
-        #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
         let count = v.len().max(1) as f64;
         v.iter().sum::<f64>() / count
     };
@@ -137,14 +130,7 @@ pub(super) fn forecast(
     if errors.is_empty() {
         return Ok(None);
     }
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an index of the list"
-    )]
     let at = |part: f64| errors[(part * (errors.len() - 1) as f64).round() as usize];
-    #[allow(clippy::cast_precision_loss, reason = "a few dozen ropes")]
     let mean_m = errors.iter().sum::<f64>() / errors.len() as f64;
     Ok(Some(ErrorForecast {
         ropes: u32::try_from(errors.len()).unwrap_or(u32::MAX),

@@ -125,11 +125,6 @@ impl ThrowSimulator {
             .map(|((rope, _), arm)| Candidate::new(rope, arm))
             .collect();
         let looked_s = motion_s + self.contact_tail_s.min(self.tail_s);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a positive count of a few hundred"
-        )]
         let count = (looked_s / self.contact_period_s).floor() as usize + 1;
         let frames = FrameTimes {
             first_s: 0.0,

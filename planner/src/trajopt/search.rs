@@ -108,7 +108,6 @@ pub fn search(
             .map(|x| space.decode(x))
             .collect::<Result<Vec<_>, _>>()?;
         let values = value(&trajectories)?;
-        #[allow(clippy::cast_precision_loss, reason = "populations are small")]
         let success_part =
             values.iter().filter(|v| v.success).count() as f64 / values.len().max(1) as f64;
         simulations += trajectories.len();

@@ -43,10 +43,6 @@ pub struct Batch {
 
 /// Parameters as parts of their ranges, order of [`RANGES`].
 #[must_use]
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "single precision is plenty for numbers from 0 to 1"
-)]
 pub fn normalised(rope: &RopeParams) -> [f32; ROPE_PARAMETERS] {
     let values = rope.to_array();
     core::array::from_fn(|i| {
@@ -143,7 +139,6 @@ impl<'a> Studio<'a> {
     pub fn batch(&self, step: usize, standard: &Standard) -> Result<Batch, TrainingError> {
         let training = &self.config.training;
         let noise_seed = seed_for(training.seed, Purpose::Noise);
-        #[allow(clippy::cast_precision_loss, reason = "step counts are far below 2^52")]
         let part = step as f64 / training.steps as f64;
         let phase = MaskPhase::at(&training.masking, part);
         let mut batch = Batch::with_capacity(training.batch);

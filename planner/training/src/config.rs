@@ -200,11 +200,6 @@ impl TrainingConfig {
 }
 
 /// Most links of the ranges.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a small positive whole number"
-)]
 fn most_links() -> usize {
     RANGES[0].max as usize
 }
@@ -212,7 +207,6 @@ fn most_links() -> usize {
 impl OptimisationConfig {
     /// Learning rate of a step: linear warm-up, then a cosine to 0.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "step counts are far below 2^52")]
     pub fn learning_rate_at(&self, step: usize) -> f64 {
         if step < self.warmup_steps {
             return self.learning_rate * (step + 1) as f64 / self.warmup_steps as f64;

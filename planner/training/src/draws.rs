@@ -36,10 +36,6 @@ pub(crate) fn generator(seed: u64, purpose: Purpose, place: u64) -> ChaCha12Rng 
 
 /// A random order of `0..count`.
 pub(crate) fn order(rng: &mut ChaCha12Rng, count: usize) -> Vec<u32> {
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "pools have far fewer ropes than 2^32"
-    )]
     let mut order: Vec<u32> = (0..count as u32).collect();
     for i in (1..count).rev() {
         order.swap(i, rng.random_range(0..=i));

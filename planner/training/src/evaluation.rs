@@ -62,7 +62,6 @@ pub struct Evaluation {
 
 /// Judges predictions.
 #[must_use]
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 pub fn evaluate(judged: &[Judged]) -> Evaluation {
     let count = judged.len().max(1) as f64;
     let mean = |f: &dyn Fn(&Judged) -> f64| judged.iter().map(f).sum::<f64>() / count;

@@ -48,11 +48,6 @@ impl Familiar {
     ///
     /// # Errors
     /// Too few of them, or embeddings that are not finite.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "single precision is plenty for a score"
-    )]
     pub fn measure(known: &[Predicted], others: &[Predicted]) -> Result<Self, TrainingError> {
         let wrong = |value: String| TrainingError::Value {
             key: "ropes for the oddity",
@@ -250,7 +245,6 @@ impl GraphWriter {
             let beta = beta.unwrap_or_else(|| Ok(vec![0.0; out]))?;
             let gamma = self.floats(&format!("{name}.norm.scale"), &[out], &gamma);
             let beta = self.floats(&format!("{name}.norm.bias"), &[out], &beta);
-            #[allow(clippy::cast_possible_truncation, reason = "1e-5 in single precision")]
             let epsilon = NORM_EPSILON as f32;
             x = self.node(
                 "LayerNormalization",
@@ -325,7 +319,6 @@ impl GraphWriter {
     fn oddity(&mut self, embedding: &str, familiar: &Familiar) {
         let mean = self.floats("familiar.mean", &[EMBEDDING], &familiar.mean);
         let whiten = self.floats("familiar.whiten", &[EMBEDDING, EMBEDDING], &familiar.whiten);
-        #[allow(clippy::cast_precision_loss, reason = "256 is exact")]
         let share = vec![1.0 / EMBEDDING as f32; EMBEDDING];
         let share = self.floats("familiar.share", &[EMBEDDING, 1], &share);
         let x = self.node("Sub", &[embedding, &mean], &[]);

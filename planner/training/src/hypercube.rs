@@ -58,7 +58,6 @@ impl Hypercube {
         RopeParams::from_array(core::array::from_fn(|parameter| {
             let parts = &self.parts[parameter];
             let within: f64 = rng.random();
-            #[allow(clippy::cast_precision_loss, reason = "counts far below 2^52")]
             let u = (f64::from(parts[index]) + within) / parts.len() as f64;
             let range = RANGES[parameter];
             if range.key == "links" {

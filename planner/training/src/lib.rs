@@ -21,7 +21,6 @@
         clippy::expect_used,
         clippy::panic,
         clippy::float_cmp,
-        clippy::cast_precision_loss,
         reason = "tests may fail loudly"
     )
 )]

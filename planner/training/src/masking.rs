@@ -62,12 +62,6 @@ impl MaskPhase {
                 // Half of the blocks begin in the first quarter.
                 along *= along;
             }
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                clippy::cast_precision_loss,
-                reason = "frame counts are small"
-            )]
             let start = (along * (places + 1) as f64) as usize;
             features.mask(start..start + self.block_frames);
         }

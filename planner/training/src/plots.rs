@@ -11,7 +11,6 @@ use std::path::Path;
 ///
 /// # Errors
 /// A plot that cannot be drawn or written.
-#[allow(clippy::cast_precision_loss, reason = "step counts are far below 2^52")]
 pub fn plot_losses(path: &Path, metrics: &[Metric]) -> Result<(), TrainingError> {
     let trained: Vec<(f64, f64)> = metrics.iter().map(|m| (m.step as f64, m.loss)).collect();
     let held_out: Vec<(f64, f64)> = metrics

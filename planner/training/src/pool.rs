@@ -248,10 +248,6 @@ impl Pool {
 
     fn push(&mut self, film: &RopeFilm) {
         self.ropes.push((*film.rope(), film.is_finite()));
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "saturates 2 m from the base, beyond any rope's reach"
-        )]
         let unit = |x: &f32| (x * UNITS_PER_M).round() as i16;
         for sample in film.positions_m().chunks_exact(3 * film.keypoints()) {
             let filled = self.positions.len() + 3 * self.keypoints;
@@ -265,7 +261,6 @@ impl Pool {
         self.positions.extend(other.positions);
     }
 
-    #[allow(clippy::cast_possible_truncation, reason = "counts are far below 2^32")]
     fn to_bytes(&self, recipe: &Recipe, shard: usize) -> Vec<u8> {
         let samples = self.positions.len() / (self.len().max(1) * self.keypoints * 3);
         let mut out = Vec::with_capacity(HEADER + self.len() * 73 + self.positions.len() * 2 + 4);

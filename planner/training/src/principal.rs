@@ -33,11 +33,6 @@ impl Principal {
     /// Measures standardised films with errors and without; `scale` is that of the
     /// channels.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "single precision is plenty for a change of axes"
-    )]
     pub fn measure(
         films: &[Vec<f32>],
         clean: &[Vec<f32>],
@@ -107,7 +102,6 @@ impl Principal {
 }
 
 /// Means of each [`POOL`] frames; frames left over at the end are left out.
-#[allow(clippy::cast_precision_loss, reason = "8 is exact")]
 fn pooled(motion: &[f32], channels: usize) -> Vec<f32> {
     let mut out = Vec::with_capacity(motion.len() / POOL);
     for group in motion.chunks_exact(POOL * channels) {

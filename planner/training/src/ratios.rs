@@ -12,10 +12,6 @@ pub(crate) const RATIOS: usize = 3;
 /// Logarithms of bending stiffness and damping over mass per length, and of lead mass
 /// over rope mass, each shifted and scaled to about mean 0 and deviation 1.
 #[must_use]
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "single precision is plenty for numbers of size 1"
-)]
 pub(crate) fn log_ratios(rope: &RopeParams) -> [f32; RATIOS] {
     let v = rope.to_array();
     let (link_m, mass) = (v[1] / v[0], v[5]);

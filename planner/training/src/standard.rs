@@ -29,10 +29,6 @@ pub struct Standard {
 impl Standard {
     /// Measures films with all their errors, and without any.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "single precision is plenty for means and deviations"
-    )]
     pub fn measure(films: &[WiggleFeatures], clean: &[WiggleFeatures]) -> Self {
         let definition = films
             .first()
@@ -104,10 +100,6 @@ impl Standard {
 }
 
 /// Mean of every frame's channels over the films in which it was seen.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "single precision is plenty for means"
-)]
 fn mean_film(films: &[WiggleFeatures], definition: &FeatureDefinition) -> Vec<f32> {
     let channels = definition.channels();
     let mut sums = vec![0.0_f64; definition.frames * channels];

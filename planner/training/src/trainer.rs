@@ -225,7 +225,6 @@ impl<'a> Judge<'a> {
         })
     }
 
-    #[allow(clippy::cast_precision_loss, reason = "counts are small")]
     fn look(
         &self,
         model: &PhiModel,

@@ -159,8 +159,6 @@ impl Room {
     }
 
     /// The room as one eye sees it, row by row, with the lens's vignetting.
-    #[allow(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    #[allow(clippy::cast_possible_truncation, reason = "video levels need no f64")]
     pub(super) fn cast(&self, eye: &Eye, vignette: &Vignette) -> Vec<Ycc> {
         let (width, height) = eye.size_px();
         let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(RAYS) - 0.5;

@@ -171,7 +171,6 @@ fn rope_strokes(
 }
 
 /// Catmull-Rom curve through the nodes, sampled finely.
-#[allow(clippy::cast_precision_loss, reason = "piece counts are small")]
 fn centreline(nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let n = nodes.len();
     let mut line = Vec::with_capacity(n * PIECES_PER_LINK);

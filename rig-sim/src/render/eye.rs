@@ -107,7 +107,6 @@ impl Vignette {
     /// Light lost in the corners of the picture.
     const CORNER_LOSS: f32 = 0.24;
 
-    #[allow(clippy::cast_precision_loss, reason = "picture sizes are small")]
     pub(super) fn of(eye: &Eye) -> Self {
         let (w, h) = eye.size_px();
         let centre = [w as f32 / 2.0, h as f32 / 2.0];

@@ -81,12 +81,6 @@ impl Renderer {
     /// row's opening to the last row's end, without gaps: about one per pixel of the
     /// fastest node, at least one.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss,
-        reason = "saturates, then clamped"
-    )]
     pub fn sub_frames(&self, start: &ScenePose, end: &ScenePose) -> usize {
         let eye = &self.eyes[0].eye;
         let moved = start.nodes.iter().zip(&end.nodes).filter_map(|(a, b)| {
@@ -149,7 +143,6 @@ impl EyeCanvas {
 
     /// Draws row `v` of this eye: the room, and over it the mean of the sub-frames,
     /// each with its weight in this row, where any of them has something.
-    #[allow(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn draw_row(
         &mut self,
         v: usize,
@@ -204,7 +197,6 @@ impl EyeCanvas {
     }
 
     /// The room's colour at a pixel before the lens dims it.
-    #[allow(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     fn behind(&self, u: usize, v: usize) -> Ycc {
         let dim = self.vignette.at(u as f32, v as f32);
         self.room[v * self.arm.width() + u].map(|c| c / dim)

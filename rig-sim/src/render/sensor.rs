@@ -27,10 +27,7 @@ impl Sensor {
             .map(|i| {
                 let scale = if i % 2 == 0 { 1.0 } else { CHROMA_NOISE };
                 let value = normal.as_ref().map_or(0.0, |n| n.sample(&mut rng)) * scale;
-                #[allow(clippy::cast_possible_truncation, reason = "saturates")]
-                {
-                    value.round() as i8
-                }
+                value.round() as i8
             })
             .collect();
         Self { table, seed }
@@ -51,11 +48,6 @@ impl Sensor {
 }
 
 /// Packs pixel pairs into `Y0 Cb Y1 Cr`; `out` holds two bytes a pixel.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "video levels; float to integer casts saturate"
-)]
 pub(super) fn pack_yuyv(pixels: &[[f32; 3]], out: &mut [u8]) {
     let level = |v: f32| (v + 0.5) as u8;
     for (pair, out) in pixels.chunks_exact(2).zip(out.chunks_exact_mut(4)) {

@@ -27,11 +27,6 @@ impl RowTimes {
 
     /// Part (0 to 1) of the time of sub-frame `i` of `count` during which row `v` gathers
     /// light; they lie evenly over the frame's time.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "rows and sub-frames are few; a weight needs no more"
-    )]
     pub(super) fn weight(self, v: usize, i: usize, count: usize) -> f32 {
         let opens = self.per_row * v as f64 * count as f64;
         let closes = opens + self.open * count as f64;

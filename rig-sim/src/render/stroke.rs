@@ -64,12 +64,6 @@ impl FromIterator<Stroke> for Strokes {
     }
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "pixel coordinates; float to integer casts saturate"
-)]
 impl Stroke {
     /// The capsule around the segment from `a_m` to `b_m` (world), if in front
     /// of the eye.

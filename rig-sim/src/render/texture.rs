@@ -13,10 +13,6 @@ fn lattice(x: i64, y: i64, seed: u64) -> f64 {
 }
 
 /// Smooth noise in -1..1, one bump per unit of `x` and `y`.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "coordinates in a room; saturating anyway"
-)]
 pub(super) fn noise(x: f64, y: f64, seed: u64) -> f64 {
     let (x0, y0) = (x.floor(), y.floor());
     let (i, j) = (x0 as i64, y0 as i64);

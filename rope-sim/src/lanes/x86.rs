@@ -58,7 +58,6 @@ macro_rules! vector_lanes {
             const ANGLE_POLYNOMIAL: &'static [f64] = $polynomial;
 
             #[inline(always)]
-            #[allow(clippy::cast_possible_truncation, reason = "the lanes' precision")]
             #[allow(trivial_numeric_casts, reason = "one of the two types is f64")]
             fn splat(value: f64) -> Self {
                 // SAFETY: only reached inside `run_*`, see the module's text.
@@ -71,7 +70,6 @@ macro_rules! vector_lanes {
                 numbers[lane.min($count - 1)].into()
             }
             #[inline(always)]
-            #[allow(clippy::cast_possible_truncation, reason = "the lanes' precision")]
             #[allow(trivial_numeric_casts, reason = "one of the two types is f64")]
             fn set(&mut self, lane: usize, value: f64) {
                 // SAFETY: as in `get`, and the borrow is unique.

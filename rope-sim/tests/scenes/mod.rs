@@ -115,11 +115,6 @@ pub fn random_rope(rng: &mut ChaCha8Rng, links: f64) -> RopeParams {
 }
 
 pub fn options(precision: Precision, horizon_s: f64, rate_hz: f64) -> SimOptions {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "small"
-    )]
     let count = (horizon_s * rate_hz + 1e-6) as usize + 1;
     SimOptions {
         step_s: 5e-4,

@@ -109,12 +109,6 @@ mod tests {
             let mut map = ClockMap::default();
             for k in 0..25_000_u64 {
                 let true_ns = 1_000_000_000_000 + k * 4_000_000;
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    clippy::cast_precision_loss,
-                    reason = "positive and far below 2^53"
-                )]
                 let stamp_us = (5e6 + (k * 4000) as f64 * (1.0 + ppm * 1e-6)) as u64;
                 let arrival_ns = true_ns + rng.random_range(200_000..6_000_000_u64);
                 let mapped = map.to_monotonic_ns(stamp_us, arrival_ns);

@@ -45,11 +45,6 @@ impl GuardianSettings {
 
     /// The silence (ns).
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked to be 8 to 5000 before the guardian begins; a cast saturates"
-    )]
     pub const fn silence_ns(&self) -> u64 {
         (self.silence_ms * 1e6) as u64
     }

@@ -103,7 +103,6 @@ impl Latencies {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "at most 1e10")]
 fn us(ns: u64) -> f64 {
     ns as f64 / 1e3
 }

@@ -67,10 +67,7 @@ pub(crate) fn projected(camera: &StereoCamera, rope: &[nalgebra::Vector3<f64>]) 
     rope.iter()
         .filter_map(|node| camera.project_left(node))
         .filter(|pixel| camera.contains(*pixel))
-        .map(|pixel| {
-            #[allow(clippy::cast_possible_truncation, reason = "inside the picture")]
-            pixel.map(|x| x.round() as i32)
-        })
+        .map(|pixel| pixel.map(|x| x.round() as i32))
         .collect()
 }
 

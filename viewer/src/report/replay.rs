@@ -96,11 +96,6 @@ pub(crate) fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> any
     })
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a positive time of seconds"
-)]
 fn frame_count(span_s: f64) -> usize {
     (span_s * RATE_HZ).floor() as usize + 1
 }
@@ -134,7 +129,6 @@ fn moved(
 }
 
 /// A place as the page reads it (0.1 mm).
-#[allow(clippy::cast_possible_truncation, reason = "saturating")]
 pub fn tenths_mm(p: &Vector3<f64>) -> [i32; 3] {
     [0, 1, 2].map(|axis| (p[axis] * 1e4).round() as i32)
 }

@@ -1,11 +1,6 @@
 //! Wrong input to every command: exit code 2 (or 1), one clear line that names
 //! the file and the field, nothing half-written.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod files;
 mod machines;

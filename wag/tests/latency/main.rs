@@ -1,11 +1,6 @@
 //! The arm's response is found again: on twenty simulated arms in virtual time,
 //! and on one over sockets by the command itself.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod command;
 mod virtual_time;

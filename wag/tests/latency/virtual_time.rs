@@ -22,7 +22,6 @@ const START: MonotonicNs = MonotonicNs(5_000_000_000_000);
 const PAUSE_S: f64 = 0.6;
 
 /// f32, as both directions of the wire carry joints.
-#[allow(clippy::cast_possible_truncation, reason = "what the wire does")]
 fn on_the_wire(q: JointVector) -> JointVector {
     q.map(|v| f64::from(v as f32))
 }

@@ -1,11 +1,6 @@
 //! Plans on the simulated arm in virtual time: it does what the preflight says, and
 //! throws planned through its response meet their targets.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 mod preflight;
 mod response;

@@ -1,12 +1,7 @@
 //! The processes of `wag` while one of them dies: what a running plan needs, it
 //! has; what an operator withdraws, stops.
-#![allow(
-    unreachable_pub,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
+#![allow(unreachable_pub, reason = "a test")]
 
 mod demo;
 mod identical;

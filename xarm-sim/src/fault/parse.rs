@@ -216,10 +216,6 @@ fn fields_of(kind: &Kind) -> String {
     quoted(&all)
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "bounds of whole numbers are far below 2^53"
-)]
 fn number(value: &Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }

@@ -45,10 +45,6 @@ impl ArmModel {
     }
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "f32 is what the wire holds"
-)]
 fn f32_le(value: &f64) -> [u8; 4] {
     (*value as f32).to_le_bytes()
 }

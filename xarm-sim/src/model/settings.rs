@@ -46,10 +46,6 @@ pub(crate) struct Reduced {
 
 impl Settings {
     /// As delivered.
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "f32 is what the wire holds"
-    )]
     pub(crate) fn factory(config: &ArmConfig) -> Self {
         let limits = &config.limits;
         Self {

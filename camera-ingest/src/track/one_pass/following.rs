@@ -148,7 +148,6 @@ impl Following {
 }
 
 /// Mean way of the nodes between two curves (px).
-#[allow(clippy::cast_precision_loss, reason = "some dozen nodes")]
 fn way_px(before: &[Point], now: &[Point], px_per_m: f64) -> f64 {
     let ways = before.iter().zip(now).map(|(a, b)| norm(sub(*a, *b)));
     ways.sum::<f64>() / now.len() as f64 * px_per_m

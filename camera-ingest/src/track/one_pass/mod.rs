@@ -66,7 +66,6 @@ struct Newest {
 }
 
 impl Newest {
-    #[allow(clippy::cast_precision_loss, reason = "nanoseconds of hours")]
     fn put(&mut self, frame: EyeFrame) {
         if self.count == 0 {
             self.first_stamp_ns = frame.stamp_ns;
@@ -207,7 +206,6 @@ impl OnePass {
     }
 
     /// Time of the frame in which the rope hung still (s).
-    #[allow(clippy::cast_precision_loss, reason = "nanoseconds of hours")]
     fn rest_s(&self, scene: &Scene) -> f64 {
         let since = scene.rest().stamp_ns;
         since.saturating_sub(self.newest.first_stamp_ns) as f64 * 1e-9

@@ -46,7 +46,6 @@ impl Finding {
 
     /// About a time in nanoseconds, given in seconds.
     #[must_use]
-    #[allow(clippy::cast_precision_loss, reason = "spans stay far below 2^53 ns")]
     pub const fn of_time(fault: FaultCode, value_ns: u64, limit_ns: u64) -> Self {
         Self::new(fault, value_ns as f64 * 1e-9, limit_ns as f64 * 1e-9)
     }
