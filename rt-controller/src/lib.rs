@@ -11,7 +11,8 @@
 //!                                 +----[ receiver ]------+ <----------------------- report port
 //! ```
 //!
-//! Read in this order: [`rt_loop`] (one cycle, top to bottom), [`control`] (the
+//! Read in this order: [`driver`] (one cycle, top to bottom), [`rt_loop`] (the thread
+//! it runs in), [`control`] (the
 //! pure core it steps), [`transport`] and [`xarm`] (the wire), then [`relay`]
 //! and [`process`] (everything that may wait).
 //!
@@ -40,6 +41,6 @@ pub mod transport;
 pub mod trial;
 
 pub use config::ControllerConfig;
-pub use control_core::{clock_map, control, overrun, point_to_point, xarm};
+pub use control_core::{clock_map, control, driver, overrun, point_to_point, report_feed, xarm};
 pub use error::ControllerError;
 pub use process::run;

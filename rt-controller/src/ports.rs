@@ -2,7 +2,8 @@
 //! single-producer single-consumer, lock-free, sized once.
 
 use crate::arm_status::ArmStatus;
-use crate::control::{ControlEvent, ControlState, CycleOutput, Motion, Order};
+use crate::control::{ControlEvent, ControlState, CycleOutput, Motion};
+use crate::driver::Mail;
 use crate::recording::{RecordedCycle, Snapshot};
 use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -20,15 +21,6 @@ const REPORTS: usize = 4096;
 const NEWEST_REPORTS: usize = 16;
 /// Orders, events and retired things are few.
 const FEW: usize = 64;
-
-/// An order for the loop, with the command link that comes with an adoption.
-#[derive(Debug)]
-pub struct Mail<T> {
-    /// What to do.
-    pub order: Order,
-    /// A fresh link, which replaces the present one.
-    pub link: Option<Box<T>>,
-}
 
 /// Something the loop is done with, to be dropped by the relay.
 #[derive(Debug)]
@@ -79,13 +71,6 @@ impl<T> RtPorts<T> {
         (0..NEWEST_REPORTS)
             .map_while(|_| self.status.pop().ok())
             .last()
-    }
-
-    /// Hands a link back to be dropped. RT-safe.
-    pub fn retire_link(&mut self, link: Option<Box<T>>) {
-        if let Some(link) = link {
-            let _ = self.retired.push(Retired::Link(link));
-        }
     }
 
     /// Passes on the whole state once a second, before a cycle. RT-safe.

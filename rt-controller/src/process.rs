@@ -205,8 +205,9 @@ impl Threads {
             let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
             rt.rehearse(rehearsal);
             let warnings = enter_real_time(&settings);
-            rt.real_time =
-                warnings.is_empty() && settings.priority.is_some() && settings.lock_memory;
+            rt.set_real_time(
+                warnings.is_empty() && settings.priority.is_some() && settings.lock_memory,
+            );
             let words: Vec<String> = warnings.iter().map(ToString::to_string).collect();
             let _ = ready.send(Ok(words));
             // A panic is a defect; caught here, the relay can still stop the arm.

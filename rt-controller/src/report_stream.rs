@@ -1,14 +1,11 @@
 //! Listening to a report port: connecting, cutting the stream into frames,
 //! connecting again, for as long as the controller runs.
 //!
-//! What the frames mean is the sink's business. A frame that cannot be used is
-//! dropped and counted; a stream that lost its place is opened anew at once. A
-//! torn report is filled up with the beginning of the next one: such a frame may
-//! hold proper numbers in wrong places, so one that took long to arrive, or that
-//! is followed by what is no report, is dropped as well.
+//! What the frames mean is the sink's business, which of them can be used that of
+//! [`ReportFeed`].
 
 use crate::os::now_ns;
-use crate::xarm::ReportReader;
+use crate::report_feed::{RETRY_NS, ReportFeed};
 use std::io::{ErrorKind, Read};
 use std::net::{IpAddr, SocketAddr, TcpStream};
 use std::sync::Arc;
@@ -17,15 +14,10 @@ use std::time::Duration;
 
 /// Longest wait for a connection.
 const CONNECT_TIMEOUT: Duration = Duration::from_millis(500);
-/// Pause before a new attempt.
-const RETRY: Duration = Duration::from_millis(200);
 /// Longest wait for bytes before `quit` is looked at again.
 const READ_TIMEOUT: Duration = Duration::from_millis(100);
-/// Longest time from the first byte of a report to its last (ns); half the time
-/// between two. A report is one packet.
-const ARRIVES_WITHIN_NS: u64 = 2_000_000;
-/// Silence after which the connection is given up and opened again.
-const SILENCE_NS: u64 = 2_000_000_000;
+/// Pause before a new attempt where nothing listened.
+const RETRY: Duration = Duration::from_nanos(RETRY_NS);
 
 /// Reports that had to be dropped, counted across threads. Reading it is RT-safe.
 #[derive(Debug, Clone, Default)]
@@ -38,8 +30,8 @@ impl BrokenReports {
         self.0.load(Ordering::Relaxed)
     }
 
-    fn add_one(&self) {
-        self.0.fetch_add(1, Ordering::Relaxed);
+    fn add(&self, count: u32) {
+        self.0.fetch_add(count, Ordering::Relaxed);
     }
 }
 
@@ -72,19 +64,12 @@ impl<S: ReportSink> ReportStream<S> {
     /// Listens until `quit` is set.
     pub fn run(&mut self) {
         while !self.quit.load(Ordering::Relaxed) {
-            let opened_ns = now_ns();
-            let mut at_once = false;
-            if let Some((port, stream)) = self.connect() {
+            let pause = self.connect().map_or(RETRY, |(port, stream)| {
                 self.sink.opened(port);
-                let lost_its_place = self.listen(port, stream);
-                let lasted_ns = u128::from(now_ns().saturating_sub(opened_ns));
-                at_once = lost_its_place && lasted_ns > RETRY.as_nanos();
-            }
-            if self.quit.load(Ordering::Relaxed) {
-                return;
-            }
-            if !at_once {
-                std::thread::sleep(RETRY);
+                self.listen(port, stream)
+            });
+            if !self.quit.load(Ordering::Relaxed) {
+                std::thread::sleep(pause);
             }
         }
     }
@@ -101,79 +86,39 @@ impl<S: ReportSink> ReportStream<S> {
         ports.find_map(|(index, port)| open(*port).map(|stream| (index, stream)))
     }
 
-    /// Passes frames on until the connection breaks, falls silent or `quit`;
-    /// true when it lost its place instead.
-    fn listen(&mut self, port: usize, mut stream: TcpStream) -> bool {
-        let mut reader = ReportReader::new();
-        let mut seen = Seen::default();
-        let mut heard_ns = now_ns();
-        while !self.quit.load(Ordering::Relaxed) {
-            match stream.read(reader.space()) {
+    /// Passes frames on until the connection breaks, falls silent, loses its place
+    /// or `quit`; the pause before the next one.
+    fn listen(&mut self, port: usize, mut stream: TcpStream) -> Duration {
+        let mut feed = ReportFeed::opened(now_ns());
+        let mut lost_place = None;
+        while lost_place.is_none() && !self.quit.load(Ordering::Relaxed) {
+            let len = match stream.read(feed.space()) {
                 Ok(0) => break,
-                Ok(n) => reader.commit(n),
+                Ok(len) => len,
                 Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                    if now_ns().saturating_sub(heard_ns) > SILENCE_NS {
+                    if feed.is_silent(now_ns()) {
                         break;
                     }
                     continue;
                 }
                 Err(e) if e.kind() == ErrorKind::Interrupted => continue,
                 Err(_gone) => break,
-            }
-            heard_ns = now_ns();
-            if !self.pass_on(port, &mut reader, &mut seen, heard_ns) {
-                return true;
-            }
+            };
+            let arrival_ns = now_ns();
+            let seen = feed.received(len, arrival_ns, |frame| {
+                self.sink.take(port, frame, arrival_ns)
+            });
+            self.broken.add(seen.broken);
+            lost_place = seen.lost_place;
         }
-        tracing::debug!("report connection ended");
-        false
-    }
-
-    /// Passes all whole frames on; false when the stream lost its place. The
-    /// size of a connection's reports never changes, so one of another size
-    /// than the first good one is torn.
-    fn pass_on(
-        &mut self,
-        port: usize,
-        reader: &mut ReportReader,
-        seen: &mut Seen,
-        arrival_ns: u64,
-    ) -> bool {
-        loop {
-            let followed_by_a_report = reader.is_followed_by_a_report();
-            let begun_ns = seen.begun_ns.take().unwrap_or(arrival_ns);
-            match reader.next_report() {
-                Ok(Some(frame)) => {
-                    let torn = !followed_by_a_report
-                        || arrival_ns.saturating_sub(begun_ns) > ARRIVES_WITHIN_NS;
-                    let fits = seen.size.is_none_or(|size| size == frame.len());
-                    if fits && !torn && self.sink.take(port, frame, arrival_ns) {
-                        seen.size = Some(frame.len());
-                    } else {
-                        self.broken.add_one();
-                    }
-                }
-                Ok(None) => {
-                    seen.begun_ns = (!reader.is_empty()).then_some(begun_ns);
-                    return true;
-                }
-                Err(broken) => {
-                    self.broken.add_one();
-                    tracing::warn!(%broken, "a report stream lost its place");
-                    return false;
-                }
-            }
+        match lost_place {
+            Some(broken) => tracing::warn!(%broken, "a report stream lost its place"),
+            None => tracing::debug!("report connection ended"),
         }
+        let over_ns = now_ns();
+        let retry_ns = feed.retry_ns(over_ns, lost_place.is_some());
+        Duration::from_nanos(retry_ns.saturating_sub(over_ns))
     }
-}
-
-/// What is remembered of a connection.
-#[derive(Debug, Default)]
-struct Seen {
-    /// Size of its reports (bytes).
-    size: Option<usize>,
-    /// When the first byte of a report that is not whole yet came (ns).
-    begun_ns: Option<u64>,
 }
 
 #[cfg(test)]

@@ -5,13 +5,11 @@
 //! 30000, 250 Hz, with the arm's own clock) or, where that is refused, to the
 //! real report (port 30003, 100 Hz, without).
 
-use crate::clock_map::ClockMap;
 use crate::os::schedule::set_fifo;
+use crate::report_feed::JointDecoder;
 use crate::report_stream::{BrokenReports, ReportSink, ReportStream};
-use crate::xarm::report::{ForceReport, MAX_REPORT_LEN, REALTIME_REPORT_LEN, RealtimeReport};
-use arm_model::JointVector;
 use rtrb::Producer;
-use shared_types::ipc::{JointReport, PAYLOAD_VERSION};
+use shared_types::ipc::JointReport;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -47,7 +45,7 @@ pub fn spawn(
         sink: JointSink {
             to_loop,
             to_relay,
-            clocks: ClockMap::default(),
+            decoder: JointDecoder::default(),
         },
         broken,
         quit,
@@ -66,21 +64,21 @@ pub fn spawn(
 struct JointSink {
     to_loop: Producer<JointReport>,
     to_relay: Producer<JointReport>,
-    clocks: ClockMap,
+    decoder: JointDecoder,
 }
 
 impl ReportSink for JointSink {
     fn opened(&mut self, _port: usize) {
-        self.clocks = ClockMap::default();
+        self.decoder = JointDecoder::default();
     }
 
     fn take(&mut self, port: usize, frame: &[u8], arrival_ns: u64) -> bool {
         let decoded = if port == 0 {
-            realtime(frame, arrival_ns, &mut self.clocks)
+            self.decoder.realtime(frame, arrival_ns)
         } else {
-            real(frame, arrival_ns)
+            JointDecoder::real(frame, arrival_ns)
         };
-        let Some(report) = decoded.filter(is_finite) else {
+        let Some(report) = decoded else {
             return false;
         };
         let _ = self.to_loop.push(report);
@@ -89,64 +87,22 @@ impl ReportSink for JointSink {
     }
 }
 
-fn is_finite(report: &JointReport) -> bool {
-    report.q.is_finite() && report.qd.is_finite() && report.q_target.is_finite()
-}
-
-/// A report of port 30000; `None` for another size than any firmware sends.
-fn realtime(frame: &[u8], arrival_ns: u64, clocks: &mut ClockMap) -> Option<JointReport> {
-    if !(REALTIME_REPORT_LEN..=MAX_REPORT_LEN).contains(&frame.len()) {
-        return None;
-    }
-    // Before the clock is followed: nonsense must not lead it astray.
-    let r = RealtimeReport::parse(frame)
-        .ok()
-        .filter(RealtimeReport::is_plausible)?;
-    Some(JointReport {
-        version: PAYLOAD_VERSION,
-        arm_state: r.state.code(),
-        arm_mode: r.mode.code(),
-        // The reading is of this very stamp.
-        stamp_ns: clocks.to_monotonic_ns(r.time_us, arrival_ns),
-        arm_clock: clocks.reading(),
-        arrival_ns,
-        q: r.actual.q,
-        qd: r.actual.qd,
-        q_target: r.target.q,
-    })
-}
-
-/// A report of port 30003, which has measured angles only.
-fn real(frame: &[u8], arrival_ns: u64) -> Option<JointReport> {
-    let r = ForceReport::parse(frame).ok()?.basic;
-    Some(JointReport {
-        version: PAYLOAD_VERSION,
-        arm_state: r.state.code(),
-        arm_mode: r.mode.code(),
-        arm_clock: 0,
-        stamp_ns: arrival_ns,
-        arrival_ns,
-        q: r.q,
-        qd: JointVector::ZERO,
-        q_target: r.q,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::xarm::report::{MAX_REPORT_LEN, RealtimeReport};
     use crate::xarm::{ArmState, Mode, TcpPose};
-    use arm_model::JointState;
+    use arm_model::{JointState, JointVector};
     use rtrb::{Consumer, RingBuffer};
 
     fn sink() -> (JointSink, Consumer<JointReport>) {
         let (to_loop, taken) = RingBuffer::new(4);
         let (to_relay, _) = RingBuffer::new(4);
-        let clocks = ClockMap::default();
+        let decoder = JointDecoder::default();
         let sink = JointSink {
             to_loop,
             to_relay,
-            clocks,
+            decoder,
         };
         (sink, taken)
     }

@@ -10,8 +10,9 @@
 use arm_model::Limits;
 use arm_model::joint::START_POSE;
 use rt_controller::control::{ControlEvent, ControlState, Order, Thresholds};
+use rt_controller::driver::Mail;
 use rt_controller::os::Clock;
-use rt_controller::ports::{Mail, RelayPorts, rings};
+use rt_controller::ports::{RelayPorts, rings};
 use rt_controller::rehearsal::Rehearsal;
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::sim::IdealArm;

@@ -2,7 +2,7 @@
 //!
 //! No clock, no I/O, no `std`: bytes and instants come in, setpoints and bytes go
 //! out, and the same numbers come out on every machine. [`control`] is the core
-//! that the real-time loop steps, [`xarm`] the arm's protocol, [`overrun`] the
+//! that the real-time loop steps, [`driver`] the cycle around it, [`xarm`] the arm's protocol, [`overrun`] the
 //! pacing, [`clock_map`] the arm's clock on ours; [`point_to_point`] plans the
 //! moves that the controller makes itself, before they begin.
 //!
@@ -18,6 +18,9 @@ extern crate alloc;
 
 pub mod clock_map;
 pub mod control;
+pub mod driver;
 pub mod overrun;
 pub mod point_to_point;
+pub mod report_feed;
+pub mod transport;
 pub mod xarm;

@@ -12,8 +12,9 @@ mod timed_link;
 mod times;
 
 use crate::control::{ControlState, Order};
+use crate::driver::Mail;
 use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, now_ns};
-use crate::ports::{Mail, RelayPorts, rings};
+use crate::ports::{RelayPorts, rings};
 use crate::rehearsal::{Rehearsal, patient, report, swinging};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::{LinkSettings, TcpLink};

@@ -11,8 +11,9 @@ use arm_model::{JointVector, Limits, LimitsSpec};
 use rt_controller::control::{
     ControlEvent, ControlSettings, ControlState, Motion, Order, Thresholds,
 };
+use rt_controller::driver::Mail;
 use rt_controller::os::Clock;
-use rt_controller::ports::{Mail, Rings, rings};
+use rt_controller::ports::{Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use shared_types::ipc::{

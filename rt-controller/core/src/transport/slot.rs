@@ -4,6 +4,7 @@ use super::wire::{WireBackend, backend};
 use super::{ArmTransport, MAX_COMMANDS};
 use crate::control::{ArmCommand, LinkInput};
 use crate::xarm::{Command, StateRequest};
+use alloc::boxed::Box;
 use shared_types::WireMode;
 
 /// Holds at most one link. RT-safe; links are made and dropped elsewhere.

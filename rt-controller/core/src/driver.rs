@@ -1,0 +1,204 @@
+//! One control cycle around the core, wherever it runs: when it is due, what goes
+//! into it, what of its answer goes out, and how long that took.
+//!
+//! ```text
+//!  deadline k          ~10 us          ~40 us            deadline k+1
+//!     |--late--|--poll, step--|--send, record--|-------------|
+//!     wake     input          setpoint out                    one period later
+//! ```
+//!
+//! The driver owns the core and the command link and decides; everything around
+//! it is a [`CycleIo`]: the real loop's shared memory and rings, or a rig in
+//! virtual time. Nothing here waits, allocates, locks or panics, as long as the
+//! [`CycleIo`] does not.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::unreachable
+    )
+)]
+
+use crate::control::record::record_input;
+use crate::control::{ArmCodes, ControlState, CycleInput, CycleOutput, Order};
+use crate::overrun::{HoldBack, Wake, after_wake, next_wake, setpoint_late_ns};
+use crate::transport::ArmTransport;
+use crate::transport::slot::LinkSlot;
+use alloc::boxed::Box;
+use shared_types::MonotonicNs;
+use shared_types::ipc::{ControllerState, GuardianBeat, InputRecord, OperatorBeat, Reports};
+
+/// An order for the cycle, with the command link that comes with an adoption.
+#[derive(Debug)]
+pub struct Mail<T> {
+    /// What to do.
+    pub order: Order,
+    /// A fresh link, which replaces the present one.
+    pub link: Option<Box<T>>,
+}
+
+/// What surrounds the cycle: its clock, the state it shares with other processes,
+/// and its ways to and from other threads. Under the real loop every call must be
+/// RT-safe.
+pub trait CycleIo<T> {
+    /// Now (CLOCK_MONOTONIC, ns).
+    fn now_ns(&self) -> u64;
+    /// Newest heartbeat of the operator, with the dead-man switch.
+    fn operator(&mut self) -> OperatorBeat;
+    /// Newest heartbeat of the guardian.
+    fn guardian(&mut self) -> GuardianBeat;
+    /// The next order.
+    fn next_order(&mut self) -> Option<Mail<T>>;
+    /// Joint reports that came since the last cycle, oldest first.
+    fn new_reports(&mut self) -> Reports;
+    /// Joint reports dropped as broken since the last cycle; asked after
+    /// [`new_reports`](Self::new_reports).
+    fn new_broken_reports(&mut self) -> u32;
+    /// The arm's newest codes, if some came since the last cycle.
+    fn new_codes(&mut self) -> Option<ArmCodes>;
+    /// Takes what the cycle was told, before the core is stepped.
+    fn put_input(&mut self, told: InputRecord);
+    /// Shows the state to other processes, its process and its priority filled in
+    /// here. The setpoint is out.
+    fn publish(&mut self, state: ControllerState);
+    /// Takes what the cycle produced.
+    fn put_output(&mut self, out: CycleOutput);
+    /// Takes the state before the next cycle.
+    fn put_state(&mut self, control: &ControlState);
+    /// Takes a link that broke or was replaced, to be dropped elsewhere.
+    fn retire_link(&mut self, link: Box<T>);
+}
+
+/// The core with its command link and its pace.
+#[derive(Debug)]
+pub struct CycleDriver<T> {
+    control: ControlState,
+    link: LinkSlot<T>,
+    held: HoldBack,
+    next: Wake,
+    period_ns: u64,
+}
+
+impl<T: ArmTransport> CycleDriver<T> {
+    /// Without a link; its first cycle is due one period after `now_ns`.
+    #[must_use]
+    pub fn new(control: ControlState, now_ns: u64) -> Self {
+        let mut driver = Self {
+            link: LinkSlot::new(control.wire()),
+            held: HoldBack::default(),
+            next: Wake {
+                deadline_ns: 0,
+                missed: 0,
+            },
+            period_ns: MonotonicNs(0).plus_s(control.period_s()).0,
+            control,
+        };
+        driver.begin(now_ns);
+        driver
+    }
+
+    /// The next cycle is due one period after `now_ns`.
+    pub const fn begin(&mut self, now_ns: u64) {
+        self.next = Wake {
+            deadline_ns: now_ns.saturating_add(self.period_ns),
+            missed: 0,
+        };
+    }
+
+    /// The core.
+    #[must_use]
+    pub const fn control(&self) -> &ControlState {
+        &self.control
+    }
+
+    /// Whether there is a command link.
+    #[must_use]
+    pub const fn is_connected(&self) -> bool {
+        self.link.is_connected()
+    }
+
+    /// When the next cycle is due (CLOCK_MONOTONIC, ns).
+    #[must_use]
+    pub const fn deadline_ns(&self) -> u64 {
+        self.next.deadline_ns
+    }
+
+    /// The cycle that is due, in a thread that woke at `woke_ns`; deadlines that
+    /// have passed by a whole period are skipped and counted. RT-safe.
+    pub fn run_due(&mut self, woke_ns: u64, io: &mut impl CycleIo<T>) {
+        let due = after_wake(self.next.deadline_ns, woke_ns, self.period_ns);
+        let missed = due.missed.saturating_add(self.next.missed);
+        let sent_ns = self.cycle(due.deadline_ns, missed, woke_ns, io);
+        self.next = next_wake(due.deadline_ns, sent_ns, io.now_ns(), self.period_ns);
+    }
+
+    /// One cycle, due at `deadline_ns` after `missed` skipped ones, in a thread
+    /// that woke at `woke_ns`: take in, step, send, record; returns when it sent,
+    /// its deadline if it held its setpoint back. RT-safe.
+    pub fn cycle(
+        &mut self,
+        deadline_ns: u64,
+        missed: u32,
+        woke_ns: u64,
+        io: &mut impl CycleIo<T>,
+    ) -> u64 {
+        let missed = missed.saturating_add(self.held.missed());
+        let mut input = self.take_in(deadline_ns, missed, io);
+        input.late_ns = setpoint_late_ns(deadline_ns, woke_ns, missed, self.period_ns);
+        let cycle = self.control.cycle().wrapping_add(1);
+        io.put_input(record_input(&input, cycle));
+        let mut out = self.control.step(input);
+        let computed_ns = io.now_ns();
+        let held = out.command.is_some() && self.held.holds(woke_ns, computed_ns, self.period_ns);
+        let command = out.command.filter(|_| !held);
+        self.link.send(command, out.request, computed_ns);
+        let sent_ns = io.now_ns();
+
+        out.record.wake_late_ns = span_ns(deadline_ns, woke_ns);
+        out.record.compute_ns = span_ns(woke_ns, computed_ns);
+        out.record.send_ns = command.map_or(0, |_| span_ns(woke_ns, sent_ns));
+        io.publish(ControllerState {
+            stamp_ns: woke_ns,
+            ..self.control.summary()
+        });
+        io.put_output(out);
+        // It takes longer than all the rest, so it comes when the setpoint is out.
+        io.put_state(&self.control);
+        if held { deadline_ns } else { computed_ns }
+    }
+
+    fn take_in(&mut self, deadline_ns: u64, missed: u32, io: &mut impl CycleIo<T>) -> CycleInput {
+        let mut mail = io.next_order();
+        if let Some(fresh) = mail.as_mut().and_then(|m| m.link.take())
+            && let Some(old) = self.link.replace(Some(fresh))
+        {
+            io.retire_link(old);
+        }
+        let link = self.link.poll(io.now_ns());
+        if link.lost
+            && let Some(broken) = self.link.replace(None)
+        {
+            io.retire_link(broken);
+        }
+        let reports = io.new_reports();
+        CycleInput {
+            deadline_ns,
+            missed,
+            late_ns: 0,
+            order: mail.map(|m| m.order),
+            operator: io.operator(),
+            guardian: io.guardian(),
+            link,
+            codes: io.new_codes(),
+            reports,
+            broken_reports: io.new_broken_reports(),
+        }
+    }
+}
+
+fn span_ns(from_ns: u64, to_ns: u64) -> u32 {
+    u32::try_from(to_ns.saturating_sub(from_ns)).unwrap_or(u32::MAX)
+}
