@@ -13,7 +13,7 @@
 //! All numbers are little-endian; the items follow, in postcard.
 
 /// Version of the layout of chunks and items. Files of another one are refused.
-pub const FORMAT: u16 = 1;
+pub const FORMAT: u16 = 2;
 /// Bytes of a header.
 pub const HEADER_LEN: usize = 24;
 /// Largest chunk, header included: a keyframe, two long motions and some cycles.

@@ -6,7 +6,7 @@ use super::arming::ArmingState;
 use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput};
 use super::finding::Finding;
 use super::limiter::{Allowance, Limiter};
-use super::mode::{Trigger, next_mode};
+use super::mode::{ModeState, Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
 use super::reaction::{Path, reaction};
@@ -17,23 +17,8 @@ use crate::xarm::Status;
 use alloc::boxed::Box;
 use arm_model::{JointState, JointVector, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::ipc::{
-    CauseRecord, ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts,
-};
+use shared_types::ipc::{ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts};
 use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
-
-#[derive(Debug)]
-pub(super) struct Running {
-    pub(super) id: u64,
-    pub(super) start_ns: u64,
-    pub(super) motion: Box<Motion>,
-}
-
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub(super) struct Stopping {
-    pub(super) start_ns: u64,
-    pub(super) stop: Stop,
-}
 
 /// State of the control cycle. Sized once; stepping never allocates.
 ///
@@ -43,9 +28,9 @@ pub(super) struct Stopping {
 pub struct ControlState {
     pub(super) limits: Limits,
     pub(super) settings: ControlSettings,
-    pub(super) mode: ControllerMode,
-    pub(super) fault: FaultCode,
-    pub(super) cause: CauseRecord,
+    /// It holds the motion, which has a fingerprint in its place when written.
+    #[serde(skip)]
+    pub(super) state: ModeState,
     pub(super) arming: ArmingState,
     pub(super) cycle: u64,
     pub(super) motions_done: u64,
@@ -55,9 +40,6 @@ pub struct ControlState {
     pub(super) tcp_speed_max_m_s: f64,
     pub(super) wire: VelocityWire,
     pub(super) monitor: Monitor,
-    #[serde(skip)]
-    pub(super) running: Option<Running>,
-    pub(super) stopping: Option<Stopping>,
 }
 
 impl ControlState {
@@ -83,9 +65,7 @@ impl ControlState {
             tcp_speed_max_m_s: limits.tcp_speed_max_m_s,
             limits,
             settings,
-            mode: ControllerMode::Offline,
-            fault: FaultCode::None,
-            cause: CauseRecord::default(),
+            state: ModeState::Offline,
             arming: ArmingState::Disarmed,
             cycle,
             motions_done,
@@ -93,15 +73,13 @@ impl ControlState {
             sent_ns: 0,
             wire: VelocityWire::default(),
             monitor: Monitor::new(settings, 0, q),
-            running: None,
-            stopping: None,
         }
     }
 
     /// Present mode.
     #[must_use]
-    pub const fn mode(&self) -> ControllerMode {
-        self.mode
+    pub fn mode(&self) -> ControllerMode {
+        self.state.mode()
     }
 
     /// Duration of a cycle (s).
@@ -122,9 +100,9 @@ impl ControlState {
     pub fn summary(&self) -> ControllerState {
         ControllerState {
             version: PAYLOAD_VERSION,
-            mode: self.mode as u8,
+            mode: self.mode() as u8,
             real_time: 0,
-            fault: self.fault as u16,
+            fault: self.state.fault() as u16,
             cycle: self.cycle,
             stamp_ns: 0,
             motions_done: self.motions_done,
@@ -157,11 +135,8 @@ impl ControlState {
         // From here on the deadline is the instant that the setpoint is for.
         input.deadline_ns = planned_ns.saturating_add(input.late_ns.into());
         self.cycle = self.cycle.wrapping_add(1);
-        if !self.mode.is_moving() {
-            self.retire(&mut out);
-        }
         self.monitor.observe(&input, &self.limits);
-        let before = self.mode;
+        let before = self.mode();
         self.watch(&input, &mut out);
         if let Some(order) = input.order.take() {
             self.obey(order, before, &input, &mut out);
@@ -184,22 +159,18 @@ impl ControlState {
     /// Time on the running motion (s) and the rate at which it is followed,
     /// from the last setpoint's or this cycle's instant.
     pub(super) fn path_at(&self, at_ns: u64) -> Option<(f64, f64)> {
-        let running = self.running.as_ref().filter(|_| self.mode.is_moving())?;
         let since_s = |begin_ns| MonotonicNs(at_ns).since_s(MonotonicNs(begin_ns));
-        Some(match self.stopping {
-            Some(Stopping {
-                start_ns,
-                stop: Stop::Slow(slow),
-            }) => {
-                let (path_s, rate, _) = slow.at(since_s(start_ns));
-                (path_s, rate)
-            }
-            Some(Stopping {
-                stop: Stop::Brake(_),
-                ..
-            }) => (since_s(running.start_ns), 0.0),
-            None => (since_s(running.start_ns), 1.0),
-        })
+        match &self.state {
+            ModeState::Offline | ModeState::Idle | ModeState::Faulted(_) => None,
+            ModeState::Following(running) => Some((since_s(running.start_ns), 1.0)),
+            ModeState::Braking(braking) => Some(match braking.stop {
+                Stop::Slow(slow) => {
+                    let (path_s, rate, _) = slow.at(since_s(braking.start_ns));
+                    (path_s, rate)
+                }
+                Stop::Brake(_) => (since_s(braking.running.start_ns), 0.0),
+            }),
+        }
     }
 
     /// Time on the running motion (s), negative when none runs.
@@ -214,9 +185,9 @@ impl ControlState {
             .map_or((JointVector::ZERO, 0), |r| (r.q, r.stamp_ns));
         CycleRecord {
             version: PAYLOAD_VERSION,
-            mode: self.mode as u8,
+            mode: self.mode() as u8,
             sent: u8::from(out.command.is_some()),
-            fault: self.fault as u16,
+            fault: self.state.fault() as u16,
             cycle: self.cycle,
             deadline_ns: input.deadline_ns,
             reply_ns: input.link.reply_ns,
@@ -238,30 +209,30 @@ impl ControlState {
 
     /// Asks the monitors and reacts; an arming ends where it must.
     fn watch(&mut self, input: &CycleInput, out: &mut CycleOutput) {
-        match self.mode {
+        match self.mode() {
             ControllerMode::Offline => {}
             ControllerMode::Faulted => {
                 // The stop that an error causes may be seen before its error bit.
                 let late = matches!(
-                    self.fault,
+                    self.state.fault(),
                     FaultCode::ArmModeChanged | FaultCode::ArmNotReady
                 );
                 if late && input.link.status.is_some_and(Status::has_error) {
-                    self.fault = FaultCode::ArmError;
+                    self.state = ModeState::Faulted(FaultCode::ArmError);
                 }
             }
             ControllerMode::Idle
             | ControllerMode::Moving
             | ControllerMode::Streaming
             | ControllerMode::Braking => {
-                let than = self.stopping.map_or(Path::Continue, |s| s.stop.path());
+                let than = self.state.stop().map_or(Path::Continue, Stop::path);
                 let missed = self.missed(input);
-                if let Some(found) = self.monitor.finding(input, missed, self.mode, than) {
+                if let Some(found) = self.monitor.finding(input, missed, self.mode(), than) {
                     self.react(self.with_speed(found), input.deadline_ns, out);
                 }
             }
         }
-        if self.mode == ControllerMode::Idle {
+        if self.mode() == ControllerMode::Idle {
             if input.operator.released != 0 {
                 self.disarm(FaultCode::DeadManReleased, out);
             } else if self.arming.is_expired(input.deadline_ns) {
@@ -286,7 +257,7 @@ impl ControlState {
 
     /// Computes, checks and commands this cycle's setpoint.
     fn command(&mut self, deadline_ns: u64, out: &mut CycleOutput) {
-        if self.mode == ControllerMode::Idle {
+        if self.mode() == ControllerMode::Idle {
             let hold = JointState::at_rest(self.commanded.q);
             if let Err(found) = self.try_send(hold, false, deadline_ns, out) {
                 self.react(found, deadline_ns, out);
@@ -294,7 +265,7 @@ impl ControlState {
             return;
         }
         if matches!(
-            self.mode,
+            self.mode(),
             ControllerMode::Moving | ControllerMode::Streaming
         ) {
             match self.follow(deadline_ns, out) {
@@ -302,20 +273,20 @@ impl ControlState {
                 Err(found) => self.react(found, deadline_ns, out),
             }
         }
-        if self.mode == ControllerMode::Braking {
+        if self.mode() == ControllerMode::Braking {
             self.follow_stop(deadline_ns, out);
         }
     }
 
     fn follow(&mut self, deadline_ns: u64, out: &mut CycleOutput) -> Result<(), Finding> {
-        let Some(running) = &self.running else {
-            return Err(Finding::plain(FaultCode::SetpointNotFinite));
+        let ModeState::Following(running) = &self.state else {
+            return Ok(());
         };
         let (id, start_ns) = (running.id, running.start_ns);
         let t_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(start_ns));
         let done = t_s >= running.motion.duration_s();
         let target = running.motion.state_at(t_s);
-        let streamed = self.mode == ControllerMode::Streaming;
+        let streamed = running.motion.mode() == ControllerMode::Streaming;
         if let Some((joint, q_rad, end_rad)) = super::brake::unstoppable(&target, &self.limits) {
             let fault = FaultCode::SetpointUnstoppable;
             return Err(Finding::of_joint(fault, joint, q_rad, end_rad));
@@ -324,8 +295,8 @@ impl ControlState {
             return Err(found);
         }
         self.try_send(target, streamed, deadline_ns, out)?;
-        if done && let Some(mode) = next_mode(self.mode, Trigger::MotionDone) {
-            self.mode = mode;
+        if done && next_mode(self.mode(), Trigger::MotionDone).is_some() {
+            self.retire_to(ModeState::Idle, out);
             self.commanded = JointState::at_rest(self.commanded.q);
             self.motions_done = self.motions_done.wrapping_add(1);
             if self.arming == ArmingState::Spent {
@@ -347,29 +318,25 @@ impl ControlState {
     /// Follows the way to rest. If even that breaks a limit, nothing is sent and
     /// the arm stops itself.
     fn follow_stop(&mut self, deadline_ns: u64, out: &mut CycleOutput) {
-        let (Some(Stopping { start_ns, stop }), Some(running)) = (self.stopping, &self.running)
-        else {
+        let ModeState::Braking(braking) = &self.state else {
             return;
         };
-        let t_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(start_ns));
-        let target = stop.state_at(&running.motion, t_s);
+        let t_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(braking.start_ns));
+        let target = braking.stop.state_at(&braking.running.motion, t_s);
+        let ended = t_s >= braking.stop.duration_s();
+        let (fault, mut cause) = (braking.fault, braking.cause);
         let sent = self.try_send(target, true, deadline_ns, out);
-        let ended = t_s >= stop.duration_s();
         let trigger = if sent.is_err() {
             Trigger::LatchFault
         } else {
             Trigger::BrakeDone
         };
         if let Err(found) = sent {
-            self.cause.second_code = found.fault as u16;
+            cause.second_code = found.fault as u16;
         }
-        if (ended || sent.is_err())
-            && let Some(mode) = next_mode(self.mode, trigger)
-        {
-            self.mode = mode;
-            let stop_arm =
-                sent.is_err() || self.cause.stop_arm != 0 || reaction(self.fault).stop_arm;
-            self.latch(stop_arm, out);
+        if (ended || sent.is_err()) && next_mode(ControllerMode::Braking, trigger).is_some() {
+            let stop_arm = sent.is_err() || cause.stop_arm != 0 || reaction(fault).stop_arm;
+            self.latch(fault, cause, stop_arm, out);
         }
     }
 
@@ -419,8 +386,9 @@ impl ControlState {
         self.settings.tiers.of(tier, self.limits.tcp_speed_max_m_s)
     }
 
-    fn retire(&mut self, out: &mut CycleOutput) {
-        if let Some(running) = self.running.take() {
+    /// Changes to a mode without a motion; the one that ran goes back.
+    pub(super) fn retire_to(&mut self, state: ModeState, out: &mut CycleOutput) {
+        if let Some(running) = self.state.change_to(state) {
             give_back(out, running.motion);
         }
     }

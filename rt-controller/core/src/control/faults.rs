@@ -1,12 +1,12 @@
 //! How faults are met: the softest way to rest the table allows, made harder
 //! when more goes wrong on the way, and one record of the first cause.
 
-use super::cycle::{ControlState, Stopping, emit};
+use super::cycle::{ControlState, emit};
 use super::exchange::{ControlEvent, CycleOutput};
 use super::finding::Finding;
-use super::mode::{Trigger, next_mode};
+use super::mode::{Braking, ModeState, Trigger, next_mode};
 use super::reaction::{Path, Reaction, reaction};
-use super::stopping::{StopFrom, choose_stop};
+use super::stopping::{Stop, StopFrom, choose_stop};
 use crate::xarm::StateRequest;
 use arm_model::{JOINTS, JointState, kinematics};
 use shared_types::ipc::{CauseRecord, ControllerMode, PAYLOAD_VERSION};
@@ -16,36 +16,24 @@ impl ControlState {
     /// Meets a fault by the table in [`reaction`]; the first cause is kept.
     pub(super) fn react(&mut self, found: Finding, deadline_ns: u64, out: &mut CycleOutput) {
         let how = reaction(found.fault);
-        let silence = how.path == Path::Silence;
-        let braking = self.mode == ControllerMode::Braking;
-        if braking {
-            self.worsen(&found, how);
+        if let ModeState::Braking(braking) = &mut self.state {
+            braking.worsen(&found, how);
         }
-        let trigger = if silence {
+        let trigger = if how.path == Path::Silence {
             Trigger::LatchFault
         } else {
             Trigger::BrakeFault
         };
-        match next_mode(self.mode, trigger) {
-            Some(mode) => {
-                if !braking {
-                    self.fault = found.fault;
-                    self.cause = self.cause_of(&found, how, deadline_ns);
-                }
-                if mode == ControllerMode::Braking {
-                    self.begin_stop(how.path);
-                    self.mode = mode;
-                } else {
-                    self.mode = mode;
-                    self.latch(how.stop_arm || self.cause.stop_arm != 0, out);
-                }
+        match next_mode(self.mode(), trigger) {
+            Some(ControllerMode::Braking) => self.begin_braking(&found, how, deadline_ns),
+            Some(_faulted) => {
+                let (fault, cause) = match &self.state {
+                    ModeState::Braking(braking) => (braking.fault, braking.cause),
+                    _ => (found.fault, self.cause_of(&found, how, deadline_ns)),
+                };
+                self.latch(fault, cause, how.stop_arm || cause.stop_arm != 0, out);
             }
-            None if braking && how.path == Path::Brake => {
-                let slow = self.stopping.is_some_and(|s| s.stop.path() == Path::Slow);
-                if slow {
-                    self.begin_stop(Path::Brake);
-                }
-            }
+            None if how.path == Path::Brake => self.brake_instead(),
             None => {}
         }
     }
@@ -54,7 +42,7 @@ impl ControlState {
     /// C60); its code comes later, so the cause shows the speed commanded last
     /// that was nearest to its limit.
     pub(super) fn with_speed(&self, found: Finding) -> Finding {
-        if found.fault != FaultCode::ArmError || !self.mode.is_moving() {
+        if found.fault != FaultCode::ArmError || !self.mode().is_moving() {
             return found;
         }
         let qd = match self.settings.wire {
@@ -78,21 +66,37 @@ impl ControlState {
             })
     }
 
-    /// Notes what made a stop that is under way harder.
-    fn worsen(&mut self, found: &Finding, how: Reaction) {
-        if self.cause.second_code == 0 && found.fault as u16 != self.cause.code {
-            self.cause.second_code = found.fault as u16;
-        }
-        self.cause.path = self.cause.path.max(how.path as u8);
-        self.cause.stop_arm |= u8::from(how.stop_arm);
-    }
-
-    /// Chooses the way to rest from the setpoint sent last.
-    fn begin_stop(&mut self, path: Path) {
-        let motion_s = self.path_at(self.sent_ns).map_or(0.0, |(t_s, _)| t_s);
-        let Some(running) = &self.running else {
+    /// Leaves the motion that runs.
+    fn begin_braking(&mut self, found: &Finding, how: Reaction, deadline_ns: u64) {
+        let Some(stop) = self.way_to_rest(how.path) else {
             return;
         };
+        let cause = self.cause_of(found, how, deadline_ns);
+        if let Some(running) = self.state.change_to(ModeState::Idle) {
+            self.state = ModeState::Braking(Braking {
+                running,
+                start_ns: self.sent_ns,
+                stop,
+                fault: found.fault,
+                cause,
+            });
+        }
+    }
+
+    /// Leaves the path, where a stop slows down along it.
+    fn brake_instead(&mut self) {
+        if let Some(Stop::Slow(_)) = self.state.stop()
+            && let Some(stop) = self.way_to_rest(Path::Brake)
+            && let ModeState::Braking(braking) = &mut self.state
+        {
+            (braking.stop, braking.start_ns) = (stop, self.sent_ns);
+        }
+    }
+
+    /// The way to rest from the setpoint sent last, if something moves.
+    fn way_to_rest(&self, path: Path) -> Option<Stop> {
+        let running = self.state.running()?;
+        let motion_s = self.path_at(self.sent_ns).map_or(0.0, |(t_s, _)| t_s);
         let from = StopFrom {
             state: &self.commanded,
             motion: &running.motion,
@@ -103,15 +107,12 @@ impl ControlState {
         // Slowing begins at rate 1, so it cannot follow another stop; nor can it
         // begin before the path.
         let before = MonotonicNs(self.sent_ns).since_s(MonotonicNs(running.start_ns)) < 0.0;
-        let path = if before || self.stopping.is_some() {
+        let path = if before || self.state.stop().is_some() {
             Path::Brake
         } else {
             path
         };
-        self.stopping = Some(Stopping {
-            start_ns: self.sent_ns,
-            stop: choose_stop(&from, path, &self.limits),
-        });
+        Some(choose_stop(&from, path, &self.limits))
     }
 
     /// The record of a cause that was just noticed.
@@ -119,17 +120,13 @@ impl ControlState {
         CauseRecord {
             version: PAYLOAD_VERSION,
             code: found.fault as u16,
-            mode: self.mode as u8,
+            mode: self.mode() as u8,
             path: how.path as u8,
             stop_arm: u8::from(how.stop_arm),
             tier: self.arming.raw_tier(),
             cycle: self.cycle,
             stamp_ns: deadline_ns,
-            motion_id: self
-                .running
-                .as_ref()
-                .filter(|_| self.mode.is_moving())
-                .map_or(0, |r| r.id),
+            motion_id: self.state.running().map_or(0, |r| r.id),
             trajectory_s: self.trajectory_s(deadline_ns),
             limit: found.limit_broken(),
             ..CauseRecord::default()
@@ -137,23 +134,39 @@ impl ControlState {
     }
 
     /// The end of every stop: no setpoints any more, the arm rests.
-    pub(super) fn latch(&mut self, stop_arm: bool, out: &mut CycleOutput) {
+    pub(super) fn latch(
+        &mut self,
+        fault: FaultCode,
+        cause: CauseRecord,
+        stop_arm: bool,
+        out: &mut CycleOutput,
+    ) {
+        self.retire_to(ModeState::Faulted(fault), out);
         self.commanded = JointState::at_rest(self.commanded.q);
-        self.stopping = None;
         if stop_arm {
             out.request = Some(StateRequest::Stop);
         }
-        let fault: FaultCode = self.fault;
         self.disarm(fault, out);
         let (arm_error, arm_warning) = self.monitor.arm_codes();
-        self.cause = CauseRecord {
+        let cause = CauseRecord {
             rest_cycle: self.cycle,
             stop_arm: u8::from(stop_arm),
             counts: self.monitor.counts(),
             arm_error,
             arm_warning,
-            ..self.cause
+            ..cause
         };
-        emit(out, ControlEvent::Latched(self.cause));
+        emit(out, ControlEvent::Latched(cause));
+    }
+}
+
+impl Braking {
+    /// Notes what made it harder.
+    fn worsen(&mut self, found: &Finding, how: Reaction) {
+        if self.cause.second_code == 0 && found.fault as u16 != self.cause.code {
+            self.cause.second_code = found.fault as u16;
+        }
+        self.cause.path = self.cause.path.max(how.path as u8);
+        self.cause.stop_arm |= u8::from(how.stop_arm);
     }
 }

@@ -1,17 +1,17 @@
 //! What orders lead to.
 
 use super::arming::ArmingState;
-use super::cycle::{ControlState, Running, emit, give_back};
+use super::cycle::{ControlState, emit, give_back};
 use super::exchange::{ControlEvent, CycleInput, CycleOutput, Order};
 use super::finding::Finding;
 use super::limiter::Limiter;
-use super::mode::{Trigger, next_mode};
+use super::mode::{ModeState, Running, Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
 use super::velocity_wire::VelocityWire;
 use alloc::boxed::Box;
 use arm_model::{JointState, JointVector};
-use shared_types::ipc::{CauseRecord, ControllerMode};
+use shared_types::ipc::ControllerMode;
 use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier};
 
 /// Starts closer than this are equal (rad); a larger difference would be a jump.
@@ -32,7 +32,7 @@ impl ControlState {
         let deadline_ns = input.deadline_ns;
         match order {
             // Ordered before this very cycle's stop, so it acknowledges nothing.
-            Order::Adopt { .. } if before != self.mode => {
+            Order::Adopt { .. } if before != self.mode() => {
                 let fault = FaultCode::WrongMode;
                 emit(out, ControlEvent::Refused { id: None, fault });
             }
@@ -43,7 +43,7 @@ impl ControlState {
             Order::Run { id, motion } => self.run(id, motion, input, out),
             Order::Stop => self.react(Finding::plain(FaultCode::OperatorStop), deadline_ns, out),
             Order::Arm(arming) => self.arm(arming, input, out),
-            Order::Disarm if self.mode.is_moving() => {
+            Order::Disarm if self.mode().is_moving() => {
                 self.react(Finding::plain(FaultCode::Disarmed), deadline_ns, out);
             }
             Order::Disarm => self.disarm(FaultCode::None, out),
@@ -51,7 +51,7 @@ impl ControlState {
     }
 
     fn arm(&mut self, arming: Arming, input: &CycleInput, out: &mut CycleOutput) {
-        let taken = if self.mode != ControllerMode::Idle {
+        let taken = if self.mode() != ControllerMode::Idle {
             Err(FaultCode::WrongMode)
         } else if input.operator.released != 0 {
             Err(FaultCode::DeadManReleased)
@@ -78,7 +78,7 @@ impl ControlState {
             // A link that broke on its way here.
             return Err(FaultCode::LinkLost);
         }
-        let mode = next_mode(self.mode, Trigger::Adopt).ok_or(FaultCode::WrongMode)?;
+        next_mode(self.mode(), Trigger::Adopt).ok_or(FaultCode::WrongMode)?;
         if !hold.is_finite() {
             return Err(FaultCode::SetpointNotFinite);
         }
@@ -86,9 +86,7 @@ impl ControlState {
             return Err(FaultCode::SetpointPosition);
         }
         let deadline_ns = input.deadline_ns;
-        self.mode = mode;
-        self.fault = FaultCode::None;
-        self.cause = CauseRecord::default();
+        self.state = ModeState::Idle;
         self.arming = ArmingState::Disarmed;
         self.commanded = JointState::at_rest(hold);
         self.limiter = Limiter::at_rest(hold, &self.limits);
@@ -97,7 +95,6 @@ impl ControlState {
         self.sent_ns = MonotonicNs(deadline_ns).plus_s(-self.period_s()).0;
         self.monitor = Monitor::new(self.settings, deadline_ns, hold);
         self.monitor.observe(input, &self.limits);
-        self.stopping = None;
         Ok(())
     }
 
@@ -107,14 +104,13 @@ impl ControlState {
                 // The planned instant, also of a late cycle: punctual setpoints then lie
                 // at whole periods of every motion, the same ones in every run.
                 let start_ns = input.deadline_ns.saturating_sub(input.late_ns.into());
-                self.mode = mode;
                 self.tcp_speed_max_m_s = self.tool_speed_of(mode, tier);
                 let shot = mode == ControllerMode::Streaming && tier == MotionTier::Throw;
                 if self.settings.arming_required && shot {
                     self.arming = ArmingState::Spent;
                 }
                 self.monitor.motion_begins(start_ns);
-                self.running = Some(Running {
+                self.state = ModeState::Following(Running {
                     id,
                     start_ns,
                     motion,
@@ -144,7 +140,7 @@ impl ControlState {
             Motion::Spline(_) => Trigger::StreamBegun,
             Motion::Move { .. } => Trigger::MoveBegun,
         };
-        let mode = next_mode(self.mode, trigger).ok_or(FaultCode::WrongMode)?;
+        let mode = next_mode(self.mode(), trigger).ok_or(FaultCode::WrongMode)?;
         let off = motion.start().zip_with(self.commanded.q, |a, b| a - b);
         if !off.is_finite() || off.max_abs() > START_TOLERANCE_RAD {
             return Err(FaultCode::StartPoseMismatch);

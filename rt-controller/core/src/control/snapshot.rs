@@ -3,20 +3,12 @@
 //! The running motion is named by number and fingerprint; everything else is
 //! in the bytes, limits and thresholds included.
 
-use super::cycle::{ControlState, Running};
+use super::cycle::ControlState;
+use super::mode::ModeState;
 use super::motion::Motion;
 use super::settings::ControlSettings;
 use alloc::boxed::Box;
 use arm_model::Limits;
-use serde::{Deserialize, Serialize};
-
-/// The running motion without its content.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Named {
-    id: u64,
-    start_ns: u64,
-    hash: u64,
-}
 
 impl ControlState {
     /// The limits it keeps.
@@ -35,11 +27,7 @@ impl ControlState {
     /// `None` when there are too few. RT-safe.
     #[must_use]
     pub fn write_to(&self, bytes: &mut [u8]) -> Option<usize> {
-        let named = self.running.as_ref().map(|running| Named {
-            id: running.id,
-            start_ns: running.start_ns,
-            hash: running.motion.fingerprint(),
-        });
+        let named = self.state.try_map(|_, motion| Some(motion.fingerprint()))?;
         postcard::to_slice(&(named, self), bytes)
             .ok()
             .map(|written| written.len())
@@ -53,17 +41,11 @@ impl ControlState {
         motion_of: impl FnOnce(u64, u64) -> Option<Box<Motion>>,
     ) -> Option<Self> {
         let ((named, mut state), rest) =
-            postcard::take_from_bytes::<(Option<Named>, Self)>(bytes).ok()?;
+            postcard::take_from_bytes::<(ModeState<u64>, Self)>(bytes).ok()?;
         if !rest.is_empty() {
             return None;
         }
-        if let Some(Named { id, start_ns, hash }) = named {
-            state.running = Some(Running {
-                id,
-                start_ns,
-                motion: motion_of(id, hash)?,
-            });
-        }
+        state.state = named.try_map(|id, hash| motion_of(id, *hash))?;
         Some(state)
     }
 }
