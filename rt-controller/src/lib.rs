@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   other processes            this process                                 arm
-//!                 requests  +-----------+ orders  +--------------+ setpoints, 250 Hz
+//!                 requests  +-----------+ commands +--------------+ setpoints, 250 Hz
 //!   wag  <----------------> |   relay   |-------> | control loop | ---------------> command port
 //!        <----------------- |           | <------ |  (real time) | <--------------- replies
 //!         cycle records,    +-----------+ records +--------------+

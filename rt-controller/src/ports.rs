@@ -3,7 +3,7 @@
 
 use crate::arm_status::ArmStatus;
 use crate::control::{ControlEvent, ControlState, CycleOutput, Motion};
-use crate::driver::Mail;
+use crate::driver::CommandMsg;
 use crate::recording::{RecordedCycle, Snapshot};
 use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -19,7 +19,7 @@ const STATE_EVERY: u64 = 250;
 const REPORTS: usize = 4096;
 /// Joint reports kept for the loop; it takes them all every cycle.
 const NEWEST_REPORTS: usize = 16;
-/// Orders, events and retired things are few.
+/// Commands, events and retired things are few.
 const FEW: usize = 64;
 
 /// Something the loop is done with, to be dropped by the relay.
@@ -34,8 +34,8 @@ pub enum Retired<T> {
 /// The loop's ends. A full ring loses what is pushed.
 #[derive(Debug)]
 pub struct RtPorts<T> {
-    /// Orders in, one taken per cycle.
-    pub orders: Consumer<Mail<T>>,
+    /// Commands in, one taken per cycle.
+    pub commands: Consumer<CommandMsg<T>>,
     /// Joint reports in; the newest counts.
     pub reports: Consumer<JointReport>,
     /// The arm's status in; the newest counts.
@@ -110,8 +110,8 @@ impl<T> RtPorts<T> {
 /// The relay's ends.
 #[derive(Debug)]
 pub struct RelayPorts<T> {
-    /// Orders out.
-    pub orders: Producer<Mail<T>>,
+    /// Commands out.
+    pub commands: Producer<CommandMsg<T>>,
     /// Joint reports in, every one.
     pub reports: Consumer<JointReport>,
     /// The arm's status in, every one.
@@ -174,7 +174,7 @@ pub struct Rings<T> {
 /// Makes all rings. Not RT-safe.
 #[must_use]
 pub fn rings<T>() -> Rings<T> {
-    let (orders_in, orders) = RingBuffer::new(FEW);
+    let (commands_in, commands) = RingBuffer::new(FEW);
     let (events, events_out) = RingBuffer::new(FEW);
     let (records, records_out) = RingBuffer::new(RECORDS);
     let (inputs, inputs_out) = RingBuffer::new(RECORDS);
@@ -186,7 +186,7 @@ pub fn rings<T>() -> Rings<T> {
     let (status_to_relay, status_out) = RingBuffer::new(FEW);
     Rings {
         rt: RtPorts {
-            orders,
+            commands,
             reports: newest,
             status,
             broken: BrokenReports::default(),
@@ -198,7 +198,7 @@ pub fn rings<T>() -> Rings<T> {
             dropped: 0,
         },
         relay: RelayPorts {
-            orders: orders_in,
+            commands: commands_in,
             reports,
             status: status_out,
             events: events_out,

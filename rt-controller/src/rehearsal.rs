@@ -13,7 +13,7 @@
 
 use crate::control::record::record_input;
 use crate::control::{
-    ControlSettings, ControlState, CycleInput, LinkInput, Motion, Order, Thresholds,
+    ControlCommand, ControlSettings, ControlState, CycleInput, LinkInput, Motion, Thresholds,
 };
 use crate::xarm::Status;
 use arm_model::joint::START_POSE;
@@ -111,7 +111,7 @@ impl Rehearsal {
         self.cycles = self.cycles.wrapping_add(1);
         let input = CycleInput {
             deadline_ns,
-            order: self.order(),
+            command: self.command(),
             operator: OperatorBeat {
                 count: self.cycles,
                 ..OperatorBeat::default()
@@ -133,14 +133,14 @@ impl Rehearsal {
     }
 
     /// What makes the twin move, or nothing.
-    fn order(&mut self) -> Option<Order> {
+    fn command(&mut self) -> Option<ControlCommand> {
         match self.twin.mode() {
             ControllerMode::Offline | ControllerMode::Faulted => {
-                Some(Order::Adopt { hold: START_POSE })
+                Some(ControlCommand::Engage { hold: START_POSE })
             }
             ControllerMode::Idle => {
                 let motion = self.motion.take()?;
-                Some(Order::Run {
+                Some(ControlCommand::Run {
                     id: self.cycles,
                     motion,
                 })

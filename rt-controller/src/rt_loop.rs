@@ -19,7 +19,7 @@
 )]
 
 use crate::control::{ArmCodes, ControlState, CycleOutput};
-use crate::driver::{CycleDriver, CycleIo, Mail};
+use crate::driver::{CommandMsg, CycleDriver, CycleIo};
 use crate::os::Clock;
 use crate::ports::{Retired, RtPorts};
 use crate::rehearsal::Rehearsal;
@@ -136,8 +136,8 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
         self.boards.guardian()
     }
 
-    fn next_order(&mut self) -> Option<Mail<T>> {
-        self.ports.orders.pop().ok()
+    fn next_command(&mut self) -> Option<CommandMsg<T>> {
+        self.ports.commands.pop().ok()
     }
 
     fn new_reports(&mut self) -> Reports {

@@ -9,8 +9,8 @@
 
 use arm_model::Limits;
 use arm_model::joint::START_POSE;
-use rt_controller::control::{ControlEvent, ControlState, Order, Thresholds};
-use rt_controller::driver::Mail;
+use rt_controller::control::{ControlCommand, ControlEvent, ControlState, Thresholds};
+use rt_controller::driver::CommandMsg;
 use rt_controller::os::Clock;
 use rt_controller::ports::{RelayPorts, rings};
 use rt_controller::rehearsal::Rehearsal;
@@ -89,9 +89,15 @@ fn run_so(
     };
     let rings = rings();
     let mut relay = rings.relay;
-    let hold = Order::Adopt { hold: START_POSE };
+    let hold = ControlCommand::Engage { hold: START_POSE };
     let link = Some(Box::new(arm));
-    relay.orders.push(Mail { order: hold, link }).unwrap();
+    relay
+        .commands
+        .push(CommandMsg {
+            command: hold,
+            link,
+        })
+        .unwrap();
     let quit = Arc::new(AtomicBool::new(false));
     let clock = LateClock {
         now_ns: Rc::new(Cell::new(BEGIN_NS)),
@@ -195,7 +201,7 @@ fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
 }
 
 #[test]
-fn a_stalled_link_is_latched_and_a_broken_one_never_adopted() {
+fn a_stalled_link_is_latched_and_a_broken_one_never_engaged() {
     let stalled = IdealArm {
         stalled: true,
         ..IdealArm::default()

@@ -24,8 +24,8 @@ use counter::Calls;
 use gauntlet::Watch;
 use gauntlet::arm::EchoArm;
 use libc::{SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto};
-use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
-use rt_controller::driver::Mail;
+use rt_controller::control::{ControlCommand, ControlSettings, ControlState, Motion, Thresholds};
+use rt_controller::driver::CommandMsg;
 use rt_controller::os::{Clock, MonotonicClock, now_ns};
 use rt_controller::ports::{RelayPorts, Rings, rings};
 use rt_controller::rehearsal::Rehearsal;
@@ -232,8 +232,11 @@ impl Running {
         }
     }
 
-    fn order(&mut self, order: Order, link: Option<Box<TcpLink>>) {
-        self.relay().orders.push(Mail { order, link }).unwrap();
+    fn command(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
+        self.relay()
+            .commands
+            .push(CommandMsg { command, link })
+            .unwrap();
     }
 }
 
@@ -314,11 +317,14 @@ fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
     running.until(&mut beside, |newest| newest.cycle > 3);
     let settings = LinkSettings::new(250, 4_000_000);
     let link = TcpLink::connect(arm.address, Duration::from_secs(5), settings).unwrap();
-    running.order(Order::Adopt { hold: START_POSE }, Some(Box::new(link)));
-    let adopted = |r: &CycleRecord| r.mode == ControllerMode::Idle as u8;
-    running.until(&mut beside, adopted);
-    running.order(
-        Order::Arm(Arming {
+    running.command(
+        ControlCommand::Engage { hold: START_POSE },
+        Some(Box::new(link)),
+    );
+    let engaged = |r: &CycleRecord| r.mode == ControllerMode::Idle as u8;
+    running.until(&mut beside, engaged);
+    running.command(
+        ControlCommand::Arm(Arming {
             tier: MotionTier::Throw,
             expires_ns: now_ns() + 10_000_000_000,
             area_clear: true,
@@ -326,7 +332,7 @@ fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
         None,
     );
     let motion = Box::new(endless());
-    running.order(Order::Run { id: 1, motion }, None);
+    running.command(ControlCommand::Run { id: 1, motion }, None);
     let moves = |r: &CycleRecord| r.mode == ControllerMode::Streaming as u8;
     running.until(&mut beside, moves);
     for _ in 0..5 {

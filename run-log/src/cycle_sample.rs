@@ -4,7 +4,7 @@ use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use rt_controller::control::{ControlSettings, ControlState};
 use rt_controller::recording::{Item, LogError, LogReader, Read, RecordedCycle};
 use serde::Serialize;
-use shared_types::ipc::{CauseRecord, ControllerMode, OrderKind};
+use shared_types::ipc::{CauseRecord, CommandKind, ControllerMode};
 use shared_types::{MonotonicNs, MotionTier};
 
 /// Setpoints farther apart than this say nothing about speed (s).
@@ -187,8 +187,8 @@ impl Differentiator {
         settings: &ControlSettings,
     ) -> CycleSample {
         let (input, record) = (&cycle.input, &cycle.record);
-        if OrderKind::from_raw(input.order.kind) == Some(OrderKind::Arm) {
-            self.tier = MotionTier::from_raw(input.order.tier);
+        if CommandKind::from_raw(input.command.kind) == Some(CommandKind::Arm) {
+            self.tier = MotionTier::from_raw(input.command.tier);
         }
         let newest = input.reports.as_slice().last().map(|r| r.arrival_ns);
         self.report_ns = newest.or(self.report_ns);

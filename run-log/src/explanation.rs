@@ -91,7 +91,7 @@ pub struct Stop {
     pub broken: Option<Broken>,
     /// The setpoint that was sent latest in the second before.
     pub latest: Option<Late>,
-    /// What happened since the arm was adopted.
+    /// What happened since the arm was engaged.
     pub counts: RunCounts,
     /// The second before and the second after.
     pub around: Vec<Row>,

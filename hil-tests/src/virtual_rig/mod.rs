@@ -1,7 +1,7 @@
 //! The control core and the simulated arm together in virtual time.
 //!
 //! ```text
-//! operator, guardian beats, orders --> CycleInput --> ControlState::step
+//! operator, guardian beats, commands --> CycleInput --> ControlState::step
 //!                                         ^                  |
 //!             report feeds, link replies -+                  v
 //!                      ^                                 CycleOutput
@@ -24,8 +24,8 @@ pub use network::VirtualStream;
 pub use surroundings::Surroundings;
 
 use arm_model::{JointVector, Limits};
-use rt_controller::control::{ControlEvent, ControlSettings, ControlState, Motion, Order};
-use rt_controller::driver::{CycleDriver, Mail};
+use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, ControlState, Motion};
+use rt_controller::driver::{CommandMsg, CycleDriver};
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
@@ -199,8 +199,8 @@ impl VirtualRig {
         let unanswered_max = self.config.settings.thresholds.unanswered_max;
         let fresh = TcpLink::over(stream, LinkSettings::new(unanswered_max, period_ns));
         let hold = self.with_arm(|arm| arm.model().measured_motion().q);
-        self.around.orders.push_back(Mail {
-            order: Order::Adopt { hold },
+        self.around.commands.push_back(CommandMsg {
+            command: ControlCommand::Engage { hold },
             link: Some(Box::new(fresh)),
         });
         self.run_cycles(2);
@@ -231,16 +231,19 @@ impl VirtualRig {
         Ok(())
     }
 
-    /// Gives the controller an order with its next cycle.
-    pub fn order(&mut self, order: Order) {
-        self.around.orders.push_back(Mail { order, link: None });
+    /// Gives the controller a command with its next cycle.
+    pub fn command(&mut self, command: ControlCommand) {
+        self.around.commands.push_back(CommandMsg {
+            command,
+            link: None,
+        });
     }
 
     /// Orders a motion; its number.
     pub fn start(&mut self, motion: Motion) -> u64 {
         self.motions += 1;
         let (id, motion) = (self.motions, Box::new(motion));
-        self.order(Order::Run { id, motion });
+        self.command(ControlCommand::Run { id, motion });
         id
     }
 

@@ -1,12 +1,12 @@
 //! What surrounds the control cycle in virtual time: the arm behind its cable, the
-//! heartbeats, the orders, the clock, and the log of what happened.
+//! heartbeats, the commands, the clock, and the log of what happened.
 
 use super::RigLog;
 use super::feeds::Feed;
 use super::network::{Network, VirtualStream};
 use rt_controller::arm_status::ArmStatus;
 use rt_controller::control::{ArmCodes, ControlEvent, ControlState, CycleOutput};
-use rt_controller::driver::{CycleIo, Mail};
+use rt_controller::driver::{CommandMsg, CycleIo};
 use rt_controller::report_feed::JointDecoder;
 use rt_controller::transport::tcp::TcpLink;
 use shared_types::MonotonicNs;
@@ -33,7 +33,7 @@ pub struct Surroundings {
     joints: Feed,
     decoder: JointDecoder,
     codes: Feed,
-    pub(super) orders: VecDeque<Mail<Link>>,
+    pub(super) commands: VecDeque<CommandMsg<Link>>,
     /// For how long the next cycles are held up before they send (ns).
     pub(super) held_up_ns: VecDeque<u64>,
     operator_beat: OperatorBeat,
@@ -57,7 +57,7 @@ impl Surroundings {
             joints: Feed::new(ReportKind::Realtime),
             decoder: JointDecoder::default(),
             codes: Feed::new(ReportKind::Rich),
-            orders: VecDeque::new(),
+            commands: VecDeque::new(),
             held_up_ns: VecDeque::new(),
             operator_beat: OperatorBeat {
                 version: PAYLOAD_VERSION,
@@ -87,11 +87,11 @@ impl Surroundings {
         self.log.arm_events.extend(net.arm.take_events());
     }
 
-    /// The controller's process is gone, its connections and orders with it.
+    /// The controller's process is gone, its connections and commands with it.
     pub(super) fn forget(&mut self) {
         self.joints = Feed::new(ReportKind::Realtime);
         self.codes = Feed::new(ReportKind::Rich);
-        self.orders.clear();
+        self.commands.clear();
     }
 }
 
@@ -119,8 +119,8 @@ impl CycleIo<Link> for Surroundings {
         self.guardian_beat
     }
 
-    fn next_order(&mut self) -> Option<Mail<Link>> {
-        self.orders.pop_front()
+    fn next_command(&mut self) -> Option<CommandMsg<Link>> {
+        self.commands.pop_front()
     }
 
     fn new_reports(&mut self) -> Reports {

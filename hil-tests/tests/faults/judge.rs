@@ -3,8 +3,8 @@
 use super::limits;
 use super::stage::Stage;
 use arm_model::{JointTrajectory, JointVector};
-use rt_controller::control::reaction::Path;
-use rt_controller::control::{ControlEvent, Motion, Order};
+use rt_controller::control::reaction::StopCategory;
+use rt_controller::control::{ControlCommand, ControlEvent, Motion};
 use shared_types::ipc::{CauseRecord, ControllerMode};
 use shared_types::{FaultCode, MonotonicNs};
 
@@ -25,14 +25,14 @@ pub(crate) fn nod(from: JointVector) -> Motion {
 #[derive(Clone, Copy)]
 pub(crate) struct Stop {
     pub(crate) fault: FaultCode,
-    pub(crate) path: Path,
+    pub(crate) path: StopCategory,
     /// The arm is asked to stop.
     pub(crate) stop_arm: bool,
 }
 
 /// Slowed along the path.
 pub(crate) fn slowed(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (Path::Slow, false);
+    let (path, stop_arm) = (StopCategory::OnPath, false);
     Stop {
         fault,
         path,
@@ -42,7 +42,7 @@ pub(crate) fn slowed(fault: FaultCode) -> Stop {
 
 /// Braked in joint space.
 pub(crate) fn braked(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (Path::Brake, false);
+    let (path, stop_arm) = (StopCategory::JointSpace, false);
     Stop {
         fault,
         path,
@@ -52,7 +52,7 @@ pub(crate) fn braked(fault: FaultCode) -> Stop {
 
 /// Braked, then the arm asked to stop.
 pub(crate) fn braked_and_stopped(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (Path::Brake, true);
+    let (path, stop_arm) = (StopCategory::JointSpace, true);
     Stop {
         fault,
         path,
@@ -62,7 +62,7 @@ pub(crate) fn braked_and_stopped(fault: FaultCode) -> Stop {
 
 /// No setpoints any more, the arm asked to stop.
 pub(crate) fn stopped(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (Path::Silence, true);
+    let (path, stop_arm) = (StopCategory::CutOff, true);
     Stop {
         fault,
         path,
@@ -72,7 +72,7 @@ pub(crate) fn stopped(fault: FaultCode) -> Stop {
 
 /// No setpoints any more; the arm has stopped by itself or cannot hear.
 pub(crate) fn silenced(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (Path::Silence, false);
+    let (path, stop_arm) = (StopCategory::CutOff, false);
     Stop {
         fault,
         path,
@@ -87,7 +87,7 @@ impl Stage {
         let cause = self.assert_one_cause(want);
         // What a dead link delivers later is no setpoint any more.
         let wire_until = match want.path {
-            Path::Silence => MonotonicNs(cause.stamp_ns),
+            StopCategory::CutOff => MonotonicNs(cause.stamp_ns),
             _ => MonotonicNs(u64::MAX),
         };
         limits::assert_kept(self, wire_until);
@@ -135,7 +135,7 @@ impl Stage {
         assert!(self.rig.now().since_s(last.at) > 0.1, "it still moves");
     }
 
-    /// Two seconds of orders of every kind without an acknowledgement.
+    /// Two seconds of commands of every kind without an acknowledgement.
     pub(crate) fn assert_nothing_moves_it(&mut self) {
         let (commands, refusals) = (self.commands(), self.refusals().len());
         let stood = self.rig.log.truth.len();
@@ -144,8 +144,8 @@ impl Stage {
             self.rig.dead_man_released = k % 3 == 1;
             self.arm();
             self.rig.start(nod(self.rig.commanded()));
-            self.rig.order(Order::Disarm);
-            self.rig.order(Order::Stop);
+            self.rig.command(ControlCommand::Disarm);
+            self.rig.command(ControlCommand::Stop);
             self.rig.run_for(0.1);
             ordered += 2;
         }

@@ -114,20 +114,20 @@ fn assert_all(stage: &Stage, wire_until: MonotonicNs, jitter_s: f64) {
 fn assert_computed(stage: &Stage) {
     let limits = Limits::default();
     let log = &stage.rig.log;
-    let adopted: Vec<u64> = log
+    let engaged: Vec<u64> = log
         .events
         .iter()
-        .filter(|(_, event)| matches!(event, ControlEvent::Adopted))
+        .filter(|(_, event)| matches!(event, ControlEvent::Engaged))
         .map(|(cycle, _)| *cycle)
         .collect();
     let mut differences = None;
     for (record, input) in log.records.iter().zip(&log.inputs) {
         let at = MonotonicNs(record.deadline_ns + u64::from(input.late_ns));
-        if adopted.contains(&record.cycle) {
+        if engaged.contains(&record.cycle) {
             differences = Some(Differences::at_rest(at, record.q_c, EXACT, 0.0));
         }
         if record.sent == 1 {
-            let judge: &mut Differences = differences.as_mut().expect("sent before an adoption");
+            let judge: &mut Differences = differences.as_mut().expect("sent before an engagement");
             judge.take(at, record.q_c, &limits);
         }
     }

@@ -6,7 +6,7 @@ use arm_model::{JointTrajectory, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::restore_input;
-use rt_controller::control::{ControlSettings, ControlState, Motion, Order, Thresholds};
+use rt_controller::control::{ControlCommand, ControlSettings, ControlState, Motion, Thresholds};
 use shared_types::ipc::CauseRecord;
 use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier, WireMode};
 use xarm_sim::Intake;
@@ -239,7 +239,7 @@ fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
             config.arm.clock_ppm = ppm;
             config.arm.intake = Intake::Clock;
             let mut stage = Stage::of(config);
-            stage.rig.order(Order::Arm(Arming {
+            stage.rig.command(ControlCommand::Arm(Arming {
                 tier: MotionTier::Wiggle,
                 expires_ns: u64::MAX,
                 area_clear: false,

@@ -6,8 +6,8 @@ use arm_model::limits::LimitsSpec;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rt_controller::control::reaction::Path;
-use rt_controller::control::{ControlEvent, Motion, Order};
+use rt_controller::control::reaction::StopCategory;
+use rt_controller::control::{ControlCommand, ControlEvent, Motion};
 use shared_types::ipc::ControllerMode;
 use shared_types::{FaultCode, MonotonicNs, WireMode};
 
@@ -59,7 +59,7 @@ impl Withdrawal {
                 FaultCode::DeadManReleased
             }
             Self::Disarms => {
-                stage.rig.order(Order::Disarm);
+                stage.rig.command(ControlCommand::Disarm);
                 FaultCode::Disarmed
             }
             Self::Stops => {
@@ -90,7 +90,10 @@ fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
     let causes = &stage.rig.log.causes;
     assert_eq!(causes.len(), 1, "{how:?} at {part}: {causes:?}");
     let cause = causes[0];
-    assert_eq!((cause.fault(), cause.path), (fault, Path::Brake as u8));
+    assert_eq!(
+        (cause.fault(), cause.path),
+        (fault, StopCategory::JointSpace as u8)
+    );
     assert_eq!(
         (cause.cycle, cause.stop_arm, cause.second_code),
         (before + 1, 0, 0),

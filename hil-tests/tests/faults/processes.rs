@@ -5,8 +5,8 @@ use super::judge::{nod, slowed};
 use super::stage::{Stage, WIRES, config};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits};
-use rt_controller::control::{ControlState, Motion, Order, Thresholds};
-use rt_controller::driver::Mail;
+use rt_controller::control::{ControlCommand, ControlState, Motion, Thresholds};
+use rt_controller::driver::CommandMsg;
 use rt_controller::os::Clock;
 use rt_controller::ports::rings;
 use rt_controller::rt_loop::RtLoop;
@@ -40,7 +40,7 @@ fn fault_25_a_throw_whose_planner_is_gone_is_the_same_to_the_bit() {
     }
 }
 
-/// A plan that never comes is no order at all: armed or not, nothing moves, and
+/// A plan that never comes is no command at all: armed or not, nothing moves, and
 /// the arming runs out.
 #[test]
 fn fault_26_without_a_whole_plan_nothing_moves_and_the_arming_runs_out() {
@@ -68,7 +68,7 @@ fn fault_26_without_a_whole_plan_nothing_moves_and_the_arming_runs_out() {
 fn fault_27_a_wiggle_ends_gently_whatever_the_camera_does() {
     for wire in WIRES {
         let mut stage = Stage::ready(wire, "");
-        stage.rig.order(Order::Arm(Arming {
+        stage.rig.command(ControlCommand::Arm(Arming {
             tier: MotionTier::Wiggle,
             expires_ns: u64::MAX,
             area_clear: false,
@@ -240,10 +240,13 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
     let reader = StateReader::open(&bus).unwrap();
     let control = ControlState::new(Limits::default(), Thresholds::strict());
     let mut all = rings();
-    let hold = Order::Adopt { hold: START_POSE };
+    let hold = ControlCommand::Engage { hold: START_POSE };
     let link = Some(Box::new(IdealArm::default()));
-    let mail = Mail { order: hold, link };
-    all.relay.orders.push(mail).unwrap();
+    let message = CommandMsg {
+        command: hold,
+        link,
+    };
+    all.relay.commands.push(message).unwrap();
     let now_ns = Rc::new(Cell::new(1_000_000_000_000));
     let clock = HandClock(Rc::clone(&now_ns));
     let mut real = RtLoop::new(control, clock, boards, all.rt);
@@ -266,9 +269,12 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
         all.reports_to_rt.push(report).unwrap();
         if cycle == begin {
             let motion = Box::new(Motion::Spline(throw));
-            let order = Order::Run { id: 1, motion };
-            let mail = Mail { order, link: None };
-            all.relay.orders.push(mail).unwrap();
+            let command = ControlCommand::Run { id: 1, motion };
+            let message = CommandMsg {
+                command,
+                link: None,
+            };
+            all.relay.commands.push(message).unwrap();
         }
         real.cycle(now_ns.get(), 0, now_ns.get());
         if audience == Audience::Restless && cycle >= begin {

@@ -3,7 +3,7 @@
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
-use rt_controller::control::{ControlEvent, ControlSettings, Motion, Order, Thresholds};
+use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, Motion, Thresholds};
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{Arming, MonotonicNs, MotionTier, WireMode};
 use xarm_sim::{ArmConfig, ArmEvent, FaultScript};
@@ -106,7 +106,7 @@ impl Stage {
 
     /// Arms for a throw.
     pub(crate) fn arm(&mut self) {
-        self.rig.order(Order::Arm(Arming {
+        self.rig.command(ControlCommand::Arm(Arming {
             tier: MotionTier::Throw,
             expires_ns: u64::MAX,
             area_clear: true,

@@ -93,7 +93,7 @@ impl Flight {
         }
     }
 
-    /// From the cycle in which a stop ends until the arm is adopted again.
+    /// From the cycle in which a stop ends until the arm is engaged again.
     fn nothing_is_sent_while_latched(&self) {
         for pair in self.cycles.windows(2) {
             let (before, now) = (&pair[0].record, &pair[1].record);
@@ -111,7 +111,7 @@ impl Flight {
     fn setpoints_keep_the_limits(&self) {
         let sent: Vec<_> = self.sent().collect();
         let runs = sent.chunk_by(|a, b| {
-            // An adoption begins anew where the arm stands.
+            // An engagement begins anew where the arm stands.
             seconds(a, b) < 0.5 && a.record.mode != ControllerMode::Faulted as u8
         });
         for run in runs {

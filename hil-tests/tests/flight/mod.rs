@@ -150,8 +150,8 @@ fn record(before: &ControlState, rig: &VirtualRig, motions: &BTreeMap<u64, Motio
     bytes.extend(writer.keyframe(&keyframe).unwrap_or_default());
     let mut causes = rig.log.causes.iter().peekable();
     for (input, record) in rig.log.inputs.iter().zip(&rig.log.records) {
-        if let Some(motion) = motions.get(&input.order.motion_id) {
-            writer.motion(input.order.motion_id, motion);
+        if let Some(motion) = motions.get(&input.command.motion_id) {
+            writer.motion(input.command.motion_id, motion);
         }
         let cycle = RecordedCycle {
             input: *input,

@@ -23,7 +23,7 @@
 )]
 
 use crate::control::record::record_input;
-use crate::control::{ArmCodes, ControlState, CycleInput, CycleOutput, Order};
+use crate::control::{ArmCodes, ControlCommand, ControlState, CycleInput, CycleOutput};
 use crate::overrun::{HoldBack, Wake, after_wake, next_wake, setpoint_late_ns};
 use crate::transport::ArmTransport;
 use crate::transport::slot::LinkSlot;
@@ -31,11 +31,11 @@ use alloc::boxed::Box;
 use shared_types::MonotonicNs;
 use shared_types::ipc::{ControllerState, GuardianBeat, InputRecord, OperatorBeat, Reports};
 
-/// An order for the cycle, with the command link that comes with an adoption.
+/// A command for the cycle, with the command link that comes with an engagement.
 #[derive(Debug)]
-pub struct Mail<T> {
+pub struct CommandMsg<T> {
     /// What to do.
-    pub order: Order,
+    pub command: ControlCommand,
     /// A fresh link, which replaces the present one.
     pub link: Option<Box<T>>,
 }
@@ -50,8 +50,8 @@ pub trait CycleIo<T> {
     fn operator(&mut self) -> OperatorBeat;
     /// Newest heartbeat of the guardian.
     fn guardian(&mut self) -> GuardianBeat;
-    /// The next order.
-    fn next_order(&mut self) -> Option<Mail<T>>;
+    /// The next command.
+    fn next_command(&mut self) -> Option<CommandMsg<T>>;
     /// Joint reports that came since the last cycle, oldest first.
     fn new_reports(&mut self) -> Reports;
     /// Joint reports dropped as broken since the last cycle; asked after
@@ -171,8 +171,8 @@ impl<T: ArmTransport> CycleDriver<T> {
     }
 
     fn take_in(&mut self, deadline_ns: u64, missed: u32, io: &mut impl CycleIo<T>) -> CycleInput {
-        let mut mail = io.next_order();
-        if let Some(fresh) = mail.as_mut().and_then(|m| m.link.take())
+        let mut message = io.next_command();
+        if let Some(fresh) = message.as_mut().and_then(|m| m.link.take())
             && let Some(old) = self.link.replace(Some(fresh))
         {
             io.retire_link(old);
@@ -188,7 +188,7 @@ impl<T: ArmTransport> CycleDriver<T> {
             deadline_ns,
             missed,
             late_ns: 0,
-            order: mail.map(|m| m.order),
+            command: message.map(|m| m.command),
             operator: io.operator(),
             guardian: io.guardian(),
             link,

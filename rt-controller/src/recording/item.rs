@@ -83,7 +83,7 @@ pub enum Item {
     Keyframe(Box<Keyframe>),
     /// A motion, before the cycle that begins it.
     Motion {
-        /// Number that orders name it by.
+        /// Number that commands name it by.
         id: u64,
         /// All of it.
         motion: Box<Motion>,

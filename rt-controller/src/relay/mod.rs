@@ -15,8 +15,8 @@ mod uploads;
 use crate::arm_status::ArmStatus;
 use crate::commander::CommanderLock;
 use crate::config::ControllerConfig;
-use crate::control::{ControlEvent, Motion, Order, Thresholds};
-use crate::driver::Mail;
+use crate::control::{ControlCommand, ControlEvent, Motion, Thresholds};
+use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
 use crate::ports::{RelayPorts, Retired};
@@ -99,9 +99,9 @@ enum Open {
     /// Answered when the arm is latched.
     Stop { call: ControllerCall },
     /// Answered when the loop holds the arm and joint reports come.
-    Adoption {
+    Engagement {
         call: ControllerCall,
-        adopted: bool,
+        engaged: bool,
         until: Instant,
     },
 }
@@ -192,7 +192,7 @@ impl Relay {
         while let Ok(event) = self.ports.events.pop() {
             self.on_event(event);
         }
-        self.settle_adoptions();
+        self.settle_engagements();
         self.uploads.settle();
         loop {
             match self.server.receive() {
@@ -213,7 +213,7 @@ impl Relay {
 
     /// Asks the loop to brake and latch.
     pub fn stop(&mut self) {
-        let _ = self.order(Order::Stop, None);
+        let _ = self.command(ControlCommand::Stop, None);
     }
 
     /// Asks the arm itself to stop, when there is no loop any more.
@@ -260,21 +260,25 @@ impl Relay {
         self.newest_status = Some(status);
     }
 
-    /// Hands an order to the loop.
-    fn order(&mut self, order: Order, link: Option<Box<TcpLink>>) -> Result<(), FaultCode> {
+    /// Hands a command to the loop.
+    fn command(
+        &mut self,
+        command: ControlCommand,
+        link: Option<Box<TcpLink>>,
+    ) -> Result<(), FaultCode> {
         self.ports
-            .orders
-            .push(Mail { order, link })
+            .commands
+            .push(CommandMsg { command, link })
             .map_err(|_full| FaultCode::WrongMode)
     }
 
     fn on_event(&mut self, event: ControlEvent) {
         match event {
-            ControlEvent::Adopted => {
+            ControlEvent::Engaged => {
                 self.arm_error = ErrorCode::NONE;
                 for open in &mut self.open {
-                    if let Open::Adoption { adopted, .. } = open {
-                        *adopted = true;
+                    if let Open::Engagement { engaged, .. } = open {
+                        *engaged = true;
                     }
                 }
             }
@@ -342,7 +346,7 @@ impl Relay {
             None => {
                 self.settle_armings(|call| refuse(call, fault, ""));
                 self.open.retain(|open| {
-                    let Open::Adoption { call, .. } = open else {
+                    let Open::Engagement { call, .. } = open else {
                         return true;
                     };
                     refuse(call, fault, "");
@@ -359,7 +363,7 @@ impl Relay {
                 tell(call);
                 false
             }
-            Open::Adoption { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
+            Open::Engagement { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
         });
     }
 
@@ -388,7 +392,7 @@ impl Relay {
             match open {
                 Open::Motion { call, .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
                 Open::Stop { call } => answer(&call, &ControllerEvent::Done),
-                Open::Adoption { call, .. } | Open::Arming { call } => refuse(&call, fault, ""),
+                Open::Engagement { call, .. } | Open::Arming { call } => refuse(&call, fault, ""),
             }
         }
     }
@@ -404,32 +408,32 @@ impl Relay {
         self.last_id += 1;
         let id = self.last_id;
         self.recording.motion(id, &motion);
-        match self.order(Order::Run { id, motion }, None) {
+        match self.command(ControlCommand::Run { id, motion }, None) {
             Ok(()) => self.open.push(Open::Motion { call, id, next }),
             Err(fault) => refuse(&call, fault, ""),
         }
     }
 
     /// Answers bring-ups whose arm is held and reports its joints.
-    fn settle_adoptions(&mut self) {
+    fn settle_engagements(&mut self) {
         let stale_ns = self.arm.report_stale_ns;
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
         self.open.retain(|open| match open {
-            Open::Adoption {
+            Open::Engagement {
                 call,
-                adopted: true,
+                engaged: true,
                 ..
             } if fresh => {
                 answer(call, &ControllerEvent::Done);
                 false
             }
-            Open::Adoption { call, until, .. } if Instant::now() > *until => {
+            Open::Engagement { call, until, .. } if Instant::now() > *until => {
                 refuse(call, FaultCode::ReportStale, "");
                 false
             }
-            Open::Adoption { .. }
+            Open::Engagement { .. }
             | Open::Arming { .. }
             | Open::Motion { .. }
             | Open::Stop { .. } => true,

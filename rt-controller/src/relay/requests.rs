@@ -3,7 +3,7 @@
 use super::answers::{ControllerCall, answer, refuse};
 use super::{Open, REPORT_WAIT, Relay, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
-use crate::control::{Motion, Order};
+use crate::control::{ControlCommand, Motion};
 use crate::os::now_ns;
 use crate::point_to_point::{MoveError, plan_move, verify};
 use crate::session::{ArmSession, SessionError};
@@ -54,9 +54,9 @@ impl Relay {
                 let (tier, area_clear) = (*tier, *area_clear);
                 self.serve_arming(call, tier, area_clear);
             }
-            ControllerRequest::Disarm => match self.order(Order::Disarm, None) {
+            ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => answer(&call, &ControllerEvent::Done),
-                Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
             },
             ControllerRequest::Announce { sha256 } => {
                 let sha256 = *sha256;
@@ -108,9 +108,9 @@ impl Relay {
             expires_ns: now_ns().saturating_add(ARMED_FOR_NS),
             area_clear,
         };
-        match self.order(Order::Arm(arming), None) {
+        match self.command(ControlCommand::Arm(arming), None) {
             Ok(()) => self.open.push(Open::Arming { call }),
-            Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+            Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
         }
     }
 
@@ -122,9 +122,9 @@ impl Relay {
             ControllerMode::Idle
             | ControllerMode::Moving
             | ControllerMode::Streaming
-            | ControllerMode::Braking => match self.order(Order::Stop, None) {
+            | ControllerMode::Braking => match self.command(ControlCommand::Stop, None) {
                 Ok(()) => self.open.push(Open::Stop { call }),
-                Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
             },
         }
     }
@@ -133,13 +133,13 @@ impl Relay {
     /// link to the loop. Nothing moves meanwhile, so waiting is harmless.
     fn set_up(&mut self, call: ControllerCall) {
         match self.prepare(&call) {
-            Ok((hold, link)) => match self.order(Order::Adopt { hold }, Some(link)) {
-                Ok(()) => self.open.push(Open::Adoption {
+            Ok((hold, link)) => match self.command(ControlCommand::Engage { hold }, Some(link)) {
+                Ok(()) => self.open.push(Open::Engagement {
                     call,
-                    adopted: false,
+                    engaged: false,
                     until: Instant::now() + REPORT_WAIT,
                 }),
-                Err(fault) => refuse(&call, fault, "the control loop takes no orders"),
+                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
             },
             Err((fault, detail)) => refuse(&call, fault, &detail),
         }

@@ -11,8 +11,8 @@ mod bare;
 mod timed_link;
 mod times;
 
-use crate::control::{ControlState, Order};
-use crate::driver::Mail;
+use crate::control::{ControlCommand, ControlState};
+use crate::driver::CommandMsg;
 use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, now_ns};
 use crate::ports::{RelayPorts, rings};
 use crate::rehearsal::{Rehearsal, patient, report, swinging};
@@ -257,10 +257,10 @@ impl Trial {
 
     /// Orders what leads to a moving arm from where the loop is.
     fn prompt(&mut self) -> Result<(), TrialError> {
-        let mail = match self.mode {
+        let message = match self.mode {
             // Acknowledged: the trial measures, whatever the machine did to it.
-            ControllerMode::Faulted => Mail {
-                order: Order::Adopt { hold: self.q },
+            ControllerMode::Faulted => CommandMsg {
+                command: ControlCommand::Engage { hold: self.q },
                 link: None,
             },
             ControllerMode::Offline => {
@@ -270,27 +270,30 @@ impl Trial {
                 let settings = LinkSettings::new(250, self.period_ns);
                 let address = self.answerer.address();
                 let link = TcpLink::connect(address, CONNECT_TIMEOUT, settings)?;
-                Mail {
-                    order: Order::Adopt { hold: START_POSE },
+                CommandMsg {
+                    command: ControlCommand::Engage { hold: START_POSE },
                     link: Some(Box::new(TimedLink::new(link, polls))),
                 }
             }
             ControllerMode::Idle => {
                 self.motions += 1;
                 let motion = Box::new(swinging(self.q)?);
-                let order = Order::Run {
+                let command = ControlCommand::Run {
                     id: self.motions,
                     motion,
                 };
-                Mail { order, link: None }
+                CommandMsg {
+                    command,
+                    link: None,
+                }
             }
             ControllerMode::Moving | ControllerMode::Streaming | ControllerMode::Braking => {
                 return Ok(());
             }
         };
         self.relay
-            .orders
-            .push(mail)
+            .commands
+            .push(message)
             .map_err(|_full| TrialError::Ended)
     }
 }

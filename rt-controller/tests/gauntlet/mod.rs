@@ -9,9 +9,9 @@ use arm::{EchoArm, Manners};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits, LimitsSpec};
 use rt_controller::control::{
-    ControlEvent, ControlSettings, ControlState, Motion, Order, Thresholds,
+    ControlCommand, ControlEvent, ControlSettings, ControlState, Motion, Thresholds,
 };
-use rt_controller::driver::Mail;
+use rt_controller::driver::CommandMsg;
 use rt_controller::os::Clock;
 use rt_controller::ports::{Rings, rings};
 use rt_controller::rt_loop::RtLoop;
@@ -236,12 +236,16 @@ impl<'w> Bench<'w> {
         ![ControllerMode::Offline, ControllerMode::Faulted].contains(&self.mode())
     }
 
-    pub(crate) fn order(&mut self, order: Order) {
-        self.send(order, None);
+    pub(crate) fn command(&mut self, command: ControlCommand) {
+        self.send(command, None);
     }
 
-    fn send(&mut self, order: Order, link: Option<Box<TcpLink>>) {
-        self.rings.relay.orders.push(Mail { order, link }).unwrap();
+    fn send(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
+        self.rings
+            .relay
+            .commands
+            .push(CommandMsg { command, link })
+            .unwrap();
         self.cycle();
     }
 
@@ -255,7 +259,7 @@ impl<'w> Bench<'w> {
         self.operator.hold();
         self.operator.release_stop();
         self.arm.be(Manners::Good);
-        // Reports that are well again come before anybody adopts the arm: a spoilt
+        // Reports that are well again come before anybody engages the arm: a spoilt
         // one followed by a true one is a jump.
         for _ in 0..3 {
             self.cycle();
@@ -265,20 +269,20 @@ impl<'w> Bench<'w> {
         let timeout = Duration::from_secs(5);
         let link = TcpLink::connect(self.arm.address, timeout, settings).unwrap();
         self.newest.q_c = START_POSE;
-        let hold = Order::Adopt { hold: START_POSE };
+        let hold = ControlCommand::Engage { hold: START_POSE };
         self.send(hold, Some(Box::new(link)));
         assert_eq!(self.mode(), ControllerMode::Idle);
     }
 
     /// Arms, begins `motion` and follows it for `cycles` at most.
     pub(crate) fn begin(&mut self, motion: Motion, tier: MotionTier, cycles: usize) {
-        self.order(Order::Arm(Arming {
+        self.command(ControlCommand::Arm(Arming {
             tier,
             expires_ns: self.now_ns + 1_000_000_000,
             area_clear: true,
         }));
         let motion = Box::new(motion);
-        self.order(Order::Run { id: 1, motion });
+        self.command(ControlCommand::Run { id: 1, motion });
         for _ in 0..cycles {
             self.cycle();
         }

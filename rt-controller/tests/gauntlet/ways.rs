@@ -5,7 +5,7 @@ use super::{Bench, Watch};
 use arm_model::joint::START_POSE;
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, LimitsSpec};
 use rt_controller::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
-use rt_controller::control::{Motion, Order};
+use rt_controller::control::{ControlCommand, Motion};
 use rt_controller::point_to_point::plan_move;
 use shared_types::ipc::ControllerMode;
 use shared_types::{Arming, FaultCode, MotionTier, WireMode};
@@ -17,7 +17,7 @@ enum Way {
     Spoilt(fn(&mut Bench<'_>)),
     /// This motion is begun.
     Motion(fn(&Limits) -> Motion, MotionTier),
-    /// Nothing moves for it: an order is refused.
+    /// Nothing moves for it: a command is refused.
     Refused(fn(&mut Bench<'_>)),
     /// The loop cannot meet it, because ...
     Never(&'static str),
@@ -35,12 +35,12 @@ fn way_to(code: FaultCode) -> Way {
         F::OperatorLost => Spoilt(|b| b.mood.operator_silent = true),
         F::GuardianLost => Spoilt(|b| b.mood.guardian_silent = true),
         F::DeadManReleased => Spoilt(|b| b.operator.let_go()),
-        F::Disarmed => Spoilt(|b| b.order(Order::Disarm)),
+        F::Disarmed => Spoilt(|b| b.command(ControlCommand::Disarm)),
         F::SetpointNotFinite => Motion(|_| not_finite(), MotionTier::Throw),
         F::SetpointPosition => Refused(|b| {
-            b.order(Order::Stop);
+            b.command(ControlCommand::Stop);
             let hold = Bench::pose(2, 3.0);
-            b.order(Order::Adopt { hold });
+            b.command(ControlCommand::Engage { hold });
         }),
         F::SetpointVelocity => Motion(|_| spline(7, 4.6, 2.0), MotionTier::Throw),
         F::SetpointAcceleration => Motion(|_| spline(7, 0.2, 0.2), MotionTier::Throw),
@@ -79,14 +79,14 @@ fn way_to(code: FaultCode) -> Way {
         F::WrongMode => Refused(|b| {
             b.begin(swing(), MotionTier::Throw, 20);
             let motion = Box::new(swing());
-            b.order(Order::Run { id: 2, motion });
+            b.command(ControlCommand::Run { id: 2, motion });
         }),
         F::NotArmed => Refused(|b| {
             let motion = Box::new(swing());
-            b.order(Order::Run { id: 1, motion });
+            b.command(ControlCommand::Run { id: 1, motion });
         }),
         F::ArmingExpired => Refused(|b| {
-            b.order(Order::Arm(Arming {
+            b.command(ControlCommand::Arm(Arming {
                 tier: MotionTier::Wiggle,
                 expires_ns: b.now_ns + 20_000_000,
                 area_clear: true,

@@ -1,4 +1,4 @@
-//! A seeded run of the core alone, with motions, orders and everything that can
+//! A seeded run of the core alone, with motions, commands and everything that can
 //! go wrong on the way in, recorded like the controller records it.
 
 #![allow(
@@ -14,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::record_input;
 use rt_controller::control::{
-    ArmCodes, ControlEvent, ControlState, CycleInput, Motion, Order, Thresholds,
+    ArmCodes, ControlCommand, ControlEvent, ControlState, CycleInput, Motion, Thresholds,
 };
 use rt_controller::point_to_point::plan_move;
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
@@ -70,7 +70,7 @@ fn run(
             bytes.extend(writer.keyframe(&snapshot).unwrap_or_default());
         }
         let input = world.input(control.mode());
-        if let Some(Order::Run { id, motion }) = &input.order {
+        if let Some(ControlCommand::Run { id, motion }) = &input.command {
             writer.motion(*id, motion);
         }
         let recorded = record_input(&input, cycle);
@@ -140,7 +140,7 @@ impl World {
         let mut input = CycleInput {
             deadline_ns: self.now_ns,
             missed,
-            order: self.order(mode),
+            command: self.command(mode),
             ..CycleInput::default()
         };
         if !self.once_in(9) {
@@ -190,20 +190,20 @@ impl World {
         }
     }
 
-    fn order(&mut self, mode: ControllerMode) -> Option<Order> {
+    fn command(&mut self, mode: ControllerMode) -> Option<ControlCommand> {
         match mode {
             ControllerMode::Offline | ControllerMode::Faulted => {
-                self.once_in(100).then_some(Order::Adopt {
+                self.once_in(100).then_some(ControlCommand::Engage {
                     hold: self.commanded,
                 })
             }
             ControllerMode::Idle if self.once_in(50) => Some(self.motion()),
-            _ if self.once_in(10_000) => Some(Order::Stop),
+            _ if self.once_in(10_000) => Some(ControlCommand::Stop),
             _ => None,
         }
     }
 
-    fn motion(&mut self) -> Order {
+    fn motion(&mut self) -> ControlCommand {
         self.last_id += 1;
         let mut end = START_POSE;
         for joint in 0..7 {
@@ -217,7 +217,7 @@ impl World {
             let middle = from + (end - from) * 0.6;
             Motion::Spline(JointTrajectory::new(&[0.0, 0.7, 1.2], &[from, middle, end]).unwrap())
         };
-        Order::Run {
+        ControlCommand::Run {
             id: self.last_id,
             motion: Box::new(motion),
         }

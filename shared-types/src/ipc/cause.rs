@@ -25,7 +25,7 @@ pub struct LimitBroken {
     pub limit: f64,
 }
 
-/// What happened since the arm was last adopted without stopping it: each of
+/// What happened since the arm was last engaged without stopping it: each of
 /// these marks the run. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "std", derive(ZeroCopySend))]

@@ -83,15 +83,15 @@ impl<'de> Deserialize<'de> for Reports {
     }
 }
 
-/// What kind of order a cycle got. Numbers are part of recorded runs.
+/// What kind of command a cycle got. Numbers are part of recorded runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[repr(u8)]
-pub enum OrderKind {
+pub enum CommandKind {
     /// None.
     #[default]
     None = 0,
     /// Hold the pose `hold`.
-    Adopt = 1,
+    Engage = 1,
     /// Begin motion `motion_id`.
     Run = 2,
     /// Brake and latch.
@@ -102,13 +102,13 @@ pub enum OrderKind {
     Disarm = 5,
 }
 
-impl OrderKind {
+impl CommandKind {
     /// The kind of a raw number, if there is one. RT-safe.
     #[must_use]
     pub const fn from_raw(raw: u8) -> Option<Self> {
         Some(match raw {
             0 => Self::None,
-            1 => Self::Adopt,
+            1 => Self::Engage,
             2 => Self::Run,
             3 => Self::Stop,
             4 => Self::Arm,
@@ -118,12 +118,12 @@ impl OrderKind {
     }
 }
 
-/// An order as plain data; what its kind does not use is zero. RT-safe to copy.
+/// A command as plain data; what its kind does not use is zero. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
-pub struct OrderRecord {
-    /// Raw [`OrderKind`].
+pub struct CommandRecord {
+    /// Raw [`CommandKind`].
     pub kind: u8,
     /// Raw [`crate::MotionTier`].
     pub tier: u8,
@@ -209,7 +209,7 @@ pub struct InputRecord {
     /// the cycle was punctual (ns).
     pub late_ns: u32,
     /// Order.
-    pub order: OrderRecord,
+    pub command: CommandRecord,
     /// Newest heartbeat of the operator.
     pub operator: OperatorBeat,
     /// Newest heartbeat of the guardian.
@@ -255,8 +255,8 @@ mod tests {
     #[test]
     fn kinds_come_back() {
         for raw in 0..6 {
-            assert_eq!(OrderKind::from_raw(raw).map(|k| k as u8), Some(raw));
+            assert_eq!(CommandKind::from_raw(raw).map(|k| k as u8), Some(raw));
         }
-        assert_eq!(OrderKind::from_raw(6), None);
+        assert_eq!(CommandKind::from_raw(6), None);
     }
 }

@@ -58,7 +58,7 @@ pub use domains::running_controllers;
 #[cfg(feature = "std")]
 pub use error::IpcError;
 pub use input::{
-    ArmCodesRecord, InputRecord, LinkRecord, OrderKind, OrderRecord, REPORTS_PER_CYCLE, Reports,
+    ArmCodesRecord, CommandKind, CommandRecord, InputRecord, LinkRecord, REPORTS_PER_CYCLE, Reports,
 };
 pub use payload::{
     ControllerMode, ControllerState, CycleRecord, FrameHeader, GuardianBeat, JointReport,

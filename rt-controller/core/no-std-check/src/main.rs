@@ -9,7 +9,7 @@
 
 extern crate alloc;
 
-use control_core::control::{ArmCommand, ControlState, CycleInput, Order, Thresholds};
+use control_core::control::{ArmCommand, ControlState, CycleInput, ControlCommand, Thresholds};
 use control_core::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use control_core::xarm::{Command, Protocol};
 use core::alloc::{GlobalAlloc, Layout};
@@ -22,12 +22,12 @@ const POSE: JointVector = JointVector([0.0, -0.3, 0.0, 0.8, 0.0, 1.1, 0.0]);
 #[unsafe(no_mangle)]
 extern "C" fn main() -> i32 {
     let mut control = ControlState::new(Limits::default(), Thresholds::relaxed());
-    let mut order = Some(Order::Adopt { hold: POSE });
+    let mut command = Some(ControlCommand::Engage { hold: POSE });
     let mut held = 0;
     for cycle in 1..=1000_u64 {
         let input = CycleInput {
             deadline_ns: cycle * PERIOD_NS,
-            order: order.take(),
+            command: command.take(),
             ..CycleInput::default()
         };
         let out = control.step(input);

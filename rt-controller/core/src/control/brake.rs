@@ -5,8 +5,8 @@
 //! hold it, ramp it back. It needs no iteration and no memory, so a brake is
 //! always available; there is nothing that could refuse.
 
-use super::finding::Finding;
 use super::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, PhasedMotion};
+use super::violation::Violation;
 use arm_model::{JOINTS, JointState, Limits, exact};
 use shared_types::FaultCode;
 
@@ -73,7 +73,7 @@ pub fn unstoppable(from: &JointState, limits: &Limits) -> Option<(usize, f64, f6
 /// Differences of setpoints are means, so they show an excess only after the
 /// motion itself has it; then no brake could begin within the limits.
 #[must_use]
-pub fn too_fast(at: &JointState, limits: &Limits) -> Option<Finding> {
+pub fn too_fast(at: &JointState, limits: &Limits) -> Option<Violation> {
     let hardest = 1.0 / limits.period_s();
     (0..JOINTS).find_map(|j| {
         let (speed_max, most) = (
@@ -87,10 +87,10 @@ pub fn too_fast(at: &JointState, limits: &Limits) -> Option<Finding> {
         let slack = 1.0 + ROUNDING_RAD;
         if speed > speed_max * slack + ROUNDING_RAD {
             let fault = FaultCode::SetpointVelocity;
-            Some(Finding::of_joint(fault, j, speed, speed_max))
+            Some(Violation::of_joint(fault, j, speed, speed_max))
         } else if qdd.abs() > most * slack + ROUNDING_RAD {
             let fault = FaultCode::SetpointAcceleration;
-            Some(Finding::of_joint(fault, j, qdd, most))
+            Some(Violation::of_joint(fault, j, qdd, most))
         } else {
             None
         }

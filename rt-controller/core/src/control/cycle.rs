@@ -1,18 +1,18 @@
 //! One control cycle: [`ControlState::step`], a pure function of its input and
-//! its own state. Orders are obeyed in `orders`, faults met in
+//! its own state. Commands are handled in `commands`, faults met in
 //! `faults`.
 
 use super::arming::ArmingState;
 use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput};
-use super::finding::Finding;
 use super::limiter::{Allowance, Limiter};
 use super::mode::{ModeState, Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
-use super::reaction::{Path, reaction};
+use super::reaction::{StopCategory, reaction};
 use super::settings::ControlSettings;
 use super::stopping::Stop;
 use super::velocity_wire::VelocityWire;
+use super::violation::Violation;
 use crate::xarm::Status;
 use alloc::boxed::Box;
 use arm_model::{JointState, JointVector, Limits};
@@ -22,8 +22,8 @@ use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
 
 /// State of the control cycle. Sized once; stepping never allocates.
 ///
-/// An adoption makes it anew, apart from its counters: a recorded run can be
-/// stepped again from any adoption on, see [`ControlState::resume`].
+/// An engagement makes it anew, apart from its counters: a recorded run can be
+/// stepped again from any engagement on, see [`ControlState::resume`].
 #[derive(Debug, Serialize, Deserialize)]
 pub struct ControlState {
     pub(super) limits: Limits,
@@ -50,7 +50,7 @@ impl ControlState {
     }
 
     /// Offline after `cycle` cycles and `motions_done` motions: what a record
-    /// that begins later, with an adoption, is stepped again from.
+    /// that begins later, with an engagement, is stepped again from.
     #[must_use]
     pub fn resume(
         limits: Limits,
@@ -115,7 +115,7 @@ impl ControlState {
         }
     }
 
-    /// What marked the run since the adoption.
+    /// What marked the run since the engagement.
     #[must_use]
     pub const fn counts(&self) -> RunCounts {
         self.monitor.counts()
@@ -127,7 +127,7 @@ impl ControlState {
         self.settings.wire
     }
 
-    /// One cycle: observe, watch, obey, command. RT-safe; returns for any input.
+    /// One cycle: observe, watch, handle the command, send a setpoint. RT-safe; returns for any input.
     pub fn step(&mut self, input: CycleInput) -> CycleOutput {
         let mut out = CycleOutput::default();
         let mut input = input;
@@ -138,8 +138,8 @@ impl ControlState {
         self.monitor.observe(&input, &self.limits);
         let before = self.mode();
         self.watch(&input, &mut out);
-        if let Some(order) = input.order.take() {
-            self.obey(order, before, &input, &mut out);
+        if let Some(command) = input.command.take() {
+            self.handle(command, before, &input, &mut out);
         }
         let deadline_ns = input.deadline_ns;
         let trajectory_s = self.trajectory_s(deadline_ns);
@@ -164,11 +164,11 @@ impl ControlState {
             ModeState::Offline | ModeState::Idle | ModeState::Faulted(_) => None,
             ModeState::Following(running) => Some((since_s(running.start_ns), 1.0)),
             ModeState::Braking(braking) => Some(match braking.stop {
-                Stop::Slow(slow) => {
+                Stop::OnPath(slow) => {
                     let (path_s, rate, _) = slow.at(since_s(braking.start_ns));
                     (path_s, rate)
                 }
-                Stop::Brake(_) => (since_s(braking.running.start_ns), 0.0),
+                Stop::JointSpace(_) => (since_s(braking.running.start_ns), 0.0),
             }),
         }
     }
@@ -225,9 +225,9 @@ impl ControlState {
             | ControllerMode::Moving
             | ControllerMode::Streaming
             | ControllerMode::Braking => {
-                let than = self.state.stop().map_or(Path::Continue, Stop::path);
+                let than = self.state.stop().map_or(StopCategory::Continue, Stop::path);
                 let missed = self.missed(input);
-                if let Some(found) = self.monitor.finding(input, missed, self.mode(), than) {
+                if let Some(found) = self.monitor.violation(input, missed, self.mode(), than) {
                     self.react(self.with_speed(found), input.deadline_ns, out);
                 }
             }
@@ -278,7 +278,7 @@ impl ControlState {
         }
     }
 
-    fn follow(&mut self, deadline_ns: u64, out: &mut CycleOutput) -> Result<(), Finding> {
+    fn follow(&mut self, deadline_ns: u64, out: &mut CycleOutput) -> Result<(), Violation> {
         let ModeState::Following(running) = &self.state else {
             return Ok(());
         };
@@ -289,7 +289,7 @@ impl ControlState {
         let streamed = running.motion.mode() == ControllerMode::Streaming;
         if let Some((joint, q_rad, end_rad)) = super::brake::unstoppable(&target, &self.limits) {
             let fault = FaultCode::SetpointUnstoppable;
-            return Err(Finding::of_joint(fault, joint, q_rad, end_rad));
+            return Err(Violation::of_joint(fault, joint, q_rad, end_rad));
         }
         if let Some(found) = super::brake::too_fast(&target, &self.limits) {
             return Err(found);
@@ -347,10 +347,10 @@ impl ControlState {
         streamed: bool,
         deadline_ns: u64,
         out: &mut CycleOutput,
-    ) -> Result<(), Finding> {
+    ) -> Result<(), Violation> {
         let step_s = MonotonicNs(deadline_ns).since_s(MonotonicNs(self.sent_ns));
         if !target.is_finite() {
-            return Err(Finding::plain(FaultCode::SetpointNotFinite));
+            return Err(Violation::plain(FaultCode::SetpointNotFinite));
         }
         let allowed = Allowance {
             tcp_speed_max_m_s: self.tcp_speed_max_m_s,
@@ -394,7 +394,7 @@ impl ControlState {
     }
 }
 
-/// A cycle has at most five events (an order's, an end, two disarmings, a latch):
+/// A cycle has at most five events (a command's, an end, two disarmings, a latch):
 /// they fit.
 pub(super) fn emit(out: &mut CycleOutput, event: ControlEvent) {
     let _ = out.events.push(event);

@@ -1,7 +1,7 @@
 //! A core with an arm that follows it, for tests of whole cycles in virtual time.
 
 use super::*;
-use crate::control::exchange::Order;
+use crate::control::exchange::ControlCommand;
 use crate::control::limiter::{Allowance, Limiter};
 use crate::control::{LinkInput, Thresholds};
 use crate::point_to_point::plan_move;
@@ -42,7 +42,7 @@ impl Bench {
 
     pub(super) fn holding() -> Self {
         let mut bench = Self::offline();
-        bench.order(Order::Adopt { hold: START_POSE });
+        bench.command(ControlCommand::Engage { hold: START_POSE });
         for _ in 0..100 {
             bench.cycle();
         }
@@ -57,7 +57,7 @@ impl Bench {
         CycleInput {
             deadline_ns: self.now_ns,
             missed,
-            order: None,
+            command: None,
             operator: OperatorBeat {
                 count: self.beat,
                 ..OperatorBeat::default()
@@ -113,15 +113,15 @@ impl Bench {
         self.requests.extend(out.request);
     }
 
-    pub(super) fn order(&mut self, order: Order) {
+    pub(super) fn command(&mut self, command: ControlCommand) {
         let mut input = self.input(0);
-        input.order = Some(order);
+        input.command = Some(command);
         self.step(input);
     }
 
     pub(super) fn run(&mut self, motion: Motion) {
         let motion = Box::new(motion);
-        self.order(Order::Run { id: 7, motion });
+        self.command(ControlCommand::Run { id: 7, motion });
     }
 
     pub(super) fn cycles_until_still(&mut self) -> usize {

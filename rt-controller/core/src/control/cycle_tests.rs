@@ -1,8 +1,8 @@
-//! Motions, orders and limits over whole cycles, in virtual time.
+//! Motions, commands and limits over whole cycles, in virtual time.
 
 use super::bench::{Bench, go, swing};
 use super::*;
-use crate::control::exchange::Order;
+use crate::control::exchange::ControlCommand;
 use crate::control::limiter::Limiter;
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
@@ -71,7 +71,7 @@ fn a_motion_that_begins_late_is_on_time_from_its_second_setpoint_on() {
     let mut input = bench.input(0);
     let start = input.deadline_ns;
     input.late_ns = 1_300_000;
-    input.order = Some(Order::Run {
+    input.command = Some(ControlCommand::Run {
         id: 7,
         motion: Box::new(motion.clone()),
     });
@@ -96,7 +96,9 @@ fn every_fault_ends_as_its_table_says() {
     type Break = fn(&mut CycleInput);
     let cases: [(FaultCode, Break); 10] = [
         (FaultCode::OperatorStop, |i| i.operator.stop = 1),
-        (FaultCode::OperatorStop, |i| i.order = Some(Order::Stop)),
+        (FaultCode::OperatorStop, |i| {
+            i.command = Some(ControlCommand::Stop)
+        }),
         (FaultCode::OperatorLost, |i| i.operator.count = 1),
         (FaultCode::ReplyStalled, |i| {
             i.link.unanswered_ns = 100_000_001;
@@ -137,17 +139,17 @@ fn every_fault_ends_as_its_table_says() {
             assert_eq!(bench.state.mode(), ControllerMode::Faulted, "{fault:?}");
             assert_eq!(
                 braked > 5,
-                reaction(fault).path < Path::Silence,
+                reaction(fault).path < StopCategory::CutOff,
                 "{fault:?} {braked}"
             );
             let stops = usize::from(reaction(fault).stop_arm);
             assert_eq!(bench.requests.len(), stops, "{fault:?}");
-            // Nothing but an adoption wakes it.
+            // Nothing but an engagement wakes it.
             bench.run(swing());
             assert_eq!(bench.state.mode(), ControllerMode::Faulted);
             let hold = bench.commanded[0];
             bench.judge = Limiter::at_rest(hold, &Limits::default());
-            bench.order(Order::Adopt { hold });
+            bench.command(ControlCommand::Engage { hold });
             assert_eq!(bench.state.mode(), ControllerMode::Idle);
         }
     }
@@ -161,7 +163,7 @@ fn the_first_braking_setpoint_comes_in_the_very_cycle() {
         bench.cycle();
     }
     let last = bench.commanded[0];
-    bench.order(Order::Stop);
+    bench.command(ControlCommand::Stop);
     assert_eq!(bench.state.mode(), ControllerMode::Braking);
     let planned = swing().state_at(61.0 * 0.004).q;
     let (braked, planned) = (bench.commanded[0] - last, planned - last);
@@ -172,7 +174,7 @@ fn the_first_braking_setpoint_comes_in_the_very_cycle() {
 fn orders_that_do_not_fit_are_refused() {
     let mut bench = Bench::offline();
     bench.run(swing());
-    bench.order(Order::Adopt {
+    bench.command(ControlCommand::Engage {
         hold: JointVector::splat(f64::NAN),
     });
     assert!(
@@ -213,7 +215,7 @@ fn a_throw_is_braked_softly_wherever_it_is_stopped() {
             let mut bench = Bench::holding();
             bench.run(Motion::Spline(throw));
             (1..k).for_each(|_| bench.cycle());
-            bench.order(Order::Stop);
+            bench.command(ControlCommand::Stop);
             bench.cycles_until_still();
             assert_eq!(bench.latched(), Some(FaultCode::OperatorStop));
             stops += 1;
@@ -259,8 +261,8 @@ proptest! {
             match kind {
                 0 => input.deadline_ns = numbers[0],
                 1 => input.missed = numbers[1] as u32,
-                2 => input.order = Some(Order::Adopt { hold: q }),
-                3 => input.order = Some(Order::Stop),
+                2 => input.command = Some(ControlCommand::Engage { hold: q }),
+                3 => input.command = Some(ControlCommand::Stop),
                 4 => input.reports = Some(JointReport {
                     q, qd: q, q_target: q, stamp_ns: numbers[2], arrival_ns: numbers[3],
                     arm_state: words[0] as u8, arm_mode: words[1] as u8,
@@ -270,10 +272,10 @@ proptest! {
                 6 => input.link.status = Some(Status(numbers[0] as u8)),
                 7 => input.operator = OperatorBeat { count: numbers[0], ..OperatorBeat::default() },
                 8 => if let Ok(t) = JointTrajectory::new(&[0.0, 0.5], &[START_POSE, q]) {
-                    input.order = Some(Order::Run { id: 1, motion: Box::new(Motion::Spline(t)) });
+                    input.command = Some(ControlCommand::Run { id: 1, motion: Box::new(Motion::Spline(t)) });
                 },
-                9 => input.order = Some(Order::Adopt { hold: START_POSE }),
-                _ => input.order = Some(Order::Run { id: 2, motion: Box::new(swing()) }),
+                9 => input.command = Some(ControlCommand::Engage { hold: START_POSE }),
+                _ => input.command = Some(ControlCommand::Run { id: 2, motion: Box::new(swing()) }),
             }
             let out = bench.state.step(input);
             if let Some(q) = out.setpoint() {
@@ -297,7 +299,7 @@ proptest! {
         bench.run(Motion::Spline(JointTrajectory::new(&times, &poses).unwrap()));
         for k in 0..600 {
             if k == stop_at {
-                bench.order(Order::Stop);
+                bench.command(ControlCommand::Stop);
             }
             bench.cycle();
         }

@@ -9,10 +9,10 @@ use shared_types::{Arming, FaultCode};
 
 /// What the relay asks of the cycle.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Order {
+pub enum ControlCommand {
     /// The arm is enabled and in its streaming mode; hold this pose (rad).
     /// Everything known about the run before is forgotten.
-    Adopt {
+    Engage {
         /// Pose to hold (rad).
         hold: JointVector,
     },
@@ -81,8 +81,8 @@ pub struct CycleInput {
     /// How much later than the deadline the instant is that the setpoint is for,
     /// 0 when the cycle was punctual (ns).
     pub late_ns: u32,
-    /// At most one order.
-    pub order: Option<Order>,
+    /// At most one command.
+    pub command: Option<ControlCommand>,
     /// Newest heartbeat of the operator, with the dead-man switch.
     pub operator: OperatorBeat,
     /// Newest heartbeat of the guardian.
@@ -115,7 +115,7 @@ pub enum ArmCommand {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControlEvent {
     /// The arm is held.
-    Adopted,
+    Engaged,
     /// The controller is armed.
     Armed(Arming),
     /// The controller is not armed any more; `fault` says why, `None` when it
@@ -140,9 +140,9 @@ pub enum ControlEvent {
         /// Deadline of the last setpoint (ns).
         end_ns: u64,
     },
-    /// An order was refused; nothing moved for it.
+    /// A command was refused; nothing moved for it.
     Refused {
-        /// Number of the motion, `None` for an adoption or an arming.
+        /// Number of the motion, `None` for an engagement or an arming.
         id: Option<u64>,
         /// Why.
         fault: FaultCode,
@@ -152,7 +152,7 @@ pub enum ControlEvent {
     Latched(CauseRecord),
 }
 
-/// Events of one cycle at most: an order's, a motion's end, an end of arming, a
+/// Events of one cycle at most: a command's, a motion's end, an end of arming, a
 /// latch.
 pub const EVENTS_PER_CYCLE: usize = 6;
 

@@ -3,10 +3,10 @@
 
 use super::cycle::{ControlState, emit};
 use super::exchange::{ControlEvent, CycleOutput};
-use super::finding::Finding;
 use super::mode::{Braking, ModeState, Trigger, next_mode};
-use super::reaction::{Path, Reaction, reaction};
+use super::reaction::{Reaction, StopCategory, reaction};
 use super::stopping::{Stop, StopFrom, choose_stop};
+use super::violation::Violation;
 use crate::xarm::StateRequest;
 use arm_model::{JOINTS, JointState, kinematics};
 use shared_types::ipc::{CauseRecord, ControllerMode, PAYLOAD_VERSION};
@@ -14,12 +14,12 @@ use shared_types::{FaultCode, MonotonicNs, WireMode};
 
 impl ControlState {
     /// Meets a fault by the table in [`reaction`]; the first cause is kept.
-    pub(super) fn react(&mut self, found: Finding, deadline_ns: u64, out: &mut CycleOutput) {
+    pub(super) fn react(&mut self, found: Violation, deadline_ns: u64, out: &mut CycleOutput) {
         let how = reaction(found.fault);
         if let ModeState::Braking(braking) = &mut self.state {
             braking.worsen(&found, how);
         }
-        let trigger = if how.path == Path::Silence {
+        let trigger = if how.path == StopCategory::CutOff {
             Trigger::LatchFault
         } else {
             Trigger::BrakeFault
@@ -33,7 +33,7 @@ impl ControlState {
                 };
                 self.latch(fault, cause, how.stop_arm || cause.stop_arm != 0, out);
             }
-            None if how.path == Path::Brake => self.brake_instead(),
+            None if how.path == StopCategory::JointSpace => self.brake_instead(),
             None => {}
         }
     }
@@ -41,7 +41,7 @@ impl ControlState {
     /// An arm that stops by an error of its own mostly does so for speed (C24,
     /// C60); its code comes later, so the cause shows the speed commanded last
     /// that was nearest to its limit.
-    pub(super) fn with_speed(&self, found: Finding) -> Finding {
+    pub(super) fn with_speed(&self, found: Violation) -> Violation {
         if found.fault != FaultCode::ArmError || !self.mode().is_moving() {
             return found;
         }
@@ -51,11 +51,11 @@ impl ControlState {
         };
         let (q, limits) = (&self.commanded.q, &self.limits);
         let tool_m_s = kinematics::tool_speed_m_s(q, &qd, &limits.tcp_offset());
-        let of_tool = Finding::new(found.fault, tool_m_s, limits.tcp_speed_max_m_s);
+        let of_tool = Violation::new(found.fault, tool_m_s, limits.tcp_speed_max_m_s);
         (0..JOINTS)
             .map(|j| {
                 let speed = qd[j].abs();
-                Finding::of_joint(found.fault, j, speed, limits.velocity_max_rad_s[j])
+                Violation::of_joint(found.fault, j, speed, limits.velocity_max_rad_s[j])
             })
             .fold(of_tool, |most, joint| {
                 if joint.part() > most.part() {
@@ -67,7 +67,7 @@ impl ControlState {
     }
 
     /// Leaves the motion that runs.
-    fn begin_braking(&mut self, found: &Finding, how: Reaction, deadline_ns: u64) {
+    fn begin_braking(&mut self, found: &Violation, how: Reaction, deadline_ns: u64) {
         let Some(stop) = self.way_to_rest(how.path) else {
             return;
         };
@@ -85,8 +85,8 @@ impl ControlState {
 
     /// Leaves the path, where a stop slows down along it.
     fn brake_instead(&mut self) {
-        if let Some(Stop::Slow(_)) = self.state.stop()
-            && let Some(stop) = self.way_to_rest(Path::Brake)
+        if let Some(Stop::OnPath(_)) = self.state.stop()
+            && let Some(stop) = self.way_to_rest(StopCategory::JointSpace)
             && let ModeState::Braking(braking) = &mut self.state
         {
             (braking.stop, braking.start_ns) = (stop, self.sent_ns);
@@ -94,7 +94,7 @@ impl ControlState {
     }
 
     /// The way to rest from the setpoint sent last, if something moves.
-    fn way_to_rest(&self, path: Path) -> Option<Stop> {
+    fn way_to_rest(&self, path: StopCategory) -> Option<Stop> {
         let running = self.state.running()?;
         let motion_s = self.path_at(self.sent_ns).map_or(0.0, |(t_s, _)| t_s);
         let from = StopFrom {
@@ -108,7 +108,7 @@ impl ControlState {
         // begin before the path.
         let before = MonotonicNs(self.sent_ns).since_s(MonotonicNs(running.start_ns)) < 0.0;
         let path = if before || self.state.stop().is_some() {
-            Path::Brake
+            StopCategory::JointSpace
         } else {
             path
         };
@@ -116,7 +116,7 @@ impl ControlState {
     }
 
     /// The record of a cause that was just noticed.
-    fn cause_of(&self, found: &Finding, how: Reaction, deadline_ns: u64) -> CauseRecord {
+    fn cause_of(&self, found: &Violation, how: Reaction, deadline_ns: u64) -> CauseRecord {
         CauseRecord {
             version: PAYLOAD_VERSION,
             code: found.fault as u16,
@@ -162,7 +162,7 @@ impl ControlState {
 
 impl Braking {
     /// Notes what made it harder.
-    fn worsen(&mut self, found: &Finding, how: Reaction) {
+    fn worsen(&mut self, found: &Violation, how: Reaction) {
         if self.cause.second_code == 0 && found.fault as u16 != self.cause.code {
             self.cause.second_code = found.fault as u16;
         }

@@ -11,7 +11,7 @@
     reason = "arithmetic of float vectors only, which cannot overflow or panic"
 )]
 
-use super::finding::Finding;
+use super::violation::Violation;
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -86,9 +86,9 @@ impl Limiter {
         step_s: f64,
         limits: &Limits,
         allowed: &Allowance,
-    ) -> Result<(), Finding> {
+    ) -> Result<(), Violation> {
         if !q.is_finite() || !step_s.is_finite() || step_s <= 0.0 {
-            return Err(Finding::plain(FaultCode::SetpointNotFinite));
+            return Err(Violation::plain(FaultCode::SetpointNotFinite));
         }
         self.check_pause(q, step_s, limits, allowed)?;
         let streamed_left = if allowed.streamed {
@@ -128,7 +128,7 @@ impl Limiter {
                     limit,
                     ROUNDING.get(order + 1).copied().unwrap_or(0.0),
                 ) {
-                    return Err(Finding::of_joint(fault, j, value, limit));
+                    return Err(Violation::of_joint(fault, j, value, limit));
                 }
             }
         }
@@ -157,7 +157,7 @@ impl Limiter {
         step_s: f64,
         limits: &Limits,
         allowed: &Allowance,
-    ) -> Result<(), Finding> {
+    ) -> Result<(), Violation> {
         if step_s <= CONTINUOUS_S {
             return Ok(());
         }
@@ -171,18 +171,18 @@ impl Limiter {
         }
         let missed = |span_s: f64| span_s / limits.period_s() - 1.0;
         let (found, most) = (missed(step_s), missed(CONTINUOUS_S));
-        Err(Finding::new(FaultCode::DeadlineMissed, found, most))
+        Err(Violation::new(FaultCode::DeadlineMissed, found, most))
     }
 }
 
-fn check_position(j: usize, q_rad: f64, limits: &Limits) -> Result<(), Finding> {
+fn check_position(j: usize, q_rad: f64, limits: &Limits) -> Result<(), Violation> {
     let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
     let [slack, ..] = ROUNDING;
     if q_rad >= low - slack && q_rad <= high + slack {
         return Ok(());
     }
     let limit = if q_rad < low { low } else { high };
-    Err(Finding::of_joint(
+    Err(Violation::of_joint(
         FaultCode::SetpointPosition,
         j,
         q_rad,
@@ -195,7 +195,7 @@ fn check_tool(
     step_s: f64,
     limits: &Limits,
     allowed: &Allowance,
-) -> Result<(), Finding> {
+) -> Result<(), Violation> {
     let [_, slack, ..] = ROUNDING;
     let speed_m_s = way_m / step_s;
     if !within(speed_m_s, allowed.tcp_speed_max_m_s, slack) {
@@ -205,13 +205,13 @@ fn check_tool(
         } else {
             FaultCode::SetpointTcpSpeed
         };
-        return Err(Finding::new(fault, speed_m_s, allowed.tcp_speed_max_m_s));
+        return Err(Violation::new(fault, speed_m_s, allowed.tcp_speed_max_m_s));
     }
     let step_max_m = STEP_MAX_M * (step_s / limits.period_s()).max(1.0);
     if within(way_m, step_max_m, slack) {
         Ok(())
     } else {
-        Err(Finding::new(FaultCode::SetpointStep, way_m, step_max_m))
+        Err(Violation::new(FaultCode::SetpointStep, way_m, step_max_m))
     }
 }
 

@@ -20,25 +20,27 @@
 
 pub mod arming;
 pub mod brake;
+mod commands;
 pub mod cycle;
 pub mod exchange;
 mod faults;
-pub mod finding;
 pub mod limiter;
 pub mod mode;
 pub mod monitor;
 pub mod motion;
-mod orders;
-pub mod path_clock;
 pub mod phases;
 pub mod reaction;
 pub mod record;
 pub mod settings;
 pub mod snapshot;
 pub mod stopping;
+pub mod time_scaling;
 pub mod velocity_wire;
+pub mod violation;
 
 pub use cycle::ControlState;
-pub use exchange::{ArmCodes, ArmCommand, ControlEvent, CycleInput, CycleOutput, LinkInput, Order};
+pub use exchange::{
+    ArmCodes, ArmCommand, ControlCommand, ControlEvent, CycleInput, CycleOutput, LinkInput,
+};
 pub use motion::Motion;
 pub use settings::{ControlSettings, Thresholds, TierSpeeds};

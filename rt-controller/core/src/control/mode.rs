@@ -1,10 +1,10 @@
 //! Modes and what leads from one to another.
 //!
 //! ```text
-//!             Adopt              MoveBegun / StreamBegun
+//!             Engage              MoveBegun / StreamBegun
 //!  Offline ----------> Idle --------------------------------> Moving / Streaming
 //!                      ^  ^ \                MotionDone           |     |
-//!               Adopt  |   \_\____________________________________/     |
+//!               Engage  |   \_\____________________________________/     |
 //!                      |      \ BrakeFault, LatchFault                  | BrakeFault
 //!                      |       v                 BrakeDone              v
 //!                      +--- Faulted <------------------------------- Braking
@@ -125,7 +125,7 @@ impl<M> ModeState<M> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trigger {
     /// The arm is enabled, in servo mode, and its pose is known.
-    Adopt,
+    Engage,
     /// A move to a pose begins.
     MoveBegun,
     /// A trajectory begins.
@@ -143,7 +143,7 @@ pub enum Trigger {
 impl Trigger {
     /// All triggers, for tables and tests.
     pub const ALL: [Self; 7] = [
-        Self::Adopt,
+        Self::Engage,
         Self::MoveBegun,
         Self::StreamBegun,
         Self::MotionDone,
@@ -159,7 +159,7 @@ pub const fn next_mode(mode: ControllerMode, trigger: Trigger) -> Option<Control
     use ControllerMode as M;
     use Trigger as T;
     match (mode, trigger) {
-        (M::Offline | M::Faulted, T::Adopt) | (M::Moving | M::Streaming, T::MotionDone) => {
+        (M::Offline | M::Faulted, T::Engage) | (M::Moving | M::Streaming, T::MotionDone) => {
             Some(M::Idle)
         }
         (M::Idle, T::MoveBegun) => Some(M::Moving),
@@ -169,7 +169,7 @@ pub const fn next_mode(mode: ControllerMode, trigger: Trigger) -> Option<Control
         | (M::Moving | M::Streaming, T::LatchFault)
         | (M::Braking, T::BrakeDone | T::LatchFault) => Some(M::Faulted),
         (M::Offline | M::Faulted, T::BrakeFault | T::LatchFault)
-        | (M::Idle | M::Moving | M::Streaming | M::Braking, T::Adopt)
+        | (M::Idle | M::Moving | M::Streaming | M::Braking, T::Engage)
         | (
             M::Offline | M::Moving | M::Streaming | M::Braking | M::Faulted,
             T::MoveBegun | T::StreamBegun,
@@ -195,9 +195,9 @@ mod tests {
     ];
 
     #[test]
-    fn only_an_adoption_leaves_a_fault() {
+    fn only_an_engagement_leaves_a_fault() {
         for trigger in Trigger::ALL {
-            let expected = (trigger == Trigger::Adopt).then_some(M::Idle);
+            let expected = (trigger == Trigger::Engage).then_some(M::Idle);
             assert_eq!(next_mode(M::Faulted, trigger), expected, "{trigger:?}");
         }
     }

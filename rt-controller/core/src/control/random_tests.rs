@@ -6,7 +6,7 @@
 
 use super::*;
 use crate::control::record::{record_input, restore_input};
-use crate::control::{ArmCodes, LinkInput, Order, Thresholds};
+use crate::control::{ArmCodes, ControlCommand, LinkInput, Thresholds};
 use crate::overrun::min_gap_ns;
 use crate::point_to_point::plan_move;
 use arm_model::joint::START_POSE;
@@ -122,14 +122,14 @@ impl Chaos {
             .into(),
             ..CycleInput::default()
         };
-        input.order = self.order(mode);
+        input.command = self.command(mode);
         if self.rng.random_ratio(1, 150) {
             self.spoil(&mut input);
         }
         input
     }
 
-    fn order(&mut self, mode: ControllerMode) -> Option<Order> {
+    fn command(&mut self, mode: ControllerMode) -> Option<ControlCommand> {
         let rng = &mut self.rng;
         let kind = match mode {
             ControllerMode::Faulted | ControllerMode::Offline => rng.random_range(0..3),
@@ -138,21 +138,21 @@ impl Chaos {
             _ => return None,
         };
         Some(match kind {
-            0 => Order::Adopt { hold: START_POSE },
-            1 => Order::Adopt {
+            0 => ControlCommand::Engage { hold: START_POSE },
+            1 => ControlCommand::Engage {
                 hold: START_POSE + JointVector::splat(any_f64(rng)),
             },
-            2 => Order::Arm(Arming {
+            2 => ControlCommand::Arm(Arming {
                 tier: MotionTier::from_raw(rng.random_range(1..4)).unwrap(),
                 expires_ns: self.now_ns + rng.random_range(0..2_000_000_000),
                 area_clear: rng.random_ratio(3, 4),
             }),
-            3 if rng.random_ratio(1, 8) => Order::Stop,
-            4 if rng.random_ratio(1, 8) => Order::Disarm,
+            3 if rng.random_ratio(1, 8) => ControlCommand::Stop,
+            4 if rng.random_ratio(1, 8) => ControlCommand::Disarm,
             _ => {
                 let id = rng.random_range(0..self.pool.len());
                 let motion = Box::new(self.pool[id].clone());
-                Order::Run {
+                ControlCommand::Run {
                     id: id as u64,
                     motion,
                 }
@@ -286,7 +286,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
         let mut latches = 0;
         for event in &out.events {
             match event {
-                ControlEvent::Adopted => {
+                ControlEvent::Engaged => {
                     let hold = state.summary().q_c;
                     judge = Judge::holding(hold, deadline_ns);
                     chaos.told = [hold; 3];
@@ -336,7 +336,7 @@ fn any_number_of_random_cycles_keep_every_limit() {
 }
 
 /// Every cycle stepped again from its bytes gives the same bytes, from the
-/// beginning and from each adoption on.
+/// beginning and from each engagement on.
 #[test]
 fn recorded_cycles_step_again_to_the_same_bytes() {
     let limits = Limits::default();
@@ -358,8 +358,8 @@ fn recorded_cycles_step_again_to_the_same_bytes() {
                 })
                 .unwrap()
             };
-            let adopts = matches!(input.order, Some(Order::Adopt { .. }));
-            if late.is_none() && adopts {
+            let engages = matches!(input.command, Some(ControlCommand::Engage { .. }));
+            if late.is_none() && engages {
                 late = Some(ControlState::resume(
                     limits.clone(),
                     settings(seed),
@@ -372,7 +372,7 @@ fn recorded_cycles_step_again_to_the_same_bytes() {
             if let Some(late_state) = &mut late {
                 let resumed = late_state.step(restore());
                 if late_state.mode() == ControllerMode::Offline {
-                    // That adoption was refused; the next one will do.
+                    // That engagement was refused; the next one will do.
                     late = None;
                 } else {
                     assert_eq!(bytes_of(&out), bytes_of(&resumed));

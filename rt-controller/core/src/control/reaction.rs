@@ -14,23 +14,23 @@ use shared_types::FaultCode;
 /// What becomes of the setpoints, the softest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[repr(u8)]
-pub enum Path {
+pub enum StopCategory {
     /// They go on; the fault is a refusal or is counted.
     #[default]
     Continue = 0,
-    /// The path clock is slowed to rest: the planned path is not left.
-    Slow = 1,
+    /// Time on the path is scaled down to rest: the planned path is not left.
+    OnPath = 1,
     /// Every joint is braked, jerk-limited, from where it was commanded last.
-    Brake = 2,
+    JointSpace = 2,
     /// There are none any more.
-    Silence = 3,
+    CutOff = 3,
 }
 
 /// How a fault is met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reaction {
     /// What becomes of the setpoints.
-    pub path: Path,
+    pub path: StopCategory,
     /// Ask the arm to stop (set state 4) once the setpoints end.
     pub stop_arm: bool,
 }
@@ -49,13 +49,13 @@ pub const fn reaction(fault: FaultCode) -> Reaction {
         | F::ArmingExpired
         | F::UploadTimedOut
         | F::UnsupportedFirmware
-        | F::ArmDiffers => (Path::Continue, false),
+        | F::ArmDiffers => (StopCategory::Continue, false),
         F::LateCycles
         | F::ReportStale
         | F::ReportFrozen
         | F::ReportClock
         | F::ReportBroken
-        | F::GuardianLost => (Path::Slow, false),
+        | F::GuardianLost => (StopCategory::OnPath, false),
         F::OperatorStop
         | F::OperatorLost
         | F::DeadManReleased
@@ -68,10 +68,12 @@ pub const fn reaction(fault: FaultCode) -> Reaction {
         | F::SetpointJerk
         | F::SetpointStep
         | F::SetpointUnstoppable
-        | F::TierExceeded => (Path::Brake, false),
-        F::TrackingError | F::JointStuck | F::EncoderJump => (Path::Brake, true),
-        F::DeadlineMissed | F::ReplyStalled | F::SecondCommander => (Path::Silence, true),
-        F::LinkLost | F::ArmError | F::ArmModeChanged | F::ArmNotReady => (Path::Silence, false),
+        | F::TierExceeded => (StopCategory::JointSpace, false),
+        F::TrackingError | F::JointStuck | F::EncoderJump => (StopCategory::JointSpace, true),
+        F::DeadlineMissed | F::ReplyStalled | F::SecondCommander => (StopCategory::CutOff, true),
+        F::LinkLost | F::ArmError | F::ArmModeChanged | F::ArmNotReady => {
+            (StopCategory::CutOff, false)
+        }
     };
     Reaction { path, stop_arm }
 }
@@ -91,7 +93,7 @@ mod tests {
             FaultCode::ReplyStalled,
             FaultCode::SecondCommander,
         ] {
-            assert_eq!(reaction(fault).path, Path::Silence, "{fault:?}");
+            assert_eq!(reaction(fault).path, StopCategory::CutOff, "{fault:?}");
         }
     }
 
@@ -103,7 +105,11 @@ mod tests {
             FaultCode::Disarmed,
         ] {
             let how = reaction(fault);
-            assert_eq!((how.path, how.stop_arm), (Path::Brake, false), "{fault:?}");
+            assert_eq!(
+                (how.path, how.stop_arm),
+                (StopCategory::JointSpace, false),
+                "{fault:?}"
+            );
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::bench::{Bench, cause_in, swing};
 use super::*;
 use crate::control::Thresholds;
-use crate::control::exchange::Order;
+use crate::control::exchange::ControlCommand;
 use crate::control::limiter::Limiter;
 use arm_model::joint::START_POSE;
 use shared_types::ipc::{JointReport, Reports};
@@ -101,14 +101,14 @@ fn armed_bench() -> Bench {
         ..Thresholds::relaxed().into()
     };
     bench.state = ControlState::new(Limits::default(), settings);
-    bench.order(Order::Adopt { hold: START_POSE });
+    bench.command(ControlCommand::Engage { hold: START_POSE });
     (0..100).for_each(|_| bench.cycle());
     bench.events.clear();
     bench
 }
 
-fn throw_arming(bench: &Bench) -> Order {
-    Order::Arm(shared_types::Arming {
+fn throw_arming(bench: &Bench) -> ControlCommand {
+    ControlCommand::Arm(shared_types::Arming {
         tier: MotionTier::Throw,
         expires_ns: bench.now_ns + 8_000_000_000,
         area_clear: true,
@@ -121,8 +121,8 @@ fn a_throw_is_armed_for_one_shot_and_nothing_re_arms_it() {
     let refused = |fault| ControlEvent::Refused { id: Some(7), fault };
     bench.run(swing());
     assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    let order = throw_arming(&bench);
-    bench.order(order);
+    let command = throw_arming(&bench);
+    bench.command(command);
     bench.run(swing());
     bench.cycles_until_still();
     assert!(bench.events.contains(&ControlEvent::Disarmed {
@@ -133,8 +133,8 @@ fn a_throw_is_armed_for_one_shot_and_nothing_re_arms_it() {
     assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
     // Expiry and the dead-man switch disarm while idle.
     for released in [0, 1] {
-        let order = throw_arming(&bench);
-        bench.order(order);
+        let command = throw_arming(&bench);
+        bench.command(command);
         let mut input = bench.input(0);
         input.operator.released = released;
         if released == 0 {
@@ -152,14 +152,14 @@ fn a_throw_is_armed_for_one_shot_and_nothing_re_arms_it() {
 fn a_disarmed_or_released_motion_brakes_in_the_very_cycle() {
     for (fault, released) in [(FaultCode::Disarmed, 0), (FaultCode::DeadManReleased, 1)] {
         let mut bench = armed_bench();
-        let order = throw_arming(&bench);
-        bench.order(order);
+        let command = throw_arming(&bench);
+        bench.command(command);
         bench.run(swing());
         (0..60).for_each(|_| bench.cycle());
         let mut input = bench.input(0);
         input.operator.released = released;
         if released == 0 {
-            input.order = Some(Order::Disarm);
+            input.command = Some(ControlCommand::Disarm);
         }
         bench.step(input);
         assert_eq!(bench.state.mode(), ControllerMode::Braking);
@@ -172,7 +172,7 @@ fn a_disarmed_or_released_motion_brakes_in_the_very_cycle() {
 #[test]
 fn a_tier_slows_nobody_down_silently_but_stops_what_is_too_fast() {
     let mut bench = armed_bench();
-    bench.order(Order::Arm(shared_types::Arming {
+    bench.command(ControlCommand::Arm(shared_types::Arming {
         tier: MotionTier::SetUp,
         expires_ns: u64::MAX,
         area_clear: false,
@@ -190,7 +190,7 @@ fn lateness_slows_and_a_stall_holds_setpoints_back() {
     let strict = Thresholds::strict();
     let mut bench = Bench::holding();
     bench.state = ControlState::new(Limits::default(), strict);
-    bench.order(Order::Adopt { hold: START_POSE });
+    bench.command(ControlCommand::Engage { hold: START_POSE });
     (0..100).for_each(|_| bench.cycle());
     bench.run(swing());
     (0..40).for_each(|_| bench.cycle());
@@ -209,7 +209,7 @@ fn lateness_slows_and_a_stall_holds_setpoints_back() {
     assert_eq!((cause.path, cause.counts.skipped), (1, 1));
 }
 
-/// An adoption on its way when the arm is stopped was meant for another state of
+/// An engagement on its way when the arm is stopped was meant for another state of
 /// the world.
 #[test]
 fn a_stop_is_not_acknowledged_by_what_was_ordered_before_it() {
@@ -218,7 +218,7 @@ fn a_stop_is_not_acknowledged_by_what_was_ordered_before_it() {
     (0..60).for_each(|_| bench.cycle());
     let mut input = bench.input(0);
     input.link.status = Some(Status(0x50));
-    input.order = Some(Order::Adopt { hold: START_POSE });
+    input.command = Some(ControlCommand::Engage { hold: START_POSE });
     bench.step(input);
     assert_eq!(bench.state.mode(), ControllerMode::Faulted);
     assert_eq!(bench.latched(), Some(FaultCode::ArmError));

@@ -5,12 +5,12 @@
 //!
 //! [`ControlState::step`]: super::ControlState::step
 
-use super::exchange::{ArmCodes, CycleInput, LinkInput, Order};
+use super::exchange::{ArmCodes, ControlCommand, CycleInput, LinkInput};
 use super::motion::Motion;
 use crate::xarm::Status;
 use alloc::boxed::Box;
 use shared_types::ipc::{
-    ArmCodesRecord, InputRecord, LinkRecord, OrderKind, OrderRecord, PAYLOAD_VERSION,
+    ArmCodesRecord, CommandKind, CommandRecord, InputRecord, LinkRecord, PAYLOAD_VERSION,
 };
 use shared_types::{Arming, MotionTier};
 
@@ -28,9 +28,9 @@ pub enum RestoreError {
         /// Layout found.
         found: u32,
     },
-    /// A number that stands for no order.
-    #[error("cycle {cycle} holds the unknown order {kind} (tier {tier}); the record is damaged")]
-    Order {
+    /// A number that stands for no command.
+    #[error("cycle {cycle} holds the unknown command {kind} (tier {tier}); the record is damaged")]
+    Command {
         /// Cycle.
         cycle: u64,
         /// Kind found.
@@ -60,10 +60,10 @@ pub fn record_input(input: &CycleInput, cycle: u64) -> InputRecord {
         deadline_ns: input.deadline_ns,
         broken_reports: input.broken_reports,
         late_ns: input.late_ns,
-        order: input
-            .order
+        command: input
+            .command
             .as_ref()
-            .map_or_else(OrderRecord::default, record_order),
+            .map_or_else(CommandRecord::default, record_command),
         operator: input.operator,
         guardian: input.guardian,
         link: record_link(&input.link),
@@ -74,29 +74,29 @@ pub fn record_input(input: &CycleInput, cycle: u64) -> InputRecord {
     }
 }
 
-fn record_order(order: &Order) -> OrderRecord {
-    let of = |kind: OrderKind| OrderRecord {
+fn record_command(command: &ControlCommand) -> CommandRecord {
+    let of = |kind: CommandKind| CommandRecord {
         kind: kind as u8,
-        ..OrderRecord::default()
+        ..CommandRecord::default()
     };
-    match order {
-        Order::Adopt { hold } => OrderRecord {
+    match command {
+        ControlCommand::Engage { hold } => CommandRecord {
             hold: *hold,
-            ..of(OrderKind::Adopt)
+            ..of(CommandKind::Engage)
         },
-        Order::Run { id, motion } => OrderRecord {
+        ControlCommand::Run { id, motion } => CommandRecord {
             motion_id: *id,
             motion_hash: motion.fingerprint(),
-            ..of(OrderKind::Run)
+            ..of(CommandKind::Run)
         },
-        Order::Stop => of(OrderKind::Stop),
-        Order::Arm(arming) => OrderRecord {
+        ControlCommand::Stop => of(CommandKind::Stop),
+        ControlCommand::Arm(arming) => CommandRecord {
             tier: arming.tier as u8,
             area_clear: u8::from(arming.area_clear),
             expires_ns: arming.expires_ns,
-            ..of(OrderKind::Arm)
+            ..of(CommandKind::Arm)
         },
-        Order::Disarm => of(OrderKind::Disarm),
+        ControlCommand::Disarm => of(CommandKind::Disarm),
     }
 }
 
@@ -150,7 +150,7 @@ pub fn restore_input(
         deadline_ns: record.deadline_ns,
         missed: record.missed,
         late_ns: record.late_ns,
-        order: restore_order(record, motion_of)?,
+        command: restore_command(record, motion_of)?,
         operator: record.operator,
         guardian: record.guardian,
         link: LinkInput {
@@ -176,36 +176,36 @@ pub fn restore_input(
     })
 }
 
-fn restore_order(
+fn restore_command(
     record: &InputRecord,
     motion_of: impl FnOnce(u64, u64) -> Option<Box<Motion>>,
-) -> Result<Option<Order>, RestoreError> {
-    let order = &record.order;
-    let unknown = RestoreError::Order {
+) -> Result<Option<ControlCommand>, RestoreError> {
+    let command = &record.command;
+    let unknown = RestoreError::Command {
         cycle: record.cycle,
-        kind: order.kind,
-        tier: order.tier,
+        kind: command.kind,
+        tier: command.tier,
     };
     Ok(Some(
-        match OrderKind::from_raw(order.kind).ok_or(unknown)? {
-            OrderKind::None => return Ok(None),
-            OrderKind::Adopt => Order::Adopt { hold: order.hold },
-            OrderKind::Run => {
-                let (id, hash) = (order.motion_id, order.motion_hash);
+        match CommandKind::from_raw(command.kind).ok_or(unknown)? {
+            CommandKind::None => return Ok(None),
+            CommandKind::Engage => ControlCommand::Engage { hold: command.hold },
+            CommandKind::Run => {
+                let (id, hash) = (command.motion_id, command.motion_hash);
                 let motion = motion_of(id, hash).ok_or(RestoreError::Motion {
                     cycle: record.cycle,
                     id,
                     hash,
                 })?;
-                Order::Run { id, motion }
+                ControlCommand::Run { id, motion }
             }
-            OrderKind::Stop => Order::Stop,
-            OrderKind::Arm => Order::Arm(Arming {
-                tier: MotionTier::from_raw(order.tier).ok_or(unknown)?,
-                expires_ns: order.expires_ns,
-                area_clear: order.area_clear != 0,
+            CommandKind::Stop => ControlCommand::Stop,
+            CommandKind::Arm => ControlCommand::Arm(Arming {
+                tier: MotionTier::from_raw(command.tier).ok_or(unknown)?,
+                expires_ns: command.expires_ns,
+                area_clear: command.area_clear != 0,
             }),
-            OrderKind::Disarm => Order::Disarm,
+            CommandKind::Disarm => ControlCommand::Disarm,
         },
     ))
 }

@@ -13,9 +13,9 @@
 use super::brake::brake_with_jerk;
 use super::limiter::{Allowance, Limiter};
 use super::motion::Motion;
-use super::path_clock::SlowDown;
 use super::phases::PhasedMotion;
-use super::reaction::Path;
+use super::reaction::StopCategory;
+use super::time_scaling::SlowDown;
 use arm_model::{JointState, Limits};
 use serde::{Deserialize, Serialize};
 
@@ -35,9 +35,9 @@ const CYCLES_MAX: u32 = 1000;
 )]
 pub enum Stop {
     /// Along the path of the running motion.
-    Slow(SlowDown),
+    OnPath(SlowDown),
     /// Every joint by itself.
-    Brake(PhasedMotion),
+    JointSpace(PhasedMotion),
 }
 
 impl Stop {
@@ -45,8 +45,8 @@ impl Stop {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         match self {
-            Self::Slow(slow) => slow.duration_s,
-            Self::Brake(phases) => phases.duration_s(),
+            Self::OnPath(slow) => slow.duration_s,
+            Self::JointSpace(phases) => phases.duration_s(),
         }
     }
 
@@ -54,17 +54,17 @@ impl Stop {
     #[must_use]
     pub fn state_at(&self, motion: &Motion, t_s: f64) -> JointState {
         match self {
-            Self::Slow(slow) => slow.state_at(motion, t_s),
-            Self::Brake(phases) => phases.state_at(t_s),
+            Self::OnPath(slow) => slow.state_at(motion, t_s),
+            Self::JointSpace(phases) => phases.state_at(t_s),
         }
     }
 
     /// How it goes.
     #[must_use]
-    pub const fn path(&self) -> Path {
+    pub const fn path(&self) -> StopCategory {
         match self {
-            Self::Slow(_) => Path::Slow,
-            Self::Brake(_) => Path::Brake,
+            Self::OnPath(_) => StopCategory::OnPath,
+            Self::JointSpace(_) => StopCategory::JointSpace,
         }
     }
 }
@@ -88,10 +88,10 @@ pub struct StopFrom<'a> {
 /// last otherwise. When nothing holds, the first brake: the limiter then ends it
 /// where it breaks a limit. RT-safe.
 #[must_use]
-pub fn choose_stop(from: &StopFrom<'_>, path: Path, limits: &Limits) -> Stop {
+pub fn choose_stop(from: &StopFrom<'_>, path: StopCategory, limits: &Limits) -> Stop {
     let slow = || {
         SLOW_S.into_iter().map(|duration_s| {
-            Stop::Slow(SlowDown {
+            Stop::OnPath(SlowDown {
                 from_s: from.motion_s,
                 duration_s,
             })
@@ -100,18 +100,18 @@ pub fn choose_stop(from: &StopFrom<'_>, path: Path, limits: &Limits) -> Stop {
     let hardest = 1.0 / limits.period_s();
     let brakes = || {
         let own = HARDER.into_iter().map(|factor| {
-            Stop::Brake(brake_with_jerk(from.state, limits, |j| {
+            Stop::JointSpace(brake_with_jerk(from.state, limits, |j| {
                 limits.jerk_max_rad_s3[j] * factor
             }))
         });
         let hard = core::iter::once_with(|| {
-            Stop::Brake(brake_with_jerk(from.state, limits, |j| {
+            Stop::JointSpace(brake_with_jerk(from.state, limits, |j| {
                 limits.acceleration_max_rad_s2[j] * hardest
             }))
         });
         own.chain(hard)
     };
-    let found = if path == Path::Slow {
+    let found = if path == StopCategory::OnPath {
         slow()
             .chain(brakes())
             .find(|stop| holds(from, stop, limits))
@@ -121,7 +121,7 @@ pub fn choose_stop(from: &StopFrom<'_>, path: Path, limits: &Limits) -> Stop {
             .find(|stop| holds(from, stop, limits))
     };
     found.unwrap_or_else(|| {
-        Stop::Brake(brake_with_jerk(from.state, limits, |j| {
+        Stop::JointSpace(brake_with_jerk(from.state, limits, |j| {
             limits.jerk_max_rad_s3[j]
         }))
     })

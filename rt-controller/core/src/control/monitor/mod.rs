@@ -8,9 +8,9 @@ pub mod history;
 pub mod reports;
 
 use super::exchange::{CycleInput, LinkInput};
-use super::finding::Finding;
-use super::reaction::{Path, reaction};
+use super::reaction::{StopCategory, reaction};
 use super::settings::ControlSettings;
+use super::violation::Violation;
 use arm_model::{JointVector, Limits};
 use history::Commanded;
 use reports::ReportWatch;
@@ -51,7 +51,7 @@ pub struct Monitor {
     settings: ControlSettings,
     commanded: Commanded,
     reports: ReportWatch,
-    adopted_ns: u64,
+    engaged_ns: u64,
     operator: Heard,
     guardian: Heard,
     counts: RunCounts,
@@ -67,7 +67,7 @@ impl Monitor {
             settings,
             commanded: Commanded::holding(q),
             reports: ReportWatch::new(),
-            adopted_ns: now_ns,
+            engaged_ns: now_ns,
             operator: Heard::default(),
             guardian: Heard::default(),
             counts: RunCounts::default(),
@@ -151,7 +151,7 @@ impl Monitor {
             }
         }
         if let Some(codes) = input.codes
-            && codes.arrival_ns.saturating_sub(self.adopted_ns) > SETTLE_NS
+            && codes.arrival_ns.saturating_sub(self.engaged_ns) > SETTLE_NS
         {
             (self.arm_error, self.arm_warning) = (codes.error, codes.warning);
         }
@@ -169,15 +169,15 @@ impl Monitor {
     /// The first fault whose reaction is harder than `than`, the most urgent
     /// first; `missed` cycles went by without a setpoint. Not asked in `Offline` and `Faulted`. RT-safe.
     #[must_use]
-    pub fn finding(
+    pub fn violation(
         &self,
         input: &CycleInput,
         missed: u32,
         mode: ControllerMode,
-        than: Path,
-    ) -> Option<Finding> {
-        let harder = |found: &Finding| reaction(found.fault).path > than;
-        let pick = |found: Option<Finding>| found.filter(harder);
+        than: StopCategory,
+    ) -> Option<Violation> {
+        let harder = |found: &Violation| reaction(found.fault).path > than;
+        let pick = |found: Option<Violation>| found.filter(harder);
         let (now_ns, t) = (input.deadline_ns, &self.settings.thresholds);
         pick(link_fault(&input.link))
             .or_else(|| pick(self.arm_fault()))
@@ -200,17 +200,17 @@ impl Monitor {
 
     /// An error of its own, or another program or a stop button took the arm
     /// out of its streaming mode.
-    fn arm_fault(&self) -> Option<Finding> {
+    fn arm_fault(&self) -> Option<Violation> {
         if self.arm_error != 0 {
-            return Some(Finding::plain(FaultCode::ArmError));
+            return Some(Violation::plain(FaultCode::ArmError));
         }
         let report = self.report()?;
-        let settled = report.arrival_ns.saturating_sub(self.adopted_ns) > SETTLE_NS;
+        let settled = report.arrival_ns.saturating_sub(self.engaged_ns) > SETTLE_NS;
         // States 1 (moving) and 2 (ready) follow setpoints.
         let serving =
             report.arm_mode == self.settings.wire.arm_mode() && matches!(report.arm_state, 1 | 2);
         (settled && !serving).then(|| {
-            Finding::new(
+            Violation::new(
                 FaultCode::ArmModeChanged,
                 report.arm_mode.into(),
                 self.settings.wire.arm_mode().into(),
@@ -218,63 +218,64 @@ impl Monitor {
         })
     }
 
-    fn commander_fault(&self, input: &CycleInput) -> Option<Finding> {
+    fn commander_fault(&self, input: &CycleInput) -> Option<Violation> {
         if input.link.foreign > 0 {
             let found = f64::from(input.link.foreign);
-            return Some(Finding::new(FaultCode::SecondCommander, found, 0.0));
+            return Some(Violation::new(FaultCode::SecondCommander, found, 0.0));
         }
         let position = self.settings.wire == shared_types::WireMode::ServoPosition;
-        let settled = input.deadline_ns.saturating_sub(self.adopted_ns) > SETTLE_NS;
+        let settled = input.deadline_ns.saturating_sub(self.engaged_ns) > SETTLE_NS;
         (position && settled)
             .then(|| self.reports.foreign_target())
             .flatten()
     }
 
-    fn operator_fault(&self, input: &CycleInput) -> Option<Finding> {
+    fn operator_fault(&self, input: &CycleInput) -> Option<Violation> {
         if input.operator.released != 0 {
-            return Some(Finding::plain(FaultCode::DeadManReleased));
+            return Some(Violation::plain(FaultCode::DeadManReleased));
         }
         let most_ns = self.settings.thresholds.operator_timeout_ns;
         let silent_ns = self.operator.silent_ns(input.deadline_ns);
-        (silent_ns > most_ns).then(|| Finding::of_time(FaultCode::OperatorLost, silent_ns, most_ns))
+        (silent_ns > most_ns)
+            .then(|| Violation::of_time(FaultCode::OperatorLost, silent_ns, most_ns))
     }
 
-    fn guardian_silent(&self, now_ns: u64) -> Option<Finding> {
+    fn guardian_silent(&self, now_ns: u64) -> Option<Violation> {
         let most_ns = self.settings.thresholds.guardian_timeout_ns;
         let silent_ns = self.guardian.silent_ns(now_ns);
         (self.settings.guardian_required && silent_ns > most_ns)
-            .then(|| Finding::of_time(FaultCode::GuardianLost, silent_ns, most_ns))
+            .then(|| Violation::of_time(FaultCode::GuardianLost, silent_ns, most_ns))
     }
 }
 
-fn stop() -> Finding {
-    Finding::plain(FaultCode::OperatorStop)
+fn stop() -> Violation {
+    Violation::plain(FaultCode::OperatorStop)
 }
 
-fn stall(link: &LinkInput, most_ns: u64) -> Option<Finding> {
+fn stall(link: &LinkInput, most_ns: u64) -> Option<Violation> {
     (link.unanswered_ns > most_ns)
-        .then(|| Finding::of_time(FaultCode::ReplyStalled, link.unanswered_ns, most_ns))
+        .then(|| Violation::of_time(FaultCode::ReplyStalled, link.unanswered_ns, most_ns))
 }
 
 /// So many cycles missed that the arm has stood still meanwhile.
-fn gap(missed: u32, most: u32) -> Option<Finding> {
-    (missed > most).then(|| Finding::new(FaultCode::DeadlineMissed, missed.into(), most.into()))
+fn gap(missed: u32, most: u32) -> Option<Violation> {
+    (missed > most).then(|| Violation::new(FaultCode::DeadlineMissed, missed.into(), most.into()))
 }
 
 /// Some cycles missed.
-fn late(missed: u32, most: u32) -> Option<Finding> {
-    (missed > most).then(|| Finding::new(FaultCode::LateCycles, missed.into(), most.into()))
+fn late(missed: u32, most: u32) -> Option<Violation> {
+    (missed > most).then(|| Violation::new(FaultCode::LateCycles, missed.into(), most.into()))
 }
 
 /// Faults the command link itself shows.
-fn link_fault(link: &LinkInput) -> Option<Finding> {
+fn link_fault(link: &LinkInput) -> Option<Violation> {
     if link.lost {
-        return Some(Finding::plain(FaultCode::LinkLost));
+        return Some(Violation::plain(FaultCode::LinkLost));
     }
     let status = link.status?;
     if status.has_error() {
-        Some(Finding::plain(FaultCode::ArmError))
+        Some(Violation::plain(FaultCode::ArmError))
     } else {
-        (!status.accepts_motion()).then_some(Finding::plain(FaultCode::ArmNotReady))
+        (!status.accepts_motion()).then_some(Violation::plain(FaultCode::ArmNotReady))
     }
 }

@@ -8,8 +8,8 @@
 
 use super::history::Commanded;
 use crate::clock_map::CLOCK_ANEW;
-use crate::control::finding::Finding;
 use crate::control::settings::Thresholds;
+use crate::control::violation::Violation;
 use arm_model::{JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::JointReport;
@@ -61,7 +61,7 @@ pub struct ReportWatch {
     /// Since when the values are the same, to the bit (stamp, ns).
     frozen_since_ns: u64,
     still: [Still; JOINTS],
-    jump: Option<Finding>,
+    jump: Option<Violation>,
     broken_in_a_row: u32,
     resyncs: u32,
     suspicion: u32,
@@ -171,26 +171,26 @@ impl ReportWatch {
 
     /// Whether the arm's own target is somebody else's.
     #[must_use]
-    pub fn foreign_target(&self) -> Option<Finding> {
-        (self.suspicion >= FOREIGN_PROOF).then_some(Finding::plain(FaultCode::SecondCommander))
+    pub fn foreign_target(&self) -> Option<Violation> {
+        (self.suspicion >= FOREIGN_PROOF).then_some(Violation::plain(FaultCode::SecondCommander))
     }
 
     /// Age of the newest report, if it is too old to move by.
     #[must_use]
-    pub fn stale(&self, now_ns: u64, t: &Thresholds) -> Option<Finding> {
+    pub fn stale(&self, now_ns: u64, t: &Thresholds) -> Option<Violation> {
         let age_ns = self
             .newest
             .map_or(now_ns, |r| now_ns.saturating_sub(r.arrival_ns));
         (age_ns > t.report_stale_ns)
-            .then(|| Finding::of_time(FaultCode::ReportStale, age_ns, t.report_stale_ns))
+            .then(|| Violation::of_time(FaultCode::ReportStale, age_ns, t.report_stale_ns))
     }
 
     /// Whether the stream itself cannot be trusted.
     #[must_use]
-    pub fn stream_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Finding> {
+    pub fn stream_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Violation> {
         if self.broken_in_a_row >= t.report_broken_max {
             let (found, most) = (self.broken_in_a_row, t.report_broken_max);
-            return Some(Finding::new(
+            return Some(Violation::new(
                 FaultCode::ReportBroken,
                 f64::from(found),
                 f64::from(most),
@@ -198,7 +198,7 @@ impl ReportWatch {
         }
         if self.resyncs > t.clock_resyncs_max {
             let (found, most) = (self.resyncs, t.clock_resyncs_max);
-            return Some(Finding::new(
+            return Some(Violation::new(
                 FaultCode::ReportClock,
                 f64::from(found),
                 f64::from(most),
@@ -209,12 +209,12 @@ impl ReportWatch {
         let must_show = commanded.at(report.stamp_ns.saturating_sub(t.tracking_window_ns));
         let moved_rad = (must_show - commanded.at(self.frozen_since_ns)).max_abs();
         (frozen_ns > t.report_frozen_ns.max(t.tracking_window_ns) && moved_rad > FROZEN_RAD)
-            .then(|| Finding::of_time(FaultCode::ReportFrozen, frozen_ns, t.report_frozen_ns))
+            .then(|| Violation::of_time(FaultCode::ReportFrozen, frozen_ns, t.report_frozen_ns))
     }
 
     /// Whether the arm is somewhere else than it was told.
     #[must_use]
-    pub fn tracking_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Finding> {
+    pub fn tracking_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Violation> {
         if let Some(jump) = self.jump {
             return Some(jump);
         }
@@ -230,7 +230,7 @@ impl ReportWatch {
             let told_rad = (must_show[j] - still.told_rad).abs();
             let off_rad = (must_show[j] - still.at_rad).abs();
             if still.since_ns < from_ns && told_rad > STUCK_RAD && off_rad > STUCK_RAD {
-                return Some(Finding::of_joint(
+                return Some(Violation::of_joint(
                     FaultCode::JointStuck,
                     j,
                     off_rad,
@@ -240,7 +240,8 @@ impl ReportWatch {
         }
         let (joint, off_rad) = self.astray(commanded, t.tracking_window_ns);
         let most = t.tracking_error_max_rad;
-        (off_rad > most).then(|| Finding::of_joint(FaultCode::TrackingError, joint, off_rad, most))
+        (off_rad > most)
+            .then(|| Violation::of_joint(FaultCode::TrackingError, joint, off_rad, most))
     }
 
     /// Joint (0-based) whose newest measured position is farthest outside what
@@ -269,7 +270,7 @@ impl Default for ReportWatch {
 }
 
 /// A joint that moved farther between two reports than any joint can.
-fn jump(before: &JointReport, report: &JointReport, limits: &Limits) -> Option<Finding> {
+fn jump(before: &JointReport, report: &JointReport, limits: &Limits) -> Option<Violation> {
     let span_s = MonotonicNs(report.stamp_ns).since_s(MonotonicNs(before.stamp_ns));
     if span_s > JUMP_SPAN_MAX_S {
         return None;
@@ -282,6 +283,6 @@ fn jump(before: &JointReport, report: &JointReport, limits: &Limits) -> Option<F
     (0..JOINTS).find_map(|j| {
         let way_rad = (report.q[j] - before.q[j]).abs();
         let most = 2.0 * limits.velocity_max_rad_s[j] * span_s + JUMP_RAD;
-        (way_rad > most).then(|| Finding::of_joint(FaultCode::EncoderJump, j, way_rad, most))
+        (way_rad > most).then(|| Violation::of_joint(FaultCode::EncoderJump, j, way_rad, most))
     })
 }

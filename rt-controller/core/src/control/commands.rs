@@ -1,14 +1,14 @@
-//! What orders lead to.
+//! What commands lead to.
 
 use super::arming::ArmingState;
 use super::cycle::{ControlState, emit, give_back};
-use super::exchange::{ControlEvent, CycleInput, CycleOutput, Order};
-use super::finding::Finding;
+use super::exchange::{ControlCommand, ControlEvent, CycleInput, CycleOutput};
 use super::limiter::Limiter;
 use super::mode::{ModeState, Running, Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
 use super::velocity_wire::VelocityWire;
+use super::violation::Violation;
 use alloc::boxed::Box;
 use arm_model::{JointState, JointVector};
 use shared_types::ipc::ControllerMode;
@@ -21,32 +21,34 @@ const START_TOLERANCE_RAD: f64 = 1e-9;
 const START_ASTRAY_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
 impl ControlState {
-    /// Obeys an order; `before` is the mode before this cycle looked at anything.
-    pub(super) fn obey(
+    /// Handles a command; `before` is the mode before this cycle looked at anything.
+    pub(super) fn handle(
         &mut self,
-        order: Order,
+        command: ControlCommand,
         before: ControllerMode,
         input: &CycleInput,
         out: &mut CycleOutput,
     ) {
         let deadline_ns = input.deadline_ns;
-        match order {
+        match command {
             // Ordered before this very cycle's stop, so it acknowledges nothing.
-            Order::Adopt { .. } if before != self.mode() => {
+            ControlCommand::Engage { .. } if before != self.mode() => {
                 let fault = FaultCode::WrongMode;
                 emit(out, ControlEvent::Refused { id: None, fault });
             }
-            Order::Adopt { hold } => match self.adopt(hold, input) {
-                Ok(()) => emit(out, ControlEvent::Adopted),
+            ControlCommand::Engage { hold } => match self.engage(hold, input) {
+                Ok(()) => emit(out, ControlEvent::Engaged),
                 Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),
             },
-            Order::Run { id, motion } => self.run(id, motion, input, out),
-            Order::Stop => self.react(Finding::plain(FaultCode::OperatorStop), deadline_ns, out),
-            Order::Arm(arming) => self.arm(arming, input, out),
-            Order::Disarm if self.mode().is_moving() => {
-                self.react(Finding::plain(FaultCode::Disarmed), deadline_ns, out);
+            ControlCommand::Run { id, motion } => self.run(id, motion, input, out),
+            ControlCommand::Stop => {
+                self.react(Violation::plain(FaultCode::OperatorStop), deadline_ns, out)
             }
-            Order::Disarm => self.disarm(FaultCode::None, out),
+            ControlCommand::Arm(arming) => self.arm(arming, input, out),
+            ControlCommand::Disarm if self.mode().is_moving() => {
+                self.react(Violation::plain(FaultCode::Disarmed), deadline_ns, out);
+            }
+            ControlCommand::Disarm => self.disarm(FaultCode::None, out),
         }
     }
 
@@ -73,12 +75,12 @@ impl ControlState {
         }
     }
 
-    fn adopt(&mut self, hold: JointVector, input: &CycleInput) -> Result<(), FaultCode> {
+    fn engage(&mut self, hold: JointVector, input: &CycleInput) -> Result<(), FaultCode> {
         if input.link.lost {
             // A link that broke on its way here.
             return Err(FaultCode::LinkLost);
         }
-        next_mode(self.mode(), Trigger::Adopt).ok_or(FaultCode::WrongMode)?;
+        next_mode(self.mode(), Trigger::Engage).ok_or(FaultCode::WrongMode)?;
         if !hold.is_finite() {
             return Err(FaultCode::SetpointNotFinite);
         }

@@ -1,4 +1,4 @@
-//! The path clock: slows a motion down to rest without leaving its path.
+//! Time scaling: slows a motion down to rest without leaving its path.
 //!
 //! Time on the path runs at rate 1. To stop, the rate falls to zero as a smooth
 //! step of length `T`, `r(u) = 1 - 3u² + 2u³` with `u = t / T`, so its second

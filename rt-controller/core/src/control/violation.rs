@@ -6,7 +6,7 @@ use shared_types::ipc::LimitBroken;
 
 /// A fault with the numbers that make it one. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Finding {
+pub struct Violation {
     /// The fault.
     pub fault: FaultCode,
     /// Joint 1 to 7; 0 when it is about no single joint.
@@ -17,7 +17,7 @@ pub struct Finding {
     pub limit: f64,
 }
 
-impl Finding {
+impl Violation {
     /// About the whole arm or the link.
     #[must_use]
     pub const fn new(fault: FaultCode, value: f64, limit: f64) -> Self {
