@@ -3,7 +3,7 @@
 //!
 //! The rich report (port 30002) is preferred; where it is refused, the normal
 //! one (port 30001) says everything but the firmware. Each status goes through
-//! two rings, to the control loop and to the relay.
+//! two rings, to the control loop and to the bridge.
 
 use crate::control::ArmCodes;
 use crate::report_stream::{BrokenReports, ReportSink, ReportStream};
@@ -77,14 +77,14 @@ pub fn spawn(
     arm: IpAddr,
     ports: [u16; 2],
     to_loop: Producer<ArmStatus>,
-    to_relay: Producer<ArmStatus>,
+    to_bridge: Producer<ArmStatus>,
     broken: BrokenReports,
     quit: Arc<AtomicBool>,
 ) -> std::io::Result<JoinHandle<()>> {
     let mut stream = ReportStream {
         arm,
         ports: ports.to_vec(),
-        sink: StatusSink { to_loop, to_relay },
+        sink: StatusSink { to_loop, to_bridge },
         broken,
         quit,
     };
@@ -95,7 +95,7 @@ pub fn spawn(
 
 struct StatusSink {
     to_loop: Producer<ArmStatus>,
-    to_relay: Producer<ArmStatus>,
+    to_bridge: Producer<ArmStatus>,
 }
 
 impl ReportSink for StatusSink {
@@ -106,7 +106,7 @@ impl ReportSink for StatusSink {
             return false;
         };
         let _ = self.to_loop.push(status);
-        let _ = self.to_relay.push(status);
+        let _ = self.to_bridge.push(status);
         true
     }
 }

@@ -13,7 +13,7 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 
 /// Longest time awake before a deadline: a quarter of the period (us).
-const REHEARSE_MAX_US: u32 = 1000;
+const WARM_UP_MAX_US: u32 = 1000;
 
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
@@ -301,11 +301,11 @@ impl ControllerConfig {
     pub fn check(&self) -> Result<(), ConfigError> {
         self.thresholds.checked(self.arm)?;
         self.guardian.check()?;
-        let rehearse_us = self.real_time.rehearse_us;
-        if rehearse_us > REHEARSE_MAX_US {
+        let warm_up_us = self.real_time.warm_up_us;
+        if warm_up_us > WARM_UP_MAX_US {
             return Err(ConfigError::Threshold {
-                key: "real_time.rehearse_us",
-                found: rehearse_us.into(),
+                key: "real_time.warm_up_us",
+                found: warm_up_us.into(),
                 allowed: "0 to 1000 us",
             });
         }
@@ -369,10 +369,10 @@ mod tests {
             config.check(),
             Err(ConfigError::Priority { found: 5 })
         ));
-        config = parse("[real_time]\nrehearse_us = 1001").unwrap();
+        config = parse("[real_time]\nwarm_up_us = 1001").unwrap();
         let said = config.check().unwrap_err().to_string();
         assert!(
-            said.contains("rehearse_us") && said.contains("1000"),
+            said.contains("warm_up_us") && said.contains("1000"),
             "{said}"
         );
         config.limits = Some(Limits::default());

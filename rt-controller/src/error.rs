@@ -9,9 +9,9 @@ pub enum ControllerError {
     /// The configuration is wrong.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The rehearsal's motion is refused.
-    #[error("the motion of the rehearsal is refused, which is a defect: {0}")]
-    Rehearsal(#[from] arm_model::TrajectoryError),
+    /// The shadow controller's motion is refused.
+    #[error("the motion of the shadow controller is refused, which is a defect: {0}")]
+    CacheWarmUp(#[from] arm_model::TrajectoryError),
     /// Shared memory does not work.
     #[error(transparent)]
     Ipc(#[from] IpcError),

@@ -3,7 +3,7 @@
 //! ```text
 //!   other processes            this process                                 arm
 //!                 requests  +-----------+ commands +--------------+ setpoints, 250 Hz
-//!   wag  <----------------> |   relay   |-------> | control loop | ---------------> command port
+//!   wag  <----------------> |   bridge   |-------> | control loop | ---------------> command port
 //!        <----------------- |           | <------ |  (real time) | <--------------- replies
 //!         cycle records,    +-----------+ records +--------------+
 //!         joint reports           ^                      ^
@@ -13,7 +13,7 @@
 //!
 //! Read in this order: [`driver`] (one cycle, top to bottom), [`rt_loop`] (the thread
 //! it runs in), [`control`] (the
-//! pure core it steps), [`transport`] and [`xarm`] (the wire), then [`relay`]
+//! pure core it steps), [`transport`] and [`xarm`] (the wire), then [`bridge`]
 //! and [`process`] (everything that may wait).
 //!
 //! It plans no throws and knows no rope: it takes finished motions, checks them
@@ -22,23 +22,23 @@
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod arm_status;
+pub mod bridge;
 pub mod commander;
 pub mod config;
 pub mod error;
 pub mod guardian;
+pub mod loopback_bench;
 pub mod os;
 pub mod ports;
 pub mod process;
 pub mod recording;
-pub mod rehearsal;
-pub mod relay;
 pub mod report_stream;
 pub mod reports;
 pub mod rt_loop;
 pub mod session;
 pub mod set_up;
 pub mod transport;
-pub mod trial;
+pub mod warm_up;
 
 pub use config::ControllerConfig;
 pub use control_core::{clock_map, control, driver, overrun, point_to_point, report_feed, xarm};

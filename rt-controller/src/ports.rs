@@ -9,20 +9,20 @@ use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{CycleRecord, InputRecord, JointReport, Reports};
 
-/// Cycle records kept while the relay is busy: sixteen seconds at 250 Hz.
+/// Cycle records kept while the bridge is busy: sixteen seconds at 250 Hz.
 const RECORDS: usize = 4096;
-/// Whole states kept for the relay, one a second.
+/// Whole states kept for the bridge, one a second.
 const STATES: usize = 4;
 /// Cycles from one whole state to the next.
 const STATE_EVERY: u64 = 250;
-/// Joint reports kept for the relay: the same time.
+/// Joint reports kept for the bridge: the same time.
 const REPORTS: usize = 4096;
 /// Joint reports kept for the loop; it takes them all every cycle.
 const NEWEST_REPORTS: usize = 16;
 /// Commands, events and retired things are few.
 const FEW: usize = 64;
 
-/// Something the loop is done with, to be dropped by the relay.
+/// Something the loop is done with, to be dropped by the bridge.
 #[derive(Debug)]
 pub enum Retired<T> {
     /// A motion that ended or was refused.
@@ -52,7 +52,7 @@ pub struct RtPorts<T> {
     pub records: Producer<CycleRecord>,
     /// What is to be dropped, out.
     pub retired: Producer<Retired<T>>,
-    /// Records lost so far because the relay was too slow.
+    /// Records lost so far because the bridge was too slow.
     pub dropped: u32,
 }
 
@@ -84,9 +84,9 @@ impl<T> RtPorts<T> {
     }
 
     /// Passes on what a cycle was told, before its record. RT-safe.
-    pub fn put_input(&mut self, told: InputRecord) {
+    pub fn put_input(&mut self, input: InputRecord) {
         // When the ring is full, so is that of the records, which counts losses.
-        let _ = self.inputs.push(told);
+        let _ = self.inputs.push(input);
     }
 
     /// Passes on what a cycle produced, its record first. RT-safe.
@@ -107,9 +107,9 @@ impl<T> RtPorts<T> {
     }
 }
 
-/// The relay's ends.
+/// The bridge's ends.
 #[derive(Debug)]
-pub struct RelayPorts<T> {
+pub struct BridgePorts<T> {
     /// Commands out.
     pub commands: Producer<CommandMsg<T>>,
     /// Joint reports in, every one.
@@ -128,7 +128,7 @@ pub struct RelayPorts<T> {
     pub retired: Consumer<Retired<T>>,
 }
 
-impl<T> RelayPorts<T> {
+impl<T> BridgePorts<T> {
     /// What the cycle of a record was told, joined with that record; `None` if
     /// it got lost.
     pub fn recorded(&mut self, record: CycleRecord) -> Option<RecordedCycle> {
@@ -159,16 +159,16 @@ impl<T> RelayPorts<T> {
 pub struct Rings<T> {
     /// The loop's ends.
     pub rt: RtPorts<T>,
-    /// The relay's ends.
-    pub relay: RelayPorts<T>,
+    /// The bridge's ends.
+    pub bridge: BridgePorts<T>,
     /// The report receiver's way to the loop.
     pub reports_to_rt: Producer<JointReport>,
-    /// The report receiver's way to the relay.
-    pub reports_to_relay: Producer<JointReport>,
+    /// The report receiver's way to the bridge.
+    pub reports_to_bridge: Producer<JointReport>,
     /// The status reader's way to the loop.
     pub status_to_rt: Producer<ArmStatus>,
-    /// The status reader's way to the relay.
-    pub status_to_relay: Producer<ArmStatus>,
+    /// The status reader's way to the bridge.
+    pub status_to_bridge: Producer<ArmStatus>,
 }
 
 /// Makes all rings. Not RT-safe.
@@ -181,9 +181,9 @@ pub fn rings<T>() -> Rings<T> {
     let (states, states_out) = RingBuffer::new(STATES);
     let (retired, retired_out) = RingBuffer::new(FEW);
     let (reports_to_rt, newest) = RingBuffer::new(NEWEST_REPORTS);
-    let (reports_to_relay, reports) = RingBuffer::new(REPORTS);
+    let (reports_to_bridge, reports) = RingBuffer::new(REPORTS);
     let (status_to_rt, status) = RingBuffer::new(NEWEST_REPORTS);
-    let (status_to_relay, status_out) = RingBuffer::new(FEW);
+    let (status_to_bridge, status_out) = RingBuffer::new(FEW);
     Rings {
         rt: RtPorts {
             commands,
@@ -197,7 +197,7 @@ pub fn rings<T>() -> Rings<T> {
             retired,
             dropped: 0,
         },
-        relay: RelayPorts {
+        bridge: BridgePorts {
             commands: commands_in,
             reports,
             status: status_out,
@@ -208,8 +208,8 @@ pub fn rings<T>() -> Rings<T> {
             retired: retired_out,
         },
         reports_to_rt,
-        reports_to_relay,
+        reports_to_bridge,
         status_to_rt,
-        status_to_relay,
+        status_to_bridge,
     }
 }

@@ -5,19 +5,19 @@
 //! | control loop | command link, blackboards, control state | FIFO, absolute deadlines |
 //! | joint reports | 250 Hz report connection | FIFO, ten below |
 //! | arm status | 5 Hz report connection | ordinary |
-//! | relay (the caller's) | services, histograms, set-up connection | ordinary |
+//! | bridge (the caller's) | services, histograms, set-up connection | ordinary |
 
 use crate::arm_status;
+use crate::bridge::{ArmSettings, Bridge};
 use crate::config::ControllerConfig;
 use crate::control::ControlState;
 use crate::error::ControllerError;
 use crate::os::{MonotonicClock, enter_real_time, shared_memory_free_mb};
 use crate::ports::{RtPorts, rings};
-use crate::rehearsal::Rehearsal;
-use crate::relay::{ArmSettings, Relay};
 use crate::reports::{self, ReportSource};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::TcpLink;
+use crate::warm_up::CacheWarmUp;
 use shared_types::ipc::{Bus, ControllerBoards, DomainSweep, IpcError};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 
 /// Name of the control thread, by which the guardian finds it.
 pub(crate) const CONTROL_THREAD: &str = "control loop";
-/// Pause between two turns of the relay.
+/// Pause between two turns of the bridge.
 const TURN: Duration = Duration::from_millis(2);
 /// Room that the controller's services take in shared memory, with some to spare
 /// for those who attach (MB); 97 were found in use.
@@ -67,7 +67,7 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     let joints = reports::spawn(
         source,
         rings.reports_to_rt,
-        rings.reports_to_relay,
+        rings.reports_to_bridge,
         broken.clone(),
         Arc::clone(&quit),
     );
@@ -78,20 +78,20 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
         config.arm,
         config.status_ports,
         rings.status_to_rt,
-        rings.status_to_relay,
+        rings.status_to_bridge,
         broken,
         quit,
     );
     threads
         .receivers
         .push(status.map_err(ControllerError::Thread)?);
-    let mut relay = Relay::open(
+    let mut bridge = Bridge::open(
         &bus,
         ArmSettings::of(&config, limits, &settings.thresholds),
         warnings,
-        rings.relay,
+        rings.bridge,
     )?;
-    serve(&mut relay, &threads, stop)
+    serve(&mut bridge, &threads, stop)
 }
 
 /// Refuses to begin where shared memory is too small or full.
@@ -106,27 +106,27 @@ fn require_room() -> Result<(), ControllerError> {
     }
 }
 
-/// Turns the relay until `stop`, then until the arm rests.
-fn serve(relay: &mut Relay, threads: &Threads, stop: &AtomicBool) -> Result<(), ControllerError> {
+/// Turns the bridge until `stop`, then until the arm rests.
+fn serve(bridge: &mut Bridge, threads: &Threads, stop: &AtomicBool) -> Result<(), ControllerError> {
     let mut stopping: Option<Instant> = None;
     loop {
-        relay.turn();
+        bridge.turn();
         if !threads.loop_lives() {
-            relay.stop_arm();
-            relay.end_recording();
+            bridge.stop_arm();
+            bridge.end_recording();
             return Err(ControllerError::LoopEnded);
         }
         if stop.load(Ordering::Relaxed) {
             let since = *stopping.get_or_insert_with(|| {
-                relay.stop();
+                bridge.stop();
                 Instant::now()
             });
-            let settled = since.elapsed() > 10 * TURN && !relay.mode().is_moving();
+            let settled = since.elapsed() > 10 * TURN && !bridge.mode().is_moving();
             if settled || since.elapsed() > BRAKE_WAIT {
                 // Once more, for callers whose answer the last cycle brought.
                 std::thread::sleep(TURN);
-                relay.turn();
-                relay.end_recording();
+                bridge.turn();
+                bridge.end_recording();
                 return Ok(());
             }
         }
@@ -149,7 +149,7 @@ fn create_boards(bus: &Bus) -> Result<ControllerBoards, IpcError> {
     }
 }
 
-/// The threads beside the relay. Dropping it ends and joins them.
+/// The threads beside the bridge. Dropping it ends and joins them.
 #[derive(Debug, Default)]
 struct Threads {
     quit: Arc<AtomicBool>,
@@ -191,8 +191,8 @@ impl Threads {
         let (domain, settings) = (config.domain.clone(), config.real_time.clone());
         let quit = Arc::clone(&self.quit);
         let (ready, wait) = mpsc::channel();
-        let ahead_us = config.real_time.rehearse_us;
-        let rehearsal = Rehearsal::new(config.resolve_limits()?, control.wire(), ahead_us)?;
+        let ahead_us = config.real_time.warm_up_us;
+        let warm_up = CacheWarmUp::new(config.resolve_limits()?, control.wire(), ahead_us)?;
         let body = move || {
             // Blackboard handles stay in the thread that made them.
             let boards = match Bus::join(&domain).and_then(|bus| create_boards(&bus)) {
@@ -203,14 +203,14 @@ impl Threads {
                 }
             };
             let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
-            rt.rehearse(rehearsal);
+            rt.set_warm_up(warm_up);
             let warnings = enter_real_time(&settings);
             rt.set_real_time(
                 warnings.is_empty() && settings.priority.is_some() && settings.lock_memory,
             );
             let words: Vec<String> = warnings.iter().map(ToString::to_string).collect();
             let _ = ready.send(Ok(words));
-            // A panic is a defect; caught here, the relay can still stop the arm.
+            // A panic is a defect; caught here, the bridge can still stop the arm.
             if catch_unwind(AssertUnwindSafe(|| rt.run(&quit))).is_err() {
                 tracing::error!("the control loop panicked");
             }

@@ -1,5 +1,5 @@
 //! The joint reports: a thread that decodes and stamps them and passes each on
-//! through two rings, to the control loop and to the relay.
+//! through two rings, to the control loop and to the bridge.
 //!
 //! It is not the real-time thread. It listens to the real-time report (port
 //! 30000, 250 Hz, with the arm's own clock) or, where that is refused, to the
@@ -35,7 +35,7 @@ pub struct ReportSource {
 pub fn spawn(
     source: ReportSource,
     to_loop: Producer<JointReport>,
-    to_relay: Producer<JointReport>,
+    to_bridge: Producer<JointReport>,
     broken: BrokenReports,
     quit: Arc<AtomicBool>,
 ) -> std::io::Result<JoinHandle<()>> {
@@ -44,7 +44,7 @@ pub fn spawn(
         ports: vec![source.realtime_port, source.fallback_port],
         sink: JointSink {
             to_loop,
-            to_relay,
+            to_bridge,
             decoder: JointDecoder::default(),
         },
         broken,
@@ -63,7 +63,7 @@ pub fn spawn(
 
 struct JointSink {
     to_loop: Producer<JointReport>,
-    to_relay: Producer<JointReport>,
+    to_bridge: Producer<JointReport>,
     decoder: JointDecoder,
 }
 
@@ -82,7 +82,7 @@ impl ReportSink for JointSink {
             return false;
         };
         let _ = self.to_loop.push(report);
-        let _ = self.to_relay.push(report);
+        let _ = self.to_bridge.push(report);
         true
     }
 }
@@ -97,11 +97,11 @@ mod tests {
 
     fn sink() -> (JointSink, Consumer<JointReport>) {
         let (to_loop, taken) = RingBuffer::new(4);
-        let (to_relay, _) = RingBuffer::new(4);
+        let (to_bridge, _) = RingBuffer::new(4);
         let decoder = JointDecoder::default();
         let sink = JointSink {
             to_loop,
-            to_relay,
+            to_bridge,
             decoder,
         };
         (sink, taken)

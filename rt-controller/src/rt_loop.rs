@@ -4,7 +4,7 @@
 //! system calls are one clock sleep, one non-blocking receive and one send at
 //! most per cycle; no allocation, no lock, no log. Both are counted over every
 //! mode and fault in `tests/no_alloc.rs` and `tests/system_calls.rs`. Everything that allocates, opens
-//! or may fail for a human reason happened before, in the relay thread, and
+//! or may fail for a human reason happened before, in the bridge thread, and
 //! came through the rings of [`RtPorts`]. The cycle itself is [`crate::driver`], maths and
 //! policy are in [`crate::control`]; here are the thread's clock, boards and rings.
 #![cfg_attr(
@@ -22,8 +22,8 @@ use crate::control::{ArmCodes, ControlState, CycleOutput};
 use crate::driver::{CommandMsg, CycleDriver, CycleIo};
 use crate::os::Clock;
 use crate::ports::{Retired, RtPorts};
-use crate::rehearsal::Rehearsal;
 use crate::transport::ArmTransport;
+use crate::warm_up::CacheWarmUp;
 use shared_types::ipc::{
     ControllerBoards, ControllerState, GuardianBeat, InputRecord, OperatorBeat, Reports,
 };
@@ -34,7 +34,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct RtLoop<T, C> {
     driver: CycleDriver<T>,
     io: RtIo<T, C>,
-    rehearsal: Option<Rehearsal>,
+    warm_up: Option<CacheWarmUp>,
 }
 
 /// What the cycle of a real thread lives in.
@@ -68,7 +68,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
                 pid: std::process::id(),
                 real_time: false,
             },
-            rehearsal: None,
+            warm_up: None,
         }
     }
 
@@ -82,9 +82,9 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         self.io.real_time = real_time;
     }
 
-    /// Rehearses each cycle from now on, if that is to be any time ahead.
-    pub fn rehearse(&mut self, rehearsal: Rehearsal) {
-        self.rehearsal = Some(rehearsal).filter(|r| r.ahead_ns > 0);
+    /// Warms the caches for each cycle from now on, if that is to be any time ahead.
+    pub fn set_warm_up(&mut self, warm_up: CacheWarmUp) {
+        self.warm_up = Some(warm_up).filter(|r| r.ahead_ns > 0);
     }
 
     /// Runs until `quit` is set.
@@ -97,19 +97,19 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         }
     }
 
-    /// Sleeps until the deadline, or until it is time to rehearse; woken with less
+    /// Sleeps until the deadline, or until it is time to warm up; woken with less
     /// than a fifth of that time left, it does without.
     fn wait_until(&mut self, deadline_ns: u64) {
         let clock = &mut self.io.clock;
-        let Some(rehearsal) = &mut self.rehearsal else {
+        let Some(warm_up) = &mut self.warm_up else {
             return clock.sleep_until(deadline_ns);
         };
-        let ahead_ns = rehearsal.ahead_ns;
+        let ahead_ns = warm_up.ahead_ns;
         clock.sleep_until(deadline_ns.saturating_sub(ahead_ns));
         let latest_ns = deadline_ns.saturating_sub(ahead_ns / 5);
         if clock.now_ns() < latest_ns {
             let (operator, guardian) = (self.io.boards.operator(), self.io.boards.guardian());
-            rehearsal.cycle(deadline_ns, operator, guardian);
+            warm_up.cycle(deadline_ns, operator, guardian);
         }
         while clock.now_ns() < deadline_ns {
             core::hint::spin_loop();
@@ -153,8 +153,8 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
         self.ports.newest_status().map(ArmCodes::from)
     }
 
-    fn put_input(&mut self, told: InputRecord) {
-        self.ports.put_input(told);
+    fn put_input(&mut self, input: InputRecord) {
+        self.ports.put_input(input);
     }
 
     fn publish(&mut self, state: ControllerState) {

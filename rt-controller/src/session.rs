@@ -1,7 +1,7 @@
 //! The set-up connection: requests that wait for their answer.
 //!
 //! Bring-up, recovery and questions about errors need replies in order and may
-//! take their time. They run in the relay thread, on a connection of their own
+//! take their time. They run in the bridge thread, on a connection of their own
 //! (the arm serves several clients), so that the control loop's link carries
 //! setpoints only.
 

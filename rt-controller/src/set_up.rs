@@ -166,7 +166,7 @@ pub struct ReadyArm {
 }
 
 /// Hears of every step that was done: its name and its result.
-pub type StepHeard<'a> = &'a mut dyn FnMut(&'static str, &str);
+pub type OnStep<'a> = &'a mut dyn FnMut(&'static str, &str);
 
 impl SetUp<'_> {
     /// Sets up the arm behind `session`; `heard` is told each step.
@@ -176,16 +176,16 @@ impl SetUp<'_> {
     pub fn run(
         &self,
         session: &mut ArmSession,
-        heard: StepHeard<'_>,
+        received: OnStep<'_>,
     ) -> Result<ReadyArm, SetUpError> {
         let version = self.identify(session)?;
-        heard(
+        received(
             "identify",
             &format!("xArm 7, firmware {}", version.firmware),
         );
-        heard("reports", &self.match_layout(version.firmware)?);
-        heard("tool", &self.match_tool(session)?);
-        heard(
+        received("reports", &self.match_layout(version.firmware)?);
+        received("tool", &self.match_tool(session)?);
+        received(
             "tool speed",
             &self.match_tool_speed(session, version.firmware)?,
         );
@@ -201,11 +201,11 @@ impl SetUp<'_> {
             ("state", Command::SetState(StateRequest::Ready)),
         ] {
             session.ask(&command)?;
-            heard(name, "taken");
+            received(name, "taken");
         }
-        heard("ready", &format!("{:?}", wait_ready(session)?));
+        received("ready", &format!("{:?}", wait_ready(session)?));
         let q = wait_still(session)?;
-        heard("still", "the arm stands");
+        received("still", "the arm stands");
         match self.limits.position_violation(&q) {
             Some(j) => Err(SetUpError::OutsideRange {
                 joint: j.saturating_add(1),

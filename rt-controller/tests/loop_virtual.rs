@@ -12,10 +12,10 @@ use arm_model::joint::START_POSE;
 use rt_controller::control::{ControlCommand, ControlEvent, ControlState, Thresholds};
 use rt_controller::driver::CommandMsg;
 use rt_controller::os::Clock;
-use rt_controller::ports::{RelayPorts, rings};
-use rt_controller::rehearsal::Rehearsal;
+use rt_controller::ports::{BridgePorts, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::sim::IdealArm;
+use rt_controller::warm_up::CacheWarmUp;
 use shared_types::FaultCode;
 use shared_types::ipc::{Bus, ControllerBoards, CycleRecord};
 use std::cell::Cell;
@@ -63,11 +63,11 @@ impl Clock for LateClock {
 }
 
 /// Runs the loop with an arm for as many cycles as `late_ns` has entries.
-fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
+fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, BridgePorts<IdealArm>) {
     run_so(name, arm, late_ns, Vec::new(), 0)
 }
 
-/// The same, held up after its wake-ups by `held_ns`, rehearsing `ahead_us`
+/// The same, held up after its wake-ups by `held_ns`, warming up `ahead_us`
 /// before each deadline.
 fn run_so(
     name: &str,
@@ -75,7 +75,7 @@ fn run_so(
     late_ns: Vec<u64>,
     held_ns: Vec<u64>,
     ahead_us: u32,
-) -> (Vec<CycleRecord>, RelayPorts<IdealArm>) {
+) -> (Vec<CycleRecord>, BridgePorts<IdealArm>) {
     let bus = Bus::join(&format!("test_{name}_{}", std::process::id())).unwrap();
     let boards = ControllerBoards::create(&bus).unwrap();
     let thresholds = Thresholds {
@@ -88,10 +88,10 @@ fn run_so(
         ..Thresholds::relaxed()
     };
     let rings = rings();
-    let mut relay = rings.relay;
+    let mut bridge = rings.bridge;
     let hold = ControlCommand::Engage { hold: START_POSE };
     let link = Some(Box::new(arm));
-    relay
+    bridge
         .commands
         .push(CommandMsg {
             command: hold,
@@ -110,14 +110,14 @@ fn run_so(
     let control = ControlState::new(Limits::default(), thresholds);
     let wire = control.wire();
     let mut rt = RtLoop::new(control, clock, boards, rings.rt);
-    rt.rehearse(Rehearsal::new(Limits::default(), wire, ahead_us).unwrap());
+    rt.set_warm_up(CacheWarmUp::new(Limits::default(), wire, ahead_us).unwrap());
     rt.run(&quit);
-    let records = std::iter::from_fn(|| relay.records.pop().ok()).collect();
-    (records, relay)
+    let records = std::iter::from_fn(|| bridge.records.pop().ok()).collect();
+    (records, bridge)
 }
 
-fn latched(relay: &mut RelayPorts<IdealArm>) -> Option<FaultCode> {
-    std::iter::from_fn(|| relay.events.pop().ok()).find_map(|event| match event {
+fn latched(bridge: &mut BridgePorts<IdealArm>) -> Option<FaultCode> {
+    std::iter::from_fn(|| bridge.events.pop().ok()).find_map(|event| match event {
         ControlEvent::Latched(cause) => Some(cause.fault()),
         _ => None,
     })
@@ -128,7 +128,7 @@ fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
     // Microseconds late, entries consumed from the back.
     let late_us = [0, 30, 3900, 0, 0, 9_500, 200, 0, 1200, 0, 799, 801, 0, 0];
     let late_ns = late_us.map(|us: u64| us * 1000).to_vec();
-    let (records, mut relay) = run("late", IdealArm::default(), late_ns);
+    let (records, mut bridge) = run("late", IdealArm::default(), late_ns);
     assert_eq!(records.len(), late_us.len());
     let mut cycles = 0;
     for pair in records.windows(2) {
@@ -142,14 +142,14 @@ fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
     // 9.5 ms passes two deadlines and its wake-up is too close to the next
     // one; 3.9, 1.2 and 0.801 ms are too close to theirs.
     assert_eq!(cycles, 6);
-    assert_eq!(latched(&mut relay), None);
+    assert_eq!(latched(&mut bridge), None);
     assert!(records.iter().all(|r| r.sent == 1));
 }
 
-/// A loop that wakes early to rehearse tells the arm the same, and lateness up to
+/// A loop that wakes early to warm up tells the arm the same, and lateness up to
 /// the time ahead is over at the deadline.
 #[test]
-fn a_rehearsal_takes_lateness_away_and_changes_nothing_else() {
+fn a_warm_up_takes_lateness_away_and_changes_nothing_else() {
     let late_us = [0, 30, 150, 0, 0, 90, 9_500, 0, 199, 0, 400, 0, 3_990, 0];
     let late_ns = late_us.map(|us: u64| us * 1000).to_vec();
     let so = |name, ahead_us| {
@@ -157,8 +157,8 @@ fn a_rehearsal_takes_lateness_away_and_changes_nothing_else() {
         run_so(name, arm, late_ns.clone(), Vec::new(), ahead_us)
     };
     let (plain, _) = so("plain", 0);
-    let (early, mut relay) = so("early", 200);
-    assert_eq!(latched(&mut relay), None);
+    let (early, mut bridge) = so("early", 200);
+    assert_eq!(latched(&mut bridge), None);
     let late = |r: &CycleRecord| u64::from(r.wake_late_ns);
     // The first wake-up is punctual.
     let wakes_us = std::iter::once(&0).chain(late_us.iter().rev());
@@ -188,7 +188,7 @@ fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
     let held_us = [0, 0, 150, 0, 3500, 0, 0, 300, 250, 0, 0, 0];
     let held_ns = held_us.map(|us: u64| us * 1000).to_vec();
     let arm = IdealArm::default();
-    let (records, mut relay) = run_so("held", arm, vec![0; held_us.len()], held_ns, 0);
+    let (records, mut bridge) = run_so("held", arm, vec![0; held_us.len()], held_ns, 0);
     let went: Vec<(bool, u32)> = records.iter().map(|r| (r.send_ns > 0, r.missed)).collect();
     let held: Vec<usize> = (0..went.len())
         .filter(|k| !went[*k].0 && records[*k].sent == 1)
@@ -197,7 +197,7 @@ fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
     // Each counts as missed for the one behind it.
     let missed: Vec<u32> = held.iter().map(|k| went[k + 1].1).collect();
     assert_eq!(missed, [1, 2, 1], "{went:?}");
-    assert_eq!(latched(&mut relay), None);
+    assert_eq!(latched(&mut bridge), None);
 }
 
 #[test]
@@ -206,17 +206,17 @@ fn a_stalled_link_is_latched_and_a_broken_one_never_engaged() {
         stalled: true,
         ..IdealArm::default()
     };
-    let (records, mut relay) = run("stalled", stalled, vec![0; 20]);
-    assert_eq!(latched(&mut relay), Some(FaultCode::ReplyStalled));
+    let (records, mut bridge) = run("stalled", stalled, vec![0; 20]);
+    assert_eq!(latched(&mut bridge), Some(FaultCode::ReplyStalled));
     // 20 ms without a reply: noticed in the sixth cycle after the first setpoint.
     assert_eq!(records.iter().filter(|r| r.sent == 1).count(), 6);
     let gone = IdealArm {
         gone: true,
         ..IdealArm::default()
     };
-    let (records, mut relay) = run("gone", gone, vec![0; 20]);
+    let (records, mut bridge) = run("gone", gone, vec![0; 20]);
     let (id, fault) = (None, FaultCode::LinkLost);
-    assert_eq!(relay.events.pop(), Ok(ControlEvent::Refused { id, fault }));
+    assert_eq!(bridge.events.pop(), Ok(ControlEvent::Refused { id, fault }));
     assert!(records.iter().all(|r| r.sent == 0));
-    assert!(relay.retired.pop().is_ok(), "the broken link comes back");
+    assert!(bridge.retired.pop().is_ok(), "the broken link comes back");
 }

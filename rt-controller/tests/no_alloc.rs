@@ -14,7 +14,7 @@ mod gauntlet;
 
 use arm_model::Limits;
 use gauntlet::Watch;
-use rt_controller::rehearsal::Rehearsal;
+use rt_controller::warm_up::CacheWarmUp;
 use shared_types::WireMode;
 use shared_types::ipc::{GuardianBeat, OperatorBeat};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -77,14 +77,14 @@ fn no_cycle_of_a_hundred_thousand_touches_the_heap() {
     assert_eq!(watch.0, 0);
 }
 
-/// Ten minutes: the swing of the rehearsal ends once and begins again.
+/// Ten minutes: the swing of the shadow controller ends once and begins again.
 #[test]
-fn no_rehearsal_touches_the_heap() {
+fn no_warm_up_touches_the_heap() {
     let (limits, wire) = (Limits::default(), WireMode::ServoPosition);
-    let mut rehearsal = Rehearsal::new(limits, wire, 200).unwrap();
+    let mut warm_up = CacheWarmUp::new(limits, wire, 200).unwrap();
     let before = touches();
     for cycle in 1..=150_000_u64 {
-        rehearsal.cycle(
+        warm_up.cycle(
             cycle * 4_000_000,
             OperatorBeat::default(),
             GuardianBeat::default(),

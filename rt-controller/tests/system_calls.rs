@@ -27,10 +27,10 @@ use libc::{SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto};
 use rt_controller::control::{ControlCommand, ControlSettings, ControlState, Motion, Thresholds};
 use rt_controller::driver::CommandMsg;
 use rt_controller::os::{Clock, MonotonicClock, now_ns};
-use rt_controller::ports::{RelayPorts, Rings, rings};
-use rt_controller::rehearsal::Rehearsal;
+use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use rt_controller::warm_up::CacheWarmUp;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, JointReport, OperatorEnd, StateReader,
 };
@@ -130,7 +130,7 @@ impl Clock for CountedClock {
     }
 }
 
-/// A running loop in a thread of its own, and what the relay would hold.
+/// A running loop in a thread of its own, and what the bridge would hold.
 struct Running {
     thread: JoinHandle<Sums>,
     quit: Arc<AtomicBool>,
@@ -175,7 +175,7 @@ fn start_loop(domain: &str) -> Running {
         let control = ControlState::new(Limits::default(), patient());
         let mut rt = RtLoop::new(control, clock, boards, ports);
         let wire = patient().wire;
-        rt.rehearse(Rehearsal::new(Limits::default(), wire, 200).unwrap());
+        rt.set_warm_up(CacheWarmUp::new(Limits::default(), wire, 200).unwrap());
         ready.send(()).unwrap();
         rt.run(&its_quit);
         counter::count(false);
@@ -190,7 +190,7 @@ fn start_loop(domain: &str) -> Running {
     }
 }
 
-/// What the relay does beside: passes records on to whoever listens.
+/// What the bridge does beside: passes records on to whoever listens.
 struct Beside {
     bus: Bus,
     cycles: shared_types::ipc::CyclePublisher,
@@ -198,11 +198,11 @@ struct Beside {
 }
 
 impl Running {
-    fn relay(&mut self) -> &mut RelayPorts<TcpLink> {
-        &mut self.rings.relay
+    fn bridge(&mut self) -> &mut BridgePorts<TcpLink> {
+        &mut self.rings.bridge
     }
 
-    /// Turns the relay until `done` or for ten seconds.
+    /// Turns the bridge until `done` or for ten seconds.
     fn until(&mut self, beside: &mut Beside, mut done: impl FnMut(&CycleRecord) -> bool) {
         let began = Instant::now();
         while !done(&self.newest) {
@@ -213,12 +213,12 @@ impl Running {
                 self.newest
             );
             beside.operator.beat();
-            while let Ok(record) = self.rings.relay.records.pop() {
+            while let Ok(record) = self.rings.bridge.records.pop() {
                 self.newest = record;
                 beside.cycles.send_copy(record).unwrap();
             }
-            while self.rings.relay.retired.pop().is_ok() {}
-            while self.rings.relay.events.pop().is_ok() {}
+            while self.rings.bridge.retired.pop().is_ok() {}
+            while self.rings.bridge.events.pop().is_ok() {}
             let report = JointReport {
                 arm_state: 1,
                 arm_mode: 1,
@@ -233,7 +233,7 @@ impl Running {
     }
 
     fn command(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
-        self.relay()
+        self.bridge()
             .commands
             .push(CommandMsg { command, link })
             .unwrap();

@@ -12,7 +12,7 @@ pub struct WriteCounts {
     pub chunks: u64,
     /// Bytes in the file.
     pub bytes: u64,
-    /// Chunks that never came here: this thread or the controller's relay was too
+    /// Chunks that never came here: this thread or the controller's bridge was too
     /// slow.
     pub lost_chunks: u64,
     /// Chunks that the disk did not take.

@@ -153,8 +153,8 @@ impl CycleIo<Link> for Surroundings {
     }
 
     /// The core is about to be stepped; the time that takes passes here.
-    fn put_input(&mut self, told: InputRecord) {
-        self.log.inputs.push(told);
+    fn put_input(&mut self, input: InputRecord) {
+        self.log.inputs.push(input);
         let held_up_ns = self.held_up_ns.pop_front().unwrap_or(0);
         let computed_ns = self.now().plus_s(COMPUTE_S).0;
         self.advance_to(MonotonicNs(computed_ns.saturating_add(held_up_ns)));

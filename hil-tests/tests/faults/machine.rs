@@ -166,9 +166,9 @@ fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
         let stage = Stage::thrown(wire, "");
         let throw = stage.throw;
         let mut again = ControlState::new(Limits::default(), config(wire, "").settings);
-        for (told, did) in stage.rig.log.inputs.iter().zip(&stage.rig.log.records) {
+        for (input, did) in stage.rig.log.inputs.iter().zip(&stage.rig.log.records) {
             let motion = |_, _| Some(Box::new(Motion::Spline(throw)));
-            let mut out = again.step(restore_input(told, motion).unwrap());
+            let mut out = again.step(restore_input(input, motion).unwrap());
             // What the rig measured, not the core.
             out.record.wake_late_ns = did.wake_late_ns;
             out.record.compute_ns = did.compute_ns;

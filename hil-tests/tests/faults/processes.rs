@@ -246,7 +246,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
         command: hold,
         link,
     };
-    all.relay.commands.push(message).unwrap();
+    all.bridge.commands.push(message).unwrap();
     let now_ns = Rc::new(Cell::new(1_000_000_000_000));
     let clock = HandClock(Rc::clone(&now_ns));
     let mut real = RtLoop::new(control, clock, boards, all.rt);
@@ -274,7 +274,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
                 command,
                 link: None,
             };
-            all.relay.commands.push(message).unwrap();
+            all.bridge.commands.push(message).unwrap();
         }
         real.cycle(now_ns.get(), 0, now_ns.get());
         if audience == Audience::Restless && cycle >= begin {
@@ -283,20 +283,20 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
             assert_eq!(seen.cycle, cycle + 1);
         }
         if audience != Audience::Stalled {
-            while let Ok(record) = all.relay.records.pop() {
+            while let Ok(record) = all.bridge.records.pop() {
                 dropped = record.dropped;
             }
-            while all.relay.inputs.pop().is_ok() {}
+            while all.bridge.inputs.pop().is_ok() {}
         }
         if cycle >= begin {
             told.push(reader.get().q_c);
         }
     }
     if audience == Audience::Stalled {
-        all.relay.records.pop().unwrap();
+        all.bridge.records.pop().unwrap();
         now_ns.set(now_ns.get() + PERIOD_NS);
         real.cycle(now_ns.get(), 0, now_ns.get());
-        dropped = std::iter::from_fn(|| all.relay.records.pop().ok())
+        dropped = std::iter::from_fn(|| all.bridge.records.pop().ok())
             .last()
             .unwrap()
             .dropped;

@@ -24,7 +24,7 @@
 
 use crate::control::record::record_input;
 use crate::control::{ArmCodes, ControlCommand, ControlState, CycleInput, CycleOutput};
-use crate::overrun::{HoldBack, Wake, after_wake, next_wake, setpoint_late_ns};
+use crate::overrun::{StaleSetpointDrop, Wake, after_wake, next_wake, setpoint_late_ns};
 use crate::transport::ArmTransport;
 use crate::transport::slot::LinkSlot;
 use alloc::boxed::Box;
@@ -60,7 +60,7 @@ pub trait CycleIo<T> {
     /// The arm's newest codes, if some came since the last cycle.
     fn new_codes(&mut self) -> Option<ArmCodes>;
     /// Takes what the cycle was told, before the core is stepped.
-    fn put_input(&mut self, told: InputRecord);
+    fn put_input(&mut self, input: InputRecord);
     /// Shows the state to other processes, its process and its priority filled in
     /// here. The setpoint is out.
     fn publish(&mut self, state: ControllerState);
@@ -77,7 +77,7 @@ pub trait CycleIo<T> {
 pub struct CycleDriver<T> {
     control: ControlState,
     link: LinkSlot<T>,
-    held: HoldBack,
+    held: StaleSetpointDrop,
     next: Wake,
     period_ns: u64,
 }
@@ -88,7 +88,7 @@ impl<T: ArmTransport> CycleDriver<T> {
     pub fn new(control: ControlState, now_ns: u64) -> Self {
         let mut driver = Self {
             link: LinkSlot::new(control.wire()),
-            held: HoldBack::default(),
+            held: StaleSetpointDrop::default(),
             next: Wake {
                 deadline_ns: 0,
                 missed: 0,

@@ -44,11 +44,11 @@ pub fn setpoint_late_ns(deadline_ns: u64, woke_ns: u64, missed: u32, period_ns: 
 /// two, and the arm would see more speed than the motion has; without it the arm
 /// sees one longer step in one longer time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct HoldBack {
+pub struct StaleSetpointDrop {
     in_a_row: u32,
 }
 
-impl HoldBack {
+impl StaleSetpointDrop {
     /// Cycles since the last setpoint sent that had theirs held back; they count
     /// as missed. RT-safe.
     #[must_use]
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn a_setpoint_that_grew_old_is_held_back_and_counts_as_missed() {
-        let mut held = HoldBack::default();
+        let mut held = StaleSetpointDrop::default();
         assert!(!held.holds(10 * P, 10 * P + 200_000, P));
         assert!(held.holds(11 * P, 11 * P + 200_001, P));
         assert!(held.holds(12 * P, 13 * P, P));

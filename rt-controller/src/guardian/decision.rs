@@ -77,7 +77,7 @@ pub enum GuardianPhase {
     /// The arm was seen stopped.
     Stopped = 3,
     /// The arm was asked to stop but never seen stopped.
-    Unheard = 4,
+    StopUnconfirmed = 4,
 }
 
 /// What is to be done after a turn.
@@ -137,7 +137,7 @@ impl Guardian {
     pub fn reaction_ns(&self) -> Option<u64> {
         let stopped = matches!(
             self.phase,
-            GuardianPhase::Stopping | GuardianPhase::Stopped | GuardianPhase::Unheard
+            GuardianPhase::Stopping | GuardianPhase::Stopped | GuardianPhase::StopUnconfirmed
         );
         stopped.then(|| self.since_ns.saturating_sub(self.lost_stamp_ns))
     }
@@ -154,7 +154,7 @@ impl Guardian {
             GuardianPhase::Waiting => self.wait(input),
             GuardianPhase::Watching => self.watch(input),
             GuardianPhase::Stopping => self.stop(input),
-            GuardianPhase::Stopped | GuardianPhase::Unheard => self.rest(input),
+            GuardianPhase::Stopped | GuardianPhase::StopUnconfirmed => self.rest(input),
         };
         out.changed = (self.phase != before).then_some(self.phase);
         out
@@ -235,7 +235,7 @@ impl Guardian {
             return GuardianOutput::default();
         }
         if input.now_ns.saturating_sub(self.since_ns) > STOP_WITHIN_NS {
-            self.phase = GuardianPhase::Unheard;
+            self.phase = GuardianPhase::StopUnconfirmed;
             return GuardianOutput::default();
         }
         self.ask(input)
@@ -394,7 +394,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.play(&mut guardian, 1000 * MS, 1100 * MS, 9000 * MS);
         assert_eq!(scene.asked_ns.len(), 31);
-        assert_eq!(scene.phases.last(), Some(&GuardianPhase::Unheard));
+        assert_eq!(scene.phases.last(), Some(&GuardianPhase::StopUnconfirmed));
     }
 
     #[test]

@@ -53,8 +53,8 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
     let _sweep = DomainSweep::new(&config.domain);
     let bus = Bus::join(&config.domain)?;
     set_up_thread(config)?;
-    let mut post = Post {
-        mind: Guardian::new(config.guardian.silence_ns()),
+    let mut runner = Runner {
+        watchdog: Guardian::new(config.guardian.silence_ns()),
         line: ArmLine::new(SocketAddr::new(config.arm, config.command_port)),
         watched: None,
         looked_ns: 0,
@@ -66,10 +66,10 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
         next_ns = next_ns.saturating_add(TURN_NS).max(clock.now_ns());
         clock.sleep_until(next_ns);
         let now_ns = clock.now_ns();
-        let moving = post.turn(&bus, now_ns);
+        let moving = runner.turn(&bus, now_ns);
         if stop.load(Ordering::Relaxed) {
             let since_ns = now_ns.saturating_sub(*leaving_ns.get_or_insert(now_ns));
-            let most_ns = if post.line.is_connected() {
+            let most_ns = if runner.line.is_connected() {
                 LEAVE_WITHIN_NS
             } else {
                 LEAVE_UNHEARD_WITHIN_NS
@@ -107,33 +107,33 @@ fn set_up_thread(config: &ControllerConfig) -> Result<(), ControllerError> {
 }
 
 /// The guardian at its post.
-struct Post {
-    mind: Guardian,
+struct Runner {
+    watchdog: Guardian,
     line: ArmLine,
     watched: Option<Watched>,
     looked_ns: u64,
 }
 
-impl Post {
+impl Runner {
     /// One turn; whether the arm may be moving.
     fn turn(&mut self, bus: &Bus, now_ns: u64) -> bool {
         let arm_state = self.line.turn(now_ns);
         let pulse = self.watched.as_mut().and_then(Watched::pulse);
-        let out = self.mind.step(&GuardianInput {
+        let out = self.watchdog.step(&GuardianInput {
             now_ns,
             pulse,
             arm_state,
             connected: self.line.is_connected(),
         });
         if out.ask_stop && !self.line.ask_stop(now_ns) {
-            self.mind.was_not_sent();
+            self.watchdog.was_not_sent();
         }
         if let Some(phase) = out.changed {
             self.tell(phase);
         }
         if let Some(watched) = &mut self.watched {
             watched.beat(GuardianBeat {
-                phase: self.mind.phase() as u8,
+                phase: self.watchdog.phase() as u8,
                 connected: u8::from(self.line.is_connected()),
                 stamp_ns: now_ns,
                 ..GuardianBeat::default()
@@ -142,10 +142,12 @@ impl Post {
         if out.look_again && now_ns.saturating_sub(self.looked_ns) > LOOK_EVERY_NS {
             self.look(bus, now_ns);
         }
-        match self.mind.phase() {
+        match self.watchdog.phase() {
             GuardianPhase::Stopping => true,
             GuardianPhase::Watching => pulse.is_some_and(|p| p.moving),
-            GuardianPhase::Waiting | GuardianPhase::Stopped | GuardianPhase::Unheard => false,
+            GuardianPhase::Waiting | GuardianPhase::Stopped | GuardianPhase::StopUnconfirmed => {
+                false
+            }
         }
     }
 
@@ -159,19 +161,19 @@ impl Post {
     }
 
     fn tell(&self, phase: GuardianPhase) {
-        let reaction_ms = self.mind.reaction_ns().map(|ns| ns / 1_000_000);
+        let reaction_ms = self.watchdog.reaction_ns().map(|ns| ns / 1_000_000);
         match phase {
             GuardianPhase::Waiting => tracing::info!("no controller to guard"),
             GuardianPhase::Watching => tracing::info!("guarding the controller"),
             GuardianPhase::Stopping => {
-                let why = match self.mind.emergency() {
+                let why = match self.watchdog.emergency() {
                     Emergency::Lost => "the controller was lost while the arm moved",
                     Emergency::CutOff => "the controller lost its link while the arm moved",
                 };
                 tracing::error!(reaction_ms, "{why}; the arm is asked to stop");
             }
             GuardianPhase::Stopped => tracing::error!(reaction_ms, "the arm was seen stopped"),
-            GuardianPhase::Unheard => tracing::error!(
+            GuardianPhase::StopUnconfirmed => tracing::error!(
                 "the arm was asked to stop for 3 s but was not seen stopped: press its emergency stop"
             ),
         }

@@ -17,9 +17,9 @@ pub struct RealTimeSettings {
     pub lock_memory: bool,
     /// Refuse to start when any of these cannot be had. Set it on a real arm.
     pub require: bool,
-    /// How long before each deadline the control thread wakes (us): it rehearses
+    /// How long before each deadline the control thread wakes (us): it warms up
     /// the cycle and waits by looking at the clock. 0: it sleeps to the deadline.
-    pub rehearse_us: u32,
+    pub warm_up_us: u32,
 }
 
 impl Default for RealTimeSettings {
@@ -29,7 +29,7 @@ impl Default for RealTimeSettings {
             cpu: None,
             lock_memory: true,
             require: false,
-            rehearse_us: 300,
+            warm_up_us: 300,
         }
     }
 }
@@ -154,7 +154,7 @@ mod tests {
             cpu: Some(1_000_000),
             lock_memory: false,
             require: false,
-            rehearse_us: 0,
+            warm_up_us: 0,
         };
         let words: Vec<String> = std::thread::spawn(move || {
             enter_real_time(&settings)

@@ -1,7 +1,7 @@
 //! The recorder of control cycles: every cycle's inputs and outputs.
 //!
 //! ```text
-//!  control loop --ring--> relay: items -> chunks --pub-sub--> recorder: file
+//!  control loop --ring--> bridge: items -> chunks --pub-sub--> recorder: file
 //!                                                              |
 //!                                    same bytes, chunk by chunk, in RUN/cycles.bin
 //! ```
@@ -13,7 +13,7 @@
 //! again and compares, bit by bit. Keyframes also let a recorder attach late and
 //! a reader go on behind a gap.
 //!
-//! The loop only pushes fixed-size values into rings; all else is the relay's.
+//! The loop only pushes fixed-size values into rings; all else is the bridge's.
 
 pub mod chunk;
 pub mod compare;

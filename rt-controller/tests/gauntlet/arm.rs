@@ -42,7 +42,7 @@ impl Manners {
 pub(crate) struct EchoArm {
     pub(crate) address: SocketAddr,
     manners: Arc<AtomicU8>,
-    heard: Arc<AtomicU64>,
+    received: Arc<AtomicU64>,
     hung_up: Arc<AtomicBool>,
 }
 
@@ -52,7 +52,7 @@ impl EchoArm {
         let arm = Self {
             address: listener.local_addr().unwrap(),
             manners: Arc::default(),
-            heard: Arc::default(),
+            received: Arc::default(),
             hung_up: Arc::default(),
         };
         let its = arm.clone();
@@ -76,8 +76,8 @@ impl EchoArm {
     }
 
     /// Requests met so far, on all connections.
-    pub(crate) fn heard(&self) -> u64 {
-        self.heard.load(Ordering::SeqCst)
+    pub(crate) fn received(&self) -> u64 {
+        self.received.load(Ordering::SeqCst)
     }
 
     /// Whether it has met `asked` requests, each in its manner.
@@ -85,7 +85,7 @@ impl EchoArm {
         if self.manners() == Manners::HangUp {
             return self.hung_up.load(Ordering::SeqCst);
         }
-        self.heard() >= asked
+        self.received() >= asked
     }
 
     /// False when it closed the connection itself.
@@ -97,7 +97,7 @@ impl EchoArm {
             while let Ok(Some(frame)) = reader.next_frame() {
                 let request = frame.as_request().unwrap();
                 let goes_on = self.answer(&mut stream, &request);
-                self.heard.fetch_add(1, Ordering::SeqCst);
+                self.received.fetch_add(1, Ordering::SeqCst);
                 if !goes_on {
                     return false;
                 }

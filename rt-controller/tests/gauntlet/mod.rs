@@ -173,11 +173,11 @@ impl<'w> Bench<'w> {
             rt.cycle(now_ns, missed, now_ns);
         });
         self.cycles += 1;
-        self.newest = self.rings.relay.records.pop().unwrap();
+        self.newest = self.rings.bridge.records.pop().unwrap();
         self.seen[usize::from(self.newest.mode)] += 1;
         self.asked += u64::from(self.newest.sent);
-        while self.rings.relay.retired.pop().is_ok() {}
-        while let Ok(event) = self.rings.relay.events.pop() {
+        while self.rings.bridge.retired.pop().is_ok() {}
+        while let Ok(event) = self.rings.bridge.events.pop() {
             self.take(&event);
         }
         if self.cycles.is_multiple_of(16) {
@@ -242,7 +242,7 @@ impl<'w> Bench<'w> {
 
     fn send(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
         self.rings
-            .relay
+            .bridge
             .commands
             .push(CommandMsg { command, link })
             .unwrap();
@@ -264,7 +264,7 @@ impl<'w> Bench<'w> {
         for _ in 0..3 {
             self.cycle();
         }
-        self.asked = self.arm.heard();
+        self.asked = self.arm.received();
         let settings = LinkSettings::new(UNANSWERED_MAX, self.period_ns);
         let timeout = Duration::from_secs(5);
         let link = TcpLink::connect(self.arm.address, timeout, settings).unwrap();

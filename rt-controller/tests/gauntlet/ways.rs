@@ -28,7 +28,7 @@ enum Way {
 fn way_to(code: FaultCode) -> Way {
     use FaultCode as F;
     use Way::{Motion, Never, Refused, Spoilt};
-    const RELAY: Way = Never("the relay's, before the loop hears of a motion");
+    const BRIDGE: Way = Never("the bridge's, before the loop hears of a motion");
     match code {
         F::None => Never("no fault"),
         F::OperatorStop => Spoilt(|b| b.operator.stop()),
@@ -93,7 +93,7 @@ fn way_to(code: FaultCode) -> Way {
             }));
             b.hold();
         }),
-        F::PlanOutOfLimits | F::PlanHashMismatch | F::UploadTimedOut => RELAY,
+        F::PlanOutOfLimits | F::PlanHashMismatch | F::UploadTimedOut => BRIDGE,
         F::UnsupportedFirmware | F::ArmDiffers => Never("the set-up's, before any link"),
     }
 }

@@ -250,7 +250,7 @@ impl Bus {
             .map_err(open_error(PREVIEW))
     }
 
-    /// Publishes cycle records. One per domain; the relay thread's.
+    /// Publishes cycle records. One per domain; the bridge thread's.
     ///
     /// # Errors
     /// [`IpcError::Open`].
@@ -275,7 +275,7 @@ impl Bus {
             .map_err(open_error(CYCLES))
     }
 
-    /// Publishes joint reports. One per domain; the relay thread's.
+    /// Publishes joint reports. One per domain; the bridge thread's.
     ///
     /// # Errors
     /// [`IpcError::Open`].
@@ -315,7 +315,7 @@ impl Bus {
     }
 
     /// Publishes chunks of a recording, of at most `chunk_bytes` bytes. One per
-    /// domain; the relay thread's.
+    /// domain; the bridge thread's.
     ///
     /// # Errors
     /// [`IpcError::Open`].

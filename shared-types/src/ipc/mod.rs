@@ -11,9 +11,9 @@
 //! | [`Bus::frame_publisher`] | camera -> tracker, recorder | pub-sub of bytes, [`FrameHeader`] |
 //! | [`Bus::keypoint_publisher`] | tracker -> planner, recorder | pub-sub |
 //! | [`Bus::preview_publisher`] | live preview -> whoever looks on | pub-sub |
-//! | [`Bus::cycle_publisher`] | controller's relay -> recorder | pub-sub |
-//! | [`Bus::joint_publisher`] | controller's relay -> recorder | pub-sub |
-//! | [`Bus::chunk_publisher`] | controller's relay -> recorder | pub-sub of bytes: every cycle's inputs and answers |
+//! | [`Bus::cycle_publisher`] | controller's bridge -> recorder | pub-sub |
+//! | [`Bus::joint_publisher`] | controller's bridge -> recorder | pub-sub |
+//! | [`Bus::chunk_publisher`] | controller's bridge -> recorder | pub-sub of bytes: every cycle's inputs and answers |
 //! | [`ControllerBoards`] | controller state out, heartbeats of operator and guardian in | blackboard |
 //! | [`rpc`] | `wag` <-> camera, planner, controller, rig | request-response, streamed answers |
 //!

@@ -144,7 +144,7 @@ pub struct GuardianBeat {
 }
 
 /// One control cycle. Written by the real-time thread into a ring, published by
-/// the relay. RT-safe to copy.
+/// the bridge. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]

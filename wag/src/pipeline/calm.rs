@@ -17,7 +17,7 @@ use std::time::Duration;
 /// that came too late. The rope sways down meanwhile: to wait spoils nothing.
 const PLANNING_S: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
 /// From the call to the first setpoint, on average (s): half a turn of the
-/// controller's relay and half a cycle.
+/// controller's bridge and half a cycle.
 const HANDOVER_S: f64 = 0.005;
 
 /// What calming did.

@@ -27,7 +27,7 @@ pub(super) fn stand_for_another_machine() {
         cpu: None,
         lock_memory: false,
         require: false,
-        rehearse_us: 0,
+        warm_up_us: 0,
     };
     for warning in enter_real_time(&settings) {
         tracing::debug!(%warning, "simulated arm");

@@ -18,7 +18,7 @@ use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier};
 const START_TOLERANCE_RAD: f64 = 1e-9;
 /// The arm may stand this far from where it was told to be when a motion begins
 /// (rad): half a degree.
-const START_ASTRAY_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
+const START_DEVIATION_MAX_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 
 impl ControlState {
     /// Handles a command; `before` is the mode before this cycle looked at anything.
@@ -150,7 +150,7 @@ impl ControlState {
         if let Some(fault) = self.monitor.refusal(input.deadline_ns) {
             return Err(fault);
         }
-        if self.monitor.astray_rad() > START_ASTRAY_RAD {
+        if self.monitor.tracking_error_rad() > START_DEVIATION_MAX_RAD {
             return Err(FaultCode::StartPoseMismatch);
         }
         if input.operator.released != 0 {

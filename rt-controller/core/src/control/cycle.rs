@@ -365,7 +365,7 @@ impl ControlState {
             WireMode::ServoPosition => ArmCommand::Position(target.q),
             WireMode::JointVelocity => self.wire.command(
                 &target,
-                &self.monitor.off(),
+                &self.monitor.deviation(),
                 step_s,
                 &self.limits,
                 self.tcp_speed_max_m_s,

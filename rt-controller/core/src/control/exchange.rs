@@ -7,7 +7,7 @@ use arm_model::JointVector;
 use shared_types::ipc::{CauseRecord, CycleRecord, GuardianBeat, OperatorBeat, Reports};
 use shared_types::{Arming, FaultCode};
 
-/// What the relay asks of the cycle.
+/// What the bridge asks of the cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ControlCommand {
     /// The arm is enabled and in its streaming mode; hold this pose (rad).
@@ -111,7 +111,7 @@ pub enum ArmCommand {
     },
 }
 
-/// What happened, for the relay.
+/// What happened, for the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControlEvent {
     /// The arm is held.

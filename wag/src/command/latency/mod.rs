@@ -16,7 +16,7 @@ use cli_output::Stage;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::response::delay::{TargetDelay, command_to_target};
 use planner::response::{Recording, Sample, Setpoint, identify};
-use rt_controller::relay::Latencies;
+use rt_controller::bridge::Latencies;
 use run_log::{Cycles, Run};
 use serde_json::Value;
 use shared_types::MonotonicNs;

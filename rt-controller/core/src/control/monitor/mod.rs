@@ -112,15 +112,15 @@ impl Monitor {
 
     /// Commanded less measured joints at the time of the newest report (rad).
     #[must_use]
-    pub fn off(&self) -> JointVector {
-        self.reports.off(&self.commanded)
+    pub fn deviation(&self) -> JointVector {
+        self.reports.deviation(&self.commanded)
     }
 
     /// How far the arm stands from everything it was told lately (rad).
     #[must_use]
-    pub fn astray_rad(&self) -> f64 {
+    pub fn tracking_error_rad(&self) -> f64 {
         let window_ns = self.settings.thresholds.tracking_window_ns;
-        self.reports.astray(&self.commanded, window_ns).1
+        self.reports.tracking_error(&self.commanded, window_ns).1
     }
 
     /// Takes in what came with this cycle.

@@ -238,7 +238,7 @@ impl ReportWatch {
                 ));
             }
         }
-        let (joint, off_rad) = self.astray(commanded, t.tracking_window_ns);
+        let (joint, off_rad) = self.tracking_error(commanded, t.tracking_window_ns);
         let most = t.tracking_error_max_rad;
         (off_rad > most)
             .then(|| Violation::of_joint(FaultCode::TrackingError, joint, off_rad, most))
@@ -247,7 +247,7 @@ impl ReportWatch {
     /// Joint (0-based) whose newest measured position is farthest outside what
     /// it was told within `window_ns`, and how far (rad).
     #[must_use]
-    pub fn astray(&self, commanded: &Commanded, window_ns: u64) -> (usize, f64) {
+    pub fn tracking_error(&self, commanded: &Commanded, window_ns: u64) -> (usize, f64) {
         self.newest.map_or((0, 0.0), |report| {
             let from_ns = report.stamp_ns.saturating_sub(window_ns);
             commanded.farthest(&report.q, from_ns, report.stamp_ns.max(report.arrival_ns))
@@ -257,7 +257,7 @@ impl ReportWatch {
     /// How far the newest measured pose is behind what was commanded when it was
     /// measured (rad).
     #[must_use]
-    pub fn off(&self, commanded: &Commanded) -> JointVector {
+    pub fn deviation(&self, commanded: &Commanded) -> JointVector {
         self.newest
             .map_or(JointVector::ZERO, |r| commanded.at(r.stamp_ns) - r.q)
     }

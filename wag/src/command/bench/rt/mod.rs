@@ -16,9 +16,9 @@ use cli_output::{Failure, OrInput, Outcome};
 use cyclictest::{Cyclictest, CyclictestError};
 use load::Load;
 use report::{Beside, Percentiles, Report};
+use rt_controller::loopback_bench::{CycleTimes, LoopbackBench, bare_slice};
 use rt_controller::os::RealTimeSettings;
 use rt_controller::os::schedule::run_on;
-use rt_controller::trial::{CycleTimes, Trial, bare_slice};
 use serde_json::Value;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -64,7 +64,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     let _load = Load::begin(&others).or_failed()?;
     let domain = format!("bench-rt-{}", std::process::id());
-    let mut trial = Trial::new(&domain, real_time.clone()).or_failed()?;
+    let mut trial = LoopbackBench::new(&domain, real_time.clone()).or_failed()?;
     let stage = Stage::begin("real time", quiet);
     let measured = take_turns(&mut trial, &real_time, &rival, seconds, |done| {
         stage.say(format!("{done} of {seconds} s each"));
@@ -108,7 +108,7 @@ struct Measured {
 
 /// Turn by turn, until each has had its time.
 fn take_turns(
-    trial: &mut Trial,
+    trial: &mut LoopbackBench,
     real_time: &RealTimeSettings,
     rival: &Cyclictest,
     seconds: u32,

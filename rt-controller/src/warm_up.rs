@@ -1,4 +1,4 @@
-//! A rehearsal of each cycle shortly before its deadline.
+//! Warm caches for each cycle: a shadow controller steps shortly before its deadline.
 //!
 //! Between two deadlines the core does other things or sleeps, and loses the
 //! loop's instructions from its caches: a cycle then takes five times as long as
@@ -8,7 +8,7 @@
 //! warm caches and trained branch predictors then, and starts on time: what the
 //! system took for waking up is over. It costs the time that the loop is awake.
 //!
-//! Nothing of a rehearsal gets into the real core, its outputs or its records: a
+//! Nothing of the shadow controller gets into the real core, its outputs or its records: a
 //! run is the same with and without.
 
 use crate::control::record::record_input;
@@ -77,8 +77,8 @@ pub(crate) fn report(q: JointVector, wire: WireMode, due_ns: u64, now_ns: u64) -
 
 /// The second core and its imaginary arm.
 #[derive(Debug)]
-pub struct Rehearsal {
-    twin: ControlState,
+pub struct CacheWarmUp {
+    shadow: ControlState,
     /// How long before a deadline it takes place (ns).
     pub(crate) ahead_ns: u64,
     /// The swing while it does not run; it is used again and again.
@@ -88,8 +88,8 @@ pub struct Rehearsal {
     cycles: u64,
 }
 
-impl Rehearsal {
-    /// A rehearsal `ahead_us` before each deadline of a loop with these limits and
+impl CacheWarmUp {
+    /// A warm-up `ahead_us` before each deadline of a loop with these limits and
     /// this wire. Not RT-safe.
     ///
     /// # Errors
@@ -97,7 +97,7 @@ impl Rehearsal {
     pub fn new(limits: Limits, wire: WireMode, ahead_us: u32) -> Result<Self, TrajectoryError> {
         let settings = ControlSettings { wire, ..patient() };
         Ok(Self {
-            twin: ControlState::new(limits, settings),
+            shadow: ControlState::new(limits, settings),
             ahead_ns: u64::from(ahead_us).saturating_mul(1000),
             motion: Some(Box::new(swinging(START_POSE)?)),
             q: START_POSE,
@@ -106,7 +106,7 @@ impl Rehearsal {
         })
     }
 
-    /// One cycle of the twin, due at `deadline_ns`. RT-safe.
+    /// One cycle of the shadow controller, due at `deadline_ns`. RT-safe.
     pub fn cycle(&mut self, deadline_ns: u64, operator: OperatorBeat, guardian: GuardianBeat) {
         self.cycles = self.cycles.wrapping_add(1);
         let input = CycleInput {
@@ -121,20 +121,20 @@ impl Rehearsal {
                 reply_ns: 1000,
                 ..LinkInput::default()
             },
-            reports: Some(report(self.q, self.twin.wire(), self.due_ns, deadline_ns)).into(),
+            reports: Some(report(self.q, self.shadow.wire(), self.due_ns, deadline_ns)).into(),
             ..CycleInput::default()
         };
         black_box((operator, guardian));
         black_box(record_input(&input, self.cycles));
-        let mut out = self.twin.step(input);
+        let mut out = self.shadow.step(input);
         self.motion = self.motion.take().or_else(|| out.retired.pop());
         (self.q, self.due_ns) = (out.record.q_c, deadline_ns);
         black_box(&out.record);
     }
 
-    /// What makes the twin move, or nothing.
+    /// What makes the shadow controller move, or nothing.
     fn command(&mut self) -> Option<ControlCommand> {
-        match self.twin.mode() {
+        match self.shadow.mode() {
             ControllerMode::Offline | ControllerMode::Faulted => {
                 Some(ControlCommand::Engage { hold: START_POSE })
             }
@@ -161,13 +161,13 @@ mod tests {
     #[test]
     fn the_twin_moves_all_the_time_and_keeps_its_motion() {
         for wire in [WireMode::ServoPosition, WireMode::JointVelocity] {
-            let mut rehearsal = Rehearsal::new(Limits::default(), wire, 200).unwrap();
+            let mut warm_up = CacheWarmUp::new(Limits::default(), wire, 200).unwrap();
             let (mut now_ns, mut moving) = (1_000_000_000_000, 0);
             for k in 0..300_000_u64 {
                 let gap = if k % 10_007 == 0 { 250 } else { 1 };
                 now_ns += gap * PERIOD_NS;
-                rehearsal.cycle(now_ns, OperatorBeat::default(), GuardianBeat::default());
-                moving += u64::from(rehearsal.twin.mode() == ControllerMode::Streaming);
+                warm_up.cycle(now_ns, OperatorBeat::default(), GuardianBeat::default());
+                moving += u64::from(warm_up.shadow.mode() == ControllerMode::Streaming);
             }
             assert!(moving > 299_000, "{wire:?}: {moving}");
         }

@@ -5,7 +5,7 @@
 //! it takes longer than that is interrupts, of this system or of the host below
 //! it: no code, however short of work, can be without them.
 
-use super::{TrialError, WARM_UP};
+use super::{LoopbackError, WARM_UP};
 use crate::os::{Clock, MonotonicClock, RealTimeSettings, enter_real_time};
 use std::time::Duration;
 
@@ -13,13 +13,13 @@ use std::time::Duration;
 /// `work_ns`, every `period` for `span`. Blocks for as long.
 ///
 /// # Errors
-/// [`TrialError`], when the system has no more threads.
+/// [`LoopbackError`], when the system has no more threads.
 pub fn bare_slice(
     real_time: &RealTimeSettings,
     work_ns: u64,
     period: Duration,
     span: Duration,
-) -> Result<Vec<u64>, TrialError> {
+) -> Result<Vec<u64>, LoopbackError> {
     let count = span.as_nanos() / period.as_nanos().max(1);
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
@@ -46,7 +46,7 @@ pub fn bare_slice(
     let thread = std::thread::Builder::new()
         .name("bare loop".to_owned())
         .spawn(body)?;
-    thread.join().map_err(|_panic| TrialError::Ended)
+    thread.join().map_err(|_panic| LoopbackError::Ended)
 }
 
 #[cfg(test)]
@@ -60,7 +60,7 @@ mod tests {
             cpu: None,
             lock_memory: false,
             require: false,
-            rehearse_us: 0,
+            warm_up_us: 0,
         };
         let [period, span] = [1, 20].map(Duration::from_millis);
         let spans_ns = bare_slice(&ordinary, 50_000, period, span).unwrap();

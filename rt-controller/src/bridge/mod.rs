@@ -1,4 +1,4 @@
-//! The relay: the controller's door to the other processes, outside the
+//! The bridge: the controller's door to the other processes, outside the
 //! real-time thread.
 //!
 //! It publishes what the loop and the report receiver put into their rings,
@@ -19,7 +19,7 @@ use crate::control::{ControlCommand, ControlEvent, Motion, Thresholds};
 use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
-use crate::ports::{RelayPorts, Retired};
+use crate::ports::{BridgePorts, Retired};
 use crate::session::ArmSession;
 use crate::set_up::OnDifference;
 use crate::transport::tcp::{LinkSettings, TcpLink};
@@ -106,12 +106,12 @@ enum Open {
     },
 }
 
-/// The relay and all it owns. Lives in the thread that opened it.
-pub struct Relay {
+/// The bridge and all it owns. Lives in the thread that opened it.
+pub struct Bridge {
     arm: ArmSettings,
     commander: Option<CommanderLock>,
     warnings: Vec<String>,
-    ports: RelayPorts<TcpLink>,
+    ports: BridgePorts<TcpLink>,
     server: RpcServer<ControllerRpc>,
     cycles: CyclePublisher,
     joints: JointPublisher,
@@ -131,16 +131,16 @@ fn codes(status: ArmStatus) -> (ErrorCode, u8) {
     (status.error, status.warning)
 }
 
-impl core::fmt::Debug for Relay {
+impl core::fmt::Debug for Bridge {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Relay")
+        f.debug_struct("Bridge")
             .field("arm", &self.arm.command)
             .field("open", &self.open.len())
             .finish_non_exhaustive()
     }
 }
 
-impl Relay {
+impl Bridge {
     /// Opens all services. `warnings` are the real-time properties that could
     /// not be had, in words.
     ///
@@ -150,7 +150,7 @@ impl Relay {
         bus: &Bus,
         arm: ArmSettings,
         warnings: Vec<String>,
-        ports: RelayPorts<TcpLink>,
+        ports: BridgePorts<TcpLink>,
     ) -> Result<Self, ControllerError> {
         Ok(Self {
             arm,

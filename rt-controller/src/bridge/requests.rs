@@ -1,7 +1,7 @@
 //! What each request of the controller's service leads to.
 
 use super::answers::{ControllerCall, answer, refuse};
-use super::{Open, REPORT_WAIT, Relay, SET_UP_TIMEOUT};
+use super::{Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
 use crate::control::{ControlCommand, Motion};
 use crate::os::now_ns;
@@ -27,7 +27,7 @@ const ARMED_FOR_NS: u64 = 600_000_000_000;
 /// Part of the limits used for that move.
 const TO_START_SPEED_PART: f64 = 0.05;
 
-impl Relay {
+impl Bridge {
     pub(super) fn serve(&mut self, call: ControllerCall) {
         match &call.request {
             ControllerRequest::Status => self.status(&call),

@@ -1,4 +1,4 @@
-//! A trial of the real loop on this machine: how late it wakes, how long it
+//! A loopback bench of the real loop on this machine: how late it wakes, how long it
 //! computes, how long its system calls take.
 //!
 //! The loop is the real one, with its blackboards, rings and command link over
@@ -14,10 +14,10 @@ mod times;
 use crate::control::{ControlCommand, ControlState};
 use crate::driver::CommandMsg;
 use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, now_ns};
-use crate::ports::{RelayPorts, rings};
-use crate::rehearsal::{Rehearsal, patient, report, swinging};
+use crate::ports::{BridgePorts, rings};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::{LinkSettings, TcpLink};
+use crate::warm_up::{CacheWarmUp, patient, report, swinging};
 use answerer::Answerer;
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits, TrajectoryError};
@@ -35,7 +35,7 @@ use std::time::{Duration, Instant};
 use timed_link::TimedLink;
 pub use times::CycleTimes;
 
-/// Pause between two turns of the part that the relay would do.
+/// Pause between two turns of the part that the bridge would do.
 const TURN: Duration = Duration::from_millis(2);
 /// Longest wait for the loop to begin to move.
 const BEGIN_WAIT: Duration = Duration::from_secs(10);
@@ -49,7 +49,7 @@ const WARM_UP: usize = 5;
 
 /// Why there is no trial.
 #[derive(Debug, thiserror::Error)]
-pub enum TrialError {
+pub enum LoopbackError {
     /// No shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
@@ -83,12 +83,12 @@ struct Go {
 
 /// The loop in its thread, at rest between slices.
 #[derive(Debug)]
-pub struct Trial {
+pub struct LoopbackBench {
     warnings: Vec<String>,
     go: Option<mpsc::Sender<Go>>,
     rested: mpsc::Receiver<()>,
     thread: Option<JoinHandle<()>>,
-    relay: RelayPorts<TimedLink>,
+    bridge: BridgePorts<TimedLink>,
     reports: Producer<JointReport>,
     polls: Option<Producer<u32>>,
     polled: Consumer<u32>,
@@ -105,13 +105,13 @@ pub struct Trial {
     _sweep: DomainSweep,
 }
 
-impl Trial {
+impl LoopbackBench {
     /// Sets the loop up in a shared-memory domain of its own. It takes what it
     /// can have of `real_time`; see [`warnings`](Self::warnings).
     ///
     /// # Errors
-    /// [`TrialError`].
-    pub fn new(domain: &str, real_time: RealTimeSettings) -> Result<Self, TrialError> {
+    /// [`LoopbackError`].
+    pub fn new(domain: &str, real_time: RealTimeSettings) -> Result<Self, LoopbackError> {
         let sweep = DomainSweep::new(domain);
         let bus = Bus::join(domain)?;
         let limits = Limits::default();
@@ -126,7 +126,7 @@ impl Trial {
             all.rt,
             domain.to_owned(),
         );
-        let rehearsal = Rehearsal::new(limits, patient().wire, real_time.rehearse_us)?;
+        let warm_up = CacheWarmUp::new(limits, patient().wire, real_time.warm_up_us)?;
         let body = move || {
             let boards = Bus::join(&its_domain).and_then(|bus| ControllerBoards::create(&bus));
             let boards = match boards {
@@ -137,7 +137,7 @@ impl Trial {
                 }
             };
             let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
-            rt.rehearse(rehearsal);
+            rt.set_warm_up(warm_up);
             let warnings = enter_real_time(&real_time);
             let _ = ready.send(Ok(warnings.iter().map(ToString::to_string).collect()));
             while let Ok(Go { quit }) = begin.recv() {
@@ -148,13 +148,13 @@ impl Trial {
         let thread = std::thread::Builder::new()
             .name("control loop".to_owned())
             .spawn(body)?;
-        let warnings = wait.recv().map_err(|_gone| TrialError::Ended)??;
+        let warnings = wait.recv().map_err(|_gone| LoopbackError::Ended)??;
         Ok(Self {
             warnings,
             go: Some(go),
             rested,
             thread: Some(thread),
-            relay: all.relay,
+            bridge: all.bridge,
             reports: all.reports_to_rt,
             polls: Some(polls),
             polled,
@@ -181,35 +181,35 @@ impl Trial {
     /// it moved.
     ///
     /// # Errors
-    /// [`TrialError`].
-    pub fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, TrialError> {
+    /// [`LoopbackError`].
+    pub fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, LoopbackError> {
         let quit = Arc::new(AtomicBool::new(false));
-        let go = self.go.as_ref().ok_or(TrialError::Ended)?;
+        let go = self.go.as_ref().ok_or(LoopbackError::Ended)?;
         go.send(Go {
             quit: Arc::clone(&quit),
         })
-        .map_err(|_gone| TrialError::Ended)?;
+        .map_err(|_gone| LoopbackError::Ended)?;
         let ran = self.follow(span);
         quit.store(true, Ordering::Relaxed);
-        self.rested.recv().map_err(|_gone| TrialError::Ended)?;
+        self.rested.recv().map_err(|_gone| LoopbackError::Ended)?;
         let mut times = ran?;
         times.drain(..WARM_UP.min(times.len()));
         Ok(times)
     }
 
-    /// Does the relay's part, keeps the arm moving and collects.
-    fn follow(&mut self, span: Duration) -> Result<Vec<CycleTimes>, TrialError> {
+    /// Does the bridge's part, keeps the arm moving and collects.
+    fn follow(&mut self, span: Duration) -> Result<Vec<CycleTimes>, LoopbackError> {
         let (began, mut moving_since) = (Instant::now(), None);
         let mut times = Vec::new();
         self.prompt()?;
         loop {
             std::thread::sleep(TURN);
             self.operator.beat();
-            while self.relay.retired.pop().is_ok() {}
-            while self.relay.events.pop().is_ok() {}
-            while self.relay.inputs.pop().is_ok() {}
-            while self.relay.states.pop().is_ok() {}
-            while let Ok(record) = self.relay.records.pop() {
+            while self.bridge.retired.pop().is_ok() {}
+            while self.bridge.events.pop().is_ok() {}
+            while self.bridge.inputs.pop().is_ok() {}
+            while self.bridge.states.pop().is_ok() {}
+            while let Ok(record) = self.bridge.records.pop() {
                 let before = self.mode;
                 self.mode = ControllerMode::from_raw(record.mode);
                 self.fault = FaultCode::from_raw(record.fault).unwrap_or(FaultCode::None);
@@ -248,15 +248,15 @@ impl Trial {
         }
     }
 
-    const fn still(&self) -> TrialError {
-        TrialError::Still {
+    const fn still(&self) -> LoopbackError {
+        LoopbackError::Still {
             mode: self.mode,
             fault: self.fault,
         }
     }
 
     /// Orders what leads to a moving arm from where the loop is.
-    fn prompt(&mut self) -> Result<(), TrialError> {
+    fn prompt(&mut self) -> Result<(), LoopbackError> {
         let message = match self.mode {
             // Acknowledged: the trial measures, whatever the machine did to it.
             ControllerMode::Faulted => CommandMsg {
@@ -291,14 +291,14 @@ impl Trial {
                 return Ok(());
             }
         };
-        self.relay
+        self.bridge
             .commands
             .push(message)
-            .map_err(|_full| TrialError::Ended)
+            .map_err(|_full| LoopbackError::Ended)
     }
 }
 
-impl Drop for Trial {
+impl Drop for LoopbackBench {
     fn drop(&mut self) {
         // Without a sender the thread ends.
         self.go = None;
@@ -320,14 +320,14 @@ mod tests {
             cpu: None,
             lock_memory: false,
             require: false,
-            rehearse_us: 100,
+            warm_up_us: 100,
         };
-        let mut trial = Trial::new(&domain, ordinary).unwrap();
-        assert!(trial.warnings().is_empty());
+        let mut bench = LoopbackBench::new(&domain, ordinary).unwrap();
+        assert!(bench.warnings().is_empty());
         for _ in 0..3 {
             // Something else has the core in between.
             std::thread::sleep(Duration::from_millis(300));
-            let times = trial.slice(Duration::from_millis(400)).unwrap();
+            let times = bench.slice(Duration::from_millis(400)).unwrap();
             assert!(times.len() > 3, "{}", times.len());
             for t in &times {
                 // On a busy machine a setpoint may grow too old before it is sent, and is
