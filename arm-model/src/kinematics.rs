@@ -5,6 +5,7 @@
 //! the vendor (UFACTORY xArm 7 manual); each joint turns about the z axis of
 //! its own frame. The flange is frame 7, its z axis points out of the tool side.
 
+use crate::cell::POLE_LENGTH_M;
 use crate::exact;
 use crate::joint::{JOINTS, JointState, JointVector};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -22,9 +23,6 @@ pub const JOINT_ORIGIN_M: [[f64; 3]; JOINTS] = [
 
 /// Quarter turns about the parent's x axis before each joint's own turn.
 pub const JOINT_QUARTER_TURNS_X: [i8; JOINTS] = [0, -1, 1, 1, 1, 1, -1];
-
-/// Length of the pole along the flange's +z (m).
-pub const POLE_LENGTH_M: f64 = 0.20;
 
 /// Fixed rotation of joint `i`'s frame in its parent at zero angle.
 fn rest_rotation(joint: usize) -> Matrix3<f64> {

@@ -22,6 +22,8 @@
 
 extern crate alloc;
 
+pub mod capsules;
+pub mod cell;
 pub mod exact;
 pub mod joint;
 pub mod kinematics;

@@ -13,6 +13,10 @@ use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+/// Longest path of the tool from one setpoint to the next (m): the vendor's advice, at
+/// which the controller stops.
+pub const STEP_MAX_M: f64 = 0.010;
+
 /// Limits as written in a file; unchecked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -7,7 +7,8 @@
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::Knot;
 use crate::lanes::{LaneTask, Lanes};
-use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X, POLE_LENGTH_M};
+use arm_model::cell::POLE_LENGTH_M;
+use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use arm_model::{JOINTS, JointState};
 
 /// Attach frames for the joint states, in double precision.

@@ -1,38 +1,16 @@
 //! The arm as capsules, and contacts of its tool side with its base side.
 
 use super::ContactCounts;
-use super::capsule::{Capsule, box_distance_m};
 use arm_model::JointVector;
-use arm_model::kinematics::{self, POLE_LENGTH_M};
-use nalgebra::Vector3;
+use arm_model::capsules::{self, ArmCapsules, Capsule, LINK_CAPSULES};
+use arm_model::cell::Cell;
 
-/// Radius of the pole (m).
-const POLE_RADIUS_M: f64 = 0.008;
 /// Added to every capsule of a link: faces of L-shaped links lie up to this far
 /// outside the two capsules that wrap their vertices (m).
 const WRAP_MARGIN_M: f64 = 0.005;
 
-/// Link (0 = base), axis ends in the link's frame (m) and radius (m).
-type LinkCapsule = (u8, [f64; 3], [f64; 3], f64);
-
-/// Capsules around the collision meshes of the 1305 model.
-const LINK_CAPSULES: [LinkCapsule; 12] = [
-    (0, [0.0, 0.0, 0.014], [0.0, 0.0, 0.104], 0.067),
-    (1, [0.0, 0.009, 0.0], [0.0, 0.0, -0.070], 0.069),
-    (2, [0.0, -0.096, 0.007], [0.0, -0.161, 0.0], 0.050),
-    (2, [0.0, -0.143, 0.064], [0.0, 0.0, 0.083], 0.054),
-    (3, [0.004, -0.003, -0.065], [0.053, 0.003, 0.0], 0.067),
-    (4, [0.077, -0.081, 0.008], [0.076, -0.143, 0.0], 0.051),
-    (4, [0.010, -0.005, 0.071], [0.089, -0.121, 0.057], 0.061),
-    (5, [0.0, 0.0, -0.163], [0.0, 0.048, -0.101], 0.049),
-    (5, [0.0, 0.059, -0.039], [0.0, 0.042, 0.0], 0.048),
-    (6, [-0.003, -0.002, 0.017], [0.074, -0.011, 0.007], 0.048),
-    (6, [0.011, 0.031, 0.014], [0.077, 0.050, 0.0], 0.042),
-    (7, [0.0, 0.0, -0.018], [0.0, -0.016, -0.018], 0.041),
-];
-
 /// Number of capsules of arm and pole.
-const CAPSULES: usize = LINK_CAPSULES.len() + 1;
+const CAPSULES: usize = LINK_CAPSULES + 1;
 
 /// What a capsule belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -59,40 +37,6 @@ impl Part {
     }
 }
 
-/// The surroundings of the arm: a square column under it, and the floor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scene {
-    /// Half width of the column, whose top is at z = 0 (m).
-    pub column_half_width_m: f64,
-    /// Height of the floor (m).
-    pub floor_z_m: f64,
-}
-
-impl Default for Scene {
-    fn default() -> Self {
-        Self {
-            column_half_width_m: 0.09,
-            floor_z_m: -0.75,
-        }
-    }
-}
-
-impl Scene {
-    /// Distance of a point to the column (m), 0 inside.
-    #[must_use]
-    pub fn column_distance_m(&self, p: &Vector3<f64>) -> f64 {
-        let w = self.column_half_width_m;
-        let low = Vector3::new(-w, -w, self.floor_z_m);
-        box_distance_m(p, &low, &Vector3::new(w, w, 0.0))
-    }
-
-    /// Whether a sphere touches column or floor.
-    #[must_use]
-    pub fn touches(&self, p: &Vector3<f64>, radius_m: f64) -> bool {
-        p.z - radius_m < self.floor_z_m || self.column_distance_m(p) < radius_m
-    }
-}
-
 /// Arm and pole at one instant, capsules in the world frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmShape {
@@ -104,33 +48,11 @@ impl ArmShape {
     /// The arm in the pose `q` (rad).
     #[must_use]
     pub fn at(q: &JointVector) -> Self {
-        let poses = kinematics::link_poses(q);
-        let place = |link: u8, p: [f64; 3]| {
-            let p = Vector3::from(p);
-            match link {
-                0 => p,
-                _ => {
-                    let (origin, r) = &poses[usize::from(link) - 1];
-                    origin + r * p
-                }
-            }
-        };
-        let pole = (
-            Part::Pole,
-            Capsule {
-                a_m: place(7, [0.0, 0.0, 0.0]),
-                b_m: place(7, [0.0, 0.0, POLE_LENGTH_M]),
-                radius_m: POLE_RADIUS_M,
-            },
-        );
+        let ArmCapsules { links, pole } = ArmCapsules::at(q);
         let capsules = core::array::from_fn(|i| {
-            LINK_CAPSULES.get(i).map_or(pole, |&(link, a, b, radius)| {
-                let capsule = Capsule {
-                    a_m: place(link, a),
-                    b_m: place(link, b),
-                    radius_m: radius + WRAP_MARGIN_M,
-                };
-                (Part::Link(link), capsule)
+            links.get(i).map_or((Part::Pole, pole), |&(link, bare)| {
+                let radius_m = bare.radius_m + WRAP_MARGIN_M;
+                (Part::Link(link), Capsule { radius_m, ..bare })
             })
         });
         Self { capsules }
@@ -140,20 +62,18 @@ impl ArmShape {
     /// bare capsules, without the pole, which the arm does not know of.
     #[must_use]
     pub fn self_clearance_m(&self) -> f64 {
-        let links = &self.capsules[..LINK_CAPSULES.len()];
-        let pairs = links.iter().enumerate().flat_map(|(i, (a, one))| {
-            let rest = links[i + 1..].iter();
-            rest.filter(move |(b, _)| b.order() >= a.order() + 2)
-                .map(move |(_, other)| one.distance_to_m(other))
+        let links: [_; LINK_CAPSULES] = core::array::from_fn(|i| {
+            let (part, capsule) = self.capsules[i];
+            (part.order(), capsule)
         });
-        pairs.fold(f64::INFINITY, f64::min) + 2.0 * WRAP_MARGIN_M
+        capsules::self_clearance_m(&links) + 2.0 * WRAP_MARGIN_M
     }
 }
 
 /// Contacts of the tool side (links 6, 7 and pole) with the rest of the arm
 /// (links at least two apart), column and floor.
 #[must_use]
-pub fn tool_contacts(arm: &ArmShape, scene: &Scene) -> ContactCounts {
+pub fn tool_contacts(arm: &ArmShape, scene: &Cell) -> ContactCounts {
     let mut out = ContactCounts::default();
     for (part, capsule) in arm.capsules.iter().filter(|(p, _)| p.order() >= 6) {
         for (other_part, other) in &arm.capsules {
@@ -184,9 +104,10 @@ pub fn tool_contacts(arm: &ArmShape, scene: &Scene) -> ContactCounts {
 mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
+    use arm_model::kinematics;
 
     fn contacts(q: [f64; 7]) -> ContactCounts {
-        tool_contacts(&ArmShape::at(&JointVector(q)), &Scene::default())
+        tool_contacts(&ArmShape::at(&JointVector(q)), &Cell::default())
     }
 
     #[test]
@@ -218,7 +139,7 @@ mod tests {
                 0.0,
             ];
             let end = kinematics::attach_pose(&JointVector(q)).0;
-            if Scene::default().column_distance_m(&end) == 0.0 {
+            if Cell::default().column_distance_m(&end) == 0.0 {
                 inside += 1;
                 assert!(contacts(q).base_region > 0, "{q:?}");
             }
@@ -233,12 +154,5 @@ mod tests {
         assert!((gap_m - 0.011).abs() < 0.002, "{gap_m}");
         let folded = ArmShape::at(&JointVector([0.0, 0.0, 0.0, 0.0, 0.0, 3.1, 0.0]));
         assert!(folded.self_clearance_m() < 0.0);
-    }
-
-    #[test]
-    fn the_pole_ends_where_the_rope_is_attached() {
-        let q = JointVector([0.3, 0.5, -0.2, 1.9, 0.4, 1.2, 0.1]);
-        let pole = ArmShape::at(&q).capsules[CAPSULES - 1].1;
-        assert!((pole.b_m - kinematics::attach_pose(&q).0).norm() < 1e-12);
     }
 }

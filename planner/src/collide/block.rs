@@ -1,7 +1,7 @@
 //! Contacts of the arm with blocks: boards, walls, stands.
 
 use super::arm::{ArmShape, Part};
-use super::capsule::{Capsule, box_distance_m};
+use arm_model::capsules::{Capsule, box_distance_m};
 use nalgebra::Isometry3;
 
 /// Distance below which arm and block count as touching: what an arm's pose and a

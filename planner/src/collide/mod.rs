@@ -7,12 +7,12 @@
 
 mod arm;
 mod block;
-mod capsule;
 mod rope;
 
-pub use arm::{ArmShape, Part, Scene, tool_contacts};
+pub use arm::{ArmShape, Part, tool_contacts};
+pub use arm_model::capsules::Capsule;
+pub use arm_model::cell::Cell as Scene;
 pub use block::{Block, block_contacts};
-pub use capsule::Capsule;
 pub use rope::{RopeShape, rope_clearance_m, rope_contacts};
 
 /// Contacts of one instant, or their sum over the sampled instants of a throw.

@@ -1,7 +1,8 @@
 //! Contacts and clearance of the rope.
 
 use super::ContactCounts;
-use super::arm::{ArmShape, Part, Scene};
+use super::Scene;
+use super::arm::{ArmShape, Part};
 use nalgebra::Vector3;
 use shared_types::RopeParams;
 

@@ -1,6 +1,7 @@
 //! The rules of the arm, one by one.
 
 use crate::collide::ArmShape;
+use arm_model::limits::STEP_MAX_M;
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use control_core::control::Thresholds;
 use nalgebra::Vector3;
@@ -13,9 +14,6 @@ const RANGE_TOLERANCE_RAD: f64 = core::f64::consts::PI / 1800.0;
 /// Part by which a speed may exceed its limit before the arm stops: positions are
 /// rounded on the wire, and the arm's clock is not ours.
 const SPEED_SLACK: f64 = 1e-3;
-/// Longest way of the tool from one setpoint to the next that the vendor advises (m); the
-/// controller stops at it.
-const STEP_MAX_M: f64 = 0.010;
 /// How far joints may be from where the model of the arm has them when velocities are sent
 /// (rad), what that may take from the gap between links and move the tool (m). The arm's
 /// clock is not ours, so a ramp may begin a cycle later.

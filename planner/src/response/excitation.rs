@@ -5,7 +5,8 @@
 //! acceleration, jerk and tool speed that may be used allows, so that every
 //! frequency is as loud as it can safely be. One joint moves at a time.
 
-use arm_model::kinematics::{POLE_LENGTH_M, tool_speed_m_s};
+use arm_model::cell::POLE_LENGTH_M;
+use arm_model::kinematics::tool_speed_m_s;
 use arm_model::response::Excitation;
 use arm_model::trajectory::MAX_WAYPOINTS;
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};

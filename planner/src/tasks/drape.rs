@@ -7,6 +7,7 @@
 use super::{PlanarScene, ThrowConfig, ThrowOutcome, ThrowTask, verdict};
 use crate::collide::Block;
 use crate::trajopt::PolePose;
+use arm_model::cell::FLOOR_Z_M;
 use nalgebra::Vector3;
 use rope_sim::{BoxRegion, Obstacle, Scene, Watch};
 use serde::{Deserialize, Serialize};
@@ -15,7 +16,6 @@ use shared_types::{RopeParams, Verdict};
 /// Edges of the wall, outwards, across and down (m).
 const WALL_M: [f64; 3] = [0.02, 0.60, 0.40];
 const WALL_FRICTION: f64 = 0.5;
-const FLOOR_Z_M: f64 = -0.75;
 /// Time before the end in which the rope must rest (s).
 const REST_S: f64 = 1.0;
 /// Movements allowed in it: of the tip's height, and of the rope's middle (m).

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::collide::Block;
 use crate::trajopt::PolePose;
+use arm_model::cell::FLOOR_Z_M;
 use nalgebra::Vector3;
 use rope_sim::{BoxRegion, Domino, Obstacle, Scene, Watch};
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,6 @@ const DOMINO_BEFORE_M: f64 = 0.06;
 const DOMINO_M: [f64; 3] = [0.008, 0.025, 0.050];
 const DOMINO_KG: f64 = 0.010;
 const DOMINO_FRICTION: f64 = 0.4;
-const FLOOR_Z_M: f64 = -0.75;
 /// Height above the board, less the lead's radius, up to which the tip lies on it (m).
 const LIES_BELOW_M: f64 = 0.05;
 /// Time for which it must lie there (s).

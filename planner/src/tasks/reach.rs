@@ -2,6 +2,7 @@
 
 use super::PlanError;
 use arm_model::JointVector;
+use arm_model::cell::FLOOR_Z_M;
 use arm_model::joint::START_POSE;
 
 /// Height of the shoulder, the common point of joints 1 to 3 (m).
@@ -13,8 +14,6 @@ const POLE_END_REACH_M: f64 = 0.955;
 /// less the rope's length (m). In the maps of a dozen random ropes the outermost cells
 /// lie 0.88 to 0.97 m out.
 const THROW_REACH_M: f64 = 0.95;
-/// Height of the floor (m).
-const FLOOR_Z_M: f64 = -0.75;
 
 /// [`START_POSE`] with joint 1 turned to the target's bearing, so that joints 2,
 /// 4 and 6 move in the vertical plane through base axis and target.

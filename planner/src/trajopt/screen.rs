@@ -5,13 +5,14 @@
 //! small matrix times its knots; a rejected draw costs well under a microsecond.
 
 use super::decode::{WAYPOINTS, WaypointSpace};
-use arm_model::kinematics::{self, POLE_LENGTH_M};
+use arm_model::cell::{Cell, POLE_LENGTH_M};
+use arm_model::kinematics;
 use arm_model::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 /// Distances the tool keeps from the scene (m).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Clearance {
     /// Height of the floor in the arm's base frame (m).
     pub floor_z_m: f64,
@@ -23,9 +24,10 @@ pub struct Clearance {
 
 impl Default for Clearance {
     fn default() -> Self {
+        let cell = Cell::default();
         Self {
-            floor_z_m: -0.75,
-            column_half_width_m: 0.09,
+            floor_z_m: cell.floor_z_m,
+            column_half_width_m: cell.column_half_width_m,
             tool_m: 0.05,
         }
     }

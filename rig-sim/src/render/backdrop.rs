@@ -4,7 +4,7 @@
 use super::colour::{Ycc, ycc};
 use super::eye::{Eye, Vignette};
 use super::texture::{fractal, noise};
-use crate::body::{COLUMN_HALF_WIDTH_M, FLOOR_Z_M};
+use arm_model::cell::{COLUMN_HALF_WIDTH_M, FLOOR_Z_M};
 use nalgebra::Vector3;
 
 /// Distance of the wall behind the arm's base (m).

@@ -6,13 +6,14 @@
 use super::clock::time;
 use super::messages::round;
 use super::urdf::{BASE, POLE_END, link_name};
-use arm_model::kinematics::{JOINT_ORIGIN_M, POLE_LENGTH_M, attach_pose, link_poses};
+use arm_model::cell::{POLE_LENGTH_M, POLE_RADIUS_M};
+use arm_model::kinematics::{JOINT_ORIGIN_M, attach_pose, link_poses};
 use arm_model::{JOINTS, JointVector};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 
 const ARM_DIAMETER_M: f64 = 0.08;
-const POLE_DIAMETER_M: f64 = 0.016;
+const POLE_DIAMETER_M: f64 = 2.0 * POLE_RADIUS_M;
 /// Diameter of the simulated rig's target ball.
 const TARGET_DIAMETER_M: f64 = 0.04;
 const ARM: [f64; 4] = [0.75, 0.78, 0.82, 1.0];

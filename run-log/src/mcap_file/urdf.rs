@@ -1,6 +1,7 @@
 //! The arm as URDF, from the kinematics this program computes with.
 
-use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X, POLE_LENGTH_M};
+use arm_model::cell::POLE_LENGTH_M;
+use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use arm_model::{JOINTS, Limits};
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;

@@ -12,6 +12,7 @@
 )]
 
 use super::violation::Violation;
+use arm_model::limits::STEP_MAX_M;
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -22,9 +23,6 @@ const RELATIVE: f64 = 1e-9;
 /// Rounding of positions (rad), and what one, two and three divisions by a
 /// period make of it (rad/s, rad/s², rad/s³).
 const ROUNDING: [f64; 4] = [1e-9, 1e-9, 1e-8, 1e-5];
-/// Longest way of the tool from one setpoint to the next (m): the vendor's
-/// advice, per cycle also where cycles were missed.
-pub const STEP_MAX_M: f64 = 0.010;
 /// After a longer pause the arm stands at the last setpoint (s): below 30 Hz its
 /// motion is not continuous.
 pub const CONTINUOUS_S: f64 = 1.0 / 30.0;
@@ -207,6 +205,7 @@ fn check_tool(
         };
         return Err(Violation::new(fault, speed_m_s, allowed.tcp_speed_max_m_s));
     }
+    // Per cycle also where cycles were missed.
     let step_max_m = STEP_MAX_M * (step_s / limits.period_s()).max(1.0);
     if within(way_m, step_max_m, slack) {
         Ok(())
