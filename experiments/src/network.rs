@@ -6,7 +6,7 @@ use planner::observation::{ObserveError, ObservedPoints};
 use planner::phi::PhiNet;
 use planner::sysid::Method;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// The network of `model`, or the built-in one.
 ///
@@ -52,6 +52,6 @@ pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) ->
         _ => network_for_camera(model)?,
     };
     rig.points = net.metadata().features.points;
-    rig.network = Some(Arc::new(Mutex::new(net)));
+    rig.network = Some(Arc::new(net));
     Ok(())
 }

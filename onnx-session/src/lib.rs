@@ -8,8 +8,9 @@ use std::sync::OnceLock;
 
 pub use ort;
 use ort::environment::Environment;
-use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
+use ort::session::{Session, SessionInputValue};
+use ort::value::TensorRef;
 
 /// Why a graph is not opened.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -64,4 +65,32 @@ pub fn open(bytes: &[u8]) -> Result<Session, OpenError> {
         .map_err(|e| refused(e.to_string()))?
         .commit_from_memory(bytes)
         .map_err(|e| refused(e.to_string()))
+}
+
+/// A tensor's name, shape and numbers.
+pub type Input<'a> = (&'a str, &'a [usize], &'a [f32]);
+
+/// The numbers of the outputs with these names.
+///
+/// # Errors
+/// What the runtime says.
+pub fn outputs<const I: usize, const O: usize>(
+    session: &mut Session,
+    inputs: [Input<'_>; I],
+    names: [&str; O],
+) -> ort::Result<[Vec<f32>; O]> {
+    let mut tensors = Vec::new();
+    for (name, shape, numbers) in inputs {
+        let tensor = TensorRef::from_array_view((shape.to_vec(), numbers))?;
+        tensors.push((name, SessionInputValue::from(tensor)));
+    }
+    let found = session.run(tensors)?;
+    let mut outputs = [const { Vec::new() }; O];
+    for (output, name) in outputs.iter_mut().zip(names) {
+        let value = found
+            .get(name)
+            .ok_or_else(|| ort::Error::new(format!("no output `{name}`")))?;
+        *output = value.try_extract_tensor::<f32>()?.1.to_vec();
+    }
+    Ok(outputs)
 }

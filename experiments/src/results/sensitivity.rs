@@ -12,7 +12,6 @@ use cli_output::Stage;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome};
 use experiments::trials::{MOMENT_FRAMES, SensitivityMap, SensitivityTrial, sensitivity_trials};
-use planner::phi::PhiNet;
 use run_log::files;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -100,8 +99,11 @@ pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
         )));
     }
     let model = args.model.as_deref();
-    let metadata = network_for_camera(model)?.metadata().clone();
-    let (rate_hz, weights) = (metadata.features.rate_hz, metadata.graph_sha256);
+    let net = network_for_camera(model)?;
+    let (rate_hz, weights) = (
+        net.metadata().features.rate_hz,
+        &net.metadata().graph_sha256,
+    );
     let Setup { rig, options, .. } = Setup::new(args)?;
     let stage = Stage::begin("sensitivity-maps", quiet);
     let sequence = Sequence {
@@ -111,9 +113,8 @@ pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
         batch: options.threads.max(1),
         told: (|t: &SensitivityTrial| largest(&t.map), "films, most per m"),
     };
-    let network = || model.map_or_else(PhiNet::embedded, PhiNet::load);
     let trials = checkpointed_trials(&sequence, args, &stage, |batch| {
-        sensitivity_trials(&rig, network, args.seed, batch, options.threads).or_failed()
+        sensitivity_trials(&rig, &net, args.seed, batch, options.threads).or_failed()
     })?;
     let map = mean(&trials)
         .ok_or_else(|| Failure::input(anyhow!("--ropes is 0, but must be 1 or more")))?;

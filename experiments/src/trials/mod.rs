@@ -45,7 +45,7 @@ use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
 use shared_types::{RopeEstimate, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Keypoints per frame.
 const KEYPOINTS: usize = 24;
@@ -63,7 +63,7 @@ pub struct TrialRig {
     pub points: ObservedPoints,
     /// The network, for [`planner::sysid::Method::Network`] and what the hybrid starts
     /// from.
-    pub network: Option<Arc<Mutex<PhiNet>>>,
+    pub network: Option<Arc<PhiNet>>,
 }
 
 /// Why a trial could not be made.
@@ -215,21 +215,18 @@ impl TrialRig {
     }
 }
 
-/// Identifies with the network at hand. It is asked by one thread at a time, the fit is
-/// everybody's own.
+/// Identifies with the network at hand.
 fn with_network(
-    net: &Mutex<PhiNet>,
+    net: &PhiNet,
     observation: &Observation<'_>,
     index: u64,
     options: &IdentifyOptions,
 ) -> Result<RopeEstimate, TrialError> {
-    // A network that panicked once is as good as before.
-    let lock = || net.lock().unwrap_or_else(PoisonError::into_inner);
     if options.method == Method::Network {
-        return identify_by_network(&mut lock(), observation, options)
+        return identify_by_network(net, observation, options)
             .map_err(|source| TrialError::Network { index, source });
     }
-    let proposed = proposal(&mut lock(), observation, options);
+    let proposed = proposal(net, observation, options);
     proposed
         .map_err(HybridError::from)
         .and_then(|rope| {

@@ -41,14 +41,14 @@ impl SensitivityMap {
     ///
     /// # Errors
     /// What the network refuses.
-    pub fn measure(net: &mut PhiNet, features: &WiggleFeatures) -> Result<Self, PredictError> {
+    pub fn measure(net: &PhiNet, features: &WiggleFeatures) -> Result<Self, PredictError> {
         let definition = features.definition;
         let mut map = Self::empty(definition.frames / MOMENT_FRAMES, definition.keypoints);
         for moment in 0..map.moments {
             for keypoint in 0..map.keypoints {
                 let mut squares = [0.0_f32; ROPE_PARAMETERS];
                 for axis in 0..2 {
-                    let mut look = |shift_m| {
+                    let look = |shift_m| {
                         let mut moved = features.clone();
                         let first = moment * MOMENT_FRAMES;
                         for frame in first..first + MOMENT_FRAMES {

@@ -53,7 +53,7 @@ impl NetworkError {
 /// # Errors
 /// See [`NetworkError`].
 pub fn identify_by_network(
-    net: &mut PhiNet,
+    net: &PhiNet,
     observation: &Observation<'_>,
     options: &IdentifyOptions,
 ) -> Result<RopeEstimate, NetworkError> {

@@ -1,13 +1,21 @@
-//! The two parts of an ONNX file that are read without its runtime: graph and
-//! metadata.
+//! What is read of an ONNX file: its graph's bytes, the weights in them, its metadata.
 //!
 //! An ONNX file is one Protocol Buffers message; each field is a number that says
-//! what follows, and the field's bytes. The rest is left to the runtime.
+//! what follows, and the field's bytes.
+
+use std::collections::BTreeMap;
 
 /// Field of the graph in an ONNX model.
 const GRAPH: u64 = 7;
 /// Field of one entry of the metadata.
 const METADATA: u64 = 14;
+
+/// Field of one tensor of weights (`initializer`) in a graph.
+const INITIALIZER: u64 = 5;
+/// Field of a tensor's name.
+const NAME: u64 = 8;
+/// Field of a tensor's numbers, little-endian.
+const RAW_DATA: u64 = 9;
 
 /// What was found in a file.
 #[derive(Debug, Default)]
@@ -42,6 +50,28 @@ pub(super) fn parts(bytes: &[u8]) -> Result<Parts<'_>, NotFields> {
         }
     }
     Ok(parts)
+}
+
+/// A graph's weights by name: the numbers of each tensor, its last axis first to change.
+pub(super) fn weights(graph: &[u8]) -> Result<BTreeMap<&str, Vec<f32>>, NotFields> {
+    let mut weights = BTreeMap::new();
+    for (_, tensor) in fields(graph)?
+        .into_iter()
+        .filter(|(n, _)| *n == INITIALIZER)
+    {
+        let tensor = fields(tensor)?;
+        let content = |number| {
+            let found = tensor.iter().find(|(n, _)| *n == number);
+            found.map(|(_, content)| *content).ok_or(NotFields)
+        };
+        let name = core::str::from_utf8(content(NAME)?).ok().ok_or(NotFields)?;
+        let (numbers, _) = content(RAW_DATA)?.as_chunks();
+        weights.insert(
+            name,
+            numbers.iter().map(|x| f32::from_le_bytes(*x)).collect(),
+        );
+    }
+    Ok(weights)
 }
 
 /// Number and content of each field of a message that has a length; fields of
@@ -96,6 +126,13 @@ mod tests {
         let parts = parts(SMALL).unwrap();
         assert_eq!(parts.graph, Some(&b"abc"[..]));
         assert_eq!(parts.metadata, [("k", "v")]);
+    }
+
+    #[test]
+    fn weights_are_found_by_name() {
+        let graph = [0x2a, 9, 0x42, 1, b'w', 0x4a, 4, 0, 0, 0x80, 0x3f];
+        assert_eq!(weights(&graph).unwrap()["w"], [1.0]);
+        assert!(weights(&graph[..8]).is_err());
     }
 
     #[test]

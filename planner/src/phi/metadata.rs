@@ -1,12 +1,13 @@
 //! What a model file says about itself, and whether to believe it.
 
-use super::file::parts;
+use super::file::{NotFields, parts, weights};
 use crate::filming::Randomisation;
 use crate::observation::FeatureDefinition;
 use crate::wiggle::WiggleConfig;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
+use std::collections::BTreeMap;
 
 /// Key of the metadata in the model file; the value is JSON.
 pub const METADATA_KEY: &str = "phi-nn";
@@ -67,7 +68,7 @@ pub struct PhiMetadata {
     pub parameters: Vec<ParameterScale>,
     /// Oddity that one in a hundred ropes of the ranges exceeds.
     pub oddity_limit: f64,
-    /// Outputs that every runtime must give again.
+    /// Outputs that the weights must give again.
     pub probe: ProbeOutputs,
     /// How it was trained.
     pub training: TrainingRecord,
@@ -116,9 +117,9 @@ pub enum ModelError {
         /// File or `embedded`.
         name: String,
     },
-    /// The runtime computes something else than the trained network did.
+    /// The weights do not give the outputs that the trained network gave.
     #[error(
-        "model {name}: the network runtime's answer to the test input is off by {difference:.1e}, at most {limit:.0e} is allowed: use another runtime"
+        "model {name}: its answer to the test input is off by {difference:.1e}, at most {limit:.0e} is allowed: export it again"
     )]
     OtherAnswer {
         /// File or `embedded`.
@@ -127,14 +128,6 @@ pub enum ModelError {
         difference: f32,
         /// Largest difference allowed.
         limit: f32,
-    },
-    /// The runtime refused or failed.
-    #[error("model {name}: the network runtime failed: {reason}")]
-    Runtime {
-        /// File or `embedded`.
-        name: String,
-        /// The runtime's words.
-        reason: String,
     },
 }
 
@@ -151,12 +144,12 @@ pub fn hex(bytes: &[u8]) -> String {
 }
 
 impl PhiMetadata {
-    /// Reads and checks the metadata of a model file's bytes; `name` is for
-    /// messages.
-    ///
-    /// # Errors
-    /// The reason why these bytes are not used as a model.
-    pub fn read(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
+    /// Reads and checks the metadata of a model file's bytes, and reads its weights by
+    /// name; `name` is for messages.
+    pub(super) fn read<'a>(
+        name: &str,
+        bytes: &'a [u8],
+    ) -> Result<(Self, BTreeMap<&'a str, Vec<f32>>), ModelError> {
         let name = || name.to_owned();
         let not_onnx = |reason: &str| ModelError::NotOnnx {
             name: name(),
@@ -181,7 +174,8 @@ impl PhiMetadata {
         if graph_sha256(graph) != metadata.graph_sha256 {
             return Err(ModelError::Damaged { name: name() });
         }
-        Ok(metadata)
+        let weights = weights(graph).map_err(|NotFields| not_onnx("its weights are cut short"))?;
+        Ok((metadata, weights))
     }
 
     fn check(&self) -> Result<(), String> {

@@ -1,17 +1,15 @@
-//! The network in its runtime.
+//! The network of a model file.
 
+use super::NetworkError;
+use super::encoder::Encoder;
 use super::metadata::{ModelError, PhiMetadata};
 use super::probe::{PARITY, difference, probe};
-use super::{INPUTS, NetworkError, OUTPUTS};
 use crate::observation::{
-    FeatureDefinition, ObserveError, ObservedPoints, ViewPlane, WIDTHS, WiggleFeatures, observe,
+    FeatureDefinition, ObserveError, ObservedPoints, ViewPlane, WiggleFeatures, observe,
 };
 use crate::sysid::Observation;
 use crate::wiggle::wiggle;
 use arm_model::Limits;
-use onnx_session::ort;
-use ort::session::Session;
-use ort::value::TensorRef;
 use rope_sim::PlannedArm;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
@@ -42,6 +40,15 @@ pub struct RawOutputs {
     pub oddity: f32,
 }
 
+impl RawOutputs {
+    fn is_finite(&self) -> bool {
+        let all = self.mean.iter().chain(&self.log_variance);
+        all.chain(&self.embedding)
+            .chain([&self.oddity])
+            .all(|x| x.is_finite())
+    }
+}
+
 /// Why there is no prediction.
 #[derive(Debug, thiserror::Error)]
 pub enum PredictError {
@@ -53,17 +60,17 @@ pub enum PredictError {
         /// The observation's.
         given: FeatureDefinition,
     },
-    /// The runtime failed.
-    #[error(transparent)]
-    Model(#[from] ModelError),
+    /// Features so far off that the outputs are no numbers.
+    #[error("the network's outputs for this film are not finite")]
+    NotFinite,
 }
 
-/// A loaded network. One prediction at a time; give each worker its own.
+/// A loaded network.
 pub struct PhiNet {
     name: String,
     metadata: PhiMetadata,
     plane: ViewPlane,
-    session: Session,
+    encoder: Encoder,
 }
 
 /// The network that comes with this version (`configs/models/README.md`).
@@ -89,7 +96,7 @@ impl PhiNet {
     /// The network that comes with this version.
     ///
     /// # Errors
-    /// A runtime that cannot be used.
+    /// None that a released version has.
     pub fn embedded() -> Result<Self, ModelError> {
         Self::from_bytes("embedded", EMBEDDED)
     }
@@ -112,31 +119,27 @@ impl PhiNet {
     /// # Errors
     /// The reason why these bytes are not used.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
-        let metadata = PhiMetadata::read(name, bytes)?;
-        let failed = |reason: String| ModelError::Runtime {
+        let (metadata, weights) = PhiMetadata::read(name, bytes)?;
+        let unfit = |reason: String| ModelError::Unfit {
             name: name.to_owned(),
             reason,
         };
-        let session = onnx_session::open(bytes).map_err(|e| failed(e.to_string()))?;
-        let plane = plane_of(&metadata).map_err(|reason| ModelError::Unfit {
-            name: name.to_owned(),
-            reason,
-        })?;
-        let mut net = Self {
+        let encoder = Encoder::read(&weights, &metadata.features).map_err(unfit)?;
+        let plane = plane_of(&metadata).map_err(unfit)?;
+        let net = Self {
             name: name.to_owned(),
             metadata,
             plane,
-            session,
+            encoder,
         };
         net.try_out()?;
         Ok(net)
     }
 
-    /// Asks it for the answer it must know, so that a graph of the wrong shape or
-    /// a runtime that computes something else shows now.
-    fn try_out(&mut self) -> Result<(), ModelError> {
+    /// Asks it for the answer it must know, so that weights in another order show now.
+    fn try_out(&self) -> Result<(), ModelError> {
         let asked = probe(self.metadata.features);
-        let answer = self.outputs(&asked.motion, &asked.widths)?;
+        let answer = self.encoder.outputs(&asked.motion, &asked.widths);
         let expected = &self.metadata.probe;
         let off = difference(&expected.mean, &answer.mean)
             .max(difference(&expected.log_variance, &answer.log_variance));
@@ -182,8 +185,8 @@ impl PhiNet {
     /// Rope parameters behind an observation of its wiggle.
     ///
     /// # Errors
-    /// A film that cannot be judged, or a failing runtime.
-    pub fn look(&mut self, observation: &Observation<'_>) -> Result<Prediction, NetworkError> {
+    /// A film that cannot be judged.
+    pub fn look(&self, observation: &Observation<'_>) -> Result<Prediction, NetworkError> {
         let features = self.see(observation)?;
         Ok(self.predict(&features)?)
     }
@@ -191,8 +194,8 @@ impl PhiNet {
     /// Rope parameters behind features.
     ///
     /// # Errors
-    /// Other features than it was trained on, or a failing runtime.
-    pub fn predict(&mut self, features: &WiggleFeatures) -> Result<Prediction, PredictError> {
+    /// Other features than it was trained on, or outputs that are not finite.
+    pub fn predict(&self, features: &WiggleFeatures) -> Result<Prediction, PredictError> {
         let out = self.run(features)?;
         let normalised = core::array::from_fn(|i| f64::from(out.mean[i]));
         let std_dev = core::array::from_fn(|i| {
@@ -213,56 +216,18 @@ impl PhiNet {
     ///
     /// # Errors
     /// As [`PhiNet::predict`].
-    pub fn run(&mut self, features: &WiggleFeatures) -> Result<RawOutputs, PredictError> {
+    pub fn run(&self, features: &WiggleFeatures) -> Result<RawOutputs, PredictError> {
         if features.definition != self.metadata.features {
             return Err(PredictError::OtherFeatures {
                 trained: self.metadata.features,
                 given: features.definition,
             });
         }
-        Ok(self.outputs(&features.motion, &features.widths)?)
-    }
-
-    /// All outputs for one observation.
-    fn outputs(&mut self, motion: &[f32], widths: &[f32]) -> Result<RawOutputs, ModelError> {
-        let name = self.name.clone();
-        let failed = |reason: String| ModelError::Runtime {
-            name: name.clone(),
-            reason,
-        };
-        let definition = self.metadata.features;
-        let shape = [1, definition.frames, definition.channels()];
-        let motion =
-            TensorRef::from_array_view((shape, motion)).map_err(|e| failed(e.to_string()))?;
-        let widths =
-            TensorRef::from_array_view(([1, WIDTHS], widths)).map_err(|e| failed(e.to_string()))?;
-        let inputs = ort::inputs![INPUTS[0] => motion, INPUTS[1] => widths];
-        let found = self
-            .session
-            .run(inputs)
-            .map_err(|e| failed(e.to_string()))?;
-        let read = |output: &str, count: Option<usize>| {
-            let value = found
-                .get(output)
-                .ok_or_else(|| failed(format!("no output `{output}`")))?;
-            let (_, numbers) = value
-                .try_extract_tensor::<f32>()
-                .map_err(|e| failed(e.to_string()))?;
-            let whole = count.is_none_or(|count| numbers.len() == count);
-            if whole && numbers.iter().all(|x| x.is_finite()) {
-                Ok(numbers.to_vec())
-            } else {
-                Err(failed(format!(
-                    "output `{output}` has {} numbers, or some that are not finite",
-                    numbers.len()
-                )))
-            }
-        };
-        Ok(RawOutputs {
-            mean: read(OUTPUTS[0], Some(ROPE_PARAMETERS))?,
-            log_variance: read(OUTPUTS[1], Some(ROPE_PARAMETERS))?,
-            embedding: read(OUTPUTS[2], None)?,
-            oddity: read(OUTPUTS[3], Some(1))?[0],
-        })
+        let found = self.encoder.outputs(&features.motion, &features.widths);
+        if found.is_finite() {
+            Ok(found)
+        } else {
+            Err(PredictError::NotFinite)
+        }
     }
 }

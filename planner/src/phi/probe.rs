@@ -1,12 +1,11 @@
 //! An input of which every model file knows the answer.
 //!
-//! The trained network's outputs for it are kept in the file, and asked of the
-//! runtime when the file is loaded: a runtime that computes something else shows
-//! before it is believed.
+//! The trained network's outputs for it are kept in the file, and computed again when
+//! the file is loaded: weights that give something else show before they are believed.
 
 use crate::observation::{FeatureDefinition, WiggleFeatures};
 
-/// Largest difference between a runtime's and the trained network's outputs;
+/// Largest difference between a file's and the trained network's outputs;
 /// relative where the output is above 1.
 pub const PARITY: f32 = 1e-5;
 

@@ -26,7 +26,7 @@ pub enum HybridError {
 /// # Errors
 /// See [`HybridError`].
 pub fn identify_with_network(
-    net: &mut PhiNet,
+    net: &PhiNet,
     observation: &Observation<'_>,
     options: &IdentifyOptions,
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
@@ -44,9 +44,9 @@ pub fn identify_with_network(
 /// it odd, or if the method starts by itself.
 ///
 /// # Errors
-/// A failing runtime.
+/// Outputs that are not finite.
 pub fn proposal(
-    net: &mut PhiNet,
+    net: &PhiNet,
     observation: &Observation<'_>,
     options: &IdentifyOptions,
 ) -> Result<Option<RopeParams>, PredictError> {

@@ -9,7 +9,6 @@ mod config;
 
 use crate::calm::{CalmError, CalmRequest, calm};
 use crate::observation::ObservedPoints;
-#[cfg(feature = "network")]
 use crate::phi::{HybridError, PhiNet, PredictError, identify_with_network};
 use crate::sysid::{self, Appearance, FitProgress, IdentifyOptions, Observation};
 use crate::tasks::{Belief, PlanError, PlanOptions, PlanRequest, plan_throw};
@@ -52,7 +51,6 @@ pub enum PlannerProcessError {
     #[error(transparent)]
     Identify(#[from] sysid::IdentifyError),
     /// The network failed.
-    #[cfg(feature = "network")]
     #[error(transparent)]
     Network(#[from] PredictError),
     /// Planning a calming move failed.
@@ -173,10 +171,9 @@ fn fit(
     options: &IdentifyOptions,
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, PlannerProcessError> {
-    #[cfg(feature = "network")]
     match PhiNet::embedded() {
-        Ok(mut net) => {
-            let found = identify_with_network(&mut net, observation, options, progress);
+        Ok(net) => {
+            let found = identify_with_network(&net, observation, options, progress);
             return found.map_err(|error| match error {
                 HybridError::Identify(error) => error.into(),
                 HybridError::Network(error) => error.into(),

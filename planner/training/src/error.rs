@@ -84,9 +84,6 @@ pub enum TrainingError {
         /// Why.
         reason: String,
     },
-    /// This build has no network runtime.
-    #[error("this build of phi-train has no network runtime; build it with feature `network`")]
-    NoRuntime,
 }
 
 impl TrainingError {

@@ -138,7 +138,6 @@ fn exit_code(error: &phi_training::TrainingError) -> u8 {
         | E::Diverged { .. }
         | E::Tensors { .. }
         | E::NotTheSame { .. }
-        | E::Plot { .. }
-        | E::NoRuntime => 1,
+        | E::Plot { .. } => 1,
     }
 }

@@ -216,14 +216,11 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<(), TrainingError> {
     from_file::check(&bytes, &studio, &others)?;
     write(&arguments.out, &bytes)?;
     println!(
-        "{}: {} bytes after {} steps, {}",
+        "{}: {} bytes after {} steps, checked against the trained network on {} films",
         arguments.out.display(),
         bytes.len(),
         state.progress.step,
-        match from_file::CHECKED {
-            0 => "not tried out: this build has no network runtime".to_owned(),
-            films => format!("checked against the trained network on {films} films"),
-        }
+        others.len().min(from_file::CHECKED)
     );
     Ok(())
 }
@@ -247,8 +244,7 @@ fn bar(length: usize, template: &str) -> ProgressBar {
     ProgressBar::new(length as u64).with_style(style)
 }
 
-/// Model files in the runtime that the planner uses.
-#[cfg(feature = "network")]
+/// Model files as the planner reads them.
 mod from_file {
     use super::{Judged, Pool, Predicted, Studio, TrainingError};
     use phi_training::export::compare;
@@ -264,7 +260,7 @@ mod from_file {
         pool: &Pool,
         count: usize,
     ) -> Result<Vec<Judged>, TrainingError> {
-        let mut net = PhiNet::load(model)?;
+        let net = PhiNet::load(model)?;
         (0..count)
             .map(|i| {
                 let found = net.predict(&studio.held_out(i)?).map_err(refused)?;
@@ -282,7 +278,7 @@ mod from_file {
         studio: &Studio<'_>,
         network: &[Predicted],
     ) -> Result<(), TrainingError> {
-        let mut net = PhiNet::from_bytes("just written", bytes)?;
+        let net = PhiNet::from_bytes("just written", bytes)?;
         let file = (0..network.len().min(CHECKED))
             .map(|film| {
                 let out = net.run(&studio.held_out(film)?).map_err(refused)?;
@@ -301,27 +297,5 @@ mod from_file {
         TrainingError::Tensors {
             reason: error.to_string(),
         }
-    }
-}
-
-#[cfg(not(feature = "network"))]
-mod from_file {
-    use super::{Judged, Pool, Predicted, Studio, TrainingError};
-    use std::path::Path;
-
-    pub(super) const CHECKED: usize = 0;
-
-    pub(super) fn judge(
-        _: &Path,
-        _: &Studio<'_>,
-        _: &Pool,
-        _: usize,
-    ) -> Result<Vec<Judged>, TrainingError> {
-        Err(TrainingError::NoRuntime)
-    }
-
-    /// Whoever loads the file asks it for the answer it must know.
-    pub(super) fn check(_: &[u8], _: &Studio<'_>, _: &[Predicted]) -> Result<(), TrainingError> {
-        Ok(())
     }
 }

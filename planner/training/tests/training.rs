@@ -134,19 +134,18 @@ fn a_training_learns_resumes_bit_for_bit_and_is_written_as_it_is() {
             .contains("another configuration")
     );
 
-    #[cfg(feature = "network")]
     written_as_it_is(&whole, &pools[1]);
 }
 
-#[cfg(feature = "network")]
 fn written_as_it_is(state: &State, held_out: &Pool) {
     use phi_training::export::compare;
-    use planner::phi::{ModelError, PhiNet};
+    use planner::observation::WIDTHS;
+    use planner::phi::{INPUTS, ModelError, OUTPUTS, PhiNet};
 
     let network = predictions(state, held_out);
     let familiar = Familiar::measure(&network, &network).unwrap();
     let bytes = to_onnx(state, &familiar).unwrap();
-    let mut net = PhiNet::from_bytes("tiny", &bytes).unwrap();
+    let net = PhiNet::from_bytes("tiny", &bytes).unwrap();
     assert_eq!(net.metadata().training.steps, 40);
     let studio = Studio::new(&state.progress.config, held_out).unwrap();
     let file: Vec<Predicted> = (0..held_out.len())
@@ -178,6 +177,31 @@ fn written_as_it_is(state: &State, held_out: &Pool) {
         .collect();
     let worst = compare(&network, &file).unwrap();
     println!("largest difference {worst:.1e}");
+    let mut session = onnx_session::open(&bytes).unwrap();
+    let features = state.progress.config.features();
+    let shape = [1, features.frames, features.channels()];
+    let in_runtime: Vec<Predicted> = (0..held_out.len())
+        .map(|film| {
+            let seen = studio.held_out(film).unwrap();
+            let [mean, log_variance, embedding, _] = onnx_session::outputs(
+                &mut session,
+                [
+                    (INPUTS[0], &shape[..], &seen.motion[..]),
+                    (INPUTS[1], &[1, WIDTHS][..], &seen.widths[..]),
+                ],
+                OUTPUTS,
+            )
+            .unwrap();
+            Predicted {
+                film,
+                mean,
+                log_variance,
+                embedding,
+            }
+        })
+        .collect();
+    let worst = compare(&network, &in_runtime).unwrap();
+    println!("largest difference in an ONNX runtime {worst:.1e}");
     let mut wrong = file;
     wrong[3].mean[2] += 2e-5;
     assert!(compare(&network, &wrong).is_err());
@@ -198,8 +222,7 @@ fn written_as_it_is(state: &State, held_out: &Pool) {
     assert!(missing.to_string().contains("/no/such/model.onnx"));
 }
 
-/// The model that comes with this version, in the runtime of this build.
-#[cfg(feature = "network")]
+/// The model that comes with this version.
 #[test]
 fn the_shipped_network_reads_ropes_it_never_saw() {
     use planner::phi::PhiNet;
@@ -207,7 +230,7 @@ fn the_shipped_network_reads_ropes_it_never_saw() {
 
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/models/phi-nn.toml");
     let mut config = TrainingConfig::load(&path).unwrap();
-    let mut net = PhiNet::embedded().unwrap();
+    let net = PhiNet::embedded().unwrap();
     let record = net.metadata().training.clone();
     assert_eq!(record.ropes, config.data.ropes);
     assert_eq!(record.steps, config.training.steps);

@@ -48,7 +48,7 @@ fn network_finding() -> Finding {
         Err(reason) => (
             Verdict::Fail,
             reason.to_string(),
-            "set ORT_DYLIB_PATH to an ONNX Runtime library, or use a build with its own",
+            "this build is damaged: install it again",
         ),
     };
     Finding {

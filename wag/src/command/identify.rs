@@ -190,11 +190,11 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         ..config.identify
     };
     let estimate = match net {
-        Some(mut net) if method == Method::Network => {
-            identify_by_network(&mut net, &observation, &options).map_err(classify_network)?
+        Some(net) if method == Method::Network => {
+            identify_by_network(&net, &observation, &options).map_err(classify_network)?
         }
-        Some(mut net) => {
-            let proposed = proposal(&mut net, &observation, &options).or_failed()?;
+        Some(net) => {
+            let proposed = proposal(&net, &observation, &options).or_failed()?;
             fitted(&observation, proposed.as_ref(), &options, &stage).map_err(classify)?
         }
         None => fitted(&observation, None, &options, &stage).map_err(classify)?,

@@ -1,26 +1,18 @@
 //! The network that reads rope parameters: the one inside this program, or a file.
 
 use anyhow::anyhow;
-use cli_output::{Failure, Outcome};
+use cli_output::{Failure, OrInput, Outcome};
 use planner::observation::{ObserveError, ObservedPoints};
-use planner::phi::{ModelError, PhiNet};
+use planner::phi::PhiNet;
 use planner::sysid::Method;
 use std::path::Path;
 
 /// The network of `model`, or the built-in one.
 ///
 /// # Errors
-/// Why it is refused: bad input where it is the file's fault.
+/// Why the file is refused.
 pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
-    let loaded = model.map_or_else(PhiNet::embedded, PhiNet::load);
-    loaded.map_err(|error| match error {
-        ModelError::Runtime { .. } | ModelError::OtherAnswer { .. } => Failure::failed(error),
-        ModelError::Unreadable { .. }
-        | ModelError::NotOnnx { .. }
-        | ModelError::NoMetadata { .. }
-        | ModelError::Unfit { .. }
-        | ModelError::Damaged { .. } => Failure::input(error),
-    })
+    model.map_or_else(PhiNet::embedded, PhiNet::load).or_input()
 }
 
 /// [`network`] for what a camera sees.

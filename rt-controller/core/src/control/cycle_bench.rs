@@ -8,7 +8,7 @@ use crate::point_to_point::plan_move;
 use crate::xarm::StateRequest;
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
-use shared_types::ipc::{JointReport, OperatorBeat};
+use shared_types::ipc::{CauseRecord, JointReport, OperatorBeat};
 
 pub(super) const PERIOD_NS: u64 = 4_000_000;
 
