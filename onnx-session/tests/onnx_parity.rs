@@ -6,28 +6,40 @@
     reason = "tests may fail loudly"
 )]
 
-use planner::observation::{WIDTHS, WiggleFeatures};
-use planner::phi::{INPUTS, OUTPUTS, PARITY, PhiNet, difference, probe};
+use planner::filming::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
+use planner::observation::{ObservedPoints, WIDTHS, WiggleFeatures};
+use planner::phi::{INPUTS, OUTPUTS, PARITY, PhiNet, difference};
+use planner::ropes::random_rope;
+use planner::sysid::Observation;
+use planner::wiggle::wiggle;
+use rope_sim::PlannedArm;
 use std::path::Path;
 
-/// The test input, and the same with other frames and widths unseen and numbers moved.
+/// What the network sees of simulated ropes on its wiggle, one film with frames unseen.
 fn films(net: &PhiNet) -> Vec<WiggleFeatures> {
-    let first = probe(net.metadata().features);
-    let channels = first.definition.channels();
-    let mut films = vec![first];
-    for film in 1..6_u16 {
-        let mut next = films[0].clone();
-        let phase = f32::from(film);
-        for (i, frame) in next.motion.chunks_mut(channels).enumerate() {
-            let seen = frame[channels - 1];
-            for x in &mut frame[..channels - 1] {
-                *x = seen * (*x * 0.6 + 0.1 * (0.05 * phase * i as f32).sin());
-            }
-        }
-        next.mask(30 * usize::from(film)..30 * usize::from(film) + 60);
-        next.widths = [0.004 + 0.001 * phase, 1.0, 0.0, 0.0];
-        films.push(next);
-    }
+    let wiggle = wiggle(&net.metadata().wiggle, &arm_model::Limits::default()).unwrap();
+    let (motion, camera) = (PlannedArm::new(wiggle), side_camera());
+    let points = net.metadata().features.points;
+    let layout = match points {
+        ObservedPoints::ArcLength => KeypointLayout::Uniform(24),
+        ObservedPoints::LinkCentres => KeypointLayout::LinkCentres,
+    };
+    let seen = |seed| {
+        let noise = FilmNoise::white(1.0, seed);
+        let timing = FilmTiming::default();
+        let filmed = film(&random_rope(seed), &motion, &camera, layout, &timing, &noise).unwrap();
+        net.see(&Observation {
+            track: &filmed.track,
+            points,
+            camera: &camera,
+            motion: &motion,
+            appearance: filmed.appearance,
+        })
+        .unwrap()
+    };
+    let mut films: Vec<WiggleFeatures> = (1..5).map(seen).collect();
+    films[1].mask(100..160);
+    films[2].widths = [0.0; WIDTHS];
     films
 }
 

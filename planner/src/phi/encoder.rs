@@ -67,21 +67,20 @@ fn average(x: &[f32], channels: usize, frames: usize) -> Vec<f32> {
     let mut means = Vec::with_capacity(x.len() / frames);
     for group in x.chunks_exact(channels * frames) {
         let (first, others) = group.split_at(channels);
-        let start = means.len();
-        means.extend_from_slice(first);
+        let mut sum: Vec<f64> = first.iter().copied().map(f64::from).collect();
         for frame in others.chunks_exact(channels) {
-            add(&mut means[start..], 1.0, frame);
+            add(&mut sum, 1.0, frame);
         }
-        for mean in &mut means[start..] {
-            *mean /= frames as f32;
-        }
+        means.extend(sum.into_iter().map(|x| (x / frames as f64) as f32));
     }
     means
 }
 
-fn add(sum: &mut [f32], factor: f32, numbers: &[f32]) {
+/// Sums are in double precision: thousands of summands would lose half of the allowance
+/// for differences between runtimes.
+fn add(sum: &mut [f64], factor: f32, numbers: &[f32]) {
     for (sum, number) in sum.iter_mut().zip(numbers) {
-        *sum += factor * number;
+        *sum += f64::from(factor) * f64::from(*number);
     }
 }
 
@@ -122,12 +121,12 @@ impl Linear {
 
     /// The outputs where the inputs before `first` and after `x` are zero.
     fn apply_from(&self, first: usize, x: &[f32]) -> Vec<f32> {
-        let mut y = self.bias.clone();
+        let mut y: Vec<f64> = self.bias.iter().copied().map(f64::from).collect();
         let rows = self.weight.chunks_exact(self.bias.len()).skip(first);
         for (x, row) in x.iter().zip(rows) {
             add(&mut y, *x, row);
         }
-        y
+        y.into_iter().map(|y| y as f32).collect()
     }
 }
 
