@@ -72,7 +72,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         ..config.identify
     };
     let stage = Stage::begin("identify", quiet);
-    let mut net = network(None)?;
+    let net = network(None)?;
     let nn = measure(&rig, args, ("nn", 0.010), |filmed, _| {
         // From keypoints to parameters; nothing is simulated.
         net.look(&rig.observation(filmed)).or_failed()?;
