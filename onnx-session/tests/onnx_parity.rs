@@ -27,7 +27,15 @@ fn films(net: &PhiNet) -> Vec<WiggleFeatures> {
     let seen = |seed| {
         let noise = FilmNoise::white(1.0, seed);
         let timing = FilmTiming::default();
-        let filmed = film(&random_rope(seed), &motion, &camera, layout, &timing, &noise).unwrap();
+        let filmed = film(
+            &random_rope(seed),
+            &motion,
+            &camera,
+            layout,
+            &timing,
+            &noise,
+        )
+        .unwrap();
         net.see(&Observation {
             track: &filmed.track,
             points,
