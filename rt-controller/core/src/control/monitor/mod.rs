@@ -1,7 +1,7 @@
 //! Watches over everything that may go wrong while the arm is commanded.
 //!
 //! Pure: time is the cycle's planned deadline; nothing here reads a clock.
-//! [`Monitor::finding`] is the fault table: one line per cause, the most urgent
+//! [`Monitor::violation`] is the fault table: one line per cause, the most urgent
 //! first; how each is met is in [`super::reaction`].
 
 pub mod history;
