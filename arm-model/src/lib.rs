@@ -7,12 +7,12 @@
 //! REP-103).
 //!
 //! ```
-//! use arm_model::{JointTrajectory, joint::START_POSE, kinematics};
+//! use arm_model::{JointTrajectory, joint::START_POSE};
 //!
 //! let mut end = START_POSE;
 //! end.0[0] += 0.2;
 //! let motion = JointTrajectory::new(&[0.0, 1.0], &[START_POSE, end])?;
-//! let halfway = motion.sample(0.5);
+//! let halfway = motion.state_at(0.5);
 //! assert!((halfway.q.0[0] - 0.1).abs() < 1e-12);
 //! # Ok::<(), arm_model::TrajectoryError>(())
 //! ```
