@@ -7,7 +7,20 @@
 )]
 
 use serde_json::Value;
+use std::path::Path;
 use std::process::Command;
+
+/// The one JSON object that a benchmark prints.
+fn report(args: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_experiments"))
+        .args(["bench", "--quick", "--json"])
+        .args(args)
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{args:?}: {errors}");
+    serde_json::from_slice(&output.stdout).expect("standard output is JSON")
+}
 
 /// The number at `path`, which must be there, finite and above zero.
 fn positive(value: &Value, path: &str) -> f64 {
@@ -19,12 +32,7 @@ fn positive(value: &Value, path: &str) -> f64 {
 
 #[test]
 fn bench_rope_prints_one_whole_json_object() {
-    let output = Command::new(env!("CARGO_BIN_EXE_experiments"))
-        .args(["bench", "rope", "--quick", "--json", "--seed", "9"])
-        .output()
-        .unwrap();
-    assert!(output.status.success());
-    let report: Value = serde_json::from_slice(&output.stdout).expect("standard output is JSON");
+    let report = report(&["rope", "--seed", "9"]);
     assert_eq!(report["ok"], true);
     assert_eq!(report["command"], "bench rope");
     assert_eq!(report["seed"], 9);
@@ -63,4 +71,34 @@ fn bench_rope_prints_one_whole_json_object() {
     for row in rows("candidates") {
         positive(row, "/us_per_rollout");
     }
+}
+
+#[test]
+fn bench_track_reports_times_and_memory_of_a_recording() {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/wiggle/a1");
+    if !Path::new(data).exists() {
+        println!("skipped: {data} not found");
+        return;
+    }
+    let report = report(&["track", "--video", data]);
+    assert_eq!(report["command"], "bench track");
+    assert_eq!(
+        (&report["limit_ms"], &report["limit_mb"]),
+        (&3.0.into(), &400.0.into())
+    );
+    let together = positive(&report, "/together_cpu_ms");
+    let decoding = positive(&report, "/decoding_cpu_ms");
+    assert!(together >= decoding.max(positive(&report, "/tracking_cpu_ms")));
+    assert_eq!(report["within_limit"], together <= 3.0);
+    for stage in ["background", "first_frame", "following"] {
+        positive(&report, &format!("/stages_wall_ms/{stage}"));
+    }
+    // The frames alone: luma and chroma of one image of the pair.
+    let frames_mb = positive(&report, "/frames") * (672 * 376 * 2) as f64 / 1e6;
+    let peak_mb = positive(&report, "/peak_memory_mb");
+    assert!(
+        (frames_mb..frames_mb + 200.0).contains(&peak_mb),
+        "{peak_mb} MB"
+    );
+    assert!((0.0..=1.0).contains(&report["lost_part"].as_f64().unwrap()));
 }
