@@ -1,19 +1,13 @@
 //! Plans throws for random ropes and prints how well they do.
 //!
-//! `throw_table [--task strike|lob|drape] [--ropes 20] [--seed 900] [--searches 1]
-//! [--config FILE] [--full 0] [--stretch 1] [--speed 1.2] [--verbose 1]`
-//!
 //! Errors are given for the rope planned for, as the root mean square over ropes off by
-//! what identification leaves open, and as the part of those that succeeds.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    reason = "an example may stop with a message"
-)]
+//! what identification leaves open, and as the fraction of those that succeeds.
+#![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
 use arm_model::Limits;
 use arm_model::limits::LimitsSpec;
+use clap::Parser;
+use experiments::trials::{mean, quantile};
 use planner::process::PlannerConfig;
 use planner::ropes::{random_rope, random_strike_target};
 use planner::tasks::{
@@ -22,32 +16,41 @@ use planner::tasks::{
 use planner::trajopt::Dimensions;
 use shared_types::Task;
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::time::Instant;
 
-fn argument(name: &str) -> Option<String> {
-    std::env::args()
-        .skip_while(|a| a != &format!("--{name}"))
-        .nth(1)
+/// Plans throws for random ropes and prints how well they do.
+#[derive(Debug, Parser)]
+struct Args {
+    /// strike, lob or drape.
+    #[arg(long, default_value = "strike")]
+    task: String,
+    #[arg(long, default_value_t = 20)]
+    ropes: u64,
+    #[arg(long, default_value_t = 900)]
+    seed: u64,
+    #[arg(long, default_value_t = 1)]
+    searches: usize,
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// Planner configuration (TOML) instead of the built-in one.
+    #[arg(long)]
+    config: Option<PathBuf>,
+    /// All seven joints instead of the planar three.
+    #[arg(long)]
+    full: bool,
+    #[arg(long, default_value_t = 1.0)]
+    stretch: f64,
+    /// Greatest speed of the tool centre point (m/s).
+    #[arg(long)]
+    speed: Option<f64>,
 }
 
-fn number<T: std::str::FromStr>(name: &str, default: T) -> T {
-    argument(name).map_or(default, |v| {
-        v.parse()
-            .unwrap_or_else(|_| panic!("--{name} {v} is not a number"))
-    })
-}
-
-fn line(name: &str, mut values: Vec<f64>) {
-    values.sort_by(f64::total_cmp);
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an index"
-    )]
-    let at = |part: f64| values[((values.len() - 1) as f64 * part).round() as usize];
+fn line(name: &str, values: &[f64]) {
+    let at = |fraction| quantile(values.iter().copied(), fraction);
     println!(
         "{name:24} mean {:7.3}  median {:7.3}  p90 {:7.3}  max {:7.3}",
-        values.iter().sum::<f64>() / values.len() as f64,
+        mean(values.iter().copied()),
         at(0.5),
         at(0.9),
         at(1.0)
@@ -55,23 +58,22 @@ fn line(name: &str, mut values: Vec<f64>) {
 }
 
 fn main() {
-    let config: PlannerConfig = argument("config").map_or_else(PlannerConfig::default, |path| {
+    let args = Args::parse();
+    let config: PlannerConfig = args.config.map_or_else(PlannerConfig::default, |path| {
         let text = std::fs::read_to_string(path).expect("--config names a file");
         toml::from_str(&text).expect("a planner file")
     });
-    let kind = match argument("task").as_deref() {
-        None | Some("strike") => Task::Strike,
-        Some("lob") => Task::Lob,
-        Some("drape") => Task::Drape,
-        Some(other) => panic!("--task {other} is not one of strike, lob, drape"),
-    };
+    let kind: Task = [Task::Strike, Task::Lob, Task::Drape]
+        .into_iter()
+        .find(|task| task.name() == args.task)
+        .expect("--task is strike, lob or drape");
     let mut spec = LimitsSpec::from(Limits::default());
-    spec.tcp_speed_max_m_s = number("speed", spec.tcp_speed_max_m_s);
+    spec.tcp_speed_max_m_s = args.speed.unwrap_or(spec.tcp_speed_max_m_s);
     let limits = Limits::try_from(spec).expect("a positive speed");
     let (mut exact, mut off, mut success, mut successes) = (vec![], vec![], vec![], vec![]);
     let (mut seconds, mut simulations) = (vec![], vec![]);
-    for index in 0..number("ropes", 20) {
-        let seed = index + number("seed", 900u64) * 1000;
+    for index in 0..args.ropes {
+        let seed = index + args.seed * 1000;
         let target_m = match kind {
             Task::Strike => random_strike_target(seed),
             Task::Lob => [0.85, 0.0, 0.20],
@@ -82,15 +84,15 @@ fn main() {
             rope: random_rope(seed),
             limits: limits.clone(),
             options: PlanOptions {
-                dimensions: if number("full", 0) == 1 {
+                dimensions: if args.full {
                     Dimensions::Full
                 } else {
                     Dimensions::Planar
                 },
-                segment_stretch_max: number("stretch", 1.0),
+                segment_stretch_max: args.stretch,
                 seed,
-                searches: number("searches", 1),
-                threads: number("threads", 2),
+                searches: args.searches,
+                threads: args.threads,
                 ..config.search
             },
             belief: Belief::default(),
@@ -115,39 +117,19 @@ fn main() {
         };
         let outcomes = simulator.run(&throws).expect("a planned throw simulates");
         let squares: f64 = outcomes.iter().map(|o| task.error_m(o).powi(2)).sum();
-        let rms_cm = (squares / outcomes.len() as f64).sqrt() * 100.0;
         let good = ropes
             .iter()
             .zip(&outcomes)
             .filter(|(r, o)| task.judge(r, o).success);
-        let part = good.count() as f64 / ropes.len() as f64;
-        if argument("verbose").is_some() {
-            let met: Vec<String> = planned
-                .verdict
-                .conditions
-                .iter()
-                .map(|c| format!("{} {}", c.name, c.met))
-                .collect();
-            println!(
-                "rope {seed:3} L {:.2} k {:.2} mu {:.3} lead {:.3} error {:.2} cm, off {rms_cm:.2} cm, success {part:.2}, {:?}, {:?}, {met:?}",
-                request.rope.length_m,
-                request.rope.joint_stiffness_nm_per_rad,
-                request.rope.mass_per_length_kg_per_m,
-                request.rope.lead_mass_kg,
-                planned.error_m * 100.0,
-                planned.limited_by,
-                planned.outcome.contacts,
-            );
-        }
         exact.push(planned.error_m * 100.0);
-        off.push(rms_cm);
+        off.push((squares / outcomes.len() as f64).sqrt() * 100.0);
         success.push(f64::from(u8::from(planned.verdict.success)));
-        successes.push(part);
+        successes.push(good.count() as f64 / ropes.len() as f64);
     }
-    line("error (cm)", exact);
-    line("error, rope off (cm)", off);
-    line("success", success);
-    line("success, rope off", successes);
-    line("seconds", seconds);
-    line("simulations", simulations);
+    line("error (cm)", &exact);
+    line("error, rope off (cm)", &off);
+    line("success", &success);
+    line("success, rope off", &successes);
+    line("seconds", &seconds);
+    line("simulations", &simulations);
 }

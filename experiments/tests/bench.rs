@@ -1,10 +1,5 @@
 //! `experiments bench`: complete, clean JSON.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use serde_json::Value;
 use std::path::Path;

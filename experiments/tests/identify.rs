@@ -1,17 +1,9 @@
 //! Identification against planted parameters and against a recording whose
 //! keypoints were made by another simulator (MuJoCo).
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    missing_docs,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use arm_model::{JointTrajectory, Limits};
-use experiments::trials::{TrialRig, outside_rope, summarise, trial_rope};
+use experiments::trials::{TrialRig, mean, outside_rope, summarise, trial_rope};
 use planner::filming::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::observation::ObservedPoints;
 use planner::ropes::random_rope;
@@ -19,7 +11,7 @@ use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Method, Observa
 use planner::wiggle::{WiggleConfig, wiggle};
 use rope_sim::{PlannedArm, PoseRow, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
-use shared_types::{Intrinsics, KeypointTrack, RopeParams, Shutter, StereoCamera};
+use shared_types::{KeypointTrack, RopeParams};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -141,13 +133,10 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
     let rig = TrialRig::new(&WiggleConfig::default()).unwrap();
     let indices: Vec<u64> = (0..20).collect();
     let rope = |i| trial_rope(4, i);
-    let trials = experiments::trials::run(&rig, rope, 4, &indices, &quick(4, 2)).unwrap();
-    let all: Vec<f64> = summarise(&trials)
-        .parameters
-        .iter()
-        .map(|p| p.coverage)
-        .collect();
-    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    let trials = experiments::trials::run(&rig, rope, &indices, &quick(4, 2)).unwrap();
+    let summary = summarise(&trials);
+    let all: Vec<f64> = summary.parameters.iter().map(|p| p.coverage).collect();
+    let mean = mean(all.iter().copied());
     // 180 intervals: three deviations of a binomial are 7 %.
     assert!((0.83..=0.97).contains(&mean), "{all:?}");
     assert!(all.iter().all(|c| *c >= 0.65), "{all:?}");
@@ -252,59 +241,14 @@ fn useless_films_are_refused_with_the_reason() {
     assert!(matches!(refuse(&bad, &arm), IdentifyError::Keypoints(_)));
 }
 
-/// The camera of recording `a1`: no distortion, so that the left eye's four
-/// numbers and the extrinsics are all there is to it.
-fn camera_of_a1(folder: &Path) -> StereoCamera {
-    let text = std::fs::read_to_string(folder.join("camera.toml")).unwrap();
-    let table: toml::Table = text.parse().unwrap();
-    let extrinsics = table["extrinsics"].as_table().unwrap();
-    let numbers = |value: &toml::Value| -> Vec<f64> {
-        let list = value.as_array().unwrap();
-        list.iter().map(|v| v.as_float().unwrap()).collect()
-    };
-    let rows: Vec<f64> = extrinsics["rotation"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .flat_map(numbers)
-        .collect();
-    let eye = Intrinsics {
-        fx: 350.0,
-        fy: 350.0,
-        cx: 335.5,
-        cy: 187.5,
-        distortion: [0.0; 5],
-    };
-    StereoCamera {
-        width_px: 672,
-        height_px: 376,
-        left: eye,
-        right: eye,
-        r_right_left: nalgebra::Matrix3::identity(),
-        t_right_left_m: nalgebra::Vector3::new(0.063, 0.0, 0.0),
-        r_w_cam: nalgebra::Matrix3::from_row_slice(&rows),
-        p_w_cam_m: nalgebra::Vector3::from_vec(numbers(&extrinsics["position_m"])),
-        shutter: Shutter::Global,
-        exposure_s: table["exposure_s"].as_float().unwrap(),
-        line_time_s: 0.0,
-    }
-}
-
 fn pose_of(folder: &Path) -> PoseTrack {
-    let text = std::fs::read_to_string(folder.join("pose.csv")).unwrap();
-    let rows: Vec<PoseRow> = text
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let v: Vec<f64> = line.split(',').map(|x| x.trim().parse().unwrap()).collect();
-            PoseRow {
-                t_s: v[0],
-                p_m: [v[1], v[2], v[3]],
-                q_wxyz: [v[4], v[5], v[6], v[7]],
-            }
-        })
-        .collect();
-    PoseTrack::new(&rows).unwrap()
+    let samples = run_log::files::read_pose(&folder.join("pose.csv")).unwrap();
+    let rows = samples.into_iter().map(|s| PoseRow {
+        t_s: s.t_s,
+        p_m: s.p_m,
+        q_wxyz: s.q_wxyz,
+    });
+    PoseTrack::new(&rows.collect::<Vec<PoseRow>>()).unwrap()
 }
 
 fn true_keypoints_of(folder: &Path) -> KeypointTrack {
@@ -337,7 +281,7 @@ fn the_recorded_rope_is_identified_from_its_true_keypoints() {
         println!("skipped: recording a1 not found");
         return;
     }
-    let camera = camera_of_a1(folder);
+    let camera = camera_ingest::load_camera(&folder.join("camera.toml")).unwrap();
     let motion = pose_of(folder);
     let track = true_keypoints_of(folder);
     let observation = Observation {

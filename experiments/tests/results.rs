@@ -1,10 +1,5 @@
 //! Results and benchmarks of planning: complete JSON, trials kept in their file.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use serde_json::Value;
 use std::process::{Command, Output};

@@ -20,10 +20,6 @@ impl CornerDetector {
         };
         let dictionary = resolve_dictionary(&board.dictionary)
             .ok_or_else(|| format!("dictionary {:?} is not known", board.dictionary))?;
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "only the ratio is used by the detector"
-        )]
         let (square, ratio) = (
             board.square_m as f32,
             (board.marker_m / board.square_m) as f32,

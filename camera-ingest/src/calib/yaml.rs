@@ -214,7 +214,6 @@ fn opencv(file: &YamlFile) -> Result<Eyes, CalibError> {
 
 /// A number, whole or not.
 fn number(value: &Yaml) -> Option<f64> {
-    #[allow(clippy::cast_precision_loss, reason = "pixels and metres are small")]
     let whole = value.as_i64().map(|whole| whole as f64);
     whole.or_else(|| value.as_f64())
 }

@@ -1,12 +1,11 @@
 //! `experiments bench identify`: time to identify one rope, by method, on all cores.
 
+use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
 use crate::network::{network, with_network};
-use cli_output::Machine;
-use cli_output::Stage;
 use cli_output::table::numbers;
-use cli_output::{OrInput, Outcome};
+use cli_output::{Machine, OrInput, Outcome, Stage};
 use experiments::trials::{TrialRig, trial_rope};
 use planner::filming::Filmed;
 use planner::sysid::{IdentifyOptions, Method};
@@ -48,7 +47,6 @@ fn measure(
         cpu_s += spent.cpu_s;
         simulations += simulated;
     }
-    #[allow(clippy::cast_precision_loss, reason = "a handful of ropes")]
     let count = ropes as f64;
     Ok(Row {
         method,
@@ -62,13 +60,12 @@ fn measure(
 }
 
 pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let config = crate::results::setup::built_in().or_failed()?;
+    let config = crate::results::experiment::built_in().or_failed()?;
     let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
     with_network(&mut rig, Method::Hybrid, None)?;
-    let machine = Machine::here();
     let options = IdentifyOptions {
         seed: args.seed,
-        threads: machine.cores,
+        threads: Machine::here().cores,
         ..config.identify
     };
     let stage = Stage::begin("identify", quiet);
@@ -98,15 +95,16 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let cmaes = measure(&rig, args, ("cmaes", 6.0), fit(whole))?;
     stage.done("3 methods measured");
     let rows = [nn, hybrid, cmaes];
-    if !quiet {
-        println!("{machine}\nseed {}", args.seed);
+    let own = json!({ "methods": rows });
+    Ok(report((args, quiet), "bench identify", own, || {
+        println!("seed {}", args.seed);
         let lines = rows.iter().map(|row| {
             [
                 row.method.to_owned(),
                 format!("{:.4}", row.wall_s),
                 format!("{:.4}", row.cpu_s),
                 format!("{:.0}", row.simulations),
-                format!("{} s kept: {}", row.limit_wall_s, row.within_limit),
+                verdict(row.limit_wall_s, row.within_limit),
             ]
         });
         let header = [
@@ -117,9 +115,5 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
             "limit",
         ];
         println!("{}", numbers(header, 1, lines));
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "bench identify", "machine": machine, "seed": args.seed,
-        "quick": args.quick, "methods": rows,
-    })))
+    }))
 }

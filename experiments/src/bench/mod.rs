@@ -6,6 +6,7 @@
 mod identify;
 mod live;
 mod plan;
+mod report;
 mod rope;
 mod spent;
 mod track;

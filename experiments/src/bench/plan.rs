@@ -1,12 +1,11 @@
 //! `experiments bench plan`: time to plan one throw of each task, and what it is spent on.
 
+use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
 use arm_model::Limits;
-use cli_output::Machine;
-use cli_output::Stage;
 use cli_output::table::numbers;
-use cli_output::{OrInput, Outcome};
+use cli_output::{OrInput, Outcome, Stage};
 use planner::process::PlannerConfig;
 use planner::ropes::random_rope;
 use planner::tasks::{
@@ -36,7 +35,7 @@ struct Row {
     cpu_s: f64,
     simulations: u32,
     rollouts_per_s: f64,
-    /// Parts of the processor time: rope with its contacts, contacts with the arm, all
+    /// Fractions of the processor time: rope with its contacts, contacts with the arm, all
     /// else (drawing, screening, learning, what finalists are observed longer and finer).
     rope_part: f64,
     contacts_part: f64,
@@ -75,7 +74,6 @@ fn measure(
     let (both, _) = least(repeats, || simulator.run(&throws)).or_failed()?;
     let (rope, _) = least(repeats, || blind.run(&throws)).or_failed()?;
     let simulations = f64::from(planned.simulations);
-    #[allow(clippy::cast_precision_loss, reason = "a small count")]
     let part = |cpu_s: f64| (cpu_s / BATCH as f64 * simulations / whole.cpu_s).clamp(0.0, 1.0);
     let both_part = part(both.cpu_s);
     // Both are measured, and noise may turn their order.
@@ -95,17 +93,17 @@ fn measure(
 }
 
 pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let config = crate::results::setup::built_in().or_failed()?;
+    let config = crate::results::experiment::built_in().or_failed()?;
     let stage = Stage::begin("bench", quiet);
     let rows = TASKS
         .into_iter()
         .map(|task| measure(&config, args, task))
         .collect::<Outcome<Vec<Row>>>()?;
     stage.done("one search per task");
-    let machine = Machine::here();
-    if !quiet {
-        println!("{machine}\nseed {}", args.seed);
-        let percent = |part: f64| format!("{:.0} %", 100.0 * part);
+    let own = json!({ "tasks": rows });
+    Ok(report((args, quiet), "bench plan", own, || {
+        println!("seed {}", args.seed);
+        let percent = |fraction: f64| format!("{:.0} %", 100.0 * fraction);
         let lines = rows.iter().map(|row| {
             [
                 row.task.to_owned(),
@@ -116,7 +114,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
                 percent(row.rope_part),
                 percent(row.contacts_part),
                 percent(row.search_part),
-                format!("{} s kept: {}", row.limit_wall_s, row.within_limit),
+                verdict(row.limit_wall_s, row.within_limit),
             ]
         });
         let header = [
@@ -124,16 +122,12 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
             "wall (s)",
             "processor (s)",
             "simulations",
-            "rollouts a second",
+            "rollouts per s",
             "rope",
             "contacts with the arm",
             "search",
             "limit",
         ];
         println!("{}", numbers(header, 1, lines));
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "bench plan", "machine": machine, "seed": args.seed,
-        "quick": args.quick, "tasks": rows,
-    })))
+    }))
 }

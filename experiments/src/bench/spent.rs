@@ -12,15 +12,21 @@ pub struct Spent {
     pub wall_s: f64,
 }
 
+impl Spent {
+    /// The smaller times of both, each by itself.
+    #[must_use]
+    pub fn or_less(self, other: Self) -> Self {
+        Self {
+            cpu_s: self.cpu_s.min(other.cpu_s),
+            wall_s: self.wall_s.min(other.wall_s),
+        }
+    }
+}
+
 /// Processor time of all threads of this process so far (s).
 fn process_cpu_s() -> f64 {
     let Timespec { tv_sec, tv_nsec } = clock_gettime(ClockId::ProcessCPUTime);
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "a process does not run for 285 years"
-    )]
-    let s = tv_sec as f64 + 1e-9 * tv_nsec as f64;
-    s
+    tv_sec as f64 + 1e-9 * tv_nsec as f64
 }
 
 /// Does the work `repeats` times; returns the smallest times, each by itself, and the
@@ -45,8 +51,7 @@ pub fn least<T, E>(
     let (mut spent, mut result) = once()?;
     for _ in 1..repeats {
         let (again, latest) = once()?;
-        spent.cpu_s = spent.cpu_s.min(again.cpu_s);
-        spent.wall_s = spent.wall_s.min(again.wall_s);
+        spent = spent.or_less(again);
         result = latest;
     }
     Ok((spent, result))

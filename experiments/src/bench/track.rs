@@ -1,15 +1,14 @@
 //! `experiments bench track`: time per frame of each stage of tracking a recorded wiggle, on
 //! one core, and the memory it takes.
 
+use super::report::report;
 use super::spent::{Spent, least};
 use crate::args::BenchArgs;
 use anyhow::{Context, anyhow};
 use camera_ingest::source::{FrameSource, StereoSource, read_left};
 use camera_ingest::{ClampPath, TrackOptions, load_camera, open_video, track};
-use cli_output::Machine;
-use cli_output::Stage;
 use cli_output::table::numbers;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage};
 use run_log::files::read_joints;
 use serde_json::{Map, Value, json};
 use shared_types::StereoCamera;
@@ -23,8 +22,7 @@ const LIMIT_MB: f64 = 400.0;
 /// Parts of the tracker that it times itself.
 const STAGES: [&str; 3] = ["background", "first_frame", "following"];
 
-/// Most memory this process has held so far (MB); nothing where the system does
-/// not tell.
+/// Most memory this process has held so far (MB), where the system reports it.
 fn peak_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
@@ -63,13 +61,9 @@ impl Pass {
 
     /// The smaller of both passes' times, each by itself.
     fn or_less(self, other: &Self) -> Self {
-        let less = |a: Spent, b: Spent| Spent {
-            cpu_s: a.cpu_s.min(b.cpu_s),
-            wall_s: a.wall_s.min(b.wall_s),
-        };
         Self {
-            decoding: less(self.decoding, other.decoding),
-            tracking: less(self.tracking, other.tracking),
+            decoding: self.decoding.or_less(other.decoding),
+            tracking: self.tracking.or_less(other.tracking),
             stages: std::array::from_fn(|i| self.stages[i].min(other.stages[i])),
             ..self
         }
@@ -101,7 +95,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     })?;
     let (mut video, camera, clamp) = recording(folder)?;
     if args.live {
-        return super::live::run(folder, (&mut video, camera, &clamp), quiet);
+        return super::live::run((args, quiet), folder, (&mut video, camera, &clamp));
     }
     let stage = Stage::begin("bench", quiet);
     let mut least = Pass::over(&mut video, &camera, &clamp)?;
@@ -111,20 +105,28 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     let frames = video.len();
     stage.done(&format!("{frames} frames"));
-    #[allow(clippy::cast_precision_loss, reason = "some hundred frames")]
     let per_frame = |s: f64| 1e3 * s / frames as f64;
     let together = Spent {
         cpu_s: least.decoding.cpu_s + least.tracking.cpu_s,
         wall_s: least.decoding.wall_s + least.tracking.wall_s,
     };
-    let machine = Machine::here();
     let stages: Map<String, Value> = STAGES
         .iter()
         .zip(least.stages)
         .map(|(name, t)| ((*name).to_owned(), json!(per_frame(t.as_secs_f64()))))
         .collect();
-    if !quiet {
-        println!("{machine}\n{frames} frames of `{}`", folder.display());
+    let own = json!({
+        "video": folder, "frames": frames,
+        "decoding_cpu_ms": per_frame(least.decoding.cpu_s),
+        "tracking_cpu_ms": per_frame(least.tracking.cpu_s),
+        "together_cpu_ms": per_frame(together.cpu_s),
+        "together_wall_ms": per_frame(together.wall_s),
+        "stages_wall_ms": stages, "limit_ms": LIMIT_MS,
+        "within_limit": per_frame(together.cpu_s) <= LIMIT_MS,
+        "peak_memory_mb": peak_mb, "limit_mb": LIMIT_MB, "lost_part": least.lost_part,
+    });
+    Ok(report((args, quiet), "bench track", own, || {
+        println!("{frames} frames of `{}`", folder.display());
         let ms = |s: f64| format!("{:.2}", per_frame(s));
         let row = |name: &str, t: Spent| [name.to_owned(), ms(t.cpu_s), ms(t.wall_s)];
         let mut rows = vec![row("decoding", least.decoding)];
@@ -136,20 +138,9 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         rows.push(row("together", together));
         let header = ["stage", "processor (ms/frame)", "wall (ms/frame)"];
         println!("{}", numbers(header, 0, rows));
-        println!("wanted: at most {LIMIT_MS} ms of processor time a frame");
+        println!("limit: {LIMIT_MS} ms of processor time per frame");
         if let Some(mb) = peak_mb {
-            println!("peak memory {mb:.0} MB (wanted: at most {LIMIT_MB} MB)");
+            println!("peak memory {mb:.0} MB (limit: {LIMIT_MB} MB)");
         }
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "bench track", "machine": machine, "video": folder,
-        "quick": args.quick, "frames": frames,
-        "decoding_cpu_ms": per_frame(least.decoding.cpu_s),
-        "tracking_cpu_ms": per_frame(least.tracking.cpu_s),
-        "together_cpu_ms": per_frame(together.cpu_s),
-        "together_wall_ms": per_frame(together.wall_s),
-        "stages_wall_ms": stages, "limit_ms": LIMIT_MS,
-        "within_limit": per_frame(together.cpu_s) <= LIMIT_MS,
-        "peak_memory_mb": peak_mb, "limit_mb": LIMIT_MB, "lost_part": least.lost_part,
-    })))
+    }))
 }

@@ -1,14 +1,11 @@
 //! `experiments parameter-importance`: strikes planned with some parameters identified
 //! and the others random, beside the paper's table.
 
-use super::checkpoint::{Sequence, checkpointed_trials};
-use super::picture::{Curve, Picture};
-use super::setup::Setup;
-use crate::args::ResultArgs;
-use cli_output::Stage;
+use super::experiment::{Experiment, cm};
+use super::picture::Curve;
+use cli_output::Outcome;
 use cli_output::table::numbers;
-use cli_output::{OrInput, Outcome};
-use experiments::trials::{ImportanceTrial, Spread, importance_trials};
+use experiments::trials::{ImportanceTrial, Spread, strike_trials};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -27,11 +24,7 @@ struct Row {
 /// The conditions, with their errors (cm) as curves.
 fn rows(trials: &[ImportanceTrial]) -> Vec<(Row, Curve)> {
     let row = |identified: &'static str, errors_m: Vec<f64>, paper_cm: [f64; 2]| {
-        let curve = Curve {
-            name: identified.to_owned(),
-            values: errors_m.iter().map(|e| 100.0 * e).collect(),
-            paper: Some(paper_cm[0]),
-        };
+        let curve = Curve::cm(identified, errors_m.iter().copied(), Some(paper_cm[0]));
         let row = Row {
             identified,
             throws: errors_m.len(),
@@ -54,48 +47,27 @@ fn rows(trials: &[ImportanceTrial]) -> Vec<(Row, Curve)> {
     ]
 }
 
-pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let Setup {
+pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
+    let Experiment {
         config,
         rig,
         options,
-    } = Setup::new(args)?;
-    let method = options.method;
-    let stage = Stage::begin("parameter-importance", quiet);
-    let sequence = Sequence {
-        name: "parameter-importance",
-        method: format!("{method:?}").to_lowercase(),
-        count: args.ropes.unwrap_or(ROPES),
-        batch: options.threads.max(1),
-        told: (
-            |t: &ImportanceTrial| 100.0 * t.identified_m,
-            "ropes, cm identified",
-        ),
-    };
-    let trials = checkpointed_trials(&sequence, args, &stage, |batch| {
-        importance_trials(&rig, &config, &options, args.seed, batch).or_failed()
+        ..
+    } = &experiment;
+    let figure = |t: &ImportanceTrial| 100.0 * t.identified_m;
+    let sequence = experiment.sequence(ROPES, 1, (figure, "ropes, cm identified"));
+    let trials = experiment.trials(sequence, |batch| {
+        strike_trials(rig, config, options, batch, ImportanceTrial::of)
     })?;
     let (rows, curves): (Vec<Row>, Vec<Curve>) = rows(&trials).into_iter().unzip();
-    let picture = Picture {
-        name: "parameter-importance",
-        axis: "distance of tip and target (cm); dashed: the paper's mean",
-        seed: args.seed,
-        curves,
-    };
-    let picture = picture.write(args.out.as_deref())?;
-    let seconds = stage.done(&format!("{} ropes", trials.len()));
-    if !quiet {
-        print(&rows);
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "parameter-importance",
-        "version": shared_types::VERSION, "seed": args.seed, "method": method,
-        "ropes": trials.len(), "seconds": seconds, "rows": rows, "out": args.out, "picture": picture,
-    })))
+    let axis = "distance of tip and target (cm); dashed: the paper's mean";
+    let picture = experiment.picture(axis, curves)?;
+    let own = json!({ "ropes": trials.len(), "rows": rows });
+    let summary = format!("{} ropes", trials.len());
+    experiment.finish(&summary, picture, own, || print(&rows))
 }
 
 fn print(rows: &[Row]) {
-    let cm = |m: f64| format!("{:.2}", 100.0 * m);
     let lines = rows.iter().map(|row| {
         let [mean, std] = row.paper_cm;
         [

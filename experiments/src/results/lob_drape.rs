@@ -1,21 +1,18 @@
 //! `experiments lob-drape`: lobs and drapes planned with identified parameters over 24
 //! ropes, judged in simulation with the true ones, beside the paper's table.
 
-use super::checkpoint::{Sequence, checkpointed_trials};
-use super::picture::{Curve, Picture};
-use super::setup::Setup;
-use crate::args::ResultArgs;
+use super::experiment::{Experiment, Sequence, cm};
+use super::picture::Curve;
 use anyhow::Context;
-use cli_output::Stage;
 use cli_output::table::numbers;
 use cli_output::{OrInput, Outcome};
-use experiments::trials::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
+use experiments::trials::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials, mean};
 use serde_json::{Value, json};
 use shared_types::Verdict;
 
 const ROPES: &str = include_str!("../../../configs/planner/lob-drape.toml");
 
-/// Parts of the ropes, and the distance of drapes.
+/// Fractions of the ropes, and the distance of drapes.
 struct Summary {
     hit: f64,
     hit_and_stay: f64,
@@ -28,9 +25,8 @@ fn met(verdict: &Verdict, name: &str) -> bool {
 }
 
 fn summarise(trials: &[LobDrapeTrial]) -> Summary {
-    #[allow(clippy::cast_precision_loss, reason = "two dozen ropes")]
-    let part = |good: &dyn Fn(&LobDrapeTrial) -> bool| {
-        trials.iter().filter(|t| good(t)).count() as f64 / trials.len().max(1) as f64
+    let fraction = |good: &dyn Fn(&LobDrapeTrial) -> bool| {
+        mean(trials.iter().map(|t| f64::from(u8::from(good(t)))))
     };
     let lob = |t: &LobDrapeTrial, name: &str| t.lob.as_ref().is_some_and(|l| met(&l.verdict, name));
     let draped: Vec<f64> = trials
@@ -38,75 +34,57 @@ fn summarise(trials: &[LobDrapeTrial]) -> Summary {
         .filter_map(|t| t.drape.as_ref().filter(|d| d.verdict.success))
         .map(|d| d.error_m)
         .collect();
-    #[allow(clippy::cast_precision_loss, reason = "two dozen ropes")]
     let midpoint_m = draped.iter().sum::<f64>() / draped.len() as f64;
     Summary {
-        hit: part(&|t| lob(t, "target hit")),
-        hit_and_stay: part(&|t| t.lob.as_ref().is_some_and(|l| l.verdict.success)),
-        draped: part(&|t| t.drape.as_ref().is_some_and(|d| d.verdict.success)),
+        hit: fraction(&|t| lob(t, "target hit")),
+        hit_and_stay: fraction(&|t| t.lob.as_ref().is_some_and(|l| l.verdict.success)),
+        draped: fraction(&|t| t.drape.as_ref().is_some_and(|d| d.verdict.success)),
         midpoint_m,
     }
 }
 
-pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let Setup {
+pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
+    let Experiment {
         config,
         rig,
         options,
-    } = Setup::new(args)?;
-    let method = options.method;
+        ..
+    } = &experiment;
     let scene: LobDrapeConfig = toml::from_str(ROPES)
         .context("the built-in `configs/planner/lob-drape.toml` is damaged")
         .or_failed()?;
-    let stage = Stage::begin("lob-drape", quiet);
     let all = scene.ropes().len() as u64;
+    let figure = |t: &LobDrapeTrial| t.drape.as_ref().map_or(f64::NAN, |d| 100.0 * d.error_m);
+    let asked = experiment.sequence(all, 1, (figure, "ropes, cm of the drape"));
     let sequence = Sequence {
-        name: "lob-drape",
-        method: format!("{method:?}").to_lowercase(),
-        count: args.ropes.unwrap_or(all).min(all),
-        batch: options.threads.max(1),
-        told: (
-            |t: &LobDrapeTrial| t.drape.as_ref().map_or(f64::NAN, |d| 100.0 * d.error_m),
-            "ropes, cm of the drape",
-        ),
+        count: asked.count.min(all),
+        ..asked
     };
-    let trials = checkpointed_trials(&sequence, args, &stage, |batch| {
-        lob_drape_trials(&rig, &config, &scene, &options, args.seed, batch).or_failed()
+    let trials = experiment.trials(sequence, |batch| {
+        lob_drape_trials(rig, config, &scene, options, batch)
     })?;
     let s = summarise(&trials);
-    let curve = |name: &str, paper, of: fn(&LobDrapeTrial) -> Option<f64>| Curve {
-        name: name.to_owned(),
-        // A rope without a throw never comes near.
-        values: trials
-            .iter()
-            .map(|t| of(t).map_or(f64::INFINITY, |m| 100.0 * m))
-            .collect(),
-        paper,
+    // A rope without a throw never comes near.
+    let curve = |name: &str, paper, of: fn(&LobDrapeTrial) -> Option<f64>| {
+        let errors_m = trials.iter().map(|t| of(t).unwrap_or(f64::INFINITY));
+        Curve::cm(name, errors_m, paper)
     };
-    let picture = Picture {
-        name: "lob-drape",
-        axis: "distance (cm); dashed: the paper's mean of drapes",
-        seed: args.seed,
-        curves: vec![
-            curve("lob: closest approach", None, |t| {
-                t.lob.as_ref().map(|l| l.error_m)
-            }),
-            curve("drape: middle of the rope from the edge", Some(4.6), |t| {
-                t.drape.as_ref().map(|d| d.error_m)
-            }),
-        ],
-    };
-    let picture = picture.write(args.out.as_deref())?;
-    let seconds = stage.done(&format!("{} ropes", trials.len()));
-    if !quiet {
-        print(&trials, &s);
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "lob-drape", "version": shared_types::VERSION,
-        "seed": args.seed, "method": method, "ropes": trials.len(), "seconds": seconds,
-        "lob_hit": s.hit, "lob_hit_and_stay": s.hit_and_stay, "draped": s.draped,
-        "midpoint_m": s.midpoint_m, "trials": trials, "out": args.out, "picture": picture,
-    })))
+    let curves = vec![
+        curve("lob: closest approach", None, |t| {
+            t.lob.as_ref().map(|l| l.error_m)
+        }),
+        curve("drape: middle of the rope from the edge", Some(4.6), |t| {
+            t.drape.as_ref().map(|d| d.error_m)
+        }),
+    ];
+    let axis = "distance (cm); dashed: the paper's mean of drapes";
+    let picture = experiment.picture(axis, curves)?;
+    let own = json!({
+        "ropes": trials.len(), "lob_hit": s.hit, "lob_hit_and_stay": s.hit_and_stay,
+        "draped": s.draped, "midpoint_m": s.midpoint_m, "trials": trials,
+    });
+    let summary = format!("{} ropes", trials.len());
+    experiment.finish(&summary, picture, own, || print(&trials, &s))
 }
 
 fn print(trials: &[LobDrapeTrial], s: &Summary) {
@@ -126,9 +104,9 @@ fn print(trials: &[LobDrapeTrial], s: &Summary) {
         [
             t.name.clone(),
             lob.map_or_else(none, |l| failed(&l.verdict)),
-            lob.map_or_else(none, |l| format!("{:.2}", 100.0 * l.error_m)),
+            lob.map_or_else(none, |l| cm(l.error_m)),
             drape.map_or_else(none, |d| failed(&d.verdict)),
-            drape.map_or_else(none, |d| format!("{:.2}", 100.0 * d.error_m)),
+            drape.map_or_else(none, |d| cm(d.error_m)),
         ]
     });
     let header = ["rope", "lob", "closest (cm)", "drape", "midpoint (cm)"];

@@ -4,6 +4,7 @@
 //! resumes from it.
 
 mod checkpoint;
+pub(crate) mod experiment;
 mod fidelity;
 mod importance;
 mod lob_drape;
@@ -13,28 +14,28 @@ mod pipeline;
 mod robust;
 mod sensitivity;
 mod sensitivity_picture;
-pub(crate) mod setup;
 mod sysid;
 mod wiggles;
 
-use crate::args::ResultCommand;
+use crate::args::{ResultArgs, ResultCommand};
 use cli_output::Outcome;
+use experiment::Experiment;
 use serde_json::Value;
 
-/// Ropes of a result of identification.
-const ROPES: u64 = 1000;
+type Study = fn(Experiment<'_>) -> Outcome<Option<Value>>;
 
 /// Makes a result. The value is what `--json` prints.
 pub fn run(command: &ResultCommand, quiet: bool) -> Outcome<Option<Value>> {
-    match command {
-        ResultCommand::Sysid(args) => sysid::run(args, quiet),
-        ResultCommand::MotionFidelity(args) => fidelity::run(args, quiet),
-        ResultCommand::SysidOod(args) => ood::run(args, quiet),
-        ResultCommand::WiggleAblation(args) => wiggles::run(args, quiet),
-        ResultCommand::SimPipeline(args) => pipeline::run(args, quiet),
-        ResultCommand::LobDrape(args) => lob_drape::run(args, quiet),
-        ResultCommand::Robust(args) => robust::run(args, quiet),
-        ResultCommand::ParameterImportance(args) => importance::run(args, quiet),
-        ResultCommand::SensitivityMaps(args) => sensitivity::run(args, quiet),
-    }
+    let (name, args, study): (_, &ResultArgs, Study) = match command {
+        ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
+        ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
+        ResultCommand::SysidOod(args) => ("sysid-ood", args, ood::run),
+        ResultCommand::WiggleAblation(args) => ("wiggle-ablation", args, wiggles::run),
+        ResultCommand::SimPipeline(args) => ("sim-pipeline", args, pipeline::run),
+        ResultCommand::LobDrape(args) => ("lob-drape", args, lob_drape::run),
+        ResultCommand::Robust(args) => ("robust", args, robust::run),
+        ResultCommand::ParameterImportance(args) => ("parameter-importance", args, importance::run),
+        ResultCommand::SensitivityMaps(args) => ("sensitivity-maps", args, sensitivity::run),
+    };
+    study(Experiment::begin(name, args, quiet)?)
 }

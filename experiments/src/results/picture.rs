@@ -32,6 +32,21 @@ pub(super) struct Curve {
     pub paper: Option<f64>,
 }
 
+impl Curve {
+    /// A curve of distances, in centimetres.
+    pub(super) fn cm(
+        name: &str,
+        distances_m: impl Iterator<Item = f64>,
+        paper_cm: Option<f64>,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            values: distances_m.map(|m| 100.0 * m).collect(),
+            paper: paper_cm,
+        }
+    }
+}
+
 /// A picture of several curves over one axis of powers of ten.
 pub(super) struct Picture<'a> {
     /// Name of the result.
@@ -44,14 +59,17 @@ pub(super) struct Picture<'a> {
     pub curves: Vec<Curve>,
 }
 
+/// Where the picture of a result file stands: `.svg` for `.json`, or after its name.
+pub(super) fn beside(result: &Path) -> PathBuf {
+    match result.extension() {
+        Some(ending) if ending == "json" => result.with_extension("svg"),
+        _ => PathBuf::from(format!("{}.svg", result.display())),
+    }
+}
+
 impl Picture<'_> {
-    /// Draws beside the result file: `.svg` for `.json`, or after its name. Nothing where
-    /// there is none.
+    /// Draws beside the result file; nothing where there is none.
     pub(super) fn write(&self, out: Option<&Path>) -> Outcome<Option<PathBuf>> {
-        let beside = |path: &Path| match path.extension() {
-            Some(ending) if ending == "json" => path.with_extension("svg"),
-            _ => PathBuf::from(format!("{}.svg", path.display())),
-        };
         let Some(path) = out.map(beside) else {
             return Ok(None);
         };
@@ -96,7 +114,7 @@ impl Picture<'_> {
         chart
             .configure_mesh()
             .x_desc(self.axis)
-            .y_desc("part of the trials below (%)")
+            .y_desc("fraction of the trials below (%)")
             .x_label_formatter(&|v| format!("{v}"))
             .draw()?;
         for (curve, colour) in self.curves.iter().zip(COLOURS.iter().cycle()) {
@@ -136,7 +154,6 @@ impl Picture<'_> {
 }
 
 /// The distribution of the values as stairs (%), between two limits.
-#[allow(clippy::cast_precision_loss, reason = "a few thousand trials")]
 fn steps(values: &[f64], low: f64, high: f64) -> Vec<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
     sorted.sort_by(f64::total_cmp);

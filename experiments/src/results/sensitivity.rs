@@ -2,13 +2,12 @@
 //! paper's activation maps show it: per parameter, the gradient of the answer over every
 //! keypoint at every moment.
 
-use super::checkpoint::{Sequence, checkpointed_trials};
+use super::experiment::{Experiment, Sequence};
+use super::picture::beside;
 use super::sensitivity_picture::svg;
-use super::setup::Setup;
-use crate::args::{MethodName, ResultArgs};
+use crate::args::MethodName;
 use crate::network::network_for_camera;
 use anyhow::anyhow;
-use cli_output::Stage;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome};
 use experiments::trials::{MOMENT_FRAMES, SensitivityMap, SensitivityTrial, sensitivity_trials};
@@ -41,12 +40,6 @@ struct Row {
     paper: &'static str,
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "counts are small"
-)]
 fn rows(map: &SensitivityMap, moment_s: f64) -> Vec<Row> {
     let most = |values: &[f64]| -> usize {
         let largest = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -80,7 +73,6 @@ fn rows(map: &SensitivityMap, moment_s: f64) -> Vec<Row> {
 }
 
 /// Mean of the films' maps.
-#[allow(clippy::cast_precision_loss, reason = "some dozen films")]
 fn mean(trials: &[SensitivityTrial]) -> Option<SensitivityMap> {
     let first = &trials.first()?.map;
     let mut map = SensitivityMap::empty(first.moments, first.keypoints);
@@ -92,52 +84,45 @@ fn mean(trials: &[SensitivityTrial]) -> Option<SensitivityMap> {
     Some(map)
 }
 
-pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
+    let Experiment {
+        args, rig, options, ..
+    } = &experiment;
     if !matches!(args.method, MethodName::Hybrid | MethodName::Nn) {
         return Err(Failure::input(anyhow!(
             "these are maps of the network: leave out --method, or name nn"
         )));
     }
-    let model = args.model.as_deref();
-    let net = network_for_camera(model)?;
-    let (rate_hz, weights) = (
-        net.metadata().features.rate_hz,
-        &net.metadata().graph_sha256,
-    );
-    let Setup { rig, options, .. } = Setup::new(args)?;
-    let stage = Stage::begin("sensitivity-maps", quiet);
+    let net = network_for_camera(args.model.as_deref())?;
+    let weights = &net.metadata().graph_sha256;
+    let figure = |t: &SensitivityTrial| largest(&t.map);
     let sequence = Sequence {
-        name: "sensitivity-maps",
         method: format!("network {weights}"),
-        count: args.ropes.unwrap_or(ROPES),
-        batch: options.threads.max(1),
-        told: (|t: &SensitivityTrial| largest(&t.map), "films, most per m"),
+        ..experiment.sequence(ROPES, 1, (figure, "films, most per m"))
     };
-    let trials = checkpointed_trials(&sequence, args, &stage, |batch| {
-        sensitivity_trials(&rig, &net, args.seed, batch, options.threads).or_failed()
+    let trials = experiment.trials(sequence, |batch| {
+        sensitivity_trials(rig, &net, args.seed, batch, options.threads)
     })?;
     let map = mean(&trials)
         .ok_or_else(|| Failure::input(anyhow!("--ropes is 0, but must be 1 or more")))?;
-    #[allow(clippy::cast_precision_loss, reason = "8 is exact")]
-    let moment_s = MOMENT_FRAMES as f64 / rate_hz;
+    let moment_s = MOMENT_FRAMES as f64 / net.metadata().features.rate_hz;
     let rows = rows(&map, moment_s);
-    let seconds = stage.done(&format!("{} films", trials.len()));
-    let picture = args.out.as_ref().map(|path| path.with_extension("svg"));
+    let picture = args.out.as_deref().map(beside);
     if let Some(path) = &picture {
         let drawn = svg(&map, moment_s, trials.len(), args.seed);
         files::write_atomic(path, drawn.as_bytes()).or_failed()?;
     }
-    if !quiet {
+    let own = json!({
+        "method": "network", "weights_sha256": weights, "films": trials.len(),
+        "moment_s": moment_s, "rows": rows, "map": map,
+    });
+    let drawn = picture.clone();
+    experiment.finish(&format!("{} films", trials.len()), picture, own, || {
         print(&rows);
-        if let Some(path) = &picture {
+        if let Some(path) = drawn {
             println!("drawn in `{}`", path.display());
         }
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "sensitivity-maps", "version": shared_types::VERSION,
-        "seed": args.seed, "weights_sha256": weights, "films": trials.len(), "moment_s": moment_s, "seconds": seconds,
-        "rows": rows, "map": map, "out": args.out, "picture": picture,
-    })))
+    })
 }
 
 fn largest(map: &SensitivityMap) -> f64 {

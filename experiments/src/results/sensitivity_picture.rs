@@ -27,7 +27,6 @@ fn colour(part: f64) -> String {
 }
 
 /// The maps, each in parts of its largest value, which is told above it.
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 pub(super) fn svg(map: &SensitivityMap, moment_s: f64, films: usize, seed: u64) -> String {
     let rows = RANGES.len().div_ceil(COLUMNS) as f64;
     let width = LEFT + COLUMNS as f64 * (PANEL[0] + GAP[0]);
@@ -51,7 +50,6 @@ pub(super) fn svg(map: &SensitivityMap, moment_s: f64, films: usize, seed: u64) 
     out
 }
 
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 fn panel(
     out: &mut String,
     map: &SensitivityMap,

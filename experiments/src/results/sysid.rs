@@ -1,61 +1,33 @@
 //! `experiments sysid`: errors of identified parameters beside the paper's, and
 //! whether intervals of 90 % hold the truth that often.
 
-use super::ROPES;
-use super::checkpoint::trials;
-use super::picture::{Curve, Picture};
-use super::setup::Setup;
-use crate::args::ResultArgs;
+use super::experiment::Experiment;
+use super::picture::Curve;
 use cli_output::Outcome;
-use cli_output::Stage;
 use cli_output::table::numbers;
-use experiments::trials::{SysidSummary, summarise, trial_rope};
+use experiments::trials::{SysidSummary, Trial, summarise, trial_rope};
 use serde_json::{Value, json};
 use shared_types::rope::RANGES;
 
-pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let Setup { rig, options, .. } = Setup::new(args)?;
-    let stage = Stage::begin("sysid", quiet);
-    let rope = |index| trial_rope(args.seed, index);
-    let all = trials(
-        "sysid",
-        args,
-        args.ropes.unwrap_or(ROPES),
-        &rig,
-        &options,
-        rope,
-        &stage,
-    )?;
-    let summary = summarise(&all);
+pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
+    let seed = experiment.args.seed;
+    let trials = experiment.identified(1, |index| trial_rope(seed, index))?;
+    let summary = summarise(&trials);
     let curves = summary.parameters.iter().zip(RANGES).enumerate();
-    let picture = Picture {
-        name: "sysid",
-        axis: "absolute error, part of the parameter's range (%); dashed: the paper's mean",
-        seed: args.seed,
-        curves: curves
-            .map(|(at, (row, range))| {
-                let part = 100.0 / (range.max - range.min);
-                Curve {
-                    name: row.label.clone(),
-                    values: all
-                        .iter()
-                        .map(|t| part * (t.found[at] - t.truth[at]).abs())
-                        .collect(),
-                    paper: Some(part * row.paper),
-                }
-            })
-            .collect(),
-    };
-    let picture = picture.write(args.out.as_deref())?;
-    let seconds = stage.done(&format!("{} ropes", all.len()));
-    if !quiet {
-        print(&summary);
-    }
-    Ok(Some(json!({
-        "ok": true, "command": "sysid", "version": shared_types::VERSION,
-        "seed": args.seed, "method": options.method, "ropes": all.len(), "seconds": seconds,
-        "out": args.out, "picture": picture, "summary": summary,
-    })))
+    let curves = curves.map(|(at, (row, range))| {
+        let percent = 100.0 / (range.max - range.min);
+        let error = |t: &Trial| percent * (t.found[at] - t.truth[at]).abs();
+        Curve {
+            name: row.label.clone(),
+            values: trials.iter().map(error).collect(),
+            paper: Some(percent * row.paper),
+        }
+    });
+    let axis = "absolute error, fraction of the parameter's range (%); dashed: the paper's mean";
+    let picture = experiment.picture(axis, curves.collect())?;
+    let own = json!({ "ropes": trials.len(), "summary": summary });
+    let ropes = format!("{} ropes", trials.len());
+    experiment.finish(&ropes, picture, own, || print(&summary))
 }
 
 fn print(summary: &SysidSummary) {
@@ -90,10 +62,10 @@ fn print(summary: &SysidSummary) {
             format!("{:.2}", 100.0 * row.p90),
         ]
     });
-    let header = ["error of ratios", "median (%)", "nine tenths below (%)"];
+    let header = ["error of ratios", "median (%)", "p90 (%)"];
     println!("\n{}", numbers(header, 0, rows));
     println!(
-        "\n{} ropes of the ranges, {:.1} % taken for ropes outside, residual {:.2} px, {:.0} simulations each",
+        "\n{} ropes of the ranges, {:.1} % flagged as out of distribution, residual {:.2} px, {:.0} simulations each",
         summary.trials,
         100.0 * summary.taken_for_outside,
         summary.residual_px,

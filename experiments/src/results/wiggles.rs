@@ -4,16 +4,14 @@
 //! The same ropes with the same noise of the films for every wiggle. The network knows
 //! one wiggle only, so that a fast search proposes the start for all.
 
-use super::checkpoint::{Sequence, checkpointed_trials};
-use super::picture::{Curve, Picture};
-use super::setup::Setup;
-use crate::args::{MethodName, ResultArgs};
+use super::experiment::{Experiment, Sequence};
+use super::picture::Curve;
+use crate::args::MethodName;
 use anyhow::anyhow;
-use cli_output::Stage;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome};
 use experiments::trials::{
-    AblatedWiggle, SysidSummary, Trial, TrialRig, ablated_wiggles, run as trials, summarise,
+    AblatedWiggle, SysidSummary, Trial, TrialRig, ablated_wiggles, mean, run as trials, summarise,
     trial_rope,
 };
 use serde_json::{Value, json};
@@ -21,88 +19,77 @@ use shared_types::rope::RANGES;
 
 /// Ropes identified with each wiggle.
 const ROPES: u64 = 24;
-/// Trials made between two writes of the file, by each thread.
-const EACH: usize = 4;
 /// Wiggles, and columns of the table with that of the names.
 const WIGGLES: usize = 9;
 const COLUMNS: usize = WIGGLES + 1;
 
-/// Mean over the parameters of a trial's errors, part of their ranges (%).
-#[allow(clippy::cast_precision_loss, reason = "nine parameters")]
+/// Mean over the parameters of a trial's errors as fractions of their ranges (%).
 fn mean_error_percent(trial: &Trial) -> f64 {
-    let parts = RANGES.iter().zip(trial.found.iter().zip(&trial.truth));
-    let sum: f64 = parts
-        .map(|(range, (found, truth))| (found - truth).abs() / (range.max - range.min))
-        .sum();
-    100.0 * sum / RANGES.len() as f64
+    let fractions = RANGES.iter().zip(trial.found.iter().zip(&trial.truth));
+    100.0
+        * mean(
+            fractions
+                .map(|(range, (found, truth))| (found - truth).abs() / (range.max - range.min)),
+        )
 }
 
-pub(super) fn run(args: &ResultArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
+    let Experiment {
+        args,
+        rig,
+        options,
+        config,
+        ..
+    } = &experiment;
     if args.method == MethodName::Nn || args.model.is_some() {
         return Err(Failure::input(anyhow!(
-            "a network knows one wiggle only: use --method hybrid or cmaes, without --model"
+            "the network is trained on one wiggle only: use --method hybrid or cmaes, without --model"
         )));
     }
-    let ropes = args.ropes.unwrap_or(ROPES);
+    let figure = |t: &Trial| t.residual_px;
+    let asked = experiment.sequence(ROPES, 4, (figure, "ropes, residual px"));
+    let ropes = asked.count;
     if ropes == 0 {
         return Err(Failure::input(anyhow!(
             "--ropes is 0, but must be 1 or more"
         )));
     }
-    let Setup {
-        rig,
-        options,
-        config,
-    } = Setup::new(args)?;
     let wiggles = ablated_wiggles(&config.wiggle).or_failed()?;
     let rigs: Vec<TrialRig> = wiggles.iter().map(|w| rig.wiggling(w)).collect();
-    let stage = Stage::begin("wiggle-ablation", quiet);
     let sequence = Sequence {
-        name: "wiggle-ablation",
-        method: format!("{:?}, {ropes} ropes", options.method).to_lowercase(),
+        method: format!("{}, {ropes} ropes", asked.method),
         count: ropes * wiggles.len() as u64,
-        batch: EACH * options.threads.max(1),
-        told: (|t: &Trial| t.residual_px, "ropes, residual px"),
+        ..asked
     };
     // Wiggle by wiggle; a trial's own index is that of the rope.
-    let all = checkpointed_trials(&sequence, args, &stage, |batch| {
+    let all = experiment.trials(sequence, |batch| {
         let rope = |index| trial_rope(args.seed, index);
         let mut made = Vec::with_capacity(batch.len());
-        for part in batch.chunk_by(|a, b| a / ropes == b / ropes) {
-            let which = usize::try_from(part[0] / ropes).or_failed()?;
-            let indices: Vec<u64> = part.iter().map(|i| i % ropes).collect();
-            made.extend(trials(&rigs[which], rope, args.seed, &indices, &options).or_failed()?);
+        for one_wiggle in batch.chunk_by(|a, b| a / ropes == b / ropes) {
+            let which = usize::try_from(one_wiggle[0] / ropes)?;
+            let indices: Vec<u64> = one_wiggle.iter().map(|i| i % ropes).collect();
+            made.extend(trials(&rigs[which], rope, &indices, options)?);
         }
-        Ok(made)
+        Ok::<_, anyhow::Error>(made)
     })?;
     let each = usize::try_from(ropes).or_failed()?;
     let summaries: Vec<SysidSummary> = all.chunks(each).map(summarise).collect();
-    let seconds = stage.done(&format!("{} wiggles, {ropes} ropes each", wiggles.len()));
-    if !quiet {
-        print(&wiggles, &summaries);
-    }
     let curve = |(wiggle, trials): (&AblatedWiggle, &[Trial])| Curve {
         name: wiggle.name.clone(),
         values: trials.iter().map(mean_error_percent).collect(),
         paper: None,
     };
-    let picture = Picture {
-        name: "wiggle-ablation",
-        axis: "mean error of the nine parameters, part of their ranges (%)",
-        seed: args.seed,
-        curves: wiggles.iter().zip(all.chunks(each)).map(curve).collect(),
-    };
-    let picture = picture.write(args.out.as_deref())?;
+    let curves = wiggles.iter().zip(all.chunks(each)).map(curve).collect();
+    let axis = "mean error of the nine parameters, fraction of their ranges (%)";
+    let picture = experiment.picture(axis, curves)?;
     let rows: Vec<Value> = wiggles
         .iter()
         .zip(&summaries)
         .map(|(w, s)| json!({"wiggle": w.name, "paper": w.paper, "breaks": w.breaks, "summary": s}))
         .collect();
-    Ok(Some(json!({
-        "ok": true, "command": "wiggle-ablation", "version": shared_types::VERSION,
-        "seed": args.seed, "method": options.method, "ropes_each": ropes, "seconds": seconds,
-        "out": args.out, "picture": picture, "wiggles": rows,
-    })))
+    let own = json!({ "ropes_each": ropes, "wiggles": rows });
+    let summary = format!("{} wiggles, {ropes} ropes each", wiggles.len());
+    experiment.finish(&summary, picture, own, || print(&wiggles, &summaries))
 }
 
 fn print(wiggles: &[AblatedWiggle], summaries: &[SysidSummary]) {

@@ -5,7 +5,7 @@
 //! uneven mass, a rest curvature. As in the paper, a throw is compared by the correlation of Fourier
 //! spectra and by the mean distance of points of the rope per frame.
 
-use super::{KEYPOINTS, TrialError, TrialRig, trial_rope};
+use super::{KEYPOINTS, TrialError, TrialRig, mean, trial_rope};
 use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use planner::filming::{FilmTiming, Filmed, RopeFilm, project};
@@ -132,6 +132,9 @@ pub struct FidelityRow {
     pub method: String,
 }
 
+/// Keypoints of a rope, frame by frame (m).
+type Paths = Vec<Vec<Vector3<f64>>>;
+
 /// Keypoint paths of a rope in a motion.
 fn paths(
     rope: &RopeParams,
@@ -139,12 +142,7 @@ fn paths(
     motion: &dyn AttachMotion,
     duration_s: f64,
     rate_hz: f64,
-) -> Result<Vec<Vec<Vector3<f64>>>, SimulateError> {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a positive count of a few thousand"
-    )]
+) -> Result<Paths, SimulateError> {
     let count = (duration_s * rate_hz).floor() as usize;
     let candidate = Candidate::new(rope, motion).with_extras(extras);
     let rollouts = roll_out(
@@ -164,12 +162,6 @@ fn paths(
         },
     )?;
     let nodes = &rollouts[0].nodes;
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "places on a rope of some dozen nodes"
-    )]
     let point = |frame: usize, k: usize| {
         let place = k as f64 * (nodes.nodes() - 1) as f64 / (KEYPOINTS - 1) as f64;
         let node = (place as usize).min(nodes.nodes() - 2);
@@ -196,16 +188,14 @@ impl TrialRig {
             &self.motion,
             duration_s,
             FILM_RATE_HZ,
-        )
-        .map_err(|source| TrialError::Film { index, source })?;
-        #[allow(clippy::cast_possible_truncation, reason = "films are kept so")]
+        )?;
         let positions = paths
             .iter()
             .flatten()
             .flat_map(|p| p.iter().map(|x| *x as f32).collect::<Vec<f32>>())
             .collect();
         let film = RopeFilm::from_positions(rope.params, 1.0 / FILM_RATE_HZ, KEYPOINTS, positions)
-            .ok_or(TrialError::EmptyFilm { index })?;
+            .ok_or(TrialError::EmptyFilm)?;
         let noise = self.randomisation.draw(seed, index);
         Ok(project(&film, &self.camera, &FilmTiming::default(), &noise))
     }
@@ -225,10 +215,8 @@ impl TrialRig {
         let filmed = self.film_real(rope, seed, index)?;
         let found = self.fit(&filmed, index, options)?;
         let arm = PlannedArm::new(*throw);
-        let moved = |rope: &RopeParams, extras: RopeExtras| {
-            paths(rope, extras, &arm, COMPARED_S, RATE_HZ)
-                .map_err(|source| TrialError::Film { index, source })
-        };
+        let moved =
+            |rope: &RopeParams, extras: RopeExtras| paths(rope, extras, &arm, COMPARED_S, RATE_HZ);
         let truth = moved(&rope.params, rope.extras)?;
         let found_paths = moved(&found.params, RopeExtras::NONE)?;
         let middle = moved(&middle_rope(), RopeExtras::NONE)?;
@@ -252,15 +240,12 @@ pub fn middle_rope() -> RopeParams {
     RopeParams::from_array(shared_types::rope::RANGES.map(|r| f64::midpoint(r.min, r.max)))
 }
 
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 fn mean_distance_m(a: &[Vec<Vector3<f64>>], b: &[Vec<Vector3<f64>>]) -> f64 {
     let pairs = a.iter().flatten().zip(b.iter().flatten());
-    let (sum, count) = pairs.fold((0.0, 0.0), |(s, c), (a, b)| (s + (a - b).norm(), c + 1.0));
-    sum / f64::max(count, 1.0)
+    mean(pairs.map(|(a, b)| (a - b).norm()))
 }
 
 /// Sizes of the first harmonics of every point and axis, the mean left out.
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 fn spectra(paths: &[Vec<Vector3<f64>>]) -> Vec<f64> {
     let frames = paths.len() as f64;
     let points = paths.first().map_or(0, Vec::len);
@@ -283,11 +268,9 @@ fn spectra(paths: &[Vec<Vector3<f64>>]) -> Vec<f64> {
 }
 
 /// Pearson correlation of two motions' spectra.
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
 fn spectra_correlation(a: &[Vec<Vector3<f64>>], b: &[Vec<Vector3<f64>>]) -> f64 {
     let (a, b) = (spectra(a), spectra(b));
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
-    let (ma, mb) = (mean(&a), mean(&b));
+    let (ma, mb) = (mean(a.iter().copied()), mean(b.iter().copied()));
     let pairs = || a.iter().zip(&b).map(|(x, y)| (x - ma, y - mb));
     let product: f64 = pairs().map(|(x, y)| x * y).sum();
     let squares = |f: fn((f64, f64)) -> f64| pairs().map(f).map(|v| v * v).sum::<f64>();

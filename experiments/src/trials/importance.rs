@@ -1,11 +1,9 @@
 //! Which identified parameters matter: strikes planned with some of them identified and
 //! the others random, thrown with the true rope.
 
-use super::strike_case::{StrikeCase, strike_trials};
+use super::strike_case::StrikeCase;
 use super::thrower::Thrower;
-use super::{TrialError, TrialRig, trial_rope};
-use planner::process::PlannerConfig;
-use planner::sysid::IdentifyOptions;
+use super::trial_rope;
 use planner::tasks::{Belief, PlanError};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
@@ -69,36 +67,26 @@ fn errors_with(
     Ok(errors_m)
 }
 
-fn trial(case: &StrikeCase<'_>, seed: u64) -> Result<ImportanceTrial, PlanError> {
-    let (thrower, found) = (&case.thrower, &case.found.params);
-    let whole = thrower.plan(found, 1, Belief::default())?;
-    let mut partly_m = [const { Vec::new() }; CONDITIONS.len()];
-    for (errors_m, identified) in partly_m.iter_mut().zip(CONDITIONS) {
-        *errors_m = errors_with(thrower, found, identified, seed.wrapping_add(case.index))?;
+impl ImportanceTrial {
+    /// Plans and throws.
+    ///
+    /// # Errors
+    /// What planning refuses.
+    pub fn of(case: &StrikeCase<'_>) -> Result<Self, PlanError> {
+        let (thrower, found) = (&case.thrower, &case.found.params);
+        let whole = thrower.plan(found, 1, Belief::default())?;
+        let mut partly_m = [const { Vec::new() }; CONDITIONS.len()];
+        for (errors_m, identified) in partly_m.iter_mut().zip(CONDITIONS) {
+            let seed = case.seed.wrapping_add(case.index);
+            *errors_m = errors_with(thrower, found, identified, seed)?;
+        }
+        Ok(Self {
+            index: case.index,
+            target_m: case.target_m,
+            identified_m: thrower.throw(&whole)?.error_m,
+            partly_m,
+        })
     }
-    Ok(ImportanceTrial {
-        index: case.index,
-        target_m: case.target_m,
-        identified_m: thrower.throw(&whole)?.error_m,
-        partly_m,
-    })
-}
-
-/// Makes the trials with these indices, in parallel; in their order, whatever the
-/// threads.
-///
-/// # Errors
-/// The first trial that cannot be made.
-pub fn importance_trials(
-    rig: &TrialRig,
-    config: &PlannerConfig,
-    options: &IdentifyOptions,
-    seed: u64,
-    indices: &[u64],
-) -> Result<Vec<ImportanceTrial>, TrialError> {
-    strike_trials(rig, config, options, seed, indices, |case| {
-        trial(case, seed)
-    })
 }
 
 #[cfg(test)]

@@ -1,16 +1,12 @@
 //! Lobs and drapes planned with identified parameters, judged with the true rope.
 
-use super::{TrialError, TrialRig};
-use arm_model::Limits;
+use super::thrower::Thrower;
+use super::{FailedTrial, TrialRig, alone, in_parallel};
 use planner::process::PlannerConfig;
 use planner::sysid::IdentifyOptions;
-use planner::tasks::{
-    Belief, PlanError, PlanOptions, PlanRequest, ThrowSimulator, plan_throw, simulator_for,
-};
-use planner::workers::map_in_order;
+use planner::tasks::{Belief, PlanError, PlanOptions};
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, Task, Verdict};
-use std::ops::ControlFlow;
 
 /// Ropes of the comparison. TOML form: keys as the fields.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -102,45 +98,23 @@ pub struct LobDrapeTrial {
     pub drape: Option<Judged>,
 }
 
-fn judged(
-    config: &PlannerConfig,
-    kind: Task,
-    target_m: [f64; 3],
-    (truth, found): (&RopeParams, &RopeParams),
-    seed: u64,
-) -> Result<Option<Judged>, PlanError> {
-    let task = config.task(kind, target_m);
-    let request = PlanRequest {
-        rope: *found,
-        limits: Limits::default(),
-        options: PlanOptions {
-            seed,
-            threads: 1,
-            ..config.search
-        },
-        belief: Belief::default(),
-        following: None,
-    };
-    let planned = match plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(())) {
+fn judged(thrower: &Thrower<'_>, found: &RopeParams) -> Result<Option<Judged>, PlanError> {
+    let planned = match thrower.plan(found, thrower.options.searches, Belief::default()) {
         Err(PlanError::OnlyCollisions { .. }) => return Ok(None),
         planned => planned?,
     };
-    let simulator = ThrowSimulator {
-        tail_s: task.config().observed_s,
-        ..simulator_for(&*task, truth, &request.options)
-    };
-    let outcomes = simulator.exact().run(&[(truth, &planned.trajectory)])?;
-    Ok(outcomes.first().map(|o| Judged {
-        verdict: task.judge(truth, o),
+    let task = thrower.task;
+    Ok(thrower.outcome(&planned)?.map(|o| Judged {
+        verdict: task.judge(&thrower.truth, &o),
         predicted: planned.verdict,
-        error_m: task.error_m(o),
+        error_m: task.error_m(&o),
         contacts: o.contacts.rope_robot + o.contacts.pole_robot + o.contacts.base_region,
         simulations: planned.simulations,
     }))
 }
 
-/// Films, identifies and throws the ropes with these indices, in parallel; in their
-/// order, whatever the threads. The lead is weighed, as anybody would.
+/// Films, identifies and throws the ropes with these indices. The lead is weighed, as
+/// anybody would.
 ///
 /// # Errors
 /// The first trial that cannot be made.
@@ -149,35 +123,35 @@ pub fn lob_drape_trials(
     config: &PlannerConfig,
     scene: &LobDrapeConfig,
     options: &IdentifyOptions,
-    seed: u64,
     indices: &[u64],
-) -> Result<Vec<LobDrapeTrial>, TrialError> {
-    let ropes = scene.ropes();
-    let trial = |index: &u64| {
-        let at = usize::try_from(*index).unwrap_or(usize::MAX) % ropes.len().max(1);
+) -> Result<Vec<LobDrapeTrial>, FailedTrial> {
+    let (ropes, seed) = (scene.ropes(), options.seed);
+    in_parallel(indices, options.threads, |index| {
+        let at = usize::try_from(index).unwrap_or(usize::MAX) % ropes.len().max(1);
         let (name, truth) = &ropes[at];
-        let filmed = rig.film(truth, seed, *index)?;
+        let filmed = rig.film(truth, seed, index)?;
         let options = IdentifyOptions {
-            threads: 1,
             lead_mass_kg: Some(truth.lead_mass_kg),
-            ..*options
+            ..alone(options)
         };
-        let found = rig.fit(&filmed, *index, &options)?.params;
+        let found = rig.fit(&filmed, index, &options)?.params;
         let judge = |kind, target_m| {
-            judged(config, kind, target_m, (truth, &found), seed ^ index).map_err(|source| {
-                TrialError::Plan {
-                    index: *index,
-                    source: Box::new(source),
-                }
-            })
+            let task = config.task(kind, target_m);
+            let thrower = Thrower {
+                task: &*task,
+                options: PlanOptions {
+                    seed: seed ^ index,
+                    threads: 1,
+                    ..config.search
+                },
+                truth: *truth,
+            };
+            judged(&thrower, &found)
         };
         Ok(LobDrapeTrial {
             name: name.clone(),
             lob: judge(Task::Lob, scene.lob_target_m)?,
             drape: judge(Task::Drape, scene.drape_target_m)?,
         })
-    };
-    map_in_order(indices, options.threads, trial)
-        .into_iter()
-        .collect()
+    })
 }

@@ -5,38 +5,37 @@
 mod fidelity;
 mod importance;
 mod lob_drape;
-mod outside;
 mod pipeline;
 mod robust;
 mod sensitivity;
 mod sensitivity_map;
+mod statistics;
 mod strike_case;
 mod summary;
 mod thrower;
 mod wiggles;
 
 pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
-pub use importance::{ImportanceTrial, importance_trials};
+pub use importance::ImportanceTrial;
 pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
-pub use outside::area_under_curve;
-pub use pipeline::{PipelineTrial, Spread, pipeline_trials};
-pub use robust::{Foreseen, RobustTrial, robust_trials};
+pub use pipeline::PipelineTrial;
+pub use robust::{Foreseen, RobustTrial};
 pub use sensitivity::{SensitivityTrial, sensitivity_trials};
 pub use sensitivity_map::{MOMENT_FRAMES, SensitivityMap};
-pub use summary::{Coverage, ParameterRow, RatioRow, SysidSummary, summarise};
+pub use statistics::{Spread, area_under_curve, mean, quantile};
+pub use strike_case::{StrikeCase, strike_trials};
+pub use summary::{ParameterRow, RatioRow, SysidSummary, summarise};
 pub use thrower::Strikes;
 pub use wiggles::{AblatedWiggle, ablated_wiggles};
 
 use planner::filming::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
 use planner::observation::ObservedPoints;
-use planner::phi::{HybridError, PhiNet, identify_by_network, proposal};
+use planner::phi::{HybridError, NetworkError, PhiNet, identify_by_network, identify_with_network};
 use planner::ropes::TRIAL_SALT;
 pub use planner::ropes::{outside_rope, trial_rope};
 
 use arm_model::Limits;
-use planner::sysid::Method;
-use planner::sysid::identify_from;
-use planner::sysid::{FitProgress, IdentifyError, IdentifyOptions, Observation, identify};
+use planner::sysid::{FitProgress, IdentifyOptions, Method, Observation, identify};
 use planner::tasks::PlanError;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
 use planner::workers::map_in_order;
@@ -69,55 +68,37 @@ pub struct TrialRig {
 /// Why a trial could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
-    /// There is no wiggle.
-    #[error(transparent)]
-    Wiggle(#[from] WiggleError),
     /// The film could not be simulated.
-    #[error("trial {index}: {source}")]
-    Film {
-        /// Index of the trial.
-        index: u64,
-        /// What is wrong.
-        source: SimulateError,
-    },
-    /// A throw could not be planned.
-    #[error("trial {index}: {source}")]
-    Plan {
-        /// Index of the trial.
-        index: u64,
-        /// What is wrong.
-        source: Box<PlanError>,
-    },
+    #[error(transparent)]
+    Film(#[from] SimulateError),
     /// The film has no frame.
-    #[error("trial {index}: the film has no frame; film longer")]
-    EmptyFilm {
-        /// Index of the trial.
-        index: u64,
-    },
+    #[error("the film has no frame; film longer")]
+    EmptyFilm,
+    /// Network or fit failed.
+    #[error(transparent)]
+    Identify(#[from] HybridError),
     /// The network gave no answer.
-    #[error("trial {index}: {source}")]
-    Network {
-        /// Index of the trial.
-        index: u64,
-        /// What is wrong.
-        source: planner::phi::NetworkError,
-    },
-    /// The fit from the network's proposal failed.
-    #[error("trial {index}: {source}")]
-    Hybrid {
-        /// Index of the trial.
-        index: u64,
-        /// What is wrong.
-        source: HybridError,
-    },
-    /// Identification failed.
-    #[error("trial {index}: {source}")]
-    Identify {
-        /// Index of the trial.
-        index: u64,
-        /// What is wrong.
-        source: IdentifyError,
-    },
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// A throw could not be planned.
+    #[error(transparent)]
+    Plan(Box<PlanError>),
+}
+
+impl From<PlanError> for TrialError {
+    fn from(error: PlanError) -> Self {
+        Self::Plan(Box::new(error))
+    }
+}
+
+/// The first of several trials that could not be made.
+#[derive(Debug, thiserror::Error)]
+#[error("trial {index}: {source}")]
+pub struct FailedTrial {
+    /// Index of the trial.
+    pub index: u64,
+    /// What is wrong.
+    pub source: TrialError,
 }
 
 /// One identified rope with its truth. Arrays are in the order of the parameter ranges.
@@ -148,7 +129,7 @@ impl TrialRig {
     ///
     /// # Errors
     /// If the arm may not execute it.
-    pub fn new(config: &WiggleConfig) -> Result<Self, TrialError> {
+    pub fn new(config: &WiggleConfig) -> Result<Self, WiggleError> {
         Ok(Self {
             motion: PlannedArm::new(wiggle(config, &Limits::default())?),
             camera: side_camera(),
@@ -169,8 +150,8 @@ impl TrialRig {
             ObservedPoints::ArcLength => KeypointLayout::Uniform(KEYPOINTS),
             ObservedPoints::LinkCentres => KeypointLayout::LinkCentres,
         };
-        film(rope, &self.motion, &self.camera, layout, &timing, &noise)
-            .map_err(|source| TrialError::Film { index, source })
+        let camera = &self.camera;
+        Ok(film(rope, &self.motion, camera, layout, &timing, &noise)?)
     }
 
     /// A film with all that is known beside it.
@@ -205,35 +186,15 @@ impl TrialRig {
             camera_look_at_std_m: self.randomisation.camera_lookat_m.max(1e-4),
             ..*options
         };
-        if let Some(net) = &self.network {
-            return with_network(net, &observation, index, &options);
-        }
-        identify(&observation, &options, &mut |_: FitProgress| {
-            ControlFlow::Continue(())
+        let quiet = &mut |_: FitProgress| ControlFlow::Continue(());
+        Ok(match &self.network {
+            Some(net) if options.method == Method::Network => {
+                identify_by_network(net, &observation, &options)?
+            }
+            Some(net) => identify_with_network(net, &observation, &options, quiet)?,
+            None => identify(&observation, &options, quiet).map_err(HybridError::from)?,
         })
-        .map_err(|source| TrialError::Identify { index, source })
     }
-}
-
-/// Identifies with the network at hand.
-fn with_network(
-    net: &PhiNet,
-    observation: &Observation<'_>,
-    index: u64,
-    options: &IdentifyOptions,
-) -> Result<RopeEstimate, TrialError> {
-    if options.method == Method::Network {
-        return identify_by_network(net, observation, options)
-            .map_err(|source| TrialError::Network { index, source });
-    }
-    let proposed = proposal(net, observation, options);
-    proposed
-        .map_err(HybridError::from)
-        .and_then(|rope| {
-            let quiet = &mut |_: FitProgress| ControlFlow::Continue(());
-            Ok(identify_from(observation, rope.as_ref(), options, quiet)?)
-        })
-        .map_err(|source| TrialError::Hybrid { index, source })
 }
 
 impl Trial {
@@ -254,27 +215,39 @@ impl Trial {
     }
 }
 
-/// Films and identifies the ropes with these indices, in parallel; trials in the order
-/// of the indices, whatever the threads.
+/// Makes the trials with these indices, in parallel; in their order, whatever the
+/// threads.
+fn in_parallel<T: Send>(
+    indices: &[u64],
+    threads: usize,
+    make: impl Fn(u64) -> Result<T, TrialError> + Sync,
+) -> Result<Vec<T>, FailedTrial> {
+    let trial = |&index: &u64| make(index).map_err(|source| FailedTrial { index, source });
+    map_in_order(indices, threads, trial).into_iter().collect()
+}
+
+/// Films and identifies the ropes with these indices.
 ///
 /// # Errors
 /// The first trial that cannot be made.
 pub fn run(
     rig: &TrialRig,
     rope: impl Fn(u64) -> RopeParams + Sync,
-    seed: u64,
     indices: &[u64],
     options: &IdentifyOptions,
-) -> Result<Vec<Trial>, TrialError> {
-    let alone = IdentifyOptions {
+) -> Result<Vec<Trial>, FailedTrial> {
+    in_parallel(indices, options.threads, |index| {
+        let truth = rope(index);
+        let filmed = rig.film(&truth, options.seed, index)?;
+        let found = rig.fit(&filmed, index, &alone(options))?;
+        Ok(Trial::new(index, &truth, &found))
+    })
+}
+
+/// One of several trials that are made at once.
+fn alone(options: &IdentifyOptions) -> IdentifyOptions {
+    IdentifyOptions {
         threads: 1,
         ..*options
-    };
-    let trials = map_in_order(indices, options.threads, |index| {
-        let truth = rope(*index);
-        let filmed = rig.film(&truth, seed, *index)?;
-        let found = rig.fit(&filmed, *index, &alone)?;
-        Ok(Trial::new(*index, &truth, &found))
-    });
-    trials.into_iter().collect()
+    }
 }

@@ -1,11 +1,8 @@
 //! Strikes planned for one identified rope beside strikes planned for every rope it might
 //! be, and whether the forecast holds.
 
-use super::strike_case::{StrikeCase, strike_trials};
+use super::strike_case::StrikeCase;
 use super::thrower::Strikes;
-use super::{TrialError, TrialRig};
-use planner::process::PlannerConfig;
-use planner::sysid::IdentifyOptions;
 use planner::tasks::{Belief, PlanError};
 use serde::{Deserialize, Serialize};
 use shared_types::ErrorForecast;
@@ -50,38 +47,29 @@ pub struct RobustTrial {
     pub robust: Foreseen,
 }
 
-fn trial(case: &StrikeCase<'_>) -> Result<RobustTrial, PlanError> {
-    let (thrower, found) = (&case.thrower, &case.found);
-    let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
-        let seed = thrower.options.seed;
-        let drawn = Belief::drawn(&found.params, &found.posterior, optimised, FORECAST, seed);
-        let planned = thrower.plan(&found.params, SEARCHES, drawn)?;
-        Ok(Foreseen {
-            strike: thrower.throw(&planned)?,
-            forecast: planned.forecast,
+impl RobustTrial {
+    /// Plans and throws.
+    ///
+    /// # Errors
+    /// What planning refuses.
+    pub fn of(case: &StrikeCase<'_>) -> Result<Self, PlanError> {
+        let (thrower, found) = (&case.thrower, &case.found);
+        let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
+            let seed = thrower.options.seed;
+            let drawn = Belief::drawn(&found.params, &found.posterior, optimised, FORECAST, seed);
+            let planned = thrower.plan(&found.params, SEARCHES, drawn)?;
+            Ok(Foreseen {
+                strike: thrower.throw(&planned)?,
+                forecast: planned.forecast,
+            })
+        };
+        Ok(Self {
+            index: case.index,
+            target_m: case.target_m,
+            plain: foreseen(0)?,
+            robust: foreseen(OPTIMISED)?,
         })
-    };
-    Ok(RobustTrial {
-        index: case.index,
-        target_m: case.target_m,
-        plain: foreseen(0)?,
-        robust: foreseen(OPTIMISED)?,
-    })
-}
-
-/// Makes the trials with these indices, in parallel; in their order, whatever the
-/// threads.
-///
-/// # Errors
-/// The first trial that cannot be made.
-pub fn robust_trials(
-    rig: &TrialRig,
-    config: &PlannerConfig,
-    options: &IdentifyOptions,
-    seed: u64,
-    indices: &[u64],
-) -> Result<Vec<RobustTrial>, TrialError> {
-    strike_trials(rig, config, options, seed, indices, trial)
+    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! What in a film the network's answer hangs on, rope by rope.
 
-use super::{SensitivityMap, TrialError, TrialRig, trial_rope};
+use super::{FailedTrial, SensitivityMap, TrialRig, in_parallel, trial_rope};
 use planner::phi::{NetworkError, PhiNet};
-use planner::workers::map_in_order;
 use serde::{Deserialize, Serialize};
 
 /// One filmed rope.
@@ -14,7 +13,7 @@ pub struct SensitivityTrial {
     pub map: SensitivityMap,
 }
 
-/// Makes the trials with these indices in parallel; in their order, whatever the threads.
+/// Makes the trials with these indices.
 ///
 /// # Errors
 /// The first trial that cannot be made.
@@ -24,16 +23,12 @@ pub fn sensitivity_trials(
     seed: u64,
     indices: &[u64],
     threads: usize,
-) -> Result<Vec<SensitivityTrial>, TrialError> {
-    let trials = map_in_order(indices, threads, |index| {
-        let index = *index;
-        let failed = |source: NetworkError| TrialError::Network { index, source };
+) -> Result<Vec<SensitivityTrial>, FailedTrial> {
+    in_parallel(indices, threads, |index| {
         let filmed = rig.film(&trial_rope(seed, index), seed, index)?;
         let features = net.see(&rig.observation(&filmed));
-        let features = features.map_err(|e| failed(e.into()))?;
-        let map = SensitivityMap::measure(net, &features);
-        let map = map.map_err(|e| failed(e.into()))?;
+        let map = SensitivityMap::measure(net, &features.map_err(NetworkError::from)?);
+        let map = map.map_err(NetworkError::from)?;
         Ok(SensitivityTrial { index, map })
-    });
-    trials.into_iter().collect()
+    })
 }

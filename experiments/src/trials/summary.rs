@@ -1,14 +1,11 @@
 //! What trials add up to.
 
-use super::Trial;
+use super::{Trial, mean, quantile};
 use serde::{Deserialize, Serialize};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 
-/// How often intervals of 90 % hold the truth (0 to 1).
-pub type Coverage = f64;
-
 /// Errors of the paper's network: mean absolute, in the order of [`RANGES`].
-const PAPER: [f64; ROPE_PARAMETERS] = [
+pub(super) const PAPER: [f64; ROPE_PARAMETERS] = [
     0.098, 0.006, 0.010, 0.111, 0.002, 0.007, 0.005, 0.008, 0.152,
 ];
 /// Best possible mean absolute errors of what no film shows, all ratios known exactly.
@@ -39,8 +36,8 @@ pub struct ParameterRow {
     pub middle: f64,
     /// Best possible mean error where the scale of the masses limits it.
     pub best_possible: Option<f64>,
-    /// Part of the trials whose interval holds the truth.
-    pub coverage: Coverage,
+    /// Fraction of the trials whose interval of 90 % holds the truth.
+    pub coverage: f64,
 }
 
 /// A ratio over all trials: absolute relative errors.
@@ -63,32 +60,12 @@ pub struct SysidSummary {
     pub parameters: Vec<ParameterRow>,
     /// Rows of ratios.
     pub ratios: Vec<RatioRow>,
-    /// Part of the ropes, all of the ranges, that were taken for ropes outside.
+    /// Fraction of the ropes, all of the ranges, that were taken for ropes outside.
     pub taken_for_outside: f64,
     /// Median distance of the fit to the keypoints (px).
     pub residual_px: f64,
     /// Mean number of simulations.
     pub simulations: f64,
-}
-
-#[allow(clippy::cast_precision_loss, reason = "counts are small")]
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_u32), |(s, c), v| (s + v, c + 1));
-    sum / f64::from(count.max(1))
-}
-
-/// The value below which `part` of them lie.
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "an index of the list"
-)]
-fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    let at = (part * sorted.len().saturating_sub(1) as f64).round() as usize;
-    sorted.get(at).copied().unwrap_or(f64::NAN)
 }
 
 fn parameter(trials: &[Trial], i: usize) -> ParameterRow {

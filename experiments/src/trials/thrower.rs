@@ -1,12 +1,13 @@
-//! A strike planned for one rope and thrown with another.
+//! A throw planned for one rope and thrown with another.
 
-use arm_model::{JointTrajectory, Limits};
+use arm_model::Limits;
 use planner::tasks::{
-    Belief, PlanError, PlanOptions, PlanRequest, Planned, ThrowSimulator, ThrowTask, plan_throw,
-    simulator_for,
+    Belief, PlanError, PlanOptions, PlanRequest, Planned, ThrowOutcome, ThrowSimulator, ThrowTask,
+    plan_throw, simulator_for,
 };
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
+use std::fmt;
 use std::ops::ControlFlow;
 
 /// What one strike did.
@@ -25,6 +26,12 @@ pub(super) struct Thrower<'a> {
     pub(super) task: &'a dyn ThrowTask,
     pub(super) options: PlanOptions,
     pub(super) truth: RopeParams,
+}
+
+impl fmt::Debug for Thrower<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Thrower").finish_non_exhaustive()
+    }
 }
 
 impl Thrower<'_> {
@@ -50,22 +57,21 @@ impl Thrower<'_> {
 
     /// What a planned throw does with the true rope.
     pub(super) fn throw(&self, planned: &Planned) -> Result<Strikes, PlanError> {
+        let outcome = self.outcome(planned)?;
         Ok(Strikes {
-            error_m: self.error_m(&planned.trajectory)?,
+            error_m: outcome.map_or(f64::INFINITY, |o| self.task.error_m(&o)),
             predicted_m: planned.error_m,
             simulations: planned.simulations,
         })
     }
 
-    /// With the true rope, in double precision at half the step (m).
-    fn error_m(&self, trajectory: &JointTrajectory) -> Result<f64, PlanError> {
+    /// With the true rope, in double precision at half the step.
+    pub(super) fn outcome(&self, planned: &Planned) -> Result<Option<ThrowOutcome>, PlanError> {
         let simulator = ThrowSimulator {
             tail_s: self.task.config().observed_s,
             ..simulator_for(self.task, &self.truth, &self.options)
         };
-        let outcomes = simulator.exact().run(&[(&self.truth, trajectory)])?;
-        Ok(outcomes
-            .first()
-            .map_or(f64::INFINITY, |o| self.task.error_m(o)))
+        let throws = [(&self.truth, &planned.trajectory)];
+        Ok(simulator.exact().run(&throws)?.pop())
     }
 }

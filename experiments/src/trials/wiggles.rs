@@ -7,7 +7,8 @@
 //! planar ones). Large ones may break a limit of the arm; they are simulated all the
 //! same, and [`AblatedWiggle::breaks`] says so.
 
-use super::{TrialError, TrialRig};
+use super::TrialRig;
+use super::summary::PAPER;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use planner::wiggle::{WiggleConfig, WiggleError, unlimited};
 use rand::{RngExt, SeedableRng};
@@ -15,64 +16,24 @@ use rand_chacha::ChaCha12Rng;
 use rope_sim::PlannedArm;
 use shared_types::rope::ROPE_PARAMETERS;
 
-/// Amplitude (degrees), frequency (Hz) and the paper's errors, order of its table:
-/// "Wiggle Study: Mean Absolute Error across wiggle variants", columns 1 to 6.
-const SINES: [(f64, f64, [f64; ROPE_PARAMETERS]); 6] = [
-    (
-        20.0,
-        0.5,
-        [
-            0.122, 0.007, 0.010, 0.118, 0.002, 0.006, 0.005, 0.008, 0.153,
-        ],
-    ),
-    (
-        20.0,
-        0.75,
-        [
-            0.127, 0.013, 0.033, 0.257, 0.003, 0.010, 0.011, 0.008, 0.160,
-        ],
-    ),
-    (
-        20.0,
-        1.0,
-        [
-            0.225, 0.017, 0.038, 0.258, 0.003, 0.010, 0.014, 0.008, 0.160,
-        ],
-    ),
-    (
-        30.0,
-        0.5,
-        [
-            0.205, 0.015, 0.018, 0.224, 0.003, 0.013, 0.008, 0.008, 0.179,
-        ],
-    ),
-    (
-        30.0,
-        0.75,
-        [
-            0.206, 0.018, 0.031, 0.244, 0.004, 0.012, 0.011, 0.008, 0.169,
-        ],
-    ),
-    (
-        30.0,
-        1.0,
-        [
-            0.360, 0.022, 0.096, 0.336, 0.006, 0.014, 0.018, 0.008, 0.241,
-        ],
-    ),
+/// The paper's mean absolute errors with one wiggle: thousandths of the parameters' units,
+/// in the order of their ranges.
+type Thousandths = [u16; ROPE_PARAMETERS];
+
+/// Amplitude (degrees), frequency (Hz) and the paper's errors: "Wiggle Study: Mean Absolute
+/// Error across wiggle variants", columns 1 to 6.
+const SINES: [(f64, f64, Thousandths); 6] = [
+    (20.0, 0.5, [122, 7, 10, 118, 2, 6, 5, 8, 153]),
+    (20.0, 0.75, [127, 13, 33, 257, 3, 10, 11, 8, 160]),
+    (20.0, 1.0, [225, 17, 38, 258, 3, 10, 14, 8, 160]),
+    (30.0, 0.5, [205, 15, 18, 224, 3, 13, 8, 8, 179]),
+    (30.0, 0.75, [206, 18, 31, 244, 4, 12, 11, 8, 169]),
+    (30.0, 1.0, [360, 22, 96, 336, 6, 14, 18, 8, 241]),
 ];
-/// The paper's errors with its two random wiggles.
-const RANDOM: [[f64; ROPE_PARAMETERS]; 2] = [
-    [
-        2.098, 0.057, 0.036, 0.388, 0.003, 0.019, 0.021, 0.007, 0.205,
-    ],
-    [
-        1.453, 0.028, 0.040, 0.322, 0.004, 0.014, 0.016, 0.008, 0.208,
-    ],
-];
-/// The paper's errors with its main wiggle.
-const MAIN: [f64; ROPE_PARAMETERS] = [
-    0.098, 0.006, 0.010, 0.111, 0.002, 0.007, 0.005, 0.008, 0.152,
+/// The same with its two random wiggles.
+const RANDOM: [Thousandths; 2] = [
+    [2098, 57, 36, 388, 3, 19, 21, 7, 205],
+    [1453, 28, 40, 322, 4, 14, 16, 8, 208],
 ];
 /// Time over which a sine fades in and out (s).
 const FADE_S: f64 = 0.8;
@@ -99,7 +60,7 @@ pub struct AblatedWiggle {
 ///
 /// # Errors
 /// If one cannot be made.
-pub fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, TrialError> {
+pub fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, WiggleError> {
     let limits = Limits::default();
     let one = |name, paper, trajectory: Result<JointTrajectory, WiggleError>| {
         let trajectory = trajectory?;
@@ -110,6 +71,7 @@ pub fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, TrialE
             trajectory,
         })
     };
+    let units = |thousandths: Thousandths| thousandths.map(|t| f64::from(t) / 1e3);
     let sines = SINES.into_iter().map(|(degrees, frequency_hz, paper)| {
         let config = WiggleConfig {
             amplitude_rad: degrees.to_radians(),
@@ -118,11 +80,11 @@ pub fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, TrialE
             ..*main
         };
         let name = format!("{degrees:.0} degrees, {frequency_hz} Hz");
-        one(name, paper, unlimited(&config))
+        one(name, units(paper), unlimited(&config))
     });
     let random = (1_u64..).zip(RANDOM).map(|(number, paper)| {
         let trajectory = random_wiggle(main, SEED + number);
-        one(format!("random {number}"), paper, trajectory)
+        one(format!("random {number}"), units(paper), trajectory)
     });
     let name = format!(
         "main: {:.1} degrees, {} Hz",
@@ -131,7 +93,7 @@ pub fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, TrialE
     );
     sines
         .chain(random)
-        .chain([one(name, MAIN, unlimited(main))])
+        .chain([one(name, PAPER, unlimited(main))])
         .collect()
 }
 

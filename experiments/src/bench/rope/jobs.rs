@@ -117,7 +117,6 @@ fn wiggle_job(workload: &Workload, extent: Extent) -> Job<'_> {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "some thousands")]
 fn measure_one(kernel: Kernel, job: &Job, extent: Extent) -> Result<JobRow, SimulateError> {
     let (spent, (_, rollouts)) = least(extent.repeats, || {
         roll_out(kernel, &job.candidates, &job.options)

@@ -8,9 +8,8 @@ mod scaling;
 mod workload;
 
 use crate::args::BenchArgs;
-use cli_output::Machine;
-use cli_output::Stage;
-use cli_output::{OrInput, Outcome};
+use crate::bench;
+use cli_output::{OrInput, Outcome, Stage};
 use serde::Serialize;
 use serde_json::Value;
 use workload::Workload;
@@ -48,11 +47,6 @@ impl Extent {
 /// Everything measured.
 #[derive(Debug, Serialize)]
 struct Report {
-    ok: bool,
-    command: &'static str,
-    machine: Machine,
-    seed: u64,
-    quick: bool,
     repeats: usize,
     kernels: Vec<kernels::KernelRow>,
     jobs: Vec<jobs::JobRow>,
@@ -78,19 +72,29 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         candidates.len()
     ));
     let report = Report {
-        ok: true,
-        command: "bench rope",
-        machine: Machine::here(),
-        seed: args.seed,
-        quick: args.quick,
         repeats: extent.repeats,
         kernels,
         jobs,
         links,
         candidates,
     };
-    if !quiet {
-        report.print();
-    }
-    serde_json::to_value(&report).or_failed().map(Some)
+    let own = serde_json::to_value(&report).or_failed()?;
+    Ok(bench::report::report(
+        (args, quiet),
+        "bench rope",
+        own,
+        || {
+            println!(
+                "seed {}, least processor time of {}{}",
+                args.seed,
+                extent.repeats,
+                if args.quick {
+                    "; quick: few candidates, rough figures"
+                } else {
+                    ""
+                }
+            );
+            report.print();
+        },
+    ))
 }

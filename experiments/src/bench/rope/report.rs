@@ -7,17 +7,6 @@ use cli_output::table::numbers;
 impl Report {
     /// Prints all tables on standard output.
     pub(super) fn print(&self) {
-        println!("{}", self.machine);
-        println!(
-            "seed {}, least processor time of {}{}",
-            self.seed,
-            self.repeats,
-            if self.quick {
-                "; quick: few candidates, rough figures"
-            } else {
-                ""
-            }
-        );
         self.print_kernels();
         self.print_jobs();
         self.print_scaling();

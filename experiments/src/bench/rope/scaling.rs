@@ -62,7 +62,6 @@ pub struct CandidateRow {
 ///
 /// # Errors
 /// What the simulator refuses.
-#[allow(clippy::cast_precision_loss, reason = "some hundreds")]
 pub fn over_links(workload: &Workload, extent: Extent) -> Result<LinkScaling, SimulateError> {
     let kernel = Precision::F32.fastest_kernel();
     let count = kernel.lanes() * extent.share(GROUPS);
@@ -124,7 +123,6 @@ fn cut_into(rope: &RopeParams, links: u32) -> RopeParams {
 ///
 /// # Errors
 /// What the simulator refuses.
-#[allow(clippy::cast_precision_loss, reason = "some thousands")]
 pub fn over_candidates(
     workload: &Workload,
     extent: Extent,
@@ -149,7 +147,6 @@ pub fn over_candidates(
 }
 
 /// Least-squares line through points (x, y): slope, intercept, R².
-#[allow(clippy::cast_precision_loss, reason = "a handful of points")]
 fn line_through(points: &[[f64; 2]]) -> [f64; 3] {
     let n = points.len() as f64;
     let mean = |axis: usize| points.iter().map(|p| p[axis]).sum::<f64>() / n;

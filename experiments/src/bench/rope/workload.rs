@@ -124,7 +124,6 @@ pub fn roll_out_in(
     options: &SimOptions,
 ) -> Result<(f64, Vec<Rollout>), SimulateError> {
     let rollouts = roll_out_in_with(kernel, scene, candidates, options)?;
-    #[allow(clippy::cast_precision_loss, reason = "some thousands")]
     let rope_steps = options.horizon_s / options.step_s * rollouts.len() as f64;
     Ok((rope_steps, rollouts))
 }

@@ -1,0 +1,201 @@
+//! What every result shares: set-up, trials that survive an interruption, report.
+
+use super::checkpoint::Checkpoint;
+use super::picture::{Curve, Picture};
+use crate::args::ResultArgs;
+use crate::network::with_network;
+use crate::report::joined;
+use anyhow::anyhow;
+use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
+use experiments::trials::{Trial, TrialRig, run as identify_all};
+use planner::process::PlannerConfig;
+use planner::sysid::{IdentifyOptions, Method};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use shared_types::RopeParams;
+use shared_types::ipc::message::Progress;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Ropes of a result of identification.
+const IDENTIFIED: u64 = 1000;
+
+/// The planner's built-in configuration, whatever this machine's folders say: results
+/// must be the same everywhere.
+pub(crate) fn built_in() -> Result<PlannerConfig, toml::de::Error> {
+    toml::from_str(include_str!("../../../configs/planner/planner.toml"))
+}
+
+/// Metres as centimetres of a table.
+pub(super) fn cm(m: f64) -> String {
+    format!("{:.2}", 100.0 * m)
+}
+
+/// One run of a result.
+pub(super) struct Experiment<'a> {
+    name: &'static str,
+    quiet: bool,
+    stage: Stage,
+    pub args: &'a ResultArgs,
+    pub config: PlannerConfig,
+    /// Films the wiggle of the configuration.
+    pub rig: TrialRig,
+    /// How to identify.
+    pub options: IdentifyOptions,
+}
+
+/// A sequence of trials.
+pub(super) struct Sequence<T> {
+    /// Distinguishes the trials of one checkpoint file from those of others, beside name
+    /// and seed.
+    pub method: String,
+    /// Trials wanted.
+    pub count: u64,
+    /// Trials that each thread makes between two writes of the file.
+    pub per_thread: usize,
+    /// Figure of the latest trial that progress shows, and its label.
+    pub figure: (fn(&T) -> f64, &'static str),
+}
+
+impl<'a> Experiment<'a> {
+    pub fn begin(name: &'static str, args: &'a ResultArgs, quiet: bool) -> Outcome<Self> {
+        let method: Method = args.method.into();
+        let config = built_in().or_failed()?;
+        let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
+        with_network(&mut rig, method, args.model.as_deref())?;
+        cli_output::watch_interrupts().or_failed()?;
+        Ok(Self {
+            name,
+            quiet,
+            stage: Stage::begin(name, quiet),
+            args,
+            rig,
+            options: IdentifyOptions {
+                method,
+                seed: args.seed,
+                threads: args.threads.map_or(config.identify.threads, usize::from),
+                ..config.identify
+            },
+            config,
+        })
+    }
+
+    /// The method as checkpoint files name it.
+    pub fn method(&self) -> String {
+        format!("{:?}", self.options.method).to_lowercase()
+    }
+
+    /// A sequence of as many trials as ropes are asked for.
+    pub fn sequence<T>(
+        &self,
+        default_count: u64,
+        per_thread: usize,
+        figure: (fn(&T) -> f64, &'static str),
+    ) -> Sequence<T> {
+        Sequence {
+            method: self.method(),
+            count: self.args.ropes.unwrap_or(default_count),
+            per_thread,
+            figure,
+        }
+    }
+
+    /// Makes the trials of a sequence, or goes on with those of an earlier run.
+    pub fn trials<T: Serialize + DeserializeOwned, E: Into<anyhow::Error>>(
+        &self,
+        sequence: Sequence<T>,
+        mut make: impl FnMut(&[u64]) -> Result<Vec<T>, E>,
+    ) -> Outcome<Vec<T>> {
+        let out = self.args.out.as_deref();
+        let count = sequence.count;
+        let empty = Checkpoint {
+            name: self.name.to_owned(),
+            version: shared_types::VERSION.to_owned(),
+            seed: self.args.seed,
+            method: sequence.method,
+            trials: Vec::new(),
+        };
+        let mut checkpoint = Checkpoint::open(out, empty).or_input()?;
+        let trials = &mut checkpoint.trials;
+        trials.truncate(usize::try_from(count).unwrap_or(usize::MAX));
+        let missing: Vec<u64> = (trials.len() as u64..count).collect();
+        for batch in missing.chunks(sequence.per_thread * self.options.threads.max(1)) {
+            checkpoint.trials.extend(make(batch).or_failed()?);
+            checkpoint.write(out).or_failed()?;
+            let done = checkpoint.trials.len();
+            let latest = checkpoint.trials.last().map_or(0.0, sequence.figure.0);
+            let all = usize::try_from(count).unwrap_or(usize::MAX);
+            self.progress(done, all, latest, sequence.figure.1);
+            if interrupted().load(Ordering::SeqCst) {
+                let how = match out {
+                    Some(_) => "; the same command resumes from there",
+                    None => "; with --out FILE it could resume from there",
+                };
+                let reason = anyhow!("interrupted after {done} of {count} ropes{how}");
+                return Err(Failure::failed(reason));
+            }
+        }
+        Ok(checkpoint.trials)
+    }
+
+    /// Films and identifies as many ropes as are asked for, times `factor`.
+    pub fn identified(
+        &self,
+        factor: u64,
+        rope: impl Fn(u64) -> RopeParams + Sync,
+    ) -> Outcome<Vec<Trial>> {
+        let figure = |t: &Trial| t.residual_px;
+        let asked = self.sequence(IDENTIFIED, 8, (figure, "ropes, residual px"));
+        let sequence = Sequence {
+            count: factor * asked.count,
+            ..asked
+        };
+        self.trials(sequence, |batch| {
+            identify_all(&self.rig, &rope, batch, &self.options)
+        })
+    }
+
+    /// Shows how many trials are done, with a figure of the latest.
+    pub fn progress(&self, done: usize, total: usize, value: f64, label: &str) {
+        self.stage.progress(&Progress {
+            done: u32::try_from(done).unwrap_or(u32::MAX),
+            total: u32::try_from(total).unwrap_or(u32::MAX),
+            value,
+            label: label.to_owned(),
+        });
+    }
+
+    /// Draws the distributions beside the result file, if there is one.
+    pub fn picture(&self, axis: &str, curves: Vec<Curve>) -> Outcome<Option<PathBuf>> {
+        let (name, seed) = (self.name, self.args.seed);
+        let picture = Picture {
+            name,
+            axis,
+            seed,
+            curves,
+        };
+        picture.write(self.args.out.as_deref())
+    }
+
+    /// Ends the run: prints its tables, unless `--json` is given, and returns what that
+    /// prints: `own` fields beside those of every result.
+    pub fn finish(
+        self,
+        summary: &str,
+        picture: Option<PathBuf>,
+        own: Value,
+        print: impl FnOnce(),
+    ) -> Outcome<Option<Value>> {
+        let seconds = self.stage.done(summary);
+        if !self.quiet {
+            print();
+        }
+        let common = json!({
+            "ok": true, "command": self.name, "version": shared_types::VERSION,
+            "seed": self.args.seed, "method": self.options.method, "seconds": seconds,
+            "out": self.args.out, "picture": picture,
+        });
+        Ok(Some(joined(common, own)))
+    }
+}
