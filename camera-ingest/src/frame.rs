@@ -73,6 +73,20 @@ pub struct EyeFrame {
 pub struct StereoFrame(pub EyeFrame);
 
 impl EyeFrame {
+    /// A picture of one grey level, stamp and sequence 0.
+    #[must_use]
+    pub fn grey([width_px, height_px]: [usize; 2], level: u8) -> Self {
+        Self {
+            stamp_ns: 0,
+            sequence: 0,
+            width_px,
+            height_px,
+            luma: vec![level; width_px * height_px],
+            cb: vec![128; width_px * height_px / 2],
+            cr: vec![128; width_px * height_px / 2],
+        }
+    }
+
     /// `[Y, Cb, Cr]` of the nearest pixel inside the image.
     #[must_use]
     pub fn ycc(&self, u: usize, v: usize) -> [u8; 3] {
@@ -329,11 +343,7 @@ fn blank(width_px: usize, height_px: usize, stamp_ns: u64, sequence: u64) -> Eye
     EyeFrame {
         stamp_ns,
         sequence,
-        width_px,
-        height_px,
-        luma: vec![0; width_px * height_px],
-        cb: vec![128; width_px * height_px / 2],
-        cr: vec![128; width_px * height_px / 2],
+        ..EyeFrame::grey([width_px, height_px], 0)
     }
 }
 

@@ -1,61 +1,12 @@
 //! Does the rope hang still?
 //!
-//! A frame is compared with one a little earlier, so that slow swinging shows,
-//! too; pixels that changed by much more than the noise are counted within the
-//! rope's reach.
+//! A frame is compared with one a little earlier, so that slow swinging shows, too; pixels
+//! that changed by much more than the noise are counted. The whole picture counts: an arm
+//! or a person that moves is not still either.
 
 use std::collections::VecDeque;
 
-use nalgebra::Vector3;
-use shared_types::StereoCamera;
-
 use crate::frame::EyeFrame;
-
-/// A rectangle of raw pixels, upper bounds exclusive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Region {
-    /// First column.
-    pub u0: usize,
-    /// First row.
-    pub v0: usize,
-    /// Column after the last.
-    pub u1: usize,
-    /// Row after the last.
-    pub v1: usize,
-}
-
-impl Region {
-    /// Where a rope of `length_m` hanging on the clamp can be while it swings
-    /// out by up to half its length; `None` when that is not in view.
-    #[must_use]
-    pub fn below_clamp(
-        camera: &StereoCamera,
-        p_w_clamp_m: &Vector3<f64>,
-        length_m: f64,
-    ) -> Option<Self> {
-        let sideways = camera.r_w_cam.column(0) * (length_m / 2.0);
-        let down = Vector3::new(0.0, 0.0, -1.1 * length_m);
-        let corners = [
-            p_w_clamp_m + sideways,
-            p_w_clamp_m - sideways,
-            p_w_clamp_m + sideways + down,
-            p_w_clamp_m - sideways + down,
-        ];
-        let pixels: Vec<[f64; 2]> = corners
-            .iter()
-            .map(|p| camera.project_left(p))
-            .collect::<Option<_>>()?;
-        let bound = |k: usize, limit: u32| {
-            let ends = pixels.iter().map(|p| p[k].clamp(0.0, f64::from(limit)));
-            let low = ends.clone().fold(f64::INFINITY, f64::min);
-            let high = ends.fold(0.0, f64::max);
-            (low as usize, high as usize)
-        };
-        let (u0, u1) = bound(0, camera.width_px);
-        let (v0, v1) = bound(1, camera.height_px);
-        (u1 > u0 + 8 && v1 > v0 + 8).then_some(Self { u0, v0, u1, v1 })
-    }
-}
 
 /// What changed between two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,23 +17,18 @@ pub struct Motion {
     pub energy: f64,
 }
 
-/// Compares two frames of one size within a region (cut to the image).
+/// Compares two frames of one size.
 #[must_use]
-pub fn motion(a: &EyeFrame, b: &EyeFrame, region: Region) -> Motion {
-    let width = a.width_px.min(b.width_px);
-    let height = a.height_px.min(b.height_px);
-    let (u1, v1) = (region.u1.min(width), region.v1.min(height));
-    let mut changes: Vec<f32> = Vec::new();
+pub fn motion(a: &EyeFrame, b: &EyeFrame) -> Motion {
     // Pairs of pixels: half the noise, and the chroma's own raster.
-    for v in region.v0..v1 {
-        for u in (region.u0..u1.saturating_sub(1)).step_by(2) {
-            let pair = |f: &EyeFrame| {
-                let at = v * f.width_px + u;
-                f32::from(f.luma[at]) + f32::from(f.luma[at + 1])
-            };
-            changes.push((pair(a) - pair(b)) / 2.0);
-        }
-    }
+    let pairs = |frame: &EyeFrame| {
+        let pairs = frame.luma.chunks_exact(2);
+        pairs
+            .map(|p| f32::from(p[0]) + f32::from(p[1]))
+            .collect::<Vec<f32>>()
+    };
+    let both = pairs(a).into_iter().zip(pairs(b));
+    let changes: Vec<f32> = both.map(|(a, b)| (a - b) / 2.0).collect();
     if changes.is_empty() {
         return Motion {
             moved_px: 0,
@@ -107,7 +53,6 @@ pub fn motion(a: &EyeFrame, b: &EyeFrame, region: Region) -> Motion {
 /// Says when a rope has hung still for a while.
 #[derive(Debug)]
 pub struct StillDetector {
-    region: Region,
     lag: usize,
     needed: usize,
     moved_limit_px: usize,
@@ -119,9 +64,8 @@ impl StillDetector {
     /// Still means: over `needed` frames in a row, no more than 12 pixels differ
     /// from the frame a tenth of a second (`lag` frames) earlier.
     #[must_use]
-    pub fn new(region: Region, lag: usize, needed: usize) -> Self {
+    pub fn new(lag: usize, needed: usize) -> Self {
         Self {
-            region,
             lag: lag.max(1),
             needed: needed.max(1),
             moved_limit_px: 12,
@@ -135,7 +79,7 @@ impl StillDetector {
         if self.recent.len() >= self.lag
             && let Some(before) = self.recent.pop_front()
         {
-            let moved = motion(&before, &frame, self.region).moved_px;
+            let moved = motion(&before, &frame).moved_px;
             self.still_frames = if moved <= self.moved_limit_px {
                 self.still_frames + 1
             } else {
@@ -163,40 +107,23 @@ mod tests {
             }
         }
         EyeFrame {
-            stamp_ns: 0,
-            sequence: 0,
-            width_px,
-            height_px,
             luma,
-            cb: vec![128; width_px * height_px / 2],
-            cr: vec![128; width_px * height_px / 2],
+            ..EyeFrame::grey([width_px, height_px], 0)
         }
     }
-
-    const ALL: Region = Region {
-        u0: 0,
-        v0: 0,
-        u1: 64,
-        v1: 48,
-    };
 
     #[test]
     fn noise_and_drift_are_not_motion() {
         let mut brighter = frame(2, Some(20));
         brighter.luma.iter_mut().for_each(|y| *y += 4);
-        assert_eq!(motion(&frame(1, Some(20)), &brighter, ALL).moved_px, 0);
-        let moved = motion(&frame(1, Some(20)), &frame(2, Some(24)), ALL);
+        assert_eq!(motion(&frame(1, Some(20)), &brighter).moved_px, 0);
+        let moved = motion(&frame(1, Some(20)), &frame(2, Some(24)));
         assert!(moved.moved_px > 100 && moved.energy > 10.0, "{moved:?}");
-        let elsewhere = Region { u1: 16, ..ALL };
-        assert_eq!(
-            motion(&frame(1, Some(20)), &frame(2, Some(24)), elsewhere).moved_px,
-            0
-        );
     }
 
     #[test]
     fn still_only_after_enough_still_frames() {
-        let mut detector = StillDetector::new(ALL, 2, 3);
+        let mut detector = StillDetector::new(2, 3);
         let mut said = Vec::new();
         for i in 0..10 {
             let bar = if i < 4 { 10 + 5 * i } else { 40 };

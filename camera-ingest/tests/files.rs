@@ -108,11 +108,7 @@ fn a_film_reads_back_with_its_rate_and_the_rope_drawn_in() {
     let grey = |i: u64| EyeFrame {
         stamp_ns: 5 + i * 20_000_000,
         sequence: i,
-        width_px: 64,
-        height_px: 32,
-        luma: vec![90; 64 * 32],
-        cb: vec![128; 32 * 32],
-        cr: vec![128; 32 * 32],
+        ..EyeFrame::grey([64, 32], 90)
     };
     let tracked = |lost: bool| TrackedFrame {
         t_s: 0.0,

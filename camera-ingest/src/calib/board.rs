@@ -101,7 +101,11 @@ impl Board {
                 "square_m and marker_m must be positive, the marker the smaller".to_owned(),
             );
         }
-        CornerDetector::new(self)
+        CornerDetector::new(
+            [self.rows, self.columns],
+            [self.square_m, self.marker_m],
+            &self.dictionary,
+        )
     }
 
     /// Place of an inner corner in the world (m).

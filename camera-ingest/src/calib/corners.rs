@@ -2,7 +2,6 @@
 //! the detector is as much to build as the rest of this crate, and is needed when a camera
 //! is set up only.
 
-use super::board::Board;
 use crate::frame::EyeFrame;
 
 #[cfg(feature = "calibration")]
@@ -10,21 +9,23 @@ pub(super) struct CornerDetector(calib_targets_charuco::CharucoDetector);
 
 #[cfg(feature = "calibration")]
 impl CornerDetector {
-    /// A detector of this board.
+    /// A detector of a board of so many squares, by the sides of a square and of a marker
+    /// and the markers' dictionary.
     ///
     /// # Errors
     /// The dictionary is not known, or the board is none: as text.
-    pub(super) fn new(board: &Board) -> Result<Self, String> {
+    pub(super) fn new(
+        [rows, columns]: [u32; 2],
+        [square_m, marker_m]: [f64; 2],
+        dictionary: &str,
+    ) -> Result<Self, String> {
         use calib_targets_charuco::{
             CharucoBoardSpec, CharucoDetector, CharucoParams, resolve_dictionary,
         };
-        let dictionary = resolve_dictionary(&board.dictionary)
-            .ok_or_else(|| format!("dictionary {:?} is not known", board.dictionary))?;
-        let (square, ratio) = (
-            board.square_m as f32,
-            (board.marker_m / board.square_m) as f32,
-        );
-        let spec = CharucoBoardSpec::new(board.rows, board.columns, square, ratio, dictionary);
+        let dictionary = resolve_dictionary(dictionary)
+            .ok_or_else(|| format!("dictionary {dictionary:?} is not known"))?;
+        let (square, ratio) = (square_m as f32, (marker_m / square_m) as f32);
+        let spec = CharucoBoardSpec::new(rows, columns, square, ratio, dictionary);
         let detector = CharucoDetector::new(CharucoParams::for_board(spec));
         detector.map(Self).map_err(|e| e.to_string())
     }
@@ -59,7 +60,11 @@ impl CornerDetector {
     ///
     /// # Errors
     /// How a build with the detector is made.
-    pub(super) fn new(_board: &Board) -> Result<Self, String> {
+    pub(super) fn new(
+        _squares: [u32; 2],
+        _sides_m: [f64; 2],
+        _dictionary: &str,
+    ) -> Result<Self, String> {
         Err(
             "this build cannot find printed boards; build it with `cargo build --release -p wag \
              --features calibration` (the Debian package has it), or show the lead instead \

@@ -7,62 +7,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Rotation3, Vector3};
 use shared_types::{Intrinsics, StereoCamera};
 
+use super::error::{CalibError, read_text, write_text};
 use super::ini::Ini;
-use super::{CalibError, read_text, write_text};
-
-/// Video mode of the camera; it names the calibration's sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum VideoMode {
-    /// 2208x1242 per eye.
-    #[serde(rename = "2K")]
-    TwoK,
-    /// 1920x1080 per eye.
-    #[serde(rename = "FHD", alias = "HD1080")]
-    FullHd,
-    /// 1280x720 per eye.
-    #[serde(rename = "HD", alias = "HD720")]
-    Hd,
-    /// 672x376 per eye.
-    #[serde(rename = "VGA")]
-    Vga,
-}
-
-impl VideoMode {
-    /// Suffix in the calibration file.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::TwoK => "2K",
-            Self::FullHd => "FHD",
-            Self::Hd => "HD",
-            Self::Vga => "VGA",
-        }
-    }
-
-    /// Width and height of one eye (px).
-    #[must_use]
-    pub fn size_px(self) -> (u32, u32) {
-        match self {
-            Self::TwoK => (2208, 1242),
-            Self::FullHd => (1920, 1080),
-            Self::Hd => (1280, 720),
-            Self::Vga => (672, 376),
-        }
-    }
-}
-
-/// What a factory file says about one mode: `X_right = R X_left - t`.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Eyes {
-    pub(super) left: Intrinsics,
-    pub(super) right: Intrinsics,
-    pub(super) r_right_left: Matrix3<f64>,
-    pub(super) t_right_left_m: Vector3<f64>,
-}
+use super::mode::{Eyes, VideoMode};
 
 const M_PER_MM: f64 = 1e-3;
 
@@ -77,9 +27,7 @@ pub(super) fn read(path: &Path, mode: VideoMode) -> Result<Eyes, CalibError> {
         };
         Ok(value.unwrap_or(0.0))
     };
-    let baseline_mm = ini
-        .number("STEREO", "Baseline")?
-        .ok_or_else(|| ini.missing("STEREO", "Baseline", mode.name()))?;
+    let baseline_mm = ini.need("STEREO", "Baseline", mode)?;
     if baseline_mm <= 0.0 {
         return Err(ini.bad("STEREO", "Baseline", "must be positive (mm)"));
     }
@@ -94,14 +42,10 @@ pub(super) fn read(path: &Path, mode: VideoMode) -> Result<Eyes, CalibError> {
 
 fn intrinsics(ini: &Ini, eye: &str, mode: VideoMode) -> Result<Intrinsics, CalibError> {
     let section = format!("{eye}_{}", mode.name());
-    let need = |key: &str| -> Result<f64, CalibError> {
-        ini.number(&section, key)?
-            .ok_or_else(|| ini.missing(&section, key, mode.name()))
-    };
     let or_zero =
         |key: &str| -> Result<f64, CalibError> { Ok(ini.number(&section, key)?.unwrap_or(0.0)) };
     let focal = |key: &str| -> Result<f64, CalibError> {
-        let value = need(key)?;
+        let value = ini.need(&section, key, mode)?;
         if value > 0.0 {
             Ok(value)
         } else {
@@ -111,8 +55,8 @@ fn intrinsics(ini: &Ini, eye: &str, mode: VideoMode) -> Result<Intrinsics, Calib
     Ok(Intrinsics {
         fx: focal("fx")?,
         fy: focal("fy")?,
-        cx: need("cx")?,
-        cy: need("cy")?,
+        cx: ini.need(&section, "cx", mode)?,
+        cy: ini.need(&section, "cy", mode)?,
         distortion: [
             or_zero("k1")?,
             or_zero("k2")?,

@@ -4,7 +4,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::CalibError;
+use super::error::CalibError;
+use super::mode::VideoMode;
 
 /// Parsed file: text by lower-case section and key.
 pub(super) struct Ini {
@@ -27,11 +28,14 @@ impl Ini {
                 let key = key.trim().to_ascii_lowercase();
                 values.insert((section.clone(), key), value.trim().to_owned());
             } else {
-                return Err(CalibError::Line {
-                    path: path.to_owned(),
-                    line: index + 1,
-                    text: raw.to_owned(),
-                });
+                return Err(CalibError::calibration(
+                    path,
+                    format!(
+                        "line {}: expected `key=value` or `[section]`, found {raw:?}; is this a \
+                         factory SNxxxx.conf?",
+                        index + 1
+                    ),
+                ));
             }
         }
         Ok(Self {
@@ -56,25 +60,27 @@ impl Ini {
         }
     }
 
-    /// Error about a value that is present.
-    pub(super) fn bad(&self, section: &str, key: &str, problem: &'static str) -> CalibError {
-        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
-        CalibError::Value {
-            path: self.path.clone(),
-            section: section.to_owned(),
-            key: key.to_owned(),
-            text: self.values.get(&at).cloned().unwrap_or_default(),
-            problem,
-        }
+    /// A number that a mode cannot do without.
+    pub(super) fn need(
+        &self,
+        section: &str,
+        key: &str,
+        mode: VideoMode,
+    ) -> Result<f64, CalibError> {
+        self.number(section, key)?.ok_or_else(|| {
+            let mode = mode.name();
+            let reason = format!("[{section}] has no `{key}`; the mode `{mode}` needs it");
+            CalibError::calibration(&self.path, reason)
+        })
     }
 
-    /// Error about a value that is absent.
-    pub(super) fn missing(&self, section: &str, key: &str, mode: &'static str) -> CalibError {
-        CalibError::Missing {
-            path: self.path.clone(),
-            section: section.to_owned(),
-            key: key.to_owned(),
-            mode,
-        }
+    /// Error about a value that is present.
+    pub(super) fn bad(&self, section: &str, key: &str, problem: &str) -> CalibError {
+        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
+        let text = self.values.get(&at).map_or("", String::as_str);
+        CalibError::calibration(
+            &self.path,
+            format!("[{section}] {key} = {text:?} {problem}"),
+        )
     }
 }

@@ -6,88 +6,23 @@
 
 pub mod board;
 mod corners;
+mod error;
 pub mod extrinsics;
 mod factory;
 mod ini;
+mod mode;
 mod models;
 mod settings;
 mod yaml;
 
-use crate::whole_file::write_whole;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-pub use factory::{VideoMode, write_factory_conf};
-pub use models::{ModelFiles, load_model_files};
-pub use settings::{check_camera, placed_camera_toml, write_camera_toml};
+pub use error::CalibError;
+pub use factory::write_factory_conf;
+pub use mode::VideoMode;
+pub use models::ModelFiles;
+pub use settings::{check_camera, load_model_files, placed_camera_toml, write_camera_toml};
 use shared_types::StereoCamera;
-
-/// Why a calibration cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum CalibError {
-    /// The file cannot be read or written.
-    #[error("calibration {path}: {source} (check the path and its permissions)")]
-    Io {
-        /// File concerned.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// `camera.toml` does not parse.
-    #[error("camera settings {path}: {reason}")]
-    Settings {
-        /// File concerned.
-        path: PathBuf,
-        /// What the parser says, with field and line.
-        reason: String,
-    },
-    /// A line of the factory file is neither section, key nor comment.
-    #[error(
-        "calibration {path}, line {line}: expected `key=value` or `[section]`, found {text:?}; \
-         is this a factory SNxxxx.conf?"
-    )]
-    Line {
-        /// File concerned.
-        path: PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// The text.
-        text: String,
-    },
-    /// A number is missing.
-    #[error("calibration {path}: [{section}] has no `{key}`; the mode `{mode}` needs it")]
-    Missing {
-        /// File concerned.
-        path: PathBuf,
-        /// Section looked at.
-        section: String,
-        /// Key looked for.
-        key: String,
-        /// Mode asked for.
-        mode: &'static str,
-    },
-    /// A value is not a usable number.
-    #[error("calibration {path}: [{section}] {key} = {text:?} {problem}")]
-    Value {
-        /// File concerned.
-        path: PathBuf,
-        /// Section.
-        section: String,
-        /// Key.
-        key: String,
-        /// Text found.
-        text: String,
-        /// What is wrong with it.
-        problem: &'static str,
-    },
-    /// A YAML calibration cannot be used.
-    #[error("calibration {path}: {reason}")]
-    Yaml {
-        /// File concerned.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-}
 
 /// Reads `camera.toml` and the calibration it names (relative to it).
 ///
@@ -110,20 +45,6 @@ pub fn load_camera(path: &Path) -> Result<StereoCamera, CalibError> {
     Ok(settings.camera(eyes))
 }
 
-fn read_text(path: &Path) -> Result<String, CalibError> {
-    std::fs::read_to_string(path).map_err(|source| CalibError::Io {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-fn write_text(path: &Path, text: &str) -> Result<(), CalibError> {
-    write_whole(path, text.as_bytes()).map_err(|source| CalibError::Io {
-        path: path.to_owned(),
-        source,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,24 +60,16 @@ mod tests {
         exposure_s = 0.008\nline_time_s = 2e-5\n[extrinsics]\nposition_m = [1, 2.5, 3]\n\
         rotation = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]\n";
 
-    fn folder(name: &str) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("calib-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        path
-    }
-
-    fn load(name: &str, conf: &str, settings: &str) -> Result<StereoCamera, CalibError> {
-        let folder = folder(name);
-        std::fs::write(folder.join("camera.conf"), conf).unwrap();
-        std::fs::write(folder.join("camera.toml"), settings).unwrap();
-        let camera = load_camera(&folder.join("camera.toml"));
-        std::fs::remove_dir_all(&folder).unwrap();
-        camera
+    fn load(conf: &str, settings: &str) -> Result<StereoCamera, CalibError> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("camera.conf"), conf).unwrap();
+        std::fs::write(folder.path().join("camera.toml"), settings).unwrap();
+        load_camera(&folder.path().join("camera.toml"))
     }
 
     #[test]
     fn lengths_are_metres_and_ty_counts_without_mode() {
-        let camera = load("plain", CONF, SETTINGS).unwrap();
+        let camera = load(CONF, SETTINGS).unwrap();
         assert!((camera.t_right_left_m - Vector3::new(0.06297, 5e-4, -2.5e-4)).norm() < 1e-12);
         let turn = Rotation3::from_matrix_unchecked(camera.r_right_left).scaled_axis();
         assert!((turn - Vector3::new(-9e-4, 6e-3, 1e-3)).norm() < 1e-12);
@@ -166,39 +79,53 @@ mod tests {
         assert_eq!(camera.right.distortion, [0.0; 5]);
         assert_eq!(camera.line_time_s, 0.0);
         let by_mode = CONF.replace("TY=0.5", "TY_VGA=0.7");
-        let camera = load("mode", &by_mode, SETTINGS).unwrap();
+        let camera = load(&by_mode, SETTINGS).unwrap();
         assert!((camera.t_right_left_m.y - 7e-4).abs() < 1e-12);
     }
 
     #[test]
     fn what_is_wrong_is_named() {
-        let message = |name: &str, conf: &str, settings: &str| -> String {
-            load(name, conf, settings).unwrap_err().to_string()
-        };
-        let none = message("none", &CONF.replace("cx=332.1", ""), SETTINGS);
-        assert!(
-            none.contains("LEFT_CAM_VGA") && none.contains("cx"),
-            "{none}"
-        );
-        let comma = message("comma", &CONF.replace("350.94", "350,94"), SETTINGS);
-        assert!(
-            comma.contains("350,94") && comma.contains("decimal point"),
-            "{comma}"
-        );
-        let line = message("line", &CONF.replace("k2=0.028", "garbage"), SETTINGS);
-        assert!(
-            line.contains("line 7") && line.contains("garbage"),
-            "{line}"
-        );
-        let unknown = format!("{SETTINGS}\n[models]\nsegmentor = \"rope.onnx\"\n");
-        let unknown = message("models", CONF, &unknown);
-        assert!(unknown.contains("segmentor"), "{unknown}");
-        let mode = message("hd", CONF, &SETTINGS.replace("VGA", "HD"));
-        assert!(mode.contains("LEFT_CAM_HD"), "{mode}");
-        let scaled = message("scaled", CONF, &SETTINGS.replace("[1, 0, 0]", "[2, 0, 0]"));
-        assert!(scaled.contains("rotation"), "{scaled}");
-        let yaml = message("yaml", CONF, &SETTINGS.replace("camera.conf", "left.yaml"));
-        assert!(yaml.contains("left.yaml"), "{yaml}");
+        let cases = [
+            (
+                CONF.replace("cx=332.1", ""),
+                SETTINGS.to_owned(),
+                ["LEFT_CAM_VGA", "cx"],
+            ),
+            (
+                CONF.replace("350.94", "350,94"),
+                SETTINGS.to_owned(),
+                ["350,94", "decimal point"],
+            ),
+            (
+                CONF.replace("k2=0.028", "garbage"),
+                SETTINGS.to_owned(),
+                ["line 7", "garbage"],
+            ),
+            (
+                CONF.to_owned(),
+                format!("{SETTINGS}\n[models]\nsegmentor = \"rope.onnx\"\n"),
+                ["segmentor", "camera.toml"],
+            ),
+            (
+                CONF.to_owned(),
+                SETTINGS.replace("VGA", "HD"),
+                ["LEFT_CAM_HD", "mode"],
+            ),
+            (
+                CONF.to_owned(),
+                SETTINGS.replace("[1, 0, 0]", "[2, 0, 0]"),
+                ["rotation", "camera.toml"],
+            ),
+            (
+                CONF.to_owned(),
+                SETTINGS.replace("camera.conf", "left.yaml"),
+                ["left.yaml", "path"],
+            ),
+        ];
+        for (conf, settings, words) in cases {
+            let said = load(&conf, &settings).unwrap_err().to_string();
+            assert!(words.iter().all(|word| said.contains(word)), "{said}");
+        }
         let absent = load_camera(Path::new("/nowhere/camera.toml")).unwrap_err();
         assert!(absent.to_string().contains("/nowhere/camera.toml"));
     }
@@ -225,12 +152,12 @@ mod tests {
             exposure_s: 0.003,
             line_time_s: 15.7e-6,
         };
-        let folder = folder("written");
-        let (toml, conf) = (folder.join("camera.toml"), folder.join("sn.conf"));
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name| folder.path().join(name);
+        let (toml, conf) = (at("camera.toml"), at("sn.conf"));
         write_factory_conf(&conf, &camera, VideoMode::Hd).unwrap();
         write_camera_toml(&toml, &camera, VideoMode::Hd, Path::new("sn.conf")).unwrap();
         let back = load_camera(&toml).unwrap();
-        std::fs::remove_dir_all(&folder).unwrap();
         assert!((back.r_right_left - camera.r_right_left).norm() < 1e-12);
         assert!((back.t_right_left_m - camera.t_right_left_m).norm() < 1e-12);
         assert_eq!((back.left, back.right), (camera.left, camera.right));

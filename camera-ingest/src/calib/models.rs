@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{CalibError, settings};
-
 /// ONNX files; what is not named is built in.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -32,13 +30,4 @@ impl ModelFiles {
             tracker: within(self.tracker),
         }
     }
-}
-
-/// The models that a `camera.toml` names, relative to its folder.
-///
-/// # Errors
-/// The file is missing or malformed.
-pub fn load_model_files(path: &Path) -> Result<ModelFiles, CalibError> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    Ok(settings::read(path)?.models.within(folder))
 }

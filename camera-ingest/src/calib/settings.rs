@@ -7,8 +7,9 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use shared_types::{Shutter, StereoCamera};
 
-use super::factory::{Eyes, VideoMode};
-use super::{CalibError, ModelFiles, read_text, write_text};
+use super::error::{CalibError, read_text, write_text};
+use super::mode::{Eyes, VideoMode};
+use super::models::ModelFiles;
 
 /// The file's fields.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -37,16 +38,20 @@ struct Extrinsics {
 }
 
 pub(super) fn read(path: &Path) -> Result<CameraSettings, CalibError> {
-    let settings: CameraSettings =
-        toml::from_str(&read_text(path)?).map_err(|e| CalibError::Settings {
-            path: path.to_owned(),
-            reason: e.to_string(),
-        })?;
-    settings.check().map_err(|reason| CalibError::Settings {
-        path: path.to_owned(),
-        reason,
-    })?;
+    let parsed: Result<CameraSettings, _> = toml::from_str(&read_text(path)?);
+    let settings = parsed.map_err(|e| CalibError::settings(path, e))?;
+    let checked = settings.check();
+    checked.map_err(|reason| CalibError::settings(path, reason))?;
     Ok(settings)
+}
+
+/// The models that a `camera.toml` names, relative to its folder.
+///
+/// # Errors
+/// The file is missing or malformed.
+pub fn load_model_files(path: &Path) -> Result<ModelFiles, CalibError> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    Ok(read(path)?.models.within(folder))
 }
 
 /// Times of the shutter (exposure, row to row, s) and the camera's place make sense.
@@ -165,10 +170,7 @@ fn rows(r: &Matrix3<f64>) -> [[f64; 3]; 3] {
 }
 
 fn text(path: &Path, settings: &CameraSettings) -> Result<String, CalibError> {
-    toml::to_string(settings).map_err(|e| CalibError::Settings {
-        path: path.to_owned(),
-        reason: e.to_string(),
-    })
+    toml::to_string(settings).map_err(|e| CalibError::settings(path, e))
 }
 
 /// The text of a `camera.toml` for `path`: the settings of `from` with another place
@@ -187,11 +189,8 @@ pub fn placed_camera_toml(
         let parent = p.parent().filter(|f| !f.as_os_str().is_empty());
         std::fs::canonicalize(parent.unwrap_or(Path::new(".")))
     };
-    let io = |source| CalibError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let (here, there) = (folder(path).map_err(io)?, folder(from).map_err(io)?);
+    let io = CalibError::io(path);
+    let (here, there) = (folder(path).map_err(&io)?, folder(from).map_err(&io)?);
     if here != there {
         settings.calibration = there.join(&settings.calibration);
         settings.calibration_right = settings.calibration_right.map(|p| there.join(p));

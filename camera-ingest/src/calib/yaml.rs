@@ -12,8 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 use shared_types::Intrinsics;
 use yaml_rust2::{Yaml, YamlLoader};
 
-use super::factory::{Eyes, VideoMode};
-use super::{CalibError, read_text};
+use super::error::{CalibError, read_text};
+use super::mode::{Eyes, VideoMode};
 
 /// Baselines of stereo cameras (m); outside it, lengths are no metres.
 const BASELINE_M: [f64; 2] = [0.005, 1.0];
@@ -35,8 +35,8 @@ pub(super) fn read(path: &Path, right: Option<&Path>, mode: VideoMode) -> Result
     let baseline_m = eyes.t_right_left_m.norm();
     if !(BASELINE_M[0]..=BASELINE_M[1]).contains(&baseline_m) {
         return Err(file.bad(&format!(
-            "the eyes are {baseline_m:.4} apart; {} to {} m are expected (were lengths \
-             calibrated in other units than metres?)",
+            "the two images' optical centres are {baseline_m:.4} apart; {} to {} m are expected \
+             (were lengths calibrated in other units than metres?)",
             BASELINE_M[0], BASELINE_M[1]
         )));
     }
@@ -72,10 +72,7 @@ impl YamlFile {
     }
 
     fn bad(&self, reason: &str) -> CalibError {
-        CalibError::Yaml {
-            path: self.path.clone(),
-            reason: reason.to_owned(),
-        }
+        CalibError::calibration(&self.path, reason)
     }
 
     fn has(&self, name: &str) -> bool {

@@ -237,15 +237,7 @@ mod tests {
     use super::*;
 
     fn grey(level: u8) -> EyeFrame {
-        EyeFrame {
-            stamp_ns: 0,
-            sequence: 0,
-            width_px: 8,
-            height_px: 4,
-            luma: vec![level; 32],
-            cb: vec![128; 16],
-            cr: vec![128; 16],
-        }
+        EyeFrame::grey([8, 4], level)
     }
 
     #[test]

@@ -71,15 +71,7 @@ mod tests {
 
     /// A wall of grey 100, and on it a bar from column `from` on, `wide` columns wide.
     fn bar(from: usize, wide: usize, level: u8) -> EyeFrame {
-        let mut frame = EyeFrame {
-            stamp_ns: 0,
-            sequence: 0,
-            width_px: 32,
-            height_px: 8,
-            luma: vec![100; 256],
-            cb: vec![128; 128],
-            cr: vec![128; 128],
-        };
+        let mut frame = EyeFrame::grey([32, 8], 100);
         for row in frame.luma.chunks_mut(32) {
             row[from..(from + wide).min(32)].fill(level);
         }

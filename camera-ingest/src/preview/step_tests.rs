@@ -43,11 +43,8 @@ fn wall(index: u64) -> EyeFrame {
     EyeFrame {
         stamp_ns: 1_000_000_000 + index * FRAME_NS,
         sequence: index,
-        width_px: WIDTH,
-        height_px: HEIGHT,
         luma: (0..WIDTH * HEIGHT).map(level).collect(),
-        cb: vec![128; WIDTH * HEIGHT / 2],
-        cr: vec![128; WIDTH * HEIGHT / 2],
+        ..EyeFrame::grey([WIDTH, HEIGHT], 0)
     }
 }
 

@@ -4,11 +4,13 @@
 //! One thread. While nothing is asked it only keeps up with the camera; a long
 //! piece of work (tracking) lets frames pass by, which slows nobody.
 
+mod answer;
 mod keep;
 mod work;
 
 use crate::frame::{EyeFrame, StereoFrame};
-use crate::still::{Region, StillDetector};
+use crate::still::StillDetector;
+use answer::{answer, failed};
 use keep::Recording;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress};
@@ -88,43 +90,22 @@ struct Process {
     job: Option<Job>,
 }
 
-fn failed(message: impl ToString) -> CameraEvent {
-    CameraEvent::Failed {
-        message: message.to_string(),
-    }
-}
-
-/// Answers; a caller that is gone is no failure of this process.
-fn answer(call: &Call<CameraRpc>, event: &CameraEvent) {
-    if let Err(e) = call.send(event) {
-        tracing::warn!("an answer was not delivered: {e}");
-    }
-}
-
 impl Process {
     fn accept(&mut self, call: Call<CameraRpc>) {
         let now = Instant::now();
-        if self.job.is_some() && !matches!(call.request, CameraRequest::Ping) {
-            answer(
-                &call,
-                &failed("camera-ingest is busy with another request; wait for its end"),
-            );
-            return;
-        }
         let waiting = match &call.request {
-            CameraRequest::Ping => {
-                answer(&call, &CameraEvent::Pong);
-                return;
+            CameraRequest::Ping => return answer(&call, &CameraEvent::Pong),
+            _ if self.job.is_some() => {
+                let busy = "camera-ingest is busy with another request; wait for its end";
+                return answer(&call, &failed(busy));
             }
             CameraRequest::Track { .. } => {
                 let event = work::track(&self.recording, &call, &self.keypoints);
-                answer(&call, &event);
-                return;
+                return answer(&call, &event);
             }
             CameraRequest::Score { .. } => {
                 let event = work::score(&mut self.recording, &call);
-                answer(&call, &event);
-                return;
+                return answer(&call, &event);
             }
             CameraRequest::WaitStill { timeout_s } => Waiting::Still {
                 detector: None,
@@ -234,15 +215,8 @@ fn wait_still(
     until: Instant,
     left: EyeFrame,
 ) -> Option<CameraEvent> {
-    // The whole picture: an arm or a person that moves is not still either.
-    let whole = Region {
-        u0: 0,
-        v0: 0,
-        u1: left.width_px,
-        v1: left.height_px,
-    };
     let still = detector
-        .get_or_insert_with(|| StillDetector::new(whole, STILL_LAG_FRAMES, STILL_FRAMES))
+        .get_or_insert_with(|| StillDetector::new(STILL_LAG_FRAMES, STILL_FRAMES))
         .push(left);
     (still || Instant::now() >= until).then_some(CameraEvent::Still { still })
 }

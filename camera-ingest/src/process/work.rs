@@ -1,7 +1,7 @@
 //! Work on a kept recording: tracking with publication, scoring.
 
+use super::answer::{answer, failed};
 use super::keep::Recording;
-use super::{answer, failed};
 use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};

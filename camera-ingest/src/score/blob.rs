@@ -189,15 +189,7 @@ mod tests {
     fn a_half_covered_rim_gives_the_true_centre() {
         let wanted = chroma_of_rgb([255, 107, 13]);
         let (width_px, height_px) = (80, 40);
-        let mut frame = EyeFrame {
-            stamp_ns: 0,
-            sequence: 0,
-            width_px,
-            height_px,
-            luma: vec![90; width_px * height_px],
-            cb: vec![128; width_px * height_px / 2],
-            cr: vec![128; width_px * height_px / 2],
-        };
+        let mut frame = EyeFrame::grey([width_px, height_px], 90);
         let empty = frame.clone();
         let truth = [33.7, 18.2];
         for y in 0..height_px {

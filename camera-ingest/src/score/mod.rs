@@ -6,6 +6,7 @@
 //! in continuous time.
 
 mod blob;
+mod options;
 mod path;
 mod scene;
 #[cfg(test)]
@@ -19,31 +20,8 @@ use serde::Serialize;
 use shared_types::StereoCamera;
 
 use crate::calib::extrinsics::Sighted;
-use crate::source::{SourceError, StereoSource};
-
-/// What a caller may choose.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScoreOptions {
-    /// Frames for the median background.
-    pub background_frames: usize,
-    /// Largest distance of the two eyes' rays, in pixels of the image.
-    pub epipolar_px: f64,
-    /// Largest ratio of the blob's areas in the two eyes.
-    pub area_ratio: f64,
-    /// Nearest and farthest depth looked at (m).
-    pub depth_m: [f64; 2],
-}
-
-impl Default for ScoreOptions {
-    fn default() -> Self {
-        Self {
-            background_frames: 31,
-            epipolar_px: 1.5,
-            area_ratio: 1.33,
-            depth_m: [0.25, 5.0],
-        }
-    }
-}
+use crate::source::StereoSource;
+pub use options::{ScoreError, ScoreOptions};
 
 /// Result of one throw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -58,58 +36,6 @@ pub struct Score {
     pub target_m: [f64; 3],
     /// Smoothed tip centre per frame it was seen in: (s, world m).
     pub tip_path: Vec<(f64, [f64; 3])>,
-}
-
-/// Why a throw cannot be scored.
-#[derive(Debug, thiserror::Error)]
-pub enum ScoreError {
-    /// A frame cannot be read.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    /// Too few frames.
-    #[error("score: the video has {found} frames, at least {least} are needed")]
-    TooShort {
-        /// Frames found.
-        found: usize,
-        /// Frames needed.
-        least: usize,
-    },
-    /// Frames differ from the camera's size.
-    #[error(
-        "score: frame {frame} is {found:?} px per eye, the camera's mode gives {expected:?}; is the \
-         `mode` in camera.toml the one recorded?"
-    )]
-    Size {
-        /// Index of the frame.
-        frame: usize,
-        /// Its size.
-        found: [usize; 2],
-        /// The camera's.
-        expected: [usize; 2],
-    },
-    /// A colour too grey to be found by chroma.
-    #[error(
-        "score: the {what}'s colour {rgb:?} is nearly grey; give the colour of a saturated marker"
-    )]
-    Grey {
-        /// `tip` or `target`.
-        what: &'static str,
-        /// Colour given.
-        rgb: [u8; 3],
-    },
-    /// Not found in enough frames.
-    #[error(
-        "score: the {what} was seen by both eyes in {seen} frames, at least {least} are needed; \
-         check its colour and the light"
-    )]
-    NotSeen {
-        /// `tip` or `target`.
-        what: &'static str,
-        /// Frames it was seen in.
-        seen: usize,
-        /// Frames needed.
-        least: usize,
-    },
 }
 
 /// Sightings of the tip needed.
@@ -137,12 +63,8 @@ pub fn score(
             least: LEAST_SIGHTINGS,
         });
     }
-    for (what, rgb) in [("tip", tip_rgb), ("target", target_rgb)] {
-        let [cb, cr] = chroma_of_rgb(rgb);
-        if cb.hypot(cr) < LEAST_CHROMA {
-            return Err(ScoreError::Grey { what, rgb });
-        }
-    }
+    check_colour("tip", tip_rgb)?;
+    check_colour("target", target_rgb)?;
     let scene = Scene::learn(source, camera, options)?;
     let target = scene.target(target_rgb)?;
     let mut sightings = Vec::new();
@@ -171,6 +93,15 @@ pub fn score(
     Ok(closest(&sightings, end_s, &target, camera))
 }
 
+/// A colour that chroma can find.
+fn check_colour(what: &'static str, rgb: [u8; 3]) -> Result<(), ScoreError> {
+    let [cb, cr] = chroma_of_rgb(rgb);
+    if cb.hypot(cr) < LEAST_CHROMA {
+        return Err(ScoreError::Grey { what, rgb });
+    }
+    Ok(())
+}
+
 /// Where both eyes see a coloured lead that the arm shows at known places:
 /// `(frame, place in the world in m)`. Frames in which it is not seen are left
 /// out. The camera's place does not matter.
@@ -184,10 +115,7 @@ pub fn sight_lead(
     shown: &[(usize, Vector3<f64>)],
     options: &ScoreOptions,
 ) -> Result<Vec<Sighted>, ScoreError> {
-    let [cb, cr] = chroma_of_rgb(rgb);
-    if cb.hypot(cr) < LEAST_CHROMA {
-        return Err(ScoreError::Grey { what: "lead", rgb });
-    }
+    check_colour("lead", rgb)?;
     let scene = Scene::learn(source, camera, options)?;
     let mut sighted = Vec::new();
     for &(frame, p_w_m) in shown {

@@ -259,32 +259,33 @@ mod tests {
         inverse_depth: 3e-3,
     };
 
+    /// Fifteen clear sightings: ray and inverse depth at a time.
+    fn clear(place: impl Fn(f64) -> ([f64; 2], f64)) -> Vec<Sighting> {
+        let sighting = |i: u8| {
+            let t_s = f64::from(i) / 60.0;
+            let (ray, inverse_depth) = place(t_s);
+            Sighting {
+                t_s,
+                ray,
+                inverse_depth,
+                area_m2: 1e-3,
+                radius_px: 6.0,
+                doubt: 1.0,
+            }
+        };
+        (0..15).map(sighting).collect()
+    }
+
     #[test]
     fn the_path_of_a_parabola_survives_an_outlier() {
         let truth = |t: f64| {
-            (
-                0.1 + 2.0 * t,
-                0.2 - 1.5 * t + 4.0 * t * t,
-                0.6 + 0.3 * t - t * t,
-            )
+            let ray = [0.1 + 2.0 * t, 0.2 - 1.5 * t + 4.0 * t * t];
+            (ray, 0.6 + 0.3 * t - t * t)
         };
-        let mut sightings: Vec<Sighting> = (0..15)
-            .map(|i| {
-                let t_s = f64::from(i) / 60.0;
-                let (x, y, inverse_depth) = truth(t_s);
-                Sighting {
-                    t_s,
-                    ray: [x, y],
-                    inverse_depth,
-                    area_m2: 1e-3,
-                    radius_px: 6.0,
-                    doubt: 1.0,
-                }
-            })
-            .collect();
+        let mut sightings = clear(truth);
         sightings[6].inverse_depth += 0.08;
         let path = LocalPath::around(&sightings, 7, LEAST).unwrap();
-        let (x, y, w) = truth(0.12);
+        let ([x, y], w) = truth(0.12);
         let p = path.at(0.12);
         assert!(
             (p - Vector3::new(x / w, y / w, 1.0 / w)).norm() < 0.004,
@@ -292,22 +293,10 @@ mod tests {
         );
         assert!(LocalPath::around(&sightings[..3], 1, LEAST).is_none());
     }
+
     #[test]
     fn cut_sightings_are_bridged_and_make_the_path_less_sure() {
-        let along = |t: f64| 0.1 + 2.0 * t + 3.0 * t * t;
-        let clear: Vec<Sighting> = (0..15)
-            .map(|i| {
-                let t_s = f64::from(i) / 60.0;
-                Sighting {
-                    t_s,
-                    ray: [along(t_s), 0.2],
-                    inverse_depth: 0.6,
-                    area_m2: 1e-3,
-                    radius_px: 6.0,
-                    doubt: 1.0,
-                }
-            })
-            .collect();
+        let clear = clear(|t| ([0.1 + 2.0 * t + 3.0 * t * t, 0.2], 0.6));
         let mut half = clear.clone();
         for sighting in &mut half[6..9] {
             sighting.ray[0] += 0.02;

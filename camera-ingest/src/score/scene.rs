@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use shared_types::StereoCamera;
 
 use super::blob::{Behind, Blob, BlobMap, Chroma, chroma_of_rgb};
+use super::options::{ScoreError, ScoreOptions};
 use super::path::{PathError, Sighting};
-use super::{ScoreError, ScoreOptions};
 use crate::frame::{EyeFrame, StereoFrame};
 use crate::source::StereoSource;
 

@@ -4,12 +4,13 @@
 //! `00dc` (or `00db`) chunk is one complete JPEG, chunks are padded to even
 //! length. The index at the end is not needed and not read.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::error::SourceError;
 use super::stamps::{self, Stamp};
-use super::{FrameSource, SourceError, StereoSource, read_bytes};
-use crate::frame::{EyeFrame, FrameError, StereoFrame};
+use super::stored::{Coding, Stored};
 
 const REMEDY: &str = "record side-by-side Motion-JPEG into an AVI, or convert to it";
 const TRUNCATED: &str = "the file is truncated: copy it again or record again";
@@ -32,7 +33,7 @@ impl AviSource {
     /// # Errors
     /// No such file, no AVI, truncated, or timestamps that do not fit.
     pub fn open(path: &Path, timestamps: Option<&Path>) -> Result<Self, SourceError> {
-        let bytes = read_bytes(path)?;
+        let bytes = std::fs::read(path).map_err(SourceError::io(path))?;
         let (frame_us, chunks) = walk(path, &bytes)?;
         let stamps = match timestamps {
             Some(csv) => stamps::read(csv, chunks.len())?,
@@ -53,44 +54,28 @@ impl AviSource {
         self.stamps = stamps::even(self.chunks.len(), 1e9 / rate_hz);
         self
     }
-
-    fn decode<T>(
-        &mut self,
-        index: usize,
-        decode: impl Fn(&[u8], u64, u64, &mut Vec<u8>) -> Result<T, FrameError>,
-    ) -> Result<T, SourceError> {
-        let (Some(range), Some(stamp)) = (self.chunks.get(index), self.stamps.get(index)) else {
-            return Err(SourceError::OutOfRange {
-                path: self.path.clone(),
-                frame: index,
-                len: self.chunks.len(),
-            });
-        };
-        let jpeg = &self.bytes[range.clone()];
-        let frame = decode(jpeg, stamp.stamp_ns, stamp.sequence, &mut self.room);
-        frame.map_err(|source| SourceError::Frame {
-            path: self.path.clone(),
-            frame: index,
-            source,
-        })
-    }
 }
 
-impl FrameSource for AviSource {
-    fn len(&self) -> usize {
-        self.chunks.len()
+impl Stored for AviSource {
+    fn path(&self) -> &Path {
+        &self.path
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
-        self.decode(index, EyeFrame::left_from_jpeg)
+    fn stamps(&self) -> &[Stamp] {
+        &self.stamps
     }
-}
 
-impl StereoSource for AviSource {
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        self.decode(index, |jpeg, stamp_ns, sequence, _room| {
-            StereoFrame::from_jpeg(jpeg, stamp_ns, sequence)
-        })
+    fn picture(&self, index: usize) -> Result<(Coding, Cow<'_, [u8]>), SourceError> {
+        let jpeg = &self.bytes[self.chunks[index].clone()];
+        Ok((Coding::Jpeg, Cow::Borrowed(jpeg)))
+    }
+
+    fn room(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.room)
+    }
+
+    fn keep(&mut self, room: Vec<u8>) {
+        self.room = room;
     }
 }
 
@@ -159,6 +144,7 @@ fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceErr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::{FrameSource, StereoSource};
 
     fn chunk_bytes(code: &[u8; 4], body: &[u8]) -> Vec<u8> {
         let size = u32::try_from(body.len()).unwrap();
@@ -179,22 +165,21 @@ mod tests {
         chunk_bytes(b"RIFF", &[&b"AVI "[..], &hdrl, &movi].concat())
     }
 
-    fn open(name: &str, bytes: &[u8], csv: Option<&str>) -> Result<AviSource, SourceError> {
-        let stem = std::env::temp_dir().join(format!("avi-{}-{name}", std::process::id()));
-        let (video, stamps) = (stem.with_extension("avi"), stem.with_extension("csv"));
+    fn open(bytes: &[u8], csv: Option<&str>) -> Result<AviSource, SourceError> {
+        let folder = tempfile::tempdir().unwrap();
+        let (video, stamps) = (folder.path().join("a.avi"), folder.path().join("a.csv"));
         std::fs::write(&video, bytes).unwrap();
-        if let Some(csv) = csv {
-            std::fs::write(&stamps, csv).unwrap();
-        }
-        let source = AviSource::open(&video, csv.map(|_| stamps.as_path()));
-        std::fs::remove_file(&video).unwrap();
-        let _ = std::fs::remove_file(&stamps);
-        source
+        let csv = csv.map(|csv| std::fs::write(&stamps, csv).unwrap());
+        AviSource::open(&video, csv.map(|()| stamps.as_path()))
+    }
+
+    fn refusal(bytes: &[u8], csv: Option<&str>) -> String {
+        open(bytes, csv).unwrap_err().to_string()
     }
 
     #[test]
     fn frames_are_found_and_damage_is_named() {
-        let mut source = open("walk", &avi(&[b"abc", b"defg"]), None).unwrap();
+        let mut source = open(&avi(&[b"abc", b"defg"]), None).unwrap();
         assert_eq!(source.len(), 2);
         assert_eq!(&source.bytes[source.chunks[1].clone()], b"defg");
         assert_eq!(source.stamps[1].stamp_ns, 16_667_000);
@@ -212,25 +197,20 @@ mod tests {
     #[test]
     fn truncation_and_other_files_are_refused() {
         let whole = avi(&[b"abc", b"defg"]);
-        let cut = open("cut", &whole[..whole.len() - 3], None)
-            .unwrap_err()
-            .to_string();
+        let cut = refusal(&whole[..whole.len() - 3], None);
         assert!(
             cut.contains("truncated") && cut.contains("frame 1 ends"),
             "{cut}"
         );
-        let other = open("other", b"RIFF....WAVEfmt ", None)
-            .unwrap_err()
-            .to_string();
+        let other = refusal(b"RIFF....WAVEfmt ", None);
         assert!(other.contains("not a RIFF AVI"), "{other}");
-        let empty = open("empty", &avi(&[]), None).unwrap_err().to_string();
+        let empty = refusal(&avi(&[]), None);
         assert!(empty.contains("no video frames"), "{empty}");
-        let second = open("second", &whole[..whole.len() - 13], None);
-        let second = second.unwrap_err().to_string();
+        let second = refusal(&whole[..whole.len() - 13], None);
         assert!(second.contains("before frame 1"), "{second}");
         // Whatever is cut off, there is an answer and no panic.
         for end in 0..whole.len() {
-            let _ = open("any", &whole[..end], None);
+            let _ = open(&whole[..end], None);
         }
     }
 
@@ -238,18 +218,18 @@ mod tests {
     fn timestamps_must_fit() {
         let video = avi(&[b"abc", b"defg"]);
         let csv = "frame,sequence,monotonic_ns\n0,5,100\n1,7,250\n";
-        let source = open("fit", &video, Some(csv)).unwrap();
+        let source = open(&video, Some(csv)).unwrap();
         assert_eq!(
             (source.stamps[1].sequence, source.stamps[1].stamp_ns),
             (7, 250)
         );
-        for (name, csv, what) in [
-            ("few", "h\n0,5,100\n", "1 rows, but the video has 2"),
-            ("back", "h\n0,5,100\n1,6,100\n", "do not increase"),
-            ("word", "h\n0,x,100\n1,6,200\n", "line 2"),
-            ("skip", "h\n0,5,100\n2,6,200\n", "frame 2 where 1 is due"),
+        for (csv, what) in [
+            ("h\n0,5,100\n", "1 rows, but the video has 2"),
+            ("h\n0,5,100\n1,6,100\n", "do not increase"),
+            ("h\n0,x,100\n1,6,200\n", "line 2"),
+            ("h\n0,5,100\n2,6,200\n", "frame 2 where 1 is due"),
         ] {
-            let message = open(name, &video, Some(csv)).unwrap_err().to_string();
+            let message = refusal(&video, Some(csv));
             assert!(message.contains(what), "{message}");
         }
     }

@@ -1,12 +1,14 @@
 //! A folder of side-by-side pictures, PNG or JPEG, one a frame, in the order of
 //! their names.
 
-use std::ffi::OsStr;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+use super::error::SourceError;
+use super::frames::StereoSource;
 use super::stamps::{self, Stamp};
-use super::{FrameSource, SourceError, StereoSource, read_bytes};
-use crate::frame::{EyeFrame, FrameError, StereoFrame};
+use super::stored::{Coding, Stored};
+use crate::frame::FrameError;
 
 const REMEDY: &str = "export the recording again, one picture a frame";
 
@@ -16,28 +18,17 @@ pub struct ImageSource {
     folder: PathBuf,
     files: Vec<PathBuf>,
     stamps: Vec<Stamp>,
-    /// Both eyes together.
-    size_px: [usize; 2],
+    /// Both eyes together; `None` until the first picture was read.
+    size_px: Option<[usize; 2]>,
 }
 
-/// How a picture is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Png,
-    Jpeg,
-}
-
-impl Kind {
-    fn of(path: &Path) -> Option<Self> {
-        let extension = path.extension()?;
-        let is = |name: &str| extension.eq_ignore_ascii_case(OsStr::new(name));
-        if is("png") {
-            Some(Self::Png)
-        } else if is("jpg") || is("jpeg") {
-            Some(Self::Jpeg)
-        } else {
-            None
-        }
+/// The coding of a picture by its file's ending.
+fn coding(path: &Path) -> Option<Coding> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    match ending.as_str() {
+        "png" => Some(Coding::Png),
+        "jpg" | "jpeg" => Some(Coding::Jpeg),
+        _ => None,
     }
 }
 
@@ -54,97 +45,48 @@ impl ImageSource {
             folder: folder.to_owned(),
             stamps: stamps::beside(folder, &csv, rate_hz, files.len())?,
             files,
-            size_px: [0; 2],
+            size_px: None,
         };
-        let first = source.decode(0, stereo)?.0;
-        source.size_px = [first.width_px, first.height_px];
+        let first = source.read(0)?.0;
+        source.size_px = Some([first.width_px, first.height_px]);
         Ok(source)
     }
+}
 
-    fn decode<T>(
-        &self,
-        index: usize,
-        decode: impl Fn(Kind, &[u8], Stamp) -> Result<T, FrameError>,
-    ) -> Result<T, SourceError> {
-        let (Some(path), Some(stamp)) = (self.files.get(index), self.stamps.get(index)) else {
-            return Err(SourceError::OutOfRange {
-                path: self.folder.clone(),
-                frame: index,
-                len: self.files.len(),
-            });
-        };
-        let kind = Kind::of(path).unwrap_or(Kind::Jpeg);
-        decode(kind, &read_bytes(path)?, *stamp).map_err(|source| self.damaged(index, source))
+impl Stored for ImageSource {
+    fn path(&self) -> &Path {
+        &self.folder
     }
 
-    fn damaged(&self, index: usize, source: FrameError) -> SourceError {
-        SourceError::Frame {
-            path: self.files.get(index).unwrap_or(&self.folder).clone(),
-            frame: index,
-            source,
+    fn file(&self, index: usize) -> &Path {
+        &self.files[index]
+    }
+
+    fn stamps(&self) -> &[Stamp] {
+        &self.stamps
+    }
+
+    fn picture(&self, index: usize) -> Result<(Coding, Cow<'_, [u8]>), SourceError> {
+        let path = &self.files[index];
+        let bytes = std::fs::read(path).map_err(SourceError::io(path))?;
+        Ok((coding(path).unwrap_or(Coding::Jpeg), Cow::Owned(bytes)))
+    }
+
+    fn check_size(&self, found: [usize; 2]) -> Result<(), FrameError> {
+        match self.size_px {
+            Some(expected) if found != expected => Err(FrameError::Size { found, expected }),
+            _ => Ok(()),
         }
-    }
-
-    fn check_size(&self, index: usize, found: [usize; 2]) -> Result<(), SourceError> {
-        if found == self.size_px {
-            return Ok(());
-        }
-        Err(self.damaged(
-            index,
-            FrameError::Size {
-                found,
-                expected: self.size_px,
-            },
-        ))
-    }
-}
-
-fn stereo(kind: Kind, bytes: &[u8], stamp: Stamp) -> Result<StereoFrame, FrameError> {
-    match kind {
-        Kind::Png => StereoFrame::from_png(bytes, stamp.stamp_ns, stamp.sequence),
-        Kind::Jpeg => StereoFrame::from_jpeg(bytes, stamp.stamp_ns, stamp.sequence),
-    }
-}
-
-fn left(kind: Kind, bytes: &[u8], stamp: Stamp) -> Result<EyeFrame, FrameError> {
-    match kind {
-        Kind::Png => stereo(kind, bytes, stamp).map(|frame| frame.left()),
-        Kind::Jpeg => {
-            EyeFrame::left_from_jpeg(bytes, stamp.stamp_ns, stamp.sequence, &mut Vec::new())
-        }
-    }
-}
-
-impl FrameSource for ImageSource {
-    fn len(&self) -> usize {
-        self.files.len()
-    }
-
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
-        let frame = self.decode(index, left)?;
-        self.check_size(index, [2 * frame.width_px, frame.height_px])?;
-        Ok(frame)
-    }
-}
-
-impl StereoSource for ImageSource {
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        let frame = self.decode(index, stereo)?;
-        self.check_size(index, [frame.0.width_px, frame.0.height_px])?;
-        Ok(frame)
     }
 }
 
 /// The pictures of a folder in the order of their names.
 fn pictures(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
-    let io = |source| SourceError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io = SourceError::io(folder);
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(io)? {
-        let path = entry.map_err(io)?.path();
-        if Kind::of(&path).is_some() {
+    for entry in std::fs::read_dir(folder).map_err(&io)? {
+        let path = entry.map_err(&io)?.path();
+        if coding(&path).is_some() {
             files.push(path);
         }
     }
@@ -189,6 +131,7 @@ fn counter(path: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::FrameSource;
 
     /// Pixels of a PNG: grey, its right half red.
     fn png(width: u32, height: u32, grey: u8) -> Vec<u8> {
@@ -210,30 +153,26 @@ mod tests {
         bytes
     }
 
-    fn folder(name: &str, files: &[(&str, &[u8])]) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("images-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
+    fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
         for (file, bytes) in files {
-            std::fs::write(path.join(file), bytes).unwrap();
+            std::fs::write(folder.path().join(file), bytes).unwrap();
         }
-        path
+        folder
     }
 
-    fn refused(name: &str, files: &[(&str, &[u8])]) -> String {
-        let path = folder(name, files);
-        let read = ImageSource::open(&path, Some(10.0))
+    fn refused(files: &[(&str, &[u8])]) -> String {
+        let read = ImageSource::open(folder(files).path(), Some(10.0))
             .and_then(|mut source| (0..source.len()).try_for_each(|i| source.read(i).map(|_| ())));
-        std::fs::remove_dir_all(&path).unwrap();
         read.unwrap_err().to_string()
     }
 
     #[test]
     fn pictures_come_in_the_order_of_their_names() {
         let (a, b) = (png(8, 2, 60), png(8, 2, 61));
-        let path = folder("order", &[("f09.png", &a), ("f10.PNG", &b), ("x.txt", b"")]);
-        let mut source = ImageSource::open(&path, Some(10.0)).unwrap();
+        let folder = folder(&[("f09.png", &a), ("f10.PNG", &b), ("x.txt", b"")]);
+        let mut source = ImageSource::open(folder.path(), Some(10.0)).unwrap();
         let (first, second) = (source.read(0).unwrap(), source.read_left(1).unwrap());
-        std::fs::remove_dir_all(&path).unwrap();
         assert_eq!(source.len(), 2);
         assert_eq!((first.0.luma[0], second.luma[0]), (60, 61));
         assert_eq!((second.width_px, second.stamp_ns), (4, 100_000_000));
@@ -245,21 +184,25 @@ mod tests {
     #[test]
     fn what_is_no_recording_says_why() {
         let (small, large) = (png(8, 2, 60), png(12, 2, 60));
-        let none = refused("none", &[("x.txt", b"")]);
-        assert!(none.contains("PNG or JPEG"), "{none}");
-        let sizes = refused("sizes", &[("f1.png", &small), ("f2.png", &large)]);
-        assert!(
-            sizes.contains("frame 1") && sizes.contains("12x2"),
-            "{sizes}"
-        );
-        let order = refused("count", &[("f9.png", &small), ("f10.png", &small)]);
-        assert!(
-            order.contains("f9.png") && order.contains("zeros"),
-            "{order}"
-        );
-        let torn = refused("torn", &[("f1.png", &small), ("f2.png", &small[..40])]);
-        assert!(torn.contains("f2.png") && torn.contains("PNG"), "{torn}");
-        let text = refused("text", &[("f1.jpg", b"words")]);
-        assert!(text.contains("f1.jpg") && text.contains("JPEG"), "{text}");
+        let cases: [(&[(&str, &[u8])], [&str; 2]); 5] = [
+            (&[("x.txt", b"")], ["PNG or JPEG", "video.avi"]),
+            (
+                &[("f1.png", &small), ("f2.png", &large)],
+                ["frame 1", "12x2"],
+            ),
+            (
+                &[("f9.png", &small), ("f10.png", &small)],
+                ["f9.png", "zeros"],
+            ),
+            (
+                &[("f1.png", &small), ("f2.png", &small[..40])],
+                ["f2.png", "PNG"],
+            ),
+            (&[("f1.jpg", b"words")], ["f1.jpg", "JPEG"]),
+        ];
+        for (files, words) in cases {
+            let said = refused(files);
+            assert!(words.iter().all(|word| said.contains(word)), "{said}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::SourceError;
+use super::error::SourceError;
 
 /// Number and time of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,10 +58,7 @@ pub(super) fn twice(csv: &Path, rate_hz: f64) -> String {
 
 /// Rows `frame,sequence,monotonic_ns`, one a frame.
 pub(super) fn read(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SourceError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = std::fs::read_to_string(path).map_err(SourceError::io(path))?;
     let fail = |line: usize, reason: String| SourceError::Timestamps {
         path: path.to_owned(),
         line,

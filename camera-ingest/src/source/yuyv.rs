@@ -1,12 +1,13 @@
 //! Raw V4L2 `YUYV` frames one after the other, without any header.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
+use super::error::SourceError;
 use super::stamps::{self, Stamp};
-use super::{FrameSource, SourceError, StereoSource};
-use crate::frame::{EyeFrame, FrameError, StereoFrame};
+use super::stored::{Coding, Stored};
 
 /// A raw file, read frame by frame: a minute of it does not fit into memory.
 #[derive(Debug)]
@@ -72,12 +73,9 @@ fn size_in_name(path: &Path) -> Option<[usize; 2]> {
 
 /// The file, and how many frames are in it.
 fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), SourceError> {
-    let io = |source| SourceError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let file = File::open(path).map_err(io)?;
-    let bytes = file.metadata().map_err(io)?.len();
+    let io = SourceError::io(path);
+    let file = File::open(path).map_err(&io)?;
+    let bytes = file.metadata().map_err(&io)?.len();
     let frame = (size_px[0] * size_px[1] * 2) as u64;
     let frames = bytes.checked_div(frame).unwrap_or(0);
     match usize::try_from(frames) {
@@ -93,60 +91,28 @@ fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), Sourc
     }
 }
 
-impl YuyvSource {
-    /// One frame's bytes, read by `decode`.
-    fn decode<T>(
-        &self,
-        index: usize,
-        decode: impl FnOnce(&[u8], [usize; 2], Stamp) -> Result<T, FrameError>,
-    ) -> Result<T, SourceError> {
-        let path = || self.path.clone();
-        let stamp = self
-            .stamps
-            .get(index)
-            .ok_or_else(|| SourceError::OutOfRange {
-                path: path(),
-                frame: index,
-                len: self.stamps.len(),
-            })?;
+impl Stored for YuyvSource {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn stamps(&self) -> &[Stamp] {
+        &self.stamps
+    }
+
+    fn picture(&self, index: usize) -> Result<(Coding, Cow<'_, [u8]>), SourceError> {
         let mut bytes = vec![0; self.size_px[0] * self.size_px[1] * 2];
         let at = index as u64 * bytes.len() as u64;
         let read = self.file.read_exact_at(&mut bytes, at);
-        read.map_err(|source| SourceError::Io {
-            path: path(),
-            source,
-        })?;
-        decode(&bytes, self.size_px, *stamp).map_err(|source| SourceError::Frame {
-            path: path(),
-            frame: index,
-            source,
-        })
-    }
-}
-
-impl FrameSource for YuyvSource {
-    fn len(&self) -> usize {
-        self.stamps.len()
-    }
-
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
-        self.decode(index, |bytes, size_px, stamp| {
-            EyeFrame::left_from_yuyv(bytes, size_px, stamp.stamp_ns, stamp.sequence)
-        })
-    }
-}
-
-impl StereoSource for YuyvSource {
-    fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
-        self.decode(index, |bytes, size_px, stamp| {
-            StereoFrame::from_yuyv(bytes, size_px, stamp.stamp_ns, stamp.sequence)
-        })
+        read.map_err(SourceError::io(&self.path))?;
+        Ok((Coding::Yuyv(self.size_px), Cow::Owned(bytes)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::{FrameSource, StereoSource};
 
     #[test]
     fn the_name_tells_the_size() {
@@ -160,9 +126,9 @@ mod tests {
 
     #[test]
     fn frames_have_the_times_beside_them_and_damage_is_named() {
-        let folder = std::env::temp_dir().join(format!("yuyv-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let (raw, csv) = (folder.join("r_8x2.yuyv"), folder.join("r_8x2.csv"));
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name| folder.path().join(name);
+        let (raw, csv) = (at("r_8x2.yuyv"), at("r_8x2.csv"));
         std::fs::write(&raw, (0..64).collect::<Vec<u8>>()).unwrap();
         let open = |rate_hz| YuyvSource::open_named(&raw, rate_hz);
         let untimed = open(None).unwrap_err().to_string();
@@ -186,6 +152,5 @@ mod tests {
         assert!(torn.contains("r_8x2.yuyv"), "{torn}");
         let uneven = open(None).unwrap_err().to_string();
         assert!(uneven.contains("40 bytes"), "{uneven}");
-        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

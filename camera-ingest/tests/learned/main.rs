@@ -164,11 +164,7 @@ fn grey(width_px: usize, height_px: usize, stamp_ns: u64) -> EyeFrame {
     EyeFrame {
         stamp_ns,
         sequence: stamp_ns,
-        width_px,
-        height_px,
-        luma: vec![90; width_px * height_px],
-        cb: vec![128; width_px * height_px / 2],
-        cr: vec![128; width_px * height_px / 2],
+        ..EyeFrame::grey([width_px, height_px], 90)
     }
 }
 

@@ -130,11 +130,8 @@ fn eye(
     EyeFrame {
         stamp_ns: seed * 16_666_667,
         sequence: seed,
-        width_px,
-        height_px,
         luma,
-        cb: vec![128; width_px * height_px / 2],
-        cr: vec![128; width_px * height_px / 2],
+        ..EyeFrame::grey([width_px, height_px], 0)
     }
 }
 

@@ -1,0 +1,55 @@
+//! Video modes, and what a calibration says about one.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use shared_types::Intrinsics;
+
+/// Video mode of the camera; it names the calibration's sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum VideoMode {
+    /// 2208x1242 per eye.
+    #[serde(rename = "2K")]
+    TwoK,
+    /// 1920x1080 per eye.
+    #[serde(rename = "FHD", alias = "HD1080")]
+    FullHd,
+    /// 1280x720 per eye.
+    #[serde(rename = "HD", alias = "HD720")]
+    Hd,
+    /// 672x376 per eye.
+    #[serde(rename = "VGA")]
+    Vga,
+}
+
+impl VideoMode {
+    /// Suffix in the calibration file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TwoK => "2K",
+            Self::FullHd => "FHD",
+            Self::Hd => "HD",
+            Self::Vga => "VGA",
+        }
+    }
+
+    /// Width and height of one eye (px).
+    #[must_use]
+    pub fn size_px(self) -> (u32, u32) {
+        match self {
+            Self::TwoK => (2208, 1242),
+            Self::FullHd => (1920, 1080),
+            Self::Hd => (1280, 720),
+            Self::Vga => (672, 376),
+        }
+    }
+}
+
+/// What a calibration says about one mode: `X_right = R X_left - t`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Eyes {
+    pub(super) left: Intrinsics,
+    pub(super) right: Intrinsics,
+    pub(super) r_right_left: Matrix3<f64>,
+    pub(super) t_right_left_m: Vector3<f64>,
+}
