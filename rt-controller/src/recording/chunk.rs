@@ -3,7 +3,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 0..4 | `WAGR` |
-//! | 4..6 | layout, [`FORMAT`] |
+//! | 4..6 | layout: [`FORMAT`], or [`FORMAT_1`] of older recordings |
 //! | 6..8 | 1 when the first item is a keyframe |
 //! | 8..12 | number of the chunk since the controller began; a gap is a loss |
 //! | 12..16 | number of items |
@@ -12,8 +12,10 @@
 //!
 //! All numbers are little-endian; the items follow, in postcard.
 
-/// Version of the layout of chunks and items. Files of another one are refused.
+/// Version of the layout of chunks and items that is written.
 pub const FORMAT: u16 = 2;
+/// The layout before, which is still read: the states in its keyframes differ.
+pub const FORMAT_1: u16 = 1;
 /// Bytes of a header.
 pub const HEADER_LEN: usize = 24;
 /// Largest chunk, header included: a keyframe, two long motions and some cycles.
@@ -26,6 +28,8 @@ const CHECKED: usize = 20;
 /// What a chunk's header says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
+    /// Layout of the items: [`FORMAT`] or [`FORMAT_1`].
+    pub format: u16,
     /// Whether the first item is a keyframe.
     pub keyframe: bool,
     /// Number of the chunk.
@@ -90,7 +94,7 @@ pub fn read(bytes: &[u8]) -> Front<'_> {
         return Front::Damaged;
     }
     let format = u16_at(head, 4);
-    if format != FORMAT {
+    if !matches!(format, FORMAT | FORMAT_1) {
         return Front::OtherFormat(format);
     }
     let payload_len = usize::try_from(u32_at(head, 16)).unwrap_or(usize::MAX);
@@ -106,6 +110,7 @@ pub fn read(bytes: &[u8]) -> Front<'_> {
     }
     Front::Chunk {
         header: Header {
+            format,
             keyframe: u16_at(head, 6) & KEYFRAME != 0,
             sequence: u32_at(head, 8),
             items: u32_at(head, 12),

@@ -67,12 +67,14 @@ impl Keyframe {
     /// The state, ready to be stepped; `None` when it cannot be read.
     #[must_use]
     pub fn state(&self) -> Option<ControlState> {
-        ControlState::read_from(&self.state, |id, hash| {
-            self.motions
-                .iter()
-                .find(|(n, motion)| *n == id && motion.fingerprint() == hash)
-                .map(|(_, motion)| motion.clone())
-        })
+        ControlState::read_from(&self.state, |id, hash| self.motion(id, hash))
+    }
+
+    fn motion(&self, id: u64, hash: u64) -> Option<Box<Motion>> {
+        self.motions
+            .iter()
+            .find(|(n, motion)| *n == id && motion.fingerprint() == hash)
+            .map(|(_, motion)| motion.clone())
     }
 }
 
@@ -92,4 +94,17 @@ pub enum Item {
     Cycle(Box<RecordedCycle>),
     /// Why the arm was stopped; comes within some cycles of the stop.
     Cause(Box<CauseRecord>),
+}
+
+impl Item {
+    /// An item of layout 1 in today's: only states were written otherwise. `None`
+    /// when the state cannot be read.
+    pub(super) fn from_layout_1(mut self) -> Option<Self> {
+        if let Self::Keyframe(keyframe) = &mut self {
+            let state =
+                ControlState::read_layout_1(&keyframe.state, |id, hash| keyframe.motion(id, hash))?;
+            keyframe.state = Snapshot::of(&state)?.as_bytes().to_vec();
+        }
+        Some(self)
+    }
 }

@@ -15,7 +15,8 @@ pub enum LogError {
     Foreign,
     /// Another version.
     #[error(
-        "the recording has layout {found}, this program reads layout {}; use the version of `wag` that made it",
+        "the recording has layout {found}, this program reads layouts {} and {}; use the version of `wag` that made it",
+        chunk::FORMAT_1,
         chunk::FORMAT
     )]
     Format {
@@ -89,8 +90,9 @@ pub enum Read {
 pub struct LogReader<'a> {
     bytes: &'a [u8],
     offset: usize,
-    /// Items left of the present chunk, and where it began.
+    /// Items left of the present chunk, their layout, and where it began.
     items: &'a [u8],
+    format: u16,
     chunk_at: usize,
     next_sequence: Option<u32>,
 }
@@ -115,6 +117,7 @@ impl<'a> LogReader<'a> {
                 bytes,
                 offset: 0,
                 items: &[],
+                format: chunk::FORMAT,
                 chunk_at: 0,
                 next_sequence: None,
             }),
@@ -140,6 +143,7 @@ impl<'a> LogReader<'a> {
             } => {
                 self.chunk_at = self.offset;
                 self.items = payload;
+                self.format = header.format;
                 self.offset += len;
                 let expected = self.next_sequence.unwrap_or(header.sequence);
                 self.next_sequence = Some(header.sequence.wrapping_add(1));
@@ -177,13 +181,19 @@ impl Iterator for LogReader<'_> {
                 return Some(Read::Flaw(flaw));
             }
         }
-        match postcard::take_from_bytes::<Item>(self.items) {
-            Ok((item, rest)) => {
+        let item = postcard::take_from_bytes::<Item>(self.items)
+            .ok()
+            .and_then(|(item, rest)| match self.format {
+                chunk::FORMAT_1 => Some((item.from_layout_1()?, rest)),
+                _ => Some((item, rest)),
+            });
+        match item {
+            Some((item, rest)) => {
                 self.items = rest;
                 Some(Read::Item(item))
             }
             // The checksum is right, so it was written by another layout.
-            Err(_unknown) => {
+            None => {
                 self.items = &[];
                 Some(Read::Flaw(Flaw::Damaged {
                     offset: self.chunk_at,
