@@ -1,10 +1,10 @@
 //! The arm's wire: frames, requests, replies, every report layout, streams cut
 //! anywhere.
 
-use rt_controller::arm_status::ArmStatus;
+use rt_controller::report_feed::arm_codes;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::report::{
-    BasicReport, ForceReport, NormalReport, RealtimeReport, RichReport, firmware_text,
+    BasicReport, ForceReport, NormalReport, RealtimeReport, RichReport,
 };
 use rt_controller::xarm::{
     ArmVersion, Command, Firmware, FrameReader, JointQuery, Protocol, ReplyData, ReportReader,
@@ -91,8 +91,7 @@ fn report(frame: &[u8]) {
     let _ = NormalReport::parse(frame);
     let _ = RichReport::parse(frame);
     let _ = RealtimeReport::parse(frame);
-    let _ = firmware_text(frame);
-    let _ = ArmStatus::parse(frame, 1);
+    let _ = arm_codes(frame, 1);
 }
 
 /// Reads `data` as everything that may come over the wire.

@@ -21,7 +21,6 @@
 //! function; the emergency stop and the arm's own limits are.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
-pub mod arm_status;
 pub mod bridge;
 pub mod commander;
 pub mod config;
@@ -33,7 +32,6 @@ pub mod ports;
 pub mod process;
 pub mod recording;
 pub mod report_stream;
-pub mod reports;
 pub mod rt_loop;
 pub mod session;
 pub mod set_up;

@@ -1,8 +1,7 @@
 //! The in-process rings between the control loop and the other threads:
 //! single-producer single-consumer, lock-free, sized once.
 
-use crate::arm_status::ArmStatus;
-use crate::control::{ControlEvent, ControlState, CycleOutput, Motion};
+use crate::control::{ArmCodes, ControlEvent, ControlState, CycleOutput, Motion};
 use crate::driver::CommandMsg;
 use crate::recording::{RecordedCycle, Snapshot};
 use crate::report_stream::BrokenReports;
@@ -38,8 +37,8 @@ pub struct RtPorts<T> {
     pub commands: Consumer<CommandMsg<T>>,
     /// Joint reports in; the newest counts.
     pub reports: Consumer<JointReport>,
-    /// The arm's status in; the newest counts.
-    pub status: Consumer<ArmStatus>,
+    /// The arm's codes in; the newest counts.
+    pub codes: Consumer<ArmCodes>,
     /// Count of reports that had to be dropped.
     pub broken: BrokenReports,
     /// Events out.
@@ -66,10 +65,10 @@ impl<T> RtPorts<T> {
         reports
     }
 
-    /// The newest status that came since the last call; bounded. RT-safe.
-    pub fn newest_status(&mut self) -> Option<ArmStatus> {
+    /// The newest codes that came since the last call; bounded. RT-safe.
+    pub fn newest_codes(&mut self) -> Option<ArmCodes> {
         (0..NEWEST_REPORTS)
-            .map_while(|_| self.status.pop().ok())
+            .map_while(|_| self.codes.pop().ok())
             .last()
     }
 
@@ -114,8 +113,8 @@ pub struct BridgePorts<T> {
     pub commands: Producer<CommandMsg<T>>,
     /// Joint reports in, every one.
     pub reports: Consumer<JointReport>,
-    /// The arm's status in, every one.
-    pub status: Consumer<ArmStatus>,
+    /// The arm's codes in, all of them.
+    pub codes: Consumer<ArmCodes>,
     /// Events in.
     pub events: Consumer<ControlEvent>,
     /// What each cycle was told, in.
@@ -161,14 +160,10 @@ pub struct Rings<T> {
     pub rt: RtPorts<T>,
     /// The bridge's ends.
     pub bridge: BridgePorts<T>,
-    /// The report receiver's way to the loop.
-    pub reports_to_rt: Producer<JointReport>,
-    /// The report receiver's way to the bridge.
-    pub reports_to_bridge: Producer<JointReport>,
-    /// The status reader's way to the loop.
-    pub status_to_rt: Producer<ArmStatus>,
-    /// The status reader's way to the bridge.
-    pub status_to_bridge: Producer<ArmStatus>,
+    /// The joint report receiver's ways to the loop and to the bridge.
+    pub reports: [Producer<JointReport>; 2],
+    /// The ways of the arm's codes to the loop and to the bridge.
+    pub codes: [Producer<ArmCodes>; 2],
 }
 
 /// Makes all rings. Not RT-safe.
@@ -182,13 +177,13 @@ pub fn rings<T>() -> Rings<T> {
     let (retired, retired_out) = RingBuffer::new(FEW);
     let (reports_to_rt, newest) = RingBuffer::new(NEWEST_REPORTS);
     let (reports_to_bridge, reports) = RingBuffer::new(REPORTS);
-    let (status_to_rt, status) = RingBuffer::new(NEWEST_REPORTS);
-    let (status_to_bridge, status_out) = RingBuffer::new(FEW);
+    let (codes_to_rt, newest_codes) = RingBuffer::new(NEWEST_REPORTS);
+    let (codes_to_bridge, codes) = RingBuffer::new(FEW);
     Rings {
         rt: RtPorts {
             commands,
             reports: newest,
-            status,
+            codes: newest_codes,
             broken: BrokenReports::default(),
             events,
             inputs,
@@ -200,16 +195,14 @@ pub fn rings<T>() -> Rings<T> {
         bridge: BridgePorts {
             commands: commands_in,
             reports,
-            status: status_out,
+            codes,
             events: events_out,
             inputs: inputs_out,
             states: states_out,
             records: records_out,
             retired: retired_out,
         },
-        reports_to_rt,
-        reports_to_bridge,
-        status_to_rt,
-        status_to_bridge,
+        reports: [reports_to_rt, reports_to_bridge],
+        codes: [codes_to_rt, codes_to_bridge],
     }
 }

@@ -7,14 +7,13 @@
 //! | arm status | 5 Hz report connection | ordinary |
 //! | bridge (the caller's) | services, histograms, set-up connection | ordinary |
 
-use crate::arm_status;
 use crate::bridge::{ArmSettings, Bridge};
 use crate::config::ControllerConfig;
 use crate::control::ControlState;
 use crate::error::ControllerError;
 use crate::os::{MonotonicClock, enter_real_time, shared_memory_free_mb};
 use crate::ports::{RtPorts, rings};
-use crate::reports::{self, ReportSource};
+use crate::report_stream::{ReportStream, code_decoder, joint_decoder};
 use crate::rt_loop::RtLoop;
 use crate::transport::tcp::TcpLink;
 use crate::warm_up::CacheWarmUp;
@@ -57,34 +56,31 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     let control = ControlState::new(limits.clone(), settings);
     let broken = rings.rt.broken.clone();
     let warnings = threads.start_loop(&config, control, rings.rt)?;
-    let source = ReportSource {
+    let joints = ReportStream {
         arm: config.arm,
-        realtime_port: config.report_port,
-        fallback_port: config.fallback_report_port,
-        priority: config.real_time.priority.map(|p| p.saturating_sub(10)),
+        ports: vec![config.report_port, config.fallback_report_port],
+        decoder: joint_decoder,
+        rings: rings.reports,
+        broken: broken.clone(),
+        quit: Arc::clone(&threads.quit),
     };
-    let quit = Arc::clone(&threads.quit);
-    let joints = reports::spawn(
-        source,
-        rings.reports_to_rt,
-        rings.reports_to_bridge,
-        broken.clone(),
-        Arc::clone(&quit),
-    );
-    threads
-        .receivers
-        .push(joints.map_err(ControllerError::Thread)?);
-    let status = arm_status::spawn(
-        config.arm,
-        config.status_ports,
-        rings.status_to_rt,
-        rings.status_to_bridge,
+    let priority = config.real_time.priority.map(|p| p.saturating_sub(10));
+    let codes = ReportStream {
+        arm: config.arm,
+        ports: config.status_ports.to_vec(),
+        decoder: code_decoder,
+        rings: rings.codes,
         broken,
-        quit,
-    );
-    threads
-        .receivers
-        .push(status.map_err(ControllerError::Thread)?);
+        quit: Arc::clone(&threads.quit),
+    };
+    for receiver in [
+        joints.spawn("joint reports", priority),
+        codes.spawn("arm status", None),
+    ] {
+        threads
+            .receivers
+            .push(receiver.map_err(ControllerError::Thread)?);
+    }
     let mut bridge = Bridge::open(
         &bus,
         ArmSettings::of(&config, limits, &settings.thresholds),

@@ -1,15 +1,21 @@
-//! Listening to a report port: connecting, cutting the stream into frames,
-//! connecting again, for as long as the controller runs.
+//! Listening to a report port: a thread that connects, cuts the stream into frames,
+//! decodes them and passes each report on through two rings, to the control loop and
+//! to the bridge; and connects again, for as long as the controller runs.
 //!
-//! What the frames mean is the sink's business, which of them can be used that of
+//! It is not the real-time thread. Which frames can be used is decided by
 //! [`ReportFeed`].
 
+use crate::control::ArmCodes;
 use crate::os::now_ns;
-use crate::report_feed::{RETRY_NS, ReportFeed};
+use crate::os::schedule::set_fifo;
+use crate::report_feed::{JointDecoder, RETRY_NS, ReportFeed, arm_codes};
+use rtrb::Producer;
+use shared_types::ipc::JointReport;
 use std::io::{ErrorKind, Read};
 use std::net::{IpAddr, SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Longest wait for a connection.
@@ -35,39 +41,67 @@ impl BrokenReports {
     }
 }
 
-/// Takes the reports of one stream.
-pub trait ReportSink {
-    /// A connection to the port with index `port` was opened.
-    fn opened(&mut self, port: usize);
+/// Decodes the frames of one connection, given with their size field and when they
+/// arrived (CLOCK_MONOTONIC, ns); `None` for one that cannot be used.
+pub type Decoder<R> = Box<dyn FnMut(&[u8], u64) -> Option<R>>;
 
-    /// A whole frame from the port with index `port`, with its size field, that
-    /// arrived at `arrival_ns`; false when it cannot be used.
-    fn take(&mut self, port: usize, frame: &[u8], arrival_ns: u64) -> bool;
+/// Decodes joint reports: of the real-time port (index 0, 250 Hz, with the arm's own
+/// clock) or, where that refuses, of the real port (100 Hz, without).
+#[must_use]
+pub fn joint_decoder(port: usize) -> Decoder<JointReport> {
+    let mut joints = JointDecoder::default();
+    Box::new(move |frame, arrival_ns| match port {
+        0 => joints.realtime(frame, arrival_ns),
+        _ => JointDecoder::real(frame, arrival_ns),
+    })
+}
+
+/// Decodes the arm's codes, which only the 5 Hz reports carry.
+#[must_use]
+pub fn code_decoder(_port: usize) -> Decoder<ArmCodes> {
+    Box::new(arm_codes)
 }
 
 /// One report stream of an arm.
 #[derive(Debug)]
-pub struct ReportStream<S> {
+pub struct ReportStream<R> {
     /// Address of the arm.
     pub arm: IpAddr,
     /// Ports in the order in which they are tried.
     pub ports: Vec<u16>,
-    /// Where the frames go.
-    pub sink: S,
+    /// Makes the decoder of a new connection from the index of its port.
+    pub decoder: fn(usize) -> Decoder<R>,
+    /// To the control loop and to the bridge.
+    pub rings: [Producer<R>; 2],
     /// Where frames that cannot be used are counted.
     pub broken: BrokenReports,
     /// Ends the stream when set.
     pub quit: Arc<AtomicBool>,
 }
 
-impl<S: ReportSink> ReportStream<S> {
-    /// Listens until `quit` is set.
-    pub fn run(&mut self) {
+impl<R: Copy + Send + 'static> ReportStream<R> {
+    /// Listens in a thread called `name`, with a `SCHED_FIFO` priority if it may have
+    /// one, which ends soon after `quit` is set.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn spawn(mut self, name: &str, priority: Option<u8>) -> std::io::Result<JoinHandle<()>> {
+        std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || {
+                if let Some(priority) = priority {
+                    // Without it reports are merely stamped a little later.
+                    let _ = set_fifo(priority);
+                }
+                self.run();
+            })
+    }
+
+    fn run(&mut self) {
         while !self.quit.load(Ordering::Relaxed) {
-            let pause = self.connect().map_or(RETRY, |(port, stream)| {
-                self.sink.opened(port);
-                self.listen(port, stream)
-            });
+            let pause = self
+                .connect()
+                .map_or(RETRY, |(port, stream)| self.listen(port, stream));
             if !self.quit.load(Ordering::Relaxed) {
                 std::thread::sleep(pause);
             }
@@ -90,6 +124,7 @@ impl<S: ReportSink> ReportStream<S> {
     /// or `quit`; the pause before the next one.
     fn listen(&mut self, port: usize, mut stream: TcpStream) -> Duration {
         let mut feed = ReportFeed::opened(now_ns());
+        let mut decode = (self.decoder)(port);
         let mut lost_place = None;
         while lost_place.is_none() && !self.quit.load(Ordering::Relaxed) {
             let len = match stream.read(feed.space()) {
@@ -106,7 +141,12 @@ impl<S: ReportSink> ReportStream<S> {
             };
             let arrival_ns = now_ns();
             let seen = feed.received(len, arrival_ns, |frame| {
-                self.sink.take(port, frame, arrival_ns)
+                let report = decode(frame, arrival_ns);
+                for ring in &mut self.rings {
+                    // A full ring loses what is pushed.
+                    let _ = report.map(|report| ring.push(report));
+                }
+                report.is_some()
             });
             self.broken.add(seen.broken);
             lost_place = seen.lost_place;
@@ -124,17 +164,22 @@ impl<S: ReportSink> ReportStream<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rtrb::{Consumer, RingBuffer};
     use std::io::Write;
     use std::net::TcpListener;
-    use std::sync::mpsc;
+    use std::time::Instant;
 
-    struct Sizes(mpsc::Sender<usize>);
+    /// The size of a frame, unless it begins with 0xFF.
+    fn size_of_frame(_port: usize) -> Decoder<usize> {
+        Box::new(|frame, _| (frame.get(4) != Some(&0xFF)).then_some(frame.len()))
+    }
 
-    impl ReportSink for Sizes {
-        fn opened(&mut self, _port: usize) {}
-        fn take(&mut self, _port: usize, frame: &[u8], _arrival_ns: u64) -> bool {
-            frame.get(4) != Some(&0xFF) && self.0.send(frame.len()).is_ok()
+    fn next(sizes: &mut Consumer<usize>) -> Option<usize> {
+        let began = Instant::now();
+        while sizes.is_empty() && began.elapsed() < Duration::from_secs(10) {
+            std::thread::sleep(Duration::from_millis(1));
         }
+        sizes.pop().ok()
     }
 
     fn frame(size: u32, first: u8) -> Vec<u8> {
@@ -152,17 +197,18 @@ mod tests {
         let gone = TcpListener::bind("127.0.0.1:0").unwrap();
         let refused = gone.local_addr().unwrap().port();
         drop(gone);
-        let (sender, sizes) = mpsc::channel();
+        let (to_loop, mut sizes) = RingBuffer::new(16);
+        let (to_bridge, _nobody) = RingBuffer::new(16);
         let (broken, quit) = (BrokenReports::default(), Arc::new(AtomicBool::new(false)));
-        let mut stream = ReportStream {
+        let stream = ReportStream {
             arm: address.ip(),
             ports: vec![refused, address.port()],
-            sink: Sizes(sender),
+            decoder: size_of_frame,
+            rings: [to_loop, to_bridge],
             broken: broken.clone(),
             quit: Arc::clone(&quit),
         };
-        let listening = std::thread::spawn(move || stream.run());
-        let wait = Duration::from_secs(10);
+        let listening = stream.spawn("reports", None).unwrap();
 
         let (mut peer, _) = server.accept().unwrap();
         for bytes in [
@@ -173,13 +219,13 @@ mod tests {
         ] {
             peer.write_all(&bytes).unwrap();
         }
-        assert_eq!(sizes.recv_timeout(wait), Ok(135));
-        assert_eq!(sizes.recv_timeout(wait), Ok(135));
+        assert_eq!(next(&mut sizes), Some(135));
+        assert_eq!(next(&mut sizes), Some(135));
         peer.write_all(&[0xFF; 8]).unwrap(); // no size at all
 
         let (mut again, _) = server.accept().unwrap();
         again.write_all(&frame(145, 1)).unwrap();
-        assert_eq!(sizes.recv_timeout(wait), Ok(145));
+        assert_eq!(next(&mut sizes), Some(145));
         assert_eq!(broken.count(), 3);
 
         // Torn: filled up by the next one, whose rest is no report, at once ...
@@ -188,15 +234,15 @@ mod tests {
         again.write_all(&torn).unwrap();
         let (mut again, _) = server.accept().unwrap();
         again.write_all(&frame(135, 1)).unwrap();
-        assert_eq!(sizes.recv_timeout(wait), Ok(135), "nothing of the torn one");
+        assert_eq!(next(&mut sizes), Some(135), "nothing of the torn one");
         // ... or only when the next one comes.
         again.write_all(&frame(135, 1)[..60]).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         again.write_all(&frame(135, 1)[..75]).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         again.write_all(&frame(135, 2)).unwrap();
-        assert_eq!(sizes.recv_timeout(wait), Ok(135));
-        assert!(sizes.try_recv().is_err(), "the late one was dropped");
+        assert_eq!(next(&mut sizes), Some(135));
+        assert!(sizes.is_empty(), "the late one was dropped");
         assert_eq!(broken.count(), 6);
         quit.store(true, Ordering::Relaxed);
         listening.join().unwrap();

@@ -150,7 +150,7 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
     }
 
     fn new_codes(&mut self) -> Option<ArmCodes> {
-        self.ports.newest_status().map(ArmCodes::from)
+        self.ports.newest_codes()
     }
 
     fn put_input(&mut self, input: InputRecord) {

@@ -227,7 +227,7 @@ impl Running {
                 q: self.newest.q_c,
                 ..JointReport::default()
             };
-            let _ = self.rings.reports_to_rt.push(report);
+            let _ = self.rings.reports[0].push(report);
             std::thread::sleep(Duration::from_millis(2));
         }
     }

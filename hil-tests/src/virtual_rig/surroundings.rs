@@ -4,10 +4,9 @@
 use super::RigLog;
 use super::feeds::Feed;
 use super::network::{Network, VirtualStream};
-use rt_controller::arm_status::ArmStatus;
 use rt_controller::control::{ArmCodes, ControlEvent, ControlState, CycleOutput};
 use rt_controller::driver::{CommandMsg, CycleIo};
-use rt_controller::report_feed::JointDecoder;
+use rt_controller::report_feed::{JointDecoder, arm_codes};
 use rt_controller::transport::tcp::TcpLink;
 use shared_types::MonotonicNs;
 use shared_types::ipc::{
@@ -145,8 +144,8 @@ impl CycleIo<Link> for Surroundings {
         let now_ns = self.now().0;
         let mut newest = None;
         self.codes.frames(now_ns, |frame| {
-            let decoded = ArmStatus::parse(frame, now_ns);
-            newest = decoded.map(ArmCodes::from).or(newest);
+            let decoded = arm_codes(frame, now_ns);
+            newest = decoded.or(newest);
             decoded.is_some()
         });
         newest

@@ -266,7 +266,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
             q: if cycle < 2 { START_POSE } else { q },
             ..JointReport::default()
         };
-        all.reports_to_rt.push(report).unwrap();
+        all.reports[0].push(report).unwrap();
         if cycle == begin {
             let motion = Box::new(Motion::Spline(throw));
             let command = ControlCommand::Run { id: 1, motion };

@@ -8,8 +8,11 @@
 //! well.
 
 use crate::clock_map::ClockMap;
+use crate::control::ArmCodes;
 use crate::xarm::ReportReader;
-use crate::xarm::report::{ForceReport, MAX_REPORT_LEN, REALTIME_REPORT_LEN, RealtimeReport};
+use crate::xarm::report::{
+    ForceReport, MAX_REPORT_LEN, NormalReport, REALTIME_REPORT_LEN, RealtimeReport,
+};
 use crate::xarm::stream::BrokenStream;
 use arm_model::JointVector;
 use shared_types::ipc::{JointReport, PAYLOAD_VERSION};
@@ -175,4 +178,71 @@ impl JointDecoder {
 
 fn is_finite(report: &JointReport) -> bool {
     report.q.is_finite() && report.qd.is_finite() && report.q_target.is_finite()
+}
+
+/// The arm's own codes from a frame of port 30001 or 30002; `None` for one that is too
+/// short or holds numbers that are not finite.
+#[must_use]
+pub fn arm_codes(frame: &[u8], arrival_ns: u64) -> Option<ArmCodes> {
+    let r = NormalReport::parse(frame).ok()?;
+    let finite = r.basic.q.is_finite() && r.tcp_offset.is_finite();
+    finite.then(|| ArmCodes {
+        error: r.error.0,
+        warning: r.warning,
+        state: r.basic.state.code(),
+        mode: r.basic.mode.code(),
+        arrival_ns,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::xarm::{ArmState, Mode, TcpPose};
+    use arm_model::JointState;
+
+    fn frame(q: f64, size: usize) -> Vec<u8> {
+        let at = JointState::at_rest(JointVector::splat(q));
+        let report = RealtimeReport {
+            time_us: 5_000_000,
+            state: ArmState::Moving,
+            mode: Mode::Servo,
+            buffered: 0,
+            target: at,
+            actual: at,
+            current_a: JointVector::ZERO,
+            torque_nm: JointVector::ZERO,
+            target_tcp: TcpPose::default(),
+            target_twist: TcpPose::default(),
+            actual_tcp: TcpPose::default(),
+            actual_twist: TcpPose::default(),
+        };
+        let mut bytes = vec![0; MAX_REPORT_LEN];
+        report.emit(&mut bytes).unwrap();
+        bytes.truncate(size);
+        bytes
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_and_wrong_sizes_are_refused() {
+        const NOW_NS: u64 = 9_000_000_000;
+        let mut decoder = JointDecoder::default();
+        let report = decoder.realtime(&frame(0.5, 784), NOW_NS).unwrap();
+        assert_eq!((report.arm_mode, report.arm_clock), (1, 1));
+        assert!((report.q - JointVector::splat(0.5)).max_abs() < 1e-7);
+        let newer_firmware = frame(0.5, 804);
+        assert!(decoder.realtime(&newer_firmware, NOW_NS).is_some());
+        for damaged in [
+            frame(f64::NAN, 784),
+            frame(f64::INFINITY, 784),
+            frame(0.5, 783),
+            frame(0.5, 145),
+            Vec::new(),
+        ] {
+            assert_eq!(decoder.realtime(&damaged, NOW_NS), None);
+            let short = &damaged[..damaged.len().min(80)];
+            assert_eq!(JointDecoder::real(short, NOW_NS), None);
+            assert_eq!(arm_codes(short, NOW_NS), None);
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The bridge: the controller's door to the other processes, outside the
+//! The bridge: how other processes reach the controller, outside the
 //! real-time thread.
 //!
 //! It publishes what the loop and the report receiver put into their rings,
@@ -12,10 +12,9 @@ mod recording;
 mod requests;
 mod uploads;
 
-use crate::arm_status::ArmStatus;
 use crate::commander::CommanderLock;
 use crate::config::ControllerConfig;
-use crate::control::{ControlCommand, ControlEvent, Motion, Thresholds};
+use crate::control::{ArmCodes, ControlCommand, ControlEvent, Motion, Thresholds};
 use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
@@ -119,16 +118,13 @@ pub struct Bridge {
     latencies: Latencies,
     newest: CycleRecord,
     newest_report: Option<JointReport>,
-    newest_status: Option<ArmStatus>,
+    /// Error and warning that the arm reported last.
+    arm_codes: (ErrorCode, u8),
     arm_error: ErrorCode,
     open: Vec<Open>,
     uploads: Uploads,
     tier: Option<MotionTier>,
     last_id: u64,
-}
-
-fn codes(status: ArmStatus) -> (ErrorCode, u8) {
-    (status.error, status.warning)
 }
 
 impl core::fmt::Debug for Bridge {
@@ -164,7 +160,7 @@ impl Bridge {
             latencies: Latencies::new()?,
             newest: CycleRecord::default(),
             newest_report: None,
-            newest_status: None,
+            arm_codes: (ErrorCode::NONE, 0),
             arm_error: ErrorCode::NONE,
             open: Vec::new(),
             uploads: Uploads::default(),
@@ -243,21 +239,21 @@ impl Bridge {
             let sent = self.joints.send_copy(report);
             failed = sent.err().or(failed);
         }
-        while let Ok(status) = self.ports.status.pop() {
-            self.on_status(status);
+        while let Ok(codes) = self.ports.codes.pop() {
+            self.on_codes(codes);
         }
         if let Some(reason) = failed {
             tracing::warn!(?reason, "records could not be published");
         }
     }
 
-    /// Remembers the arm's status and says so when its codes change.
-    fn on_status(&mut self, status: ArmStatus) {
-        let before = self.newest_status.map_or((ErrorCode::NONE, 0), codes);
-        if codes(status) != before {
-            tracing::warn!(error = %status.error, warning = status.warning, "the arm's codes changed");
+    /// Says so when the arm's codes change.
+    fn on_codes(&mut self, codes: ArmCodes) {
+        let (error, warning) = (ErrorCode(codes.error), codes.warning);
+        if self.arm_codes != (error, warning) {
+            tracing::warn!(%error, warning, "the arm's codes changed");
         }
-        self.newest_status = Some(status);
+        self.arm_codes = (error, warning);
     }
 
     /// Hands a command to the loop.

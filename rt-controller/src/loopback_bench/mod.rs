@@ -47,16 +47,16 @@ const POLLS: usize = 4096;
 /// predictors are another program's.
 const WARM_UP: usize = 5;
 
-/// Why there is no trial.
+/// Why nothing can be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum LoopbackError {
     /// No shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
     /// No socket or thread.
-    #[error("the trial cannot begin: {0}")]
+    #[error("the loopback bench cannot begin: {0}")]
     System(#[from] std::io::Error),
-    /// The motion of the trial; a defect.
+    /// The motion of the bench; a defect.
     #[error(transparent)]
     Motion(#[from] TrajectoryError),
     /// The loop does not move; a defect, or a machine that does not run it.
@@ -117,6 +117,7 @@ impl LoopbackBench {
         let limits = Limits::default();
         let period_ns = MonotonicNs(0).plus_s(limits.period_s()).0;
         let all = rings();
+        let [reports_to_loop, _] = all.reports;
         let (polls, polled) = RingBuffer::new(POLLS);
         let (go, begin) = mpsc::channel::<Go>();
         let (rest, rested) = mpsc::channel();
@@ -155,7 +156,7 @@ impl LoopbackBench {
             rested,
             thread: Some(thread),
             bridge: all.bridge,
-            reports: all.reports_to_rt,
+            reports: reports_to_loop,
             polls: Some(polls),
             polled,
             operator: OperatorEnd::take(&bus)?,
@@ -258,7 +259,7 @@ impl LoopbackBench {
     /// Orders what leads to a moving arm from where the loop is.
     fn prompt(&mut self) -> Result<(), LoopbackError> {
         let message = match self.mode {
-            // Acknowledged: the trial measures, whatever the machine did to it.
+            // Acknowledged: the bench measures, whatever the machine did to it.
             ControllerMode::Faulted => CommandMsg {
                 command: ControlCommand::Engage { hold: self.q },
                 link: None,
@@ -313,8 +314,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trial_runs_in_slices_and_times_every_cycle_in_parts() {
-        let domain = format!("test_trial_{}", std::process::id());
+    fn it_runs_in_slices_and_times_every_cycle_in_parts() {
+        let domain = format!("test_loopback_{}", std::process::id());
         let ordinary = RealTimeSettings {
             priority: None,
             cpu: None,

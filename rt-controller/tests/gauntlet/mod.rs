@@ -166,7 +166,7 @@ impl<'w> Bench<'w> {
         }
         if !self.mood.reports_stop {
             let report = self.report();
-            self.rings.reports_to_rt.push(report).unwrap();
+            self.rings.reports[0].push(report).unwrap();
         }
         let (rt, now_ns) = (&mut self.rt, self.now_ns);
         self.watch.around(&mut || {

@@ -16,7 +16,7 @@ mod realtime;
 
 pub use periodic::{
     BasicReport, FORCE_REPORT_LEN, ForceReport, NORMAL_REPORT_LEN, NormalReport, RICH_REPORT_LEN,
-    RichReport, firmware_text,
+    RichReport,
 };
 pub use realtime::{REALTIME_REPORT_LEN, RealtimeReport};
 

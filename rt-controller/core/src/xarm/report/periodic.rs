@@ -19,7 +19,6 @@ pub const RICH_REPORT_LEN: usize = 574;
 /// Offsets in the rich report (bytes).
 mod rich {
     pub(super) const AXES: usize = 145;
-    pub(super) const FIRMWARE: usize = 151;
     pub(super) const TCP_DYNAMICS: usize = 181;
     pub(super) const JOINT_DYNAMICS: usize = 201;
     pub(super) const ROTATION: usize = 221;
@@ -204,14 +203,6 @@ impl NormalReport {
         check_len(frame, NORMAL_REPORT_LEN)?;
         Self::read(&mut ByteReader::new(frame)).ok_or(too_short(frame, NORMAL_REPORT_LEN))
     }
-}
-
-/// Firmware text of a rich report, `None` for a report without one.
-#[must_use]
-pub fn firmware_text(frame: &[u8]) -> Option<&str> {
-    let text = frame.get(rich::FIRMWARE..rich::TCP_DYNAMICS)?;
-    let text = text.split(|byte| *byte == 0).next()?;
-    core::str::from_utf8(text).ok()
 }
 
 /// Report of port 30002, 5 Hz.
