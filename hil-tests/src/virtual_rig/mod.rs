@@ -27,10 +27,11 @@ use arm_model::{JointVector, Limits};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, ControlState, Motion};
 use rt_controller::driver::{CommandMsg, CycleDriver};
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use rt_controller::transport::wire::arm_mode;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
+use rt_controller::xarm::{Command, Protocol, StateRequest};
+use shared_types::MonotonicNs;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord, InputRecord, RunCounts};
-use shared_types::{MonotonicNs, WireMode};
 use std::collections::VecDeque;
 use xarm_sim::{
     ArmConfig, ArmEndpoint, ArmEvent, ConnectRefused, Fault, JointSample, Service, TimedEvent,
@@ -172,10 +173,7 @@ impl VirtualRig {
     /// # Errors
     /// [`ConnectRefused`] when the arm cannot be reached.
     pub fn bring_up(&mut self) -> Result<(), ConnectRefused> {
-        let mode = match self.config.settings.wire {
-            WireMode::ServoPosition => Mode::Servo,
-            WireMode::JointVelocity => Mode::JointVelocity,
-        };
+        let mode = arm_mode(self.config.settings.wire);
         let mut session = VirtualStream::connect(&self.around.network, Service::Commands)?;
         for (id, command) in [
             Command::CleanError,

@@ -9,7 +9,7 @@ use crate::point_to_point::{MoveError, plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
 use crate::transport::tcp::TcpLink;
-use crate::transport::wire::backend;
+use crate::transport::wire::arm_mode;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
@@ -158,12 +158,12 @@ impl Bridge {
         }
         let plan = SetUp {
             limits: &self.arm.limits,
-            mode: backend(self.arm.wire).mode(),
+            mode: arm_mode(self.arm.wire),
             status: self.arm.status,
             joints: self.arm.joints,
             on_difference: self.arm.on_difference,
         };
-        let mut heard = |name: &'static str, result: &str| {
+        let mut step_done = |name: &'static str, result: &str| {
             tracing::info!(step = name, result, "setting up the arm");
             let step = ControllerEvent::Step {
                 name: name.to_owned(),
@@ -174,7 +174,7 @@ impl Bridge {
         ArmSession::connect(command, SET_UP_TIMEOUT)
             .map_err(SetUpError::from)
             .and_then(|mut session| {
-                let ready = plan.run(&mut session, &mut heard)?;
+                let ready = plan.run(&mut session, &mut step_done)?;
                 let link = TcpLink::connect(command, SET_UP_TIMEOUT, self.arm.link);
                 let link = link.map_err(|reason| SessionError::Connect {
                     address: command,

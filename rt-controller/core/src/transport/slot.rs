@@ -1,36 +1,27 @@
 //! The place of the loop's command link: empty, connected, or just broken.
 
-use super::wire::{WireBackend, backend};
-use super::{ArmTransport, MAX_COMMANDS};
+use super::{ArmTransport, MAX_COMMANDS, wire};
 use crate::control::{ArmCommand, LinkInput};
 use crate::xarm::{Command, StateRequest};
 use alloc::boxed::Box;
 use shared_types::WireMode;
 
 /// Holds at most one link. RT-safe; links are made and dropped elsewhere.
+#[derive(Debug)]
 pub struct LinkSlot<T> {
     link: Option<Box<T>>,
     lost: bool,
-    wire: &'static dyn WireBackend,
-}
-
-impl<T> core::fmt::Debug for LinkSlot<T> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("LinkSlot")
-            .field("connected", &self.link.is_some())
-            .field("lost", &self.lost)
-            .finish_non_exhaustive()
-    }
+    interface: WireMode,
 }
 
 impl<T> LinkSlot<T> {
-    /// Empty; commands will travel by `wire`.
+    /// Empty; commands will travel by `interface`.
     #[must_use]
-    pub fn new(wire: WireMode) -> Self {
+    pub const fn new(interface: WireMode) -> Self {
         Self {
             link: None,
             lost: false,
-            wire: backend(wire),
+            interface,
         }
     }
 }
@@ -72,7 +63,7 @@ impl<T: ArmTransport> LinkSlot<T> {
         let Some(link) = self.link.as_mut() else {
             return;
         };
-        let setpoint = command.and_then(|c| self.wire.request(&c));
+        let setpoint = command.and_then(|c| wire::request(self.interface, &c));
         let request = request.map(Command::SetState);
         let mut commands: heapless::Vec<Command, MAX_COMMANDS> = heapless::Vec::new();
         for command in [setpoint, request].into_iter().flatten() {
