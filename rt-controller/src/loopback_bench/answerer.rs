@@ -1,4 +1,4 @@
-//! The other end of a trial's command link: a thread that answers every request.
+//! The other end of the bench's command link: a thread that answers every request.
 
 use crate::xarm::frame::MAX_FRAME_LEN;
 use crate::xarm::{FrameReader, ReplyData, Status};

@@ -64,9 +64,9 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     let _load = Load::begin(&others).or_failed()?;
     let domain = format!("bench-rt-{}", std::process::id());
-    let mut trial = LoopbackBench::new(&domain, real_time.clone()).or_failed()?;
+    let mut bench = LoopbackBench::new(&domain, real_time.clone()).or_failed()?;
     let stage = Stage::begin("real time", quiet);
-    let measured = take_turns(&mut trial, &real_time, &rival, seconds, |done| {
+    let measured = take_turns(&mut bench, &real_time, &rival, seconds, |done| {
         stage.say(format!("{done} of {seconds} s each"));
     })?;
     stage.done(&format!("{} cycles", measured.ours.len()));
@@ -80,7 +80,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         cpu,
         loaded: others,
         period_us: PERIOD.as_secs_f64() * 1e6,
-        warnings: trial.warnings().to_vec(),
+        warnings: bench.warnings().to_vec(),
         missed: measured.ours.iter().map(|t| u64::from(t.missed)).sum(),
         wake: Beside::of(
             Percentiles::of(measured.ours.iter().map(|t| t.wake_ns)),
@@ -108,7 +108,7 @@ struct Measured {
 
 /// Turn by turn, until each has had its time.
 fn take_turns(
-    trial: &mut LoopbackBench,
+    bench: &mut LoopbackBench,
     real_time: &RealTimeSettings,
     rival: &Cyclictest,
     seconds: u32,
@@ -122,7 +122,7 @@ fn take_turns(
     };
     for turn in 0..seconds {
         say(turn);
-        measured.ours.extend(trial.slice(SLICE).or_failed()?);
+        measured.ours.extend(bench.slice(SLICE).or_failed()?);
         let work_ns = median(measured.ours.iter().map(|t| t.compute_ns));
         let bare = bare_slice(real_time, work_ns, PERIOD, SLICE);
         measured.bare.extend(bare.or_failed()?);
