@@ -37,8 +37,9 @@ pub enum Error {
     NoRun(PathBuf),
     /// A folder without a recording.
     #[error(
-        "`{}` is no run folder with a recording: it holds neither {} nor {}",
-        .0.display(), crate::CYCLES_FILE, crate::RUN_FILE
+        "`{}` is no run folder with recorded control cycles: it holds no {} with any (nor {}, \
+         as older versions wrote it)",
+        .0.display(), crate::files::RUN, crate::files::CYCLES
     )]
     NoRecording(PathBuf),
     /// Something else than an MCAP file.

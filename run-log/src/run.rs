@@ -1,78 +1,173 @@
 //! A recorded run, from its folder or its file.
 
 use crate::error::At;
-use crate::mcap_file::{RUN_FILE, RunFilm, is_mcap, replay_bytes};
-use crate::{CYCLES_FILE, Error, Result, RunLog};
+use crate::mcap_file::{RunFilm, is_mcap, replay_bytes};
+use crate::{CommandLine, Cycles, Error, Explanation, Result, RunLog, explain, files};
 use rt_controller::recording::{Item, LogReader, Read};
-use shared_types::ipc::{CycleRecord, JointReport};
+use serde_json::Value;
+use shared_types::{KeypointTrack, Plan, RopeParams};
 use std::path::{Path, PathBuf};
 
-/// A recorded run. Everything that is told of the control cycles comes from the exact
-/// recording, bit for bit.
+/// A run. What a folder does not hold is `None`; what it holds and is damaged is an error
+/// that names the file.
 #[derive(Debug, Clone)]
 pub struct Run {
-    path: PathBuf,
-    recording: Vec<u8>,
+    folder: PathBuf,
+    recorded: Option<PathBuf>,
+    film: PathBuf,
 }
 
-/// What the control loop did and was told.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cycles {
-    /// Control cycles in order.
-    pub cycles: Vec<CycleRecord>,
-    /// Joint reports as they came, each one once.
-    pub joints: Vec<JointReport>,
+/// The exact recording of a run's control cycles.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    path: PathBuf,
+    bytes: Vec<u8>,
 }
 
 impl Run {
-    /// Opens a run folder, or a file `run.mcap` or `cycles.bin`.
+    /// Opens a run folder, or a file `run.mcap` or `cycles.bin` (of a version that wrote
+    /// the cycles apart).
     ///
     /// # Errors
-    /// [`Error::NoRun`], [`Error::NoRecording`], or the recording cannot be read.
+    /// [`Error::NoRun`].
     pub fn open(run: &Path) -> Result<Self> {
         if !run.exists() {
             return Err(Error::NoRun(run.to_owned()));
         }
-        let file = if run.is_dir() {
-            // Either will do; the smaller one is read sooner.
-            [CYCLES_FILE, RUN_FILE]
-                .map(|name| run.join(name))
-                .into_iter()
-                .find(|file| file.is_file())
-                .ok_or_else(|| Error::NoRecording(run.to_owned()))?
-        } else {
-            run.to_owned()
-        };
-        let mut recording = std::fs::read(&file).map_err(Error::read(&file))?;
-        if is_mcap(&recording) {
-            recording = replay_bytes(&recording).at(|| format!("`{}`", file.display()))?;
+        if run.is_dir() {
+            // Where there are both, the smaller one is read sooner.
+            let files = [files::CYCLES, files::RUN].map(|name| run.join(name));
+            return Ok(Self {
+                folder: run.to_owned(),
+                recorded: files.into_iter().find(|file| file.is_file()),
+                film: run.join(files::RUN),
+            });
         }
         Ok(Self {
-            path: run.to_owned(),
-            recording,
+            folder: run.parent().unwrap_or(Path::new("")).to_owned(),
+            recorded: Some(run.to_owned()),
+            film: run.to_owned(),
         })
     }
 
-    /// The exact recording, for [`rt_controller::recording::replay()`].
-    #[must_use]
-    pub fn recording(&self) -> &[u8] {
-        &self.recording
+    /// The run's folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The exact recording.
+    ///
+    /// # Errors
+    /// [`Error::NoRecording`], or the file cannot be read.
+    pub fn recording(&self) -> Result<Recording> {
+        let none = || Error::NoRecording(self.folder.clone());
+        let path = self.recorded.clone().ok_or_else(none)?;
+        let mut bytes = std::fs::read(&path).map_err(Error::read(&path))?;
+        if is_mcap(&bytes) {
+            bytes = replay_bytes(&bytes).at(|| format!("`{}`", path.display()))?;
+            if bytes.is_empty() {
+                return Err(none());
+            }
+        }
+        Ok(Recording { path, bytes })
+    }
+
+    /// The pictures, the camera and the measured joints in the run's file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not as this program writes it.
+    pub fn film(&self) -> Result<RunFilm> {
+        RunFilm::read(&self.film)
+    }
+
+    /// A file of the folder, read by `read` where it is there.
+    fn file<T>(&self, name: &str, read: impl FnOnce(&Path) -> Result<T>) -> Result<Option<T>> {
+        let path = self.folder.join(name);
+        path.is_file().then(|| read(&path)).transpose()
+    }
+
+    /// How it was made.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn command(&self) -> Result<Option<CommandLine>> {
+        self.file(files::COMMAND, files::read_json)
+    }
+
+    /// Every figure of it.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn summary(&self) -> Result<Option<Value>> {
+        self.file(files::SUMMARY, files::read_json)
+    }
+
+    /// The tracked keypoints.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn keypoints(&self) -> Result<Option<KeypointTrack>> {
+        self.file(files::KEYPOINTS, files::read_json)
+    }
+
+    /// The identified rope.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn rope(&self) -> Result<Option<RopeParams>> {
+        self.file(files::ROPE, files::read_rope)
+    }
+
+    /// The plan of the throw.
+    ///
+    /// # Errors
+    /// The file is damaged, or was changed after it was planned.
+    pub fn plan(&self) -> Result<Option<Plan>> {
+        self.file(files::PLAN, files::read_plan)
+    }
+
+    /// Why it was stopped, as it was kept.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn cause(&self) -> Result<Option<Value>> {
+        self.file(files::CAUSE, files::read_json)
+    }
+
+    /// Explains the recording of the run and keeps the explanation as `cause.json` when the
+    /// arm was stopped. `None` when there is no recording to explain; that never spoils the
+    /// run itself.
+    pub fn keep_cause(&self) -> Option<Explanation> {
+        let found = explain(&self.recording().ok()?.log().ok()?);
+        if found.stopped
+            && let Err(reason) = files::write_json(&self.folder.join(files::CAUSE), &found)
+        {
+            tracing::warn!(%reason, "the cause of the stop could not be kept");
+        }
+        Some(found)
+    }
+}
+
+impl Recording {
+    /// Its bytes, for [`rt_controller::recording::replay()`].
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// What a person wants to know of each cycle, and every stop.
     ///
     /// # Errors
-    /// The recording holds nothing this version can read.
+    /// It holds nothing this version can read.
     pub fn log(&self) -> Result<RunLog> {
-        RunLog::read(&self.recording).at(|| format!("`{}`", self.path.display()))
+        RunLog::read(&self.bytes).at(|| format!("`{}`", self.path.display()))
     }
 
-    /// Control cycles and joint reports.
+    /// Control cycles and joint reports, bit for bit.
     ///
     /// # Errors
-    /// The recording holds nothing this version can read.
+    /// It holds nothing this version can read.
     pub fn cycles(&self) -> Result<Cycles> {
-        let items = LogReader::open(&self.recording).at(|| format!("`{}`", self.path.display()))?;
+        let items = LogReader::open(&self.bytes).at(|| format!("`{}`", self.path.display()))?;
         let mut found = Cycles::default();
         for read in items {
             if let Read::Item(Item::Cycle(cycle)) = read {
@@ -84,20 +179,13 @@ impl Run {
         }
         Ok(found)
     }
-
-    /// The pictures, the camera and the measured joints in a run's file.
-    ///
-    /// # Errors
-    /// The file cannot be read, or is not as this program writes it.
-    pub fn film(file: &Path) -> Result<RunFilm> {
-        RunFilm::read(file)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use rt_controller::recording::{ChunkWriter, RecordedCycle};
+    use shared_types::ipc::JointReport;
 
     /// Cycles with a joint report in every second one.
     fn recording() -> (Vec<u8>, Cycles) {
@@ -131,10 +219,10 @@ mod tests {
     fn cycles_and_reports_come_back_bit_for_bit() {
         let (bytes, told) = recording();
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join(CYCLES_FILE), &bytes).unwrap();
-        let run = Run::open(folder.path()).unwrap();
-        assert_eq!(run.recording(), bytes);
-        assert_eq!(run.cycles().unwrap(), told);
+        std::fs::write(folder.path().join(files::CYCLES), &bytes).unwrap();
+        let found = Run::open(folder.path()).unwrap().recording().unwrap();
+        assert_eq!(found.bytes(), bytes);
+        assert_eq!(found.cycles().unwrap(), told);
     }
 
     #[test]
@@ -142,13 +230,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let none = folder.path().join("none");
         assert!(matches!(Run::open(&none), Err(Error::NoRun(path)) if path == none));
-        assert!(matches!(
-            Run::open(folder.path()),
-            Err(Error::NoRecording(_))
-        ));
+        let empty = Run::open(folder.path()).unwrap();
+        assert!(matches!(empty.recording(), Err(Error::NoRecording(_))));
+        assert!(empty.summary().unwrap().is_none());
         let words = folder.path().join("words");
         std::fs::write(&words, "t,q1\n0,1\n").unwrap();
-        let error = Run::open(&words).unwrap().cycles().unwrap_err();
+        let recording = Run::open(&words).unwrap().recording().unwrap();
+        let error = recording.cycles().unwrap_err();
         assert!(error.to_string().contains("words"), "{error}");
     }
 
@@ -156,14 +244,12 @@ mod tests {
     #[test]
     fn damage_costs_chunks_and_never_invents_cycles() {
         let (bytes, told) = recording();
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(CYCLES_FILE);
         for k in 0..200_usize {
             let mut bytes = bytes.clone();
             let at = (k * 2_654_435_761) % bytes.len();
             bytes[at] ^= 1 << (k % 8);
-            std::fs::write(&path, &bytes).unwrap();
-            let Ok(found) = Run::open(folder.path()).unwrap().cycles() else {
+            let path = PathBuf::from("changed");
+            let Ok(found) = (Recording { path, bytes }).cycles() else {
                 continue;
             };
             assert!(found.cycles.iter().all(|c| told.cycles.contains(c)));

@@ -17,7 +17,6 @@ mod command;
 mod config;
 mod doctor;
 mod files;
-mod ledger;
 mod moved;
 mod pipeline;
 mod session;

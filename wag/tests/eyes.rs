@@ -3,6 +3,7 @@
 
 #[path = "../../camera-ingest/tests/printed_board/mod.rs"]
 mod printed_board;
+mod support;
 
 use arm_model::joint::START_POSE;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
@@ -11,38 +12,13 @@ use camera_ingest::{ClampPath, FrameSource, TrackOptions, load_camera, open_vide
 use nalgebra::{Rotation3, Vector3};
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
-use serde_json::Value;
 use shared_types::{KeypointTrack, StereoCamera};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use support::{json_in, refused_in};
 
 /// Frames of a recording that are enough to follow the rope.
 const FRAMES: usize = 120;
-
-fn wag(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .current_dir(folder)
-        .args(args)
-        .output()
-        .unwrap()
-}
-
-/// Runs a command that must succeed; what `--json` prints.
-fn done(folder: &Path, args: &[&str]) -> Value {
-    let output = wag(folder, args);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "wag {}: {said}", args.join(" "));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-/// Runs a command that must fail with an exit code; its error.
-fn refused(folder: &Path, code: i32, args: &[&str]) -> String {
-    let output = wag(folder, args);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(code), "wag {args:?}: {said}");
-    said
-}
 
 /// A recorded wiggle; `None`, said aloud, where the data are not there.
 fn recording(name: &str) -> Option<PathBuf> {
@@ -120,23 +96,12 @@ fn pictures_and_raw_files_are_tracked_like_the_film() {
     fs::create_dir(dir.path().join("drawn")).unwrap();
     let expected = keypoints(&from);
     let track = |video: &str, overlay: &str| {
-        let args = [
-            "track",
-            "--json",
-            "--video",
-            video,
-            "--camera",
-            "camera.toml",
-        ];
-        let more = [
-            "--pose",
-            "pose.csv",
-            "--overlay",
-            overlay,
-            "--out",
-            "k.json",
-        ];
-        let report = done(dir.path(), &[args, more].concat());
+        let report = json_in(
+            dir.path(),
+            &format!(
+                "track --video {video} --camera camera.toml --pose pose.csv --overlay {overlay} --out k.json"
+            ),
+        );
         assert_eq!(report["frames"], FRAMES);
         let text = fs::read_to_string(dir.path().join("k.json")).unwrap();
         serde_json::from_str::<KeypointTrack>(&text).unwrap()
@@ -148,34 +113,27 @@ fn pictures_and_raw_files_are_tracked_like_the_film() {
     let sheet = fs::read(dir.path().join("drawn/sheet.png")).unwrap();
     assert!(sheet.starts_with(b"\x89PNG"));
 
-    let own = [
-        "--camera",
-        "camera.toml",
-        "--pose",
-        "pose.csv",
-        "--out",
-        "k2.json",
-    ];
-    let told = |code: i32, args: &[&str]| refused(dir.path(), code, &[args, &own].concat());
-    let twice = told(2, &["track", "--video", ".", "--fps", "60"]);
+    let own = "--camera camera.toml --pose pose.csv --out k2.json";
+    let told = |video: &str| refused_in(dir.path(), 2, &format!("track --video {video} {own}"));
+    let twice = told(". --fps 60");
     assert!(twice.contains("leave out the frame rate"), "{twice}");
     fs::rename(dir.path().join("f0100.jpg"), dir.path().join("kept")).unwrap();
-    let rows = told(2, &["track", "--video", "."]);
+    let rows = told(".");
     assert!(
         rows.contains("timestamps.csv") && rows.contains("119"),
         "{rows}"
     );
     fs::remove_file(dir.path().join("timestamps.csv")).unwrap();
-    let untimed = told(2, &["track", "--video", "."]);
+    let untimed = told(".");
     assert!(untimed.contains("give the frame rate"), "{untimed}");
-    let rate = told(2, &["track", "--video", ".", "--fps", "0"]);
+    let rate = told(". --fps 0");
     assert!(rate.contains("--fps"), "{rate}");
     fs::copy(
         dir.path().join("raw_1344x376.yuyv"),
         dir.path().join("raw.yuyv"),
     )
     .unwrap();
-    let unnamed = told(2, &["track", "--video", "raw.yuyv", "--fps", "60"]);
+    let unnamed = told("raw.yuyv --fps 60");
     assert!(
         unnamed.contains("raw.yuyv") && unnamed.contains("name"),
         "{unnamed}"
@@ -187,15 +145,14 @@ fn pictures_and_raw_files_are_tracked_like_the_film() {
 fn a_film_on_another_clock_is_told_and_put_right() {
     let Some(from) = recording("a1") else { return };
     let dir = tempfile::tempdir().unwrap();
-    let path = |name: &str| from.join(name).display().to_string();
     let late = |late_ms: &str| {
-        let (camera, pose) = (path("camera.toml"), path("pose.csv"));
-        let video = from.display().to_string();
-        let files = ["--video", &video, "--camera", &camera, "--pose", &pose];
-        let own = ["--film-late-ms", late_ms, "--out", "k.json"];
-        let report = done(
+        let folder = from.display();
+        let report = json_in(
             dir.path(),
-            &[&["track", "--json"][..], &files, &own].concat(),
+            &format!(
+                "track --video {folder} --camera {folder}/camera.toml --pose {folder}/pose.csv \
+                 --film-late-ms {late_ms} --out k.json"
+            ),
         );
         let number = |name: &str| report["clamp"][name].as_f64().unwrap();
         (number("time_offset_s"), number("time_std_s"))
@@ -258,18 +215,11 @@ fn a_board_tells_where_the_camera_stands() {
     other.dictionary = "DICT_9X9".to_owned();
     fs::write(at("other.toml"), toml::to_string(&other).unwrap()).unwrap();
 
-    let shown = [
-        "--video",
-        "film_2560x720.yuyv",
-        "--fps",
-        "30",
-        "--board",
-        "board.toml",
-    ];
-    let args = ["calib", "extrinsics", "--json", "--camera", "thought.toml"];
-    let report = done(
+    let film = "--video film_2560x720.yuyv --fps 30";
+    let find = format!("calib extrinsics --camera thought.toml {film}");
+    let report = json_in(
         dir.path(),
-        &[&args, &shown[..], &["--out", "found.toml"]].concat(),
+        &format!("{find} --board board.toml --out found.toml"),
     );
     let (away_m, away_degrees) = off(&at("found.toml"), &truth);
     assert!(away_m <= 0.003 && away_degrees <= 0.2);
@@ -279,55 +229,35 @@ fn a_board_tells_where_the_camera_stands() {
     );
     assert!(report["position_error_m"].as_f64().unwrap() > 0.0);
 
-    let check = ["calib", "check", "--json", "--camera"];
-    let report = done(
-        dir.path(),
-        &[&check[..], &["found.toml"], &shown[..]].concat(),
-    );
+    let check = |camera: &str| format!("calib check --camera {camera} {film} --board board.toml");
+    let report = json_in(dir.path(), &check("found.toml"));
     assert!(
         report["residual"]["rms_px"].as_f64().unwrap() < 0.3,
         "{report}"
     );
-    let shifted = refused(
-        dir.path(),
-        1,
-        &[&check[..], &["thought.toml"], &shown[..]].concat(),
-    );
+    let shifted = refused_in(dir.path(), 1, &check("thought.toml"));
     assert!(shifted.contains("wag calib extrinsics"), "{shifted}");
-    let turned = refused(
-        dir.path(),
-        1,
-        &[&check[..], &["turned.toml"], &shown[..]].concat(),
-    );
+    let turned = refused_in(dir.path(), 1, &check("turned.toml"));
     assert!(turned.contains("sign is wrong"), "{turned}");
 
-    let film = [
-        "--video",
-        "film_2560x720.yuyv",
-        "--fps",
-        "30",
-        "--out",
-        "no.toml",
-    ];
-    let args = [&args[..], &film].concat();
-    let told = |code: i32, more: &[&str]| refused(dir.path(), code, &[&args, more].concat());
-    let board = told(2, &["--board", "other.toml"]);
+    let told = |shown: &str| refused_in(dir.path(), 2, &format!("{find} --out no.toml {shown}"));
+    let board = told("--board other.toml");
     assert!(
         board.contains("other.toml") && board.contains("DICT_9X9"),
         "{board}"
     );
-    let nothing = told(2, &[]);
+    let nothing = told("");
     assert!(nothing.contains("--board"), "{nothing}");
-    let colourless = told(2, &["--lead", "shown.csv"]);
+    let colourless = told("--lead shown.csv");
     assert!(colourless.contains("--lead-rgb"), "{colourless}");
     fs::write(at("shown.csv"), "frame,x,y,z\n7,0,0,0\n").unwrap();
-    let beyond = told(2, &["--lead", "shown.csv", "--lead-rgb", "240,150,30"]);
+    let beyond = told("--lead shown.csv --lead-rgb 240,150,30");
     assert!(
         beyond.contains("shown.csv") && beyond.contains("frame 7"),
         "{beyond}"
     );
     fs::write(at("shown.csv"), "frame,x,y,z\n0,0,nan,0\n").unwrap();
-    let nan = told(2, &["--lead", "shown.csv", "--lead-rgb", "240,150,30"]);
+    let nan = told("--lead shown.csv --lead-rgb 240,150,30");
     assert!(nan.contains("shown.csv") && nan.contains("finite"), "{nan}");
     assert!(!at("no.toml").exists());
 }
@@ -363,24 +293,15 @@ fn the_lead_at_known_places_tells_where_the_camera_stands() {
     let dir = film_of(&frames, &camera, VideoMode::Vga);
     fs::write(dir.path().join("shown.csv"), rows).unwrap();
     let colour = appearance.target_rgb.map(|c| c.to_string()).join(",");
-    let film = [
-        "--video",
-        "film_1344x376.yuyv",
-        "--fps",
-        "30",
-        "--camera",
-        "thought.toml",
-    ];
-    let shown = ["--lead", "shown.csv", "--lead-rgb", &colour];
-    let command = ["calib", "extrinsics", "--json", "--out", "found.toml"];
-    let report = done(dir.path(), &[&command[..], &film, &shown].concat());
+    let command = "calib extrinsics --video film_1344x376.yuyv --fps 30 --camera thought.toml \
+                   --lead shown.csv --out found.toml --lead-rgb";
+    let report = json_in(dir.path(), &format!("{command} {colour}"));
     println!("{report}");
     let (away_m, away_degrees) = off(&dir.path().join("found.toml"), &camera);
     assert!(away_m <= 0.01 && away_degrees <= 0.5);
     let seen = report["residual"]["points"].as_u64().unwrap();
     assert!(seen >= 12, "{report}");
     // Grey is no colour to be found by.
-    let grey = ["--lead", "shown.csv", "--lead-rgb", "120,120,120"];
-    let grey = refused(dir.path(), 1, &[&command[..], &film, &grey].concat());
+    let grey = refused_in(dir.path(), 1, &format!("{command} 120,120,120"));
     assert!(grey.contains("grey"), "{grey}");
 }

@@ -7,6 +7,8 @@
     reason = "tests may fail loudly"
 )]
 
+mod support;
+
 use arm_model::Limits;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use planner::filming::{FilmTiming, KeypointLayout, Randomisation, film as film_rope, side_camera};
@@ -16,7 +18,7 @@ use rope_sim::PlannedArm;
 use shared_types::RopeParams;
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
+use support::{said, wag_in};
 
 /// Seed of ropes and noise.
 const SEED: u64 = 71;
@@ -60,24 +62,15 @@ fn film(rope: &RopeParams, index: u64, folder: &Path) {
 fn identified(rope: &RopeParams, index: u64) -> (String, toml::Table) {
     let folder = tempfile::tempdir().unwrap();
     film(rope, index, folder.path());
-    let output = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .current_dir(folder.path())
-        .args([
-            "identify",
-            "--method",
-            "hybrid",
-            "--keypoints",
-            "keypoints.json",
-        ])
-        .args(["--camera", "camera.toml", "--joints", "joints.csv"])
-        .args(["--out", "rope.toml"])
-        .output()
-        .unwrap();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{error}");
+    let output = wag_in(
+        folder.path(),
+        "identify --method hybrid --keypoints keypoints.json --camera camera.toml \
+         --joints joints.csv --out rope.toml",
+    );
+    assert!(output.status.success(), "{}", said(&output));
     let file = std::fs::read_to_string(folder.path().join("rope.toml")).unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    (said, file.parse().unwrap())
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    (printed, file.parse().unwrap())
 }
 
 #[test]

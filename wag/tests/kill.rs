@@ -2,13 +2,16 @@
 //! three seconds, nothing is left running, and the next demo succeeds.
 #![cfg(test)]
 
+mod support;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::fs;
+use rustix::process::Signal;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+use support::{command, process_of, processes_of, send, until};
 
 const PROCESSES: [&str; 5] = [
     "rig",
@@ -18,76 +21,24 @@ const PROCESSES: [&str; 5] = [
     "planner",
 ];
 
-/// Command lines of all running processes: (pid, arguments).
-fn running() -> Vec<(u32, Vec<String>)> {
-    fs::read_dir("/proc")
-        .unwrap()
-        .filter_map(|entry| {
-            let pid: u32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
-            let bytes = fs::read(format!("/proc/{pid}/cmdline")).ok()?;
-            let args: Vec<String> = bytes
-                .split(|b| *b == 0)
-                .map(|a| String::from_utf8_lossy(a).into_owned())
-                .collect();
-            (args.len() > 1).then_some((pid, args))
-        })
-        .collect()
-}
-
-/// Processes whose command line names this run folder, by process name.
-fn of_run(run: &Path) -> Vec<(u32, String)> {
-    let run = run.display().to_string();
-    running()
-        .into_iter()
-        .filter(|(_, args)| args.iter().any(|a| a.starts_with(&run)))
-        .map(|(pid, args)| {
-            let named = args
-                .iter()
-                .position(|a| a == "process")
-                .and_then(|i| args.get(i + 1));
-            (pid, named.cloned().unwrap_or_else(|| "wag".to_owned()))
-        })
-        .collect()
-}
-
 fn demo(run: &Path, seed: u64) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(["demo", "--json", "--seed", &seed.to_string(), "--out"])
-        .arg(run)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
-
-fn kill_9(pid: u32) {
-    let pid = rustix::process::Pid::from_raw(i32::try_from(pid).unwrap()).unwrap();
-    rustix::process::kill_process(pid, rustix::process::Signal::KILL).unwrap();
+    let line = format!("demo --json --seed {seed} --out {}", run.display());
+    command(&line).spawn().unwrap()
 }
 
 /// Waits until the named process runs and some more.
 fn wait_for(run: &Path, name: &str, more: Duration) -> u32 {
-    let began = Instant::now();
-    loop {
-        if let Some((pid, _)) = of_run(run).into_iter().find(|(_, n)| n == name) {
-            sleep(more);
-            return pid;
-        }
-        assert!(
-            began.elapsed() < Duration::from_secs(20),
-            "{name} never started"
-        );
-        sleep(Duration::from_millis(10));
-    }
+    let run = run.display().to_string();
+    let pid = until(name, Duration::from_secs(20), || process_of(&run, name));
+    sleep(more);
+    pid
 }
 
 fn nothing_left(run: &Path, within: Duration) {
-    let began = Instant::now();
-    while !of_run(run).is_empty() {
-        assert!(began.elapsed() < within, "still running: {:?}", of_run(run));
-        sleep(Duration::from_millis(20));
-    }
+    let run = run.display().to_string();
+    until("the end of all processes", within, || {
+        processes_of(&run).is_empty().then_some(())
+    });
 }
 
 #[test]
@@ -99,7 +50,7 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
         let child = demo(&run, 100 + i as u64);
         let moment = Duration::from_millis(rng.random_range(300..16_000));
         let pid = wait_for(&run, victim, moment);
-        kill_9(pid);
+        send(pid, Signal::KILL);
         let killed = Instant::now();
         let output = child.wait_with_output().unwrap();
         let took = killed.elapsed();
@@ -130,7 +81,7 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
         "planner",
         Duration::from_millis(rng.random_range(300..8_000)),
     );
-    kill_9(child.id());
+    send(child.id(), Signal::KILL);
     child.wait().unwrap();
     nothing_left(&run, Duration::from_secs(3));
 
@@ -166,8 +117,7 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
         "plan.csv",
         "params.toml",
         "keypoints.json",
-        "joints.csv",
-        "cycles.csv",
+        "run.mcap",
         "wiggle.png",
     ] {
         assert!(run.join(file).is_file(), "{file} is missing");

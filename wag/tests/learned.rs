@@ -4,12 +4,14 @@
 
 #[path = "../../camera-ingest/tests/learned/onnx.rs"]
 mod onnx;
+mod support;
 
 use onnx::Axis::{Is, Open};
 use planner::phi::graph_sha256;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
+use support::{said, wag_in};
 
 /// Folder of a recorded wiggle; `None`, said aloud, where it is not there.
 fn wiggle() -> Option<PathBuf> {
@@ -38,38 +40,35 @@ fn folder(wiggle: &Path) -> tempfile::TempDir {
     dir
 }
 
-fn track(folder: &Path, wiggle: &Path, args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
-    command
-        .current_dir(folder)
-        .args(["track", "--json", "--video"])
-        .arg(wiggle)
-        .arg("--pose")
-        .arg(wiggle.join("pose.csv"))
-        .args(["--out", "keypoints.json"])
-        .args(args);
-    if !args.contains(&"--camera") {
-        command.arg("--camera").arg(wiggle.join("camera.toml"));
-    }
-    command.output().unwrap()
+fn track(folder: &Path, wiggle: &Path, more: &str) -> Output {
+    let wiggle = wiggle.display();
+    let camera = if more.contains("--camera") {
+        String::new()
+    } else {
+        format!("--camera {wiggle}/camera.toml")
+    };
+    let files = format!("--video {wiggle} --pose {wiggle}/pose.csv {camera}");
+    wag_in(
+        folder,
+        &format!("track --json {files} --out keypoints.json {more}"),
+    )
 }
 
 #[test]
 fn the_report_tells_who_did_what() {
     let Some(wiggle) = wiggle() else { return };
     let dir = folder(&wiggle);
-    let cases: [(&[&str], Option<&str>); 3] = [
-        (&[], None),
-        (&["--camera", "camera.toml"], Some("half.onnx")),
+    let cases = [
+        ("", None),
+        ("--camera camera.toml", Some("half.onnx")),
         (
-            &["--camera", "camera.toml", "--segmenter", "open.onnx"],
+            "--camera camera.toml --segmenter open.onnx",
             Some("open.onnx"),
         ),
     ];
-    for (args, model) in cases {
-        let output = track(dir.path(), &wiggle, args);
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{error}");
+    for (more, model) in cases {
+        let output = track(dir.path(), &wiggle, more);
+        assert!(output.status.success(), "{}", said(&output));
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(report["lost"], 0, "{report}");
         assert_eq!(report["models"]["following"]["by"], "built-in");
@@ -89,31 +88,28 @@ fn the_report_tells_who_did_what() {
 fn what_does_not_fit_is_refused() {
     let Some(wiggle) = wiggle() else { return };
     let dir = folder(&wiggle);
-    let cases: [(&[&str], &[&str]); 8] = [
-        (&["--segmenter", "nowhere.onnx"], &["nowhere.onnx", "path"]),
-        (&["--segmenter", "none.onnx"], &["none.onnx", "ONNX file?"]),
+    let cases: [(&str, &[&str]); 8] = [
+        ("--segmenter nowhere.onnx", &["nowhere.onnx", "path"]),
+        ("--segmenter none.onnx", &["none.onnx", "ONNX file?"]),
         (
-            &["--tracker", "open.onnx"],
+            "--tracker open.onnx",
             &["open.onnx", "`image`", "`frames`, `queries`"],
         ),
-        (&["--lead-px", "300,250"], &["--lead-px", "--segmenter"]),
+        ("--lead-px 300,250", &["--lead-px", "--segmenter"]),
         (
-            &["--segmenter", "open.onnx", "--lead-px", "700,250"],
+            "--segmenter open.onnx --lead-px 700,250",
             &["700,250", "672x376"],
         ),
-        (&["--lead-px", "300"], &["--lead-px", "U,V"]),
-        (&["--lead-px", "300,nan"], &["--lead-px", "finite"]),
-        (
-            &["--camera", "misspelt.toml"],
-            &["misspelt.toml", "segmentor"],
-        ),
+        ("--lead-px 300", &["--lead-px", "U,V"]),
+        ("--lead-px 300,nan", &["--lead-px", "finite"]),
+        ("--camera misspelt.toml", &["misspelt.toml", "segmentor"]),
     ];
-    for (args, words) in cases {
-        let output = track(dir.path(), &wiggle, args);
-        let error = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
+    for (more, words) in cases {
+        let output = track(dir.path(), &wiggle, more);
+        let error = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{more}: {error}");
         for word in words {
-            assert!(error.contains(word), "{args:?}: {error}");
+            assert!(error.contains(word), "{more}: {error}");
         }
         assert!(!dir.path().join("keypoints.json").exists());
     }

@@ -1,11 +1,13 @@
 //! `wag plan`: broken off, it leaves the best throw so far, marked as such.
 #![cfg(test)]
 
-use rustix::process::{Pid, Signal, kill_process};
+mod support;
+
+use rustix::process::Signal;
 use serde_json::Value;
 use std::io::Read;
-use std::process::{Command, Stdio};
 use std::time::Duration;
+use support::{command, send};
 
 const ROPE: &str = "links = 20
 length_m = 0.5
@@ -26,18 +28,16 @@ fn an_interrupt_leaves_the_best_plan_so_far() {
     let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
     std::fs::write(at("rope.toml"), ROPE).unwrap();
     std::fs::write(at("planner.toml"), ENDLESS).unwrap();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(["plan", "strike", "--target", "0.95,0.1,0.2", "--json"])
-        .args(["--rope", &at("rope.toml"), "--config", &at("planner.toml")])
-        .args(["--out", &at("plan.json"), "--allow-miss"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = command(
+        "plan strike --target 0.95,0.1,0.2 --json --rope rope.toml --config planner.toml \
+         --out plan.json --allow-miss",
+    )
+    .current_dir(dir.path())
+    .spawn()
+    .unwrap();
     std::thread::sleep(Duration::from_secs(2));
     assert!(child.try_wait().unwrap().is_none(), "ended by itself");
-    let pid = Pid::from_raw(child.id().try_into().unwrap()).unwrap();
-    kill_process(pid, Signal::INT).unwrap();
+    send(child.id(), Signal::INT);
     let mut answer = String::new();
     let mut stdout = child.stdout.take().unwrap();
     stdout.read_to_string(&mut answer).unwrap();

@@ -21,10 +21,10 @@ use shared_types::{MonotonicNs, StereoCamera};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-use support::{command, said};
+use support::{command, process_of, said, send};
 
 const SEED: u64 = 4;
 /// Longest wait for a stage of a demo on a busy machine.
@@ -55,38 +55,13 @@ impl Drop for Ends {
     }
 }
 
-fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let began = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(began.elapsed() < PATIENCE, "{what} never came");
-        sleep(Duration::from_millis(5));
-    }
-}
-
-/// The preview that the process `parent` started.
-fn preview_of(parent: u32) -> Option<Pid> {
-    let parent = parent.to_string();
-    std::fs::read_dir("/proc").unwrap().find_map(|entry| {
-        let pid: i32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
-        let line = std::fs::read(format!("/proc/{pid}/cmdline")).ok()?;
-        let args: Vec<_> = line
-            .split(|b| *b == 0)
-            .map(String::from_utf8_lossy)
-            .collect();
-        let has = |a: &str, b: &str| args.windows(2).any(|pair| pair[0] == a && pair[1] == b);
-        (has("process", "preview") && has("--parent", &parent))
-            .then(|| Pid::from_raw(pid))
-            .flatten()
-    })
+fn until<T>(what: &str, look: impl FnMut() -> Option<T>) -> T {
+    support::until(what, PATIENCE, look)
 }
 
 /// `wag watch RUN --preview`, and the address of its page.
 fn watch(run: &Path) -> (Ends, String) {
-    let mut child = command(&["watch", "--preview", "--json"])
-        .arg(run)
+    let mut child = command(&format!("watch --preview --json {}", run.display()))
         .stderr(Stdio::inherit())
         .spawn()
         .unwrap();
@@ -294,12 +269,12 @@ fn rehearse(demo: &mut Ends, run: &Path) -> Option<Heard> {
     let (page, url) = watch(run);
     stand.follows(60)?;
     // Killed, it is started again by the page and finds the rope again.
-    let first = preview_of(page.0.id()).unwrap();
-    kill_process(first, Signal::KILL).unwrap();
+    let first = process_of(&page.0.id().to_string(), "preview").unwrap();
+    send(first, Signal::KILL);
     stand.listen();
     let killed_at = stand.heard.told.len();
     stand.follows(60)?;
-    let second = preview_of(page.0.id()).unwrap();
+    let second = process_of(&page.0.id().to_string(), "preview").unwrap();
     assert_ne!(first, second);
     assert!(stand.heard.told[killed_at..].iter().any(|t| t.seen <= 5));
     // What it tells is drawn.
@@ -313,9 +288,9 @@ fn rehearse(demo: &mut Ends, run: &Path) -> Option<Heard> {
     // Kept from running now and then, as on a busy machine, it leaves frames out.
     let before = stand.heard.told.last().unwrap().skipped;
     for _ in 0..3 {
-        kill_process(second, Signal::STOP).unwrap();
+        send(second, Signal::STOP);
         sleep(Duration::from_millis(300));
-        kill_process(second, Signal::CONT).unwrap();
+        send(second, Signal::CONT);
         sleep(Duration::from_millis(300));
     }
     stand.listen();
@@ -331,11 +306,8 @@ fn the_rope_is_followed_at_rest_and_in_motion_whatever_happens_to_the_preview() 
     let folder = tempfile::tempdir().unwrap();
     for attempt in 0..3 {
         let run = folder.path().join(format!("run-{attempt}"));
-        let seed = SEED.to_string();
-        let child: Child = command(&["demo", "--seed", &seed, "--json", "--out"])
-            .arg(&run)
-            .spawn()
-            .unwrap();
+        let line = format!("demo --seed {SEED} --json --out {}", run.display());
+        let child = command(&line).spawn().unwrap();
         let mut demo = Ends(child);
         let Some(heard) = rehearse(&mut demo, &run) else {
             let said = told(demo);
@@ -384,11 +356,7 @@ fn a_preview_alone_says_what_it_waits_for_and_needs_a_calibration() {
     let camera = folder.path().join("camera.toml");
     let text = format!("domain = \"{domain}\"\ncamera = \"{}\"\n", camera.display());
     std::fs::write(&config, text).unwrap();
-    let process = || -> Command {
-        let mut command = command(&["process", "preview", "--config"]);
-        command.arg(&config);
-        command
-    };
+    let process = || command(&format!("process preview --config {}", config.display()));
     let refused = process().output().unwrap();
     assert_eq!(refused.status.code(), Some(1), "{}", said(&refused));
     assert!(said(&refused).contains("camera.toml"), "{}", said(&refused));

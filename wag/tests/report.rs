@@ -5,13 +5,15 @@
 mod support;
 
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, JointVector, kinematics};
+use arm_model::{JointTrajectory, kinematics};
+use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
+use shared_types::MonotonicNs;
+use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
 use shared_types::plan::trajectory_hash_hex;
-use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::wag;
+use support::{recording, wag};
 
 /// A name and a text that would do harm as markup.
 const HOSTILE: &str = "<script>alert(1)<!--";
@@ -34,39 +36,44 @@ fn throw() -> JointTrajectory {
 
 /// The measured arm is behind its setpoints by this (s).
 const LAG_S: f64 = 0.02;
-/// The run's clock at the begin of the throw (s).
-const BEGIN_S: f64 = 12.5;
+/// Control cycles before and after the throw's begin; each brings a joint report.
+const CYCLES: std::ops::Range<i32> = -125..500;
+const PERIOD_S: f64 = 0.004;
 
-fn write_motion(run: &Path, motion: &JointTrajectory) {
-    let mut cycles = String::from(
-        "cycle,deadline_s,mode,fault,sent,wake_late_us,compute_us,send_us,reply_us,missed,dropped,trajectory_s,\
-         q1_c,q2_c,q3_c,q4_c,q5_c,q6_c,q7_c\n",
-    );
-    let numbers = |q: JointVector| q.iter().map(|v| format!(",{v:.9}")).collect::<String>();
-    for cycle in 0..300_u32 {
-        let t = f64::from(cycle) * 0.004;
-        let (mode, on, q) = if t <= 1.0 {
-            ("Streaming", t, motion.state_at(t).q)
+fn recorded(motion: &JointTrajectory) -> Vec<u8> {
+    let begin = MonotonicNs(12_500_000_000);
+    recording(CYCLES.map(|cycle| {
+        let t = f64::from(cycle) * PERIOD_S;
+        let streams = (0.0..=1.0).contains(&t);
+        let mode = if streams {
+            ControllerMode::Streaming
         } else {
-            ("Idle", -1.0, motion.end())
+            ControllerMode::Idle
         };
-        let late = 10 + cycle % 50;
-        let deadline = BEGIN_S + t;
-        writeln!(
-            cycles,
-            "{cycle},{deadline:.6},{mode},None,1,{late}.0,20.0,60.0,90.0,0,0,{on:.6}{}",
-            numbers(q)
-        )
-        .unwrap();
-    }
-    fs::write(run.join("cycles.csv"), cycles).unwrap();
-    let mut joints = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
-    for sample in 0..500_u32 {
-        let t = f64::from(sample) * 0.005 - 0.5;
-        let q = motion.state_at((t - LAG_S).clamp(0.0, 1.0)).q;
-        writeln!(joints, "{:.6}{}", BEGIN_S + t, numbers(q)).unwrap();
-    }
-    fs::write(run.join("joints.csv"), joints).unwrap();
+        let late_us = cycle.rem_euclid(50).unsigned_abs() + 10;
+        let deadline_ns = begin.plus_s(t).0;
+        let record = CycleRecord {
+            deadline_ns,
+            mode: mode as u8,
+            sent: 1,
+            wake_late_ns: 1000 * late_us,
+            compute_ns: 20_000,
+            send_ns: 60_000,
+            trajectory_s: if streams { t } else { -1.0 },
+            q_c: motion.state_at(t.clamp(0.0, 1.0)).q,
+            ..CycleRecord::default()
+        };
+        let mut one = RecordedCycle {
+            record,
+            ..RecordedCycle::default()
+        };
+        one.input.reports.push(JointReport {
+            stamp_ns: deadline_ns,
+            q: motion.state_at((t - LAG_S).clamp(0.0, 1.0)).q,
+            ..JointReport::default()
+        });
+        one
+    }))
 }
 
 /// A run whose every text tries to get out of its place.
@@ -74,7 +81,7 @@ fn hostile_run(folder: &Path) -> PathBuf {
     let run = folder.join(HOSTILE);
     fs::create_dir(&run).unwrap();
     let motion = throw();
-    write_motion(&run, &motion);
+    fs::write(run.join("cycles.bin"), recorded(&motion)).unwrap();
     fs::write(run.join("params.toml"), ROPE).unwrap();
     let rope: Value = serde_json::to_value(
         toml::from_str::<toml::Table>(ROPE.split("[interval").next().unwrap()).unwrap(),
@@ -125,13 +132,11 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
     let dir = tempfile::tempdir().unwrap();
     let run = hostile_run(dir.path());
     let out = dir.path().join("r.html");
-    let made = wag(&[
-        "report",
-        run.to_str().unwrap(),
-        "--out",
-        out.to_str().unwrap(),
-        "--json",
-    ]);
+    let made = wag(&format!(
+        "report {} --out {} --json",
+        run.display(),
+        out.display()
+    ));
     assert!(made.status.success(), "{made:?}");
     let html = fs::read_to_string(&out).unwrap();
     let said: Value = serde_json::from_slice(&made.stdout).unwrap();
@@ -166,7 +171,7 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
     );
     let missing = data["missing"].to_string();
     assert!(
-        missing.contains("cycles.bin") && missing.contains("wiggle.png"),
+        missing.contains("wiggle.png") && !missing.contains("run.mcap"),
         "{missing}"
     );
     let url = data["pictures"][0]["url"].as_str().unwrap();
@@ -174,16 +179,8 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
 
     // The same bytes again.
     let again = dir.path().join("again.html");
-    assert!(
-        wag(&[
-            "report",
-            run.to_str().unwrap(),
-            "--out",
-            again.to_str().unwrap()
-        ])
-        .status
-        .success()
-    );
+    let line = format!("report {} --out {}", run.display(), again.display());
+    assert!(wag(&line).status.success());
     assert_eq!(fs::read(&again).unwrap(), html.into_bytes());
 }
 
@@ -191,7 +188,7 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
 fn the_replay_is_the_measured_arm_with_the_rope_on_it() {
     let dir = tempfile::tempdir().unwrap();
     let run = hostile_run(dir.path());
-    assert!(wag(&["report", run.to_str().unwrap()]).status.success());
+    assert!(wag(&format!("report {}", run.display())).status.success());
     let html = fs::read_to_string(run.join("report.html")).unwrap();
     let (data, _) = parts(&html);
     let scene = &data["scenes"][0];
@@ -247,7 +244,7 @@ fn what_is_no_run_or_is_damaged_is_refused_by_name() {
     let empty = dir.path().join("empty");
     fs::create_dir(&empty).unwrap();
     let refused = |run: &Path, word: &str| {
-        let output = wag(&["report", run.to_str().unwrap()]);
+        let output = wag(&format!("report {}", run.display()));
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains(word) && said.lines().count() == 1, "{said}");
@@ -257,11 +254,9 @@ fn what_is_no_run_or_is_damaged_is_refused_by_name() {
     refused(&empty, "no run folder");
     for (file, text, word) in [
         ("summary.json", "{", "summary.json"),
-        ("cycles.csv", "a,b\n1,2\n", "cycles.csv"),
         ("cycles.bin", "nothing", "cycles.bin"),
         ("params.toml", "links = 0", "params.toml"),
         ("plan.json", "{}", "plan.json"),
-        ("joints.csv", "t\n", "joints.csv"),
         ("wiggle.png", "no picture", "wiggle.png"),
     ] {
         let run = hostile_run(&{

@@ -5,18 +5,17 @@
 mod support;
 
 use mcap::{MessageStream, Summary};
+use rustix::process::Signal;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
-use support::{Rig, json, said, wag};
+use support::{Rig, json, process_of, said, send, until_recorded, wag};
 
 /// Runs a wiggle on a simulated arm; `during` sees the run folder and the process.
 fn wiggle(run: &Path, during: impl FnOnce(&Path, u32)) -> Output {
-    let rig = Rig::start(&[]);
+    let rig = Rig::start("");
     let child = rig.wiggle(run);
     during(run, child.id());
     child.wait_with_output().unwrap()
@@ -71,28 +70,32 @@ fn a_run_lies_in_one_file_that_replays_to_the_bit() {
     assert_eq!(summary.attachment_indexes.len(), 1);
     let counts = topics(&bytes);
     println!("{} bytes, {counts:?}", bytes.len());
-    // The file is the longer one by what came while the controller ended.
-    let kept = fs::read_to_string(run.join("cycles.csv")).unwrap();
-    let kept = kept.lines().count() as u64 - 1;
-    let more = counts["/controller/cycles"].checked_sub(kept);
-    assert!(
-        more.is_some_and(|n| n < 500),
-        "{kept} cycles kept, {counts:?}"
-    );
     assert!(
         counts["/arm/measured"] > 1000 && counts["/tf"] > 200,
         "{counts:?}"
     );
     assert_eq!(counts["/wag/summary"], 1);
     python_agrees(&file);
-    // The same recording, whichever file it is read from.
-    let of = |path: &Path| json(&["replay", &path.display().to_string()])["replay"].clone();
-    let from_file = of(&file);
-    assert_eq!(from_file["differing_bytes"], 0, "{from_file}");
-    assert_eq!(from_file, of(&run));
-    fs::remove_file(run.join("cycles.bin")).unwrap();
-    assert_eq!(from_file, of(&run));
-    let told = json(&["record", "recover", &file.display().to_string()]);
+    let replayed = json(&format!("replay {}", run.display()))["replay"].clone();
+    assert_eq!(replayed["differing_bytes"], 0, "{replayed}");
+    let tables = json(&format!("export csv {}", run.display()));
+    assert_eq!(tables["cycles"], replayed["cycles"]);
+    let rows = fs::read_to_string(run.join("cycles.csv")).unwrap();
+    assert_eq!(
+        rows.lines().count() as u64 - 1,
+        tables["cycles"].as_u64().unwrap()
+    );
+    let reports = fs::read_to_string(run.join("joints.csv")).unwrap();
+    assert_eq!(
+        reports.lines().count() as u64 - 1,
+        tables["joints"].as_u64().unwrap()
+    );
+    let exact = tables["cycles"].as_u64().unwrap();
+    assert!(
+        counts["/controller/cycles"].abs_diff(exact) < 500,
+        "{exact} cycles, {counts:?}"
+    );
+    let told = json(&format!("record recover {}", file.display()));
     assert_eq!(told["recovered"]["was_whole"], true);
     assert_eq!(fs::read(&file).unwrap(), bytes);
     ledger_knows(folder.path(), &run);
@@ -101,18 +104,18 @@ fn a_run_lies_in_one_file_that_replays_to_the_bit() {
 /// The run is listed, told how it was made, and a broken folder beside it hides nothing.
 fn ledger_knows(runs: &Path, run: &Path) {
     fs::create_dir(runs.join("broken")).unwrap();
-    let csv = runs.join("runs.csv").display().to_string();
-    let told = json(&["ledger", &runs.display().to_string(), "--csv", &csv]);
+    let (csv, places) = (runs.join("runs.csv"), runs.display());
+    let told = json(&format!("ledger {places} --csv {}", csv.display()));
     let listed = told["runs"].as_array().unwrap();
     assert_eq!(listed.len(), 2, "{told:#}");
     assert_eq!(listed[0]["result"], "broken");
     assert_eq!(listed[1]["result"], "ok");
     assert_eq!(listed[1]["arguments"][0], "wiggle");
     assert_eq!(fs::read_to_string(&csv).unwrap().lines().count(), 3);
-    let only = json(&["ledger", &runs.display().to_string(), "--result", "ok"]);
+    let only = json(&format!("ledger {places} --result ok"));
     assert_eq!(only["runs"].as_array().unwrap().len(), 1);
     let run = run.display().to_string();
-    let again = json(&["ledger", "rerun", &run]);
+    let again = json(&format!("ledger rerun {run}"));
     let words: Vec<&str> = again["arguments"]
         .as_array()
         .unwrap()
@@ -124,10 +127,10 @@ fn ledger_knows(runs: &Path, run: &Path) {
         !words.contains(&"--out") && !words.contains(&run.as_str()),
         "{words:?}"
     );
-    let same = json(&["ledger", "compare", &run, &run]);
+    let same = json(&format!("ledger compare {run} {run}"));
     assert_eq!(same["differences"], Value::Array(Vec::new()));
     // The arm is gone by now: making the run again fails as it would by hand.
-    let gone = wag(&["ledger", "rerun", &run, "--go"]);
+    let gone = wag(&format!("ledger rerun {run} --go"));
     let said = said(&gone);
     assert_eq!(gone.status.code(), Some(1), "{said}");
     assert_eq!(
@@ -137,40 +140,20 @@ fn ledger_knows(runs: &Path, run: &Path) {
     );
 }
 
-/// Process number of the recorder that `parent` started.
-fn recorder_of(parent: u32) -> Option<u32> {
-    fs::read_dir("/proc").unwrap().flatten().find_map(|entry| {
-        let pid: u32 = entry.file_name().to_str()?.parse().ok()?;
-        let line = fs::read_to_string(entry.path().join("cmdline")).ok()?;
-        let words: Vec<&str> = line.split('\0').collect();
-        let is_recorder = words.get(1..3) == Some(&["process", "recorder"]);
-        (is_recorder && words.contains(&parent.to_string().as_str())).then_some(pid)
-    })
-}
-
 #[test]
 fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     let mut killed_ns = 0;
     let output = wiggle(&run, |run, pid| {
-        let began = Instant::now();
-        let cycles = run.join("cycles.bin");
         // Well into the motion.
-        while fs::metadata(&cycles).map_or(0, |m| m.len()) < 1_000_000 {
-            assert!(began.elapsed() < Duration::from_secs(60), "nothing moves");
-            sleep(Duration::from_millis(10));
-        }
-        let recorder = recorder_of(pid).expect("there is a recorder").to_string();
+        until_recorded(run, 900);
+        let recorder = process_of(&pid.to_string(), "recorder").expect("there is a recorder");
         killed_ns = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .unwrap()
             .as_nanos();
-        let status = Command::new("kill")
-            .args(["-9", &recorder])
-            .status()
-            .unwrap();
-        assert!(status.success());
+        send(recorder, Signal::KILL);
     });
     let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
@@ -191,8 +174,11 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
         Ok(Some(_))
     ));
     // Reading commands take it as it is.
-    assert_eq!(json(&["replay", &name])["replay"]["differing_bytes"], 0);
-    let found = json(&["record", "recover", &name])["recovered"].clone();
+    assert_eq!(
+        json(&format!("replay {name}"))["replay"]["differing_bytes"],
+        0
+    );
+    let found = json(&format!("record recover {name}"))["recovered"].clone();
     assert_eq!(
         (&found["was_whole"], &found["damaged"]),
         (&Value::from(false), &Value::from(0))

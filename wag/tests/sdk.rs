@@ -45,17 +45,11 @@ fn two_clients_of_the_vendor_sdk_share_the_simulated_arm() {
         println!("skipped: WAG_SDK_PYTHON does not name a Python with xarm-python-sdk installed");
         return;
     };
-    let rig = Rig::start(&[]);
+    let rig = Rig::start("");
     let ports = rig.ports();
     let output = Command::new(python)
-        .args([
-            "-c",
-            TWO_CLIENTS,
-            &ports[0],
-            &ports[2],
-            &ports[3],
-            &ports[4],
-        ])
+        .args(["-c", TWO_CLIENTS, &ports[0]])
+        .args(&ports[2..])
         .output()
         .unwrap();
     drop(rig);
@@ -75,18 +69,13 @@ fn the_vendor_sdk_accepts_the_simulated_arm() {
         println!("skipped: WAG_SDK_PYTHON does not name a Python with xarm-python-sdk installed");
         return;
     };
-    let rig = Rig::start(&[]);
+    let rig = Rig::start("");
     let ports = rig.ports();
     let reports = ports[2..].join(",");
     let output = Command::new(python)
         .arg(&check)
-        .args([
-            "127.0.0.1",
-            "--control-port",
-            &ports[0],
-            "--report-ports",
-            &reports,
-        ])
+        .args(["127.0.0.1", "--control-port", &ports[0]])
+        .args(["--report-ports", &reports])
         .output()
         .unwrap();
     drop(rig);

@@ -2,24 +2,20 @@
 //! full, results to standard output, links and pipes in the place of files.
 #![cfg(test)]
 
+mod support;
+
 use std::fs::{self, File};
 use std::io::Read;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Command;
+use support::{command, json_in, refused_in, said};
 
-fn wag(folder: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
+/// `wag` in a folder.
+fn wag(folder: &Path, line: &str) -> Command {
+    let mut command = command(line);
+    command.current_dir(folder);
     command
-        .current_dir(folder)
-        .args(args)
-        .stdin(Stdio::null())
-        .stderr(Stdio::piped());
-    command
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 const HEADER: &str = "t,q1,q2,q3,q4,q5,q6,q7";
@@ -27,12 +23,9 @@ const HEADER: &str = "t,q1,q2,q3,q4,q5,q6,q7";
 #[test]
 fn a_reader_who_leaves_early_changes_nothing_about_the_work() {
     let dir = tempfile::tempdir().unwrap();
-    for json in [&[][..], &["--json"]] {
-        let args = [&["wiggle", "--csv", "w.csv"], json].concat();
-        let mut child = wag(dir.path(), &args)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+    for json in ["", "--json"] {
+        let line = format!("wiggle --csv w.csv {json}");
+        let mut child = wag(dir.path(), &line).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", said(&output));
@@ -46,7 +39,7 @@ fn a_reader_who_leaves_early_changes_nothing_about_the_work() {
 fn a_full_disk_behind_standard_output_is_one_clear_error() {
     let dir = tempfile::tempdir().unwrap();
     let full = File::options().write(true).open("/dev/full").unwrap();
-    let output = wag(dir.path(), &["wiggle", "--csv", "w.csv"])
+    let output = wag(dir.path(), "wiggle --csv w.csv")
         .stdout(full)
         .output()
         .unwrap();
@@ -61,8 +54,7 @@ fn a_full_disk_behind_standard_output_is_one_clear_error() {
 #[test]
 fn a_result_can_go_to_standard_output_and_stands_there_alone() {
     let dir = tempfile::tempdir().unwrap();
-    let output = wag(dir.path(), &["wiggle", "--csv", "/dev/stdout"])
-        .stdout(Stdio::piped())
+    let output = wag(dir.path(), "wiggle --csv /dev/stdout")
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", said(&output));
@@ -89,10 +81,7 @@ fn pipes_and_links_stay_what_they_are() {
             .unwrap()
             .success()
     );
-    let child = wag(dir.path(), &["wiggle", "--csv", "pipe"])
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
+    let child = wag(dir.path(), "wiggle --csv pipe").spawn().unwrap();
     let mut text = String::new();
     File::open(&pipe)
         .unwrap()
@@ -105,9 +94,7 @@ fn pipes_and_links_stay_what_they_are() {
 
     fs::write(dir.path().join("real.csv"), "").unwrap();
     std::os::unix::fs::symlink("real.csv", dir.path().join("link.csv")).unwrap();
-    let output = wag(dir.path(), &["wiggle", "--csv", "link.csv"])
-        .output()
-        .unwrap();
+    let output = wag(dir.path(), "wiggle --csv link.csv").output().unwrap();
     assert!(output.status.success(), "{}", said(&output));
     let link = dir.path().join("link.csv").symlink_metadata().unwrap();
     assert!(link.is_symlink());
@@ -118,12 +105,12 @@ fn pipes_and_links_stay_what_they_are() {
 #[test]
 fn a_wrong_command_line_is_json_where_json_was_asked_for() {
     let dir = tempfile::tempdir().unwrap();
-    for args in [
-        &["fling", "--json"][..],
-        &["--json", "plan", "strike"],
-        &["demo", "--json", "--seed=-1"],
+    for line in [
+        "fling --json",
+        "--json plan strike",
+        "demo --json --seed=-1",
     ] {
-        let output = wag(dir.path(), args).output().unwrap();
+        let output = wag(dir.path(), line).output().unwrap();
         assert_eq!(output.status.code(), Some(2));
         let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(told["ok"], false);
@@ -135,14 +122,10 @@ fn a_wrong_command_line_is_json_where_json_was_asked_for() {
 fn a_dry_run_needs_no_arm_and_connects_to_nothing() {
     let dir = tempfile::tempdir().unwrap();
     for command in ["wiggle", "latency"] {
-        let output = wag(dir.path(), &[command, "--dry-run", "--json"])
-            .output()
-            .unwrap();
-        assert!(output.status.success(), "{}", said(&output));
-        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let told = json_in(dir.path(), &format!("{command} --dry-run"));
         assert_eq!(told["ok"], true, "{told}");
     }
-    let output = wag(dir.path(), &["wiggle", "--dry-run"]).output().unwrap();
+    let output = wag(dir.path(), "wiggle --dry-run").output().unwrap();
     let page = String::from_utf8_lossy(&output.stdout).into_owned();
     for words in ["nothing moves", "250 setpoints a second", "Tightest: "] {
         assert!(page.contains(words), "`{words}` is not in\n{page}");
@@ -150,79 +133,36 @@ fn a_dry_run_needs_no_arm_and_connects_to_nothing() {
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
-/// Arguments and words that must be in the error.
-type Case = (&'static [&'static str], &'static [&'static str]);
-
-const REFUSED: &[Case] = &[
+/// Command lines and words that must be in the error.
+const REFUSED: &[(&str, &[&str])] = &[
+    ("demo --seed -1", &["--seed", "whole number from 0"]),
     (
-        &["demo", "--seed", "-1"],
-        &["--seed", "whole number from 0"],
-    ),
-    (
-        &[
-            "identify",
-            "--keypoints",
-            "k.json",
-            "--camera",
-            "c.toml",
-            "--pose",
-            "p.csv",
-            "--out",
-            "r.toml",
-            "--lead-mass",
-            "-1",
-        ],
+        "identify --keypoints k.json --camera c.toml --pose p.csv --out r.toml --lead-mass -1",
         &["--lead-mass", "above 0"],
     ),
     (
-        &[
-            "identify",
-            "--keypoints",
-            "k.json",
-            "--camera",
-            "c.toml",
-            "--pose",
-            "p.csv",
-            "--out",
-            "r.toml",
-            "--lead-mass",
-            "nan",
-        ],
+        "identify --keypoints k.json --camera c.toml --pose p.csv --out r.toml --lead-mass nan",
         &["--lead-mass", "above 0"],
     ),
-    (&["demo", "--target", "0,0,0.2"], &["arm's base"]),
-    (&["demo", "--rig-config", "none.toml"], &["none.toml"]),
+    ("demo --target 0,0,0.2", &["arm's base"]),
+    ("demo --rig-config none.toml", &["none.toml"]),
+    ("wiggle --dry-run --csv no/w.csv", &["no/w.csv", "folder"]),
     (
-        &["wiggle", "--dry-run", "--csv", "no/w.csv"],
-        &["no/w.csv", "folder"],
+        "wiggle --arm no.such.host.invalid --dry-run",
+        &["no.such.host"],
     ),
-    (
-        &["wiggle", "--arm", "no such host", "--dry-run"],
-        &["no such host"],
-    ),
-    (&["record", "none"], &["none", "no run folder"]),
+    ("record none", &["none", "no run folder"]),
 ];
 
 #[test]
 fn what_cannot_work_is_refused_at_once() {
     let dir = tempfile::tempdir().unwrap();
-    for (args, words) in REFUSED {
-        let output = wag(dir.path(), args).output().unwrap();
-        let said = said(&output);
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "wag {}: {said}",
-            args.join(" ")
-        );
+    for (line, words) in REFUSED {
+        let said = refused_in(dir.path(), 2, line);
         for word in *words {
-            assert!(
-                said.contains(word),
-                "wag {}: `{word}` is not in {said}",
-                args.join(" ")
-            );
+            assert!(said.contains(word), "wag {line}: `{word}` is not in {said}");
         }
         assert!(!said.contains(".tmp"), "{said}");
-        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0, "{args:?}");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0, "{line}");
     }
 }

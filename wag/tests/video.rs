@@ -2,6 +2,8 @@
 //! rope moves like the true one in a motion it was not identified from.
 #![cfg(test)]
 
+mod support;
+
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, FrameTimes, PoseRow, PoseTrack, Precision, SimOptions, Start, Watch, roll_out,
@@ -9,7 +11,7 @@ use rope_sim::{
 use serde_json::Value;
 use shared_types::RopeParams;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use support::json_in;
 
 /// The fling lasts a second; half of one more is held.
 const FLING_S: f64 = 1.5;
@@ -22,19 +24,10 @@ fn shared(path: &str) -> PathBuf {
 }
 
 fn identified(folder: &Path) -> RopeParams {
-    let file = |name: &str| folder.join(name).to_str().unwrap().to_owned();
-    let dir = tempfile::tempdir().unwrap();
-    let out = dir.path().join("rope.toml");
-    let output = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(["identify", "--json", "--video", &file("video.avi")])
-        .args(["--camera", &file("camera.toml")])
-        .args(["--pose", &file("pose.csv"), "--out"])
-        .arg(&out)
-        .output()
-        .unwrap();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{error}");
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let (dir, folder) = (tempfile::tempdir().unwrap(), folder.display());
+    let files = format!("--camera {folder}/camera.toml --pose {folder}/pose.csv --out rope.toml");
+    let line = format!("identify --video {folder}/video.avi {files}");
+    let report = json_in(dir.path(), &line);
     assert_eq!(report["out_of_distribution"], false, "{report}");
     serde_json::from_value(report["rope"].clone()).unwrap()
 }
@@ -56,7 +49,7 @@ fn truth(folder: &Path) -> RopeParams {
     }
 }
 
-/// Way of the tip in the fling of the reference trajectories.
+/// Path of the tip in the fling of the reference trajectories.
 fn fling(rope: &RopeParams) -> Vec<Vector3<f64>> {
     let text = std::fs::read_to_string(shared("reference/rope-truth/pose-M3.csv")).unwrap();
     let rows: Vec<PoseRow> = text

@@ -3,7 +3,7 @@
 //! ```text
 //!  control loop --ring--> bridge: items -> chunks --pub-sub--> recorder: file
 //!                                                              |
-//!                                    same bytes, chunk by chunk, in RUN/cycles.bin
+//!                                    same bytes, chunk by chunk, in RUN/run.mcap
 //! ```
 //!
 //! A recording is a row of [`chunk`]s, each with a checksum, so that a file cut

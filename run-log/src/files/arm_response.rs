@@ -1,6 +1,7 @@
 //! `arm-response.toml`: how an arm follows its setpoints.
 
-use super::{read_text, write_atomic};
+use super::atomic::write_atomic;
+use super::text::read_text;
 use crate::Result;
 use crate::error::At;
 use arm_model::ArmResponse;

@@ -98,7 +98,7 @@ pub fn write_joints(path: &Path, samples: impl Iterator<Item = (f64, JointVector
         }
         text.push('\n');
     }
-    super::write_atomic(path, text.as_bytes())
+    super::atomic::write_atomic(path, text.as_bytes())
 }
 
 /// A pose of the attach frame in the world frame.

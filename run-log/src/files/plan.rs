@@ -1,7 +1,6 @@
 //! Plans as `wag plan` writes them.
 
-use super::read_text;
-use crate::error::At;
+use super::text::read_json;
 use crate::{Error, Result};
 use shared_types::Plan;
 use shared_types::plan::trajectory_hash_hex;
@@ -12,8 +11,7 @@ use std::path::Path;
 /// # Errors
 /// The file cannot be read, is no plan, or was changed after it was planned.
 pub fn read_plan(path: &Path) -> Result<Plan> {
-    let text = read_text(path)?;
-    let plan: Plan = serde_json::from_str(&text).at(|| format!("plan `{}`", path.display()))?;
+    let plan: Plan = read_json(path)?;
     if trajectory_hash_hex(&plan.trajectory) == plan.trajectory_sha256 {
         return Ok(plan);
     }

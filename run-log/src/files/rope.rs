@@ -1,6 +1,7 @@
 //! `rope.toml`: nine parameters, with their uncertainty when they were identified.
 
-use super::{read_text, write_atomic};
+use super::atomic::write_atomic;
+use super::text::read_text;
 use crate::Result;
 use crate::error::At;
 use shared_types::rope::{RANGES, RopeEstimate, RopeParams, RopePosterior};

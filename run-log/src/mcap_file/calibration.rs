@@ -1,13 +1,10 @@
 //! Where the camera stands and how it sees.
 
-use super::clock::time;
+use super::fields::{CAMERA_FRAME, time};
 use super::scene::{placed, transform};
 use super::urdf::BASE;
 use serde_json::{Value, json};
 use shared_types::StereoCamera;
-
-/// Optical frame of the left eye.
-pub(super) const CAMERA_FRAME: &str = "camera_left";
 
 /// `foxglove.CameraCalibration` of the left eye.
 pub(super) fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {

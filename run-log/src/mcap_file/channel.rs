@@ -3,7 +3,7 @@
 /// One channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
-    /// Chunks of the exact recording, as in `cycles.bin`.
+    /// Chunks of the exact recording.
     Replay,
     /// Measured joints.
     Measured,

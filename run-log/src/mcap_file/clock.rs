@@ -1,7 +1,6 @@
 //! From the run's clock to the one that viewers show.
 
 use rustix::time::{ClockId, clock_gettime};
-use serde_json::{Value, json};
 
 /// How far the wall clock was ahead of CLOCK_MONOTONIC when the file was begun.
 /// Later steps of the wall clock do not matter.
@@ -39,9 +38,4 @@ impl Clock {
     pub(super) fn now_ns(self) -> u64 {
         self.wall_ns(read_ns(ClockId::Monotonic))
     }
-}
-
-/// A wall time as messages hold it.
-pub(super) fn time(wall_ns: u64) -> Value {
-    json!({ "sec": wall_ns / 1_000_000_000, "nsec": wall_ns % 1_000_000_000 })
 }

@@ -1,8 +1,6 @@
 //! What comes from shared memory, as messages.
 
-use super::calibration::CAMERA_FRAME;
-use super::clock::time;
-use super::scene::colour;
+use super::fields::{CAMERA_FRAME, colour, round, time};
 use super::urdf::joint_name;
 use arm_model::{JOINTS, JointVector};
 use base64::Engine;
@@ -17,12 +15,6 @@ use shared_types::keypoints::KeypointFrame;
 pub(super) enum Level {
     Info = 2,
     Error = 4,
-}
-
-/// A tenth of a microradian or a micrometre is less than anything here is known to;
-/// the exact bits are in the recording for replay.
-pub(super) fn round(value: f64) -> f64 {
-    (value * 1e7).round() / 1e7
 }
 
 /// Angles that are no numbers are left out, as the schema has it.

@@ -8,6 +8,8 @@
 mod calibration;
 mod channel;
 mod clock;
+mod counts;
+mod fields;
 mod film;
 mod image;
 mod messages;
@@ -17,19 +19,18 @@ mod recover;
 mod results;
 mod scene;
 mod schema;
+mod thinned;
 mod thread;
 mod urdf;
 mod writer;
 
 pub use channel::Channel;
+pub use counts::RecordingCounts;
 pub use film::{RunFilm, RunPart};
 pub(crate) use messages::mode_name;
 pub use read::{Walked, is_mcap, replay_bytes};
-pub use recorder::{RecorderConfig, run as record};
+pub use recorder::{Recorded, RecorderConfig, run as record};
 pub use recover::{Recovered, recover};
 pub use results::{RopeMotion, SimulateRope};
 pub use thread::RunFileThread;
 pub use writer::McapFile;
-
-/// File of a run folder that holds the whole run.
-pub const RUN_FILE: &str = "run.mcap";

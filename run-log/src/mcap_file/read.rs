@@ -141,7 +141,7 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
     (len == told && records.iter().all(allowed)).then_some(records)
 }
 
-/// The exact recording of the control cycles in a file: the bytes of `cycles.bin`.
+/// The exact recording of the control cycles in a file, from the first keyframe on.
 ///
 /// # Errors
 /// [`Error::NotMcap`], [`Error::NoChannel`].
@@ -154,7 +154,6 @@ pub fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
                 id = Some(channel.id);
             }
             Record::Message { header, data } if Some(header.channel_id) == id => {
-                // As `cycles.bin` does, from the first keyframe on.
                 let begins =
                     matches!(chunk::read(data), Front::Chunk { header, .. } if header.keyframe);
                 if begins || !out.is_empty() {

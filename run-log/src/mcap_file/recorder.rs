@@ -1,18 +1,19 @@
 //! The process that writes the file: it subscribes, writes what comes, and finishes
 //! the file when it is told to end or its parent is gone.
 
-use super::RUN_FILE;
 use super::calibration::{calibration, place};
 use super::channel::Channel;
 use super::clock::Clock;
+use super::counts::RecordingCounts;
 use super::film::CAMERA;
 use super::image::left_jpeg;
 use super::messages::{self, Level};
 use super::results::{Results, SimulateRope};
 use super::scene::{arm_frames, room};
+use super::thinned::Thinned;
 use super::urdf::urdf;
 use super::writer::McapFile;
-use crate::{Error, Result};
+use crate::{Error, Result, files};
 use arm_model::Limits;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde::{Deserialize, Serialize};
@@ -74,45 +75,13 @@ impl RecorderConfig {
     pub fn of_run(domain: &str, run: &Path, limits: &Limits) -> Self {
         Self {
             domain: domain.to_owned(),
-            file: run.join(RUN_FILE),
+            file: run.join(files::RUN),
             run: run.to_owned(),
             pictures_hz: PICTURES_HZ,
             target_m: None,
             limits: limits.clone(),
             camera: None,
         }
-    }
-}
-
-/// Lets one through per period of its own time.
-#[derive(Debug)]
-struct Thinned {
-    period_ns: u64,
-    next_ns: u64,
-}
-
-impl Thinned {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "saturating"
-    )]
-    fn at(rate_hz: f64) -> Self {
-        Self {
-            period_ns: (1e9 / rate_hz) as u64,
-            next_ns: 0,
-        }
-    }
-
-    fn takes(&mut self, stamp_ns: u64) -> bool {
-        if stamp_ns < self.next_ns {
-            return false;
-        }
-        // Keeps the rhythm, and finds it again after a pause.
-        let slack_ns = self.period_ns / 4;
-        let due_ns = self.next_ns + self.period_ns;
-        self.next_ns = due_ns.max((stamp_ns + self.period_ns).saturating_sub(slack_ns));
-        true
     }
 }
 
@@ -160,6 +129,7 @@ fn each<T, E: std::error::Error>(
 /// A recording under way.
 struct Recording {
     file: McapFile,
+    counts: RecordingCounts,
     clock: Clock,
     mode: Option<u8>,
     fault: u16,
@@ -199,6 +169,7 @@ impl Recording {
         }
         Ok(Self {
             file,
+            counts: RecordingCounts::default(),
             clock,
             mode: None,
             fault: 0,
@@ -251,6 +222,7 @@ impl Recording {
     }
 
     fn chunk(&mut self, bytes: &[u8]) -> Result<()> {
+        self.counts.count(bytes);
         self.file
             .bytes(Channel::Replay, self.clock.now_ns(), bytes)?;
         for read in LogReader::open(bytes).into_iter().flatten() {
@@ -337,19 +309,50 @@ impl Recording {
         }
         Ok(true)
     }
+}
 
-    fn finish(mut self, results: &mut Results, simulate: SimulateRope) -> Result<()> {
-        results.look(&mut self.file, self.clock)?;
-        results.simulate(&mut self.file, self.clock, simulate)?;
-        self.file.metadata(
+/// A recording that has ended; everything that came is in the file, which can be read.
+pub struct Recorded {
+    recording: Recording,
+    results: Results,
+}
+
+impl std::fmt::Debug for Recorded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Recorded").field(&self.counts()).finish()
+    }
+}
+
+impl Recorded {
+    /// What became of the exact recording.
+    pub const fn counts(&self) -> RecordingCounts {
+        self.recording.counts
+    }
+
+    /// Finishes the file with the run's results, and the rope that `simulate` makes of them.
+    ///
+    /// # Errors
+    /// The disk takes nothing any more.
+    pub fn finish(self, simulate: SimulateRope) -> Result<()> {
+        let (mut recording, mut results) = (self.recording, self.results);
+        results.look(&mut recording.file, recording.clock)?;
+        results.simulate(&mut recording.file, recording.clock, simulate)?;
+        let RecordingCounts {
+            chunks,
+            lost_chunks,
+            ..
+        } = recording.counts;
+        recording.file.metadata(
             "recorder",
             &[
-                ("cycles_lost", self.cycles_lost.to_string()),
-                ("frames_lost", self.frames_lost.to_string()),
-                ("pictures_left_out", self.pictures_late.to_string()),
+                ("chunks", chunks.to_string()),
+                ("chunks_lost", lost_chunks.to_string()),
+                ("cycles_lost", recording.cycles_lost.to_string()),
+                ("frames_lost", recording.frames_lost.to_string()),
+                ("pictures_left_out", recording.pictures_late.to_string()),
             ],
         )?;
-        self.file.finish()
+        recording.file.finish()
     }
 }
 
@@ -357,9 +360,16 @@ impl Recording {
 /// makes of the run's results.
 ///
 /// # Errors
-/// Shared memory cannot be joined, or the disk takes nothing any more; what is in the
-/// file by then can be recovered.
+/// As [`listen`] and [`Recorded::finish`]; what is in the file by then can be recovered.
 pub fn run(config: &RecorderConfig, simulate: SimulateRope, stop: &AtomicBool) -> Result<()> {
+    listen(config, stop)?.finish(simulate)
+}
+
+/// Records until `stop` is set.
+///
+/// # Errors
+/// Shared memory cannot be joined, or the disk takes nothing any more.
+pub(super) fn listen(config: &RecorderConfig, stop: &AtomicBool) -> Result<Recorded> {
     if let Err(reason) = rustix::process::nice(NICE) {
         tracing::warn!(%reason, "the recorder runs with ordinary priority");
     }
@@ -386,7 +396,8 @@ pub fn run(config: &RecorderConfig, simulate: SimulateRope, stop: &AtomicBool) -
         };
         recording.pictures(&ports, most)?;
         if last {
-            return recording.finish(&mut results, simulate);
+            recording.file.flush()?;
+            return Ok(Recorded { recording, results });
         }
         if looked.elapsed() >= LOOK_EVERY {
             results.look(&mut recording.file, recording.clock)?;
@@ -436,17 +447,5 @@ mod tests {
         assert_eq!(recording.next_frame, Some(1), "one, then the rest");
         recording.pictures(&ports, FRAMES_AT_ONCE).unwrap();
         assert_eq!(recording.next_frame, Some(8));
-    }
-
-    #[test]
-    fn half_of_the_frames_of_a_jittering_camera_are_taken() {
-        let mut thinned = Thinned::at(30.0);
-        let taken = (0..600u64)
-            .map(|n| 5_000_000_000 + n * 16_666_667 + (n * 7_919 % 3_000_000))
-            .filter(|stamp| thinned.takes(*stamp))
-            .count();
-        assert!((295..=305).contains(&taken), "{taken}");
-        assert!(thinned.takes(60_000_000_000));
-        assert!(!thinned.takes(60_010_000_000));
     }
 }

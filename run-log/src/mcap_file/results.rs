@@ -2,7 +2,8 @@
 //! files of the run folder appear whole, so one that is there can be taken in.
 
 use super::channel::Channel;
-use super::clock::{Clock, time};
+use super::clock::Clock;
+use super::fields::time;
 use super::scene::rope;
 use super::writer::McapFile;
 use crate::{Result, files};
@@ -14,16 +15,16 @@ use std::path::{Path, PathBuf};
 const ROPE_EVERY: usize = 2;
 /// Files that come while the run goes on, with their channels and fields.
 const FILES: [(&str, Channel, &str); 3] = [
-    ("plan.json", Channel::Plan, "plan"),
-    ("params.toml", Channel::Parameters, "parameters"),
-    ("summary.json", Channel::Summary, "summary"),
+    (files::PLAN, Channel::Plan, "plan"),
+    (files::ROPE, Channel::Parameters, "parameters"),
+    (files::SUMMARY, Channel::Summary, "summary"),
 ];
 
 /// The identified rope, simulated on one motion of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RopeMotion {
-    /// Time of the first frame on the run's clock (s).
-    pub begin_s: f64,
+    /// Instant of the first frame.
+    pub begin: MonotonicNs,
     /// Time between frames (s).
     pub period_s: f64,
     /// Each frame: x, y, z of the rope's nodes in the world frame (0.1 mm).
@@ -72,19 +73,13 @@ impl Results {
         Ok(())
     }
 
-    /// The identified rope on the motions of the run, once its figures are there.
+    /// The identified rope on the motions of the run.
     pub(super) fn simulate(
         &self,
         file: &mut McapFile,
         clock: Clock,
         simulate: SimulateRope,
     ) -> Result<()> {
-        let Ok(summary) = read(&self.run.join("summary.json")) else {
-            return Ok(());
-        };
-        let Some(epoch_ns) = summary["epoch_ns"].as_u64() else {
-            return Ok(());
-        };
         let motions = match simulate(&self.run) {
             Ok(motions) => motions,
             Err(reason) => {
@@ -94,8 +89,8 @@ impl Results {
         };
         for motion in motions {
             for (index, nodes) in motion.nodes.iter().enumerate().step_by(ROPE_EVERY) {
-                let t_s = motion.begin_s + index as f64 * motion.period_s;
-                let at_ns = clock.wall_ns(MonotonicNs(epoch_ns).plus_s(t_s).0);
+                let at = motion.begin.plus_s(index as f64 * motion.period_s);
+                let at_ns = clock.wall_ns(at.0);
                 file.json(Channel::Rope, at_ns, &rope(at_ns, nodes, motion.radii_m))?;
             }
         }
@@ -105,10 +100,9 @@ impl Results {
 
 /// A JSON or TOML file as JSON.
 fn read(path: &Path) -> Result<Value> {
-    let text = files::read_text(path)?;
-    Ok(if path.extension().is_some_and(|e| e == "toml") {
-        serde_json::to_value(toml::from_str::<toml::Table>(&text)?)?
-    } else {
-        serde_json::from_str(&text)?
-    })
+    if path.extension().is_some_and(|e| e == "toml") {
+        let table: toml::Table = toml::from_str(&files::read_text(path)?)?;
+        return Ok(serde_json::to_value(table)?);
+    }
+    files::read_json(path)
 }

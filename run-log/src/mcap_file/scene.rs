@@ -3,8 +3,7 @@
 //! The arm is drawn once, each piece bound to the frame of its link; only the frames
 //! move.
 
-use super::clock::time;
-use super::messages::round;
+use super::fields::{colour, round, time};
 use super::urdf::{BASE, POLE_END, link_name};
 use arm_model::cell::{POLE_LENGTH_M, POLE_RADIUS_M};
 use arm_model::kinematics::{JOINT_ORIGIN_M, attach_pose, link_poses};
@@ -21,11 +20,6 @@ const POLE: [f64; 4] = [0.2, 0.2, 0.2, 1.0];
 const TARGET: [f64; 4] = [0.9, 0.1, 0.1, 1.0];
 const ROPE: [f64; 4] = [0.1, 0.5, 0.9, 1.0];
 const LEAD: [f64; 4] = [0.95, 0.75, 0.1, 1.0];
-
-/// A colour with its opacity.
-pub(super) fn colour([r, g, b, a]: [f64; 4]) -> Value {
-    json!({ "r": r, "g": g, "b": b, "a": a })
-}
 
 fn vector(v: &Vector3<f64>) -> Value {
     json!({ "x": round(v.x), "y": round(v.y), "z": round(v.z) })

@@ -1,7 +1,6 @@
 //! The recorder as a thread, for a command that does nothing but record.
 
-use super::recorder::{RecorderConfig, run};
-use super::results::SimulateRope;
+use super::recorder::{Recorded, RecorderConfig, listen};
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,11 +10,11 @@ use std::time::Duration;
 /// Pause between two looks whether it has begun.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// A recording under way; dropping it finishes the file.
+/// A recording under way; dropping it ends it.
 #[derive(Debug)]
 pub struct RunFileThread {
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Result<()>>>,
+    thread: Option<JoinHandle<Result<Recorded>>>,
 }
 
 impl RunFileThread {
@@ -23,13 +22,13 @@ impl RunFileThread {
     ///
     /// # Errors
     /// Shared memory cannot be joined or the file cannot be written.
-    pub fn start(config: RecorderConfig, simulate: SimulateRope) -> Result<Self> {
+    pub fn start(config: RecorderConfig) -> Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let file = config.file.clone();
         let thread = std::thread::Builder::new()
             .name("run-file".to_owned())
-            .spawn(move || run(&config, simulate, &stopped))
+            .spawn(move || listen(&config, &stopped))
             .map_err(|reason| {
                 Error::Recorder(format!("cannot start the recording thread: {reason}"))
             })?;
@@ -44,7 +43,7 @@ impl RunFileThread {
         if file.exists() {
             Ok(started)
         } else {
-            started.finish()?;
+            started.stop()?;
             Err(Error::Recorder(format!(
                 "the recording of `{}` ended at once",
                 file.display()
@@ -56,24 +55,20 @@ impl RunFileThread {
     ///
     /// # Errors
     /// The file could not be written; what is in it can be recovered.
-    pub fn finish(mut self) -> Result<()> {
-        self.end()
-    }
-
-    fn end(&mut self) -> Result<()> {
+    pub fn stop(mut self) -> Result<Recorded> {
         self.stop.store(true, Ordering::SeqCst);
         let ended = self.thread.take().map(JoinHandle::join);
-        ended.map_or(Ok(()), |result| {
-            result
-                .map_err(|_panic| Error::Recorder("the recording thread broke down".to_owned()))?
-        })
+        let broke_down = || Error::Recorder("the recording thread broke down".to_owned());
+        ended
+            .ok_or_else(broke_down)?
+            .map_err(|_panic| broke_down())?
     }
 }
 
 impl Drop for RunFileThread {
     fn drop(&mut self) {
-        if let Err(reason) = self.end() {
-            tracing::warn!("the recording is not whole: {reason:#}");
-        }
+        self.stop.store(true, Ordering::SeqCst);
+        // Whoever drops it does not ask what became of it.
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }

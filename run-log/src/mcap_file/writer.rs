@@ -122,9 +122,15 @@ impl McapFile {
     /// Closes the chunk when it is time.
     pub fn turn(&mut self) -> Result<()> {
         if self.flushed.elapsed() >= FLUSH_EVERY {
-            self.writer.flush()?;
-            self.flushed = Instant::now();
+            self.flush()?;
         }
+        Ok(())
+    }
+
+    /// Closes the chunk, so that everything told so far can be read.
+    pub(super) fn flush(&mut self) -> Result<()> {
+        self.writer.flush()?;
+        self.flushed = Instant::now();
         Ok(())
     }
 

@@ -5,6 +5,7 @@ use arm_model::limits::Margin;
 use run_log::Explanation;
 use serde::Serialize;
 use serde_json::Value;
+use shared_types::MonotonicNs;
 
 /// Everything in a report.
 #[derive(Debug, Serialize)]
@@ -88,12 +89,12 @@ pub struct Histogram {
 
 /// One motion: pictures of arm and rope, and its joints as numbers.
 #[derive(Debug, Serialize)]
-pub struct Scene {
+pub(crate) struct Scene {
     /// Name for people.
     pub name: String,
-    /// Begin of the motion on the run's clock (s).
+    /// When the motion began.
     #[serde(skip)]
-    pub begin_s: f64,
+    pub begin: MonotonicNs,
     /// Time of the first frame on the motion's clock (s).
     pub from_s: f64,
     /// Time between frames (s).
@@ -102,7 +103,7 @@ pub struct Scene {
     pub arm: Vec<Vec<i32>>,
     /// Each frame: the rope's nodes (0.1 mm); none when no rope is known.
     pub rope: Vec<Vec<i32>>,
-    /// Planned way of the tip, at the same times (0.1 mm).
+    /// Planned path of the tip, at the same times (0.1 mm).
     pub planned_tip: Vec<i32>,
     /// Radius of the rope and of its lead (m).
     pub radii_m: [f64; 2],
@@ -114,7 +115,7 @@ pub struct Scene {
 
 /// Joints over time; all series have the length of `t_s`.
 #[derive(Debug, Default, Serialize)]
-pub struct Joints {
+pub(crate) struct Joints {
     /// What `wanted` is.
     pub wanted_is: &'static str,
     /// Time on the motion (s).

@@ -1,7 +1,7 @@
 //! Times of the control loop as histograms.
 
 use super::data::Histogram;
-use super::motion::CycleRow;
+use shared_types::ipc::CycleRecord;
 
 /// Bins for each doubling.
 const BINS_PER_OCTAVE: f64 = 2.0;
@@ -12,15 +12,15 @@ const BINS: u32 = 27;
 
 /// Histograms of wake-up, computing and sending over the cycles that belong to a
 /// motion; empty when there was none.
-pub(crate) fn histograms(rows: &[&CycleRow]) -> Vec<Histogram> {
-    let sent = || rows.iter().filter(|row| row.sent != 0);
+pub(crate) fn histograms(cycles: &[&CycleRecord]) -> Vec<Histogram> {
+    let us = |of: fn(&CycleRecord) -> u32, sent_only: bool| {
+        let counted = cycles.iter().filter(|c| !sent_only || c.sent != 0);
+        counted.map(|c| f64::from(of(c)) / 1e3).collect()
+    };
     [
-        (
-            "late wake-up",
-            rows.iter().map(|r| r.wake_late_us).collect(),
-        ),
-        ("compute", rows.iter().map(|r| r.compute_us).collect()),
-        ("wake-up to sent", sent().map(|r| r.send_us).collect()),
+        ("late wake-up", us(|c| c.wake_late_ns, false)),
+        ("compute", us(|c| c.compute_ns, false)),
+        ("wake-up to sent", us(|c| c.send_ns, true)),
     ]
     .into_iter()
     .filter_map(|(name, times): (_, Vec<f64>)| histogram(name, times))

@@ -14,9 +14,10 @@ mod read;
 mod replay;
 mod rope;
 
-pub use data::{Histogram, Scene};
+pub use data::Histogram;
 pub use latency::histogram;
 pub use page::{PLOTS, STYLE, VIEW};
+pub use read::simulated_rope;
 pub use replay::{arm_points, tenths_mm};
 
 use anyhow::ensure;
@@ -36,14 +37,6 @@ pub struct Written {
     pub bytes: usize,
     /// What the run folder does not hold.
     pub missing: Vec<String>,
-}
-
-/// The motions of a run folder with the identified rope simulated on them.
-///
-/// # Errors
-/// The run is no folder of a run, or one of its files is wrong.
-pub fn scenes(run: &Path) -> anyhow::Result<Vec<Scene>> {
-    Ok(read::read_run(run)?.scenes)
 }
 
 /// Makes the report of a run folder and writes it to `out`, by default into the

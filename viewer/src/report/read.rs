@@ -1,13 +1,11 @@
 //! A run folder as what a report holds.
 
-use super::data::{Errors, ReportData};
-use super::motion::{motions, read_cycles};
+use super::data::{Errors, ReportData, Scene};
+use super::motion::motions;
 use super::replay::{Known, scene};
 use super::{latency, pictures, rope};
 use anyhow::{Context, ensure};
-use run_log::files;
-use run_log::files::read_plan;
-use run_log::{CYCLES_FILE, RunLog, explain, show};
+use run_log::{RopeMotion, Run, explain, files, show};
 use serde_json::Value;
 use std::path::Path;
 
@@ -16,6 +14,42 @@ const TOLD_ELSEWHERE: [&str; 4] = ["identified", "truth", "explanation", "run"];
 /// Most motions that are shown.
 const SCENES_MAX: usize = 6;
 
+/// The first motions of a run.
+fn scenes(known: &Known<'_>) -> anyhow::Result<Vec<Scene>> {
+    let motions = motions(&known.cycles.cycles).into_iter().take(SCENES_MAX);
+    let scenes = motions.enumerate();
+    scenes
+        .map(|(index, motion)| scene(index, motion, known))
+        .collect()
+}
+
+/// The identified rope, simulated on the motions of a run folder.
+///
+/// # Errors
+/// A file of the run is damaged.
+pub fn simulated_rope(
+    run: &Path,
+) -> Result<Vec<RopeMotion>, Box<dyn std::error::Error + Send + Sync>> {
+    let run = Run::open(run)?;
+    let plan = run.plan()?;
+    let Some(rope) = run.rope()?.or(plan.as_ref().map(|p| p.rope)) else {
+        return Ok(Vec::new());
+    };
+    let known = Known {
+        cycles: &run.recording()?.cycles()?,
+        rope: Some(&rope),
+        plan: plan.as_ref(),
+        target_m: None,
+    };
+    let motion = |scene: Scene| RopeMotion {
+        begin: scene.begin.plus_s(scene.from_s),
+        period_s: scene.period_s,
+        nodes: scene.rope,
+        radii_m: scene.radii_m,
+    };
+    Ok(scenes(&known)?.into_iter().map(motion).collect())
+}
+
 /// Reads a run.
 pub(crate) fn read_run(run: &Path) -> anyhow::Result<ReportData> {
     ensure!(
@@ -23,59 +57,49 @@ pub(crate) fn read_run(run: &Path) -> anyhow::Result<ReportData> {
         "`{}` is no folder; name a run folder as made by wag demo, throw, wiggle or record",
         run.display()
     );
+    let of_run = Run::open(run)?;
     let mut missing = Vec::new();
-    let mut there = |file: &str, gives: &str| {
-        let path = run.join(file);
-        let found = path.is_file();
-        if !found {
+    let mut note = |is_there: bool, file: &str, gives: &str| {
+        if !is_there {
             missing.push(format!("{file}: {gives}"));
         }
-        found.then_some(path)
     };
-    let summary = there("summary.json", "no figures of the run");
-    let cycles = there("cycles.csv", "no motions, no times of the control loop");
-    let bin = there(CYCLES_FILE, "no limits used, no causes of stops");
+    let summary = of_run.summary()?;
+    note(summary.is_some(), files::SUMMARY, "no figures of the run");
+    let recorded = match of_run.recording() {
+        Ok(recording) => Some((recording.cycles()?, explain(&recording.log()?))),
+        Err(run_log::Error::NoRecording(_)) => None,
+        Err(damaged) => return Err(damaged.into()),
+    };
     ensure!(
-        summary.is_some() || cycles.is_some() || bin.is_some(),
-        "`{}` is no run folder: it holds neither summary.json nor {CYCLES_FILE}",
-        run.display()
+        summary.is_some() || recorded.is_some(),
+        "`{}` is no run folder: it holds neither {} nor {}",
+        run.display(),
+        files::SUMMARY,
+        files::RUN
     );
-    let mut summary = summary
-        .map(|path| read_json(&path))
-        .transpose()?
-        .unwrap_or_default();
-    let plan = there("plan.json", "no plan to compare with")
-        .map(|path| read_plan(&path))
-        .transpose()?;
-    let (params, rope_rows) = there("params.toml", "no identified rope")
-        .map(|path| rope::read(&path, &summary["truth"]["rope"]))
-        .transpose()?
-        .unzip();
-    let joints = there("joints.csv", "no measured joints")
-        .map(|path| files::read_joints(&path))
-        .transpose()?;
-    let rows = cycles
-        .map(|path| read_cycles(&path))
-        .transpose()?
-        .unwrap_or_default();
-    let log = bin.map(|path| read_log(&path)).transpose()?;
-    let explanation = log.as_ref().map(explain);
-    let motions = motions(&rows);
+    let mut summary = summary.unwrap_or_default();
+    let gives = "no motions, no times of the control loop, no limits used, no causes of stops";
+    note(recorded.is_some(), files::RUN, gives);
+    let (cycles, explanation) = recorded.unzip();
+    let cycles = cycles.unwrap_or_default();
+    let plan = of_run.plan()?;
+    note(plan.is_some(), files::PLAN, "no plan to compare with");
+    let params = of_run.rope()?;
+    note(params.is_some(), files::ROPE, "no identified rope");
+    let rope_rows = match &params {
+        Some(rope) => rope::rows(rope, &run.join(files::ROPE), &summary["truth"]["rope"])?,
+        None => Vec::new(),
+    };
     let known = Known {
-        joints: joints.as_ref(),
+        cycles: &cycles,
         // A throw alone has the rope it was planned for.
         rope: params.as_ref().or(plan.as_ref().map(|p| &p.rope)),
         plan: plan.as_ref(),
         target_m: target(&summary).or(plan.as_ref().map(|p| p.target_m)),
     };
-    let scenes = motions
-        .iter()
-        .take(SCENES_MAX)
-        .enumerate()
-        .map(|(index, motion)| scene(index, motion, &known))
-        .collect::<anyhow::Result<_>>()
-        .with_context(|| format!("run `{}`", run.display()))?;
-    let moving: Vec<_> = motions.iter().copied().flatten().collect();
+    let scenes = scenes(&known).with_context(|| format!("run `{}`", run.display()))?;
+    let moving: Vec<_> = motions(&cycles.cycles).into_iter().flatten().collect();
     let pictures = pictures::read(run, &mut missing)?;
     let error = Errors {
         planned_m: plan.as_ref().map(|p| p.predicted_error_m),
@@ -94,7 +118,7 @@ pub(crate) fn read_run(run: &Path) -> anyhow::Result<ReportData> {
         run: folder_name(run),
         summary,
         error,
-        rope: rope_rows.unwrap_or_default(),
+        rope: rope_rows,
         plan_margins: plan.as_ref().map(|p| p.margins.clone()).unwrap_or_default(),
         cause: explanation.as_ref().filter(|e| e.stopped).map(show),
         explanation,
@@ -110,17 +134,6 @@ fn folder_name(run: &Path) -> String {
     name(run)
         .or_else(|| name(&run.canonicalize().ok()?))
         .unwrap_or_default()
-}
-
-fn read_json(path: &Path) -> anyhow::Result<Value> {
-    serde_json::from_str(&files::read_text(path)?)
-        .with_context(|| format!("`{}` is no JSON", path.display()))
-}
-
-fn read_log(path: &Path) -> anyhow::Result<RunLog> {
-    let fail = || format!("recording `{}`", path.display());
-    let bytes = std::fs::read(path).with_context(fail)?;
-    RunLog::read(&bytes).with_context(fail)
 }
 
 fn pair(value: &Value) -> Option<[f64; 2]> {

@@ -1,7 +1,7 @@
 //! Motions to look at: the arm as measured, the identified rope simulated on it.
 
 use super::data::{Joints, Scene};
-use super::motion::CycleRow;
+use super::motion::begin;
 use anyhow::Context;
 use arm_model::{JOINTS, JointVector, kinematics};
 use nalgebra::Vector3;
@@ -9,8 +9,9 @@ use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome, PlannedArm, Precision, SimOptions,
     Start, Watch, roll_out,
 };
-use run_log::files::JointsCsv;
-use shared_types::{Plan, RopeParams};
+use run_log::Cycles;
+use shared_types::ipc::CycleRecord;
+use shared_types::{MonotonicNs, Plan, RopeParams};
 
 /// Frames per second.
 const RATE_HZ: f64 = 60.0;
@@ -30,8 +31,8 @@ const SAMPLES_MIN: usize = 8;
 /// What is known of a run beside the motion itself.
 #[derive(Debug)]
 pub(crate) struct Known<'a> {
-    /// Measured joints on the run's clock.
-    pub joints: Option<&'a JointsCsv>,
+    /// Its cycles and measured joints.
+    pub cycles: &'a Cycles,
     /// The identified rope.
     pub rope: Option<&'a RopeParams>,
     /// The plan of the throw.
@@ -42,8 +43,8 @@ pub(crate) struct Known<'a> {
 
 /// Which motions of `count` are the wiggle and the throw cannot be read from the
 /// cycles; the plan tells the throw by its duration, and what is first is the wiggle.
-fn name(index: usize, motion: &[CycleRow], plan: Option<&Plan>, has_rope: bool) -> String {
-    let duration_s = motion.last().map_or(0.0, |row| row.trajectory_s);
+fn name(index: usize, motion: &[CycleRecord], plan: Option<&Plan>, has_rope: bool) -> String {
+    let duration_s = motion.last().map_or(0.0, |c| c.trajectory_s);
     let is_throw = plan.is_some_and(|p| (p.trajectory.duration_s() - duration_s).abs() < 0.02);
     match (is_throw, index, has_rope) {
         (true, _, _) => "throw".to_owned(),
@@ -53,13 +54,17 @@ fn name(index: usize, motion: &[CycleRow], plan: Option<&Plan>, has_rope: bool) 
 }
 
 /// The scene of one motion.
-pub(crate) fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> anyhow::Result<Scene> {
+pub(crate) fn scene(
+    index: usize,
+    motion: &[CycleRecord],
+    known: &Known<'_>,
+) -> anyhow::Result<Scene> {
     let name = name(index, motion, known.plan, known.rope.is_some());
     let plan = known.plan.filter(|_| name == "throw");
-    let begin_s = motion[0].deadline_s - motion[0].trajectory_s;
+    let begin = begin(motion);
     let last = motion.last().unwrap_or(&motion[0]);
-    let until_s = (last.deadline_s - begin_s).min(LONGEST_S) + AFTER_S;
-    let (times_s, q, is_measured) = moved(motion, begin_s, until_s, known);
+    let until_s = MonotonicNs(last.deadline_ns).since_s(begin).min(LONGEST_S) + AFTER_S;
+    let (times_s, q, is_measured) = moved(motion, begin, until_s, known.cycles);
     let arm = MeasuredArm::new(&times_s, &q).context("the joints of a motion")?;
     let frames = FrameTimes {
         first_s: 0.0,
@@ -79,7 +84,7 @@ pub(crate) fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> any
         None => Vec::new(),
     };
     Ok(Scene {
-        begin_s,
+        begin,
         from_s: -BEFORE_S,
         period_s: frames.period_s,
         arm: (0..frames.count)
@@ -91,7 +96,7 @@ pub(crate) fn scene(index: usize, motion: &[CycleRow], known: &Known<'_>) -> any
             .rope
             .map_or([0.0; 2], |r| [r.radius_m, r.lead_radius_m]),
         target_m: known.target_m,
-        joints: curves(motion, begin_s, plan, is_measured.then_some(&arm)),
+        joints: curves(motion, begin, plan, is_measured.then_some(&arm)),
         name,
     })
 }
@@ -103,29 +108,22 @@ fn frame_count(span_s: f64) -> usize {
 /// Joints on the motion's clock: measured, or as commanded where nothing was
 /// measured; then they stand for the arm but are not called measured.
 fn moved(
-    motion: &[CycleRow],
-    begin_s: f64,
+    motion: &[CycleRecord],
+    begin: MonotonicNs,
     until_s: f64,
-    known: &Known<'_>,
+    cycles: &Cycles,
 ) -> (Vec<f64>, Vec<JointVector>, bool) {
-    if let Some(joints) = known.joints {
-        let (times_s, q): (Vec<f64>, Vec<JointVector>) = joints
-            .times_s
-            .iter()
-            .map(|t| t - begin_s)
-            .zip(joints.q.iter().copied())
-            .filter(|(t, _)| (-BEFORE_S..=until_s).contains(t))
-            .unzip();
-        if times_s.len() >= SAMPLES_MIN {
-            return (times_s, q, true);
-        }
-    }
-    let (times_s, q) = motion
-        .iter()
-        .map(|row| (row.deadline_s - begin_s, row.commanded()))
+    let span = [-BEFORE_S, until_s].map(|t| begin.plus_s(t).0);
+    let measured = cycles.joints_between(span[0], span[1]);
+    let is_measured = measured.len() >= SAMPLES_MIN;
+    let commanded = || motion.iter().map(|c| (c.deadline_ns, c.q_c)).collect();
+    let moved: Vec<(u64, JointVector)> = if is_measured { measured } else { commanded() };
+    let (times_s, q) = moved
+        .into_iter()
+        .map(|(at_ns, q)| (MonotonicNs(at_ns).since_s(begin), q))
         .filter(|(t, _)| *t <= until_s)
         .unzip();
-    (times_s, q, false)
+    (times_s, q, is_measured)
 }
 
 /// A place as the page reads it (0.1 mm).
@@ -174,7 +172,7 @@ fn simulate(
         .collect())
 }
 
-/// The tip's way with the plan's own rope on the planned motion.
+/// The tip's path with the plan's own rope on the planned motion.
 fn planned_tip(plan: &Plan, until_s: f64) -> anyhow::Result<Vec<i32>> {
     let frames = FrameTimes {
         first_s: 0.0,
@@ -191,8 +189,8 @@ fn planned_tip(plan: &Plan, until_s: f64) -> anyhow::Result<Vec<i32>> {
 
 /// Joints as wanted and as measured, at times that show their shape.
 fn curves(
-    motion: &[CycleRow],
-    begin_s: f64,
+    motion: &[CycleRecord],
+    begin: MonotonicNs,
     plan: Option<&Plan>,
     measured: Option<&MeasuredArm>,
 ) -> Joints {
@@ -207,13 +205,13 @@ fn curves(
     };
     // A hundredth of a milliradian is less than the arm reports.
     let round = |v: f64| (v * 1e5).round() / 1e5;
-    for row in motion.iter().step_by(every) {
-        let t_s = row.deadline_s - begin_s;
+    for cycle in motion.iter().step_by(every) {
+        let t_s = MonotonicNs(cycle.deadline_ns).since_s(begin);
         if t_s > LONGEST_S {
             break;
         }
         joints.t_s.push(round(t_s));
-        let wanted = plan.map_or_else(|| row.commanded(), |p| p.trajectory.state_at(t_s).q);
+        let wanted = plan.map_or(cycle.q_c, |p| p.trajectory.state_at(t_s).q);
         let seen = measured.map(|arm| arm.joints_at(t_s).q);
         for j in 0..JOINTS {
             joints.wanted[j].push(round(wanted[j]));

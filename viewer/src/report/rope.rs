@@ -8,9 +8,13 @@ use shared_types::RopeParams;
 use shared_types::rope::RANGES;
 use std::path::Path;
 
-/// Reads the identified rope; `truth` is what a simulated rig said about it.
-pub(crate) fn read(path: &Path, truth: &Value) -> anyhow::Result<(RopeParams, Vec<RopeRow>)> {
-    let params = files::read_rope(path)?;
+/// Rows of a rope with the intervals in its file; `truth` is what a simulated rig said
+/// about it.
+pub(crate) fn rows(
+    params: &RopeParams,
+    path: &Path,
+    truth: &Value,
+) -> anyhow::Result<Vec<RopeRow>> {
     let table: toml::Table = toml::from_str(&files::read_text(path)?)
         .with_context(|| format!("rope file `{}`", path.display()))?;
     let interval = |key: &str| {
@@ -20,7 +24,7 @@ pub(crate) fn read(path: &Path, truth: &Value) -> anyhow::Result<(RopeParams, Ve
             _ => None,
         }
     };
-    let rows = RANGES
+    Ok(RANGES
         .iter()
         .zip(params.to_array())
         .map(|(range, value)| RopeRow {
@@ -31,6 +35,5 @@ pub(crate) fn read(path: &Path, truth: &Value) -> anyhow::Result<(RopeParams, Ve
             range: [range.min, range.max],
             truth: truth[range.key].as_f64(),
         })
-        .collect();
-    Ok((params, rows))
+        .collect())
 }

@@ -1,8 +1,9 @@
 //! Arguments of `wag ledger`.
 
-use crate::ledger::RunResult;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use cli_output::seed;
+use run_log::ledger::RunResult;
 use std::path::PathBuf;
 
 /// Arguments of `wag ledger`.
@@ -16,7 +17,7 @@ pub struct LedgerArgs {
     #[arg(value_name = "FOLDER")]
     pub places: Vec<PathBuf>,
     /// Only runs that ended so.
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = results())]
     pub result: Option<RunResult>,
     /// Only runs of this command, as `demo`.
     #[arg(long, value_name = "NAME")]
@@ -30,6 +31,10 @@ pub struct LedgerArgs {
     /// Write the list as CSV too.
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
+}
+
+fn results() -> impl TypedValueParser<Value = RunResult> {
+    PossibleValuesParser::new(["ok", "failed", "broken"]).try_map(|name| name.parse())
 }
 
 /// `wag ledger ...`

@@ -82,7 +82,7 @@ pub struct WatchArgs {
 /// Arguments of `wag replay`.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// Run folder, or its file cycles.bin or run.mcap.
+    /// Run folder, or its file run.mcap (cycles.bin of an older version).
     pub run: PathBuf,
     /// First cycle to compare; the core is stepped from the keyframe before.
     #[arg(long, default_value_t = 0)]
@@ -92,7 +92,7 @@ pub struct ReplayArgs {
 /// Arguments of `wag explain`.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
-    /// Run folder, or its file cycles.bin or run.mcap.
+    /// Run folder, or its file run.mcap (cycles.bin of an older version).
     pub run: PathBuf,
 }
 
@@ -106,7 +106,7 @@ pub enum ExportCommand {
 /// Arguments of `wag export csv`.
 #[derive(Debug, Args)]
 pub struct ExportCsvArgs {
-    /// Run folder, or its file cycles.bin or run.mcap.
+    /// Run folder, or its file run.mcap (cycles.bin of an older version).
     pub run: PathBuf,
     /// Folder for the tables, which must exist. Default: the run folder.
     #[arg(long)]

@@ -21,7 +21,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::RigConfig;
 use rig_sim::render::Appearance;
-use run_log::CYCLES_FILE;
 use serde_json::Value;
 use shared_types::ipc::message::{
     CameraRpc, PlannerRpc, RigEvent, RigRequest, RigRpc, ScoreResult, StrikeOrder,
@@ -81,20 +80,14 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let began = Instant::now();
     let mut record = DemoRecord::new(args.seed, target_m, &folder);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    session
-        .record_cycles(&folder.file(CYCLES_FILE))
-        .or_failed()?;
     let result = throw_once(&folder, &mut session, &mut record, &rig, quiet);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
-    let kept = session
-        .recorder
-        .write(folder.path(), record.first_frame_ns());
-    record.recording.clone_from(&session.recorded);
-    explain_stop(folder.path(), quiet);
-    record.epoch_ns = record.first_frame_ns();
+    let kept = session.received.keep_keypoints(folder.path());
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
-    files::write_json(&folder.file("summary.json"), &record).or_failed()?;
+    files::write_json(&folder.file(files::SUMMARY), &record).or_failed()?;
+    let recorded = session.finish_run_file();
+    explain_stop(folder.path(), quiet);
     result
         .with_context(|| format!("run `{}`", folder.path().display()))
         .map_err(Failure::failed)?;
@@ -103,7 +96,7 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
         show(&record);
     }
     keep_report(folder.path(), quiet);
-    session.finish_run_file().or_failed()?;
+    recorded.or_failed()?;
     Ok(Some(serde_json::to_value(&record).or_failed()?))
 }
 
@@ -261,7 +254,7 @@ impl<'a> Demo<'a> {
             self.record.seed,
             &stage,
         )?;
-        files::write_rope_estimate(&self.folder.file("params.toml"), &rope)?;
+        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope)?;
         self.record.stages.identify_s = stage.done(&format!(
             "length {:.3} m, residual {:.2} px, {} simulations",
             rope.params.length_m, rope.residual_px, rope.simulations
@@ -280,7 +273,7 @@ impl<'a> Demo<'a> {
             seed: self.record.seed,
         };
         let plan = pipeline::plan_strike(self.session, &self.planner, order, &stage)?;
-        files::write_json(&self.folder.file("plan.json"), &plan)?;
+        files::write_json(&self.folder.file(files::PLAN), &plan)?;
         write_trajectory_csv(
             &self.folder.file("plan.csv"),
             &plan.trajectory,
@@ -306,7 +299,10 @@ impl<'a> Demo<'a> {
         plan: &Plan,
     ) -> anyhow::Result<()> {
         let stage = Stage::begin("calm", self.quiet);
-        let arm_lag_s = pipeline::joint_lag_s(&self.session.recorder, &film.motion, WIGGLE_JOINT);
+        let arm_lag_s = {
+            let span = [film.motion.start_ns, film.motion.end_ns];
+            self.session.received.cycles.joint_lag_s(WIGGLE_JOINT, span)
+        };
         let input = CalmInput {
             rope: rope.params,
             film,

@@ -4,7 +4,6 @@ use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
 use anyhow::bail;
 use cli_output::table;
 use comfy_table::Table;
-use run_log::RecordingReport;
 use serde::Serialize;
 use shared_types::ipc::message::{LatencyReport, Percentiles, RigEvent, ScoreResult};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
@@ -91,8 +90,9 @@ pub struct DemoRecord {
     planned_tip_target_distance_m: Option<f64>,
     /// Distance measured by the stereo camera (m).
     stereo_tip_target_distance_m: Option<f64>,
-    /// Instant that times in the run's files count from (CLOCK_MONOTONIC, ns).
-    pub epoch_ns: u64,
+    /// Instant that times in the run's files count from (CLOCK_MONOTONIC, ns): the
+    /// wiggle's first frame.
+    epoch_ns: u64,
     /// Wall time of the whole demo (s).
     pub wall_s: f64,
     /// Wall time of the stages (s).
@@ -110,8 +110,6 @@ pub struct DemoRecord {
     /// What the real-time set-up could not get, and what is poor about the plan.
     pub warnings: Vec<String>,
     truth: Option<TruthFigures>,
-    /// What became of the recording of control cycles.
-    pub recording: Option<RecordingReport>,
 }
 
 impl DemoRecord {
@@ -143,18 +141,12 @@ impl DemoRecord {
             latency: None,
             warnings: Vec::new(),
             truth: None,
-            recording: None,
         }
-    }
-
-    /// Instant that times in recorded files count from (CLOCK_MONOTONIC, ns):
-    /// the wiggle's first frame.
-    pub fn first_frame_ns(&self) -> u64 {
-        self.wiggle.map_or(0, |w| w.first_stamp_ns)
     }
 
     /// Keeps the wiggle's figures.
     pub fn set_wiggle(&mut self, film: &Film) {
+        self.epoch_ns = film.first_stamp_ns;
         self.wiggle = Some(WiggleFigures {
             frames: film.frames,
             dropped: film.dropped,

@@ -7,7 +7,7 @@ use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
 use cli_output::{OrInput, Outcome};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
-use run_log::{RUN_FILE, Run};
+use run_log::Run;
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 
@@ -99,8 +99,8 @@ pub struct Filmed {
 /// The run's file, if `video` is one or a run's folder; it may be damaged, or not there.
 fn run_of(video: &Path) -> Option<PathBuf> {
     if video.is_dir() {
-        let file = video.join(RUN_FILE);
-        let run = [RUN_FILE, "cycles.bin", "command.json"].map(|name| video.join(name));
+        let file = video.join(files::RUN);
+        let run = [files::RUN, files::CYCLES, files::COMMAND].map(|name| video.join(name));
         let is_run = run.iter().any(|path| path.try_exists().unwrap_or(true));
         return (is_run && !video.join("video.avi").exists()).then_some(file);
     }
@@ -150,7 +150,7 @@ impl Filmed {
             "--fps is for recordings without times, but the run's file `{}` has them",
             path.display()
         );
-        let part = Run::film(path)?.part(scene.part.unwrap_or(1))?;
+        let part = Run::open(path)?.film()?.part(scene.part.unwrap_or(1))?;
         let camera = match (&scene.camera, &part.camera) {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),

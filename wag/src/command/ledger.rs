@@ -2,10 +2,11 @@
 
 use crate::cli::{LedgerArgs, LedgerCommand, LedgerCompareArgs, LedgerRerunArgs};
 use crate::files;
-use crate::ledger::{self, CommandLine, Entry, RUNS, quoted};
 use anyhow::{Context, anyhow};
 use cli_output::table;
 use cli_output::{Failure, OrInput, Outcome};
+use run_log::ledger::{self, Entry, RUNS};
+use run_log::{Run, quoted};
 use serde_json::{Value, json};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
 
 fn known(run: &Path) -> Outcome<Entry> {
     if run.is_dir() {
-        Ok(ledger::read(run))
+        ledger::read(run).or_input()
     } else {
         Err(Failure::input(anyhow!(
             "`{}` is no folder; name a run folder",
@@ -96,7 +97,14 @@ fn compare(args: &LedgerCompareArgs, quiet: bool) -> Outcome<Option<Value>> {
 
 fn rerun(args: &LedgerRerunArgs, quiet: bool) -> Outcome<Option<Value>> {
     known(&args.run)?;
-    let line = CommandLine::read(&args.run).or_input()?;
+    let command = Run::open(&args.run).and_then(|run| run.command());
+    let line = command.or_input()?.ok_or_else(|| {
+        Failure::input(anyhow!(
+            "`{}` does not say how it was made: it holds no {}",
+            args.run.display(),
+            files::COMMAND
+        ))
+    })?;
     let mut again = line.again();
     if args.go {
         if quiet && !again.iter().any(|word| word == "--json") {

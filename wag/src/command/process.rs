@@ -5,13 +5,13 @@
 
 use crate::cli::{ProcessArgs, ProcessName};
 use crate::files;
-use crate::session::simulated_rope;
 use anyhow::Context;
 use cli_output::{OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
 use shared_types::ipc::DomainSweep;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use viewer::report::simulated_rope;
 
 /// How often the parent is looked for.
 const PARENT_EVERY: Duration = Duration::from_millis(100);

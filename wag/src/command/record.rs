@@ -3,19 +3,16 @@
 use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::files;
 use crate::pipeline::RunFolder;
-use crate::session::simulated_rope;
 use anyhow::anyhow;
 use cli_output::{Failure, OrInput, Outcome};
 use cli_output::{interrupted, watch_interrupts};
-use run_log::{
-    CYCLES_FILE, RUN_FILE, RecorderConfig, RecordingReport, RecordingThread, RunFileThread,
-    keep_cause,
-};
+use run_log::{RecorderConfig, Run, RunFileThread};
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use viewer::live::domain_of_run;
+use viewer::report::simulated_rope;
 
 /// `wag record recover`: a file without its end becomes a whole one.
 fn recover(args: &RecoverArgs, quiet: bool) -> Outcome<Option<Value>> {
@@ -59,9 +56,8 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     Bus::join(&domain).or_input()?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
-    let thread = RecordingThread::start(&domain, &folder.file(CYCLES_FILE)).or_failed()?;
     let config = RecorderConfig::of_run(&domain, folder.path(), &limits);
-    let file = RunFileThread::start(config, simulated_rope).or_failed()?;
+    let recorder = RunFileThread::start(config).or_failed()?;
     if !quiet {
         println!(
             "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",
@@ -76,27 +72,29 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     while !interrupted().load(Ordering::SeqCst) && !over() {
         std::thread::sleep(Duration::from_millis(20));
     }
-    let report = thread.finish();
-    if let Err(nothing) = judge(&report, &domain) {
-        drop(file);
+    let recorded = recorder.stop().or_failed()?;
+    let counts = recorded.counts();
+    if counts.chunks == 0 {
         // An empty folder goes by itself.
-        let _ = std::fs::remove_file(folder.file(RUN_FILE));
-        return Err(Failure::failed(nothing));
+        let _ = std::fs::remove_file(folder.file(files::RUN));
+        return Err(Failure::failed(anyhow!(
+            "nothing was recorded: no controller runs in domain `{domain}`; {}",
+            those_that_run(&running_controllers())
+        )));
     }
-    let explanation = keep_cause(folder.path());
+    let explanation = Run::open(folder.path()).or_failed()?.keep_cause();
     let summary = json!({
-        "ok": report.chunks > 0, "command": "record", "run": folder.path(), "domain": domain,
-        "recording": report, "explanation": explanation,
+        "ok": true, "command": "record", "run": folder.path(), "domain": domain,
+        "recording": counts, "explanation": explanation,
     });
-    files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
-    let written = file.finish();
-    disk(&report).map_err(Failure::failed)?;
-    written.or_failed()?;
+    files::write_json(&folder.file(files::SUMMARY), &summary).or_failed()?;
+    recorded.finish(simulated_rope).or_failed()?;
     if !quiet {
         println!(
-            "{:.1} MB; read it with `wag explain {}`, or look at its {RUN_FILE}",
-            report.bytes as f64 / 1e6,
-            folder.path().display()
+            "{:.1} MB; read it with `wag explain {}`, or look at its {}",
+            counts.bytes as f64 / 1e6,
+            folder.path().display(),
+            files::RUN
         );
     }
     Ok(Some(summary))
@@ -138,26 +136,5 @@ fn those_that_run(domains: &[String]) -> String {
             "controllers of these domains run: {}; name one with --domain",
             domains.join(", ")
         )
-    }
-}
-
-/// Nothing recorded is nothing to keep.
-fn judge(report: &RecordingReport, domain: &str) -> anyhow::Result<()> {
-    if report.chunks == 0 && report.disk_error.is_none() {
-        return Err(anyhow!(
-            "nothing was recorded: no controller runs in domain `{domain}`; {}",
-            those_that_run(&running_controllers())
-        ));
-    }
-    Ok(())
-}
-
-fn disk(report: &RecordingReport) -> anyhow::Result<()> {
-    match &report.disk_error {
-        Some(error) => Err(anyhow!(
-            "{} chunks could not be written ({error}); make room on the disk",
-            report.unwritten_chunks
-        )),
-        None => Ok(()),
     }
 }

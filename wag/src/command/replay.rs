@@ -9,12 +9,13 @@ use run_log::{Run, explain};
 use serde_json::{Value, json};
 
 pub fn run(args: &ReplayArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let run = Run::open(&args.run).or_input()?;
-    let found = replay(run.recording(), args.from_cycle)
+    let recording = Run::open(&args.run).and_then(|run| run.recording());
+    let recording = recording.or_input()?;
+    let found = replay(recording.bytes(), args.from_cycle)
         .with_context(|| format!("`{}`", args.run.display()))
         .or_input()?;
     // The end of a controller at rest is recorded as a stop, but is none.
-    let stops = run.log().map_or(found.causes, |log| {
+    let stops = recording.log().map_or(found.causes, |log| {
         let stops = explain(&log).stops;
         let compared = stops.iter().filter(|s| s.cycle >= found.first_cycle);
         compared.count() as u64

@@ -12,7 +12,6 @@ use arm_model::{JointTrajectory, Limits};
 use cli_output::Stage;
 use cli_output::watch_interrupts;
 use cli_output::{Failure, OrInput, Outcome};
-use run_log::CYCLES_FILE;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 use std::path::Path;
@@ -49,27 +48,22 @@ pub fn drive(
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    session
-        .record_cycles(&folder.file(CYCLES_FILE))
-        .or_failed()?;
     if arm.dead_man {
         session.hold_dead_man(quiet).or_failed()?;
     }
     let result = stream(&mut session, &folder, arm, limits, trajectory, tier, quiet);
     session.end(result.is_ok());
-    let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
-    let kept = session.recorder.write(folder.path(), epoch_ns);
     let mut summary = match &result {
         Ok(value) => value.clone(),
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
     };
-    summary["epoch_ns"] = json!(epoch_ns);
-    summary["recording"] = json!(session.recorded);
+    let first = session.received.cycles.cycles.first();
+    summary["epoch_ns"] = json!(first.map_or(0, |c| c.deadline_ns));
+    files::write_json(&folder.file(files::SUMMARY), &summary).or_failed()?;
+    let recorded = session.finish_run_file();
     explain_stop(folder.path(), quiet);
-    files::write_json(&folder.file("summary.json"), &summary).or_failed()?;
     let value = result.or_failed()?;
-    kept.or_failed()?;
-    session.finish_run_file().or_failed()?;
+    recorded.or_failed()?;
     if !quiet {
         println!("done; run folder: {}", folder.path().display());
     }

@@ -64,12 +64,13 @@ pub fn calm(
     stage: &Stage,
 ) -> anyhow::Result<Calmed> {
     for planning_s in PLANNING_S {
-        session.recorder.drain()?;
+        session.received.drain()?;
         let begin = now().plus_s(planning_s);
         let order = CalmOrder {
             rope: input.rope,
             joints: session
-                .recorder
+                .received
+                .cycles
                 .joints_between(input.film.first_stamp_ns, u64::MAX),
             start_ns: begin.plus_s(input.arm_lag_s).0,
             start_q: input.start_q,

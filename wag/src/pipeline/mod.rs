@@ -5,7 +5,6 @@
 
 mod arm;
 mod calm;
-mod lag;
 mod observe;
 mod processes;
 mod run_folder;
@@ -13,7 +12,6 @@ mod stages;
 
 pub use arm::{ArmLink, acquire, arm_for, execute, latency, move_to};
 pub use calm::{CalmInput, Calmed, calm};
-pub use lag::joint_lag_s;
 pub use observe::{Film, Shot, film_during};
 pub use processes::{
     ArmAddress, arm_ports, preview_spec, rig_config, shipped_rig, start_camera, start_controller,

@@ -1,8 +1,8 @@
 //! The folder of one run: results, configurations as used, logs.
 
-use crate::ledger::{COMMAND_FILE, CommandLine};
 use anyhow::{Context, anyhow};
 use cli_output::{Failure, OrInput, Outcome};
+use run_log::{CommandLine, files};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -42,7 +42,7 @@ impl RunFolder {
             domain: format!("run-{}", std::process::id()),
         };
         let command = CommandLine::of_this_program(SystemTime::now());
-        crate::files::write_json(&folder.file(COMMAND_FILE), &command).or_failed()?;
+        files::write_json(&folder.file(files::COMMAND), &command).or_failed()?;
         Ok(folder)
     }
 
@@ -76,7 +76,7 @@ impl RunFolder {
     pub fn config<T: serde::Serialize>(&self, name: &str, config: &T) -> anyhow::Result<PathBuf> {
         let path = self.path.join("config").join(format!("{name}.toml"));
         let text = toml::to_string(config).with_context(|| format!("configuration of {name}"))?;
-        crate::files::write_atomic(&path, text.as_bytes())?;
+        files::write_atomic(&path, text.as_bytes())?;
         Ok(path)
     }
 }
@@ -85,16 +85,12 @@ impl RunFolder {
 /// tells nothing and is in the way of the next try.
 impl Drop for RunFolder {
     fn drop(&mut self) {
-        let cycles = self.file(run_log::CYCLES_FILE);
-        if cycles.metadata().is_ok_and(|file| file.len() == 0) {
-            let _ = std::fs::remove_file(cycles);
-        }
         // Removes empty folders only.
-        let files = |folder: &Path| folder.read_dir().map_or(0, Iterator::count);
+        let count = |folder: &Path| folder.read_dir().map_or(0, Iterator::count);
         let only_command =
-            files(&self.path) == 3 && files(&self.path.join("config")) + files(&self.log()) == 0;
+            count(&self.path) == 3 && count(&self.path.join("config")) + count(&self.log()) == 0;
         if only_command {
-            let _ = std::fs::remove_file(self.file(COMMAND_FILE));
+            let _ = std::fs::remove_file(self.file(files::COMMAND));
         }
         for folder in [self.path.join("config"), self.log(), self.path.clone()] {
             let _ = std::fs::remove_dir(folder);
@@ -111,7 +107,6 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("run");
         let folder = RunFolder::create(Some(&out), "test").unwrap();
-        std::fs::write(folder.file(run_log::CYCLES_FILE), "").unwrap();
         assert!(out.join("log").is_dir());
         drop(folder);
         assert!(!out.exists());

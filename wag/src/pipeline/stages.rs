@@ -67,7 +67,7 @@ pub fn track(
     stage: &Stage,
 ) -> anyhow::Result<Tracked> {
     let joints = film_joints(session, film)?;
-    session.recorder.keypoints.clear();
+    session.received.keypoints.clear();
     let request = CameraRequest::Track {
         camera: Box::new(calibration.clone()),
         joints,
@@ -99,9 +99,9 @@ fn film_joints(
     session: &mut Session,
     film: &Film,
 ) -> anyhow::Result<Vec<(u64, arm_model::JointVector)>> {
-    session.recorder.drain()?;
+    session.received.drain()?;
     let end_ns = film.first_stamp_ns + u64::from(film.frames + film.dropped) * 16_800_000;
-    let joints = session.recorder.joints_between(
+    let joints = session.received.cycles.joints_between(
         film.first_stamp_ns.saturating_sub(JOINT_MARGIN_NS),
         end_ns + JOINT_MARGIN_NS,
     );

@@ -1,10 +1,9 @@
 //! The session a command works in: shared memory, supervised processes, the
-//! operator's heartbeat, the recorder, and what to show meanwhile.
+//! operator's heartbeat, what is received, and the file of the run.
 
-use super::{DeadMan, ProcessSpec, Recorder, RunFile, Supervisor};
+use super::{DeadMan, ProcessSpec, Received, RunFile, Supervisor};
 use anyhow::{anyhow, bail};
 use cli_output::interrupted;
-use run_log::{RecordingReport, RecordingThread};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
@@ -33,15 +32,11 @@ pub struct Session {
     committed: bool,
     /// Child processes.
     supervisor: Supervisor,
-    /// Everything received.
-    pub recorder: Recorder,
-    recording: Option<RecordingThread>,
-    /// What became of the recording of control cycles, once the session ended.
-    pub recorded: Option<RecordingReport>,
+    /// What stages work with.
+    pub received: Received,
     run_file: Option<RunFile>,
     bus: Bus,
     _sweep: DomainSweep,
-    domain: String,
     log_folder: PathBuf,
     last_beat: Instant,
 }
@@ -58,23 +53,13 @@ impl Session {
             dead_man: None,
             committed: false,
             supervisor: Supervisor::default(),
-            recorder: Recorder::open(&bus)?,
-            recording: None,
-            recorded: None,
+            received: Received::open(&bus)?,
             run_file: None,
             bus,
             _sweep: DomainSweep::new(domain),
-            domain: domain.to_owned(),
             log_folder: log_folder.to_owned(),
             last_beat: Instant::now(),
         })
-    }
-
-    /// Records every control cycle of this session in `path`; call it before the
-    /// controller is started.
-    pub fn record_cycles(&mut self, path: &Path) -> anyhow::Result<()> {
-        self.recording = Some(RecordingThread::start(&self.domain, path)?);
-        Ok(())
     }
 
     /// Starts the process that records the whole run in `path`; call it before the
@@ -116,7 +101,7 @@ impl Session {
                 self.last_beat = Instant::now();
             }
         }
-        self.recorder.drain()?;
+        self.received.drain()?;
         if let Some(file) = &mut self.run_file {
             file.watch();
         }
@@ -261,19 +246,8 @@ impl Session {
         {
             operator.stop();
         }
-        let _ = self.recorder.drain();
+        let _ = self.received.drain();
         self.supervisor.stop();
-        if let Some(recording) = self.recording.take() {
-            let report = recording.finish();
-            if let Some(error) = &report.disk_error {
-                tracing::warn!(
-                    unwritten = report.unwritten_chunks,
-                    %error,
-                    "the recording of control cycles is not whole: make room on the disk"
-                );
-            }
-            self.recorded = Some(report);
-        }
         self.bus.remove_leftovers();
     }
 }

@@ -2,13 +2,12 @@
 
 mod dead_man;
 mod live;
-mod recorder;
+mod received;
 mod run_file;
 mod supervisor;
 
 use dead_man::DeadMan;
 pub use live::Session;
-pub use recorder::Recorder;
+use received::Received;
 use run_file::RunFile;
-pub use run_file::simulated_rope;
 pub use supervisor::{ProcessSpec, Supervisor};

@@ -3,31 +3,13 @@
 
 use super::{ProcessSpec, Supervisor};
 use anyhow::{Context, anyhow};
-use run_log::RopeMotion;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use viewer::report;
 
 /// How long it may take to begin.
 const BEGIN: Duration = Duration::from_secs(10);
 /// How long it may take to simulate the rope and to write the end of the file.
 const FINISH: Duration = Duration::from_secs(20);
-
-/// The identified rope on the motions of a run folder, for its file.
-///
-/// # Errors
-/// A file of the run folder is missing or wrong.
-pub fn simulated_rope(
-    run: &Path,
-) -> Result<Vec<RopeMotion>, Box<dyn std::error::Error + Send + Sync>> {
-    let motion = |scene: report::Scene| RopeMotion {
-        begin_s: scene.begin_s + scene.from_s,
-        period_s: scene.period_s,
-        nodes: scene.rope,
-        radii_m: scene.radii_m,
-    };
-    Ok(report::scenes(run)?.into_iter().map(motion).collect())
-}
 
 /// A recording under way.
 #[derive(Debug)]

@@ -74,7 +74,7 @@ pub(crate) const CASES: &[Case] = &[
     ("throw damaged.json --arm 127.0.0.1", 2, &["damaged.json"]),
     ("latency", 2, &["--arm", "--run"]),
     ("latency --run none", 2, &["none", "does not exist"]),
-    ("latency --run .", 2, &["no run folder", "cycles.bin"]),
+    ("latency --run .", 2, &["no run folder", "run.mcap"]),
     (
         "latency --run . --arm 127.0.0.1",
         2,

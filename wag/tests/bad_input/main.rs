@@ -6,21 +6,14 @@ mod files;
 mod machines;
 mod records;
 mod ropes;
+#[path = "../support/mod.rs"]
+mod support;
 
 use files::{LINKS, prepare};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use support::{refused_in, wag_in};
 
-fn wag(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .current_dir(folder)
-        .args(args)
-        .output()
-        .unwrap()
-}
-
-/// Command line (`%20` is a space within an argument, `LINKS` a model), exit code, words
+/// Command line (`LINKS` is a model), exit code, words
 /// that must be in the error.
 type Case = (&'static str, i32, &'static [&'static str]);
 
@@ -30,14 +23,7 @@ fn wrong_input_gets_one_clear_line_and_leaves_nothing_behind() {
     let before = fs::read_dir(dir.path()).unwrap().count();
     let cases = [machines::CASES, records::CASES, ropes::CASES].concat();
     for (line, code, words) in cases {
-        let args: Vec<String> = line
-            .split_whitespace()
-            .map(|arg| arg.replace("%20", " ").replace("LINKS", LINKS))
-            .collect();
-        let args: Vec<&str> = args.iter().map(String::as_str).collect();
-        let output = wag(dir.path(), &args);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(code), "wag {line}: {said}");
+        let said = refused_in(dir.path(), code, &line.replace("LINKS", LINKS));
         for word in words {
             assert!(
                 said.contains(word),
@@ -60,19 +46,15 @@ fn a_port_in_use_is_named_with_a_remedy() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
     let dir = tempfile::tempdir().unwrap();
-    let output = wag(
-        dir.path(),
-        &["rig", "--command-port", &port, "--report-ports", "0,0,0,0"],
-    );
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let line = format!("rig --command-port {port} --report-ports 0,0,0,0");
+    let said = refused_in(dir.path(), 1, &line);
     assert!(said.contains(&port), "{said}");
 }
 
 #[test]
 fn json_errors_are_json() {
     let dir = tempfile::tempdir().unwrap();
-    let output = wag(dir.path(), &["check", "none.json", "--json"]);
+    let output = wag_in(dir.path(), "check none.json --json");
     let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(told["ok"], false);
     assert!(told["error"].as_str().unwrap().contains("none.json"));

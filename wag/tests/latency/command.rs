@@ -1,30 +1,16 @@
 //! `wag latency` on a simulated arm with a secret, over sockets, and again from
 //! the run it recorded.
 
+use super::support::json_in;
 use super::{Errors, report, secret_lags};
 use arm_model::{ArmResponse, JOINTS};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
 use xarm_sim::{ArmConfig, JointLag, SimulatedArm};
 
 /// Joints that are moved (1-based); the others rest.
 const MOVED: [usize; 3] = [1, 4, 6];
-
-fn wag(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wag"))
-        .args(args)
-        .output()
-        .unwrap()
-}
-
-fn parsed(output: &Output) -> Value {
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    serde_json::from_slice(&output.stdout).expect("standard output is one JSON object")
-}
 
 fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
     let text = std::fs::read_to_string(path).unwrap();
@@ -61,26 +47,15 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
     let ports = arm.ports();
     let dir = tempfile::tempdir().unwrap();
     let run = dir.path().join("run");
-    let [command, joints, status] =
-        [ports.command, ports.reports[0], ports.reports[2]].map(|p| p.to_string());
-    let told = parsed(&wag(&[
-        "latency",
-        "--json",
-        "--arm",
-        "127.0.0.1",
-        "--command-port",
-        &command,
-        "--report-port",
-        &joints,
-        "--status-port",
-        &status,
-        "--joints",
-        "1,4,6",
-        "--seed",
-        "3",
-        "--out",
-        run.to_str().unwrap(),
-    ]));
+    let [joints, _, status, _] = ports.reports;
+    let told = json_in(
+        dir.path(),
+        &format!(
+            "latency --arm 127.0.0.1 --command-port {} --report-port {joints} \
+             --status-port {status} --joints 1,4,6 --seed 3 --out run",
+            ports.command
+        ),
+    );
     assert_eq!(told["command"], "latency");
     assert_eq!(told["excitation"]["seed"], 3);
     assert_eq!(told["joints"].as_array().unwrap().len(), JOINTS);
@@ -97,25 +72,15 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
     }
     let high = told["command_to_target"]["interval_s"][1].as_f64().unwrap();
     assert!(high > 0.0 && high < 0.02, "{high}");
-    for file in ["cycles.bin", "run.mcap"] {
-        let file = run.join(file).display().to_string();
-        let told = parsed(&wag(&["replay", "--json", &file]));
-        assert_eq!(told["replay"]["differing_bytes"], 0, "{file}");
-    }
+    let replayed = json_in(dir.path(), "replay run");
+    assert_eq!(replayed["replay"]["differing_bytes"], 0);
     report(
         "over sockets",
         &check(&run.join("arm-response.toml"), &secrets),
     );
 
     let again = dir.path().join("again.toml");
-    let told = parsed(&wag(&[
-        "latency",
-        "--json",
-        "--run",
-        run.to_str().unwrap(),
-        "--response",
-        again.to_str().unwrap(),
-    ]));
+    let told = json_in(dir.path(), "latency --run run --response again.toml");
     let again_high = told["command_to_target"]["interval_s"][1].as_f64().unwrap();
     assert!((again_high - high).abs() < 1e-3, "{again_high} {high}");
     assert!(told["excitation"].is_null());

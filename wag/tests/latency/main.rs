@@ -3,6 +3,8 @@
 #![cfg(test)]
 
 mod command;
+#[path = "../support/mod.rs"]
+mod support;
 mod virtual_time;
 
 use arm_model::JOINTS;

@@ -4,14 +4,15 @@
 use super::chromium::Chromium;
 use super::client::Watch;
 use super::fake::{Fake, run_folder};
+use super::support::{recording, wag};
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
+use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
 use shared_types::RopeParams;
+use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::rope::RANGES;
-use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -53,24 +54,26 @@ fn throw_folder(run: &Path) {
         &[START_POSE, (START_POSE + end) * 0.5, end],
     )
     .unwrap();
-    let mut cycles = String::from(
-        "cycle,deadline_s,mode,fault,sent,wake_late_us,compute_us,send_us,reply_us,missed,dropped,trajectory_s,\
-         q1_c,q2_c,q3_c,q4_c,q5_c,q6_c,q7_c\n",
-    );
-    for cycle in 0..250_u32 {
+    let cycles = (0..250_u32).map(|cycle| {
         let t = f64::from(cycle) * 0.004;
-        let late = 10 + cycle % 50;
-        write!(
-            cycles,
-            "{cycle},{t:.6},Streaming,None,1,{late}.0,20.0,60.0,90.0,0,0,{t:.6}"
-        )
-        .unwrap();
-        for q in throw.state_at(t).q.iter() {
-            write!(cycles, ",{q:.9}").unwrap();
+        let record = CycleRecord {
+            cycle: cycle.into(),
+            deadline_ns: u64::from(cycle) * 4_000_000 + 1_000_000_000,
+            mode: ControllerMode::Streaming as u8,
+            sent: 1,
+            wake_late_ns: (10 + cycle % 50) * 1000,
+            compute_ns: 20_000,
+            send_ns: 60_000,
+            trajectory_s: t,
+            q_c: throw.state_at(t).q,
+            ..CycleRecord::default()
+        };
+        RecordedCycle {
+            record,
+            ..RecordedCycle::default()
         }
-        cycles.push('\n');
-    }
-    std::fs::write(run.join("cycles.csv"), cycles).unwrap();
+    });
+    std::fs::write(run.join("cycles.bin"), recording(cycles)).unwrap();
     let rope = RopeParams::from_array(RANGES.map(|r| 0.5 * (r.min + r.max)));
     std::fs::write(run.join("params.toml"), toml::to_string(&rope).unwrap()).unwrap();
     let summary = json!({ "ok": true, "command": "throw", "target_m": [0.9, 0.1, 0.2] });
@@ -85,11 +88,7 @@ fn a_report_is_drawn_its_slider_moves_the_rope_and_two_fingers_come_nearer() {
     };
     let dir = tempfile::tempdir().unwrap();
     throw_folder(dir.path());
-    let made = Command::new(env!("CARGO_BIN_EXE_wag"))
-        .arg("report")
-        .arg(dir.path())
-        .output()
-        .unwrap();
+    let made = wag(&format!("report {}", dir.path().display()));
     assert!(made.status.success(), "{made:?}");
     let file = dir.path().join("report.html");
     assert!(file.metadata().unwrap().len() < REPORT_MAX_BYTES);
@@ -147,7 +146,7 @@ fn the_live_page_follows_a_run_and_stops_it() {
     let fake = Fake::start(&format!("watch-page-{}", std::process::id()));
     let dir = tempfile::tempdir().unwrap();
     run_folder(dir.path(), &fake.domain);
-    let watch = Watch::start(&[dir.path().to_str().unwrap()]);
+    let watch = Watch::start(dir.path().to_str().unwrap());
     page.open(&watch.url);
     page.until(
         "the rope",

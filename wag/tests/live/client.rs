@@ -1,9 +1,10 @@
 //! A `wag watch` as a process, and requests to it byte by byte.
 
+use super::support::{command, send};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// A watcher that ends when dropped.
@@ -22,12 +23,9 @@ pub(crate) struct Answer {
 }
 
 impl Watch {
-    pub(crate) fn start(args: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_wag"))
-            .args(["watch", "--json"])
-            .args(args)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
+    pub(crate) fn start(args: &str) -> Self {
+        let mut process = command(&format!("watch --json {args}"))
+            .stderr(Stdio::inherit())
             .spawn()
             .unwrap();
         let mut text = String::new();
@@ -102,8 +100,7 @@ impl Watch {
 
     /// Ends it as Ctrl-C does; its exit code.
     pub(crate) fn end(mut self) -> Option<i32> {
-        let pid = rustix::process::Pid::from_child(&self.process);
-        rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+        send(self.process.id(), rustix::process::Signal::INT);
         self.process.wait().unwrap().code()
     }
 }

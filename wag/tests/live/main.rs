@@ -7,3 +7,5 @@ mod chromium;
 mod client;
 mod fake;
 mod server;
+#[path = "../support/mod.rs"]
+mod support;

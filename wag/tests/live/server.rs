@@ -13,7 +13,7 @@ fn domain(tag: &str) -> String {
 
 #[test]
 fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
-    let watch = Watch::start(&["--domain", &domain("strange")]);
+    let watch = Watch::start(&format!("--domain {}", domain("strange")));
     let (home, host) = (watch.home(), watch.host());
     let port = host.rsplit_once(':').unwrap().1;
     let get = |path: &str, lines: &str| watch.raw(&format!("GET {path} HTTP/1.1\r\n{lines}\r\n"));
@@ -72,7 +72,7 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
 #[test]
 fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
     let fake = Fake::start(&domain("ask"));
-    let watch = Watch::start(&["--domain", &fake.domain]);
+    let watch = Watch::start(&format!("--domain {}", fake.domain));
     let mut states = watch.states();
     states.until("a streaming controller", |s| {
         s["controller"]["mode"] == "streaming"
@@ -118,7 +118,7 @@ fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
     let name = domain("next");
     let dir = tempfile::tempdir().unwrap();
     run_folder(dir.path(), &name);
-    let watch = Watch::start(&[dir.path().to_str().unwrap()]);
+    let watch = Watch::start(dir.path().to_str().unwrap());
     let mut states = watch.states();
     let before = states.next();
     assert!(before["controller"].is_null());
@@ -162,7 +162,7 @@ fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
 #[test]
 fn readers_that_never_read_hold_nobody_up() {
     let fake = Fake::start(&domain("slow"));
-    let watch = Watch::start(&["--domain", &fake.domain]);
+    let watch = Watch::start(&format!("--domain {}", fake.domain));
     let (home, host) = (watch.home(), watch.host());
     // Ten that follow and never read, ten that never end their question.
     let mut idle: Vec<TcpStream> = (0..20).map(|_| watch.connect()).collect();

@@ -1,7 +1,7 @@
 //! Processes of a whole demo killed while the arm moves.
 
-use super::shell::{process_of, recorded, said, send, until};
-use crate::support::command;
+use super::shell::{recorded, said};
+use crate::support::{command, process_of, send, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
 use shared_types::{FaultCode, MotionTier, Plan};
@@ -28,10 +28,8 @@ const TOO_BUSY: [&str; 2] = [
 fn demo_in(into: &Path, tier: MotionTier) -> (Child, PathBuf) {
     for attempt in 0..3 {
         let run = into.join(format!("run-{attempt}"));
-        let mut child = command(&["demo", "--seed", "4", "--json", "--out"])
-            .arg(&run)
-            .spawn()
-            .unwrap();
+        let line = format!("demo --seed 4 --json --out {}", run.display());
+        let mut child = command(&line).spawn().unwrap();
         if streams(&mut child, &run, tier) {
             return (child, run);
         }
@@ -78,7 +76,10 @@ fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report(
     let _alone = MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
     let (child, run) = demo_in(folder.path(), MotionTier::Throw);
     std::thread::sleep(Duration::from_millis(300));
-    send(process_of(&run, "planner").unwrap(), Signal::KILL);
+    send(
+        process_of(&run.display().to_string(), "planner").unwrap(),
+        Signal::KILL,
+    );
     let (code, said) = said(child);
     assert_eq!(code, Some(1), "{said}");
     assert!(
@@ -112,7 +113,10 @@ fn fault_27_a_camera_killed_during_the_wiggle_ends_it_gently_and_nothing_is_iden
     let _alone = MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
     let (child, run) = demo_in(folder.path(), MotionTier::Wiggle);
     std::thread::sleep(Duration::from_millis(700));
-    send(process_of(&run, "camera-ingest").unwrap(), Signal::KILL);
+    send(
+        process_of(&run.display().to_string(), "camera-ingest").unwrap(),
+        Signal::KILL,
+    );
     let (code, said) = said(child);
     assert_eq!(code, Some(1), "{said}");
     assert!(

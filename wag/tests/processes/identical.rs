@@ -1,8 +1,8 @@
 //! A plan is executed identically, byte for byte in the record, with planner and
 //! camera killed half-way.
 
-use super::shell::{arm, read, send, until};
-use crate::support::command;
+use super::shell::{arm, read};
+use crate::support::{command, send, until};
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use camera_ingest::process::CameraConfig;
@@ -46,7 +46,7 @@ impl Part {
         let path = folder.join(format!("{name}.toml"));
         std::fs::write(&path, toml::to_string(config).unwrap()).unwrap();
         let log = std::fs::File::create(folder.join(format!("{name}.log"))).unwrap();
-        let mut command = command(&["process", name, "--config"]);
+        let mut command = command(&format!("process {name} --config"));
         command.arg(&path).env("WAG_LOG", "info").stderr(log);
         Self(command.spawn().unwrap())
     }

@@ -6,7 +6,6 @@ use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::{CauseRecord, CycleRecord};
 use std::path::Path;
 use std::process::{Child, Command};
-use std::time::{Duration, Instant};
 use xarm_sim::{ArmConfig, SimulatedArm};
 
 /// An arm in this process, at the start pose.
@@ -21,50 +20,14 @@ pub fn arm() -> SimulatedArm {
 }
 
 /// `wag wiggle` on that arm, into `run`.
-pub fn wiggle(arm: &SimulatedArm, run: &Path, more: &[&str]) -> Command {
+pub fn wiggle(arm: &SimulatedArm, run: &Path, more: &str) -> Command {
     let [joints, _, rich, _] = arm.ports().reports;
-    let mut command = command(&["wiggle", "--arm", "127.0.0.1", "--json"]);
-    command
-        .args(["--command-port", &arm.ports().command.to_string()])
-        .args(["--report-port", &joints.to_string()])
-        .args(["--status-port", &rich.to_string()])
-        .args(more)
-        .arg("--out")
-        .arg(run);
-    command
-}
-
-pub fn send(pid: u32, signal: rustix::process::Signal) {
-    let pid = rustix::process::Pid::from_raw(i32::try_from(pid).unwrap()).unwrap();
-    rustix::process::kill_process(pid, signal).unwrap();
-}
-
-/// Process of a run by its name, `None` while it is not there.
-pub fn process_of(run: &Path, name: &str) -> Option<u32> {
-    let run = run.display().to_string();
-    std::fs::read_dir("/proc").unwrap().find_map(|entry| {
-        let pid: u32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
-        let line = std::fs::read(format!("/proc/{pid}/cmdline")).ok()?;
-        let args: Vec<_> = line
-            .split(|b| *b == 0)
-            .map(String::from_utf8_lossy)
-            .collect();
-        let is_it = args
-            .windows(2)
-            .any(|pair| pair[0] == "process" && pair[1] == name);
-        (is_it && args.iter().any(|a| a.starts_with(&run))).then_some(pid)
-    })
-}
-
-pub fn until<T>(what: &str, within: Duration, mut look: impl FnMut() -> Option<T>) -> T {
-    let began = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(began.elapsed() < within, "{what} never came");
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    let ports = format!("--report-port {joints} --status-port {rich}");
+    let address = format!("--arm 127.0.0.1 --command-port {}", arm.ports().command);
+    let out = run.display();
+    command(&format!(
+        "wiggle --json {address} {ports} {more} --out {out}"
+    ))
 }
 
 /// What a child said, once it has ended; its exit code.
@@ -80,7 +43,8 @@ pub fn said(child: Child) -> (Option<i32>, String) {
 
 /// Cycles and causes of a run's recording.
 pub fn recorded(run: &Path) -> (Vec<CycleRecord>, Vec<CauseRecord>) {
-    read(&std::fs::read(run.join("cycles.bin")).unwrap())
+    let recording = run_log::Run::open(run).unwrap().recording().unwrap();
+    read(recording.bytes())
 }
 
 /// Cycles and causes of a recording.

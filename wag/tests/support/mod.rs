@@ -1,16 +1,22 @@
-//! `wag` as its users start it, and a simulated arm to start it against.
+//! `wag` as its users start it, a simulated arm to start it against, and what it recorded.
 #![allow(dead_code, reason = "each test uses a part")]
 
+use arm_model::Limits;
+use rt_controller::control::{ControlState, Thresholds};
+use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
+use std::fs;
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
-/// A command that hears nothing and whose words are kept.
-pub(crate) fn command(args: &[&str]) -> Command {
+/// A command that hears nothing and whose words are kept; its line is split at spaces.
+pub(crate) fn command(line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wag"));
     command
-        .args(args)
+        .args(line.split_whitespace())
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
@@ -18,8 +24,13 @@ pub(crate) fn command(args: &[&str]) -> Command {
 }
 
 /// Runs `wag` to its end.
-pub(crate) fn wag(args: &[&str]) -> Output {
-    command(args).output().unwrap()
+pub(crate) fn wag(line: &str) -> Output {
+    command(line).output().unwrap()
+}
+
+/// The same in a folder.
+pub(crate) fn wag_in(folder: &Path, line: &str) -> Output {
+    command(line).current_dir(folder).output().unwrap()
 }
 
 /// What it said to people.
@@ -28,11 +39,86 @@ pub(crate) fn said(output: &Output) -> String {
 }
 
 /// Runs a command that must succeed; what `--json` prints.
-pub(crate) fn json(args: &[&str]) -> Value {
-    let output = wag(&[args, &["--json"]].concat());
-    let said = said(&output);
-    assert!(output.status.success(), "wag {}: {said}", args.join(" "));
+pub(crate) fn json(line: &str) -> Value {
+    json_in(Path::new("."), line)
+}
+
+/// The same in a folder.
+pub(crate) fn json_in(folder: &Path, line: &str) -> Value {
+    let output = wag_in(folder, &format!("{line} --json"));
+    assert!(output.status.success(), "wag {line}: {}", said(&output));
     serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Runs a command that must fail with an exit code; its error.
+pub(crate) fn refused_in(folder: &Path, code: i32, line: &str) -> String {
+    let output = wag_in(folder, line);
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(code), "wag {line}: {said}");
+    said
+}
+
+/// Waits for something that comes within a time.
+pub(crate) fn until<T>(what: &str, within: Duration, mut look: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(began.elapsed() < within, "{what} never came");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+pub(crate) fn send(pid: u32, signal: Signal) {
+    kill_process(Pid::from_raw(pid.try_into().unwrap()).unwrap(), signal).unwrap();
+}
+
+/// Processes of `wag` that belong to a run folder or have a parent, with their names.
+pub(crate) fn processes_of(run_or_parent: &str) -> Vec<(u32, String)> {
+    let inside = format!("{run_or_parent}/");
+    let of = |entry: std::io::Result<fs::DirEntry>| {
+        let pid: u32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
+        let line = fs::read(format!("/proc/{pid}/cmdline")).ok()?;
+        let words = line.split(|b| *b == 0).map(String::from_utf8_lossy);
+        let args: Vec<_> = words.collect();
+        let is_of = |a: &str| a == run_or_parent || a.starts_with(&inside);
+        let named = args.windows(2).find(|pair| pair[0] == "process");
+        let name = named.map_or("wag", |pair| &pair[1]);
+        let belongs = args.iter().skip(1).any(|a| is_of(a));
+        belongs.then(|| (pid, name.to_owned()))
+    };
+    fs::read_dir("/proc").unwrap().filter_map(of).collect()
+}
+
+/// One of them by its name, `None` while it is not there.
+pub(crate) fn process_of(run_or_parent: &str, name: &str) -> Option<u32> {
+    let found = processes_of(run_or_parent);
+    found
+        .into_iter()
+        .find(|(_, n)| n == name)
+        .map(|(pid, _)| pid)
+}
+
+/// Waits until so many control cycles lie in the file of a run under way.
+pub(crate) fn until_recorded(run: &Path, cycles: usize) {
+    until("the recording", Duration::from_secs(60), || {
+        std::thread::sleep(Duration::from_millis(20));
+        let recording = run_log::Run::open(run).ok()?.recording().ok()?;
+        (recording.cycles().ok()?.cycles.len() >= cycles).then_some(())
+    });
+}
+
+/// A recording of these cycles as the controller writes it.
+pub(crate) fn recording(cycles: impl IntoIterator<Item = RecordedCycle>) -> Vec<u8> {
+    let control = ControlState::new(Limits::default(), Thresholds::strict());
+    let (mut writer, mut bytes) = (ChunkWriter::default(), Vec::new());
+    writer.keyframe(&Snapshot::of(&control).unwrap());
+    for cycle in cycles {
+        bytes.extend(writer.cycle(&cycle).unwrap_or_default());
+    }
+    bytes.extend(writer.flush().unwrap_or_default());
+    bytes
 }
 
 /// `wag rig` on free ports; it ends with the test.
@@ -43,28 +129,14 @@ pub(crate) struct Rig {
 }
 
 impl Rig {
-    pub(crate) fn start(more: &[&str]) -> Self {
-        let free = [
-            "rig",
-            "--json",
-            "--command-port",
-            "0",
-            "--report-ports",
-            "0,0,0,0",
-        ];
-        let mut process = command(&[&free, more].concat())
-            .stderr(Stdio::inherit())
-            .spawn()
-            .unwrap();
+    pub(crate) fn start(more: &str) -> Self {
+        let line = format!("rig --json --command-port 0 --report-ports 0,0,0,0 {more}");
+        let mut process = command(&line).stderr(Stdio::inherit()).spawn().unwrap();
         // The object ends with a brace at the begin of a line.
         let (mut text, mut byte) = (Vec::new(), [0]);
+        let stdout = process.stdout.as_mut().unwrap();
         while !text.ends_with(b"\n}\n") {
-            process
-                .stdout
-                .as_mut()
-                .unwrap()
-                .read_exact(&mut byte)
-                .unwrap();
+            stdout.read_exact(&mut byte).unwrap();
             text.push(byte[0]);
         }
         Self {
@@ -83,8 +155,8 @@ impl Rig {
     /// `wag wiggle` on it, into `run`, from the folder that `run` lies in.
     pub(crate) fn wiggle(&self, run: &Path) -> Child {
         let [port, joints, _, rich, _] = self.ports();
-        command(&["wiggle", "--arm", "localhost", "--command-port", &port])
-            .args(["--report-port", &joints, "--status-port", &rich, "--out"])
+        let ports = format!("--command-port {port} --report-port {joints} --status-port {rich}");
+        command(&format!("wiggle --arm localhost {ports} --out"))
             .arg(run)
             .current_dir(run.parent().unwrap())
             .spawn()
@@ -93,16 +165,10 @@ impl Rig {
 
     /// Ends it as Ctrl-C does; returns its exit code and what else it printed.
     pub(crate) fn end(mut self) -> (Option<i32>, String) {
-        let pid = self.process.id().to_string();
-        let status = Command::new("kill").args(["-INT", &pid]).status().unwrap();
-        assert!(status.success());
+        send(self.process.id(), Signal::INT);
         let mut rest = String::new();
-        self.process
-            .stdout
-            .take()
-            .unwrap()
-            .read_to_string(&mut rest)
-            .unwrap();
+        let stdout = self.process.stdout.as_mut().unwrap();
+        stdout.read_to_string(&mut rest).unwrap();
         (self.process.wait().unwrap().code(), rest)
     }
 }

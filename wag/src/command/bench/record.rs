@@ -19,7 +19,6 @@ use cli_output::{OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use rig_sim::RigConfig;
-use run_log::RUN_FILE;
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
@@ -152,7 +151,7 @@ fn measure(
         cycles.0[usize::from(with)].extend(seen);
         if with {
             session.finish_run_file()?;
-            let file = folder.file(RUN_FILE);
+            let file = folder.file(files::RUN);
             file_bytes += file.metadata().context("the recorder left no file")?.len();
             std::fs::remove_file(&file)?;
         }
@@ -167,13 +166,14 @@ fn stream(
     motion: &JointTrajectory,
 ) -> anyhow::Result<Vec<CycleRecord>> {
     pipeline::arm_for(session, arm, MotionTier::Wiggle)?;
-    session.recorder.drain()?;
-    session.recorder.cycles.clear();
+    session.received.drain()?;
+    session.received.cycles.cycles.clear();
     pipeline::execute(arm, motion)?.finish(session)?;
-    session.recorder.drain()?;
+    session.received.drain()?;
     let streaming = |c: &CycleRecord| ControllerMode::from_raw(c.mode) == ControllerMode::Streaming;
     Ok(session
-        .recorder
+        .received
+        .cycles
         .cycles
         .iter()
         .filter(|c| streaming(c))

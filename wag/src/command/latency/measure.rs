@@ -1,6 +1,6 @@
 //! Moving an arm so that its joints show how they follow.
 
-use super::Evidence;
+use super::evidence::{Evidence, recorded};
 use crate::cli::LatencyArgs;
 use crate::command::area::require_clear_area;
 use crate::command::explain::explain_stop;
@@ -14,7 +14,6 @@ use cli_output::Stage;
 use cli_output::watch_interrupts;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::response::excitation::sweep;
-use run_log::CYCLES_FILE;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 use std::net::IpAddr;
@@ -77,9 +76,6 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "latency")?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    session
-        .record_cycles(&folder.file(CYCLES_FILE))
-        .or_failed()?;
     if args.arm.dead_man {
         session.hold_dead_man(quiet).or_failed()?;
     }
@@ -93,22 +89,14 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
         quiet,
     );
     session.end(result.is_ok());
-    let epoch_ns = session.recorder.cycles.first().map_or(0, |c| c.deadline_ns);
-    let kept = session.recorder.write(folder.path(), epoch_ns);
+    let whole = session.finish_run_file();
     explain_stop(folder.path(), quiet);
     result.or_failed()?;
-    kept.or_failed()?;
-    session.finish_run_file().or_failed()?;
-    let recorder = &mut session.recorder;
-    let reports = core::mem::take(&mut recorder.joints);
+    whole.or_failed()?;
     Ok(Evidence {
         source: format!("arm {address}:{}", args.arm.ports.command_port),
-        folder: folder.path().to_owned(),
-        cycles: core::mem::take(&mut recorder.cycles),
-        has_targets: reports.iter().any(|r| r.arm_clock != 0),
-        reports,
         excitation: Some(excitation),
-        camera_offset_s: None,
+        ..recorded(folder.path()).or_failed()?
     })
 }
 

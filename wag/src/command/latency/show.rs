@@ -1,6 +1,6 @@
 //! The result for people and for programs.
 
-use super::{Evidence, Findings, known_joints};
+use super::evidence::{Evidence, Findings, RESPONSE_FILE};
 use arm_model::JointResponse;
 use arm_model::response::{Estimate, NotExcited, TrackingLag};
 use cli_output::table;
@@ -124,7 +124,7 @@ pub(super) fn print(findings: &Findings, evidence: &Evidence, path: Option<&Path
         Some(path) => println!("Written to {}.", path.display()),
         None => println!(
             "Not written: {} is kept; name another file with --response.",
-            evidence.folder.join(super::RESPONSE_FILE).display()
+            evidence.folder.join(RESPONSE_FILE).display()
         ),
     }
 }
@@ -141,6 +141,11 @@ pub(super) fn json(findings: &Findings, evidence: &Evidence, path: Option<&Path>
             }),
         })
         .collect();
+    let known: Vec<usize> = (1..)
+        .zip(&findings.response.joints)
+        .filter(|(_, j)| j.lag().is_some())
+        .map(|(joint, _)| joint)
+        .collect();
     json!({
         "ok": true,
         "command": "latency",
@@ -151,7 +156,7 @@ pub(super) fn json(findings: &Findings, evidence: &Evidence, path: Option<&Path>
         "excitation": findings.response.excitation,
         "loop": loop_json(&report, findings),
         "joints": joints,
-        "joints_measured": known_joints(&findings.response.joints),
+        "joints_measured": known,
         "command_to_target": findings.target_delay.map(|d| json!({
             "interval_s": d.interval_s, "agreed_part": d.agreed_part, "setpoints": d.seen,
         })),

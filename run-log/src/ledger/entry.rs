@@ -1,16 +1,13 @@
 //! One run, as far as its folder tells.
 
-use super::CommandLine;
-use crate::files;
-use crate::files::read_plan;
-use anyhow::Context;
+use crate::{Result, Run, files};
 use serde::Serialize;
-use serde_json::Value;
 use shared_types::RopeParams;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// What came of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RunResult {
     /// It went through.
@@ -65,58 +62,55 @@ impl Entry {
     }
 }
 
-/// A file of a run, if it is there; one that is damaged is a problem of the run.
-fn part<T>(
-    run: &Path,
-    name: &str,
-    problems: &mut Vec<String>,
-    read: impl Fn(&Path) -> anyhow::Result<T>,
-) -> Option<T> {
-    let path = run.join(name);
-    if !path.is_file() {
-        return None;
+impl FromStr for RunResult {
+    type Err = String;
+
+    fn from_str(name: &str) -> std::result::Result<Self, String> {
+        match name {
+            "ok" => Ok(Self::Ok),
+            "failed" => Ok(Self::Failed),
+            "broken" => Ok(Self::Broken),
+            _ => Err("a run is ok, failed or broken".to_owned()),
+        }
     }
-    read(&path)
-        .map_err(|reason| problems.push(format!("{name}: {reason:#}").replace('\n', " ")))
-        .ok()
 }
 
-fn json(path: &Path) -> anyhow::Result<Value> {
-    serde_json::from_str(&files::read_text(path)?).context("this is no JSON")
+/// A file of a run; one that is damaged is a problem of the run.
+fn part<T>(name: &str, damage: &mut Vec<String>, found: Result<Option<T>>) -> Option<T> {
+    found.unwrap_or_else(|error| {
+        let reasons = std::iter::successors(Some(&error as &dyn std::error::Error), |e| e.source());
+        let reasons: Vec<String> = reasons.map(ToString::to_string).collect();
+        damage.push(format!("{name}: {}", reasons.join(": ")).replace('\n', " "));
+        None
+    })
 }
 
 /// Reads a run; whatever is wrong with it is reported in it.
-pub fn read(run: &Path) -> Entry {
+///
+/// # Errors
+/// There is no such run.
+pub fn read(folder: &Path) -> Result<Entry> {
+    let run = Run::open(folder)?;
     let mut damage = Vec::new();
-    let summary = part(run, "summary.json", &mut damage, json);
-    let plan = part(run, "plan.json", &mut damage, |path| Ok(read_plan(path)?));
-    let rope = part(run, "params.toml", &mut damage, |path| {
-        Ok(files::read_rope(path)?)
-    });
-    let cause = part(run, "cause.json", &mut damage, json).unwrap_or_default();
-    let line = part(run, super::COMMAND_FILE, &mut damage, |_| {
-        CommandLine::read(run)
-    });
+    let summary = part(files::SUMMARY, &mut damage, run.summary());
+    let plan = part(files::PLAN, &mut damage, run.plan());
+    let rope = part(files::ROPE, &mut damage, run.rope());
+    let cause = part(files::CAUSE, &mut damage, run.cause()).unwrap_or_default();
+    let line = part(files::COMMAND, &mut damage, run.command());
     if summary.is_none() && damage.is_empty() {
         damage.push("summary.json is missing: the run is under way, or was killed".to_owned());
     }
     let broken = !damage.is_empty();
     let summary = summary.unwrap_or_default();
     let text = |key: &str| summary[key].as_str().map(str::to_owned);
-    let number = |value: &Value| value.as_f64();
     let failed = text("error");
     let result = match (broken, summary["ok"].as_bool()) {
         (true, _) => RunResult::Broken,
         (false, Some(true)) => RunResult::Ok,
         (false, Some(false) | None) => RunResult::Failed,
     };
-    let target = &summary["target_m"];
-    let target = target[0]
-        .as_f64()
-        .zip(target[1].as_f64())
-        .zip(target[2].as_f64());
-    Entry {
-        run: run.to_owned(),
+    Ok(Entry {
+        run: folder.to_owned(),
         result,
         problems: failed.into_iter().chain(damage).collect(),
         started: line.as_ref().map(|l| l.started.clone()),
@@ -129,17 +123,17 @@ pub fn read(run: &Path) -> Entry {
         task: text("task").or(plan
             .as_ref()
             .map(|p| format!("{:?}", p.task).to_lowercase())),
-        target_m: target
-            .map(|((x, y), z)| [x, y, z])
+        target_m: serde_json::from_value(summary["target_m"].clone())
+            .ok()
             .or(plan.as_ref().map(|p| p.target_m)),
         wiggle_frames: summary["wiggle"]["frames"].as_u64(),
         rope: rope.or(plan.as_ref().map(|p| p.rope)),
         plan_sha256: plan.as_ref().map(|p| p.trajectory_sha256.clone()),
         predicted_m: plan.as_ref().map(|p| p.predicted_error_m),
-        true_m: number(&summary["true_tip_target_distance_m"]),
-        camera_m: number(&summary["score"]["closest_m"]),
+        true_m: summary["true_tip_target_distance_m"].as_f64(),
+        camera_m: summary["score"]["closest_m"].as_f64(),
         stopped_by: cause["stops"][0]["code"].as_str().map(str::to_owned),
-    }
+    })
 }
 
 #[cfg(test)]
@@ -151,16 +145,16 @@ mod tests {
     fn a_broken_folder_says_what_is_wrong() {
         let dir = tempfile::tempdir().unwrap();
         let run = dir.path();
-        let found = read(run);
+        let found = read(run).unwrap();
         assert_eq!(found.result, RunResult::Broken);
         assert!(
             found.problems[0].contains("summary.json is missing"),
             "{found:?}"
         );
         fs::write(run.join("summary.json"), "{\"ok\": true, \"seed\": 4}").unwrap();
-        assert_eq!(read(run).result, RunResult::Ok);
+        assert_eq!(read(run).unwrap().result, RunResult::Ok);
         fs::write(run.join("params.toml"), "links = no").unwrap();
-        let found = read(run);
+        let found = read(run).unwrap();
         assert_eq!((found.result, found.seed), (RunResult::Broken, Some(4)));
         assert!(found.problems[0].starts_with("params.toml"), "{found:?}");
         fs::remove_file(run.join("params.toml")).unwrap();
@@ -169,7 +163,7 @@ mod tests {
             "{\"ok\": false, \"error\": \"no arm\"}",
         )
         .unwrap();
-        let found = read(run);
+        let found = read(run).unwrap();
         assert_eq!(
             (found.result, found.problems.as_slice()),
             (RunResult::Failed, &["no arm".to_owned()][..])

@@ -1,13 +1,8 @@
 //! The command line a run was made with.
 
-use crate::files;
-use anyhow::{Context, anyhow};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::SystemTime;
-
-/// File of a run folder that says how it was made.
-pub const COMMAND_FILE: &str = "command.json";
 
 /// How a run was made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,22 +29,6 @@ impl CommandLine {
                 .map(|arg| arg.to_string_lossy().into_owned())
                 .collect(),
         }
-    }
-
-    /// Reads that of a run.
-    ///
-    /// # Errors
-    /// The run holds none, or a damaged one.
-    pub fn read(run: &Path) -> anyhow::Result<Self> {
-        let path = run.join(COMMAND_FILE);
-        if !path.is_file() {
-            return Err(anyhow!(
-                "`{}` does not say how it was made: it holds no {COMMAND_FILE}",
-                run.display()
-            ));
-        }
-        serde_json::from_str(&files::read_text(&path)?)
-            .with_context(|| format!("`{}`", path.display()))
     }
 
     /// What makes such a run once more: results go into a new folder, and whoever

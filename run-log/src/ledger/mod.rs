@@ -1,16 +1,14 @@
 //! Runs side by side: what was done, with which rope, and what came of it.
 
-mod command_line;
 mod compare;
 mod entry;
 mod export;
 
-pub use command_line::{COMMAND_FILE, CommandLine, quoted};
-pub use compare::compare;
+pub use compare::{Difference, compare};
 pub use entry::{Entry, RunResult, read};
 pub use export::{csv, table};
 
-use anyhow::Context;
+use crate::{Error, Result, files};
 use std::path::{Path, PathBuf};
 
 /// Where runs lie by default.
@@ -18,16 +16,17 @@ pub const RUNS: &str = "runs";
 
 /// The runs in `places`: each is a run folder, or a folder of run folders. In order
 /// of their names, which begin with the time.
-pub fn find(places: &[PathBuf]) -> anyhow::Result<Vec<Entry>> {
+///
+/// # Errors
+/// A place cannot be read.
+pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {
     let mut found = Vec::new();
     for place in places {
         if is_run(place) {
             found.push(place.clone());
             continue;
         }
-        let inside = place
-            .read_dir()
-            .with_context(|| format!("cannot read the folder `{}`", place.display()))?;
+        let inside = place.read_dir().map_err(Error::read(place))?;
         let mut runs: Vec<PathBuf> = inside
             .flatten()
             .map(|entry| entry.path())
@@ -36,12 +35,12 @@ pub fn find(places: &[PathBuf]) -> anyhow::Result<Vec<Entry>> {
         runs.sort();
         found.append(&mut runs);
     }
-    Ok(found.iter().map(|run| read(run)).collect())
+    found.iter().map(|run| read(run)).collect()
 }
 
 /// Whether a folder is a run's own: it says how it was made or what came of it.
 fn is_run(folder: &Path) -> bool {
-    [COMMAND_FILE, "summary.json"]
+    [files::COMMAND, files::SUMMARY]
         .iter()
         .any(|file| folder.join(file).is_file())
 }

@@ -1,6 +1,7 @@
 //! Two runs, value by value.
 
 use super::Entry;
+use crate::Result;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -18,7 +19,10 @@ pub struct Difference {
 }
 
 /// All differences of two runs but their folders and times.
-pub fn compare(first: &Entry, second: &Entry) -> anyhow::Result<Vec<Difference>> {
+///
+/// # Errors
+/// A value is none that JSON knows.
+pub fn compare(first: &Entry, second: &Entry) -> Result<Vec<Difference>> {
     let (a, b) = (serde_json::to_value(first)?, serde_json::to_value(second)?);
     let mut found = Vec::new();
     collect("", &a, &b, &mut found);

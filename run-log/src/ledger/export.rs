@@ -1,6 +1,7 @@
 //! Runs as a table for people and as CSV.
 
 use super::{Entry, RunResult};
+use crate::{Result, quoted};
 use cli_output::table;
 use comfy_table::Table;
 use shared_types::rope::RANGES;
@@ -55,7 +56,10 @@ pub fn table(entries: &[Entry]) -> Table {
 }
 
 /// A line per run with every value, for a spreadsheet.
-pub fn csv(entries: &[Entry]) -> anyhow::Result<Vec<u8>> {
+///
+/// # Errors
+/// The table cannot be put together.
+pub fn csv(entries: &[Entry]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header = vec![
         "run",
@@ -85,10 +89,7 @@ pub fn csv(entries: &[Entry]) -> anyhow::Result<Vec<u8>> {
             format!("{:?}", e.result).to_lowercase(),
             e.problems.join("; "),
             e.started.clone().unwrap_or_default(),
-            e.arguments
-                .as_ref()
-                .map(|a| super::command_line::quoted(a))
-                .unwrap_or_default(),
+            e.arguments.as_ref().map(|a| quoted(a)).unwrap_or_default(),
             e.version.clone().unwrap_or_default(),
             e.seed.map(|s| s.to_string()).unwrap_or_default(),
             e.task.clone().unwrap_or_default(),
@@ -102,5 +103,7 @@ pub fn csv(entries: &[Entry]) -> anyhow::Result<Vec<u8>> {
         row.extend((0..RANGES.len()).map(|i| number(rope.map(|r| r[i]))));
         writer.write_record(&row)?;
     }
-    Ok(writer.into_inner()?)
+    writer
+        .into_inner()
+        .map_err(|e| csv::Error::from(e.into_error()).into())
 }
