@@ -14,6 +14,8 @@ use std::ops::Range;
 const LENGTH_M: f64 = 0.5;
 /// Radii of rope and lead (m) where a test does not choose others.
 const RADII_M: [f64; 2] = [0.006, 0.02];
+const RED_AND_BLUE: [[f64; 3]; 2] = [[190.0, 60.0, 40.0], [40.0, 60.0, 170.0]];
+const GREEN: [f64; 3] = [60.0, 110.0, 60.0];
 const WIDTH: usize = 672;
 const HEIGHT: usize = 376;
 const NODES: usize = 41;
@@ -169,26 +171,50 @@ struct Recording {
     clamp: ClampPath,
 }
 
-/// Draws `count` frames with a rope of radii [`RADII_M`].
-fn record(
-    motion: &Motion,
+/// What is drawn.
+struct Scene {
+    motion: Motion,
     count: usize,
-    rope_lead: [[f64; 3]; 2],
+    /// Colours and radii of rope and lead.
+    colours: [[f64; 3]; 2],
+    radii_m: [f64; 2],
+    /// Radius of a knot a third down the rope.
+    knot_m: f64,
+    /// Frames in which the rope is hidden.
     hidden: Range<usize>,
-) -> Recording {
-    record_sizes(motion, count, rope_lead, RADII_M, RADII_M[0], hidden)
 }
 
-/// Draws `count` frames; the rope is hidden in those of `hidden`. A knot of
-/// radius `knot_m` sits a third down the rope.
-fn record_sizes(
-    motion: &Motion,
-    count: usize,
-    rope_lead: [[f64; 3]; 2],
-    radii_m: [f64; 2],
-    knot_m: f64,
-    hidden: Range<usize>,
-) -> Recording {
+impl Scene {
+    /// `count` frames of a rope without a knot that is never hidden.
+    fn new(motion: Motion, count: usize, colours: [[f64; 3]; 2], radii_m: [f64; 2]) -> Self {
+        Self {
+            motion,
+            count,
+            colours,
+            radii_m,
+            knot_m: radii_m[0],
+            hidden: 0..0,
+        }
+    }
+
+    /// The rope looks as it was drawn, and is followed closely in all frames.
+    fn assert_followed(&self) {
+        let recording = record(self);
+        let result = follow(&recording);
+        assert_looks(&result, self.radii_m);
+        assert_small(errors(&recording, &result, 0..self.count));
+    }
+}
+
+fn record(scene: &Scene) -> Recording {
+    let Scene {
+        motion,
+        count,
+        colours,
+        radii_m,
+        knot_m,
+        hidden,
+    } = scene;
     let camera = camera();
     let pixels = |nodes: &[Vector3<f64>]| -> Vec<[f64; 2]> {
         let project = |p| camera.project_left(p).unwrap();
@@ -196,7 +222,7 @@ fn record_sizes(
     };
     let px_per_m = 350.0 / 0.95;
     let (mut frames, mut truth, mut clamp) = (Vec::new(), Vec::new(), Vec::new());
-    for index in 0..count {
+    for index in 0..*count {
         let t_s = index as f64 * 16_666_667e-9;
         let seen_s = t_s + camera.row_time_s(0.0);
         let (hold, nodes) = (motion.clamp(seen_s), motion.rope(seen_s));
@@ -208,16 +234,16 @@ fn record_sizes(
         canvas.stroke(&pole, 0.01 * px_per_m, [60.0, 62.0, 66.0]);
         let rope = pixels(&nodes);
         if !hidden.contains(&index) {
-            canvas.stroke(&rope, radii_m[0] * px_per_m, rope_lead[0]);
-            canvas.stroke(&[rope[NODES / 3]; 2], knot_m * px_per_m, rope_lead[0]);
-            canvas.stroke(&[rope[NODES - 1]; 2], radii_m[1] * px_per_m, rope_lead[1]);
+            canvas.stroke(&rope, radii_m[0] * px_per_m, colours[0]);
+            canvas.stroke(&[rope[NODES / 3]; 2], knot_m * px_per_m, colours[0]);
+            canvas.stroke(&[rope[NODES - 1]; 2], radii_m[1] * px_per_m, colours[1]);
         }
         frames.push(canvas.frame(index));
         truth.push(rope);
         clamp.push(motion.clamp(t_s));
     }
     // A little more of the arm's motion than the video shows.
-    clamp.push(motion.clamp(count as f64 * 16_666_667e-9));
+    clamp.push(motion.clamp(*count as f64 * 16_666_667e-9));
     Recording {
         frames,
         truth,
@@ -270,9 +296,12 @@ fn a_red_rope_that_sways_gently_and_is_hidden_for_a_while() {
         clamp_m: 0.012,
         tip_rad: 0.35,
     };
-    let colours = [[190.0, 60.0, 40.0], [40.0, 60.0, 170.0]];
     let hidden = 80..86;
-    let recording = record(&motion, 150, colours, hidden.clone());
+    let scene = Scene {
+        hidden: hidden.clone(),
+        ..Scene::new(motion, 150, RED_AND_BLUE, RADII_M)
+    };
+    let recording = record(&scene);
     let result = follow(&recording);
     assert_looks(&result, RADII_M);
     assert_small(errors(&recording, &result, 0..hidden.start));
@@ -289,11 +318,8 @@ fn a_rope_that_is_still_for_most_of_the_recording() {
         clamp_m: 0.006,
         tip_rad: 0.4,
     };
-    let colours = [[60.0, 110.0, 60.0], [230.0, 140.0, 30.0]];
-    let recording = record(&motion, 150, colours, 0..0);
-    let result = follow(&recording);
-    assert_looks(&result, RADII_M);
-    assert_small(errors(&recording, &result, 0..150));
+    let colours = [GREEN, [230.0, 140.0, 30.0]];
+    Scene::new(motion, 150, colours, RADII_M).assert_followed();
 }
 
 #[test]
@@ -304,8 +330,7 @@ fn a_rope_thinner_than_two_pixels_is_not_taken_for_a_hidden_one() {
         tip_rad: 1.0,
     };
     let colours = [[60.0, 90.0, 160.0], [235.0, 140.0, 40.0]];
-    let radii_m = [0.0015, 0.035];
-    let recording = record_sizes(&motion, 150, colours, radii_m, radii_m[0], 0..0);
+    let recording = record(&Scene::new(motion, 150, colours, [0.0015, 0.035]));
     let result = follow(&recording);
     assert_small(errors(&recording, &result, 0..150));
     let lost = result.track.frames.iter().filter(|f| f.lost).count();
@@ -323,45 +348,21 @@ const SWAY: Motion = Motion {
 
 #[test]
 fn a_lead_hardly_fatter_than_the_rope_is_told_by_its_colour() {
-    // A knot near the clamp is the fattest place.
     let colours = [[44.0, 82.0, 160.0], [240.0, 150.0, 30.0]];
-    let radii_m = [0.011, 0.0125];
-    let recording = record_sizes(&SWAY, 100, colours, radii_m, 0.0145, 0..0);
-    let result = follow(&recording);
-    assert_looks(&result, radii_m);
-    assert_small(errors(&recording, &result, 0..100));
+    let scene = Scene {
+        // A knot near the clamp is the fattest place.
+        knot_m: 0.0145,
+        ..Scene::new(SWAY, 100, colours, [0.011, 0.0125])
+    };
+    scene.assert_followed();
 }
 
+/// Without a width to go by, either, the lead is the free end.
 #[test]
-fn a_lead_of_the_ropes_colour_is_told_by_its_width() {
-    let radii_m = [0.006, 0.017];
-    let recording = record_sizes(
-        &SWAY,
-        100,
-        [[60.0, 110.0, 60.0]; 2],
-        radii_m,
-        radii_m[0],
-        0..0,
-    );
-    let result = follow(&recording);
-    assert_looks(&result, radii_m);
-    assert_small(errors(&recording, &result, 0..100));
-}
-
-#[test]
-fn without_width_or_colour_to_go_by_the_lead_is_the_free_end() {
-    let radii_m = [0.011, 0.011];
-    let recording = record_sizes(
-        &SWAY,
-        100,
-        [[60.0, 110.0, 60.0]; 2],
-        radii_m,
-        radii_m[0],
-        0..0,
-    );
-    let result = follow(&recording);
-    assert_looks(&result, radii_m);
-    assert_small(errors(&recording, &result, 0..100));
+fn a_lead_of_the_ropes_colour_is_told_by_its_width_or_is_the_free_end() {
+    for radii_m in [[0.006, 0.017], [0.011, 0.011]] {
+        Scene::new(SWAY, 100, [GREEN; 2], radii_m).assert_followed();
+    }
 }
 
 /// The same path, told `late_s` later and `aside_m` further to the right.
@@ -376,8 +377,7 @@ fn moved(path: &ClampPath, late_s: f64, aside_m: f64) -> ClampPath {
 
 #[test]
 fn a_clock_and_a_clamp_that_are_off_are_told() {
-    let colours = [[190.0, 60.0, 40.0], [40.0, 60.0, 170.0]];
-    let mut recording = record(&SWAY, 150, colours, 0..0);
+    let mut recording = record(&Scene::new(SWAY, 150, RED_AND_BLUE, RADII_M));
     let path = recording.clamp.clone();
     for (late_s, aside_m) in [(0.0, 0.0), (0.008, 0.002), (-0.012, -0.002)] {
         recording.clamp = moved(&path, late_s, aside_m);
@@ -403,7 +403,10 @@ fn no_rope_is_an_error_that_says_so() {
         clamp_m: 0.03,
         tip_rad: 0.4,
     };
-    let recording = record(&motion, 30, [[0.0; 3]; 2], 0..30);
+    let recording = record(&Scene {
+        hidden: 0..30,
+        ..Scene::new(motion, 30, [[0.0; 3]; 2], RADII_M)
+    });
     let options = TrackOptions::default();
     let error = track(&recording.frames, &camera(), &recording.clamp, &options).unwrap_err();
     assert!(

@@ -122,17 +122,13 @@ fn publish(
     poses: &[ScenePose],
     arrives: MonotonicNs,
 ) -> Result<(), RigError> {
-    let failed = |reason: String| IpcError::Transfer {
-        service: SERVICE,
-        reason,
-    };
     let mut frame = publisher
         .loan_slice(renderer.frame_bytes())
-        .map_err(|e| failed(format!("{e:?}")))?;
+        .map_err(IpcError::transfer(SERVICE))?;
     *frame.user_header_mut() = header;
     renderer.render(poses, header.sequence, frame.payload_mut());
     clock::sleep_until(arrives);
-    frame.send().map_err(|e| failed(format!("{e:?}")))?;
+    frame.send().map_err(IpcError::transfer(SERVICE))?;
     Ok(())
 }
 

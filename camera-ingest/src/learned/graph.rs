@@ -9,6 +9,7 @@ use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, TensorRef};
 use sha2::{Digest, Sha256};
 
+use super::picture::Size;
 use crate::track::ModelError;
 
 /// How long an axis is.
@@ -28,12 +29,13 @@ pub(super) struct Wanted {
 }
 
 /// Lengths that a graph fixes, by name of the axis.
-pub(super) type Fixed = BTreeMap<&'static str, usize>;
+type Fixed = BTreeMap<&'static str, usize>;
 
 /// An opened graph.
 pub(super) struct Graph {
     path: String,
     sha256: String,
+    fixed: Fixed,
     session: Session,
 }
 
@@ -46,11 +48,8 @@ impl core::fmt::Debug for Graph {
     }
 }
 
-/// Values of an input and how many there are along each axis.
-pub(super) struct Input<'a> {
-    pub(super) shape: Vec<usize>,
-    pub(super) values: &'a [f32],
-}
+/// Name and values of an input, and how many there are along each axis.
+pub(super) type Input<'a> = (&'static str, Vec<usize>, &'a [f32]);
 
 impl Graph {
     /// Opens a file and compares its inputs and outputs with those wanted.
@@ -58,7 +57,7 @@ impl Graph {
         path: &Path,
         inputs: &[Wanted],
         outputs: &[Wanted],
-    ) -> Result<(Self, Fixed), ModelError> {
+    ) -> Result<Self, ModelError> {
         let name = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| ModelError::Unreadable {
             path: name.clone(),
@@ -78,12 +77,23 @@ impl Graph {
             .iter()
             .map(|byte| format!("{byte:02x}"))
             .collect();
-        let graph = Self {
+        Ok(Self {
             path: name,
             sha256,
+            fixed,
             session,
-        };
-        Ok((graph, fixed))
+        })
+    }
+
+    /// The length of an axis, if the graph fixes it.
+    pub(super) fn fixed(&self, axis: &str) -> Option<usize> {
+        self.fixed.get(axis).copied()
+    }
+
+    /// Size of the pictures it looks at, for frames of a size.
+    pub(super) fn size(&self, frame: Size) -> Size {
+        let of = |axis, k: usize| self.fixed(axis).unwrap_or(frame[k]);
+        [of("W", 0), of("H", 1)]
     }
 
     /// Hash of the file.
@@ -111,7 +121,7 @@ impl Graph {
     /// Runs the graph; the values of each output, which must have the given shape.
     pub(super) fn run<const OUTPUTS: usize>(
         &mut self,
-        inputs: &[(&'static str, Input<'_>)],
+        inputs: &[Input<'_>],
         outputs: [(&'static str, Vec<usize>); OUTPUTS],
     ) -> Result<[Vec<f32>; OUTPUTS], ModelError> {
         let path = self.path.clone();
@@ -119,16 +129,11 @@ impl Graph {
             path: path.clone(),
             reason: e.to_string(),
         };
-        let mut given = Vec::new();
-        for (name, input) in inputs {
-            let tensor =
-                TensorRef::from_array_view((input.shape.clone(), input.values)).map_err(failed)?;
-            given.push((*name, tensor));
+        let mut given: Vec<(&str, ort::session::SessionInputValue<'_>)> = Vec::new();
+        for (name, shape, values) in inputs {
+            let tensor = TensorRef::from_array_view((shape.clone(), *values)).map_err(failed)?;
+            given.push((name, tensor.into()));
         }
-        let given: Vec<(&str, ort::session::SessionInputValue<'_>)> = given
-            .into_iter()
-            .map(|(name, tensor)| (name, tensor.into()))
-            .collect();
         let found = self.session.run(given).map_err(failed)?;
         let mut values = [const { Vec::new() }; OUTPUTS];
         for ((name, wanted), values) in outputs.into_iter().zip(&mut values) {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::graph::Axis::{Is, Named};
-use super::graph::{Fixed, Graph, Input, Wanted};
+use super::graph::{Graph, Wanted};
 use super::picture::{Size, append_planes, place_in, scaled, size_of};
 use crate::track::{FirstMask, FirstScene, ModelError};
 
@@ -32,7 +32,6 @@ const NO_POINT: f32 = -1.0;
 #[derive(Debug)]
 pub struct OnnxSegmenter {
     graph: Graph,
-    fixed: Fixed,
 }
 
 impl OnnxSegmenter {
@@ -41,20 +40,14 @@ impl OnnxSegmenter {
     /// # Errors
     /// The reason why the file is not used.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
-        let (graph, fixed) = Graph::load(path, &[IMAGE, POINTS, LABELS], &[MASK])?;
-        Ok(Self { graph, fixed })
+        let graph = Graph::load(path, &[IMAGE, POINTS, LABELS], &[MASK])?;
+        Ok(Self { graph })
     }
 
     /// Hash of the file (SHA-256, hexadecimal).
     #[must_use]
     pub fn sha256(&self) -> &str {
         self.graph.sha256()
-    }
-
-    /// Size of the picture it looks at.
-    fn size(&self, frame: Size) -> Size {
-        let of = |axis, k: usize| self.fixed.get(axis).copied().unwrap_or(frame[k]);
-        [of("W", 0), of("H", 1)]
     }
 }
 
@@ -75,19 +68,15 @@ fn prompts(scene: &FirstScene<'_>, size: Size, count: Option<usize>) -> (Vec<f32
 impl FirstMask for OnnxSegmenter {
     fn mask(&mut self, scene: &FirstScene<'_>) -> Result<Vec<bool>, ModelError> {
         let frame = size_of(scene.frame);
-        let size = self.size(frame);
+        let size = self.graph.size(frame);
         let mut image = Vec::with_capacity(3 * size[0] * size[1]);
         append_planes(scene.frame, size, &mut image);
-        let (points, labels) = prompts(scene, size, self.fixed.get("P").copied());
+        let (points, labels) = prompts(scene, size, self.graph.fixed("P"));
         let count = labels.len();
-        let input = |shape: &[usize], values| Input {
-            shape: shape.to_vec(),
-            values,
-        };
         let inputs = [
-            (IMAGE.name, input(&[1, 3, size[1], size[0]], &image)),
-            (POINTS.name, input(&[1, count, 2], &points)),
-            (LABELS.name, input(&[1, count], &labels)),
+            (IMAGE.name, vec![1, 3, size[1], size[0]], &image[..]),
+            (POINTS.name, vec![1, count, 2], &points),
+            (LABELS.name, vec![1, count], &labels),
         ];
         let [logits] = self
             .graph

@@ -7,8 +7,8 @@
 use std::path::Path;
 
 use super::graph::Axis::{Is, Named};
-use super::graph::{Fixed, Graph, Input, Wanted};
-use super::picture::{Size, append_planes, place_in, size_of};
+use super::graph::{Graph, Wanted};
+use super::picture::{append_planes, place_in, size_of};
 use crate::frame::EyeFrame;
 use crate::track::{ModelError, PointTracker, SeenPoint};
 
@@ -41,7 +41,6 @@ const LEAST_POINTS: usize = 4;
 #[derive(Debug)]
 pub struct OnnxTracker {
     graph: Graph,
-    fixed: Fixed,
 }
 
 /// Where a point is looked for from: frame of the film, raw pixel.
@@ -53,18 +52,18 @@ impl OnnxTracker {
     /// # Errors
     /// The reason why the file is not used.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
-        let (graph, fixed) = Graph::load(path, &[FRAMES, QUERIES], &[TRACKS, VISIBILITY])?;
+        let graph = Graph::load(path, &[FRAMES, QUERIES], &[TRACKS, VISIBILITY])?;
         let too_few = |wanted: &Wanted, axis: &str, least: usize| {
-            let found = fixed.get(axis).filter(|found| **found < least)?;
+            let found = graph.fixed(axis).filter(|found| *found < least)?;
             let form = |length: &dyn core::fmt::Display| format!("of {axis} = {length}");
             let least = format!("{least} or more");
-            Some(graph.unfit("input", wanted.name, form(found), form(&least)))
+            Some(graph.unfit("input", wanted.name, form(&found), form(&least)))
         };
         let refused =
             too_few(&FRAMES, "T", LEAST_FRAMES).or_else(|| too_few(&QUERIES, "N", LEAST_POINTS));
         match refused {
             Some(error) => Err(error),
-            None => Ok(Self { graph, fixed }),
+            None => Ok(Self { graph }),
         }
     }
 
@@ -76,10 +75,7 @@ impl OnnxTracker {
 
     /// Frames of a chunk of a film.
     fn chunk(&self, film: usize) -> usize {
-        self.fixed
-            .get("T")
-            .copied()
-            .unwrap_or_else(|| CHUNK.min(film))
+        self.graph.fixed("T").unwrap_or_else(|| CHUNK.min(film))
     }
 
     /// Follows points through the chunk of frames that begins at `start`.
@@ -91,8 +87,7 @@ impl OnnxTracker {
     ) -> Result<Vec<Vec<SeenPoint>>, ModelError> {
         let (length, count) = (self.chunk(frames.len()), queries.len());
         let film = size_of(&frames[0]);
-        let of = |axis, k: usize| self.fixed.get(axis).copied().unwrap_or(film[k]);
-        let size: Size = [of("W", 0), of("H", 1)];
+        let size = self.graph.size(film);
         let mut pictures = Vec::with_capacity(length * 3 * size[0] * size[1]);
         for at in start..start + length {
             // A film shorter than a chunk stands still at its end.
@@ -108,18 +103,10 @@ impl OnnxTracker {
         let inputs = [
             (
                 FRAMES.name,
-                Input {
-                    shape: vec![1, length, 3, size[1], size[0]],
-                    values: &pictures,
-                },
+                vec![1, length, 3, size[1], size[0]],
+                &pictures[..],
             ),
-            (
-                QUERIES.name,
-                Input {
-                    shape: vec![1, count, 3],
-                    values: &asked,
-                },
-            ),
+            (QUERIES.name, vec![1, count, 3], &asked),
         ];
         let outputs = [
             (TRACKS.name, vec![1, length, count, 2]),
@@ -150,7 +137,7 @@ fn starts(film: usize, chunk: usize) -> Vec<usize> {
 
 impl PointTracker for OnnxTracker {
     fn points(&self) -> Option<usize> {
-        self.fixed.get("N").copied()
+        self.graph.fixed("N")
     }
 
     fn follow(

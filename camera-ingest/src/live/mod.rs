@@ -11,6 +11,7 @@ mod exposure;
 mod kernel;
 mod publish;
 mod record;
+mod setup;
 #[cfg(test)]
 mod tests;
 
@@ -49,20 +50,18 @@ pub struct LiveSettings {
 impl LiveSettings {
     /// Width of both eyes together and height (px).
     #[must_use]
-    pub fn size_px(&self) -> [usize; 2] {
+    pub fn size_px(&self) -> [u32; 2] {
         let (width_px, height_px) = self.mode.size_px();
-        [2 * width_px as usize, height_px as usize]
+        [2 * width_px, height_px]
     }
 
     /// Bytes of one frame.
     #[must_use]
     pub fn frame_bytes(&self) -> usize {
         let [width_px, height_px] = self.size_px();
-        2 * width_px * height_px
+        2 * width_px as usize * height_px as usize
     }
-}
 
-impl LiveSettings {
     /// What the sensors are to be set to, or what is out of range.
     fn sensor(&self) -> Result<Option<Sensor>, String> {
         if !(1..=240).contains(&self.rate_hz) {

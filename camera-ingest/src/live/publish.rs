@@ -6,7 +6,6 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{Bus, FrameHeader, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV};
 
-use super::camera::picture_side;
 use super::{LiveCamera, LiveError, LiveSettings};
 
 const SERVICE: &str = "wag/v1/camera/frames";
@@ -51,20 +50,16 @@ pub(super) fn publish(
     stop: &AtomicBool,
 ) -> Result<(), PublishError> {
     let bus = Bus::join(domain)?;
-    let [width_px, height_px] = camera.settings().size_px().map(picture_side);
+    let [width_px, height_px] = camera.settings().size_px();
     let frame_bytes = camera.settings().frame_bytes();
     let publisher = bus.frame_publisher(frame_bytes)?;
-    let failed = |reason: String| IpcError::Transfer {
-        service: SERVICE,
-        reason,
-    };
     tracing::info!(domain, device = %camera.settings().device.display(), "the camera runs");
     let mut told = 0;
     while !stop.load(Ordering::Relaxed) {
         let frame = camera.next(PATIENCE)?;
         let mut sample = publisher
             .loan_slice_uninit(frame_bytes)
-            .map_err(|e| failed(format!("{e:?}")))?;
+            .map_err(IpcError::transfer(SERVICE))?;
         *sample.user_header_mut() = FrameHeader {
             version: PAYLOAD_VERSION,
             pixel_format: PIXEL_FORMAT_YUYV,
@@ -76,7 +71,7 @@ pub(super) fn publish(
         sample
             .write_from_slice(frame.bytes)
             .send()
-            .map_err(|e| failed(format!("{e:?}")))?;
+            .map_err(IpcError::transfer(SERVICE))?;
         let lost = camera.losses();
         if lost.total() > told && camera.frames().is_multiple_of(TELL_EVERY) {
             tracing::warn!(?lost, frames = camera.frames(), "the camera loses frames");

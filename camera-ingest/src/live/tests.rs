@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use shared_types::ipc::{Bus, DomainSweep};
 
 use super::abi;
-use super::camera::cannot_open;
 use super::device::{Device, Filled, Identity};
 use super::publish::publish;
+use super::setup::cannot_open;
 use super::{LiveCamera, LiveError, LiveSettings, Losses, RecordError, record};
 use crate::calib::VideoMode;
 use crate::frame::StereoFrame;

@@ -149,13 +149,6 @@ struct Ports {
     out: PreviewPublisher,
 }
 
-fn transfer<E: std::fmt::Debug>(service: &'static str) -> impl Fn(E) -> IpcError {
-    move |e| IpcError::Transfer {
-        service,
-        reason: format!("{e:?}"),
-    }
-}
-
 impl Ports {
     fn open(bus: &Bus) -> Result<Self, IpcError> {
         Ok(Self {
@@ -167,7 +160,7 @@ impl Ports {
 
     /// The left eye of the newest frame; all frames have gone back to the camera then.
     fn newest(&self) -> Result<Option<Arrived>, IpcError> {
-        let failed = transfer("wag/v1/camera/frames");
+        let failed = IpcError::transfer("wag/v1/camera/frames");
         let mut newest = None;
         while let Some(sample) = self.frames.receive().map_err(&failed)? {
             newest = Some(sample);
@@ -186,7 +179,7 @@ impl Ports {
     }
 
     fn take_joints(&self, preview: &mut Preview) -> Result<(), IpcError> {
-        let failed = transfer("wag/v1/controller/joints");
+        let failed = IpcError::transfer("wag/v1/controller/joints");
         while let Some(report) = self.joints.receive().map_err(&failed)? {
             preview.report(report.stamp_ns, &report.q);
         }
@@ -195,6 +188,7 @@ impl Ports {
 
     fn publish(&self, found: &PreviewFrame) -> Result<(), IpcError> {
         let sent = self.out.send_copy(*found);
-        sent.map_err(transfer("wag/v1/camera/preview")).map(|_| ())
+        sent.map_err(IpcError::transfer("wag/v1/camera/preview"))
+            .map(|_| ())
     }
 }

@@ -127,10 +127,8 @@ impl Process {
     fn take_frames(&mut self) -> Result<bool, IpcError> {
         let mut any = false;
         loop {
-            let sample = self.frames.receive().map_err(|e| IpcError::Transfer {
-                service: "wag/v1/camera/frames",
-                reason: format!("{e:?}"),
-            })?;
+            let failed = IpcError::transfer("wag/v1/camera/frames");
+            let sample = self.frames.receive().map_err(failed)?;
             let Some(sample) = sample else { break };
             any = true;
             if self.job.is_some() {

@@ -24,10 +24,8 @@ impl Collector {
     /// Takes in what was published.
     pub(super) fn drain(&mut self) -> Result<(), IpcError> {
         loop {
-            let sample = self.subscriber.receive().map_err(|e| IpcError::Transfer {
-                service: "wag/v1/camera/keypoints",
-                reason: format!("{e:?}"),
-            })?;
+            let failed = IpcError::transfer("wag/v1/camera/keypoints");
+            let sample = self.subscriber.receive().map_err(failed)?;
             let Some(sample) = sample else { return Ok(()) };
             if self.frames.len() == KEEP {
                 self.frames.pop_front();

@@ -73,3 +73,13 @@ pub enum IpcError {
         timeout_s: u64,
     },
 }
+
+impl IpcError {
+    /// Makes [`Self::Transfer`] of what the library said about a service.
+    pub fn transfer<E: std::fmt::Debug>(service: &'static str) -> impl Fn(E) -> Self {
+        move |error| Self::Transfer {
+            service,
+            reason: format!("{error:?}"),
+        }
+    }
+}

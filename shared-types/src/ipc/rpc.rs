@@ -125,10 +125,7 @@ impl<R: Rpc> RpcServer<R> {
     /// [`IpcError::Transfer`]; [`IpcError::Message`] for one that cannot be
     /// understood (it is dropped, the caller sees its answer end).
     pub fn receive(&self) -> Result<Option<Call<R>>, IpcError> {
-        let active = self.server.receive().map_err(|e| IpcError::Transfer {
-            service: R::NAME,
-            reason: format!("{e:?}"),
-        })?;
+        let active = self.server.receive().map_err(IpcError::transfer(R::NAME))?;
         active
             .map(|active| {
                 let request = decode(R::NAME, active.payload())?;
@@ -152,19 +149,15 @@ impl<R: Rpc> Call<R> {
     /// # Errors
     /// [`IpcError::Transfer`] or [`IpcError::Message`].
     pub fn send(&self, event: &R::Event) -> Result<(), IpcError> {
-        let fail = |reason: String| IpcError::Transfer {
-            service: R::NAME,
-            reason,
-        };
         let bytes = encode(R::NAME, event)?;
         let response = self
             .active
             .loan_slice_uninit(bytes.len())
-            .map_err(|e| fail(format!("{e:?}")))?;
+            .map_err(IpcError::transfer(R::NAME))?;
         response
             .write_from_slice(&bytes)
             .send()
-            .map_err(|e| fail(format!("{e:?}")))?;
+            .map_err(IpcError::transfer(R::NAME))?;
         Ok(())
     }
 
@@ -205,19 +198,15 @@ impl<R: Rpc> RpcClient<R> {
     /// # Errors
     /// [`IpcError::Gone`] when nobody serves, else transfer errors.
     pub fn call(&self, request: &R::Request) -> Result<Pending<R>, IpcError> {
-        let fail = |reason: String| IpcError::Transfer {
-            service: R::NAME,
-            reason,
-        };
         let bytes = encode(R::NAME, request)?;
         let loan = self
             .client
             .loan_slice_uninit(bytes.len())
-            .map_err(|e| fail(format!("{e:?}")))?;
+            .map_err(IpcError::transfer(R::NAME))?;
         let pending = loan
             .write_from_slice(&bytes)
             .send()
-            .map_err(|e| fail(format!("{e:?}")))?;
+            .map_err(IpcError::transfer(R::NAME))?;
         if pending.number_of_server_connections() == 0 {
             return Err(IpcError::Gone { service: R::NAME });
         }
@@ -241,12 +230,12 @@ impl<R: Rpc> Pending<R> {
     /// # Errors
     /// [`IpcError::Gone`] when the server ended before its last event.
     pub fn try_next(&self) -> Result<Option<R::Event>, IpcError> {
-        let fail = |reason: String| IpcError::Transfer {
-            service: R::NAME,
-            reason,
-        };
         let connected = self.pending.is_connected();
-        match self.pending.receive().map_err(|e| fail(format!("{e:?}")))? {
+        match self
+            .pending
+            .receive()
+            .map_err(IpcError::transfer(R::NAME))?
+        {
             Some(response) => decode(R::NAME, response.payload()).map(Some),
             None if !connected => Err(IpcError::Gone { service: R::NAME }),
             None => Ok(None),
