@@ -16,7 +16,6 @@ mod cli;
 mod command;
 mod config;
 mod doctor;
-mod files;
 mod moved;
 mod pipeline;
 mod session;

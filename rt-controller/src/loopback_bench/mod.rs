@@ -8,6 +8,8 @@
 
 mod answerer;
 mod bare;
+mod cyclictest;
+mod load;
 mod timed_link;
 mod times;
 
@@ -22,6 +24,8 @@ use answerer::Answerer;
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits, TrajectoryError};
 pub use bare::bare_slice;
+pub use cyclictest::{Cyclictest, CyclictestError};
+pub use load::Load;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,

@@ -10,7 +10,7 @@ mod text;
 
 pub use arm_response::{read_arm_response, read_excitation, write_arm_response};
 pub use atomic::{check_writable, write_atomic, write_json};
-pub use motion::{JointsCsv, PoseSample, read_joints, read_pose, write_joints};
+pub use motion::{JointsCsv, PoseSample, read_joints, read_pose, write_joints, write_trajectory};
 pub use plan::read_plan;
 pub use rope::{read_posterior, read_rope, write_rope_estimate};
 pub use text::{read_json, read_text};

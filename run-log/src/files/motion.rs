@@ -2,7 +2,7 @@
 
 use crate::error::At;
 use crate::{Error, Result};
-use arm_model::{JOINTS, JointVector};
+use arm_model::{JOINTS, JointTrajectory, JointVector};
 use std::path::Path;
 
 /// Joint samples: times (s) and positions (rad).
@@ -99,6 +99,24 @@ pub fn write_joints(path: &Path, samples: impl Iterator<Item = (f64, JointVector
         text.push('\n');
     }
     super::atomic::write_atomic(path, text.as_bytes())
+}
+
+/// Writes a trajectory as joints at a rate, its last row at rest.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_trajectory(path: &Path, trajectory: &JointTrajectory, period_s: f64) -> Result<()> {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a trajectory lasts at most ten minutes"
+    )]
+    let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
+    let rows = (0..=cycles).map(|i| {
+        let t = f64::from(i) * period_s;
+        (t, trajectory.state_at(t).q)
+    });
+    write_joints(path, rows)
 }
 
 /// A pose of the attach frame in the world frame.

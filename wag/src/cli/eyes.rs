@@ -95,9 +95,9 @@ pub struct ModelArgs {
     pub lead_px: Option<Pixel>,
 }
 
-/// Arguments of `wag score`.
+/// A stereo film and what filmed it.
 #[derive(Debug, Args)]
-pub struct ScoreArgs {
+pub struct StereoArgs {
     /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
     /// JPEG pictures, and timestamps.csv.
     #[arg(long)]
@@ -105,9 +105,16 @@ pub struct ScoreArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera calibration and extrinsics.
+    /// Camera calibration and extrinsics; `wag calib` finds wrong extrinsics.
     #[arg(long)]
     pub camera: PathBuf,
+}
+
+/// Arguments of `wag score`.
+#[derive(Debug, Args)]
+pub struct ScoreArgs {
+    #[command(flatten)]
+    pub film: StereoArgs,
     /// Colour of the tip, R,G,B from 0 to 255.
     #[arg(long)]
     pub tip_rgb: Colour,
@@ -128,16 +135,8 @@ pub enum CalibCommand {
 /// What the camera is shown.
 #[derive(Debug, Args)]
 pub struct ShownArgs {
-    /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, or folder with video.avi or with PNG or
-    /// JPEG pictures, and timestamps.csv.
-    #[arg(long)]
-    pub video: PathBuf,
-    /// Frames per second, for a recording that does not tell its frames' times.
-    #[arg(long, value_parser = rate_hz)]
-    pub fps: Option<f64>,
-    /// Camera calibration; its extrinsics may be wrong.
-    #[arg(long)]
-    pub camera: PathBuf,
+    #[command(flatten)]
+    pub film: StereoArgs,
     /// Printed ChArUco board that hangs still (board.toml).
     #[arg(long, conflicts_with_all = ["lead", "lead_rgb"], required_unless_present = "lead")]
     pub board: Option<PathBuf>,

@@ -2,7 +2,6 @@
 //! the arm shows at known places.
 
 use crate::cli::{CalibCheckArgs, CalibCommand, ExtrinsicsArgs, ShownArgs};
-use crate::files;
 use anyhow::{Context, anyhow};
 use camera_ingest::calib::board::{Board, BoardError};
 use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
@@ -10,9 +9,9 @@ use camera_ingest::calib::placed_camera_toml;
 use camera_ingest::score::sight_lead;
 use camera_ingest::source::FrameSource;
 use camera_ingest::{ScoreOptions, load_camera, open_video};
-use cli_output::Stage;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage};
 use nalgebra::Vector3;
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::StereoCamera;
 use std::path::Path;
@@ -53,7 +52,7 @@ fn read_shown(path: &Path, frames: usize) -> anyhow::Result<Vec<(usize, Vector3<
 
 /// What the camera saw of what it was shown.
 fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<Sighted>> {
-    let mut video = open_video(&args.video, args.fps).or_input()?;
+    let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
     stage.say("looking");
     match (&args.board, &args.lead, args.lead_rgb) {
         (Some(path), _, _) => {
@@ -67,7 +66,7 @@ fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<S
             let shown = read_shown(path, video.len()).or_input()?;
             let options = ScoreOptions::default();
             sight_lead(&mut video, camera, rgb.0, &shown, &options)
-                .with_context(|| format!("video `{}`", args.video.display()))
+                .with_context(|| format!("video `{}`", args.film.video.display()))
                 .or_failed()
         }
         _ => Err(Failure::input(anyhow!(
@@ -84,12 +83,12 @@ fn told(residual: &Residual) -> String {
 }
 
 fn extrinsics(args: &ExtrinsicsArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let camera = load_camera(&args.shown.camera).or_input()?;
+    let camera = load_camera(&args.shown.film.camera).or_input()?;
     let stage = Stage::begin("calib extrinsics", quiet);
     let points = look(&args.shown, &camera, &stage)?;
     let found = solve(&camera, &points).or_failed()?;
     let (r, p) = (&found.r_w_cam, &found.p_w_cam_m);
-    let text = placed_camera_toml(&args.out, &args.shown.camera, r, p).or_failed()?;
+    let text = placed_camera_toml(&args.out, &args.shown.film.camera, r, p).or_failed()?;
     files::write_atomic(&args.out, text.as_bytes()).or_failed()?;
     stage.done(&told(&found.residual));
     if !quiet {
@@ -114,7 +113,7 @@ fn extrinsics(args: &ExtrinsicsArgs, quiet: bool) -> Outcome<Option<Value>> {
 }
 
 fn check(args: &CalibCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let camera = load_camera(&args.shown.camera).or_input()?;
+    let camera = load_camera(&args.shown.film.camera).or_input()?;
     let stage = Stage::begin("calib check", quiet);
     let points = look(&args.shown, &camera, &stage)?;
     let here = residual(&camera, &points);

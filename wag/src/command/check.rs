@@ -1,15 +1,15 @@
 //! `wag check`: preflight of a plan.
 
 use crate::cli::{CheckArgs, WireName};
-use crate::files::{self, read_plan};
+use crate::config;
 use anyhow::{anyhow, ensure};
-use arm_model::JointTrajectory;
 use arm_model::limits::{LimitKind, Margin};
-use cli_output::table;
-use cli_output::{Failure, OrInput, Outcome};
+use arm_model::{JointTrajectory, Limits};
+use cli_output::{Failure, OrInput, Outcome, table};
 use comfy_table::Table;
 use planner::collide::{ArmShape, Scene, tool_contacts};
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
+use run_log::files::read_plan;
 use serde_json::{Value, json};
 use shared_types::WireMode;
 
@@ -98,7 +98,7 @@ fn tool_contact_s(trajectory: &JointTrajectory, period_s: f64) -> Option<f64> {
 pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     let arm = judged_arm(args).or_input()?;
     let plan = read_plan(&args.plan).or_input()?;
-    let limits = files::read_limits(args.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let margins = limits.margins(&plan.trajectory);
     let broken: Vec<&Margin> = margins
         .iter()

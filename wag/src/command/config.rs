@@ -3,8 +3,7 @@
 use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
 use crate::config::{Folders, Kind, Layers};
 use anyhow::anyhow;
-use cli_output::table;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, table};
 use serde_json::{Value, json};
 
 pub fn run(command: &ConfigCommand, quiet: bool) -> Outcome<Option<Value>> {

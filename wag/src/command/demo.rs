@@ -3,17 +3,14 @@
 
 use super::demo_summary::{DemoRecord, show};
 use super::explain::explain_stop;
-use super::plan::{clear_of_arm, describe, warnings, write_trajectory_csv};
+use super::plan::{clear_of_arm, describe, warnings};
 use crate::cli::{DemoArgs, TaskName};
 use crate::config;
-use crate::files;
 use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder, Shot};
 use crate::session::Session;
 use anyhow::{Context, anyhow};
 use arm_model::{JointTrajectory, Limits};
-use cli_output::Stage;
-use cli_output::watch_interrupts;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
 use planner::process::PlannerConfig;
 use planner::tasks::check_reach;
 use planner::wiggle::wiggle;
@@ -21,6 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::RigConfig;
 use rig_sim::render::Appearance;
+use run_log::files;
 use serde_json::Value;
 use shared_types::ipc::message::{
     CameraRpc, PlannerRpc, RigEvent, RigRequest, RigRpc, ScoreResult, StrikeOrder,
@@ -161,7 +159,7 @@ impl<'a> Demo<'a> {
         rig_config: &RigConfig,
     ) -> anyhow::Result<Self> {
         let stage = Stage::begin("start", quiet);
-        let limits = files::read_limits(None)?;
+        let limits = config::here::<Limits>(None)?;
         let calibration = rig_config.stereo_camera();
         pipeline::write_calibration(folder, &calibration)?;
         let target_m = Some(record.target_m);
@@ -220,7 +218,7 @@ impl<'a> Demo<'a> {
             },
             &stage,
         )?;
-        self.record.set_wiggle(&film);
+        self.record.set_wiggle(film);
         self.record.stages.wiggle_s =
             stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
         Ok(film)
@@ -238,7 +236,7 @@ impl<'a> Demo<'a> {
             &overlay,
             &stage,
         )?;
-        self.record.set_track(&tracked);
+        self.record.track = Some(tracked);
         self.record.stages.track_s = stage.done(&format!(
             "{:.1} ms a frame, rope lost in {:.1} %",
             tracked.ms_per_frame,
@@ -259,7 +257,7 @@ impl<'a> Demo<'a> {
             "length {:.3} m, residual {:.2} px, {} simulations",
             rope.params.length_m, rope.residual_px, rope.simulations
         ));
-        self.record.set_identified(&rope);
+        self.record.identified = Some(rope.clone());
         Ok(rope)
     }
 
@@ -274,10 +272,10 @@ impl<'a> Demo<'a> {
         };
         let plan = pipeline::plan_strike(self.session, &self.planner, order, &stage)?;
         files::write_json(&self.folder.file(files::PLAN), &plan)?;
-        write_trajectory_csv(
+        files::write_trajectory(
             &self.folder.file("plan.csv"),
             &plan.trajectory,
-            &self.limits,
+            self.limits.period_s(),
         )?;
         self.record.stages.plan_s = stage.done(&describe(&plan));
         for warning in warnings(&plan) {
@@ -314,7 +312,8 @@ impl<'a> Demo<'a> {
         let calmed = pipeline::calm(self.session, &self.planner, &self.arm, &input, &stage)?;
         stage.say("waiting for the rope to hang still");
         pipeline::wait_still(self.session, &self.camera, STILL_S)?;
-        self.record.set_calm(&calmed, arm_lag_s);
+        self.record.calm = Some(calmed);
+        self.record.arm_lag_s = arm_lag_s;
         self.record.stages.calm_s = stage.done(&format!(
             "sway {:.1} cm -> {:.1} cm",
             100.0 * calmed.plain_sway_m,
@@ -341,8 +340,7 @@ impl<'a> Demo<'a> {
             },
             &stage,
         )?;
-        self.record
-            .set_latency(&pipeline::latency(self.session, &self.arm)?);
+        self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
         self.record.stages.throw_s =
             stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
         Ok(film)

@@ -1,11 +1,12 @@
 //! What a demo keeps and shows: every stage's figures, and the truth apart.
 
+use super::latency::loop_table;
 use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
 use anyhow::bail;
 use cli_output::table;
 use comfy_table::Table;
 use serde::Serialize;
-use shared_types::ipc::message::{LatencyReport, Percentiles, RigEvent, ScoreResult};
+use shared_types::ipc::message::{LatencyReport, RigEvent, ScoreResult};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use shared_types::{Plan, RopeEstimate, RopeParams};
 
@@ -32,23 +33,6 @@ pub struct StageTimes {
     pub score_s: f64,
 }
 
-/// Figures of the wiggle's film.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct WiggleFigures {
-    frames: u32,
-    dropped: u32,
-    first_stamp_ns: u64,
-}
-
-/// Figures of the tracker.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct TrackFigures {
-    lost_part: f64,
-    ms_per_frame: f64,
-    rope_radius_m: Option<f64>,
-    lead_radius_m: Option<f64>,
-}
-
 /// Figures of the plan.
 #[derive(Debug, Clone, Serialize)]
 pub struct PlanFigures {
@@ -69,7 +53,7 @@ pub struct TruthFigures {
 }
 
 /// Everything a demo reports; `summary.json` and `--json`.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct DemoRecord {
     /// Whether the throw went through.
     pub ok: bool,
@@ -97,16 +81,20 @@ pub struct DemoRecord {
     pub wall_s: f64,
     /// Wall time of the stages (s).
     pub stages: StageTimes,
-    wiggle: Option<WiggleFigures>,
-    track: Option<TrackFigures>,
-    identified: Option<RopeEstimate>,
+    wiggle: Option<Film>,
+    /// What tracking found.
+    pub track: Option<Tracked>,
+    /// The identified rope.
+    pub identified: Option<RopeEstimate>,
     plan: Option<PlanFigures>,
-    calm: Option<Calmed>,
+    /// What calming did.
+    pub calm: Option<Calmed>,
     /// How late the arm follows its setpoints, from the wiggle (s).
-    arm_lag_s: Option<f64>,
+    pub arm_lag_s: Option<f64>,
     score: Option<ScoreResult>,
     score_failed: Option<String>,
-    latency: Option<LatencyReport>,
+    /// The loop's latencies during the throw.
+    pub latency: Option<LatencyReport>,
     /// What the real-time set-up could not get, and what is poor about the plan.
     pub warnings: Vec<String>,
     truth: Option<TruthFigures>,
@@ -116,57 +104,20 @@ impl DemoRecord {
     /// An empty record.
     pub fn new(seed: u64, target_m: [f64; 3], folder: &RunFolder) -> Self {
         Self {
-            ok: false,
             command: "demo",
             version: shared_types::VERSION,
             seed,
             run: folder.path().display().to_string(),
             task: "strike",
             target_m,
-            error: None,
-            true_tip_target_distance_m: None,
-            planned_tip_target_distance_m: None,
-            stereo_tip_target_distance_m: None,
-            epoch_ns: 0,
-            wall_s: 0.0,
-            stages: StageTimes::default(),
-            wiggle: None,
-            track: None,
-            identified: None,
-            plan: None,
-            calm: None,
-            arm_lag_s: None,
-            score: None,
-            score_failed: None,
-            latency: None,
-            warnings: Vec::new(),
-            truth: None,
+            ..Self::default()
         }
     }
 
     /// Keeps the wiggle's figures.
-    pub fn set_wiggle(&mut self, film: &Film) {
+    pub fn set_wiggle(&mut self, film: Film) {
         self.epoch_ns = film.first_stamp_ns;
-        self.wiggle = Some(WiggleFigures {
-            frames: film.frames,
-            dropped: film.dropped,
-            first_stamp_ns: film.first_stamp_ns,
-        });
-    }
-
-    /// Keeps the tracker's figures.
-    pub fn set_track(&mut self, tracked: &Tracked) {
-        self.track = Some(TrackFigures {
-            lost_part: tracked.lost_part,
-            ms_per_frame: tracked.ms_per_frame,
-            rope_radius_m: tracked.appearance.rope_radius_m,
-            lead_radius_m: tracked.appearance.lead_radius_m,
-        });
-    }
-
-    /// Keeps the identified rope.
-    pub fn set_identified(&mut self, estimate: &RopeEstimate) {
-        self.identified = Some(estimate.clone());
+        self.wiggle = Some(film);
     }
 
     /// Keeps the plan's figures.
@@ -179,17 +130,6 @@ impl DemoRecord {
             resampled: plan.resampled,
             trajectory_sha256: plan.trajectory_sha256.clone(),
         });
-    }
-
-    /// Keeps what calming did.
-    pub fn set_calm(&mut self, calmed: &Calmed, arm_lag_s: Option<f64>) {
-        self.calm = Some(*calmed);
-        self.arm_lag_s = arm_lag_s;
-    }
-
-    /// Keeps the loop's latencies during the throw.
-    pub fn set_latency(&mut self, report: &LatencyReport) {
-        self.latency = Some(*report);
     }
 
     /// Keeps the camera's score. That the camera could not see the throw does
@@ -243,25 +183,6 @@ fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
     table::numbers(header, 1, rows)
 }
 
-fn latency_table(report: &LatencyReport) -> Table {
-    let row = |name: &str, p: &Percentiles| {
-        [
-            name.to_owned(),
-            format!("{:.0}", p.p50_us),
-            format!("{:.0}", p.p99_us),
-            format!("{:.0}", p.p999_us),
-            format!("{:.0}", p.max_us),
-        ]
-    };
-    let rows = [
-        row("late wake-up", &report.wake),
-        row("compute", &report.compute),
-        row("wake-up to sent", &report.send),
-        row("reply", &report.reply),
-    ];
-    table::numbers(["control loop (µs)", "p50", "p99", "p99.9", "max"], 0, rows)
-}
-
 /// Prints the summary of a demo.
 pub fn show(record: &DemoRecord) {
     if let (Some(estimate), Some(truth)) = (&record.identified, &record.truth) {
@@ -271,27 +192,27 @@ pub fn show(record: &DemoRecord) {
         );
     }
     if let Some(latency) = &record.latency {
-        println!("{}", latency_table(latency));
+        println!("{}", loop_table(latency));
         println!(
             "throw: {} cycles, {} missed\n",
             latency.cycles, latency.missed
         );
     }
     let s = &record.stages;
-    println!(
-        "time: start {:.1}, bring-up {:.1}, wiggle {:.1}, track {:.1}, identify {:.1}, plan {:.1}, calm {:.1}, \
-         throw {:.1}, score {:.1}, in all {:.1} s\n",
-        s.start_s,
-        s.bringup_s,
-        s.wiggle_s,
-        s.track_s,
-        s.identify_s,
-        s.plan_s,
-        s.calm_s,
-        s.throw_s,
-        s.score_s,
-        record.wall_s
-    );
+    let stages = [
+        ("start", s.start_s),
+        ("bring-up", s.bringup_s),
+        ("wiggle", s.wiggle_s),
+        ("track", s.track_s),
+        ("identify", s.identify_s),
+        ("plan", s.plan_s),
+        ("calm", s.calm_s),
+        ("throw", s.throw_s),
+        ("score", s.score_s),
+        ("in all", record.wall_s),
+    ];
+    let times = stages.map(|(name, s)| format!("{name} {s:.1}"));
+    println!("time: {} s\n", times.join(", "));
     for warning in &record.warnings {
         println!("warning: {warning}");
     }

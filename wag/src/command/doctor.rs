@@ -4,8 +4,7 @@ use super::network::network;
 use crate::cli::DoctorArgs;
 use crate::doctor::{ArmLine, Facts, Finding, Verdict, judge, judge_line};
 use anyhow::anyhow;
-use cli_output::{Failure, Outcome};
-use cli_output::{output, table};
+use cli_output::{Failure, Outcome, output, table};
 use serde_json::{Value, json};
 use std::path::Path;
 

@@ -3,9 +3,7 @@
 use crate::cli::{FilmArgs, ModeName};
 use camera_ingest::calib::VideoMode;
 use camera_ingest::live::{LiveCamera, LiveError, LiveSettings, record};
-use cli_output::Stage;
-use cli_output::{Failure, OrInput, Outcome};
-use cli_output::{interrupted, watch_interrupts};
+use cli_output::{Failure, OrInput, Outcome, Stage, interrupted, watch_interrupts};
 use serde_json::{Value, json};
 
 impl From<ModeName> for VideoMode {

@@ -1,13 +1,13 @@
 //! What films a rope: its pictures, the camera, and how the clamp moved meanwhile.
 
 use crate::cli::SceneArgs;
-use crate::files::{self, JointsCsv};
 use anyhow::{Context, anyhow, ensure};
 use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
 use cli_output::{OrInput, Outcome};
-use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
+use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
 use run_log::Run;
+use run_log::files::{self, JointsCsv, PoseSample};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 
@@ -70,7 +70,7 @@ impl ClampMotion {
                 Ok(Box::new(arm))
             }
             Told::Pose(path) => {
-                let mut rows = files::read_pose(path)?;
+                let mut rows = read_pose(path)?;
                 for row in &mut rows {
                     row.t_s += self.late_s;
                 }
@@ -80,6 +80,16 @@ impl ClampMotion {
             }
         }
     }
+}
+
+/// Poses of the attach frame, for the simulator.
+pub fn read_pose(path: &Path) -> anyhow::Result<Vec<PoseRow>> {
+    let row = |s: PoseSample| PoseRow {
+        t_s: s.t_s,
+        p_m: s.p_m,
+        q_wxyz: s.q_wxyz,
+    };
+    Ok(files::read_pose(path)?.into_iter().map(row).collect())
 }
 
 /// A film of a rope.

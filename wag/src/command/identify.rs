@@ -6,12 +6,8 @@ use super::network::{asks_network, network_for_camera, no_model_without_network}
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName};
 use crate::config;
-use crate::files;
 use anyhow::{Context, anyhow};
-use cli_output::Stage;
-use cli_output::interrupted;
-use cli_output::table;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage, interrupted, table};
 use comfy_table::Table;
 use planner::observation::ObservedPoints;
 use planner::phi::{NetworkError, identify_by_network, proposal};
@@ -20,6 +16,7 @@ use planner::sysid::{
     Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify_from,
 };
 use rope_sim::AttachMotion;
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::rope::{Ambiguity, RANGES};

@@ -1,10 +1,9 @@
 //! `wag ledger`: runs listed, compared, made again.
 
 use crate::cli::{LedgerArgs, LedgerCommand, LedgerCompareArgs, LedgerRerunArgs};
-use crate::files;
 use anyhow::{Context, anyhow};
-use cli_output::table;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, table};
+use run_log::files;
 use run_log::ledger::{self, Entry, RUNS};
 use run_log::{Run, quoted};
 use serde_json::{Value, json};

@@ -1,12 +1,11 @@
 //! `wag man` and `wag completions`: the command line, told to `man` and to shells.
 
 use crate::cli::{Cli, CompletionsArgs, ManArgs};
-use crate::files;
 use anyhow::Context;
 use clap::CommandFactory;
 use clap_mangen::Man;
-use cli_output::output;
-use cli_output::{OrInput, Outcome};
+use cli_output::{OrInput, Outcome, output};
+use run_log::files;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

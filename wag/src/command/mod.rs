@@ -65,7 +65,7 @@ fn results(command: &Command) -> Vec<&Path> {
 /// Runs a command. The value is what `--json` prints.
 pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
     for path in results(&cli.command) {
-        crate::files::check_writable(path).or_input()?;
+        run_log::files::check_writable(path).or_input()?;
     }
     let quiet = cli.json;
     match &cli.command {

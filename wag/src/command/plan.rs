@@ -3,18 +3,16 @@
 use super::reach_picture;
 use crate::cli::PlanArgs;
 use crate::config;
-use crate::files;
 use anyhow::{Context, anyhow, bail};
-use arm_model::{JointTrajectory, JointVector, Limits, kinematics};
-use cli_output::Stage;
-use cli_output::interrupted;
-use cli_output::{Failure, OrInput, Outcome};
+use arm_model::{JointVector, Limits, kinematics};
+use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
 use planner::response::Following;
 use planner::tasks::{
     Belief, PlanError, PlanOptions, PlanRequest, ReachMap, ThrowConfig, plan_throw, start_pose_for,
 };
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
 use shared_types::{Plan, Task};
@@ -73,26 +71,6 @@ fn distance_to_segment(p: Vector3<f64>, a: Vector3<f64>, b: Vector3<f64>) -> f64
     let along = b - a;
     let t = (p - a).dot(&along) / along.norm_squared().max(1e-12);
     (p - a - along * t.clamp(0.0, 1.0)).norm()
-}
-
-/// Writes a trajectory as joints at the limits' rate, its last row at rest.
-pub fn write_trajectory_csv(
-    path: &Path,
-    trajectory: &JointTrajectory,
-    limits: &Limits,
-) -> anyhow::Result<()> {
-    let period_s = limits.period_s();
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a trajectory lasts at most ten minutes"
-    )]
-    let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
-    let rows = (0..=cycles).map(|i| {
-        let t = f64::from(i) * period_s;
-        (t, trajectory.state_at(t).q)
-    });
-    Ok(files::write_joints(path, rows)?)
 }
 
 /// Bad requests are the caller's; everything else is a failure of the work.
@@ -218,7 +196,7 @@ pub fn describe(plan: &Plan) -> String {
 pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     clear_of_arm(args.target.0).or_input()?;
-    let limits = files::read_limits(args.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
     let belief = belief(args).or_input()?;
     let response = args.arm_response.as_deref().map(files::read_arm_response);
@@ -262,7 +240,7 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     stage.done(&describe(&plan));
     files::write_json(&args.out, &plan).or_failed()?;
     if let Some(path) = &args.csv {
-        write_trajectory_csv(path, &plan.trajectory, &limits).or_failed()?;
+        files::write_trajectory(path, &plan.trajectory, limits.period_s()).or_failed()?;
     }
     if !quiet {
         for warning in &warnings {

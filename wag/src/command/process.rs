@@ -4,10 +4,9 @@
 //! A process ends in order on SIGTERM, SIGINT, or when its parent is gone.
 
 use crate::cli::{ProcessArgs, ProcessName};
-use crate::files;
 use anyhow::Context;
-use cli_output::{OrInput, Outcome};
-use cli_output::{interrupted, watch_interrupts};
+use cli_output::{OrInput, Outcome, interrupted, watch_interrupts};
+use run_log::files;
 use shared_types::ipc::DomainSweep;
 use std::sync::atomic::Ordering;
 use std::time::Duration;

@@ -1,11 +1,12 @@
 //! `wag record`: attaches to a running controller and records its cycles.
 
 use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
-use crate::files;
+use crate::config;
 use crate::pipeline::RunFolder;
 use anyhow::anyhow;
-use cli_output::{Failure, OrInput, Outcome};
-use cli_output::{interrupted, watch_interrupts};
+use arm_model::Limits;
+use cli_output::{Failure, OrInput, Outcome, interrupted, watch_interrupts};
+use run_log::files;
 use run_log::{RecorderConfig, Run, RunFileThread};
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
@@ -48,7 +49,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(out) = &args.out {
         RunFolder::refuse_existing(out)?;
     }
-    let limits = files::read_limits(args.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let domain = chosen_domain(args)?;
     // Goes last, so that no file of the domain stays when this was its last user.
     let _sweep = DomainSweep::new(&domain);

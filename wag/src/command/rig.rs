@@ -1,12 +1,10 @@
 //! `wag rig`: the simulated xArm 7 as a server.
 
 use crate::cli::RigArgs;
-use crate::files;
 use anyhow::anyhow;
-use cli_output::output;
-use cli_output::{Failure, OrInput, Outcome};
-use cli_output::{interrupted, watch_interrupts};
+use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
 use rig_sim::{RigConfig, run_announced};
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::DomainSweep;
 use std::net::IpAddr;

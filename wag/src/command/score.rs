@@ -3,13 +3,12 @@
 use crate::cli::ScoreArgs;
 use anyhow::Context;
 use camera_ingest::{ScoreOptions, load_camera, open_video, score};
-use cli_output::Stage;
-use cli_output::{OrInput, Outcome};
+use cli_output::{OrInput, Outcome, Stage};
 use serde_json::{Value, json};
 
 pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let camera = load_camera(&args.camera).or_input()?;
-    let mut video = open_video(&args.video, args.fps).or_input()?;
+    let camera = load_camera(&args.film.camera).or_input()?;
+    let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
     let stage = Stage::begin("score", quiet);
     let found = score(
         &mut video,
@@ -18,7 +17,7 @@ pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
         args.target_rgb.0,
         &ScoreOptions::default(),
     )
-    .with_context(|| format!("video `{}`", args.video.display()))
+    .with_context(|| format!("video `{}`", args.film.video.display()))
     .or_failed()?;
     let line = format!(
         "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s",

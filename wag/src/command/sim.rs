@@ -1,13 +1,14 @@
 //! `wag sim`: rope simulation from files to files.
 
+use super::filmed::read_pose;
 use crate::cli::{PrecisionName, SimRopeArgs, SimThrowArgs};
-use crate::files;
 use anyhow::{Context, anyhow, ensure};
 use cli_output::{Failure, OrInput, Outcome};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome as SimOutcome, PoseTrack, Precision,
     Rollout, SimOptions, Start, Watch, roll_out,
 };
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::RopeParams;
 
@@ -50,7 +51,7 @@ fn frame_count(duration_s: f64, rate_hz: f64) -> usize {
 
 pub fn rope(args: &SimRopeArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
-    let rows = files::read_pose(&args.pose).or_input()?;
+    let rows = read_pose(&args.pose).or_input()?;
     let (first_s, last_s) = match (rows.first(), rows.last()) {
         (Some(a), Some(b)) => (a.t_s, b.t_s),
         _ => {

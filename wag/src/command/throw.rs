@@ -4,14 +4,13 @@ use super::area::require_clear_area;
 use super::dry_run;
 use super::explain::explain_stop;
 use crate::cli::{ArmArgs, ThrowArgs};
-use crate::files::{self, read_plan};
+use crate::config;
 use crate::pipeline::{self, ArmAddress, RunFolder};
 use crate::session::Session;
 use anyhow::anyhow;
 use arm_model::{JointTrajectory, Limits};
-use cli_output::Stage;
-use cli_output::watch_interrupts;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
+use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 use std::path::Path;
@@ -119,7 +118,7 @@ fn stream(
 pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
     require_clear_area(&args.arm, "THROW", quiet)?;
-    let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let run = drive(
         &args.arm,
         &limits,

@@ -3,14 +3,13 @@
 use super::filmed::Filmed;
 use super::learned::{Learned, classify};
 use crate::cli::TrackArgs;
-use crate::files;
 use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
 use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_with};
-use cli_output::Stage;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage};
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::KeypointTrack;
 use shared_types::keypoints::TrackedFrame;

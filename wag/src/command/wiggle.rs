@@ -1,16 +1,16 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
 use super::area::require_clear_area;
-use super::plan::write_trajectory_csv;
 use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
 use crate::config;
-use crate::files;
 use anyhow::anyhow;
+use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 
@@ -24,11 +24,11 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
         )));
     }
     require_clear_area(&args.arm, "WIGGLE", quiet)?;
-    let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;
     if let Some(path) = &args.csv {
-        write_trajectory_csv(path, &trajectory, &limits).or_failed()?;
+        files::write_trajectory(path, &trajectory, limits.period_s()).or_failed()?;
         if !quiet {
             println!(
                 "{:.2} s of joint positions in `{}`",

@@ -1,18 +1,16 @@
 //! `wag wiggle --evaluate` and `--optimise`: what a wiggle can tell about ropes.
 
-use super::plan::write_trajectory_csv;
 use crate::cli::WiggleArgs;
 use crate::config;
-use crate::files;
 use anyhow::anyhow;
-use cli_output::Stage;
-use cli_output::interrupted;
+use arm_model::Limits;
 use cli_output::table::numbers;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
 use planner::filming::side_camera;
 use planner::process::PlannerConfig;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
 use planner::wiggle_design::{DesignError, JudgedWiggle, judge, optimise};
+use run_log::files;
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -41,7 +39,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             "--evaluate and --optimise move nothing: leave --arm out, or execute the wiggle without them"
         )));
     }
-    let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
     let camera = side_camera();
     let threads = config.identify.threads;
@@ -75,7 +73,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
         rows.push(("optimised", judged(&best)?));
         if let Some(path) = &args.csv {
             let trajectory = wiggle(&best, &limits).or_failed()?;
-            write_trajectory_csv(path, &trajectory, &limits).or_failed()?;
+            files::write_trajectory(path, &trajectory, limits.period_s()).or_failed()?;
         }
     }
     if !quiet {

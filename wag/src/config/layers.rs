@@ -2,8 +2,8 @@
 
 use super::kind::{Configured, Kind};
 use super::nearest::suggestion;
-use crate::files::read_text;
 use anyhow::{Context, anyhow, bail};
+use run_log::files::read_text;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 

@@ -10,7 +10,7 @@ use shared_types::ipc::rpc::RpcClient;
 use std::time::Duration;
 
 /// A filmed motion.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Film {
     /// Start of exposure of the first frame (CLOCK_MONOTONIC, ns).
     pub first_stamp_ns: u64,
@@ -19,6 +19,7 @@ pub struct Film {
     /// Frames the camera dropped.
     pub dropped: u32,
     /// When the motion ran.
+    #[serde(skip)]
     pub motion: MotionSpan,
 }
 

@@ -2,7 +2,6 @@
 
 use super::{ArmLink, RunFolder, STARTUP};
 use crate::config;
-use crate::files;
 use crate::session::{ProcessSpec, Session};
 use anyhow::{Context, anyhow, bail};
 use arm_model::Limits;
@@ -14,12 +13,13 @@ use rig_sim::RigConfig;
 use rt_controller::ControllerConfig;
 use rt_controller::set_up::OnDifference;
 use run_log::RecorderConfig;
+use run_log::files;
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{
     CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigEvent, RigRequest,
     RigRpc,
 };
-use shared_types::ipc::rpc::RpcClient;
+use shared_types::ipc::rpc::{Rpc, RpcClient};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::Path;
 use std::time::Duration;
@@ -80,19 +80,29 @@ pub fn start_recorder(
     Ok(())
 }
 
+/// Starts a process that holds no arm and connects to its service.
+fn start<R: Rpc>(
+    session: &mut Session,
+    folder: &RunFolder,
+    name: &'static str,
+    config: &impl serde::Serialize,
+    ping: &R::Request,
+) -> anyhow::Result<RpcClient<R>> {
+    session.start(&ProcessSpec {
+        name,
+        config: folder.config(name, config)?,
+        holds_arm: false,
+    })?;
+    session.connect(ping, STARTUP)
+}
+
 /// Starts the simulated rig.
 pub fn start_rig(
     session: &mut Session,
     folder: &RunFolder,
     config: &RigConfig,
 ) -> anyhow::Result<RpcClient<RigRpc>> {
-    let config = folder.config("rig", config)?;
-    session.start(&ProcessSpec {
-        name: "rig",
-        config,
-        holds_arm: false,
-    })?;
-    session.connect(&RigRequest::Ports, STARTUP)
+    start(session, folder, "rig", config, &RigRequest::Ports)
 }
 
 /// Starts camera-ingest.
@@ -100,18 +110,23 @@ pub fn start_camera(
     session: &mut Session,
     folder: &RunFolder,
 ) -> anyhow::Result<RpcClient<CameraRpc>> {
-    let config = folder.config(
-        "camera-ingest",
-        &CameraConfig {
-            domain: folder.domain.clone(),
-        },
-    )?;
-    session.start(&ProcessSpec {
-        name: "camera-ingest",
-        config,
-        holds_arm: false,
-    })?;
-    session.connect(&CameraRequest::Ping, STARTUP)
+    let domain = folder.domain.clone();
+    let config = CameraConfig { domain };
+    let ping = &CameraRequest::Ping;
+    start(session, folder, "camera-ingest", &config, ping)
+}
+
+/// Starts the planner.
+pub fn start_planner(
+    session: &mut Session,
+    folder: &RunFolder,
+    settings: &PlannerConfig,
+) -> anyhow::Result<RpcClient<PlannerRpc>> {
+    let config = PlannerConfig {
+        domain: folder.domain.clone(),
+        ..settings.clone()
+    };
+    start(session, folder, "planner", &config, &PlannerRequest::Ping)
 }
 
 /// The live preview of a domain's rope, to be started by whoever shows it; its
@@ -126,25 +141,6 @@ pub fn preview_spec(folder: &Path, domain: &str, camera: &Path) -> anyhow::Resul
         config: path,
         holds_arm: false,
     })
-}
-
-/// Starts the planner.
-pub fn start_planner(
-    session: &mut Session,
-    folder: &RunFolder,
-    settings: &PlannerConfig,
-) -> anyhow::Result<RpcClient<PlannerRpc>> {
-    let config = PlannerConfig {
-        domain: folder.domain.clone(),
-        ..settings.clone()
-    };
-    let config = folder.config("planner", &config)?;
-    session.start(&ProcessSpec {
-        name: "planner",
-        config,
-        holds_arm: false,
-    })?;
-    session.connect(&PlannerRequest::Ping, STARTUP)
 }
 
 /// Where an arm listens.
@@ -249,5 +245,15 @@ mod tests {
         assert!(
             (rig.lag.natural_frequency_rad_s - default.lag.natural_frequency_rad_s).abs() < 1e-2
         );
+    }
+
+    #[test]
+    fn the_shipped_limits_keep_the_vendor_ranges() {
+        let (shipped, vendor): (Limits, _) = (config::built_in().unwrap(), Limits::default());
+        for j in 0..7 {
+            assert!(shipped.position_min_rad[j] >= vendor.position_min_rad[j] - 1e-6);
+            assert!(shipped.position_max_rad[j] <= vendor.position_max_rad[j] + 1e-6);
+            assert!(shipped.velocity_max_rad_s[j] <= vendor.velocity_max_rad_s[j] + 1e-6);
+        }
     }
 }

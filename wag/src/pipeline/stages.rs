@@ -22,36 +22,66 @@ pub const KEYPOINTS: u32 = 24;
 type Camera = RpcClient<CameraRpc>;
 type Planner = RpcClient<PlannerRpc>;
 
-fn camera_error(event: CameraEvent) -> anyhow::Error {
+/// Asks the camera; its last event, unless that is a failure.
+fn ask_camera(
+    session: &mut Session,
+    camera: &Camera,
+    request: &CameraRequest,
+    timeout_s: f64,
+    stage: Option<&Stage>,
+) -> anyhow::Result<CameraEvent> {
+    let timeout = Duration::from_secs_f64(timeout_s);
+    let event = session.ask(camera, request, timeout, |event| {
+        if let (CameraEvent::Progress(p), Some(stage)) = (event, stage) {
+            stage.progress(p);
+        }
+    })?;
     match event {
-        CameraEvent::Failed { message } => anyhow!(message),
-        other => anyhow!("the camera process answered with {other:?}"),
+        CameraEvent::Failed { message } => bail!(message),
+        event => Ok(event),
     }
 }
 
-fn planner_error(event: PlannerEvent) -> anyhow::Error {
+/// Asks the planner; its last event, unless that is a failure.
+fn ask_planner(
+    session: &mut Session,
+    planner: &Planner,
+    request: &PlannerRequest,
+    stage: &Stage,
+) -> anyhow::Result<PlannerEvent> {
+    let timeout = Duration::from_secs(300);
+    let event = session.ask(planner, request, timeout, |event| {
+        if let PlannerEvent::Progress(p) = event {
+            stage.progress(p);
+        }
+    })?;
     match event {
-        PlannerEvent::Failed { message } => anyhow!(message),
-        other => anyhow!("the planner process answered with {other:?}"),
+        PlannerEvent::Failed { message } => bail!(message),
+        event => Ok(event),
     }
+}
+
+/// An answer to another question.
+fn unexpected(process: &str, event: &impl std::fmt::Debug) -> anyhow::Error {
+    anyhow!("the {process} process answered with {event:?}")
 }
 
 /// Waits until nothing moves in the picture, at most `timeout_s`.
 pub fn wait_still(session: &mut Session, camera: &Camera, timeout_s: f64) -> anyhow::Result<bool> {
     let request = CameraRequest::WaitStill { timeout_s };
-    let timeout = Duration::from_secs_f64(timeout_s + 5.0);
-    match session.ask(camera, &request, timeout, |_| ())? {
+    match ask_camera(session, camera, &request, timeout_s + 5.0, None)? {
         CameraEvent::Still { still } => Ok(still),
-        other => Err(camera_error(other)),
+        other => Err(unexpected("camera", &other)),
     }
 }
 
 /// What tracking found.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Tracked {
     /// Part of the frames in which the rope was lost (0 to 1).
     pub lost_part: f64,
-    /// Sizes and colours of rope and lead.
+    /// Sizes of rope and lead.
+    #[serde(flatten)]
     pub appearance: RopeAppearance,
     /// Processing time per frame (ms).
     pub ms_per_frame: f64,
@@ -74,12 +104,7 @@ pub fn track(
         keypoints: KEYPOINTS,
         overlay: Some(overlay.display().to_string()),
     };
-    let event = session.ask(camera, &request, Duration::from_secs(60), |event| {
-        if let CameraEvent::Progress(p) = event {
-            stage.progress(p);
-        }
-    })?;
-    match event {
+    match ask_camera(session, camera, &request, 60.0, Some(stage))? {
         CameraEvent::Tracked {
             lost_part,
             appearance,
@@ -90,7 +115,7 @@ pub fn track(
             appearance,
             ms_per_frame,
         }),
-        other => Err(camera_error(other)),
+        other => Err(unexpected("camera", &other)),
     }
 }
 
@@ -133,14 +158,9 @@ pub fn identify(
         lead_mass_kg: None,
         seed,
     }));
-    let event = session.ask(planner, &request, Duration::from_secs(300), |event| {
-        if let PlannerEvent::Progress(p) = event {
-            stage.progress(p);
-        }
-    })?;
-    match event {
+    match ask_planner(session, planner, &request, stage)? {
         PlannerEvent::Identified(estimate) => Ok(*estimate),
-        other => Err(planner_error(other)),
+        other => Err(unexpected("planner", &other)),
     }
 }
 
@@ -152,14 +172,9 @@ pub fn plan_strike(
     stage: &Stage,
 ) -> anyhow::Result<Plan> {
     let request = PlannerRequest::Strike(Box::new(order));
-    let event = session.ask(planner, &request, Duration::from_secs(300), |event| {
-        if let PlannerEvent::Progress(p) = event {
-            stage.progress(p);
-        }
-    })?;
-    match event {
+    match ask_planner(session, planner, &request, stage)? {
         PlannerEvent::Planned(plan) => Ok(*plan),
-        other => Err(planner_error(other)),
+        other => Err(unexpected("planner", &other)),
     }
 }
 
@@ -178,8 +193,8 @@ pub fn score(
         target_rgb,
         strobe: Some(strobe.display().to_string()),
     };
-    match session.ask(camera, &request, Duration::from_secs(60), |_| ())? {
+    match ask_camera(session, camera, &request, 60.0, None)? {
         CameraEvent::Scored(result) => Ok(result),
-        other => Err(camera_error(other)),
+        other => Err(unexpected("camera", &other)),
     }
 }

@@ -3,6 +3,7 @@
 //! A benchmark measures and compares with limits; it does not judge: the exit code
 //! is 0 whatever the figures are.
 
+mod percentiles;
 mod record;
 mod rt;
 

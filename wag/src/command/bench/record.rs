@@ -4,21 +4,18 @@
 //! time with the recorder beside it (without, with, with, without, ...), while the
 //! simulated camera publishes. Both see the same machine and the same load.
 
+use super::percentiles::Percentiles;
 use crate::cli::BenchArgs;
 use crate::config;
-use crate::files;
 use crate::pipeline::{self, ArmLink, RunFolder};
 use crate::session::Session;
 use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
-use cli_output::Machine;
-use cli_output::Stage;
-use cli_output::table;
-use cli_output::watch_interrupts;
-use cli_output::{OrInput, Outcome};
+use cli_output::{Machine, OrInput, Outcome, Stage, table, watch_interrupts};
 use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use rig_sim::RigConfig;
+use run_log::files;
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
@@ -48,7 +45,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     watch_interrupts().or_failed()?;
     let room = tempfile::tempdir().or_failed()?;
     let folder = RunFolder::create(Some(&room.path().join("run")), "bench")?;
-    let limits = files::default_limits().or_failed()?;
+    let limits = config::built_in::<Limits>().or_failed()?;
     let motion = wiggle(
         &config::built_in::<PlannerConfig>().or_failed()?.wiggle,
         &limits,
@@ -188,53 +185,21 @@ fn rows(cycles: &Cycles) -> Vec<Row> {
         ("compute", |c| c.compute_ns),
         ("wake-up to sent", |c| c.send_ns),
     ];
-    const PARTS: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
     let mut rows = Vec::new();
     for (what, figure) in FIGURES {
-        let sorted = cycles.0.each_ref().map(|cycles| {
-            let mut values: Vec<u32> = cycles.iter().map(figure).collect();
-            values.sort_unstable();
-            values
+        let [without, with] = cycles.0.each_ref().map(|cycles| {
+            let times_ns = cycles.iter().map(|c| u64::from(figure(c)));
+            Percentiles::of(times_ns).values_us()
         });
-        for (part, quantile) in PARTS {
-            let [without_us, with_us] = sorted.each_ref().map(|v| at(v, quantile) / 1e3);
-            let ratio = with_us / without_us.max(1e-3);
+        for (i, part) in Percentiles::NAMES.into_iter().enumerate() {
             rows.push(Row {
                 what,
                 part,
-                without_us,
-                with_us,
-                ratio,
+                without_us: without[i],
+                with_us: with[i],
+                ratio: with[i] / without[i].max(1e-3),
             });
         }
     }
     rows
-}
-
-/// The value that `quantile` of them do not exceed.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "an index into a list"
-)]
-fn at(sorted: &[u32], quantile: f64) -> f64 {
-    let place = (quantile * sorted.len() as f64).ceil() as usize;
-    sorted
-        .get(place.saturating_sub(1))
-        .copied()
-        .map_or(0.0, f64::from)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quantiles_are_values_that_were_seen() {
-        let sorted: Vec<u32> = (1..=1000).collect();
-        for (quantile, value) in [(0.5, 500.0), (0.99, 990.0), (0.999, 999.0), (1.0, 1000.0)] {
-            assert_eq!(at(&sorted, quantile), value);
-        }
-        assert_eq!(at(&[], 0.5), 0.0);
-    }
 }

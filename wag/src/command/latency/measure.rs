@@ -4,16 +4,15 @@ use super::evidence::{Evidence, recorded};
 use crate::cli::LatencyArgs;
 use crate::command::area::require_clear_area;
 use crate::command::explain::explain_stop;
-use crate::files;
+use crate::config;
 use crate::pipeline::{self, ArmAddress, RunFolder};
 use crate::session::Session;
 use anyhow::anyhow;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
-use cli_output::Stage;
-use cli_output::watch_interrupts;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
 use planner::response::excitation::sweep;
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::MotionTier;
 use std::net::IpAddr;
@@ -33,7 +32,7 @@ struct Intent {
 }
 
 fn intent(args: &LatencyArgs) -> Outcome<Intent> {
-    let limits = files::read_limits(args.arm.limits.as_deref()).or_input()?;
+    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let mut excitation = match &args.excitation {
         Some(path) => files::read_excitation(path).or_input()?,
         None => Excitation::default(),

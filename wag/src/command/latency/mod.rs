@@ -8,16 +8,17 @@ mod evidence;
 mod measure;
 mod show;
 
+pub use show::loop_table;
+
 use crate::cli::LatencyArgs;
-use crate::files;
 use anyhow::{Context, anyhow};
 use arm_model::{ArmResponse, JOINTS};
-use cli_output::Stage;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{Failure, OrInput, Outcome, Stage};
 use evidence::{Evidence, Findings, RESPONSE_FILE, recorded};
 use planner::response::delay::command_to_target;
 use planner::response::{Recording, Sample, Setpoint, identify};
 use rt_controller::bridge::Latencies;
+use run_log::files;
 use serde_json::Value;
 use shared_types::MonotonicNs;
 use std::path::PathBuf;

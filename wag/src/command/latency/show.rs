@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 use shared_types::ipc::message::{LatencyReport, Percentiles};
 use std::path::Path;
 
-fn loop_table(report: &LatencyReport) -> Table {
+/// Times within the control loop.
+pub fn loop_table(report: &LatencyReport) -> Table {
     let rows = [
         ("wake-up late", report.wake),
         ("compute", report.compute),

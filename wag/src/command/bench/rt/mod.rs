@@ -5,18 +5,15 @@
 //! computes, take turns of a second each on one core, so that all meet the same
 //! neighbours; all other cores are kept busy meanwhile.
 
-mod cyclictest;
-mod load;
 mod report;
 
+use super::percentiles::Percentiles;
 use crate::cli::BenchArgs;
-use cli_output::Machine;
-use cli_output::Stage;
-use cli_output::{Failure, OrInput, Outcome};
-use cyclictest::{Cyclictest, CyclictestError};
-use load::Load;
-use report::{Beside, Percentiles, Report};
-use rt_controller::loopback_bench::{CycleTimes, LoopbackBench, bare_slice};
+use cli_output::{Failure, Machine, OrInput, Outcome, Stage};
+use report::{Beside, Report};
+use rt_controller::loopback_bench::{
+    CycleTimes, Cyclictest, CyclictestError, Load, LoopbackBench, bare_slice,
+};
 use rt_controller::os::RealTimeSettings;
 use rt_controller::os::schedule::run_on;
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! `cyclictest` of the `rt-tests` package, the kernel developers' own measure of
 //! how late a thread wakes.
 
-use rt_controller::os::schedule::run_on;
+use crate::os::schedule::run_on;
 use std::io::ErrorKind;
 use std::process::Command;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Work on the other cores, so that the measured one has neighbours.
 
-use rt_controller::os::schedule::run_on;
+use crate::os::schedule::run_on;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
