@@ -1,35 +1,99 @@
 //! The cell: what is fixed to the arm's flange and what stands around its base.
 //!
-//! Planner, preflight, controller, simulated rig, renderer and viewers take these numbers
-//! from here and from nowhere else. Lengths in metres, world frame.
+//! Planner, preflight, simulated arm, renderer, tracker, recorder and viewers are handed
+//! the same [`Cell`], read from a file under `configs/cell/`. Lengths in metres, world
+//! frame.
 
-use crate::capsules::box_distance_m;
-use nalgebra::Vector3;
+use crate::geometry::box_distance_m;
+use crate::joint::{JointState, JointVector};
+use crate::kinematics::{FrameMotion, flange_motion, flange_pose};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Deserializer, Serialize};
 
-/// Length of the pole along the flange's +z (m).
-pub const POLE_LENGTH_M: f64 = 0.20;
-/// Radius of the pole (m).
-pub const POLE_RADIUS_M: f64 = 0.008;
-/// Height of the floor (m).
-pub const FLOOR_Z_M: f64 = -0.75;
-/// Half width of the square column whose top carries the arm at z = 0 (m).
-pub const COLUMN_HALF_WIDTH_M: f64 = 0.09;
+/// Largest length of anything in a cell (m).
+const LENGTH_MAX_M: f64 = 10.0;
 
-/// What stands around the arm: a square column under it, and the floor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cell {
-    /// Half width of the column, whose top is at z = 0 (m).
-    pub column_half_width_m: f64,
-    /// Height of the floor (m).
-    pub floor_z_m: f64,
+/// The pole on the flange, along the flange's +z. The rope's first joint sits at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pole {
+    /// From its foot to its end (m).
+    #[serde(deserialize_with = "length")]
+    pub length_m: f64,
+    /// Its radius (m).
+    #[serde(deserialize_with = "length")]
+    pub radius_m: f64,
+    /// Its foot in the flange frame (m).
+    #[serde(deserialize_with = "place")]
+    pub offset_m: [f64; 3],
 }
 
+/// What stands around the arm, and what it carries.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// Height of the floor (m).
+    #[serde(deserialize_with = "below_zero")]
+    pub floor_z_m: f64,
+    /// Half width of the square column whose top carries the arm at z = 0 (m).
+    #[serde(deserialize_with = "length")]
+    pub column_half_width_m: f64,
+    /// The pole on the flange.
+    pub pole: Pole,
+}
+
+fn checked<'de, D: Deserializer<'de>>(
+    from: D,
+    holds: impl Fn(f64) -> bool,
+    expected: &str,
+) -> Result<f64, D::Error> {
+    let value = f64::deserialize(from)?;
+    if holds(value) {
+        Ok(value)
+    } else {
+        Err(serde::de::Error::custom(format_args!(
+            "{value} m is {expected}"
+        )))
+    }
+}
+
+fn length<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let holds = |v: f64| v > 0.0 && v <= LENGTH_MAX_M;
+    checked(from, holds, "not above 0 and at most 10 m")
+}
+
+fn below_zero<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let holds = |v: f64| (-LENGTH_MAX_M..0.0).contains(&v);
+    checked(from, holds, "not below 0 and at least -10 m")
+}
+
+fn place<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
+    let place = <[f64; 3]>::deserialize(from)?;
+    if place.iter().all(|v| v.abs() <= LENGTH_MAX_M) {
+        Ok(place)
+    } else {
+        Err(serde::de::Error::custom("a coordinate is beyond 10 m"))
+    }
+}
+
+#[cfg(feature = "std")]
 impl Default for Cell {
+    /// The cell of `configs/cell/lab.toml`.
     fn default() -> Self {
-        Self {
-            column_half_width_m: COLUMN_HALF_WIDTH_M,
-            floor_z_m: FLOOR_Z_M,
-        }
+        #[allow(clippy::expect_used, reason = "a file of this crate's own sources")]
+        static LAB: std::sync::LazyLock<Cell> = std::sync::LazyLock::new(|| {
+            toml::from_str(include_str!("../../configs/cell/lab.toml"))
+                .expect("configs/cell/lab.toml is a cell")
+        });
+        *LAB
+    }
+}
+
+#[cfg(feature = "std")]
+impl Default for Pole {
+    /// The pole of `configs/cell/lab.toml`.
+    fn default() -> Self {
+        Cell::default().pole
     }
 }
 
@@ -46,5 +110,106 @@ impl Cell {
     #[must_use]
     pub fn touches(&self, p: &Vector3<f64>, radius_m: f64) -> bool {
         p.z - radius_m < self.floor_z_m || self.column_distance_m(p) < radius_m
+    }
+}
+
+impl Pole {
+    /// Its end in the flange frame (m).
+    #[must_use]
+    pub fn end_m(&self) -> Vector3<f64> {
+        let [x, y, z] = self.offset_m;
+        Vector3::new(x, y, z + self.length_m)
+    }
+
+    /// Motion of the rope's attach frame A at the pole's end: x as the flange's, -z
+    /// along the pole (`R_A = R_flange diag(1, -1, -1)`). RT-safe.
+    #[must_use]
+    pub fn attach_motion(&self, state: &JointState) -> FrameMotion {
+        let end = flange_motion(state).at_offset(&self.end_m());
+        FrameMotion {
+            r: flip_yz(&end.r),
+            ..end
+        }
+    }
+
+    /// Pose of the attach frame A as (origin in m, attitude). RT-safe.
+    #[must_use]
+    pub fn attach_pose(&self, q: &JointVector) -> (Vector3<f64>, Matrix3<f64>) {
+        let (p, r) = flange_pose(q);
+        (p + r * self.end_m(), flip_yz(&r))
+    }
+}
+
+fn flip_yz(r: &Matrix3<f64>) -> Matrix3<f64> {
+    Matrix3::from_columns(&[r.column(0).into(), -r.column(1), -r.column(2)])
+}
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = include_str!("../../configs/cell/lab.toml");
+
+    #[test]
+    fn a_cell_survives_a_file_and_nonsense_is_refused_by_key() {
+        let lab = Cell::default();
+        let back: Cell = toml::from_str(&toml::to_string(&lab).unwrap()).unwrap();
+        assert_eq!(back, lab);
+        for (from, to, says) in [
+            ("floor_z_m = -0.75", "floor_z_m = 0.75", "below 0"),
+            ("length_m = 0.20", "length_m = 0.0", "above 0"),
+            ("radius_m = 0.008", "radius_m = nan", "above 0"),
+            ("offset_m = [0.0,", "offset_m = [inf,", "beyond 10 m"),
+            ("floor_z_m", "flor_z_m", "flor_z_m"),
+        ] {
+            let refusal = toml::from_str::<Cell>(&TEXT.replace(from, to)).unwrap_err();
+            assert!(refusal.to_string().contains(says), "{to}: {refusal}");
+        }
+    }
+
+    #[test]
+    fn pole_points_straight_down_in_the_wiggle_pose() {
+        let q = JointVector([0.0, 0.8, 0.0, 2.4, 0.0, 1.6, 0.0]);
+        let (p, r) = Pole::default().attach_pose(&q);
+        assert!((p - Vector3::new(0.663, 0.0, 0.224)).norm() < 1e-3, "{p}");
+        assert!((r.column(2) - Vector3::z()).norm() < 1e-9);
+    }
+
+    #[test]
+    fn the_rope_hangs_from_the_end_of_whatever_pole_there_is() {
+        let q = JointVector([0.3, 0.5, -0.2, 1.9, 0.4, 1.2, 0.1]);
+        let lab = Pole::default();
+        let other = Pole {
+            length_m: 0.30,
+            offset_m: [0.01, 0.0, 0.02],
+            ..lab
+        };
+        let (_, flange) = flange_pose(&q);
+        let moved = other.attach_pose(&q).0 - lab.attach_pose(&q).0;
+        assert!((flange.transpose() * moved - Vector3::new(0.01, 0.0, 0.12)).norm() < 1e-12);
+        let still = other.attach_motion(&JointState::at_rest(q));
+        assert_eq!((still.p_m, still.r), other.attach_pose(&q));
+    }
+
+    /// Velocities and accelerations against central differences of the pose.
+    #[test]
+    fn derivatives_match_differences() {
+        let at = |t: f64| {
+            let w = |i: usize| 1.0 + 0.3 * i as f64;
+            let vector = |f: &dyn Fn(usize) -> f64| JointVector(core::array::from_fn(f));
+            Pole::default().attach_motion(&JointState {
+                q: vector(&|i| 0.3 * (i as f64) + 0.4 * (t * w(i)).sin()),
+                qd: vector(&|i| 0.4 * w(i) * (t * w(i)).cos()),
+                qdd: vector(&|i| -0.4 * w(i) * w(i) * (t * w(i)).sin()),
+            })
+        };
+        let h = 1e-4;
+        let (m, o, p) = (at(0.7 - h), at(0.7), at(0.7 + h));
+        assert!(((p.p_m - m.p_m) / (2.0 * h) - o.v_m_s).norm() < 1e-6);
+        assert!(((p.v_m_s - m.v_m_s) / (2.0 * h) - o.a_m_s2).norm() < 1e-5);
+        assert!(((p.w_rad_s - m.w_rad_s) / (2.0 * h) - o.alpha_rad_s2).norm() < 1e-5);
+        let skew = (p.r - m.r) / (2.0 * h) * o.r.transpose();
+        let w = Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)]);
+        assert!((w - o.w_rad_s).norm() < 1e-6);
     }
 }

@@ -1,11 +1,10 @@
-//! Kinematics of the xArm 7: flange pose, pole tip, velocities and
-//! accelerations from joint motion.
+//! Kinematics of the xArm 7: poses of links and flange, velocities and accelerations from
+//! joint motion.
 //!
 //! Joint origins are the URDF form of the modified Denavit-Hartenberg table of
 //! the vendor (UFACTORY xArm 7 manual); each joint turns about the z axis of
 //! its own frame. The flange is frame 7, its z axis points out of the tool side.
 
-use crate::cell::POLE_LENGTH_M;
 use crate::exact;
 use crate::joint::{JOINTS, JointState, JointVector};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -139,28 +138,6 @@ pub fn flange_motion(state: &JointState) -> FrameMotion {
     link_motions(state)[JOINTS - 1]
 }
 
-/// Motion of the rope's attach frame A at the pole's end: x as the flange's, -z
-/// along the pole (`R_A = R_flange diag(1, -1, -1)`). RT-safe.
-#[must_use]
-pub fn attach_motion(state: &JointState) -> FrameMotion {
-    let tip = flange_motion(state).at_offset(&Vector3::new(0.0, 0.0, POLE_LENGTH_M));
-    FrameMotion {
-        r: flip_yz(&tip.r),
-        ..tip
-    }
-}
-
-/// Pose of the attach frame A. RT-safe.
-#[must_use]
-pub fn attach_pose(q: &JointVector) -> (Vector3<f64>, Matrix3<f64>) {
-    let (p, r) = flange_pose(q);
-    (p + r * Vector3::new(0.0, 0.0, POLE_LENGTH_M), flip_yz(&r))
-}
-
-fn flip_yz(r: &Matrix3<f64>) -> Matrix3<f64> {
-    Matrix3::from_columns(&[r.column(0).into(), -r.column(1), -r.column(2)])
-}
-
 /// Fixed-axis roll, pitch, yaw (`Rz Ry Rx`) of an attitude, as the arm reports it.
 #[must_use]
 pub fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
@@ -222,39 +199,5 @@ mod tests {
             [311.679, 0.0, 332.462],
             None,
         );
-    }
-
-    #[test]
-    fn pole_points_straight_down_in_the_wiggle_pose() {
-        let (p, r) = attach_pose(&JointVector([0.0, 0.8, 0.0, 2.4, 0.0, 1.6, 0.0]));
-        assert!((p - Vector3::new(0.663, 0.0, 0.224)).norm() < 1e-3, "{p}");
-        assert!((r.column(2) - Vector3::z()).norm() < 1e-9);
-    }
-
-    /// Velocities and accelerations against central differences of the pose.
-    #[test]
-    fn derivatives_match_differences() {
-        let at = |t: f64| {
-            let q = JointVector(core::array::from_fn(|i| {
-                0.3 * (i as f64) + 0.4 * (t * (1.0 + 0.3 * i as f64)).sin()
-            }));
-            let qd = JointVector(core::array::from_fn(|i| {
-                let w = 1.0 + 0.3 * i as f64;
-                0.4 * w * (t * w).cos()
-            }));
-            let qdd = JointVector(core::array::from_fn(|i| {
-                let w = 1.0 + 0.3 * i as f64;
-                -0.4 * w * w * (t * w).sin()
-            }));
-            attach_motion(&JointState { q, qd, qdd })
-        };
-        let h = 1e-4;
-        let (m, o, p) = (at(0.7 - h), at(0.7), at(0.7 + h));
-        assert!(((p.p_m - m.p_m) / (2.0 * h) - o.v_m_s).norm() < 1e-6);
-        assert!(((p.v_m_s - m.v_m_s) / (2.0 * h) - o.a_m_s2).norm() < 1e-5);
-        assert!(((p.w_rad_s - m.w_rad_s) / (2.0 * h) - o.alpha_rad_s2).norm() < 1e-5);
-        let skew = (p.r - m.r) / (2.0 * h) * o.r.transpose();
-        let w = Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)]);
-        assert!((w - o.w_rad_s).norm() < 1e-6);
     }
 }

@@ -25,15 +25,19 @@ extern crate alloc;
 pub mod capsules;
 pub mod cell;
 pub mod exact;
+pub mod geometry;
 pub mod joint;
 pub mod kinematics;
 pub mod limits;
+pub mod piece;
 #[cfg(feature = "std")]
 pub mod response;
 pub mod trajectory;
 
+pub use cell::{Cell, Pole};
 pub use joint::{JOINTS, JointState, JointVector};
 pub use limits::{Limits, LimitsSpec};
+pub use piece::JointPiece;
 #[cfg(feature = "std")]
 pub use response::{ArmResponse, JointResponse, TrackingLag};
 pub use trajectory::{JointTrajectory, TrajectoryError};

@@ -4,6 +4,7 @@
 //! what identification leaves open, and as the fraction of those that succeeds.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
+use arm_model::Cell;
 use arm_model::Limits;
 use arm_model::limits::LimitsSpec;
 use clap::Parser;
@@ -83,6 +84,7 @@ fn main() {
         let request = PlanRequest {
             rope: random_rope(seed),
             limits: limits.clone(),
+            cell: Cell::default(),
             options: PlanOptions {
                 dimensions: if args.full {
                     Dimensions::Full
@@ -113,7 +115,7 @@ fn main() {
         let throws: Vec<_> = ropes.iter().map(|r| (r, &planned.trajectory)).collect();
         let simulator = ThrowSimulator {
             tail_s: task.config().observed_s,
-            ..simulator_for(&*task, &request.rope, &request.options)
+            ..simulator_for(&*task, &request.rope, &request.cell, &request.options)
         };
         let outcomes = simulator.run(&throws).expect("a planned throw simulates");
         let squares: f64 = outcomes.iter().map(|o| task.error_m(o).powi(2)).sum();

@@ -2,7 +2,7 @@
 //! keypoints were made by another simulator (MuJoCo).
 #![cfg(test)]
 
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{JointTrajectory, Limits, Pole};
 use experiments::trials::{TrialRig, mean, outside_rope, summarise, trial_rope};
 use planner::filming::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::observation::ObservedPoints;
@@ -16,7 +16,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 fn wiggling_arm() -> PlannedArm {
-    PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
+    PlannedArm::new(
+        wiggle(&WiggleConfig::default(), &Limits::default()).unwrap(),
+        Pole::default(),
+    )
 }
 
 fn quick(seed: u64, threads: usize) -> IdentifyOptions {
@@ -195,7 +198,10 @@ fn the_estimate_does_not_depend_on_threads() {
 fn useless_films_are_refused_with_the_reason() {
     let camera = side_camera();
     let arm = wiggling_arm();
-    let short = PlannedArm::new(JointTrajectory::hold(arm_model::joint::START_POSE, 2.0).unwrap());
+    let short = PlannedArm::new(
+        JointTrajectory::hold(arm_model::joint::START_POSE, 2.0).unwrap(),
+        Pole::default(),
+    );
     let timing = FilmTiming {
         frames: 200,
         ..FilmTiming::default()

@@ -2,8 +2,8 @@
 #![cfg(test)]
 #![allow(missing_docs, reason = "a test")]
 
+use arm_model::Cell;
 use arm_model::joint::START_POSE;
-use arm_model::kinematics::attach_pose;
 use camera_ingest::StereoFrame;
 use nalgebra::Vector3;
 use rig_sim::CameraConfig;
@@ -23,12 +23,12 @@ const COLOURS: Appearance = Appearance {
 };
 
 fn renderer(camera: &StereoCamera, noise_levels: f32) -> Renderer {
-    Renderer::new(camera, ROPE, COLOURS, noise_levels, 5)
+    Renderer::new(camera, &Cell::default(), ROPE, COLOURS, noise_levels, 5)
 }
 
 /// A bent rope in front of the wall, moved sideways by `shift_m`.
 fn pose(shift_m: f64) -> ScenePose {
-    let (clamp, _) = attach_pose(&START_POSE);
+    let (clamp, _) = Cell::default().pole.attach_pose(&START_POSE);
     let nodes = (0..=22).map(|i| {
         let s = f64::from(i) / 22.0;
         clamp + Vector3::new(0.12 * (s * 4.0).sin() + shift_m, 0.05 * s, -0.55 * s)

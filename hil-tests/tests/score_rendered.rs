@@ -2,6 +2,7 @@
 //! frames that matter, lead and target cover each other.
 #![cfg(test)]
 
+use arm_model::Cell;
 use arm_model::joint::START_POSE;
 use camera_ingest::{ScoreOptions, StereoFrame, score};
 use nalgebra::Vector3;
@@ -125,7 +126,14 @@ fn scores_of(seed: u64, config: &CameraConfig) -> Scores {
         radius_m: 0.005,
         lead_radius_m: rng.random_range(0.015..0.045),
     };
-    let mut renderer = Renderer::new(&camera, shape, appearance, config.noise_levels, seed);
+    let mut renderer = Renderer::new(
+        &camera,
+        &Cell::default(),
+        shape,
+        appearance,
+        config.noise_levels,
+        seed,
+    );
     let mut scores = Scores::default();
     for index in 0..THROWS {
         let throw = Throw::random(&mut rng, 1.0 / config.frame_rate_hz);

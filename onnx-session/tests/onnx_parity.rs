@@ -6,6 +6,7 @@
     reason = "tests may fail loudly"
 )]
 
+use arm_model::Pole;
 use planner::filming::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
 use planner::observation::{ObservedPoints, WIDTHS, WiggleFeatures};
 use planner::phi::{INPUTS, OUTPUTS, PARITY, PhiNet, difference};
@@ -18,7 +19,7 @@ use std::path::Path;
 /// What the network sees of simulated ropes on its wiggle, one film with frames unseen.
 fn films(net: &PhiNet) -> Vec<WiggleFeatures> {
     let wiggle = wiggle(&net.metadata().wiggle, &arm_model::Limits::default()).unwrap();
-    let (motion, camera) = (PlannedArm::new(wiggle), side_camera());
+    let (motion, camera) = (PlannedArm::new(wiggle, Pole::default()), side_camera());
     let points = net.metadata().features.points;
     let layout = match points {
         ObservedPoints::ArcLength => KeypointLayout::Uniform(24),

@@ -3,6 +3,7 @@
 //! `stop_at [SEED]`. See `docs/src/adding-a-task.md`.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
+use arm_model::Cell;
 use arm_model::Limits;
 use planner::ropes::random_rope;
 use planner::tasks::{
@@ -63,6 +64,7 @@ fn main() {
     let request = PlanRequest {
         rope: random_rope(seed),
         limits: Limits::default(),
+        cell: Cell::default(),
         options: PlanOptions {
             seed,
             ..PlanOptions::default()

@@ -4,9 +4,9 @@
 //! joint 6 that excites the rope while it stays in view, filmed for 400 frames
 //! at 60 frames a second, the last part of them at rest.
 
-use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m};
+use crate::collide::{ArmShape, RopeShape, rope_clearance_m};
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, FrameTimes, Outcome, PlannedArm, Precision, SimOptions, SimulateError, Start, Watch,
@@ -192,11 +192,11 @@ pub struct WiggleClearance {
 pub fn clearance(
     trajectory: &JointTrajectory,
     ropes: &[RopeParams],
-    scene: &Scene,
+    cell: &Cell,
     threads: usize,
 ) -> Result<Vec<WiggleClearance>, WiggleError> {
     const PERIOD_S: f64 = 0.02;
-    let arm = PlannedArm::new(*trajectory);
+    let arm = PlannedArm::new(*trajectory, cell.pole);
     let candidates: Vec<Candidate<'_>> = ropes
         .iter()
         .map(|rope| Candidate::new(rope, &arm))
@@ -236,13 +236,11 @@ pub fn clearance(
             };
             let mut time_s = 0.0;
             for frame in 0..rollout.nodes.frames() {
-                let pose = ArmShape::at(&trajectory.state_at(time_s).q);
+                let pose = ArmShape::at(&trajectory.state_at(time_s).q, &cell.pole);
                 let nodes: Vec<Vector3<f64>> = (0..rollout.nodes.nodes())
                     .map(|node| rollout.nodes.position(frame, node))
                     .collect();
-                out.gap_m = out
-                    .gap_m
-                    .min(rope_clearance_m(&pose, scene, &shape, &nodes));
+                out.gap_m = out.gap_m.min(rope_clearance_m(&pose, cell, &shape, &nodes));
                 if let (Some(clamp), Some(tip)) = (nodes.first(), nodes.last()) {
                     out.swing_m = out.swing_m.max((tip - clamp).xy().norm());
                 }
@@ -307,7 +305,7 @@ mod tests {
     fn ropes_of_the_ranges_stay_clear_of_column_and_arm() {
         let t = wiggle(&WiggleConfig::default(), &Limits::default()).unwrap();
         let ropes: Vec<_> = (0..64).map(random_rope).collect();
-        let all = clearance(&t, &ropes, &Scene::default(), 2).unwrap();
+        let all = clearance(&t, &ropes, &Cell::default(), 2).unwrap();
         let worst = all.iter().map(|c| c.gap_m).fold(f64::INFINITY, f64::min);
         assert!(all.iter().all(|c| c.finite) && worst > 0.15, "{worst}");
     }

@@ -2,11 +2,10 @@
 //! limits and clear of arm and column.
 
 use crate::cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
-use crate::collide::Scene;
 use crate::ropes::random_rope;
 use crate::sysid::{IdentifyError, WiggleInformation, information};
 use crate::wiggle::{WiggleConfig, WiggleError, clearance, wiggle};
-use arm_model::Limits;
+use arm_model::{Cell, Limits};
 use rope_sim::PlannedArm;
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, StereoCamera};
@@ -73,20 +72,21 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 pub fn judge(
     config: &WiggleConfig,
     limits: &Limits,
+    cell: &Cell,
     camera: &StereoCamera,
     seed: u64,
     exact: bool,
     threads: usize,
 ) -> Result<JudgedWiggle, DesignError> {
     let trajectory = wiggle(config, limits)?;
-    let arm = PlannedArm::new(trajectory);
+    let arm = PlannedArm::new(trajectory, cell.pole);
     let ropes = ropes(seed);
     let mut all = Vec::with_capacity(ropes.len());
     for rope in &ropes {
         all.extend(information(rope, &arm, camera, exact, threads)?);
     }
     let over = |of: fn(&WiggleInformation) -> f64| median(all.iter().map(of));
-    let gaps = clearance(&trajectory, &ropes, &Scene::default(), threads)?;
+    let gaps = clearance(&trajectory, &ropes, cell, threads)?;
     Ok(JudgedWiggle {
         amplitude_rad: config.amplitude_rad,
         frequency_hz: config.frequency_hz,
@@ -112,6 +112,7 @@ pub fn judge(
 pub fn optimise(
     start: &WiggleConfig,
     limits: &Limits,
+    cell: &Cell,
     camera: &StereoCamera,
     seed: u64,
     threads: usize,
@@ -147,7 +148,7 @@ pub fn optimise(
         let asked: Vec<Vec<f64>> = strategy.ask(&mut |_| true)?;
         let mut values = Vec::with_capacity(asked.len());
         for x in &asked {
-            let value = match judge(&at(x), limits, camera, seed, false, threads) {
+            let value = match judge(&at(x), limits, cell, camera, seed, false, threads) {
                 Ok(judged) if judged.gap_m >= GAP_MIN_M => judged.information.log_volume,
                 Ok(_) | Err(DesignError::Wiggle(_)) => FORBIDDEN,
                 Err(e) => return Err(e),
@@ -182,7 +183,16 @@ mod tests {
                 amplitude_rad,
                 ..WiggleConfig::default()
             };
-            judge(&config, &limits, &side_camera(), 1, false, 2).unwrap()
+            judge(
+                &config,
+                &limits,
+                &Cell::default(),
+                &side_camera(),
+                1,
+                false,
+                2,
+            )
+            .unwrap()
         };
         let (narrow, wide) = (of(0.1), of(0.25));
         assert!(wide.information.log_volume < narrow.information.log_volume - 0.3);

@@ -1,31 +1,33 @@
 //! The rig's solid bodies: arm and pole as capsules, the column under the arm.
 
-use arm_model::JointVector;
-use arm_model::capsules::{ArmCapsules, Capsule, LINK_CAPSULES};
-use arm_model::cell::Cell;
+use arm_model::capsules::{LINK_CAPSULES, arm_at};
+use arm_model::geometry::Capsule;
+use arm_model::{Cell, JointVector};
 use nalgebra::Vector3;
 
 /// Part of the rope, measured from the clamp, that lies against the pole's end
 /// by construction (m).
 const CLAMPED_M: f64 = 0.05;
 
-/// Arm and pole in one pose.
+/// Arm and pole in one pose, in their cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmBody {
     /// Base and links, from the base to the flange.
     pub links: [Capsule; LINK_CAPSULES],
     /// The pole, flange end first.
     pub pole: Capsule,
+    cell: Cell,
 }
 
 impl ArmBody {
     /// Bodies for the joint angles `q` (rad), in the world.
     #[must_use]
-    pub fn at(q: &JointVector) -> Self {
-        let ArmCapsules { links, pole } = ArmCapsules::at(q);
+    pub fn at(q: &JointVector, cell: &Cell) -> Self {
+        let (links, pole) = arm_at(q, &cell.pole);
         Self {
             links: links.map(|(_, link)| link),
             pole,
+            cell: *cell,
         }
     }
 
@@ -39,13 +41,12 @@ impl ArmBody {
         rope_radius_m: f64,
         lead_radius_m: f64,
     ) -> bool {
-        let cell = Cell::default();
         let hits = |p: &Vector3<f64>, radius_m: f64| {
             self.links
                 .iter()
                 .any(|c| c.distance_to_point_m(p) < radius_m)
                 || self.pole.distance_to_point_m(p) < radius_m
-                || cell.column_distance_m(p) < radius_m
+                || self.cell.column_distance_m(p) < radius_m
         };
         let mut arc_m = 0.0;
         let last = nodes.len().saturating_sub(1);
@@ -68,7 +69,6 @@ impl ArmBody {
 mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
-    use arm_model::kinematics::attach_pose;
 
     fn straight(from: Vector3<f64>, to: Vector3<f64>) -> Vec<Vector3<f64>> {
         (0..=20)
@@ -78,8 +78,9 @@ mod tests {
 
     #[test]
     fn a_hanging_rope_is_free_and_one_through_the_column_is_not() {
-        let body = ArmBody::at(&START_POSE);
-        let (clamp, _) = attach_pose(&START_POSE);
+        let cell = Cell::default();
+        let body = ArmBody::at(&START_POSE, &cell);
+        let (clamp, _) = cell.pole.attach_pose(&START_POSE);
         assert!((body.pole.b_m - clamp).norm() < 1e-12);
         let hanging = straight(clamp, clamp - Vector3::z() * 0.65);
         assert!(!body.is_touched_by(&hanging, 0.01, 0.045));

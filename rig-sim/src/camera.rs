@@ -102,8 +102,8 @@ impl CameraConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::Pole;
     use arm_model::joint::START_POSE;
-    use arm_model::kinematics::attach_pose;
 
     /// Inside both pictures with `radius_m` to spare.
     fn seen(camera: &StereoCamera, p: Vector3<f64>, radius_m: f64) -> bool {
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn both_eyes_see_the_swinging_rope_and_every_sensible_target() {
         let camera = CameraConfig::default().stereo_camera();
-        let (clamp, _) = attach_pose(&START_POSE);
+        let (clamp, _) = Pole::default().attach_pose(&START_POSE);
         for degrees in -90..=90 {
             let angle = f64::from(degrees).to_radians();
             let tip = clamp + Vector3::new(angle.sin(), 0.0, -angle.cos()) * 0.65;

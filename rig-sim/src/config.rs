@@ -4,7 +4,7 @@ use super::camera::CameraConfig;
 use crate::hidden::hidden_rope;
 use crate::render::Appearance;
 use arm_model::joint::START_POSE;
-use arm_model::{JOINTS, JointVector, Limits};
+use arm_model::{Cell, JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, StereoCamera};
 use std::net::IpAddr;
@@ -35,7 +35,9 @@ pub struct RigConfig {
     pub clock_ppm: f64,
     /// Whose clock paces setpoints.
     pub intake: Intake,
-    /// What stands in the arm's way.
+    /// The pole, and what stands around the arm.
+    pub cell: Cell,
+    /// What stands in the arm's way besides.
     pub obstacles: Vec<Obstacle>,
     /// Faults of arm and wire to inject.
     pub faults: FaultScript,
@@ -72,6 +74,7 @@ impl Default for RigConfig {
             firmware: arm.firmware,
             clock_ppm: arm.clock_ppm,
             intake: arm.intake,
+            cell: Cell::default(),
             obstacles: arm.obstacles,
             faults: arm.faults,
             limits: arm.limits,
@@ -117,6 +120,7 @@ impl RigConfig {
             firmware: self.firmware,
             clock_ppm: self.clock_ppm,
             intake: self.intake,
+            cell: Some(self.cell),
             obstacles: self.obstacles.clone(),
             faults: self.faults.clone(),
             limits: self.limits.clone(),

@@ -25,6 +25,7 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
     let camera = config.stereo_camera();
     let mut renderer = Renderer::new(
         &camera,
+        &config.cell,
         RopeShape::from(&config.rope()),
         config.appearance(),
         config.camera.noise_levels,

@@ -182,7 +182,7 @@ pub fn run_announced(
         let started = [
             part(
                 "rig-physics",
-                Box::new(move || physics::run(&rope, &history, record, ended)),
+                Box::new(move || physics::run(&rope, &config.cell, &history, record, ended)),
             ),
             part("rig-camera", Box::new(move || film(config, record, ended))),
         ];

@@ -3,8 +3,7 @@
 use super::RigError;
 use super::body::ArmBody;
 use super::record::{Moment, Record};
-use arm_model::kinematics::{FrameMotion, attach_motion};
-use arm_model::{JointState, JointVector};
+use arm_model::{Cell, JointPiece, JointState};
 use rope_sim::LiveRope;
 use shared_types::{MonotonicNs, RopeParams};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,6 +20,7 @@ const GAP_S: f64 = 0.1;
 /// sample of the arm's motion.
 pub(super) fn run(
     rope: &RopeParams,
+    cell: &Cell,
     arm: &MotionHistory,
     record: &Record,
     stop: &AtomicBool,
@@ -33,7 +33,7 @@ pub(super) fn run(
         if physics.is_none()
             && let Some(first) = rest.next()
         {
-            physics = Some(Physics::new(rope, first)?);
+            physics = Some(Physics::new(rope, cell, first)?);
         }
         if let Some(physics) = &mut physics {
             let moments = rest.map(|sample| physics.follow(sample));
@@ -47,16 +47,18 @@ pub(super) fn run(
 struct Physics {
     live: LiveRope,
     rope: RopeParams,
+    cell: Cell,
     start: MonotonicNs,
     last: JointSample,
 }
 
 impl Physics {
-    fn new(rope: &RopeParams, first: &JointSample) -> Result<Self, RigError> {
-        let attach = attach_motion(&JointState::at_rest(first.state.q));
+    fn new(rope: &RopeParams, cell: &Cell, first: &JointSample) -> Result<Self, RigError> {
+        let attach = cell.pole.attach_motion(&JointState::at_rest(first.state.q));
         Ok(Self {
             live: LiveRope::new(rope, &attach, STEP_S)?,
             rope: *rope,
+            cell: *cell,
             start: first.at,
             last: *first,
         })
@@ -76,15 +78,16 @@ impl Physics {
             self.last.at.since_s(self.start),
             next.at.since_s(self.start),
         );
-        let piece = JointPiece::new(&self.last.state, &next.state, span_s);
-        let motion = |t_s: f64| -> FrameMotion { attach_motion(&piece.at(t_s - from_s)) };
+        let piece = JointPiece::quintic(&self.last.state, &next.state, span_s);
+        let pole = self.cell.pole;
+        let motion = |t_s: f64| pole.attach_motion(&piece.at(t_s - from_s));
         self.live.advance(&motion, to_s);
         self.last = *next;
         let nodes = self.live.nodes().to_vec();
         if !nodes.iter().all(|p| p.sum().is_finite()) {
             return Err(RigError::RopeDiverged);
         }
-        let body = ArmBody::at(&next.state.q);
+        let body = ArmBody::at(&next.state.q, &self.cell);
         let (radius_m, lead_m) = (self.rope.radius_m, self.rope.lead_radius_m);
         Ok(Moment {
             at: next.at,
@@ -95,80 +98,11 @@ impl Physics {
     }
 }
 
-/// Joint motion between two samples: the polynomials of fifth degree that meet
-/// position, velocity and acceleration at both ends.
-struct JointPiece {
-    /// Coefficients of `(t / span)^i`, i = 0 to 5.
-    c: [JointVector; 6],
-    span_s: f64,
-}
-
-impl JointPiece {
-    fn new(from: &JointState, to: &JointState, span_s: f64) -> Self {
-        let scaled = |v: JointVector, s: f64| v.map(|v| v * s);
-        let (v0, v1) = (scaled(from.qd, span_s), scaled(to.qd, span_s));
-        let square = span_s * span_s;
-        let (a0, a1) = (scaled(from.qdd, square), scaled(to.qdd, square));
-        let sum = |terms: [(JointVector, f64); 5]| {
-            terms
-                .into_iter()
-                .fold(JointVector::ZERO, |s, (v, k)| s + scaled(v, k))
-        };
-        let d = to.q - from.q;
-        Self {
-            c: [
-                from.q,
-                v0,
-                scaled(a0, 0.5),
-                sum([(d, 10.0), (v0, -6.0), (v1, -4.0), (a0, -1.5), (a1, 0.5)]),
-                sum([(d, -15.0), (v0, 8.0), (v1, 7.0), (a0, 1.5), (a1, -1.0)]),
-                sum([(d, 6.0), (v0, -3.0), (v1, -3.0), (a0, -0.5), (a1, 0.5)]),
-            ],
-            span_s,
-        }
-    }
-
-    /// Joint state `t_s` after the first sample.
-    fn at(&self, t_s: f64) -> JointState {
-        let (u, h) = (t_s / self.span_s, self.span_s);
-        // Horner's rule for position, velocity and acceleration at once.
-        let mut q = self.c[5];
-        let (mut qd, mut half_qdd) = (JointVector::ZERO, JointVector::ZERO);
-        for c in self.c[..5].iter().rev() {
-            half_qdd = half_qdd.map(|v| v * u) + qd;
-            qd = qd.map(|v| v * u) + q;
-            q = q.map(|v| v * u) + *c;
-        }
-        JointState {
-            q,
-            qd: qd.map(|v| v / h),
-            qdd: half_qdd.map(|v| 2.0 * v / (h * h)),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::hidden::hidden_rope;
     use arm_model::joint::START_POSE;
-
-    #[test]
-    fn a_piece_meets_its_ends_and_reproduces_a_quintic() {
-        // q = t^5 - 2 t^3 + 3 t, with its derivatives.
-        let exact = |t: f64| JointState {
-            q: JointVector::splat(t.powi(5) - 2.0 * t.powi(3) + 3.0 * t),
-            qd: JointVector::splat(5.0 * t.powi(4) - 6.0 * t * t + 3.0),
-            qdd: JointVector::splat(20.0 * t.powi(3) - 12.0 * t),
-        };
-        let piece = JointPiece::new(&exact(0.3), &exact(0.8), 0.5);
-        for t in [0.3, 0.41, 0.55, 0.8] {
-            let (got, want) = (piece.at(t - 0.3), exact(t));
-            assert!((got.q[0] - want.q[0]).abs() < 1e-12);
-            assert!((got.qd[3] - want.qd[3]).abs() < 1e-11);
-            assert!((got.qdd[6] - want.qdd[6]).abs() < 1e-10);
-        }
-    }
 
     /// Following samples must not differ from knowing the motion exactly.
     #[test]
@@ -187,18 +121,21 @@ mod tests {
             at: MonotonicNs(7_000_000_000 + u64::from(ms) * 1_000_000),
             state: state(f64::from(ms) * 1e-3),
         };
-        let rope = hidden_rope(3);
-        let mut physics = Physics::new(&rope, &sample(0)).unwrap();
+        let (rope, cell) = (hidden_rope(3), Cell::default());
+        let mut physics = Physics::new(&rope, &cell, &sample(0)).unwrap();
         let mut exact = LiveRope::new(
             &rope,
-            &attach_motion(&JointState::at_rest(START_POSE)),
+            &cell.pole.attach_motion(&JointState::at_rest(START_POSE)),
             STEP_S,
         )
         .unwrap();
         let mut moved_m: f64 = 0.0;
         for ms in 1..=1500 {
             let moment = physics.follow(&sample(ms)).unwrap();
-            exact.advance(&|t| attach_motion(&state(t)), f64::from(ms) * 1e-3);
+            exact.advance(
+                &|t| cell.pole.attach_motion(&state(t)),
+                f64::from(ms) * 1e-3,
+            );
             let (got, want) = (moment.nodes.last().unwrap(), exact.nodes().last().unwrap());
             assert!((got - want).norm() < 1e-5, "{ms} ms: {got} and {want}");
             moved_m = moved_m.max((got.x - 0.663).abs());

@@ -5,8 +5,8 @@ use crate::CameraConfig;
 use crate::hidden::hidden_rope;
 use crate::render::{Appearance, Renderer, RopeShape, ScenePose};
 use arm_model::joint::START_POSE;
-use arm_model::kinematics::{FrameMotion, attach_motion};
-use arm_model::{JointState, JointVector};
+use arm_model::kinematics::FrameMotion;
+use arm_model::{Cell, JointState, JointVector, Pole};
 use nalgebra::Vector3;
 use rope_sim::{LiveRope, SimulateError};
 use shared_types::{RopeParams, StereoCamera};
@@ -44,7 +44,7 @@ pub fn joints(t_s: f64) -> JointVector {
 pub fn attach(t_s: f64) -> FrameMotion {
     const H: f64 = 1e-3;
     let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
-    attach_motion(&JointState {
+    Pole::default().attach_motion(&JointState {
         q: now,
         qd: (after - before).map(|d| d / (2.0 * H)),
         qdd: (after + before - now - now).map(|d| d / (H * H)),
@@ -97,7 +97,14 @@ impl WiggleFilm {
             (rope.radius_m, rope.lead_radius_m) = (radius_m, lead_radius_m);
         }
         let shape = RopeShape::from(&rope);
-        let mut renderer = Renderer::new(&camera, shape, appearance, config.noise_levels, seed);
+        let mut renderer = Renderer::new(
+            &camera,
+            &Cell::default(),
+            shape,
+            appearance,
+            config.noise_levels,
+            seed,
+        );
         renderer.place_target(Some(TARGET_M.into()));
         Ok(Self {
             live: LiveRope::new(&rope, &attach(late_s), PHYSICS_STEP_S)?,

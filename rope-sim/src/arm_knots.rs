@@ -7,13 +7,14 @@
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::Knot;
 use crate::lanes::{LaneTask, Lanes};
-use arm_model::cell::POLE_LENGTH_M;
 use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use arm_model::{JOINTS, JointState};
 
 /// Attach frames for the joint states, in double precision.
 pub(crate) struct ArmKnots<'a> {
     pub(crate) states: &'a [JointState],
+    /// End of the pole in the flange frame (m).
+    pub(crate) pole_end_m: [f64; 3],
 }
 
 impl LaneTask for ArmKnots<'_> {
@@ -23,7 +24,7 @@ impl LaneTask for ArmKnots<'_> {
     fn run<V: Lanes>(self) -> Self::Output {
         let mut knots = Vec::with_capacity(self.states.len());
         for states in self.states.chunks(V::COUNT) {
-            let frame = attach_frame(&JointLanes::<V>::of(states));
+            let frame = attach_frame(&JointLanes::<V>::of(states), self.pole_end_m);
             let (value, rate, acceleration) = frame.channels();
             for lane in 0..states.len() {
                 knots.push(Knot {
@@ -178,16 +179,16 @@ impl<V: Lanes> Frame<V> {
     }
 }
 
-/// Attach frame at the pole's end, as `arm_model::kinematics::attach_motion`.
+/// Attach frame at the pole's end, as `arm_model::Pole::attach_motion`.
 #[inline(always)]
-fn attach_frame<V: Lanes>(joints: &JointLanes<V>) -> Frame<V> {
+fn attach_frame<V: Lanes>(joints: &JointLanes<V>, pole_end_m: [f64; 3]) -> Frame<V> {
     let mut frame = Frame::world();
     for i in 0..JOINTS {
         frame.offset(JOINT_ORIGIN_M[i]);
         frame.quarter_turn_x(JOINT_QUARTER_TURNS_X[i]);
         frame.joint(joints.q[i], joints.qd[i], joints.qdd[i]);
     }
-    frame.offset([0.0, 0.0, POLE_LENGTH_M]);
+    frame.offset(pole_end_m);
     // Half a turn about x: the attach frame's -z points along the pole.
     let Quat {
         w,
@@ -276,8 +277,7 @@ fn doubled<V: Lanes>(sin: V, cos: V) -> (V, V) {
 mod tests {
     use super::*;
     use crate::Kernel;
-    use arm_model::JointVector;
-    use arm_model::kinematics::attach_motion;
+    use arm_model::{JointVector, Pole};
 
     fn states() -> Vec<JointState> {
         let wave = |i: usize, joint: usize, scale: f64| {
@@ -292,17 +292,32 @@ mod tests {
             .collect()
     }
 
+    fn knots(kernel: Kernel, states: &[JointState], pole: &Pole) -> Vec<Knot> {
+        kernel.run(ArmKnots {
+            states,
+            pole_end_m: pole.end_m().into(),
+        })
+    }
+
     #[test]
     fn agrees_with_the_arm_one_instant_at_a_time() {
         let states = states();
-        let knots = Kernel::PortableF64.run(ArmKnots { states: &states });
-        for (state, got) in states.iter().zip(knots) {
-            let mut want = Knot::new(&attach_motion(state));
-            want.on_the_side_of(&got);
-            for c in 0..7 {
-                assert!((got.value[c] - want.value[c]).abs() < 1e-14);
-                assert!((got.rate[c] - want.rate[c]).abs() < 1e-13);
-                assert!((got.acceleration[c] - want.acceleration[c]).abs() < 1e-12);
+        let lab = Pole::default();
+        let aside = Pole {
+            length_m: 0.3,
+            offset_m: [0.01, -0.02, 0.03],
+            ..lab
+        };
+        for pole in [lab, aside] {
+            let knots = knots(Kernel::PortableF64, &states, &pole);
+            for (state, got) in states.iter().zip(knots) {
+                let mut want = Knot::new(&pole.attach_motion(state));
+                want.on_the_side_of(&got);
+                for c in 0..7 {
+                    assert!((got.value[c] - want.value[c]).abs() < 1e-14);
+                    assert!((got.rate[c] - want.rate[c]).abs() < 1e-13);
+                    assert!((got.acceleration[c] - want.acceleration[c]).abs() < 1e-12);
+                }
             }
         }
     }
@@ -311,7 +326,7 @@ mod tests {
     fn vector_kernels_agree_bit_by_bit() {
         let states = states();
         let bits = |kernel: Kernel| -> Vec<u64> {
-            let knots = kernel.run(ArmKnots { states: &states });
+            let knots = knots(kernel, &states, &Pole::default());
             let numbers = |k: Knot| [k.value, k.rate, k.acceleration].concat();
             knots
                 .into_iter()

@@ -210,12 +210,15 @@ pub(crate) fn attitude(frame: &FrameMotion) -> UnitQuaternion<f64> {
 /// Exact motion at each of the times.
 fn knots(motion: &dyn AttachMotion, times_s: &[f64]) -> Result<Vec<Knot>, NotFinite> {
     let joints: Option<Vec<JointState>> = times_s.iter().map(|t| motion.joints_at(*t)).collect();
-    let knots = match joints {
-        Some(states) => {
+    let knots = match (joints, motion.pole()) {
+        (Some(states), Some(pole)) => {
             let kernel = Precision::F64.fastest_kernel();
-            kernel.run(ArmKnots { states: &states })
+            kernel.run(ArmKnots {
+                states: &states,
+                pole_end_m: pole.end_m().into(),
+            })
         }
-        None => times_s.iter().map(|t| Knot::new(&motion.at(*t))).collect(),
+        _ => times_s.iter().map(|t| Knot::new(&motion.at(*t))).collect(),
     };
     match knots.iter().position(|knot| !knot.is_finite()) {
         Some(index) => Err(NotFinite {
@@ -291,7 +294,7 @@ fn quintics(a: &Knot, b: &Knot, length_s: f64) -> [[f64; 6]; CHANNELS] {
 mod tests {
     use super::*;
     use crate::PlannedArm;
-    use arm_model::{JointTrajectory, JointVector};
+    use arm_model::{JointTrajectory, JointVector, Pole};
 
     fn arm() -> PlannedArm {
         let waypoints = [
@@ -299,7 +302,10 @@ mod tests {
             JointVector([0.3, -0.2, 0.4, 0.7, -0.5, 1.1, 0.6]),
             JointVector([0.1, -0.5, 0.2, 1.0, 0.3, 1.6, -0.4]),
         ];
-        PlannedArm::new(JointTrajectory::new(&[0.0, 0.31234, 0.70321], &waypoints).unwrap())
+        PlannedArm::new(
+            JointTrajectory::new(&[0.0, 0.31234, 0.70321], &waypoints).unwrap(),
+            Pole::default(),
+        )
     }
 
     #[test]

@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 use arm_model::JointVector;
+use arm_model::Pole;
 use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -331,7 +332,7 @@ fn times_that_do_not_increase_name_the_sample() {
         assert!(error.to_string().contains("sample 2"), "{error}");
     }
     let times_s = [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.04, 0.07];
-    let error = MeasuredArm::new(&times_s, &[JointVector::ZERO; 8]).unwrap_err();
+    let error = MeasuredArm::new(&times_s, &[JointVector::ZERO; 8], Pole::default()).unwrap_err();
     assert!(
         matches!(error, MotionError::TimeOrder { index: 6, .. }),
         "{error}"

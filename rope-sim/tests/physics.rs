@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
 use arm_model::kinematics::FrameMotion;
-use arm_model::{JointTrajectory, JointVector};
+use arm_model::{JointTrajectory, JointVector, Pole};
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start, Watch,
@@ -177,7 +177,10 @@ fn clamped_arm() -> PlannedArm {
         JointVector([0.2, -0.3, 0.2, 0.8, -0.2, 1.2, 0.3]),
         JointVector([0.1, -0.5, 0.1, 1.0, 0.1, 1.6, -0.2]),
     ];
-    PlannedArm::new(JointTrajectory::new(&[0.0, 0.2137, 0.4511], &waypoints).unwrap())
+    PlannedArm::new(
+        JointTrajectory::new(&[0.0, 0.2137, 0.4511], &waypoints).unwrap(),
+        Pole::default(),
+    )
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use crate::error::At;
 use crate::mcap_file::{RunFilm, is_mcap, replay_bytes};
 use crate::{CommandLine, Cycles, Error, Explanation, Result, RunLog, explain, files};
+use arm_model::Cell;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
 use shared_types::{KeypointTrack, Plan, RopeParams};
@@ -108,6 +109,14 @@ impl Run {
     /// The file is damaged.
     pub fn keypoints(&self) -> Result<Option<KeypointTrack>> {
         self.file(files::KEYPOINTS, files::read_json)
+    }
+
+    /// The cell it ran in; runs of older versions do not tell it.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn cell(&self) -> Result<Option<Cell>> {
+        self.file(files::CELL, files::read_cell)
     }
 
     /// The identified rope.

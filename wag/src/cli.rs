@@ -45,6 +45,10 @@ pub struct Cli {
     /// Seed of everything random; a command without chance takes it and ignores it.
     #[arg(long, global = true, allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
+    /// The cell: the pole on the arm, and what stands around it (TOML, as
+    /// configs/cell/lab.toml); it says only what differs. Default: the effective one.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub cell: Option<PathBuf>,
     /// Log more to standard error (-v info, -vv debug).
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,

@@ -38,5 +38,8 @@ fn main() -> ExitCode {
         }
     };
     cli_output::start_logging(cli.verbose);
+    if let Some(file) = &cli.cell {
+        config::name_cell(file);
+    }
     cli_output::finish(command::run(&cli), cli.json)
 }

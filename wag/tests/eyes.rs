@@ -5,6 +5,7 @@
 mod printed_board;
 mod support;
 
+use arm_model::Cell;
 use arm_model::joint::START_POSE;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::frame::StereoFrame;
@@ -270,7 +271,7 @@ fn the_lead_at_known_places_tells_where_the_camera_stands() {
         radius_m: 0.005,
         lead_radius_m: 0.015,
     };
-    let mut renderer = Renderer::new(&camera, shape, appearance, 1.6, 4);
+    let mut renderer = Renderer::new(&camera, &Cell::default(), shape, appearance, 1.6, 4);
     let resting = ScenePose {
         q: START_POSE,
         nodes: Vec::new(),

@@ -10,6 +10,7 @@
 mod support;
 
 use arm_model::Limits;
+use arm_model::Pole;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use planner::filming::{FilmTiming, KeypointLayout, Randomisation, film as film_rope, side_camera};
 use planner::ropes::{TRIAL_SALT, outside_rope, trial_rope};
@@ -30,7 +31,7 @@ fn film(rope: &RopeParams, index: u64, folder: &Path) {
     let camera = side_camera();
     let filmed = film_rope(
         rope,
-        &PlannedArm::new(motion),
+        &PlannedArm::new(motion, Pole::default()),
         &camera,
         KeypointLayout::Uniform(24),
         &FilmTiming::default(),

@@ -10,6 +10,7 @@
 mod support;
 
 use arm_model::JointVector;
+use arm_model::Pole;
 use rig_sim::hidden::hidden_rope;
 use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
 use rustix::process::{Pid, Signal, kill_process};
@@ -129,7 +130,7 @@ fn truth(camera: &StereoCamera, joints: &[JointReport], stamps: &[u64]) -> Vec<V
         .map(|r| MonotonicNs(r.stamp_ns).since_s(zero))
         .collect();
     let q: Vec<JointVector> = joints.iter().map(|r| r.q).collect();
-    let arm = MeasuredArm::new(&times, &q).unwrap();
+    let arm = MeasuredArm::new(&times, &q, Pole::default()).unwrap();
     let rope = hidden_rope(SEED);
     let last_s = *times.last().unwrap();
     // A rope every millisecond; the exposure's middle is nearest to one of them.

@@ -5,7 +5,7 @@
 mod support;
 
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, kinematics};
+use arm_model::{JointTrajectory, Pole};
 use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
 use shared_types::MonotonicNs;
@@ -206,7 +206,7 @@ fn the_replay_is_the_measured_arm_with_the_rope_on_it() {
     for frame in [0, 30, count / 2, count - 30] {
         let t = from_s + period_s * frame as f64;
         let q = throw().state_at((t - LAG_S).clamp(0.0, 1.0)).q;
-        let (end, _) = kinematics::attach_pose(&q);
+        let (end, _) = Pole::default().attach_pose(&q);
         let shown = at(&scene["arm"], frame, 8);
         let clamp = at(&scene["rope"], frame, 0);
         for axis in 0..3 {

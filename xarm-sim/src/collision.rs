@@ -1,10 +1,10 @@
-//! What the arm may run into: itself, and obstacles of the rig.
+//! What the arm may run into: obstacles of the rig, floor and column of its cell.
 //!
-//! Links are the capsules of [`arm_model::capsules`]. Link pairs closer than two apart
-//! always touch and are left out.
+//! Links and pole are the capsules of [`arm_model::capsules`].
 
-use arm_model::capsules::{self, ArmCapsules};
-use arm_model::{JOINTS, JointVector, kinematics};
+use arm_model::capsules::{arm_at, links_at};
+use arm_model::geometry::Capsule;
+use arm_model::{Cell, JointVector, kinematics};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +32,22 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
+    /// The floor and the column of a cell.
+    #[must_use]
+    pub fn of_cell(cell: &Cell) -> [Self; 2] {
+        let half = cell.column_half_width_m;
+        [
+            Self::Plane {
+                point_m: [0.0, 0.0, cell.floor_z_m],
+                normal: [0.0, 0.0, 1.0],
+            },
+            Self::Box {
+                min_m: [-half, -half, cell.floor_z_m],
+                max_m: [half, half, 0.0],
+            },
+        ]
+    }
+
     /// Whether the numbers make a body.
     #[must_use]
     pub fn is_well_formed(&self) -> bool {
@@ -65,32 +81,41 @@ impl Obstacle {
     }
 }
 
-/// Smallest gap between links two or more apart, negative when they touch (m).
+/// How deep the arm and what it carries reach into obstacles and into what stands in its
+/// cell, negative when they do not (m). It carries the cell's pole and a tool, a straight
+/// stick from the flange to `tcp_offset_m`; an arm without a cell stands free.
 #[must_use]
-pub fn self_clearance_m(q: &JointVector) -> f64 {
-    capsules::self_clearance_m(&ArmCapsules::at(q).links)
-}
-
-/// How deep arm and tool reach into obstacles, negative when they do not (m).
-/// The tool is a straight stick from the flange to `tcp_offset_m`.
-#[must_use]
-pub fn obstacle_depth_m(q: &JointVector, tcp_offset_m: &Vector3<f64>, all: &[Obstacle]) -> f64 {
+pub fn obstacle_depth_m(
+    q: &JointVector,
+    tcp_offset_m: &Vector3<f64>,
+    cell: Option<&Cell>,
+    obstacles: &[Obstacle],
+) -> f64 {
     /// Balls along a stick.
     const BALLS: u8 = 4;
     const TOOL_RADIUS_M: f64 = 0.01;
-    let (flange, attitude) = kinematics::link_poses(q)[JOINTS - 1];
-    let tool = [flange, flange + attitude * tcp_offset_m];
-    let moving = ArmCapsules::at(q)
-        .links
-        .into_iter()
-        .filter(|(link, _)| *link >= FIRST_REACHING_LINK)
-        .map(|(_, link)| ([link.a_m, link.b_m], link.radius_m))
-        .chain([(tool, TOOL_RADIUS_M)]);
+    let (flange, attitude) = kinematics::flange_pose(q);
+    let tool = Capsule {
+        a_m: flange,
+        b_m: flange + attitude * tcp_offset_m,
+        radius_m: TOOL_RADIUS_M,
+    };
+    let reaching = links_at(q).into_iter();
+    let moving = reaching
+        .filter_map(|(link, capsule)| (link >= FIRST_REACHING_LINK).then_some(capsule))
+        .chain([tool])
+        .chain(cell.map(|cell| arm_at(q, &cell.pole).1));
+    let standing = cell.map(Obstacle::of_cell);
     let mut depth_m = f64::NEG_INFINITY;
-    for ([a, b], radius_m) in moving {
+    for Capsule {
+        a_m: a,
+        b_m: b,
+        radius_m,
+    } in moving
+    {
         for k in 0..=BALLS {
             let centre = a + (b - a) * (f64::from(k) / f64::from(BALLS));
-            for obstacle in all {
+            for obstacle in obstacles.iter().chain(standing.iter().flatten()) {
                 depth_m = depth_m.max(obstacle.depth_m(&centre, radius_m));
             }
         }
@@ -102,6 +127,7 @@ pub fn obstacle_depth_m(q: &JointVector, tcp_offset_m: &Vector3<f64>, all: &[Obs
 mod tests {
     use super::*;
     use arm_model::Limits;
+    use arm_model::capsules::self_clearance_m;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -133,14 +159,23 @@ mod tests {
             point_m: [0.0; 3],
             normal: [0.0, 0.0, 2.0],
         };
-        let depth_m = obstacle_depth_m(&q, &tool, &[table]);
+        let depth_m = obstacle_depth_m(&q, &tool, None, &[table]);
         assert!((depth_m - (0.01 - 0.0205)).abs() < 1e-9, "{depth_m}");
         let block = Obstacle::Box {
             min_m: [0.1, -0.1, -0.1],
             max_m: [0.3, 0.1, 0.03],
         };
-        let depth_m = obstacle_depth_m(&q, &tool, &[table, block]);
+        let depth_m = obstacle_depth_m(&q, &tool, None, &[table, block]);
         assert!((depth_m - (0.01 + 0.0095)).abs() < 1e-9, "{depth_m}");
         assert!(block.is_well_formed() && table.is_well_formed());
+        // The pole of a cell reaches further down, to a floor that may be anywhere.
+        let mut cell = Cell::default();
+        let pole = cell.pole;
+        cell.floor_z_m = 0.0505 - pole.length_m;
+        let depth_m = obstacle_depth_m(&q, &Vector3::zeros(), Some(&cell), &[]);
+        assert!((depth_m - (pole.radius_m - 0.07)).abs() < 1e-9, "{depth_m}");
+        cell.pole.length_m += 0.1;
+        let depth_m = obstacle_depth_m(&q, &Vector3::zeros(), Some(&cell), &[]);
+        assert!((depth_m - (pole.radius_m + 0.03)).abs() < 1e-9, "{depth_m}");
     }
 }

@@ -6,7 +6,7 @@ use super::firmware::Firmware;
 use super::joint::JointDynamics;
 use super::pacer::Intake;
 use super::start_error::ArmStartError;
-use arm_model::{JOINTS, JointVector, Limits};
+use arm_model::{Cell, JOINTS, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{COMMAND_PORT, REPORT_PORTS};
@@ -72,7 +72,9 @@ pub struct ArmConfig {
     pub clock_ppm: f64,
     /// Whose clock paces setpoints.
     pub intake: Intake,
-    /// What stands in the arm's way.
+    /// The cell it stands in, whose pole it carries; left out, it stands free.
+    pub cell: Option<Cell>,
+    /// What stands in the arm's way besides.
     pub obstacles: Vec<Obstacle>,
     /// Whether self collision is looked for at the start (register 77).
     pub self_collision_check: bool,
@@ -101,6 +103,7 @@ impl Default for ArmConfig {
             uptime_s: 100.0,
             clock_ppm: 0.0,
             intake: Intake::default(),
+            cell: None,
             obstacles: Vec::new(),
             self_collision_check: false,
             fence_mm: None,

@@ -1,6 +1,6 @@
 //! What the controller checks a setpoint against.
 
-use super::collision::self_clearance_m;
+use arm_model::capsules::self_clearance_m;
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use nalgebra::Vector3;
 use rt_controller::xarm::ErrorCode;

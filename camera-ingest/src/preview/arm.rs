@@ -5,8 +5,7 @@
 
 use std::collections::VecDeque;
 
-use arm_model::JointVector;
-use arm_model::kinematics::attach_pose;
+use arm_model::{JointVector, Pole};
 use nalgebra::Vector3;
 use shared_types::MonotonicNs;
 
@@ -38,11 +37,11 @@ pub(super) struct Knot {
 
 impl Knot {
     /// From measured joints (CLOCK_MONOTONIC ns, rad); `None` for what is no pose.
-    pub(super) fn of_joints(stamp_ns: u64, q: &JointVector) -> Option<Self> {
+    pub(super) fn of_joints(stamp_ns: u64, q: &JointVector, pole: &Pole) -> Option<Self> {
         if !q.is_finite() {
             return None;
         }
-        let (p_w_m, r) = attach_pose(q);
+        let (p_w_m, r) = pole.attach_pose(q);
         Some(Self::new(stamp_ns, p_w_m, r.column(2).into()))
     }
 
@@ -221,6 +220,6 @@ mod tests {
         assert!(arm.is_known_at(500 * MS) && arm.is_known_at(1300 * MS));
         assert!(!arm.is_known_at(1301 * MS));
         let broken = JointVector::splat(f64::NAN);
-        assert!(Knot::of_joints(0, &broken).is_none());
+        assert!(Knot::of_joints(0, &broken, &Pole::default()).is_none());
     }
 }

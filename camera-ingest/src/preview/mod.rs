@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use arm_model::Cell;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
     Bus, FrameHeader, FrameSubscriber, IpcError, JointSubscriber, PIXEL_FORMAT_YUYV, PreviewFrame,
@@ -30,7 +31,7 @@ const TURN: Duration = Duration::from_millis(2);
 const SILENCE: Duration = Duration::from_millis(500);
 
 /// Configuration of the process. TOML form: keys as the fields.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PreviewConfig {
     /// Shared-memory domain.
@@ -40,6 +41,9 @@ pub struct PreviewConfig {
     /// Keypoints per frame, clamp and lead centre included (2 to 32).
     #[serde(default = "usual_keypoints")]
     pub keypoints: usize,
+    /// The cell, for its pole.
+    #[serde(default)]
+    pub cell: Cell,
 }
 
 fn usual_keypoints() -> usize {
@@ -47,13 +51,14 @@ fn usual_keypoints() -> usize {
 }
 
 impl PreviewConfig {
-    /// The usual one for a camera.
+    /// The usual one for a camera in a cell.
     #[must_use]
-    pub fn new(domain: &str, camera: PathBuf) -> Self {
+    pub fn new(domain: &str, camera: PathBuf, cell: Cell) -> Self {
         Self {
             domain: domain.to_owned(),
             camera,
             keypoints: usual_keypoints(),
+            cell,
         }
     }
 }
@@ -79,7 +84,7 @@ pub enum PreviewError {
 pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError> {
     let camera = load_camera(&config.camera)?;
     let eye_px = [camera.width_px, camera.height_px];
-    let mut preview = Preview::new(camera, config.keypoints)?;
+    let mut preview = Preview::new(camera, config.cell.pole, config.keypoints)?;
     let bus = Bus::join(&config.domain)?;
     let ports = Ports::open(&bus)?;
     tracing::info!(domain = config.domain, "preview is ready");

@@ -1,6 +1,6 @@
 //! What the preview makes of frames and poses as they come: no clock, no shared memory.
 
-use arm_model::JointVector;
+use arm_model::{JointVector, Pole};
 use shared_types::StereoCamera;
 use shared_types::ipc::{PreviewFrame, PreviewState};
 use shared_types::keypoints::{KeypointFrame, TrackedFrame};
@@ -59,6 +59,7 @@ struct Attempt {
 #[derive(Debug)]
 pub struct Preview {
     tracker: OnePass,
+    pole: Pole,
     arm: Arm,
     attempt: Option<Attempt>,
     last: Option<Last>,
@@ -68,13 +69,15 @@ pub struct Preview {
 }
 
 impl Preview {
-    /// One that has seen nothing; so many keypoints a frame, clamp and lead centre included.
+    /// One that has seen nothing, of a rope on this pole; so many keypoints a frame, clamp and
+    /// lead centre included.
     ///
     /// # Errors
     /// Too many or few keypoints.
-    pub fn new(camera: StereoCamera, keypoints: usize) -> Result<Self, TrackError> {
+    pub fn new(camera: StereoCamera, pole: Pole, keypoints: usize) -> Result<Self, TrackError> {
         Ok(Self {
             tracker: OnePass::new(camera, keypoints)?,
+            pole,
             arm: Arm::default(),
             attempt: None,
             last: None,
@@ -86,7 +89,7 @@ impl Preview {
 
     /// Takes in the arm's joints as measured (CLOCK_MONOTONIC ns, rad).
     pub fn report(&mut self, stamp_ns: u64, q: &JointVector) {
-        if let Some(knot) = Knot::of_joints(stamp_ns, q) {
+        if let Some(knot) = Knot::of_joints(stamp_ns, q, &self.pole) {
             self.arm.put(knot);
         }
     }

@@ -1,6 +1,7 @@
 //! The stepping logic on frames drawn from formulas.
 
 use super::*;
+use arm_model::Pole;
 use arm_model::joint::START_POSE;
 use nalgebra::{Matrix3, Vector3};
 use shared_types::{Intrinsics, Shutter};
@@ -146,7 +147,7 @@ fn show(
 
 #[test]
 fn a_swinging_rope_is_followed_found_where_the_arm_goes_and_given_up_when_it_is_gone() {
-    let mut preview = Preview::new(camera(), 21).unwrap();
+    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
     let mut swing = Swing {
         still_s: 0.5,
         away_m: 0.0,
@@ -181,7 +182,7 @@ fn a_swinging_rope_is_followed_found_where_the_arm_goes_and_given_up_when_it_is_
 
 #[test]
 fn frames_left_out_are_counted_and_do_not_stop_it() {
-    let mut preview = Preview::new(camera(), 21).unwrap();
+    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
     let swing = Swing {
         still_s: 0.5,
         away_m: 0.0,
@@ -211,7 +212,7 @@ fn frames_left_out_are_counted_and_do_not_stop_it() {
 
 /// One that has seen `frames` frames of a wall under an arm that stands.
 fn looking(frames: u64) -> Preview {
-    let mut preview = Preview::new(camera(), 21).unwrap();
+    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
     for index in 0..frames {
         let frame = wall(index);
         preview.report(frame.stamp_ns, &START_POSE);
@@ -222,7 +223,7 @@ fn looking(frames: u64) -> Preview {
 
 #[test]
 fn without_a_camera_or_an_arm_it_waits_and_says_so() {
-    let mut preview = Preview::new(camera(), 21).unwrap();
+    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
     assert_eq!(preview.without_camera().state(), PreviewState::NoCamera);
     let found = preview.see(wall(0));
     assert_eq!((found.state(), found.seen), (PreviewState::NoArm, 1));
@@ -276,5 +277,5 @@ fn frames_of_another_camera_are_said_to_be_unfit_and_end_with_the_next_that_fits
     assert_eq!(preview.see(narrow).state(), PreviewState::Unfit);
     assert_eq!(preview.unfit(4, wall(4).stamp_ns).restarts, 1);
     assert_eq!(preview.see(wall(5)).state(), PreviewState::Looking);
-    assert!(Preview::new(camera(), 1).is_err());
+    assert!(Preview::new(camera(), Pole::default(), 1).is_err());
 }

@@ -11,6 +11,7 @@ mod work;
 use crate::frame::{EyeFrame, StereoFrame};
 use crate::still::StillDetector;
 use answer::{answer, failed};
+use arm_model::{Cell, Pole};
 use keep::Recording;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress};
@@ -22,11 +23,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Configuration of the process. TOML form: keys as the fields.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraConfig {
     /// Shared-memory domain.
     pub domain: String,
+    /// The cell, for its pole.
+    #[serde(default)]
+    pub cell: Cell,
 }
 
 /// Frames that are compared to see motion: a tenth of a second apart at 60 Hz.
@@ -48,6 +52,7 @@ pub fn run(config: &CameraConfig, stop: &AtomicBool) -> Result<(), IpcError> {
     let mut process = Process {
         frames,
         keypoints,
+        pole: config.cell.pole,
         recording: Recording::default(),
         job: None,
     };
@@ -86,6 +91,7 @@ struct Job {
 struct Process {
     frames: FrameSubscriber,
     keypoints: KeypointPublisher,
+    pole: Pole,
     recording: Recording,
     job: Option<Job>,
 }
@@ -100,7 +106,7 @@ impl Process {
                 return answer(&call, &failed(busy));
             }
             CameraRequest::Track { .. } => {
-                let event = work::track(&self.recording, &call, &self.keypoints);
+                let event = work::track(&self.recording, &self.pole, &call, &self.keypoints);
                 return answer(&call, &event);
             }
             CameraRequest::Score { .. } => {

@@ -7,7 +7,7 @@ use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
 use crate::track::{ClampPath, TrackOptions, TrackResult, track as track_frames};
-use arm_model::JointVector;
+use arm_model::{JointVector, Pole};
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
@@ -28,14 +28,16 @@ type Failure = Box<dyn std::error::Error>;
 /// Tracks the rope and publishes its keypoints.
 pub(super) fn track(
     recording: &Recording,
+    pole: &Pole,
     call: &Call<CameraRpc>,
     publisher: &KeypointPublisher,
 ) -> CameraEvent {
-    try_track(recording, call, publisher).unwrap_or_else(failed)
+    try_track(recording, pole, call, publisher).unwrap_or_else(failed)
 }
 
 fn try_track(
     recording: &Recording,
+    pole: &Pole,
     call: &Call<CameraRpc>,
     publisher: &KeypointPublisher,
 ) -> Result<CameraEvent, Failure> {
@@ -59,7 +61,7 @@ fn try_track(
     };
     answer(call, &CameraEvent::Progress(progress));
     let began = Instant::now();
-    let clamp = clamp_path(joints, recording.first_stamp_ns())?;
+    let clamp = clamp_path(joints, recording.first_stamp_ns(), pole)?;
     let options = TrackOptions {
         keypoints: *keypoints as usize,
         ..TrackOptions::default()
@@ -86,12 +88,16 @@ fn try_track(
 }
 
 /// The clamp's motion, time 0 at the first frame.
-fn clamp_path(joints: &[(u64, JointVector)], first_stamp_ns: u64) -> Result<ClampPath, Failure> {
+fn clamp_path(
+    joints: &[(u64, JointVector)],
+    first_stamp_ns: u64,
+    pole: &Pole,
+) -> Result<ClampPath, Failure> {
     let samples: Vec<(f64, JointVector)> = joints
         .iter()
         .map(|(t, q)| (MonotonicNs(*t).since_s(MonotonicNs(first_stamp_ns)), *q))
         .collect();
-    Ok(ClampPath::from_joints(&samples)?)
+    Ok(ClampPath::from_joints(&samples, pole)?)
 }
 
 fn publish(

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use arm_model::JointVector;
-use arm_model::kinematics::attach_pose;
+use arm_model::{JointVector, Pole};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Why a path of the clamp is refused.
@@ -71,17 +70,17 @@ impl ClampPath {
         Ok(Self { samples })
     }
 
-    /// From joint positions in order of time (t = 0: first frame), through the
-    /// arm's kinematics.
+    /// From joint positions in order of time (t = 0: first frame), through the kinematics
+    /// of the arm with this pole.
     ///
     /// # Errors
     /// As [`ClampPath::new`].
-    pub fn from_joints(joints: &[(f64, JointVector)]) -> Result<Self, ClampError> {
+    pub fn from_joints(joints: &[(f64, JointVector)], pole: &Pole) -> Result<Self, ClampError> {
         Self::new(
             joints
                 .iter()
                 .map(|(t_s, q)| {
-                    let (p_w_m, r) = attach_pose(q);
+                    let (p_w_m, r) = pole.attach_pose(q);
                     ClampSample {
                         t_s: *t_s,
                         p_w_m,

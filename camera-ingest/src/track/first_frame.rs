@@ -21,7 +21,7 @@ const FIRST_GAP_M: f64 = 0.15;
 /// Smoothing makes the mask this much wider than what is seen (px).
 const MASK_GROWS_PX: f64 = 1.0;
 /// The pole and what holds it: blocked out to this distance behind the clamp (m).
-const POLE_LENGTH_M: f64 = 0.35;
+const BLOCKED_BEHIND_M: f64 = 0.35;
 /// Half-width of what is blocked around the pole (m).
 const POLE_HALF_WIDTH_M: f64 = 0.035;
 /// Coverage at which a pixel counts as lead (see [`Matter::full`]).
@@ -267,7 +267,7 @@ fn ground(
     let on = |&on: &bool| if on { Ground::On } else { Ground::Off };
     let mut ground: Vec<Ground> = mask.iter().map(on).collect();
     // Begin where the half-circle around the pole's start ends at the clamp.
-    let Some((a, b)) = behind(POLE_HALF_WIDTH_M + 0.004).zip(behind(POLE_LENGTH_M)) else {
+    let Some((a, b)) = behind(POLE_HALF_WIDTH_M + 0.004).zip(behind(BLOCKED_BEHIND_M)) else {
         return ground;
     };
     let range = |k: usize, size: usize| {

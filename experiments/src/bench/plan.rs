@@ -3,6 +3,7 @@
 use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
+use arm_model::Cell;
 use arm_model::Limits;
 use cli_output::table::numbers;
 use cli_output::{OrInput, Outcome, Stage};
@@ -54,6 +55,7 @@ fn measure(
     let request = PlanRequest {
         rope: random_rope(args.seed),
         limits: Limits::default(),
+        cell: Cell::default(),
         options: PlanOptions {
             seed: args.seed,
             searches: 1,
@@ -66,7 +68,7 @@ fn measure(
     let plan = || plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()));
     let (whole, planned): (_, Planned) = least(repeats, plan).or_failed()?;
     let throws = vec![(&request.rope, &planned.trajectory); BATCH];
-    let simulator = simulator_for(&*task, &request.rope, &request.options);
+    let simulator = simulator_for(&*task, &request.rope, &request.cell, &request.options);
     let blind = ThrowSimulator {
         contact_period_s: NEVER_S,
         ..simulator.clone()

@@ -5,6 +5,7 @@ use super::report::report;
 use super::spent::{Spent, least};
 use crate::args::BenchArgs;
 use anyhow::{Context, anyhow};
+use arm_model::Pole;
 use camera_ingest::source::{FrameSource, StereoSource, read_left};
 use camera_ingest::{ClampPath, TrackOptions, load_camera, open_video, track};
 use cli_output::table::numbers;
@@ -76,7 +77,7 @@ fn recording(folder: &Path) -> Outcome<(Box<dyn StereoSource>, StereoCamera, Cla
     let clamp = if joints.exists() {
         let csv = read_joints(&joints).or_input()?;
         let samples: Vec<_> = csv.times_s.into_iter().zip(csv.q).collect();
-        ClampPath::from_joints(&samples)
+        ClampPath::from_joints(&samples, &Pole::default())
             .with_context(|| format!("`{}`", joints.display()))
             .or_input()?
     } else {

@@ -4,7 +4,7 @@
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;
 use anyhow::{Context, anyhow};
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{Cell, JointTrajectory, Limits};
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome, interrupted};
 use experiments::trials::{FidelityConfig, FidelityRow, mean, middle_rope};
@@ -25,6 +25,7 @@ fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
     let request = PlanRequest {
         rope: middle_rope(),
         limits: Limits::default(),
+        cell: Cell::default(),
         options: PlanOptions {
             seed,
             ..config.search

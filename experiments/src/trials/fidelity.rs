@@ -7,6 +7,7 @@
 
 use super::{KEYPOINTS, TrialError, TrialRig, mean, trial_rope};
 use arm_model::JointTrajectory;
+use arm_model::Pole;
 use nalgebra::Vector3;
 use planner::filming::{FilmTiming, Filmed, RopeFilm, project};
 use planner::sysid::IdentifyOptions;
@@ -214,7 +215,7 @@ impl TrialRig {
     ) -> Result<FidelityRow, TrialError> {
         let filmed = self.film_real(rope, seed, index)?;
         let found = self.fit(&filmed, index, options)?;
-        let arm = PlannedArm::new(*throw);
+        let arm = PlannedArm::new(*throw, Pole::default());
         let moved =
             |rope: &RopeParams, extras: RopeExtras| paths(rope, extras, &arm, COMPARED_S, RATE_HZ);
         let truth = moved(&rope.params, rope.extras)?;

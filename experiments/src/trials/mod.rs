@@ -35,6 +35,7 @@ use planner::ropes::TRIAL_SALT;
 pub use planner::ropes::{outside_rope, trial_rope};
 
 use arm_model::Limits;
+use arm_model::Pole;
 use planner::sysid::{FitProgress, IdentifyOptions, Method, Observation, identify};
 use planner::tasks::PlanError;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
@@ -131,7 +132,7 @@ impl TrialRig {
     /// If the arm may not execute it.
     pub fn new(config: &WiggleConfig) -> Result<Self, WiggleError> {
         Ok(Self {
-            motion: PlannedArm::new(wiggle(config, &Limits::default())?),
+            motion: PlannedArm::new(wiggle(config, &Limits::default())?, Pole::default()),
             camera: side_camera(),
             randomisation: Randomisation::default(),
             points: ObservedPoints::ArcLength,

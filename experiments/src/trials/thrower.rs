@@ -1,5 +1,6 @@
 //! A throw planned for one rope and thrown with another.
 
+use arm_model::Cell;
 use arm_model::Limits;
 use planner::tasks::{
     Belief, PlanError, PlanOptions, PlanRequest, Planned, ThrowOutcome, ThrowSimulator, ThrowTask,
@@ -45,6 +46,7 @@ impl Thrower<'_> {
         let request = PlanRequest {
             rope: *rope,
             limits: Limits::default(),
+            cell: Cell::default(),
             options: PlanOptions {
                 searches,
                 ..self.options
@@ -69,7 +71,7 @@ impl Thrower<'_> {
     pub(super) fn outcome(&self, planned: &Planned) -> Result<Option<ThrowOutcome>, PlanError> {
         let simulator = ThrowSimulator {
             tail_s: self.task.config().observed_s,
-            ..simulator_for(self.task, &self.truth, &self.options)
+            ..simulator_for(self.task, &self.truth, &Cell::default(), &self.options)
         };
         let throws = [(&self.truth, &planned.trajectory)];
         Ok(simulator.exact().run(&throws)?.pop())

@@ -9,7 +9,7 @@
 
 use super::TrialRig;
 use super::summary::PAPER;
-use arm_model::{JointTrajectory, JointVector, Limits};
+use arm_model::{JointTrajectory, JointVector, Limits, Pole};
 use planner::wiggle::{WiggleConfig, WiggleError, unlimited};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -130,7 +130,7 @@ impl TrialRig {
     #[must_use]
     pub fn wiggling(&self, wiggle: &AblatedWiggle) -> Self {
         Self {
-            motion: PlannedArm::new(wiggle.trajectory),
+            motion: PlannedArm::new(wiggle.trajectory, Pole::default()),
             network: None,
             ..self.clone()
         }

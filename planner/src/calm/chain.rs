@@ -2,8 +2,8 @@
 //! joints, a hold, then the move.
 
 use super::{CalmError, CalmRequest};
-use arm_model::kinematics::{FrameMotion, attach_motion, link_motions};
-use arm_model::{JOINTS, JointState, JointTrajectory, JointVector};
+use arm_model::kinematics::{FrameMotion, link_motions};
+use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector};
 use rope_sim::{AttachMotion, MeasuredArm};
 
 /// Largest distance of a joint from the commanded start pose (rad): above what
@@ -14,6 +14,7 @@ const START_TOLERANCE_RAD: f64 = 0.02;
 #[derive(Debug)]
 pub(super) struct Prelude {
     measured: MeasuredArm,
+    pub(super) cell: Cell,
     /// When the move begins (s).
     pub(super) start_s: f64,
     /// Measured minus commanded pose at rest (rad). The arm is taken to stand as
@@ -23,7 +24,7 @@ pub(super) struct Prelude {
 
 impl Prelude {
     pub(super) fn new(request: &CalmRequest) -> Result<Self, CalmError> {
-        let measured = MeasuredArm::new(&request.times_s, &request.q)?;
+        let measured = MeasuredArm::new(&request.times_s, &request.q, request.cell.pole)?;
         let last_s = measured.duration_s();
         let start_s = request.start_s;
         if !(start_s >= last_s && start_s > 0.0 && start_s.is_finite()) {
@@ -38,6 +39,7 @@ impl Prelude {
             }),
             None => Ok(Self {
                 measured,
+                cell: request.cell,
                 start_s,
                 standing_error,
             }),
@@ -75,7 +77,7 @@ impl ChainedArm<'_> {
 
 impl AttachMotion for ChainedArm<'_> {
     fn at(&self, t_s: f64) -> FrameMotion {
-        attach_motion(&self.joints_at(t_s))
+        self.prelude.cell.pole.attach_motion(&self.joints_at(t_s))
     }
 
     fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {

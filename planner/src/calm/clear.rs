@@ -1,7 +1,7 @@
 //! Room around rope and tool during a move.
 
 use super::sway::{Sway, SwaySimulator};
-use crate::collide::{ArmShape, RopeShape, Scene, rope_clearance_m, tool_contacts};
+use crate::collide::{ArmShape, RopeShape, rope_clearance_m, tool_contacts};
 use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
@@ -22,7 +22,7 @@ pub(super) fn room(
     trajectory: &JointTrajectory,
     sway: &Sway,
 ) -> Room {
-    let scene = Scene::default();
+    let cell = &simulator.prelude.cell;
     let shape = RopeShape::from(rope);
     let mut out = Room {
         rope_gap_m: f64::INFINITY,
@@ -30,14 +30,14 @@ pub(super) fn room(
     };
     for frame in 0..sway.nodes.frames() {
         let q = trajectory.state_at(Sway::time_s(frame)).q + simulator.prelude.standing_error;
-        let arm = ArmShape::at(&q);
+        let arm = ArmShape::at(&q, &cell.pole);
         let nodes: Vec<Vector3<f64>> = (0..sway.nodes.nodes())
             .map(|n| sway.nodes.position(frame, n))
             .collect();
         out.rope_gap_m = out
             .rope_gap_m
-            .min(rope_clearance_m(&arm, &scene, &shape, &nodes));
-        out.tool_touches |= !tool_contacts(&arm, &scene).none();
+            .min(rope_clearance_m(&arm, cell, &shape, &nodes));
+        out.tool_touches |= !tool_contacts(&arm, cell).none();
     }
     out
 }

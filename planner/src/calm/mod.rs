@@ -16,7 +16,7 @@ mod sway;
 #[cfg(test)]
 mod tests;
 
-use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
 use chain::Prelude;
 use descent::Calmest;
 use rope_sim::sensitivity::SensitivityError;
@@ -49,6 +49,8 @@ pub struct CalmRequest {
     pub end_q: JointVector,
     /// What the arm may do.
     pub limits: Limits,
+    /// The pole, and what stands around the arm.
+    pub cell: Cell,
 }
 
 /// Size of a calming move and of the search for it.

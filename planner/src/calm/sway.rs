@@ -164,10 +164,10 @@ fn rest(
     prelude: &Prelude,
     plain: &JointTrajectory,
 ) -> Result<[(usize, Vector3<f64>); 2], CalmError> {
-    let held = PlannedArm::new(JointTrajectory::hold(
-        plain.end() + prelude.standing_error,
-        1.0,
-    )?);
+    let held = PlannedArm::new(
+        JointTrajectory::hold(plain.end() + prelude.standing_error, 1.0)?,
+        prelude.cell.pole,
+    );
     let rollouts = roll_out(
         &[Candidate::new(rope, &held)],
         &SimOptions {

@@ -1,8 +1,9 @@
 use super::*;
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
+use arm_model::Cell;
+use arm_model::Pole;
 use arm_model::joint::START_POSE;
-use arm_model::kinematics::attach_pose;
 use arm_model::limits::LimitsSpec;
 use nalgebra::Vector3;
 use rope_sim::{
@@ -58,6 +59,7 @@ fn request(rope: RopeParams, turn_deg: f64) -> CalmRequest {
         start_q: START_POSE,
         end_q: turned(turn_deg),
         limits: Limits::default(),
+        cell: Cell::default(),
     }
 }
 
@@ -84,7 +86,7 @@ fn settled_sway_m(request: &CalmRequest, trajectory: &JointTrajectory) -> f64 {
             trajectory.state_at(t - request.start_s).q
         }
     });
-    let arm = MeasuredArm::new(&times_s, &q).unwrap();
+    let arm = MeasuredArm::new(&times_s, &q, Pole::default()).unwrap();
     let rollouts = roll_out(
         &[Candidate::new(&request.rope, &arm)],
         &SimOptions {
@@ -102,7 +104,8 @@ fn settled_sway_m(request: &CalmRequest, trajectory: &JointTrajectory) -> f64 {
         },
     )
     .unwrap();
-    let below = attach_pose(&request.end_q).0 - Vector3::z() * request.rope.length_m;
+    let below =
+        Pole::default().attach_pose(&request.end_q).0 - Vector3::z() * request.rope.length_m;
     let nodes = &rollouts[0].nodes;
     (0..nodes.frames())
         .map(|f| (nodes.position(f, nodes.nodes() - 1) - below).norm())
@@ -253,6 +256,6 @@ fn the_arm_keeps_its_standing_error_through_the_move() {
     let mut end_q = request.end_q;
     end_q[5] += 0.004;
     let end = arm.at(arm.duration_s() + 1.0);
-    assert!((end.p_m - attach_pose(&end_q).0).norm() < 1e-6);
+    assert!((end.p_m - Pole::default().attach_pose(&end_q).0).norm() < 1e-6);
     assert_eq!(end.v_m_s.norm(), 0.0);
 }

@@ -1,9 +1,9 @@
 //! The arm as capsules, and contacts of its tool side with its base side.
 
 use super::ContactCounts;
-use arm_model::JointVector;
-use arm_model::capsules::{self, ArmCapsules, Capsule, LINK_CAPSULES};
-use arm_model::cell::Cell;
+use arm_model::capsules::{LINK_CAPSULES, arm_at};
+use arm_model::geometry::Capsule;
+use arm_model::{Cell, JointVector, Pole};
 
 /// Added to every capsule of a link: faces of L-shaped links lie up to this far
 /// outside the two capsules that wrap their vertices (m).
@@ -45,10 +45,10 @@ pub struct ArmShape {
 }
 
 impl ArmShape {
-    /// The arm in the pose `q` (rad).
+    /// The arm in the pose `q` (rad), with this pole on its flange.
     #[must_use]
-    pub fn at(q: &JointVector) -> Self {
-        let ArmCapsules { links, pole } = ArmCapsules::at(q);
+    pub fn at(q: &JointVector, pole: &Pole) -> Self {
+        let (links, pole) = arm_at(q, pole);
         let capsules = core::array::from_fn(|i| {
             links.get(i).map_or((Part::Pole, pole), |&(link, bare)| {
                 let radius_m = bare.radius_m + WRAP_MARGIN_M;
@@ -57,23 +57,12 @@ impl ArmShape {
         });
         Self { capsules }
     }
-
-    /// Smallest gap between links two or more apart, negative when they overlap (m): the
-    /// bare capsules, without the pole, which the arm does not know of.
-    #[must_use]
-    pub fn self_clearance_m(&self) -> f64 {
-        let links: [_; LINK_CAPSULES] = core::array::from_fn(|i| {
-            let (part, capsule) = self.capsules[i];
-            (part.order(), capsule)
-        });
-        capsules::self_clearance_m(&links) + 2.0 * WRAP_MARGIN_M
-    }
 }
 
 /// Contacts of the tool side (links 6, 7 and pole) with the rest of the arm
 /// (links at least two apart), column and floor.
 #[must_use]
-pub fn tool_contacts(arm: &ArmShape, scene: &Cell) -> ContactCounts {
+pub fn tool_contacts(arm: &ArmShape, cell: &Cell) -> ContactCounts {
     let mut out = ContactCounts::default();
     for (part, capsule) in arm.capsules.iter().filter(|(p, _)| p.order() >= 6) {
         for (other_part, other) in &arm.capsules {
@@ -92,7 +81,7 @@ pub fn tool_contacts(arm: &ArmShape, scene: &Cell) -> ContactCounts {
         if ends
             .into_iter()
             .chain([&middle])
-            .any(|p| scene.touches(p, capsule.radius_m))
+            .any(|p| cell.touches(p, capsule.radius_m))
         {
             out.base_region += 1;
         }
@@ -104,10 +93,10 @@ pub fn tool_contacts(arm: &ArmShape, scene: &Cell) -> ContactCounts {
 mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
-    use arm_model::kinematics;
 
     fn contacts(q: [f64; 7]) -> ContactCounts {
-        tool_contacts(&ArmShape::at(&JointVector(q)), &Cell::default())
+        let cell = Cell::default();
+        tool_contacts(&ArmShape::at(&JointVector(q), &cell.pole), &cell)
     }
 
     #[test]
@@ -138,21 +127,13 @@ mod tests {
                 grid(c, -1.6, 3.1),
                 0.0,
             ];
-            let end = kinematics::attach_pose(&JointVector(q)).0;
-            if Cell::default().column_distance_m(&end) == 0.0 {
+            let cell = Cell::default();
+            let end = cell.pole.attach_pose(&JointVector(q)).0;
+            if cell.column_distance_m(&end) == 0.0 {
                 inside += 1;
                 assert!(contacts(q).base_region > 0, "{q:?}");
             }
         }
         assert!(inside > 5, "{inside}");
-    }
-
-    /// The vendor's zero pose is free, its smallest gap 11 mm.
-    #[test]
-    fn the_zero_pose_is_free_by_eleven_millimetres() {
-        let gap_m = ArmShape::at(&JointVector::ZERO).self_clearance_m();
-        assert!((gap_m - 0.011).abs() < 0.002, "{gap_m}");
-        let folded = ArmShape::at(&JointVector([0.0, 0.0, 0.0, 0.0, 0.0, 3.1, 0.0]));
-        assert!(folded.self_clearance_m() < 0.0);
     }
 }

@@ -1,7 +1,7 @@
 //! Contacts of the arm with blocks: boards, walls, stands.
 
 use super::arm::{ArmShape, Part};
-use arm_model::capsules::{Capsule, box_distance_m};
+use arm_model::geometry::{Capsule, box_distance_m};
 use nalgebra::Isometry3;
 
 /// Distance below which arm and block count as touching: what an arm's pose and a
@@ -61,8 +61,8 @@ pub fn block_contacts(arm: &ArmShape, blocks: &[Block]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::Pole;
     use arm_model::joint::START_POSE;
-    use arm_model::kinematics;
     use nalgebra::{UnitQuaternion, Vector3};
 
     #[test]
@@ -95,8 +95,9 @@ mod tests {
 
     #[test]
     fn a_block_at_the_pole_is_touched_and_one_beside_it_is_not() {
-        let arm = ArmShape::at(&START_POSE);
-        let end = kinematics::attach_pose(&START_POSE).0;
+        let pole = Pole::default();
+        let arm = ArmShape::at(&START_POSE, &pole);
+        let end = pole.attach_pose(&START_POSE).0;
         let at = |x: f64| Block {
             pose: Isometry3::translation(end.x + x, end.y, end.z),
             half_m: [0.01, 0.3, 0.05],

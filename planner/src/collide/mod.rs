@@ -10,8 +10,7 @@ mod block;
 mod rope;
 
 pub use arm::{ArmShape, Part, tool_contacts};
-pub use arm_model::capsules::Capsule;
-pub use arm_model::cell::Cell as Scene;
+pub use arm_model::geometry::Capsule;
 pub use block::{Block, block_contacts};
 pub use rope::{RopeShape, rope_clearance_m, rope_contacts};
 

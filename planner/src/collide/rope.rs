@@ -1,8 +1,8 @@
 //! Contacts and clearance of the rope.
 
 use super::ContactCounts;
-use super::Scene;
 use super::arm::{ArmShape, Part};
+use arm_model::Cell;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
 
@@ -68,7 +68,7 @@ fn bounding_box(nodes: &[Vector3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
 #[must_use]
 pub fn rope_contacts(
     arm: &ArmShape,
-    scene: &Scene,
+    cell: &Cell,
     shape: &RopeShape,
     nodes: &[Vector3<f64>],
 ) -> ContactCounts {
@@ -89,11 +89,11 @@ pub fn rope_contacts(
             last_part = Some(*part);
         }
     }
-    let w = scene.column_half_width_m + largest;
+    let w = cell.column_half_width_m + largest;
     let near_column = low.z < largest && low.x < w && high.x > -w && low.y < w && high.y > -w;
-    let near_floor = low.z - largest < scene.floor_z_m;
+    let near_floor = low.z - largest < cell.floor_z_m;
     if (near_column || near_floor)
-        && spheres(shape, nodes).any(|(p, radius, _)| scene.touches(&p, radius))
+        && spheres(shape, nodes).any(|(p, radius, _)| cell.touches(&p, radius))
     {
         out.base_region += 1;
     }
@@ -105,7 +105,7 @@ pub fn rope_contacts(
 #[must_use]
 pub fn rope_clearance_m(
     arm: &ArmShape,
-    scene: &Scene,
+    cell: &Cell,
     shape: &RopeShape,
     nodes: &[Vector3<f64>],
 ) -> f64 {
@@ -117,7 +117,7 @@ pub fn rope_clearance_m(
                 .filter(|(part, _)| !matches!(part, Part::Pole | Part::Link(6 | 7)))
                 .map(|(_, capsule)| capsule.distance_to_point_m(&p))
                 .fold(f64::INFINITY, f64::min);
-            to_arm.min(scene.column_distance_m(&p)) - radius
+            to_arm.min(cell.column_distance_m(&p)) - radius
         })
         .fold(f64::INFINITY, f64::min)
 }
@@ -126,7 +126,6 @@ pub fn rope_clearance_m(
 mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
-    use arm_model::kinematics;
 
     fn straight(from: Vector3<f64>, direction: Vector3<f64>) -> Vec<Vector3<f64>> {
         (0..=20)
@@ -142,25 +141,25 @@ mod tests {
 
     #[test]
     fn a_hanging_rope_is_free_and_its_clearance_is_that_of_the_column() {
-        let arm = ArmShape::at(&START_POSE);
-        let scene = Scene::default();
-        let clamp = kinematics::attach_pose(&START_POSE).0;
+        let cell = Cell::default();
+        let arm = ArmShape::at(&START_POSE, &cell.pole);
+        let clamp = cell.pole.attach_pose(&START_POSE).0;
         let nodes = straight(clamp, -Vector3::z());
-        assert!(rope_contacts(&arm, &scene, &SHAPE, &nodes).none());
-        assert!(rope_clearance_m(&arm, &scene, &SHAPE, &nodes) > 0.2);
+        assert!(rope_contacts(&arm, &cell, &SHAPE, &nodes).none());
+        assert!(rope_clearance_m(&arm, &cell, &SHAPE, &nodes) > 0.2);
         let near = straight(Vector3::new(0.25, 0.0, -0.05), -Vector3::z());
-        let gap = rope_clearance_m(&arm, &scene, &SHAPE, &near);
+        let gap = rope_clearance_m(&arm, &cell, &SHAPE, &near);
         assert!((gap - (0.25 - 0.09 - 0.03)).abs() < 1e-9, "{gap}");
     }
 
     #[test]
     fn contacts_with_arm_column_and_floor_are_told_apart() {
-        let arm = ArmShape::at(&START_POSE);
-        let scene = Scene::default();
+        let cell = Cell::default();
+        let arm = ArmShape::at(&START_POSE, &cell.pole);
         let count = |from: [f64; 3], direction: Vector3<f64>| {
             rope_contacts(
                 &arm,
-                &scene,
+                &cell,
                 &SHAPE,
                 &straight(Vector3::from(from), direction),
             )

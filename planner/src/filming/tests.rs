@@ -2,13 +2,16 @@ use super::noise::TrackingNoise;
 use super::*;
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{JointTrajectory, Limits, Pole};
 use nalgebra::Vector3;
 use rope_sim::PlannedArm;
 use shared_types::Shutter;
 
 fn arm() -> PlannedArm {
-    PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
+    PlannedArm::new(
+        wiggle(&WiggleConfig::default(), &Limits::default()).unwrap(),
+        Pole::default(),
+    )
 }
 
 fn short() -> FilmTiming {
@@ -165,7 +168,7 @@ fn tracking_errors_have_the_size_and_correlation_asked_for() {
 fn errors_lie_along_and_across_the_rope() {
     let (rope, camera) = (random_rope(6), side_camera());
     let hold = JointTrajectory::hold(arm_model::joint::START_POSE, 3.0).unwrap();
-    let arm = PlannedArm::new(hold);
+    let arm = PlannedArm::new(hold, Pole::default());
     let look = |noise: &FilmNoise| film(&rope, &arm, &camera, 9, &short(), noise).unwrap();
     let plain = look(&FilmNoise::default());
     // A hanging rope is upright in the picture: along it is along v.

@@ -2,13 +2,16 @@ use super::*;
 use crate::filming::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{JointTrajectory, Limits, Pole};
 use nalgebra::{Matrix3, Vector3};
 use rope_sim::PlannedArm;
 use shared_types::{Intrinsics, RopeParams, Shutter};
 
 fn arm() -> PlannedArm {
-    PlannedArm::new(wiggle(&WiggleConfig::default(), &Limits::default()).unwrap())
+    PlannedArm::new(
+        wiggle(&WiggleConfig::default(), &Limits::default()).unwrap(),
+        Pole::default(),
+    )
 }
 
 fn filmed(camera: &StereoCamera) -> KeypointTrack {
@@ -209,7 +212,7 @@ fn useless_recordings_are_refused_with_the_reason() {
     assert!(matches!(look(&bad, &camera), ObserveError::Keypoints(_)));
     let hold = JointTrajectory::hold(arm_model::joint::START_POSE, 3.0).unwrap();
     assert!(matches!(
-        ViewPlane::of_motion(&PlannedArm::new(hold), 3.0),
+        ViewPlane::of_motion(&PlannedArm::new(hold, Pole::default()), 3.0),
         Err(ObserveError::NoWiggle { .. })
     ));
 }
@@ -225,7 +228,7 @@ fn widths_not_seen_are_marked() {
 
 /// A film of the hanging rope under a wiggle, begun `padding_frames` early.
 fn film_of(config: &WiggleConfig, padding_frames: u32) -> KeypointTrack {
-    let arm = PlannedArm::new(wiggle(config, &Limits::default()).unwrap());
+    let arm = PlannedArm::new(wiggle(config, &Limits::default()).unwrap(), Pole::default());
     let noise = FilmNoise {
         padding_frames,
         clock_offset_s: 0.007,

@@ -10,6 +10,7 @@ use crate::observation::{
 use crate::sysid::Observation;
 use crate::wiggle::wiggle;
 use arm_model::Limits;
+use arm_model::Pole;
 use rope_sim::PlannedArm;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
@@ -88,7 +89,7 @@ impl core::fmt::Debug for PhiNet {
 /// The wiggle that the network was trained on, as the camera sees it.
 fn plane_of(metadata: &PhiMetadata) -> Result<ViewPlane, String> {
     let wiggle = wiggle(&metadata.wiggle, &Limits::default());
-    let arm = PlannedArm::new(wiggle.map_err(|error| error.to_string())?);
+    let arm = PlannedArm::new(wiggle.map_err(|error| error.to_string())?, Pole::default());
     ViewPlane::of_motion(&arm, metadata.wiggle.filmed_s).map_err(|error| error.to_string())
 }
 

@@ -1,6 +1,6 @@
 //! The rules of the arm, one by one.
 
-use crate::collide::ArmShape;
+use arm_model::capsules::self_clearance_m;
 use arm_model::limits::STEP_MAX_M;
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use control_core::control::Thresholds;
@@ -208,7 +208,7 @@ impl Rule {
             }
             Self::ToolSpeed => way_m() / limits.period_s(),
             Self::StepLength => way_m(),
-            Self::SelfCollision => ArmShape::at(q).self_clearance_m(),
+            Self::SelfCollision => self_clearance_m(q),
             Self::SafetyBoundary => arm
                 .fence
                 .map_or(f64::INFINITY, |f| f.inside_m(&tool(q, limits))),

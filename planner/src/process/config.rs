@@ -6,6 +6,7 @@ use crate::tasks::{
     Drape, DrapeConfig, Lob, LobConfig, PlanOptions, Strike, ThrowConfig, ThrowTask,
 };
 use crate::wiggle::WiggleConfig;
+use arm_model::Cell;
 use serde::{Deserialize, Serialize};
 use shared_types::Task;
 
@@ -17,6 +18,9 @@ pub struct PlannerConfig {
     /// Shared-memory domain.
     #[serde(default = "default_domain")]
     pub domain: String,
+    /// The pole, and what stands around the arm; of a process, its caller's.
+    #[serde(default)]
+    pub cell: Cell,
     /// Size and rules of identifications.
     #[serde(default)]
     pub identify: IdentifyOptions,
@@ -69,6 +73,7 @@ impl Default for PlannerConfig {
     fn default() -> Self {
         Self {
             domain: default_domain(),
+            cell: Cell::default(),
             identify: IdentifyOptions::default(),
             search: PlanOptions::default(),
             strike: ThrowConfig::default(),

@@ -131,7 +131,7 @@ fn identify(
         .iter()
         .map(|(t, q)| (MonotonicNs(*t).since_s(epoch), *q))
         .unzip();
-    let motion = MeasuredArm::new(&times_s, &q)?;
+    let motion = MeasuredArm::new(&times_s, &q, config.cell.pole)?;
     let appearance = request
         .appearance
         .map_or_else(Appearance::default, |a| Appearance {
@@ -203,6 +203,7 @@ fn take_out_sway(
         start_q: order.start_q,
         end_q: order.end_q,
         limits: order.limits.clone(),
+        cell: config.cell,
     };
     let found = calm(&request, &config.calm)?;
     Ok(PlannerEvent::Calmed {
@@ -222,6 +223,7 @@ fn strike(
     let request = PlanRequest {
         rope: order.rope,
         limits: order.limits.clone(),
+        cell: config.cell,
         options: PlanOptions {
             seed: order.seed,
             ..config.search

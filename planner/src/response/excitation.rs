@@ -5,12 +5,10 @@
 //! acceleration, jerk and tool speed that may be used allows, so that every
 //! frequency is as loud as it can safely be. One joint moves at a time.
 
-use arm_model::cell::POLE_LENGTH_M;
 use arm_model::kinematics::tool_speed_m_s;
 use arm_model::response::Excitation;
 use arm_model::trajectory::MAX_WAYPOINTS;
-use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};
-use nalgebra::Vector3;
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole, TrajectoryError};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -89,10 +87,10 @@ fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
 }
 
 /// Joint speed at which flange or pole reach the allowed tool speed (rad/s).
-fn speed_allowed_rad_s(e: &Excitation, limits: &Limits, joint: usize) -> f64 {
+fn speed_allowed_rad_s(e: &Excitation, limits: &Limits, pole: &Pole, joint: usize) -> f64 {
     let mut unit = JointVector::ZERO;
     unit[joint] = 1.0;
-    let lever_m = [limits.tcp_offset(), Vector3::new(0.0, 0.0, POLE_LENGTH_M)]
+    let lever_m = [limits.tcp_offset(), pole.end_m()]
         .iter()
         .map(|point| tool_speed_m_s(&e.pose_rad, &unit, point))
         .fold(1e-9, f64::max);
@@ -117,7 +115,7 @@ fn phases_rad(seed: u64) -> [f64; JOINTS] {
     core::array::from_fn(|_| rng.random_range(0.0..core::f64::consts::TAU))
 }
 
-/// The sweep of one joint (0-based), from the pose and back to it, checked
+/// The sweep of one joint (0-based) of an arm with this pole, from the pose and back to it, checked
 /// against the limits with the reduced tool speed.
 ///
 /// # Errors
@@ -125,10 +123,11 @@ fn phases_rad(seed: u64) -> [f64; JOINTS] {
 pub fn sweep(
     e: &Excitation,
     limits: &Limits,
+    pole: &Pole,
     joint: usize,
 ) -> Result<JointTrajectory, ExcitationError> {
     check(e, limits)?;
-    let speed = PEAK_RESERVE * speed_allowed_rad_s(e, limits, joint);
+    let speed = PEAK_RESERVE * speed_allowed_rad_s(e, limits, pole, joint);
     let part = PEAK_RESERVE * e.limits_part;
     let acceleration = part * limits.acceleration_max_rad_s2[joint];
     let jerk = part * limits.jerk_max_rad_s3[joint];
@@ -207,7 +206,7 @@ mod tests {
                 ..Excitation::default()
             };
             for joint in 0..JOINTS {
-                let t = sweep(&e, &limits, joint).unwrap();
+                let t = sweep(&e, &limits, &Pole::default(), joint).unwrap();
                 assert!((t.end() - e.pose_rad).max_abs() < 1e-12);
                 for other in 0..JOINTS {
                     let x = t.extrema(other);
@@ -224,7 +223,11 @@ mod tests {
     #[test]
     fn values_out_of_range_are_refused_by_key() {
         let limits = Limits::default();
-        let refused = |e: Excitation| sweep(&e, &limits, 0).unwrap_err().to_string();
+        let refused = |e: Excitation| {
+            sweep(&e, &limits, &Pole::default(), 0)
+                .unwrap_err()
+                .to_string()
+        };
         let good = Excitation::default();
         for (key, bad) in [
             (

@@ -5,6 +5,7 @@ use super::excitation::sweep;
 use super::lag::Lag;
 use super::*;
 use arm_model::Limits;
+use arm_model::Pole;
 use arm_model::response::Excitation;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,7 +22,7 @@ fn setpoints(joints: &[usize], seed: u64) -> Vec<Setpoint> {
     };
     let sweeps: Vec<_> = joints
         .iter()
-        .map(|j| sweep(&e, &Limits::default(), *j).unwrap())
+        .map(|j| sweep(&e, &Limits::default(), &Pole::default(), *j).unwrap())
         .collect();
     let each_s = e.duration_s + PAUSE_S;
     let cycles = (each_s * joints.len() as f64 / 0.004) as usize;

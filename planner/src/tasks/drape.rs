@@ -7,7 +7,7 @@
 use super::{PlanarScene, ThrowConfig, ThrowOutcome, ThrowTask, verdict};
 use crate::collide::Block;
 use crate::trajopt::PolePose;
-use arm_model::cell::FLOOR_Z_M;
+use arm_model::Cell;
 use nalgebra::Vector3;
 use rope_sim::{BoxRegion, Obstacle, Scene, Watch};
 use serde::{Deserialize, Serialize};
@@ -135,14 +135,14 @@ impl ThrowTask for Drape {
         &self.config.throw
     }
 
-    fn scene(&self) -> Scene {
+    fn scene(&self, cell: &Cell) -> Scene {
         Scene::with(vec![
             self.place().box_below([0.0; 3], WALL_M, WALL_FRICTION),
-            Obstacle::floor(FLOOR_Z_M, WALL_FRICTION),
+            Obstacle::floor(cell.floor_z_m, WALL_FRICTION),
         ])
     }
 
-    fn keep_clear(&self) -> Vec<Block> {
+    fn keep_clear(&self, _: &Cell) -> Vec<Block> {
         vec![self.place().block_below([0.0; 3], WALL_M)]
     }
 

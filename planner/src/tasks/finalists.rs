@@ -48,6 +48,7 @@ impl Setup<'_> {
                 space: &self.space,
                 screen: &self.screen,
                 rope: &self.request.rope,
+                pole: self.request.cell.pole,
                 following: self.request.following.as_ref(),
                 slopes: &self.simulator.options(motion_s, frames),
                 exact: &self.simulator.exact().options(motion_s, frames),

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::collide::Block;
 use crate::trajopt::PolePose;
-use arm_model::cell::FLOOR_Z_M;
+use arm_model::Cell;
 use nalgebra::Vector3;
 use rope_sim::{BoxRegion, Domino, Obstacle, Scene, Watch};
 use serde::{Deserialize, Serialize};
@@ -119,9 +119,9 @@ impl ThrowTask for Lob {
         &self.config.throw
     }
 
-    fn scene(&self) -> Scene {
+    fn scene(&self, cell: &Cell) -> Scene {
         let place = self.place();
-        let column_m = self.target_m[2] - BOARD_M[2] - FLOOR_Z_M;
+        let column_m = self.target_m[2] - BOARD_M[2] - cell.floor_z_m;
         Scene {
             obstacles: vec![
                 place.box_below([0.0, 0.0, 0.0], BOARD_M, BOARD_FRICTION),
@@ -131,7 +131,7 @@ impl ThrowTask for Lob {
                     column_m.max(0.01),
                     BOARD_FRICTION,
                 ),
-                Obstacle::floor(FLOOR_Z_M, BOARD_FRICTION),
+                Obstacle::floor(cell.floor_z_m, BOARD_FRICTION),
             ],
             domino: Some(Domino {
                 foot_m: place.point([-DOMINO_BEFORE_M, 0.0, 0.0]),
@@ -145,9 +145,9 @@ impl ThrowTask for Lob {
         }
     }
 
-    fn keep_clear(&self) -> Vec<Block> {
+    fn keep_clear(&self, cell: &Cell) -> Vec<Block> {
         let place = self.place();
-        let column_m = self.target_m[2] - BOARD_M[2] - FLOOR_Z_M;
+        let column_m = self.target_m[2] - BOARD_M[2] - cell.floor_z_m;
         let column = [
             2.0 * COLUMN_RADIUS_M,
             2.0 * COLUMN_RADIUS_M,

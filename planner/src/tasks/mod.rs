@@ -24,7 +24,7 @@ pub use drape::{Drape, DrapeConfig};
 pub use lob::{Lob, LobConfig};
 pub use planning::{PlanRequest, Planned, plan_throw};
 pub use reach::{check_reach, start_pose_for};
-pub use reach_map::{Cell, ReachMap};
+pub use reach_map::{GridCell, ReachMap};
 pub use scene::PlanarScene;
 pub use strike::Strike;
 pub use task::{ThrowTask, proximity_reward, simulator_for, verdict};

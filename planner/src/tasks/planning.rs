@@ -6,7 +6,7 @@ use super::setup::{Count, Setup};
 use super::{Belief, PlanError, PlanOptions, PlanProgress, ThrowOutcome, ThrowTask, check_reach};
 use crate::response::Following;
 use arm_model::limits::LimitKind;
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{Cell, JointTrajectory, Limits};
 use shared_types::plan::trajectory_hash_hex;
 use shared_types::{ErrorForecast, LimitedBy, Plan, RopeParams, Task, VERSION, Verdict};
 use std::ops::ControlFlow;
@@ -18,6 +18,8 @@ pub struct PlanRequest {
     pub rope: RopeParams,
     /// What the arm may do.
     pub limits: Limits,
+    /// The pole, and what stands around the arm.
+    pub cell: Cell,
     /// Size of the search.
     pub options: PlanOptions,
     /// What the rope might be instead.
@@ -63,7 +65,7 @@ pub fn plan_throw(
 ) -> Result<Planned, PlanError> {
     request.rope.validate()?;
     check_options(&request.options)?;
-    check_reach(task.target_m(), request.rope.length_m)?;
+    check_reach(task.target_m(), request.rope.length_m, &request.cell)?;
     let setup = Setup::new(task, request)?;
     let mut count = Count::default();
     let mut finalists: Vec<Finalist> = Vec::new();

@@ -6,9 +6,9 @@
 //! archive of J.-B. Mouret and J. Clune, "Illuminating search spaces by mapping elites").
 
 use super::{PlanError, ThrowConfig, start_pose_for};
-use crate::collide::{ArmShape, RopeShape, Scene as Surroundings, rope_contacts};
+use crate::collide::{ArmShape, RopeShape, rope_contacts};
 use crate::trajopt::{Dimensions, Screen, WAYPOINTS, WaypointSpace};
-use arm_model::{JointTrajectory, JointVector, Limits};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits};
 use nalgebra::Vector3;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -34,13 +34,13 @@ const STEP_S: f64 = 1e-3;
 const NEAR_M: f64 = 0.10;
 
 /// A cell: columns outwards from the base axis, rows upwards from the base.
-pub type Cell = (i32, i32);
+pub type GridCell = (i32, i32);
 
 /// What the throws reached.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReachMap {
     /// Throws that passed each cell.
-    cells: BTreeMap<Cell, u32>,
+    cells: BTreeMap<GridCell, u32>,
     /// Throws simulated.
     pub throws: u32,
 }
@@ -60,6 +60,7 @@ impl ReachMap {
     pub fn explore(
         rope: &RopeParams,
         limits: &Limits,
+        cell: &Cell,
         config: &ThrowConfig,
         seed: u64,
         threads: usize,
@@ -71,20 +72,20 @@ impl ReachMap {
             times_s: config.waypoint_times_s,
             stretch_max: 1.0,
         };
-        let screen = Screen::new(space.clone(), limits.clone(), config.clearance)?;
+        let screen = Screen::new(space.clone(), limits.clone(), *cell, config.clearance)?;
         let std_dev = space.std_dev(&JointVector(config.std_dev_rad));
         let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x4ea_c400);
-        let mut archive: BTreeMap<Cell, Kept> = BTreeMap::new();
+        let mut archive: BTreeMap<GridCell, Kept> = BTreeMap::new();
         let mut throws = 0;
         for _ in 0..ROUNDS {
             let points: Vec<Vec<f64>> = (0..THROWS)
                 .filter_map(|_| draw(&space, &screen, &std_dev, &archive, &mut rng))
                 .collect();
-            let paths = tip_paths(rope, &space, config, &points, threads)?;
+            let paths = tip_paths(rope, &space, cell, config, &points, threads)?;
             throws += u32::try_from(points.len()).unwrap_or(u32::MAX);
             for (x, path) in points.into_iter().zip(paths) {
-                for cell in path {
-                    let kept = archive.entry(cell).or_insert_with(|| Kept {
+                for passed in path {
+                    let kept = archive.entry(passed).or_insert_with(|| Kept {
                         x: x.clone(),
                         passed: 0,
                     });
@@ -100,13 +101,13 @@ impl ReachMap {
     }
 
     /// Cells that were reached, with the number of throws that passed them.
-    pub fn cells(&self) -> impl Iterator<Item = (Cell, u32)> + '_ {
+    pub fn cells(&self) -> impl Iterator<Item = (GridCell, u32)> + '_ {
         self.cells.iter().map(|(cell, passed)| (*cell, *passed))
     }
 
     /// Middle of a cell: distance from the base axis and height (m).
     #[must_use]
-    pub fn middle_m((column, row): Cell) -> [f64; 2] {
+    pub fn middle_m((column, row): GridCell) -> [f64; 2] {
         [column, row].map(|i| (f64::from(i) + 0.5) * CELL_M)
     }
 
@@ -124,7 +125,7 @@ impl ReachMap {
     pub fn check(&self, target_m: [f64; 3]) -> Result<(), PlanError> {
         let [x, y, z] = target_m;
         let rho_m = x.hypot(y);
-        let away_m = |cell: Cell| {
+        let away_m = |cell: GridCell| {
             let [rho, up] = Self::middle_m(cell);
             (rho - rho_m).hypot(up - z)
         };
@@ -152,7 +153,7 @@ fn draw(
     space: &WaypointSpace,
     screen: &Screen,
     std_dev: &[f64],
-    archive: &BTreeMap<Cell, Kept>,
+    archive: &BTreeMap<GridCell, Kept>,
     rng: &mut ChaCha12Rng,
 ) -> Option<Vec<f64>> {
     let kept: Vec<&Kept> = archive.values().collect();
@@ -177,13 +178,14 @@ fn draw(
 fn tip_paths(
     rope: &RopeParams,
     space: &WaypointSpace,
+    cell: &Cell,
     config: &ThrowConfig,
     points: &[Vec<f64>],
     threads: usize,
-) -> Result<Vec<Vec<Cell>>, PlanError> {
+) -> Result<Vec<Vec<GridCell>>, PlanError> {
     let motions = points
         .iter()
-        .map(|x| Ok(PlannedArm::new(space.decode(x)?)))
+        .map(|x| Ok(PlannedArm::new(space.decode(x)?, cell.pole)))
         .collect::<Result<Vec<_>, PlanError>>()?;
     let candidates: Vec<Candidate> = motions.iter().map(|m| Candidate::new(rope, m)).collect();
     let horizon_s = space.times_s[WAYPOINTS - 1] + config.tail_s;
@@ -203,12 +205,8 @@ fn tip_paths(
     };
     let rollouts = roll_out(&candidates, &options)?;
     let paths = motions.iter().zip(&rollouts);
-    let surroundings = Surroundings {
-        column_half_width_m: config.clearance.column_half_width_m,
-        floor_z_m: config.clearance.floor_z_m,
-    };
     Ok(paths
-        .map(|(motion, rollout)| passed(rope, motion.trajectory(), rollout, &surroundings))
+        .map(|(motion, rollout)| passed(rope, motion.trajectory(), rollout, cell))
         .collect())
 }
 
@@ -216,8 +214,8 @@ fn passed(
     rope: &RopeParams,
     motion: &JointTrajectory,
     rollout: &Rollout,
-    surroundings: &Surroundings,
-) -> Vec<Cell> {
+    cell: &Cell,
+) -> Vec<GridCell> {
     let shape = RopeShape::from(rope);
     let track = &rollout.nodes;
     let mut cells = Vec::new();
@@ -225,8 +223,8 @@ fn passed(
         let nodes: Vec<Vector3<f64>> = (0..track.nodes())
             .map(|node| track.position(frame, node))
             .collect();
-        let arm = ArmShape::at(&motion.state_at(f64::from(k) * PERIOD_S).q);
-        let free = rope_contacts(&arm, surroundings, &shape, &nodes).none();
+        let arm = ArmShape::at(&motion.state_at(f64::from(k) * PERIOD_S).q, &cell.pole);
+        let free = rope_contacts(&arm, cell, &shape, &nodes).none();
         let Some(tip) = nodes.last().filter(|tip| free && tip.x.is_finite()) else {
             break;
         };
@@ -250,8 +248,9 @@ mod tests {
         let mut rope = crate::ropes::random_rope(4);
         rope.length_m = 0.45;
         let config = ThrowConfig::default();
+        let (limits, cell) = (Limits::default(), Cell::default());
         let explore =
-            |threads| ReachMap::explore(&rope, &Limits::default(), &config, 1, threads).unwrap();
+            |threads| ReachMap::explore(&rope, &limits, &cell, &config, 1, threads).unwrap();
         let map = explore(2);
         assert_eq!(map, explore(1));
         for (rho, z) in [(0.6, 0.0), (0.9, 0.3), (1.0, 0.0), (1.1, 0.2)] {

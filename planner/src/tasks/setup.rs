@@ -67,10 +67,15 @@ impl<'a> Setup<'a> {
             times_s: config.waypoint_times_s,
             stretch_max: request.options.segment_stretch_max,
         };
-        let screen = Screen::new(space.clone(), request.limits.clone(), config.clearance)?;
+        let screen = Screen::new(
+            space.clone(),
+            request.limits.clone(),
+            request.cell,
+            config.clearance,
+        )?;
         let simulator = ThrowSimulator {
             following: request.following.clone(),
-            ..simulator_for(task, &request.rope, &request.options)
+            ..simulator_for(task, &request.rope, &request.cell, &request.options)
         };
         let searching = ThrowSimulator {
             step_s: request.options.search_step_s.max(simulator.step_s),
@@ -83,7 +88,7 @@ impl<'a> Setup<'a> {
         Ok(Self {
             bounds: space.bounds(&request.limits),
             std_dev: space.std_dev(&JointVector(config.std_dev_rad)),
-            start: start_point(task, &request.rope, &space, &screen),
+            start: start_point(task, request, &space, &screen),
             ropes: config.robustness.variants(&request.rope),
             space,
             screen,
@@ -163,13 +168,13 @@ impl<'a> Setup<'a> {
 /// The task's warm start, as far from rest as the arm may go; rest without one.
 fn start_point(
     task: &dyn ThrowTask,
-    rope: &RopeParams,
+    request: &PlanRequest,
     space: &WaypointSpace,
     screen: &Screen,
 ) -> Vec<f64> {
     const PARTS: u32 = 20;
     let resting = space.resting();
-    let poses = task.warm_start(rope);
+    let poses = task.warm_start(&request.rope);
     if poses.len() != WAYPOINTS {
         return resting;
     }
@@ -177,7 +182,7 @@ fn start_point(
     let mut wanted: Vec<f64> = poses
         .iter()
         .scan(space.start, |from, pose| {
-            *from = reach_pose(from, *pose);
+            *from = reach_pose(from, *pose, &request.cell.pole);
             Some(*from)
         })
         .flat_map(|q| joints.iter().map(move |&j| q[j]))

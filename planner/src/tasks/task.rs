@@ -1,8 +1,9 @@
 //! What a task is.
 
 use super::{PlanOptions, ThrowConfig, ThrowOutcome, ThrowSimulator};
-use crate::collide::{Block, Scene as Surroundings};
+use crate::collide::Block;
 use crate::trajopt::{PolePose, WAYPOINTS};
+use arm_model::Cell;
 use rope_sim::{Precision, Scene, Watch};
 use shared_types::{Condition, RopeParams, Verdict};
 
@@ -19,13 +20,13 @@ pub trait ThrowTask: Sync {
     /// Tuned values.
     fn config(&self) -> &ThrowConfig;
 
-    /// What the rope can touch.
-    fn scene(&self) -> Scene {
+    /// What the rope can touch in this cell.
+    fn scene(&self, _cell: &Cell) -> Scene {
         Scene::EMPTY
     }
 
     /// What arm and pole must not touch.
-    fn keep_clear(&self) -> Vec<Block> {
+    fn keep_clear(&self, _cell: &Cell) -> Vec<Block> {
         Vec::new()
     }
 
@@ -80,18 +81,19 @@ pub fn verdict<const N: usize>(conditions: [(&str, bool); N]) -> Verdict {
     }
 }
 
-/// The simulator that values throws of a task with a rope.
+/// The simulator that values throws of a task with a rope in a cell.
 #[must_use]
 pub fn simulator_for(
     task: &dyn ThrowTask,
     rope: &RopeParams,
+    cell: &Cell,
     options: &PlanOptions,
 ) -> ThrowSimulator {
     let config = task.config();
     ThrowSimulator {
         watch: task.watch(rope),
-        scene: task.scene(),
-        keep_clear: task.keep_clear(),
+        scene: task.scene(cell),
+        keep_clear: task.keep_clear(cell),
         // Longer throws than these times are among the candidates of free times only.
         motion_s_min: config.waypoint_times_s[WAYPOINTS - 1] * options.segment_stretch_max,
         tail_s: config.tail_s,
@@ -99,10 +101,7 @@ pub fn simulator_for(
         step_s: options.step_s,
         precision: Precision::F32,
         contact_period_s: config.contact_period_s,
-        surroundings: Surroundings {
-            column_half_width_m: config.clearance.column_half_width_m,
-            floor_z_m: config.clearance.floor_z_m,
-        },
+        cell: *cell,
         following: None,
         threads: options.threads.max(1),
     }

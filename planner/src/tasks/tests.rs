@@ -1,6 +1,7 @@
 use super::*;
 use crate::collide::ContactCounts;
 use crate::ropes::random_rope;
+use arm_model::Cell;
 use arm_model::Limits;
 use setup::Setup;
 use shared_types::{Plan, Task};
@@ -17,6 +18,7 @@ fn request() -> PlanRequest {
     PlanRequest {
         rope: random_rope(11),
         limits: Limits::default(),
+        cell: Cell::default(),
         options: PlanOptions {
             population: 24,
             generations: Some(12),
@@ -173,7 +175,12 @@ fn warm_starts_are_executable_at_any_bearing() {
         assert_ne!(setup.start, setup.space.resting(), "{}", task.name());
         assert!(setup.screen.accepts(&setup.start), "{}", task.name());
         assert_eq!(
-            task.keep_clear()[0].pose.translation.vector.y.signum(),
+            task.keep_clear(&r.cell)[0]
+                .pose
+                .translation
+                .vector
+                .y
+                .signum(),
             task.target_m()[1].signum()
         );
     }

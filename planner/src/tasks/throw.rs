@@ -2,12 +2,11 @@
 
 use super::PlanError;
 use crate::collide::{
-    ArmShape, Block, ContactCounts, RopeShape, Scene as Surroundings, block_contacts,
-    rope_contacts, tool_contacts,
+    ArmShape, Block, ContactCounts, RopeShape, block_contacts, rope_contacts, tool_contacts,
 };
 use crate::response::Following;
 use crate::workers::map_in_order;
-use arm_model::JointTrajectory;
+use arm_model::{Cell, JointTrajectory};
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, ContactSummary, DominoOutcome, FrameTimes, Outcome, PlannedArm, Precision, Rollout,
@@ -60,8 +59,8 @@ pub struct ThrowSimulator {
     pub precision: Precision,
     /// Period at which contacts with the arm are looked for (s).
     pub contact_period_s: f64,
-    /// Column and floor.
-    pub surroundings: Surroundings,
+    /// The pole, column and floor.
+    pub cell: Cell,
     /// How the arm follows what it is told; none for an arm that does exactly that.
     pub following: Option<Following>,
     /// Threads.
@@ -118,7 +117,10 @@ impl ThrowSimulator {
             .collect::<Result<Vec<_>, _>>()?;
         let motion_s = motions.iter().map(JointTrajectory::duration_s);
         let motion_s = motion_s.fold(self.motion_s_min, f64::max);
-        let arms: Vec<PlannedArm> = motions.iter().map(|m| PlannedArm::new(*m)).collect();
+        let arms: Vec<PlannedArm> = motions
+            .iter()
+            .map(|m| PlannedArm::new(*m, self.cell.pole))
+            .collect();
         let candidates: Vec<Candidate<'_>> = throws
             .iter()
             .zip(&arms)
@@ -151,21 +153,21 @@ impl ThrowSimulator {
         let mut contacts = ContactCounts::default();
         let shape = RopeShape::from(rope);
         let mut nodes: Vec<Vector3<f64>> = Vec::new();
-        let mut arm = ArmShape::at(&motion.state_at(0.0).q);
+        let mut arm = ArmShape::at(&motion.state_at(0.0).q, &self.cell.pole);
         let mut of_arm = ContactCounts::default();
         let mut time_s = 0.0;
         for frame in 0..rollout.nodes.frames() {
             // Once the arm stands, only the rope moves on.
             if time_s < motion.duration_s() + self.contact_period_s {
-                arm = ArmShape::at(&motion.state_at(time_s).q);
-                of_arm = tool_contacts(&arm, &self.surroundings);
+                arm = ArmShape::at(&motion.state_at(time_s).q, &self.cell.pole);
+                of_arm = tool_contacts(&arm, &self.cell);
                 of_arm.pole_robot += block_contacts(&arm, &self.keep_clear);
             }
             contacts += of_arm;
             nodes.clear();
             nodes
                 .extend((0..rollout.nodes.nodes()).map(|node| rollout.nodes.position(frame, node)));
-            contacts += rope_contacts(&arm, &self.surroundings, &shape, &nodes);
+            contacts += rope_contacts(&arm, &self.cell, &shape, &nodes);
             time_s += self.contact_period_s;
         }
         let closest = rollout

@@ -1,6 +1,6 @@
 //! Poses of the pole in the plane of joints 2, 4 and 6, and the joints that reach them.
 
-use arm_model::{JointVector, kinematics};
+use arm_model::{JointVector, Pole};
 use nalgebra::{Matrix3, Vector3};
 
 /// Where the pole's end is and where the pole points, in the vertical plane through the
@@ -26,8 +26,8 @@ const DAMPING: f64 = 1e-3;
 impl PolePose {
     /// The pole in the pose `q`, seen in the plane of its joint 1.
     #[must_use]
-    pub fn of(q: &JointVector) -> Self {
-        let (end, attach) = kinematics::attach_pose(q);
+    pub fn of(q: &JointVector, pole: &Pole) -> Self {
+        let (end, attach) = pole.attach_pose(q);
         let (sin, cos) = q[0].sin_cos();
         let outwards = Vector3::new(cos, sin, 0.0);
         // -z of the attach frame points along the pole.
@@ -60,16 +60,16 @@ impl PolePose {
 /// Joints 2, 4 and 6 changed from `start` so that the pole takes the pose, or comes as
 /// near to it as the arm gets (rad).
 #[must_use]
-pub fn reach_pose(start: &JointVector, wanted: PolePose) -> JointVector {
+pub fn reach_pose(start: &JointVector, wanted: PolePose, pole: &Pole) -> JointVector {
     const STEP: f64 = 1e-6;
     let mut q = *start;
     for _ in 0..ITERATIONS {
-        let now = PolePose::of(&q);
+        let now = PolePose::of(&q, pole);
         let missing = wanted.minus(now);
         let slopes = Matrix3::from_fn(|i, k| {
             let mut moved = q;
             moved[JOINTS_IN_PLANE[k]] += STEP;
-            PolePose::of(&moved).minus(now)[i] / STEP
+            PolePose::of(&moved, pole).minus(now)[i] / STEP
         });
         let normal = slopes.tr_mul(&slopes) + Matrix3::identity() * DAMPING;
         let Some(step) = normal.lu().solve(&slopes.tr_mul(&missing)) else {
@@ -90,7 +90,8 @@ mod tests {
 
     #[test]
     fn poses_in_reach_are_reached_in_any_plane() {
-        let down = PolePose::of(&START_POSE);
+        let pole = Pole::default();
+        let down = PolePose::of(&START_POSE, &pole);
         assert!(down.tilt_rad.abs() < 1e-3 && (down.rho_m - 0.663).abs() < 2e-3);
         let mut start = START_POSE;
         start[0] = -0.6;
@@ -106,7 +107,7 @@ mod tests {
                 tilt_rad: 1.0,
             },
         ] {
-            let found = PolePose::of(&reach_pose(&start, wanted));
+            let found = PolePose::of(&reach_pose(&start, wanted, &pole), &pole);
             assert!(wanted.minus(found).norm() < 2e-3, "{wanted:?} {found:?}");
         }
         let far = PolePose {
@@ -114,6 +115,6 @@ mod tests {
             z_m: 0.3,
             tilt_rad: 1.5,
         };
-        assert!(PolePose::of(&reach_pose(&start, far)).rho_m > 0.85);
+        assert!(PolePose::of(&reach_pose(&start, far, &pole), &pole).rho_m > 0.85);
     }
 }

@@ -10,7 +10,7 @@ use super::decode::WaypointSpace;
 use super::screen::Screen;
 use crate::response::Following;
 use crate::tasks::PlanError;
-use arm_model::JointTrajectory;
+use arm_model::{JointTrajectory, Pole};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -49,6 +49,8 @@ pub struct Polish<'a> {
     pub screen: &'a Screen,
     /// The rope.
     pub rope: &'a RopeParams,
+    /// The pole on the arm.
+    pub pole: Pole,
     /// How the arm follows what it is told.
     pub following: Option<&'a Following>,
     /// Rope simulation for slopes, and for the miss itself.
@@ -132,7 +134,7 @@ impl Polish<'_> {
         };
         points
             .iter()
-            .map(|x| Ok(PlannedArm::new(decode(x.as_ref())?)))
+            .map(|x| Ok(PlannedArm::new(decode(x.as_ref())?, self.pole)))
             .collect()
     }
 

@@ -5,31 +5,21 @@
 //! small matrix times its knots; a rejected draw costs well under a microsecond.
 
 use super::decode::{WAYPOINTS, WaypointSpace};
-use arm_model::cell::{Cell, POLE_LENGTH_M};
 use arm_model::kinematics;
-use arm_model::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
+use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use nalgebra::{Matrix4, Vector3, Vector4};
 
-/// Distances the tool keeps from the scene (m).
+/// Distances the tool keeps from the cell (m).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Clearance {
-    /// Height of the floor in the arm's base frame (m).
-    pub floor_z_m: f64,
-    /// Half width of the square column under the arm, top at z = 0 (m).
-    pub column_half_width_m: f64,
     /// Smallest distance of flange and pole end to floor and column (m).
     pub tool_m: f64,
 }
 
 impl Default for Clearance {
     fn default() -> Self {
-        let cell = Cell::default();
-        Self {
-            floor_z_m: cell.floor_z_m,
-            column_half_width_m: cell.column_half_width_m,
-            tool_m: 0.05,
-        }
+        Self { tool_m: 0.05 }
     }
 }
 
@@ -40,11 +30,12 @@ const LIMIT_PART: f64 = 0.985;
 /// most bad candidates already fail there (s).
 const TOOL_STEPS_S: [f64; 2] = [0.06, 0.012];
 
-/// Checks candidates of one [`WaypointSpace`] against limits and scene.
+/// Checks candidates of one [`WaypointSpace`] against limits and cell.
 #[derive(Debug, Clone)]
 pub struct Screen {
     space: WaypointSpace,
     limits: Limits,
+    cell: Cell,
     clearance: Clearance,
     /// Second derivatives at the knots from positions at the knots; by candidate where
     /// the times are free.
@@ -65,6 +56,7 @@ impl Screen {
     pub fn new(
         space: WaypointSpace,
         limits: Limits,
+        cell: Cell,
         clearance: Clearance,
     ) -> Result<Self, arm_model::TrajectoryError> {
         let resting = space.resting();
@@ -74,6 +66,7 @@ impl Screen {
         Ok(Self {
             space,
             limits,
+            cell,
             clearance,
             curvature,
         })
@@ -144,14 +137,14 @@ impl Screen {
         step_s: f64,
     ) -> bool {
         let offset = self.limits.tcp_offset();
+        let pole_end = self.cell.pole.end_m();
         let speed_max = LIMIT_PART * self.limits.tcp_speed_max_m_s;
         let mut t = step_s / 2.0;
         while t < times[WAYPOINTS] {
             let flange = kinematics::flange_motion(&state_at(splines, times, t));
-            let pole_end = flange.p_m + flange.r * Vector3::new(0.0, 0.0, POLE_LENGTH_M);
             if flange.at_offset(&offset).v_m_s.norm() > speed_max
                 || !self.clear(&flange.p_m)
-                || !self.clear(&pole_end)
+                || !self.clear(&(flange.p_m + flange.r * pole_end))
             {
                 return false;
             }
@@ -162,9 +155,9 @@ impl Screen {
 
     /// Whether a point keeps its distance to floor and column.
     fn clear(&self, p: &Vector3<f64>) -> bool {
-        let c = &self.clearance;
-        let beside = c.column_half_width_m + c.tool_m;
-        p.z > c.floor_z_m + c.tool_m && (p.z > c.tool_m || p.x.abs() > beside || p.y.abs() > beside)
+        let (cell, tool_m) = (&self.cell, self.clearance.tool_m);
+        let beside = cell.column_half_width_m + tool_m;
+        p.z > cell.floor_z_m + tool_m && (p.z > tool_m || p.x.abs() > beside || p.y.abs() > beside)
     }
 
     /// Sum over joints of the speed above its limit (rad/s), the paper's
@@ -236,7 +229,7 @@ mod tests {
             stretch_max,
         };
         let limits = Limits::try_from(spec).unwrap();
-        Screen::new(space, limits, Clearance::default()).unwrap()
+        Screen::new(space, limits, Cell::default(), Clearance::default()).unwrap()
     }
 
     /// The verdict on random candidates against the extrema and margins that
@@ -275,7 +268,7 @@ mod tests {
                         .state_at(f64::from(k) * trajectory.duration_s() / 200.0)
                         .q;
                     let (p, r) = kinematics::flange_pose(&q);
-                    let end = p + r * Vector3::new(0.0, 0.0, POLE_LENGTH_M);
+                    let end = p + r * s.cell.pole.end_m();
                     !s.clear(&p) || !s.clear(&end)
                 });
                 assert!(low, "refused without a reason");

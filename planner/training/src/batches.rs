@@ -10,6 +10,7 @@ use crate::principal::PRINCIPAL;
 use crate::ratios::{RATIOS, log_ratios};
 use crate::standard::Standard;
 use arm_model::Limits;
+use arm_model::Pole;
 use planner::filming::{FilmNoise, FilmTiming, project, side_camera};
 use planner::observation::{FeatureDefinition, ViewPlane, WIDTHS, WiggleFeatures, observe};
 use planner::wiggle::wiggle;
@@ -67,7 +68,10 @@ impl<'a> Studio<'a> {
     /// # Errors
     /// A wiggle that cannot be made or seen.
     pub fn new(config: &'a TrainingConfig, pool: &'a Pool) -> Result<Self, TrainingError> {
-        let arm = PlannedArm::new(wiggle(&config.data.wiggle, &Limits::default())?);
+        let arm = PlannedArm::new(
+            wiggle(&config.data.wiggle, &Limits::default())?,
+            Pole::default(),
+        );
         Ok(Self {
             config,
             pool,

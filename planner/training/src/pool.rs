@@ -11,6 +11,7 @@ use crate::config::DataConfig;
 use crate::files::{read, write_whole};
 use crate::hypercube::{Hypercube, Share};
 use arm_model::Limits;
+use arm_model::Pole;
 use planner::filming::{KeypointLayout, RecordOptions, RopeFilm, record};
 use planner::observation::ObservedPoints;
 use planner::phi::hex;
@@ -104,7 +105,10 @@ impl Recipe {
     /// # Errors
     /// A wiggle that cannot be executed, or what the simulator refuses.
     pub fn simulate(&self, shard: usize) -> Result<Pool, TrainingError> {
-        let arm = PlannedArm::new(wiggle(&self.data.wiggle, &Limits::default())?);
+        let arm = PlannedArm::new(
+            wiggle(&self.data.wiggle, &Limits::default())?,
+            Pole::default(),
+        );
         let cube = Hypercube::new(self.data.seed, self.share, self.ropes());
         let ropes: Vec<RopeParams> = self.range(shard).map(|i| cube.rope(i)).collect();
         let mut pool = self.empty();

@@ -4,7 +4,7 @@
 use super::colour::{Ycc, ycc};
 use super::eye::{Eye, Vignette};
 use super::texture::{fractal, noise};
-use arm_model::cell::{COLUMN_HALF_WIDTH_M, FLOOR_Z_M};
+use arm_model::Cell;
 use nalgebra::Vector3;
 
 /// Distance of the wall behind the arm's base (m).
@@ -19,25 +19,26 @@ type Rgb = Vector3<f64>;
 struct Cuboid {
     low_m: Vector3<f64>,
     high_m: Vector3<f64>,
-    paint: fn(&Vector3<f64>, &Vector3<f64>) -> Rgb,
+    /// Its colour at a point, on a face with this normal, so high above the floor (m).
+    paint: fn(&Vector3<f64>, &Vector3<f64>, f64) -> Rgb,
 }
 
 /// What stands in the room.
-fn furniture() -> [Cuboid; 4] {
-    let half = COLUMN_HALF_WIDTH_M;
+fn furniture(cell: &Cell) -> [Cuboid; 4] {
+    let (half, floor_z_m) = (cell.column_half_width_m, cell.floor_z_m);
     [
         Cuboid {
-            low_m: Vector3::new(-half, -half, FLOOR_Z_M),
+            low_m: Vector3::new(-half, -half, floor_z_m),
             high_m: Vector3::new(half, half, 0.0),
             paint: column,
         },
         Cuboid {
-            low_m: Vector3::new(-0.17, -0.17, FLOOR_Z_M),
-            high_m: Vector3::new(0.17, 0.17, FLOOR_Z_M + 0.015),
+            low_m: Vector3::new(-0.17, -0.17, floor_z_m),
+            high_m: Vector3::new(0.17, 0.17, floor_z_m + 0.015),
             paint: plate,
         },
         Cuboid {
-            low_m: Vector3::new(-1.32, 0.50, FLOOR_Z_M + 0.06),
+            low_m: Vector3::new(-1.32, 0.50, floor_z_m + 0.06),
             high_m: Vector3::new(-0.42, WALL_Y_M, 0.02),
             paint: cabinet,
         },
@@ -56,23 +57,23 @@ fn light(normal: &Vector3<f64>) -> f64 {
 }
 
 /// Slotted aluminium profile.
-fn column(p: &Vector3<f64>, normal: &Vector3<f64>) -> Rgb {
+fn column(p: &Vector3<f64>, normal: &Vector3<f64>, above_floor_m: f64) -> Rgb {
     if normal.z > 0.5 {
         return Rgb::repeat(150.0);
     }
     let across = if normal.x.abs() > 0.5 { p.y } else { p.x };
     let slot = ((across / 0.045).fract().abs() - 0.5).abs() < 0.09;
     let brushed = 1.0 + 0.05 * noise(across * 900.0, p.z * 6.0, 3);
-    let ramp = 1.0 + 0.06 * (p.z - FLOOR_Z_M);
+    let ramp = 1.0 + 0.06 * above_floor_m;
     Rgb::new(168.0, 171.0, 175.0) * (brushed * ramp * light(normal) * if slot { 0.55 } else { 1.0 })
 }
 
-fn plate(p: &Vector3<f64>, normal: &Vector3<f64>) -> Rgb {
+fn plate(p: &Vector3<f64>, normal: &Vector3<f64>, _: f64) -> Rgb {
     Rgb::new(74.0, 76.0, 80.0) * (light(normal) * (1.0 + 0.06 * noise(p.x * 60.0, p.y * 60.0, 9)))
 }
 
 /// Grey laminate with two doors and handles.
-fn cabinet(p: &Vector3<f64>, normal: &Vector3<f64>) -> Rgb {
+fn cabinet(p: &Vector3<f64>, normal: &Vector3<f64>, _: f64) -> Rgb {
     let grain = 1.0 + 0.04 * fractal(p.x * 5.0, p.z * 60.0, 3, 21);
     if normal.z > 0.5 {
         return Rgb::new(150.0, 138.0, 122.0) * (grain * light(normal));
@@ -89,7 +90,7 @@ fn cabinet(p: &Vector3<f64>, normal: &Vector3<f64>) -> Rgb {
 }
 
 /// A whiteboard in an aluminium frame, wiped but not clean.
-fn whiteboard(p: &Vector3<f64>, normal: &Vector3<f64>) -> Rgb {
+fn whiteboard(p: &Vector3<f64>, normal: &Vector3<f64>, _: f64) -> Rgb {
     let edge = (p.x - 1.52).min(2.62 - p.x).min(p.z - 0.10).min(0.86 - p.z);
     if edge < 0.018 {
         return Rgb::new(140.0, 143.0, 147.0) * light(normal);
@@ -98,30 +99,32 @@ fn whiteboard(p: &Vector3<f64>, normal: &Vector3<f64>) -> Rgb {
     (Rgb::new(214.0, 217.0, 218.0) + Rgb::repeat(smear)) * light(normal)
 }
 
-/// The room with its wall colour.
+/// The room of a cell, with its wall colour.
 pub(super) struct Room {
     wall_rgb: Rgb,
+    floor_z_m: f64,
     furniture: [Cuboid; 4],
 }
 
 impl Room {
-    pub(super) fn new(wall_rgb: [u8; 3]) -> Self {
+    pub(super) fn new(wall_rgb: [u8; 3], cell: &Cell) -> Self {
         Self {
             wall_rgb: Rgb::from(wall_rgb.map(f64::from)),
-            furniture: furniture(),
+            floor_z_m: cell.floor_z_m,
+            furniture: furniture(cell),
         }
     }
 
     fn wall(&self, p: &Vector3<f64>) -> Rgb {
-        if p.z < FLOOR_Z_M + 0.08 {
-            let top = p.z > FLOOR_Z_M + 0.072;
+        if p.z < self.floor_z_m + 0.08 {
+            let top = p.z > self.floor_z_m + 0.072;
             return Rgb::repeat(if top { 205.0 } else { 186.0 });
         }
         let rough = 0.035 * fractal(p.x * 45.0, p.z * 45.0, 3, 1);
         let stains = 0.045 * fractal(p.x * 1.7, p.z * 1.7, 3, 5);
         // Light falls off from the lamp at the upper left.
         let falloff = 0.085 * ((p.x + 0.4).hypot(p.z - 0.9) - 0.9);
-        let corner = 0.10 * (-(p.z - FLOOR_Z_M) / 0.18).exp();
+        let corner = 0.10 * (-(p.z - self.floor_z_m) / 0.18).exp();
         self.wall_rgb * (1.13 + rough + stains - falloff - corner)
     }
 
@@ -145,9 +148,9 @@ impl Room {
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((t, normal, cuboid)) = nearest {
             let p = origin + ray * t;
-            return (cuboid.paint)(&p, &normal);
+            return (cuboid.paint)(&p, &normal, p.z - self.floor_z_m);
         }
-        let to_floor = (FLOOR_Z_M - origin.z) / ray.z;
+        let to_floor = (self.floor_z_m - origin.z) / ray.z;
         let to_wall = (WALL_Y_M - origin.y) / ray.y;
         if to_floor > 0.0 && !(to_wall > 0.0 && to_wall < to_floor) {
             Self::floor(&(origin + ray * to_floor))

@@ -5,9 +5,7 @@ use super::colour::ycc;
 use super::eye::Eye;
 use super::stroke::{Material, Stroke, Strokes};
 use crate::body::ArmBody;
-use arm_model::JointVector;
-use arm_model::cell::FLOOR_Z_M;
-use arm_model::kinematics::attach_pose;
+use arm_model::{Cell, JointVector};
 use nalgebra::Vector3;
 use shared_types::RopeParams;
 
@@ -63,12 +61,16 @@ pub(super) struct Spell {
 pub(super) fn spells(
     eye: &Eye,
     poses: &[ScenePose],
+    cell: &Cell,
     rope: RopeShape,
     appearance: &Appearance,
     target_m: Option<Vector3<f64>>,
 ) -> Vec<Spell> {
     // A pole's end out of view does not move in the picture.
-    let pole_end = |pose: &ScenePose| eye.project(&attach_pose(&pose.q).0).unwrap_or_default();
+    let pole_end = |pose: &ScenePose| {
+        let end = cell.pole.attach_pose(&pose.q).0;
+        eye.project(&end).unwrap_or_default()
+    };
     let mut began = poses.first().map(pole_end).unwrap_or_default();
     let together = |_: &ScenePose, next: &ScenePose| {
         let now = pole_end(next);
@@ -87,10 +89,10 @@ pub(super) fn spells(
         .chunk_by(together)
         .map(|spell| Spell {
             first: first_of(spell),
-            arm: arm_strokes(eye, &spell[spell.len() / 2].q),
+            arm: arm_strokes(eye, cell, &spell[spell.len() / 2].q),
             target: target_m
                 .into_iter()
-                .flat_map(|at| target_strokes(eye, &at, appearance))
+                .flat_map(|at| target_strokes(eye, cell, &at, appearance))
                 .collect(),
             ropes: spell
                 .iter()
@@ -108,7 +110,7 @@ fn material(rgb: [u8; 3], gloss: f32) -> Material {
 }
 
 /// Links in white with grey joints, a black flange, a carbon pole.
-fn arm_strokes(eye: &Eye, q: &JointVector) -> Strokes {
+fn arm_strokes(eye: &Eye, cell: &Cell, q: &JointVector) -> Strokes {
     const WHITE: [u8; 3] = [226, 228, 230];
     const GREY: [u8; 3] = [148, 151, 156];
     const DARK: [u8; 3] = [58, 60, 64];
@@ -116,7 +118,7 @@ fn arm_strokes(eye: &Eye, q: &JointVector) -> Strokes {
     const PAINT: [[u8; 3]; 12] = [
         BASE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, GREY, DARK,
     ];
-    let body = ArmBody::at(q);
+    let body = ArmBody::at(q, cell);
     let links = body.links.iter().zip(PAINT);
     let pole = body.pole;
     let collar = pole.b_m + (pole.a_m - pole.b_m).normalize() * 0.012;
@@ -200,11 +202,16 @@ fn centreline(nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 /// The ball, its rod down to the floor, and a foot.
-fn target_strokes(eye: &Eye, at: &Vector3<f64>, appearance: &Appearance) -> Vec<Stroke> {
+fn target_strokes(
+    eye: &Eye,
+    cell: &Cell,
+    at: &Vector3<f64>,
+    appearance: &Appearance,
+) -> Vec<Stroke> {
     /// The lens bends long straight things; short pieces follow it.
     const ROD_PIECES: i32 = 12;
     let rod = material([96, 98, 102], 40.0);
-    let foot = Vector3::new(at.x, at.y, FLOOR_Z_M + 0.01);
+    let foot = Vector3::new(at.x, at.y, cell.floor_z_m + 0.01);
     let point = |i: i32| at + (foot - at) * (f64::from(i) / f64::from(ROD_PIECES));
     let foot_end = |dx: f64| foot + Vector3::new(dx, 0.0, 0.0);
     (0..ROD_PIECES)

@@ -8,6 +8,7 @@ use super::eye::{Eye, Vignette};
 use super::layer::{RowLayer, composite};
 use super::sensor::{Sensor, pack_yuyv};
 use super::shutter::RowTimes;
+use arm_model::Cell;
 use nalgebra::Vector3;
 use shared_types::StereoCamera;
 
@@ -20,6 +21,7 @@ const MAX_SUB_FRAMES: usize = 12;
 #[derive(Debug)]
 pub struct Renderer {
     eyes: [EyeCanvas; 2],
+    cell: Cell,
     rope: RopeShape,
     appearance: Appearance,
     sensor: Sensor,
@@ -47,16 +49,18 @@ impl Renderer {
     #[must_use]
     pub fn new(
         camera: &StereoCamera,
+        cell: &Cell,
         rope: RopeShape,
         appearance: Appearance,
         noise_levels: f32,
         seed: u64,
     ) -> Self {
-        let room = Room::new(appearance.wall_rgb);
+        let room = Room::new(appearance.wall_rgb, cell);
         let eyes = [Eye::left(camera), Eye::right(camera)].map(|eye| EyeCanvas::new(eye, &room));
         let size_px = eyes[0].eye.size_px();
         Self {
             eyes,
+            cell: *cell,
             rope,
             appearance,
             sensor: Sensor::new(noise_levels, size_px.0 * 4, seed),
@@ -104,6 +108,7 @@ impl Renderer {
             let spells = spells(
                 &canvas.eye,
                 poses,
+                &self.cell,
                 self.rope,
                 &self.appearance,
                 self.target_m,

@@ -1,8 +1,8 @@
 //! The arm as its joint encoders reported it.
 
 use super::{AttachMotion, MotionError, check_times};
-use arm_model::kinematics::{FrameMotion, attach_motion, link_motions};
-use arm_model::{JOINTS, JointState, JointVector};
+use arm_model::kinematics::{FrameMotion, link_motions};
+use arm_model::{JOINTS, JointState, JointVector, Pole};
 
 /// Knot spacing of the fitted spline (s): short enough for the arm's bandwidth,
 /// long enough that encoder noise does not become acceleration.
@@ -25,15 +25,16 @@ pub struct MeasuredArm {
     last_s: f64,
     /// Control points; point i has most weight at `first_s + (i - 1) KNOT_S`.
     control: Vec<[f64; JOINTS]>,
+    pole: Pole,
 }
 
 impl MeasuredArm {
-    /// Fits joint angles `q` (rad) at `times_s`.
+    /// Fits joint angles `q` (rad) at `times_s`, of an arm with this pole on its flange.
     ///
     /// # Errors
     /// Fewer than eight samples, unequal lengths, times that do not increase or span
     /// more than ten minutes, numbers that are not finite.
-    pub fn new(times_s: &[f64], q: &[JointVector]) -> Result<Self, MotionError> {
+    pub fn new(times_s: &[f64], q: &[JointVector], pole: Pole) -> Result<Self, MotionError> {
         if times_s.len() != q.len() {
             return Err(MotionError::LengthMismatch {
                 times: times_s.len(),
@@ -63,6 +64,7 @@ impl MeasuredArm {
             first_s,
             last_s,
             control,
+            pole,
         })
     }
 
@@ -95,11 +97,15 @@ impl MeasuredArm {
 
 impl AttachMotion for MeasuredArm {
     fn at(&self, t_s: f64) -> FrameMotion {
-        attach_motion(&self.joints_at(t_s))
+        self.pole.attach_motion(&self.joints_at(t_s))
     }
 
     fn joints_at(&self, t_s: f64) -> Option<JointState> {
         Some(self.joints_at(t_s))
+    }
+
+    fn pole(&self) -> Option<Pole> {
+        Some(self.pole)
     }
 
     fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
@@ -241,7 +247,7 @@ mod tests {
     #[test]
     fn noise_free_motion_is_recovered_with_its_acceleration() {
         let (times, joints) = samples(0.0);
-        let arm = MeasuredArm::new(&times, &joints).unwrap();
+        let arm = MeasuredArm::new(&times, &joints, Pole::default()).unwrap();
         for i in 10..290 {
             let t = f64::from(i) * 0.01;
             let (got, want) = (arm.joints_at(t), truth(t));
@@ -254,7 +260,7 @@ mod tests {
     #[test]
     fn encoder_noise_leaves_accelerations_usable() {
         let (times, joints) = samples(1e-4);
-        let arm = MeasuredArm::new(&times, &joints).unwrap();
+        let arm = MeasuredArm::new(&times, &joints, Pole::default()).unwrap();
         let mut sum = 0.0;
         for i in 0..2800 {
             let t = 0.1 + f64::from(i) * 0.001;
@@ -268,7 +274,7 @@ mod tests {
     #[test]
     fn derivatives_belong_to_the_positions_everywhere() {
         let (times, joints) = samples(1e-4);
-        let arm = MeasuredArm::new(&times, &joints).unwrap();
+        let arm = MeasuredArm::new(&times, &joints, Pole::default()).unwrap();
         let d = 1e-6;
         for t in [-0.05, -0.011, 0.0, 0.5, 2.99, 3.03, 3.2] {
             let (a, b, c) = (arm.joints_at(t - d), arm.joints_at(t), arm.joints_at(t + d));
@@ -283,12 +289,12 @@ mod tests {
     fn bad_logs_are_named() {
         let (times, mut joints) = samples(0.0);
         assert!(matches!(
-            MeasuredArm::new(&times[1..], &joints),
+            MeasuredArm::new(&times[1..], &joints, Pole::default()),
             Err(MotionError::LengthMismatch { .. })
         ));
         joints[12][3] = f64::NAN;
         assert_eq!(
-            MeasuredArm::new(&times, &joints).unwrap_err(),
+            MeasuredArm::new(&times, &joints, Pole::default()).unwrap_err(),
             MotionError::NotFinite { index: 12 }
         );
     }

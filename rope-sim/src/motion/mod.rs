@@ -14,7 +14,7 @@ pub use planned::PlannedArm;
 pub use pose_track::{PoseRow, PoseTrack};
 
 use arm_model::kinematics::FrameMotion;
-use arm_model::{JOINTS, JointState};
+use arm_model::{JOINTS, JointState, Pole};
 use nalgebra::Vector3;
 
 /// Motion of the attach frame A in the world: pose and its exact first two
@@ -36,10 +36,15 @@ pub trait AttachMotion: Sync {
         true
     }
 
-    /// State of the arm's joints that puts the attach frame where
-    /// [`AttachMotion::at`] says, where there is an arm: many instants of it are
-    /// evaluated side by side then.
+    /// State of the arm's joints that, with the [`AttachMotion::pole`], puts the attach
+    /// frame where [`AttachMotion::at`] says, where there is an arm: many instants of it
+    /// are evaluated side by side then.
     fn joints_at(&self, _t_s: f64) -> Option<JointState> {
+        None
+    }
+
+    /// The pole on that arm.
+    fn pole(&self) -> Option<Pole> {
         None
     }
 

@@ -1,21 +1,22 @@
 //! The arm following a planned joint trajectory exactly.
 
 use super::AttachMotion;
-use arm_model::kinematics::{FrameMotion, attach_motion, link_motions};
-use arm_model::{JOINTS, JointState, JointTrajectory};
+use arm_model::kinematics::{FrameMotion, link_motions};
+use arm_model::{JOINTS, JointState, JointTrajectory, Pole};
 
 /// Attach frame at the pole's end of an arm that follows a trajectory exactly. It
 /// holds still before the start and after the end.
 #[derive(Debug, Clone)]
 pub struct PlannedArm {
     trajectory: JointTrajectory,
+    pole: Pole,
 }
 
 impl PlannedArm {
-    /// The arm on `trajectory`.
+    /// The arm on `trajectory`, with this pole on its flange.
     #[must_use]
-    pub fn new(trajectory: JointTrajectory) -> Self {
-        Self { trajectory }
+    pub fn new(trajectory: JointTrajectory, pole: Pole) -> Self {
+        Self { trajectory, pole }
     }
 
     /// The trajectory it follows.
@@ -27,11 +28,15 @@ impl PlannedArm {
 
 impl AttachMotion for PlannedArm {
     fn at(&self, t_s: f64) -> FrameMotion {
-        attach_motion(&self.trajectory.state_at(t_s))
+        self.pole.attach_motion(&self.trajectory.state_at(t_s))
     }
 
     fn joints_at(&self, t_s: f64) -> Option<JointState> {
         Some(self.trajectory.state_at(t_s))
+    }
+
+    fn pole(&self) -> Option<Pole> {
+        Some(self.pole)
     }
 
     fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
@@ -60,7 +65,10 @@ mod tests {
             JointVector([0.3, -0.2, 0.4, 0.7, -0.5, 1.1, 0.6]),
             JointVector([0.1, -0.5, 0.2, 1.0, 0.3, 1.6, -0.4]),
         ];
-        let arm = PlannedArm::new(JointTrajectory::new(&[0.0, 0.5, 1.1], &waypoints).unwrap());
+        let arm = PlannedArm::new(
+            JointTrajectory::new(&[0.0, 0.5, 1.1], &waypoints).unwrap(),
+            Pole::default(),
+        );
         let d = 1e-5;
         for t in [0.1, 0.33, 0.7, 1.0] {
             let (before, now, after) = (arm.at(t - d), arm.at(t), arm.at(t + d));

@@ -6,7 +6,7 @@ use crate::base_path::BasePath;
 use crate::frames::FrameTimes;
 use crate::group::{GroupTask, Member, MemberResult};
 use crate::lanes::Kernel;
-use arm_model::{JointTrajectory, JointVector};
+use arm_model::{JointTrajectory, JointVector, Pole};
 use shared_types::RopeParams;
 
 fn ropes(count: usize) -> Vec<RopeParams> {
@@ -27,7 +27,10 @@ fn path() -> BasePath {
         JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
         JointVector([0.1, -0.3, 0.1, 0.8, -0.1, 1.2, 0.2]),
     ];
-    let arm = PlannedArm::new(JointTrajectory::new(&[0.0, 0.2], &waypoints).unwrap());
+    let arm = PlannedArm::new(
+        JointTrajectory::new(&[0.0, 0.2], &waypoints).unwrap(),
+        Pole::default(),
+    );
     BasePath::new_in(Vec::new(), &arm, 1e-3, HORIZON_S).unwrap()
 }
 

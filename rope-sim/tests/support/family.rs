@@ -1,6 +1,6 @@
 //! A throw whose slopes are looked at.
 
-use arm_model::{JointTrajectory, JointVector};
+use arm_model::{JointTrajectory, JointVector, Pole};
 use rope_sim::sensitivity::Sensitivity;
 use rope_sim::{FrameTimes, PlannedArm, Precision, SimOptions, Start, Watch};
 use shared_types::RopeParams;
@@ -20,7 +20,10 @@ pub(crate) fn throw(offset: f64) -> PlannedArm {
         JointVector([0.2, -0.3 + offset, 0.2, 0.8, -0.2, 1.2, 0.3]),
         JointVector([0.1, -0.5, 0.1, 1.0, 0.1, 1.6, -0.2]),
     ];
-    PlannedArm::new(JointTrajectory::new(&[0.0, 0.2137, 0.4511], &waypoints).unwrap())
+    PlannedArm::new(
+        JointTrajectory::new(&[0.0, 0.2137, 0.4511], &waypoints).unwrap(),
+        Pole::default(),
+    )
 }
 
 /// Double precision with frames, approach and final state.

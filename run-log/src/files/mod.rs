@@ -3,6 +3,7 @@
 
 mod arm_response;
 mod atomic;
+mod cell;
 mod motion;
 mod plan;
 mod rope;
@@ -10,6 +11,7 @@ mod text;
 
 pub use arm_response::{read_arm_response, read_excitation, write_arm_response};
 pub use atomic::{check_writable, write_atomic, write_json};
+pub use cell::read_cell;
 pub use motion::{JointsCsv, PoseSample, read_joints, read_pose, write_joints, write_trajectory};
 pub use plan::read_plan;
 pub use rope::{read_posterior, read_rope, write_rope_estimate};
@@ -25,6 +27,8 @@ pub const CAUSE: &str = "cause.json";
 pub const COMMAND: &str = "command.json";
 /// File of a run folder that holds every figure of it.
 pub const SUMMARY: &str = "summary.json";
+/// File of a run folder with the cell it ran in.
+pub const CELL: &str = "config/cell.toml";
 /// File of a run folder with the tracked keypoints.
 pub const KEYPOINTS: &str = "keypoints.json";
 /// File of a run folder with the identified rope.

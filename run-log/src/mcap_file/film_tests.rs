@@ -5,6 +5,7 @@ use crate::mcap_file::clock::Clock;
 use crate::mcap_file::image::left_jpeg;
 use crate::mcap_file::messages;
 use crate::mcap_file::writer::McapFile;
+use arm_model::Pole;
 use camera_ingest::{ClampPath, TrackOptions, track};
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{Frame, WiggleFilm, joints};
@@ -113,7 +114,7 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
         .copied()
         .zip(part.joints.q.clone())
         .collect();
-    let clamp = ClampPath::from_joints(&samples).unwrap();
+    let clamp = ClampPath::from_joints(&samples, &Pole::default()).unwrap();
     let frames: Vec<EyeFrame> = (0..part.len())
         .map(|i| part.read_left(i).unwrap())
         .collect();

@@ -14,7 +14,7 @@ use super::thinned::Thinned;
 use super::urdf::urdf;
 use super::writer::McapFile;
 use crate::{Error, Result, files};
-use arm_model::Limits;
+use arm_model::{Cell, Limits, Pole};
 use rt_controller::recording::{Item, LogReader, Read};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -65,6 +65,9 @@ pub struct RecorderConfig {
     pub target_m: Option<[f64; 3]>,
     /// Limits of the arm.
     pub limits: Limits,
+    /// The cell, for its pole.
+    #[serde(default)]
+    pub cell: Cell,
     /// The camera, where there is one.
     pub camera: Option<StereoCamera>,
 }
@@ -72,7 +75,7 @@ pub struct RecorderConfig {
 impl RecorderConfig {
     /// Records the run of a folder; the camera and the target are told in it where they
     /// are known.
-    pub fn of_run(domain: &str, run: &Path, limits: &Limits) -> Self {
+    pub fn of_run(domain: &str, run: &Path, limits: &Limits, cell: Cell) -> Self {
         Self {
             domain: domain.to_owned(),
             file: run.join(files::RUN),
@@ -80,6 +83,7 @@ impl RecorderConfig {
             pictures_hz: PICTURES_HZ,
             target_m: None,
             limits: limits.clone(),
+            cell,
             camera: None,
         }
     }
@@ -133,6 +137,7 @@ struct Recording {
     clock: Clock,
     mode: Option<u8>,
     fault: u16,
+    pole: Pole,
     arm: Thinned,
     pictures: Thinned,
     next_frame: Option<u64>,
@@ -156,9 +161,13 @@ impl Recording {
                 ("pictures_hz", config.pictures_hz.to_string()),
             ],
         )?;
-        let arm = urdf(&config.limits);
+        let arm = urdf(&config.limits, &config.cell.pole);
         file.attach(at_ns, "robot.urdf", "application/xml", arm.as_bytes())?;
-        file.json(Channel::Scene, at_ns, &room(at_ns, config.target_m))?;
+        file.json(
+            Channel::Scene,
+            at_ns,
+            &room(at_ns, &config.cell.pole, config.target_m),
+        )?;
         if let Some(camera) = &config.camera {
             let text = serde_json::to_string(camera)?;
             file.metadata(CAMERA[0], &[(CAMERA[1], text)])?;
@@ -173,6 +182,7 @@ impl Recording {
             clock,
             mode: None,
             fault: 0,
+            pole: config.cell.pole,
             arm: Thinned::at(FRAMES_HZ),
             pictures: Thinned::at(config.pictures_hz),
             next_frame: None,
@@ -273,7 +283,7 @@ impl Recording {
         self.file
             .json(Channel::Measured, at_ns, &messages::measured(at_ns, report))?;
         if self.arm.takes(report.stamp_ns)
-            && let Some(frames) = arm_frames(at_ns, &report.q)
+            && let Some(frames) = arm_frames(at_ns, &report.q, &self.pole)
         {
             self.file.json(Channel::Frames, at_ns, &frames)?;
         }
@@ -421,7 +431,8 @@ mod tests {
         let bus = Bus::join(&domain).unwrap();
         let camera = bus.frame_publisher(64 * 16 * 2).unwrap();
         let ports = Ports::open(&bus).unwrap();
-        let config = RecorderConfig::of_run(&domain, folder.path(), &Limits::default());
+        let config =
+            RecorderConfig::of_run(&domain, folder.path(), &Limits::default(), Cell::default());
         let mut recording = Recording::begin(&config).unwrap();
         // Far in the future, so that none of them is late.
         let begin_ns = recording.clock.now_ns();

@@ -5,18 +5,16 @@
 
 use super::fields::{colour, round, time};
 use super::urdf::{BASE, POLE_END, link_name};
-use arm_model::cell::{POLE_LENGTH_M, POLE_RADIUS_M};
-use arm_model::kinematics::{JOINT_ORIGIN_M, attach_pose, link_poses};
-use arm_model::{JOINTS, JointVector};
+use arm_model::kinematics::{JOINT_ORIGIN_M, link_poses};
+use arm_model::{JOINTS, JointVector, Pole};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 
 const ARM_DIAMETER_M: f64 = 0.08;
-const POLE_DIAMETER_M: f64 = 2.0 * POLE_RADIUS_M;
 /// Diameter of the simulated rig's target ball.
 const TARGET_DIAMETER_M: f64 = 0.04;
 const ARM: [f64; 4] = [0.75, 0.78, 0.82, 1.0];
-const POLE: [f64; 4] = [0.2, 0.2, 0.2, 1.0];
+const POLE_RGBA: [f64; 4] = [0.2, 0.2, 0.2, 1.0];
 const TARGET: [f64; 4] = [0.9, 0.1, 0.1, 1.0];
 const ROPE: [f64; 4] = [0.1, 0.5, 0.9, 1.0];
 const LEAD: [f64; 4] = [0.95, 0.75, 0.1, 1.0];
@@ -51,7 +49,7 @@ pub(super) fn transform(at_ns: u64, parent: &str, child: &str, place: Isometry3<
 }
 
 /// Places of all links and of the pole's end; `None` when an angle is no number.
-pub(super) fn arm_frames(at_ns: u64, q: &JointVector) -> Option<Value> {
+pub(super) fn arm_frames(at_ns: u64, q: &JointVector, pole: &Pole) -> Option<Value> {
     if !q.is_finite() {
         return None;
     }
@@ -60,7 +58,7 @@ pub(super) fn arm_frames(at_ns: u64, q: &JointVector) -> Option<Value> {
         .enumerate()
         .map(|(i, (p, r))| transform(at_ns, BASE, &link_name(i), placed(p, r)))
         .collect();
-    let (p, r) = attach_pose(q);
+    let (p, r) = pole.attach_pose(q);
     transforms.push(transform(at_ns, BASE, POLE_END, placed(&p, &r)));
     Some(json!({ "transforms": transforms }))
 }
@@ -86,20 +84,21 @@ fn ball(at_m: &Vector3<f64>, diameter_m: f64, rgba: [f64; 4]) -> Value {
     })
 }
 
-/// A rod from the frame's origin to `to_m`.
-fn rod(to_m: &Vector3<f64>, diameter_m: f64, rgba: [f64; 4]) -> Value {
-    let along = UnitQuaternion::rotation_between(&Vector3::z(), to_m).unwrap_or_else(|| {
+/// A rod between two points of the frame.
+fn rod(from_m: &Vector3<f64>, to_m: &Vector3<f64>, diameter_m: f64, rgba: [f64; 4]) -> Value {
+    let way_m = to_m - from_m;
+    let along = UnitQuaternion::rotation_between(&Vector3::z(), &way_m).unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
     });
-    let middle = Isometry3::from_parts(Translation3::from(to_m * 0.5), along);
+    let middle = Isometry3::from_parts(Translation3::from(from_m + way_m * 0.5), along);
     json!({
-        "pose": pose(&middle), "size": vector(&Vector3::new(diameter_m, diameter_m, to_m.norm())),
+        "pose": pose(&middle), "size": vector(&Vector3::new(diameter_m, diameter_m, way_m.norm())),
         "bottom_scale": 1.0, "top_scale": 1.0, "color": colour(rgba),
     })
 }
 
 /// Arm, pole and, where there is one, the target.
-pub(super) fn room(at_ns: u64, target_m: Option<[f64; 3]>) -> Value {
+pub(super) fn room(at_ns: u64, pole: &Pole, target_m: Option<[f64; 3]>) -> Value {
     let mut entities = Vec::new();
     let origins = JOINT_ORIGIN_M.map(Vector3::from);
     for (i, to_m) in origins.iter().enumerate() {
@@ -110,20 +109,24 @@ pub(super) fn room(at_ns: u64, target_m: Option<[f64; 3]>) -> Value {
         };
         let mut parts = vec![("spheres", ball(&Vector3::zeros(), ARM_DIAMETER_M, ARM))];
         if to_m.norm() > 0.0 {
-            parts.push(("cylinders", rod(to_m, ARM_DIAMETER_M, ARM)));
+            parts.push((
+                "cylinders",
+                rod(&Vector3::zeros(), to_m, ARM_DIAMETER_M, ARM),
+            ));
         }
         entities.push(entity(at_ns, &format!("arm{i}"), &frame, &parts));
     }
-    let pole = rod(
-        &Vector3::new(0.0, 0.0, POLE_LENGTH_M),
-        POLE_DIAMETER_M,
-        POLE,
+    let stick = rod(
+        &pole.offset_m.into(),
+        &pole.end_m(),
+        2.0 * pole.radius_m,
+        POLE_RGBA,
     );
     entities.push(entity(
         at_ns,
         "pole",
         &link_name(JOINTS - 1),
-        &[("cylinders", pole)],
+        &[("cylinders", stick)],
     ));
     if let Some(target_m) = target_m {
         let target = ball(&Vector3::from(target_m), TARGET_DIAMETER_M, TARGET);
@@ -158,14 +161,19 @@ mod tests {
     #[test]
     fn each_rod_ends_where_the_next_link_begins() {
         let q = JointVector([0.3, 0.8, -0.4, 2.1, 0.2, 1.2, 0.1]);
-        let frames = arm_frames(0, &q).unwrap();
+        let pole = Pole {
+            length_m: 0.3,
+            offset_m: [0.01, -0.02, 0.03],
+            ..Pole::default()
+        };
+        let frames = arm_frames(0, &q, &pole).unwrap();
         let read = |v: &Value| Vector3::from(["x", "y", "z"].map(|k| v[k].as_f64().unwrap()));
         let turn = |v: &Value| {
             let [x, y, z, w] = ["x", "y", "z", "w"].map(|k| v[k].as_f64().unwrap());
             UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z))
         };
         let origin = |i: usize| read(&frames["transforms"][i]["translation"]);
-        let drawn = room(0, None);
+        let drawn = room(0, &pole, None);
         for entity in drawn["entities"].as_array().unwrap() {
             let Some(rod) = entity["cylinders"].get(0) else {
                 continue;

@@ -1,8 +1,7 @@
 //! The arm as URDF, from the kinematics this program computes with.
 
-use arm_model::cell::POLE_LENGTH_M;
 use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
-use arm_model::{JOINTS, Limits};
+use arm_model::{JOINTS, Limits, Pole};
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write;
 
@@ -22,7 +21,7 @@ pub(super) fn link_name(i: usize) -> String {
 }
 
 /// Links, joints and limits; without meshes, which belong to the arm's maker.
-pub(super) fn urdf(limits: &Limits) -> String {
+pub(super) fn urdf(limits: &Limits, pole: &Pole) -> String {
     let mut text =
         format!("<?xml version=\"1.0\"?>\n<robot name=\"xarm7\">\n  <link name=\"{BASE}\"/>\n");
     let mut parent = BASE.to_owned();
@@ -43,11 +42,12 @@ pub(super) fn urdf(limits: &Limits) -> String {
         );
         parent = link;
     }
+    let [x, y, z] = pole.end_m().into();
     let _ = write!(
         text,
         "  <link name=\"{POLE_END}\"/>\n  <joint name=\"pole\" type=\"fixed\">\n    \
          <parent link=\"{parent}\"/>\n    <child link=\"{POLE_END}\"/>\n    \
-         <origin xyz=\"0 0 {POLE_LENGTH_M}\" rpy=\"{} 0 0\"/>\n  </joint>\n</robot>\n",
+         <origin xyz=\"{x} {y} {z}\" rpy=\"{} 0 0\"/>\n  </joint>\n</robot>\n",
         std::f64::consts::PI,
     );
     text
@@ -56,7 +56,7 @@ pub(super) fn urdf(limits: &Limits) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use arm_model::{JointVector, kinematics};
+    use arm_model::JointVector;
     use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
     fn numbers(text: &str, key: &str) -> Vec<f64> {
@@ -68,7 +68,11 @@ mod tests {
     /// Reads the text as a viewer would and walks down the chain.
     #[test]
     fn a_reader_of_the_text_gets_the_same_pole_end() {
-        let text = urdf(&Limits::default());
+        let pole = Pole {
+            offset_m: [0.01, -0.02, 0.03],
+            ..Pole::default()
+        };
+        let text = urdf(&Limits::default(), &pole);
         for q in [
             [0.0; 7],
             [0.1, -0.2, 0.3, 0.4, 0.5, 0.6, 0.7],
@@ -86,7 +90,7 @@ mod tests {
                     pose *= Isometry3::rotation(Vector3::z() * *angle);
                 }
             }
-            let (p, r) = kinematics::attach_pose(&JointVector(q));
+            let (p, r) = pole.attach_pose(&JointVector(q));
             assert!((pose.translation.vector - p).norm() < 1e-12);
             let turned = pose.rotation.to_rotation_matrix();
             assert!((turned.matrix() - r).norm() < 1e-12);

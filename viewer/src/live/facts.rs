@@ -2,6 +2,7 @@
 //! where the camera stands.
 
 use anyhow::Context;
+use arm_model::Cell;
 use camera_ingest::load_camera;
 use rt_controller::ControllerConfig;
 use run_log::files;
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// Files that are looked at, in the order of [`Facts::stamps`].
-const FILES: [&str; 3] = ["params.toml", "plan.json", "camera.toml"];
+const FILES: [&str; 4] = ["params.toml", "plan.json", "camera.toml", files::CELL];
 
 /// The domain that a run's controller was configured with.
 pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
@@ -26,11 +27,13 @@ pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
 #[derive(Debug, Default)]
 pub(crate) struct Facts {
     folder: Option<PathBuf>,
-    stamps: [Option<SystemTime>; 3],
+    stamps: [Option<SystemTime>; 4],
     identified: Option<RopeParams>,
     plan: Option<Plan>,
     /// The camera, where its calibration lies in the folder.
     pub camera: Option<StereoCamera>,
+    /// The cell it runs in, where the folder tells it.
+    pub cell: Option<Cell>,
 }
 
 impl Facts {
@@ -72,6 +75,7 @@ impl Facts {
                     let text = files::read_text(&path).ok();
                     self.plan = text.and_then(|text| serde_json::from_str(&text).ok());
                 }
+                files::CELL => self.cell = files::read_cell(&path).ok(),
                 _ => self.camera = load_camera(&path).ok(),
             }
         }

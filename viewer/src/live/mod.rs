@@ -22,8 +22,10 @@ pub use facts::domain_of_run;
 pub use preview::{PreviewChild, PreviewProcess};
 
 use crate::report::{arm_points, tenths_mm};
+use arm_model::{Cell, Pole};
 use ask::{Ask, Asked, Open, Present, hand_over};
 use attached::{Attached, Seen, newest_domain};
+use facts::Facts;
 use http::Site;
 use jitter::Jitter;
 use rope::FollowingRope;
@@ -59,6 +61,8 @@ pub enum Wanted {
 #[derive(Debug)]
 pub struct Watcher {
     wanted: Wanted,
+    /// Where a run does not tell its own.
+    cell: Cell,
     site: Arc<Site>,
     asks: mpsc::Receiver<Asked>,
     open: Vec<Open>,
@@ -85,6 +89,7 @@ impl Watcher {
     pub fn start(
         wanted: Wanted,
         bind: SocketAddr,
+        cell: Cell,
         preview: Option<PreviewChild>,
     ) -> anyhow::Result<(Self, String)> {
         let (sender, asks) = mpsc::channel();
@@ -95,6 +100,7 @@ impl Watcher {
         let (url, site) = http::serve(bind, sender)?;
         let watcher = Self {
             wanted,
+            cell,
             site,
             asks,
             open: Vec::new(),
@@ -246,10 +252,11 @@ impl Watcher {
             controller.facts.look();
         }
         let facts = attached.controller.as_ref().map(|c| &c.facts);
+        let pole = pole_of(facts, &self.cell);
         match facts.and_then(|facts| facts.rope()) {
             Some((rope, name)) => {
                 if self.rope.as_ref().is_none_or(|(r, _)| *r.params() != rope) {
-                    self.rope = Some((FollowingRope::new(rope), name));
+                    self.rope = Some((FollowingRope::new(rope, pole), name));
                 }
             }
             None => self.rope = None,
@@ -333,7 +340,7 @@ impl Watcher {
             stop: self.stop.clone(),
         });
         if mode != ControllerMode::Offline && state.q.is_finite() {
-            snapshot.arm = arm_points(&state.q);
+            snapshot.arm = arm_points(&state.q, &pole_of(facts, &self.cell));
         }
         snapshot.target_m = facts.and_then(|facts| facts.target_m());
         match &self.rope {
@@ -353,4 +360,12 @@ impl Watcher {
         }
         snapshot
     }
+}
+
+/// The pole on the arm that is watched.
+fn pole_of(facts: Option<&Facts>, otherwise: &Cell) -> Pole {
+    facts
+        .and_then(|facts| facts.cell)
+        .unwrap_or(*otherwise)
+        .pole
 }

@@ -1,7 +1,6 @@
 //! A known rope simulated under the joints as they are measured, a little behind them.
 
-use arm_model::kinematics::{FrameMotion, attach_motion};
-use arm_model::{JointState, JointVector};
+use arm_model::{JointPiece, JointState, JointVector, Pole};
 use rope_sim::LiveRope;
 use shared_types::RopeParams;
 
@@ -24,6 +23,7 @@ struct Knot {
 #[derive(Debug)]
 pub(crate) struct FollowingRope {
     params: RopeParams,
+    pole: Pole,
     live: Option<LiveRope>,
     /// When the simulation's clock began (CLOCK_MONOTONIC, ns).
     began_ns: u64,
@@ -32,10 +32,11 @@ pub(crate) struct FollowingRope {
 }
 
 impl FollowingRope {
-    /// A rope that hangs still at the first report.
-    pub(crate) fn new(params: RopeParams) -> Self {
+    /// A rope on this pole that hangs still at the first report.
+    pub(crate) fn new(params: RopeParams, pole: Pole) -> Self {
         Self {
             params,
+            pole,
             live: None,
             began_ns: 0,
             knots: Vec::with_capacity(4),
@@ -74,7 +75,7 @@ impl FollowingRope {
     }
 
     fn hang(&mut self, stamp_ns: u64, q: JointVector) {
-        let attach = attach_motion(&JointState::at_rest(q));
+        let attach = self.pole.attach_motion(&JointState::at_rest(q));
         self.live = LiveRope::new(&self.params, &attach, STEP_S).ok();
         self.began_ns = stamp_ns;
         self.knots.clear();
@@ -90,54 +91,15 @@ impl FollowingRope {
             _ => return,
         };
         let slope = |a: Knot, b: Knot| (b.q - a.q) * (1.0 / (b.t_s - a.t_s));
-        let piece = Piece {
-            from,
-            to,
-            slopes: [slope(before, to), slope(from, after)],
-        };
+        let slopes = [slope(before, to), slope(from, after)];
+        let piece = JointPiece::cubic([from.q, to.q], slopes, to.t_s - from.t_s);
         if let Some(live) = &mut self.live {
-            live.advance(&|t_s| piece.at(t_s), to.t_s);
+            let pole = self.pole;
+            live.advance(&|t_s| pole.attach_motion(&piece.at(t_s - from.t_s)), to.t_s);
         }
         if self.knots.len() == 4 {
             self.knots.remove(0);
         }
-    }
-}
-
-/// Joint motion between two reports.
-struct Piece {
-    from: Knot,
-    to: Knot,
-    slopes: [JointVector; 2],
-}
-
-impl Piece {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        let h = self.to.t_s - self.from.t_s;
-        let s = (t_s - self.from.t_s) / h;
-        let blend = |w: [f64; 4]| {
-            self.from.q * w[0]
-                + self.slopes[0] * (h * w[1])
-                + self.to.q * w[2]
-                + self.slopes[1] * (h * w[3])
-        };
-        let (s2, s3) = (s * s, s * s * s);
-        attach_motion(&JointState {
-            q: blend([
-                1.0 - 3.0 * s2 + 2.0 * s3,
-                s - 2.0 * s2 + s3,
-                3.0 * s2 - 2.0 * s3,
-                s3 - s2,
-            ]),
-            qd: blend([
-                6.0 * (s2 - s),
-                1.0 - 4.0 * s + 3.0 * s2,
-                6.0 * (s - s2),
-                3.0 * s2 - 2.0 * s,
-            ]) * (1.0 / h),
-            qdd: blend([12.0 * s - 6.0, 6.0 * s - 4.0, 6.0 - 12.0 * s, 6.0 * s - 2.0])
-                * (1.0 / (h * h)),
-        })
     }
 }
 
@@ -162,7 +124,7 @@ mod tests {
 
     #[test]
     fn it_follows_the_reports_as_a_simulation_of_the_whole_motion_does() {
-        let mut rope_live = FollowingRope::new(rope());
+        let mut rope_live = FollowingRope::new(rope(), Pole::default());
         let began_ns = 7_000_000_000;
         for k in 0..500_u64 {
             rope_live.report(began_ns + k * 4_000_000, joints(k as f64 * 0.004));
@@ -171,7 +133,7 @@ mod tests {
         assert!(reached_s > 1.93, "{reached_s}");
         let times: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.002).collect();
         let q: Vec<JointVector> = times.iter().map(|t| joints(*t)).collect();
-        let arm = MeasuredArm::new(&times, &q).unwrap();
+        let arm = MeasuredArm::new(&times, &q, Pole::default()).unwrap();
         let options = SimOptions {
             step_s: 1e-3,
             precision: Precision::F64,
@@ -199,7 +161,7 @@ mod tests {
 
     impl FollowingRope {
         fn at_rest(rope: &RopeParams) -> nalgebra::Vector3<f64> {
-            let mut still = Self::new(*rope);
+            let mut still = Self::new(*rope, Pole::default());
             still.report(0, joints(0.0));
             *still.nodes().last().unwrap()
         }
@@ -207,12 +169,14 @@ mod tests {
 
     #[test]
     fn after_a_silence_it_hangs_still_where_the_arm_is_now() {
-        let mut rope = FollowingRope::new(rope());
+        let mut rope = FollowingRope::new(rope(), Pole::default());
         assert!(rope.nodes().is_empty());
         rope.report(0, joints(0.0));
         rope.report(2_000_000_000, joints(0.6));
         let (clamp, tip) = (rope.nodes()[0], *rope.nodes().last().unwrap());
-        let there = attach_motion(&JointState::at_rest(joints(0.6))).p_m;
+        let there = Pole::default()
+            .attach_motion(&JointState::at_rest(joints(0.6)))
+            .p_m;
         assert!((clamp - there).norm() < 1e-12);
         assert!(tip.z < clamp.z - 0.2);
     }

@@ -36,6 +36,7 @@ pub fn simulated_rope(
         return Ok(Vec::new());
     };
     let known = Known {
+        cell: run.cell()?.unwrap_or_default(),
         cycles: &run.recording()?.cycles()?,
         rope: Some(&rope),
         plan: plan.as_ref(),
@@ -92,6 +93,8 @@ pub(crate) fn read_run(run: &Path) -> anyhow::Result<ReportData> {
         None => Vec::new(),
     };
     let known = Known {
+        // Runs from before it was recorded were all in the same one.
+        cell: of_run.cell()?.unwrap_or_default(),
         cycles: &cycles,
         // A throw alone has the rope it was planned for.
         rope: params.as_ref().or(plan.as_ref().map(|p| &p.rope)),

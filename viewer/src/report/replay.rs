@@ -3,7 +3,7 @@
 use super::data::{Joints, Scene};
 use super::motion::begin;
 use anyhow::Context;
-use arm_model::{JOINTS, JointVector, kinematics};
+use arm_model::{Cell, JOINTS, JointVector, Pole, kinematics};
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome, PlannedArm, Precision, SimOptions,
@@ -31,6 +31,8 @@ const SAMPLES_MIN: usize = 8;
 /// What is known of a run beside the motion itself.
 #[derive(Debug)]
 pub(crate) struct Known<'a> {
+    /// The cell it ran in.
+    pub cell: Cell,
     /// Its cycles and measured joints.
     pub cycles: &'a Cycles,
     /// The identified rope.
@@ -65,7 +67,7 @@ pub(crate) fn scene(
     let last = motion.last().unwrap_or(&motion[0]);
     let until_s = MonotonicNs(last.deadline_ns).since_s(begin).min(LONGEST_S) + AFTER_S;
     let (times_s, q, is_measured) = moved(motion, begin, until_s, known.cycles);
-    let arm = MeasuredArm::new(&times_s, &q).context("the joints of a motion")?;
+    let arm = MeasuredArm::new(&times_s, &q, known.cell.pole).context("the joints of a motion")?;
     let frames = FrameTimes {
         first_s: 0.0,
         period_s: 1.0 / RATE_HZ,
@@ -73,14 +75,15 @@ pub(crate) fn scene(
     };
     // The simulator's clock begins with the first frame.
     let shifted: Vec<f64> = times_s.iter().map(|t| t + BEFORE_S).collect();
-    let on_film = MeasuredArm::new(&shifted, &q).context("the joints of a motion")?;
+    let on_film =
+        MeasuredArm::new(&shifted, &q, known.cell.pole).context("the joints of a motion")?;
     let step_s = if plan.is_some() { STEP_S.0 } else { STEP_S.1 };
     let rope = match known.rope {
         Some(rope) => simulate(rope, &on_film, frames, step_s)?,
         None => Vec::new(),
     };
     let planned_tip = match plan {
-        Some(plan) => planned_tip(plan, until_s)?,
+        Some(plan) => planned_tip(plan, known.cell.pole, until_s)?,
         None => Vec::new(),
     };
     Ok(Scene {
@@ -88,7 +91,7 @@ pub(crate) fn scene(
         from_s: -BEFORE_S,
         period_s: frames.period_s,
         arm: (0..frames.count)
-            .map(|i| arm_points(&on_film.joints_at(frames.time_s(i)).q))
+            .map(|i| arm_points(&on_film.joints_at(frames.time_s(i)).q, &known.cell.pole))
             .collect(),
         rope,
         planned_tip,
@@ -132,9 +135,9 @@ pub fn tenths_mm(p: &Vector3<f64>) -> [i32; 3] {
 }
 
 /// Base, origins of the joints, end of the pole (0.1 mm).
-pub fn arm_points(q: &JointVector) -> Vec<i32> {
+pub fn arm_points(q: &JointVector, pole: &Pole) -> Vec<i32> {
     let origins = kinematics::link_poses(q).map(|(p, _)| p);
-    let (tip, _) = kinematics::attach_pose(q);
+    let (tip, _) = pole.attach_pose(q);
     std::iter::once(Vector3::zeros())
         .chain(origins)
         .chain([tip])
@@ -173,13 +176,13 @@ fn simulate(
 }
 
 /// The tip's path with the plan's own rope on the planned motion.
-fn planned_tip(plan: &Plan, until_s: f64) -> anyhow::Result<Vec<i32>> {
+fn planned_tip(plan: &Plan, pole: Pole, until_s: f64) -> anyhow::Result<Vec<i32>> {
     let frames = FrameTimes {
         first_s: 0.0,
         period_s: 1.0 / RATE_HZ,
         count: frame_count(until_s),
     };
-    let arm = PlannedArm::new(plan.trajectory);
+    let arm = PlannedArm::new(plan.trajectory, pole);
     let rope = simulate(&plan.rope, &arm, frames, STEP_S.0)?;
     Ok(rope
         .iter()

@@ -18,7 +18,8 @@ pub enum ConfigCommand {
 #[derive(Debug, Args)]
 #[command(after_help = "LAYERS, the later over the earlier:\n  \
     built in   the files in configs/ that this program was built with\n  \
-    site       planner.toml, limits.toml, rt-controller.toml, rig.toml in /etc/wag\n  \
+    site       planner.toml, limits.toml, cell.toml, rt-controller.toml, rig.toml in\n  \
+               /etc/wag\n  \
     rig        the same in the folder that WAG_CONFIG names, else in ~/.config/wag\n  \
     run        the file named on the command line, as --config FILE of `wag plan`\n\n\
     A file says only what differs from the layers below it.")]

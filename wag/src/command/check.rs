@@ -4,10 +4,10 @@ use crate::cli::{CheckArgs, WireName};
 use crate::config;
 use anyhow::{anyhow, ensure};
 use arm_model::limits::{LimitKind, Margin};
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{Cell, JointTrajectory, Limits};
 use cli_output::{Failure, OrInput, Outcome, table};
 use comfy_table::Table;
-use planner::collide::{ArmShape, Scene, tool_contacts};
+use planner::collide::{ArmShape, tool_contacts};
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
 use run_log::files::read_plan;
 use serde_json::{Value, json};
@@ -82,23 +82,24 @@ fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
 
 /// When pole or wrist first come to arm, column or floor (s), which the arm would only
 /// feel.
-fn tool_contact_s(trajectory: &JointTrajectory, period_s: f64) -> Option<f64> {
-    let scene = Scene::default();
+fn tool_contact_s(trajectory: &JointTrajectory, cell: &Cell, period_s: f64) -> Option<f64> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a trajectory lasts at most ten minutes"
     )]
     let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
-    (0..=cycles)
-        .map(|k| f64::from(k) * period_s)
-        .find(|t| !tool_contacts(&ArmShape::at(&trajectory.state_at(*t).q), &scene).none())
+    (0..=cycles).map(|k| f64::from(k) * period_s).find(|t| {
+        let arm = ArmShape::at(&trajectory.state_at(*t).q, &cell.pole);
+        !tool_contacts(&arm, cell).none()
+    })
 }
 
 pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     let arm = judged_arm(args).or_input()?;
     let plan = read_plan(&args.plan).or_input()?;
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
+    let cell = config::cell().or_input()?;
     let margins = limits.margins(&plan.trajectory);
     let broken: Vec<&Margin> = margins
         .iter()
@@ -133,7 +134,7 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     if stop.is_some() {
         return refuse(format!("keeps the limits, but {arm_says}"));
     }
-    let contact_s = tool_contact_s(&plan.trajectory, limits.period_s());
+    let contact_s = tool_contact_s(&plan.trajectory, &cell, limits.period_s());
     if !quiet {
         if let Some(contact_s) = contact_s {
             eprintln!(

@@ -70,9 +70,9 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
         .target
         .map_or_else(|| random_target(args.seed), |p| p.0);
     // Refused before anything starts, whatever rope turns out to be there.
-    check_reach(target_m, RANGES[1].max).or_input()?;
-    clear_of_arm(target_m).or_input()?;
     let rig = pipeline::shipped_rig(args.rig_config.as_deref()).or_input()?;
+    check_reach(target_m, RANGES[1].max, &rig.cell).or_input()?;
+    clear_of_arm(target_m, &rig.cell).or_input()?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{}", args.seed))?;
     let began = Instant::now();

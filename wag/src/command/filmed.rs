@@ -1,7 +1,9 @@
 //! What films a rope: its pictures, the camera, and how the clamp moved meanwhile.
 
 use crate::cli::SceneArgs;
+use crate::config;
 use anyhow::{Context, anyhow, ensure};
+use arm_model::{Cell, Pole};
 use camera_ingest::source::{read_left, run_file};
 use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
 use cli_output::{OrInput, Outcome};
@@ -17,6 +19,7 @@ const NO_MOTION: &str = "name the clamp's motion with --joints or --pose";
 #[derive(Debug)]
 pub struct ClampMotion {
     told: Told,
+    pole: Pole,
     /// How late the film's times are on the motion's (s).
     late_s: f64,
 }
@@ -38,12 +41,13 @@ impl ClampMotion {
             (None, Some(path)) => Told::Pose(path.clone()),
             (None, None) => return Err(anyhow!(NO_MOTION)),
         };
-        Ok(Self::late(told, scene))
+        Ok(Self::late(told, config::cell()?, scene))
     }
 
-    fn late(told: Told, scene: &SceneArgs) -> Self {
+    fn late(told: Told, cell: Cell, scene: &SceneArgs) -> Self {
         Self {
             told,
+            pole: cell.pole,
             late_s: scene.film_late_ms * 1e-3,
         }
     }
@@ -53,7 +57,8 @@ impl ClampMotion {
         let path = match &self.told {
             Told::Joints(path, csv) => {
                 let samples: Vec<_> = csv.times_s.iter().copied().zip(csv.q.clone()).collect();
-                ClampPath::from_joints(&samples).with_context(|| format!("`{}`", path.display()))?
+                ClampPath::from_joints(&samples, &self.pole)
+                    .with_context(|| format!("`{}`", path.display()))?
             }
             Told::Pose(path) => ClampPath::from_pose_csv(path)?,
         };
@@ -65,7 +70,7 @@ impl ClampMotion {
         match &self.told {
             Told::Joints(path, csv) => {
                 let times_s: Vec<f64> = csv.times_s.iter().map(|t| t + self.late_s).collect();
-                let arm = MeasuredArm::new(&times_s, &csv.q)
+                let arm = MeasuredArm::new(&times_s, &csv.q, self.pole)
                     .with_context(|| format!("`{}`", path.display()))?;
                 Ok(Box::new(arm))
             }
@@ -160,7 +165,8 @@ impl Filmed {
             "--fps is for recordings without times, but the run's file `{}` has them",
             path.display()
         );
-        let part = Run::open(path)?.film()?.part(scene.part.unwrap_or(1))?;
+        let run = Run::open(path)?;
+        let part = run.film()?.part(scene.part.unwrap_or(1))?;
         let camera = match (&scene.camera, &part.camera) {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),
@@ -180,7 +186,13 @@ impl Filmed {
         let motion = if scene.motion.is_given() {
             ClampMotion::read(scene)?
         } else {
-            ClampMotion::late(Told::Joints(path.to_owned(), part.joints.clone()), scene)
+            // The pole it was filmed with, where its folder tells it.
+            let cell = run.cell()?.map_or_else(config::cell, Ok)?;
+            ClampMotion::late(
+                Told::Joints(path.to_owned(), part.joints.clone()),
+                cell,
+                scene,
+            )
         };
         Ok(Self {
             warnings: part.warnings.clone(),

@@ -4,13 +4,13 @@ use super::reach_picture;
 use crate::cli::PlanArgs;
 use crate::config;
 use anyhow::{Context, anyhow, bail};
-use arm_model::{JointVector, Limits, kinematics};
+use arm_model::{Cell, JointVector, Limits, kinematics};
 use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
 use nalgebra::Vector3;
 use planner::process::PlannerConfig;
 use planner::response::Following;
 use planner::tasks::{
-    Belief, PlanError, PlanOptions, PlanRequest, ReachMap, ThrowConfig, plan_throw, start_pose_for,
+    Belief, PlanError, PlanOptions, PlanRequest, ReachMap, plan_throw, start_pose_for,
 };
 use run_log::files;
 use serde_json::{Value, json};
@@ -39,7 +39,7 @@ const LINK_RADIUS_M: f64 = 0.08;
 ///
 /// # Errors
 /// Which part the target lies in.
-pub fn clear_of_arm(target_m: [f64; 3]) -> anyhow::Result<()> {
+pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> anyhow::Result<()> {
     let [x, y, z] = target_m;
     let refuse = |part: &str| {
         bail!(
@@ -51,7 +51,7 @@ pub fn clear_of_arm(target_m: [f64; 3]) -> anyhow::Result<()> {
         return refuse("base");
     }
     let target = Vector3::new(x, y, z);
-    let chain = arm_chain(&start_pose_for(target_m));
+    let chain = arm_chain(&start_pose_for(target_m), cell);
     let near = |pair: &[Vector3<f64>]| distance_to_segment(target, pair[0], pair[1]);
     if chain.windows(2).map(near).any(|d| d < LINK_RADIUS_M) {
         return refuse("links in the start pose");
@@ -60,10 +60,10 @@ pub fn clear_of_arm(target_m: [f64; 3]) -> anyhow::Result<()> {
 }
 
 /// Points along the arm in a pose: the shoulder, the joints, the flange, the pole's end (m).
-fn arm_chain(q: &JointVector) -> Vec<Vector3<f64>> {
+fn arm_chain(q: &JointVector, cell: &Cell) -> Vec<Vector3<f64>> {
     let mut chain: Vec<Vector3<f64>> = kinematics::link_poses(q).iter().map(|f| f.0).collect();
     chain.push(kinematics::flange_pose(q).0);
-    chain.push(kinematics::attach_pose(q).0);
+    chain.push(cell.pole.attach_pose(q).0);
     chain
 }
 
@@ -164,14 +164,22 @@ fn reach(
     path: &Path,
     args: &PlanArgs,
     limits: &Limits,
-    config: &ThrowConfig,
+    config: &PlannerConfig,
     quiet: bool,
 ) -> Outcome<()> {
     /// The reach is explored before anything else is done.
     const THREADS: usize = 2;
     let rope = files::read_rope(&args.rope).or_input()?;
     let stage = Stage::begin("reach", quiet);
-    let map = ReachMap::explore(&rope, limits, config, args.seed, THREADS).map_err(classify)?;
+    let map = ReachMap::explore(
+        &rope,
+        limits,
+        &config.cell,
+        &config.strike,
+        args.seed,
+        THREADS,
+    )
+    .map_err(classify)?;
     let picture = reach_picture::svg(&map, &rope, args.target.0, args.seed);
     files::write_atomic(path, picture.as_bytes()).or_failed()?;
     stage.done(&format!(
@@ -195,20 +203,21 @@ pub fn describe(plan: &Plan) -> String {
 /// Plans a throw of a task.
 pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
-    clear_of_arm(args.target.0).or_input()?;
-    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
+    clear_of_arm(args.target.0, &config.cell).or_input()?;
+    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let belief = belief(args).or_input()?;
     let response = args.arm_response.as_deref().map(files::read_arm_response);
     let response = response.transpose().or_input()?;
     if let Some(path) = &args.reach {
-        reach(path, args, &limits, &config.strike, quiet)?;
+        reach(path, args, &limits, &config, quiet)?;
     }
     cli_output::watch_interrupts().or_failed()?;
     let stage = Stage::begin("plan", quiet);
     let request = PlanRequest {
         rope,
         limits: limits.clone(),
+        cell: config.cell,
         options: PlanOptions {
             seed: args.seed,
             segment_stretch_max: args
@@ -279,16 +288,17 @@ mod tests {
 
     #[test]
     fn targets_in_the_arm_are_refused() {
-        let said = |t| format!("{:#}", clear_of_arm(t).unwrap_err());
+        let cell = Cell::default();
+        let said = |t| format!("{:#}", clear_of_arm(t, &cell).unwrap_err());
         assert!(said([0.0, 0.0, 0.1]).contains("base"));
         assert!(said([0.05, -0.05, -0.3]).contains("base"));
         let flange = kinematics::flange_pose(&start_pose_for([1.0, 0.0, 0.0])).0;
         assert!(said(flange.into()).contains("links"), "{flange}");
         let turned = start_pose_for([0.6, 0.6, 0.0]);
-        let end = kinematics::attach_pose(&turned).0;
+        let end = cell.pole.attach_pose(&turned).0;
         assert!(said(end.into()).contains("links"), "{end}");
         for free in [[1.0, 0.0, 0.4], [0.85, 0.3, -0.1], [1.05, -0.3, 0.6]] {
-            assert!(clear_of_arm(free).is_ok(), "{free:?}");
+            assert!(clear_of_arm(free, &cell).is_ok(), "{free:?}");
         }
     }
 }

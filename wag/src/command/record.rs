@@ -50,6 +50,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
         RunFolder::refuse_existing(out)?;
     }
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
+    let cell = config::cell().or_input()?;
     let domain = chosen_domain(args)?;
     // Goes last, so that no file of the domain stays when this was its last user.
     let _sweep = DomainSweep::new(&domain);
@@ -57,7 +58,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     Bus::join(&domain).or_input()?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
-    let config = RecorderConfig::of_run(&domain, folder.path(), &limits);
+    let config = RecorderConfig::of_run(&domain, folder.path(), &limits, cell);
     let recorder = RunFileThread::start(config).or_failed()?;
     if !quiet {
         println!(
@@ -83,6 +84,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
             those_that_run(&running_controllers())
         )));
     }
+    folder.config("cell", &cell).or_failed()?;
     let explanation = Run::open(folder.path()).or_failed()?.keep_cause();
     let summary = json!({
         "ok": true, "command": "record", "run": folder.path(), "domain": domain,

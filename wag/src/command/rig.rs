@@ -1,6 +1,7 @@
 //! `wag rig`: the simulated xArm 7 as a server.
 
 use crate::cli::RigArgs;
+use crate::config;
 use anyhow::anyhow;
 use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
 use rig_sim::{RigConfig, run_announced};
@@ -44,6 +45,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
                 command_port: args.command_port,
                 report_ports,
                 faults,
+                cell: config::cell().or_input()?,
                 ..RigConfig::default()
             };
             config.camera.enabled = args.camera.is_some();

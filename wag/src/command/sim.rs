@@ -2,6 +2,7 @@
 
 use super::filmed::read_pose;
 use crate::cli::{PrecisionName, SimRopeArgs, SimThrowArgs};
+use crate::config;
 use anyhow::{Context, anyhow, ensure};
 use cli_output::{Failure, OrInput, Outcome};
 use rope_sim::{
@@ -125,9 +126,10 @@ pub fn throw(args: &SimThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let joints = files::read_joints(&args.joints).or_input()?;
     check_step(args.dt).or_input()?;
+    let cell = config::cell().or_input()?;
     let first_s = joints.times_s.first().copied().unwrap_or_default();
     let times: Vec<f64> = joints.times_s.iter().map(|t| t - first_s).collect();
-    let motion = MeasuredArm::new(&times, &joints.q)
+    let motion = MeasuredArm::new(&times, &joints.q, cell.pole)
         .with_context(|| format!("`{}`", args.joints.display()))
         .or_input()?;
     let duration_s = times.last().copied().unwrap_or_default();

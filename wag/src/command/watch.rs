@@ -1,6 +1,7 @@
 //! `wag watch`: a page in the browser that shows what runs.
 
 use crate::cli::WatchArgs;
+use crate::config;
 use crate::pipeline::preview_spec;
 use crate::session::Supervisor;
 use anyhow::{Context, anyhow};
@@ -63,16 +64,16 @@ pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(camera) = &args.camera {
         load_camera(camera).or_input()?;
     }
+    let cell = config::cell().or_input()?;
     watch_interrupts().or_failed()?;
     let process = args.preview.then(Preview::new).transpose().or_failed()?;
     let preview = process.map(|p| PreviewChild::new(Box::new(p), args.camera.clone()));
-    let (mut watcher, url) =
-        Watcher::start(wanted, args.bind, preview).map_err(|error| {
-            match error.downcast_ref::<IpcError>() {
-                Some(IpcError::Domain { .. }) => Failure::input(error),
-                _ => Failure::failed(error),
-            }
-        })?;
+    let (mut watcher, url) = Watcher::start(wanted, args.bind, cell, preview).map_err(|error| {
+        match error.downcast_ref::<IpcError>() {
+            Some(IpcError::Domain { .. }) => Failure::input(error),
+            _ => Failure::failed(error),
+        }
+    })?;
     // Whatever happens here may wait; what is watched may not.
     let _ = rustix::process::nice(NICE);
     let began = Instant::now();

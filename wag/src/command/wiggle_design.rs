@@ -44,7 +44,16 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     let camera = side_camera();
     let threads = config.identify.threads;
     let judged = |wiggle: &WiggleConfig| {
-        judge(wiggle, &limits, &camera, args.seed, true, threads).map_err(classify)
+        judge(
+            wiggle,
+            &limits,
+            &config.cell,
+            &camera,
+            args.seed,
+            true,
+            threads,
+        )
+        .map_err(classify)
     };
     cli_output::watch_interrupts().or_failed()?;
     let mut rows: Vec<(&'static str, JudgedWiggle)> = vec![
@@ -56,6 +65,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
         let best = optimise(
             &config.wiggle,
             &limits,
+            &config.cell,
             &camera,
             args.seed,
             threads,

@@ -1,6 +1,6 @@
 //! The kinds of configuration, and what is built in of each.
 
-use arm_model::Limits;
+use arm_model::{Cell, Limits};
 use planner::process::PlannerConfig;
 use rig_sim::{RigConfig, check};
 use rt_controller::config::ControllerConfig;
@@ -14,6 +14,8 @@ pub enum Kind {
     Planner,
     /// What the arm may do.
     Limits,
+    /// The pole on the arm, and what stands around it.
+    Cell,
     /// The controller: real-time set-up, monitors, guardian.
     Controller,
     /// The simulated rig: camera, arm lag, noise.
@@ -24,10 +26,24 @@ pub enum Kind {
 pub trait Configured: DeserializeOwned {
     /// Its kind.
     const KIND: Kind;
+
+    /// The same in a cell, where it has one.
+    #[must_use]
+    fn in_cell(self, _cell: Cell) -> Self {
+        self
+    }
+}
+
+impl Configured for Cell {
+    const KIND: Kind = Kind::Cell;
 }
 
 impl Configured for PlannerConfig {
     const KIND: Kind = Kind::Planner;
+
+    fn in_cell(self, cell: Cell) -> Self {
+        Self { cell, ..self }
+    }
 }
 
 impl Configured for Limits {
@@ -40,17 +56,28 @@ impl Configured for ControllerConfig {
 
 impl Configured for RigConfig {
     const KIND: Kind = Kind::Rig;
+
+    fn in_cell(self, cell: Cell) -> Self {
+        Self { cell, ..self }
+    }
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Planner, Self::Limits, Self::Controller, Self::Rig];
+    pub const ALL: [Self; 5] = [
+        Self::Planner,
+        Self::Limits,
+        Self::Cell,
+        Self::Controller,
+        Self::Rig,
+    ];
 
     /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Planner => "planner",
             Self::Limits => "limits",
+            Self::Cell => "cell",
             Self::Controller => "controller",
             Self::Rig => "rig",
         }
@@ -61,6 +88,7 @@ impl Kind {
         match self {
             Self::Planner => "planner.toml",
             Self::Limits => "limits.toml",
+            Self::Cell => "cell.toml",
             Self::Controller => "rt-controller.toml",
             Self::Rig => "rig.toml",
         }
@@ -71,6 +99,7 @@ impl Kind {
         match self {
             Self::Planner => "configs/planner/planner.toml",
             Self::Limits => "configs/robot/xarm7.toml",
+            Self::Cell => "configs/cell/lab.toml",
             Self::Controller => "configs/rt/controller.toml",
             Self::Rig => "configs/rig/demo.toml",
         }
@@ -81,6 +110,7 @@ impl Kind {
         match self {
             Self::Planner => include_str!("../../../configs/planner/planner.toml"),
             Self::Limits => include_str!("../../../configs/robot/xarm7.toml"),
+            Self::Cell => include_str!("../../../configs/cell/lab.toml"),
             Self::Controller => include_str!("../../../configs/rt/controller.toml"),
             Self::Rig => include_str!("../../../configs/rig/demo.toml"),
         }
@@ -88,9 +118,15 @@ impl Kind {
 
     /// Whether a table can be read as this kind.
     pub fn accepts(self, table: toml::Table) -> Result<(), toml::de::Error> {
+        if table.contains_key("cell") {
+            return Err(toml::de::Error::custom(
+                "`cell` has a file of its own: cell.toml, or --cell FILE",
+            ));
+        }
         match self {
             Self::Planner => table.try_into::<PlannerConfig>().map(drop),
             Self::Limits => table.try_into::<Limits>().map(drop),
+            Self::Cell => table.try_into::<Cell>().map(drop),
             Self::Controller => table.try_into::<ControllerConfig>().map(drop),
             Self::Rig => table
                 .try_into::<RigConfig>()
@@ -103,6 +139,7 @@ impl Kind {
         match self {
             Self::Planner => toml::from_str::<PlannerConfig>(text).err(),
             Self::Limits => toml::from_str::<Limits>(text).err(),
+            Self::Cell => toml::from_str::<Cell>(text).err(),
             Self::Controller => toml::from_str::<ControllerConfig>(text).err(),
             Self::Rig => toml::from_str::<RigConfig>(text).err(),
         }

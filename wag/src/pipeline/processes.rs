@@ -64,10 +64,12 @@ pub fn start_recorder(
     camera: Option<&StereoCamera>,
     target_m: Option<[f64; 3]>,
 ) -> anyhow::Result<()> {
+    let cell = config::cell()?;
+    folder.config("cell", &cell)?;
     let config = RecorderConfig {
         target_m,
         camera: camera.cloned(),
-        ..RecorderConfig::of_run(&folder.domain, folder.path(), limits)
+        ..RecorderConfig::of_run(&folder.domain, folder.path(), limits, cell)
     };
     let file = config.file.clone();
     let config = folder.config("recorder", &config)?;
@@ -110,8 +112,10 @@ pub fn start_camera(
     session: &mut Session,
     folder: &RunFolder,
 ) -> anyhow::Result<RpcClient<CameraRpc>> {
-    let domain = folder.domain.clone();
-    let config = CameraConfig { domain };
+    let config = CameraConfig {
+        domain: folder.domain.clone(),
+        cell: config::cell()?,
+    };
     let ping = &CameraRequest::Ping;
     start(session, folder, "camera-ingest", &config, ping)
 }
@@ -132,7 +136,7 @@ pub fn start_planner(
 /// The live preview of a domain's rope, to be started by whoever shows it; its
 /// configuration goes into `folder`.
 pub fn preview_spec(folder: &Path, domain: &str, camera: &Path) -> anyhow::Result<ProcessSpec> {
-    let config = PreviewConfig::new(domain, camera.to_owned());
+    let config = PreviewConfig::new(domain, camera.to_owned(), config::cell()?);
     let path = folder.join("preview.toml");
     let text = toml::to_string(&config).context("configuration of preview")?;
     files::write_atomic(&path, text.as_bytes())?;

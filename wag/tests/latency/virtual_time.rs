@@ -4,7 +4,7 @@
 
 use super::{Errors, report, secret_lags};
 use arm_model::response::{Excitation, JointResponse, NotExcited};
-use arm_model::{JOINTS, JointTrajectory, JointVector, Limits};
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole};
 use planner::response::delay::command_to_target;
 use planner::response::excitation::sweep;
 use planner::response::{Recording, Sample, Setpoint, identify};
@@ -54,7 +54,7 @@ impl Programme {
     fn new(e: &Excitation, joints: &[usize]) -> Self {
         let sweeps = joints
             .iter()
-            .map(|j| sweep(e, &Limits::default(), *j).unwrap())
+            .map(|j| sweep(e, &Limits::default(), &Pole::default(), *j).unwrap())
             .collect();
         Self {
             sweeps,

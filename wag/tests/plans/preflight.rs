@@ -2,10 +2,10 @@
 //! arm do. `WAG_LONG_TESTS=1` runs 10 000 plans instead of 300.
 
 use super::{arm_error, long_tests, run};
+use arm_model::capsules::self_clearance_m;
 use arm_model::joint::START_POSE;
 use arm_model::limits::{LimitKind, LimitsSpec};
 use arm_model::{JointTrajectory, JointVector, Limits, kinematics};
-use planner::collide::ArmShape;
 use planner::preflight::{Fence, JudgedArm, arm_margins, first_stop};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -73,7 +73,7 @@ fn random_start(rng: &mut ChaCha8Rng, about: JointVector, spread_rad: f64) -> Jo
     loop {
         let wide = about.map(|q| q + rng.random_range(-spread_rad..spread_rad));
         let q = wide.map(|q| (q / 1e-5).round() * 1e-5);
-        if limits.position_violation(&q).is_none() && ArmShape::at(&q).self_clearance_m() > 0.004 {
+        if limits.position_violation(&q).is_none() && self_clearance_m(&q) > 0.004 {
             return q;
         }
     }

@@ -4,7 +4,7 @@
 
 use super::{long_tests, run};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
-use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
+use arm_model::{ArmResponse, Cell, JOINTS, JointTrajectory, Limits, Pole};
 use hil_tests::virtual_rig::VirtualRig;
 use planner::response::Following;
 use planner::ropes::{random_rope, random_strike_target};
@@ -72,7 +72,7 @@ fn thrown_m(rig: &VirtualRig, rope: &RopeParams, target_m: [f64; 3]) -> f64 {
     let (times_s, q): (Vec<f64>, Vec<_>) = truth
         .map(|s| ((s.at.0 - first.deadline_ns) as f64 * 1e-9, s.state.q))
         .unzip();
-    let arm = MeasuredArm::new(&times_s, &q).unwrap();
+    let arm = MeasuredArm::new(&times_s, &q, Pole::default()).unwrap();
     let options = SimOptions {
         step_s: 2.5e-4,
         precision: Precision::F64,
@@ -101,6 +101,7 @@ fn throws_planned_through_the_response_meet_their_targets() {
             let request = PlanRequest {
                 rope,
                 limits: limits.clone(),
+                cell: Cell::default(),
                 options: PlanOptions {
                     seed,
                     population: if small { 24 } else { 60 },

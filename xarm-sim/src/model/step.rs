@@ -124,12 +124,15 @@ impl ArmModel {
 
     /// A contact that deepens is a collision.
     fn watch_obstacles(&mut self) {
-        let obstacles = &self.config.obstacles;
-        if obstacles.is_empty() || self.true_motion().qd.max_abs() < STANDING_RAD_S {
+        let ArmConfig {
+            cell, obstacles, ..
+        } = &self.config;
+        let stands_free = cell.is_none() && obstacles.is_empty();
+        if stands_free || self.true_motion().qd.max_abs() < STANDING_RAD_S {
             return;
         }
         let tool = self.settings.tcp_offset.position();
-        let depth_m = obstacle_depth_m(&self.true_motion().q, &tool, obstacles);
+        let depth_m = obstacle_depth_m(&self.true_motion().q, &tool, cell.as_ref(), obstacles);
         if depth_m > self.contact_m + CONTACT_STEP_M {
             self.contact_m = depth_m;
             if self.error.is_none() {

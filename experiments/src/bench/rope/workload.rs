@@ -1,7 +1,7 @@
 //! The ropes and motions that are simulated, all drawn from one seed.
 
 use arm_model::trajectory::TrajectoryError;
-use arm_model::{JointTrajectory, JointVector};
+use arm_model::{JointTrajectory, JointVector, Pole};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
@@ -54,7 +54,7 @@ impl Workload {
             ropes,
             throws,
             wiggle: wiggle()?,
-            still: PlannedArm::new(still),
+            still: PlannedArm::new(still, Pole::default()),
         })
     }
 
@@ -148,7 +148,7 @@ fn throw(random: &mut ChaCha8Rng) -> Result<PlannedArm, TrajectoryError> {
             JointVector(q)
         })
         .collect();
-    JointTrajectory::new(&times_s, &waypoints).map(PlannedArm::new)
+    JointTrajectory::new(&times_s, &waypoints).map(|throw| PlannedArm::new(throw, Pole::default()))
 }
 
 fn wiggle() -> Result<PlannedArm, TrajectoryError> {
@@ -161,5 +161,5 @@ fn wiggle() -> Result<PlannedArm, TrajectoryError> {
             JointVector(q)
         })
         .collect();
-    JointTrajectory::new(&times_s, &waypoints).map(PlannedArm::new)
+    JointTrajectory::new(&times_s, &waypoints).map(|throw| PlannedArm::new(throw, Pole::default()))
 }

@@ -109,9 +109,13 @@ fn sweeps(
         [] => (1..=JOINTS).collect(),
         named => named.iter().map(|j| usize::from(*j)).collect(),
     };
+    let pole = config::cell().or_input()?.pole;
     joints
         .into_iter()
-        .map(|joint| Ok((joint, sweep(excitation, limits, joint - 1).or_input()?)))
+        .map(|joint| {
+            let swept = sweep(excitation, limits, &pole, joint - 1).or_input()?;
+            Ok((joint, swept))
+        })
         .collect()
 }
 

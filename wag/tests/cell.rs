@@ -1,0 +1,150 @@
+//! A cell given in one file: everything that computes with the pole, the floor or the
+//! column follows it.
+#![cfg(test)]
+
+mod support;
+
+use arm_model::joint::START_POSE;
+use arm_model::{Cell, JointTrajectory};
+use planner::collide::{ArmShape, tool_contacts};
+use planner::ropes::random_rope;
+use planner::tasks::check_reach;
+use planner::trajopt::PolePose;
+use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
+use rig_sim::{CameraConfig, RigConfig};
+use rope_sim::{AttachMotion, PlannedArm};
+use std::fmt::Write;
+use support::{said, wag_in};
+use xarm_sim::collision::obstacle_depth_m;
+
+const LAB: &str = include_str!("../../configs/cell/lab.toml");
+
+/// The shipped cell, and one with a pole of 0.30 m and a floor that this pole reaches in
+/// the start pose bent down, the shipped one not.
+fn cells() -> (Cell, Cell) {
+    let other = LAB
+        .replace("length_m = 0.20", "length_m = 0.30")
+        .replace("floor_z_m = -0.75", "floor_z_m = -0.10");
+    (Cell::default(), toml::from_str(&other).unwrap())
+}
+
+/// The start pose bent down until the lab's pole ends 5 cm above the other cell's floor.
+fn low_pose(lab: &Cell, other: &Cell) -> arm_model::JointVector {
+    let (mut q, wanted_m) = (START_POSE, other.floor_z_m + 0.05);
+    while lab.pole.attach_pose(&q).0.z > wanted_m {
+        q[1] += 1e-3;
+        q[5] -= 1e-3;
+    }
+    q
+}
+
+#[test]
+fn planner_preflight_arm_and_viewer_follow_the_cell() {
+    let (lab, other) = cells();
+    let attach = |cell: &Cell| {
+        let hold = JointTrajectory::hold(START_POSE, 1.0).unwrap();
+        PlannedArm::new(hold, cell.pole).at(0.5).p_m
+    };
+    let down_m = attach(&lab) - attach(&other);
+    assert!((down_m.norm() - 0.10).abs() < 1e-9 && down_m.z > 0.0999);
+    let pole_z = |cell: &Cell| PolePose::of(&START_POSE, &cell.pole).z_m;
+    assert!((pole_z(&lab) - pole_z(&other) - 0.10).abs() < 1e-6);
+    assert!(check_reach([0.6, 0.0, -0.2], 0.5, &lab).is_ok());
+    assert!(check_reach([0.6, 0.0, -0.2], 0.5, &other).is_err());
+
+    let q = low_pose(&lab, &other);
+    let touches = |cell: &Cell| !tool_contacts(&ArmShape::at(&q, &cell.pole), cell).none();
+    assert!(!touches(&lab) && touches(&other));
+
+    let depth_m = |cell: Cell| {
+        let arm = RigConfig {
+            cell,
+            ..RigConfig::default()
+        };
+        let arm = arm.arm();
+        let tool = arm.limits.tcp_offset();
+        obstacle_depth_m(&q, &tool, arm.cell.as_ref(), &arm.obstacles)
+    };
+    assert!(depth_m(lab) < 0.0 && depth_m(other) > 0.0);
+
+    let end = |cell: &Cell| {
+        let points = viewer::report::arm_points(&START_POSE, &cell.pole);
+        points[points.len() - 1]
+    };
+    assert_eq!(end(&lab) - end(&other), 1000, "tenths of a millimetre");
+}
+
+#[test]
+fn the_renderer_draws_the_cell() {
+    let (lab, other) = cells();
+    let camera = CameraConfig::default().stereo_camera();
+    let shape = RopeShape::from(&random_rope(1));
+    let frame = |cell: &Cell| {
+        let colours = Appearance::from_seed(1);
+        let mut renderer = Renderer::new(&camera, cell, shape, colours, 0.0, 1);
+        let pose = ScenePose {
+            q: START_POSE,
+            nodes: Vec::new(),
+        };
+        let mut out = vec![0; renderer.frame_bytes()];
+        renderer.render(&[pose], 0, &mut out);
+        out
+    };
+    let longer = Cell {
+        pole: other.pole,
+        ..lab
+    };
+    let [plain, longer_pole, all] = [&lab, &longer, &other].map(frame);
+    // Where only the longer pole is: the wall, or dark carbon.
+    let ends = [&lab, &other].map(|cell| cell.pole.attach_pose(&START_POSE).0);
+    let [u, v] = camera.project_left(&ends[0].lerp(&ends[1], 0.5)).unwrap();
+    let at = (v.round() as usize * camera.width_px as usize * 2 + u.round() as usize) * 2;
+    assert!(plain[at] > longer_pole[at] + 30);
+    assert_ne!(longer_pole, all, "the floor is another one");
+}
+
+#[test]
+fn one_file_changes_what_the_commands_compute() {
+    let dir = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    put("cell.toml", "[pole]\nlength_m = 0.30\n");
+    put("rope.toml", &toml::to_string(&random_rope(1)).unwrap());
+    let mut joints = "t,q1,q2,q3,q4,q5,q6,q7\n".to_owned();
+    for k in 0..20 {
+        let angles = START_POSE.iter().map(|q| format!(",{q}"));
+        writeln!(
+            joints,
+            "{}{}",
+            0.01 * f64::from(k),
+            angles.collect::<String>()
+        )
+        .unwrap();
+    }
+    put("joints.csv", &joints);
+    let tip_z = |more: &str| -> f64 {
+        let sim = "sim throw --rope rope.toml --joints joints.csv --out tip.csv";
+        let output = wag_in(dir.path(), &format!("{sim} {more}"));
+        assert!(output.status.success(), "{output:?}");
+        let tips = std::fs::read_to_string(dir.path().join("tip.csv")).unwrap();
+        let last = tips.lines().last().unwrap();
+        last.rsplit(',').next().unwrap().parse().unwrap()
+    };
+    let lower_m = tip_z("") - tip_z("--cell cell.toml");
+    assert!((lower_m - 0.10).abs() < 1e-6, "{lower_m}");
+
+    let shown = wag_in(dir.path(), "config show cell cell.toml --origin");
+    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    assert!(
+        shown.contains("pole.length_m") && shown.contains("cell.toml"),
+        "{shown}"
+    );
+
+    // It has no second home.
+    put("planner.toml", "[cell]\nfloor_z_m = -0.5\n");
+    let refused = wag_in(dir.path(), "config check planner planner.toml");
+    let said = said(&refused);
+    assert!(
+        !refused.status.success() && said.contains("--cell"),
+        "{said}"
+    );
+}
