@@ -28,7 +28,7 @@ const MASK: Wanted = Wanted {
 const ON_ROPE: f32 = 1.0;
 const NO_POINT: f32 = -1.0;
 
-/// A segmenter from an ONNX file (inputs and outputs: `docs/src/eyes.md`).
+/// A segmenter from an ONNX file (inputs and outputs: `docs/src/camera.md`).
 #[derive(Debug)]
 pub struct OnnxSegmenter {
     graph: Graph,

@@ -37,7 +37,7 @@ const SHARED: usize = 4;
 const LEAST_FRAMES: usize = 2;
 const LEAST_POINTS: usize = 4;
 
-/// A tracker from an ONNX file (inputs and outputs: `docs/src/eyes.md`).
+/// A tracker from an ONNX file (inputs and outputs: `docs/src/camera.md`).
 #[derive(Debug)]
 pub struct OnnxTracker {
     graph: Graph,
