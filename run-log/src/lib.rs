@@ -44,7 +44,8 @@ pub use explanation::{Broken, Explanation, Late, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{
     Channel, McapFile, Recorded, RecorderConfig, RecordingCounts, Recovered, RopeMotion,
-    RunFileThread, RunFilm, RunPart, SimulateRope, Walked, is_mcap, record, recover, replay_bytes,
+    RunFileThread, RunFilm, RunPart, SimulateRope, Walked, is_mcap, left_jpeg, record, recover,
+    replay_bytes,
 };
 pub use page::show;
 pub use run::{Recording, Run};

@@ -16,26 +16,16 @@ mod cli;
 mod command;
 mod config;
 mod doctor;
-mod moved;
 mod pipeline;
 mod session;
 
 use clap::Parser;
-use cli_output::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,
-        Err(e) => {
-            return match moved::replacement(std::env::args().skip(1)) {
-                Some(instead) if e.use_stderr() => {
-                    let json = std::env::args().any(|arg| arg == "--json");
-                    cli_output::finish(Err(Failure::input(anyhow::anyhow!(instead))), json)
-                }
-                _ => cli_output::refuse_usage(&e),
-            };
-        }
+        Err(error) => return cli_output::refuse_usage(&error),
     };
     cli_output::start_logging(cli.verbose);
     if let Some(file) = &cli.cell {

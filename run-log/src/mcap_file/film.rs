@@ -15,8 +15,8 @@ use camera_ingest::calib::check_camera;
 use camera_ingest::{EyeFrame, FrameSource, SourceError};
 use mcap::records::Record;
 use serde::Deserialize;
-use shared_types::StereoCamera;
 use shared_types::ipc::ControllerMode;
+use shared_types::{MonotonicNs, StereoCamera};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -256,7 +256,7 @@ impl RunFilm {
         if missing_ns > 0 {
             warnings.push(format!(
                 "run file `{name}`: pictures of {:.1} s of motion {number} are missing",
-                since_s(missing_ns, 0)
+                MonotonicNs(missing_ns).since_s(MonotonicNs(0))
             ));
         }
         warnings
@@ -324,8 +324,9 @@ impl RunFilm {
         };
         let span = zero_ns.saturating_sub(MARGIN_NS)..=last_ns.saturating_add(MARGIN_NS);
         let around = self.joints.iter().filter(|(t, _)| span.contains(t));
-        let (times_s, q): (Vec<f64>, Vec<JointVector>) =
-            around.map(|(t, q)| (since_s(*t, zero_ns), *q)).unzip();
+        let (times_s, q): (Vec<f64>, Vec<JointVector>) = around
+            .map(|(t, q)| (MonotonicNs(*t).since_s(MonotonicNs(zero_ns)), *q))
+            .unzip();
         if times_s.len() < MIN_JOINTS {
             return Err(missing(format!(
                 "the arm reported its joints {} times during motion {number}, but {MIN_JOINTS} \
@@ -341,18 +342,6 @@ impl RunFilm {
             joints: JointsCsv { times_s, q },
         })
     }
-}
-
-/// Seconds from one instant to another, which may be before it.
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "a run lasts far less than 2^53 ns"
-)]
-fn since_s(at_ns: u64, zero_ns: u64) -> f64 {
-    if at_ns < zero_ns {
-        return -since_s(zero_ns, at_ns);
-    }
-    (at_ns - zero_ns) as f64 * 1e-9
 }
 
 impl FrameSource for RunPart {

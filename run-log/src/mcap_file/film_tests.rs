@@ -78,7 +78,7 @@ fn write_part(
             height_px: sees.height_px,
             ..FrameHeader::default()
         };
-        let jpeg = left_jpeg(&header, &frame.yuyv).unwrap();
+        let jpeg = left_jpeg(&header, &frame.yuyv, 1, 75).unwrap();
         let now_ns = clock.wall_ns(at_ns(frame.start_s));
         let told = messages::image(now_ns, &jpeg);
         file.json(Channel::Image, now_ns, &told).unwrap();

@@ -1,17 +1,16 @@
 //! The camera's left eye as JPEG.
-//!
-//! Left only: the rope is tracked in it, and the right eye would double the file.
 
 use crate::{Error, Result};
 use jpeg_encoder::{Encoder, ImageBuffer, JpegColorType, SamplingFactor};
 use shared_types::ipc::{FrameHeader, PIXEL_FORMAT_YUYV};
 
-/// JPEG quality.
-const QUALITY: u8 = 75;
-
-/// The left half of packed 4:2:2 rows, whose colours a JPEG takes as they are.
+/// The left half of packed 4:2:2 rows, whose colours a JPEG takes as they are: of every
+/// `scale` pixels and rows the first.
 struct LeftEye<'a> {
     yuyv: &'a [u8],
+    /// Pixels of the eye in a row of the frame.
+    columns: usize,
+    scale: usize,
     width: u16,
     height: u16,
 }
@@ -27,40 +26,46 @@ impl ImageBuffer for LeftEye<'_> {
         self.height
     }
     fn fill_buffers(&self, row: u16, planes: &mut [Vec<u8>; 4]) {
-        let eye = 2 * usize::from(self.width);
-        let begin = 2 * eye * usize::from(row);
-        for quad in self.yuyv[begin..begin + eye].chunks_exact(4) {
-            for luma in [quad[0], quad[2]] {
-                planes[0].push(luma);
-                planes[1].push(quad[1]);
-                planes[2].push(quad[3]);
-            }
+        let begin = 4 * self.columns * usize::from(row) * self.scale;
+        for u in (0..self.columns).step_by(self.scale) {
+            let quad = &self.yuyv[begin + u / 2 * 4..][..4];
+            planes[0].push(quad[u % 2 * 2]);
+            planes[1].push(quad[1]);
+            planes[2].push(quad[3]);
         }
     }
 }
 
-/// The left eye of a side-by-side frame.
-pub(super) fn left_jpeg(header: &FrameHeader, yuyv: &[u8]) -> Result<Vec<u8>> {
-    let too_large = |_| Error::Picture("the frame is too large for a JPEG".to_owned());
-    let width = u16::try_from(header.width_px / 2).map_err(too_large)?;
-    let height = u16::try_from(header.height_px).map_err(too_large)?;
+/// The left eye of a side-by-side frame, made `scale` times smaller each way.
+///
+/// # Errors
+/// [`Error::Picture`].
+pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -> Result<Vec<u8>> {
+    let (width, height) = (header.width_px as usize, header.height_px as usize);
     let is_yuyv = header.pixel_format == PIXEL_FORMAT_YUYV
-        && header.width_px.is_multiple_of(4)
-        && yuyv.len() == 4 * usize::from(width) * usize::from(height);
+        && width > 0
+        && height > 0
+        && width.is_multiple_of(4)
+        && yuyv.len() == 2 * width * height;
     if !is_yuyv {
         return Err(Error::Picture(format!(
-            "the frame is no YUYV of {} x {} px",
-            header.width_px, header.height_px
+            "the frame is no YUYV of {width} x {height} px"
         )));
     }
-    let mut jpeg = Vec::new();
-    let mut encoder = Encoder::new(&mut jpeg, QUALITY);
-    encoder.set_sampling_factor(SamplingFactor::F_2_1);
+    let side = |px: usize| {
+        let side = u16::try_from(px.div_ceil(scale));
+        side.map_err(|_| Error::Picture("the frame is too large for a JPEG".to_owned()))
+    };
     let eye = LeftEye {
         yuyv,
-        width,
-        height,
+        columns: width / 2,
+        scale,
+        width: side(width / 2)?,
+        height: side(height)?,
     };
+    let mut jpeg = Vec::new();
+    let mut encoder = Encoder::new(&mut jpeg, quality);
+    encoder.set_sampling_factor(SamplingFactor::F_2_1);
     encoder
         .encode_image(eye)
         .map_err(|reason| Error::Picture(reason.to_string()))?;
@@ -91,7 +96,8 @@ mod tests {
             height_px: height,
             ..FrameHeader::default()
         };
-        let jpeg = left_jpeg(&header, &row.repeat(height as usize)).unwrap();
+        let frame = row.repeat(height as usize);
+        let jpeg = left_jpeg(&header, &frame, 1, 75).unwrap();
         // The reader takes it for a pair, which only concerns how it splits it.
         let StereoFrame(seen) = StereoFrame::from_jpeg(&jpeg, 0, 0).unwrap();
         assert_eq!((seen.width_px, seen.height_px), (32, 16));
@@ -99,6 +105,30 @@ mod tests {
             let [y, cb, cr] = seen.ycc(u, v).map(i32::from);
             assert!((y - 60).abs() < 3 && (cb - 180).abs() < 3 && (cr - 100).abs() < 3);
         }
-        assert!(left_jpeg(&header, &row).is_err(), "one row is no frame");
+        assert!(
+            left_jpeg(&header, &row, 1, 75).is_err(),
+            "one row is no frame"
+        );
+    }
+
+    #[test]
+    fn the_left_eye_is_cut_out_pixel_by_pixel() {
+        // Two rows of eight pixels: luma counts, chroma tells the eye.
+        let pair = |y: u8, eye: u8| [y, 100 + eye, y + 1, 200 + eye];
+        let row = |y: u8| [pair(y, 0), pair(y + 2, 0), pair(y + 4, 1), pair(y + 6, 1)].concat();
+        let frame = [row(0), row(10)].concat();
+        for (scale, row, luma) in [(1, 1, &[10, 11, 12, 13][..]), (2, 0, &[0, 2])] {
+            let eye = LeftEye {
+                yuyv: &frame,
+                columns: 4,
+                scale,
+                width: 0,
+                height: 0,
+            };
+            let mut planes = [const { Vec::new() }; 4];
+            eye.fill_buffers(row, &mut planes);
+            assert_eq!(planes[0], luma);
+            assert!(planes[1].iter().all(|cb| *cb == 100) && planes[2].iter().all(|cr| *cr == 200));
+        }
     }
 }

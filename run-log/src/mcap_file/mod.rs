@@ -27,6 +27,7 @@ mod writer;
 pub use channel::Channel;
 pub use counts::RecordingCounts;
 pub use film::{RunFilm, RunPart};
+pub use image::left_jpeg;
 pub(crate) use messages::mode_name;
 pub use read::{Walked, is_mcap, replay_bytes};
 pub use recorder::{Recorded, RecorderConfig, run as record};

@@ -45,6 +45,9 @@ const PICTURES_AT_ONCE: usize = 1;
 /// Frames of the arm's links per second.
 const FRAMES_HZ: f64 = 50.0;
 
+/// Quality of the pictures as JPEG. They are the left eye's: the rope is tracked in it, and
+/// the right eye would double the file.
+const QUALITY: u8 = 75;
 /// Most pictures a second in the recording of a run: half of what the camera gives,
 /// because each costs milliseconds of a core.
 const PICTURES_HZ: f64 = 30.0;
@@ -307,7 +310,7 @@ impl Recording {
             self.pictures_late += 1;
             return Ok(false);
         }
-        match left_jpeg(header, pixels) {
+        match left_jpeg(header, pixels, 1, QUALITY) {
             Ok(jpeg) => {
                 let at_ns = self.clock.wall_ns(header.stamp_ns);
                 self.file

@@ -1,358 +1,66 @@
 //! JSON schemas of the messages: Foxglove's well-known ones by their published
 //! names, fields and numbers, and our own.
 
+use crate::Result;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
-/// What a field holds.
-#[derive(Debug, Clone, Copy)]
-enum Kind {
-    /// Seconds and nanoseconds.
-    Time,
-    Duration,
-    Text,
-    /// Bytes in base64.
-    Bytes,
-    Number,
-    /// A number that may be left out.
-    MaybeNumber,
-    Count,
-    Flag,
-    /// One of this many numbers from 0.
-    Choice(u32),
-    Numbers,
-    Counts,
-    /// Another message.
-    Of(&'static str),
-    /// A list of another message.
-    List(&'static str),
-    /// A JSON object whose inside is told by the file it stands for.
-    Object,
-}
+/// Messages by name with their fields and what each holds: one of the kinds that [`of_kind`]
+/// knows, another message, or a list of either (`[]`); `?` may be left out. Names, fields
+/// and numbers of `foxglove.*` are those of the Foxglove SDK's message definitions.
+const MESSAGES: &str = include_str!("../../assets/messages.json");
 
-use Kind::{
-    Bytes, Choice, Count, Counts, Duration, Flag, List, MaybeNumber, Number, Numbers, Object, Of,
-    Text, Time,
-};
+/// The messages of a file.
+pub(super) struct Schemas(BTreeMap<String, Vec<(String, String)>>);
 
-type Fields = &'static [(&'static str, Kind)];
-
-/// Messages by name. Names, fields and numbers of `foxglove.*` are those of the
-/// Foxglove SDK's message definitions.
-const MESSAGES: &[(&str, Fields)] = &[
-    (
-        "foxglove.CompressedImage",
-        &[
-            ("timestamp", Time),
-            ("frame_id", Text),
-            ("data", Bytes),
-            ("format", Text),
-        ],
-    ),
-    (
-        "foxglove.CameraCalibration",
-        &[
-            ("timestamp", Time),
-            ("frame_id", Text),
-            ("width", Count),
-            ("height", Count),
-            ("distortion_model", Text),
-            ("D", Numbers),
-            ("K", Numbers),
-            ("R", Numbers),
-            ("P", Numbers),
-        ],
-    ),
-    (
-        "foxglove.FrameTransforms",
-        &[("transforms", List("foxglove.FrameTransform"))],
-    ),
-    (
-        "foxglove.FrameTransform",
-        &[
-            ("timestamp", Time),
-            ("parent_frame_id", Text),
-            ("child_frame_id", Text),
-            ("translation", Of("foxglove.Vector3")),
-            ("rotation", Of("foxglove.Quaternion")),
-        ],
-    ),
-    (
-        "foxglove.JointStates",
-        &[("timestamp", Time), ("joints", List("foxglove.JointState"))],
-    ),
-    (
-        "foxglove.JointState",
-        &[
-            ("name", Text),
-            ("position", MaybeNumber),
-            ("velocity", MaybeNumber),
-            ("acceleration", MaybeNumber),
-            ("effort", MaybeNumber),
-        ],
-    ),
-    (
-        "foxglove.Log",
-        &[
-            ("timestamp", Time),
-            ("level", Choice(6)),
-            ("message", Text),
-            ("name", Text),
-            ("file", Text),
-            ("line", Count),
-        ],
-    ),
-    (
-        "foxglove.ImageAnnotations",
-        &[
-            ("circles", List("foxglove.CircleAnnotation")),
-            ("points", List("foxglove.PointsAnnotation")),
-            ("texts", List("foxglove.TextAnnotation")),
-        ],
-    ),
-    (
-        "foxglove.CircleAnnotation",
-        &[
-            ("timestamp", Time),
-            ("position", Of("foxglove.Point2")),
-            ("diameter", Number),
-            ("thickness", Number),
-            ("fill_color", Of("foxglove.Color")),
-            ("outline_color", Of("foxglove.Color")),
-            ("metadata", List("foxglove.KeyValuePair")),
-        ],
-    ),
-    (
-        "foxglove.PointsAnnotation",
-        &[
-            ("timestamp", Time),
-            ("type", Choice(5)),
-            ("points", List("foxglove.Point2")),
-            ("outline_color", Of("foxglove.Color")),
-            ("outline_colors", List("foxglove.Color")),
-            ("fill_color", Of("foxglove.Color")),
-            ("thickness", Number),
-            ("metadata", List("foxglove.KeyValuePair")),
-        ],
-    ),
-    (
-        "foxglove.TextAnnotation",
-        &[
-            ("timestamp", Time),
-            ("position", Of("foxglove.Point2")),
-            ("text", Text),
-            ("font_size", Number),
-            ("text_color", Of("foxglove.Color")),
-            ("background_color", Of("foxglove.Color")),
-            ("metadata", List("foxglove.KeyValuePair")),
-        ],
-    ),
-    (
-        "foxglove.SceneUpdate",
-        &[
-            ("deletions", List("foxglove.SceneEntityDeletion")),
-            ("entities", List("foxglove.SceneEntity")),
-        ],
-    ),
-    (
-        "foxglove.SceneEntityDeletion",
-        &[("timestamp", Time), ("type", Choice(2)), ("id", Text)],
-    ),
-    (
-        "foxglove.SceneEntity",
-        &[
-            ("timestamp", Time),
-            ("frame_id", Text),
-            ("id", Text),
-            ("lifetime", Duration),
-            ("frame_locked", Flag),
-            ("metadata", List("foxglove.KeyValuePair")),
-            ("arrows", List("foxglove.ArrowPrimitive")),
-            ("cubes", List("foxglove.CubePrimitive")),
-            ("spheres", List("foxglove.SpherePrimitive")),
-            ("cylinders", List("foxglove.CylinderPrimitive")),
-            ("lines", List("foxglove.LinePrimitive")),
-            ("triangles", List("foxglove.TriangleListPrimitive")),
-            ("texts", List("foxglove.TextPrimitive")),
-            ("models", List("foxglove.ModelPrimitive")),
-        ],
-    ),
-    (
-        "foxglove.ArrowPrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("shaft_length", Number),
-            ("shaft_diameter", Number),
-            ("head_length", Number),
-            ("head_diameter", Number),
-            ("color", Of("foxglove.Color")),
-        ],
-    ),
-    (
-        "foxglove.CubePrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("size", Of("foxglove.Vector3")),
-            ("color", Of("foxglove.Color")),
-        ],
-    ),
-    (
-        "foxglove.SpherePrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("size", Of("foxglove.Vector3")),
-            ("color", Of("foxglove.Color")),
-        ],
-    ),
-    (
-        "foxglove.CylinderPrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("size", Of("foxglove.Vector3")),
-            ("bottom_scale", Number),
-            ("top_scale", Number),
-            ("color", Of("foxglove.Color")),
-        ],
-    ),
-    (
-        "foxglove.LinePrimitive",
-        &[
-            ("type", Choice(3)),
-            ("pose", Of("foxglove.Pose")),
-            ("thickness", Number),
-            ("scale_invariant", Flag),
-            ("points", List("foxglove.Point3")),
-            ("color", Of("foxglove.Color")),
-            ("colors", List("foxglove.Color")),
-            ("indices", Counts),
-        ],
-    ),
-    (
-        "foxglove.TriangleListPrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("points", List("foxglove.Point3")),
-            ("color", Of("foxglove.Color")),
-            ("colors", List("foxglove.Color")),
-            ("indices", Counts),
-        ],
-    ),
-    (
-        "foxglove.TextPrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("billboard", Flag),
-            ("font_size", Number),
-            ("scale_invariant", Flag),
-            ("color", Of("foxglove.Color")),
-            ("text", Text),
-        ],
-    ),
-    (
-        "foxglove.ModelPrimitive",
-        &[
-            ("pose", Of("foxglove.Pose")),
-            ("scale", Of("foxglove.Vector3")),
-            ("color", Of("foxglove.Color")),
-            ("override_color", Flag),
-            ("url", Text),
-            ("media_type", Text),
-            ("data", Bytes),
-        ],
-    ),
-    ("foxglove.KeyValuePair", &[("key", Text), ("value", Text)]),
-    (
-        "foxglove.Pose",
-        &[
-            ("position", Of("foxglove.Vector3")),
-            ("orientation", Of("foxglove.Quaternion")),
-        ],
-    ),
-    (
-        "foxglove.Vector3",
-        &[("x", Number), ("y", Number), ("z", Number)],
-    ),
-    (
-        "foxglove.Point3",
-        &[("x", Number), ("y", Number), ("z", Number)],
-    ),
-    ("foxglove.Point2", &[("x", Number), ("y", Number)]),
-    (
-        "foxglove.Quaternion",
-        &[("x", Number), ("y", Number), ("z", Number), ("w", Number)],
-    ),
-    (
-        "foxglove.Color",
-        &[("r", Number), ("g", Number), ("b", Number), ("a", Number)],
-    ),
-    (
-        "wag.Cycle",
-        &[
-            ("timestamp", Time),
-            ("cycle", Count),
-            ("mode", Text),
-            ("fault", Text),
-            ("sent", Flag),
-            ("wake_late_us", Number),
-            ("compute_us", Number),
-            ("send_us", Number),
-            ("reply_us", Number),
-            ("missed", Count),
-            ("dropped", Count),
-            ("path_rate", Number),
-            ("trajectory_s", MaybeNumber),
-        ],
-    ),
-    ("wag.Plan", &[("timestamp", Time), ("plan", Object)]),
-    (
-        "wag.Parameters",
-        &[("timestamp", Time), ("parameters", Object)],
-    ),
-    ("wag.Summary", &[("timestamp", Time), ("summary", Object)]),
-];
-
-/// The schema of a message, other messages in it written out in place.
-pub(super) fn schema(name: &str) -> Value {
-    let fields = MESSAGES
-        .iter()
-        .find(|(n, _)| *n == name)
-        .map_or(&[][..], |(_, f)| f);
-    let mut properties = Map::new();
-    let mut required = Vec::new();
-    for (field, kind) in fields {
-        properties.insert((*field).to_owned(), of_kind(*kind));
-        if !matches!(kind, MaybeNumber) {
-            required.push(*field);
-        }
+impl Schemas {
+    /// All of them.
+    pub(super) fn read() -> Result<Self> {
+        Ok(Self(serde_json::from_str(MESSAGES)?))
     }
-    json!({ "title": name, "type": "object", "properties": properties, "required": required })
-}
 
-fn of_kind(kind: Kind) -> Value {
-    let whole = json!({ "type": "integer", "minimum": 0 });
-    let list = |items: Value| json!({ "type": "array", "items": items });
-    let moment = |title: &str, sec: Value| {
-        json!({
-            "type": "object", "title": title, "properties": {
-                "sec": sec, "nsec": { "type": "integer", "minimum": 0, "maximum": 999_999_999 },
-            },
-        })
-    };
-    match kind {
-        Time => moment("time", whole),
-        Duration => moment("duration", json!({ "type": "integer" })),
-        Text => json!({ "type": "string" }),
-        Bytes => json!({ "type": "string", "contentEncoding": "base64" }),
-        Number | MaybeNumber => json!({ "type": "number" }),
-        Count => whole,
-        Flag => json!({ "type": "boolean" }),
-        Choice(of) => {
-            json!({ "oneOf": (0..of).map(|n| json!({ "const": n })).collect::<Vec<_>>() })
+    /// The schema of a message, other messages in it written out in place.
+    pub(super) fn schema(&self, name: &str) -> Value {
+        let mut properties = Map::new();
+        let mut required = Vec::new();
+        for (field, kind) in self.0.get(name).into_iter().flatten() {
+            let needed = kind.strip_suffix('?');
+            properties.insert(field.clone(), self.of_kind(needed.unwrap_or(kind)));
+            if needed.is_none() {
+                required.push(field);
+            }
         }
-        Numbers => list(json!({ "type": "number" })),
-        Counts => list(whole),
-        Of(name) => schema(name),
-        List(name) => list(schema(name)),
-        Object => json!({ "type": "object" }),
+        json!({ "title": name, "type": "object", "properties": properties, "required": required })
+    }
+
+    fn of_kind(&self, kind: &str) -> Value {
+        if let Some(items) = kind.strip_suffix("[]") {
+            return json!({ "type": "array", "items": self.of_kind(items) });
+        }
+        if let Some(choices) = kind.strip_prefix("choice ") {
+            let of: u32 = choices.parse().unwrap_or_default();
+            let choices: Vec<Value> = (0..of).map(|n| json!({ "const": n })).collect();
+            return json!({ "oneOf": choices });
+        }
+        let whole = json!({ "type": "integer", "minimum": 0 });
+        let moment = |sec: Value| {
+            json!({
+                "type": "object", "title": kind, "properties": {
+                    "sec": sec, "nsec": { "type": "integer", "minimum": 0, "maximum": 999_999_999 },
+                },
+            })
+        };
+        match kind {
+            "time" => moment(whole),
+            "duration" => moment(json!({ "type": "integer" })),
+            "text" => json!({ "type": "string" }),
+            "bytes" => json!({ "type": "string", "contentEncoding": "base64" }),
+            "number" => json!({ "type": "number" }),
+            "count" => whole,
+            "flag" => json!({ "type": "boolean" }),
+            "object" => json!({ "type": "object" }),
+            message => self.schema(message),
+        }
     }
 }
 
@@ -364,32 +72,33 @@ mod tests {
     /// everything pass.
     #[test]
     fn every_message_named_is_there() {
-        for (name, fields) in MESSAGES {
+        let Schemas(messages) = Schemas::read().unwrap();
+        for (name, fields) in &messages {
             assert!(!fields.is_empty(), "{name}");
-            for (field, kind) in *fields {
-                if let Of(other) | List(other) = kind {
-                    assert!(
-                        MESSAGES.iter().any(|(n, _)| n == other),
-                        "{name}.{field}: {other}"
-                    );
-                }
+            for (field, kind) in fields {
+                let other = kind.trim_end_matches("[]");
+                assert!(
+                    !other.contains('.') || messages.contains_key(other),
+                    "{name}.{field}: {other}"
+                );
             }
         }
         for channel in super::super::channel::Channel::ALL {
             if let Some(name) = channel.schema() {
-                assert!(MESSAGES.iter().any(|(n, _)| *n == name), "{name}");
+                assert!(messages.contains_key(name), "{name}");
             }
         }
     }
 
     #[test]
     fn nested_messages_are_written_out() {
-        let found = schema("foxglove.SceneUpdate");
+        let schemas = Schemas::read().unwrap();
+        let found = schemas.schema("foxglove.SceneUpdate");
         let colour = &found["properties"]["entities"]["items"]["properties"]["lines"]["items"]["properties"]
             ["color"];
         assert_eq!(colour["title"], "foxglove.Color");
         assert_eq!(colour["required"], json!(["r", "g", "b", "a"]));
-        let joint = schema("foxglove.JointState");
+        let joint = schemas.schema("foxglove.JointState");
         assert_eq!(joint["required"], json!(["name"]));
     }
 }

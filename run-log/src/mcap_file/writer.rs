@@ -1,7 +1,7 @@
 //! An MCAP file that grows by whole chunks.
 
 use super::channel::Channel;
-use super::schema::schema;
+use super::schema::Schemas;
 use crate::error::At;
 use crate::{Error, Result};
 use mcap::records::{MessageHeader, Metadata};
@@ -52,12 +52,15 @@ impl McapFile {
             .map_err(Error::write(path))?;
         let cannot = || format!("cannot write `{}`", path.display());
         let mut writer = options().create(file).at(cannot)?;
+        let schemas = Schemas::read()?;
         let mut ids = Vec::new();
         for channel in Channel::ALL {
             let schema_id = match channel.schema() {
-                Some(name) => {
-                    writer.add_schema(name, "jsonschema", schema(name).to_string().as_bytes())?
-                }
+                Some(name) => writer.add_schema(
+                    name,
+                    "jsonschema",
+                    schemas.schema(name).to_string().as_bytes(),
+                )?,
                 None => 0,
             };
             ids.push(writer.add_channel(

@@ -43,6 +43,19 @@ pub(super) fn host(text: &str) -> Result<IpAddr, String> {
         .ok_or_else(|| format!("`{text}` has no address"))
 }
 
+/// So many numbers with commas between them, each as it should be.
+fn listed<T: FromStr, const N: usize>(
+    text: &str,
+    what: &str,
+    fits: impl Fn(&T) -> bool,
+) -> Result<[T; N], String> {
+    let numbers: Option<Vec<T>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
+    numbers
+        .filter(|numbers| numbers.iter().all(fits))
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| format!("`{text}` must be {what}"))
+}
+
 /// A pixel `U,V`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel(pub [f64; 2]);
@@ -50,14 +63,8 @@ pub struct Pixel(pub [f64; 2]);
 impl FromStr for Pixel {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` must be two finite numbers U,V, none below 0");
-        let numbers: Vec<f64> = text
-            .split(',')
-            .map(|t| t.trim().parse().map_err(|_e| wrong()))
-            .collect::<Result<_, _>>()?;
-        let pixel: [f64; 2] = numbers.try_into().map_err(|_e| wrong())?;
-        let inside = pixel.iter().all(|x| x.is_finite() && *x >= 0.0);
-        inside.then_some(Self(pixel)).ok_or_else(wrong)
+        let fits = |x: &f64| x.is_finite() && *x >= 0.0;
+        listed(text, "two finite numbers U,V, none below 0", fits).map(Self)
     }
 }
 
@@ -68,17 +75,8 @@ pub struct Point(pub [f64; 3]);
 impl FromStr for Point {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` must be three finite numbers x,y,z");
-        let numbers: Vec<f64> = text
-            .split(',')
-            .map(|t| t.trim().parse().map_err(|_e| wrong()))
-            .collect::<Result<_, _>>()?;
-        let point: [f64; 3] = numbers.try_into().map_err(|_e| wrong())?;
-        if point.iter().all(|v| v.is_finite()) {
-            Ok(Self(point))
-        } else {
-            Err(wrong())
-        }
+        let fits = |v: &f64| v.is_finite();
+        listed(text, "three finite numbers x,y,z", fits).map(Self)
     }
 }
 
@@ -89,11 +87,6 @@ pub struct Colour(pub [u8; 3]);
 impl FromStr for Colour {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` must be three whole numbers R,G,B from 0 to 255");
-        let numbers: Vec<u8> = text
-            .split(',')
-            .map(|t| t.trim().parse().map_err(|_e| wrong()))
-            .collect::<Result<_, _>>()?;
-        numbers.try_into().map(Self).map_err(|_e| wrong())
+        listed(text, "three whole numbers R,G,B from 0 to 255", |_| true).map(Self)
     }
 }

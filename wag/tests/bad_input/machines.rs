@@ -8,12 +8,6 @@ pub(crate) const CASES: &[Case] = &[
     ("demo --seed x", 2, &["--seed"]),
     ("bench", 2, &["NAME"]),
     ("bench wibble", 2, &["wibble", "possible values", "record"]),
-    (
-        "bench track --video none",
-        2,
-        &["experiments -- bench track --video none"],
-    ),
-    ("reproduce sysid", 2, &["has moved", "experiments -- sysid"]),
     ("demo --target 1,2", 2, &["x,y,z"]),
     ("demo --target 3,0,0.4", 2, &["reach"]),
     ("demo --target nan,0,0.4", 2, &["finite"]),

@@ -21,8 +21,15 @@ type Case = (&'static str, i32, &'static [&'static str]);
 fn wrong_input_gets_one_clear_line_and_leaves_nothing_behind() {
     let dir = prepare();
     let before = fs::read_dir(dir.path()).unwrap().count();
+    let sim_rope = ropes::SIM_ROPE.iter().map(|(rope, pose, words)| {
+        let line = format!("sim rope --rope {rope} --pose {pose} --fps 60 --out o.npy");
+        (line, 2, *words)
+    });
     let cases = [machines::CASES, records::CASES, ropes::CASES].concat();
-    for (line, code, words) in cases {
+    let cases = cases
+        .into_iter()
+        .map(|(line, code, words)| (line.to_owned(), code, words));
+    for (line, code, words) in cases.chain(sim_rope) {
         let said = refused_in(dir.path(), code, &line.replace("LINKS", LINKS));
         for word in words {
             assert!(

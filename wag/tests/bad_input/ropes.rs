@@ -5,66 +5,6 @@ use super::Case;
 pub(crate) const CASES: &[Case] = &[
     ("calib", 2, &["Usage", "extrinsics"]),
     (
-        "sim rope --rope none.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["none.toml"],
-    ),
-    (
-        "sim rope --rope negative.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["negative.toml", "lead_mass_kg", "-0.05"],
-    ),
-    (
-        "sim rope --rope zero.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["zero.toml", "links"],
-    ),
-    (
-        "sim rope --rope missing.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["missing.toml", "length_m"],
-    ),
-    (
-        "sim rope --rope unknown.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["unknown.toml", "wibble"],
-    ),
-    (
-        "sim rope --rope nan.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["nan.toml", "radius_m"],
-    ),
-    (
-        "sim rope --rope text.toml --pose pose.csv --fps 60 --out o.npy",
-        2,
-        &["text.toml"],
-    ),
-    (
-        "sim rope --rope rope.toml --pose nan.csv --fps 60 --out o.npy",
-        2,
-        &["nan.csv", "line 12", "`x`"],
-    ),
-    (
-        "sim rope --rope rope.toml --pose unsorted.csv --fps 60 --out o.npy",
-        2,
-        &["unsorted.csv", "does not come after"],
-    ),
-    (
-        "sim rope --rope rope.toml --pose columns.csv --fps 60 --out o.npy",
-        2,
-        &["columns.csv", "t,x,y,z,qw,qx,qy,qz"],
-    ),
-    (
-        "sim rope --rope rope.toml --pose noquat.csv --fps 60 --out o.npy",
-        2,
-        &["noquat.csv", "quaternion"],
-    ),
-    (
-        "sim rope --rope rope.toml --pose short.csv --fps 60 --out o.npy",
-        2,
-        &["short.csv", "two rows"],
-    ),
-    (
         "sim rope --rope rope.toml --pose pose.csv --fps -60 --out o.npy",
         2,
         &["--fps"],
@@ -167,4 +107,32 @@ pub(crate) const CASES: &[Case] = &[
         2,
         &["300"],
     ),
+];
+
+/// Rope, pose, and words in the error of `wag sim rope`.
+pub(crate) const SIM_ROPE: &[(&str, &str, &[&str])] = &[
+    ("none.toml", "pose.csv", &["none.toml"]),
+    (
+        "negative.toml",
+        "pose.csv",
+        &["negative.toml", "lead_mass_kg", "-0.05"],
+    ),
+    ("zero.toml", "pose.csv", &["zero.toml", "links"]),
+    ("missing.toml", "pose.csv", &["missing.toml", "length_m"]),
+    ("unknown.toml", "pose.csv", &["unknown.toml", "wibble"]),
+    ("nan.toml", "pose.csv", &["nan.toml", "radius_m"]),
+    ("text.toml", "pose.csv", &["text.toml"]),
+    ("rope.toml", "nan.csv", &["nan.csv", "line 12", "`x`"]),
+    (
+        "rope.toml",
+        "unsorted.csv",
+        &["unsorted.csv", "does not come after"],
+    ),
+    (
+        "rope.toml",
+        "columns.csv",
+        &["columns.csv", "t,x,y,z,qw,qx,qy,qz"],
+    ),
+    ("rope.toml", "noquat.csv", &["noquat.csv", "quaternion"]),
+    ("rope.toml", "short.csv", &["short.csv", "two rows"]),
 ];
