@@ -3,7 +3,7 @@
 use super::collision::Obstacle;
 use super::fault::FaultScript;
 use super::firmware::Firmware;
-use super::joint::JointDynamics;
+use super::joint::{JointDynamics, JointLag};
 use super::pacer::Intake;
 use super::start_error::ArmStartError;
 use arm_model::{Cell, JOINTS, JointVector, Limits};
@@ -12,30 +12,6 @@ use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{COMMAND_PORT, REPORT_PORTS};
 use serde::{Deserialize, Serialize};
 use std::net::{IpAddr, Ipv4Addr};
-
-/// How a joint follows its setpoint: silence, then a second-order lag.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct JointLag {
-    /// Time before a setpoint has any effect (s).
-    pub dead_time_s: f64,
-    /// Natural frequency of the lag (rad/s).
-    pub natural_frequency_rad_s: f64,
-    /// Damping ratio of the lag; 1 is critical.
-    pub damping_ratio: f64,
-}
-
-impl Default for JointLag {
-    /// No tracking delay of the real arm is published; these are plausible for
-    /// a harmonic drive with a 1 kHz loop behind a 250 Hz command cycle.
-    fn default() -> Self {
-        Self {
-            dead_time_s: 0.008,
-            natural_frequency_rad_s: core::f64::consts::TAU * 25.0,
-            damping_ratio: 0.9,
-        }
-    }
-}
 
 /// Set-up of a simulated arm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -109,26 +85,6 @@ impl Default for ArmConfig {
             fence_mm: None,
             faults: FaultScript::default(),
         }
-    }
-}
-
-impl JointLag {
-    fn check(&self) -> Result<(), ArmStartError> {
-        let refuse = |key, why| Err(ArmStartError::Config { key, why });
-        if !(self.dead_time_s >= 0.0 && self.dead_time_s <= 1.0) {
-            return refuse("lag.dead_time_s", "must lie between 0 and 1 s");
-        }
-        // The joint model integrates in steps of 1 ms.
-        if !(self.natural_frequency_rad_s > 0.0 && self.natural_frequency_rad_s <= 1000.0) {
-            return refuse(
-                "lag.natural_frequency_rad_s",
-                "must lie above 0 and up to 1000 rad/s",
-            );
-        }
-        if !(self.damping_ratio >= 0.1 && self.damping_ratio <= 2.0) {
-            return refuse("lag.damping_ratio", "must lie between 0.1 and 2");
-        }
-        Ok(())
     }
 }
 

@@ -44,13 +44,14 @@ mod start_error;
 mod velocity;
 
 pub use collision::Obstacle;
-pub use config::{ArmConfig, JointLag};
+pub use config::ArmConfig;
 pub use controller_clock::ControllerClock;
 pub use endpoint::{ArmEndpoint, Closing, ConnectRefused, Service};
 pub use event::{ArmCounters, ArmEvent, EventLog, TimedEvent};
 pub use fault::{Fault, FaultKind, FaultScript, FaultScriptError, Trigger};
 pub use firmware::Firmware;
 pub use history::{JointSample, MotionHistory};
+pub use joint::JointLag;
 pub use model::{Answer, AnswerData, ArmModel};
 pub use pacer::Intake;
 pub use reports::ReportKind;

@@ -12,14 +12,14 @@ use super::fault::Fault;
 use super::history::MotionHistory;
 use super::reports::ReportKind;
 use super::start_error::ArmStartError;
-use door::{Door, join, listen};
+use listener::{Listener, join, listen};
 use plant::Plant;
 use rt_controller::xarm::ErrorCode;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-mod door;
 mod line;
+mod listener;
 mod plant;
 
 /// Ports that a simulated arm listens on.
@@ -38,7 +38,7 @@ pub struct SimulatedArm {
     plant: Arc<Plant>,
     ports: ArmPorts,
     model_thread: Option<JoinHandle<()>>,
-    doors: Vec<Door>,
+    listeners: Vec<Listener>,
 }
 
 impl SimulatedArm {
@@ -51,13 +51,13 @@ impl SimulatedArm {
         config.check()?;
         let command = listen(config.bind, config.command_port)?;
         let mut numbers = [command.local_addr()?.port(), 0, 0, 0, 0];
-        let mut doors_to_open = vec![(command, Service::Commands)];
+        let mut sockets = vec![(command, Service::Commands)];
         let wishes = config.report_ports.into_iter().zip(ReportKind::ALL);
         for ((port, kind), number) in wishes.zip(&mut numbers[1..]) {
             let listener = listen(config.bind, port)?;
             *number = listener.local_addr()?.port();
             if kind.len(config.firmware).is_some() {
-                doors_to_open.push((listener, Service::Reports(kind)));
+                sockets.push((listener, Service::Reports(kind)));
             }
         }
         let [command, reports @ ..] = numbers;
@@ -67,15 +67,16 @@ impl SimulatedArm {
             plant: Arc::clone(&plant),
             ports: ArmPorts { command, reports },
             model_thread: None,
-            doors: Vec::new(),
+            listeners: Vec::new(),
         };
         arm.model_thread = Some(
             thread::Builder::new()
                 .name("arm-model".to_owned())
                 .spawn(move || plant.run())?,
         );
-        for (listener, service) in doors_to_open {
-            arm.doors.push(Door::open(listener, service, &arm.plant)?);
+        for (listener, service) in sockets {
+            let listener = Listener::open(listener, service, &arm.plant)?;
+            arm.listeners.push(listener);
         }
         Ok(arm)
     }
@@ -127,8 +128,8 @@ impl Drop for SimulatedArm {
     fn drop(&mut self) {
         self.plant.stop();
         self.plant.hang_up_all();
-        for door in self.doors.drain(..) {
-            door.close();
+        for listener in self.listeners.drain(..) {
+            listener.close();
         }
         if let Some(model_thread) = self.model_thread.take() {
             join(model_thread);

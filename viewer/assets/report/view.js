@@ -202,16 +202,17 @@ class View {
     const eye = [this.at[0] + this.far * Math.cos(this.tilt) * Math.cos(this.turn),
       this.at[1] + this.far * Math.cos(this.tilt) * Math.sin(this.turn), this.at[2] + this.far * Math.sin(this.tilt)];
     gl.uniformMatrix4fv(this.place.camera, false, cameraMatrix(eye, this.at, w / h));
+    const { floor_z_m: floor, column_half_width_m: half, pole: { radius_m: poleRadius } } = scene.cell;
     const grid = [];
     for (let i = -10; i <= 10; i++) {
-      grid.push([i / 5, -2, -0.4], [i / 5, 2, -0.4], [-2, i / 5, -0.4], [2, i / 5, -0.4]);
+      grid.push([i / 5, -2, floor], [i / 5, 2, floor], [-2, i / 5, floor], [2, i / 5, floor]);
     }
     this.way(grid, [0.55, 0.58, 0.62], gl.LINES);
-    this.rod([0, 0, -0.4], [0, 0, 0], 0.08, [0.5, 0.52, 0.55]);
+    this.rod([0, 0, floor], [0, 0, 0], half, [0.5, 0.52, 0.55]);
     const arm = points(scene.arm[this.frame] || []), last = arm.length - 1;
     for (let i = 0; i < last; i++) {
       const pole = i === last - 1;
-      this.rod(arm[i], arm[i + 1], pole ? 0.008 : 0.055 - 0.003 * i, pole ? [0.2, 0.2, 0.22] : [0.86, 0.88, 0.9]);
+      this.rod(arm[i], arm[i + 1], pole ? poleRadius : 0.055 - 0.003 * i, pole ? [0.2, 0.2, 0.22] : [0.86, 0.88, 0.9]);
       if (!pole) this.sphere(arm[i + 1], 0.058 - 0.003 * i, [0.35, 0.37, 0.4]);
     }
     const rope = points(scene.rope[this.frame] || []);

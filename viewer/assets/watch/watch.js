@@ -63,7 +63,7 @@ function jitter(histograms, missed) {
 function draw(s) {
   byId("title").textContent = s.title;
   byId("note").textContent = s.note;
-  view.show({ arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
+  view.show({ cell: s.cell, arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
   byId("viewnote").textContent = `Drag to turn, wheel or two fingers to come nearer. Rope: ${s.rope_is || "none"}.` +
     (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
   controller(s.controller);

@@ -22,7 +22,7 @@ pub use facts::domain_of_run;
 pub use preview::{PreviewChild, PreviewProcess};
 
 use crate::report::{arm_points, tenths_mm};
-use arm_model::{Cell, Pole};
+use arm_model::Cell;
 use ask::{Ask, Asked, Open, Present, hand_over};
 use attached::{Attached, Seen, newest_domain};
 use facts::Facts;
@@ -252,7 +252,7 @@ impl Watcher {
             controller.facts.look();
         }
         let facts = attached.controller.as_ref().map(|c| &c.facts);
-        let pole = pole_of(facts, &self.cell);
+        let pole = cell_of(facts, &self.cell).pole;
         match facts.and_then(|facts| facts.rope()) {
             Some((rope, name)) => {
                 if self.rope.as_ref().is_none_or(|(r, _)| *r.params() != rope) {
@@ -314,11 +314,13 @@ impl Watcher {
                 rope: left.rope,
                 rope_is: left.rope_is,
                 radii_m: left.radii_m,
+                cell: left.cell,
                 target_m: left.target_m,
                 ..snapshot
             };
         };
         let facts = attached.controller.as_ref().map(|c| &c.facts);
+        snapshot.cell = cell_of(facts, &self.cell);
         let folder = facts.and_then(|facts| facts.folder()?.file_name());
         snapshot.title = match folder {
             Some(name) => format!("{} (domain {})", name.display(), attached.domain),
@@ -340,7 +342,7 @@ impl Watcher {
             stop: self.stop.clone(),
         });
         if mode != ControllerMode::Offline && state.q.is_finite() {
-            snapshot.arm = arm_points(&state.q, &pole_of(facts, &self.cell));
+            snapshot.arm = arm_points(&state.q, &snapshot.cell.pole);
         }
         snapshot.target_m = facts.and_then(|facts| facts.target_m());
         match &self.rope {
@@ -362,10 +364,7 @@ impl Watcher {
     }
 }
 
-/// The pole on the arm that is watched.
-fn pole_of(facts: Option<&Facts>, otherwise: &Cell) -> Pole {
-    facts
-        .and_then(|facts| facts.cell)
-        .unwrap_or(*otherwise)
-        .pole
+/// The cell of the arm that is watched.
+fn cell_of(facts: Option<&Facts>, otherwise: &Cell) -> Cell {
+    facts.and_then(|facts| facts.cell).unwrap_or(*otherwise)
 }

@@ -2,6 +2,7 @@
 
 use super::ask::Ask;
 use crate::report::Histogram;
+use arm_model::Cell;
 use serde::Serialize;
 use shared_types::ipc::ControllerMode;
 use shared_types::{FaultCode, MotionTier};
@@ -23,6 +24,8 @@ pub(crate) struct Snapshot {
     pub rope_is: &'static str,
     /// Radius of the rope and of its lead (m).
     pub radii_m: [f64; 2],
+    /// The cell.
+    pub cell: Cell,
     /// Target (m).
     pub target_m: Option<[f64; 3]>,
     /// Histograms of the control loop, now and then; `None` in between.

@@ -1,5 +1,6 @@
 //! What a report holds, as the page's script reads it.
 
+use arm_model::Cell;
 use arm_model::JOINTS;
 use arm_model::limits::Margin;
 use run_log::Explanation;
@@ -99,6 +100,8 @@ pub(crate) struct Scene {
     pub from_s: f64,
     /// Time between frames (s).
     pub period_s: f64,
+    /// The cell it ran in.
+    pub cell: Cell,
     /// Each frame: joints' origins from the base to the pole's end (0.1 mm).
     pub arm: Vec<Vec<i32>>,
     /// Each frame: the rope's nodes (0.1 mm); none when no rope is known.

@@ -90,6 +90,7 @@ pub(crate) fn scene(
         begin,
         from_s: -BEFORE_S,
         period_s: frames.period_s,
+        cell: known.cell,
         arm: (0..frames.count)
             .map(|i| arm_points(&on_film.joints_at(frames.time_s(i)).q, &known.cell.pole))
             .collect(),

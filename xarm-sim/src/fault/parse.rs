@@ -15,7 +15,30 @@ const COUNT: Values = Values::Whole(1, u32::MAX as i64);
 const TRIGGERS: &str =
     "\"first_setpoint\", \"setpoint:N\", \"motion:PERCENT\", \"speed:RAD_PER_S\"";
 
-pub(super) fn script(text: &str) -> Result<FaultScript, FaultScriptError> {
+impl core::str::FromStr for FaultScript {
+    type Err = FaultScriptError;
+
+    /// Parses the text of a script.
+    fn from_str(text: &str) -> Result<Self, FaultScriptError> {
+        script(text)
+    }
+}
+
+impl TryFrom<Vec<Table>> for FaultScript {
+    type Error = FaultScriptError;
+
+    fn try_from(tables: Vec<Table>) -> Result<Self, FaultScriptError> {
+        entries(tables)
+    }
+}
+
+impl From<FaultScript> for Vec<Table> {
+    fn from(script: FaultScript) -> Self {
+        script.faults.iter().map(to_table).collect()
+    }
+}
+
+fn script(text: &str) -> Result<FaultScript, FaultScriptError> {
     let mut top: Table =
         toml::from_str(text).map_err(|error| FaultScriptError::Toml(error.to_string()))?;
     let faults = top.remove("fault");
@@ -40,7 +63,7 @@ pub(super) fn script(text: &str) -> Result<FaultScript, FaultScriptError> {
     entries(tables.ok_or_else(not_a_list)?)
 }
 
-pub(super) fn entries(tables: Vec<Table>) -> Result<FaultScript, FaultScriptError> {
+fn entries(tables: Vec<Table>) -> Result<FaultScript, FaultScriptError> {
     let faults = tables
         .into_iter()
         .enumerate()
@@ -232,7 +255,7 @@ fn admits(values: Values, found: &Value) -> bool {
 }
 
 /// An entry as it would be written in a file.
-pub(super) fn to_table(fault: &Fault) -> Table {
+fn to_table(fault: &Fault) -> Table {
     // A plain struct of numbers and words always becomes a table.
     let mut table = Table::try_from(fault.kind).unwrap_or_default();
     let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);

@@ -2,7 +2,6 @@
 
 use super::error::FaultScriptError;
 use super::kind::FaultKind;
-use super::parse;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -78,28 +77,5 @@ impl FaultScript {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.faults.is_empty()
-    }
-}
-
-impl core::str::FromStr for FaultScript {
-    type Err = FaultScriptError;
-
-    /// Parses the text of a script.
-    fn from_str(text: &str) -> Result<Self, FaultScriptError> {
-        parse::script(text)
-    }
-}
-
-impl TryFrom<Vec<toml::Table>> for FaultScript {
-    type Error = FaultScriptError;
-
-    fn try_from(entries: Vec<toml::Table>) -> Result<Self, FaultScriptError> {
-        parse::entries(entries)
-    }
-}
-
-impl From<FaultScript> for Vec<toml::Table> {
-    fn from(script: FaultScript) -> Self {
-        script.faults.iter().map(parse::to_table).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! The endpoint in real time, shared by the threads of the server.
 
-use super::line::Line;
+use super::line::{Line, lock};
 use crate::clock;
 use crate::config::ArmConfig;
 use crate::endpoint::{ArmEndpoint, Closing, ConnectRefused, Service};
@@ -12,7 +12,7 @@ use shared_types::MonotonicNs;
 use std::collections::BTreeMap;
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// `SCHED_FIFO` priority of the arm's threads, below that of a controller.
 const ARM_PRIORITY: u8 = 40;
@@ -32,11 +32,6 @@ pub(super) fn stand_for_another_machine() {
     for warning in enter_real_time(&settings) {
         tracing::debug!(%warning, "simulated arm");
     }
-}
-
-/// A panic elsewhere leaves whole values behind.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The endpoint, its sockets, and what threads need to share them.

@@ -24,29 +24,29 @@ const DEAF_PAUSE: Duration = Duration::from_millis(2);
 
 /// A listening port and its accepting thread.
 #[derive(Debug)]
-pub(super) struct Door {
-    listener: TcpListener,
+pub(super) struct Listener {
+    socket: TcpListener,
     thread: JoinHandle<()>,
 }
 
-impl Door {
+impl Listener {
     pub(super) fn open(
-        listener: TcpListener,
+        socket: TcpListener,
         service: Service,
         plant: &Arc<Plant>,
     ) -> Result<Self, ArmStartError> {
-        let accepting = listener.try_clone()?;
+        let accepting = socket.try_clone()?;
         let plant = Arc::clone(plant);
         let thread = thread::Builder::new()
             .name("arm-accept".to_owned())
             .spawn(move || accept_all(&accepting, service, &plant))?;
-        Ok(Self { listener, thread })
+        Ok(Self { socket, thread })
     }
 
     /// Accepts nobody any more; the plant has been told to stop.
     pub(super) fn close(self) {
         // Wakes the thread out of accept.
-        if let Err(error) = SockRef::from(&self.listener).shutdown(Shutdown::Both) {
+        if let Err(error) = SockRef::from(&self.socket).shutdown(Shutdown::Both) {
             tracing::debug!(%error, "listener was closed already");
         }
         join(self.thread);
