@@ -196,7 +196,7 @@ pub struct Excitation {
 }
 
 impl Default for Excitation {
-    /// 3 s per joint, within the tool speed of the set-up tier.
+    /// 3 s per joint, within the tool speed allowed for setting up.
     fn default() -> Self {
         Self {
             seed: 1,

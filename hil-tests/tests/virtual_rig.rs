@@ -6,7 +6,7 @@ use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlSettings, Motion, Thresholds};
 use shared_types::ipc::ControllerMode;
-use shared_types::{FaultCode, WireMode};
+use shared_types::{CommandInterface, FaultCode};
 use xarm_sim::{ArmConfig, FaultScript};
 
 /// A swing of three joints from `from` and back, 1.5 s.
@@ -18,14 +18,14 @@ fn swing(from: JointVector) -> Motion {
 }
 
 fn rig(script: &str) -> VirtualRig {
-    rig_by(WireMode::ServoPosition, script)
+    rig_by(CommandInterface::ServoPosition, script)
 }
 
-fn rig_by(wire: WireMode, script: &str) -> VirtualRig {
+fn rig_by(interface: CommandInterface, script: &str) -> VirtualRig {
     let mut rig = VirtualRig::new(VirtualRigConfig {
         limits: Limits::default(),
         settings: ControlSettings {
-            wire,
+            interface,
             ..Thresholds::strict().into()
         },
         arm: ArmConfig {
@@ -101,14 +101,17 @@ fn a_healthy_throw_passes_and_the_arm_follows() {
 #[test]
 fn a_throw_by_velocities_follows_its_path_and_ends_where_it_should() {
     let mut worst = Vec::new();
-    for wire in [WireMode::ServoPosition, WireMode::JointVelocity] {
-        let mut rig = rig_by(wire, "");
+    for interface in [
+        CommandInterface::ServoPosition,
+        CommandInterface::JointVelocity,
+    ] {
+        let mut rig = rig_by(interface, "");
         run_swing(&mut rig);
         assert!(rig.log.causes.is_empty(), "{:?}", rig.log.causes);
         worst.push(worst_distance(&rig));
         let end = rig.with_arm(|arm| arm.model().true_motion());
-        assert!((end.q - rig.commanded()).max_abs() < 1e-3, "{wire:?}");
-        assert!(end.qd.max_abs() < 1e-3, "{wire:?}");
+        assert!((end.q - rig.commanded()).max_abs() < 1e-3, "{interface:?}");
+        assert!(end.qd.max_abs() < 1e-3, "{interface:?}");
     }
     println!(
         "beside a pure delay: servo {} rad, velocity {} rad",

@@ -8,7 +8,7 @@ use crate::set_up::OnDifference;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::Limits;
 use serde::{Deserialize, Serialize};
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ pub struct ControllerConfig {
     /// the limits.
     pub on_difference: OnDifference,
     /// How setpoints reach the arm.
-    pub wire: WireMode,
+    pub command_interface: CommandInterface,
     /// Whether motions need an arming. Without, every motion runs as a throw
     /// would; for tests of other things.
     pub arming_required: bool,
@@ -106,7 +106,7 @@ impl Default for ControllerConfig {
             limits: None,
             real_time: RealTimeSettings::default(),
             thresholds: ThresholdSettings::default(),
-            wire: WireMode::default(),
+            command_interface: CommandInterface::default(),
             arming_required: true,
             guardian: GuardianSettings::default(),
         }
@@ -287,7 +287,7 @@ impl ControllerConfig {
     /// [`ConfigError`].
     pub fn control_settings(&self) -> Result<ControlSettings, ConfigError> {
         Ok(ControlSettings {
-            wire: self.wire,
+            interface: self.command_interface,
             arming_required: self.arming_required,
             guardian_required: self.guardian.required,
             ..ControlSettings::from(self.thresholds.checked(self.arm)?)

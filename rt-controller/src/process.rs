@@ -188,7 +188,7 @@ impl Threads {
         let quit = Arc::clone(&self.quit);
         let (ready, wait) = mpsc::channel();
         let ahead_us = config.real_time.warm_up_us;
-        let warm_up = CacheWarmUp::new(config.resolve_limits()?, control.wire(), ahead_us)?;
+        let warm_up = CacheWarmUp::new(config.resolve_limits()?, control.interface(), ahead_us)?;
         let body = move || {
             // Blackboard handles stay in the thread that made them.
             let boards = match Bus::join(&domain).and_then(|bus| create_boards(&bus)) {

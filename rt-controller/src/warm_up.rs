@@ -19,7 +19,7 @@ use crate::xarm::Status;
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use core::hint::black_box;
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 use shared_types::ipc::{ControllerMode, GuardianBeat, JointReport, OperatorBeat};
 
 /// Joint 7 to and fro by this (rad): in a pause of a second it never gets farther
@@ -64,10 +64,15 @@ pub(crate) fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
 
 /// The report of an arm that is where it was told to be (rad) by the setpoint due
 /// at `due_ns`, received at `now_ns`.
-pub(crate) fn report(q: JointVector, wire: WireMode, due_ns: u64, now_ns: u64) -> JointReport {
+pub(crate) fn report(
+    q: JointVector,
+    interface: CommandInterface,
+    due_ns: u64,
+    now_ns: u64,
+) -> JointReport {
     JointReport {
         arm_state: 1,
-        arm_mode: wire.arm_mode(),
+        arm_mode: interface.arm_mode(),
         stamp_ns: due_ns,
         arrival_ns: now_ns,
         q,
@@ -94,8 +99,15 @@ impl CacheWarmUp {
     ///
     /// # Errors
     /// [`TrajectoryError`]; a defect.
-    pub fn new(limits: Limits, wire: WireMode, ahead_us: u32) -> Result<Self, TrajectoryError> {
-        let settings = ControlSettings { wire, ..patient() };
+    pub fn new(
+        limits: Limits,
+        interface: CommandInterface,
+        ahead_us: u32,
+    ) -> Result<Self, TrajectoryError> {
+        let settings = ControlSettings {
+            interface,
+            ..patient()
+        };
         Ok(Self {
             shadow: ControlState::new(limits, settings),
             ahead_ns: u64::from(ahead_us).saturating_mul(1000),
@@ -121,7 +133,13 @@ impl CacheWarmUp {
                 reply_ns: 1000,
                 ..LinkInput::default()
             },
-            reports: Some(report(self.q, self.shadow.wire(), self.due_ns, deadline_ns)).into(),
+            reports: Some(report(
+                self.q,
+                self.shadow.interface(),
+                self.due_ns,
+                deadline_ns,
+            ))
+            .into(),
             ..CycleInput::default()
         };
         black_box((operator, guardian));
@@ -160,8 +178,11 @@ mod tests {
     /// its one motion is never lost.
     #[test]
     fn the_twin_moves_all_the_time_and_keeps_its_motion() {
-        for wire in [WireMode::ServoPosition, WireMode::JointVelocity] {
-            let mut warm_up = CacheWarmUp::new(Limits::default(), wire, 200).unwrap();
+        for interface in [
+            CommandInterface::ServoPosition,
+            CommandInterface::JointVelocity,
+        ] {
+            let mut warm_up = CacheWarmUp::new(Limits::default(), interface, 200).unwrap();
             let (mut now_ns, mut moving) = (1_000_000_000_000, 0);
             for k in 0..300_000_u64 {
                 let gap = if k % 10_007 == 0 { 250 } else { 1 };
@@ -169,7 +190,7 @@ mod tests {
                 warm_up.cycle(now_ns, OperatorBeat::default(), GuardianBeat::default());
                 moving += u64::from(warm_up.shadow.mode() == ControllerMode::Streaming);
             }
-            assert!(moving > 299_000, "{wire:?}: {moving}");
+            assert!(moving > 299_000, "{interface:?}: {moving}");
         }
     }
 }

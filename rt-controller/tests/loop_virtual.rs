@@ -108,9 +108,9 @@ fn run_so(
         quit: Arc::clone(&quit),
     };
     let control = ControlState::new(Limits::default(), thresholds);
-    let wire = control.wire();
+    let interface = control.interface();
     let mut rt = RtLoop::new(control, clock, boards, rings.rt);
-    rt.set_warm_up(CacheWarmUp::new(Limits::default(), wire, ahead_us).unwrap());
+    rt.set_warm_up(CacheWarmUp::new(Limits::default(), interface, ahead_us).unwrap());
     rt.run(&quit);
     let records = std::iter::from_fn(|| bridge.records.pop().ok()).collect();
     (records, bridge)

@@ -15,7 +15,7 @@ mod gauntlet;
 use arm_model::Limits;
 use gauntlet::Watch;
 use rt_controller::warm_up::CacheWarmUp;
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 use shared_types::ipc::{GuardianBeat, OperatorBeat};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -80,8 +80,8 @@ fn no_cycle_of_a_hundred_thousand_touches_the_heap() {
 /// Ten minutes: the swing of the shadow controller ends once and begins again.
 #[test]
 fn no_warm_up_touches_the_heap() {
-    let (limits, wire) = (Limits::default(), WireMode::ServoPosition);
-    let mut warm_up = CacheWarmUp::new(limits, wire, 200).unwrap();
+    let (limits, interface) = (Limits::default(), CommandInterface::ServoPosition);
+    let mut warm_up = CacheWarmUp::new(limits, interface, 200).unwrap();
     let before = touches();
     for cycle in 1..=150_000_u64 {
         warm_up.cycle(

@@ -18,7 +18,7 @@ use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerR
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, ControllerMode, IpcError, OperatorEnd};
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MotionTier};
+use shared_types::{FaultCode, OperatingMode};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -406,8 +406,11 @@ fn motions_need_an_arming_and_plans_come_in_time() {
     config.arming_required = true;
     let mut running = Running::start(config);
     let operator = &mut running.operator;
-    let arm_for = |tier, area_clear| ControllerRequest::Arm { tier, area_clear };
-    let setting_up = arm_for(MotionTier::SetUp, false);
+    let arm_for = |operating_mode, area_clear| ControllerRequest::Arm {
+        operating_mode,
+        area_clear,
+    };
+    let setting_up = arm_for(OperatingMode::SetUp, false);
     assert_eq!(operator.refused(&setting_up), FaultCode::WrongMode);
     assert_eq!(
         operator.ask(&ControllerRequest::Bringup),
@@ -415,12 +418,14 @@ fn motions_need_an_arming_and_plans_come_in_time() {
     );
     let throw = swing(-0.3, 0.8);
     assert_eq!(operator.refused(&execute(&throw)), FaultCode::NotArmed);
-    let blind = arm_for(MotionTier::Throw, false);
+    let blind = arm_for(OperatingMode::Throw, false);
     assert_eq!(operator.refused(&blind), FaultCode::NotArmed);
-    let armed = arm_for(MotionTier::Throw, true);
+    let armed = arm_for(OperatingMode::Throw, true);
     assert_eq!(operator.ask(&armed), ControllerEvent::Done);
     match operator.ask(&ControllerRequest::Status) {
-        ControllerEvent::Status { tier, .. } => assert_eq!(tier, Some(MotionTier::Throw)),
+        ControllerEvent::Status { operating_mode, .. } => {
+            assert_eq!(operating_mode, Some(OperatingMode::Throw))
+        }
         other => panic!("{other:?}"),
     }
     assert_eq!(

@@ -34,7 +34,7 @@ use rt_controller::warm_up::CacheWarmUp;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, JointReport, OperatorEnd, StateReader,
 };
-use shared_types::{Arming, MotionTier};
+use shared_types::{Arming, OperatingMode};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -174,8 +174,8 @@ fn start_loop(domain: &str) -> Running {
         };
         let control = ControlState::new(Limits::default(), patient());
         let mut rt = RtLoop::new(control, clock, boards, ports);
-        let wire = patient().wire;
-        rt.set_warm_up(CacheWarmUp::new(Limits::default(), wire, 200).unwrap());
+        let interface = patient().interface;
+        rt.set_warm_up(CacheWarmUp::new(Limits::default(), interface, 200).unwrap());
         ready.send(()).unwrap();
         rt.run(&its_quit);
         counter::count(false);
@@ -325,7 +325,7 @@ fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
     running.until(&mut beside, engaged);
     running.command(
         ControlCommand::Arm(Arming {
-            tier: MotionTier::Throw,
+            operating_mode: OperatingMode::Throw,
             expires_ns: now_ns() + 10_000_000_000,
             area_clear: true,
         }),

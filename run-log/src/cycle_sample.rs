@@ -5,7 +5,7 @@ use rt_controller::control::{ControlSettings, ControlState};
 use rt_controller::recording::{Item, LogError, LogReader, Read, RecordedCycle};
 use serde::Serialize;
 use shared_types::ipc::{CauseRecord, CommandKind, ControllerMode};
-use shared_types::{MonotonicNs, MotionTier};
+use shared_types::{MonotonicNs, OperatingMode};
 
 /// Setpoints farther apart than this say nothing about speed (s).
 const APART_MAX_S: f64 = 0.1;
@@ -58,7 +58,7 @@ pub struct CycleSample {
     /// Time on the motion (s), negative when none runs.
     pub trajectory_s: f64,
     /// How fast the path is followed.
-    pub path_rate: f64,
+    pub speed_override: f64,
     /// Commanded joints (rad).
     pub q_c: JointVector,
     /// Commanded joint speed closest to its limit (rad/s).
@@ -125,8 +125,9 @@ impl RunLog {
                         continue;
                     };
                     // An arming from before the recording shows only here.
-                    let tier = MotionTier::from_raw(state.summary().tier);
-                    differentiator.tier = tier.or(differentiator.tier);
+                    let operating_mode = OperatingMode::from_raw(state.summary().operating_mode);
+                    differentiator.operating_mode =
+                        operating_mode.or(differentiator.operating_mode);
                     if !known {
                         log.take_settings(&state);
                         known = true;
@@ -166,7 +167,7 @@ impl RunLog {
 struct Differentiator {
     before: Option<Sent>,
     report_ns: Option<u64>,
-    tier: Option<MotionTier>,
+    operating_mode: Option<OperatingMode>,
 }
 
 /// A setpoint and how it moved.
@@ -188,18 +189,18 @@ impl Differentiator {
     ) -> CycleSample {
         let (input, record) = (&cycle.input, &cycle.record);
         if CommandKind::from_raw(input.command.kind) == Some(CommandKind::Arm) {
-            self.tier = MotionTier::from_raw(input.command.tier);
+            self.operating_mode = OperatingMode::from_raw(input.command.operating_mode);
         }
         let newest = input.reports.as_slice().last().map(|r| r.arrival_ns);
         self.report_ns = newest.or(self.report_ns);
         let mode = ControllerMode::from_raw(record.mode);
         let armed = self
-            .tier
+            .operating_mode
             .filter(|_| settings.arming_required)
-            .unwrap_or(MotionTier::Throw);
+            .unwrap_or(OperatingMode::Throw);
         // Moves the controller makes itself are never faster than a wiggle.
-        let tier = if mode == ControllerMode::Moving && settings.arming_required {
-            armed.min(MotionTier::Wiggle)
+        let operating_mode = if mode == ControllerMode::Moving && settings.arming_required {
+            armed.min(OperatingMode::Wiggle)
         } else {
             armed
         };
@@ -210,12 +211,12 @@ impl Differentiator {
             planned_ns: input.deadline_ns,
             mode,
             trajectory_s: record.trajectory_s,
-            path_rate: record.path_rate,
+            speed_override: record.speed_override,
             q_c: record.q_c,
             speed: WorstJoint::default(),
             acceleration: WorstJoint::default(),
             tool_m_s: 0.0,
-            tool_max_m_s: settings.tiers.of(tier, limits.tcp_speed_max_m_s),
+            tool_max_m_s: settings.speeds.of(operating_mode, limits.tcp_speed_max_m_s),
             link_ms: input.link.unanswered_ns as f64 / 1e6,
             report_ms: self.report_ns.map(age_ms),
             missed: input.missed,
@@ -274,7 +275,7 @@ mod tests {
             planned_ns: at_ms * 1_000_000,
             mode: ControllerMode::Streaming,
             trajectory_s: 0.0,
-            path_rate: 1.0,
+            speed_override: 1.0,
             q_c: q,
             speed: WorstJoint::default(),
             acceleration: WorstJoint::default(),

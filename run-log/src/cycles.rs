@@ -129,7 +129,7 @@ impl Cycles {
 
 /// The instant that a cycle's setpoint is for: a late one is not for its deadline.
 fn instant_ns(cycle: &CycleRecord, start_ns: u64) -> u64 {
-    if cycle.trajectory_s >= 0.0 && cycle.path_rate >= 1.0 {
+    if cycle.trajectory_s >= 0.0 && cycle.speed_override >= 1.0 {
         MonotonicNs(start_ns).plus_s(cycle.trajectory_s).0
     } else {
         cycle.deadline_ns

@@ -5,7 +5,7 @@ use super::margins::{Margin, smallest_margins};
 use rt_controller::xarm::ErrorCode;
 use serde::Serialize;
 use shared_types::ipc::{CauseRecord, ControllerMode, RunCounts};
-use shared_types::{FaultCode, MotionTier};
+use shared_types::{FaultCode, OperatingMode};
 
 /// Ends of the rows around a stop (ms); a row covers what lies between the end
 /// before and its own.
@@ -75,8 +75,8 @@ pub struct Stop {
     pub time_s: f64,
     /// Mode then.
     pub mode: ControllerMode,
-    /// Armed tier.
-    pub tier: Option<&'static str>,
+    /// Armed operating mode.
+    pub operating_mode: Option<&'static str>,
     /// Motion that ran.
     pub motion: Option<u64>,
     /// Time on it (s).
@@ -122,7 +122,7 @@ pub struct Row {
     /// Time on the motion at its end (s).
     pub motion_s: Option<f64>,
     /// How fast the path is followed at its end.
-    pub path_rate: f64,
+    pub speed_override: f64,
     /// Joint speed (rad/s).
     pub speed: WorstJoint,
     /// Joint acceleration (rad/s²).
@@ -185,7 +185,7 @@ fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
         cycle: cause.cycle,
         time_s: log.time_s(cause.stamp_ns),
         mode: cause.mode_then(),
-        tier: MotionTier::from_raw(cause.tier).map(tier_name),
+        operating_mode: OperatingMode::from_raw(cause.operating_mode).map(operating_mode_name),
         motion: Some(cause.motion_id).filter(|id| *id != 0),
         motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),
         met: met(cause.path),
@@ -198,11 +198,11 @@ fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
     }
 }
 
-const fn tier_name(tier: MotionTier) -> &'static str {
-    match tier {
-        MotionTier::SetUp => "set-up",
-        MotionTier::Wiggle => "wiggle",
-        MotionTier::Throw => "throw",
+const fn operating_mode_name(operating_mode: OperatingMode) -> &'static str {
+    match operating_mode {
+        OperatingMode::SetUp => "set-up",
+        OperatingMode::Wiggle => "wiggle",
+        OperatingMode::Throw => "throw",
     }
 }
 
@@ -248,7 +248,7 @@ const fn unit(code: FaultCode, joint: u32) -> &'static str {
         F::ArmError | F::SetpointVelocity => "rad/s",
         F::SetpointAcceleration => "rad/s²",
         F::SetpointJerk => "rad/s³",
-        F::SetpointTcpSpeed | F::TierExceeded => "m/s",
+        F::SetpointTcpSpeed | F::OperatingModeExceeded => "m/s",
         F::SetpointStep => "m",
         F::DeadlineMissed | F::LateCycles => "cycles",
         F::OperatorLost
@@ -304,7 +304,7 @@ fn row(until_ms: f64, samples: &[&CycleSample]) -> Option<Row> {
         until_ms,
         mode: last.mode,
         motion_s: Some(last.trajectory_s).filter(|t| *t >= 0.0),
-        path_rate: last.path_rate,
+        speed_override: last.speed_override,
         speed: worst(|m| m.speed),
         acceleration: worst(|m| m.acceleration),
         tool_m_s: most(|m| m.tool_m_s),
@@ -377,7 +377,7 @@ mod tests {
                 ControllerMode::Faulted
             },
             trajectory_s: 0.5,
-            path_rate: 1.0,
+            speed_override: 1.0,
             q_c: JointVector::ZERO,
             speed: WorstJoint::default(),
             acceleration: WorstJoint::default(),

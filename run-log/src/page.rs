@@ -143,8 +143,8 @@ fn place(stop: &Stop) -> String {
     if let Some(t) = stop.motion_s {
         let _ = write!(text, ", {t:.3} s into it");
     }
-    if let Some(tier) = stop.tier {
-        let _ = write!(text, "; armed for {tier}");
+    if let Some(operating_mode) = stop.operating_mode {
+        let _ = write!(text, "; armed for {operating_mode}");
     }
     text
 }
@@ -197,7 +197,7 @@ fn around(rows: &[Row]) -> Table {
             [
                 format!("{:.0}", r.until_ms),
                 r.motion_s.map_or("-".to_owned(), |t| format!("{t:.3}")),
-                format!("{:.2}", r.path_rate),
+                format!("{:.2}", r.speed_override),
                 percent(&r.speed),
                 percent(&r.acceleration),
                 format!("{:.3}", r.tool_m_s),

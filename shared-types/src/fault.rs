@@ -75,8 +75,8 @@ pub enum FaultCode {
     WrongMode = 43,
     /// The arm is not armed for this motion.
     NotArmed = 44,
-    /// A motion was faster than its tier allows.
-    TierExceeded = 45,
+    /// A motion was faster than its operating mode allows.
+    OperatingModeExceeded = 45,
     /// The arming ran out before the motion began.
     ArmingExpired = 46,
     /// The upload of a plan did not end in time.
@@ -125,7 +125,7 @@ impl FaultCode {
         Self::PlanHashMismatch,
         Self::WrongMode,
         Self::NotArmed,
-        Self::TierExceeded,
+        Self::OperatingModeExceeded,
         Self::ArmingExpired,
         Self::UploadTimedOut,
         Self::SecondCommander,
@@ -236,8 +236,8 @@ impl FaultCode {
             Self::NotArmed => {
                 "the arm is not armed for this motion; arm it, for a throw with the area clear"
             }
-            Self::TierExceeded => {
-                "the motion is faster than its tier allows; slow it down or arm a higher tier"
+            Self::OperatingModeExceeded => {
+                "the motion is faster than its operating mode allows; slow it down or arm for a faster one"
             }
             Self::ArmingExpired => {
                 "the arming ran out before the motion began; look whether the area is still clear and arm again"

@@ -20,30 +20,30 @@ extern crate alloc;
 
 #[cfg(feature = "std")]
 pub mod camera;
+pub mod command_interface;
 pub mod fault;
 pub mod ipc;
 #[cfg(feature = "std")]
 pub mod keypoints;
+pub mod operating_mode;
 #[cfg(feature = "std")]
 pub mod plan;
 #[cfg(feature = "std")]
 pub mod rope;
-pub mod tier;
 pub mod time;
-pub mod wire;
 
 #[cfg(feature = "std")]
 pub use camera::{Intrinsics, Shutter, StereoCamera};
+pub use command_interface::CommandInterface;
 pub use fault::FaultCode;
 #[cfg(feature = "std")]
 pub use keypoints::{KeypointFrame, KeypointTrack};
+pub use operating_mode::{Arming, OperatingMode};
 #[cfg(feature = "std")]
 pub use plan::{Condition, ErrorForecast, LimitedBy, Plan, Task, Verdict};
 #[cfg(feature = "std")]
 pub use rope::{RopeEstimate, RopeParams};
-pub use tier::{Arming, MotionTier};
 pub use time::MonotonicNs;
-pub use wire::WireMode;
 
 /// Version of this build, written into every result file.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

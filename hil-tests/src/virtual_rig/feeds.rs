@@ -3,7 +3,7 @@
 
 use super::network::{Network, VirtualStream};
 use rt_controller::report_feed::{RETRY_NS, ReportFeed};
-use rt_controller::transport::ByteWire;
+use rt_controller::transport::ByteStream;
 use std::cell::RefCell;
 use std::io::ErrorKind;
 use std::rc::Rc;

@@ -26,8 +26,8 @@ pub use surroundings::Surroundings;
 use arm_model::{JointVector, Limits};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, ControlState, Motion};
 use rt_controller::driver::{CommandMsg, CycleDriver};
+use rt_controller::transport::command_interface::arm_mode;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
-use rt_controller::transport::wire::arm_mode;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, Protocol, StateRequest};
 use shared_types::MonotonicNs;
@@ -173,7 +173,7 @@ impl VirtualRig {
     /// # Errors
     /// [`ConnectRefused`] when the arm cannot be reached.
     pub fn bring_up(&mut self) -> Result<(), ConnectRefused> {
-        let mode = arm_mode(self.config.settings.wire);
+        let mode = arm_mode(self.config.settings.interface);
         let mut session = VirtualStream::connect(&self.around.network, Service::Commands)?;
         for (id, command) in [
             Command::CleanError,
@@ -294,7 +294,7 @@ impl VirtualRig {
 
 /// Sends a request of the set-up; its reply is not waited for.
 fn ask(session: &mut VirtualStream, id: usize, command: &Command) {
-    use rt_controller::transport::ByteWire;
+    use rt_controller::transport::ByteStream;
     let mut frame = [0; MAX_FRAME_LEN];
     let transaction = u16::try_from(id + 1).unwrap_or(u16::MAX);
     if let Ok(len) = emit_command(&mut frame, transaction, Protocol::Private, command) {

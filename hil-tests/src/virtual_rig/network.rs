@@ -1,6 +1,6 @@
 //! The cable between controller and arm, in virtual time.
 
-use rt_controller::transport::ByteWire;
+use rt_controller::transport::ByteStream;
 use shared_types::MonotonicNs;
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -89,7 +89,7 @@ impl Drop for VirtualStream {
     }
 }
 
-impl ByteWire for VirtualStream {
+impl ByteStream for VirtualStream {
     /// All that has come and fits, as a socket gives it.
     fn receive(&mut self, into: &mut [u8]) -> std::io::Result<(usize, Option<u64>)> {
         let mut net = self.network.borrow_mut();

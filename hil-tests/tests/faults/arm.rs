@@ -1,14 +1,14 @@
 //! Faults of the arm's controller: 9 to 12.
 
 use super::judge::silenced;
-use super::stage::{Stage, WIRES, config, mid_throw};
+use super::stage::{INTERFACES, Stage, config, mid_throw};
 use arm_model::Limits;
 use shared_types::ipc::{CauseRecord, ControllerMode};
-use shared_types::{FaultCode, MonotonicNs, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 
 /// A throw that the arm ends by an error of its own: nothing is sent any more.
-fn ended_by_the_arm(wire: WireMode, kind: &str, code: u8) -> (Stage, CauseRecord) {
-    let mut stage = Stage::thrown(wire, &mid_throw(kind));
+fn ended_by_the_arm(via: CommandInterface, kind: &str, code: u8) -> (Stage, CauseRecord) {
+    let mut stage = Stage::thrown(via, &mid_throw(kind));
     let cause = stage.assert_stop(silenced(FaultCode::ArmError));
     assert_eq!(stage.arm_errors(), [code]);
     assert_stopped_sending(&stage, &cause);
@@ -25,10 +25,10 @@ fn assert_stopped_sending(stage: &Stage, cause: &CauseRecord) {
 
 #[test]
 fn fault_09_a_speed_error_of_the_arm_is_latched_with_speed_and_margin() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for code in [60, 24] {
             let raise = format!("kind = \"raise_error\"\ncode = {code}");
-            let (mut stage, cause) = ended_by_the_arm(wire, &raise, code);
+            let (mut stage, cause) = ended_by_the_arm(via, &raise, code);
             let part = cause.limit.value / cause.limit.limit;
             assert!((0.3..1.0).contains(&part), "{:?}", cause.limit);
             stage.assert_works_again();
@@ -40,7 +40,7 @@ fn fault_09_a_speed_error_of_the_arm_is_latched_with_speed_and_margin() {
 /// cause shows a speed above what the arm took.
 #[test]
 fn fault_09_an_arm_slower_than_its_limits_stops_with_c60() {
-    let mut config = config(WireMode::ServoPosition, "");
+    let mut config = config(CommandInterface::ServoPosition, "");
     config.arm.speed_limit_factor = 0.8;
     let mut stage = Stage::of(config);
     stage.begin();
@@ -58,13 +58,13 @@ fn fault_09_an_arm_slower_than_its_limits_stops_with_c60() {
 
 #[test]
 fn fault_10_a_collision_or_a_boundary_is_latched() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for (kind, code) in [
             ("kind = \"collision\"", 31),
             ("kind = \"raise_error\"\ncode = 35", 35),
             ("kind = \"raise_error\"\ncode = 22", 22),
         ] {
-            let (mut stage, _) = ended_by_the_arm(wire, kind, code);
+            let (mut stage, _) = ended_by_the_arm(via, kind, code);
             stage.assert_works_again();
         }
     }
@@ -72,10 +72,10 @@ fn fault_10_a_collision_or_a_boundary_is_latched() {
 
 #[test]
 fn fault_11_an_emergency_stop_lasts_until_it_is_released_and_acknowledged() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for code in 1..=3 {
             let press = format!("kind = \"emergency_stop\"\ncode = {code}\nduration_s = 8");
-            let (mut stage, _) = ended_by_the_arm(wire, &press, code);
+            let (mut stage, _) = ended_by_the_arm(via, &press, code);
             // Pressed still: an acknowledgement alone moves nothing.
             stage.rig.bring_up().unwrap();
             stage.rig.run_for(0.5);
@@ -90,14 +90,14 @@ fn fault_11_an_emergency_stop_lasts_until_it_is_released_and_acknowledged() {
 
 #[test]
 fn fault_12_no_command_is_sent_in_a_mode_or_state_that_somebody_changed() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for kind in [
             "kind = \"mode_changed\"\nmode = 0",
             "kind = \"state_changed\"\nstate = 3",
             "kind = \"state_changed\"\nstate = 4",
             "kind = \"state_changed\"\nstate = 5",
         ] {
-            let mut stage = Stage::thrown(wire, &mid_throw(kind));
+            let mut stage = Stage::thrown(via, &mid_throw(kind));
             let cause = stage.assert_stop(silenced(FaultCode::ArmNotReady));
             assert_stopped_sending(&stage, &cause);
             stage.assert_works_again();

@@ -107,13 +107,13 @@ impl Stage {
             causes.len(),
             1,
             "{:?} {:?}: {causes:?}",
-            self.wire,
+            self.via,
             want.fault
         );
         let cause = causes[0];
         let said = (cause.fault(), cause.path, cause.stop_arm != 0);
         let wanted = (want.fault, want.path as u8, want.stop_arm);
-        assert_eq!(said, wanted, "{:?}: {cause:?}", self.wire);
+        assert_eq!(said, wanted, "{:?}: {cause:?}", self.via);
         assert!(cause.cycle <= cause.rest_cycle && cause.motion_id > 0);
         let (value, limit) = (cause.limit.value, cause.limit.limit);
         // Codes that are no excess: an error shows how near the speed limit was.
@@ -203,7 +203,7 @@ impl Stage {
 
     /// Asserts that the same was commanded as if nothing had happened.
     pub(crate) fn assert_same_path(&self) {
-        let undisturbed = Self::thrown(self.wire, "");
+        let undisturbed = Self::thrown(self.via, "");
         let path = |stage: &Self| -> Vec<(f64, JointVector)> {
             stage.on_path().map(|r| (r.trajectory_s, r.q_c)).collect()
         };
@@ -225,14 +225,14 @@ impl Stage {
 
     fn assert_ended(&self) {
         let log = &self.rig.log;
-        assert!(log.causes.is_empty(), "{:?}: {:?}", self.wire, log.causes);
+        assert!(log.causes.is_empty(), "{:?}: {:?}", self.via, log.causes);
         assert_eq!(
             (self.finished(), self.rig.mode()),
             (1, ControllerMode::Idle)
         );
         assert_eq!(self.arm_errors(), [0_u8; 0]);
         let off = self.rig.with_arm(|arm| arm.model().true_motion().q) - self.throw.end();
-        assert!(off.max_abs() < 2e-3, "{:?}: ends {off:?} off", self.wire);
+        assert!(off.max_abs() < 2e-3, "{:?}: ends {off:?} off", self.via);
         assert!(self.speed() < STANDING_RAD_S);
     }
 

@@ -6,7 +6,7 @@
 use super::stage::Stage;
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use rt_controller::control::ControlEvent;
-use shared_types::{MonotonicNs, WireMode};
+use shared_types::{CommandInterface, MonotonicNs};
 
 /// Smallest time between two setpoints (s): 0.8 of a cycle.
 const GAP_MIN_S: f64 = 0.0032;
@@ -104,9 +104,9 @@ pub(crate) fn assert_kept_with_jitter(stage: &Stage, jitter_s: f64) {
 
 fn assert_all(stage: &Stage, wire_until: MonotonicNs, jitter_s: f64) {
     assert_computed(stage);
-    match stage.wire {
-        WireMode::ServoPosition => assert_arrived(stage, wire_until, jitter_s),
-        WireMode::JointVelocity => assert_velocities(stage, wire_until, jitter_s),
+    match stage.via {
+        CommandInterface::ServoPosition => assert_arrived(stage, wire_until, jitter_s),
+        CommandInterface::JointVelocity => assert_velocities(stage, wire_until, jitter_s),
     }
     assert_true_motion(stage);
 }

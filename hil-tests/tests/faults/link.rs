@@ -1,10 +1,10 @@
 //! Faults of the command link: 1, 4, 5, 6, 7, 8, 13.
 
 use super::judge::{silenced, stopped};
-use super::stage::{Stage, WIRES, entry, mid_throw};
+use super::stage::{INTERFACES, Stage, entry, mid_throw};
 use arm_model::{JointVector, Limits, kinematics};
 use rt_controller::xarm::{ArmState, Command, Register, StateRequest};
-use shared_types::{FaultCode, MonotonicNs, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 use xarm_sim::ArmEvent;
 
 /// From an unanswered setpoint to the cause (s): two cycles, and one until a
@@ -19,8 +19,8 @@ fn tool(q: &JointVector) -> nalgebra::Vector3<f64> {
 /// noticed. When it lets go, the stop comes with it: no burst is followed.
 #[test]
 fn fault_01_a_stall_of_190_ms_ends_in_a_stop_and_not_in_a_burst() {
-    for wire in WIRES {
-        let mut stage = Stage::thrown(wire, &mid_throw("kind = \"stall\"\nduration_s = 0.19"));
+    for via in INTERFACES {
+        let mut stage = Stage::thrown(via, &mid_throw("kind = \"stall\"\nduration_s = 0.19"));
         let cause = stage.assert_stop(stopped(FaultCode::ReplyStalled));
         let began = stage.fault_began(1);
         assert!(MonotonicNs(cause.stamp_ns).since_s(began) < NOTICED_WITHIN_S);
@@ -54,7 +54,7 @@ fn fault_01_a_stall_of_190_ms_ends_in_a_stop_and_not_in_a_burst() {
         let last = stage.rig.log.truth.last().unwrap().state.q;
         assert!((last - frozen).max_abs() < 0.004 * Limits::default().velocity_max_rad_s[0]);
         assert!((tool(&last) - tool(&frozen)).norm() < 0.010);
-        if let (WireMode::ServoPosition, Some((_, first))) = (wire, held.first()) {
+        if let (CommandInterface::ServoPosition, Some((_, first))) = (via, held.first()) {
             assert!((tool(first) - tool(&frozen)).norm() < 0.010);
         }
         stage.assert_works_again();
@@ -63,8 +63,8 @@ fn fault_01_a_stall_of_190_ms_ends_in_a_stop_and_not_in_a_burst() {
 
 #[test]
 fn fault_01_a_stall_that_is_over_in_a_cycle_is_borne() {
-    for wire in WIRES {
-        let stage = Stage::thrown(wire, &mid_throw("kind = \"stall\"\nduration_s = 0.005"));
+    for via in INTERFACES {
+        let stage = Stage::thrown(via, &mid_throw("kind = \"stall\"\nduration_s = 0.005"));
         stage.assert_finished_with_jitter(0.006);
         stage.assert_same_path();
     }
@@ -72,8 +72,8 @@ fn fault_01_a_stall_that_is_over_in_a_cycle_is_borne() {
 
 #[test]
 fn fault_04_a_reset_connection_is_latched_and_a_new_one_resumes_nothing() {
-    for wire in WIRES {
-        let mut stage = Stage::thrown(wire, &mid_throw("kind = \"connection_reset\""));
+    for via in INTERFACES {
+        let mut stage = Stage::thrown(via, &mid_throw("kind = \"connection_reset\""));
         let cause = stage.assert_stop(silenced(FaultCode::LinkLost));
         assert!(MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1)) < 0.0081);
         assert!(!stage.rig.is_connected());
@@ -89,8 +89,8 @@ fn fault_04_a_reset_connection_is_latched_and_a_new_one_resumes_nothing() {
 
 #[test]
 fn fault_05_a_half_open_link_is_noticed_in_two_cycles() {
-    for wire in WIRES {
-        let mut stage = Stage::thrown(wire, &mid_throw("kind = \"half_open\""));
+    for via in INTERFACES {
+        let mut stage = Stage::thrown(via, &mid_throw("kind = \"half_open\""));
         let cause = stage.assert_stop(stopped(FaultCode::ReplyStalled));
         assert!(MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1)) < NOTICED_WITHIN_S);
         // The controller's own stop cannot get through; the guardian's does.
@@ -106,9 +106,9 @@ fn fault_05_a_half_open_link_is_noticed_in_two_cycles() {
 
 #[test]
 fn fault_06_a_cable_that_comes_back_after_500_ms_changes_nothing() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = mid_throw("kind = \"cable_pull\"\nduration_s = 0.5");
-        let mut stage = Stage::thrown(wire, &script);
+        let mut stage = Stage::thrown(via, &script);
         let cause = stage.assert_stop(stopped(FaultCode::ReplyStalled));
         assert!(MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1)) < NOTICED_WITHIN_S);
         stage.assert_works_again();
@@ -117,19 +117,19 @@ fn fault_06_a_cable_that_comes_back_after_500_ms_changes_nothing() {
 
 #[test]
 fn fault_07_replies_out_of_order_and_doubled_are_counted_and_nothing_else() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = entry(
             "at_s = 0.1",
             "kind = \"replies_reordered\"\nduration_s = 10",
         );
-        let stage = Stage::thrown(wire, &script);
+        let stage = Stage::thrown(via, &script);
         stage.assert_undisturbed();
         assert!(stage.rig.counts().out_of_order > 100);
         let script = entry(
             "at_s = 0.1",
             "kind = \"replies_duplicated\"\nduration_s = 10",
         );
-        let stage = Stage::thrown(wire, &script);
+        let stage = Stage::thrown(via, &script);
         stage.assert_undisturbed();
         assert!(stage.rig.counts().duplicates > 100);
     }
@@ -137,16 +137,16 @@ fn fault_07_replies_out_of_order_and_doubled_are_counted_and_nothing_else() {
 
 #[test]
 fn fault_08_a_reply_with_a_warning_is_counted_one_with_an_error_ends_the_motion() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let bit = |kind: &str| mid_throw(&format!("kind = \"{kind}\"\nduration_s = 0.1"));
-        let stage = Stage::thrown(wire, &bit("warning_bit"));
+        let stage = Stage::thrown(via, &bit("warning_bit"));
         stage.assert_undisturbed();
         assert!(stage.rig.counts().warnings >= 20);
         for (kind, fault) in [
             ("error_bit", FaultCode::ArmError),
             ("not_ready_bit", FaultCode::ArmNotReady),
         ] {
-            let mut stage = Stage::thrown(wire, &bit(kind));
+            let mut stage = Stage::thrown(via, &bit(kind));
             let cause = stage.assert_stop(silenced(fault));
             assert!(MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1)) < 0.0081);
             stage.assert_works_again();
@@ -162,7 +162,7 @@ fn fault_13_a_second_commander_is_noticed_by_the_arms_own_target() {
         "at_s = 1.5",
         "kind = \"second_commander\"\nwish = \"setpoints\"\nrate_hz = 60\nduration_s = 1",
     );
-    let mut stage = Stage::ready(WireMode::ServoPosition, &script);
+    let mut stage = Stage::ready(CommandInterface::ServoPosition, &script);
     stage.rig.run_for(2.0);
     let causes = stage.rig.log.causes.clone();
     assert_eq!(causes.len(), 1, "{causes:?}");
@@ -179,18 +179,18 @@ fn fault_13_a_second_commander_in_the_middle_of_a_throw_ends_it() {
     let rest = |wish: &str| {
         format!("kind = \"second_commander\"\nwish = \"{wish}\"\nrate_hz = 50\nduration_s = 0.2")
     };
-    for wire in WIRES {
+    for via in INTERFACES {
         for wish in ["stop", "mode"] {
-            let mut stage = Stage::thrown(wire, &mid_throw(&rest(wish)));
+            let mut stage = Stage::thrown(via, &mid_throw(&rest(wish)));
             stage.assert_stop(silenced(FaultCode::ArmNotReady));
             stage.assert_works_again();
         }
     }
     // Positions are nothing to an arm that follows velocities.
     let script = mid_throw(&rest("setpoints"));
-    Stage::thrown(WireMode::JointVelocity, &script).assert_undisturbed();
+    Stage::thrown(CommandInterface::JointVelocity, &script).assert_undisturbed();
     // In servo mode setpoints beside a fast path are too fast for the arm.
-    let mut stage = Stage::thrown(WireMode::ServoPosition, &script);
+    let mut stage = Stage::thrown(CommandInterface::ServoPosition, &script);
     let cause = stage.assert_stop(silenced(FaultCode::ArmError));
     assert_eq!(stage.arm_errors(), [24], "{cause:?}");
     stage.assert_works_again();

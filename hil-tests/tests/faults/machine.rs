@@ -1,14 +1,14 @@
 //! Faults of the machine and of clocks: 2, 3, 33, 34, 35.
 
 use super::judge::{braked_and_stopped, slowed, stopped};
-use super::stage::{Stage, WIRES, config};
+use super::stage::{INTERFACES, Stage, config};
 use arm_model::{JointTrajectory, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::restore_input;
 use rt_controller::control::{ControlCommand, ControlSettings, ControlState, Motion, Thresholds};
 use shared_types::ipc::CauseRecord;
-use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier, WireMode};
+use shared_types::{Arming, CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 use xarm_sim::Intake;
 
 const MS: u64 = 1_000_000;
@@ -16,9 +16,9 @@ const MS: u64 = 1_000_000;
 /// Wakes so late that one, two or three cycles are lost, at many phases.
 #[test]
 fn fault_02_a_single_late_wake_up_costs_its_setpoints_and_no_more() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for late_us in [300, 900, 2000, 3900, 4300, 6000, 7900, 8000] {
-            let mut stage = Stage::throwing(wire, "");
+            let mut stage = Stage::throwing(via, "");
             stage.run_part(0.5);
             stage.rig.oversleep([late_us * 1000]);
             stage.finish();
@@ -46,9 +46,9 @@ fn assert_on_time(stage: &Stage) {
 /// they arrive, never sees one too far from the last.
 #[test]
 fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for first_us in [500, 1500, 2500, 3500, 3900] {
-            let mut stage = Stage::throwing(wire, "");
+            let mut stage = Stage::throwing(via, "");
             stage.run_part(0.2);
             let pairs = (0..60).flat_map(|k| [first_us * MS / 1000, (k % 4) * 900_000, 0]);
             stage.rig.oversleep(pairs);
@@ -63,9 +63,9 @@ fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
 /// soon after it.
 #[test]
 fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for held_us in [100, 300, 500, 1500, 2500, 3500, 3900, 4500, 7000] {
-            let mut stage = Stage::throwing(wire, "");
+            let mut stage = Stage::throwing(via, "");
             stage.run_part(0.2);
             // Two cycles lost again and again are another fault's matter.
             let times = if held_us < 4000 { 40 } else { 1 };
@@ -84,8 +84,8 @@ fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
 /// cycles are.
 #[test]
 fn fault_02_a_machine_that_is_always_too_slow_stops_the_motion() {
-    for wire in WIRES {
-        let mut stage = Stage::throwing(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::throwing(via, "");
         stage.run_part(0.2);
         stage.rig.hold_up([MS; 2000]);
         stage.finish();
@@ -99,9 +99,9 @@ fn fault_02_a_machine_that_is_always_too_slow_stops_the_motion() {
 #[test]
 fn fault_02_three_cycles_lost_at_once_slow_the_motion() {
     // By velocities the arm has begun to brake by itself after 12 ms.
-    let servo = |wire: &WireMode| *wire == WireMode::ServoPosition;
-    for wire in WIRES.into_iter().filter(servo) {
-        let mut stage = Stage::throwing(wire, "");
+    let servo = |via: &CommandInterface| *via == CommandInterface::ServoPosition;
+    for via in INTERFACES.into_iter().filter(servo) {
+        let mut stage = Stage::throwing(via, "");
         stage.run_part(0.5);
         stage.rig.oversleep([12 * MS + 300_000]);
         stage.finish();
@@ -115,8 +115,8 @@ fn fault_02_three_cycles_lost_at_once_slow_the_motion() {
 /// with a jump.
 #[test]
 fn fault_03_twenty_lost_cycles_end_the_motion() {
-    for wire in WIRES {
-        let mut stage = Stage::throwing(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::throwing(via, "");
         stage.run_part(0.5);
         stage.rig.oversleep([80 * MS]);
         stage.finish();
@@ -130,10 +130,10 @@ fn fault_03_twenty_lost_cycles_end_the_motion() {
 /// gets a setpoint that it cannot reach from rest.
 #[test]
 fn fault_03_patience_does_not_turn_a_gap_into_a_jump() {
-    for wire in WIRES {
-        let mut config = config(wire, "");
+    for via in INTERFACES {
+        let mut config = config(via, "");
         config.settings = ControlSettings {
-            wire,
+            interface: via,
             guardian_required: true,
             arming_required: true,
             ..Thresholds {
@@ -148,10 +148,10 @@ fn fault_03_patience_does_not_turn_a_gap_into_a_jump() {
         stage.run_part(0.5);
         stage.rig.oversleep([160 * MS]);
         stage.finish();
-        stage.assert_stop(match wire {
-            WireMode::ServoPosition => stopped(FaultCode::DeadlineMissed),
+        stage.assert_stop(match via {
+            CommandInterface::ServoPosition => stopped(FaultCode::DeadlineMissed),
             // Its own watchdog has stopped this arm elsewhere than it was told.
-            WireMode::JointVelocity => braked_and_stopped(FaultCode::TrackingError),
+            CommandInterface::JointVelocity => braked_and_stopped(FaultCode::TrackingError),
         });
         assert_eq!(stage.arm_errors(), [0_u8; 0]);
         stage.assert_works_again();
@@ -162,10 +162,10 @@ fn fault_03_patience_does_not_turn_a_gap_into_a_jump() {
 /// the monotonic clock, and what it was told makes it do the same at any hour.
 #[test]
 fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
-    for wire in WIRES {
-        let stage = Stage::thrown(wire, "");
+    for via in INTERFACES {
+        let stage = Stage::thrown(via, "");
         let throw = stage.throw;
-        let mut again = ControlState::new(Limits::default(), config(wire, "").settings);
+        let mut again = ControlState::new(Limits::default(), config(via, "").settings);
         for (input, did) in stage.rig.log.inputs.iter().zip(&stage.rig.log.records) {
             let motion = |_, _| Some(Box::new(Motion::Spline(throw)));
             let mut out = again.step(restore_input(input, motion).unwrap());
@@ -190,10 +190,10 @@ fn slower(throw: &JointTrajectory) -> JointTrajectory {
 /// twentieth of the speed limits goes on.
 #[test]
 fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for seed in 0..20 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut stage = Stage::ready(wire, "");
+            let mut stage = Stage::ready(via, "");
             stage.throw = slower(&stage.throw);
             stage.begin();
             stage
@@ -213,11 +213,11 @@ fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
 #[test]
 fn fault_34_beyond_the_bounds_the_motion_is_slowed() {
     // By velocities the arm has begun to brake by itself after 12 ms.
-    let servo = |wire: &WireMode| *wire == WireMode::ServoPosition;
-    for wire in WIRES.into_iter().filter(servo) {
+    let servo = |via: &CommandInterface| *via == CommandInterface::ServoPosition;
+    for via in INTERFACES.into_iter().filter(servo) {
         for seed in 0..20 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut stage = Stage::throwing(wire, "");
+            let mut stage = Stage::throwing(via, "");
             let calm = rng.random_range(20..200);
             let late = |_| rng.random_range(200_000..3_990_000);
             let jitter: Vec<u64> = (0..calm).map(late).collect();
@@ -233,14 +233,14 @@ fn fault_34_beyond_the_bounds_the_motion_is_slowed() {
 /// evenly, and nothing else shows.
 #[test]
 fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for ppm in [1000.0, -1000.0] {
-            let mut config = config(wire, "");
+            let mut config = config(via, "");
             config.arm.clock_ppm = ppm;
             config.arm.intake = Intake::Clock;
             let mut stage = Stage::of(config);
             stage.rig.command(ControlCommand::Arm(Arming {
-                tier: MotionTier::Wiggle,
+                operating_mode: OperatingMode::Wiggle,
                 expires_ns: u64::MAX,
                 area_clear: false,
             }));
@@ -266,8 +266,8 @@ fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
             // 62 s are 15 500 cycles, of which a thousandth slips.
             let counters = stage.rig.with_arm(|arm| arm.model().counters());
             let slipped = counters.dropped + counters.repeated;
-            assert!((10..25).contains(&slipped), "{wire:?} {ppm}: {counters:?}");
-            if wire == WireMode::ServoPosition {
+            assert!((10..25).contains(&slipped), "{via:?} {ppm}: {counters:?}");
+            if via == CommandInterface::ServoPosition {
                 assert_no_beat(&stage, &minute);
             }
         }

@@ -1,7 +1,7 @@
 //! The operator lets go or withdraws the arming: 36.
 
 use super::limits;
-use super::stage::{Stage, WIRES};
+use super::stage::{INTERFACES, Stage};
 use arm_model::limits::LimitsSpec;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
@@ -9,15 +9,15 @@ use rand_chacha::ChaCha8Rng;
 use rt_controller::control::reaction::StopCategory;
 use rt_controller::control::{ControlCommand, ControlEvent, Motion};
 use shared_types::ipc::ControllerMode;
-use shared_types::{FaultCode, MonotonicNs, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 
 /// Limits that a throw of each wire uses fully. An arm that follows velocities
 /// makes its own jerk and cannot follow steps of the full acceleration closely.
-fn limits_of(wire: WireMode) -> Limits {
+fn limits_of(via: CommandInterface) -> Limits {
     let limits = Limits::default();
-    match wire {
-        WireMode::ServoPosition => limits,
-        WireMode::JointVelocity => Limits::try_from(LimitsSpec {
+    match via {
+        CommandInterface::ServoPosition => limits,
+        CommandInterface::JointVelocity => Limits::try_from(LimitsSpec {
             acceleration_max_rad_s2: limits.acceleration_max_rad_s2 * 0.5,
             ..limits.into()
         })
@@ -109,12 +109,12 @@ fn fault_36_the_arm_is_braked_within_a_cycle_at_1000_random_moments_of_fast_thro
     let mut rng = ChaCha8Rng::seed_from_u64(36);
     let mut throws = [None; 2];
     for k in 0..1000 {
-        let wire = WIRES[k % 2];
-        let mut stage = Stage::ready(wire, "");
+        let via = INTERFACES[k % 2];
+        let mut stage = Stage::ready(via, "");
         // Ten moments of each throw.
         if k % 20 < 2 {
             let from = stage.rig.commanded();
-            throws[k % 2] = Some(random_throw(from, &limits_of(wire), &mut rng));
+            throws[k % 2] = Some(random_throw(from, &limits_of(via), &mut rng));
         }
         stage.throw = throws[k % 2].unwrap();
         stage.begin();
@@ -131,9 +131,9 @@ fn fault_36_the_arm_is_braked_within_a_cycle_at_1000_random_moments_of_fast_thro
 /// The whole judgement, for each way and each wire.
 #[test]
 fn fault_36_nothing_moves_until_the_operator_acknowledges_and_arms_again() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for how in [Withdrawal::LetsGo, Withdrawal::Disarms, Withdrawal::Stops] {
-            let mut stage = Stage::throwing(wire, "");
+            let mut stage = Stage::throwing(via, "");
             assert_braked_at(&mut stage, how, 0.55);
             stage.rig.operator_stop = false;
             let fault = stage.rig.log.causes[0].fault();
@@ -147,8 +147,8 @@ fn fault_36_nothing_moves_until_the_operator_acknowledges_and_arms_again() {
 /// with it.
 #[test]
 fn fault_36_a_switch_that_is_let_go_disarms_and_refuses() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         stage.arm();
         stage.rig.run_cycles(2);
         stage.rig.dead_man_released = true;

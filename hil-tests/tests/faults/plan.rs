@@ -2,13 +2,13 @@
 
 use super::judge::braked;
 use super::limits;
-use super::stage::{Stage, WIRES};
+use super::stage::{INTERFACES, Stage};
 use arm_model::limits::{LimitKind, LimitsSpec};
 use arm_model::{JointTrajectory, JointVector, Limits};
 use rt_controller::control::Motion;
 use rt_controller::point_to_point::verify;
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MonotonicNs, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 use xarm_sim::{Fault, FaultKind, Trigger};
 
 /// Half a degree and a little (rad).
@@ -16,8 +16,8 @@ const BESIDE_RAD: f64 = 0.0088;
 
 #[test]
 fn fault_22_a_plan_that_begins_half_a_degree_beside_the_arm_is_refused() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         let mut beside = stage.rig.commanded();
         beside[2] += BESIDE_RAD;
         stage.arm();
@@ -32,9 +32,9 @@ fn fault_22_a_plan_that_begins_half_a_degree_beside_the_arm_is_refused() {
 /// The plan fits what the controller commands, but the arm is elsewhere.
 #[test]
 fn fault_22_an_arm_that_stands_beside_what_it_was_told_begins_nothing() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for (by_rad, begins) in [(0.0095, false), (0.006, true)] {
-            let mut stage = Stage::ready(wire, "");
+            let mut stage = Stage::ready(via, "");
             stage.rig.inject(Fault {
                 trigger: Trigger::At(0.0),
                 duration_s: None,
@@ -96,14 +96,14 @@ fn fault_23_a_plan_outside_the_limits_is_refused_and_would_be_braked() {
         (6, 0.9, 0.5, FaultCode::SetpointAcceleration),
         (5, 1.65, 1.2, FaultCode::SetpointPosition),
     ];
-    for wire in WIRES {
+    for via in INTERFACES {
         for (joint, way_rad, time_s, fault) in cases {
             // By velocities an arm may overshoot the end of a range by its own jerk
             // and stop with C23; only the preflight keeps such a plan away.
-            if wire == WireMode::JointVelocity && fault == FaultCode::SetpointPosition {
+            if via == CommandInterface::JointVelocity && fault == FaultCode::SetpointPosition {
                 continue;
             }
-            let mut stage = Stage::ready(wire, "");
+            let mut stage = Stage::ready(via, "");
             let from = stage.rig.commanded();
             let mut to = from;
             to[joint] += way_rad;
@@ -121,7 +121,7 @@ fn fault_23_a_plan_outside_the_limits_is_refused_and_would_be_braked() {
             } else {
                 fault
             };
-            assert_eq!(found, Some(expected), "{wire:?}");
+            assert_eq!(found, Some(expected), "{via:?}");
             stage.assert_stop(braked(expected));
             stage.assert_works_again();
         }
@@ -131,8 +131,8 @@ fn fault_23_a_plan_outside_the_limits_is_refused_and_would_be_braked() {
 /// A throw that the flange may do, but not the end of a pole.
 #[test]
 fn fault_24_a_plan_too_fast_for_the_configured_tool_is_refused_with_time_and_margin() {
-    for wire in WIRES {
-        let mut config = super::stage::config(wire, "");
+    for via in INTERFACES {
+        let mut config = super::stage::config(via, "");
         let with_pole = Limits::try_from(LimitsSpec {
             tcp_offset_m: [0.0, 0.0, 0.2],
             ..config.limits.clone().into()

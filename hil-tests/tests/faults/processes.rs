@@ -2,7 +2,7 @@
 //! processes themselves do is tested with real ones.
 
 use super::judge::{nod, slowed};
-use super::stage::{Stage, WIRES, config};
+use super::stage::{INTERFACES, Stage, config};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits};
 use rt_controller::control::{ControlCommand, ControlState, Motion, Thresholds};
@@ -14,7 +14,7 @@ use rt_controller::transport::sim::IdealArm;
 use rt_controller::xarm::{ArmState, Command, StateRequest};
 use shared_types::ipc::{Bus, ControllerBoards, JointReport, OperatorEnd, StateReader};
 use shared_types::ipc::{ControllerMode, PAYLOAD_VERSION};
-use shared_types::{Arming, FaultCode, MotionTier, WireMode};
+use shared_types::{Arming, CommandInterface, FaultCode, OperatingMode};
 use std::cell::Cell;
 use std::rc::Rc;
 use xarm_sim::JointSample;
@@ -23,8 +23,8 @@ use xarm_sim::JointSample;
 /// the throw and want something else.
 #[test]
 fn fault_25_a_throw_whose_planner_is_gone_is_the_same_to_the_bit() {
-    for wire in WIRES {
-        let mut stage = Stage::throwing(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::throwing(via, "");
         stage.run_part(0.5);
         let mut other = stage.throw.start();
         other[0] += 0.3;
@@ -44,8 +44,8 @@ fn fault_25_a_throw_whose_planner_is_gone_is_the_same_to_the_bit() {
 /// the arming runs out.
 #[test]
 fn fault_26_without_a_whole_plan_nothing_moves_and_the_arming_runs_out() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         stage.arm();
         stage.rig.run_for(10.5);
         assert!(stage.on_path().next().is_none());
@@ -66,10 +66,10 @@ fn fault_26_without_a_whole_plan_nothing_moves_and_the_arming_runs_out() {
 /// The core knows no camera; a wiggle ends as planned whatever is filmed.
 #[test]
 fn fault_27_a_wiggle_ends_gently_whatever_the_camera_does() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         stage.rig.command(ControlCommand::Arm(Arming {
-            tier: MotionTier::Wiggle,
+            operating_mode: OperatingMode::Wiggle,
             expires_ns: u64::MAX,
             area_clear: false,
         }));
@@ -89,8 +89,8 @@ fn fault_27_a_wiggle_ends_gently_whatever_the_camera_does() {
 /// stop then finds it standing, and a new controller moves nothing.
 #[test]
 fn fault_28_a_controller_that_is_killed_leaves_an_arm_that_holds_or_brakes() {
-    for wire in WIRES {
-        let mut stage = Stage::throwing(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::throwing(via, "");
         stage.run_part(0.55);
         let (before, commands) = (stage.rig.log.truth.len(), stage.commands());
         let speed = stage.speed();
@@ -104,7 +104,7 @@ fn fault_28_a_controller_that_is_killed_leaves_an_arm_that_holds_or_brakes() {
             "one may have been under way"
         );
         let dead = &stage.rig.log.truth[before..];
-        if wire == WireMode::JointVelocity {
+        if via == CommandInterface::JointVelocity {
             // It brakes from 12 ms after the last velocity on.
             assert!(dead[60].state.qd.max_abs() < speed);
         }
@@ -122,7 +122,7 @@ fn fault_28_a_controller_that_is_killed_leaves_an_arm_that_holds_or_brakes() {
 /// Without any guardian: the arm's own watchdog alone.
 #[test]
 fn fault_28_in_velocity_mode_the_arm_stops_by_itself() {
-    let mut stage = Stage::throwing(WireMode::JointVelocity, "");
+    let mut stage = Stage::throwing(CommandInterface::JointVelocity, "");
     stage.run_part(0.55);
     let (before, speed) = (stage.rig.log.truth.len(), stage.speed());
     stage.rig.kill_controller(2.0);
@@ -143,8 +143,8 @@ fn fault_28_in_velocity_mode_the_arm_stops_by_itself() {
 
 #[test]
 fn fault_29_a_guardian_that_falls_silent_slows_the_motion() {
-    for wire in WIRES {
-        let mut stage = Stage::throwing(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::throwing(via, "");
         stage.run_part(0.4);
         stage.rig.guardian_alive = false;
         let silent = stage.rig.now();
@@ -159,8 +159,8 @@ fn fault_29_a_guardian_that_falls_silent_slows_the_motion() {
 
 #[test]
 fn fault_29_without_a_guardian_nothing_begins() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         stage.rig.guardian_alive = false;
         stage.rig.run_for(0.1);
         stage.arm();
@@ -174,8 +174,8 @@ fn fault_29_without_a_guardian_nothing_begins() {
 /// it moves nothing.
 #[test]
 fn fault_32_without_shared_memory_nobody_beats_and_nothing_moves() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         stage.rig.operator_alive = false;
         stage.rig.guardian_alive = false;
         stage.rig.run_for(1.0);
@@ -190,8 +190,8 @@ fn fault_32_without_shared_memory_nobody_beats_and_nothing_moves() {
 /// time-out that began with it.
 #[test]
 fn fault_32_an_operator_who_never_beats_loses_the_arm() {
-    for wire in WIRES {
-        let mut stage = Stage::ready(wire, "");
+    for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
         stage.rig.operator_alive = false;
         stage.begin();
         stage.finish();
@@ -325,9 +325,9 @@ fn fault_31_readers_that_come_and_go_while_it_moves_change_nothing() {
 /// The same rig, twice: nothing in it is left to chance or to the time of day.
 #[test]
 fn fault_25_to_32_are_judged_on_a_rig_that_repeats_itself() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let run = || {
-            let mut stage = Stage::of(config(wire, ""));
+            let mut stage = Stage::of(config(via, ""));
             stage.begin();
             stage.finish();
             format!("{:?}{:?}", stage.rig.log.records, stage.rig.log.arm_events)

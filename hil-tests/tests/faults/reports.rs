@@ -1,7 +1,7 @@
 //! Faults of the joint reports: 14 to 18.
 
 use super::judge::slowed;
-use super::stage::{Stage, WIRES, config, entry, mid_throw};
+use super::stage::{INTERFACES, Stage, config, entry, mid_throw};
 use rt_controller::xarm::version::{ArmVersion, VersionError};
 use shared_types::{FaultCode, MonotonicNs};
 use xarm_sim::Firmware;
@@ -16,9 +16,9 @@ fn assert_on_the_path(stage: &Stage) {
 
 #[test]
 fn fault_14_a_report_stream_that_stops_slows_the_motion_within_100_ms() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = mid_throw("kind = \"report_stop\"\nduration_s = 3");
-        let mut stage = Stage::thrown(wire, &script);
+        let mut stage = Stage::thrown(via, &script);
         let cause = stage.assert_stop(slowed(FaultCode::ReportStale));
         let noticed_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
         assert!(noticed_s < 0.1, "{noticed_s}");
@@ -29,9 +29,9 @@ fn fault_14_a_report_stream_that_stops_slows_the_motion_within_100_ms() {
 
 #[test]
 fn fault_15_reports_that_repeat_their_values_slow_the_motion() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = mid_throw("kind = \"report_freeze\"\nduration_s = 3");
-        let mut stage = Stage::thrown(wire, &script);
+        let mut stage = Stage::thrown(via, &script);
         let cause = stage.assert_stop(slowed(FaultCode::ReportFrozen));
         let noticed_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
         assert!(noticed_s < 0.12, "{noticed_s}");
@@ -42,7 +42,7 @@ fn fault_15_reports_that_repeat_their_values_slow_the_motion() {
 
 #[test]
 fn fault_16_a_report_clock_that_jumps_wraps_or_drifts_is_followed() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for (kind, resyncs) in [
             ("kind = \"report_time_jump\"\nby_s = -0.4", 1),
             ("kind = \"report_time_jump\"\nby_s = -3", 1),
@@ -55,7 +55,7 @@ fn fault_16_a_report_clock_that_jumps_wraps_or_drifts_is_followed() {
                 0,
             ),
         ] {
-            let stage = Stage::thrown(wire, &mid_throw(kind));
+            let stage = Stage::thrown(via, &mid_throw(kind));
             stage.assert_undisturbed();
             assert!(stage.rig.counts().clock_resyncs >= resyncs, "{kind}");
         }
@@ -64,12 +64,12 @@ fn fault_16_a_report_clock_that_jumps_wraps_or_drifts_is_followed() {
 
 #[test]
 fn fault_16_a_report_clock_that_keeps_jumping_slows_the_motion() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let jump = "kind = \"report_time_jump\"\nby_s = -0.2";
         let script: String = (12..22)
             .map(|k| entry(&format!("on = \"speed:{}\"", f64::from(k) * 0.05), jump))
             .collect();
-        let mut stage = Stage::thrown(wire, &script);
+        let mut stage = Stage::thrown(via, &script);
         let cause = stage.assert_stop(slowed(FaultCode::ReportClock));
         assert!(cause.counts.clock_resyncs > 3);
         assert_on_the_path(&stage);
@@ -91,9 +91,9 @@ fn spoiled(frames: u32) -> [String; 5] {
 
 #[test]
 fn fault_17_single_broken_reports_are_dropped_and_counted() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for kind in &spoiled(1) {
-            let stage = Stage::thrown(wire, &mid_throw(kind));
+            let stage = Stage::thrown(via, &mid_throw(kind));
             stage.assert_undisturbed();
             assert!(stage.rig.counts().broken_reports >= 1, "{kind}");
         }
@@ -102,9 +102,9 @@ fn fault_17_single_broken_reports_are_dropped_and_counted() {
 
 #[test]
 fn fault_17_five_broken_reports_in_a_row_slow_the_motion() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for kind in &spoiled(100)[2..] {
-            let mut stage = Stage::thrown(wire, &mid_throw(kind));
+            let mut stage = Stage::thrown(via, &mid_throw(kind));
             let cause = stage.assert_stop(slowed(FaultCode::ReportBroken));
             assert_eq!(cause.limit.value, 5.0, "{kind}");
             assert_on_the_path(&stage);
@@ -117,8 +117,8 @@ fn fault_17_five_broken_reports_in_a_row_slow_the_motion() {
 /// of a real process refuses it by its version before that.
 #[test]
 fn fault_18_firmware_without_a_known_report_is_refused() {
-    for wire in WIRES {
-        let mut config = config(wire, "");
+    for via in INTERFACES {
+        let mut config = config(via, "");
         config.arm.firmware = Firmware(1, 12, 0);
         let mut stage = Stage::of(config);
         stage.arm();

@@ -5,11 +5,14 @@ use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, Motion, Thresholds};
 use shared_types::ipc::{ControllerMode, CycleRecord};
-use shared_types::{Arming, MonotonicNs, MotionTier, WireMode};
+use shared_types::{Arming, CommandInterface, MonotonicNs, OperatingMode};
 use xarm_sim::{ArmConfig, ArmEvent, FaultScript};
 
 /// Both ways setpoints travel.
-pub(crate) const WIRES: [WireMode; 2] = [WireMode::ServoPosition, WireMode::JointVelocity];
+pub(crate) const INTERFACES: [CommandInterface; 2] = [
+    CommandInterface::ServoPosition,
+    CommandInterface::JointVelocity,
+];
 /// In the middle of the throw: a joint is asked for more than 1.2 rad/s.
 pub(crate) const MID_THROW: &str = "on = \"speed:1.2\"";
 
@@ -51,16 +54,16 @@ pub(crate) fn fast_throw(from: JointVector) -> JointTrajectory {
 /// A rig, the wire it uses and what it is to throw.
 pub(crate) struct Stage {
     pub(crate) rig: VirtualRig,
-    pub(crate) wire: WireMode,
+    pub(crate) via: CommandInterface,
     pub(crate) throw: JointTrajectory,
 }
 
 /// The set-up of a stage: strict thresholds, arming and guardian required.
-pub(crate) fn config(wire: WireMode, script: &str) -> VirtualRigConfig {
+pub(crate) fn config(via: CommandInterface, script: &str) -> VirtualRigConfig {
     VirtualRigConfig {
         limits: Limits::default(),
         settings: ControlSettings {
-            wire,
+            interface: via,
             arming_required: true,
             guardian_required: true,
             ..Thresholds::strict().into()
@@ -76,30 +79,30 @@ pub(crate) fn config(wire: WireMode, script: &str) -> VirtualRigConfig {
 
 impl Stage {
     /// The arm is held and has settled; nothing is armed.
-    pub(crate) fn ready(wire: WireMode, script: &str) -> Self {
-        Self::of(config(wire, script))
+    pub(crate) fn ready(via: CommandInterface, script: &str) -> Self {
+        Self::of(config(via, script))
     }
 
     /// The same of another set-up.
     pub(crate) fn of(config: VirtualRigConfig) -> Self {
-        let wire = config.settings.wire;
+        let via = config.settings.interface;
         let mut rig = VirtualRig::new(config);
         rig.bring_up().unwrap();
         rig.run_for(0.5);
         let throw = fast_throw(rig.commanded());
-        Self { rig, wire, throw }
+        Self { rig, via, throw }
     }
 
     /// A stage whose throw has begun.
-    pub(crate) fn throwing(wire: WireMode, script: &str) -> Self {
-        let mut stage = Self::ready(wire, script);
+    pub(crate) fn throwing(via: CommandInterface, script: &str) -> Self {
+        let mut stage = Self::ready(via, script);
         stage.begin();
         stage
     }
 
     /// A stage whose throw has ended, one way or the other.
-    pub(crate) fn thrown(wire: WireMode, script: &str) -> Self {
-        let mut stage = Self::throwing(wire, script);
+    pub(crate) fn thrown(via: CommandInterface, script: &str) -> Self {
+        let mut stage = Self::throwing(via, script);
         stage.finish();
         stage
     }
@@ -107,7 +110,7 @@ impl Stage {
     /// Arms for a throw.
     pub(crate) fn arm(&mut self) {
         self.rig.command(ControlCommand::Arm(Arming {
-            tier: MotionTier::Throw,
+            operating_mode: OperatingMode::Throw,
             expires_ns: u64::MAX,
             area_clear: true,
         }));

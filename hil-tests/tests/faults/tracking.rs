@@ -1,14 +1,14 @@
 //! The arm is not where it was told to be: 19 to 21.
 
 use super::judge::{braked_and_stopped, nod};
-use super::stage::{Stage, WIRES, entry, mid_throw};
+use super::stage::{INTERFACES, Stage, entry, mid_throw};
 use shared_types::{FaultCode, MonotonicNs};
 
 #[test]
 fn fault_19_an_arm_that_lags_by_100_ms_is_braked() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = entry("at_s = 0.1", "kind = \"tracking_lag\"\nlag_s = 0.1");
-        let mut stage = Stage::thrown(wire, &script);
+        let mut stage = Stage::thrown(via, &script);
         let cause = stage.assert_stop(braked_and_stopped(FaultCode::TrackingError));
         assert!([2, 4, 6].contains(&cause.limit.joint), "{:?}", cause.limit);
         assert!(cause.limit.value < 0.1, "noticed late: {:?}", cause.limit);
@@ -17,10 +17,10 @@ fn fault_19_an_arm_that_lags_by_100_ms_is_braked() {
 
 #[test]
 fn fault_20_a_joint_that_is_stuck_is_named_and_the_others_are_braked() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for joint in [2, 4, 6] {
             let kind = format!("kind = \"joint_stuck\"\njoint = {joint}\nduration_s = 8");
-            let mut stage = Stage::thrown(wire, &mid_throw(&kind));
+            let mut stage = Stage::thrown(via, &mid_throw(&kind));
             let cause = stage.assert_stop(braked_and_stopped(FaultCode::JointStuck));
             assert_eq!(cause.limit.joint, joint);
             let noticed_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
@@ -35,12 +35,12 @@ fn fault_20_a_joint_that_is_stuck_is_named_and_the_others_are_braked() {
 /// Slow enough that what it was told when it got stuck is long forgotten.
 #[test]
 fn fault_20_a_joint_that_sticks_in_a_slow_motion_is_named_too() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = entry(
             "at_s = 0.1",
             "kind = \"joint_stuck\"\njoint = 7\nduration_s = 9",
         );
-        let mut stage = Stage::ready(wire, &script);
+        let mut stage = Stage::ready(via, &script);
         stage.arm();
         let from = stage.rig.commanded();
         let mut to = from;
@@ -57,11 +57,11 @@ fn fault_20_a_joint_that_sticks_in_a_slow_motion_is_named_too() {
 
 #[test]
 fn fault_21_an_encoder_that_jumps_by_five_degrees_is_noticed_with_the_next_report() {
-    for wire in WIRES {
+    for via in INTERFACES {
         for sign in [1.0, -1.0] {
             let by = sign * 5_f64.to_radians();
             let kind = format!("kind = \"encoder_jump\"\njoint = 4\nby_rad = {by}\nduration_s = 8");
-            let mut stage = Stage::thrown(wire, &mid_throw(&kind));
+            let mut stage = Stage::thrown(via, &mid_throw(&kind));
             let cause = stage.assert_stop(braked_and_stopped(FaultCode::EncoderJump));
             assert_eq!(cause.limit.joint, 4);
             let noticed_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
@@ -76,12 +76,12 @@ fn fault_21_an_encoder_that_jumps_by_five_degrees_is_noticed_with_the_next_repor
 /// from where the arm is not.
 #[test]
 fn fault_21_an_encoder_that_jumped_at_rest_refuses_the_next_motion() {
-    for wire in WIRES {
+    for via in INTERFACES {
         let script = entry(
             "at_s = 1.0",
             "kind = \"encoder_jump\"\njoint = 1\nby_rad = 0.0873",
         );
-        let mut stage = Stage::ready(wire, &script);
+        let mut stage = Stage::ready(via, &script);
         stage.rig.run_for(0.5);
         stage.arm();
         stage.rig.start(nod(stage.rig.commanded()));

@@ -3,7 +3,7 @@
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use rt_controller::recording::RecordedCycle;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord};
-use shared_types::{FaultCode, MonotonicNs, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 use xarm_sim::{ArmEvent, JointSample, TimedEvent};
 
 /// Speed under which the arm stands (rad/s).
@@ -19,7 +19,7 @@ const FEEDBACK_CHECK: ArmEvent = ArmEvent::Request { register: 253 };
 #[derive(Debug)]
 pub struct Flight {
     limits: Limits,
-    wire: WireMode,
+    interface: CommandInterface,
     /// Every control cycle, in order.
     pub cycles: Vec<RecordedCycle>,
     /// Every record of a cause.
@@ -34,15 +34,15 @@ pub struct Flight {
 
 impl Default for Flight {
     fn default() -> Self {
-        Self::new(Limits::default(), WireMode::default())
+        Self::new(Limits::default(), CommandInterface::default())
     }
 }
 
 impl Flight {
-    pub fn new(limits: Limits, wire: WireMode) -> Self {
+    pub fn new(limits: Limits, interface: CommandInterface) -> Self {
         Self {
             limits,
-            wire,
+            interface,
             cycles: Vec::new(),
             causes: Vec::new(),
             arm: Vec::new(),
@@ -160,9 +160,9 @@ impl Flight {
 
     /// What reached the arm is what the cycles sent, in order, nothing twice.
     fn the_arm_got_what_was_recorded(&self) {
-        let mut sent = self.sent().map(|c| match self.wire {
-            WireMode::ServoPosition => on_the_wire(&c.record.q_c),
-            WireMode::JointVelocity => on_the_wire(&c.record.qd_wire),
+        let mut sent = self.sent().map(|c| match self.interface {
+            CommandInterface::ServoPosition => on_the_wire(&c.record.q_c),
+            CommandInterface::JointVelocity => on_the_wire(&c.record.qd_sent),
         });
         for event in &self.arm {
             let (ArmEvent::Setpoint(got) | ArmEvent::Velocity { qd: got, .. }) = event.event else {

@@ -3,7 +3,7 @@
 use super::child::{Process, Role};
 use super::stand::Stand;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
-use shared_types::{FaultCode, MotionTier};
+use shared_types::{FaultCode, OperatingMode};
 use std::time::Duration;
 use xarm_sim::ArmConfig;
 
@@ -28,7 +28,7 @@ fn fault_36_a_dead_man_switch_let_go_brakes_and_holds_until_it_is_held_again() {
     // Acknowledged, but not held: no arming.
     stand.make_ready();
     let arming = ControllerRequest::Arm {
-        tier: MotionTier::SetUp,
+        operating_mode: OperatingMode::SetUp,
         area_clear: true,
     };
     assert_eq!(stand.refused(&arming).0, fault);

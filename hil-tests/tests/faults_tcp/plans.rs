@@ -8,7 +8,7 @@ use shared_types::ipc::Bus;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MotionTier};
+use shared_types::{FaultCode, OperatingMode};
 use std::time::Duration;
 
 /// The controller's service, for requests that no proper program would make.
@@ -38,7 +38,7 @@ fn fault_22_a_plan_that_begins_elsewhere_is_refused_with_the_distance() {
     stand.make_ready();
     let mut from = START_POSE;
     from[2] += 0.6_f64.to_radians();
-    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     let (fault, message) = stand.refused(&execute(&swing(from)));
     assert_eq!(fault, FaultCode::StartPoseMismatch);
     assert!(message.contains("0.60 deg"), "{message}");
@@ -124,7 +124,7 @@ fn fault_24_a_plan_too_fast_for_the_tool_is_refused_with_time_and_margin() {
         q
     };
     let fast = JointTrajectory::new(&[0.0, 1.0], &[START_POSE, turned(1.7)]).unwrap();
-    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     let (fault, message) = stand.refused(&execute(&fast));
     println!("{message}");
     assert_eq!(fault, FaultCode::PlanOutOfLimits);
@@ -149,7 +149,7 @@ fn fault_26_an_upload_that_hangs_is_refused_after_its_time() {
     let trajectory = Box::new(plan);
     let upload = ControllerRequest::Upload { trajectory, sha256 };
     assert_eq!(stand.ask(&upload), ControllerEvent::Done);
-    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     assert!(matches!(stand.ask(&late), ControllerEvent::Finished { .. }));
     stand.finish();
 }

@@ -5,7 +5,7 @@ use super::flight::Flight;
 use super::stand::{PATIENCE, Stand, execute, patient, swing};
 use rt_controller::xarm::ArmState;
 use shared_types::ipc::message::ControllerEvent;
-use shared_types::{FaultCode, MonotonicNs, MotionTier};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 use xarm_sim::{ArmConfig, ArmEvent, JointSample, SimulatedArm, TimedEvent, clock};
@@ -131,7 +131,7 @@ fn fault_29_without_a_guardian_nothing_begins_and_what_moves_is_slowed_to_rest()
     }
     stand.rest(Duration::from_millis(1500));
     let from = stand.commanded();
-    assert_eq!(stand.arm_for(MotionTier::Throw), ControllerEvent::Done);
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     assert_eq!(stand.refused(&execute(&swing(from))).0, lost[0]);
     // A new one takes its place.
     let text = toml::to_string(&stand.config).unwrap();

@@ -13,7 +13,7 @@ use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerR
 use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use xarm_sim::{ArmConfig, FaultScript, SimulatedArm, clock};
@@ -140,7 +140,7 @@ impl Stand {
             chunks,
             controller,
             guardian,
-            flight: Flight::new(config.resolve_limits().unwrap(), config.wire),
+            flight: Flight::new(config.resolve_limits().unwrap(), config.command_interface),
             arm,
             bus,
             config,
@@ -282,9 +282,9 @@ impl Stand {
         self.rest(Duration::from_millis(100));
     }
 
-    pub fn arm_for(&mut self, tier: MotionTier) -> ControllerEvent {
+    pub fn arm_for(&mut self, operating_mode: OperatingMode) -> ControllerEvent {
         self.ask(&ControllerRequest::Arm {
-            tier,
+            operating_mode,
             area_clear: true,
         })
     }
@@ -299,7 +299,7 @@ impl Stand {
     /// Arms and begins to swing from where the arm stands.
     pub fn begin(&mut self) -> Pending<ControllerRpc> {
         let from = self.commanded();
-        assert_eq!(self.arm_for(MotionTier::Throw), ControllerEvent::Done);
+        assert_eq!(self.arm_for(OperatingMode::Throw), ControllerEvent::Done);
         self.call(&execute(&swing(from)))
     }
 
@@ -349,7 +349,7 @@ impl Stand {
         let from = self.commanded();
         for request in [
             ControllerRequest::Arm {
-                tier: MotionTier::Throw,
+                operating_mode: OperatingMode::Throw,
                 area_clear: true,
             },
             ControllerRequest::MoveTo {
@@ -404,9 +404,9 @@ impl Stand {
         flight
     }
 
-    /// Whether setpoints travel as velocities.
+    /// Setpoints travel as velocities.
     pub fn velocity(config: &mut ControllerConfig) {
-        config.wire = WireMode::JointVelocity;
+        config.command_interface = CommandInterface::JointVelocity;
     }
 }
 

@@ -16,7 +16,7 @@ pub use rules::{Fence, FenceError, JudgedArm, Rule, RuleMargin};
 use arm_model::{JointTrajectory, Limits};
 use rules::Step;
 use setpoints::setpoints;
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 
 /// Everything the arm judges, in the order in which it does.
 #[must_use]
@@ -34,13 +34,13 @@ pub fn arm_margins(
             margin.meet(found, time_s);
         }
     };
-    match arm.wire {
-        WireMode::ServoPosition => {
+    match arm.interface {
+        CommandInterface::ServoPosition => {
             for (time_s, setpoint) in setpoints(trajectory, limits.period_s()) {
                 judge(time_s, &mut Step::at(setpoint));
             }
         }
-        WireMode::JointVelocity => {
+        CommandInterface::JointVelocity => {
             for cycle in velocity::cycles(trajectory, limits) {
                 let mut step = Step {
                     q: cycle.q,

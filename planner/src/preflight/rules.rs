@@ -6,7 +6,7 @@ use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use control_core::control::Thresholds;
 use nalgebra::Vector3;
 use serde::Serialize;
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 
 /// How far outside its range a streamed position is still taken (rad): 0.1 deg, as the
 /// vendor's SDK tests it.
@@ -101,7 +101,7 @@ impl Fence {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct JudgedArm {
     /// How setpoints reach it.
-    pub wire: WireMode,
+    pub interface: CommandInterface,
     /// Linear speed limit of servo mode, the factor of 1 m/s set in the arm.
     pub speed_factor: f64,
     /// Safety boundary, if one is set.
@@ -112,7 +112,7 @@ impl Default for JudgedArm {
     /// As delivered: positions, factor 1.2, no boundary.
     fn default() -> Self {
         Self {
-            wire: WireMode::ServoPosition,
+            interface: CommandInterface::ServoPosition,
             speed_factor: 1.2,
             fence: None,
         }
@@ -297,8 +297,8 @@ impl JudgedArm {
         let speed = 1.0 + SPEED_SLACK;
         // The controller looks before the arm does.
         let step = RuleMargin::new(Rule::StepLength, STEP_MAX_M);
-        let mut out = match self.wire {
-            WireMode::ServoPosition => vec![
+        let mut out = match self.interface {
+            CommandInterface::ServoPosition => vec![
                 step,
                 RuleMargin::new(Rule::JointRange, RANGE_TOLERANCE_RAD),
                 RuleMargin::new(Rule::JointSpeed, limits.velocity_max_rad_s[0] * speed),
@@ -307,7 +307,7 @@ impl JudgedArm {
             ],
             // Speeds are limited before they are sent; where the joints go is not quite
             // where the plan goes.
-            WireMode::JointVelocity => vec![
+            CommandInterface::JointVelocity => vec![
                 step,
                 RuleMargin::new(Rule::JointRange, -VELOCITY_STRAY_RAD),
                 RuleMargin::new(Rule::SelfCollision, VELOCITY_GAP_M),
@@ -318,9 +318,9 @@ impl JudgedArm {
             ],
         };
         if self.fence.is_some() {
-            let stray_m = match self.wire {
-                WireMode::ServoPosition => 0.0,
-                WireMode::JointVelocity => VELOCITY_STRAY_M,
+            let stray_m = match self.interface {
+                CommandInterface::ServoPosition => 0.0,
+                CommandInterface::JointVelocity => VELOCITY_STRAY_M,
             };
             out.push(RuleMargin::new(Rule::SafetyBoundary, stray_m));
         }

@@ -1,7 +1,7 @@
 use super::*;
 use arm_model::JointVector;
 use arm_model::joint::START_POSE;
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 
 fn swing(joint: usize, by_rad: f64, in_s: f64) -> JointTrajectory {
     let mut end = START_POSE;
@@ -58,9 +58,9 @@ fn margins_are_told_where_they_are_least() {
 fn by_velocities_the_end_of_the_range_is_kept_clear_of() {
     let near = swing(3, 1.527 - 0.003, 4.0);
     assert_eq!(stop(&near, &JudgedArm::default()), None);
-    let wire = WireMode::JointVelocity;
+    let interface = CommandInterface::JointVelocity;
     let arm = JudgedArm {
-        wire,
+        interface,
         ..JudgedArm::default()
     };
     assert_eq!(stop(&near, &arm), Some(23));

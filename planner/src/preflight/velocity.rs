@@ -7,7 +7,7 @@
 
 use arm_model::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use control_core::control::brake::brake_with_jerk;
-use control_core::control::velocity_wire::VelocityWire;
+use control_core::control::velocity_interface::VelocityInterface;
 use control_core::control::{ArmCommand, Thresholds};
 use std::collections::VecDeque;
 
@@ -69,7 +69,7 @@ pub(super) fn cycles(trajectory: &JointTrajectory, limits: &Limits) -> Vec<Cycle
     let mut ramp = Ramp {
         state: JointState::at_rest(start),
     };
-    let mut wire = VelocityWire::default();
+    let mut interface = VelocityInterface::default();
     // Newest last: what was planned, and what the firmware asked for.
     let mut planned = VecDeque::from(vec![start; window]);
     let mut asked = VecDeque::from(vec![start; SHOWN_LATE]);
@@ -90,7 +90,7 @@ pub(super) fn cycles(trajectory: &JointTrajectory, limits: &Limits) -> Vec<Cycle
         asked.push_back(ramp.state.q);
         off.push_back(target.q - shown);
         let reported = off.pop_front().unwrap_or_default();
-        let command = wire.command(
+        let command = interface.command(
             &target,
             &reported,
             period_s,

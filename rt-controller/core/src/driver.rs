@@ -87,7 +87,7 @@ impl<T: ArmTransport> CycleDriver<T> {
     #[must_use]
     pub fn new(control: ControlState, now_ns: u64) -> Self {
         let mut driver = Self {
-            link: LinkSlot::new(control.wire()),
+            link: LinkSlot::new(control.interface()),
             held: StaleSetpointDrop::default(),
             next: Wake {
                 deadline_ns: 0,

@@ -32,7 +32,7 @@ use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
     Bus, ControllerMode, CyclePublisher, CycleRecord, JointPublisher, JointReport,
 };
-use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -59,7 +59,7 @@ pub struct ArmSettings {
     /// What to do when it is configured otherwise.
     pub on_difference: OnDifference,
     /// How setpoints reach it.
-    pub wire: WireMode,
+    pub interface: CommandInterface,
     /// How its slowness is met.
     pub link: LinkSettings,
     /// Largest age of a joint report that counts as fresh (ns).
@@ -78,7 +78,7 @@ impl ArmSettings {
             joints: SocketAddr::new(config.arm, config.report_port),
             limits,
             on_difference: config.on_difference,
-            wire: config.wire,
+            interface: config.command_interface,
             link: LinkSettings::new(thresholds.unanswered_max, period_ns),
             report_stale_ns: thresholds.report_stale_ns,
         }
@@ -123,7 +123,7 @@ pub struct Bridge {
     arm_error: ErrorCode,
     open: Vec<Open>,
     uploads: Uploads,
-    tier: Option<MotionTier>,
+    operating_mode: Option<OperatingMode>,
     last_id: u64,
 }
 
@@ -164,7 +164,7 @@ impl Bridge {
             arm_error: ErrorCode::NONE,
             open: Vec::new(),
             uploads: Uploads::default(),
-            tier: None,
+            operating_mode: None,
             last_id: 0,
         })
     }
@@ -297,12 +297,12 @@ impl Bridge {
             }
             ControlEvent::Armed(arming) => {
                 tracing::info!(?arming, "armed");
-                self.tier = Some(arming.tier);
+                self.operating_mode = Some(arming.operating_mode);
                 self.settle_armings(|call| answer(call, &ControllerEvent::Done));
             }
             ControlEvent::Disarmed { fault } => {
                 tracing::info!(?fault, "disarmed");
-                self.tier = None;
+                self.operating_mode = None;
             }
         }
     }

@@ -8,13 +8,13 @@ use crate::os::now_ns;
 use crate::point_to_point::{MoveError, plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
+use crate::transport::command_interface::arm_mode;
 use crate::transport::tcp::TcpLink;
-use crate::transport::wire::arm_mode;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{Arming, FaultCode, MotionTier};
+use shared_types::{Arming, FaultCode, OperatingMode};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -50,9 +50,12 @@ impl Bridge {
                 let (q, speed_part) = (*q, *speed_part);
                 self.serve_move(call, q, speed_part);
             }
-            ControllerRequest::Arm { tier, area_clear } => {
-                let (tier, area_clear) = (*tier, *area_clear);
-                self.serve_arming(call, tier, area_clear);
+            ControllerRequest::Arm {
+                operating_mode,
+                area_clear,
+            } => {
+                let (operating_mode, area_clear) = (*operating_mode, *area_clear);
+                self.serve_arming(call, operating_mode, area_clear);
             }
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => answer(&call, &ControllerEvent::Done),
@@ -87,7 +90,7 @@ impl Bridge {
                 fault: FaultCode::from_raw(self.newest.fault).unwrap_or_default(),
                 arm_error: self.arm_error.0,
                 q_c: self.newest.q_c,
-                tier: self.tier,
+                operating_mode: self.operating_mode,
                 warnings: self.warnings.clone(),
             },
         );
@@ -99,12 +102,17 @@ impl Bridge {
     }
 
     /// Hands an arming to the loop, which answers. Throws expire sooner there.
-    fn serve_arming(&mut self, call: ControllerCall, tier: MotionTier, area_clear: bool) {
+    fn serve_arming(
+        &mut self,
+        call: ControllerCall,
+        operating_mode: OperatingMode,
+        area_clear: bool,
+    ) {
         if self.mode() != ControllerMode::Idle {
             return self.wrong_mode(&call, "it is armed when it is Idle");
         }
         let arming = Arming {
-            tier,
+            operating_mode,
             expires_ns: now_ns().saturating_add(ARMED_FOR_NS),
             area_clear,
         };
@@ -158,7 +166,7 @@ impl Bridge {
         }
         let plan = SetUp {
             limits: &self.arm.limits,
-            mode: arm_mode(self.arm.wire),
+            mode: arm_mode(self.arm.interface),
             status: self.arm.status,
             joints: self.arm.joints,
             on_difference: self.arm.on_difference,

@@ -131,7 +131,7 @@ impl LoopbackBench {
             all.rt,
             domain.to_owned(),
         );
-        let warm_up = CacheWarmUp::new(limits, patient().wire, real_time.warm_up_us)?;
+        let warm_up = CacheWarmUp::new(limits, patient().interface, real_time.warm_up_us)?;
         let body = move || {
             let boards = Bus::join(&its_domain).and_then(|bus| ControllerBoards::create(&bus));
             let boards = match boards {
@@ -239,7 +239,7 @@ impl LoopbackBench {
             if due_ns > 0 {
                 let _ = self
                     .reports
-                    .push(report(self.q, patient().wire, due_ns, now_ns()));
+                    .push(report(self.q, patient().interface, due_ns, now_ns()));
             }
             if self.mode == ControllerMode::Streaming {
                 moving_since.get_or_insert_with(Instant::now);

@@ -106,8 +106,8 @@ pub fn cycle_fields(record: &CycleRecord) -> Vec<Field> {
         q_c,
         q,
         q_stamp_ns,
-        path_rate,
-        qd_wire,
+        speed_override,
+        qd_sent,
     } = record;
     let mut fields = Fields::default();
     fields.whole("version", *version);
@@ -122,8 +122,8 @@ pub fn cycle_fields(record: &CycleRecord) -> Vec<Field> {
     fields.joints("q_c", q_c);
     fields.joints("q", q);
     fields.whole("q_stamp_ns", *q_stamp_ns);
-    fields.real("path_rate", *path_rate);
-    fields.joints("qd_wire", qd_wire);
+    fields.real("speed_override", *speed_override);
+    fields.joints("qd_sent", qd_sent);
     fields.0
 }
 
@@ -138,7 +138,7 @@ pub fn cause_fields(cause: &CauseRecord) -> Vec<Field> {
         mode,
         path,
         stop_arm,
-        tier,
+        operating_mode,
         second_code,
         reserved: _,
         cycle,
@@ -157,7 +157,7 @@ pub fn cause_fields(cause: &CauseRecord) -> Vec<Field> {
     fields.whole("cause.mode", *mode);
     fields.whole("cause.path", *path);
     fields.whole("cause.stop_arm", *stop_arm);
-    fields.whole("cause.tier", *tier);
+    fields.whole("cause.operating_mode", *operating_mode);
     fields.whole("cause.second_code", *second_code);
     fields.whole("cause.cycle", *cycle);
     fields.whole("cause.stamp_ns", *stamp_ns);

@@ -18,11 +18,13 @@ pub mod in_flight;
 pub mod sim;
 pub mod tcp;
 
-pub use control_core::transport::{ArmTransport, LinkGone, MAX_COMMANDS, Sent, slot, wire};
+pub use control_core::transport::{
+    ArmTransport, LinkGone, MAX_COMMANDS, Sent, command_interface, slot,
+};
 
 /// A connected stream of bytes that never makes its user wait: a socket, or a
 /// cable in virtual time.
-pub trait ByteWire {
+pub trait ByteStream {
     /// Reads what has come: how many bytes, and when they arrived
     /// (CLOCK_MONOTONIC, ns) where that is known. No byte means the end.
     ///

@@ -7,7 +7,7 @@
 
 use super::heartbeat::{Heartbeat, Silence};
 use super::in_flight::{InFlight, Matched};
-use super::{ArmTransport, ByteWire, LinkGone, MAX_COMMANDS, Sent};
+use super::{ArmTransport, ByteStream, LinkGone, MAX_COMMANDS, Sent};
 use crate::control::LinkInput;
 use crate::os::receive::{receive, stamp_arrivals};
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
@@ -66,7 +66,7 @@ struct Written {
     is_setpoint: bool,
 }
 
-impl ByteWire for TcpStream {
+impl ByteStream for TcpStream {
     fn receive(&mut self, into: &mut [u8]) -> std::io::Result<(usize, Option<u64>)> {
         receive(self, into)
     }
@@ -98,7 +98,7 @@ impl TcpLink {
     }
 }
 
-impl<W: ByteWire> TcpLink<W> {
+impl<W: ByteStream> TcpLink<W> {
     /// A link over a connected wire. Not RT-safe.
     #[must_use]
     pub fn over(stream: W, settings: LinkSettings) -> Self {
@@ -235,7 +235,7 @@ impl<W: ByteWire> TcpLink<W> {
 }
 
 /// Bytes the socket took; 0 when it would have had to wait.
-fn write_once(stream: &mut impl ByteWire, bytes: &[u8]) -> Result<usize, LinkGone> {
+fn write_once(stream: &mut impl ByteStream, bytes: &[u8]) -> Result<usize, LinkGone> {
     match stream.send(bytes) {
         Ok(0) => Err(LinkGone),
         Ok(n) => Ok(n),
@@ -244,7 +244,7 @@ fn write_once(stream: &mut impl ByteWire, bytes: &[u8]) -> Result<usize, LinkGon
     }
 }
 
-impl<W: ByteWire> ArmTransport for TcpLink<W> {
+impl<W: ByteStream> ArmTransport for TcpLink<W> {
     fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone> {
         let clear = self.rest.is_empty();
         let mut frames: heapless::Vec<Written, MAX_COMMANDS> = heapless::Vec::new();

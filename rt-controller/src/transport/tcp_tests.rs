@@ -155,7 +155,7 @@ struct Narrow {
     writes: usize,
 }
 
-impl ByteWire for Narrow {
+impl ByteStream for Narrow {
     fn receive(&mut self, _: &mut [u8]) -> std::io::Result<(usize, Option<u64>)> {
         Err(ErrorKind::WouldBlock.into())
     }

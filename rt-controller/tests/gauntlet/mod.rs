@@ -20,7 +20,7 @@ use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, GuardianBeat, GuardianEnd, JointReport,
     OperatorEnd,
 };
-use shared_types::{Arming, FaultCode, MotionTier, WireMode};
+use shared_types::{Arming, CommandInterface, FaultCode, OperatingMode};
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::rc::Rc;
@@ -69,7 +69,7 @@ pub(crate) struct Bench<'w> {
     guardian: GuardianEnd,
     watch: &'w mut dyn Watch,
     pub(crate) limits: Limits,
-    wire: WireMode,
+    interface: CommandInterface,
     period_ns: u64,
     pub(crate) now_ns: u64,
     pub(crate) newest: CycleRecord,
@@ -86,9 +86,9 @@ pub(crate) struct Bench<'w> {
 
 const UNANSWERED_MAX: u16 = 200;
 
-fn settings(wire: WireMode) -> ControlSettings {
+fn settings(interface: CommandInterface) -> ControlSettings {
     ControlSettings {
-        wire,
+        interface,
         arming_required: true,
         guardian_required: true,
         ..ControlSettings::from(Thresholds {
@@ -103,7 +103,7 @@ fn settings(wire: WireMode) -> ControlSettings {
 
 impl<'w> Bench<'w> {
     pub(crate) fn new(
-        wire: WireMode,
+        interface: CommandInterface,
         rate_hz: f64,
         arm: &EchoArm,
         watch: &'w mut dyn Watch,
@@ -111,7 +111,7 @@ impl<'w> Bench<'w> {
         let name = format!(
             "test_gauntlet_{}_{}_{rate_hz}",
             std::process::id(),
-            wire as u8
+            interface as u8
         );
         let bus = Bus::join(&name).unwrap();
         let boards = ControllerBoards::create(&bus).unwrap();
@@ -124,7 +124,7 @@ impl<'w> Bench<'w> {
         let rt_ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
         let now_ns = 1_000_000_000_000;
         let clock = Rc::new(Cell::new(now_ns));
-        let control = ControlState::new(limits.clone(), settings(wire));
+        let control = ControlState::new(limits.clone(), settings(interface));
         Self {
             rt: RtLoop::new(control, Hand(Rc::clone(&clock)), boards, rt_ports),
             clock,
@@ -135,7 +135,7 @@ impl<'w> Bench<'w> {
             watch,
             period_ns: (1e9 * limits.period_s()).round() as u64,
             limits,
-            wire,
+            interface,
             now_ns,
             newest: CycleRecord::default(),
             said: JointReport::default(),
@@ -201,7 +201,7 @@ impl<'w> Bench<'w> {
     fn report(&mut self) -> JointReport {
         let mut report = JointReport {
             arm_state: 1,
-            arm_mode: self.wire.arm_mode(),
+            arm_mode: self.interface.arm_mode(),
             stamp_ns: self.now_ns,
             arrival_ns: self.now_ns,
             q: self.newest.q_c,
@@ -275,9 +275,9 @@ impl<'w> Bench<'w> {
     }
 
     /// Arms, begins `motion` and follows it for `cycles` at most.
-    pub(crate) fn begin(&mut self, motion: Motion, tier: MotionTier, cycles: usize) {
+    pub(crate) fn begin(&mut self, motion: Motion, operating_mode: OperatingMode, cycles: usize) {
         self.command(ControlCommand::Arm(Arming {
-            tier,
+            operating_mode,
             expires_ns: self.now_ns + 1_000_000_000,
             area_clear: true,
         }));

@@ -8,7 +8,7 @@ use rt_controller::control::phases::{AxisPhases, AxisState, MAX_PHASES, Phase, P
 use rt_controller::control::{ControlCommand, Motion};
 use rt_controller::point_to_point::plan_move;
 use shared_types::ipc::ControllerMode;
-use shared_types::{Arming, FaultCode, MotionTier, WireMode};
+use shared_types::{Arming, CommandInterface, FaultCode, OperatingMode};
 use std::collections::BTreeSet;
 
 /// A way to a fault.
@@ -16,7 +16,7 @@ enum Way {
     /// A motion runs and this is done to it.
     Spoilt(fn(&mut Bench<'_>)),
     /// This motion is begun.
-    Motion(fn(&Limits) -> Motion, MotionTier),
+    Motion(fn(&Limits) -> Motion, OperatingMode),
     /// Nothing moves for it: a command is refused.
     Refused(fn(&mut Bench<'_>)),
     /// The loop cannot meet it, because ...
@@ -36,20 +36,20 @@ fn way_to(code: FaultCode) -> Way {
         F::GuardianLost => Spoilt(|b| b.mood.guardian_silent = true),
         F::DeadManReleased => Spoilt(|b| b.operator.let_go()),
         F::Disarmed => Spoilt(|b| b.command(ControlCommand::Disarm)),
-        F::SetpointNotFinite => Motion(|_| not_finite(), MotionTier::Throw),
+        F::SetpointNotFinite => Motion(|_| not_finite(), OperatingMode::Throw),
         F::SetpointPosition => Refused(|b| {
             b.command(ControlCommand::Stop);
             let hold = Bench::pose(2, 3.0);
             b.command(ControlCommand::Engage { hold });
         }),
-        F::SetpointVelocity => Motion(|_| spline(7, 4.6, 2.0), MotionTier::Throw),
-        F::SetpointAcceleration => Motion(|_| spline(7, 0.2, 0.2), MotionTier::Throw),
-        F::SetpointTcpSpeed => Motion(|_| spline(1, 3.4, 1.55), MotionTier::Throw),
-        F::SetpointJerk => Motion(jerky, MotionTier::Throw),
+        F::SetpointVelocity => Motion(|_| spline(7, 4.6, 2.0), OperatingMode::Throw),
+        F::SetpointAcceleration => Motion(|_| spline(7, 0.2, 0.2), OperatingMode::Throw),
+        F::SetpointTcpSpeed => Motion(|_| spline(1, 3.4, 1.55), OperatingMode::Throw),
+        F::SetpointJerk => Motion(jerky, OperatingMode::Throw),
         // Ten millimetres per cycle are slower than the tool may be at 100 Hz.
-        F::SetpointStep => Motion(|_| spline(1, 2.6, 1.55), MotionTier::Throw),
-        F::SetpointUnstoppable => Motion(|_| spline(6, 2.2, 1.2), MotionTier::Throw),
-        F::TierExceeded => Motion(|_| spline(1, 3.4, 1.55), MotionTier::Wiggle),
+        F::SetpointStep => Motion(|_| spline(1, 2.6, 1.55), OperatingMode::Throw),
+        F::SetpointUnstoppable => Motion(|_| spline(6, 2.2, 1.2), OperatingMode::Throw),
+        F::OperatingModeExceeded => Motion(|_| spline(1, 3.4, 1.55), OperatingMode::Wiggle),
         F::DeadlineMissed => Spoilt(|b| b.mood.missed = 7),
         F::LateCycles => Spoilt(|b| b.mood.missed = 4),
         F::ReplyStalled => Spoilt(|b| b.arm.be(Manners::Mute)),
@@ -74,10 +74,10 @@ fn way_to(code: FaultCode) -> Way {
         F::StartPoseMismatch => Refused(|b| {
             let from = Bench::pose(3, 0.1);
             let motion = JointTrajectory::hold(from, 1.0).unwrap();
-            b.begin(super::Motion::Spline(motion), MotionTier::Throw, 0);
+            b.begin(super::Motion::Spline(motion), OperatingMode::Throw, 0);
         }),
         F::WrongMode => Refused(|b| {
-            b.begin(swing(), MotionTier::Throw, 20);
+            b.begin(swing(), OperatingMode::Throw, 20);
             let motion = Box::new(swing());
             b.command(ControlCommand::Run { id: 2, motion });
         }),
@@ -87,7 +87,7 @@ fn way_to(code: FaultCode) -> Way {
         }),
         F::ArmingExpired => Refused(|b| {
             b.command(ControlCommand::Arm(Arming {
-                tier: MotionTier::Wiggle,
+                operating_mode: OperatingMode::Wiggle,
                 expires_ns: b.now_ns + 20_000_000,
                 area_clear: true,
             }));
@@ -159,10 +159,10 @@ fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
             bench.until_still();
             assert!(bench.met.contains(&(code as u16)), "{code:?}");
         }
-        Way::Motion(make, tier) => {
+        Way::Motion(make, operating_mode) => {
             bench.recover();
             bench.last_cause = FaultCode::None;
-            bench.begin(make(&bench.limits), tier, 0);
+            bench.begin(make(&bench.limits), operating_mode, 0);
             bench.until_still();
             assert_eq!(bench.last_cause, code);
         }
@@ -170,7 +170,7 @@ fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
             for motion in motions {
                 bench.recover();
                 bench.hold();
-                bench.begin(motion, MotionTier::Throw, 30);
+                bench.begin(motion, OperatingMode::Throw, 30);
                 let stopped_by = bench.last_cause;
                 assert!(bench.mode().is_moving(), "{code:?}: {stopped_by:?}");
                 bench.last_cause = FaultCode::None;
@@ -191,12 +191,24 @@ pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
     // At 250 Hz the tool's speed limit comes before its largest step, at 100 Hz
     // after it.
     let set_ups = [
-        (WireMode::ServoPosition, 250.0, FaultCode::SetpointStep),
-        (WireMode::JointVelocity, 250.0, FaultCode::SetpointStep),
-        (WireMode::ServoPosition, 100.0, FaultCode::SetpointTcpSpeed),
+        (
+            CommandInterface::ServoPosition,
+            250.0,
+            FaultCode::SetpointStep,
+        ),
+        (
+            CommandInterface::JointVelocity,
+            250.0,
+            FaultCode::SetpointStep,
+        ),
+        (
+            CommandInterface::ServoPosition,
+            100.0,
+            FaultCode::SetpointTcpSpeed,
+        ),
     ];
-    for (wire, rate_hz, hidden) in set_ups {
-        let mut bench = Bench::new(wire, rate_hz, &arm, watch);
+    for (interface, rate_hz, hidden) in set_ups {
+        let mut bench = Bench::new(interface, rate_hz, &arm, watch);
         for _ in 0..5 {
             bench.cycle();
         }
@@ -207,7 +219,7 @@ pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
                 }
             }
             bench.recover();
-            bench.begin(swing(), MotionTier::Throw, 0);
+            bench.begin(swing(), OperatingMode::Throw, 0);
             bench.until_still();
             assert_eq!(bench.mode(), ControllerMode::Idle, "a throw in peace");
         }

@@ -71,7 +71,7 @@ pub(super) fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
         "reply_us": us(c.reply_ns),
         "missed": c.missed,
         "dropped": c.dropped,
-        "path_rate": if c.path_rate.is_finite() { round(c.path_rate) } else { 0.0 },
+        "speed_override": if c.speed_override.is_finite() { round(c.speed_override) } else { 0.0 },
     });
     // Negative while nothing runs.
     if c.trajectory_s >= 0.0 {

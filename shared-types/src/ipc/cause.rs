@@ -71,8 +71,8 @@ pub struct CauseRecord {
     pub path: u8,
     /// 1 when the arm itself was asked to stop.
     pub stop_arm: u8,
-    /// Armed tier, raw [`crate::MotionTier`]; 0 when not armed.
-    pub tier: u8,
+    /// Armed operating mode, raw [`crate::OperatingMode`]; 0 when not armed.
+    pub operating_mode: u8,
     /// Code of what made the stop harder on the way, 0 if nothing did.
     pub second_code: u16,
     /// Zero.

@@ -96,7 +96,7 @@ pub enum CommandKind {
     Run = 2,
     /// Brake and latch.
     Stop = 3,
-    /// Arm for `tier` until `expires_ns`.
+    /// Arm for `operating_mode` until `expires_ns`.
     Arm = 4,
     /// Withdraw the arming.
     Disarm = 5,
@@ -125,8 +125,8 @@ impl CommandKind {
 pub struct CommandRecord {
     /// Raw [`CommandKind`].
     pub kind: u8,
-    /// Raw [`crate::MotionTier`].
-    pub tier: u8,
+    /// Raw [`crate::OperatingMode`].
+    pub operating_mode: u8,
     /// 1 when the area was declared clear.
     pub area_clear: u8,
     /// Zero.

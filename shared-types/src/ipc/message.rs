@@ -4,9 +4,9 @@ use super::payload::ControllerMode;
 use super::rpc::Rpc;
 use crate::camera::StereoCamera;
 use crate::fault::FaultCode;
+use crate::operating_mode::OperatingMode;
 use crate::plan::Plan;
 use crate::rope::{RopeEstimate, RopeParams};
-use crate::tier::MotionTier;
 use arm_model::joint::JointVector;
 use arm_model::limits::Limits;
 use arm_model::trajectory::JointTrajectory;
@@ -282,11 +282,11 @@ pub enum ControllerRequest {
         /// [`crate::plan::trajectory_hash`] of it.
         sha256: [u8; 32],
     },
-    /// Allow motions of a tier: a throw once, begun within ten seconds, and only
+    /// Allow motions of an operating mode: a throw once, begun within ten seconds, and only
     /// with a clear area; the others for ten minutes. Any stop disarms.
     Arm {
         /// What for.
-        tier: MotionTier,
+        operating_mode: OperatingMode,
         /// The operator declared that nobody is within reach of arm and rope.
         area_clear: bool,
     },
@@ -366,7 +366,7 @@ pub enum ControllerEvent {
         /// Commanded joints (rad).
         q_c: JointVector,
         /// What the controller is armed for.
-        tier: Option<MotionTier>,
+        operating_mode: Option<OperatingMode>,
         /// Real-time set-up steps that failed, in words; empty when all is well.
         warnings: Vec<String>,
     },

@@ -96,10 +96,10 @@ pub struct ControllerState {
     pub q_c: JointVector,
     /// Measured joints (rad).
     pub q: JointVector,
-    /// Armed tier, raw [`crate::MotionTier`]; 0 when not armed.
-    pub tier: u8,
-    /// Raw [`crate::WireMode`].
-    pub wire: u8,
+    /// Armed operating mode, raw [`crate::OperatingMode`]; 0 when not armed.
+    pub operating_mode: u8,
+    /// Raw [`crate::CommandInterface`].
+    pub interface: u8,
     /// Zero.
     pub reserved: [u8; 2],
     /// The controller's process.
@@ -182,9 +182,9 @@ pub struct CycleRecord {
     /// When they were measured (CLOCK_MONOTONIC, ns).
     pub q_stamp_ns: u64,
     /// How fast the path is followed: 1 as planned, 0 at rest or off the path.
-    pub path_rate: f64,
+    pub speed_override: f64,
     /// Joint velocity on the wire in joint-velocity mode (rad/s), else zero.
-    pub qd_wire: JointVector,
+    pub qd_sent: JointVector,
 }
 
 /// One joint report of the arm, as received. RT-safe to copy.

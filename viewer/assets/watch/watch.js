@@ -20,7 +20,7 @@ function controller(c) {
   shownController = now;
   if (!c) return fill(byId("controller"), [["controller", "none"]]);
   const stop = c.stop ? `${words(c.stop.code)} in cycle ${c.stop.cycle}${c.stop.latched ? ", latched" : ", acknowledged"}: ${c.stop.words}` : "none since this page looks";
-  fill(byId("controller"), [["controller", c.alive ? "running" : "silent"], ["mode", words(c.mode)], ["armed for", c.tier ? words(c.tier) : "nothing"],
+  fill(byId("controller"), [["controller", c.alive ? "running" : "silent"], ["mode", words(c.mode)], ["armed for", c.operating_mode ? words(c.operating_mode) : "nothing"],
     ["operator", c.operator ? "present" : "none"], ["last stop", stop],
     ["real-time priority and locked memory", c.real_time ? "yes" : "no"], ["cycle", String(c.cycle)]]);
 }

@@ -29,7 +29,7 @@ use facts::Facts;
 use http::Site;
 use jitter::Jitter;
 use rope::FollowingRope;
-use shared_types::MotionTier;
+use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use snapshot::{ControllerView, Snapshot, StopView, note_stop};
 use std::net::SocketAddr;
@@ -195,7 +195,7 @@ impl Watcher {
                 .filter(|s| s.alive)
                 .map(|s| ControllerMode::from_raw(s.state.mode)),
             operator: seen.is_some_and(|s| s.operator),
-            armed: seen.is_some_and(|s| s.state.tier != 0),
+            armed: seen.is_some_and(|s| s.state.operating_mode != 0),
         };
         if let Err(error) = self.listen(search) {
             tracing::warn!("connecting anew: {error:#}");
@@ -334,7 +334,7 @@ impl Watcher {
         let mode = ControllerMode::from_raw(state.mode);
         snapshot.controller = Some(ControllerView {
             mode,
-            tier: MotionTier::from_raw(state.tier),
+            operating_mode: OperatingMode::from_raw(state.operating_mode),
             real_time: state.real_time != 0,
             cycle: state.cycle,
             alive: seen.alive,

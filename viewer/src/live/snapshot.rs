@@ -5,7 +5,7 @@ use crate::report::Histogram;
 use arm_model::Cell;
 use serde::Serialize;
 use shared_types::ipc::ControllerMode;
-use shared_types::{FaultCode, MotionTier};
+use shared_types::{FaultCode, OperatingMode};
 
 /// One moment.
 #[derive(Debug, Default, Serialize)]
@@ -44,7 +44,7 @@ pub(crate) struct ControllerView {
     /// What it is doing.
     pub mode: ControllerMode,
     /// What motions are armed.
-    pub tier: Option<MotionTier>,
+    pub operating_mode: Option<OperatingMode>,
     /// Whether its loop has real-time priority and locked memory.
     pub real_time: bool,
     /// Cycle.

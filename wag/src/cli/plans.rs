@@ -52,7 +52,7 @@ pub struct PlanArgs {
 
 /// How setpoints reach the arm, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum WireName {
+pub enum InterfaceName {
     /// Joint positions, the arm's mode 1.
     Servo,
     /// Joint velocities, the arm's mode 4.
@@ -67,9 +67,9 @@ pub struct CheckArgs {
     /// Limits of the arm; default: the built-in xArm 7.
     #[arg(long)]
     pub limits: Option<PathBuf>,
-    /// How setpoints reach the arm.
-    #[arg(long, value_enum, default_value_t = WireName::Servo)]
-    pub wire: WireName,
+    /// Command interface: how setpoints reach the arm.
+    #[arg(long, alias = "wire", value_enum, default_value_t = InterfaceName::Servo)]
+    pub interface: InterfaceName,
     /// Linear speed limit set in the arm, as a factor of 1 m/s (servo only).
     #[arg(long, default_value_t = 1.2, value_name = "FACTOR")]
     pub speed_factor: f64,

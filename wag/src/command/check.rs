@@ -1,6 +1,6 @@
 //! `wag check`: preflight of a plan.
 
-use crate::cli::{CheckArgs, WireName};
+use crate::cli::{CheckArgs, InterfaceName};
 use crate::config;
 use anyhow::{anyhow, ensure};
 use arm_model::limits::{LimitKind, Margin};
@@ -11,7 +11,7 @@ use planner::collide::{ArmShape, tool_contacts};
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
 use run_log::files::read_plan;
 use serde_json::{Value, json};
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 
 fn kind_name(kind: LimitKind) -> &'static str {
     match kind {
@@ -71,9 +71,9 @@ fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
         Some(sides) => anyhow::bail!("--fence takes 6 numbers, found {}", sides.len()),
     };
     Ok(JudgedArm {
-        wire: match args.wire {
-            WireName::Servo => WireMode::ServoPosition,
-            WireName::Velocity => WireMode::JointVelocity,
+        interface: match args.interface {
+            InterfaceName::Servo => CommandInterface::ServoPosition,
+            InterfaceName::Velocity => CommandInterface::JointVelocity,
         },
         speed_factor: args.speed_factor,
         fence,
@@ -149,7 +149,7 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
         );
     }
     Ok(Some(json!({
-        "ok": true, "command": "check", "wire": arm.wire, "margins": margins, "arm": judged,
+        "ok": true, "command": "check", "interface": arm.interface, "margins": margins, "arm": judged,
         "tool_contact_s": contact_s,
     })))
 }

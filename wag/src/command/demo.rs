@@ -25,7 +25,7 @@ use shared_types::ipc::message::{
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
-use shared_types::{MotionTier, Plan, RopeEstimate, StereoCamera};
+use shared_types::{OperatingMode, Plan, RopeEstimate, StereoCamera};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viewer::report;
@@ -190,7 +190,7 @@ impl<'a> Demo<'a> {
         let stage = Stage::begin("bring-up", self.quiet);
         self.record.warnings = pipeline::acquire(self.session, &self.arm)?;
         // The arm is simulated: nobody needs to be asked.
-        pipeline::arm_for(self.session, &self.arm, MotionTier::SetUp)?;
+        pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp)?;
         pipeline::move_to(self.session, &self.arm, wiggle.start(), MOVE_SPEED)?;
         stage.say("waiting for the rope to hang still");
         let still = pipeline::wait_still(self.session, &self.camera, STILL_S)?;
@@ -205,7 +205,7 @@ impl<'a> Demo<'a> {
     /// Streams the wiggle and films it.
     fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
         let stage = Stage::begin("wiggle", self.quiet);
-        pipeline::arm_for(self.session, &self.arm, MotionTier::Wiggle)?;
+        pipeline::arm_for(self.session, &self.arm, OperatingMode::Wiggle)?;
         let film = pipeline::film_during(
             self.session,
             &self.camera,
@@ -325,7 +325,7 @@ impl<'a> Demo<'a> {
     /// Throws once, open loop, filmed.
     fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
         let stage = Stage::begin("throw", self.quiet);
-        pipeline::arm_for(self.session, &self.arm, MotionTier::Throw)?;
+        pipeline::arm_for(self.session, &self.arm, OperatingMode::Throw)?;
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
         let film = pipeline::film_during(

@@ -21,9 +21,11 @@ pub fn tell(
     name: &str,
     quiet: bool,
 ) -> Outcome<Value> {
-    let wire = config::here::<ControllerConfig>(None).or_input()?.wire;
+    let interface = config::here::<ControllerConfig>(None)
+        .or_input()?
+        .command_interface;
     let judge = JudgedArm {
-        wire,
+        interface,
         ..JudgedArm::default()
     };
     let judged = arm_margins(trajectory, limits, &judge);
@@ -69,7 +71,7 @@ pub fn tell(
         );
     }
     Ok(json!({
-        "dry_run": true, "duration_s": duration_s, "start_rad": trajectory.start(), "wire": wire,
+        "dry_run": true, "duration_s": duration_s, "start_rad": trajectory.start(), "interface": interface,
         "tightest": tightest,
     }))
 }

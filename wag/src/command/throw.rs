@@ -12,25 +12,25 @@ use arm_model::{JointTrajectory, Limits};
 use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
 use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
-use shared_types::MotionTier;
+use shared_types::OperatingMode;
 use std::path::Path;
 
 /// Part of the arm's speed limits used for the move to the start pose.
 const MOVE_SPEED: f64 = 0.1;
 
-/// Moves to a trajectory's start and streams it, armed for `tier`; returns what was
+/// Moves to a trajectory's start and streams it, armed for `operating_mode`; returns what was
 /// measured.
 pub fn drive(
     arm: &ArmArgs,
     limits: &Limits,
     trajectory: &JointTrajectory,
     out: Option<&Path>,
-    tier: MotionTier,
+    operating_mode: OperatingMode,
     quiet: bool,
 ) -> Outcome<Option<Value>> {
-    let name = match tier {
-        MotionTier::Throw => "throw",
-        MotionTier::Wiggle | MotionTier::SetUp => "wiggle",
+    let name = match operating_mode {
+        OperatingMode::Throw => "throw",
+        OperatingMode::Wiggle | OperatingMode::SetUp => "wiggle",
     };
     if let Some(worst) = limits.worst_violation(trajectory) {
         return Err(Failure::input(anyhow!(
@@ -50,7 +50,15 @@ pub fn drive(
     if arm.dead_man {
         session.hold_dead_man(quiet).or_failed()?;
     }
-    let result = stream(&mut session, &folder, arm, limits, trajectory, tier, quiet);
+    let result = stream(
+        &mut session,
+        &folder,
+        arm,
+        limits,
+        trajectory,
+        operating_mode,
+        quiet,
+    );
     session.end(result.is_ok());
     let mut summary = match &result {
         Ok(value) => value.clone(),
@@ -75,7 +83,7 @@ fn stream(
     arm: &ArmArgs,
     limits: &Limits,
     trajectory: &JointTrajectory,
-    tier: MotionTier,
+    operating_mode: OperatingMode,
     quiet: bool,
 ) -> anyhow::Result<Value> {
     let stage = Stage::begin("bring-up", quiet);
@@ -93,7 +101,7 @@ fn stream(
         tracing::warn!("{warning}");
     }
     stage.say("moving to the start pose");
-    pipeline::arm_for(session, &link, MotionTier::SetUp)?;
+    pipeline::arm_for(session, &link, OperatingMode::SetUp)?;
     pipeline::move_to(session, &link, trajectory.start(), MOVE_SPEED)?;
     stage.done(if address.ip.is_loopback() {
         "arm stands at the start; simulated, so it is armed without asking"
@@ -102,7 +110,7 @@ fn stream(
     });
     let stage = Stage::begin("stream", quiet);
     pipeline::latency(session, &link)?;
-    pipeline::arm_for(session, &link, tier)?;
+    pipeline::arm_for(session, &link, operating_mode)?;
     let span = pipeline::execute(&link, trajectory)?.finish(session)?;
     let latency = pipeline::latency(session, &link)?;
     stage.done(&format!(
@@ -124,7 +132,7 @@ pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
         &limits,
         &plan.trajectory,
         args.out.as_deref(),
-        MotionTier::Throw,
+        OperatingMode::Throw,
         quiet,
     )?;
     Ok(Some(

@@ -12,7 +12,7 @@ use planner::process::PlannerConfig;
 use planner::wiggle::wiggle;
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::MotionTier;
+use shared_types::OperatingMode;
 
 pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     if args.evaluate || args.optimise {
@@ -43,7 +43,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             &limits,
             &trajectory,
             args.out.as_deref(),
-            MotionTier::Wiggle,
+            OperatingMode::Wiggle,
             quiet,
         )?
     } else {

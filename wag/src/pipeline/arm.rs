@@ -3,7 +3,7 @@
 use crate::session::Session;
 use anyhow::{anyhow, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
-use shared_types::MotionTier;
+use shared_types::OperatingMode;
 use shared_types::ipc::message::{
     ControllerEvent, ControllerRequest, ControllerRpc, LatencyReport,
 };
@@ -77,11 +77,15 @@ pub fn acquire(session: &mut Session, arm: &ArmLink) -> anyhow::Result<Vec<Strin
     }
 }
 
-/// Arms the controller for a tier of motions. Whoever calls this has made sure
+/// Arms the controller for motions of an operating mode. Whoever calls this has made sure
 /// that the area is clear, or that the arm is simulated.
-pub fn arm_for(session: &mut Session, arm: &ArmLink, tier: MotionTier) -> anyhow::Result<()> {
+pub fn arm_for(
+    session: &mut Session,
+    arm: &ArmLink,
+    operating_mode: OperatingMode,
+) -> anyhow::Result<()> {
     let request = ControllerRequest::Arm {
-        tier,
+        operating_mode,
         area_clear: true,
     };
     let done = session.ask(arm, &request, Duration::from_secs(5), |_| ())?;

@@ -9,7 +9,7 @@ use shared_types::ipc::{
     JointReport, OperatorEnd, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
 use shared_types::rope::RANGES;
-use shared_types::{FaultCode, MonotonicNs, MotionTier, RopeParams};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode, RopeParams};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -106,7 +106,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
             stamp_ns: now_ns,
             q_c: q,
             q,
-            tier: MotionTier::Wiggle as u8,
+            operating_mode: OperatingMode::Wiggle as u8,
             pid: u32::MAX,
             ..ControllerState::default()
         });

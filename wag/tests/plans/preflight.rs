@@ -10,7 +10,7 @@ use planner::preflight::{Fence, JudgedArm, arm_margins, first_stop};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::{ControlSettings, Thresholds};
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 use xarm_sim::ArmConfig;
 
 /// A plan and the safety boundary it is judged with, if any (mm: x+, x-, y+, y-, z+, z-).
@@ -39,13 +39,13 @@ impl Case {
         Self { plan, fence_mm }
     }
 
-    fn judged(&self, wire: WireMode) -> JudgedArm {
+    fn judged(&self, interface: CommandInterface) -> JudgedArm {
         let fence = self.fence_mm.map(|mm| {
             let [x1, x0, y1, y0, z1, z0] = mm.map(|mm| f64::from(mm) * 1e-3);
             Fence::new([x0, x1, y0, y1, z0, z1]).unwrap()
         });
         JudgedArm {
-            wire,
+            interface,
             fence,
             ..JudgedArm::default()
         }
@@ -60,8 +60,8 @@ impl Case {
     }
 
     /// The code the arm is expected to stop with; none if it runs to the end.
-    fn expected(&self, wire: WireMode, limits: &Limits) -> Option<u8> {
-        let margins = arm_margins(&self.plan, limits, &self.judged(wire));
+    fn expected(&self, interface: CommandInterface, limits: &Limits) -> Option<u8> {
+        let margins = arm_margins(&self.plan, limits, &self.judged(interface));
         first_stop(&margins).map(|m| m.rule.code().unwrap_or(0))
     }
 }
@@ -146,7 +146,7 @@ fn arm_agrees(case: &Case) -> Result<Option<u8>, String> {
         tracking_error_max_rad: 100.0,
         ..Thresholds::relaxed()
     };
-    let expected = case.expected(WireMode::ServoPosition, &Limits::default());
+    let expected = case.expected(CommandInterface::ServoPosition, &Limits::default());
     let rig = run(&case.plan, &boundless(), settings.into(), case.arm());
     let found = arm_error(&rig);
     if found == expected {
@@ -162,13 +162,13 @@ fn arm_agrees(case: &Case) -> Result<Option<u8>, String> {
 /// Plans within the limits, with the controller as it is: whether one that passes runs to
 /// its end. By velocities, one that does not pass may run, where the preflight was only
 /// cautious: the arm's ramps are not known to the millisecond.
-fn throw_agrees(case: &Case, wire: WireMode) -> Result<Throw, String> {
+fn throw_agrees(case: &Case, interface: CommandInterface) -> Result<Throw, String> {
     let limits = Limits::default();
     let settings = ControlSettings {
-        wire,
+        interface,
         ..Thresholds::strict().into()
     };
-    let expected = case.expected(wire, &limits);
+    let expected = case.expected(interface, &limits);
     let rig = run(&case.plan, &limits, settings, case.arm());
     let (found, causes) = (arm_error(&rig), &rig.log.causes);
     let ran = found.is_none() && causes.is_empty();
@@ -176,11 +176,11 @@ fn throw_agrees(case: &Case, wire: WireMode) -> Result<Throw, String> {
     match (expected, ran) {
         (None, true) if arrived => Ok(Throw::Ran),
         (Some(_), false) => Ok(Throw::Stopped),
-        (Some(_), true) if wire == WireMode::JointVelocity => Ok(Throw::Cautious),
+        (Some(_), true) if interface == CommandInterface::JointVelocity => Ok(Throw::Cautious),
         _ => {
             let causes: Vec<_> = causes.iter().map(|c| c.fault()).collect();
             Err(format!(
-                "{wire:?}: expected {expected:?}, the arm {found:?}, {causes:?}, arrived {arrived}"
+                "{interface:?}: expected {expected:?}, the arm {found:?}, {causes:?}, arrived {arrived}"
             ))
         }
     }
@@ -209,9 +209,12 @@ fn preflight_and_arm_agree() {
         if limits.worst_violation(&case.plan).is_some() {
             continue;
         }
-        let wires = [WireMode::ServoPosition, WireMode::JointVelocity];
-        for (count, wire) in throws.iter_mut().zip(wires) {
-            match throw_agrees(&case, wire) {
+        let interfaces = [
+            CommandInterface::ServoPosition,
+            CommandInterface::JointVelocity,
+        ];
+        for (count, interface) in throws.iter_mut().zip(interfaces) {
+            match throw_agrees(&case, interface) {
                 Ok(throw) => count[throw as usize] += 1,
                 Err(why) => disagreements.push(format!("plan {seed}: {why}")),
             }

@@ -4,7 +4,7 @@ use super::shell::{recorded, said};
 use crate::support::{command, process_of, send, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
-use shared_types::{FaultCode, MotionTier, Plan};
+use shared_types::{FaultCode, OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::{Mutex, PoisonError};
@@ -21,31 +21,31 @@ const TOO_BUSY: [&str; 2] = [
     "no camera frame arrived",
 ];
 
-/// A demo that streams a trajectory of `tier` right now, and its folder in `into`.
+/// A demo that streams a trajectory of `operating_mode` right now, and its folder in `into`.
 ///
 /// One that gave up before because the machine was too busy is begun again, twice;
 /// any other that ended has failed, and says why.
-fn demo_in(into: &Path, tier: MotionTier) -> (Child, PathBuf) {
+fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
     for attempt in 0..3 {
         let run = into.join(format!("run-{attempt}"));
         let line = format!("demo --seed 4 --json --out {}", run.display());
         let mut child = command(&line).spawn().unwrap();
-        if streams(&mut child, &run, tier) {
+        if streams(&mut child, &run, operating_mode) {
             return (child, run);
         }
         let (code, said) = said(child);
         assert!(
             TOO_BUSY.iter().any(|cause| said.contains(cause)),
-            "the demo ended before its {tier:?}, exit code {code:?}: {said}"
+            "the demo ended before its {operating_mode:?}, exit code {code:?}: {said}"
         );
         eprintln!("demo {attempt}: {said}");
     }
     panic!("three demos found the machine too busy");
 }
 
-/// Waits until the demo `child` streams a trajectory of `tier`; `false` when it
+/// Waits until the demo `child` streams a trajectory of `operating_mode`; `false` when it
 /// ended before.
-fn streams(child: &mut Child, run: &Path, tier: MotionTier) -> bool {
+fn streams(child: &mut Child, run: &Path, operating_mode: OperatingMode) -> bool {
     let config = run.join("config/rt-controller.toml");
     let mut state: Option<StateReader> = None;
     until("the motion", PATIENCE, || {
@@ -56,7 +56,8 @@ fn streams(child: &mut Child, run: &Path, tier: MotionTier) -> bool {
         }
         let now = state.as_ref().map(StateReader::get);
         let streams = now.is_some_and(|now| {
-            now.mode == ControllerMode::Streaming as u8 && now.tier == tier as u8
+            now.mode == ControllerMode::Streaming as u8
+                && now.operating_mode == operating_mode as u8
         });
         let mut ended = || child.try_wait().unwrap().is_some();
         (streams || ended()).then_some(streams)
@@ -74,7 +75,7 @@ fn domain(config: &Path) -> Option<String> {
 fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report() {
     let folder = tempfile::tempdir().unwrap();
     let _alone = MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
-    let (child, run) = demo_in(folder.path(), MotionTier::Throw);
+    let (child, run) = demo_in(folder.path(), OperatingMode::Throw);
     std::thread::sleep(Duration::from_millis(300));
     send(
         process_of(&run.display().to_string(), "planner").unwrap(),
@@ -111,7 +112,7 @@ fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report(
 fn fault_27_a_camera_killed_during_the_wiggle_ends_it_gently_and_nothing_is_identified() {
     let folder = tempfile::tempdir().unwrap();
     let _alone = MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
-    let (child, run) = demo_in(folder.path(), MotionTier::Wiggle);
+    let (child, run) = demo_in(folder.path(), OperatingMode::Wiggle);
     std::thread::sleep(Duration::from_millis(700));
     send(
         process_of(&run.display().to_string(), "camera-ingest").unwrap(),

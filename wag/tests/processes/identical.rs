@@ -19,7 +19,7 @@ use shared_types::ipc::{
     StateReader,
 };
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MonotonicNs, MotionTier, RopeParams};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode, RopeParams};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Child;
@@ -207,7 +207,7 @@ impl Play {
             log.contains("guarding the controller").then_some(())
         });
         let armed = ControllerRequest::Arm {
-            tier: MotionTier::Throw,
+            operating_mode: OperatingMode::Throw,
             area_clear: true,
         };
         assert_eq!(self.ask(&armed), ControllerEvent::Done);
@@ -341,7 +341,7 @@ fn is_the_plan(flown: &[CycleRecord]) {
         );
         // Behind its end it is followed no more.
         let rate = f64::from(record.trajectory_s < plan.duration_s());
-        assert_eq!(record.path_rate.to_bits(), rate.to_bits());
+        assert_eq!(record.speed_override.to_bits(), rate.to_bits());
     }
     let end_s = flown.last().unwrap().trajectory_s;
     assert!(end_s >= plan.duration_s(), "ended at {end_s} s");

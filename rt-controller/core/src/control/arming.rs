@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!              Arm                 throw begins
-//!  Disarmed ---------> Armed(tier) ------------> Spent(throw)
+//!  Disarmed ---------> Armed(for) ------------> Spent(throw)
 //!     ^                   |                          |
 //!     +-------------------+--------------------------+
 //!       Disarm, expiry, dead-man switch released, any stop, end of the shot
@@ -11,7 +11,7 @@
 //! Nothing re-arms by itself.
 
 use serde::{Deserialize, Serialize};
-use shared_types::{Arming, FaultCode, MotionTier};
+use shared_types::{Arming, FaultCode, OperatingMode};
 
 /// Longest time from arming a throw to its begin (ns).
 pub const THROW_WITHIN_NS: u64 = 10_000_000_000;
@@ -22,7 +22,7 @@ pub enum ArmingState {
     /// None.
     #[default]
     Disarmed,
-    /// Those of a tier, begun before it expires.
+    /// Those of an operating mode, begun before it expires.
     Armed(Arming),
     /// The one that runs: a throw, armed for one shot.
     Spent,
@@ -36,7 +36,7 @@ impl ArmingState {
     /// [`FaultCode::ArmingExpired`] for one that has already expired.
     pub fn arm(&mut self, arming: Arming, now_ns: u64) -> Result<Arming, FaultCode> {
         let mut arming = arming;
-        if arming.tier == MotionTier::Throw {
+        if arming.operating_mode == OperatingMode::Throw {
             if !arming.area_clear {
                 return Err(FaultCode::NotArmed);
             }
@@ -51,15 +51,15 @@ impl ArmingState {
         Ok(arming)
     }
 
-    /// Tier under which a motion may begin now.
+    /// Operating mode under which a motion may begin now.
     ///
     /// # Errors
     /// [`FaultCode::NotArmed`], [`FaultCode::ArmingExpired`].
-    pub const fn admit(&self, now_ns: u64) -> Result<MotionTier, FaultCode> {
+    pub const fn admit(&self, now_ns: u64) -> Result<OperatingMode, FaultCode> {
         match self {
             Self::Disarmed | Self::Spent => Err(FaultCode::NotArmed),
             Self::Armed(arming) if arming.expires_ns <= now_ns => Err(FaultCode::ArmingExpired),
-            Self::Armed(arming) => Ok(arming.tier),
+            Self::Armed(arming) => Ok(arming.operating_mode),
         }
     }
 
@@ -69,13 +69,13 @@ impl ArmingState {
         matches!(self, Self::Armed(arming) if arming.expires_ns <= now_ns)
     }
 
-    /// Tier that is armed or runs, raw; 0 for none.
+    /// Operating mode that is armed or runs, raw; 0 for none.
     #[must_use]
-    pub const fn raw_tier(&self) -> u8 {
+    pub const fn raw_operating_mode(&self) -> u8 {
         match self {
             Self::Disarmed => 0,
-            Self::Armed(arming) => arming.tier as u8,
-            Self::Spent => MotionTier::Throw as u8,
+            Self::Armed(arming) => arming.operating_mode as u8,
+            Self::Spent => OperatingMode::Throw as u8,
         }
     }
 }
@@ -88,7 +88,7 @@ mod tests {
 
     fn throw(expires_ns: u64, area_clear: bool) -> Arming {
         Arming {
-            tier: MotionTier::Throw,
+            operating_mode: OperatingMode::Throw,
             expires_ns,
             area_clear,
         }
@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(state, ArmingState::Disarmed);
         let taken = state.arm(throw(u64::MAX, true), NOW_NS).unwrap();
         assert_eq!(taken.expires_ns, NOW_NS + THROW_WITHIN_NS);
-        assert_eq!(state.admit(taken.expires_ns - 1), Ok(MotionTier::Throw));
+        assert_eq!(state.admit(taken.expires_ns - 1), Ok(OperatingMode::Throw));
         assert_eq!(state.admit(taken.expires_ns), Err(FaultCode::ArmingExpired));
         assert_eq!(
             ArmingState::default().arm(throw(NOW_NS, true), NOW_NS),
@@ -116,6 +116,9 @@ mod tests {
     #[test]
     fn a_spent_shot_admits_nothing() {
         assert_eq!(ArmingState::Spent.admit(0), Err(FaultCode::NotArmed));
-        assert_eq!(ArmingState::Spent.raw_tier(), MotionTier::Throw as u8);
+        assert_eq!(
+            ArmingState::Spent.raw_operating_mode(),
+            OperatingMode::Throw as u8
+        );
     }
 }

@@ -7,12 +7,12 @@ use super::limiter::Limiter;
 use super::mode::{ModeState, Running, Trigger, next_mode};
 use super::monitor::Monitor;
 use super::motion::Motion;
-use super::velocity_wire::VelocityWire;
+use super::velocity_interface::VelocityInterface;
 use super::violation::Violation;
 use alloc::boxed::Box;
 use arm_model::{JointState, JointVector};
 use shared_types::ipc::ControllerMode;
-use shared_types::{Arming, FaultCode, MonotonicNs, MotionTier};
+use shared_types::{Arming, FaultCode, MonotonicNs, OperatingMode};
 
 /// Starts closer than this are equal (rad); a larger difference would be a jump.
 const START_TOLERANCE_RAD: f64 = 1e-9;
@@ -93,7 +93,7 @@ impl ControlState {
         self.commanded = JointState::at_rest(hold);
         self.limiter = Limiter::at_rest(hold, &self.limits);
         self.tcp_speed_max_m_s = self.limits.tcp_speed_max_m_s;
-        self.wire = VelocityWire::default();
+        self.velocity = VelocityInterface::default();
         self.sent_ns = MonotonicNs(deadline_ns).plus_s(-self.period_s()).0;
         self.monitor = Monitor::new(self.settings, deadline_ns, hold);
         self.monitor.observe(input, &self.limits);
@@ -102,12 +102,13 @@ impl ControlState {
 
     fn run(&mut self, id: u64, motion: Box<Motion>, input: &CycleInput, out: &mut CycleOutput) {
         match self.admit(&motion, input) {
-            Ok((mode, tier)) => {
+            Ok((mode, operating_mode)) => {
                 // The planned instant, also of a late cycle: punctual setpoints then lie
                 // at whole periods of every motion, the same ones in every run.
                 let start_ns = input.deadline_ns.saturating_sub(input.late_ns.into());
-                self.tcp_speed_max_m_s = self.tool_speed_of(mode, tier);
-                let shot = mode == ControllerMode::Streaming && tier == MotionTier::Throw;
+                self.tcp_speed_max_m_s = self.tool_speed_of(mode, operating_mode);
+                let shot =
+                    mode == ControllerMode::Streaming && operating_mode == OperatingMode::Throw;
                 if self.settings.arming_required && shot {
                     self.arming = ArmingState::Spent;
                 }
@@ -132,12 +133,12 @@ impl ControlState {
         }
     }
 
-    /// Whether a motion may begin now; its mode and the tier it runs under.
+    /// Whether a motion may begin now; its mode and the operating mode it runs under.
     fn admit(
         &self,
         motion: &Motion,
         input: &CycleInput,
-    ) -> Result<(ControllerMode, MotionTier), FaultCode> {
+    ) -> Result<(ControllerMode, OperatingMode), FaultCode> {
         let trigger = match motion {
             Motion::Spline(_) => Trigger::StreamBegun,
             Motion::Move { .. } => Trigger::MoveBegun,
@@ -156,11 +157,11 @@ impl ControlState {
         if input.operator.released != 0 {
             return Err(FaultCode::DeadManReleased);
         }
-        let tier = if self.settings.arming_required {
+        let operating_mode = if self.settings.arming_required {
             self.arming.admit(input.deadline_ns)?
         } else {
-            MotionTier::Throw
+            OperatingMode::Throw
         };
-        Ok((mode, tier))
+        Ok((mode, operating_mode))
     }
 }

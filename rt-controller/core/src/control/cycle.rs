@@ -11,14 +11,14 @@ use super::motion::Motion;
 use super::reaction::{StopCategory, reaction};
 use super::settings::ControlSettings;
 use super::stopping::Stop;
-use super::velocity_wire::VelocityWire;
+use super::velocity_interface::VelocityInterface;
 use super::violation::Violation;
 use crate::xarm::Status;
 use alloc::boxed::Box;
 use arm_model::{JointState, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts};
-use shared_types::{FaultCode, MonotonicNs, MotionTier, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 
 /// State of the control cycle. Sized once; stepping never allocates.
 ///
@@ -38,7 +38,7 @@ pub struct ControlState {
     pub(super) sent_ns: u64,
     pub(super) limiter: Limiter,
     pub(super) tcp_speed_max_m_s: f64,
-    pub(super) wire: VelocityWire,
+    pub(super) velocity: VelocityInterface,
     pub(super) monitor: Monitor,
 }
 
@@ -71,7 +71,7 @@ impl ControlState {
             motions_done,
             commanded: JointState::at_rest(q),
             sent_ns: 0,
-            wire: VelocityWire::default(),
+            velocity: VelocityInterface::default(),
             monitor: Monitor::new(settings, 0, q),
         }
     }
@@ -108,8 +108,8 @@ impl ControlState {
             motions_done: self.motions_done,
             q_c: self.commanded.q,
             q: self.monitor.report().map_or(JointVector::ZERO, |r| r.q),
-            tier: self.arming.raw_tier(),
-            wire: self.settings.wire as u8,
+            operating_mode: self.arming.raw_operating_mode(),
+            interface: self.settings.interface as u8,
             reserved: [0; 2],
             pid: 0,
         }
@@ -123,8 +123,8 @@ impl ControlState {
 
     /// How commands reach the arm.
     #[must_use]
-    pub const fn wire(&self) -> WireMode {
-        self.settings.wire
+    pub const fn interface(&self) -> CommandInterface {
+        self.settings.interface
     }
 
     /// One cycle: observe, watch, handle the command, send a setpoint. RT-safe; returns for any input.
@@ -196,10 +196,10 @@ impl ControlState {
             q_c: self.commanded.q,
             q,
             q_stamp_ns,
-            path_rate: self
+            speed_override: self
                 .path_at(input.deadline_ns)
                 .map_or(0.0, |(_, rate)| rate),
-            qd_wire: match out.command {
+            qd_sent: match out.command {
                 Some(ArmCommand::Velocity { qd, .. }) => qd,
                 Some(ArmCommand::Position(_)) | None => JointVector::ZERO,
             },
@@ -361,9 +361,9 @@ impl ControlState {
         self.commanded = target;
         self.sent_ns = deadline_ns;
         self.monitor.sent(deadline_ns, target.q);
-        out.command = Some(match self.settings.wire {
-            WireMode::ServoPosition => ArmCommand::Position(target.q),
-            WireMode::JointVelocity => self.wire.command(
+        out.command = Some(match self.settings.interface {
+            CommandInterface::ServoPosition => ArmCommand::Position(target.q),
+            CommandInterface::JointVelocity => self.velocity.command(
                 &target,
                 &self.monitor.deviation(),
                 step_s,
@@ -374,16 +374,18 @@ impl ControlState {
         Ok(())
     }
 
-    /// Tool speed a motion of `mode` may show under `tier` (m/s). Moves the
+    /// Tool speed a motion of `mode` may show when armed for `armed` (m/s). Moves the
     /// controller makes itself never go faster than a wiggle once arming is in
     /// force, whatever is armed.
-    pub(super) fn tool_speed_of(&self, mode: ControllerMode, tier: MotionTier) -> f64 {
-        let tier = if mode == ControllerMode::Moving && self.settings.arming_required {
-            tier.min(MotionTier::Wiggle)
+    pub(super) fn tool_speed_of(&self, mode: ControllerMode, armed: OperatingMode) -> f64 {
+        let armed = if mode == ControllerMode::Moving && self.settings.arming_required {
+            armed.min(OperatingMode::Wiggle)
         } else {
-            tier
+            armed
         };
-        self.settings.tiers.of(tier, self.limits.tcp_speed_max_m_s)
+        self.settings
+            .speeds
+            .of(armed, self.limits.tcp_speed_max_m_s)
     }
 
     /// Changes to a mode without a motion; the one that ran goes back.

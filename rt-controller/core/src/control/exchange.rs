@@ -25,7 +25,7 @@ pub enum ControlCommand {
     },
     /// Brake and latch.
     Stop,
-    /// Allow motions of a tier.
+    /// Allow motions of an operating mode.
     Arm(Arming),
     /// Allow no motion any more; one that runs is braked.
     Disarm,

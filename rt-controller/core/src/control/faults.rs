@@ -10,7 +10,7 @@ use super::violation::Violation;
 use crate::xarm::StateRequest;
 use arm_model::{JOINTS, JointState, kinematics};
 use shared_types::ipc::{CauseRecord, ControllerMode, PAYLOAD_VERSION};
-use shared_types::{FaultCode, MonotonicNs, WireMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 
 impl ControlState {
     /// Meets a fault by the table in [`reaction`]; the first cause is kept.
@@ -45,9 +45,9 @@ impl ControlState {
         if found.fault != FaultCode::ArmError || !self.mode().is_moving() {
             return found;
         }
-        let qd = match self.settings.wire {
-            WireMode::ServoPosition => self.limiter.speed(),
-            WireMode::JointVelocity => self.wire.newest(),
+        let qd = match self.settings.interface {
+            CommandInterface::ServoPosition => self.limiter.speed(),
+            CommandInterface::JointVelocity => self.velocity.newest(),
         };
         let (q, limits) = (&self.commanded.q, &self.limits);
         let tool_m_s = kinematics::tool_speed_m_s(q, &qd, &limits.tcp_offset());
@@ -123,7 +123,7 @@ impl ControlState {
             mode: self.mode() as u8,
             path: how.path as u8,
             stop_arm: u8::from(how.stop_arm),
-            tier: self.arming.raw_tier(),
+            operating_mode: self.arming.raw_operating_mode(),
             cycle: self.cycle,
             stamp_ns: deadline_ns,
             motion_id: self.state.running().map_or(0, |r| r.id),

@@ -9,7 +9,7 @@ use super::monitor::Monitor;
 use super::motion::Motion;
 use super::settings::ControlSettings;
 use super::stopping::Stop;
-use super::velocity_wire::VelocityWire;
+use super::velocity_interface::VelocityInterface;
 use alloc::boxed::Box;
 use arm_model::{JointState, Limits};
 use serde::Deserialize;
@@ -33,7 +33,7 @@ struct Recorded {
     sent_ns: u64,
     limiter: Limiter,
     tcp_speed_max_m_s: f64,
-    wire: VelocityWire,
+    velocity: VelocityInterface,
     monitor: Monitor,
     /// When it began (ns), and how it goes.
     stopping: Option<(u64, Stop)>,
@@ -90,7 +90,7 @@ impl ControlState {
             sent_ns: recorded.sent_ns,
             limiter: recorded.limiter,
             tcp_speed_max_m_s: recorded.tcp_speed_max_m_s,
-            wire: recorded.wire,
+            velocity: recorded.velocity,
             monitor: recorded.monitor,
         })
     }

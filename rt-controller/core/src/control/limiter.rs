@@ -197,9 +197,9 @@ fn check_tool(
     let [_, slack, ..] = ROUNDING;
     let speed_m_s = way_m / step_s;
     if !within(speed_m_s, allowed.tcp_speed_max_m_s, slack) {
-        let tier = allowed.tcp_speed_max_m_s < limits.tcp_speed_max_m_s;
-        let fault = if tier {
-            FaultCode::TierExceeded
+        let armed_for_less = allowed.tcp_speed_max_m_s < limits.tcp_speed_max_m_s;
+        let fault = if armed_for_less {
+            FaultCode::OperatingModeExceeded
         } else {
             FaultCode::SetpointTcpSpeed
         };
@@ -378,6 +378,6 @@ mod tests {
         };
         let mut limiter = Limiter::at_rest(START_POSE, &limits);
         let found = limiter.admit(&q, PERIOD_S, &limits, &slow).unwrap_err();
-        assert_eq!(found.fault, FaultCode::TierExceeded);
+        assert_eq!(found.fault, FaultCode::OperatingModeExceeded);
     }
 }

@@ -36,7 +36,7 @@ pub mod settings;
 pub mod snapshot;
 pub mod stopping;
 pub mod time_scaling;
-pub mod velocity_wire;
+pub mod velocity_interface;
 pub mod violation;
 
 pub use cycle::ControlState;
@@ -44,4 +44,4 @@ pub use exchange::{
     ArmCodes, ArmCommand, ControlCommand, ControlEvent, CycleInput, CycleOutput, LinkInput,
 };
 pub use motion::Motion;
-pub use settings::{ControlSettings, Thresholds, TierSpeeds};
+pub use settings::{ControlSettings, OperatingModeSpeeds, Thresholds};

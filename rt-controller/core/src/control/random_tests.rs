@@ -143,7 +143,7 @@ impl Chaos {
                 hold: START_POSE + JointVector::splat(any_f64(rng)),
             },
             2 => ControlCommand::Arm(Arming {
-                tier: MotionTier::from_raw(rng.random_range(1..4)).unwrap(),
+                operating_mode: OperatingMode::from_raw(rng.random_range(1..4)).unwrap(),
                 expires_ns: self.now_ns + rng.random_range(0..2_000_000_000),
                 area_clear: rng.random_ratio(3, 4),
             }),

@@ -68,7 +68,7 @@ pub const fn reaction(fault: FaultCode) -> Reaction {
         | F::SetpointJerk
         | F::SetpointStep
         | F::SetpointUnstoppable
-        | F::TierExceeded => (StopCategory::JointSpace, false),
+        | F::OperatingModeExceeded => (StopCategory::JointSpace, false),
         F::TrackingError | F::JointStuck | F::EncoderJump => (StopCategory::JointSpace, true),
         F::DeadlineMissed | F::ReplyStalled | F::SecondCommander => (StopCategory::CutOff, true),
         F::LinkLost | F::ArmError | F::ArmModeChanged | F::ArmNotReady => {

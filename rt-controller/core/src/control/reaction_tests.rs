@@ -109,7 +109,7 @@ fn armed_bench() -> Bench {
 
 fn throw_arming(bench: &Bench) -> ControlCommand {
     ControlCommand::Arm(shared_types::Arming {
-        tier: MotionTier::Throw,
+        operating_mode: OperatingMode::Throw,
         expires_ns: bench.now_ns + 8_000_000_000,
         area_clear: true,
     })
@@ -173,14 +173,14 @@ fn a_disarmed_or_released_motion_brakes_in_the_very_cycle() {
 fn a_tier_slows_nobody_down_silently_but_stops_what_is_too_fast() {
     let mut bench = armed_bench();
     bench.command(ControlCommand::Arm(shared_types::Arming {
-        tier: MotionTier::SetUp,
+        operating_mode: OperatingMode::SetUp,
         expires_ns: u64::MAX,
         area_clear: false,
     }));
     bench.run(swing());
     bench.cycles_until_still();
     let cause = cause_in(&bench.events).unwrap();
-    assert_eq!(cause.fault(), FaultCode::TierExceeded);
+    assert_eq!(cause.fault(), FaultCode::OperatingModeExceeded);
     assert!(cause.limit.value > 0.25 && cause.limit.limit == 0.25);
 }
 

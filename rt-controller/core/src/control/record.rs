@@ -12,7 +12,7 @@ use alloc::boxed::Box;
 use shared_types::ipc::{
     ArmCodesRecord, CommandKind, CommandRecord, InputRecord, LinkRecord, PAYLOAD_VERSION,
 };
-use shared_types::{Arming, MotionTier};
+use shared_types::{Arming, OperatingMode};
 
 const REPLIED: u8 = 1;
 const LOST: u8 = 2;
@@ -29,14 +29,16 @@ pub enum RestoreError {
         found: u32,
     },
     /// A number that stands for no command.
-    #[error("cycle {cycle} holds the unknown command {kind} (tier {tier}); the record is damaged")]
+    #[error(
+        "cycle {cycle} holds the unknown command {kind} (operating mode {operating_mode}); the record is damaged"
+    )]
     Command {
         /// Cycle.
         cycle: u64,
         /// Kind found.
         kind: u8,
-        /// Tier found.
-        tier: u8,
+        /// Operating mode found.
+        operating_mode: u8,
     },
     /// The motion was not stored.
     #[error("motion {id} (fingerprint {hash:016x}) of cycle {cycle} was not recorded")]
@@ -91,7 +93,7 @@ fn record_command(command: &ControlCommand) -> CommandRecord {
         },
         ControlCommand::Stop => of(CommandKind::Stop),
         ControlCommand::Arm(arming) => CommandRecord {
-            tier: arming.tier as u8,
+            operating_mode: arming.operating_mode as u8,
             area_clear: u8::from(arming.area_clear),
             expires_ns: arming.expires_ns,
             ..of(CommandKind::Arm)
@@ -184,7 +186,7 @@ fn restore_command(
     let unknown = RestoreError::Command {
         cycle: record.cycle,
         kind: command.kind,
-        tier: command.tier,
+        operating_mode: command.operating_mode,
     };
     Ok(Some(
         match CommandKind::from_raw(command.kind).ok_or(unknown)? {
@@ -201,7 +203,7 @@ fn restore_command(
             }
             CommandKind::Stop => ControlCommand::Stop,
             CommandKind::Arm => ControlCommand::Arm(Arming {
-                tier: MotionTier::from_raw(command.tier).ok_or(unknown)?,
+                operating_mode: OperatingMode::from_raw(command.operating_mode).ok_or(unknown)?,
                 expires_ns: command.expires_ns,
                 area_clear: command.area_clear != 0,
             }),

@@ -1,7 +1,7 @@
 //! What the core is configured to do, and when its monitors give up.
 
 use serde::{Deserialize, Serialize};
-use shared_types::{MotionTier, WireMode};
+use shared_types::{CommandInterface, OperatingMode};
 
 const MS: u64 = 1_000_000;
 
@@ -83,16 +83,16 @@ impl Thresholds {
     }
 }
 
-/// Largest tool speed of each tier (m/s); a throw's is that of the limits.
+/// Largest tool speed of each operating mode (m/s); a throw's is that of the limits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct TierSpeeds {
+pub struct OperatingModeSpeeds {
     /// Setting up.
     pub set_up_m_s: f64,
     /// Wiggles.
     pub wiggle_m_s: f64,
 }
 
-impl Default for TierSpeeds {
+impl Default for OperatingModeSpeeds {
     fn default() -> Self {
         Self {
             set_up_m_s: 0.25,
@@ -101,14 +101,14 @@ impl Default for TierSpeeds {
     }
 }
 
-impl TierSpeeds {
-    /// Largest tool speed of a tier (m/s), `limit_m_s` at most. RT-safe.
+impl OperatingModeSpeeds {
+    /// Largest tool speed of an operating mode (m/s), `limit_m_s` at most. RT-safe.
     #[must_use]
-    pub const fn of(&self, tier: MotionTier, limit_m_s: f64) -> f64 {
-        match tier {
-            MotionTier::SetUp => self.set_up_m_s.min(limit_m_s),
-            MotionTier::Wiggle => self.wiggle_m_s.min(limit_m_s),
-            MotionTier::Throw => limit_m_s,
+    pub const fn of(&self, armed: OperatingMode, limit_m_s: f64) -> f64 {
+        match armed {
+            OperatingMode::SetUp => self.set_up_m_s.min(limit_m_s),
+            OperatingMode::Wiggle => self.wiggle_m_s.min(limit_m_s),
+            OperatingMode::Throw => limit_m_s,
         }
     }
 }
@@ -119,13 +119,13 @@ pub struct ControlSettings {
     /// When the monitors give up.
     pub thresholds: Thresholds,
     /// How setpoints reach the arm.
-    pub wire: WireMode,
+    pub interface: CommandInterface,
     /// Motions need an arming; without this, every motion runs as a throw would.
     pub arming_required: bool,
     /// Motions need a living guardian.
     pub guardian_required: bool,
-    /// Tool speeds of the tiers.
-    pub tiers: TierSpeeds,
+    /// Tool speeds of the operating modes.
+    pub speeds: OperatingModeSpeeds,
 }
 
 impl From<Thresholds> for ControlSettings {
@@ -133,10 +133,10 @@ impl From<Thresholds> for ControlSettings {
     fn from(thresholds: Thresholds) -> Self {
         Self {
             thresholds,
-            wire: WireMode::ServoPosition,
+            interface: CommandInterface::ServoPosition,
             arming_required: false,
             guardian_required: false,
-            tiers: TierSpeeds::default(),
+            speeds: OperatingModeSpeeds::default(),
         }
     }
 }

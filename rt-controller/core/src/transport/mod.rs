@@ -1,8 +1,8 @@
 //! How setpoints reach an arm and replies come back: what the cycle asks of a
 //! command link. Sockets are not here.
 
+pub mod command_interface;
 pub mod slot;
-pub mod wire;
 
 use crate::control::LinkInput;
 use crate::xarm::Command;

@@ -1,23 +1,24 @@
 //! The place of the loop's command link: empty, connected, or just broken.
 
-use super::{ArmTransport, MAX_COMMANDS, wire};
+use super::command_interface::request;
+use super::{ArmTransport, MAX_COMMANDS};
 use crate::control::{ArmCommand, LinkInput};
 use crate::xarm::{Command, StateRequest};
 use alloc::boxed::Box;
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 
 /// Holds at most one link. RT-safe; links are made and dropped elsewhere.
 #[derive(Debug)]
 pub struct LinkSlot<T> {
     link: Option<Box<T>>,
     lost: bool,
-    interface: WireMode,
+    interface: CommandInterface,
 }
 
 impl<T> LinkSlot<T> {
     /// Empty; commands will travel by `interface`.
     #[must_use]
-    pub const fn new(interface: WireMode) -> Self {
+    pub const fn new(interface: CommandInterface) -> Self {
         Self {
             link: None,
             lost: false,
@@ -52,21 +53,16 @@ impl<T: ArmTransport> LinkSlot<T> {
         seen
     }
 
-    /// Sends a cycle's command and request, in this order and at once. Call it
+    /// Sends a cycle's command and request for a state, in this order and at once. Call it
     /// every cycle: without a command a question of the link's own may go out.
-    pub fn send(
-        &mut self,
-        command: Option<ArmCommand>,
-        request: Option<StateRequest>,
-        now_ns: u64,
-    ) {
+    pub fn send(&mut self, command: Option<ArmCommand>, state: Option<StateRequest>, now_ns: u64) {
         let Some(link) = self.link.as_mut() else {
             return;
         };
-        let setpoint = command.and_then(|c| wire::request(self.interface, &c));
-        let request = request.map(Command::SetState);
+        let setpoint = command.and_then(|c| request(self.interface, &c));
+        let state = state.map(Command::SetState);
         let mut commands: heapless::Vec<Command, MAX_COMMANDS> = heapless::Vec::new();
-        for command in [setpoint, request].into_iter().flatten() {
+        for command in [setpoint, state].into_iter().flatten() {
             // Two at most: they fit.
             let _ = commands.push(command);
         }

@@ -18,7 +18,7 @@ use rig_sim::RigConfig;
 use run_log::files;
 use serde::Serialize;
 use serde_json::{Value, json};
-use shared_types::MotionTier;
+use shared_types::OperatingMode;
 use shared_types::ipc::{ControllerMode, CycleRecord};
 
 /// Part of the arm's speed limits used between two wiggles.
@@ -131,7 +131,7 @@ fn measure(
     let mut file_bytes = 0;
     for block in 0..2 * pairs {
         stage.say(format!("{} of {}", block + 1, 2 * pairs));
-        pipeline::arm_for(session, &arm, MotionTier::SetUp)?;
+        pipeline::arm_for(session, &arm, OperatingMode::SetUp)?;
         pipeline::move_to(session, &arm, motion.start(), MOVE_SPEED)?;
         let with = matches!(block % 4, 1 | 2);
         if with {
@@ -162,7 +162,7 @@ fn stream(
     arm: &ArmLink,
     motion: &JointTrajectory,
 ) -> anyhow::Result<Vec<CycleRecord>> {
-    pipeline::arm_for(session, arm, MotionTier::Wiggle)?;
+    pipeline::arm_for(session, arm, OperatingMode::Wiggle)?;
     session.received.drain()?;
     session.received.cycles.cycles.clear();
     pipeline::execute(arm, motion)?.finish(session)?;

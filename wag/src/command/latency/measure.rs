@@ -14,7 +14,7 @@ use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
 use planner::response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::MotionTier;
+use shared_types::OperatingMode;
 use std::net::IpAddr;
 use std::time::Duration;
 
@@ -141,7 +141,7 @@ fn stream(
         tracing::warn!("{warning}");
     }
     stage.say("moving to the pose");
-    pipeline::arm_for(session, &link, MotionTier::SetUp)?;
+    pipeline::arm_for(session, &link, OperatingMode::SetUp)?;
     if let Some((_, first)) = sweeps.first() {
         pipeline::move_to(session, &link, first.start(), MOVE_SPEED)?;
     }

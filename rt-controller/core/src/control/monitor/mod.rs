@@ -207,13 +207,13 @@ impl Monitor {
         let report = self.report()?;
         let settled = report.arrival_ns.saturating_sub(self.engaged_ns) > SETTLE_NS;
         // States 1 (moving) and 2 (ready) follow setpoints.
-        let serving =
-            report.arm_mode == self.settings.wire.arm_mode() && matches!(report.arm_state, 1 | 2);
+        let serving = report.arm_mode == self.settings.interface.arm_mode()
+            && matches!(report.arm_state, 1 | 2);
         (settled && !serving).then(|| {
             Violation::new(
                 FaultCode::ArmModeChanged,
                 report.arm_mode.into(),
-                self.settings.wire.arm_mode().into(),
+                self.settings.interface.arm_mode().into(),
             )
         })
     }
@@ -223,7 +223,7 @@ impl Monitor {
             let found = f64::from(input.link.foreign);
             return Some(Violation::new(FaultCode::SecondCommander, found, 0.0));
         }
-        let position = self.settings.wire == shared_types::WireMode::ServoPosition;
+        let position = self.settings.interface == shared_types::CommandInterface::ServoPosition;
         let settled = input.deadline_ns.saturating_sub(self.engaged_ns) > SETTLE_NS;
         (position && settled)
             .then(|| self.reports.foreign_target())

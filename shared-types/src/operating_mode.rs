@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 )]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
-pub enum MotionTier {
+pub enum OperatingMode {
     /// Setting up and teaching: at most 250 mm/s at the tool.
     #[default]
     SetUp = 1,
@@ -23,8 +23,8 @@ pub enum MotionTier {
     Throw = 3,
 }
 
-impl MotionTier {
-    /// The tier of a raw number, `None` for 0 (not armed) and unknown ones. RT-safe.
+impl OperatingMode {
+    /// The operating mode of a raw number, `None` for 0 (not armed) and unknown ones. RT-safe.
     #[must_use]
     pub const fn from_raw(raw: u8) -> Option<Self> {
         match raw {
@@ -41,7 +41,7 @@ impl MotionTier {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Arming {
     /// What for.
-    pub tier: MotionTier,
+    pub operating_mode: OperatingMode,
     /// Motions must begin before this instant (CLOCK_MONOTONIC, ns). For throws
     /// the controller allows ten seconds at most.
     pub expires_ns: u64,
@@ -56,9 +56,16 @@ mod tests {
 
     #[test]
     fn numbers_come_back_and_zero_is_not_armed() {
-        for tier in [MotionTier::SetUp, MotionTier::Wiggle, MotionTier::Throw] {
-            assert_eq!(MotionTier::from_raw(tier as u8), Some(tier));
+        for operating_mode in [
+            OperatingMode::SetUp,
+            OperatingMode::Wiggle,
+            OperatingMode::Throw,
+        ] {
+            assert_eq!(
+                OperatingMode::from_raw(operating_mode as u8),
+                Some(operating_mode)
+            );
         }
-        assert_eq!(MotionTier::from_raw(0), None);
+        assert_eq!(OperatingMode::from_raw(0), None);
     }
 }

@@ -3,14 +3,14 @@
 
 use crate::control::ArmCommand;
 use crate::xarm::{Command, Mode};
-use shared_types::WireMode;
+use shared_types::CommandInterface;
 
 /// Mode of the arm in which it takes commands by `interface`.
 #[must_use]
-pub const fn arm_mode(interface: WireMode) -> Mode {
+pub const fn arm_mode(interface: CommandInterface) -> Mode {
     match interface {
-        WireMode::ServoPosition => Mode::Servo,
-        WireMode::JointVelocity => Mode::JointVelocity,
+        CommandInterface::ServoPosition => Mode::Servo,
+        CommandInterface::JointVelocity => Mode::JointVelocity,
     }
 }
 
@@ -18,11 +18,13 @@ pub const fn arm_mode(interface: WireMode) -> Mode {
 /// duration (firmware 1.8) for velocities. `None` for a command of the other
 /// interface, which must never be sent in this mode. RT-safe.
 #[must_use]
-pub fn request(interface: WireMode, command: &ArmCommand) -> Option<Command> {
+pub fn request(interface: CommandInterface, command: &ArmCommand) -> Option<Command> {
     match (interface, command) {
-        (WireMode::ServoPosition, ArmCommand::Position(q)) => Some(Command::ServoJoint(*q)),
+        (CommandInterface::ServoPosition, ArmCommand::Position(q)) => Some(Command::ServoJoint(*q)),
         // Without a duration the arm would move on for ever.
-        (WireMode::JointVelocity, ArmCommand::Velocity { qd, duration_s }) if *duration_s > 0.0 => {
+        (CommandInterface::JointVelocity, ArmCommand::Velocity { qd, duration_s })
+            if *duration_s > 0.0 =>
+        {
             Some(Command::JointVelocity {
                 velocity: *qd,
                 // Each joint takes its own velocity at once; waiting for the
@@ -38,7 +40,7 @@ pub fn request(interface: WireMode, command: &ArmCommand) -> Option<Command> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use WireMode::{JointVelocity, ServoPosition};
+    use CommandInterface::{JointVelocity, ServoPosition};
     use arm_model::JointVector;
 
     #[test]

@@ -28,11 +28,11 @@ pub const DURATION_CYCLES: f64 = 3.0;
 
 /// The velocity sent last. RT-safe.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct VelocityWire {
+pub struct VelocityInterface {
     qd: JointVector,
 }
 
-impl VelocityWire {
+impl VelocityInterface {
     /// Velocity sent last (rad/s).
     #[must_use]
     pub const fn newest(&self) -> JointVector {
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn whatever_is_wanted_stays_in_limits() {
         let limits = Limits::default();
-        let mut wire = VelocityWire::default();
+        let mut interface = VelocityInterface::default();
         let mut before = JointVector::ZERO;
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         for k in 0..20_000 {
@@ -114,7 +114,7 @@ mod tests {
             if k % 7 == 0 {
                 off[3] = f64::NAN;
             }
-            let qd = velocity(wire.command(&target, &off, 0.004, &limits, 1.2));
+            let qd = velocity(interface.command(&target, &off, 0.004, &limits, 1.2));
             assert!(qd.max_abs() <= limits.velocity_max_rad_s[0] * (1.0 + 1e-9));
             assert!((qd - before).max_abs() <= 20.0 * 0.004 * (1.0 + 1e-9));
             let speed = kinematics::tool_speed_m_s(&START_POSE, &qd, &limits.tcp_offset());
@@ -127,11 +127,11 @@ mod tests {
     #[test]
     fn an_offset_is_worked_off() {
         let limits = Limits::default();
-        let mut wire = VelocityWire::default();
+        let mut interface = VelocityInterface::default();
         let target = JointState::at_rest(START_POSE);
         let mut off = JointVector::splat(0.01);
         for _ in 0..500 {
-            let qd = velocity(wire.command(&target, &off, 0.004, &limits, 1.2));
+            let qd = velocity(interface.command(&target, &off, 0.004, &limits, 1.2));
             off = off - qd * 0.004;
         }
         assert!(off.max_abs() < 1e-4, "{off:?}");

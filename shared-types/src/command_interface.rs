@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
-pub enum WireMode {
+pub enum CommandInterface {
     /// Joint positions (mode 1, register 29): the arm holds the last one when
     /// nothing comes, and stops with C60 above its tool speed limit.
     #[default]
@@ -18,7 +18,7 @@ pub enum WireMode {
     JointVelocity = 1,
 }
 
-impl WireMode {
+impl CommandInterface {
     /// The mode of a raw number, if there is one. RT-safe.
     #[must_use]
     pub const fn from_raw(raw: u8) -> Option<Self> {
@@ -45,9 +45,12 @@ mod tests {
 
     #[test]
     fn numbers_come_back() {
-        for mode in [WireMode::ServoPosition, WireMode::JointVelocity] {
-            assert_eq!(WireMode::from_raw(mode as u8), Some(mode));
+        for mode in [
+            CommandInterface::ServoPosition,
+            CommandInterface::JointVelocity,
+        ] {
+            assert_eq!(CommandInterface::from_raw(mode as u8), Some(mode));
         }
-        assert_eq!(WireMode::from_raw(2), None);
+        assert_eq!(CommandInterface::from_raw(2), None);
     }
 }
