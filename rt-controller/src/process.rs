@@ -226,3 +226,20 @@ impl Threads {
         Ok(warnings)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn required_real_time_that_cannot_be_had_is_a_refusal() {
+        let mut config = ControllerConfig {
+            domain: format!("test_require_{}", std::process::id()),
+            ..ControllerConfig::default()
+        };
+        config.real_time.cpu = Some(1_000_000);
+        config.real_time.require = true;
+        let error = run(config, &AtomicBool::new(false)).unwrap_err();
+        assert!(error.to_string().contains("core 1000000"), "{error}");
+    }
+}

@@ -120,3 +120,14 @@ fn a_recording_that_begins_late_begins_at_its_first_keyframe() {
         assert_eq!(found.last_cycle, 3000);
     }
 }
+
+/// Made by commit c3b4e48: a swing that is slowed down on its path for lateness, then
+/// braked by the operator, with a keyframe in each state and one at rest.
+#[test]
+fn a_recording_of_layout_1_replays_to_the_bit() {
+    let found = replay(include_bytes!("recording/layout-1.bin"), 0).unwrap();
+    assert_eq!((found.first_cycle, found.last_cycle), (150, 182));
+    assert_eq!((found.cycles, found.states, found.causes), (33, 3, 1));
+    assert_eq!(found.differing_bytes, 0, "{:?}", found.first_difference);
+    assert!(found.gaps.is_empty() && found.skipped == 0, "{found:?}");
+}

@@ -18,4 +18,5 @@ mod operator;
 mod plans;
 mod processes;
 mod reports;
+mod service;
 mod stand;

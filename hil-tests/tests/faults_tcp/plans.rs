@@ -146,9 +146,17 @@ fn fault_26_an_upload_that_hangs_is_refused_after_its_time() {
     assert_eq!(stand.refused(&announce).0, FaultCode::UploadTimedOut);
     let late = ControllerRequest::ExecuteUploaded { sha256 };
     assert_eq!(stand.refused(&late).0, FaultCode::WrongMode);
-    let trajectory = Box::new(plan);
-    let upload = ControllerRequest::Upload { trajectory, sha256 };
-    assert_eq!(stand.ask(&upload), ControllerEvent::Done);
+    let upload = |sha256| ControllerRequest::Upload {
+        trajectory: Box::new(plan),
+        sha256,
+    };
+    assert_eq!(
+        stand.refused(&upload([1; 32])).0,
+        FaultCode::PlanHashMismatch
+    );
+    let pending = stand.call(&announce);
+    assert_eq!(stand.ask(&upload(sha256)), ControllerEvent::Done);
+    assert_eq!(stand.answer(&pending), ControllerEvent::Done);
     assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     assert!(matches!(stand.ask(&late), ControllerEvent::Finished { .. }));
     stand.finish();

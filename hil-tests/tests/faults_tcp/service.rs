@@ -1,0 +1,119 @@
+//! What the controller's service answers, mode by mode.
+
+use super::stand::{Stand, execute, swing};
+use arm_model::joint::START_POSE;
+use arm_model::{Limits, LimitsSpec};
+use rt_controller::commander::CommanderLock;
+use shared_types::ipc::ControllerMode;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
+use shared_types::{FaultCode, OperatingMode};
+use xarm_sim::ArmConfig;
+
+fn arm_for(operating_mode: OperatingMode, area_clear: bool) -> ControllerRequest {
+    ControllerRequest::Arm {
+        operating_mode,
+        area_clear,
+    }
+}
+
+#[test]
+fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
+    let mut stand = Stand::start("armed");
+    let mut aside = START_POSE;
+    aside[0] += 0.1;
+    let move_to = |q| ControllerRequest::MoveTo { q, speed_part: 0.5 };
+    for early in [move_to(aside), arm_for(OperatingMode::SetUp, false)] {
+        assert_eq!(stand.refused(&early).0, FaultCode::WrongMode);
+    }
+    stand.make_ready();
+    let throw = execute(&swing(START_POSE));
+    for unarmed in [throw.clone(), arm_for(OperatingMode::Throw, false)] {
+        assert_eq!(stand.refused(&unarmed).0, FaultCode::NotArmed);
+    }
+
+    let armed = arm_for(OperatingMode::SetUp, false);
+    assert_eq!(stand.ask(&armed), ControllerEvent::Done);
+    match stand.ask(&ControllerRequest::Status) {
+        ControllerEvent::Status { operating_mode, .. } => {
+            assert_eq!(operating_mode, Some(OperatingMode::SetUp));
+        }
+        other => panic!("{other:?}"),
+    }
+    for pose in [aside, START_POSE] {
+        let answer = stand.ask(&move_to(pose));
+        assert!(
+            matches!(answer, ControllerEvent::Finished { .. }),
+            "{answer:?}"
+        );
+        assert!((stand.commanded() - pose).max_abs() < 1e-6);
+    }
+    assert_eq!(stand.ask(&ControllerRequest::Disarm), ControllerEvent::Done);
+    assert_eq!(stand.refused(&throw).0, FaultCode::NotArmed);
+
+    match stand.throw() {
+        ControllerEvent::Finished { start_ns, end_ns } => {
+            let lasted_s = (end_ns - start_ns) as f64 * 1e-9;
+            assert!((2.4..4.0).contains(&lasted_s), "{lasted_s}");
+        }
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(stand.refused(&throw).0, FaultCode::NotArmed);
+    match stand.ask(&ControllerRequest::Latency) {
+        ControllerEvent::Latency(report) => {
+            assert!(
+                report.cycles > 200 && report.reply.count > 100,
+                "{report:?}"
+            );
+        }
+        other => panic!("{other:?}"),
+    }
+    stand.finish();
+}
+
+/// Both hear of it: who asked for the stop and who asked for the motion.
+#[test]
+fn a_stop_is_served_while_a_trajectory_runs() {
+    let mut stand = Stand::start("served");
+    stand.make_ready();
+    let pending = stand.begin();
+    stand.wait_for_speed();
+    assert_eq!(stand.ask(&ControllerRequest::Stop), ControllerEvent::Done);
+    let answer = stand.answer(&pending);
+    let fault = FaultCode::OperatorStop;
+    assert!(
+        matches!(answer, ControllerEvent::Stopped { fault: f, .. } if f == fault),
+        "{answer:?}"
+    );
+    stand.expect(&[fault]);
+    stand.is_latched();
+    assert_eq!(
+        stand.ask(&ControllerRequest::Acknowledge),
+        ControllerEvent::Done
+    );
+    assert_eq!(stand.mode().0, ControllerMode::Idle);
+    stand.works_again();
+    stand.finish();
+}
+
+#[test]
+fn another_commander_or_another_tool_speed_is_a_refusal_that_says_what() {
+    let mut stand = Stand::with("refusals", ArmConfig::default(), |config| {
+        let mut spec = LimitsSpec::from(Limits::default());
+        spec.tcp_speed_max_m_s = 1.0;
+        config.limits = Some(spec.try_into().unwrap());
+    });
+    let arm = (stand.config.arm, stand.config.command_port).into();
+    let lock = CommanderLock::take(arm).unwrap();
+    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+    assert_eq!(fault, FaultCode::SecondCommander);
+    let me = format!("process {}", std::process::id());
+    assert!(message.contains(&me), "{message}");
+    drop(lock);
+    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+    assert_eq!(fault, FaultCode::ArmDiffers);
+    assert!(
+        message.contains("1.200") && message.contains("1.000"),
+        "{message}"
+    );
+    stand.finish();
+}
