@@ -45,7 +45,7 @@ pub enum FrameError {
         expected: [usize; 2],
     },
     /// Not two eyes side by side.
-    #[error("a width of {0} px is no side-by-side pair with 4:2:2 chroma (must divide by 4)")]
+    #[error("a width of {0} px is not a side-by-side pair with 4:2:2 chroma (must divide by 4)")]
     Width(usize),
 }
 

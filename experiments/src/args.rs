@@ -40,7 +40,7 @@ pub enum Command {
 pub enum ResultCommand {
     /// Errors of identified parameters (the paper's in-domain table) and coverage.
     Sysid(ResultArgs),
-    /// Telling ropes outside the parameter ranges from those inside.
+    /// Detection of ropes outside the parameter ranges.
     SysidOod(ResultArgs),
     /// Errors of identified parameters with each of the paper's nine wiggles.
     WiggleAblation(ResultArgs),
@@ -50,7 +50,7 @@ pub enum ResultCommand {
     SimPipeline(ResultArgs),
     /// Success of lobs and drapes planned with identified parameters.
     LobDrape(ResultArgs),
-    /// Strikes planned for every rope it might be, beside plain ones, and their forecasts.
+    /// Robust strikes compared with plain ones, and the coverage of their forecasts.
     Robust(ResultArgs),
     /// Error of strikes planned with only some parameters identified.
     ParameterImportance(ResultArgs),
@@ -126,7 +126,7 @@ pub struct BenchArgs {
     /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
     #[arg(long)]
     pub video: Option<PathBuf>,
-    /// `track`: the online tracker, which sees every frame once, in order.
+    /// `track`: the online tracker.
     #[arg(long)]
     pub live: bool,
 }

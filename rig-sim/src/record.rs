@@ -140,7 +140,7 @@ impl Record {
         if from < first.at {
             let kept_s = last.at.since_s(first.at);
             return Err(format!(
-                "the span begins before what is kept ({kept_s:.0} s); ask sooner after the throw"
+                "the span begins before what is kept ({kept_s:.0} s); request it sooner after the throw"
             ));
         }
         if to > last.at || to <= from {

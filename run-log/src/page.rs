@@ -52,13 +52,13 @@ fn show_stop(page: &mut String, stop: &Stop) {
     line(page, "by how much", &by_how_much(stop));
     line(page, "where", &place(stop));
     let asked = if stop.arm_asked_to_stop {
-        "; the arm was asked to stop"
+        "; the arm was commanded to stop"
     } else {
         ""
     };
     line(
         page,
-        "how it was met",
+        "reaction",
         &format!(
             "{}{asked}; at rest after {:.0} ms",
             stop.met,
@@ -68,7 +68,7 @@ fn show_stop(page: &mut String, stop: &Stop) {
     if let Some(second) = stop.second {
         line(
             page,
-            "on the way",
+            "while stopping",
             &format!("{second:?}: {}", second.explain()),
         );
     }

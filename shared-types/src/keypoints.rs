@@ -130,7 +130,7 @@ pub enum KeypointError {
     },
     /// A frame has another number of points or confidences than `keypoints` says.
     #[error(
-        "keypoints: frame {frame} has {found} points or confidences, `keypoints` says {expected}"
+        "keypoints: frame {frame} has {found} points or confidences, `keypoints` is {expected}"
     )]
     FrameSize {
         /// Index of the frame.

@@ -46,7 +46,7 @@ pub struct Cli {
     #[arg(long, global = true, allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// The cell: the pole on the arm, and what stands around it (TOML, as
-    /// configs/cell/lab.toml); it says only what differs. Default: the effective one.
+    /// configs/cell/lab.toml); it contains only what differs. Default: the effective one.
     #[arg(long, global = true, value_name = "FILE")]
     pub cell: Option<PathBuf>,
     /// Log more to standard error (-v info, -vv debug).
@@ -71,7 +71,7 @@ pub enum Command {
     Wiggle(WiggleArgs),
     /// Record a stereo camera as a raw film that `wag track` and `wag score` read.
     Film(FilmArgs),
-    /// Follow the rope through a video.
+    /// Track the rope through a video.
     Track(TrackArgs),
     /// Identify the rope parameters from a video or from keypoints.
     Identify(IdentifyArgs),
@@ -104,7 +104,7 @@ pub enum Command {
     /// Estimate or check the camera's extrinsics.
     #[command(subcommand)]
     Calib(CalibCommand),
-    /// Measure how punctual the controller is on this machine.
+    /// Measure the timing of the control loop on this machine.
     Bench(BenchArgs),
     /// Show the effective configuration or check files: built in, site, rig, run.
     #[command(subcommand)]
@@ -213,17 +213,17 @@ pub struct SimThrowArgs {
     pub out: PathBuf,
 }
 
-/// Camera and motion of a recorded wiggle; a run's file tells both itself.
+/// Camera and motion of a recorded wiggle; a run's file contains both.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// Camera calibration and place (camera.toml); default for a run: the one in its file.
+    /// Camera calibration and extrinsics (camera.toml); default for a run: the one in its file.
     #[arg(long)]
     pub camera: Option<PathBuf>,
     /// Motion of the clamp.
     #[command(flatten)]
     pub motion: MotionArgs,
     /// Which of a run's motions that were streamed to the arm; default: 1, the wiggle. A
-    /// demo's second one calms the rope, its third is the throw.
+    /// demo's second one damps the swing, its third is the throw.
     #[arg(long, value_name = "N", requires = "video")]
     pub part: Option<usize>,
     /// Delay of the film's clock against the motion's, as `wag track` reports it (ms).
@@ -231,7 +231,7 @@ pub struct SceneArgs {
     pub film_late_ms: f64,
 }
 
-/// How the rope's clamp moved; a run's file tells it itself.
+/// How the rope's clamp moved; a run's file contains it.
 #[derive(Debug, Args)]
 #[group(multiple = false)]
 pub struct MotionArgs {
@@ -283,7 +283,7 @@ pub struct IdentifyArgs {
     /// Observation.
     #[command(flatten)]
     pub observation: ObservationArgs,
-    /// Frames per second, for a recording that does not tell its frames' times.
+    /// Frames per second, for a recording without frame times.
     #[arg(long, value_parser = rate_hz, requires = "video")]
     pub fps: Option<f64>,
     /// Camera and motion.
@@ -321,7 +321,7 @@ pub enum PlanCommand {
 /// Arguments of `wag doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
-    /// Address or name of an arm's controller to ask too; nothing of it is changed.
+    /// Address or name of an arm's controller to check too; nothing on it is changed.
     #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
     pub address: Option<IpAddr>,
     #[command(flatten)]
@@ -371,7 +371,7 @@ pub enum ProcessName {
     Camera,
     /// Camera frames to keypoints.
     CameraIngest,
-    /// Keypoints of the rope while it is filmed, to look at.
+    /// Keypoints of the rope during filming, for display.
     Preview,
     /// Identification and planning.
     Planner,

@@ -101,7 +101,7 @@ fn ropes_outside_are_fitted_wide_and_it_is_said() {
         let (said, file) = identified(&rope, *kind);
         assert!(said.contains("outside the known ranges"), "{kind}: {said}");
         assert!(
-            said.contains("by a search that knows no ranges"),
+            said.contains("by a search without ranges"),
             "{kind}: {said}"
         );
         assert_eq!(

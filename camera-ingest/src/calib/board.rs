@@ -29,7 +29,7 @@ pub enum BoardError {
     Source(#[from] SourceError),
     /// The board was not found.
     #[error(
-        "the board was found by both eyes in none of {frames} frames (at best {most} corners, \
+        "the board was found in both images in none of {frames} frames (at best {most} corners, \
          {least} are needed); show it whole, flat and lit, and check rows, columns and dictionary",
         least = MIN_CORNERS
     )]
@@ -86,7 +86,7 @@ impl Board {
         board.detector().map_err(fail)?;
         let r = board.rotation();
         if (r * r.transpose() - Matrix3::identity()).norm() > 1e-3 || r.determinant() < 0.0 {
-            return Err(fail("pose.rotation is no rotation matrix".to_owned()));
+            return Err(fail("pose.rotation is not a rotation matrix".to_owned()));
         }
         Ok(board)
     }

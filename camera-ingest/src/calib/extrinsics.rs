@@ -51,7 +51,7 @@ pub struct Residual {
 pub enum ExtrinsicsError {
     /// Too few points.
     #[error(
-        "camera pose: {found} points are seen by both eyes, at least {LEAST_POINTS} are needed"
+        "camera pose: {found} points are seen in both images, at least {LEAST_POINTS} are needed"
     )]
     TooFew {
         /// Points given.

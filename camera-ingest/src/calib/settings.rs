@@ -65,7 +65,7 @@ fn check_place(times_s: [f64; 2], r: &Matrix3<f64>, position_m: &[f64; 3]) -> Re
     let off = (r * r.transpose() - Matrix3::identity()).norm();
     if !(off < 1e-3 && r.determinant() > 0.0) {
         return Err(format!(
-            "extrinsics.rotation is no rotation matrix (R R^T differs from 1 by {off:.2e}, \
+            "extrinsics.rotation is not a rotation matrix (R R^T differs from 1 by {off:.2e}, \
              determinant {:.3}); give the 3x3 rows of camera to world",
             r.determinant()
         ));
@@ -83,7 +83,7 @@ fn check_place(times_s: [f64; 2], r: &Matrix3<f64>, position_m: &[f64; 3]) -> Re
 pub fn check_camera(camera: &StereoCamera) -> Result<(), String> {
     let sizes = [camera.width_px, camera.height_px];
     if sizes.iter().any(|px| !(16..=10_000).contains(px)) {
-        return Err(format!("an eye of {} x {} px", sizes[0], sizes[1]));
+        return Err(format!("an image of {} x {} px", sizes[0], sizes[1]));
     }
     for eye in [&camera.left, &camera.right] {
         let focal = [eye.fx, eye.fy];
@@ -98,7 +98,7 @@ pub fn check_camera(camera: &StereoCamera) -> Result<(), String> {
     let r = &camera.r_right_left;
     let apart = camera.t_right_left_m.norm();
     if !((r * r.transpose() - Matrix3::identity()).norm() < 1e-3 && apart.is_finite()) {
-        return Err("the right eye's place is none".to_owned());
+        return Err("the right camera's pose is invalid".to_owned());
     }
     let times_s = [camera.exposure_s, camera.line_time_s];
     check_place(times_s, &camera.r_w_cam, &camera.p_w_cam_m.into())

@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, right: Option<&Path>, mode: VideoMode) -> Result
     }
     let r = eyes.r_right_left;
     if (r * r.transpose() - Matrix3::identity()).norm() > 1e-3 {
-        return Err(file.bad("the rotation between the eyes is no rotation matrix"));
+        return Err(file.bad("the rotation between left and right is not a rotation matrix"));
     }
     Ok(eyes)
 }
@@ -153,7 +153,7 @@ fn ros(file: &YamlFile, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, C
         }
         None => {
             return Err(file.bad(
-                "which file is the right eye's? name it in camera.toml as `calibration_right`",
+                "the right camera's file is unknown; name it in camera.toml as `calibration_right`",
             ));
         }
     };

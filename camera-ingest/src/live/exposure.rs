@@ -75,7 +75,7 @@ impl Sensor {
         let most = most_exposure(rate_hz);
         if !(LEAST_EXPOSURE..=most).contains(&self.exposure_raw) {
             return Err(format!(
-                "exposure_raw is {}, at {rate_hz} frames a second it must be {LEAST_EXPOSURE} to \
+                "exposure_raw is {}, at {rate_hz} frames per second it must be {LEAST_EXPOSURE} to \
                  {most}",
                 self.exposure_raw
             ));

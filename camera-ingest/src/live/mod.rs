@@ -132,7 +132,7 @@ pub enum LiveError {
         remedy: &'static str,
     },
     /// The driver granted something else than was asked.
-    #[error("camera {device}: {what}: {asked} asked for, {granted} granted; {remedy}")]
+    #[error("camera {device}: {what}: {asked} requested, {granted} granted; {remedy}")]
     Granted {
         /// Device concerned.
         device: PathBuf,
@@ -154,7 +154,7 @@ pub enum LiveError {
         reason: String,
     },
     /// It is gone.
-    #[error("camera {device} was unplugged after {frames} frames; look at plug, cable and power")]
+    #[error("camera {device} was unplugged after {frames} frames; check plug, cable and power")]
     Unplugged {
         /// Device concerned.
         device: PathBuf,
@@ -164,7 +164,7 @@ pub enum LiveError {
     /// No good frame for too long.
     #[error(
         "camera {device}: no good frame for {waited_ms} ms (after {frames} good ones; {} missed, {} \
-         damaged, {} short, {} out of order); look at cable and USB port", losses.missed,
+         damaged, {} short, {} out of order); check cable and USB port", losses.missed,
         losses.damaged, losses.short, losses.unordered
     )]
     Silent {

@@ -47,12 +47,12 @@ impl Setup<'_> {
             device: self.settings.device.clone(),
             reason,
             remedy: "name the camera's own /dev/videoN (`ls -l /dev/v4l/by-id`); its second one \
-                     holds notes about frames, no frames",
+                     holds metadata of frames, not frames",
         };
         let identity = match self.device.identity() {
             Ok(identity) => identity,
             Err(e) if e.raw_os_error() == Some(libc::ENOTTY) => {
-                return Err(unfit("it is no video device".to_owned()));
+                return Err(unfit("it is not a video device".to_owned()));
             }
             Err(e) => return Err(self.refused("asking what it is", e)),
         };
@@ -105,7 +105,7 @@ impl Setup<'_> {
             "picture",
             name(&wanted),
             name(&granted),
-            "choose a mode that the camera has (at USB 2 only VGA), both eyes side by side",
+            "choose a mode that the camera has (at USB 2 only VGA), both images side by side",
         ))
     }
 
@@ -123,7 +123,7 @@ impl Setup<'_> {
             // Tenths of a per cent are rounding: 1/60 may be granted as 166666/9999960.
             Some([n, d]) if n > 0 && d.abs_diff(n.saturating_mul(rate_hz)) <= d / 1000 => Ok(()),
             _ => Err(self.granted(
-                "frames a second",
+                "frames per second",
                 rate_hz.to_string(),
                 name,
                 "choose a rate that the camera has in this mode",

@@ -363,12 +363,13 @@ fn what_the_driver_grants_is_checked() {
     for (grant, said) in grants {
         let message = refusal(settings(), |d| d.grant = grant);
         assert!(
-            message.contains(said) && message.contains("1344x376 YUYV in rows of 2688 bytes asked"),
+            message.contains(said)
+                && message.contains("1344x376 YUYV in rows of 2688 bytes requested"),
             "{message}"
         );
     }
     for (rate, said) in [
-        (Some([1, 30]), "60 asked for, 30/1 granted"),
+        (Some([1, 30]), "60 requested, 30/1 granted"),
         (Some([0, 0]), "0/0 granted"),
         (None, "cannot be chosen granted"),
     ] {
@@ -380,7 +381,7 @@ fn what_the_driver_grants_is_checked() {
         .0
         .unwrap();
     let few = refusal(settings(), |d| d.granted_buffers = 2);
-    assert!(few.contains("buffers: 6 asked for, 2 granted"), "{few}");
+    assert!(few.contains("buffers: 6 requested, 2 granted"), "{few}");
 }
 
 #[test]
@@ -391,7 +392,7 @@ fn what_is_no_camera_says_so() {
         "{metadata}"
     );
     for (call, code, said) in [
-        ("identity", libc::ENOTTY, "no video device"),
+        ("identity", libc::ENOTTY, "not a video device"),
         ("format", libc::EBUSY, "another program uses it"),
         ("buffers", libc::EBUSY, "another program uses it"),
         ("stream", libc::ENOSPC, "starting the stream failed"),
@@ -424,7 +425,10 @@ fn a_device_of_this_machine_is_opened_or_named() {
         "{missing}"
     );
     let null = open("/dev/null");
-    assert!(null.contains("/dev/null: it is no video device"), "{null}");
+    assert!(
+        null.contains("/dev/null: it is not a video device"),
+        "{null}"
+    );
     let denied = cannot_open(
         Path::new("/dev/video7"),
         io::ErrorKind::PermissionDenied.into(),
@@ -491,12 +495,12 @@ fn settings_out_of_range_are_named() {
     for (settings, said) in [
         (
             long,
-            "exposure_raw is 881, at 60 frames a second it must be 2 to 880",
+            "exposure_raw is 881, at 60 frames per second it must be 2 to 880",
         ),
         (gap, "sensor_gain_raw is 300"),
         (alone, "needs exposure_raw"),
         (still, "rate_hz is 0"),
-        (gain, "gain: 9 asked for, 8 granted"),
+        (gain, "gain: 9 requested, 8 granted"),
     ] {
         let message = refusal(settings, |_| {});
         assert!(message.contains(said), "{message}");

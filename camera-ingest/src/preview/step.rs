@@ -120,7 +120,7 @@ impl Preview {
         self.seen += 1;
         if let Some(last) = self.last {
             if sequence <= last.sequence || stamp_ns <= last.stamp_ns {
-                self.begin_anew("the camera began anew");
+                self.begin_anew("the camera restarted");
             } else {
                 self.skipped += sequence - last.sequence - 1;
                 if stamp_ns - last.stamp_ns > PAUSE_NS {
@@ -135,7 +135,7 @@ impl Preview {
     fn begin_anew(&mut self, why: &'static str) {
         if self.attempt.take().is_some() {
             self.restarts = self.restarts.saturating_add(1);
-            tracing::info!("begins anew: {why}");
+            tracing::info!("restarts: {why}");
         }
         self.tracker.begin_anew();
     }
@@ -170,13 +170,13 @@ impl Preview {
         let stamp_ns = frame.stamp_ns;
         let clamp = self.arm.newest().copied();
         let Some(clamp) = clamp.filter(|_| self.arm.is_known_at(stamp_ns)) else {
-            self.begin_anew("nobody tells where the arm is");
+            self.begin_anew("the arm's pose is unknown");
             return (PreviewState::NoArm, None);
         };
         match self.outdated(stamp_ns) {
             Some((Forget::Rope, why)) if self.tracker.knows_scene() => {
                 self.restarts = self.restarts.saturating_add(1);
-                tracing::info!("looks for the rope anew: {why}");
+                tracing::info!("detects the rope again: {why}");
                 self.learn_anew(stamp_ns, clamp);
             }
             Some((_, why)) => self.begin_anew(why),

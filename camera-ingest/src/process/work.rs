@@ -52,7 +52,7 @@ fn try_track(
     };
     let frames = recording
         .left()
-        .ok_or("nothing is recorded for tracking; record first, left eye only")?;
+        .ok_or("nothing is recorded for tracking; record first, left image only")?;
     let progress = Progress {
         done: 0,
         total: 1,
@@ -136,7 +136,7 @@ fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<Camera
         return Err("not a request to score".into());
     };
     if !recording.has_both() {
-        return Err("nothing is recorded for scoring; record first, both eyes".into());
+        return Err("nothing is recorded for scoring; record first, both images".into());
     }
     // The picture is worth having even when the score fails.
     let found = measure(recording, camera, *tip_rgb, *target_rgb);

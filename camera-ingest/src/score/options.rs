@@ -42,7 +42,7 @@ pub enum ScoreError {
     },
     /// Frames differ from the camera's size.
     #[error(
-        "score: frame {frame} is {found:?} px per eye, the camera's mode gives {expected:?}; is the \
+        "score: frame {frame} is {found:?} px per image, the camera's mode gives {expected:?}; is the \
          `mode` in camera.toml the one recorded?"
     )]
     Size {
@@ -65,7 +65,7 @@ pub enum ScoreError {
     },
     /// Not found in enough frames.
     #[error(
-        "score: the {what} was seen by both eyes in {seen} frames, at least {least} are needed; \
+        "score: the {what} was detected in both images of {seen} frames, at least {least} are needed; \
          check its colour and the light"
     )]
     NotSeen {

@@ -144,9 +144,9 @@ fn what_cannot_be_scored_says_why() {
     let grey = run(&mut frames, [90, 92, 90], TARGET_RGB);
     assert!(grey.contains("tip") && grey.contains("grey"), "{grey}");
     let no_target = run(&mut frames, TIP_RGB, [20, 40, 250]);
-    assert!(no_target.contains("target was seen"), "{no_target}");
+    assert!(no_target.contains("target was detected"), "{no_target}");
     let no_tip = run(&mut frames, [20, 40, 250], TARGET_RGB);
-    assert!(no_tip.contains("tip was seen"), "{no_tip}");
+    assert!(no_tip.contains("tip was detected"), "{no_tip}");
     frames.truncate(3);
     assert!(run(&mut frames, TIP_RGB, TARGET_RGB).contains("3 frames"));
 }

@@ -38,7 +38,7 @@ pub enum SourceError {
         source: FrameError,
     },
     /// No such frame.
-    #[error("video {path}: frame {frame} asked for, but it has {len}")]
+    #[error("video {path}: frame {frame} requested, but it has {len}")]
     OutOfRange {
         /// File concerned.
         path: PathBuf,
@@ -47,7 +47,7 @@ pub enum SourceError {
         /// Number of frames.
         len: usize,
     },
-    /// Nothing tells when the frames were taken, or two things do.
+    /// The frame times are unknown, or given twice.
     #[error("video {path}: {reason}")]
     Times {
         /// File or folder concerned.

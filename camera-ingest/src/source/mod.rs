@@ -30,22 +30,22 @@ pub use yuyv::YuyvSource;
 /// place of the header's. It must be positive.
 ///
 /// # Errors
-/// A file is missing, truncated or of another kind, or a run's file, which has one eye
-/// only; nothing tells when the frames were taken, or both a CSV and `rate_hz` do.
+/// A file is missing, truncated or of another kind, or a run's file, which has the left image
+/// only; the frame times are unknown, or given both by a CSV and by `rate_hz`.
 pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSource>, SourceError> {
     let device = |m: std::fs::Metadata| m.file_type().is_char_device();
     if std::fs::metadata(path).is_ok_and(device) {
         return Err(SourceError::Container {
             path: path.to_owned(),
-            reason: "it is a device, no recording".to_owned(),
+            reason: "it is a device, not a recording".to_owned(),
             remedy: "record a camera first, with `wag film`",
         });
     }
     if let Some(path) = run_file(path) {
         return Err(SourceError::Container {
             path,
-            reason: "it is a run's file, which holds the left eye only".to_owned(),
-            remedy: "use the recording of both eyes; `wag track` and `wag identify` take a \
+            reason: "it is a run's file, which holds the left image only".to_owned(),
+            remedy: "use the recording of both images; `wag track` and `wag identify` take a \
                      run's file",
         });
     }

@@ -41,17 +41,17 @@ pub(super) fn beside(
         (false, Some(hz)) => Ok(even(frames, 1e9 / hz)),
         (true, Some(hz)) => Err(times(twice(csv, hz))),
         (false, None) => Err(times(format!(
-            "nothing tells when its frames were taken; give the frame rate, or put {} there with \
+            "its frame times are unknown; give the frame rate, or put {} there with \
              rows `frame,sequence,monotonic_ns`",
             csv.display()
         ))),
     }
 }
 
-/// The frame rate is told twice.
+/// The frame rate is given twice.
 pub(super) fn twice(csv: &Path, rate_hz: f64) -> String {
     format!(
-        "{} tells when its frames were taken; leave out the frame rate of {rate_hz} a second",
+        "{} contains its frame times; leave out the frame rate of {rate_hz} per second",
         csv.display()
     )
 }

@@ -44,7 +44,7 @@ impl YuyvSource {
     pub fn open_named(path: &Path, rate_hz: Option<f64>) -> Result<Self, SourceError> {
         let size_px = size_in_name(path).ok_or_else(|| SourceError::Container {
             path: path.to_owned(),
-            reason: "its name does not end in the size of both eyes together, as in \
+            reason: "its name does not end in the size of both images together, as in \
                      `wiggle_1344x376.yuyv`"
                 .to_owned(),
             remedy: "rename it",
@@ -83,10 +83,10 @@ fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), Sourc
         _ => Err(SourceError::Container {
             path: path.to_owned(),
             reason: format!(
-                "{bytes} bytes are no whole number of {}x{} YUYV frames ({frame} bytes each)",
+                "{bytes} bytes are not a whole number of {}x{} YUYV frames ({frame} bytes each)",
                 size_px[0], size_px[1]
             ),
-            remedy: "give the size of both eyes together, or copy the file again",
+            remedy: "give the size of both images together, or copy the file again",
         }),
     }
 }

@@ -104,7 +104,7 @@ impl State {
         let damaged = || {
             TrainingError::bad_file(
                 path,
-                "not a checkpoint, or damaged: remove it to begin anew",
+                "not a checkpoint, or damaged: remove it to start over",
             )
         };
         let (body, checksum) = bytes.split_last_chunk::<4>().ok_or_else(damaged)?;
@@ -122,7 +122,7 @@ impl State {
             Ok::<_, TrainingError>(part.to_vec())
         };
         let progress: Progress = serde_json::from_slice(&part()?).map_err(|error| {
-            let reason = format!("written by another version ({error}): remove it to begin anew");
+            let reason = format!("written by another version ({error}): remove it to start over");
             TrainingError::bad_file(path, reason)
         })?;
         let record = ModuleRecord::from_bytes(Bytes::from_bytes_vec(part()?)).map_err(tensors)?;

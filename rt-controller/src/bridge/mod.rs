@@ -380,7 +380,7 @@ impl Bridge {
             .any(|open| matches!(open, Open::Motion { .. }));
         if fault == FaultCode::OperatorStop && !moved {
             // How every session ends: nothing moved, nothing is wrong.
-            tracing::info!(cycle, "told to stop at rest");
+            tracing::info!(cycle, "commanded to stop at rest");
         } else {
             tracing::warn!(?fault, cycle, arm_error = %self.arm_error, "stopped");
         }

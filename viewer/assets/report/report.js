@@ -8,9 +8,9 @@ function head() {
   const s = data.summary || {};
   document.title = "wag report: " + data.run;
   byId("title").textContent = data.run;
-  const told = [s.command, s.task, s.seed !== undefined && "seed " + s.seed,
-    s.ok === true ? "ended well" : s.ok === false ? "did not end well" : null, s.error].filter(Boolean);
-  byId("subtitle").textContent = told.map(String).join(" · ");
+  const head = [s.command, s.task, s.seed !== undefined && "seed " + s.seed,
+    s.ok === true ? "succeeded" : s.ok === false ? "failed" : null, s.error].filter(Boolean);
+  byId("subtitle").textContent = head.map(String).join(" · ");
   byId("footer").textContent = `Made by wag ${data.version} from the run folder alone.`;
   if (data.cause) { byId("stopped").hidden = false; byId("cause").textContent = data.cause; }
 }
@@ -31,7 +31,7 @@ function limits() {
   if (data.explanation) {
     byId("limitnote").textContent = `${data.explanation.cycles} cycles in ${data.explanation.duration_s.toFixed(1)} s; ` +
       (data.explanation.stopped ? "the arm was stopped." : "the arm was not stopped.") +
-      data.explanation.flaws.map((f) => " The recording is not whole: " + f + ".").join("");
+      data.explanation.flaws.map((f) => " The recording is incomplete: " + f + ".").join("");
     fill(byId("margins"), [["as commanded", "used", "value", "allowed", "unit", "joint"],
       ...found.map((m) => [m.what, (100 * m.part).toFixed(1) + " %", short(m.value), short(m.limit), m.unit, m.joint || "–"])]);
   }
@@ -53,8 +53,8 @@ function rope() {
 function loop() {
   if (!data.latency.length) return hide("loop");
   byId("latency").replaceChildren(...data.latency.map((h) => make("figure", {}, bars(h),
-    make("figcaption", {}, `${h.name}: ${h.cycles} cycles, half at most ${h.p50_us.toFixed(0)} µs, 99 % at most ` +
-      `${h.p99_us.toFixed(0)} µs, the longest ${h.max_us.toFixed(0)} µs`))));
+    make("figcaption", {}, `${h.name}: ${h.cycles} cycles, median ${h.p50_us.toFixed(0)} µs, p99 ` +
+      `${h.p99_us.toFixed(0)} µs, max ${h.max_us.toFixed(0)} µs`))));
 }
 
 function film() {
@@ -74,7 +74,7 @@ function rest() {
 function joints(scene) {
   const j = scene.joints, measured = j.measured[0].length > 0;
   byId("jointnote").textContent = `Dashed: ${j.wanted_is}. ` + (measured
-    ? "Solid: measured. What is between them is mostly how late the arm follows." : "Nothing was measured.");
+    ? "Solid: measured. The difference is mostly the arm's lag." : "Nothing was measured.");
   byId("joints").replaceChildren(...j.wanted.map((wanted, i) => {
     const apart = Math.max(0, ...j.measured[i].map((v, k) => Math.abs(v - wanted[k])));
     return make("figure", {}, curves(j.t_s, [
@@ -114,9 +114,9 @@ function replay() {
     scene = data.scenes[index];
     slider.max = scene.arm.length - 1;
     [...byId("scenes").children].forEach((b, i) => b.setAttribute("aria-pressed", String(i === index)));
-    byId("viewnote").textContent = "Drag to turn, wheel or two fingers to come nearer. " +
-      (scene.rope.length ? "The rope is the identified one, simulated under the joints of the run from hanging still. Green: way of the tip. " : "") +
-      (scene.planned_tip.length ? "Orange: way of the tip as planned." : "") +
+    byId("viewnote").textContent = "Drag to rotate, scroll or pinch to zoom. " +
+      (scene.rope.length ? "The rope is the identified one, simulated from rest under the joints of the run. Green: tip path. " : "") +
+      (scene.planned_tip.length ? "Orange: planned tip path." : "") +
       (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
     joints(scene);
     show(0);

@@ -11,7 +11,7 @@ const watched = { states: 0, drawn: 0, pictures: 0, last: null };
 let tips = [], shownAsks = "", shownController = "";
 
 function controller(c) {
-  // Rows that stay the same are not laid out anew.
+  // Rows that stay the same are not laid out again.
   const now = JSON.stringify({ ...c, cycle: 0 });
   if (now === shownController) {
     if (c) byId("controller").rows[6].cells[1].textContent = c.cycle;
@@ -19,7 +19,7 @@ function controller(c) {
   }
   shownController = now;
   if (!c) return fill(byId("controller"), [["controller", "none"]]);
-  const stop = c.stop ? `${words(c.stop.code)} in cycle ${c.stop.cycle}${c.stop.latched ? ", latched" : ", acknowledged"}: ${c.stop.words}` : "none since this page looks";
+  const stop = c.stop ? `${words(c.stop.code)} in cycle ${c.stop.cycle}${c.stop.latched ? ", latched" : ", acknowledged"}: ${c.stop.words}` : "none since this page was opened";
   fill(byId("controller"), [["controller", c.alive ? "running" : "silent"], ["mode", words(c.mode)], ["armed for", c.operating_mode ? words(c.operating_mode) : "nothing"],
     ["operator", c.operator ? "present" : "none"], ["last stop", stop],
     ["real-time priority and locked memory", c.real_time ? "yes" : "no"], ["cycle", String(c.cycle)]]);
@@ -27,12 +27,12 @@ function controller(c) {
 
 async function ask(name, button) {
   button.disabled = true;
-  byId("answer").textContent = `${WORDS[name]}: asked`;
+  byId("answer").textContent = `${WORDS[name]}: requested`;
   try {
     const answer = await fetch("ask/" + name, { method: "POST" });
     byId("answer").textContent = `${WORDS[name]}: ${await answer.text()}`;
   } catch {
-    byId("answer").textContent = `${WORDS[name]}: this page lost its server; use the emergency stop`;
+    byId("answer").textContent = `${WORDS[name]}: connection to the server lost; use the emergency stop`;
   }
   button.disabled = false;
 }
@@ -54,17 +54,17 @@ function asks(list) {
 }
 
 function jitter(histograms, missed) {
-  byId("loopnote").textContent = `The last ten seconds. Missed since this page looks: ${missed}.`;
+  byId("loopnote").textContent = `The last ten seconds. Missed since this page was opened: ${missed}.`;
   byId("jitter").replaceChildren(...histograms.map((h) => make("figure", {}, bars(h),
-    make("figcaption", {}, `${h.name}: half at most ${h.p50_us.toFixed(0)} µs, 99 % at most ` +
-      `${h.p99_us.toFixed(0)} µs, the longest ${h.max_us.toFixed(0)} µs`))));
+    make("figcaption", {}, `${h.name}: median ${h.p50_us.toFixed(0)} µs, p99 ` +
+      `${h.p99_us.toFixed(0)} µs, max ${h.max_us.toFixed(0)} µs`))));
 }
 
 function draw(s) {
   byId("title").textContent = s.title;
   byId("note").textContent = s.note;
   view.show({ cell: s.cell, arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
-  byId("viewnote").textContent = `Drag to turn, wheel or two fingers to come nearer. Rope: ${s.rope_is || "none"}.` +
+  byId("viewnote").textContent = `Drag to rotate, scroll or pinch to zoom. Rope: ${s.rope_is || "none"}.` +
     (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
   controller(s.controller);
   asks(s.asks);
@@ -84,7 +84,7 @@ function show(s) {
   watched.last = s;
 }
 
-/** Draws what a picture's header tells over it. */
+/** Draws the contents of a picture's header over it. */
 function over(c, o) {
   const at = ([u, v]) => [(u + 0.5) / o.scale, (v + 0.5) / o.scale];
   c.fillStyle = "#ffd400";
@@ -124,5 +124,5 @@ async function pictures() {
 
 const events = new EventSource("state");
 events.onmessage = (e) => show(JSON.parse(e.data));
-events.onerror = () => { byId("note").textContent = "this page lost its server; what it shows is old, and its buttons do nothing"; };
+events.onerror = () => { byId("note").textContent = "connection to the server lost; what is shown is outdated, and the buttons do nothing"; };
 pictures();

@@ -111,7 +111,7 @@ pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: &Present) -> Optio
         (None, None) => Err(anyhow::anyhow!("no controller runs")),
         (None, Some(bus)) => RpcClient::<ControllerRpc>::open(bus)
             .and_then(|client| Ok((client.call(&asked.ask.request())?, client)))
-            .context("the controller cannot be asked; use the emergency stop"),
+            .context("the controller cannot be reached; use the emergency stop"),
     };
     match sent {
         Ok((pending, client)) => Some(Open {

@@ -158,7 +158,7 @@ impl Watcher {
     }
 
     fn pass_on(&mut self, asked: Asked) {
-        tracing::info!(ask = asked.ask.name(), "asked for by a page");
+        tracing::info!(ask = asked.ask.name(), "requested by a page");
         let bus = self.attached.as_ref().map(Attached::bus);
         self.open.extend(hand_over(asked, bus, &self.present));
     }
@@ -198,7 +198,7 @@ impl Watcher {
             armed: seen.is_some_and(|s| s.state.operating_mode != 0),
         };
         if let Err(error) = self.listen(search) {
-            tracing::warn!("connecting anew: {error:#}");
+            tracing::warn!("reconnecting: {error:#}");
             self.end();
             self.attached = None;
             return self.snapshot(None);

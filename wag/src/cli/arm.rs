@@ -29,7 +29,7 @@ pub struct ArmArgs {
     #[command(flatten)]
     pub ports: ArmPorts,
     /// The area is clear and the emergency stop is in reach. Asked for at any
-    /// address that is not this machine unless given here.
+    /// address that is not this machine unless this is given.
     #[arg(long, alias = "confirm")]
     pub yes: bool,
     /// Limits of the arm; default: the built-in xArm 7.
@@ -48,10 +48,10 @@ pub struct ArmArgs {
 /// Arguments of `wag wiggle`.
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
-    /// Report how well it identifies ropes of the ranges, beside the paper's wiggle.
+    /// Report how well it identifies ropes of the ranges, compared with the paper's wiggle.
     #[arg(long)]
     pub evaluate: bool,
-    /// Search the most informative wiggle within the limits and report how well it does.
+    /// Search for the most informative wiggle within the limits and report how well it does.
     #[arg(long)]
     pub optimise: bool,
     /// Seed of the ropes a wiggle is judged by.
@@ -95,7 +95,7 @@ pub struct LatencyArgs {
     pub joints: Vec<u8>,
     /// Shape of the motion (TOML); default: the built-in one. In its pose the tool is
     /// far from the axes of joints 1 and 3, which the allowed tool speed then keeps
-    /// too slow to be measured: `pose_rad` names another.
+    /// too slow to be measured: set another with `pose_rad`.
     #[arg(long, value_name = "FILE")]
     pub excitation: Option<PathBuf>,
     /// Seed of the phases the motion begins with; default: the motion's own.
@@ -119,7 +119,7 @@ pub struct RigArgs {
     /// Command port; 0 takes any free one.
     #[arg(long, default_value_t = 502)]
     pub command_port: u16,
-    /// Report ports in the place of 30000,30001,30002,30003; 0 takes any free one.
+    /// Report ports instead of 30000,30001,30002,30003; 0 takes any free one.
     #[arg(
         long,
         value_delimiter = ',',

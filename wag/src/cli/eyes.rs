@@ -11,7 +11,7 @@ pub struct FilmArgs {
     /// The camera, /dev/videoN.
     #[arg(long)]
     pub device: PathBuf,
-    /// Picture size of an eye: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
+    /// Size of one image: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
     #[arg(long, value_enum, default_value_t = ModeName::Vga)]
     pub mode: ModeName,
     /// Frames per second.
@@ -20,10 +20,10 @@ pub struct FilmArgs {
     /// Frames to record.
     #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..=36_000))]
     pub frames: u64,
-    /// The camera's ordinary control for gain.
+    /// The camera's standard gain control.
     #[arg(long)]
     pub gain: Option<i32>,
-    /// Exposure in the sensor's own units; ends automatic exposure (ZED only).
+    /// Exposure in the sensor's own units; disables automatic exposure (ZED only).
     #[arg(long)]
     pub exposure_raw: Option<u32>,
     /// Gain in the sensor's own units (ZED only).
@@ -78,18 +78,18 @@ pub struct TrackArgs {
     pub out: PathBuf,
 }
 
-/// Learned models in the place of parts of the tracker.
+/// Learned models instead of parts of the tracker.
 #[derive(Debug, Args)]
 pub struct ModelArgs {
     /// ONNX segmenter for the first frame's mask, instead of the one camera.toml names
     /// or the built-in one.
     #[arg(long, value_name = "ONNX")]
     pub segmenter: Option<PathBuf>,
-    /// ONNX point tracker for following the rope, instead of the one camera.toml names
+    /// ONNX point tracker, instead of the one camera.toml names
     /// or the built-in one.
     #[arg(long, value_name = "ONNX")]
     pub tracker: Option<PathBuf>,
-    /// Where the lead's centre hangs in the first frame of the left eye (pixel U,V): a
+    /// Centre of the lead in the first frame of the left image (pixel U,V): a
     /// prompt for the segmenter.
     #[arg(long, value_name = "U,V")]
     pub lead_px: Option<Pixel>,
@@ -165,7 +165,7 @@ pub struct CalibCheckArgs {
     /// What the camera is shown.
     #[command(flatten)]
     pub shown: ShownArgs,
-    /// Largest residual that passes (px, RMS over both eyes).
+    /// Largest residual that passes (px, RMS over both images).
     #[arg(long, default_value_t = 2.0)]
     pub limit_px: f64,
 }

@@ -16,16 +16,16 @@ pub struct LedgerArgs {
     /// Run folders, or folders of them; default: runs.
     #[arg(value_name = "FOLDER")]
     pub places: Vec<PathBuf>,
-    /// Only runs that ended so.
+    /// Only runs with this outcome.
     #[arg(long, value_parser = results())]
     pub result: Option<RunResult>,
-    /// Only runs of this command, as `demo`.
+    /// Only runs of this command, such as `demo`.
     #[arg(long, value_name = "NAME")]
     pub command: Option<String>,
     /// Only runs of this seed.
     #[arg(long, value_name = "SEED", allow_negative_numbers = true, value_parser = seed)]
     pub seed_is: Option<u64>,
-    /// Only runs of the plan whose hash begins so.
+    /// Only runs of the plan whose hash has this prefix.
     #[arg(long, value_name = "HASH")]
     pub plan: Option<String>,
     /// Write the list as CSV too.
@@ -60,7 +60,7 @@ pub struct LedgerCompareArgs {
 pub struct LedgerRerunArgs {
     /// Run folder.
     pub run: PathBuf,
-    /// Execute it. An arm that is no simulation asks again whether its area is clear.
+    /// Execute it. A real arm asks for confirmation again that its area is clear.
     #[arg(long)]
     pub go: bool,
 }

@@ -26,7 +26,7 @@ pub struct BenchArgs {
 /// Benchmarks known by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BenchName {
-    /// The control loop: wake-up error beside `cyclictest`, times within a cycle.
+    /// The control loop: wake-up latency compared with `cyclictest`, times within a cycle.
     Rt,
     /// Recording: times within a control cycle without and with the recorder.
     Record,

@@ -77,7 +77,7 @@ fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<S
 
 fn told(residual: &Residual) -> String {
     format!(
-        "{} points in both eyes, {:.2} px RMS (worst {:.2} px, {:.2} px between the eyes)",
+        "{} points in both images, {:.2} px RMS (max {:.2} px, epipolar {:.2} px)",
         residual.points, residual.rms_px, residual.worst_px, residual.epipolar_px
     )
 }
@@ -93,7 +93,7 @@ fn extrinsics(args: &ExtrinsicsArgs, quiet: bool) -> Outcome<Option<Value>> {
     stage.done(&told(&found.residual));
     if !quiet {
         println!(
-            "left eye at ({:.4}, {:.4}, {:.4}) m, give or take {:.1} mm and {:.2} degrees",
+            "left camera at ({:.4}, {:.4}, {:.4}) m, standard error {:.1} mm and {:.2} degrees",
             p.x,
             p.y,
             p.z,

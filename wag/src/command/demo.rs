@@ -195,9 +195,9 @@ impl<'a> Demo<'a> {
         stage.say("waiting for the rope to hang still");
         let still = pipeline::wait_still(self.session, &self.camera, STILL_S)?;
         self.record.stages.bringup_s = stage.done(if still {
-            "arm enabled and armed (simulated: nobody asked), rope hangs still"
+            "arm enabled and armed (simulated: no confirmation needed), rope hangs still"
         } else {
-            "arm enabled, rope still sways a little"
+            "arm enabled, rope still swings a little"
         });
         Ok(())
     }
@@ -315,7 +315,7 @@ impl<'a> Demo<'a> {
         self.record.calm = Some(calmed);
         self.record.arm_lag_s = arm_lag_s;
         self.record.stages.calm_s = stage.done(&format!(
-            "sway {:.1} cm -> {:.1} cm",
+            "swing {:.1} cm -> {:.1} cm",
             100.0 * calmed.plain_sway_m,
             100.0 * calmed.calm_sway_m
         ));

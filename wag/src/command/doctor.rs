@@ -35,7 +35,7 @@ pub fn run(args: &DoctorArgs, quiet: bool) -> Outcome<Option<Value>> {
         output::object(&value);
     }
     Err(Failure::failed(anyhow!(
-        "{failed} of {} checks failed; what to do stands beside each",
+        "{failed} of {} checks failed; remedies are listed above",
         findings.len()
     )))
 }

@@ -135,7 +135,7 @@ fn in_words(ambiguity: &Ambiguity) -> String {
 /// What a person should know beside the numbers.
 fn print_remarks(estimate: &RopeEstimate) {
     for ambiguity in &estimate.posterior.ambiguities {
-        println!("not told apart by the film: {}", in_words(ambiguity));
+        println!("the film cannot separate {}", in_words(ambiguity));
     }
     if estimate.novelty.is_outside() {
         println!(
@@ -146,9 +146,9 @@ fn print_remarks(estimate: &RopeEstimate) {
         );
     }
     if estimate.method.as_str() == planner::sysid::WIDE {
-        println!("it was fitted again, by a search that knows no ranges");
+        println!("it was fitted again, by a search without ranges");
     } else if estimate.novelty.is_outside() {
-        println!("--method hybrid fits it again by a search that knows no ranges");
+        println!("--method hybrid fits it again by a search without ranges");
     }
 }
 

@@ -59,7 +59,7 @@ fn check_lead(lead_px: Option<[f64; 2]>, read: bool, camera: &StereoCamera) -> O
     }
     if !camera.contains([u, v]) {
         return Err(Failure::input(anyhow!(
-            "--lead-px {u},{v} lies outside the left eye's {}x{} px",
+            "--lead-px {u},{v} lies outside the left image's {}x{} px",
             camera.width_px,
             camera.height_px
         )));

@@ -117,7 +117,7 @@ fn fault(plan: &Plan) -> Option<String> {
 fn miss(predicted_error_m: f64) -> Option<String> {
     (predicted_error_m > MISS_WARN_M).then(|| {
         format!(
-            "the tip is predicted to miss the target by {:.1} cm; try another --seed or a target nearer to the middle of the reach",
+            "the tip is predicted to miss the target by {:.1} cm; try another --seed or a target closer to the middle of the reach",
             100.0 * predicted_error_m
         )
     })
@@ -193,7 +193,7 @@ fn reach(
 /// One line about a plan.
 pub fn describe(plan: &Plan) -> String {
     format!(
-        "predicted error {:.2} cm at {:.2} s, {} simulations",
+        "residual in simulation {:.2} cm at {:.2} s, {} simulations",
         100.0 * plan.predicted_error_m,
         plan.predicted_time_s,
         plan.simulations

@@ -94,7 +94,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     recorded.finish(simulated_rope).or_failed()?;
     if !quiet {
         println!(
-            "{:.1} MB; read it with `wag explain {}`, or look at its {}",
+            "{:.1} MB; read it with `wag explain {}`, or open its {}",
             counts.bytes as f64 / 1e6,
             folder.path().display(),
             files::RUN

@@ -108,7 +108,7 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     let lost = frames_in(|f| f.lost);
     let doubted = frames_in(|f| !f.lost && f.confidence.iter().all(|c| *c <= 0.5));
     let seconds = stage.done(&format!(
-        "{count} frames, rope lost in {lost}, in doubt in {doubted}"
+        "{count} frames, rope lost in {lost}, unconfirmed in {doubted}"
     ));
     if lost + doubted > count * 4 / 5 {
         let doubt = "the rope was hardly ever seen for sure: look at an overlay, and whether \

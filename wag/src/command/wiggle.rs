@@ -20,7 +20,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     if args.csv.is_none() && args.arm.address.is_none() && !args.arm.dry_run {
         return Err(Failure::input(anyhow!(
-            "say what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate says what it tells"
+            "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate reports its information"
         )));
     }
     require_clear_area(&args.arm, "WIGGLE", quiet)?;

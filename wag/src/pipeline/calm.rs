@@ -89,10 +89,7 @@ pub fn calm(
             PlannerEvent::Failed { message } => bail!(message),
             other => bail!("the planner process answered with {other:?}"),
         };
-        stage.say(format!(
-            "moving, {:.1} cm of sway to take out",
-            100.0 * plain_sway_m
-        ));
+        stage.say(format!("damping {:.1} cm of swing", 100.0 * plain_sway_m));
         if let Some(late_s) = begin_at(session, arm, &trajectory, begin)? {
             return Ok(Calmed {
                 plain_sway_m,
@@ -102,7 +99,7 @@ pub fn calm(
         }
     }
     Err(anyhow!(
-        "planning a calming move takes too long on this machine; stop other programs"
+        "planning a swing-damping move takes too long on this machine; stop other programs"
     ))
 }
 

@@ -111,7 +111,7 @@ impl Session {
             self.supervisor.check()?;
         }
         if interrupted().load(Ordering::SeqCst) {
-            bail!("interrupted; the arm was told to stop and all processes were ended");
+            bail!("interrupted; the arm was commanded to stop and all processes were ended");
         }
         Ok(())
     }
@@ -144,7 +144,10 @@ impl Session {
                     self.idle(Duration::from_millis(10))?;
                 }
                 Err(IpcError::Gone { service }) => {
-                    bail!("nobody serves `{service}` after {} s", timeout.as_secs());
+                    bail!(
+                        "no process serves `{service}` after {} s",
+                        timeout.as_secs()
+                    );
                 }
                 Err(e) => return Err(e.into()),
             }

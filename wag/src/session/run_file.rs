@@ -53,7 +53,7 @@ impl RunFile {
 
     fn lose(&mut self, reason: anyhow::Error) {
         eprintln!(
-            "warning: the run goes on, but `{}` will not be whole: {reason:#}",
+            "warning: the run continues, but `{}` will be incomplete: {reason:#}",
             self.path.display()
         );
         self.lost = Some(reason);

@@ -23,7 +23,7 @@ pub(crate) const CASES: &[Case] = &[
     (
         "film --device /dev/null --out w",
         2,
-        &["/dev/null", "no video device"],
+        &["/dev/null", "not a video device"],
     ),
     (
         "film --device /dev/null --out w --fps 0",

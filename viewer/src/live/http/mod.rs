@@ -193,19 +193,19 @@ fn answer(
         ("GET", Some("picture")) => picture(stream, site, request),
         ("POST", Some(path)) if path.starts_with("ask/") => match Ask::named(&path[4..]) {
             Some(ask) => wish(stream, site, ask, keep),
-            None => Reply::said(404, "nothing of this name can be asked for").write(stream, keep),
+            None => Reply::said(404, "unknown request").write(stream, keep),
         },
         ("GET" | "POST", Some(path)) => {
             let known = matches!(path, "" | "watch.js" | "watch.css" | "state" | "picture")
                 || path.strip_prefix("ask/").and_then(Ask::named).is_some();
             let (status, why) = if known {
-                (405, "not by this method")
+                (405, "method not allowed")
             } else {
                 (404, "there is nothing here")
             };
             Reply::said(status, why).write(stream, keep)
         }
-        _ => Reply::said(405, "not by this method").write(stream, keep),
+        _ => Reply::said(405, "method not allowed").write(stream, keep),
     }
 }
 
