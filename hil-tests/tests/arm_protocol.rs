@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp, reason = "tests compare exact numbers")]
 
 use arm_model::JointVector;
+use hil_tests::scenario::bring_up;
 use rand::seq::IndexedRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -76,15 +77,7 @@ impl Client {
     }
 
     fn bring_up(&mut self, mode: Mode) {
-        for command in [
-            Command::CleanError,
-            Command::MotionEnable {
-                joint: Command::ALL_JOINTS,
-                enable: true,
-            },
-            Command::SetMode(mode),
-            Command::SetState(StateRequest::Ready),
-        ] {
+        for command in bring_up(mode) {
             self.ask(&command);
         }
         assert_eq!(self.state(), ArmState::Ready);

@@ -1,58 +1,37 @@
 //! Control core and simulated arm together in virtual time.
 #![cfg(test)]
 
-use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, JointVector, Limits};
+use arm_model::JointVector;
+use hil_tests::scenario::{entry, swing};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
-use rt_controller::control::{ControlSettings, Motion, Thresholds};
+use rt_controller::control::{ControlSettings, Thresholds};
 use shared_types::ipc::ControllerMode;
 use shared_types::{CommandInterface, FaultCode};
-use xarm_sim::{ArmConfig, FaultScript};
-
-/// A swing of three joints from `from` and back, 1.5 s.
-fn swing(from: JointVector) -> Motion {
-    let mut out = from;
-    (out[1], out[3], out[5]) = (out[1] + 0.10, out[3] - 0.10, out[5] + 0.40);
-    let waypoints = [from, out, from];
-    Motion::Spline(JointTrajectory::new(&[0.0, 0.75, 1.5], &waypoints).unwrap())
-}
 
 fn rig(script: &str) -> VirtualRig {
     rig_by(CommandInterface::ServoPosition, script)
 }
 
 fn rig_by(interface: CommandInterface, script: &str) -> VirtualRig {
-    let mut rig = VirtualRig::new(VirtualRigConfig {
-        limits: Limits::default(),
-        settings: ControlSettings {
-            interface,
-            ..Thresholds::strict().into()
-        },
-        arm: ArmConfig {
-            initial_q: START_POSE,
-            faults: script.parse::<FaultScript>().unwrap(),
-            ..ArmConfig::default()
-        },
-        delay_s: 0.0002,
-    });
+    let settings = ControlSettings {
+        interface,
+        ..Thresholds::strict().into()
+    };
+    let mut rig = VirtualRig::new(VirtualRigConfig::new(settings, script.parse().unwrap()));
     rig.bring_up().unwrap();
     assert_eq!(rig.mode(), ControllerMode::Idle, "{:?}", rig.log.causes);
     rig
 }
 
 fn run_swing(rig: &mut VirtualRig) {
-    rig.start(swing(rig.commanded()));
+    rig.start(swing(rig.commanded()).unwrap());
     rig.run_for(2.5);
-}
-
-fn entry(on: &str, rest: &str) -> String {
-    format!("[[fault]]\n{on}\n{rest}\n")
 }
 
 /// Largest distance of the true motion from the swing as commanded, whatever
 /// the lag (rad).
 fn worst_distance(rig: &VirtualRig) -> f64 {
-    let motion = swing(rig.commanded());
+    let motion = swing(rig.commanded()).unwrap();
     let began = rig
         .log
         .records
@@ -163,7 +142,7 @@ fn faults_of_the_arm_end_in_one_cause_each() {
         assert!(speed < 1e-3, "{kind}: {speed}");
         // Nothing moves it again without an acknowledgement.
         let before = rig.log.setpoints().count();
-        rig.start(swing(rig.commanded()));
+        rig.start(swing(rig.commanded()).unwrap());
         rig.run_for(0.5);
         assert_eq!(rig.log.setpoints().count(), before, "{kind}");
     }
@@ -194,17 +173,10 @@ fn two_runs_are_equal_bit_for_bit() {
             "kind = \"replies_duplicated\"\nduration_s = 0.5",
         );
     let run = |seed: u64| {
-        let mut rig = VirtualRig::new(VirtualRigConfig {
-            limits: Limits::default(),
-            settings: Thresholds::relaxed().into(),
-            arm: ArmConfig {
-                initial_q: START_POSE,
-                faults: script.parse::<FaultScript>().unwrap(),
-                seed,
-                ..ArmConfig::default()
-            },
-            delay_s: 0.0003,
-        });
+        let relaxed = Thresholds::relaxed().into();
+        let mut config = VirtualRigConfig::new(relaxed, script.parse().unwrap());
+        (config.arm.seed, config.delay_s) = (seed, 0.0003);
+        let mut rig = VirtualRig::new(config);
         rig.bring_up().unwrap();
         rig.oversleep([0, 0, 900_000, 0, 5_000_000, 0]);
         run_swing(&mut rig);

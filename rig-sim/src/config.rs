@@ -1,6 +1,7 @@
 //! Set-up of the rig, as read from a file or made in code.
 
 use super::camera::CameraConfig;
+use super::error::RigError;
 use crate::hidden::hidden_rope;
 use crate::render::Appearance;
 use arm_model::joint::START_POSE;
@@ -128,6 +129,48 @@ impl RigConfig {
             ..ArmConfig::default()
         }
     }
+}
+
+/// Refuses settings no thread could work with.
+///
+/// # Errors
+/// [`RigError::Config`]: the first number that makes no rig, and its limits.
+pub fn check(config: &RigConfig) -> Result<(), RigError> {
+    let camera = &config.camera;
+    // The last row is exposed before the next frame begins.
+    let rows = f64::from(camera.stereo_camera().height_px - 1);
+    let spare_s = 1.0 / camera.frame_rate_hz - camera.exposure_s;
+    let longest_line_s = (spare_s / rows * 1e9).floor().max(0.0) / 1e9;
+    let bounds = [
+        ("camera.frame_rate_hz", camera.frame_rate_hz, 1.0, 200.0),
+        ("camera.exposure_s", camera.exposure_s, 1e-5, 0.1),
+        (
+            "camera.line_time_s",
+            camera.line_time_s,
+            0.0,
+            longest_line_s,
+        ),
+        ("camera.baseline_m", camera.baseline_m, 0.01, 1.0),
+        ("camera.tilt_up_rad", camera.tilt_up_rad, -1.5, 1.5),
+        ("camera.latency_s", camera.latency_s, 0.0, 0.5),
+        (
+            "camera.noise_levels",
+            f64::from(camera.noise_levels),
+            0.0,
+            40.0,
+        ),
+    ];
+    for (key, value, min, max) in bounds {
+        if !(value >= min && value <= max) {
+            return Err(RigError::Config {
+                key,
+                value,
+                min,
+                max,
+            });
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The camera: takes frames at its own pace and publishes them late but with
 //! honest stamps, like a real one.
 
-use super::RigError;
 use super::config::RigConfig;
+use super::error::RigError;
 use super::record::Record;
 use crate::render::{Renderer, RopeShape, ScenePose};
 use shared_types::MonotonicNs;

@@ -14,6 +14,7 @@
 pub mod body;
 mod camera;
 mod config;
+mod error;
 mod filming;
 pub mod hidden;
 mod physics;
@@ -23,116 +24,16 @@ mod service;
 pub mod wiggle_film;
 
 pub use camera::{CameraConfig, Resolution};
-pub use config::RigConfig;
+pub use config::{RigConfig, check};
+pub use error::RigError;
 
 use nalgebra::Vector3;
 use record::Record;
-use rope_sim::SimulateError;
 use service::Service;
-use shared_types::ipc::IpcError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
-use xarm_sim::{ArmPorts, ArmStartError, SimulatedArm};
-
-/// Why the rig did not start or did not go on.
-#[derive(Debug, thiserror::Error)]
-pub enum RigError {
-    /// A number of the set-up makes no rig.
-    #[error("`{key}` is {value}, but must lie between {min} and {max}")]
-    Config {
-        /// Key.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
-    /// Another rig answers in this domain.
-    #[error("domain `{domain}` is in use by another rig; end that one or name another domain")]
-    DomainInUse {
-        /// The domain.
-        domain: String,
-    },
-    /// The arm did not start.
-    #[error(transparent)]
-    Arm(#[from] ArmStartError),
-    /// The rope could not be simulated.
-    #[error("the rope cannot be simulated")]
-    Rope(#[from] SimulateError),
-    /// The rope's motion became infinite.
-    #[error("the simulated rope diverged; choose a rope within the documented ranges")]
-    RopeDiverged,
-    /// The machine lost the thread of the arm's motion.
-    #[error(
-        "the simulation lost {gap_s:.2} s of the arm's motion; the machine is too busy, stop other programs"
-    )]
-    FellBehind {
-        /// Missing time (s).
-        gap_s: f64,
-    },
-    /// Shared memory failed.
-    #[error(transparent)]
-    Ipc(#[from] IpcError),
-    /// A thread could not be started.
-    #[error("cannot start the thread `{name}`")]
-    Thread {
-        /// Which one.
-        name: &'static str,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A part of the rig ended by a bug.
-    #[error("the rig's thread `{name}` panicked; see the messages above")]
-    Panicked {
-        /// Which one.
-        name: &'static str,
-    },
-}
-
-/// Refuses settings no thread could work with.
-///
-/// # Errors
-/// [`RigError::Config`]: the first number that makes no rig, and its limits.
-pub fn check(config: &RigConfig) -> Result<(), RigError> {
-    let camera = &config.camera;
-    // The last row is exposed before the next frame begins.
-    let rows = f64::from(camera.stereo_camera().height_px - 1);
-    let spare_s = 1.0 / camera.frame_rate_hz - camera.exposure_s;
-    let longest_line_s = (spare_s / rows * 1e9).floor().max(0.0) / 1e9;
-    let bounds = [
-        ("camera.frame_rate_hz", camera.frame_rate_hz, 1.0, 200.0),
-        ("camera.exposure_s", camera.exposure_s, 1e-5, 0.1),
-        (
-            "camera.line_time_s",
-            camera.line_time_s,
-            0.0,
-            longest_line_s,
-        ),
-        ("camera.baseline_m", camera.baseline_m, 0.01, 1.0),
-        ("camera.tilt_up_rad", camera.tilt_up_rad, -1.5, 1.5),
-        ("camera.latency_s", camera.latency_s, 0.0, 0.5),
-        (
-            "camera.noise_levels",
-            f64::from(camera.noise_levels),
-            0.0,
-            40.0,
-        ),
-    ];
-    for (key, value, min, max) in bounds {
-        if !(value >= min && value <= max) {
-            return Err(RigError::Config {
-                key,
-                value,
-                min,
-                max,
-            });
-        }
-    }
-    Ok(())
-}
+use xarm_sim::{ArmPorts, SimulatedArm};
 
 /// Runs the rig until `stop` is set or a part of it fails.
 ///

@@ -1,7 +1,7 @@
 //! The rope on the arm's true motion, a few milliseconds behind real time.
 
-use super::RigError;
 use super::body::ArmBody;
+use super::error::RigError;
 use super::record::{Moment, Record};
 use arm_model::{Cell, JointPiece, JointState};
 use rope_sim::LiveRope;

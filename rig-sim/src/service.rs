@@ -1,7 +1,7 @@
 //! Answers about the rig: ports, target, truth.
 
-use super::RigError;
 use super::config::RigConfig;
+use super::error::RigError;
 use super::record::Record;
 use nalgebra::Vector3;
 use shared_types::MonotonicNs;

@@ -1,16 +1,80 @@
-//! The form in which a response lies in its file, and what is refused.
+//! A measured arm, the form in which it lies in its file, and what is refused.
 
-use super::{
-    ArmResponse, ArmResponseError, Estimate, Excitation, JointResponse, NotExcited,
-    RESPONSE_FORMAT, TrackingLag,
-};
+use super::measured::{Estimate, Excitation, JointResponse, NotExcited, TrackingLag};
 use crate::joint::JOINTS;
 use serde::{Deserialize, Serialize};
+
+/// Version of the file's layout.
+pub const RESPONSE_FORMAT: u32 = 1;
+
+/// Why a file is no arm response.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ArmResponseError {
+    /// Written by another version.
+    #[error("`format` is {found}, this version reads {RESPONSE_FORMAT}: measure the arm again")]
+    Format {
+        /// Number found.
+        found: u32,
+    },
+    /// Not seven joints.
+    #[error("`joints` has {found} entries, it needs one for each of the {JOINTS} joints")]
+    JointCount {
+        /// Entries found.
+        found: usize,
+    },
+    /// Entries out of order.
+    #[error("entry {place} of `joints` is for joint {found}: list them from 1 to {JOINTS}")]
+    JointOrder {
+        /// Place in the list, 1-based.
+        place: usize,
+        /// Joint named there.
+        found: u8,
+    },
+    /// An excited joint lacks a value, or one at rest has some.
+    #[error("joint {joint}: `{key}` must be given exactly when `excited` is {expected}")]
+    Presence {
+        /// Joint, 1-based.
+        joint: u8,
+        /// Key in the file.
+        key: &'static str,
+        /// Value of `excited` that it belongs to.
+        expected: bool,
+    },
+    /// A value makes no sense.
+    #[error("joint {joint}: `{key}` is {value}, but must be {expected}")]
+    Value {
+        /// Joint, 1-based; 0 for the whole arm.
+        joint: u8,
+        /// Key in the file.
+        key: &'static str,
+        /// Value found.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+}
+
+/// A measured arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ArmResponseForm", into = "ArmResponseForm")]
+pub struct ArmResponse {
+    /// Version of the program that measured.
+    pub version: String,
+    /// Arm or run the measurement is from.
+    pub source: String,
+    /// From the sending of a setpoint until the arm reports it as its target
+    /// (s): the interval most setpoints agree on, when the arm's reports show it.
+    pub command_to_target_s: Option<[f64; 2]>,
+    /// The motion it was measured with; none for a recorded run.
+    pub excitation: Option<Excitation>,
+    /// Joint 1 first.
+    pub joints: [JointResponse; JOINTS],
+}
 
 /// The file form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ArmResponseForm {
+struct ArmResponseForm {
     format: u32,
     version: String,
     source: String,

@@ -1,6 +1,7 @@
 //! Files that are taken, and files that are refused with joint and key.
 
 use super::*;
+use crate::JOINTS;
 
 fn around(value: f64) -> Estimate {
     Estimate {

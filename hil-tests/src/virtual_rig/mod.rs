@@ -23,18 +23,21 @@ mod surroundings;
 pub use network::VirtualStream;
 pub use surroundings::Surroundings;
 
+use crate::scenario;
+use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, ControlState, Motion};
 use rt_controller::driver::{CommandMsg, CycleDriver};
 use rt_controller::transport::command_interface::arm_mode;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::{Command, Protocol, StateRequest};
+use rt_controller::xarm::{Command, Protocol};
 use shared_types::MonotonicNs;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord, InputRecord, RunCounts};
 use std::collections::VecDeque;
 use xarm_sim::{
-    ArmConfig, ArmEndpoint, ArmEvent, ConnectRefused, Fault, JointSample, Service, TimedEvent,
+    ArmConfig, ArmEndpoint, ArmEvent, ConnectRefused, Fault, FaultScript, JointSample, Service,
+    TimedEvent,
 };
 
 /// When a virtual rig is switched on.
@@ -53,6 +56,23 @@ pub struct VirtualRigConfig {
     pub arm: ArmConfig,
     /// Time a byte takes between the two, each way (s).
     pub delay_s: f64,
+}
+
+impl VirtualRigConfig {
+    /// The arm in its start pose on a good cable, with faults to come.
+    #[must_use]
+    pub fn new(settings: ControlSettings, faults: FaultScript) -> Self {
+        Self {
+            limits: Limits::default(),
+            settings,
+            arm: ArmConfig {
+                initial_q: START_POSE,
+                faults,
+                ..ArmConfig::default()
+            },
+            delay_s: 0.0002,
+        }
+    }
 }
 
 /// Everything that happened.
@@ -175,19 +195,7 @@ impl VirtualRig {
     pub fn bring_up(&mut self) -> Result<(), ConnectRefused> {
         let mode = arm_mode(self.config.settings.interface);
         let mut session = VirtualStream::connect(&self.around.network, Service::Commands)?;
-        for (id, command) in [
-            Command::CleanError,
-            Command::CleanWarning,
-            Command::MotionEnable {
-                joint: Command::ALL_JOINTS,
-                enable: true,
-            },
-            Command::SetMode(mode),
-            Command::SetState(StateRequest::Ready),
-        ]
-        .iter()
-        .enumerate()
-        {
+        for (id, command) in scenario::bring_up(mode).iter().enumerate() {
             ask(&mut session, id, command);
         }
         self.run_for(BRING_UP_S);

@@ -1,45 +1,46 @@
 //! What goes wrong with the arm itself.
 
-use super::bench::{Bench, CYCLE_S, entry};
-use arm_model::JointVector;
+use super::scenario::{CYCLE_S, Scenario};
+use arm_model::{JointVector, Pole};
+use hil_tests::scenario::entry;
 use rt_controller::xarm::{Command, Mode, Status, TcpPose};
 use xarm_sim::{ArmConfig, ConnectRefused, Obstacle, Service};
 
 #[test]
 fn errors_stops_and_drives_latch_as_on_the_real_arm() {
-    let mut b = Bench::new(&entry(
+    let mut b = Scenario::new(&entry(
         "on = \"setpoint:20\"",
         "kind = \"raise_error\"\ncode = 60",
     ));
     b.bring_up(Mode::Servo);
     b.stream(0.2, 0.2);
     assert_eq!(b.errors(), [60]);
-    assert!(Status(b.replies.last().unwrap().status).has_error());
+    assert!(b.status().has_error());
     b.bring_up(Mode::Servo);
     b.q = b.arm.model().reference_motion().q;
     b.stream(0.2, 0.1);
-    assert!(Status(b.replies.last().unwrap().status).accepts_motion());
+    assert!(b.status().accepts_motion());
 
     // A pressed button cannot be cleared away.
-    let mut b = Bench::new(&entry(
+    let mut b = Scenario::new(&entry(
         "at_s = 0.1",
         "kind = \"emergency_stop\"\ncode = 2\nduration_s = 1",
     ));
     b.wait(0.5);
     b.bring_up(Mode::Servo);
-    assert!(Status(b.replies.last().unwrap().status).has_error());
+    assert!(b.status().has_error());
     b.wait(0.7);
     b.bring_up(Mode::Servo);
-    assert_eq!(b.replies.last().unwrap().status, 0);
+    assert_eq!(b.status(), Status(0));
 
     // Nor can a broken drive, until power was off.
     let script = entry("at_s = 0.1", "kind = \"servo_error\"\njoint = 3\ncode = 23")
         + &entry("at_s = 1", "kind = \"power_cycle\"\nduration_s = 0.5");
-    let mut b = Bench::new(&script);
+    let mut b = Scenario::new(&script);
     b.wait(0.5);
     assert_eq!(b.errors(), [13]);
     b.bring_up(Mode::Servo);
-    assert!(Status(b.replies.last().unwrap().status).has_error());
+    assert!(b.status().has_error());
     b.wait(0.6);
     assert_eq!(
         b.arm.connect(Service::Commands, b.now),
@@ -50,7 +51,7 @@ fn errors_stops_and_drives_latch_as_on_the_real_arm() {
     // The controller's clock began anew.
     assert!(b.arm.model().time_us() < 300_000);
     b.bring_up(Mode::Servo);
-    assert_eq!(b.replies.last().unwrap().status, 0);
+    assert_eq!(b.status(), Status(0));
 }
 
 #[test]
@@ -61,10 +62,10 @@ fn warnings_states_and_modes_change_by_themselves() {
         ("kind = \"warning\"\ncode = 11", Status::WARNING),
         ("kind = \"collision\"", Status::ERROR | Status::NOT_READY),
     ] {
-        let mut b = Bench::new(&entry("on = \"setpoint:10\"", kind));
+        let mut b = Scenario::new(&entry("on = \"setpoint:10\"", kind));
         b.bring_up(Mode::Servo);
         b.stream(0.2, 0.1);
-        assert_eq!(b.replies.last().unwrap().status, want, "{kind}");
+        assert_eq!(b.status(), Status(want), "{kind}");
     }
 }
 
@@ -77,7 +78,7 @@ fn a_second_commander_moves_stops_or_takes_the_arm_away() {
                 "kind = \"second_commander\"\nwish = \"{wish}\"\nrate_hz = 50\nduration_s = 0.1"
             ),
         );
-        let mut b = Bench::new(&script);
+        let mut b = Scenario::new(&script);
         b.bring_up(Mode::Servo);
         b.stream(0.0, 0.3);
         b
@@ -95,14 +96,14 @@ fn a_second_commander_moves_stops_or_takes_the_arm_away() {
     );
     for wish in ["stop", "mode"] {
         let b = run(wish);
-        assert!(Status(b.replies.last().unwrap().status).is_not_ready());
+        assert!(b.status().is_not_ready());
     }
 }
 
 #[test]
 fn joints_lag_stick_and_lie() {
     let run = |kind: &str| {
-        let mut b = Bench::new(&entry("at_s = 0.5", kind));
+        let mut b = Scenario::new(&entry("at_s = 0.5", kind));
         b.bring_up(Mode::Servo);
         b.stream(0.5, 1.0);
         let asked = b.q[6];
@@ -133,7 +134,7 @@ fn a_clock_off_by_a_thousandth_is_counted() {
     };
     let run = |ppm: f64| {
         let script = entry("at_s = 0", &format!("kind = \"clock_rate\"\nppm = {ppm}"));
-        let mut b = Bench::with(&script, config());
+        let mut b = Scenario::with(&script, config());
         let uptime_us = b.arm.model().time_us();
         b.wait(0.01);
         b.bring_up(Mode::Servo);
@@ -159,7 +160,7 @@ fn a_clock_off_by_a_thousandth_is_counted() {
 fn obstacles_raise_c31_and_the_boundary_c35() {
     let pose = JointVector([0.0, 0.3, 0.0, 1.0, 0.0, 0.7, 0.0]);
     let offset = Command::TcpOffset(TcpPose {
-        position_m: [0.0, 0.0, 0.2],
+        position_m: Pole::default().end_m().into(),
         rpy_rad: [0.0; 3],
     });
     let wall = Obstacle::Plane {
@@ -172,7 +173,7 @@ fn obstacles_raise_c31_and_the_boundary_c35() {
             initial_q: pose,
             ..ArmConfig::default()
         };
-        let mut b = Bench::with("", config);
+        let mut b = Scenario::with("", config);
         b.send(&offset);
         if fence {
             // Registers 52 and 59: y at most 20 mm.

@@ -1,7 +1,8 @@
 //! What goes wrong between client and arm.
 
-use super::bench::{Bench, CYCLE_S, entry};
+use super::scenario::{CYCLE_S, Scenario};
 use arm_model::JointVector;
+use hil_tests::scenario::entry;
 use rt_controller::xarm::{Command, Mode, Status};
 use xarm_sim::{Closing, ConnectRefused, ReportKind, Service};
 
@@ -11,7 +12,7 @@ fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {
         "on = \"setpoint:50\"",
         "kind = \"stall\"\nduration_s = 0.19",
     );
-    let mut b = Bench::new(&script);
+    let mut b = Scenario::new(&script);
     b.bring_up(Mode::Servo);
     b.replies.clear();
     b.stream(0.5, 1.0);
@@ -34,7 +35,7 @@ fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {
 #[test]
 fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
     // A reset: the connection ends, a new one works.
-    let mut b = Bench::new(&entry(
+    let mut b = Scenario::new(&entry(
         "on = \"setpoint:10\"",
         "kind = \"connection_reset\"",
     ));
@@ -48,7 +49,7 @@ fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
     assert_eq!(b.replies.len(), 10);
 
     // Half open: it stays, but nothing comes any more.
-    let mut b = Bench::new(&entry("on = \"setpoint:10\"", "kind = \"half_open\""));
+    let mut b = Scenario::new(&entry("on = \"setpoint:10\"", "kind = \"half_open\""));
     b.bring_up(Mode::Servo);
     b.replies.clear();
     b.stream(0.1, 0.1);
@@ -63,7 +64,7 @@ fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
         "on = \"setpoint:10\"",
         "kind = \"cable_pull\"\nduration_s = 0.5",
     );
-    let mut b = Bench::new(&script);
+    let mut b = Scenario::new(&script);
     let reports = b
         .arm
         .connect(Service::Reports(ReportKind::Realtime), b.now)
@@ -87,7 +88,7 @@ fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
 #[test]
 fn replies_come_late_swapped_twice_or_not_at_all() {
     let run = |kind: &str| {
-        let mut b = Bench::new(&entry("at_s = 0.1", kind));
+        let mut b = Scenario::new(&entry("at_s = 0.1", kind));
         b.wait(0.2);
         for _ in 0..40 {
             b.send(&Command::GetState);
@@ -113,7 +114,7 @@ fn replies_come_late_swapped_twice_or_not_at_all() {
 /// A reply that waits for another one to pass does not wait for ever.
 #[test]
 fn a_lonely_reply_is_only_delayed_by_reordering() {
-    let mut b = Bench::new(&entry("at_s = 0", "kind = \"replies_reordered\""));
+    let mut b = Scenario::new(&entry("at_s = 0", "kind = \"replies_reordered\""));
     b.wait(0.01);
     b.send(&Command::GetState);
     b.wait(0.1);
@@ -132,7 +133,7 @@ fn status_bits_lie_without_anything_else_changing() {
             "on = \"setpoint:5\"",
             &format!("kind = \"{kind}\"\nduration_s = 0.02"),
         );
-        let mut b = Bench::new(&script);
+        let mut b = Scenario::new(&script);
         b.bring_up(Mode::Servo);
         b.replies.clear();
         b.stream(0.2, 0.1);
@@ -145,7 +146,7 @@ fn status_bits_lie_without_anything_else_changing() {
 /// A client that asks for it is told about the beginning and end of its moves.
 #[test]
 fn feedback_is_pushed_when_asked_for() {
-    let mut b = Bench::new("");
+    let mut b = Scenario::new("");
     b.bring_up(Mode::Position);
     b.send(&Command::FeedbackMask(3));
     let mut target = JointVector::ZERO;

@@ -4,6 +4,6 @@
 #![allow(unreachable_pub, clippy::float_cmp, reason = "a test")]
 
 mod arm;
-mod bench;
 mod link;
 mod reports;
+mod scenario;

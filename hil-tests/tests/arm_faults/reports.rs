@@ -1,13 +1,14 @@
 //! What goes wrong with the reports, and what firmware leaves out of them.
 
-use super::bench::{Bench, CYCLE_S, START, entry};
+use super::scenario::{CYCLE_S, START, Scenario};
+use hil_tests::scenario::entry;
 use rt_controller::xarm::report::{RealtimeReport, RichReport};
 use rt_controller::xarm::{Command, Mode, Status};
 use xarm_sim::{ArmConfig, Firmware, ReportKind, Service};
 
 /// Real-time reports of a run with a fault at 0.5 s, as bytes, by arrival (ms).
 fn reports(kind: &str) -> Vec<(u64, Vec<u8>)> {
-    let mut b = Bench::new(&entry("at_s = 0.5", kind));
+    let mut b = Scenario::new(&entry("at_s = 0.5", kind));
     let client = b
         .arm
         .connect(Service::Reports(ReportKind::Realtime), b.now)
@@ -86,7 +87,7 @@ fn firmware_decides_layouts_and_what_is_known() {
         ..ArmConfig::default()
     };
     let sizes = |firmware| {
-        let mut b = Bench::with("", config(firmware));
+        let mut b = Scenario::with("", config(firmware));
         ReportKind::ALL.map(|kind| {
             let client = b.arm.connect(Service::Reports(kind), b.now).ok()?;
             b.arm.take_frame(client, b.now).map(|frame| frame.len())
@@ -98,18 +99,18 @@ fn firmware_decides_layouts_and_what_is_known() {
     assert_eq!(sizes(Firmware(1, 12, 10)), of(None, 417));
 
     let factor = |firmware| {
-        let mut b = Bench::with("", config(firmware));
+        let mut b = Scenario::with("", config(firmware));
         b.send(&Command::GetSpeedLimitFactor);
         Status(b.replies[0].status).is_invalid()
     };
     assert!(factor(Firmware(2, 2, 0)) && !factor(Firmware(2, 3, 0)));
 
     // A change concerns new connections; the old ones keep their size.
-    let mut b = Bench::new(&entry(
+    let mut b = Scenario::new(&entry(
         "at_s = 0.1",
         "kind = \"firmware_changed\"\nversion = \"2.8.2\"",
     ));
-    let rich = |b: &mut Bench| {
+    let rich = |b: &mut Scenario| {
         b.arm
             .connect(Service::Reports(ReportKind::Rich), b.now)
             .unwrap()
@@ -117,7 +118,7 @@ fn firmware_decides_layouts_and_what_is_known() {
     let old = rich(&mut b);
     b.wait(0.3);
     let new = rich(&mut b);
-    let len = |b: &mut Bench, client| {
+    let len = |b: &mut Scenario, client| {
         let mut last = 0;
         while let Some(frame) = b.arm.take_frame(client, b.now) {
             last = frame.len();

@@ -1,7 +1,7 @@
 //! What every stop, and every fault that is no stop, must look like.
 
 use super::limits;
-use super::stage::Stage;
+use super::stage::{INTERFACES, Stage, mid_throw};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::control::reaction::StopCategory;
 use rt_controller::control::{ControlCommand, ControlEvent, Motion};
@@ -30,53 +30,57 @@ pub(crate) struct Stop {
     pub(crate) stop_arm: bool,
 }
 
-/// Slowed along the path.
-pub(crate) fn slowed(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (StopCategory::OnPath, false);
-    Stop {
-        fault,
-        path,
-        stop_arm,
+impl Stop {
+    const fn of(fault: FaultCode, path: StopCategory, stop_arm: bool) -> Self {
+        Self {
+            fault,
+            path,
+            stop_arm,
+        }
     }
+}
+
+/// Slowed along the path.
+pub(crate) const fn slowed(fault: FaultCode) -> Stop {
+    Stop::of(fault, StopCategory::OnPath, false)
 }
 
 /// Braked in joint space.
-pub(crate) fn braked(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (StopCategory::JointSpace, false);
-    Stop {
-        fault,
-        path,
-        stop_arm,
-    }
+pub(crate) const fn braked(fault: FaultCode) -> Stop {
+    Stop::of(fault, StopCategory::JointSpace, false)
 }
 
 /// Braked, then the arm asked to stop.
-pub(crate) fn braked_and_stopped(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (StopCategory::JointSpace, true);
-    Stop {
-        fault,
-        path,
-        stop_arm,
-    }
+pub(crate) const fn braked_and_stopped(fault: FaultCode) -> Stop {
+    Stop::of(fault, StopCategory::JointSpace, true)
 }
 
 /// No setpoints any more, the arm asked to stop.
-pub(crate) fn stopped(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (StopCategory::CutOff, true);
-    Stop {
-        fault,
-        path,
-        stop_arm,
-    }
+pub(crate) const fn stopped(fault: FaultCode) -> Stop {
+    Stop::of(fault, StopCategory::CutOff, true)
 }
 
 /// No setpoints any more; the arm has stopped by itself or cannot hear.
-pub(crate) fn silenced(fault: FaultCode) -> Stop {
-    let (path, stop_arm) = (StopCategory::CutOff, false);
-    Stop {
-        fault,
-        path,
-        stop_arm,
+pub(crate) const fn silenced(fault: FaultCode) -> Stop {
+    Stop::of(fault, StopCategory::CutOff, false)
+}
+
+/// A fault in the middle of a throw, by each interface: it stops the throw as wanted, is noticed
+/// within `noticed_s`, and after `lasts_s` more the arm works again.
+pub(crate) fn assert_stopped_by(
+    kind: &str,
+    want: Stop,
+    [noticed_s, lasts_s]: [f64; 2],
+    also: impl Fn(&Stage, &CauseRecord),
+) {
+    for via in INTERFACES {
+        let mut stage = Stage::thrown(via, &mid_throw(kind));
+        let cause = stage.assert_stop(want);
+        let took_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
+        assert!(took_s < noticed_s, "{via:?}, {kind}: {took_s} s");
+        also(&stage, &cause);
+        stage.rig.run_for(lasts_s);
+        stage.assert_works_again();
     }
 }
 

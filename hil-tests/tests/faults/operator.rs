@@ -11,7 +11,7 @@ use rt_controller::control::{ControlCommand, ControlEvent, Motion};
 use shared_types::ipc::ControllerMode;
 use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 
-/// Limits that a throw of each wire uses fully. An arm that follows velocities
+/// Limits that a throw of each interface uses fully. An arm that follows velocities
 /// makes its own jerk and cannot follow steps of the full acceleration closely.
 fn limits_of(via: CommandInterface) -> Limits {
     let limits = Limits::default();
@@ -128,7 +128,7 @@ fn fault_36_the_arm_is_braked_within_a_cycle_at_1000_random_moments_of_fast_thro
     }
 }
 
-/// The whole judgement, for each way and each wire.
+/// The whole judgement, for each withdrawal and each interface.
 #[test]
 fn fault_36_nothing_moves_until_the_operator_acknowledges_and_arms_again() {
     for via in INTERFACES {

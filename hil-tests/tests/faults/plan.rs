@@ -4,7 +4,7 @@ use super::judge::braked;
 use super::limits;
 use super::stage::{INTERFACES, Stage};
 use arm_model::limits::{LimitKind, LimitsSpec};
-use arm_model::{JointTrajectory, JointVector, Limits};
+use arm_model::{JointTrajectory, JointVector, Limits, Pole};
 use rt_controller::control::Motion;
 use rt_controller::point_to_point::verify;
 use shared_types::plan::trajectory_hash;
@@ -134,7 +134,7 @@ fn fault_24_a_plan_too_fast_for_the_configured_tool_is_refused_with_time_and_mar
     for via in INTERFACES {
         let mut config = super::stage::config(via, "");
         let with_pole = Limits::try_from(LimitsSpec {
-            tcp_offset_m: [0.0, 0.0, 0.2],
+            tcp_offset_m: Pole::default().end_m().into(),
             ..config.limits.clone().into()
         })
         .unwrap();

@@ -1,9 +1,10 @@
 //! Faults of the joint reports: 14 to 18.
 
-use super::judge::slowed;
-use super::stage::{INTERFACES, Stage, config, entry, mid_throw};
+use super::judge::{assert_stopped_by, slowed};
+use super::stage::{INTERFACES, Stage, config, mid_throw};
+use hil_tests::scenario::entry;
 use rt_controller::xarm::version::{ArmVersion, VersionError};
-use shared_types::{FaultCode, MonotonicNs};
+use shared_types::FaultCode;
 use xarm_sim::Firmware;
 
 /// A slow-down leaves the planned path nowhere.
@@ -16,28 +17,20 @@ fn assert_on_the_path(stage: &Stage) {
 
 #[test]
 fn fault_14_a_report_stream_that_stops_slows_the_motion_within_100_ms() {
-    for via in INTERFACES {
-        let script = mid_throw("kind = \"report_stop\"\nduration_s = 3");
-        let mut stage = Stage::thrown(via, &script);
-        let cause = stage.assert_stop(slowed(FaultCode::ReportStale));
-        let noticed_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
-        assert!(noticed_s < 0.1, "{noticed_s}");
-        assert_on_the_path(&stage);
-        stage.assert_works_again();
-    }
+    let kind = "kind = \"report_stop\"\nduration_s = 3";
+    let stale = slowed(FaultCode::ReportStale);
+    assert_stopped_by(kind, stale, [0.1, 0.0], |stage, _| {
+        assert_on_the_path(stage)
+    });
 }
 
 #[test]
 fn fault_15_reports_that_repeat_their_values_slow_the_motion() {
-    for via in INTERFACES {
-        let script = mid_throw("kind = \"report_freeze\"\nduration_s = 3");
-        let mut stage = Stage::thrown(via, &script);
-        let cause = stage.assert_stop(slowed(FaultCode::ReportFrozen));
-        let noticed_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
-        assert!(noticed_s < 0.12, "{noticed_s}");
-        assert_on_the_path(&stage);
-        stage.assert_works_again();
-    }
+    let kind = "kind = \"report_freeze\"\nduration_s = 3";
+    let frozen = slowed(FaultCode::ReportFrozen);
+    assert_stopped_by(kind, frozen, [0.12, 0.0], |stage, _| {
+        assert_on_the_path(stage)
+    });
 }
 
 #[test]

@@ -1,12 +1,12 @@
-//! A rig on which a fast throw is about to run, by either wire.
+//! A rig on which a fast throw is about to run, by either command interface.
 
-use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector, Limits};
+use hil_tests::scenario::entry;
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, Motion, Thresholds};
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{Arming, CommandInterface, MonotonicNs, OperatingMode};
-use xarm_sim::{ArmConfig, ArmEvent, FaultScript};
+use xarm_sim::ArmEvent;
 
 /// Both ways setpoints travel.
 pub(crate) const INTERFACES: [CommandInterface; 2] = [
@@ -15,11 +15,6 @@ pub(crate) const INTERFACES: [CommandInterface; 2] = [
 ];
 /// In the middle of the throw: a joint is asked for more than 1.2 rad/s.
 pub(crate) const MID_THROW: &str = "on = \"speed:1.2\"";
-
-/// An entry of a fault script.
-pub(crate) fn entry(on: &str, rest: &str) -> String {
-    format!("[[fault]]\n{on}\n{rest}\n")
-}
 
 /// A fault in the middle of the throw.
 pub(crate) fn mid_throw(rest: &str) -> String {
@@ -51,7 +46,7 @@ pub(crate) fn fast_throw(from: JointVector) -> JointTrajectory {
         .expect("slow enough, it fits the limits")
 }
 
-/// A rig, the wire it uses and what it is to throw.
+/// A rig, the command interface it uses and what it is to throw.
 pub(crate) struct Stage {
     pub(crate) rig: VirtualRig,
     pub(crate) via: CommandInterface,
@@ -60,21 +55,13 @@ pub(crate) struct Stage {
 
 /// The set-up of a stage: strict thresholds, arming and guardian required.
 pub(crate) fn config(via: CommandInterface, script: &str) -> VirtualRigConfig {
-    VirtualRigConfig {
-        limits: Limits::default(),
-        settings: ControlSettings {
-            interface: via,
-            arming_required: true,
-            guardian_required: true,
-            ..Thresholds::strict().into()
-        },
-        arm: ArmConfig {
-            initial_q: START_POSE,
-            faults: script.parse::<FaultScript>().unwrap(),
-            ..ArmConfig::default()
-        },
-        delay_s: 0.0002,
-    }
+    let settings = ControlSettings {
+        interface: via,
+        arming_required: true,
+        guardian_required: true,
+        ..Thresholds::strict().into()
+    };
+    VirtualRigConfig::new(settings, script.parse().unwrap())
 }
 
 impl Stage {

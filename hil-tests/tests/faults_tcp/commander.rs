@@ -10,20 +10,17 @@ use std::time::{Duration, Instant};
 
 #[test]
 fn fault_13_replies_to_commands_never_sent_mean_a_second_commander() {
-    let mut stand = Stand::start("foreign");
-    stand.make_ready();
+    let mut stand = Stand::ready("foreign");
     let script = at_speed("kind = \"replies_foreign\"\nduration_s = 0.4");
     stand.stopped_by(&script, &[FaultCode::SecondCommander]);
-    stand.works_again();
-    stand.finish();
+    stand.recovers();
 }
 
 /// A client of its own that holds the arm where the motion began, as a second
 /// program would that does not know of the first.
 #[test]
 fn fault_13_a_second_program_that_streams_is_noticed() {
-    let mut stand = Stand::start("second");
-    stand.make_ready();
+    let mut stand = Stand::ready("second");
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, stand.config.command_port));
     let mut second = ArmSession::connect(address, Duration::from_secs(5)).unwrap();
     second.ask(&Command::FeedbackCheck).unwrap();
@@ -66,6 +63,5 @@ fn fault_13_a_second_program_that_streams_is_noticed() {
         FaultCode::ArmModeChanged,
     ]);
     stand.is_latched();
-    stand.works_again();
-    stand.finish();
+    stand.recovers();
 }

@@ -8,8 +8,7 @@ use xarm_sim::{ArmEvent, clock};
 
 /// Errors of the controller one after the other, each acknowledged.
 fn raised(name: &str, codes: &[u8], kind: impl Fn(u8) -> String) {
-    let mut stand = Stand::start(name);
-    stand.make_ready();
+    let mut stand = Stand::ready(name);
     for code in codes {
         // The stop that an error causes may be seen before the error itself.
         let expected = [
@@ -28,7 +27,7 @@ fn raised(name: &str, codes: &[u8], kind: impl Fn(u8) -> String) {
         assert!(message.contains(&format!("C{code}")), "{message}");
         stand.make_ready();
     }
-    assert!(matches!(stand.throw(), ControllerEvent::Finished { .. }));
+    stand.throws();
     stand.finish();
 }
 
@@ -55,8 +54,7 @@ fn fault_11_an_emergency_stop_latches_until_it_is_released() {
 
 #[test]
 fn fault_12_no_setpoint_is_sent_in_a_mode_or_state_that_was_changed_under_us() {
-    let mut stand = Stand::start("mode");
-    stand.make_ready();
+    let mut stand = Stand::ready("mode");
     let expected = [FaultCode::ArmModeChanged, FaultCode::ArmNotReady];
     for kind in [
         "kind = \"mode_changed\"\nmode = 0",
@@ -67,7 +65,7 @@ fn fault_12_no_setpoint_is_sent_in_a_mode_or_state_that_was_changed_under_us() {
         stand.stopped_by(&at_speed(kind), &expected);
         stand.make_ready();
     }
-    assert!(matches!(stand.throw(), ControllerEvent::Finished { .. }));
+    stand.throws();
     let now = clock::now();
     let flight = stand.finish();
     let ignored: Vec<_> = flight

@@ -6,12 +6,10 @@ use std::time::Duration;
 
 /// Brakes, and asks the arm to stop; works again once the fault is over.
 fn braked(name: &str, kind: &str, expected: &[FaultCode]) {
-    let mut stand = Stand::start(name);
-    stand.make_ready();
+    let mut stand = Stand::ready(name);
     stand.stopped_by(&at_speed(kind), expected);
     stand.rest(Duration::from_secs(2));
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     let cause = flight.causes[0];
     assert_eq!((cause.path, cause.stop_arm), (2, 1), "{cause:?}");
 }

@@ -5,7 +5,6 @@ use super::stand::{Stand, at_speed};
 use rt_controller::ControllerConfig;
 use rt_controller::xarm::ArmState;
 use shared_types::FaultCode;
-use shared_types::ipc::message::ControllerEvent;
 use xarm_sim::{ArmConfig, ArmEvent};
 
 /// The profile's own patience with the link: a silence of 100 ms, 25 setpoints.
@@ -31,8 +30,7 @@ fn fault_01_a_stall_of_190_ms_stops_without_a_burst() {
     stand.make_ready();
     let script = at_speed("kind = \"stall\"\nduration_s = 0.19");
     stand.stopped_by(&script, &[FaultCode::ReplyStalled]);
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     let began = flight
         .arm
         .iter()
@@ -55,17 +53,15 @@ fn fault_01_a_stall_of_190_ms_stops_without_a_burst() {
 
 #[test]
 fn fault_01_a_stall_of_30_ms_is_absorbed() {
-    let mut stand = Stand::start("short_stall");
-    stand.make_ready();
+    let mut stand = Stand::ready("short_stall");
     stand.inject(&at_speed("kind = \"stall\"\nduration_s = 0.03"));
-    assert!(matches!(stand.throw(), ControllerEvent::Finished { .. }));
+    stand.throws();
     stand.finish();
 }
 
 #[test]
 fn fault_04_a_reset_connection_is_met_by_the_guardian_and_never_resumed() {
-    let mut stand = Stand::start("reset");
-    stand.make_ready();
+    let mut stand = Stand::ready("reset");
     let script = at_speed("kind = \"connection_reset\"\nports = \"commands\"");
     stand.stopped_by(&script, &[FaultCode::LinkLost]);
     stand.works_again();
@@ -89,8 +85,7 @@ fn fault_05_a_half_open_connection_is_noticed_and_the_arm_stopped_on_another() {
         let all = seen.since(shared_types::MonotonicNs(0));
         all.iter().rev().any(|e| was_stopped(&e.event))
     });
-    stand.works_again();
-    stand.finish();
+    stand.recovers();
 }
 
 #[test]
@@ -104,8 +99,7 @@ fn fault_06_a_pulled_cable_that_comes_back_resumes_nothing() {
         FaultCode::ReportFrozen,
     ];
     stand.stopped_by(&script, &expected);
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     assert!(
         flight.arm.iter().any(|e| was_stopped(&e.event)),
         "by state 4"
@@ -114,11 +108,10 @@ fn fault_06_a_pulled_cable_that_comes_back_resumes_nothing() {
 
 #[test]
 fn fault_07_replies_in_another_order_or_twice_are_counted_and_change_nothing() {
-    let mut stand = Stand::start("replies");
-    stand.make_ready();
+    let mut stand = Stand::ready("replies");
     for kind in ["replies_reordered", "replies_duplicated"] {
         stand.inject(&at_speed(&format!("kind = \"{kind}\"\nduration_s = 1.0")));
-        assert!(matches!(stand.throw(), ControllerEvent::Finished { .. }));
+        stand.throws();
     }
     let flight = stand.finish();
     let reordered = flight.total(|c| c.input.link.out_of_order.into());
@@ -130,17 +123,15 @@ fn fault_07_replies_in_another_order_or_twice_are_counted_and_change_nothing() {
 
 #[test]
 fn fault_08_a_warning_bit_is_counted_and_an_error_bit_stops() {
-    let mut stand = Stand::start("bits");
-    stand.make_ready();
+    let mut stand = Stand::ready("bits");
     stand.inject(&at_speed("kind = \"warning_bit\"\nduration_s = 0.4"));
-    assert!(matches!(stand.throw(), ControllerEvent::Finished { .. }));
+    stand.throws();
     let script = at_speed("kind = \"error_bit\"\nduration_s = 0.4");
     stand.stopped_by(&script, &[FaultCode::ArmError]);
     stand.make_ready();
     let script = at_speed("kind = \"not_ready_bit\"\nduration_s = 0.4");
     stand.stopped_by(&script, &[FaultCode::ArmNotReady]);
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     assert!(
         flight.causes[0].counts.warnings >= 50,
         "{:?}",

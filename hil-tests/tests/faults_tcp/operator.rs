@@ -12,8 +12,7 @@ const BRAKED: (u8, u8) = (2, 0);
 
 #[test]
 fn fault_36_a_dead_man_switch_let_go_brakes_and_holds_until_it_is_held_again() {
-    let mut stand = Stand::start("dead_man");
-    stand.make_ready();
+    let mut stand = Stand::ready("dead_man");
     let pending = stand.begin();
     stand.wait_for_speed();
     stand.operator().let_go();
@@ -33,8 +32,7 @@ fn fault_36_a_dead_man_switch_let_go_brakes_and_holds_until_it_is_held_again() {
     };
     assert_eq!(stand.refused(&arming).0, fault);
     stand.operator().hold();
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     let cause = flight.causes[0];
     assert_eq!((cause.path, cause.stop_arm), BRAKED, "{cause:?}");
 }
@@ -60,8 +58,7 @@ fn a_killed_operator_is_missed_and_leaves_its_place_to_the_next() {
     stand.expect(&[fault]);
     stand.is_latched();
     stand.take_the_operators_place();
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     let cause = flight.causes[0];
     assert_eq!((cause.path, cause.stop_arm), BRAKED, "{cause:?}");
 }

@@ -34,22 +34,19 @@ impl Rpc for Anything {
 
 #[test]
 fn fault_22_a_plan_that_begins_elsewhere_is_refused_with_the_distance() {
-    let mut stand = Stand::start("elsewhere");
-    stand.make_ready();
+    let mut stand = Stand::ready("elsewhere");
     let mut from = START_POSE;
     from[2] += 0.6_f64.to_radians();
     assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     let (fault, message) = stand.refused(&execute(&swing(from)));
     assert_eq!(fault, FaultCode::StartPoseMismatch);
     assert!(message.contains("0.60 deg"), "{message}");
-    stand.works_again();
-    stand.finish();
+    stand.recovers();
 }
 
 #[test]
 fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
-    let mut stand = Stand::start("damaged");
-    stand.make_ready();
+    let mut stand = Stand::ready("damaged");
     let plan = swing(START_POSE);
     let request = ControllerRequest::Execute {
         trajectory: Box::new(plan),
@@ -103,8 +100,7 @@ fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
             ControllerEvent::Status { .. }
         ));
     }
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     let moved = flight
         .cycles
         .iter()
@@ -115,8 +111,7 @@ fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
 
 #[test]
 fn fault_24_a_plan_too_fast_for_the_tool_is_refused_with_time_and_margin() {
-    let mut stand = Stand::start("too_fast");
-    stand.make_ready();
+    let mut stand = Stand::ready("too_fast");
     // The arm turns about its base, 0.6 m away from the tool.
     let turned = |by: f64| {
         let mut q: JointVector = START_POSE;
@@ -132,14 +127,12 @@ fn fault_24_a_plan_too_fast_for_the_tool_is_refused_with_time_and_margin() {
         message.contains("m/s") && message.contains(" s"),
         "{message}"
     );
-    stand.works_again();
-    stand.finish();
+    stand.recovers();
 }
 
 #[test]
 fn fault_26_an_upload_that_hangs_is_refused_after_its_time() {
-    let mut stand = Stand::start("hangs");
-    stand.make_ready();
+    let mut stand = Stand::ready("hangs");
     let plan = swing(START_POSE);
     let sha256 = trajectory_hash(&plan);
     let announce = ControllerRequest::Announce { sha256 };

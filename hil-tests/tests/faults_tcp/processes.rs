@@ -112,8 +112,7 @@ fn fault_28_in_velocity_mode_the_arm_stops_by_itself_without_any_guardian() {
 
 #[test]
 fn fault_29_without_a_guardian_nothing_begins_and_what_moves_is_slowed_to_rest() {
-    let mut stand = Stand::start("guardian");
-    stand.make_ready();
+    let mut stand = Stand::ready("guardian");
     let pending = stand.begin();
     stand.wait_for_speed();
     stand.guardian.as_mut().unwrap().kill();
@@ -137,8 +136,7 @@ fn fault_29_without_a_guardian_nothing_begins_and_what_moves_is_slowed_to_rest()
     let text = toml::to_string(&stand.config).unwrap();
     stand.guardian = Some(Process::start(Role::Guardian, "guardian_2", &text));
     stand.rest(Duration::from_millis(800));
-    stand.works_again();
-    let flight = stand.finish();
+    let flight = stand.recovers();
     assert_eq!(flight.causes[0].path, 1, "{:?}", flight.causes[0]);
 }
 
@@ -159,11 +157,10 @@ fn faults_30_and_31_subscribers_that_sleep_come_or_are_killed_change_no_setpoint
     let quiet = {
         let mut stand = Stand::start("quiet");
         stand.make_ready();
-        assert!(matches!(stand.throw(), ControllerEvent::Finished { .. }));
+        stand.throws();
         stand.finish()
     };
-    let mut stand = Stand::start("crowded");
-    stand.make_ready();
+    let mut stand = Stand::ready("crowded");
     let domain = stand.config.domain.clone();
     let sleeper = Process::start(Role::Sleeper, "crowded", &domain);
     // A sleeper's buffers run over in some seconds.

@@ -110,6 +110,13 @@ impl Stand {
         Self::with(name, ArmConfig::default(), |_| ())
     }
 
+    /// The same with its arm brought up.
+    pub fn ready(name: &str) -> Self {
+        let mut stand = Self::start(name);
+        stand.make_ready();
+        stand
+    }
+
     /// A stand with an arm and changes to the controller's configuration of its
     /// own.
     pub fn with(name: &str, arm: ArmConfig, change: impl FnOnce(&mut ControllerConfig)) -> Self {
@@ -368,10 +375,25 @@ impl Stand {
         self.flight.at_rest_between(from_ns, clock::now());
     }
 
+    /// Arms and swings to the end.
+    pub fn throws(&mut self) {
+        let answer = self.throw();
+        assert!(
+            matches!(answer, ControllerEvent::Finished { .. }),
+            "{answer:?}"
+        );
+    }
+
     /// After an acknowledgement the arm works as before.
     pub fn works_again(&mut self) {
         self.make_ready();
-        assert!(matches!(self.throw(), ControllerEvent::Finished { .. }));
+        self.throws();
+    }
+
+    /// Works again, and that was all.
+    pub fn recovers(mut self) -> Flight {
+        self.works_again();
+        self.finish()
     }
 
     /// The stop expected next, made by something else than a script.

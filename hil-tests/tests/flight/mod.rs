@@ -9,14 +9,15 @@
 )]
 
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, JointVector, Limits};
+use arm_model::{JointVector, Limits};
+use hil_tests::scenario::{entry, swing};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlState, Motion, Thresholds};
 use rt_controller::point_to_point::plan_move;
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use shared_types::ipc::ControllerMode;
 use std::collections::BTreeMap;
-use xarm_sim::{ArmConfig, FaultScript};
+use xarm_sim::FaultScript;
 
 /// Pause from fault to fault (s).
 const FAULT_EVERY_S: f64 = 6.0;
@@ -60,7 +61,7 @@ fn script(span_s: f64) -> FaultScript {
         if at_s >= span_s {
             break;
         }
-        text += &format!("[[fault]]\nat_s = {at_s:.3}\n{fault}\n");
+        text += &entry(&format!("at_s = {at_s:.3}"), fault);
         // Not in step with the swings: each fault meets every part of them.
         at_s += FAULT_EVERY_S + 0.137;
     }
@@ -68,25 +69,9 @@ fn script(span_s: f64) -> FaultScript {
 }
 
 fn config(span_s: f64) -> VirtualRigConfig {
-    VirtualRigConfig {
-        limits: Limits::default(),
-        settings: Thresholds::strict().into(),
-        arm: ArmConfig {
-            initial_q: START_POSE,
-            faults: script(span_s),
-            seed: 20,
-            ..ArmConfig::default()
-        },
-        delay_s: 0.0002,
-    }
-}
-
-/// Out and back from where the arm is held.
-fn swing(from: JointVector) -> Motion {
-    let mut out = from;
-    (out[1], out[3], out[5]) = (out[1] + 0.10, out[3] - 0.10, out[5] + 0.40);
-    let waypoints = [from, out, from];
-    Motion::Spline(JointTrajectory::new(&[0.0, 0.75, 1.5], &waypoints).unwrap())
+    let mut config = VirtualRigConfig::new(Thresholds::strict().into(), script(span_s));
+    config.arm.seed = 20;
+    config
 }
 
 /// A swing from home, or the way home from where a stop left the arm.
@@ -95,7 +80,7 @@ fn from_here(q: JointVector) -> Motion {
     if off > HOME_RAD {
         plan_move(&q, &START_POSE, 0.3, &Limits::default()).unwrap()
     } else {
-        swing(q)
+        swing(q).unwrap()
     }
 }
 

@@ -1,8 +1,9 @@
 //! An arm in virtual time and a client of its command port.
 
 use arm_model::{JointState, JointVector};
+use hil_tests::scenario::bring_up;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::{Command, ErrorCode, FrameReader, Mode, Protocol, StateRequest};
+use rt_controller::xarm::{Command, ErrorCode, FrameReader, Mode, Protocol, Status};
 use shared_types::MonotonicNs;
 use xarm_sim::{ArmConfig, ArmEndpoint, ArmEvent, FaultScript, Service, TimedEvent};
 
@@ -19,7 +20,7 @@ pub struct Seen {
 }
 
 /// An arm in virtual time with a client of the command port.
-pub struct Bench {
+pub struct Scenario {
     pub arm: ArmEndpoint,
     pub now: MonotonicNs,
     pub client: u32,
@@ -29,7 +30,7 @@ pub struct Bench {
     pub q: JointVector,
 }
 
-impl Bench {
+impl Scenario {
     pub fn new(script: &str) -> Self {
         Self::with(script, ArmConfig::default())
     }
@@ -87,15 +88,7 @@ impl Bench {
     }
 
     pub fn bring_up(&mut self, mode: Mode) {
-        for command in [
-            Command::CleanError,
-            Command::MotionEnable {
-                joint: Command::ALL_JOINTS,
-                enable: true,
-            },
-            Command::SetMode(mode),
-            Command::SetState(StateRequest::Ready),
-        ] {
+        for command in bring_up(mode) {
             self.send(&command);
         }
     }
@@ -107,6 +100,11 @@ impl Bench {
             self.send(&Command::ServoJoint(self.q));
             self.wait(CYCLE_S);
         }
+    }
+
+    /// The status byte of the newest reply.
+    pub fn status(&self) -> Status {
+        Status(self.replies.last().unwrap().status)
     }
 
     pub fn truth(&self) -> JointState {
@@ -129,8 +127,4 @@ impl Bench {
         };
         self.events.iter().filter_map(times).collect()
     }
-}
-
-pub fn entry(on: &str, rest: &str) -> String {
-    format!("[[fault]]\n{on}\n{rest}\n")
 }
