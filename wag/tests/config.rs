@@ -51,6 +51,7 @@ fn a_wrong_file_is_named_by_check_and_stops_a_run_before_it_begins() {
         assert_eq!(output.status.code(), Some(2), "{line}: {said}");
         for part in [
             "rig/planner.toml",
+            "line 2",
             "populaton",
             "did you mean `population`?",
         ] {

@@ -10,6 +10,7 @@ mod answerer;
 mod bare;
 mod cyclictest;
 mod load;
+mod side_by_side;
 mod timed_link;
 mod times;
 
@@ -31,6 +32,7 @@ use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,
 };
 use shared_types::{FaultCode, MonotonicNs};
+pub use side_by_side::SideBySide;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;

@@ -263,21 +263,6 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_is_refused_with_file_line_and_the_nearest_name() {
-        let (_dir, folders) = folders("", "[search]\npopulaton = 40\n");
-        let error = Layers::read(Kind::Planner, &folders, None).unwrap_err();
-        let said = format!("{error:#}");
-        for part in [
-            "rig/planner.toml",
-            "line 2",
-            "populaton",
-            "did you mean `population`?",
-        ] {
-            assert!(said.contains(part), "{part}: {said}");
-        }
-    }
-
-    #[test]
     fn the_layer_that_breaks_a_limit_is_named_not_the_one_below() {
         let (dir, folders) = folders("[search]\npopulation = 40\n", "");
         let run = dir.path().join("run.toml");
