@@ -19,6 +19,7 @@ mod learned;
 mod ledger;
 mod manual;
 mod network;
+mod on_arm;
 mod plan;
 mod process;
 mod reach_picture;

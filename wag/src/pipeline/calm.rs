@@ -7,7 +7,7 @@ use crate::session::Session;
 use anyhow::{anyhow, bail};
 use arm_model::{JointTrajectory, JointVector, Limits};
 use cli_output::Stage;
-use rustix::time::{ClockId, clock_gettime};
+use rt_controller::os::now_ns;
 use shared_types::ipc::message::{CalmOrder, PlannerEvent, PlannerRequest, PlannerRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::{MonotonicNs, RopeParams};
@@ -29,13 +29,6 @@ pub struct Calmed {
     pub calm_sway_m: f64,
     /// How much later than planned the move began (s).
     pub late_s: f64,
-}
-
-/// CLOCK_MONOTONIC.
-fn now() -> MonotonicNs {
-    let t = clock_gettime(ClockId::Monotonic);
-    let ns = i128::from(t.tv_sec) * 1_000_000_000 + i128::from(t.tv_nsec);
-    MonotonicNs(u64::try_from(ns).unwrap_or_default())
 }
 
 /// What a calming move is planned from.
@@ -65,7 +58,7 @@ pub fn calm(
 ) -> anyhow::Result<Calmed> {
     for planning_s in PLANNING_S {
         session.received.drain()?;
-        let begin = now().plus_s(planning_s);
+        let begin = MonotonicNs(now_ns()).plus_s(planning_s);
         let order = CalmOrder {
             rope: input.rope,
             joints: session
@@ -110,12 +103,12 @@ fn begin_at(
     trajectory: &JointTrajectory,
     begin: MonotonicNs,
 ) -> anyhow::Result<Option<f64>> {
-    let left_s = begin.since_s(now()) - HANDOVER_S;
+    let left_s = begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S;
     if left_s < 0.0 {
         return Ok(None);
     }
     session.idle(Duration::from_secs_f64((left_s - 0.03).max(0.0)))?;
-    let left_s = (begin.since_s(now()) - HANDOVER_S).max(0.0);
+    let left_s = (begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S).max(0.0);
     std::thread::sleep(Duration::from_secs_f64(left_s));
     let span = execute(arm, trajectory)?.finish(session)?;
     Ok(Some(MonotonicNs(span.start_ns).since_s(begin)))

@@ -3,23 +3,18 @@
 use super::evidence::{Evidence, recorded};
 use crate::cli::LatencyArgs;
 use crate::command::area::require_clear_area;
-use crate::command::explain::explain_stop;
+use crate::command::on_arm::on_arm;
 use crate::config;
-use crate::pipeline::{self, ArmAddress, RunFolder};
-use crate::session::Session;
+use crate::pipeline;
 use anyhow::anyhow;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
+use cli_output::{Failure, OrInput, Outcome, Stage};
 use planner::response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::OperatingMode;
-use std::net::IpAddr;
 use std::time::Duration;
 
-/// Part of the arm's speed limits used for the move to the pose.
-const MOVE_SPEED: f64 = 0.1;
 /// Rest before and after each sweep, so that every joint starts and ends at rest.
 const REST: Duration = Duration::from_millis(600);
 
@@ -72,30 +67,32 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
         sweeps,
     } = intent(args)?;
     require_clear_area(&args.arm, "MEASURE", quiet)?;
-    watch_interrupts().or_failed()?;
-    let folder = RunFolder::create(args.out.as_deref(), "latency")?;
-    let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    if args.arm.dead_man {
-        session.hold_dead_man(quiet).or_failed()?;
-    }
-    let result = stream(
-        &mut session,
-        &folder,
-        args,
-        address,
+    let Some((_, first)) = sweeps.first() else {
+        return Err(Failure::input(anyhow!("name a joint with --joints")));
+    };
+    let place = (args.out.as_deref(), "latency");
+    let (folder, _) = on_arm(
+        &args.arm,
         &limits,
-        &sweeps,
+        first.start(),
+        place,
         quiet,
-    );
-    session.end(result.is_ok());
-    let whole = session.finish_run_file();
-    explain_stop(folder.path(), quiet);
-    result.or_failed()?;
-    whole.or_failed()?;
+        |session, link| {
+            let stage = Stage::begin("sweep", quiet);
+            for (place, (joint, sweep)) in sweeps.iter().enumerate() {
+                stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
+                session.idle(REST)?;
+                pipeline::execute(link, sweep)?.finish(session)?;
+            }
+            session.idle(REST)?;
+            stage.done(&format!("{} joints swept", sweeps.len()));
+            Ok(json!({}))
+        },
+    )?;
     Ok(Evidence {
         source: format!("arm {address}:{}", args.arm.ports.command_port),
         excitation: Some(excitation),
-        ..recorded(folder.path()).or_failed()?
+        ..recorded(&folder).or_failed()?
     })
 }
 
@@ -117,42 +114,4 @@ fn sweeps(
             Ok((joint, swept))
         })
         .collect()
-}
-
-fn stream(
-    session: &mut Session,
-    folder: &RunFolder,
-    args: &LatencyArgs,
-    ip: IpAddr,
-    limits: &Limits,
-    sweeps: &[(usize, JointTrajectory)],
-    quiet: bool,
-) -> anyhow::Result<()> {
-    let stage = Stage::begin("bring-up", quiet);
-    let address = ArmAddress {
-        ip,
-        command: args.arm.ports.command_port,
-        joints: args.arm.ports.report_port,
-        status: [args.arm.ports.status_port; 2],
-    };
-    pipeline::start_recorder(session, folder, limits, None, None)?;
-    let link = pipeline::start_controller(session, folder, limits, address)?;
-    for warning in pipeline::acquire(session, &link)? {
-        tracing::warn!("{warning}");
-    }
-    stage.say("moving to the pose");
-    pipeline::arm_for(session, &link, OperatingMode::SetUp)?;
-    if let Some((_, first)) = sweeps.first() {
-        pipeline::move_to(session, &link, first.start(), MOVE_SPEED)?;
-    }
-    stage.done("arm stands in the pose of the sweeps");
-    let stage = Stage::begin("sweep", quiet);
-    for (place, (joint, sweep)) in sweeps.iter().enumerate() {
-        stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
-        session.idle(REST)?;
-        pipeline::execute(&link, sweep)?.finish(session)?;
-    }
-    session.idle(REST)?;
-    stage.done(&format!("{} joints swept", sweeps.len()));
-    Ok(())
 }

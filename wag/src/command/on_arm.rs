@@ -1,0 +1,98 @@
+//! Work on an arm from its bring-up to the end of its record: what throw, wiggle and
+//! latency have in common.
+
+use super::explain::explain_stop;
+use crate::cli::ArmArgs;
+use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
+use crate::session::Session;
+use anyhow::anyhow;
+use arm_model::{JointVector, Limits};
+use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
+use run_log::files;
+use serde_json::{Value, json};
+use shared_types::OperatingMode;
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+
+/// Part of the arm's speed limits used for the move to the start pose.
+const MOVE_SPEED: f64 = 0.1;
+
+/// Moves an arm to `start` and lets `work` go on; returns the run's folder and what it says.
+///
+/// # Errors
+/// No arm is named; or what went wrong, which the run's summary says too.
+pub fn on_arm(
+    arm: &ArmArgs,
+    limits: &Limits,
+    start: JointVector,
+    (out, name): (Option<&Path>, &str),
+    quiet: bool,
+    work: impl FnOnce(&mut Session, &ArmLink) -> anyhow::Result<Value>,
+) -> Outcome<(PathBuf, Value)> {
+    let Some(ip) = arm.address else {
+        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
+    };
+    watch_interrupts().or_failed()?;
+    let folder = RunFolder::create(out, name)?;
+    let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
+    if arm.dead_man {
+        session.hold_dead_man(quiet).or_failed()?;
+    }
+    let worked = |session: &mut Session| -> anyhow::Result<Value> {
+        let (link, warnings) = bring_up(session, &folder, arm, ip, limits, start, quiet)?;
+        let mut value = work(session, &link)?;
+        value["ok"] = true.into();
+        value["run"] = json!(folder.path());
+        value["warnings"] = json!(warnings);
+        Ok(value)
+    };
+    let result = worked(&mut session);
+    session.end(result.is_ok());
+    let mut summary = match &result {
+        Ok(value) => value.clone(),
+        Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
+    };
+    let first = session.received.cycles.cycles.first();
+    summary["epoch_ns"] = json!(first.map_or(0, |c| c.deadline_ns));
+    files::write_json(&folder.file(files::SUMMARY), &summary).or_failed()?;
+    let recorded = session.finish_run_file();
+    explain_stop(folder.path(), quiet);
+    let value = result.or_failed()?;
+    recorded.or_failed()?;
+    Ok((folder.path().to_owned(), value))
+}
+
+/// Starts everything and moves to the start pose; also returns what the real-time set-up
+/// could not get.
+fn bring_up(
+    session: &mut Session,
+    folder: &RunFolder,
+    arm: &ArmArgs,
+    ip: IpAddr,
+    limits: &Limits,
+    start: JointVector,
+    quiet: bool,
+) -> anyhow::Result<(ArmLink, Vec<String>)> {
+    let stage = Stage::begin("bring-up", quiet);
+    let address = ArmAddress {
+        ip,
+        command: arm.ports.command_port,
+        joints: arm.ports.report_port,
+        status: [arm.ports.status_port; 2],
+    };
+    pipeline::start_recorder(session, folder, limits, None, None)?;
+    let link = pipeline::start_controller(session, folder, limits, address)?;
+    let warnings = pipeline::acquire(session, &link)?;
+    for warning in &warnings {
+        tracing::warn!("{warning}");
+    }
+    stage.say("moving to the start pose");
+    pipeline::arm_for(session, &link, OperatingMode::SetUp)?;
+    pipeline::move_to(session, &link, start, MOVE_SPEED)?;
+    stage.done(if ip.is_loopback() {
+        "arm stands at the start; simulated, so it is armed without asking"
+    } else {
+        "arm stands at the start"
+    });
+    Ok((link, warnings))
+}
