@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// Longest time awake before a deadline: a quarter of the period (us).
 const WARM_UP_MAX_US: u32 = 1000;
+/// Key of the one time that has a maximum of its own.
+const WINDOW_KEY: &str = "tracking_window_ms";
 
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +43,7 @@ pub enum ConfigError {
     #[error("`{key}` is {found}, it must be {allowed}")]
     Threshold {
         /// Key.
-        key: &'static str,
+        key: String,
         /// Value found.
         found: f64,
         /// What would be allowed.
@@ -142,9 +144,9 @@ pub struct ThresholdSettings {
     /// Largest age of the newest joint report while the arm moves (ms).
     pub report_stale_ms: Option<f64>,
     /// Longest time in which joint reports may repeat their values while the arm
-    /// is told to move (ms).
+    /// is commanded to move (ms).
     pub report_frozen_ms: Option<f64>,
-    /// Largest distance of a measured joint from everything it was told in the
+    /// Largest distance of a measured joint from everything commanded in the
     /// last `tracking_window_ms` (rad).
     pub tracking_error_max_rad: Option<f64>,
     /// Longest lag of the arm that counts as normal (ms), 250 at most.
@@ -170,89 +172,82 @@ impl ThresholdSettings {
             Profile::Strict => Thresholds::strict(),
             Profile::Relaxed => Thresholds::relaxed(),
         };
-        let error = self
-            .tracking_error_max_rad
-            .unwrap_or(base.tracking_error_max_rad);
-        if !(error > 0.0 && error <= 1.0) {
-            return Err(ConfigError::Threshold {
-                key: "thresholds.tracking_error_max_rad",
-                found: error,
-                allowed: "above 0 and at most 1 rad",
-            });
-        }
-        let unanswered_max = self.unanswered_max.unwrap_or(base.unanswered_max);
-        if unanswered_max == 0 {
-            return Err(ConfigError::Threshold {
-                key: "thresholds.unanswered_max",
-                found: 0.0,
-                allowed: "at least 1",
-            });
-        }
-        Ok(Thresholds {
-            operator_timeout_ns: span_ns(
-                "thresholds.operator_timeout_ms",
-                self.operator_timeout_ms,
-                base.operator_timeout_ns,
-            )?,
-            guardian_timeout_ns: span_ns(
-                "thresholds.guardian_timeout_ms",
-                self.guardian_timeout_ms,
-                base.guardian_timeout_ns,
-            )?,
-            reply_stall_ns: span_ns(
-                "thresholds.reply_stall_ms",
-                self.reply_stall_ms,
-                base.reply_stall_ns,
-            )?,
-            report_stale_ns: span_ns(
-                "thresholds.report_stale_ms",
-                self.report_stale_ms,
-                base.report_stale_ns,
-            )?,
-            report_frozen_ns: span_ns(
-                "thresholds.report_frozen_ms",
-                self.report_frozen_ms,
-                base.report_frozen_ns,
-            )?,
-            tracking_window_ns: self.window_ns(base.tracking_window_ns)?,
-            tracking_error_max_rad: error,
-            unanswered_max,
+        let mut checked = Thresholds {
+            tracking_error_max_rad: self
+                .tracking_error_max_rad
+                .unwrap_or(base.tracking_error_max_rad),
+            unanswered_max: self.unanswered_max.unwrap_or(base.unanswered_max),
             late_cycles_max: self.late_cycles_max.unwrap_or(base.late_cycles_max),
             missed_cycles_max: self.missed_cycles_max.unwrap_or(base.missed_cycles_max),
             ..base
-        })
-    }
-
-    /// No longer than what is remembered of the setpoints.
-    fn window_ns(&self, base_ns: u64) -> Result<u64, ConfigError> {
-        let key = "thresholds.tracking_window_ms";
-        match self.tracking_window_ms {
-            Some(found) if found > TRACKING_WINDOW_MAX_MS => Err(ConfigError::Threshold {
-                key,
-                found,
-                allowed: "4 to 250 ms",
-            }),
-            given => span_ns(key, given, base_ns),
+        };
+        let (error, unanswered) = (checked.tracking_error_max_rad, checked.unanswered_max);
+        let key = "thresholds.tracking_error_max_rad";
+        let allowed = "above 0 and at most 1 rad";
+        require(error > 0.0 && error <= 1.0, key, error, allowed)?;
+        let key = "thresholds.unanswered_max";
+        require(unanswered > 0, key, unanswered, "at least 1")?;
+        let c = &mut checked;
+        for (key, found_ms, span_ns) in [
+            (
+                "operator_timeout_ms",
+                self.operator_timeout_ms,
+                &mut c.operator_timeout_ns,
+            ),
+            (
+                "guardian_timeout_ms",
+                self.guardian_timeout_ms,
+                &mut c.guardian_timeout_ns,
+            ),
+            ("reply_stall_ms", self.reply_stall_ms, &mut c.reply_stall_ns),
+            (
+                "report_stale_ms",
+                self.report_stale_ms,
+                &mut c.report_stale_ns,
+            ),
+            (
+                "report_frozen_ms",
+                self.report_frozen_ms,
+                &mut c.report_frozen_ns,
+            ),
+            (
+                WINDOW_KEY,
+                self.tracking_window_ms,
+                &mut c.tracking_window_ns,
+            ),
+        ] {
+            let Some(ms) = found_ms else {
+                continue;
+            };
+            // The window is no longer than what is remembered of the setpoints.
+            let (most_ms, allowed) = if key == WINDOW_KEY {
+                (TRACKING_WINDOW_MAX_MS, "4 to 250 ms")
+            } else {
+                (10_000.0, "4 to 10000 ms")
+            };
+            let key = format!("thresholds.{key}");
+            require((4.0..=most_ms).contains(&ms), &key, ms, allowed)?;
+            *span_ns = (ms * 1e6) as u64;
         }
+        Ok(checked)
     }
 }
 
-/// A time from the file (ms), checked, or the profile's (ns).
-fn span_ns(key: &'static str, found_ms: Option<f64>, base_ns: u64) -> Result<u64, ConfigError> {
-    match found_ms {
-        None => Ok(base_ns),
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "4 to 10 000 ms"
-        )]
-        Some(ms) if (4.0..=10_000.0).contains(&ms) => Ok((ms * 1e6) as u64),
-        Some(found) => Err(ConfigError::Threshold {
-            key,
-            found,
-            allowed: "4 to 10000 ms",
-        }),
+/// Refuses the value found under a key unless it is allowed.
+fn require(
+    holds: bool,
+    key: &str,
+    found: impl Into<f64>,
+    allowed: &'static str,
+) -> Result<(), ConfigError> {
+    if holds {
+        return Ok(());
     }
+    Err(ConfigError::Threshold {
+        key: key.to_owned(),
+        found: found.into(),
+        allowed,
+    })
 }
 
 impl ControllerConfig {
@@ -281,7 +276,7 @@ impl ControllerConfig {
         }
     }
 
-    /// What the control core is told.
+    /// Settings of the control core.
     ///
     /// # Errors
     /// [`ConfigError`].
@@ -300,15 +295,11 @@ impl ControllerConfig {
     /// [`ConfigError`].
     pub fn check(&self) -> Result<(), ConfigError> {
         self.thresholds.checked(self.arm)?;
-        self.guardian.check()?;
-        let warm_up_us = self.real_time.warm_up_us;
-        if warm_up_us > WARM_UP_MAX_US {
-            return Err(ConfigError::Threshold {
-                key: "real_time.warm_up_us",
-                found: warm_up_us.into(),
-                allowed: "0 to 1000 us",
-            });
-        }
+        let (silence_ms, warm_up_us) = (self.guardian.silence_ms, self.real_time.warm_up_us);
+        let holds = (8.0..=5000.0).contains(&silence_ms);
+        require(holds, "guardian.silence_ms", silence_ms, "8 to 5000 ms")?;
+        let holds = warm_up_us <= WARM_UP_MAX_US;
+        require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;
         match self.real_time.priority {
             Some(found) if !(11..=99).contains(&found) => Err(ConfigError::Priority { found }),
             _ => Ok(()),
@@ -344,37 +335,22 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         let parse = toml::from_str::<ControllerConfig>;
-        assert!(
-            parse("comand_port = 5")
-                .unwrap_err()
-                .to_string()
-                .contains("comand_port")
-        );
-        let mut config = parse("[thresholds]\nreply_stall_ms = 0.0").unwrap();
-        assert!(
-            config
-                .check()
-                .unwrap_err()
-                .to_string()
-                .contains("thresholds.reply_stall_ms")
-        );
-        config = parse("[thresholds]\ntracking_window_ms = 251.0").unwrap();
-        let said = config.check().unwrap_err().to_string();
-        assert!(
-            said.contains("tracking_window_ms") && said.contains("250"),
-            "{said}"
-        );
-        config = parse("[real_time]\npriority = 5").unwrap();
-        assert!(matches!(
-            config.check(),
-            Err(ConfigError::Priority { found: 5 })
-        ));
-        config = parse("[real_time]\nwarm_up_us = 1001").unwrap();
-        let said = config.check().unwrap_err().to_string();
-        assert!(
-            said.contains("warm_up_us") && said.contains("1000"),
-            "{said}"
-        );
+        let unknown = parse("comand_port = 5").unwrap_err().to_string();
+        assert!(unknown.contains("comand_port"), "{unknown}");
+        for (text, allowed) in [
+            ("thresholds.reply_stall_ms = 0.0", "10000"),
+            ("thresholds.tracking_window_ms = 251.0", "250"),
+            ("thresholds.tracking_error_max_rad = nan", "1 rad"),
+            ("thresholds.unanswered_max = 0", "at least 1"),
+            ("guardian.silence_ms = 5.0", "8 to 5000"),
+            ("real_time.priority = 5", "11 to 99"),
+            ("real_time.warm_up_us = 1001", "1000"),
+        ] {
+            let said = parse(text).unwrap().check().unwrap_err().to_string();
+            let (key, _) = text.split_once(' ').unwrap();
+            assert!(said.contains(key) && said.contains(allowed), "{said}");
+        }
+        let mut config = ControllerConfig::default();
         config.limits = Some(Limits::default());
         config.limits_file = Some("x".into());
         assert!(matches!(
@@ -382,18 +358,15 @@ mod tests {
             Err(ConfigError::LimitsTwice)
         ));
     }
+
     #[test]
     fn an_arm_elsewhere_is_held_to_strict_thresholds() {
         let local = ThresholdSettings::default();
         let checked = |settings: ThresholdSettings, arm: [u8; 4]| settings.checked(arm.into());
-        assert_eq!(
-            checked(local, [127, 0, 0, 1]).unwrap(),
-            Thresholds::relaxed()
-        );
-        assert_eq!(
-            checked(local, [192, 168, 1, 203]).unwrap(),
-            Thresholds::strict()
-        );
+        let here = checked(local, [127, 0, 0, 1]).unwrap();
+        assert_eq!(here, Thresholds::relaxed());
+        let elsewhere = checked(local, [192, 168, 1, 203]).unwrap();
+        assert_eq!(elsewhere, Thresholds::strict());
         let own = ThresholdSettings {
             profile: Some(Profile::Strict),
             reply_stall_ms: Some(20.0),

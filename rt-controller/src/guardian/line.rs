@@ -34,7 +34,7 @@ struct Open {
     /// Transaction of the newest question for the state.
     question: u16,
     asked_ns: u64,
-    heard_ns: u64,
+    received_ns: u64,
     /// When the newest stop was asked for.
     stop_ns: Option<u64>,
 }
@@ -103,7 +103,7 @@ impl ArmLine {
         let Phase::Up(open) = &mut self.phase else {
             return false;
         };
-        if open.stop_ns.is_some_and(|at_ns| open.heard_ns <= at_ns) {
+        if open.stop_ns.is_some_and(|at_ns| open.received_ns <= at_ns) {
             tracing::warn!("the arm does not answer on this connection; opening another");
             self.phase = Phase::Down { retry_ns: now_ns };
             return false;
@@ -159,7 +159,7 @@ fn take(address: SocketAddr, now_ns: u64, socket: &Socket) -> Result<Phase> {
         transaction: 0,
         question: 0,
         asked_ns: 0,
-        heard_ns: now_ns,
+        received_ns: now_ns,
         stop_ns: None,
     })))
 }
@@ -188,7 +188,7 @@ impl Open {
 
     fn turn(&mut self, now_ns: u64) -> Result<Option<u8>> {
         let state = self.receive(now_ns)?;
-        if now_ns.saturating_sub(self.heard_ns) > SILENCE_NS {
+        if now_ns.saturating_sub(self.received_ns) > SILENCE_NS {
             return Err(ErrorKind::TimedOut.into());
         }
         if now_ns.saturating_sub(self.asked_ns) >= ASK_EVERY_NS {
@@ -202,7 +202,7 @@ impl Open {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(n) => {
                 self.reader.commit(n);
-                self.heard_ns = now_ns;
+                self.received_ns = now_ns;
             }
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 return Ok(None);
@@ -289,7 +289,7 @@ mod tests {
         until(&mut line, &mut now_ns, |_, state| state == Some(4));
         assert_eq!(asked.try_iter().take(3).collect::<Vec<_>>(), [13, 12, 13]);
 
-        // Heard since: the same connection serves for the next stop.
+        // Answered since: the same connection serves for the next stop.
         now_ns += 100 * MS;
         assert!(line.ask_stop(now_ns));
         until(&mut line, &mut now_ns, |_, state| state == Some(4));

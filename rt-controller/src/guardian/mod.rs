@@ -40,7 +40,7 @@ const LOOK_EVERY_NS: u64 = 50_000_000;
 const LEAVE_WITHIN_NS: u64 = 4_000_000_000;
 /// The same where no connection to the arm can be had (ns): its host is down or
 /// gone, and whoever ends the guardian is told to look at the arm.
-const LEAVE_UNHEARD_WITHIN_NS: u64 = 1_500_000_000;
+const LEAVE_UNCONFIRMED_WITHIN_NS: u64 = 1_500_000_000;
 
 /// Guards the arm and the controller of `config` until `stop` is set; when the
 /// arm moves then, until it stands. Blocks the calling thread.
@@ -72,7 +72,7 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
             let most_ns = if runner.line.is_connected() {
                 LEAVE_WITHIN_NS
             } else {
-                LEAVE_UNHEARD_WITHIN_NS
+                LEAVE_UNCONFIRMED_WITHIN_NS
             };
             if moving && since_ns > most_ns {
                 tracing::error!(
@@ -106,7 +106,7 @@ fn set_up_thread(config: &ControllerConfig) -> Result<(), ControllerError> {
     Ok(())
 }
 
-/// The guardian at its post.
+/// Runs the watchdog: its connection to the arm, the controller it watches.
 struct Runner {
     watchdog: Guardian,
     line: ArmLine,

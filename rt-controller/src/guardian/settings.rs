@@ -1,6 +1,5 @@
 //! Settings of the guardian.
 
-use crate::config::ConfigError;
 use serde::{Deserialize, Serialize};
 
 /// How the guardian watches; table `[guardian]` of the controller's file.
@@ -28,21 +27,6 @@ impl Default for GuardianSettings {
 }
 
 impl GuardianSettings {
-    /// Refuses what makes no sense.
-    ///
-    /// # Errors
-    /// [`ConfigError::Threshold`].
-    pub fn check(&self) -> Result<(), ConfigError> {
-        if (8.0..=5000.0).contains(&self.silence_ms) {
-            return Ok(());
-        }
-        Err(ConfigError::Threshold {
-            key: "guardian.silence_ms",
-            found: self.silence_ms,
-            allowed: "8 to 5000 ms",
-        })
-    }
-
     /// The silence (ns).
     #[must_use]
     pub const fn silence_ns(&self) -> u64 {
