@@ -7,12 +7,12 @@ use shared_types::ipc::{CauseRecord, CycleRecord, InputRecord};
 /// Version of the program whose core made a recording.
 pub const CORE_VERSION: &str = shared_types::VERSION;
 
-/// One cycle: what it was told and what it answered. RT-safe to copy.
+/// One cycle: its inputs and outputs. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct RecordedCycle {
-    /// What it was told.
+    /// Its inputs.
     pub input: InputRecord,
-    /// What it answered.
+    /// Its outputs.
     pub record: CycleRecord,
 }
 

@@ -4,7 +4,7 @@
 //! from the same state must give the same records and causes, bit for bit. At
 //! every keyframe the whole state is compared as well.
 
-use super::compare::{Unequal, cause_fields, cycle_fields, cycles_agree, first_unequal};
+use super::compare::{Unequal, cause_fields, cycle_fields, first_unequal};
 use super::found::{Gap, Replay, ReplayError};
 use super::item::{Item, Keyframe, RecordedCycle, Snapshot};
 use super::log::{Flaw, LogError, LogReader, Read};
@@ -179,10 +179,8 @@ impl Player {
                 self.found.first_cycle = number;
             }
             self.found.last_cycle = number;
-            if !cycles_agree(&cycle.record, &out.record)
-                && let Some(unequal) =
-                    first_unequal(&cycle_fields(&cycle.record), &cycle_fields(&out.record))
-            {
+            let (then, now) = (cycle_fields(&cycle.record), cycle_fields(&out.record));
+            if let Some(unequal) = first_unequal(&then, &now) {
                 self.found.differs(number, unequal);
             }
         }

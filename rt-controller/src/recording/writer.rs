@@ -1,9 +1,8 @@
 //! Items into chunks.
 
 use super::chunk;
-use super::item::{CORE_VERSION, Keyframe, RecordedCycle, Snapshot};
+use super::item::{CORE_VERSION, Item, Keyframe, RecordedCycle, Snapshot};
 use crate::control::Motion;
-use serde::Serialize;
 use shared_types::ipc::CauseRecord;
 
 /// Cycles of a chunk: a tenth of a second at 250 Hz.
@@ -25,16 +24,6 @@ pub struct ChunkWriter {
     motions: Vec<(u64, Box<Motion>)>,
 }
 
-/// The borrowed form of [`super::Item`], variant by variant, to be written without
-/// copying.
-#[derive(Serialize)]
-enum ItemRef<'a> {
-    Keyframe(&'a Keyframe),
-    Motion { id: u64, motion: &'a Motion },
-    Cycle(&'a RecordedCycle),
-    Cause(&'a CauseRecord),
-}
-
 impl ChunkWriter {
     /// Begins a chunk with a keyframe; returns the chunk that ends before it.
     pub fn keyframe(&mut self, snapshot: &Snapshot) -> Option<&[u8]> {
@@ -46,27 +35,28 @@ impl ChunkWriter {
             motions: self.motions.clone(),
         };
         self.keyframe = true;
-        self.add(&ItemRef::Keyframe(&keyframe));
+        self.add(&Item::Keyframe(Box::new(keyframe)));
         ended.then_some(&self.chunk)
     }
 
-    /// Adds a motion that is about to be ordered.
+    /// Adds a motion that is about to be commanded.
     pub fn motion(&mut self, id: u64, motion: &Motion) {
-        self.add(&ItemRef::Motion { id, motion });
+        let motion = Box::new(motion.clone());
         if self.motions.len() == MOTIONS {
             self.motions.remove(0);
         }
-        self.motions.push((id, Box::new(motion.clone())));
+        self.motions.push((id, motion.clone()));
+        self.add(&Item::Motion { id, motion });
     }
 
     /// Adds a cause.
     pub fn cause(&mut self, cause: &CauseRecord) {
-        self.add(&ItemRef::Cause(cause));
+        self.add(&Item::Cause(Box::new(*cause)));
     }
 
     /// Adds a cycle; returns a chunk when one is full.
     pub fn cycle(&mut self, cycle: &RecordedCycle) -> Option<&[u8]> {
-        self.add(&ItemRef::Cycle(cycle));
+        self.add(&Item::Cycle(Box::new(*cycle)));
         self.cycles += 1;
         if self.cycles >= CYCLES_PER_CHUNK || self.payload.len() >= CLOSE_AT {
             self.flush()
@@ -98,7 +88,7 @@ impl ChunkWriter {
         true
     }
 
-    fn add(&mut self, item: &ItemRef<'_>) {
+    fn add(&mut self, item: &Item) {
         match postcard::to_allocvec(item) {
             Ok(bytes) => {
                 self.payload.extend_from_slice(&bytes);
@@ -106,38 +96,6 @@ impl ChunkWriter {
             }
             // No item holds what postcard cannot write.
             Err(reason) => tracing::error!(%reason, "an item could not be recorded"),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::Item;
-    use super::*;
-
-    #[test]
-    fn borrowed_items_are_written_like_owned_ones() {
-        let cycle = RecordedCycle::default();
-        let cause = CauseRecord::default();
-        let keyframe = Keyframe {
-            core: "x".to_owned(),
-            next_cycle: 3,
-            state: vec![1, 2],
-            motions: Vec::new(),
-        };
-        let pairs = [
-            (
-                ItemRef::Keyframe(&keyframe),
-                Item::Keyframe(Box::new(keyframe.clone())),
-            ),
-            (ItemRef::Cycle(&cycle), Item::Cycle(Box::new(cycle))),
-            (ItemRef::Cause(&cause), Item::Cause(Box::new(cause))),
-        ];
-        for (borrowed, owned) in pairs {
-            assert_eq!(
-                postcard::to_allocvec(&borrowed).unwrap(),
-                postcard::to_allocvec(&owned).unwrap()
-            );
         }
     }
 }

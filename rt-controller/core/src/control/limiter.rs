@@ -299,38 +299,27 @@ mod tests {
     #[test]
     fn a_jump_or_nonsense_never_passes_and_leaves_no_trace() {
         let limits = Limits::default();
-        let mut limiter = Limiter::at_rest(START_POSE, &limits);
-        let before = limiter;
-        let mut jump = START_POSE;
-        jump[6] += 0.001;
-        assert_eq!(
-            limiter
-                .admit(&jump, PERIOD_S, &limits, &STREAMED)
-                .map_err(|found| found.fault),
-            Err(FaultCode::SetpointAcceleration)
-        );
-        let mut bad = START_POSE;
-        bad[3] = f64::NAN;
-        assert_eq!(
-            limiter
-                .admit(&bad, PERIOD_S, &limits, &STREAMED)
-                .map_err(|found| found.fault),
-            Err(FaultCode::SetpointNotFinite)
-        );
-        assert_eq!(
-            limiter
-                .admit(&START_POSE, 0.0, &limits, &STREAMED)
-                .map_err(|found| found.fault),
-            Err(FaultCode::SetpointNotFinite)
-        );
-        bad[3] = -0.2;
-        assert_eq!(
-            limiter
-                .admit(&bad, PERIOD_S, &limits, &STREAMED)
-                .map_err(|found| found.fault),
-            Err(FaultCode::SetpointPosition)
-        );
-        assert_eq!(limiter, before);
+        let at_rest = Limiter::at_rest(START_POSE, &limits);
+        let moved = |joint: usize, q_rad: f64| {
+            let mut q = START_POSE;
+            q[joint] = q_rad;
+            q
+        };
+        for (q, step_s, fault) in [
+            (
+                moved(6, START_POSE[6] + 0.001),
+                PERIOD_S,
+                FaultCode::SetpointAcceleration,
+            ),
+            (moved(3, f64::NAN), PERIOD_S, FaultCode::SetpointNotFinite),
+            (START_POSE, 0.0, FaultCode::SetpointNotFinite),
+            (moved(3, -0.2), PERIOD_S, FaultCode::SetpointPosition),
+        ] {
+            let mut limiter = at_rest;
+            let found = limiter.admit(&q, step_s, &limits, &STREAMED).unwrap_err();
+            assert_eq!(found.fault, fault);
+            assert_eq!(limiter, at_rest);
+        }
     }
 
     /// A setpoint whose jerk alone is too large for a motion of the controller's
@@ -368,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tier_is_slower_than_the_limits() {
+    fn an_operating_mode_is_slower_than_the_limits() {
         let limits = Limits::default();
         let mut q = START_POSE;
         q[0] += 0.5 * PERIOD_S * PERIOD_S * 20.0;

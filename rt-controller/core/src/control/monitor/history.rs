@@ -1,4 +1,4 @@
-//! The setpoints sent last: what the arm was told, and when.
+//! The setpoints sent last, and when.
 
 #![allow(
     clippy::arithmetic_side_effects,
@@ -10,30 +10,31 @@ use serde::{Deserialize, Serialize};
 use shared_types::MonotonicNs;
 
 /// Setpoints remembered: 0.256 s at 250 Hz; no window may be longer than
-/// [`TRACKING_WINDOW_MAX_MS`](crate::control::settings::TRACKING_WINDOW_MAX_MS).
-const LENGTH: usize = 64;
+/// [`TRACKING_WINDOW_MAX_MS`](crate::control::settings::TRACKING_WINDOW_MAX_MS). In
+/// two halves, each as long as an array may be for serde.
+const LENGTH: usize = 2 * HALF;
+const HALF: usize = 32;
 
 /// Fixed size, oldest overwritten. RT-safe.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Commanded {
-    #[serde(with = "crate::control::snapshot::array")]
-    sent: [(u64, JointVector); LENGTH],
+    sent: [[(u64, JointVector); HALF]; 2],
     next: usize,
 }
 
 impl Commanded {
-    /// Told to be in `q` for ever.
+    /// Commanded to be in `q` for ever.
     #[must_use]
     pub const fn holding(q: JointVector) -> Self {
         Self {
-            sent: [(0, q); LENGTH],
+            sent: [[(0, q); HALF]; 2],
             next: 0,
         }
     }
 
     /// A setpoint was sent.
     pub fn push(&mut self, deadline_ns: u64, q: JointVector) {
-        if let Some(slot) = self.sent.get_mut(self.next) {
+        if let Some(slot) = self.sent.as_flattened_mut().get_mut(self.next) {
             *slot = (deadline_ns, q);
         }
         self.next = self.next.wrapping_add(1) % LENGTH;
@@ -66,7 +67,8 @@ impl Commanded {
 
     /// Setpoints are sent in the order of their times, so the ring is in order.
     fn newest_first(&self) -> impl Iterator<Item = &(u64, JointVector)> {
-        let (newer, older) = self.sent.split_at_checked(self.next).unwrap_or_default();
+        let sent = self.sent.as_flattened();
+        let (newer, older) = sent.split_at_checked(self.next).unwrap_or_default();
         newer.iter().rev().chain(older.iter().rev())
     }
 

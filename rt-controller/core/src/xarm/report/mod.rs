@@ -46,15 +46,17 @@ fn parse_state(bytes: &mut ByteReader<'_>) -> Option<(ArmState, Mode)> {
     Some((ArmState::from_code(byte & 0x0F), Mode::from_code(byte >> 4)))
 }
 
-/// Refuses a frame shorter than `needed` before its fields are read.
-fn check_len(frame: &[u8], needed: usize) -> Result<(), ReportTooShort> {
-    if frame.len() < needed {
-        return Err(ReportTooShort {
-            given: frame.len(),
-            needed,
-        });
-    }
-    Ok(())
+/// Reads a frame of at least `needed` bytes.
+fn parse<'a, T>(
+    frame: &'a [u8],
+    needed: usize,
+    read: impl FnOnce(&'a [u8]) -> Option<T>,
+) -> Result<T, ReportTooShort> {
+    let given = frame.len();
+    (given >= needed)
+        .then(|| read(frame))
+        .flatten()
+        .ok_or(ReportTooShort { given, needed })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The reports that share a layout: real (30003), normal (30001), rich (30002).
 
-use super::{ReportTooShort, check_len, emit_state, parse_state};
+use super::{ReportTooShort, emit_state, parse, parse_state};
 use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError};
 use crate::xarm::error_code::ErrorCode;
 use crate::xarm::pose::TcpPose;
@@ -74,15 +74,9 @@ impl BasicReport {
     /// # Errors
     /// [`ReportTooShort`] below 87 bytes.
     pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        check_len(frame, BASIC_LEN)?;
-        Self::read(&mut ByteReader::new(frame)).ok_or(too_short(frame, BASIC_LEN))
-    }
-}
-
-fn too_short(frame: &[u8], needed: usize) -> ReportTooShort {
-    ReportTooShort {
-        given: frame.len(),
-        needed,
+        parse(frame, BASIC_LEN, |frame| {
+            Self::read(&mut ByteReader::new(frame))
+        })
     }
 }
 
@@ -115,13 +109,13 @@ impl ForceReport {
     /// # Errors
     /// [`ReportTooShort`].
     pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        check_len(frame, BASIC_LEN)?;
-        let mut bytes = ByteReader::new(frame);
-        let basic = BasicReport::read(&mut bytes).ok_or(too_short(frame, BASIC_LEN))?;
-        Ok(Self {
-            basic,
-            external_force: bytes.f32s_le().unwrap_or_default(),
-            raw_force: bytes.f32s_le().unwrap_or_default(),
+        parse(frame, BASIC_LEN, |frame| {
+            let mut bytes = ByteReader::new(frame);
+            Some(Self {
+                basic: BasicReport::read(&mut bytes)?,
+                external_force: bytes.f32s_le().unwrap_or_default(),
+                raw_force: bytes.f32s_le().unwrap_or_default(),
+            })
         })
     }
 }
@@ -200,8 +194,9 @@ impl NormalReport {
     /// # Errors
     /// [`ReportTooShort`].
     pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        check_len(frame, NORMAL_REPORT_LEN)?;
-        Self::read(&mut ByteReader::new(frame)).ok_or(too_short(frame, NORMAL_REPORT_LEN))
+        parse(frame, NORMAL_REPORT_LEN, |frame| {
+            Self::read(&mut ByteReader::new(frame))
+        })
     }
 }
 
@@ -285,8 +280,7 @@ impl RichReport {
     /// # Errors
     /// [`ReportTooShort`].
     pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        check_len(frame, RICH_REPORT_LEN)?;
-        Self::read(frame).ok_or(too_short(frame, RICH_REPORT_LEN))
+        parse(frame, RICH_REPORT_LEN, Self::read)
     }
 
     fn read(frame: &[u8]) -> Option<Self> {

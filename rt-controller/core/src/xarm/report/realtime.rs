@@ -1,7 +1,7 @@
 //! The real-time report of port 30000, the only one with measured velocity and
 //! a time stamp of the controller.
 
-use super::{ReportTooShort, check_len, emit_state, parse_state};
+use super::{ReportTooShort, emit_state, parse, parse_state};
 use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError};
 use crate::xarm::pose::TcpPose;
 use crate::xarm::status::{ArmState, Mode};
@@ -102,11 +102,7 @@ impl RealtimeReport {
     /// # Errors
     /// [`ReportTooShort`].
     pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        check_len(frame, REALTIME_REPORT_LEN)?;
-        Self::read(frame).ok_or(ReportTooShort {
-            given: frame.len(),
-            needed: REALTIME_REPORT_LEN,
-        })
+        parse(frame, REALTIME_REPORT_LEN, Self::read)
     }
 
     fn read(frame: &[u8]) -> Option<Self> {
