@@ -3,21 +3,14 @@
 
 use super::bus::{Transport, open_error};
 use super::payload::{ControllerState, GuardianBeat, OperatorBeat, PAYLOAD_VERSION};
-use super::slots::{Place, Slots, create_slots};
+use super::slots::{Key, Place, Slots, create_slots, reader_of};
 use super::{Bus, IpcError};
 use iceoryx2::port::reader::{EntryHandle, Reader};
 use iceoryx2::port::writer::{EntryHandleMut, Writer};
-use iceoryx2::prelude::*;
-use iceoryx2::service::port_factory::blackboard::PortFactory;
 
 const STATE: &str = "wag/v1/controller/state";
 const OPERATOR: &str = "wag/v1/controller/operator";
 const GUARDIAN: &str = "wag/v1/controller/guardian";
-
-/// Key of an entry of a blackboard.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ZeroCopySend)]
-#[repr(C)]
-pub(super) struct Key(pub(super) u32);
 
 const KEY: Key = Key(0);
 
@@ -84,16 +77,6 @@ impl ControllerBoards {
     }
 }
 
-pub(super) fn opened(
-    bus: &Bus,
-    name: &'static str,
-) -> Result<PortFactory<Transport, Key>, IpcError> {
-    bus.service(name)?
-        .blackboard_opener::<Key>()
-        .open()
-        .map_err(open_error(name))
-}
-
 /// Reads the controller's state.
 pub struct StateReader {
     state: EntryHandle<Transport, Key, ControllerState>,
@@ -112,10 +95,7 @@ impl StateReader {
     /// # Errors
     /// [`IpcError::Open`] when there is no controller in this domain.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        let reader = opened(bus, STATE)?
-            .reader_builder()
-            .create()
-            .map_err(open_error(STATE))?;
+        let reader = reader_of(bus, STATE)?;
         Ok(Self {
             state: reader.entry(&KEY).map_err(open_error(STATE))?,
             _keep: reader,
@@ -146,12 +126,8 @@ impl OperatorReader {
     /// # Errors
     /// [`IpcError::Open`] when there is no controller in this domain.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        let reader = opened(bus, OPERATOR)?
-            .reader_builder()
-            .create()
-            .map_err(open_error(OPERATOR))?;
         Ok(Self {
-            beats: Slots::read(reader, OPERATOR)?,
+            beats: Slots::read(reader_of(bus, OPERATOR)?, OPERATOR)?,
         })
     }
 

@@ -1,6 +1,7 @@
 //! One process's connection to shared memory, and the pub-sub services.
 
 use super::IpcError;
+use super::domain::{config_of, root_folder};
 use super::payload::{CycleRecord, FrameHeader, JointReport};
 use super::preview::PreviewFrame;
 use crate::keypoints::KeypointFrame;
@@ -37,11 +38,19 @@ pub type ChunkPublisher = Publisher<Transport, [u8], ()>;
 pub type ChunkSubscriber = Subscriber<Transport, [u8], ()>;
 
 const FRAMES: &str = "wag/v1/camera/frames";
-const KEYPOINTS: &str = "wag/v1/camera/keypoints";
-const PREVIEW: &str = "wag/v1/camera/preview";
-const CYCLES: &str = "wag/v1/controller/cycles";
-const JOINTS: &str = "wag/v1/controller/joints";
 const RECORDING: &str = "wag/v1/controller/recording";
+
+/// A service of records: its name, and how many are kept for a subscriber.
+type Topic = (&'static str, usize);
+
+/// A whole wiggle and more.
+const KEYPOINTS: Topic = ("wag/v1/camera/keypoints", 1024);
+/// A second of them. Who comes late wants the newest.
+const PREVIEW: Topic = ("wag/v1/camera/preview", 64);
+/// Four seconds.
+const CYCLES: Topic = ("wag/v1/controller/cycles", 1024);
+/// Four seconds.
+const JOINTS: Topic = ("wag/v1/controller/joints", 1024);
 
 /// The run that a record belongs to, its recorder, a page that looks on, the one that works
 /// on frames or previews them, and a recorder that joined late, with its exact recording.
@@ -50,12 +59,6 @@ const SUBSCRIBERS: usize = 6;
 const NODES: usize = 10;
 /// Frames a slow subscriber may lag behind before it loses the oldest.
 const FRAME_BUFFER: usize = 16;
-/// Keypoint frames kept for a subscriber: a whole wiggle and more.
-const KEYPOINT_BUFFER: usize = 1024;
-/// Previews kept for a subscriber: a second of them. Who comes late wants the newest.
-const PREVIEW_BUFFER: usize = 64;
-/// Cycle records and joint reports kept for a subscriber: four seconds.
-const RECORD_BUFFER: usize = 1024;
 /// Chunks of a recording kept for a subscriber, ten to the second: twelve seconds.
 const CHUNK_BUFFER: usize = 128;
 
@@ -74,33 +77,6 @@ pub(super) fn open_error<E: core::fmt::Debug>(service: &'static str) -> impl Fn(
     }
 }
 
-/// The library's configuration for a domain: a prefix of its own for every file,
-/// in this user's folder.
-pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if domain.is_empty() || domain.len() > 40 || !domain.chars().all(plain) {
-        return Err(IpcError::Domain {
-            domain: domain.to_owned(),
-        });
-    }
-    let root = super::domains::root_folder()?;
-    let fail = |e: SemanticStringError| IpcError::Join {
-        domain: domain.to_owned(),
-        folder: root.clone(),
-        reason: format!("{e:?}"),
-    };
-    let mut config = Config::default();
-    config.global.prefix = FileName::new(prefix_of(domain).as_bytes()).map_err(fail)?;
-    let path = Path::new(root.as_os_str().as_encoded_bytes()).map_err(fail)?;
-    config.global.set_root_path(&path);
-    Ok(config)
-}
-
-/// What the name of every file of a domain begins with.
-pub(super) fn prefix_of(domain: &str) -> String {
-    format!("wag_{domain}_")
-}
-
 impl Bus {
     /// Joins `domain`. Files left by killed processes of the same user are
     /// removed on the way.
@@ -110,7 +86,7 @@ impl Bus {
     /// of this user's own, [`IpcError::Join`] otherwise.
     pub fn join(domain: &str) -> Result<Self, IpcError> {
         let config = config_of(domain)?;
-        let root = super::domains::root_folder()?;
+        let root = root_folder()?;
         let fail = |reason: String| IpcError::Join {
             domain: domain.to_owned(),
             folder: root,
@@ -182,10 +158,9 @@ impl Bus {
             .map_err(open_error(FRAMES))
     }
 
-    fn records<T: core::fmt::Debug + ZeroCopySend + Sized + 'static>(
+    fn records<T: core::fmt::Debug + ZeroCopySend + 'static>(
         &self,
-        name: &'static str,
-        buffer: usize,
+        (name, buffer): Topic,
     ) -> Result<publish_subscribe::PortFactory<Transport, T, ()>, IpcError> {
         self.service(name)?
             .publish_subscribe::<T>()
@@ -200,16 +175,30 @@ impl Bus {
             .map_err(open_error(name))
     }
 
+    fn publisher<T: core::fmt::Debug + ZeroCopySend + 'static>(
+        &self,
+        topic: Topic,
+    ) -> Result<Publisher<Transport, T, ()>, IpcError> {
+        let service = self.records(topic)?;
+        let port = service.publisher_builder().create();
+        port.map_err(open_error(topic.0))
+    }
+
+    fn subscriber<T: core::fmt::Debug + ZeroCopySend + 'static>(
+        &self,
+        topic: Topic,
+    ) -> Result<Subscriber<Transport, T, ()>, IpcError> {
+        let service = self.records(topic)?;
+        let port = service.subscriber_builder().buffer_size(topic.1).create();
+        port.map_err(open_error(topic.0))
+    }
+
     /// Publishes keypoints. One per domain.
     ///
     /// # Errors
     /// [`IpcError::Open`].
     pub fn keypoint_publisher(&self) -> Result<KeypointPublisher, IpcError> {
-        let service = self.records::<KeypointFrame>(KEYPOINTS, KEYPOINT_BUFFER)?;
-        service
-            .publisher_builder()
-            .create()
-            .map_err(open_error(KEYPOINTS))
+        self.publisher(KEYPOINTS)
     }
 
     /// Receives keypoints.
@@ -217,12 +206,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`].
     pub fn keypoint_subscriber(&self) -> Result<KeypointSubscriber, IpcError> {
-        let service = self.records::<KeypointFrame>(KEYPOINTS, KEYPOINT_BUFFER)?;
-        service
-            .subscriber_builder()
-            .buffer_size(KEYPOINT_BUFFER)
-            .create()
-            .map_err(open_error(KEYPOINTS))
+        self.subscriber(KEYPOINTS)
     }
 
     /// Publishes what the live preview sees. One per domain.
@@ -230,11 +214,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`], for instance when another preview runs.
     pub fn preview_publisher(&self) -> Result<PreviewPublisher, IpcError> {
-        let service = self.records::<PreviewFrame>(PREVIEW, PREVIEW_BUFFER)?;
-        service
-            .publisher_builder()
-            .create()
-            .map_err(open_error(PREVIEW))
+        self.publisher(PREVIEW)
     }
 
     /// Receives what the live preview sees; a slow reader loses the oldest.
@@ -242,12 +222,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`].
     pub fn preview_subscriber(&self) -> Result<PreviewSubscriber, IpcError> {
-        let service = self.records::<PreviewFrame>(PREVIEW, PREVIEW_BUFFER)?;
-        service
-            .subscriber_builder()
-            .buffer_size(PREVIEW_BUFFER)
-            .create()
-            .map_err(open_error(PREVIEW))
+        self.subscriber(PREVIEW)
     }
 
     /// Publishes cycle records. One per domain; the bridge thread's.
@@ -255,11 +230,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`].
     pub fn cycle_publisher(&self) -> Result<CyclePublisher, IpcError> {
-        let service = self.records::<CycleRecord>(CYCLES, RECORD_BUFFER)?;
-        service
-            .publisher_builder()
-            .create()
-            .map_err(open_error(CYCLES))
+        self.publisher(CYCLES)
     }
 
     /// Receives cycle records.
@@ -267,12 +238,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`].
     pub fn cycle_subscriber(&self) -> Result<CycleSubscriber, IpcError> {
-        let service = self.records::<CycleRecord>(CYCLES, RECORD_BUFFER)?;
-        service
-            .subscriber_builder()
-            .buffer_size(RECORD_BUFFER)
-            .create()
-            .map_err(open_error(CYCLES))
+        self.subscriber(CYCLES)
     }
 
     /// Publishes joint reports. One per domain; the bridge thread's.
@@ -280,11 +246,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`].
     pub fn joint_publisher(&self) -> Result<JointPublisher, IpcError> {
-        let service = self.records::<JointReport>(JOINTS, RECORD_BUFFER)?;
-        service
-            .publisher_builder()
-            .create()
-            .map_err(open_error(JOINTS))
+        self.publisher(JOINTS)
     }
 
     /// Receives joint reports.
@@ -292,12 +254,7 @@ impl Bus {
     /// # Errors
     /// [`IpcError::Open`].
     pub fn joint_subscriber(&self) -> Result<JointSubscriber, IpcError> {
-        let service = self.records::<JointReport>(JOINTS, RECORD_BUFFER)?;
-        service
-            .subscriber_builder()
-            .buffer_size(RECORD_BUFFER)
-            .create()
-            .map_err(open_error(JOINTS))
+        self.subscriber(JOINTS)
     }
 
     fn chunks(&self) -> Result<publish_subscribe::PortFactory<Transport, [u8], ()>, IpcError> {

@@ -1,4 +1,4 @@
-//! Everything a control cycle was told, as plain data: recorded, published and
+//! Everything a control cycle received, as plain data: recorded, published and
 //! stepped again.
 //!
 //! Motions are named by number and fingerprint and stored once, elsewhere.
@@ -190,7 +190,7 @@ pub struct ArmCodesRecord {
     pub arrival_ns: u64,
 }
 
-/// Everything one cycle was told. RT-safe to copy.
+/// Everything one cycle received. RT-safe to copy.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "std", derive(ZeroCopySend))]
 #[repr(C)]
@@ -208,7 +208,7 @@ pub struct InputRecord {
     /// How much later than the deadline the instant of the setpoint is, 0 when
     /// the cycle was punctual (ns).
     pub late_ns: u32,
-    /// Order.
+    /// Command.
     pub command: CommandRecord,
     /// Newest heartbeat of the operator.
     pub operator: OperatorBeat,

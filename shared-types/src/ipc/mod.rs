@@ -28,7 +28,7 @@ mod boards;
 mod bus;
 mod cause;
 #[cfg(feature = "std")]
-mod domains;
+mod domain;
 #[cfg(feature = "std")]
 mod error;
 mod input;
@@ -39,6 +39,8 @@ mod payload;
 mod preview;
 #[cfg(feature = "std")]
 pub mod rpc;
+#[cfg(feature = "std")]
+mod running;
 #[cfg(feature = "std")]
 mod slots;
 #[cfg(feature = "std")]
@@ -54,8 +56,6 @@ pub use bus::{
 };
 pub use cause::{CauseRecord, LimitBroken, RunCounts};
 #[cfg(feature = "std")]
-pub use domains::running_controllers;
-#[cfg(feature = "std")]
 pub use error::IpcError;
 pub use input::{
     ArmCodesRecord, CommandKind, CommandRecord, InputRecord, LinkRecord, REPORTS_PER_CYCLE, Reports,
@@ -66,5 +66,7 @@ pub use payload::{
 };
 #[cfg(feature = "std")]
 pub use preview::{PreviewFrame, PreviewState};
+#[cfg(feature = "std")]
+pub use running::running_controllers;
 #[cfg(feature = "std")]
 pub use sweep::DomainSweep;

@@ -5,16 +5,34 @@
 //! this kind therefore has several entries: whoever writes next takes the first
 //! that is free, and the reader takes the entry with the largest count.
 
-use super::boards::{Key, opened};
 use super::bus::{Transport, open_error};
 use super::payload::{GuardianBeat, OperatorBeat};
 use super::{Bus, IpcError};
 use iceoryx2::port::reader::{EntryHandle, Reader};
 use iceoryx2::port::writer::{EntryHandleMut, Writer};
 use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2::service::port_factory::blackboard::PortFactory;
 
 /// Entries: as many writers may be killed while one controller lives, less one.
 const SLOTS: u32 = 32;
+
+/// Key of an entry of a blackboard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ZeroCopySend)]
+#[repr(C)]
+pub(super) struct Key(pub(super) u32);
+
+fn opened(bus: &Bus, name: &'static str) -> Result<PortFactory<Transport, Key>, IpcError> {
+    bus.service(name)?
+        .blackboard_opener::<Key>()
+        .open()
+        .map_err(open_error(name))
+}
+
+/// A reader of a blackboard that exists.
+pub(super) fn reader_of(bus: &Bus, name: &'static str) -> Result<Reader<Transport, Key>, IpcError> {
+    let reader = opened(bus, name)?.reader_builder().create();
+    reader.map_err(open_error(name))
+}
 
 /// A value that counts up with every write.
 pub(super) trait Beat:
@@ -102,13 +120,8 @@ impl<T: Beat> Place<T> {
     /// writer at a time.
     pub(super) fn take(bus: &Bus, name: &'static str) -> Result<(Self, T), IpcError> {
         bus.remove_leftovers();
-        let service = opened(bus, name)?;
-        let reader = service
-            .reader_builder()
-            .create()
-            .map_err(open_error(name))?;
-        let before = Slots::read(reader, name)?.newest();
-        let writer = service
+        let before = Slots::read(reader_of(bus, name)?, name)?.newest();
+        let writer = opened(bus, name)?
             .writer_builder()
             .create()
             .map_err(open_error(name))?;

@@ -3,7 +3,8 @@
 //! The library keeps one small counter per domain and never removes it, so a
 //! machine that throws a thousand times would keep a thousand of them.
 
-use super::bus::{Transport, config_of, prefix_of};
+use super::bus::Transport;
+use super::domain::{config_of, prefix_of};
 use iceoryx2::prelude::{CallbackProgression, Node, NodeState};
 use std::path::Path;
 

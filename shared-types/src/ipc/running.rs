@@ -1,55 +1,11 @@
-//! Where domains lie on this machine, and which ones have a controller.
-//!
-//! Every user has a folder of their own for the services' descriptions: the
-//! library makes it readable for its owner only, so a shared one would lock out
-//! every user but the first.
+//! Which domains of this machine have a controller.
 
-use super::bus::prefix_of;
+use super::domain::{prefix_of, root_folder};
 use super::{Bus, DomainSweep, IpcError, StateReader};
-use std::fs::DirBuilder;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-use std::path::{Path, PathBuf};
 
 /// Letters of the hash at the end of a service's name.
 const HASH: usize = 40;
 const SERVICE_SUFFIX: &str = ".service";
-
-/// The folder of `user` (a numeric user id). It depends on nothing but the user,
-/// so that a daemon and a terminal meet.
-fn folder_of(user: u32) -> PathBuf {
-    PathBuf::from(format!("/tmp/wag-{user}"))
-}
-
-/// This user's folder, made when it is missing.
-///
-/// # Errors
-/// [`IpcError::Folder`] when it cannot be made or belongs to somebody else.
-pub(super) fn root_folder() -> Result<PathBuf, IpcError> {
-    let user = rustix::process::getuid().as_raw();
-    let folder = folder_of(user);
-    own_folder(&folder, user)?;
-    Ok(folder)
-}
-
-fn own_folder(folder: &Path, user: u32) -> Result<(), IpcError> {
-    let fail = |reason: String| IpcError::Folder {
-        folder: folder.to_owned(),
-        reason,
-    };
-    match DirBuilder::new().mode(0o700).create(folder) {
-        Ok(()) => return Ok(()),
-        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-        Err(e) => return Err(fail(e.to_string())),
-    }
-    let found = folder.symlink_metadata().map_err(|e| fail(e.to_string()))?;
-    if !found.is_dir() {
-        return Err(fail("it is no folder".to_owned()));
-    }
-    if found.uid() != user {
-        return Err(fail(format!("it belongs to user {}", found.uid())));
-    }
-    Ok(())
-}
 
 /// Domain of a service's file, `wag_DOMAIN_HASH.service`.
 fn domain_in(file: &str) -> Option<&str> {
@@ -96,26 +52,6 @@ fn has_controller(domain: &str) -> bool {
 mod tests {
     use super::*;
     use crate::ipc::ControllerBoards;
-
-    #[test]
-    fn every_user_has_a_folder_of_their_own() {
-        assert_ne!(folder_of(0), folder_of(1000));
-        let user = rustix::process::getuid().as_raw();
-        let dir = std::env::temp_dir().join(format!("wag-own-{}", std::process::id()));
-        own_folder(&dir, user).unwrap();
-        own_folder(&dir, user).unwrap();
-        assert_eq!(dir.metadata().unwrap().mode() & 0o777, 0o700);
-        let said = own_folder(&dir, user + 1).unwrap_err().to_string();
-        assert!(
-            said.contains("wag-own") && said.contains("belongs to user"),
-            "{said}"
-        );
-        std::fs::remove_dir(&dir).unwrap();
-        std::fs::write(&dir, "x").unwrap();
-        let said = own_folder(&dir, user).unwrap_err().to_string();
-        std::fs::remove_file(&dir).unwrap();
-        assert!(said.contains("no folder"), "{said}");
-    }
 
     #[test]
     fn domains_are_read_from_file_names() {
