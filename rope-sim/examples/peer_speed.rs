@@ -11,21 +11,20 @@
     clippy::unwrap_used,
     clippy::expect_used,
     missing_docs,
+    dead_code,
     unreachable_pub,
     reason = "a measuring program may stop loudly"
 )]
 
-#[path = "../tests/support/mod.rs"]
-mod support;
+#[path = "../tests/support/truth.rs"]
+mod truth;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rope_sim::{
-    Candidate, FrameTimes, Kernel, Outcome, Precision, SimOptions, Start, Watch, roll_out_with,
-};
+use rope_sim::{Candidate, Kernel, Outcome, Precision, Scene, roll_out_in_with};
 use serde_json::{Value, json};
 use shared_types::RopeParams;
-use support::Case;
+use truth::Case;
 
 const BOUND_MM: f64 = 5.0;
 const SEED: u64 = 7;
@@ -41,7 +40,7 @@ const REPEATS: usize = 3;
 const GROUPS: usize = 4;
 
 fn main() {
-    let Some(folder) = support::truth_folder() else {
+    let Some(folder) = truth::truth_folder() else {
         std::process::exit(2);
     };
     let wanted: Vec<String> = std::env::args().skip(1).collect();
@@ -51,7 +50,7 @@ fn main() {
         Precision::F64.fastest_kernel(),
         Kernel::ScalarF64,
     ];
-    for case in support::cases(&folder, |id| wanted.iter().any(|w| w == id)) {
+    for case in truth::cases(&folder, |id| wanted.iter().any(|w| w == id)) {
         for kernel in kernels {
             rows.push(measure(&case, kernel));
         }
@@ -86,8 +85,8 @@ fn longest_accurate_step(case: &Case, kernel: Kernel) -> Option<(f64, f64)> {
     let mut longest = None;
     for per_frame in STEPS_PER_FRAME.into_iter().rev() {
         let step_s = 1.0 / (case.rate_hz * f64::from(per_frame));
-        let rollout = support::simulate(case, kernel, step_s);
-        let error_mm = support::max_tip_error_mm(case, &rollout);
+        let rollout = truth::simulate(case, kernel, step_s);
+        let error_mm = truth::max_tip_error_mm(case, &rollout);
         if !(error_mm <= BOUND_MM && rollout.outcome == Outcome::Clean) {
             break;
         }
@@ -116,23 +115,7 @@ fn similar_ropes(rope: &RopeParams, count: usize) -> Vec<RopeParams> {
 /// Rope-seconds simulated per second of this process's CPU time, everything included:
 /// the attach motion, recording all nodes at the frames, checks of divergence.
 fn simulated_s_per_cpu_s(case: &Case, kernel: Kernel, step_s: f64, ropes: &[RopeParams]) -> f64 {
-    let frames = case.truth.shape[0];
-    let horizon_s = (frames - 1) as f64 / case.rate_hz;
-    let options = SimOptions {
-        step_s,
-        precision: Precision::F64,
-        start: Start::Straight {
-            joint0_rotvec: case.joint0_rotvec,
-        },
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / case.rate_hz,
-            count: frames,
-        },
-        watch: Watch::NOTHING,
-        horizon_s,
-        threads: 1,
-    };
+    let options = truth::options_of(case, step_s);
     let candidates: Vec<Candidate> = ropes
         .iter()
         .map(|rope| Candidate::new(rope, &case.motion))
@@ -142,8 +125,8 @@ fn simulated_s_per_cpu_s(case: &Case, kernel: Kernel, step_s: f64, ropes: &[Rope
         let started_s = cpu_s();
         let mut simulated_s = 0.0;
         while cpu_s() - started_s < MEASURED_S {
-            roll_out_with(kernel, &candidates, &options).unwrap();
-            simulated_s += horizon_s * ropes.len() as f64;
+            roll_out_in_with(kernel, &Scene::EMPTY, &candidates, &options).unwrap();
+            simulated_s += options.horizon_s * ropes.len() as f64;
         }
         best = best.max(simulated_s / (cpu_s() - started_s));
     }

@@ -5,17 +5,18 @@
     clippy::unwrap_used,
     clippy::expect_used,
     missing_docs,
+    dead_code,
     unreachable_pub,
     reason = "a measuring program may stop loudly"
 )]
 
-#[path = "../tests/support/mod.rs"]
-mod support;
+#[path = "../tests/support/truth.rs"]
+mod truth;
 
-use rope_sim::{Kernel, Outcome, Precision};
+use rope_sim::{Outcome, Precision};
 
 fn main() {
-    let Some(folder) = support::truth_folder() else {
+    let Some(folder) = truth::truth_folder() else {
         return;
     };
     let mut steps_ms: Vec<f64> = std::env::args()
@@ -25,39 +26,28 @@ fn main() {
     if steps_ms.is_empty() {
         steps_ms = vec![1.0, 0.5, 0.25];
     }
-    let kernels: [Kernel; 2] =
-        [Precision::F64, Precision::F32].map(rope_sim::Precision::fastest_kernel);
+    let kernels = [Precision::F64, Precision::F32].map(Precision::fastest_kernel);
     print!("largest tip error (mm); * repeated at h/4, ! diverged\ncase   angle");
     for kernel in kernels {
         for step in &steps_ms {
-            print!(
-                " {:>12}",
-                format!(
-                    "{}{}",
-                    if kernel.is_single_precision() {
-                        "f32 "
-                    } else {
-                        "f64 "
-                    },
-                    step
-                )
-            );
+            let single = kernel.is_single_precision();
+            print!(" {:>8} {step:>3}", if single { "f32" } else { "f64" });
         }
     }
     println!();
-    for case in support::cases(&folder, |_| true) {
+    for case in truth::cases(&folder, |_| true) {
         let mut line = String::new();
         let mut angle = 0.0_f64;
         for kernel in kernels {
             for step_ms in &steps_ms {
-                let rollout = support::simulate(&case, kernel, step_ms * 1e-3);
+                let rollout = truth::simulate(&case, kernel, step_ms * 1e-3);
                 let mark = match rollout.outcome {
                     Outcome::Clean => ' ',
                     Outcome::RerunAtQuarterStep => '*',
                     Outcome::Diverged => '!',
                 };
                 angle = rollout.max_joint_angle_rad.to_degrees();
-                let error = support::max_tip_error_mm(&case, &rollout);
+                let error = truth::max_tip_error_mm(&case, &rollout);
                 line += &format!(" {error:>11.4}{mark}");
             }
         }

@@ -166,13 +166,6 @@ impl<V: Lanes> Quat<V> {
             v: phi.scale(sinc),
         }
     }
-    /// A vector of the body, in the world.
-    #[inline(always)]
-    pub(crate) fn turn(self, body: Vec3<V>) -> Vec3<V> {
-        let across = self.v.cross_add(body, body.scale(self.w));
-        let twice = across.add(across);
-        self.v.cross_add(twice, body)
-    }
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, q: [f64; 4]) {
         self.w.set(lane, q[0]);
@@ -211,9 +204,7 @@ impl<V: Lanes> Mat3<V> {
         let [r0, r1, r2] = self.0;
         r0.scale_sub(v.0, r1.scale_sub(v.1, r2.scale_sub(v.2, c)))
     }
-}
 
-impl<V: Lanes> Mat3<V> {
     #[inline(always)]
     pub(crate) fn scale(&self, f: V) -> Self {
         let [a, b, c] = self.0;

@@ -8,11 +8,11 @@
 //! are made in double precision.
 
 use crate::arm_knots::ArmKnots;
+use crate::knot::{CHANNELS, Knot};
 use crate::motion::AttachMotion;
 use crate::rollout::Precision;
 use arm_model::JointState;
 use arm_model::kinematics::FrameMotion;
-use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
 
 /// Longest time between exact evaluations of the attach motion (s).
 const KNOT_S: f64 = 0.004;
@@ -22,9 +22,6 @@ const AT_ONCE: usize = 32;
 const SAME_TIME_S: f64 = 1e-6;
 /// How far beside a jump its two sides are looked at (s).
 const BESIDE_S: f64 = 1e-11;
-
-/// Position, then quaternion scalar first.
-pub(crate) const CHANNELS: usize = 7;
 
 /// A few equal steps with one quintic per channel over them.
 #[derive(Debug, Clone)]
@@ -202,18 +199,13 @@ fn evaluate(motion: &dyn AttachMotion, time_s: f64) -> Result<FrameMotion, NotFi
     }
 }
 
-/// Attitude of a frame as a quaternion, scalar first.
-pub(crate) fn attitude(frame: &FrameMotion) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame.r))
-}
-
 /// Exact motion at each of the times.
 fn knots(motion: &dyn AttachMotion, times_s: &[f64]) -> Result<Vec<Knot>, NotFinite> {
     let joints: Option<Vec<JointState>> = times_s.iter().map(|t| motion.joints_at(*t)).collect();
     let knots = match (joints, motion.pole()) {
         (Some(states), Some(pole)) => {
             let kernel = Precision::F64.fastest_kernel();
-            kernel.run(ArmKnots {
+            kernel.run_double(ArmKnots {
                 states: &states,
                 pole_end_m: pole.end_m().into(),
             })
@@ -225,45 +217,6 @@ fn knots(motion: &dyn AttachMotion, times_s: &[f64]) -> Result<Vec<Knot>, NotFin
             time_s: times_s[index],
         }),
         None => Ok(knots),
-    }
-}
-
-/// Channels and their first two derivatives at one time.
-pub(crate) struct Knot {
-    pub(crate) value: [f64; CHANNELS],
-    pub(crate) rate: [f64; CHANNELS],
-    pub(crate) acceleration: [f64; CHANNELS],
-}
-
-impl Knot {
-    /// From a frame's motion.
-    pub(crate) fn new(m: &FrameMotion) -> Self {
-        let q = attitude(m).into_inner();
-        let w = Quaternion::from_imag(m.w_rad_s * 0.5);
-        let q_rate = w * q;
-        let q_acceleration = Quaternion::from_imag(m.alpha_rad_s2 * 0.5) * q + w * q_rate;
-        let join =
-            |p: &nalgebra::Vector3<f64>, q: &Quaternion<f64>| [p.x, p.y, p.z, q.w, q.i, q.j, q.k];
-        Self {
-            value: join(&m.p_m, &q),
-            rate: join(&m.v_m_s, &q_rate),
-            acceleration: join(&m.a_m_s2, &q_acceleration),
-        }
-    }
-
-    /// Turns the quaternion's sign towards that of another knot.
-    pub(crate) fn on_the_side_of(&mut self, other: &Self) {
-        let dot: f64 = (3..CHANNELS).map(|c| self.value[c] * other.value[c]).sum();
-        if dot < 0.0 {
-            for numbers in [&mut self.value, &mut self.rate, &mut self.acceleration] {
-                numbers[3..].iter_mut().for_each(|x| *x = -*x);
-            }
-        }
-    }
-
-    fn is_finite(&self) -> bool {
-        let sum = |numbers: &[f64; CHANNELS]| numbers.iter().sum::<f64>();
-        (sum(&self.value) + sum(&self.rate) + sum(&self.acceleration)).is_finite()
     }
 }
 

@@ -1,13 +1,14 @@
 //! Batches of simulations: grouping into lanes, threads, repeats of what blew up.
 
-use crate::base_path::{BasePath, Interval, NotFinite, attitude};
+use crate::base_path::{BasePath, Interval, NotFinite};
 use crate::contact::Starting;
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member, MemberResult};
+use crate::knot::attitude;
 use crate::lanes::Kernel;
-use crate::motion::{AttachMotion, LinkMotion};
-use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check, check_scene};
+use crate::motion::AttachMotion;
+use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check};
 use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::watch::Watched;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -17,6 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How much smaller the steps of a repeated rollout are.
 pub(crate) const REPEAT_DIVISOR: f64 = 4.0;
+
 /// Simulates all candidates; results in their order. Candidates are grouped by link
 /// count into lanes and lane groups are spread over threads; a candidate's result does
 /// not depend on its neighbours, its lane, or the number of threads.
@@ -43,20 +45,8 @@ pub fn roll_out_in(
     roll_out_in_with(kernel, scene, candidates, options)
 }
 
-/// [`roll_out`] with a chosen kernel, whose number type overrides
+/// [`roll_out_in`] with a chosen kernel, whose number type overrides
 /// [`SimOptions::precision`].
-///
-/// # Errors
-/// As [`roll_out`].
-pub fn roll_out_with(
-    kernel: Kernel,
-    candidates: &[Candidate],
-    options: &SimOptions,
-) -> Result<Vec<Rollout>, SimulateError> {
-    roll_out_in_with(kernel, &Scene::EMPTY, candidates, options)
-}
-
-/// [`roll_out_in`] with a chosen kernel, as [`roll_out_with`].
 ///
 /// # Errors
 /// As [`roll_out_in`].
@@ -67,7 +57,7 @@ pub fn roll_out_in_with(
     options: &SimOptions,
 ) -> Result<Vec<Rollout>, SimulateError> {
     check(candidates, options)?;
-    check_scene(scene, candidates)?;
+    scene.check()?;
     let all: Vec<usize> = (0..candidates.len()).collect();
     let batch = Batch {
         kernel,
@@ -95,27 +85,27 @@ pub fn roll_out_in_with(
 }
 
 fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
-    if !result.survived {
-        result.nodes.hold_last_finite();
+    if result.survived {
         return Rollout {
             nodes: result.nodes,
-            watched: Watched::default(),
-            peak_tip_speed_m_s: 0.0,
-            outcome: Outcome::Diverged,
-            // NaN where the very first steps failed.
-            max_joint_angle_rad: result.max_joint_angle_rad.max(0.0),
-            contacts: vec![ContactSummary::default(); result.contacts.len()],
-            domino: result.domino.map(|_| DominoOutcome::default()),
+            watched: result.watched,
+            peak_tip_speed_m_s: result.peak_tip_speed_m_s,
+            outcome: success,
+            max_joint_angle_rad: result.max_joint_angle_rad,
+            contacts: result.contacts,
+            domino: result.domino,
         };
     }
+    result.nodes.hold_last_finite();
     Rollout {
         nodes: result.nodes,
-        watched: result.watched,
-        peak_tip_speed_m_s: result.peak_tip_speed_m_s,
-        outcome: success,
-        max_joint_angle_rad: result.max_joint_angle_rad,
-        contacts: result.contacts,
-        domino: result.domino,
+        watched: Watched::default(),
+        peak_tip_speed_m_s: 0.0,
+        outcome: Outcome::Diverged,
+        // NaN where the very first steps failed.
+        max_joint_angle_rad: result.max_joint_angle_rad.max(0.0),
+        contacts: vec![ContactSummary::default(); result.contacts.len()],
+        domino: result.domino.map(|_| DominoOutcome::default()),
     }
 }
 
@@ -195,9 +185,9 @@ impl Batch<'_> {
     fn shared_paths(&self, indices: &[usize]) -> BTreeMap<usize, SharedPath> {
         let mut users: BTreeMap<usize, usize> = BTreeMap::new();
         for index in indices {
-            *users
-                .entry(address(self.candidates[*index].motion))
-                .or_default() += 1;
+            if let Some(address) = address(self.candidates[*index].motion) {
+                *users.entry(address).or_default() += 1;
+            }
         }
         users
             .into_iter()
@@ -215,16 +205,17 @@ impl Batch<'_> {
     ) -> Result<Vec<MemberResult>, SimulateError> {
         let build =
             |motion, memory| BasePath::new_in(memory, motion, self.step_s, self.options.horizon_s);
+        let slot_of = |motion| address(motion).and_then(|address| shared.get(&address));
         let mut own = Vec::with_capacity(group.len());
         for index in group {
             let motion = self.candidates[*index].motion;
-            let is_own = !shared.contains_key(&address(motion));
+            let is_own = slot_of(motion).is_none();
             own.push(is_own.then(|| build(motion, memory.pop().unwrap_or_default())));
         }
         let mut members = Vec::with_capacity(group.len());
         for (index, own) in group.iter().zip(&own) {
             let candidate = &self.candidates[*index];
-            let path = match (own, shared.get(&address(candidate.motion))) {
+            let path = match (own, slot_of(candidate.motion)) {
                 (Some(path), _) => path,
                 (None, Some(slot)) => slot.get_or_init(|| build(candidate.motion, Vec::new())),
                 (None, None) => continue,
@@ -236,12 +227,17 @@ impl Batch<'_> {
                     time_s: bad.time_s,
                 })?;
             let links = start_attitudes(candidate, path, self.options.start);
-            self.check_start(*index, path, &links)?;
+            let starting = Starting {
+                candidate: *index,
+                rope: candidate.rope,
+                attach_m: &path.start.p_m,
+                links: &links,
+            };
+            starting.check(self.scene)?;
             members.push(Member {
                 rope: candidate.rope,
                 path,
                 extras: candidate.extras,
-                arm: self.arm_paths(*index)?,
                 links,
             });
         }
@@ -257,26 +253,6 @@ impl Batch<'_> {
         Ok(results)
     }
 
-    /// Refuses a rope that would start inside an obstacle.
-    fn check_start(
-        &self,
-        candidate: usize,
-        path: &BasePath,
-        links: &[[f64; 4]],
-    ) -> Result<(), SimulateError> {
-        let Candidate { rope, motion, .. } = self.candidates[candidate];
-        let on_arm = self.scene.first_on_arm().is_some();
-        let arm = on_arm.then(|| motion.arm_links(0.0)).flatten();
-        let starting = Starting {
-            candidate,
-            rope,
-            attach: &path.start,
-            arm: arm.as_ref(),
-            links,
-        };
-        Ok(starting.check(self.scene)?)
-    }
-
     fn task<'m, const ALONE: bool>(&'m self, members: &'m [Member<'m>]) -> GroupTask<'m, ALONE> {
         GroupTask {
             members,
@@ -288,27 +264,11 @@ impl Batch<'_> {
             single_precision: self.kernel.is_single_precision(),
         }
     }
-
-    /// Paths of the arm links that carry obstacles.
-    fn arm_paths(&self, candidate: usize) -> Result<Vec<BasePath>, SimulateError> {
-        let motion = self.candidates[candidate].motion;
-        let links = self.scene.arm_links().into_iter();
-        links
-            .map(|link| {
-                let link = LinkMotion { motion, link };
-                BasePath::new_in(Vec::new(), &link, self.step_s, self.options.horizon_s)
-            })
-            .collect::<Result<_, _>>()
-            .map_err(|bad| SimulateError::MotionNotFinite {
-                candidate,
-                time_s: bad.time_s,
-            })
-    }
 }
 
-/// Identity of a motion: the address of its data.
-fn address(motion: &dyn AttachMotion) -> usize {
-    core::ptr::from_ref(motion).cast::<()>().addr()
+/// Identity of a motion: the address of its data, if it has any.
+fn address(motion: &dyn AttachMotion) -> Option<usize> {
+    (size_of_val(motion) > 0).then(|| core::ptr::from_ref(motion).cast::<()>().addr())
 }
 
 fn start_attitudes(candidate: &Candidate, path: &BasePath, start: Start) -> Vec<[f64; 4]> {

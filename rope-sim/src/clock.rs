@@ -4,7 +4,8 @@
 //! every rope has step boundaries on its own acceleration jumps.
 
 use crate::algebra::{Quat, Vec3};
-use crate::base_path::{BasePath, CHANNELS, Interval, attitude};
+use crate::base_path::{BasePath, Interval};
+use crate::knot::{CHANNELS, attitude};
 use crate::lanes::Lanes;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{BaseLanes, RopeLanes};

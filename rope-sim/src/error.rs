@@ -79,31 +79,26 @@ pub enum SimulateError {
 impl SimulateError {
     /// Index of the candidate at fault, if one is.
     #[must_use]
-    pub fn candidate(&self) -> Option<usize> {
-        match *self {
-            Self::Rope { candidate, .. }
-            | Self::Extras { candidate, .. }
-            | Self::MotionTooShort { candidate, .. }
-            | Self::MotionNotFinite { candidate, .. }
-            | Self::Scene(
-                SceneError::StartsInside { candidate, .. } | SceneError::NoArm { candidate, .. },
-            ) => Some(candidate),
-            _ => None,
-        }
+    pub fn candidate(mut self) -> Option<usize> {
+        self.candidate_mut().copied()
     }
 
     /// The same with another index for the candidate at fault.
     pub(crate) fn of_candidate(mut self, index: usize) -> Self {
-        match &mut self {
+        if let Some(candidate) = self.candidate_mut() {
+            *candidate = index;
+        }
+        self
+    }
+
+    fn candidate_mut(&mut self) -> Option<&mut usize> {
+        match self {
             Self::Rope { candidate, .. }
             | Self::Extras { candidate, .. }
             | Self::MotionTooShort { candidate, .. }
             | Self::MotionNotFinite { candidate, .. }
-            | Self::Scene(
-                SceneError::StartsInside { candidate, .. } | SceneError::NoArm { candidate, .. },
-            ) => *candidate = index,
-            _ => {}
+            | Self::Scene(SceneError::StartsInside { candidate, .. }) => Some(candidate),
+            _ => None,
         }
-        self
     }
 }

@@ -18,6 +18,9 @@ pub struct AirDrag {
     pub lead_coefficient: f64,
 }
 
+/// The first number that is unusable: its field, value, and what it must be.
+pub(crate) type Unusable = (&'static str, f64, &'static str);
+
 /// Physics of a rope beyond its nine parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RopeExtras {
@@ -54,8 +57,7 @@ impl RopeExtras {
         1.0 + self.mass_slope * (2.0 * place - 1.0)
     }
 
-    /// First unusable number: its field, value, and what it must be.
-    pub(crate) fn fault(&self) -> Option<(&'static str, f64, &'static str)> {
+    pub(crate) fn fault(&self) -> Option<Unusable> {
         let curvature = self.rest_curvature_per_m.into_iter();
         if let Some(value) = curvature.into_iter().find(|v| v.abs() > 1e3 || v.is_nan()) {
             return Some((

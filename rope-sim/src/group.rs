@@ -3,6 +3,8 @@
 use crate::algebra::{Quat, Vec3};
 use crate::base_path::BasePath;
 use crate::clock::Clock;
+use crate::contact::Contacts;
+use crate::environment::Environment;
 use crate::extras::RopeExtras;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
 use crate::kernel::{Elimination, step};
@@ -10,7 +12,6 @@ use crate::lanes::{LaneTask, Lanes};
 use crate::load::Unloaded;
 use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::state::{Link, RopeLanes};
-use crate::surroundings::Surroundings;
 use crate::watch::{Watch, Watched, Watcher};
 use shared_types::RopeParams;
 
@@ -27,8 +28,6 @@ pub(crate) struct Member<'a> {
     pub(crate) rope: &'a RopeParams,
     pub(crate) path: &'a BasePath,
     pub(crate) extras: RopeExtras,
-    /// Paths of the arm links that carry obstacles.
-    pub(crate) arm: Vec<BasePath>,
     /// Attitudes of the links at the start, scalar first.
     pub(crate) links: Vec<[f64; 4]>,
 }
@@ -47,7 +46,7 @@ pub(crate) struct MemberResult {
 /// The work of one group; at most as many members as the kernel has lanes, all with
 /// the same number of links.
 /// With `ALONE` there is nothing but the rope: the loop is compiled without a trace of
-/// its surroundings.
+/// an environment.
 pub(crate) struct GroupTask<'a, const ALONE: bool> {
     pub(crate) members: &'a [Member<'a>],
     pub(crate) scene: &'a Scene,
@@ -87,9 +86,14 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         let mut min_half_cos = V::splat(1.0);
         let mut restarts = Vec::with_capacity(count);
         let mut steps = 0_usize;
-        let mut around = (!ALONE).then(|| Surroundings::new(&self, &ropes));
-        if let Some(around) = &mut around {
-            around.begin(&links, &rope, &start);
+        let mut environment = (!ALONE).then(|| {
+            let origin_m = self.watch.origin_m();
+            let contacts = Contacts::new(self.scene, &ropes, self.max_step_s, origin_m);
+            let extras: Vec<_> = self.members.iter().map(|m| (m.rope, m.extras)).collect();
+            Environment::new(contacts, &extras)
+        });
+        if let Some(environment) = &mut environment {
+            environment.look(&links, &rope, &start);
         }
 
         while clock.next_step(&mut rope, &mut restarts) {
@@ -103,10 +107,11 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
                 }
             }
             recorder.before_step(&clock, &links, rope.link_length);
-            watcher.before_step(&clock, &links);
             let base = clock.base();
-            let report = match &mut around {
-                Some(around) => around.step(&mut links, &mut scratch, &rope, &base, &mut clock),
+            let report = match &mut environment {
+                Some(environment) => {
+                    environment.step(&mut links, &mut scratch, &rope, &base, &mut clock)
+                }
                 None => step(
                     &mut links,
                     &mut scratch,
@@ -119,7 +124,7 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
             recorder.after_step(&clock, &links, rope.link_length);
             health.mark_finished(&clock, &links);
             watcher.after_step(
-                [base.position, base.velocity],
+                base.position,
                 [
                     base.position.add(report.tip),
                     base.velocity.add(report.tip_velocity),
@@ -145,14 +150,16 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
                 nodes: tracks
                     .next()
                     .unwrap_or_else(|| NodeTrack::zeros(0, n + 1, false)),
-                watched: watcher.watched(lane, paths[lane], &links),
+                watched: watcher.watched(lane, paths[lane]),
                 peak_tip_speed_m_s: watcher.peak_speed_m_s(lane),
                 max_joint_angle_rad: 2.0 * min_half_cos.get(lane).clamp(0.0, 1.0).acos(),
                 survived: health.alive[lane],
-                contacts: around
+                contacts: environment
                     .as_ref()
-                    .map_or_else(Vec::new, |a| a.summaries_of(lane)),
-                domino: around.as_ref().and_then(|a| a.domino_of(lane)),
+                    .map_or_else(Vec::new, |e| e.contacts.summaries_of(lane)),
+                domino: environment
+                    .as_ref()
+                    .and_then(|e| e.contacts.domino_of(lane)),
             })
             .collect()
     }

@@ -5,7 +5,7 @@ use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
-use crate::scene::{ContactSummary, DominoOutcome, Scene, SceneError};
+use crate::scene::{ContactSummary, DominoOutcome};
 use crate::watch::{Watch, Watched};
 use shared_types::RopeParams;
 
@@ -27,15 +27,10 @@ impl Precision {
     #[must_use]
     pub fn fastest_kernel(self) -> Kernel {
         let single = self == Self::F32;
-        let portable = if single {
-            Kernel::PortableF32
-        } else {
-            Kernel::PortableF64
-        };
         Kernel::ALL
             .into_iter()
             .find(|k| k.is_single_precision() == single && k.is_available())
-            .unwrap_or(portable)
+            .unwrap_or(Kernel::ScalarF64)
     }
 }
 
@@ -70,8 +65,24 @@ pub struct SimOptions {
     pub threads: usize,
 }
 
+impl SimOptions {
+    /// From equilibrium on one thread, with nothing recorded.
+    #[must_use]
+    pub const fn new(step_s: f64, precision: Precision, horizon_s: f64) -> Self {
+        Self {
+            step_s,
+            precision,
+            start: Start::Equilibrium,
+            frames: FrameTimes::NONE,
+            watch: Watch::NOTHING,
+            horizon_s,
+            threads: 1,
+        }
+    }
+}
+
 /// One rope on one motion.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct Candidate<'a> {
     /// The rope.
     pub rope: &'a RopeParams,
@@ -97,15 +108,6 @@ impl<'a> Candidate<'a> {
     #[must_use]
     pub fn with_extras(self, extras: RopeExtras) -> Self {
         Self { extras, ..self }
-    }
-}
-
-impl core::fmt::Debug for Candidate<'_> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Candidate")
-            .field("rope", self.rope)
-            .field("extras", &self.extras)
-            .finish_non_exhaustive()
     }
 }
 
@@ -142,36 +144,17 @@ pub struct Rollout {
     pub domino: Option<DominoOutcome>,
 }
 
-/// Checks the scene's numbers, and that every motion knows the arm it is on.
-pub(crate) fn check_scene(scene: &Scene, candidates: &[Candidate]) -> Result<(), SimulateError> {
-    scene.check()?;
-    if let Some((obstacle, link)) = scene.first_on_arm()
-        && let Some(candidate) = candidates
-            .iter()
-            .position(|c| c.motion.arm_links(0.0).is_none())
-    {
-        return Err(SimulateError::Scene(SceneError::NoArm {
-            candidate,
-            obstacle,
-            link,
-        }));
+/// Refuses an option that is not finite and above 0.
+pub(crate) fn positive(field: &'static str, value: f64) -> Result<(), SimulateError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
     }
-    Ok(())
+    let need = "must be finite and above 0";
+    Err(SimulateError::Option { field, value, need })
 }
 
 /// Checks options and candidates, by name.
 pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<(), SimulateError> {
-    let positive = |field: &'static str, value: f64| {
-        if value.is_finite() && value > 0.0 {
-            Ok(())
-        } else {
-            Err(SimulateError::Option {
-                field,
-                value,
-                need: "must be finite and above 0",
-            })
-        }
-    };
     positive("step_s", options.step_s)?;
     positive("horizon_s", options.horizon_s)?;
     let steps = options.horizon_s / options.step_s;

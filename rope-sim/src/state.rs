@@ -21,9 +21,9 @@ pub(crate) struct RopeLanes<V> {
     pub(crate) per_resistance: V,
 }
 
-/// Least joint resistance (N m s²/rad), for ropes without springs and dampers: a
+/// Smallest joint resistance (N m s²/rad), for ropes without springs and dampers: a
 /// hundred thousandth of a link's inertia.
-const LEAST_RESISTANCE: f64 = 1e-13;
+const MIN_RESISTANCE: f64 = 1e-13;
 
 impl<V: Lanes> RopeLanes<V> {
     /// The same rope in every lane, with a joint resistance of 1 N m s²/rad.
@@ -50,7 +50,7 @@ impl<V: Lanes> RopeLanes<V> {
     /// ahead, see [`crate::scheme::joint_resistance`].
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, rope: &RopeParams, joint_resistance: f64) {
-        let unit = 1.0 / joint_resistance.max(LEAST_RESISTANCE);
+        let unit = 1.0 / joint_resistance.max(MIN_RESISTANCE);
         self.per_resistance.set(lane, unit);
         self.stiffness
             .set(lane, rope.joint_stiffness_nm_per_rad * unit);

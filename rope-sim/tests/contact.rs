@@ -2,18 +2,19 @@
 #![cfg(test)]
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
-mod scenes;
+mod support;
 
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, Obstacle, Outcome, Placement, Precision, Rollout, Shape, Start,
-    roll_out_in,
+    AttachMotion, Candidate, Obstacle, Outcome, Precision, Rollout, RopePart, Scene, SceneBody,
+    SceneError, Shape, SimOptions, SimulateError, roll_out_in,
 };
-use scenes::{G_M_S2, Still, WALL_HALF_M, Whip, alone, options, random_rope, simulate};
 use shared_types::RopeParams;
+use support::contact::{WALL_HALF_M, Whip, random_rope, wall};
+use support::{G_M_S2, options, released, simulate, still};
 
 fn rope() -> RopeParams {
     RopeParams::from_array([22.0, 0.55, 0.02, 0.1, 0.005, 0.06, 0.12, 0.03, 0.8])
@@ -52,9 +53,6 @@ impl AttachMotion for Drop {
             ..FrameMotion::world()
         }
     }
-    fn duration_s(&self) -> f64 {
-        self.halt_s()
-    }
     fn acceleration_jumps_s(&self) -> Vec<f64> {
         vec![self.fall_s, self.halt_s()]
     }
@@ -63,7 +61,7 @@ impl AttachMotion for Drop {
 #[test]
 fn a_dropped_lead_sinks_less_than_a_millimetre_and_settles() {
     let rope = rope();
-    let floor = alone(Obstacle::fixed(Shape::HalfSpace, [0.0; 3], 0.6));
+    let floor = Scene::with(vec![Obstacle::floor(0.0, 0.6)]);
     let fall_s = (2.0 * 0.5 / G_M_S2).sqrt();
     // After half a metre of free fall the lead meets the floor; the frame follows a little.
     let motion = Drop {
@@ -75,9 +73,9 @@ fn a_dropped_lead_sinks_less_than_a_millimetre_and_settles() {
         let run = simulate(&floor, &rope, &motion, &options(precision, 3.0, 50.0));
         assert_eq!(run.outcome, Outcome::Clean);
         let contact = run.contacts[0];
-        let (touched_s, _) = contact.first.unwrap();
+        let (touched_s, part) = contact.first.unwrap();
         assert!((touched_s - fall_s).abs() < 0.01, "{touched_s}");
-        assert!(contact.lead_touched);
+        assert_eq!(part, RopePart::Lead);
         println!("{precision:?} {contact:?}");
         let last = run.nodes.frames() - 1;
         let tip = |f| run.nodes.position(f, 22);
@@ -111,24 +109,18 @@ fn friction_holds_up_to_its_angle_and_no_further() {
             let normal = slope * Vector3::z();
             let plane = Obstacle {
                 shape: Shape::HalfSpace,
-                placement: Placement::World(Isometry3::from_parts(
+                pose: Isometry3::from_parts(
                     Translation3::from(-normal * lever.lead_radius_m),
                     UnitQuaternion::from_rotation_matrix(&slope),
-                )),
+                ),
                 friction,
             };
             // The frame's -z looks along +x.
             let along_x =
                 Rotation3::from_axis_angle(&Vector3::y_axis(), -core::f64::consts::FRAC_PI_2);
-            let still = Still {
-                p_m: Vector3::zeros(),
-                r: along_x,
-            };
-            let mut options = options(precision, 1.0, 10.0);
-            options.start = Start::Straight {
-                joint0_rotvec: [0.0; 3],
-            };
-            let run = simulate(&alone(plane), &lever, &still, &options);
+            let options = released([0.0; 3], options(precision, 1.0, 10.0));
+            let scene = Scene::with(vec![plane]);
+            let run = simulate(&scene, &lever, &still(Vector3::zeros(), along_x), &options);
             let [start, end] = [0, 10].map(|f| run.nodes.position(f, 1));
             let path_m = (end - start).norm();
             let excess = G_M_S2 * (tilt.sin() - friction * tilt.cos());
@@ -172,19 +164,16 @@ fn random_throws(count: usize, seed: u64) -> Throws {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let ropes: Vec<RopeParams> = (0..count).map(|_| random_rope(&mut rng, 22.0)).collect();
     let whips: Vec<Whip> = (0..count).map(|_| Whip::random(&mut rng)).collect();
-    let wall = alone(Obstacle::fixed(
-        Shape::Box {
-            half_m: WALL_HALF_M,
-        },
-        [0.0; 3],
-        0.5,
-    ));
     let candidates: Vec<_> = ropes
         .iter()
         .zip(&whips)
         .map(|(r, w)| Candidate::new(r, w))
         .collect();
-    let runs = roll_out_in(&wall, &candidates, &options(Precision::F32, 0.8, 200.0)).unwrap();
+    let options = SimOptions {
+        threads: 2,
+        ..options(Precision::F32, 0.8, 200.0)
+    };
+    let runs = roll_out_in(&Scene::with(vec![wall()]), &candidates, &options).unwrap();
     let mut throws = Throws::default();
     for run in runs.iter().filter(|run| run.contacts[0].touched()) {
         throws.touched += 1;
@@ -223,45 +212,25 @@ fn rest_shapes_over_a_cylinder_are_mujocos() {
     for case in fixture["cases"].as_array().unwrap() {
         let number = |v: &serde_json::Value| v.as_f64().unwrap();
         let vector = |v: &serde_json::Value| Vector3::from_fn(|i, _| number(&v[i]));
-        let rope = &case["rope"];
-        let keys = [
-            "N",
-            "L",
-            "c",
-            "k",
-            "r",
-            "mu",
-            "m_L",
-            "r_L",
-            "link_extra_scale",
-        ];
-        let rope = RopeParams::from_array(keys.map(|k| number(&rope[k])));
+        let rope = support::truth::rope_of(&case["rope"]);
         let q = &case["attach_q_wxyz"];
         let [w, x, y, z] = [0, 1, 2, 3].map(|i| number(&q[i]));
         let q = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
-        let still = Still {
-            p_m: vector(&case["attach_p_m"]),
-            r: q.to_rotation_matrix(),
-        };
+        let still = still(vector(&case["attach_p_m"]), q.to_rotation_matrix());
         let cylinder = &case["cylinder"];
         let axis = vector(&cylinder["axis"]);
         let along = UnitQuaternion::rotation_between(&Vector3::z(), &axis).unwrap();
-        let over = alone(Obstacle {
+        let over = Scene::with(vec![Obstacle {
             shape: Shape::Cylinder {
                 half_length_m: number(&cylinder["half_length_m"]),
                 radius_m: number(&cylinder["radius_m"]),
             },
-            placement: Placement::World(Isometry3::from_parts(
-                Translation3::from(vector(&cylinder["centre_m"])),
-                along,
-            )),
+            pose: Isometry3::from_parts(Translation3::from(vector(&cylinder["centre_m"])), along),
             friction: number(&case["friction"]),
-        });
+        }]);
         for precision in [Precision::F64, Precision::F32] {
-            let mut options = options(precision, 13.0, 1.0);
-            options.start = Start::Straight {
-                joint0_rotvec: vector(&case["initial_joint0_rotvec"]).into(),
-            };
+            let turn = vector(&case["initial_joint0_rotvec"]).into();
+            let options = released(turn, options(precision, 13.0, 1.0));
             let run = simulate(&over, &rope, &still, &options);
             let rest = case["rest_nodes_m"].as_array().unwrap();
             let offsets = rest
@@ -277,4 +246,35 @@ fn rest_shapes_over_a_cylinder_are_mujocos() {
             assert!(largest_m < 5e-3, "{}: {largest_m} m", case["name"]);
         }
     }
+}
+
+/// Who starts inside what is said, whichever candidate it is.
+#[test]
+fn starting_inside_an_obstacle_is_refused_by_name() {
+    let rope = RopeParams::from_array([22.0, 0.55, 0.01, 0.05, 0.005, 0.06, 0.06, 0.02, 0.8]);
+    let motions = [0.0, 1.0].map(|x_m| still(Vector3::x() * x_m, Rotation3::identity()));
+    let block = Shape::Box { half_m: [0.02; 3] };
+    let scene = Scene::with(vec![
+        Obstacle::floor(-1.0, 0.5),
+        Obstacle::fixed(block, [1.0, 0.0, -0.3], 0.5),
+    ]);
+    let [outside, inside] = &motions;
+    let candidates = [outside, inside].map(|motion| Candidate::new(&rope, motion));
+    let options = options(Precision::F32, 0.1, 10.0);
+    let refused = roll_out_in(&scene, &candidates, &options).unwrap_err();
+    let SimulateError::Scene(SceneError::StartsInside {
+        candidate,
+        body,
+        link,
+        depth_m,
+    }) = refused
+    else {
+        panic!("{refused}");
+    };
+    assert_eq!((candidate, body), (1, SceneBody::Obstacle(1)));
+    assert!((10..14).contains(&link));
+    // Deeper than a touch, at most half the block and the rope's radius.
+    assert!((1e-3..0.0251).contains(&depth_m), "{depth_m}");
+    assert_eq!(refused.candidate(), Some(1));
+    assert!(roll_out_in(&scene, &candidates[..1], &options).is_ok());
 }

@@ -2,39 +2,25 @@
 #![cfg(test)]
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
-mod scenes;
+mod support;
 
 use arm_model::kinematics::FrameMotion;
-use nalgebra::{Isometry3, Rotation3, Vector3};
+use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AirDrag, AttachMotion, Candidate, Domino, Kernel, Obstacle, Outcome, Placement, Precision,
-    Rollout, RopeExtras, Scene, Shape, SimOptions, Start, roll_out_in_with, roll_out_with,
+    AirDrag, Candidate, Domino, Kernel, Obstacle, Outcome, Precision, Rollout, RopeExtras, Scene,
+    SimOptions, roll_out_in_with,
 };
-use scenes::{Still, WALL_HALF_M, Whip, alone, options, random_rope, simulate};
 use shared_types::RopeParams;
+use support::contact::{Whip, random_rope, wall};
+use support::options;
 
-/// A wall with a floor beside it, a pole, and a domino.
+/// A wall with a floor beside it and a domino.
 fn crowded() -> Scene {
-    let wall = Shape::Box {
-        half_m: WALL_HALF_M,
-    };
-    let pole = Shape::Capsule {
-        half_length_m: 0.1,
-        radius_m: 0.008,
-    };
     Scene {
-        obstacles: vec![
-            Obstacle::fixed(wall, [0.0; 3], 0.5),
-            Obstacle::fixed(Shape::HalfSpace, [0.0, 0.0, -0.45], 0.6),
-            Obstacle {
-                shape: pole,
-                placement: Placement::Attach(Isometry3::translation(0.0, 0.0, 0.1)),
-                friction: 0.3,
-            },
-        ],
+        obstacles: vec![wall(), Obstacle::floor(-0.45, 0.6)],
         domino: Some(Domino {
             foot_m: [0.0, 0.0, 0.2],
             facing_rad: 0.3,
@@ -79,8 +65,10 @@ fn candidates(throws: &[(RopeParams, Whip)]) -> Vec<Candidate<'_>> {
 }
 
 fn run(kernel: Kernel, candidates: &[Candidate], threads: usize) -> Vec<Rollout> {
-    let mut options = options(Precision::F32, 0.35, 40.0);
-    options.threads = threads;
+    let options = SimOptions {
+        threads,
+        ..options(Precision::F32, 0.35, 40.0)
+    };
     roll_out_in_with(kernel, &crowded(), candidates, &options).unwrap()
 }
 
@@ -120,25 +108,6 @@ fn the_scene_is_touched_in_these_throws() {
     assert!(touched.count() > 2);
 }
 
-/// Shaken to pieces from the first step on.
-struct Violent;
-
-impl AttachMotion for Violent {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        FrameMotion {
-            p_m: Vector3::new(-0.25, 0.0, 0.42),
-            a_m_s2: Vector3::new(1e12 * (1e5 * t_s).sin(), 1e12, 0.0),
-            ..FrameMotion::world()
-        }
-    }
-    fn duration_s(&self) -> f64 {
-        10.0
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        Vec::new()
-    }
-}
-
 #[test]
 fn a_rope_that_blows_up_disturbs_no_other() {
     let throws = throws(11);
@@ -146,7 +115,13 @@ fn a_rope_that_blows_up_disturbs_no_other() {
     let kernel = Precision::F32.fastest_kernel();
     let alone = run(kernel, &candidates, 1);
     let spoilt = candidates[3].rope;
-    candidates[3] = Candidate::new(spoilt, &Violent);
+    // Shaken to pieces from the first step on.
+    let violent = |t_s: f64| FrameMotion {
+        p_m: Vector3::new(-0.25, 0.0, 0.42),
+        a_m_s2: Vector3::new(1e12 * (1e5 * t_s).sin(), 1e12, 0.0),
+        ..FrameMotion::world()
+    };
+    candidates[3] = Candidate::new(spoilt, &violent);
     let together = run(kernel, &candidates, 1);
     assert_eq!(together[3].outcome, Outcome::Diverged);
     for (index, (a, b)) in alone.iter().zip(&together).enumerate() {
@@ -163,7 +138,8 @@ fn looking_for_contacts_changes_nothing() {
     let candidates: Vec<_> = throws.iter().map(|(r, w)| Candidate::new(r, w)).collect();
     for kernel in [Precision::F32, Precision::F64].map(Precision::fastest_kernel) {
         let options = options(Precision::F32, 0.3, 500.0);
-        let plain = roll_out_with(kernel, &candidates, &options).unwrap();
+        let run = |scene: &Scene| roll_out_in_with(kernel, scene, &candidates, &options).unwrap();
+        let plain = run(&Scene::EMPTY);
         let lowest = |run: &Rollout| {
             let frames = 0..run.nodes.frames();
             frames
@@ -173,53 +149,10 @@ fn looking_for_contacts_changes_nothing() {
                 .fold(f64::INFINITY, f64::min)
         };
         let lowest_m = plain.iter().map(lowest).fold(f64::INFINITY, f64::min);
-        let floor = Obstacle::fixed(Shape::HalfSpace, [0.0, 0.0, lowest_m - 0.055], 0.5);
-        let among = roll_out_in_with(kernel, &alone(floor), &candidates, &options).unwrap();
+        let among = run(&Scene::with(vec![Obstacle::floor(lowest_m - 0.055, 0.5)]));
         for (a, b) in plain.iter().zip(&among) {
             assert!(!b.contacts[0].touched());
             assert_eq!(a.nodes, b.nodes);
         }
     }
-}
-
-/// A rope that hangs from its pole is not pushed off it.
-#[test]
-fn the_mounting_is_no_contact() {
-    let pole = Obstacle {
-        shape: Shape::Capsule {
-            half_length_m: 0.1,
-            radius_m: 0.008,
-        },
-        placement: Placement::Attach(Isometry3::translation(0.0, 0.0, 0.1)),
-        friction: 0.5,
-    };
-    let rope = RopeParams::from_array([22.0, 0.55, 0.02, 0.1, 0.012, 0.06, 0.05, 0.03, 0.8]);
-    let still = Still {
-        p_m: Vector3::zeros(),
-        r: Rotation3::identity(),
-    };
-    let run = simulate(
-        &alone(pole),
-        &rope,
-        &still,
-        &options(Precision::F64, 0.5, 10.0),
-    );
-    assert!(!run.contacts[0].touched());
-    let drift = run.nodes.position(5, 22) - run.nodes.position(0, 22);
-    assert!(drift.norm() < 1e-9, "{drift}");
-    let folded = Rotation3::from_axis_angle(&Vector3::y_axis(), 3.1);
-    let still = Still { r: folded, ..still };
-    let soft = RopeParams {
-        joint_stiffness_nm_per_rad: 0.001,
-        ..rope
-    };
-    let upright = SimOptions {
-        start: Start::Straight {
-            joint0_rotvec: [0.0; 3],
-        },
-        ..options(Precision::F64, 1.0, 10.0)
-    };
-    let run = simulate(&alone(pole), &soft, &still, &upright);
-    // From upright it folds over and comes down beside the pole.
-    assert!(run.contacts[0].touched());
 }

@@ -2,7 +2,7 @@
 //! joints, a hold, then the move.
 
 use super::{CalmError, CalmRequest};
-use arm_model::kinematics::{FrameMotion, link_motions};
+use arm_model::kinematics::FrameMotion;
 use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector};
 use rope_sim::{AttachMotion, MeasuredArm};
 
@@ -78,10 +78,6 @@ impl ChainedArm<'_> {
 impl AttachMotion for ChainedArm<'_> {
     fn at(&self, t_s: f64) -> FrameMotion {
         self.prelude.cell.pole.attach_motion(&self.joints_at(t_s))
-    }
-
-    fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
-        Some(link_motions(&self.joints_at(t_s)))
     }
 
     fn duration_s(&self) -> f64 {

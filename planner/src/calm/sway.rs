@@ -4,7 +4,7 @@ use super::CalmError;
 use super::chain::Prelude;
 use arm_model::JointTrajectory;
 use nalgebra::Vector3;
-use rope_sim::sensitivity::{Beside, Difference, Direction, sensitivity};
+use rope_sim::sensitivity::{Family, Perturbation, sensitivity};
 use rope_sim::{
     Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, Watch,
     roll_out,
@@ -115,15 +115,15 @@ impl<'a> SwaySimulator<'a> {
     ) -> Result<Option<SwaySlopes>, CalmError> {
         let here = self.prelude.then(plan);
         let arms: Vec<_> = beside.iter().map(|t| self.prelude.then(t)).collect();
-        let directions: Vec<Direction<'_>> = arms
+        let perturbations: Vec<Perturbation<'_>> = arms
             .iter()
-            .map(|arm| Direction::Motion {
-                plus: Beside { at: arm, distance },
-                minus: None,
-            })
+            .map(|motion| Perturbation::Motion { motion, distance })
             .collect();
-        let base = Candidate::new(self.rope, &here);
-        let found = sensitivity(base, &directions, Difference::Forward, &self.options)?;
+        let family = Family {
+            base: Candidate::new(self.rope, &here),
+            perturbations: &perturbations,
+        };
+        let found = sensitivity(&family, &self.options)?;
         let slopes = found.slopes(|rollout| self.displacements_m(&rollout.nodes));
         let slopes: Option<Vec<_>> = slopes.into_iter().collect();
         let finite = found.base.outcome != Outcome::Diverged;

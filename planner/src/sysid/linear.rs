@@ -11,9 +11,7 @@ use super::film::{Fidelity, Film, Grid, Instant, Sighting, is_finite, sample_s};
 use super::noise::{Noise, RESIDUAL, Row, Rows};
 use crate::workers::map_in_order;
 use nalgebra::{SMatrix, Vector3};
-use rope_sim::sensitivity::{
-    Beside, Difference, Direction, Doubt, Family, Sensitivity, SensitivityError, sensitivities,
-};
+use rope_sim::sensitivity::{Family, Perturbation, Sensitivity, SensitivityError, sensitivities};
 use rope_sim::{Candidate, NodeTrack, Rollout};
 use shared_types::RopeParams;
 
@@ -76,15 +74,17 @@ pub(super) fn linearise(
 ) -> Result<(Vec<Option<Linearised>>, usize), IdentifyError> {
     let fine = fidelity == Fidelity::Fine;
     let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links)).collect();
-    let directions: Vec<Vec<Direction<'_>>> =
-        points.iter().map(|x| directions(x, links, fine)).collect();
+    let perturbations: Vec<Vec<Perturbation<'_>>> = points
+        .iter()
+        .map(|x| perturbations(x, links, fine))
+        .collect();
     let motion = film.observation.motion;
     let mut families: Vec<Family<'_>> = ropes
         .iter()
-        .zip(&directions)
-        .map(|(rope, directions)| Family {
+        .zip(&perturbations)
+        .map(|(rope, perturbations)| Family {
             base: Candidate::new(rope, motion),
-            directions,
+            perturbations,
         })
         .collect();
     let counts = neighbour_counts(links);
@@ -96,12 +96,11 @@ pub(super) fn linearise(
     };
     families.extend(other.iter().map(|rope| Family {
         base: Candidate::new(rope, motion),
-        directions: &[],
+        perturbations: &[],
     }));
     let options = film.sim_options(fidelity);
-    let all =
-        sensitivities(&families, Difference::Forward, &options).map_err(unwrap_sensitivity)?;
-    let simulations = all.iter().map(simulated).sum();
+    let all = sensitivities(&families, &options).map_err(unwrap_sensitivity)?;
+    let simulations = all.iter().map(|s| 1 + s.neighbours.len()).sum();
     let (bases, others) = all.split_at(points.len());
     let out = points.iter().zip(bases).enumerate().map(|(i, (x, at))| {
         let mut pairs = pairs(at);
@@ -143,43 +142,31 @@ fn unwrap_sensitivity(error: SensitivityError) -> IdentifyError {
     }
 }
 
-fn simulated(s: &Sensitivity) -> usize {
-    let beside = s.neighbours.iter();
-    1 + beside
-        .map(|n| 1 + usize::from(n.from.is_some()))
-        .sum::<usize>()
-}
-
-fn directions(x: &Point, links: u32, fine: bool) -> Vec<Direction<'static>> {
+fn perturbations(x: &Point, links: u32, fine: bool) -> Vec<Perturbation<'static>> {
     let steps = if fine { FINE_STEPS } else { COARSE_STEPS };
-    let beside = |i: usize| {
-        let mut moved = *x;
-        moved[i] += steps[i];
-        Beside {
-            at: simulated_rope(&moved, links),
-            distance: steps[i],
-        }
-    };
     [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS, INERTIA]
         .into_iter()
         .filter(|i| steps[*i] > 0.0)
-        .map(|i| Direction::Rope {
-            plus: beside(i),
-            minus: None,
+        .map(|i| {
+            let mut moved = *x;
+            moved[i] += steps[i];
+            Perturbation::Rope {
+                rope: simulated_rope(&moved, links),
+                distance: steps[i],
+            }
         })
         .collect()
 }
 
-/// Directions are in the order of the rope's coordinates.
+/// Neighbours are in the order of the rope's coordinates.
 fn pairs(at: &Sensitivity) -> Vec<Pair<'_>> {
-    let usable = at.neighbours.iter().enumerate();
+    let usable = at.neighbours.iter().enumerate().filter(|(_, n)| n.valid);
     usable
-        .filter(|(_, n)| n.doubt != Some(Doubt::Diverged))
         .map(|(coordinate, n)| Pair {
             coordinate,
-            to: &n.to,
-            from: n.from.as_ref(),
-            span: n.span,
+            to: &n.rollout,
+            from: None,
+            span: n.distance,
         })
         .collect()
 }

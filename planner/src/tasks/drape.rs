@@ -179,10 +179,8 @@ impl ThrowTask for Drape {
     fn fitness(&self, rope: &RopeParams, outcome: &ThrowOutcome) -> f64 {
         let c = &self.config;
         let watched = &outcome.watched;
-        let hang_m = watched
-            .to_segment
-            .map_or(UNKNOWN_M, |s| s.approach.distance_m);
-        let highest_m = watched.height.map_or(0.0, |h| h.highest_m);
+        let hang_m = watched.to_segment.map_or(UNKNOWN_M, |s| s.distance_m);
+        let highest_m = watched.highest_m.unwrap_or(0.0);
         let arc_m = (highest_m - self.target_m[2] - c.arc_height_m).max(0.0);
         let (tip_m, moving_m) = watched.rest.map_or((UNKNOWN_M, UNKNOWN_M), |r| {
             let hanging = Vector3::from(self.hanging(rope));

@@ -218,7 +218,7 @@ impl ThrowTask for Lob {
         let near = outcome
             .watched
             .to_segment
-            .is_some_and(|s| s.approach.distance_m < HIT_M);
+            .is_some_and(|s| s.distance_m < HIT_M);
         let stay = Self::stay_s(outcome) >= STAY_S;
         let mut verdict = verdict([("domino down", down), ("stay", stay)]);
         verdict.conditions.push(shared_types::Condition {

@@ -2,7 +2,7 @@
 
 use crate::collide::Block;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rope_sim::{Obstacle, Placement, Shape};
+use rope_sim::{Obstacle, Shape};
 
 /// A frame at the target whose x points away from the base axis and whose z is up: the
 /// scene of a task beside the x axis is that on it, turned.
@@ -46,7 +46,7 @@ impl PlanarScene {
         let (pose, half_m) = self.middle_of(top_m, size_m);
         Obstacle {
             shape: Shape::Box { half_m },
-            placement: Placement::World(pose),
+            pose,
             friction,
         }
     }

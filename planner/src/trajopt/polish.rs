@@ -14,8 +14,8 @@ use arm_model::{JointTrajectory, Pole};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
-use rope_sim::sensitivity::{Beside, Difference, Direction, Family, sensitivities};
-use rope_sim::{AttachMotion, Candidate, ClosestApproach, PlannedArm, SimOptions};
+use rope_sim::sensitivity::{Family, Perturbation, sensitivities};
+use rope_sim::{Candidate, ClosestApproach, PlannedArm, SimOptions};
 use shared_types::RopeParams;
 
 /// Step of a coordinate for slopes (rad): it moves the tip by a hundred times the
@@ -164,30 +164,26 @@ impl Polish<'_> {
             }
         }
         let moved = self.motions(&moved)?;
-        let directions: Vec<Direction> = moved
+        let perturbations: Vec<Perturbation> = moved
             .iter()
-            .map(|motion| Direction::Motion {
-                plus: Beside {
-                    at: motion as &dyn AttachMotion,
-                    distance: STEP_RAD,
-                },
-                minus: None,
+            .map(|motion| Perturbation::Motion {
+                motion,
+                distance: STEP_RAD,
             })
             .collect();
         let families: Vec<Family> = bases
             .iter()
-            .zip(directions.chunks(n))
-            .map(|(motion, directions)| Family {
+            .zip(perturbations.chunks(n))
+            .map(|(motion, perturbations)| Family {
                 base: Candidate::new(self.rope, motion),
-                directions,
+                perturbations,
             })
             .collect();
-        let all = sensitivities(&families, Difference::Forward, self.slopes)?;
+        let all = sensitivities(&families, self.slopes)?;
         Ok(all
             .iter()
             .map(|s| {
-                let columns: Vec<Option<[f64; 3]>> =
-                    (0..n).map(|i| s.closest(i).map(|a| a.tip_m)).collect();
+                let columns: Vec<Option<[f64; 3]>> = (0..n).map(|i| s.closest_tip_m(i)).collect();
                 // A neighbour that comes closest elsewhere says nothing.
                 let known = columns.iter().any(Option::is_some);
                 let slope = |row: usize, k: usize| {

@@ -1,26 +1,10 @@
 //! An obstacle as the lanes see it: shape, and its frame at the end of the step.
 
 use super::shape;
-use crate::algebra::{Quat, Vec3};
-use crate::clock::BaseState;
+use crate::algebra::Vec3;
 use crate::lanes::Lanes;
-use crate::scene::{Obstacle, Placement, Shape};
-use nalgebra::{Isometry3, Point3, Vector3};
-use shared_types::RopeParams;
-
-/// Parts of the straight rope closer than this to what holds it belong to the
-/// mounting (m).
-const MOUNTING_GAP_M: f64 = 1e-3;
-
-/// What carries an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Carrier {
-    World,
-    Attach,
-    /// Index into the arm links the scene uses.
-    ArmLink(usize),
-    Domino,
-}
+use crate::scene::{Obstacle, Shape};
+use nalgebra::{Isometry3, Vector3};
 
 /// A rigid frame that moves, one per lane. Positions are relative to the clock's
 /// origin.
@@ -41,21 +25,6 @@ impl<V: Lanes> Frame<V> {
             axes: axes_of(pose),
             v: Vec3::zero(),
             w: Vec3::zero(),
-        }
-    }
-
-    /// The frame at `local` in the carrier's frame.
-    #[inline(always)]
-    fn carried(carrier: &BaseState<V>, local: &Isometry3<f64>) -> Self {
-        let q: Quat<V> = carrier.dynamics.q;
-        let [x, y, z] = axes_of(local);
-        let arm = q.turn(constant(&local.translation.vector));
-        let w = carrier.dynamics.w;
-        Self {
-            p: carrier.position.add(arm),
-            axes: [q.turn(x), q.turn(y), q.turn(z)],
-            v: w.cross_add(arm, carrier.velocity),
-            w,
         }
     }
 
@@ -101,48 +70,19 @@ pub(crate) fn constant<V: Lanes>(v: &Vector3<f64>) -> Vec3<V> {
 pub(crate) struct Body<V> {
     pub(crate) shape: Shape,
     pub(crate) friction: V,
-    pub(crate) carrier: Carrier,
-    local: Isometry3<f64>,
     pub(crate) frame: Frame<V>,
-    /// First link whose middle, and whose farther node, may touch; links before it
-    /// belong to the mounting.
-    pub(crate) first_middle: V,
-    pub(crate) first_node: V,
+    /// Whether it is the domino, which yields.
+    pub(crate) rocks: bool,
 }
 
 impl<V: Lanes> Body<V> {
     #[inline(always)]
-    pub(crate) fn new(obstacle: &Obstacle, arm_links: &[usize], origin_m: [f64; 3]) -> Self {
-        let (carrier, local) = match obstacle.placement {
-            Placement::World(pose) => (Carrier::World, pose),
-            Placement::Attach(pose) => (Carrier::Attach, pose),
-            Placement::ArmLink { link, pose } => {
-                let index = arm_links.iter().position(|l| *l == link);
-                (Carrier::ArmLink(index.unwrap_or(0)), pose)
-            }
-        };
+    pub(crate) fn new(obstacle: &Obstacle, origin_m: [f64; 3]) -> Self {
         Self {
             shape: obstacle.shape,
             friction: V::splat(obstacle.friction),
-            carrier,
-            local,
-            frame: Frame::fixed(&local, origin_m),
-            first_middle: V::splat(0.0),
-            first_node: V::splat(0.0),
-        }
-    }
-
-    /// Moves it to where its carrier is at the end of the step.
-    #[inline(always)]
-    pub(crate) fn follow(&mut self, attach: &BaseState<V>, arm: &[BaseState<V>]) {
-        match self.carrier {
-            Carrier::World | Carrier::Domino => {}
-            Carrier::Attach => self.frame = Frame::carried(attach, &self.local),
-            Carrier::ArmLink(index) => {
-                if let Some(link) = arm.get(index) {
-                    self.frame = Frame::carried(link, &self.local);
-                }
-            }
+            frame: Frame::fixed(&obstacle.pose, origin_m),
+            rocks: false,
         }
     }
 
@@ -151,24 +91,5 @@ impl<V: Lanes> Body<V> {
     pub(crate) fn distance(&self, x: Vec3<V>) -> (V, Vec3<V>) {
         let (d, n) = shape::distance(&self.shape, self.frame.to_local(x));
         (d, self.frame.to_world(n))
-    }
-
-    /// Lets pass the links of one lane that touch it while the rope leaves the attach
-    /// frame straight.
-    #[inline(always)]
-    pub(crate) fn exempt_mounting(&mut self, lane: usize, rope: &RopeParams) {
-        if self.carrier != Carrier::Attach {
-            return;
-        }
-        let is_free = |node: u32| {
-            let down_m = rope.link_length_m() * f64::from(node);
-            let p = self.local.inverse() * Point3::new(0.0, 0.0, -down_m);
-            let (distance_m, _) = shape::distance(&self.shape, Vec3::<f64>(p.x, p.y, p.z));
-            distance_m > rope.radius_m + MOUNTING_GAP_M
-        };
-        let first_free = (0..=rope.links).find(|n| is_free(*n)).unwrap_or(rope.links);
-        self.first_middle.set(lane, f64::from(first_free));
-        self.first_node
-            .set(lane, f64::from(first_free.saturating_sub(1)));
     }
 }

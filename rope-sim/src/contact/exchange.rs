@@ -1,10 +1,11 @@
 //! What rope and obstacles exchange in one step: forces before it, motion after it.
 
 use super::body::Body;
+use super::nodes::{Node, Predicted};
+use super::summary::{StepEnd, Tally};
 use super::touch::{Point, Touch};
-use super::{Carrier, Contacts, Node, POINTS, StepEnd, middle, summary};
+use super::{Contacts, POINTS, middle};
 use crate::algebra::Vec3;
-use crate::clock::BaseState;
 use crate::lanes::Lanes;
 use crate::load::LinkLoads;
 use crate::scene::Shape;
@@ -15,29 +16,14 @@ use crate::state::Link;
 const LINK_STIFFNESS_N_M: f64 = 1e5;
 /// Stiffness of a lead's surface (N/m): 120 g at 3 m/s push it in by less than 1 mm.
 const LEAD_STIFFNESS_N_M: f64 = 2e6;
-/// Index of a link's contact point at its farther node, and of that closest to the
+/// Index of a link's contact point at its farther node; the other is that closest to the
 /// obstacle.
 const AT_NODE: usize = 0;
-const BETWEEN: usize = 1;
-
-/// The rope at the predictions.
-#[derive(Clone, Copy)]
-pub(crate) struct Predicted<'a, V> {
-    pub(crate) links: &'a [Link<V>],
-    pub(crate) nodes: &'a [Node<V>],
-    pub(crate) scheme: &'a Scheme<V>,
-}
 
 impl<V: Lanes> Contacts<V> {
     /// Adds the contacts' reactions at the predictions to `loads`.
     #[inline(always)]
-    pub(crate) fn load(
-        &mut self,
-        loads: &mut LinkLoads<V>,
-        rope: Predicted<V>,
-        attach: &BaseState<V>,
-        arm: &[BaseState<V>],
-    ) {
+    pub(crate) fn load(&mut self, loads: &mut LinkLoads<V>, rope: Predicted<V>) {
         self.imminent = V::splat(0.0);
         if let Some(domino) = &mut self.domino
             && let Some(body) = self.bodies.last_mut()
@@ -49,9 +35,7 @@ impl<V: Lanes> Contacts<V> {
             if !self.engaged[index] {
                 continue;
             }
-            let body = &mut self.bodies[index];
-            body.follow(attach, arm);
-            let mut nearer_m = body.distance(attach.position).0;
+            let mut nearer_m = self.bodies[index].distance(rope.attach).0;
             for link in 0..rope.links.len() {
                 let farther_m = self.bodies[index].distance(rope.nodes[link].x).0;
                 self.load_link(index, link, loads, rope, [nearer_m, farther_m]);
@@ -70,61 +54,78 @@ impl<V: Lanes> Contacts<V> {
         rope: Predicted<V>,
         distances_m: [V; 2],
     ) {
-        let zero = V::splat(0.0);
-        let node = &rope.nodes[link];
-        let body = &self.bodies[index];
         let slot = index * rope.links.len() + link;
-        let is_last = link + 1 == rope.links.len();
-        let near = self.near[index];
-        let first = V::splat(link as f64 + 0.5);
-
-        let radius = if is_last {
-            self.lead_radius
-        } else {
-            self.radius
-        };
-        let close = V::select_less(distances_m[1], self.reach + radius, near, zero);
-        if V::any_less(zero, close) {
-            let stiffness = if is_last {
-                LEAD_STIFFNESS_N_M
-            } else {
-                LINK_STIFFNESS_N_M
-            };
-            let point = Point {
-                back: zero,
-                radius,
-                stiffness: V::splat(stiffness),
-                may_touch: V::select_less(body.first_node, first, close, zero),
-            };
-            self.press(index, (slot, AT_NODE), link, &point, loads, rope);
-        } else {
-            self.release((slot, AT_NODE));
+        let points = [
+            self.point_at_node(index, link, rope, distances_m[1]),
+            self.point_between(index, link, rope, distances_m),
+        ];
+        for which in 0..POINTS {
+            match &points[which] {
+                Some(point) => self.press(index, (slot, which), link, point, loads, rope),
+                None => self.release((slot, which)),
+            }
         }
+    }
 
+    /// The link's farther node, if it is near a body in any lane.
+    #[inline(always)]
+    fn point_at_node(
+        &self,
+        index: usize,
+        link: usize,
+        rope: Predicted<V>,
+        distance_m: V,
+    ) -> Option<Point<V>> {
+        let zero = V::splat(0.0);
+        let (radius, stiffness) = if link + 1 == rope.links.len() {
+            (self.lead_radius, LEAD_STIFFNESS_N_M)
+        } else {
+            (self.radius, LINK_STIFFNESS_N_M)
+        };
+        let close = V::select_less(distance_m, self.reach + radius, self.near[index], zero);
+        if !V::any_less(zero, close) {
+            return None;
+        }
+        Some(Point {
+            back: zero,
+            radius,
+            stiffness: V::splat(stiffness),
+            may_touch: close,
+        })
+    }
+
+    /// The point of a link closest to a body, if that is near and between the nodes in
+    /// any lane.
+    #[inline(always)]
+    fn point_between(
+        &self,
+        index: usize,
+        link: usize,
+        rope: Predicted<V>,
+        distances_m: [V; 2],
+    ) -> Option<Point<V>> {
+        let zero = V::splat(0.0);
+        let body = &self.bodies[index];
         // Of a straight link above a plane an end is closest.
-        if self.bodies[index].shape == Shape::HalfSpace {
-            return;
+        if body.shape == Shape::HalfSpace {
+            return None;
         }
         // No point of the link is closer than half of what its ends' distances leave
         // beyond its length.
-        let length_m = node.span.norm();
+        let length_m = rope.nodes[link].span.norm();
         let least_m = (distances_m[0] + distances_m[1] - length_m) * V::splat(0.5);
-        let body = &self.bodies[index];
-        let close = V::select_less(least_m, self.reach + self.radius, near, zero);
-        let may_touch = V::select_less(body.first_middle, first, close, zero);
-        if V::any_less(zero, may_touch)
-            && let Some((back, inside)) = closest_at_start(body, link, rope)
-        {
-            let point = Point {
-                back,
-                radius: self.radius,
-                stiffness: V::splat(LINK_STIFFNESS_N_M),
-                may_touch: V::select_less(zero, inside, may_touch, zero),
-            };
-            self.press(index, (slot, BETWEEN), link, &point, loads, rope);
-        } else {
-            self.release((slot, BETWEEN));
+        let reach_m = self.reach + self.radius;
+        let close = V::select_less(least_m, reach_m, self.near[index], zero);
+        if !V::any_less(zero, close) {
+            return None;
         }
+        let (back, inside) = closest_at_start(body, link, rope)?;
+        Some(Point {
+            back,
+            radius: self.radius,
+            stiffness: V::splat(LINK_STIFFNESS_N_M),
+            may_touch: V::select_less(zero, inside, close, zero),
+        })
     }
 
     /// Presses one point of a link against a body.
@@ -145,7 +146,7 @@ impl<V: Lanes> Contacts<V> {
         let about_to = touch.find(body, point, node, w, rope.scheme.h);
         self.imminent = self.imminent.max(about_to);
         let yielding = match &self.domino {
-            Some(domino) if body.carrier == Carrier::Domino => {
+            Some(domino) if body.rocks => {
                 touch.keep_where(domino.standing());
                 Some(domino.mobility(touch.normal(), touch.place(node)))
             }
@@ -181,8 +182,7 @@ impl<V: Lanes> Contacts<V> {
                 continue;
             }
             let body = &self.bodies[index];
-            let is_domino = body.carrier == Carrier::Domino;
-            let mut tally = summary::Tally::none();
+            let mut tally = Tally::none();
             for link in 0..count {
                 for which in 0..POINTS {
                     let slot = index * count + link;
@@ -192,8 +192,10 @@ impl<V: Lanes> Contacts<V> {
                     let touch = &mut self.touches[slot][which];
                     let (force, at) = touch.settle(body, &nodes[link], links[link].w, scheme);
                     let is_lead = which == AT_NODE && link + 1 == count;
-                    tally.add(touch.force, touch.depth(), is_lead);
-                    if is_domino && let Some(domino) = &mut self.domino {
+                    tally.add(touch.force, is_lead);
+                    if body.rocks
+                        && let Some(domino) = &mut self.domino
+                    {
                         domino.push(force, at);
                     }
                 }

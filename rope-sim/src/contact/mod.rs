@@ -13,21 +13,21 @@ mod body;
 mod exchange;
 mod middle;
 mod nodes;
+mod rocking;
 mod shape;
 mod start;
 mod summary;
 mod touch;
 
-pub(crate) use body::{Body, Carrier, Frame, constant};
-pub(crate) use exchange::Predicted;
-pub(crate) use nodes::{Node, corrected, predicted};
+pub(crate) use nodes::{Node, Predicted, corrected, predicted};
 pub(crate) use start::Starting;
+pub(crate) use summary::StepEnd;
 
-use crate::clock::BaseState;
-use crate::domino::DominoLanes;
 use crate::lanes::Lanes;
 use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::state::RopeLanes;
+use body::Body;
+use rocking::RockingBlocks;
 use shared_types::RopeParams;
 use summary::Summaries;
 use touch::Touch;
@@ -59,7 +59,7 @@ pub(crate) struct Contacts<V> {
     max_step: V,
     /// Positive in lanes that are about to touch.
     pub(crate) imminent: V,
-    domino: Option<DominoLanes<V>>,
+    domino: Option<RockingBlocks<V>>,
     summaries: Summaries,
 }
 
@@ -72,12 +72,11 @@ impl<V: Lanes> Contacts<V> {
         max_step_s: f64,
         origin_m: [f64; 3],
     ) -> Self {
-        let arm_links = scene.arm_links();
         let links = ropes.first().map_or(0, |r| r.links as usize);
         let mut bodies: Vec<Body<V>> = scene
             .obstacles
             .iter()
-            .map(|o| Body::new(o, &arm_links, origin_m))
+            .map(|o| Body::new(o, origin_m))
             .collect();
         let mut radius = V::splat(0.0);
         let mut lead_radius = radius;
@@ -85,17 +84,14 @@ impl<V: Lanes> Contacts<V> {
             let Some(rope) = ropes.get(lane).or_else(|| ropes.last()) else {
                 continue;
             };
-            for body in &mut bodies {
-                body.exempt_mounting(lane, rope);
-            }
             radius.set(lane, rope.radius_m);
             lead_radius.set(lane, rope.lead_radius_m.max(rope.radius_m));
         }
         let domino = scene
             .domino
             .as_ref()
-            .map(|d| DominoLanes::new(d, ropes.len(), origin_m));
-        bodies.extend(domino.as_ref().map(DominoLanes::body));
+            .map(|d| RockingBlocks::new(d, ropes.len(), origin_m));
+        bodies.extend(domino.as_ref().map(RockingBlocks::body));
         let count = bodies.len();
         Self {
             touches: vec![[Touch::none(); POINTS]; count * links],
@@ -115,18 +111,12 @@ impl<V: Lanes> Contacts<V> {
 
     /// Whether anything may be touched before the next look.
     pub(crate) fn is_engaged(&self) -> bool {
-        self.engaged.contains(&true) || self.domino.as_ref().is_some_and(DominoLanes::is_rocking)
+        self.engaged.contains(&true) || self.domino.as_ref().is_some_and(RockingBlocks::is_rocking)
     }
 
     /// Looks how far everything is; `nodes` must be up to date.
     #[inline(always)]
-    pub(crate) fn look(
-        &mut self,
-        nodes: &[Node<V>],
-        rope: &RopeLanes<V>,
-        attach: &BaseState<V>,
-        arm: &[BaseState<V>],
-    ) {
+    pub(crate) fn look(&mut self, nodes: &[Node<V>], rope: &RopeLanes<V>) {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let mut speed = zero;
         for node in nodes {
@@ -140,8 +130,7 @@ impl<V: Lanes> Contacts<V> {
         let horizon = travel.fma(V::splat(LOOK_PERIOD as f64), size);
         self.reach = travel * V::splat(REACH_STEPS);
         self.imminent = zero;
-        for (index, body) in self.bodies.iter_mut().enumerate() {
-            body.follow(attach, arm);
+        for (index, body) in self.bodies.iter().enumerate() {
             let mut least = V::splat(1e9);
             for node in nodes {
                 least = least.min(body.distance(node.x).0);
@@ -159,18 +148,6 @@ impl<V: Lanes> Contacts<V> {
 
     /// What became of one lane's domino.
     pub(crate) fn domino_of(&self, lane: usize) -> Option<DominoOutcome> {
-        let first = self.summaries.of(lane, self.bodies.len());
-        let touched = first.last().and_then(|s| s.first).map(|(t, _)| t);
-        self.domino.as_ref().map(|d| d.outcome(lane, touched))
+        self.domino.as_ref().map(|d| d.outcome(lane))
     }
-}
-
-/// End of the current step in one lane.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct StepEnd {
-    /// Time at its end, and its length (s).
-    pub(crate) time_s: f64,
-    pub(crate) step_s: f64,
-    /// Whether the lane still counts.
-    pub(crate) running: bool,
 }

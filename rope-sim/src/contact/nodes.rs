@@ -33,6 +33,16 @@ impl<V: Lanes> Node<V> {
     }
 }
 
+/// The rope at the predictions.
+#[derive(Clone, Copy)]
+pub(crate) struct Predicted<'a, V> {
+    pub(crate) links: &'a [Link<V>],
+    pub(crate) nodes: &'a [Node<V>],
+    /// Attach point relative to the clock's origin (m).
+    pub(crate) attach: Vec3<V>,
+    pub(crate) scheme: &'a Scheme<V>,
+}
+
 /// Nodes at the predictions; the links must have been predicted.
 #[inline(always)]
 pub(crate) fn predicted<V: Lanes>(

@@ -19,16 +19,6 @@ pub(crate) fn distance<V: Lanes>(shape: &Shape, p: Vec3<V>) -> (V, Vec3<V>) {
             let [x, y, z] = half_m;
             to_box([V::splat(x), V::splat(y), V::splat(z)], p)
         }
-        Shape::Capsule {
-            half_length_m,
-            radius_m,
-        } => {
-            let end = V::splat(half_length_m);
-            let along = p.2.min(end).max(-end);
-            let off = Vec3(p.0, p.1, p.2 - along);
-            let (length, direction) = direction(off, Vec3::splat(1.0, 0.0, 0.0));
-            (length - V::splat(radius_m), direction)
-        }
         Shape::Cylinder {
             half_length_m,
             radius_m,
@@ -89,10 +79,6 @@ mod tests {
         half_length_m: 0.3,
         radius_m: 0.1,
     };
-    const CAPSULE: Shape = Shape::Capsule {
-        half_length_m: 0.3,
-        radius_m: 0.1,
-    };
 
     #[test]
     fn distances_known_by_hand() {
@@ -103,8 +89,6 @@ mod tests {
             (CYLINDER, [0.0, 0.3, 0.0], 0.2),
             (CYLINDER, [0.0, 0.13, 0.34], 0.05),
             (CYLINDER, [0.0, 0.02, -0.29], -0.01),
-            (CAPSULE, [0.0, 0.03, 0.34], -0.05),
-            (CAPSULE, [0.0, 0.3, 0.1], 0.2),
             (Shape::HalfSpace, [4.0, 5.0, -0.2], -0.2),
         ] {
             assert!((at(shape, p).0 - d).abs() < 1e-12, "{shape:?} {p:?}");
@@ -118,7 +102,7 @@ mod tests {
         for i in 0..500 {
             let t = f64::from(i);
             let p = Vector3::new((t * 1.7).sin(), (t * 0.9).cos(), (t * 2.3).sin()) * 0.45;
-            for shape in [BOX, CYLINDER, CAPSULE] {
+            for shape in [BOX, CYLINDER] {
                 let (d, n) = at(shape, p.into());
                 assert!((n.norm() - 1.0).abs() < 1e-12);
                 let foot = p - n * d;

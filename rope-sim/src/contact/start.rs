@@ -2,12 +2,9 @@
 
 use super::body::Body;
 use super::middle;
+use super::rocking::RockingBlocks;
 use crate::algebra::Vec3;
-use crate::clock::BaseState;
-use crate::domino::DominoLanes;
 use crate::scene::{Scene, SceneBody, SceneError};
-use arm_model::JOINTS;
-use arm_model::kinematics::FrameMotion;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 
@@ -18,8 +15,7 @@ const TOUCH_M: f64 = 1e-3;
 pub(crate) struct Starting<'a> {
     pub(crate) candidate: usize,
     pub(crate) rope: &'a RopeParams,
-    pub(crate) attach: &'a FrameMotion,
-    pub(crate) arm: Option<&'a [FrameMotion; JOINTS]>,
+    pub(crate) attach_m: &'a Vector3<f64>,
     /// Attitudes of the links, scalar first.
     pub(crate) links: &'a [[f64; 4]],
 }
@@ -28,23 +24,13 @@ impl Starting<'_> {
     /// # Errors
     /// The first body of the scene that the rope is in.
     pub(crate) fn check(&self, scene: &Scene) -> Result<(), SceneError> {
-        let carriers = scene.arm_links();
-        let at = |link: &usize| {
-            self.arm
-                .and_then(|arm| arm.get(link - 1))
-                .map(BaseState::of)
-        };
-        let arm: Vec<BaseState<f64>> = carriers.iter().filter_map(at).collect();
-        let attach = BaseState::of(self.attach);
         let nodes = self.nodes_m();
         for (index, obstacle) in scene.obstacles.iter().enumerate() {
-            let mut body = Body::<f64>::new(obstacle, &carriers, [0.0; 3]);
-            body.exempt_mounting(0, self.rope);
-            body.follow(&attach, &arm);
+            let body = Body::new(obstacle, [0.0; 3]);
             self.check_body(&body, &nodes, SceneBody::Obstacle(index))?;
         }
         if let Some(domino) = &scene.domino {
-            let body = DominoLanes::<f64>::new(domino, 1, [0.0; 3]).body();
+            let body = RockingBlocks::new(domino, 1, [0.0; 3]).body();
             self.check_body(&body, &nodes, SceneBody::Domino)?;
         }
         Ok(())
@@ -53,7 +39,7 @@ impl Starting<'_> {
     /// All nodes, attach point first (m).
     fn nodes_m(&self) -> Vec<Vec3<f64>> {
         let down = Vector3::z() * -self.rope.link_length_m();
-        let mut at = self.attach.p_m;
+        let mut at = *self.attach_m;
         let mut nodes = vec![Vec3(at.x, at.y, at.z)];
         for [w, x, y, z] in self.links {
             at += UnitQuaternion::new_unchecked(Quaternion::new(*w, *x, *y, *z)) * down;
@@ -76,13 +62,8 @@ impl Starting<'_> {
             } else {
                 self.rope.radius_m
             };
-            let mut depth_m = f64::NEG_INFINITY;
-            if body.first_node < link as f64 + 0.5 {
-                depth_m = radius_m - body.distance(far).0;
-            }
-            if body.first_middle < link as f64 + 0.5
-                && let Some((back, _)) = middle::closest(body, near, far)
-            {
+            let mut depth_m = radius_m - body.distance(far).0;
+            if let Some((back, _)) = middle::closest(body, near, far) {
                 let at = near.sub(far).scale_add(back, far);
                 depth_m = depth_m.max(self.rope.radius_m - body.distance(at).0);
             }

@@ -1,14 +1,22 @@
 //! What a rollout says about each obstacle.
 
-use super::StepEnd;
 use crate::lanes::Lanes;
 use crate::scene::{ContactSummary, RopePart};
 
-/// Largest numbers over the contact points of one obstacle in one step.
+/// End of the current step in one lane.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepEnd {
+    /// Time at its end, and its length (s).
+    pub(crate) time_s: f64,
+    pub(crate) step_s: f64,
+    /// Whether the lane still counts.
+    pub(crate) running: bool,
+}
+
+/// Largest forces over the contact points of one obstacle in one step (N).
 pub(crate) struct Tally<V> {
-    links_force: V,
-    lead_force: V,
-    depth: V,
+    links: V,
+    lead: V,
 }
 
 impl<V: Lanes> Tally<V> {
@@ -16,20 +24,18 @@ impl<V: Lanes> Tally<V> {
     pub(crate) fn none() -> Self {
         let zero = V::splat(0.0);
         Self {
-            links_force: zero,
-            lead_force: zero,
-            depth: zero,
+            links: zero,
+            lead: zero,
         }
     }
 
     #[inline(always)]
-    pub(crate) fn add(&mut self, force: V, depth: V, is_lead: bool) {
+    pub(crate) fn add(&mut self, force: V, is_lead: bool) {
         if is_lead {
-            self.lead_force = self.lead_force.max(force);
+            self.lead = self.lead.max(force);
         } else {
-            self.links_force = self.links_force.max(force);
+            self.links = self.links.max(force);
         }
-        self.depth = self.depth.max(depth);
     }
 }
 
@@ -48,29 +54,19 @@ impl Summaries {
     /// Takes in one step of one body.
     #[inline(always)]
     pub(crate) fn add<V: Lanes>(&mut self, body: usize, tally: &Tally<V>, lanes: &[StepEnd]) {
-        let largest = tally.links_force.max(tally.lead_force);
+        let largest = tally.links.max(tally.lead);
         if !V::any_less(V::splat(0.0), largest) {
             return;
         }
         for (lane, end) in lanes.iter().enumerate() {
-            let force_n = largest.get(lane);
-            if !(end.running && force_n > 0.0) {
-                continue;
+            if end.running && largest.get(lane) > 0.0 {
+                let part = if tally.lead.get(lane) > 0.0 {
+                    RopePart::Lead
+                } else {
+                    RopePart::Links
+                };
+                self.all[body][lane].first.get_or_insert((end.time_s, part));
             }
-            let summary = &mut self.all[body][lane];
-            let lead = tally.lead_force.get(lane) > 0.0;
-            let part = if lead {
-                RopePart::Lead
-            } else {
-                RopePart::Links
-            };
-            summary.first = summary.first.or(Some((end.time_s, part)));
-            summary.lead_touched |= lead;
-            summary.links_touched |= tally.links_force.get(lane) > 0.0;
-            summary.in_touch_s += end.step_s;
-            summary.peak_normal_force_n = summary.peak_normal_force_n.max(force_n);
-            let depth_m = tally.depth.get(lane);
-            summary.greatest_penetration_m = summary.greatest_penetration_m.max(depth_m);
         }
     }
 

@@ -215,13 +215,6 @@ impl<V: Lanes> Touch<V> {
         (on_rope, x)
     }
 
-    /// Depth below the surface (m), after [`Touch::settle`]; 0 out of contact.
-    #[inline(always)]
-    pub(crate) fn depth(&self) -> V {
-        let zero = V::splat(0.0);
-        V::select_less(zero, self.force, -self.gap, zero).max(zero)
-    }
-
     /// Lets the contact be where `standing` is positive only.
     #[inline(always)]
     pub(crate) fn keep_where(&mut self, standing: V) {

@@ -18,16 +18,16 @@
 //! between the halves of the elimination of a link, where the processor would
 //! otherwise wait for a division.
 
-mod beyond;
 mod joints;
+mod outboard;
 
 use crate::algebra::{Mat3, Sym3, Vec3};
 use crate::lanes::Lanes;
 use crate::load::Loads;
 use crate::scheme::Scheme;
 use crate::state::{BaseLanes, Link, RopeLanes};
-use beyond::Beyond;
 use joints::{Ends, Joints};
+use outboard::Outboard;
 
 /// Standard gravity of the model (m/s²), along -z.
 pub(crate) const GRAVITY_M_S2: f64 = 9.81;
@@ -116,7 +116,7 @@ fn eliminate<V: Lanes, L: Loads<V>>(
     scheme: &Scheme<V>,
     loads: &L,
 ) -> V {
-    let mut beyond = Beyond::lead(rope);
+    let mut outboard = Outboard::lead(rope);
     let mut joints = Joints::new(base, rope);
     if let Some(last) = links.last_mut() {
         if !L::PRESENT {
@@ -131,11 +131,11 @@ fn eliminate<V: Lanes, L: Loads<V>>(
         (nearer.split_last_mut(), spaces.split_last_mut())
     {
         if let Some(load) = loads.on_link(links_nearer.len()) {
-            beyond.add(load, rope.per_resistance);
+            outboard.add(load, rope.per_resistance);
         }
-        let half = beyond.open(rope, joints.span, link.al_change);
+        let half = outboard.open(rope, joints.span, link.al_change);
         joints.prepare(links_nearer, spaces_nearer, rope, scheme, loads);
-        beyond.close(rope, space, &half);
+        outboard.close(rope, space, &half);
         nearer = links_nearer;
         spaces = spaces_nearer;
     }

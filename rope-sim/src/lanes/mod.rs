@@ -1,8 +1,8 @@
 //! Vectors of ropes: the number type the whole simulator is written in.
 //!
 //! One lane is one rope. Every operation acts on each lane alone, so a lane's bits
-//! do not depend on its position or its neighbours; vector kernels fuse multiply-adds,
-//! so those of one precision agree bit by bit. This is the only module with `unsafe` code: the
+//! do not depend on its position or its neighbours, and every type fuses multiply-adds,
+//! so kernels of one precision agree bit by bit. This is the only module with `unsafe` code: the
 //! wrappers over `core::arch` in [`x86`] and the call into code compiled for the
 //! processor found at run time.
 #![allow(
@@ -10,12 +10,11 @@
     reason = "vector instructions and calls into code compiled for them need it"
 )]
 
-mod portable;
+mod scalar;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 use core::ops::{Add, Mul, Neg, Sub};
-use portable::Plain;
 
 /// Coefficients, lowest power first, of `2 acos(1 - x) / sqrt(1 - (1 - x)²)` on
 /// [0, 1]: interpolation at the Chebyshev nodes, relative error 8e-8.
@@ -71,9 +70,9 @@ pub(crate) trait Lanes:
     fn get(&self, lane: usize) -> f64;
     /// Replaces the number in `lane`.
     fn set(&mut self, lane: usize, value: f64);
-    /// `self * b + c`, fused where the processor can.
+    /// `self * b + c`, rounded once.
     fn fma(self, b: Self, c: Self) -> Self;
-    /// `c - self * b`, fused where the processor can.
+    /// `c - self * b`, rounded once.
     fn fnma(self, b: Self, c: Self) -> Self;
     /// `1 / self`.
     fn recip(self) -> Self;
@@ -116,28 +115,25 @@ pub enum Kernel {
     Avx512F32,
     /// 8 single precision lanes, AVX2 and FMA.
     Avx2F32,
-    /// One rope in single precision, any processor.
-    PortableF32,
+    /// One rope in single precision, on processors other than x86-64.
+    ScalarF32,
     /// 8 double precision lanes, AVX-512.
     Avx512F64,
     /// 4 double precision lanes, AVX2 and FMA.
     Avx2F64,
-    /// One rope in double precision, any processor.
-    PortableF64,
-    /// One rope in double precision with fused multiply-adds, rounding as the vector
-    /// kernels do; slow where the processor has no such instruction.
+    /// One rope in double precision, any processor; slow where it has no fused
+    /// multiply-adds.
     ScalarF64,
 }
 
 impl Kernel {
     /// All forms, fastest first within a precision.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 6] = [
         Self::Avx512F32,
         Self::Avx2F32,
-        Self::PortableF32,
+        Self::ScalarF32,
         Self::Avx512F64,
         Self::Avx2F64,
-        Self::PortableF64,
         Self::ScalarF64,
     ];
 
@@ -148,14 +144,14 @@ impl Kernel {
             Self::Avx512F32 => 16,
             Self::Avx2F32 | Self::Avx512F64 => 8,
             Self::Avx2F64 => 4,
-            Self::PortableF32 | Self::PortableF64 | Self::ScalarF64 => 1,
+            Self::ScalarF32 | Self::ScalarF64 => 1,
         }
     }
 
     /// Whether it computes in single precision.
     #[must_use]
     pub const fn is_single_precision(self) -> bool {
-        matches!(self, Self::Avx512F32 | Self::Avx2F32 | Self::PortableF32)
+        matches!(self, Self::Avx512F32 | Self::Avx2F32 | Self::ScalarF32)
     }
 
     /// Whether this processor can run it.
@@ -164,57 +160,72 @@ impl Kernel {
         match self {
             Self::Avx512F32 | Self::Avx512F64 => has_avx512(),
             Self::Avx2F32 | Self::Avx2F64 => has_avx2(),
-            Self::PortableF32 | Self::PortableF64 | Self::ScalarF64 => true,
+            Self::ScalarF32 => cfg!(not(target_arch = "x86_64")),
+            Self::ScalarF64 => true,
         }
     }
 
-    /// Runs `task` in this form; a form this processor lacks falls back to the
-    /// portable one of the same precision.
+    /// Runs `task` in this form; one that this processor lacks falls back to one rope in
+    /// double precision.
     pub(crate) fn run<T: LaneTask>(self, task: T) -> T::Output {
         #[cfg(target_arch = "x86_64")]
-        {
-            match self {
-                // SAFETY: the processor has AVX-512 F, DQ, VL, AVX2 and FMA, checked just before.
-                Self::Avx512F32 if has_avx512() => return unsafe { x86::run_avx512_f32(task) },
-                // SAFETY: as above.
-                Self::Avx512F64 if has_avx512() => return unsafe { x86::run_avx512_f64(task) },
-                // SAFETY: the processor has AVX2 and FMA, checked just before.
-                Self::Avx2F32 if has_avx2() => return unsafe { x86::run_avx2_f32(task) },
-                // SAFETY: as above.
-                Self::Avx2F64 if has_avx2() => return unsafe { x86::run_avx2_f64(task) },
-                // SAFETY: as above.
-                Self::ScalarF64 if has_avx2() => return unsafe { x86::run_fma_scalar(task) },
-                _ => {}
-            }
-        }
         match self {
-            Self::ScalarF64 => task.run::<f64>(),
-            single if single.is_single_precision() => task.run::<Plain<f32>>(),
-            _ => task.run::<Plain<f64>>(),
+            // SAFETY: the processor has AVX-512 F, DQ, VL, AVX2 and FMA, checked just before.
+            Self::Avx512F32 if has_avx512() => return unsafe { x86::run_avx512_f32(task) },
+            // SAFETY: the processor has AVX2 and FMA, checked just before.
+            Self::Avx2F32 if has_avx2() => return unsafe { x86::run_avx2_f32(task) },
+            _ => {}
         }
+        #[cfg(not(target_arch = "x86_64"))]
+        if self == Self::ScalarF32 {
+            return task.run::<f32>();
+        }
+        self.run_double(task)
+    }
+
+    /// [`Kernel::run`] for tasks of double precision: single-precision forms fall back to
+    /// one rope. What only ever runs so is not compiled for the other forms.
+    pub(crate) fn run_double<T: LaneTask>(self, task: T) -> T::Output {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            // SAFETY: the processor has AVX-512 F, DQ, VL, AVX2 and FMA, checked just before.
+            Self::Avx512F64 if has_avx512() => return unsafe { x86::run_avx512_f64(task) },
+            // SAFETY: the processor has AVX2 and FMA, checked just before.
+            Self::Avx2F64 if has_avx2() => return unsafe { x86::run_avx2_f64(task) },
+            _ => {}
+        }
+        run_scalar(task)
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-fn has_avx512() -> bool {
-    is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512vl")
-        && has_avx2()
+/// Runs `task` for one rope in double precision.
+pub(crate) fn run_scalar<T: LaneTask>(task: T) -> T::Output {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        // SAFETY: the processor has AVX2 and FMA, checked just before.
+        return unsafe { x86::run_fma_scalar(task) };
+    }
+    task.run::<f64>()
 }
 
-#[cfg(target_arch = "x86_64")]
-fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
-}
-
-#[cfg(not(target_arch = "x86_64"))]
 fn has_avx512() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+            && has_avx2()
+    }
+    #[cfg(not(target_arch = "x86_64"))]
     false
 }
 
-#[cfg(not(target_arch = "x86_64"))]
 fn has_avx2() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
     false
 }
 

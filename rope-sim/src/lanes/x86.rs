@@ -9,6 +9,17 @@ use super::{ANGLE_POLYNOMIAL_F32, ANGLE_POLYNOMIAL_F64, LaneTask, Lanes};
 use core::arch::x86_64::*;
 use core::ops::{Add, Mul, Neg, Sub};
 
+/// Methods of a vector type that are an expression of intrinsics.
+macro_rules! wrap {
+    ($(fn $method:ident($self:ident $(, $other:ident)*) => $vector:expr;)+) => {$(
+        #[inline(always)]
+        fn $method($self $(, $other: Self)*) -> Self {
+            // SAFETY: only reached inside `run_*`, see the module's text.
+            Self(unsafe { $vector })
+        }
+    )+};
+}
+
 macro_rules! vector_lanes {
     ($(#[$doc:meta])* $name:ident: $vector:ty, $scalar:ty, $count:literal, $polynomial:ident,
      $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident,
@@ -23,40 +34,34 @@ macro_rules! vector_lanes {
 
         impl Add for $name {
             type Output = Self;
-            #[inline(always)]
-            fn add(self, other: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $add(self.0, other.0) })
-            }
+            wrap! { fn add(self, other) => $add(self.0, other.0); }
         }
         impl Sub for $name {
             type Output = Self;
-            #[inline(always)]
-            fn sub(self, other: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $sub(self.0, other.0) })
-            }
+            wrap! { fn sub(self, other) => $sub(self.0, other.0); }
         }
         impl Mul for $name {
             type Output = Self;
-            #[inline(always)]
-            fn mul(self, other: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $mul(self.0, other.0) })
-            }
+            wrap! { fn mul(self, other) => $mul(self.0, other.0); }
         }
         impl Neg for $name {
             type Output = Self;
-            #[inline(always)]
-            fn neg(self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $xor(self.0, $splat(-0.0)) })
-            }
+            wrap! { fn neg(self) => $xor(self.0, $splat(-0.0)); }
         }
         impl Lanes for $name {
             const COUNT: usize = $count;
             const ANGLE_POLYNOMIAL: &'static [f64] = $polynomial;
 
+            wrap! {
+                fn fma(self, b, c) => $fma(self.0, b.0, c.0);
+                fn fnma(self, b, c) => $fnma(self.0, b.0, c.0);
+                fn recip(self) => $div($splat(1.0), self.0);
+                fn sqrt(self) => $sqrt(self.0);
+                fn abs(self) => $andnot($splat(-0.0), self.0);
+                fn flip_by(self, sign) => $xor(self.0, $and(sign.0, $splat(-0.0)));
+                fn min(self, other) => $min(self.0, other.0);
+                fn max(self, other) => $max(self.0, other.0);
+            }
             #[inline(always)]
             #[allow(trivial_numeric_casts, reason = "one of the two types is f64")]
             fn splat(value: f64) -> Self {
@@ -75,46 +80,6 @@ macro_rules! vector_lanes {
                 // SAFETY: as in `get`, and the borrow is unique.
                 let numbers: &mut [$scalar; $count] = unsafe { &mut *(&raw mut self.0).cast() };
                 numbers[lane.min($count - 1)] = value as $scalar;
-            }
-            #[inline(always)]
-            fn fma(self, b: Self, c: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $fma(self.0, b.0, c.0) })
-            }
-            #[inline(always)]
-            fn fnma(self, b: Self, c: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $fnma(self.0, b.0, c.0) })
-            }
-            #[inline(always)]
-            fn recip(self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $div($splat(1.0), self.0) })
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $sqrt(self.0) })
-            }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $andnot($splat(-0.0), self.0) })
-            }
-            #[inline(always)]
-            fn flip_by(self, sign: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $xor(self.0, $and(sign.0, $splat(-0.0))) })
-            }
-            #[inline(always)]
-            fn min(self, other: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $min(self.0, other.0) })
-            }
-            #[inline(always)]
-            fn max(self, other: Self) -> Self {
-                // SAFETY: only reached inside `run_*`, see the module's text.
-                Self(unsafe { $max(self.0, other.0) })
             }
             #[inline(always)]
             fn select_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {

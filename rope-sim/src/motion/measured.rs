@@ -1,7 +1,7 @@
 //! The arm as its joint encoders reported it.
 
 use super::{AttachMotion, MotionError, check_times};
-use arm_model::kinematics::{FrameMotion, link_motions};
+use arm_model::kinematics::FrameMotion;
 use arm_model::{JOINTS, JointState, JointVector, Pole};
 
 /// Knot spacing of the fitted spline (s): short enough for the arm's bandwidth,
@@ -108,16 +108,8 @@ impl AttachMotion for MeasuredArm {
         Some(self.pole)
     }
 
-    fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
-        Some(link_motions(&self.joints_at(t_s)))
-    }
-
     fn duration_s(&self) -> f64 {
         self.last_s
-    }
-
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        Vec::new()
     }
 }
 

@@ -14,21 +14,25 @@ pub use planned::PlannedArm;
 pub use pose_track::{PoseRow, PoseTrack};
 
 use arm_model::kinematics::FrameMotion;
-use arm_model::{JOINTS, JointState, Pole};
-use nalgebra::Vector3;
+use arm_model::{JointState, Pole};
 
 /// Motion of the attach frame A in the world: pose and its exact first two
-/// derivatives. The rope at rest leaves A along its -z axis.
+/// derivatives. The rope at rest leaves A along its -z axis. A function of time (s) is
+/// one that never ends and whose acceleration never jumps.
 pub trait AttachMotion: Sync {
     /// Pose, velocity and acceleration at `t_s`; any time gives an answer.
     fn at(&self, t_s: f64) -> FrameMotion;
 
     /// Time at which the described motion ends (s); it starts at 0.
-    fn duration_s(&self) -> f64;
+    fn duration_s(&self) -> f64 {
+        f64::INFINITY
+    }
 
     /// Times at which the acceleration jumps (ends of clamped splines); the
     /// integrator puts step boundaries there and restarts.
-    fn acceleration_jumps_s(&self) -> Vec<f64>;
+    fn acceleration_jumps_s(&self) -> Vec<f64> {
+        Vec::new()
+    }
 
     /// Whether the frame is known to hold still after [`AttachMotion::duration_s`].
     /// Where it is not, simulating beyond that time is refused.
@@ -47,39 +51,17 @@ pub trait AttachMotion: Sync {
     fn pole(&self) -> Option<Pole> {
         None
     }
-
-    /// Motions of the arm's links 1 to 7 that go with [`AttachMotion::at`], where
-    /// there is an arm; obstacles can be placed on them.
-    fn arm_links(&self, _t_s: f64) -> Option<[FrameMotion; JOINTS]> {
-        None
-    }
 }
 
-/// One link of the arm behind a motion, as a motion of its own.
-pub(crate) struct LinkMotion<'a> {
-    pub(crate) motion: &'a dyn AttachMotion,
-    /// 1 to 7.
-    pub(crate) link: usize,
-}
-
-impl AttachMotion for LinkMotion<'_> {
-    /// NaN where there is no arm, which building a path reports.
+impl<F: Fn(f64) -> FrameMotion + Sync> AttachMotion for F {
     fn at(&self, t_s: f64) -> FrameMotion {
-        let nowhere = FrameMotion {
-            p_m: Vector3::repeat(f64::NAN),
-            ..FrameMotion::world()
-        };
-        let arm = self.motion.arm_links(t_s);
-        arm.and_then(|links| links.get(self.link - 1).copied())
-            .unwrap_or(nowhere)
+        self(t_s)
     }
+}
 
-    fn duration_s(&self) -> f64 {
-        self.motion.duration_s()
-    }
-
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        self.motion.acceleration_jumps_s()
+impl core::fmt::Debug for dyn AttachMotion + '_ {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("AttachMotion")
     }
 }
 

@@ -1,8 +1,8 @@
 //! The arm following a planned joint trajectory exactly.
 
 use super::AttachMotion;
-use arm_model::kinematics::{FrameMotion, link_motions};
-use arm_model::{JOINTS, JointState, JointTrajectory, Pole};
+use arm_model::kinematics::FrameMotion;
+use arm_model::{JointState, JointTrajectory, Pole};
 
 /// Attach frame at the pole's end of an arm that follows a trajectory exactly. It
 /// holds still before the start and after the end.
@@ -37,10 +37,6 @@ impl AttachMotion for PlannedArm {
 
     fn pole(&self) -> Option<Pole> {
         Some(self.pole)
-    }
-
-    fn arm_links(&self, t_s: f64) -> Option<[FrameMotion; JOINTS]> {
-        Some(link_motions(&self.trajectory.state_at(t_s)))
     }
 
     fn duration_s(&self) -> f64 {

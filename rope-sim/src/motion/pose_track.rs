@@ -70,12 +70,6 @@ impl PoseTrack {
         })
     }
 
-    /// Time of the first row (s).
-    #[must_use]
-    pub fn first_s(&self) -> f64 {
-        self.t_s[0]
-    }
-
     /// Value, first and second derivative of the seven channels.
     fn channels(&self, t_s: f64) -> [[f64; 7]; 3] {
         let last = self.t_s.len() - 1;
@@ -115,10 +109,6 @@ impl AttachMotion for PoseTrack {
 
     fn duration_s(&self) -> f64 {
         self.t_s[self.t_s.len() - 1]
-    }
-
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        Vec::new()
     }
 
     fn holds_after_end(&self) -> bool {

@@ -1,8 +1,7 @@
 //! Scenes that cannot be simulated, and why.
 
-use super::{Domino, Obstacle, Placement, Scene, Shape};
-use arm_model::JOINTS;
-use nalgebra::Vector3;
+use super::{Domino, Obstacle, Scene, Shape};
+use crate::extras::Unusable;
 
 impl Scene {
     /// # Errors
@@ -25,55 +24,40 @@ impl Scene {
     }
 }
 
-type Fault = (&'static str, f64, &'static str);
-
 const SIZE: &str = "must be above 0 and at most 100 m";
 const FRICTION: &str = "must be from 0 to 10";
 const FINITE: &str = "must be finite";
 
-fn size(field: &'static str, value: f64) -> Option<Fault> {
+fn size(field: &'static str, value: f64) -> Option<Unusable> {
     (!(value > 0.0 && value <= 100.0)).then_some((field, value, SIZE))
 }
 
-fn friction(value: f64) -> Option<Fault> {
+fn friction(value: f64) -> Option<Unusable> {
     (!(0.0..=10.0).contains(&value)).then_some(("friction", value, FRICTION))
 }
 
-fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Option<Fault> {
+fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Option<Unusable> {
     let bad = values.into_iter().find(|v| !v.is_finite());
     bad.map(|value| (field, value, FINITE))
 }
 
 impl Obstacle {
-    fn fault(&self) -> Option<Fault> {
-        let pose = match self.placement {
-            Placement::World(pose) | Placement::Attach(pose) => pose,
-            Placement::ArmLink { link, pose } => {
-                if !(1..=JOINTS).contains(&link) {
-                    return Some(("link", link as f64, "must be from 1 to 7"));
-                }
-                pose
-            }
-        };
-        let place: Vector3<f64> = pose.translation.vector;
+    fn fault(&self) -> Option<Unusable> {
+        let place = self.pose.translation.vector;
         self.shape
             .fault()
             .or_else(|| friction(self.friction))
             .or_else(|| finite("translation", place.iter().copied()))
-            .or_else(|| finite("rotation", pose.rotation.coords.iter().copied()))
+            .or_else(|| finite("rotation", self.pose.rotation.coords.iter().copied()))
     }
 }
 
 impl Shape {
-    fn fault(&self) -> Option<Fault> {
+    fn fault(&self) -> Option<Unusable> {
         match *self {
             Self::HalfSpace => None,
             Self::Box { half_m } => half_m.into_iter().find_map(|v| size("half_m", v)),
-            Self::Capsule {
-                half_length_m,
-                radius_m,
-            }
-            | Self::Cylinder {
+            Self::Cylinder {
                 half_length_m,
                 radius_m,
             } => size("half_length_m", half_length_m).or_else(|| size("radius_m", radius_m)),
@@ -82,7 +66,7 @@ impl Shape {
 }
 
 impl Domino {
-    fn fault(&self) -> Option<Fault> {
+    fn fault(&self) -> Option<Unusable> {
         size("thickness_m", self.thickness_m)
             .or_else(|| size("width_m", self.width_m))
             .or_else(|| size("height_m", self.height_m))
@@ -158,25 +142,11 @@ pub enum SceneError {
         /// How deep the rope's surface is (m).
         depth_m: f64,
     },
-    /// An obstacle is on a link of an arm nobody knows.
-    #[error(
-        "obstacle {obstacle} is on arm link {link}, but the motion of candidate {candidate} knows \
-         no arm; place it in the world or use a motion with arm links"
-    )]
-    NoArm {
-        /// Index of the candidate, from 0.
-        candidate: usize,
-        /// Index of the obstacle, from 0.
-        obstacle: usize,
-        /// The link, 1 to 7.
-        link: usize,
-    },
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Isometry3;
 
     fn board() -> Obstacle {
         let shape = Shape::Box {
@@ -202,22 +172,13 @@ mod tests {
             }
         };
         assert_eq!(fault(|o| o.friction = -0.1), "friction");
-        assert_eq!(
-            fault(|o| o.shape = Shape::Box {
-                half_m: [0.1, 0.0, 0.1]
-            }),
-            "half_m"
-        );
-        assert_eq!(
-            fault(|o| o.placement = Placement::ArmLink {
-                link: 8,
-                pose: Isometry3::identity()
-            }),
-            "link"
-        );
-        assert_eq!(
-            fault(|o| o.placement = Placement::World(Isometry3::translation(f64::NAN, 0.0, 0.0))),
-            "translation"
-        );
+        let flat = |o: &mut Obstacle| {
+            o.shape = Shape::Box {
+                half_m: [0.1, 0.0, 0.1],
+            };
+        };
+        assert_eq!(fault(flat), "half_m");
+        let nowhere = |o: &mut Obstacle| o.pose.translation.vector.x = f64::NAN;
+        assert_eq!(fault(nowhere), "translation");
     }
 }

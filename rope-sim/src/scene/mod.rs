@@ -16,13 +16,6 @@ pub enum Shape {
         /// Half its edges (m).
         half_m: [f64; 3],
     },
-    /// Cylinder about the z axis with hemispheres on its ends.
-    Capsule {
-        /// Half the length of the cylindrical part (m).
-        half_length_m: f64,
-        /// Radius (m).
-        radius_m: f64,
-    },
     /// Cylinder about the z axis with flat ends.
     Cylinder {
         /// Half its length (m).
@@ -32,33 +25,15 @@ pub enum Shape {
     },
 }
 
-/// Where a shape's frame is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Placement {
-    /// Fixed in the world.
-    World(Isometry3<f64>),
-    /// Fixed in the attach frame, as the pole is. Parts of the rope that touch it
-    /// while the rope leaves the frame straight belong to the mounting and pass it.
-    Attach(Isometry3<f64>),
-    /// Fixed in a link of the arm; needs a motion that knows its arm, see
-    /// [`crate::AttachMotion::arm_links`].
-    ArmLink {
-        /// Link 1 to 7; its frame is as in `arm_model::kinematics::link_motions`.
-        link: usize,
-        /// Pose in the link's frame.
-        pose: Isometry3<f64>,
-    },
-}
-
-/// A body the rope can touch. It does not yield; contacts are inelastic with Coulomb
+/// A body fixed in the world that the rope can touch. It does not yield; contacts are inelastic with Coulomb
 /// friction. The rope's links touch as capsules of the rope's radius, the lead as a
 /// sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {
     /// Its form.
     pub shape: Shape,
-    /// Its place.
-    pub placement: Placement,
+    /// Pose of its frame in the world.
+    pub pose: Isometry3<f64>,
     /// Coefficient of friction (1).
     pub friction: f64,
 }
@@ -102,23 +77,11 @@ pub enum RopePart {
     Lead,
 }
 
-/// What happened between a rope and one obstacle, from the states at step ends. All
-/// numbers are zero while nothing has touched.
+/// What happened between a rope and one obstacle, from the states at step ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactSummary {
-    /// First touch: when (s) and by which part.
+    /// First touch, if any: when (s) and by which part.
     pub first: Option<(f64, RopePart)>,
-    /// Whether a link has touched.
-    pub links_touched: bool,
-    /// Whether the lead has touched.
-    pub lead_touched: bool,
-    /// Time in touch (s).
-    pub in_touch_s: f64,
-    /// Largest normal force of one contact point in one step (N); an impact's is its
-    /// impulse over the step.
-    pub peak_normal_force_n: f64,
-    /// Greatest depth of one contact point (m).
-    pub greatest_penetration_m: f64,
 }
 
 impl ContactSummary {
@@ -132,8 +95,6 @@ impl ContactSummary {
 /// What became of the domino.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DominoOutcome {
-    /// First touch by the rope (s).
-    pub touched_at_s: Option<f64>,
     /// When its tilt passed 45 degrees (s).
     pub down_at_s: Option<f64>,
     /// Greatest tilt (rad), positive along the direction it faces away from the
@@ -162,42 +123,16 @@ impl Scene {
     pub fn is_empty(&self) -> bool {
         self.obstacles.is_empty() && self.domino.is_none()
     }
-
-    /// First obstacle on an arm link: its index and the link, 1 to 7.
-    pub(crate) fn first_on_arm(&self) -> Option<(usize, usize)> {
-        let carriers = self.obstacles.iter().enumerate();
-        carriers
-            .filter_map(|(index, o)| match o.placement {
-                Placement::ArmLink { link, .. } => Some((index, link)),
-                _ => None,
-            })
-            .next()
-    }
-
-    /// The arm links its obstacles are on, each once.
-    pub(crate) fn arm_links(&self) -> Vec<usize> {
-        let mut links: Vec<usize> = self
-            .obstacles
-            .iter()
-            .filter_map(|o| match o.placement {
-                Placement::ArmLink { link, .. } => Some(link),
-                _ => None,
-            })
-            .collect();
-        links.sort_unstable();
-        links.dedup();
-        links
-    }
 }
 
 impl Obstacle {
-    /// A body fixed in the world with its own axes along the world's.
+    /// A body whose axes are along the world's.
     #[must_use]
     pub fn fixed(shape: Shape, centre_m: [f64; 3], friction: f64) -> Self {
         let [x, y, z] = centre_m;
         Self {
             shape,
-            placement: Placement::World(Isometry3::translation(x, y, z)),
+            pose: Isometry3::translation(x, y, z),
             friction,
         }
     }

@@ -1,30 +1,71 @@
-//! Slopes of rollouts with respect to rope parameters and motions.
+//! Slopes of rollouts with respect to ropes and motions.
 //!
-//! Finite differences with every neighbour in a lane: bases and neighbours of one call
-//! are one batch, so that lanes are full. A base and its neighbours always take the
-//! same steps; otherwise the time-discretisation error would not cancel and the slopes
-//! would be wrong by its size over the step of the difference.
+//! One-sided finite differences with every neighbour in a lane: bases and neighbours of
+//! one call are one batch, so that lanes are full. A base and its neighbours always take
+//! the same steps; otherwise the time-discretisation error would not cancel and the
+//! slopes would be wrong by its size over the step of the difference.
 
-mod direction;
 mod plan;
-mod slopes;
-
-pub use direction::{Beside, Difference, Direction};
-pub use slopes::{ApproachSlope, Doubt, LinkSlope, Neighbours, Sensitivity};
 
 use crate::batch::REPEAT_DIVISOR;
 use crate::error::SimulateError;
-use crate::rollout::{Candidate, SimOptions, check, check_scene};
-use crate::scene::Scene;
-use plan::{FamilyPlan, Plan, is_comparable};
+use crate::motion::AttachMotion;
+use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, check};
+use plan::Plan;
+use shared_types::RopeParams;
 
-/// A candidate and the directions in which it is varied.
+/// Largest difference between the times of two closest approaches for them to be the
+/// same one (s); beyond it a neighbour passes the target on another part of its way.
+const SAME_APPROACH_S: f64 = 0.01;
+
+/// What takes the place of the base's rope or motion, and how far away it is, in the unit
+/// in which slopes are wanted.
+#[derive(Debug, Clone, Copy)]
+pub enum Perturbation<'a> {
+    /// Another rope of the same link count.
+    Rope {
+        /// The rope.
+        rope: RopeParams,
+        /// Its distance from the base's; positive.
+        distance: f64,
+    },
+    /// Another attach motion, such as that of a moved waypoint.
+    Motion {
+        /// The motion.
+        motion: &'a dyn AttachMotion,
+        /// Its distance from the base's; positive.
+        distance: f64,
+    },
+}
+
+/// A candidate and its neighbours.
 #[derive(Debug, Clone, Copy)]
 pub struct Family<'a> {
     /// Where slopes are wanted.
     pub base: Candidate<'a>,
-    /// Along what.
-    pub directions: &'a [Direction<'a>],
+    /// Towards what.
+    pub perturbations: &'a [Perturbation<'a>],
+}
+
+/// A simulated neighbour of a base.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbour {
+    /// Its rollout.
+    pub rollout: Rollout,
+    /// Its distance from the base.
+    pub distance: f64,
+    /// Whether neither it nor the base blew up: their difference is a slope.
+    pub valid: bool,
+}
+
+/// A base with its neighbours, all simulated in the same steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensitivity {
+    /// The base itself. [`Outcome::RerunAtQuarterStep`] means that it or a neighbour
+    /// blew up at first, and that all of them took steps of a quarter.
+    pub base: Rollout,
+    /// Its neighbours, in the order of [`Family::perturbations`].
+    pub neighbours: Vec<Neighbour>,
 }
 
 /// Why there are no slopes.
@@ -32,54 +73,44 @@ pub struct Family<'a> {
 pub enum SensitivityError {
     /// The number of links cannot be varied.
     #[error(
-        "base {base}, direction {direction}: the number of links is discrete and has no slope; compare rollouts of both counts instead"
+        "base {base}, neighbour {neighbour}: the number of links is discrete and has no slope; compare rollouts of both counts instead"
     )]
     LinksAreDiscrete {
         /// Index of the base, from 0.
         base: usize,
-        /// Index of its direction, from 0.
-        direction: usize,
+        /// Index of its neighbour, from 0.
+        neighbour: usize,
     },
-    /// There is no such parameter.
-    #[error("base {base}, direction {direction}: there is no rope parameter {index}, only 1 to 8")]
-    UnknownParameter {
-        /// Index of the base, from 0.
-        base: usize,
-        /// Index of its direction, from 0.
-        direction: usize,
-        /// Index asked for.
-        index: usize,
-    },
-    /// A step or distance is unusable.
+    /// A distance is unusable.
     #[error(
-        "base {base}, direction {direction}: the step is {value}, but must be finite and above 0"
+        "base {base}, neighbour {neighbour}: the step is {value}, but must be finite and above 0"
     )]
     Distance {
         /// Index of the base, from 0.
         base: usize,
-        /// Index of its direction, from 0.
-        direction: usize,
+        /// Index of its neighbour, from 0.
+        neighbour: usize,
         /// Value found.
         value: f64,
     },
     /// A neighbour's motion has other acceleration jumps than the base's.
     #[error(
-        "base {base}, direction {direction}: the acceleration of the varied motion jumps so differently that it cannot take the same steps; vary it less"
+        "base {base}, neighbour {neighbour}: the acceleration of the varied motion jumps so differently that it cannot take the same steps; vary it less"
     )]
     SteppedDifferently {
         /// Index of the base, from 0.
         base: usize,
-        /// Index of its direction, from 0.
-        direction: usize,
+        /// Index of its neighbour, from 0.
+        neighbour: usize,
     },
     /// A base, named as `candidate`, or an option cannot be simulated.
     #[error(transparent)]
     Base(#[from] SimulateError),
     /// A neighbour cannot be simulated.
-    #[error("direction {direction} of a base: {source}")]
+    #[error("neighbour {neighbour} of a base: {source}")]
     Neighbour {
-        /// Index of the direction, from 0.
-        direction: usize,
+        /// Index of the neighbour, from 0.
+        neighbour: usize,
         /// What is wrong; its `candidate` is the index of the base.
         source: SimulateError,
     },
@@ -89,14 +120,8 @@ pub enum SensitivityError {
 ///
 /// # Errors
 /// See [`SensitivityError`].
-pub fn sensitivity(
-    base: Candidate,
-    directions: &[Direction],
-    difference: Difference,
-    options: &SimOptions,
-) -> Result<Sensitivity, SensitivityError> {
-    let family = Family { base, directions };
-    let mut all = sensitivities(&[family], difference, options)?;
+pub fn sensitivity(family: &Family, options: &SimOptions) -> Result<Sensitivity, SensitivityError> {
+    let mut all = sensitivities(core::slice::from_ref(family), options)?;
     all.pop().ok_or(SimulateError::WorkerPanicked.into())
 }
 
@@ -110,54 +135,95 @@ pub fn sensitivity(
 /// The first option, base or neighbour that cannot be simulated.
 pub fn sensitivities(
     families: &[Family],
-    difference: Difference,
-    options: &SimOptions,
-) -> Result<Vec<Sensitivity>, SensitivityError> {
-    sensitivities_in(&Scene::EMPTY, families, difference, options)
-}
-
-/// [`sensitivities`] among obstacles. Slopes exist where touching does not begin, end or
-/// slip between base and neighbour; across such an event they are those of a jump, and
-/// behind an impact they keep the error of its steps, which neighbours do not share.
-///
-/// # Errors
-/// As [`sensitivities`], and what is wrong with the scene.
-pub fn sensitivities_in(
-    scene: &Scene,
-    families: &[Family],
-    difference: Difference,
     options: &SimOptions,
 ) -> Result<Vec<Sensitivity>, SensitivityError> {
     let bases: Vec<Candidate> = families.iter().map(|f| f.base).collect();
     check(&bases, options)?;
-    check_scene(scene, &bases)?;
-    let plan = Plan::new(families, difference, options.precision)?;
+    let plan = Plan::new(families)?;
     plan.check(options)?;
     let everyone: Vec<usize> = (0..plan.members.len()).collect();
-    let mut rollouts = plan.run(scene, &everyone, options)?;
+    let mut rollouts = plan.run(&everyone, options)?;
+    let blew_up = |family: &std::ops::Range<usize>| {
+        let mut rollouts = rollouts[family.clone()].iter();
+        rollouts.any(|r| r.outcome != Outcome::Clean)
+    };
     let again: Vec<usize> = plan
         .families
         .iter()
-        .filter(|family| !rollouts[family.members()].iter().all(is_comparable))
-        .flat_map(FamilyPlan::members)
+        .filter(|f| blew_up(f))
+        .cloned()
+        .flatten()
         .collect();
     if !again.is_empty() {
         let quarter = SimOptions {
             step_s: options.step_s / REPEAT_DIVISOR,
             ..*options
         };
-        for (index, rollout) in again.iter().zip(plan.run(scene, &again, &quarter)?) {
+        for (index, rollout) in again.iter().zip(plan.run(&again, &quarter)?) {
             rollouts[*index] = rollout;
         }
     }
     let mut rollouts = rollouts.into_iter();
     let collected = plan.families.iter().filter_map(|family| {
+        let members = &plan.members[family.start + 1..family.end];
         let base = rollouts.next()?;
-        let mut collected = family.collect(&plan.members, base, rollouts.by_ref());
-        if again.contains(&family.first) {
+        let neighbours = members.iter().zip(rollouts.by_ref());
+        let mut collected = Sensitivity {
+            neighbours: neighbours
+                .map(|(member, rollout)| Neighbour {
+                    distance: member.distance,
+                    valid: [&base, &rollout]
+                        .iter()
+                        .all(|r| r.outcome == Outcome::Clean),
+                    rollout,
+                })
+                .collect(),
+            base,
+        };
+        if again.contains(&family.start) {
             collected.mark_repeated();
         }
         Some(collected)
     });
     Ok(collected.collect())
+}
+
+impl Sensitivity {
+    /// Slopes of anything that can be read off a rollout, one row per neighbour, or
+    /// `None` there if it is not valid. `observe` must give equally many numbers for each
+    /// rollout.
+    #[must_use]
+    pub fn slopes(&self, observe: impl Fn(&Rollout) -> Vec<f64>) -> Vec<Option<Vec<f64>>> {
+        let base = observe(&self.base);
+        let slope = |n: &Neighbour| {
+            let to = observe(&n.rollout);
+            let pairs = to.iter().zip(&base);
+            pairs.map(|(b, a)| (b - a) / n.distance).collect()
+        };
+        self.neighbours
+            .iter()
+            .map(|n| n.valid.then(|| slope(n)))
+            .collect()
+    }
+
+    /// Slope towards one neighbour of the lead's place at its closest approach to
+    /// [`crate::Watch::point_m`] (m per unit); `None` if it was not watched, the neighbour
+    /// is not valid, or it comes closest at quite another time, so that there is no slope.
+    #[must_use]
+    pub fn closest_tip_m(&self, neighbour: usize) -> Option<[f64; 3]> {
+        let to = self.neighbours.get(neighbour).filter(|n| n.valid)?;
+        let (b, a) = (to.rollout.watched.to_point?, self.base.watched.to_point?);
+        ((b.time_s - a.time_s).abs() < SAME_APPROACH_S)
+            .then(|| core::array::from_fn(|i| (b.tip_m[i] - a.tip_m[i]) / to.distance))
+    }
+
+    /// Notes that everything took steps of a quarter.
+    fn mark_repeated(&mut self) {
+        let beside = self.neighbours.iter_mut().map(|n| &mut n.rollout);
+        for rollout in core::iter::once(&mut self.base).chain(beside) {
+            if rollout.outcome == Outcome::Clean {
+                rollout.outcome = Outcome::RerunAtQuarterStep;
+            }
+        }
+    }
 }

@@ -1,18 +1,13 @@
-//! The batch of a call: which rollouts it needs and what becomes of them.
+//! The batch of a call: which rollouts it needs.
 
-use super::direction::Difference;
-use super::slopes::{Doubt, Neighbours, Sensitivity};
-use super::{Family, SensitivityError};
+use super::{Family, Perturbation, SensitivityError};
 use crate::base_path::steps_between_jumps;
-use crate::batch::roll_out_in;
+use crate::batch::roll_out;
 use crate::error::SimulateError;
-use crate::rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, check};
-use crate::scene::Scene;
+use crate::rollout::{Candidate, Rollout, SimOptions, check};
 use shared_types::RopeParams;
 use std::ops::Range;
 
-/// Joint angle beyond which the model's torque may flip (rad).
-const ILL_POSED_RAD: f64 = 2.6;
 /// Step lengths tried, relative to the one asked for, until motions whose jump times
 /// differ a little are cut into equally many steps.
 const STEP_FACTORS: [f64; 5] = [1.0, 0.98, 0.95, 0.91, 0.86];
@@ -24,12 +19,55 @@ pub(super) struct Member<'a> {
     base: Candidate<'a>,
     family: usize,
     /// `None` for the base itself.
-    direction: Option<usize>,
-    /// Signed distance from the base.
-    offset: f64,
+    neighbour: Option<usize>,
+    /// Distance from the base.
+    pub(super) distance: f64,
 }
 
-impl Member<'_> {
+impl<'a> Member<'a> {
+    fn base(family: usize, base: &Candidate<'a>) -> Self {
+        Self {
+            rope: *base.rope,
+            base: *base,
+            family,
+            neighbour: None,
+            distance: 0.0,
+        }
+    }
+
+    /// The neighbour with this index.
+    fn perturbed(
+        self,
+        perturbation: &Perturbation<'a>,
+        neighbour: usize,
+    ) -> Result<Self, SensitivityError> {
+        let base = self.family;
+        let (rope, motion, distance) = match *perturbation {
+            Perturbation::Rope { rope, distance } => (rope, self.base.motion, distance),
+            Perturbation::Motion { motion, distance } => (self.rope, motion, distance),
+        };
+        if rope.links != self.rope.links {
+            return Err(SensitivityError::LinksAreDiscrete { base, neighbour });
+        }
+        if !(distance.is_finite() && distance > 0.0) {
+            return Err(SensitivityError::Distance {
+                base,
+                neighbour,
+                value: distance,
+            });
+        }
+        Ok(Self {
+            rope,
+            base: Candidate {
+                motion,
+                ..self.base
+            },
+            neighbour: Some(neighbour),
+            distance,
+            ..self
+        })
+    }
+
     fn candidate(&self) -> Candidate<'_> {
         Candidate {
             rope: &self.rope,
@@ -40,131 +78,37 @@ impl Member<'_> {
     /// An error of this member alone, in the caller's terms.
     fn blame(&self, error: SimulateError) -> SensitivityError {
         let source = error.of_candidate(self.family);
-        match self.direction {
-            Some(direction) => SensitivityError::Neighbour { direction, source },
+        match self.neighbour {
+            Some(neighbour) => SensitivityError::Neighbour { neighbour, source },
             None => SensitivityError::Base(source),
         }
     }
 }
 
-/// Where the members of one family lie: the base first, then one or two neighbours per
-/// direction.
-pub(super) struct FamilyPlan {
-    pub(super) first: usize,
-    /// Neighbours of each direction, 1 or 2.
-    counts: Vec<usize>,
-}
-
-impl FamilyPlan {
-    /// Indices of its members.
-    pub(super) fn members(&self) -> Range<usize> {
-        self.first..self.first + 1 + self.counts.iter().sum::<usize>()
-    }
-
-    /// Puts the base's rollout and those of its neighbours, next in `rollouts`, together.
-    pub(super) fn collect(
-        &self,
-        members: &[Member],
-        base: Rollout,
-        rollouts: &mut impl Iterator<Item = Rollout>,
-    ) -> Sensitivity {
-        let base_member = &members[self.first];
-        let mut beside = members[self.first + 1..self.members().end]
-            .iter()
-            .zip(rollouts);
-        let neighbours = self.counts.iter().filter_map(|count| {
-            let (to_member, to) = beside.next()?;
-            let (from_member, from) = match count {
-                1 => (base_member, None),
-                _ => beside.next().map(|(m, r)| (m, Some(r)))?,
-            };
-            let members = [base_member, to_member, from_member];
-            Some(Neighbours {
-                doubt: doubt(members, [&base, &to, from.as_ref().unwrap_or(&base)]),
-                span: to_member.offset - from_member.offset,
-                to,
-                from,
-            })
-        });
-        let neighbours = neighbours.collect();
-        Sensitivity { base, neighbours }
-    }
-}
-
-/// What speaks against a slope between these.
-fn doubt(members: [&Member; 3], rollouts: [&Rollout; 3]) -> Option<Doubt> {
-    let scale_rules = members.map(|m| scale_rules(&m.rope));
-    if !rollouts.into_iter().all(is_comparable) {
-        Some(Doubt::Diverged)
-    } else if rollouts
-        .iter()
-        .any(|r| r.max_joint_angle_rad > ILL_POSED_RAD)
-    {
-        Some(Doubt::IllPosed)
-    } else if scale_rules.contains(&!scale_rules[0]) {
-        Some(Doubt::InertiaKink)
-    } else {
-        None
-    }
-}
-
-/// Whether the extra scale, not the rope's radius, rules the link inertia.
-fn scale_rules(rope: &RopeParams) -> bool {
-    rope.link_extra_scale * rope.link_length_m() / 2.0 > rope.radius_m
-}
-
-/// Whether a rollout took the steps it was given.
-pub(super) fn is_comparable(rollout: &Rollout) -> bool {
-    rollout.outcome == Outcome::Clean
-}
-
 /// All rollouts of a call.
 pub(super) struct Plan<'a> {
     pub(super) members: Vec<Member<'a>>,
-    pub(super) families: Vec<FamilyPlan>,
+    /// Where each family's members lie, the base first.
+    pub(super) families: Vec<Range<usize>>,
 }
 
 impl<'a> Plan<'a> {
     /// Every base followed by its neighbours.
-    pub(super) fn new(
-        families: &[Family<'a>],
-        difference: Difference,
-        precision: Precision,
-    ) -> Result<Self, SensitivityError> {
-        let mut plan = Self {
-            members: Vec::new(),
-            families: Vec::with_capacity(families.len()),
-        };
-        for (family, Family { base, directions }) in families.iter().enumerate() {
-            let first = plan.members.len();
-            plan.members.push(Member {
-                rope: *base.rope,
-                base: *base,
-                family,
-                direction: None,
-                offset: 0.0,
-            });
-            let mut counts = Vec::with_capacity(directions.len());
-            for (index, direction) in directions.iter().enumerate() {
-                let (to, from) = direction
-                    .variants(base, difference, precision)
-                    .map_err(|e| e.at(family, index))?;
-                counts.push(1 + usize::from(from.is_some()));
-                let variants = [Some(to), from].into_iter().flatten();
-                plan.members.extend(variants.map(|v| Member {
-                    rope: v.rope,
-                    base: Candidate {
-                        motion: v.motion,
-                        ..*base
-                    },
-                    family,
-                    direction: Some(index),
-                    offset: v.offset,
-                }));
+    pub(super) fn new(families: &[Family<'a>]) -> Result<Self, SensitivityError> {
+        let mut members = Vec::new();
+        let mut ranges = Vec::with_capacity(families.len());
+        for (family, of) in families.iter().enumerate() {
+            let first = members.len();
+            members.push(Member::base(family, &of.base));
+            for (neighbour, perturbation) in of.perturbations.iter().enumerate() {
+                members.push(Member::base(family, &of.base).perturbed(perturbation, neighbour)?);
             }
-            plan.families.push(FamilyPlan { first, counts });
+            ranges.push(first..members.len());
         }
-        Ok(plan)
+        Ok(Self {
+            members,
+            families: ranges,
+        })
     }
 
     /// Refuses neighbours that cannot be simulated, by name.
@@ -179,7 +123,6 @@ impl<'a> Plan<'a> {
     /// [`SimOptions::step_s`].
     pub(super) fn run(
         &self,
-        scene: &Scene,
         indices: &[usize],
         options: &SimOptions,
     ) -> Result<Vec<Rollout>, SensitivityError> {
@@ -191,7 +134,7 @@ impl<'a> Plan<'a> {
             .iter()
             .map(|i| self.members[*i].candidate())
             .collect();
-        roll_out_in(scene, &candidates, &options).map_err(|error| {
+        roll_out(&candidates, &options).map_err(|error| {
             match error.candidate().and_then(|c| indices.get(c)) {
                 Some(index) => self.members[*index].blame(error),
                 None => SensitivityError::Base(error),
@@ -210,24 +153,22 @@ impl<'a> Plan<'a> {
                 return Ok(step_s);
             }
         }
-        let (base, direction) = different.unwrap_or_default();
-        Err(SensitivityError::SteppedDifferently { base, direction })
+        let (base, neighbour) = different.unwrap_or_default();
+        Err(SensitivityError::SteppedDifferently { base, neighbour })
     }
 
-    /// First family and direction whose neighbour would not step like its base.
+    /// First family and neighbour that would not step like its base.
     fn stepped_differently(&self, step_s: f64, horizon_s: f64) -> Option<(usize, usize)> {
-        self.families
-            .iter()
-            .enumerate()
-            .find_map(|(index, family)| {
-                let base = self.members[family.first].base.motion;
-                let steps = steps_between_jumps(base, step_s, horizon_s);
-                self.members[family.members()].iter().find_map(|member| {
-                    let motion = member.base.motion;
-                    let differs = !core::ptr::addr_eq(motion, base)
-                        && steps_between_jumps(motion, step_s, horizon_s) != steps;
-                    member.direction.filter(|_| differs).map(|d| (index, d))
-                })
+        self.families.iter().find_map(|family| {
+            let base = self.members[family.start].base.motion;
+            let steps = steps_between_jumps(base, step_s, horizon_s);
+            self.members[family.clone()].iter().find_map(|member| {
+                let motion = member.base.motion;
+                let differs = !core::ptr::addr_eq(motion, base)
+                    && steps_between_jumps(motion, step_s, horizon_s) != steps;
+                let neighbour = member.neighbour.filter(|_| differs);
+                neighbour.map(|neighbour| (member.family, neighbour))
             })
+        })
     }
 }

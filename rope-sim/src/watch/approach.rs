@@ -24,38 +24,53 @@ pub struct ClosestApproach {
     pub velocity_m_s: [f64; 3],
 }
 
-/// Closest approach of the lead's centre to a segment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SegmentApproach {
-    /// Distance, time and state of the lead.
-    pub approach: ClosestApproach,
-    /// Place of the nearest point on the segment: 0 its first end, 1 its second.
-    pub along: f64,
+/// What the lead comes near to, relative to the clock's origin (m).
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Target {
+    Point([f64; 3]),
+    /// Between two ends.
+    Segment([[f64; 3]; 2]),
 }
 
-/// Rating of a step by its distance from a point: squared distance of the straight
-/// line through its end (m²).
-#[inline(always)]
-fn rate_point<V: Lanes>(point: Vec3<V>, tip: &TipStep<V>) -> V {
-    let zero = V::splat(0.0);
-    let [x, v] = [tip.after[0].sub(point), tip.after[1]];
-    let back = x.dot(v) * (v.dot(v) + V::splat(1e-12)).recip();
-    let nearest = v.scale_sub(back.max(zero).min(tip.h), x);
-    nearest.dot(nearest)
+impl Target {
+    /// Rating of a step by a straight line in place of its path: squared distance (m²).
+    #[inline(always)]
+    fn rate<V: Lanes>(&self, tip: &TipStep<V>) -> V {
+        match *self {
+            Self::Point([x, y, z]) => {
+                let zero = V::splat(0.0);
+                let [x, v] = [tip.after[0].sub(Vec3::splat(x, y, z)), tip.after[1]];
+                let back = x.dot(v) * (v.dot(v) + V::splat(1e-12)).recip();
+                let nearest = v.scale_sub(back.max(zero).min(tip.h), x);
+                nearest.dot(nearest)
+            }
+            Self::Segment([a, b]) => {
+                let ends = [Vec3::splat(a[0], a[1], a[2]), Vec3::splat(b[0], b[1], b[2])];
+                squared_distance([tip.before[0], tip.after[0]], ends)
+            }
+        }
+    }
+
+    /// Its point nearest to `x`.
+    fn foot(&self, x: [f64; 3]) -> [f64; 3] {
+        match *self {
+            Self::Point(point) => point,
+            Self::Segment(ends) => nearest_on(ends, x),
+        }
+    }
 }
 
-/// Watches the distance to a point.
-pub(super) struct PointRecorder<V> {
-    /// Relative to the clock's origin (m).
-    point: [f64; 3],
+/// Watches the distance to a point or a segment.
+pub(super) struct ApproachRecorder<V> {
+    target: Target,
     best: BestStep<V>,
 }
 
-impl<V: Lanes> PointRecorder<V> {
+impl<V: Lanes> ApproachRecorder<V> {
     #[inline(always)]
-    pub(super) fn new(point: [f64; 3], tip: [Vec3<V>; 2]) -> Self {
+    pub(super) fn new(target: Target, tip: [Vec3<V>; 2]) -> Self {
         Self {
-            point,
+            target,
             best: BestStep::new(tip),
         }
     }
@@ -63,9 +78,7 @@ impl<V: Lanes> PointRecorder<V> {
     /// Takes in step number `count`.
     #[inline(always)]
     pub(super) fn after_step(&mut self, count: f64, tip: &TipStep<V>) {
-        let [x, y, z] = self.point;
-        self.best
-            .offer(rate_point(Vec3::splat(x, y, z), tip), count, tip);
+        self.best.offer(self.target.rate(tip), count, tip);
     }
 
     /// Refined approach of one lane; `origin_m` is the clock's origin.
@@ -77,49 +90,7 @@ impl<V: Lanes> PointRecorder<V> {
         time_of_step: impl Fn(usize) -> (f64, f64),
     ) -> ClosestApproach {
         let (cubic, start_s) = self.best.cubic(lane, time_of_step);
-        approach_to(&cubic, start_s, origin_m, |_| self.point)
-    }
-}
-
-/// Watches the distance to a segment.
-pub(super) struct SegmentRecorder<V> {
-    /// Ends relative to the clock's origin (m).
-    ends: [[f64; 3]; 2],
-    best: BestStep<V>,
-}
-
-impl<V: Lanes> SegmentRecorder<V> {
-    #[inline(always)]
-    pub(super) fn new(ends: [[f64; 3]; 2], tip: [Vec3<V>; 2]) -> Self {
-        Self {
-            ends,
-            best: BestStep::new(tip),
-        }
-    }
-
-    /// Takes in step number `count`.
-    #[inline(always)]
-    pub(super) fn after_step(&mut self, count: f64, tip: &TipStep<V>) {
-        let [a, b] = self.ends.map(|[x, y, z]| Vec3::splat(x, y, z));
-        let rating = squared_distance([tip.before[0], tip.after[0]], [a, b]);
-        self.best.offer(rating, count, tip);
-    }
-
-    /// Refined approach of one lane; `origin_m` is the clock's origin.
-    #[inline(always)]
-    pub(super) fn closest(
-        &self,
-        lane: usize,
-        origin_m: [f64; 3],
-        time_of_step: impl Fn(usize) -> (f64, f64),
-    ) -> SegmentApproach {
-        let (cubic, start_s) = self.best.cubic(lane, time_of_step);
-        let approach = approach_to(&cubic, start_s, origin_m, |x| point_at(self.ends, x).1);
-        let tip = core::array::from_fn(|i| approach.tip_m[i] - origin_m[i]);
-        SegmentApproach {
-            approach,
-            along: point_at(self.ends, tip).0,
-        }
+        approach_to(&cubic, start_s, origin_m, |x| self.target.foot(x))
     }
 }
 
@@ -142,19 +113,15 @@ fn approach_to(
     }
 }
 
-/// Place along a segment and point on it nearest to `x`.
-fn point_at(ends: [[f64; 3]; 2], x: [f64; 3]) -> (f64, [f64; 3]) {
-    let [a, b] = ends;
+/// Point of a segment nearest to `x`.
+fn nearest_on([a, b]: [[f64; 3]; 2], x: [f64; 3]) -> [f64; 3] {
     let (mut dot, mut squared) = (0.0, TINY_M2);
     for i in 0..3 {
         dot += (x[i] - a[i]) * (b[i] - a[i]);
         squared += (b[i] - a[i]).powi(2);
     }
     let along = (dot / squared).clamp(0.0, 1.0);
-    (
-        along,
-        core::array::from_fn(|i| a[i] + along * (b[i] - a[i])),
-    )
+    core::array::from_fn(|i| a[i] + along * (b[i] - a[i]))
 }
 
 /// Squared distance of two segments (m²): the closest points of the lines, each in
@@ -180,13 +147,14 @@ fn squared_distance<V: Lanes>(p: [Vec3<V>; 2], q: [Vec3<V>; 2]) -> V {
 mod tests {
     use super::*;
 
-    /// Feeds a path with its velocity to a recorder, in steps of `h`.
-    fn follow(
+    /// Closest approach of a path with its velocity, in `steps` steps of `h`.
+    fn closest(
+        target: Target,
         state: impl Fn(f64) -> [Vec3<f64>; 2],
         h: f64,
         steps: u32,
-        mut take: impl FnMut(f64, &TipStep<f64>),
-    ) {
+    ) -> ClosestApproach {
+        let mut recorder = ApproachRecorder::new(target, state(0.0));
         for i in 1..=steps {
             let tip = TipStep {
                 before: state(f64::from(i - 1) * h),
@@ -194,18 +162,16 @@ mod tests {
                 h,
                 running: 1.0,
             };
-            take(f64::from(i), &tip);
+            recorder.after_step(f64::from(i), &tip);
         }
+        recorder.closest(0, [1.0, 0.0, 0.0], |step| (step as f64 * h, h))
     }
 
     #[test]
     fn passing_between_two_steps_is_seen() {
         // Along x at 10 m/s, 3 mm beside the target, passing it at t = 0.0127.
-        let h = 1e-3;
         let state = |t: f64| [Vec3(10.0 * (t - 0.0127), 0.003, 0.0), Vec3(10.0, 0.0, 0.0)];
-        let mut recorder = PointRecorder::new([0.0; 3], state(0.0));
-        follow(state, h, 30, |i, tip| recorder.after_step(i, tip));
-        let closest = recorder.closest(0, [1.0, 0.0, 0.0], |step| (step as f64 * h, h));
+        let closest = closest(Target::Point([0.0; 3]), state, 1e-3, 30);
         assert!((closest.distance_m - 0.003).abs() < 1e-12);
         assert!((closest.time_s - 0.0127).abs() < 1e-12);
         assert!((closest.tip_m[0] - 1.0).abs() < 1e-10);
@@ -215,7 +181,7 @@ mod tests {
     #[test]
     fn curved_paths_are_refined_on_the_curve() {
         // A circle of radius 0.1 m about (0, 0.1): closest to the origin at the bottom.
-        let (h, turn) = (2e-3, 40.0);
+        let turn = 40.0;
         let state = |t: f64| {
             let (s, c) = (turn * (t - 0.0213)).sin_cos();
             [
@@ -223,9 +189,7 @@ mod tests {
                 Vec3(0.1 * turn * c, 0.1 * turn * s, 0.0),
             ]
         };
-        let mut recorder = PointRecorder::new([0.0; 3], state(0.0));
-        follow(state, h, 25, |i, tip| recorder.after_step(i, tip));
-        let closest = recorder.closest(0, [0.0; 3], |step| (step as f64 * h, h));
+        let closest = closest(Target::Point([0.0; 3]), state, 2e-3, 25);
         assert!((closest.distance_m - 0.002).abs() < 1e-7, "{closest:?}");
         assert!((closest.time_s - 0.0213).abs() < 1e-6, "{closest:?}");
         assert!((closest.velocity_m_s[0] - 4.0).abs() < 1e-3, "{closest:?}");
@@ -234,18 +198,15 @@ mod tests {
     #[test]
     fn a_path_above_a_segment_is_nearest_where_the_lines_cross() {
         // Crossing a segment along y at 7 m/s, 4 mm above, at (0.3, 0.12).
-        let h = 1e-3;
         let state = |t: f64| {
             let s = t - 0.0204;
             [Vec3(0.3 + 7.0 * s, 0.12 + s, 0.504), Vec3(7.0, 1.0, 0.0)]
         };
         let ends = [[0.3, 0.1, 0.5], [0.3, 0.2, 0.5]];
-        let mut recorder = SegmentRecorder::new(ends, state(0.0));
-        follow(state, h, 40, |i, tip| recorder.after_step(i, tip));
-        let found = recorder.closest(0, [0.0; 3], |step| (step as f64 * h, h));
-        assert!((found.approach.distance_m - 0.004).abs() < 1e-12);
-        assert!((found.approach.time_s - 0.0204).abs() < 1e-12);
-        assert!((found.along - 0.2).abs() < 1e-9);
+        let found = closest(Target::Segment(ends), state, 1e-3, 40);
+        assert!((found.distance_m - 0.004).abs() < 1e-12);
+        assert!((found.time_s - 0.0204).abs() < 1e-12);
+        assert!((found.tip_m[1] - 0.12).abs() < 1e-9);
     }
 
     #[test]
@@ -262,7 +223,7 @@ mod tests {
             let mut best = f64::INFINITY;
             for s in 0..=1000 {
                 let x = p[1].sub(p[0]).scale_add(f64::from(s) / 1000.0, p[0]);
-                let foot = point_at(q.map(|e| e.get(0)), x.get(0)).1;
+                let foot = nearest_on(q.map(|e| e.get(0)), x.get(0));
                 let gap = x.sub(Vec3(foot[0], foot[1], foot[2]));
                 best = best.min(gap.dot(gap));
             }

@@ -27,10 +27,6 @@ pub struct BoxRegion {
 pub struct Dwell {
     /// Time inside in all (s).
     pub total_s: f64,
-    /// Longest stay without a break (s).
-    pub longest_s: f64,
-    /// Start of that stay (s); 0 if there was none.
-    pub longest_from_s: f64,
     /// Since when it has been inside at the end of the simulation (s); `None` if it is
     /// outside then.
     pub inside_since_s: Option<f64>,
@@ -59,12 +55,7 @@ impl Stays {
     /// Counts the stay under way as if it ended at `time_s`.
     fn close(&mut self, time_s: f64) {
         if let Some(since_s) = self.done.inside_since_s {
-            let stay_s = time_s - since_s;
-            self.done.total_s += stay_s;
-            if stay_s > self.done.longest_s {
-                self.done.longest_s = stay_s;
-                self.done.longest_from_s = since_s;
-            }
+            self.done.total_s += time_s - since_s;
         }
     }
 }
@@ -99,8 +90,6 @@ impl DwellRecorder {
             recorder.stays.push(Stays {
                 done: Dwell {
                     total_s: 0.0,
-                    longest_s: 0.0,
-                    longest_from_s: 0.0,
                     inside_since_s: inside.then_some(0.0),
                 },
                 until_s: 0.0,
@@ -265,7 +254,6 @@ mod tests {
         let found = stay(&region, h, 900, swing);
         let half_pass = (1.0_f64 / 3.0).asin() / w;
         assert!((found.total_s - 9.0 * half_pass).abs() < 1e-8, "{found:?}");
-        assert!((found.longest_s - 2.0 * half_pass).abs() < 1e-8);
         assert_eq!(found.inside_since_s, None);
     }
 
@@ -284,7 +272,6 @@ mod tests {
         };
         let found = stay(&region, 0.01, 3, pass);
         assert!((found.total_s - 0.04 / 12.0).abs() < 1e-12, "{found:?}");
-        assert!((found.longest_from_s - (0.015 - 0.02 / 12.0)).abs() < 1e-12);
     }
 
     #[test]
@@ -298,7 +285,6 @@ mod tests {
         let still = |_: f64| arrive(2.0);
         let found = stay(&cube(0.05), 0.01, 50, still);
         assert_eq!(found.inside_since_s, Some(0.0));
-        assert!((found.longest_s - 0.5).abs() < 1e-12);
         assert!((found.total_s - 0.5).abs() < 1e-12);
         let outside = stay(&cube(0.05), 0.01, 50, |_| arrive(0.0));
         assert_eq!((outside.total_s, outside.inside_since_s), (0.0, None));

@@ -1,27 +1,13 @@
-//! Highest and lowest place of the lead, in continuous time.
+//! Highest place of the lead, in continuous time.
 
 use super::cubic::{BestStep, Cubic, TipStep};
 use crate::algebra::Vec3;
 use crate::lanes::Lanes;
 
-/// How high and how low the lead's centre went.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeightRange {
-    /// Greatest height (m, world z).
-    pub highest_m: f64,
-    /// When (s).
-    pub highest_s: f64,
-    /// Smallest height (m, world z).
-    pub lowest_m: f64,
-    /// When (s).
-    pub lowest_s: f64,
-}
-
-/// Steps with the highest and lowest points.
+/// The step with the highest point.
 pub(super) struct HeightRecorder<V> {
     /// Rated by negative height.
     highest: BestStep<V>,
-    lowest: BestStep<V>,
 }
 
 impl<V: Lanes> HeightRecorder<V> {
@@ -29,36 +15,20 @@ impl<V: Lanes> HeightRecorder<V> {
     pub(super) fn new(tip: [Vec3<V>; 2]) -> Self {
         Self {
             highest: BestStep::new(tip),
-            lowest: BestStep::new(tip),
         }
     }
 
     /// Takes in step number `count`.
     #[inline(always)]
     pub(super) fn after_step(&mut self, count: f64, tip: &TipStep<V>) {
-        let (low, high) = span(tip);
+        let (_, high) = span(tip);
         self.highest.offer(-high, count, tip);
-        self.lowest.offer(low, count, tip);
     }
 
-    /// Refined heights of one lane; `origin_m` is the clock's origin.
+    /// Greatest height of one lane, relative to the clock's origin (m).
     #[inline(always)]
-    pub(super) fn range(
-        &self,
-        lane: usize,
-        origin_m: [f64; 3],
-        time_of_step: impl Fn(usize) -> (f64, f64),
-    ) -> HeightRange {
-        let (above, above_s) = self.highest.cubic(lane, &time_of_step);
-        let (below, below_s) = self.lowest.cubic(lane, &time_of_step);
-        let (u_high, high) = extremum(&above, 1.0);
-        let (u_low, low) = extremum(&below, -1.0);
-        HeightRange {
-            highest_m: high + origin_m[2],
-            highest_s: above_s + above.h_s * u_high,
-            lowest_m: low + origin_m[2],
-            lowest_s: below_s + below.h_s * u_low,
-        }
+    pub(super) fn highest(&self, lane: usize, time_of_step: impl Fn(usize) -> (f64, f64)) -> f64 {
+        highest(&self.highest.cubic(lane, time_of_step).0)
     }
 }
 
@@ -75,8 +45,8 @@ pub(super) fn span<V: Lanes>(tip: &TipStep<V>) -> (V, V) {
     (apex.min(x0.2).min(x1.2), apex.max(x0.2).max(x1.2))
 }
 
-/// Fraction and value of the largest `sign z` within a step.
-fn extremum(cubic: &Cubic, sign: f64) -> (f64, f64) {
+/// Largest z within a step.
+fn highest(cubic: &Cubic) -> f64 {
     let [z0, v0, z1, v1] = cubic.states.map(|s| s[2]);
     let (w0, w1) = (v0 * cubic.h_s, v1 * cubic.h_s);
     // Rate per fraction: a u² + b u + w0.
@@ -87,9 +57,9 @@ fn extremum(cubic: &Cubic, sign: f64) -> (f64, f64) {
     [0.0, 1.0, q / a, w0 / q]
         .into_iter()
         .filter(|u| (0.0..=1.0).contains(u))
-        .map(|u| (u, cubic.at(u)[2]))
-        .max_by(|x, y| (sign * x.1).total_cmp(&(sign * y.1)))
-        .unwrap_or((0.0, z0))
+        .map(|u| cubic.at(u)[2])
+        .max_by(f64::total_cmp)
+        .unwrap_or(z0)
 }
 
 #[cfg(test)]
@@ -116,14 +86,8 @@ mod tests {
             };
             recorder.after_step(f64::from(i), &tip);
         }
-        let range = recorder.range(0, [0.0, 0.0, 0.5], |step| (step as f64 * h, h));
-        assert!(
-            (range.highest_m - (1.5 + 4.5 / g)).abs() < 1e-12,
-            "{range:?}"
-        );
-        assert!((range.highest_s - 3.0 / g).abs() < 1e-9, "{range:?}");
-        assert!((range.lowest_m - (0.5 + state(0.7)[0].2)).abs() < 1e-12);
-        assert!((range.lowest_s - 0.7).abs() < 1e-12);
+        let highest_m = recorder.highest(0, |step| (step as f64 * h, h));
+        assert!((highest_m - (1.0 + 4.5 / g)).abs() < 1e-12, "{highest_m}");
     }
 
     #[test]
@@ -138,7 +102,7 @@ mod tests {
         assert_eq!(span(&tip), (0.25, 0.25));
         let mut recorder = HeightRecorder::new(still);
         recorder.after_step(1.0, &tip);
-        let range = recorder.range(0, [0.0; 3], |step| (step as f64 * 1e-3, 1e-3));
-        assert_eq!((range.highest_m, range.lowest_m), (0.25, 0.25));
+        let highest_m = recorder.highest(0, |step| (step as f64 * 1e-3, 1e-3));
+        assert_eq!(highest_m, 0.25);
     }
 }

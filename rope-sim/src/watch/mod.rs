@@ -7,14 +7,11 @@
 mod approach;
 mod cubic;
 mod dwell;
-mod final_state;
 mod height;
 mod rest;
 
-pub use approach::{ClosestApproach, SegmentApproach};
+pub use approach::ClosestApproach;
 pub use dwell::{BoxRegion, Dwell};
-pub use final_state::LinkState;
-pub use height::HeightRange;
 pub use rest::RestMeasures;
 
 use crate::algebra::Vec3;
@@ -23,10 +20,9 @@ use crate::clock::Clock;
 use crate::error::SimulateError;
 use crate::lanes::Lanes;
 use crate::state::Link;
-use approach::{PointRecorder, SegmentRecorder};
+use approach::{ApproachRecorder, Target};
 use cubic::TipStep;
 use dwell::DwellRecorder;
-use final_state::FinalStates;
 use height::HeightRecorder;
 use rest::RestRecorder;
 
@@ -39,12 +35,10 @@ pub struct Watch {
     pub segment_m: Option<[[f64; 3]; 2]>,
     /// Time the lead spends in this box.
     pub dwell_in: Option<BoxRegion>,
-    /// Highest and lowest place of the lead.
+    /// Highest place of the lead.
     pub height: bool,
     /// Movement of tip and middle within this time before the end (s).
     pub rest_window_s: Option<f64>,
-    /// State of every link at the end.
-    pub final_state: bool,
 }
 
 /// What was measured; each is `None` if it was not asked for or the simulation
@@ -54,15 +48,13 @@ pub struct Watched {
     /// See [`Watch::point_m`].
     pub to_point: Option<ClosestApproach>,
     /// See [`Watch::segment_m`].
-    pub to_segment: Option<SegmentApproach>,
+    pub to_segment: Option<ClosestApproach>,
     /// See [`Watch::dwell_in`].
     pub dwell: Option<Dwell>,
-    /// See [`Watch::height`].
-    pub height: Option<HeightRange>,
+    /// See [`Watch::height`] (m, world z).
+    pub highest_m: Option<f64>,
     /// See [`Watch::rest_window_s`].
     pub rest: Option<RestMeasures>,
-    /// See [`Watch::final_state`]; from the attach point to the lead.
-    pub final_state: Option<Vec<LinkState>>,
 }
 
 impl Watch {
@@ -73,7 +65,6 @@ impl Watch {
         dwell_in: None,
         height: false,
         rest_window_s: None,
-        final_state: false,
     };
 
     /// Only the closest approach to a point (m, world).
@@ -138,12 +129,11 @@ pub(crate) struct Watcher<V> {
     count: f64,
     tip: [Vec3<V>; 2],
     peak_speed_squared: V,
-    to_point: Option<PointRecorder<V>>,
-    to_segment: Option<SegmentRecorder<V>>,
+    to_point: Option<ApproachRecorder<V>>,
+    to_segment: Option<ApproachRecorder<V>>,
     dwell: Option<DwellRecorder>,
     height: Option<HeightRecorder<V>>,
     rest: Option<RestRecorder<V>>,
-    final_states: Option<FinalStates>,
 }
 
 impl<V: Lanes> Watcher<V> {
@@ -161,10 +151,10 @@ impl<V: Lanes> Watcher<V> {
             peak_speed_squared: tip[1].dot(tip[1]),
             to_point: watch
                 .point_m
-                .map(|point| PointRecorder::new(relative(point), tip)),
+                .map(|point| ApproachRecorder::new(Target::Point(relative(point)), tip)),
             to_segment: watch
                 .segment_m
-                .map(|ends| SegmentRecorder::new(ends.map(relative), tip)),
+                .map(|ends| ApproachRecorder::new(Target::Segment(ends.map(relative)), tip)),
             dwell: watch
                 .dwell_in
                 .map(|region| DwellRecorder::new(&region, origin_m, tip[0], lanes)),
@@ -172,24 +162,14 @@ impl<V: Lanes> Watcher<V> {
             rest: watch
                 .rest_window_s
                 .map(|window_s| RestRecorder::new(horizon_s - window_s, lanes)),
-            final_states: watch.final_state.then(|| FinalStates::new(lanes)),
         }
     }
 
-    /// Call once the clock has begun a step, before it is taken.
-    #[inline(always)]
-    pub(crate) fn before_step(&mut self, clock: &Clock<V>, links: &[Link<V>]) {
-        if let Some(states) = &mut self.final_states {
-            states.before_step(clock, links);
-        }
-    }
-
-    /// Takes in the state after a step: attach point and lead, each with its velocity;
-    /// lanes where `running` is not positive are left alone.
+    /// Takes in the state after a step: attach point, lead and its velocity; lanes where `running` is not positive are left alone.
     #[inline(always)]
     pub(crate) fn after_step(
         &mut self,
-        attach: [Vec3<V>; 2],
+        attach: Vec3<V>,
         tip: [Vec3<V>; 2],
         clock: &Clock<V>,
         links: &[Link<V>],
@@ -207,11 +187,11 @@ impl<V: Lanes> Watcher<V> {
             running,
         };
         self.tip = tip;
-        if let Some(point) = &mut self.to_point {
-            point.after_step(self.count, &step);
+        if let Some(approach) = &mut self.to_point {
+            approach.after_step(self.count, &step);
         }
-        if let Some(segment) = &mut self.to_segment {
-            segment.after_step(self.count, &step);
+        if let Some(approach) = &mut self.to_segment {
+            approach.after_step(self.count, &step);
         }
         if let Some(dwell) = &mut self.dwell {
             dwell.after_step(&step, |lane| clock.span_s(lane));
@@ -232,27 +212,22 @@ impl<V: Lanes> Watcher<V> {
         self.peak_speed_squared.get(lane).sqrt()
     }
 
-    /// Everything measured in one lane; `links` is the state after the last step.
+    /// Everything measured in one lane.
     #[inline(always)]
-    pub(crate) fn watched(&mut self, lane: usize, path: &BasePath, links: &[Link<V>]) -> Watched {
+    pub(crate) fn watched(&self, lane: usize, path: &BasePath) -> Watched {
         let origin_m = self.origin_m;
         let time_of_step = |step| path.end_of_step_s(step);
+        let closest =
+            |recorder: &ApproachRecorder<V>| recorder.closest(lane, origin_m, time_of_step);
         Watched {
-            to_point: self
-                .to_point
-                .as_ref()
-                .map(|r| r.closest(lane, origin_m, time_of_step)),
-            to_segment: self
-                .to_segment
-                .as_ref()
-                .map(|r| r.closest(lane, origin_m, time_of_step)),
+            to_point: self.to_point.as_ref().map(closest),
+            to_segment: self.to_segment.as_ref().map(closest),
             dwell: self.dwell.as_ref().map(|r| r.dwell(lane)),
-            height: self
+            highest_m: self
                 .height
                 .as_ref()
-                .map(|r| r.range(lane, origin_m, time_of_step)),
+                .map(|r| r.highest(lane, time_of_step) + origin_m[2]),
             rest: self.rest.as_ref().map(|r| r.measures(lane, origin_m)),
-            final_state: self.final_states.as_mut().map(|r| r.take(lane, links)),
         }
     }
 }

@@ -20,12 +20,8 @@ pub struct RestMeasures {
     pub middle_movement_m: f64,
     /// Lead's centre at the end (m, world).
     pub tip_m: [f64; 3],
-    /// Its velocity (m/s).
-    pub tip_velocity_m_s: [f64; 3],
     /// Middle of the rope at the end (m, world).
     pub middle_m: [f64; 3],
-    /// Its velocity (m/s).
-    pub middle_velocity_m_s: [f64; 3],
 }
 
 /// Extremes within the window and the latest states. The window begins with the first
@@ -38,8 +34,8 @@ pub(super) struct RestRecorder<V> {
     height: [V; 2],
     low: Vec3<V>,
     high: Vec3<V>,
-    tip: [Vec3<V>; 2],
-    middle: [Vec3<V>; 2],
+    tip: Vec3<V>,
+    middle: Vec3<V>,
 }
 
 impl<V: Lanes> RestRecorder<V> {
@@ -54,18 +50,18 @@ impl<V: Lanes> RestRecorder<V> {
             height: [V::splat(most), V::splat(-most)],
             low: Vec3::splat(most, most, most),
             high: Vec3::splat(-most, -most, -most),
-            tip: [Vec3::zero(); 2],
-            middle: [Vec3::zero(); 2],
+            tip: Vec3::zero(),
+            middle: Vec3::zero(),
         }
     }
 
-    /// Takes in a step; `attach` is the attach point with its velocity at the step's
-    /// end, `span_s` gives start and end of the step in a lane (s).
+    /// Takes in a step; `attach` is the attach point at the step's end, `span_s` gives
+    /// start and end of the step in a lane (s).
     #[inline(always)]
     pub(super) fn after_step(
         &mut self,
         tip: &TipStep<V>,
-        attach: [Vec3<V>; 2],
+        attach: Vec3<V>,
         links: &[Link<V>],
         link_length: V,
         lanes: usize,
@@ -98,17 +94,12 @@ impl<V: Lanes> RestRecorder<V> {
             keep(low.min(self.height[0]), self.height[0]),
             keep(high.max(self.height[1]), self.height[1]),
         ];
-        let [x, v] = middle(links, link_length);
-        let middle = [attach[0].add(x), attach[1].add(v)];
-        let m = middle[0];
+        let m = attach.add(middle(links, link_length));
         let (l, h) = (self.low, self.high);
         self.low = keep3(Vec3(m.0.min(l.0), m.1.min(l.1), m.2.min(l.2)), l);
         self.high = keep3(Vec3(m.0.max(h.0), m.1.max(h.1), m.2.max(h.2)), h);
-        self.middle = [keep3(m, self.middle[0]), keep3(middle[1], self.middle[1])];
-        self.tip = [
-            keep3(tip.after[0], self.tip[0]),
-            keep3(tip.after[1], self.tip[1]),
-        ];
+        self.middle = keep3(m, self.middle);
+        self.tip = keep3(tip.after[0], self.tip);
     }
 
     /// Measures of one lane; `origin_m` is the clock's origin.
@@ -123,19 +114,17 @@ impl<V: Lanes> RestRecorder<V> {
         RestMeasures {
             tip_height_spread_m: self.height[1].get(lane) - self.height[0].get(lane),
             middle_movement_m: squared.sqrt(),
-            tip_m: world(self.tip[0]),
-            tip_velocity_m_s: self.tip[1].get(lane),
-            middle_m: world(self.middle[0]),
-            middle_velocity_m_s: self.middle[1].get(lane),
+            tip_m: world(self.tip),
+            middle_m: world(self.middle),
         }
     }
 }
 
-/// Middle of the rope and its velocity, relative to node 0: a node, or with an odd
-/// number of links the middle of a link.
+/// Middle of the rope relative to node 0: a node, or with an odd number of links the
+/// middle of a link.
 #[inline(always)]
-fn middle<V: Lanes>(links: &[Link<V>], link_length: V) -> [Vec3<V>; 2] {
-    let (mut x, mut v) = (Vec3::zero(), Vec3::zero());
+fn middle<V: Lanes>(links: &[Link<V>], link_length: V) -> Vec3<V> {
+    let mut x = Vec3::zero();
     let whole = links.len() / 2;
     let half = links.len() % 2;
     for (index, link) in links.iter().take(whole + half).enumerate() {
@@ -144,9 +133,7 @@ fn middle<V: Lanes>(links: &[Link<V>], link_length: V) -> [Vec3<V>; 2] {
         } else {
             link_length
         };
-        let span = link.q.down(length);
-        x = x.add(span);
-        v = link.w.cross_add(span, v);
+        x = x.add(link.q.down(length));
     }
-    [x, v]
+    x
 }

@@ -96,12 +96,4 @@ impl AttachMotion for Fling {
             alpha_rad_s2: alpha,
         }
     }
-
-    fn duration_s(&self) -> f64 {
-        (CONTROL - 3) as f64 * KNOT_S
-    }
-
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        Vec::new()
-    }
 }

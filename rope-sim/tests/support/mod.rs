@@ -1,138 +1,119 @@
-//! The reference trajectories of `shared/reference/rope-truth`.
+//! Ropes, motions and options that the tests share.
+#![allow(
+    dead_code,
+    unreachable_pub,
+    reason = "every test file compiles its own copy"
+)]
 
+pub mod contact;
+pub mod fling;
+pub mod truth;
+
+use arm_model::kinematics::FrameMotion;
+use arm_model::{JointTrajectory, JointVector, Pole};
+use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    Candidate, FrameTimes, Kernel, PoseRow, PoseTrack, Rollout, SimOptions, Start, Watch, npy,
-    roll_out_with,
+    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, Scene, SimOptions, Start,
+    roll_out_in,
 };
 use shared_types::RopeParams;
-use std::path::PathBuf;
 
-/// Where the reference trajectories are, if they are.
-pub fn truth_folder() -> Option<PathBuf> {
-    let folder = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/reference/rope-truth"
-    );
-    let folder = PathBuf::from(folder);
-    if !folder.join("manifest.json").is_file() {
-        println!("skipped: {} not found", folder.display());
-        return None;
+pub const G_M_S2: f64 = 9.81;
+
+/// A soft rope whose links' inertia follows from the extra scale.
+pub fn rope() -> RopeParams {
+    RopeParams::from_array([22.0, 0.55, 0.01, 0.2, 0.008, 0.06, 0.06, 0.03, 0.8])
+}
+
+/// One rigid link with a lead: a pendulum. Also its inertia about the clamp (kg m²) and
+/// its weight's greatest moment (N m).
+pub fn pendulum() -> (RopeParams, f64, f64) {
+    let rope = RopeParams::from_array([1.0, 0.5, 0.0, 0.0, 0.01, 0.06, 0.05, 0.03, 0.5]);
+    let (s, m, m_lead) = (rope.length_m, rope.link_mass_kg(), rope.lead_mass_kg);
+    let inertia =
+        rope.link_inertia_kg_m2() + m * s * s / 4.0 + rope.lead_inertia_kg_m2() + m_lead * s * s;
+    (rope, inertia, G_M_S2 * s * (m / 2.0 + m_lead))
+}
+
+/// A throw that starts and stops with a jump of acceleration, off the grid of steps; its
+/// middle waypoint is moved by `offset` at joint 2 (rad).
+pub fn throw(offset: f64) -> PlannedArm {
+    let waypoints = [
+        JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
+        JointVector([0.2, -0.3 + offset, 0.2, 0.8, -0.2, 1.2, 0.3]),
+        JointVector([0.1, -0.5, 0.1, 1.0, 0.1, 1.6, -0.2]),
+    ];
+    PlannedArm::new(
+        JointTrajectory::new(&[0.0, 0.2137, 0.4511], &waypoints).unwrap(),
+        Pole::default(),
+    )
+}
+
+/// A frame that stands still at the origin.
+pub fn world(_t_s: f64) -> FrameMotion {
+    FrameMotion::world()
+}
+
+/// A frame that stands still.
+pub fn still(p_m: Vector3<f64>, r: Rotation3<f64>) -> impl AttachMotion + Copy {
+    move |_t_s: f64| FrameMotion {
+        p_m,
+        r: r.into_inner(),
+        ..FrameMotion::world()
     }
-    Some(folder)
 }
 
-/// One rope on one motion with its reference trajectory.
-pub struct Case {
-    /// Name as in the manifest, such as `A1-M3`.
-    pub id: String,
-    /// The rope.
-    pub rope: RopeParams,
-    /// The motion.
-    pub motion: PoseTrack,
-    /// Rotation vector of joint 0 at the start (rad).
-    pub joint0_rotvec: [f64; 3],
-    /// Reference node positions, shape (frames, N + 1, 3).
-    pub truth: npy::Array,
-    /// Frame rate of the reference (Hz).
-    pub rate_hz: f64,
-}
-
-/// Reads the cases whose name passes `wanted`.
-pub fn cases(folder: &std::path::Path, wanted: impl Fn(&str) -> bool) -> Vec<Case> {
-    let text = std::fs::read_to_string(folder.join("manifest.json")).unwrap();
-    let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let mut out = Vec::new();
-    for case in manifest["cases"].as_array().unwrap() {
-        let id = case["id"].as_str().unwrap().to_owned();
-        if !wanted(&id) {
-            continue;
-        }
-        let rope = &manifest["ropes"][case["rope"].as_str().unwrap()];
-        let motion = &manifest["motions"][case["motion"].as_str().unwrap()];
-        let number = |key: &str| rope[key].as_f64().unwrap();
-        let keys = [
-            "N",
-            "L",
-            "c",
-            "k",
-            "r",
-            "mu",
-            "m_L",
-            "r_L",
-            "link_extra_scale",
-        ];
-        let rotvec = motion["initial_joint0_rotvec"].as_array();
-        let nodes = std::fs::File::open(folder.join(case["nodes"].as_str().unwrap())).unwrap();
-        out.push(Case {
-            id,
-            rope: RopeParams::from_array(keys.map(number)),
-            motion: read_poses(&folder.join(motion["pose_csv"].as_str().unwrap())),
-            joint0_rotvec: core::array::from_fn(|i| rotvec.map_or(0.0, |v| v[i].as_f64().unwrap())),
-            truth: npy::read(nodes).unwrap(),
-            rate_hz: case["rate"].as_f64().unwrap(),
-        });
-    }
-    out
-}
-
-/// Pose table `t,x,y,z,qw,qx,qy,qz`.
-fn read_poses(path: &std::path::Path) -> PoseTrack {
-    let text = std::fs::read_to_string(path).unwrap();
-    let rows: Vec<PoseRow> = text
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let v: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
-            PoseRow {
-                t_s: v[0],
-                p_m: [v[1], v[2], v[3]],
-                q_wxyz: [v[4], v[5], v[6], v[7]],
-            }
-        })
-        .collect();
-    PoseTrack::new(&rows).unwrap()
-}
-
-/// Simulates a case in steps of at most `step_s` with one kernel.
-pub fn simulate(case: &Case, kernel: Kernel, step_s: f64) -> Rollout {
-    let frames = case.truth.shape[0];
-    let last_s = (frames - 1) as f64 / case.rate_hz;
-    let options = SimOptions {
-        // A whole number of steps per frame, as the published figures have it.
-        step_s: 1.0 / (case.rate_hz * (1.0 / (case.rate_hz * step_s)).round()),
-        precision: rope_sim::Precision::F64,
-        start: Start::Straight {
-            joint0_rotvec: case.joint0_rotvec,
-        },
+/// Steps of 0.5 ms from equilibrium, all nodes recorded at `rate_hz` up to the horizon.
+pub fn options(precision: Precision, horizon_s: f64, rate_hz: f64) -> SimOptions {
+    SimOptions {
         frames: FrameTimes {
             first_s: 0.0,
-            period_s: 1.0 / case.rate_hz,
-            count: frames,
+            period_s: 1.0 / rate_hz,
+            count: (horizon_s * rate_hz + 1e-6) as usize + 1,
         },
-        watch: Watch::NOTHING,
-        horizon_s: last_s,
-        threads: 1,
-    };
-    let candidate = Candidate::new(&case.rope, &case.motion);
-    roll_out_with(kernel, &[candidate], &options)
+        ..SimOptions::new(5e-4, precision, horizon_s)
+    }
+}
+
+/// The same from a straight rope whose joint 0 is turned (rad).
+pub fn released(joint0_rotvec: [f64; 3], options: SimOptions) -> SimOptions {
+    SimOptions {
+        start: Start::Straight { joint0_rotvec },
+        ..options
+    }
+}
+
+pub fn simulate(
+    scene: &Scene,
+    rope: &RopeParams,
+    motion: &dyn AttachMotion,
+    options: &SimOptions,
+) -> Rollout {
+    roll_out_in(scene, &[Candidate::new(rope, motion)], options)
         .unwrap()
         .remove(0)
 }
 
-/// Largest distance of the tip from the reference over all frames (mm).
-pub fn max_tip_error_mm(case: &Case, rollout: &Rollout) -> f64 {
-    let [frames, nodes, _] = rollout.nodes.shape();
-    assert_eq!(case.truth.shape, [frames, nodes, 3]);
-    let mut worst = 0.0_f64;
-    for frame in 0..frames {
-        let tip = rollout.nodes.position(frame, nodes - 1);
-        let at = (frame * nodes + nodes - 1) * 3;
-        let d = (0..3)
-            .map(|i| (tip[i] - case.truth.values[at + i]).powi(2))
-            .sum::<f64>()
-            .sqrt();
-        // NaN must count as wrong.
-        worst = if d > worst || d.is_nan() { d } else { worst };
+/// The lead at all frames.
+pub fn tips(rollout: &Rollout) -> Vec<Vector3<f64>> {
+    let last = rollout.nodes.nodes() - 1;
+    (0..rollout.nodes.frames())
+        .map(|f| rollout.nodes.position(f, last))
+        .collect()
+}
+
+/// Asserts that velocities and accelerations of a motion are the derivatives of its poses.
+pub fn assert_derivatives(motion: &dyn AttachMotion, times_s: impl IntoIterator<Item = f64>) {
+    let d = 1e-5;
+    for t in times_s {
+        let (before, now, after) = (motion.at(t - d), motion.at(t), motion.at(t + d));
+        let v = (after.p_m - before.p_m) / (2.0 * d);
+        let a = (after.v_m_s - before.v_m_s) / (2.0 * d);
+        let alpha = (after.w_rad_s - before.w_rad_s) / (2.0 * d);
+        let turned = (after.r - before.r) / (2.0 * d);
+        assert!((v - now.v_m_s).norm() < 1e-6, "velocity at {t}");
+        assert!((a - now.a_m_s2).norm() < 1e-4, "acceleration at {t}");
+        assert!((alpha - now.alpha_rad_s2).norm() < 1e-4, "alpha at {t}");
+        assert!((turned - now.w_rad_s.cross_matrix() * now.r).norm() < 1e-6);
     }
-    worst * 1e3
 }

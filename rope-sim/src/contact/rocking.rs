@@ -1,4 +1,5 @@
-//! The domino: a rigid box rocking about its lower edges, one per lane.
+//! The scene's domino as a rocking block: a rigid box rocking about its lower edges, one
+//! per lane.
 //!
 //! One angle is its state, positive when it leans to where it faces. About the edge
 //! it leans on, gravity and the rope's push make `I tilt'' = M_rope - m g rho
@@ -7,8 +8,9 @@
 //! The rope feels a body that yields: contact stiffness and the domino's mobility are
 //! in series. Simultaneous contacts share the mobility.
 
+use super::body::{Body, Frame, constant};
+use super::summary::StepEnd;
 use crate::algebra::Vec3;
-use crate::contact::{Body, Carrier, Frame, StepEnd, constant};
 use crate::kernel::GRAVITY_M_S2;
 use crate::lanes::Lanes;
 use crate::scene::{Domino, DominoOutcome, Obstacle, Shape};
@@ -16,7 +18,7 @@ use core::f64::consts::FRAC_PI_4;
 use nalgebra::Vector3;
 
 /// Pose and pushes of every lane's domino.
-pub(crate) struct DominoLanes<V> {
+pub(crate) struct RockingBlocks<V> {
     domino: Domino,
     foot: Vec3<V>,
     forward: Vec3<V>,
@@ -44,7 +46,7 @@ struct Tilt {
     outcome: DominoOutcome,
 }
 
-impl<V: Lanes> DominoLanes<V> {
+impl<V: Lanes> RockingBlocks<V> {
     #[inline(always)]
     pub(crate) fn new(domino: &Domino, count: usize, origin_m: [f64; 3]) -> Self {
         let (s, c) = domino.facing_rad.sin_cos();
@@ -70,10 +72,11 @@ impl<V: Lanes> DominoLanes<V> {
         let d = &self.domino;
         let half_m = [0.5 * d.thickness_m, 0.5 * d.width_m, 0.5 * d.height_m];
         let upright = Obstacle::fixed(Shape::Box { half_m }, [0.0; 3], d.friction);
-        let mut body = Body::new(&upright, &[], [0.0; 3]);
-        body.carrier = Carrier::Domino;
-        body.frame = self.frame();
-        body
+        Body {
+            frame: self.frame(),
+            rocks: true,
+            ..Body::new(&upright, [0.0; 3])
+        }
     }
 
     /// 1 where it has not fallen.
@@ -116,7 +119,7 @@ impl<V: Lanes> DominoLanes<V> {
         let upward = self.forward.scale_add(sin, up.scale(cos));
         let half_t = self.lean * V::splat(0.5 * self.domino.thickness_m);
         let half_h = V::splat(0.5 * self.domino.height_m);
-        let edge = self.forward.scale_add(half_t, self.foot);
+        let edge = self.edge(self.lean);
         let arm = upward.scale_add(half_h, along.scale(-half_t));
         let w = self.axis.scale(rate);
         Frame {
@@ -191,12 +194,8 @@ impl<V: Lanes> DominoLanes<V> {
     }
 
     /// What became of one lane's.
-    pub(crate) fn outcome(&self, lane: usize, touched_at_s: Option<f64>) -> DominoOutcome {
-        let outcome = self.lanes.get(lane).map(|t| t.outcome).unwrap_or_default();
-        DominoOutcome {
-            touched_at_s,
-            ..outcome
-        }
+    pub(crate) fn outcome(&self, lane: usize) -> DominoOutcome {
+        self.lanes.get(lane).map(|t| t.outcome).unwrap_or_default()
     }
 }
 

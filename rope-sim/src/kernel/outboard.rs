@@ -1,4 +1,4 @@
-//! The articulated elimination of one link.
+//! The articulated inertia outboard of a node, and the elimination of one link.
 
 use super::{Elimination, up};
 use crate::algebra::{Mat3, Sym3, Vec3};
@@ -6,10 +6,10 @@ use crate::lanes::Lanes;
 use crate::load::Load;
 use crate::state::RopeLanes;
 
-/// Reaction of everything beyond node i on link i, for an acceleration `a` of the
+/// Articulated inertia of everything outboard of node i: its reaction on link i, for an acceleration `a` of the
 /// node and the angular acceleration `alpha` of the link: `force = vv a + vw alpha +
 /// bv`, `torque = vw^T a + ww alpha + bw`.
-pub(super) struct Beyond<V> {
+pub(super) struct Outboard<V> {
     /// `vv` and half the mass of the link.
     vv_link: Sym3<V>,
     vw: Mat3<V>,
@@ -31,7 +31,7 @@ pub(super) struct HalfEliminated<V> {
     bw: Vec3<V>,
 }
 
-impl<V: Lanes> Beyond<V> {
+impl<V: Lanes> Outboard<V> {
     /// Adds what touches the link, in units of the joint resistance.
     #[inline(always)]
     pub(super) fn add(&mut self, load: &Load<V>, per_resistance: V) {

@@ -1,46 +1,21 @@
-//! Motions and scenes the contact tests share.
-#![allow(
-    dead_code,
-    unreachable_pub,
-    reason = "every test file compiles its own copy"
-)]
+//! Throws of random ropes across a thin wall.
 
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Obstacle, Precision, Rollout, Scene, SimOptions, Start,
-    Watch, roll_out_in,
-};
+use rope_sim::{AttachMotion, Obstacle, Shape};
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
-
-pub const G_M_S2: f64 = 9.81;
 
 /// Half edges of the thin wall about the origin.
 pub const WALL_HALF_M: [f64; 3] = [0.005, 0.3, 0.2];
 
-/// A frame that stands still.
-pub struct Still {
-    pub p_m: Vector3<f64>,
-    pub r: Rotation3<f64>,
-}
-
-impl AttachMotion for Still {
-    fn at(&self, _t_s: f64) -> FrameMotion {
-        FrameMotion {
-            p_m: self.p_m,
-            r: self.r.into_inner(),
-            ..FrameMotion::world()
-        }
-    }
-    fn duration_s(&self) -> f64 {
-        0.0
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        Vec::new()
-    }
+pub fn wall() -> Obstacle {
+    let shape = Shape::Box {
+        half_m: WALL_HALF_M,
+    };
+    Obstacle::fixed(shape, [0.0; 3], 0.5)
 }
 
 /// Throws a rope across a thin wall: the frame jerks sideways with a constant
@@ -112,39 +87,4 @@ pub fn random_rope(rng: &mut ChaCha8Rng, links: f64) -> RopeParams {
         (v[4], v[7]) = (0.003, 0.003);
     }
     RopeParams::from_array(v)
-}
-
-pub fn options(precision: Precision, horizon_s: f64, rate_hz: f64) -> SimOptions {
-    let count = (horizon_s * rate_hz + 1e-6) as usize + 1;
-    SimOptions {
-        step_s: 5e-4,
-        precision,
-        start: Start::Equilibrium,
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / rate_hz,
-            count,
-        },
-        watch: Watch::default(),
-        horizon_s,
-        threads: 2,
-    }
-}
-
-pub fn alone(obstacle: Obstacle) -> Scene {
-    Scene {
-        obstacles: vec![obstacle],
-        domino: None,
-    }
-}
-
-pub fn simulate(
-    scene: &Scene,
-    rope: &RopeParams,
-    motion: &dyn AttachMotion,
-    options: &SimOptions,
-) -> Rollout {
-    roll_out_in(scene, &[Candidate::new(rope, motion)], options)
-        .unwrap()
-        .remove(0)
 }

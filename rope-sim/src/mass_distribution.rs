@@ -1,6 +1,6 @@
 //! Mass that is uneven along a rope, see [`RopeExtras::mass_slope`].
 //!
-//! The kernel knows links of one mass. What a link has more or less than that rides at
+//! The elimination knows links of one mass. What a link has more or less than that rides at
 //! its centre, as a load.
 
 use crate::algebra::{Sym3, Vec3};
@@ -14,13 +14,13 @@ use shared_types::RopeParams;
 
 /// Mass of every link beyond that of an even rope (kg), negative where it has less; one
 /// rope per lane.
-pub(crate) struct UnevenLanes<V> {
+pub(crate) struct MassLanes<V> {
     beyond: Vec<V>,
 }
 
-impl<V: Lanes> UnevenLanes<V> {
+impl<V: Lanes> MassLanes<V> {
     #[inline(always)]
-    pub(crate) fn even(links: usize) -> Self {
+    pub(crate) fn uniform(links: usize) -> Self {
         Self {
             beyond: vec![V::splat(0.0); links],
         }

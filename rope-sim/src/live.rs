@@ -1,0 +1,275 @@
+//! One rope advanced as its attach frame moves: for simulated rigs.
+
+use crate::algebra::Vec3;
+use crate::clock::BaseState;
+use crate::equilibrium::hanging_links;
+use crate::error::SimulateError;
+use crate::extras::RopeExtras;
+use crate::kernel::{Elimination, step};
+use crate::lanes::{LaneTask, Lanes, run_scalar};
+use crate::load::Unloaded;
+use crate::rollout::positive;
+use crate::scheme::{Phase, Scheme, joint_resistance};
+use crate::state::{Link, RopeLanes};
+use arm_model::kinematics::FrameMotion;
+use nalgebra::Vector3;
+use shared_types::RopeParams;
+
+/// A rope in double precision that follows its attach frame step by step. Advancing
+/// it does not allocate.
+pub struct LiveRope {
+    params: RopeParams,
+    rope: RopeLanes<f64>,
+    max_step_s: f64,
+    links: Vec<Link<f64>>,
+    scratch: Vec<Elimination<f64>>,
+    scheme: Scheme<f64>,
+    /// Of the last step; `None` before the first.
+    phase: Option<Phase>,
+    step_s: f64,
+    time_s: f64,
+    nodes: Vec<Vector3<f64>>,
+}
+
+impl core::fmt::Debug for LiveRope {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("LiveRope")
+            .field("time_s", &self.time_s)
+            .field("nodes", &self.nodes)
+            .finish_non_exhaustive()
+    }
+}
+
+impl LiveRope {
+    /// A rope hanging still below `attach` at time 0, advanced in steps of at most
+    /// `step_s`.
+    ///
+    /// # Errors
+    /// Parameters that are not physical, a step that is not above zero.
+    pub fn new(
+        rope: &RopeParams,
+        attach: &FrameMotion,
+        step_s: f64,
+    ) -> Result<Self, SimulateError> {
+        rope.validate().map_err(|source| SimulateError::Rope {
+            candidate: 0,
+            source,
+        })?;
+        positive("step_s", step_s)?;
+        if !(attach.p_m.sum() + attach.r.sum()).is_finite() {
+            return Err(SimulateError::MotionNotFinite {
+                candidate: 0,
+                time_s: 0.0,
+            });
+        }
+        let mut links: Vec<Link<f64>> = Vec::new();
+        for q in hanging_links(rope, &RopeExtras::NONE, &attach.r) {
+            let mut link = Link::at_rest();
+            link.q.set(0, q);
+            links.push(link);
+        }
+        let n = links.len();
+        let mut live = Self {
+            rope: RopeLanes::of(rope),
+            params: *rope,
+            max_step_s: step_s,
+            links,
+            scratch: vec![Elimination::empty(); n],
+            scheme: Scheme::new(),
+            phase: None,
+            step_s: 0.0,
+            time_s: 0.0,
+            nodes: vec![Vector3::zeros(); n + 1],
+        };
+        live.place_nodes(&attach.p_m);
+        Ok(live)
+    }
+
+    /// Advances to `to_t_s` in equal steps, reading the attach frame's motion at the
+    /// end of each. Times that are not later than the one reached do nothing.
+    pub fn advance(&mut self, motion: &dyn Fn(f64) -> FrameMotion, to_t_s: f64) {
+        if !(to_t_s > self.time_s && to_t_s.is_finite()) {
+            return;
+        }
+        run_scalar(Advance {
+            live: self,
+            motion,
+            to_t_s,
+        });
+        self.time_s = to_t_s;
+        self.place_nodes(&motion(to_t_s).p_m);
+    }
+
+    /// Time reached (s).
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Node positions (m, world), attach point first, lead last.
+    #[must_use]
+    pub fn nodes(&self) -> &[Vector3<f64>] {
+        &self.nodes
+    }
+
+    /// Whether the state is still finite; once false, it stays so.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.nodes
+            .iter()
+            .all(|node| node.iter().all(|x| x.is_finite()))
+    }
+
+    fn place_nodes(&mut self, attach_m: &Vector3<f64>) {
+        let mut at = *attach_m;
+        self.nodes[0] = at;
+        for (node, link) in self.nodes.iter_mut().skip(1).zip(&self.links) {
+            let Vec3(x, y, z) = link.q.down(self.rope.link_length);
+            at += Vector3::new(x, y, z);
+            *node = at;
+        }
+    }
+
+    fn set_step(&mut self, step_s: f64) {
+        let phase = match self.phase {
+            None => Phase::Restart,
+            Some(Phase::Restart) => Phase::AfterRestart,
+            Some(_) => Phase::Regular,
+        };
+        if self.phase != Some(phase) || (step_s - self.step_s).abs() > 0.0 {
+            self.scheme.set(0, step_s, phase);
+            let resistance = joint_resistance(step_s, phase, &self.params);
+            self.rope.set(0, &self.params, resistance);
+            (self.phase, self.step_s) = (Some(phase), step_s);
+        }
+    }
+}
+
+/// The steps of one [`LiveRope::advance`].
+struct Advance<'a> {
+    live: &'a mut LiveRope,
+    motion: &'a dyn Fn(f64) -> FrameMotion,
+    to_t_s: f64,
+}
+
+impl LaneTask for Advance<'_> {
+    type Output = ();
+
+    /// Always run in scalar lanes, which are `f64`.
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let live = self.live;
+        let from_s = live.time_s;
+        let span_s = self.to_t_s - from_s;
+        let steps = (span_s / live.max_step_s - 1e-9).ceil().max(1.0);
+        // Rounding of the clock must not look like a new step length every time.
+        let step_s = (span_s / steps * 1e12).round() / 1e12;
+        let mut done = 0.0;
+        while done < steps {
+            done += 1.0;
+            live.set_step(step_s);
+            let time_s = from_s + span_s * (done / steps);
+            step(
+                &mut live.links,
+                &mut live.scratch,
+                &live.rope,
+                &BaseState::of(&(self.motion)(time_s)).dynamics,
+                &live.scheme,
+                &Unloaded,
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Candidate, FrameTimes, Precision, SimOptions, roll_out};
+    use core::f64::consts::TAU;
+    use nalgebra::Rotation3;
+
+    fn rope() -> RopeParams {
+        RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
+    }
+
+    #[test]
+    fn stays_in_equilibrium_under_a_tilted_frame() {
+        let tilt = Rotation3::from_euler_angles(0.3, 0.9, 0.2);
+        let attach = FrameMotion {
+            r: tilt.into_inner(),
+            ..FrameMotion::world()
+        };
+        let mut live = LiveRope::new(&rope(), &attach, 1e-3).unwrap();
+        let before = live.nodes()[22];
+        live.advance(&|_| attach, 1.0);
+        let moved = live.nodes()[22] - before;
+        assert!(moved.norm() < 1e-9, "{moved}");
+    }
+
+    /// Swings along x, starting and ending softly.
+    fn swing(t_s: f64) -> FrameMotion {
+        let (s, c) = (TAU * t_s).sin_cos();
+        FrameMotion {
+            p_m: Vector3::new(0.1 * (t_s - s / TAU), 0.0, 1.0),
+            v_m_s: Vector3::new(0.1 * (1.0 - c), 0.0, 0.0),
+            a_m_s2: Vector3::new(0.1 * TAU * s, 0.0, 0.0),
+            ..FrameMotion::world()
+        }
+    }
+
+    /// Turns about the vertical by more than a full turn, tilted, softly.
+    fn turn(t_s: f64) -> FrameMotion {
+        let (s, c) = (TAU * t_s).sin_cos();
+        let yaw = Rotation3::from_axis_angle(&Vector3::z_axis(), 7.0 * (t_s - s / TAU));
+        let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.4);
+        FrameMotion {
+            r: (yaw * tilt).into_inner(),
+            w_rad_s: Vector3::z() * (7.0 * (1.0 - c)),
+            alpha_rad_s2: Vector3::z() * (7.0 * TAU * s),
+            ..FrameMotion::world()
+        }
+    }
+
+    /// The batch reads continuous quaternions, the live rope those of matrices, whose
+    /// sign jumps: a full turn must not matter to either.
+    #[test]
+    fn follows_the_batch_simulation() {
+        for motion in [swing, turn] {
+            let mut live = LiveRope::new(&rope(), &motion(0.0), 5e-4).unwrap();
+            for cycle in 1..=250 {
+                live.advance(&motion, f64::from(cycle) * 0.004);
+            }
+            let options = SimOptions {
+                frames: FrameTimes {
+                    first_s: 1.0,
+                    period_s: 1.0,
+                    count: 1,
+                },
+                ..SimOptions::new(5e-4, Precision::F64, 1.0)
+            };
+            let rope = rope();
+            let batch = roll_out(&[Candidate::new(&rope, &motion)], &options).unwrap();
+            for (node, at) in live.nodes().iter().enumerate() {
+                let d = (batch[0].nodes.position(0, node) - at).norm();
+                assert!(d < 1e-7, "node {node} differs by {d} m");
+            }
+        }
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let world = FrameMotion::world();
+        let bad = RopeParams { links: 0, ..rope() };
+        assert!(matches!(
+            LiveRope::new(&bad, &world, 1e-3),
+            Err(SimulateError::Rope { .. })
+        ));
+        assert!(matches!(
+            LiveRope::new(&rope(), &world, 0.0),
+            Err(SimulateError::Option {
+                field: "step_s",
+                ..
+            })
+        ));
+    }
+}

@@ -1,4 +1,0 @@
-//! Checks of the equations that need the inside of a step.
-
-mod energy;
-mod isolation;
