@@ -91,7 +91,6 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
             watched: result.watched,
             peak_tip_speed_m_s: result.peak_tip_speed_m_s,
             outcome: success,
-            max_joint_angle_rad: result.max_joint_angle_rad,
             contacts: result.contacts,
             domino: result.domino,
         };
@@ -102,8 +101,6 @@ fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
         watched: Watched::default(),
         peak_tip_speed_m_s: 0.0,
         outcome: Outcome::Diverged,
-        // NaN where the very first steps failed.
-        max_joint_angle_rad: result.max_joint_angle_rad.max(0.0),
         contacts: vec![ContactSummary::default(); result.contacts.len()],
         domino: result.domino.map(|_| DominoOutcome::default()),
     }

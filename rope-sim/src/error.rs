@@ -1,21 +1,15 @@
 //! Why a simulation is refused.
 
 use crate::scene::SceneError;
+use crate::unusable::Unusable;
 use shared_types::rope::RopeError;
 
 /// Why [`crate::roll_out`] gave nothing.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SimulateError {
-    /// An option has an unusable value.
-    #[error("simulation option `{field}` is {value}: {need}")]
-    Option {
-        /// Field of [`crate::SimOptions`].
-        field: &'static str,
-        /// Value found.
-        value: f64,
-        /// What is wrong with it.
-        need: &'static str,
-    },
+    /// A field of [`crate::SimOptions`] has an unusable value.
+    #[error("simulation option {0}")]
+    Option(Unusable),
     /// A frame lies outside the simulated time.
     #[error(
         "frames from {first_s} s to {last_s} s do not fit into the simulated 0 s to {horizon_s} s"
@@ -36,17 +30,13 @@ pub enum SimulateError {
         /// Which parameter, and its limits.
         source: RopeError,
     },
-    /// A rope's drag or rest curvature is unusable.
-    #[error("candidate {candidate}: `{field}` is {value}: {need}")]
+    /// A field of [`crate::RopeExtras`] or [`crate::AirDrag`] is unusable.
+    #[error("candidate {candidate}: {unusable}")]
     Extras {
         /// Index of the candidate, from 0.
         candidate: usize,
-        /// Field of [`crate::RopeExtras`] or [`crate::AirDrag`].
-        field: &'static str,
-        /// Value found.
-        value: f64,
-        /// What is wrong with it.
-        need: &'static str,
+        /// The number.
+        unusable: Unusable,
     },
     /// The scene cannot be simulated.
     #[error(transparent)]

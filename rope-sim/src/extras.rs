@@ -1,6 +1,8 @@
 //! What a rope may have beyond the paper's nine parameters: air drag, a rest curvature
 //! and mass that is uneven along it. Off by default.
 
+use crate::unusable::Unusable;
+
 /// Drag of still air on the links and the lead, quadratic in the speed.
 ///
 /// A link of length s and radius r feels `1/2 rho 2 r s (c_n |v_n| v_n + c_t |v_t| v_t)`
@@ -17,9 +19,6 @@ pub struct AirDrag {
     /// Coefficient of the lead, on its cross section (1), about 0.5.
     pub lead_coefficient: f64,
 }
-
-/// The first number that is unusable: its field, value, and what it must be.
-pub(crate) type Unusable = (&'static str, f64, &'static str);
 
 /// Physics of a rope beyond its nine parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,28 +56,25 @@ impl RopeExtras {
         1.0 + self.mass_slope * (2.0 * place - 1.0)
     }
 
-    pub(crate) fn fault(&self) -> Option<Unusable> {
-        let curvature = self.rest_curvature_per_m.into_iter();
-        if let Some(value) = curvature.into_iter().find(|v| v.abs() > 1e3 || v.is_nan()) {
-            return Some((
-                "rest_curvature_per_m",
-                value,
-                "must be a number of at most 1000 rad/m",
-            ));
-        }
-        if !(-0.95..=0.95).contains(&self.mass_slope) {
-            return Some(("mass_slope", self.mass_slope, "must be from -0.95 to 0.95"));
-        }
-        let drag = self.air_drag?;
-        [
+    pub(crate) fn check(&self) -> Result<(), Unusable> {
+        let curvature = self.rest_curvature_per_m;
+        let need = "must be a number of at most 1000 rad/m";
+        Unusable::unless("rest_curvature_per_m", need, curvature, |v| v.abs() <= 1e3)?;
+        let need = "must be from -0.95 to 0.95";
+        Unusable::unless("mass_slope", need, [self.mass_slope], |v| v.abs() <= 0.95)?;
+        let Some(drag) = self.air_drag else {
+            return Ok(());
+        };
+        for (field, number) in [
             ("air_density_kg_m3", drag.air_density_kg_m3),
             ("normal_coefficient", drag.normal_coefficient),
             ("tangential_coefficient", drag.tangential_coefficient),
             ("lead_coefficient", drag.lead_coefficient),
-        ]
-        .into_iter()
-        .find(|(_, value)| !(0.0..=1e4).contains(value))
-        .map(|(field, value)| (field, value, "must be from 0 to 10 000"))
+        ] {
+            let need = "must be from 0 to 10 000";
+            Unusable::unless(field, need, [number], |v| (0.0..=1e4).contains(&v))?;
+        }
+        Ok(())
     }
 }
 

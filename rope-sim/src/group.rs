@@ -37,7 +37,6 @@ pub(crate) struct MemberResult {
     pub(crate) nodes: NodeTrack,
     pub(crate) watched: Watched,
     pub(crate) peak_tip_speed_m_s: f64,
-    pub(crate) max_joint_angle_rad: f64,
     pub(crate) survived: bool,
     pub(crate) contacts: Vec<ContactSummary>,
     pub(crate) domino: Option<DominoOutcome>,
@@ -83,7 +82,6 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
             self.horizon_s,
         );
         let mut health = Health::<V>::new(count);
-        let mut min_half_cos = V::splat(1.0);
         let mut restarts = Vec::with_capacity(count);
         let mut steps = 0_usize;
         let mut environment = (!ALONE).then(|| {
@@ -134,9 +132,6 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
                 rope.link_length,
                 health.running,
             );
-            let zero = V::splat(0.0);
-            let half_cos = V::select_less(zero, health.running, report.min_half_cos, V::splat(1.0));
-            min_half_cos = min_half_cos.min(half_cos);
             steps += 1;
             if steps.is_multiple_of(HEALTH_PERIOD) && !health.check(&links, clock.scheme.h) {
                 break;
@@ -152,7 +147,6 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
                     .unwrap_or_else(|| NodeTrack::zeros(0, n + 1, false)),
                 watched: watcher.watched(lane, paths[lane]),
                 peak_tip_speed_m_s: watcher.peak_speed_m_s(lane),
-                max_joint_angle_rad: 2.0 * min_half_cos.get(lane).clamp(0.0, 1.0).acos(),
                 survived: health.alive[lane],
                 contacts: environment
                     .as_ref()

@@ -45,6 +45,7 @@ mod scene;
 mod scheme;
 pub mod sensitivity;
 mod state;
+mod unusable;
 mod watch;
 
 pub use batch::{roll_out, roll_out_in, roll_out_in_with};
@@ -58,4 +59,5 @@ pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};
 pub use scene::{
     ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, SceneBody, SceneError, Shape,
 };
+pub use unusable::Unusable;
 pub use watch::{BoxRegion, ClosestApproach, Dwell, RestMeasures, Watch, Watched};

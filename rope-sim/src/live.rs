@@ -8,9 +8,9 @@ use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes, run_scalar};
 use crate::load::Unloaded;
-use crate::rollout::positive;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{Link, RopeLanes};
+use crate::unusable::Unusable;
 use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
@@ -55,7 +55,7 @@ impl LiveRope {
             candidate: 0,
             source,
         })?;
-        positive("step_s", step_s)?;
+        Unusable::unless_positive("step_s", step_s).map_err(SimulateError::Option)?;
         if !(attach.p_m.sum() + attach.r.sum()).is_finite() {
             return Err(SimulateError::MotionNotFinite {
                 candidate: 0,
@@ -266,10 +266,10 @@ mod tests {
         ));
         assert!(matches!(
             LiveRope::new(&rope(), &world, 0.0),
-            Err(SimulateError::Option {
+            Err(SimulateError::Option(Unusable {
                 field: "step_s",
                 ..
-            })
+            }))
         ));
     }
 }

@@ -6,6 +6,7 @@ use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
 use crate::scene::{ContactSummary, DominoOutcome};
+use crate::unusable::Unusable;
 use crate::watch::{Watch, Watched};
 use shared_types::RopeParams;
 
@@ -134,9 +135,6 @@ pub struct Rollout {
     pub peak_tip_speed_m_s: f64,
     /// How it went.
     pub outcome: Outcome,
-    /// Largest joint angle (rad). Beyond about 2.6 the model's own law (torque flips
-    /// at pi) makes the motion ill-posed.
-    pub max_joint_angle_rad: f64,
     /// What it did with each obstacle of the scene, in their order; nothing after
     /// [`Outcome::Diverged`].
     pub contacts: Vec<ContactSummary>,
@@ -144,30 +142,10 @@ pub struct Rollout {
     pub domino: Option<DominoOutcome>,
 }
 
-/// Refuses an option that is not finite and above 0.
-pub(crate) fn positive(field: &'static str, value: f64) -> Result<(), SimulateError> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    let need = "must be finite and above 0";
-    Err(SimulateError::Option { field, value, need })
-}
-
 /// Checks options and candidates, by name.
 pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<(), SimulateError> {
-    positive("step_s", options.step_s)?;
-    positive("horizon_s", options.horizon_s)?;
-    let steps = options.horizon_s / options.step_s;
-    if steps > MAX_STEPS {
-        let need = "gives more than 1e8 steps; shorten the horizon or lengthen the step";
-        return Err(SimulateError::Option {
-            field: "step_s",
-            value: options.step_s,
-            need,
-        });
-    }
+    check_numbers(options).map_err(SimulateError::Option)?;
     if options.frames.count > 0 {
-        positive("frames.period_s", options.frames.period_s)?;
         let last_s = options.frames.time_s(options.frames.count - 1);
         if !(options.frames.first_s >= 0.0 && last_s <= options.horizon_s + 1e-9) {
             return Err(SimulateError::FramesOutsideHorizon {
@@ -177,18 +155,6 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
             });
         }
     }
-    options.watch.check(options.horizon_s)?;
-    let turned = match options.start {
-        Start::Straight { joint0_rotvec } => joint0_rotvec,
-        Start::Equilibrium => [0.0; 3],
-    };
-    if let Some(value) = turned.into_iter().find(|v| !v.is_finite()) {
-        return Err(SimulateError::Option {
-            field: "start.joint0_rotvec",
-            value,
-            need: "must be finite",
-        });
-    }
     for (index, candidate) in candidates.iter().enumerate() {
         candidate
             .rope
@@ -197,14 +163,11 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
                 candidate: index,
                 source,
             })?;
-        if let Some((field, value, need)) = candidate.extras.fault() {
-            return Err(SimulateError::Extras {
-                candidate: index,
-                field,
-                value,
-                need,
-            });
-        }
+        let unusable = |unusable| SimulateError::Extras {
+            candidate: index,
+            unusable,
+        };
+        candidate.extras.check().map_err(unusable)?;
         let ends_s = candidate.motion.duration_s();
         let long_enough = candidate.motion.holds_after_end() || ends_s >= options.horizon_s - 1e-9;
         if !long_enough {
@@ -215,6 +178,22 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
                 horizon_s,
             });
         }
+    }
+    Ok(())
+}
+
+fn check_numbers(options: &SimOptions) -> Result<(), Unusable> {
+    Unusable::unless_positive("step_s", options.step_s)?;
+    Unusable::unless_positive("horizon_s", options.horizon_s)?;
+    let need = "gives more than 1e8 steps; shorten the horizon or lengthen the step";
+    let few = |step_s| options.horizon_s / step_s <= MAX_STEPS;
+    Unusable::unless("step_s", need, [options.step_s], few)?;
+    if options.frames.count > 0 {
+        Unusable::unless_positive("frames.period_s", options.frames.period_s)?;
+    }
+    options.watch.check(options.horizon_s)?;
+    if let Start::Straight { joint0_rotvec } = options.start {
+        Unusable::unless_finite("start.joint0_rotvec", joint0_rotvec)?;
     }
     Ok(())
 }

@@ -40,7 +40,6 @@ fn one_link_swings_with_the_period_of_a_pendulum() {
     assert!(back.norm() < 1e-5 * s, "{back}");
     let fastest = (2.0 * moment * (1.0 - amplitude.cos()) / inertia).sqrt() * s;
     assert!((rollout.peak_tip_speed_m_s / fastest - 1.0).abs() < 1e-4);
-    assert!((rollout.max_joint_angle_rad - amplitude).abs() < 1e-3);
 }
 
 #[test]

@@ -99,7 +99,6 @@ fn half_a_millisecond_in_single_precision_is_enough_for_random_flings() {
     for rollout in truth.iter().chain(&fast) {
         assert!(rollout.nodes.to_f64().iter().all(|x| x.is_finite()));
         assert!(rollout.peak_tip_speed_m_s.is_finite());
-        assert!(rollout.max_joint_angle_rad.is_finite());
     }
     let count = |outcome| fast.iter().filter(|r| r.outcome == outcome).count();
     let errors = || {

@@ -33,7 +33,6 @@ pub(super) struct Joints<V> {
     pub(super) child: Ends<V>,
     /// Of the link prepared last (m).
     pub(super) span: Vec3<V>,
-    pub(super) min_half_cos: V,
 }
 
 impl<V: Lanes> Joints<V> {
@@ -47,7 +46,6 @@ impl<V: Lanes> Joints<V> {
             base,
             child: base,
             span: Vec3::zero(),
-            min_half_cos: V::splat(1.0),
         }
     }
 
@@ -84,7 +82,6 @@ impl<V: Lanes> Joints<V> {
         } else {
             self.child.q.times_conj(parent.q)
         };
-        self.min_half_cos = self.min_half_cos.min(turn.w.abs());
         let pull = self.child.pull.sub(parent.pull);
         space.y = turn.v.scale_sub(spring(rope, turn.w), pull);
         self.child = parent;

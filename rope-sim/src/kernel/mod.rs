@@ -68,8 +68,6 @@ pub(crate) struct StepReport<V> {
     pub(crate) tip: Vec3<V>,
     /// Its velocity relative to node 0's (m/s).
     pub(crate) tip_velocity: Vec3<V>,
-    /// Smallest |cos| of half a joint angle, at the predictions.
-    pub(crate) min_half_cos: V,
 }
 
 /// Advances every lane by one step.
@@ -82,7 +80,7 @@ pub(crate) fn step<V: Lanes, L: Loads<V>>(
     scheme: &Scheme<V>,
     loads: &L,
 ) -> StepReport<V> {
-    let min_half_cos = eliminate(links, scratch, rope, base, scheme, loads);
+    eliminate(links, scratch, rope, base, scheme, loads);
     let mut acceleration = base.a;
     let mut alpha = base.alpha;
     let mut tip = Vec3::zero();
@@ -98,15 +96,10 @@ pub(crate) fn step<V: Lanes, L: Loads<V>>(
         tip = tip.add(span);
         tip_velocity = link.w.cross_add(span, tip_velocity);
     }
-    StepReport {
-        tip,
-        tip_velocity,
-        min_half_cos,
-    }
+    StepReport { tip, tip_velocity }
 }
 
-/// Sweep from the lead to the attach point; returns the smallest |cos| of half a
-/// joint angle.
+/// Sweep from the lead to the attach point.
 #[inline(always)]
 fn eliminate<V: Lanes, L: Loads<V>>(
     links: &mut [Link<V>],
@@ -115,7 +108,7 @@ fn eliminate<V: Lanes, L: Loads<V>>(
     base: &BaseLanes<V>,
     scheme: &Scheme<V>,
     loads: &L,
-) -> V {
+) {
     let mut outboard = Outboard::lead(rope);
     let mut joints = Joints::new(base, rope);
     if let Some(last) = links.last_mut() {
@@ -139,7 +132,6 @@ fn eliminate<V: Lanes, L: Loads<V>>(
         nearer = links_nearer;
         spaces = spaces_nearer;
     }
-    joints.min_half_cos
 }
 
 /// `w x (w x span)` (m/s²) at the extrapolated velocity: the predicted one carries the

@@ -1,86 +1,64 @@
 //! Scenes that cannot be simulated, and why.
 
 use super::{Domino, Obstacle, Scene, Shape};
-use crate::extras::Unusable;
+use crate::unusable::Unusable;
 
 impl Scene {
     /// # Errors
     /// The first obstacle, or the domino, with an unusable number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
-        for (index, obstacle) in self.obstacles.iter().enumerate() {
-            if let Some((field, value, need)) = obstacle.fault() {
-                return Err(SceneError::Obstacle {
-                    obstacle: index,
-                    field,
-                    value,
-                    need,
-                });
-            }
+        for (obstacle, of) in self.obstacles.iter().enumerate() {
+            let named = |unusable| SceneError::Obstacle { obstacle, unusable };
+            of.check().map_err(named)?;
         }
-        match self.domino.as_ref().and_then(Domino::fault) {
-            Some((field, value, need)) => Err(SceneError::Domino { field, value, need }),
-            None => Ok(()),
-        }
+        self.domino
+            .as_ref()
+            .map_or(Ok(()), Domino::check)
+            .map_err(SceneError::Domino)
     }
 }
 
-const SIZE: &str = "must be above 0 and at most 100 m";
-const FRICTION: &str = "must be from 0 to 10";
-const FINITE: &str = "must be finite";
-
-fn size(field: &'static str, value: f64) -> Option<Unusable> {
-    (!(value > 0.0 && value <= 100.0)).then_some((field, value, SIZE))
+fn check_size(field: &'static str, numbers: impl IntoIterator<Item = f64>) -> Result<(), Unusable> {
+    let need = "must be above 0 and at most 100 m";
+    Unusable::unless(field, need, numbers, |v| v > 0.0 && v <= 100.0)
 }
 
-fn friction(value: f64) -> Option<Unusable> {
-    (!(0.0..=10.0).contains(&value)).then_some(("friction", value, FRICTION))
-}
-
-fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Option<Unusable> {
-    let bad = values.into_iter().find(|v| !v.is_finite());
-    bad.map(|value| (field, value, FINITE))
+fn check_friction(number: f64) -> Result<(), Unusable> {
+    Unusable::unless("friction", "must be from 0 to 10", [number], |v| {
+        (0.0..=10.0).contains(&v)
+    })
 }
 
 impl Obstacle {
-    fn fault(&self) -> Option<Unusable> {
-        let place = self.pose.translation.vector;
-        self.shape
-            .fault()
-            .or_else(|| friction(self.friction))
-            .or_else(|| finite("translation", place.iter().copied()))
-            .or_else(|| finite("rotation", self.pose.rotation.coords.iter().copied()))
-    }
-}
-
-impl Shape {
-    fn fault(&self) -> Option<Unusable> {
-        match *self {
-            Self::HalfSpace => None,
-            Self::Box { half_m } => half_m.into_iter().find_map(|v| size("half_m", v)),
-            Self::Cylinder {
+    fn check(&self) -> Result<(), Unusable> {
+        match self.shape {
+            Shape::HalfSpace => {}
+            Shape::Box { half_m } => check_size("half_m", half_m)?,
+            Shape::Cylinder {
                 half_length_m,
                 radius_m,
-            } => size("half_length_m", half_length_m).or_else(|| size("radius_m", radius_m)),
+            } => {
+                check_size("half_length_m", [half_length_m])?;
+                check_size("radius_m", [radius_m])?;
+            }
         }
+        check_friction(self.friction)?;
+        let place = self.pose.translation.vector;
+        Unusable::unless_finite("translation", place.iter().copied())?;
+        Unusable::unless_finite("rotation", self.pose.rotation.coords.iter().copied())
     }
 }
 
 impl Domino {
-    fn fault(&self) -> Option<Unusable> {
-        size("thickness_m", self.thickness_m)
-            .or_else(|| size("width_m", self.width_m))
-            .or_else(|| size("height_m", self.height_m))
-            .or_else(|| friction(self.friction))
-            .or_else(|| finite("foot_m", self.foot_m))
-            .or_else(|| finite("facing_rad", [self.facing_rad]))
-            .or_else(|| {
-                let bad = !(self.mass_kg > 0.0 && self.mass_kg <= 100.0);
-                bad.then_some((
-                    "mass_kg",
-                    self.mass_kg,
-                    "must be above 0 and at most 100 kg",
-                ))
-            })
+    fn check(&self) -> Result<(), Unusable> {
+        check_size("thickness_m", [self.thickness_m])?;
+        check_size("width_m", [self.width_m])?;
+        check_size("height_m", [self.height_m])?;
+        check_friction(self.friction)?;
+        Unusable::unless_finite("foot_m", self.foot_m)?;
+        Unusable::unless_finite("facing_rad", [self.facing_rad])?;
+        let need = "must be above 0 and at most 100 kg";
+        Unusable::unless("mass_kg", need, [self.mass_kg], |v| v > 0.0 && v <= 100.0)
     }
 }
 
@@ -106,27 +84,16 @@ impl core::fmt::Display for SceneBody {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// An obstacle has an unusable number.
-    #[error("obstacle {obstacle}: `{field}` is {value}: {need}")]
+    #[error("obstacle {obstacle}: {unusable}")]
     Obstacle {
         /// Index of the obstacle, from 0.
         obstacle: usize,
-        /// Field of its shape or placement.
-        field: &'static str,
-        /// Value found.
-        value: f64,
-        /// What is wrong with it.
-        need: &'static str,
+        /// The number.
+        unusable: Unusable,
     },
     /// The domino has an unusable number.
-    #[error("domino: `{field}` is {value}: {need}")]
-    Domino {
-        /// Field of [`Domino`].
-        field: &'static str,
-        /// Value found.
-        value: f64,
-        /// What is wrong with it.
-        need: &'static str,
-    },
+    #[error("domino: {0}")]
+    Domino(Unusable),
     /// A rope starts deeper in an obstacle than a touch.
     #[error(
         "candidate {candidate}: at the start its rope is {depth_m} m deep in {body}, at link \
@@ -166,8 +133,9 @@ mod tests {
             change(&mut scene.obstacles[1]);
             match scene.check().unwrap_err() {
                 SceneError::Obstacle {
-                    obstacle: 1, field, ..
-                } => field,
+                    obstacle: 1,
+                    unusable,
+                } => unusable.field,
                 other => panic!("{other}"),
             }
         };

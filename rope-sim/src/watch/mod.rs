@@ -17,9 +17,9 @@ pub use rest::RestMeasures;
 use crate::algebra::Vec3;
 use crate::base_path::BasePath;
 use crate::clock::Clock;
-use crate::error::SimulateError;
 use crate::lanes::Lanes;
 use crate::state::Link;
+use crate::unusable::Unusable;
 use approach::{ApproachRecorder, Target};
 use cubic::TipStep;
 use dwell::DwellRecorder;
@@ -85,39 +85,20 @@ impl Watch {
     }
 
     /// Refuses what cannot be measured within `horizon_s`, by name.
-    pub(crate) fn check(&self, horizon_s: f64) -> Result<(), SimulateError> {
-        let refuse = |field, value, need| Err(SimulateError::Option { field, value, need });
-        let [a, b] = self.segment_m.unwrap_or_default();
-        let region = self.dwell_in.unwrap_or(BoxRegion {
-            center_m: [0.0; 3],
-            half_m: [1.0; 3],
-            yaw_rad: 0.0,
-        });
-        let points = [
-            ("watch.point_m", self.point_m.unwrap_or_default()),
-            ("watch.segment_m", a),
-            ("watch.segment_m", b),
-            ("watch.dwell_in.center_m", region.center_m),
-            ("watch.dwell_in.yaw_rad", [region.yaw_rad; 3]),
-        ];
-        for (field, point) in points {
-            if let Some(value) = point.into_iter().find(|x| !x.is_finite()) {
-                return refuse(field, value, "must be finite");
-            }
+    pub(crate) fn check(&self, horizon_s: f64) -> Result<(), Unusable> {
+        Unusable::unless_finite("watch.point_m", self.point_m.into_iter().flatten())?;
+        let ends = self.segment_m.into_iter().flatten().flatten();
+        Unusable::unless_finite("watch.segment_m", ends)?;
+        if let Some(region) = self.dwell_in {
+            Unusable::unless_finite("watch.dwell_in.center_m", region.center_m)?;
+            Unusable::unless_finite("watch.dwell_in.yaw_rad", [region.yaw_rad])?;
+            let field = "watch.dwell_in.half_m";
+            Unusable::unless(field, "must be above 0", region.half_m, |v| v > 0.0)?;
         }
-        for value in region.half_m {
-            if value.is_nan() || value <= 0.0 {
-                return refuse("watch.dwell_in.half_m", value, "must be above 0");
-            }
-        }
-        match self.rest_window_s {
-            Some(value) if !(value > 0.0 && value <= horizon_s) => refuse(
-                "watch.rest_window_s",
-                value,
-                "must be above 0 and at most the horizon",
-            ),
-            _ => Ok(()),
-        }
+        let need = "must be above 0 and at most the horizon";
+        Unusable::unless("watch.rest_window_s", need, self.rest_window_s, |v| {
+            v > 0.0 && v <= horizon_s
+        })
     }
 }
 
@@ -277,10 +258,7 @@ mod tests {
             ("watch.rest_window_s", lately(nan)),
         ];
         for (name, watch) in wrong {
-            let Err(SimulateError::Option { field, .. }) = watch.check(2.0) else {
-                panic!("{name} was accepted");
-            };
-            assert_eq!(field, name);
+            assert_eq!(watch.check(2.0).unwrap_err().field, name);
         }
     }
 }
