@@ -62,7 +62,7 @@ impl<V: Lanes> Elimination<V> {
     }
 }
 
-/// What a step tells about itself.
+/// What a step reports.
 pub(crate) struct StepReport<V> {
     /// Lead relative to node 0 (m).
     pub(crate) tip: Vec3<V>,

@@ -279,15 +279,18 @@ mod tests {
 
     #[test]
     fn bad_logs_are_named() {
-        let (times, mut joints) = samples(0.0);
-        assert!(matches!(
-            MeasuredArm::new(&times[1..], &joints, Pole::default()),
-            Err(MotionError::LengthMismatch { .. })
-        ));
-        joints[12][3] = f64::NAN;
-        assert_eq!(
-            MeasuredArm::new(&times, &joints, Pole::default()).unwrap_err(),
-            MotionError::NotFinite { index: 12 }
-        );
+        let (times, joints) = samples(0.0);
+        let refusal = |change: fn(&mut Vec<f64>, &mut Vec<JointVector>)| {
+            let (mut times, mut joints) = (times.clone(), joints.clone());
+            change(&mut times, &mut joints);
+            MeasuredArm::new(&times, &joints, Pole::default()).unwrap_err()
+        };
+        let shorter = refusal(|times, _| times.truncate(9));
+        assert!(matches!(shorter, MotionError::LengthMismatch { .. }));
+        let nan = refusal(|_, joints| joints[12][3] = f64::NAN);
+        assert_eq!(nan, MotionError::NotFinite { index: 12 });
+        let backwards = refusal(|times, _| times[6] = times[4]);
+        assert!(matches!(backwards, MotionError::TimeOrder { index: 6, .. }));
+        assert!(backwards.to_string().contains("sample 6"), "{backwards}");
     }
 }
