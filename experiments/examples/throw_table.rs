@@ -9,12 +9,11 @@ use arm_model::Limits;
 use arm_model::limits::LimitsSpec;
 use clap::Parser;
 use experiments::trials::{mean, quantile};
-use planner::process::PlannerConfig;
-use planner::ropes::{random_rope, random_strike_target};
-use planner::tasks::{
-    Belief, PlanOptions, PlanRequest, Robustness, ThrowSimulator, plan_throw, simulator_for,
+use planner::PlannerConfig;
+use planner::plan::{
+    Dimensions, PlanOptions, PlanRequest, Robustness, ThrowSimulator, simulator_for,
 };
-use planner::trajopt::Dimensions;
+use planner::ropes::{random_rope, random_strike_target};
 use shared_types::Task;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -80,28 +79,25 @@ fn main() {
             Task::Lob => [0.85, 0.0, 0.20],
             Task::Drape => [0.75, 0.0, 0.30],
         };
-        let task = config.task(kind, target_m);
-        let request = PlanRequest {
-            rope: random_rope(seed),
-            limits: limits.clone(),
-            cell: Cell::default(),
-            options: PlanOptions {
-                dimensions: if args.full {
-                    Dimensions::Full
-                } else {
-                    Dimensions::Planar
-                },
-                segment_stretch_max: args.stretch,
-                seed,
-                searches: args.searches,
-                threads: args.threads,
-                ..config.search
+        let options = PlanOptions {
+            dimensions: if args.full {
+                Dimensions::Full
+            } else {
+                Dimensions::Planar
             },
-            belief: Belief::default(),
-            following: None,
+            segment_stretch_max: args.stretch,
+            seed,
+            searches: args.searches,
+            threads: args.threads,
+            ..config.search
         };
+        let request = PlanRequest {
+            limits: limits.clone(),
+            ..PlanRequest::new(config.goal(kind, target_m), &random_rope(seed), options)
+        };
+        let task = request.goal.task();
         let start = Instant::now();
-        let planned = match plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(())) {
+        let planned = match planner::plan(&request, &mut |_| ControlFlow::Continue(())) {
             Ok(planned) => planned,
             Err(error) => {
                 println!("rope {seed}: {error}");
@@ -115,7 +111,7 @@ fn main() {
         let throws: Vec<_> = ropes.iter().map(|r| (r, &planned.trajectory)).collect();
         let simulator = ThrowSimulator {
             tail_s: task.config().observed_s,
-            ..simulator_for(&*task, &request.rope, &request.cell, &request.options)
+            ..simulator_for(task, &request.rope, &request.cell, &request.options)
         };
         let outcomes = simulator.run(&throws).expect("a planned throw simulates");
         let squares: f64 = outcomes.iter().map(|o| task.error_m(o).powi(2)).sum();
@@ -123,7 +119,7 @@ fn main() {
             .iter()
             .zip(&outcomes)
             .filter(|(r, o)| task.judge(r, o).success);
-        exact.push(planned.error_m * 100.0);
+        exact.push(planned.predicted_error_m * 100.0);
         off.push((squares / outcomes.len() as f64).sqrt() * 100.0);
         success.push(f64::from(u8::from(planned.verdict.success)));
         successes.push(good.count() as f64 / ropes.len() as f64);

@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
-use planner::sysid::Method;
+use planner::identify::Method;
 use std::path::PathBuf;
 
 /// Reproduce a result of the paper, or measure how fast this machine runs a part of the

@@ -2,9 +2,8 @@
 
 use cli_output::{Failure, OrInput, Outcome};
 use experiments::trials::TrialRig;
-use planner::observation::{ObserveError, ObservedPoints};
+use planner::identify::Method;
 use planner::phi::PhiNet;
-use planner::sysid::Method;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -19,25 +18,13 @@ pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
     }
 }
 
-/// [`network`] for what a camera sees.
-///
-/// # Errors
-/// As [`network`], or a network that reads what no camera shows.
-pub fn network_for_camera(model: Option<&Path>) -> Outcome<PhiNet> {
-    let net = network(model)?;
-    match net.metadata().features.points {
-        ObservedPoints::ArcLength => Ok(net),
-        ObservedPoints::LinkCentres => Err(Failure::input(ObserveError::NeedsLinkCentres)),
-    }
-}
-
 /// Gives a rig the network if the method asks one, and lets it film what the network
 /// reads.
 ///
 /// # Errors
 /// As [`network`], a model for a method that asks none, or one that a fit cannot follow.
 pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) -> Outcome {
-    if !matches!(method, Method::Network | Method::Hybrid) {
+    if !method.asks_network() {
         return match model {
             Some(path) => Err(Failure::input(anyhow::anyhow!(
                 "--model {} is for --method nn and hybrid only",
@@ -49,7 +36,7 @@ pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) ->
     // A fit looks at keypoints as a camera gives them.
     let net = match method {
         Method::Network => network(model)?,
-        _ => network_for_camera(model)?,
+        _ => network(model)?.for_camera().or_input()?,
     };
     rig.points = net.metadata().features.points;
     rig.network = Some(Arc::new(net));

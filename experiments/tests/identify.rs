@@ -4,10 +4,11 @@
 
 use arm_model::{JointTrajectory, Limits, Pole};
 use experiments::trials::{TrialRig, mean, outside_rope, summarise, trial_rope};
-use planner::filming::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
-use planner::observation::ObservedPoints;
+use planner::identify;
+use planner::identify::{IdentifyError, IdentifyOptions, Method};
+use planner::observation::{Appearance, Observation, ObservedPoints};
 use planner::ropes::random_rope;
-use planner::sysid::{Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify};
+use planner::synthetic::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::wiggle::{WiggleConfig, wiggle};
 use rope_sim::{PlannedArm, PoseRow, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
@@ -24,6 +25,7 @@ fn wiggling_arm() -> PlannedArm {
 
 fn quick(seed: u64, threads: usize) -> IdentifyOptions {
     IdentifyOptions {
+        method: Method::HybridSearch,
         seed,
         threads,
         ..IdentifyOptions::default()
@@ -49,8 +51,8 @@ fn both_methods_find_planted_parameters_in_noise() {
     let arm = wiggling_arm();
     let camera = side_camera();
     for (seed, method) in [
-        (21, Method::Hybrid),
-        (22, Method::Hybrid),
+        (21, Method::HybridSearch),
+        (22, Method::HybridSearch),
         (22, Method::Cmaes),
     ] {
         let rope = random_rope(seed);
@@ -78,7 +80,7 @@ fn both_methods_find_planted_parameters_in_noise() {
             camera_roll_std_rad: 1e-3,
             ..quick(seed, 2)
         };
-        let found = identify(&observation, &options, &mut |p| {
+        let found = identify(&observation, &options, None, &mut |p| {
             last = p.generation;
             ControlFlow::Continue(())
         })
@@ -97,7 +99,7 @@ fn both_methods_find_planted_parameters_in_noise() {
         assert!(off_m < 4.0 * found.std_dev[1].unwrap());
         // Neither was the width of the rope seen nor does motion tell it.
         assert!(found.std_dev[4].is_none() && found.std_dev[8].is_none());
-        assert!(!found.novelty.is_outside(), "{found:?}");
+        assert!(!found.out_of_distribution.is_outside(), "{found:?}");
     }
 }
 
@@ -151,9 +153,9 @@ fn a_rope_like_a_chain_is_noticed_with_the_reason() {
     let rope = outside_rope(1, 0);
     let filmed = rig.film(&rope, 1, 0).unwrap();
     let found = rig.fit(&filmed, 0, &quick(1, 2)).unwrap();
-    assert!(found.novelty.is_outside(), "{found:?}");
+    assert!(found.out_of_distribution.is_outside(), "{found:?}");
     assert_eq!(found.method.as_str(), "hybrid-wide");
-    assert!(!found.novelty.reasons.is_empty());
+    assert!(!found.out_of_distribution.reasons.is_empty());
 }
 
 #[test]
@@ -179,7 +181,7 @@ fn the_estimate_does_not_depend_on_threads() {
     let rig = TrialRig::new(&WiggleConfig::default()).unwrap();
     let noise = Randomisation::default().draw(7, 5);
     let film = filmed(&random_rope(5), &noise);
-    for method in [Method::Hybrid, Method::Cmaes] {
+    for method in [Method::HybridSearch, Method::Cmaes] {
         let run = |threads| {
             let options = IdentifyOptions {
                 method,
@@ -218,7 +220,7 @@ fn useless_films_are_refused_with_the_reason() {
             motion,
             appearance: Appearance::default(),
         };
-        identify(&observation, &quick(0, 2), &mut |_| {
+        identify(&observation, &quick(0, 2), None, &mut |_| {
             panic!("the film must be refused before any simulation")
         })
         .unwrap_err()
@@ -300,7 +302,7 @@ fn the_recorded_rope_is_identified_from_its_true_keypoints() {
             lead_radius_m: Some(0.02),
         },
     };
-    let found = identify(&observation, &IdentifyOptions::default(), &mut |_| {
+    let found = identify(&observation, &quick(0, 2), None, &mut |_| {
         ControlFlow::Continue(())
     })
     .unwrap();

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use planner::service::{PlannerEvent, PlannerRequest};
 use shared_types::ipc::message::{
-    CameraEvent, CameraRequest, ControllerEvent, ControllerRequest, PlannerEvent, PlannerRequest,
-    RigEvent, RigRequest,
+    CameraEvent, CameraRequest, ControllerEvent, ControllerRequest, RigEvent, RigRequest,
 };
 use shared_types::ipc::rpc::{decode, encode};
 use shared_types::ipc::{CauseRecord, CycleRecord, InputRecord};

@@ -7,11 +7,11 @@
 )]
 
 use arm_model::Pole;
-use planner::filming::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
-use planner::observation::{ObservedPoints, WIDTHS, WiggleFeatures};
+use planner::features::{WIDTHS, WiggleFeatures};
+use planner::observation::{Observation, ObservedPoints};
 use planner::phi::{INPUTS, OUTPUTS, PARITY, PhiNet, difference};
 use planner::ropes::random_rope;
-use planner::sysid::Observation;
+use planner::synthetic::{FilmNoise, FilmTiming, KeypointLayout, film, side_camera};
 use planner::wiggle::wiggle;
 use rope_sim::PlannedArm;
 use std::path::Path;
@@ -71,7 +71,7 @@ fn the_shipped_networks_give_what_an_onnx_runtime_gives() {
                 found.mean,
                 found.log_variance,
                 found.embedding,
-                vec![found.oddity],
+                vec![found.out_of_distribution],
             ];
             for ((expected, found), output) in expected.iter().zip(&found).zip(OUTPUTS) {
                 let off = difference(expected, found);

@@ -5,10 +5,10 @@
 
 use arm_model::Cell;
 use arm_model::Limits;
-use planner::ropes::random_rope;
-use planner::tasks::{
+use planner::plan::{
     Belief, PlanOptions, PlanRequest, ThrowConfig, ThrowOutcome, ThrowTask, plan_throw, verdict,
 };
+use planner::ropes::random_rope;
 use shared_types::{RopeParams, Verdict};
 use std::ops::ControlFlow;
 

@@ -1,27 +1,37 @@
-//! Identifies rope parameters from one filmed wiggle and plans throws.
+//! Identifies rope parameters from one filmed wiggle and plans throws: [`identify`](fn@identify),
+//! [`plan`](fn@plan) and [`settle`](fn@settle), called in this process or asked of
+//! [`service`] with the same requests.
 //!
-//! Two searches share one strategy, [`cmaes`]: [`sysid`] fits the rope's
-//! parameters to keypoints (the paper's Φ-CMA-ES), and [`tasks`] finds the joint
-//! waypoints of a throw (CMA-ES-traj) with the pieces of [`trajopt`] and
-//! [`collide`]. [`wiggle`] makes the motion that is filmed. [`response`] finds how
-//! the arm follows its setpoints, and [`preflight`] says what it will make of a plan. [`filming`] makes recordings of known ropes with
+//! Two searches share one strategy, [`cmaes`]: [`mod@identify`] fits the rope's
+//! parameters to keypoints (the paper's Φ-CMA-ES), [`mod@plan`] finds the joint
+//! waypoints of a throw (CMA-ES-traj) clear of what [`collide`] knows, and
+//! [`mod@settle`] the move between wiggle and throw after which the rope hangs still.
+//! [`wiggle`] makes the motion that is filmed. [`arm_response`] finds how
+//! the arm follows its setpoints, and [`preflight`] what it will make of a plan.
+//! [`synthetic`] makes recordings of known ropes with
 //! the errors of real ones. The physics is that of `rope-sim`.
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
-pub mod calm;
+pub mod arm_response;
 pub mod cmaes;
 pub mod collide;
-pub mod filming;
+mod config;
+pub mod features;
+pub mod identify;
 pub mod observation;
 pub mod phi;
+pub mod plan;
 pub mod preflight;
-pub mod process;
-pub mod response;
 pub mod ropes;
-pub mod sysid;
-pub mod tasks;
-pub mod trajopt;
+pub mod service;
+pub mod settle;
+pub mod synthetic;
 pub mod wiggle;
 pub mod wiggle_design;
 pub mod workers;
+
+pub use config::PlannerConfig;
+pub use identify::identify;
+pub use plan::plan;
+pub use settle::settle;

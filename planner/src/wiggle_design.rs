@@ -2,8 +2,8 @@
 //! limits and clear of arm and column.
 
 use crate::cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
+use crate::identify::{IdentifyError, WiggleInformation, information};
 use crate::ropes::random_rope;
-use crate::sysid::{IdentifyError, WiggleInformation, information};
 use crate::wiggle::{WiggleConfig, WiggleError, clearance, wiggle};
 use arm_model::{Cell, Limits};
 use rope_sim::PlannedArm;
@@ -173,7 +173,7 @@ pub fn optimise(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filming::side_camera;
+    use crate::synthetic::side_camera;
 
     #[test]
     fn a_wider_wiggle_tells_more() {

@@ -268,7 +268,7 @@ pub struct FitCircumstances {
 
 /// How far a rope is from those the ranges know.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Novelty {
+pub struct OutOfDistribution {
     /// Score: about how many deviations the rope is outside.
     pub score: f64,
     /// Score from which it counts as outside.
@@ -277,7 +277,7 @@ pub struct Novelty {
     pub reasons: Vec<String>,
 }
 
-impl Novelty {
+impl OutOfDistribution {
     /// Whether the rope is not one of those the ranges know.
     #[must_use]
     pub fn is_outside(&self) -> bool {
@@ -309,7 +309,7 @@ pub struct RopeEstimate {
     /// Noise and camera as the fit found them.
     pub circumstances: FitCircumstances,
     /// Whether the rope is one of those the ranges know.
-    pub novelty: Novelty,
+    pub out_of_distribution: OutOfDistribution,
 }
 
 #[cfg(test)]

@@ -12,8 +12,10 @@ mod support;
 use arm_model::Limits;
 use arm_model::Pole;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
-use planner::filming::{FilmTiming, KeypointLayout, Randomisation, film as film_rope, side_camera};
 use planner::ropes::{TRIAL_SALT, outside_rope, trial_rope};
+use planner::synthetic::{
+    FilmTiming, KeypointLayout, Randomisation, film as film_rope, side_camera,
+};
 use planner::wiggle::{WiggleConfig, wiggle};
 use rope_sim::PlannedArm;
 use shared_types::RopeParams;

@@ -147,10 +147,7 @@ const REFUSED: &[(&str, &[&str])] = &[
     ("demo --target 0,0,0.2", &["arm's base"]),
     ("demo --rig-config none.toml", &["none.toml"]),
     ("wiggle --dry-run --csv no/w.csv", &["no/w.csv", "folder"]),
-    (
-        "wiggle --arm no..host --dry-run",
-        &["no..host"],
-    ),
+    ("wiggle --arm no..host --dry-run", &["no..host"]),
     ("record none", &["none", "no run folder"]),
 ];
 

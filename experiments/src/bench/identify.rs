@@ -7,8 +7,8 @@ use crate::network::{network, with_network};
 use cli_output::table::numbers;
 use cli_output::{Machine, OrInput, Outcome, Stage};
 use experiments::trials::{TrialRig, trial_rope};
-use planner::filming::Filmed;
-use planner::sysid::{IdentifyOptions, Method};
+use planner::identify::{IdentifyOptions, Method};
+use planner::synthetic::Filmed;
 use serde::Serialize;
 use serde_json::{Value, json};
 

@@ -3,18 +3,14 @@
 use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
-use arm_model::Cell;
-use arm_model::Limits;
 use cli_output::table::numbers;
 use cli_output::{OrInput, Outcome, Stage};
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
+use planner::plan::{PlanOptions, PlanRequest, ThrowSimulator, simulator_for};
 use planner::ropes::random_rope;
-use planner::tasks::{
-    Belief, PlanOptions, PlanRequest, Planned, ThrowSimulator, plan_throw, simulator_for,
-};
 use serde::Serialize;
 use serde_json::{Value, json};
-use shared_types::Task;
+use shared_types::{Plan, Task};
 use std::ops::ControlFlow;
 
 /// Longest wall time wanted of one plan on two cores (s), and the target (m).
@@ -51,24 +47,26 @@ fn measure(
     (kind, limit_wall_s, target_m): (Task, f64, [f64; 3]),
 ) -> Outcome<Row> {
     let repeats = if args.quick { 1 } else { 3 };
-    let task = config.task(kind, target_m);
-    let request = PlanRequest {
-        rope: random_rope(args.seed),
-        limits: Limits::default(),
-        cell: Cell::default(),
-        options: PlanOptions {
-            seed: args.seed,
-            searches: 1,
-            generations: args.quick.then_some(3),
-            ..config.search
-        },
-        belief: Belief::default(),
-        following: None,
+    let options = PlanOptions {
+        seed: args.seed,
+        searches: 1,
+        generations: args.quick.then_some(3),
+        ..config.search
     };
-    let plan = || plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()));
-    let (whole, planned): (_, Planned) = least(repeats, plan).or_failed()?;
+    let request = PlanRequest::new(
+        config.goal(kind, target_m),
+        &random_rope(args.seed),
+        options,
+    );
+    let plan = || planner::plan(&request, &mut |_| ControlFlow::Continue(()));
+    let (whole, planned): (_, Plan) = least(repeats, plan).or_failed()?;
     let throws = vec![(&request.rope, &planned.trajectory); BATCH];
-    let simulator = simulator_for(&*task, &request.rope, &request.cell, &request.options);
+    let simulator = simulator_for(
+        request.goal.task(),
+        &request.rope,
+        &request.cell,
+        &request.options,
+    );
     let blind = ThrowSimulator {
         contact_period_s: NEVER_S,
         ..simulator.clone()

@@ -4,12 +4,12 @@
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;
 use anyhow::{Context, anyhow};
-use arm_model::{Cell, JointTrajectory, Limits};
+use arm_model::JointTrajectory;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome, interrupted};
 use experiments::trials::{FidelityConfig, FidelityRow, mean, middle_rope};
-use planner::process::PlannerConfig;
-use planner::tasks::{Belief, PlanOptions, PlanRequest, plan_throw};
+use planner::PlannerConfig;
+use planner::plan::{PlanOptions, PlanRequest};
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::Task;
@@ -22,19 +22,12 @@ const TARGET_M: [f64; 3] = [1.0, 0.0, 0.4];
 
 /// A throw planned for the middle of the ranges: no rope compared knows it.
 fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
-    let request = PlanRequest {
-        rope: middle_rope(),
-        limits: Limits::default(),
-        cell: Cell::default(),
-        options: PlanOptions {
-            seed,
-            ..config.search
-        },
-        belief: Belief::default(),
-        following: None,
+    let options = PlanOptions {
+        seed,
+        ..config.search
     };
-    let task = config.task(Task::Strike, TARGET_M);
-    let plan = plan_throw(&*task, &request, &mut |_| ControlFlow::Continue(()))?;
+    let request = PlanRequest::new(config.goal(Task::Strike, TARGET_M), &middle_rope(), options);
+    let plan = planner::plan(&request, &mut |_| ControlFlow::Continue(()))?;
     Ok(plan.trajectory)
 }
 

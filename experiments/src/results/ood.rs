@@ -28,7 +28,12 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let all = format!("{} ropes", trials.len());
     let (inside, outside): (Vec<Trial>, Vec<Trial>) =
         trials.into_iter().partition(|t| t.index.is_multiple_of(2));
-    let scores = |trials: &[Trial]| trials.iter().map(|t| t.novelty).collect::<Vec<f64>>();
+    let scores = |trials: &[Trial]| {
+        trials
+            .iter()
+            .map(|t| t.out_of_distribution)
+            .collect::<Vec<f64>>()
+    };
     let area = area_under_curve(&scores(&outside), &scores(&inside));
     let curve = |name: &str, trials: &[Trial]| Curve {
         name: name.to_owned(),

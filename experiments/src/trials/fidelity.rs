@@ -9,8 +9,8 @@ use super::{KEYPOINTS, TrialError, TrialRig, mean, trial_rope};
 use arm_model::JointTrajectory;
 use arm_model::Pole;
 use nalgebra::Vector3;
-use planner::filming::{FilmTiming, Filmed, RopeFilm, project};
-use planner::sysid::IdentifyOptions;
+use planner::identify::IdentifyOptions;
+use planner::synthetic::{FilmTiming, Filmed, RopeFilm, project};
 use rope_sim::{
     AirDrag, AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, RopeExtras, SimOptions,
     SimulateError, Start, Watch, roll_out,

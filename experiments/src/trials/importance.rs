@@ -4,7 +4,7 @@
 use super::strike_case::StrikeCase;
 use super::thrower::Thrower;
 use super::trial_rope;
-use planner::tasks::{Belief, PlanError};
+use planner::plan::{PlanError, PosteriorEnsemble};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
 use shared_types::rope::ROPE_PARAMETERS;
@@ -48,7 +48,7 @@ fn mixed(found: &RopeParams, identified: &[usize], other: &RopeParams) -> RopePa
 
 /// Errors of throws planned with random parameters besides the identified ones.
 fn errors_with(
-    thrower: &Thrower<'_>,
+    thrower: &Thrower,
     found: &RopeParams,
     identified: &[usize],
     seed: u64,
@@ -56,7 +56,7 @@ fn errors_with(
     let mut errors_m = Vec::with_capacity(DRAWS);
     for attempt in 0..ATTEMPTS {
         let rope = mixed(found, identified, &trial_rope(seed ^ OTHER, attempt));
-        match thrower.plan(&rope, 1, Belief::default()) {
+        match thrower.plan(&rope, 1, PosteriorEnsemble::default()) {
             Err(PlanError::OnlyCollisions { .. } | PlanError::Unreachable { .. }) => {}
             planned => errors_m.push(thrower.throw(&planned?)?.error_m),
         }
@@ -72,9 +72,9 @@ impl ImportanceTrial {
     ///
     /// # Errors
     /// What planning refuses.
-    pub fn of(case: &StrikeCase<'_>) -> Result<Self, PlanError> {
+    pub fn of(case: &StrikeCase) -> Result<Self, PlanError> {
         let (thrower, found) = (&case.thrower, &case.found.params);
-        let whole = thrower.plan(found, 1, Belief::default())?;
+        let whole = thrower.plan(found, 1, PosteriorEnsemble::default())?;
         let mut partly_m = [const { Vec::new() }; CONDITIONS.len()];
         for (errors_m, identified) in partly_m.iter_mut().zip(CONDITIONS) {
             let seed = case.seed.wrapping_add(case.index);

@@ -2,9 +2,9 @@
 
 use super::thrower::Thrower;
 use super::{FailedTrial, TrialRig, alone, in_parallel};
-use planner::process::PlannerConfig;
-use planner::sysid::IdentifyOptions;
-use planner::tasks::{Belief, PlanError, PlanOptions};
+use planner::PlannerConfig;
+use planner::identify::IdentifyOptions;
+use planner::plan::{PlanError, PlanOptions, PosteriorEnsemble};
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, Task, Verdict};
 
@@ -98,12 +98,16 @@ pub struct LobDrapeTrial {
     pub drape: Option<Judged>,
 }
 
-fn judged(thrower: &Thrower<'_>, found: &RopeParams) -> Result<Option<Judged>, PlanError> {
-    let planned = match thrower.plan(found, thrower.options.searches, Belief::default()) {
+fn judged(thrower: &Thrower, found: &RopeParams) -> Result<Option<Judged>, PlanError> {
+    let planned = match thrower.plan(
+        found,
+        thrower.options.searches,
+        PosteriorEnsemble::default(),
+    ) {
         Err(PlanError::OnlyCollisions { .. }) => return Ok(None),
         planned => planned?,
     };
-    let task = thrower.task;
+    let task = thrower.goal.task();
     Ok(thrower.outcome(&planned)?.map(|o| Judged {
         verdict: task.judge(&thrower.truth, &o),
         predicted: planned.verdict,
@@ -136,9 +140,8 @@ pub fn lob_drape_trials(
         };
         let found = rig.fit(&filmed, index, &options)?.params;
         let judge = |kind, target_m| {
-            let task = config.task(kind, target_m);
             let thrower = Thrower {
-                task: &*task,
+                goal: config.goal(kind, target_m),
                 options: PlanOptions {
                     seed: seed ^ index,
                     threads: 1,

@@ -28,16 +28,16 @@ pub use summary::{ParameterRow, RatioRow, SysidSummary, summarise};
 pub use thrower::Strikes;
 pub use wiggles::{AblatedWiggle, ablated_wiggles};
 
-use planner::filming::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
-use planner::observation::ObservedPoints;
-use planner::phi::{HybridError, NetworkError, PhiNet, identify_by_network, identify_with_network};
+use planner::observation::{Observation, ObservedPoints};
+use planner::phi::{PhiNet, PredictError};
 use planner::ropes::TRIAL_SALT;
 pub use planner::ropes::{outside_rope, trial_rope};
+use planner::synthetic::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
 
 use arm_model::Limits;
 use arm_model::Pole;
-use planner::sysid::{FitProgress, IdentifyOptions, Method, Observation, identify};
-use planner::tasks::PlanError;
+use planner::identify::{IdentifyError, IdentifyOptions, Method};
+use planner::plan::PlanError;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
 use planner::workers::map_in_order;
 use rope_sim::{PlannedArm, SimulateError};
@@ -61,8 +61,8 @@ pub struct TrialRig {
     pub randomisation: Randomisation,
     /// Where on the rope the keypoints of its films lie.
     pub points: ObservedPoints,
-    /// The network, for [`planner::sysid::Method::Network`] and what the hybrid starts
-    /// from.
+    /// The network, for [`Method::Network`] and what the hybrid starts from; without one
+    /// the hybrid starts from a search.
     pub network: Option<Arc<PhiNet>>,
 }
 
@@ -77,10 +77,10 @@ pub enum TrialError {
     EmptyFilm,
     /// Network or fit failed.
     #[error(transparent)]
-    Identify(#[from] HybridError),
+    Identify(#[from] IdentifyError),
     /// The network gave no answer.
     #[error(transparent)]
-    Network(#[from] NetworkError),
+    Network(#[from] PredictError),
     /// A throw could not be planned.
     #[error(transparent)]
     Plan(Box<PlanError>),
@@ -115,9 +115,9 @@ pub struct Trial {
     pub interval_90: [[f64; 2]; ROPE_PARAMETERS],
     /// Distance of the fit to the keypoints (px).
     pub residual_px: f64,
-    /// Score of the novelty, and whether the rope was taken for one outside the ranges.
-    pub novelty: f64,
-    /// Whether it was.
+    /// Out-of-distribution score.
+    pub out_of_distribution: f64,
+    /// Whether the rope was taken for one outside the ranges.
     pub outside: bool,
     /// Method as the estimate names it.
     pub method: String,
@@ -185,16 +185,15 @@ impl TrialRig {
             noise_min_px: 0.0,
             camera_position_std_m: self.randomisation.camera_position_m.max(1e-4),
             camera_look_at_std_m: self.randomisation.camera_lookat_m.max(1e-4),
+            method: match (options.method, &self.network) {
+                (Method::Hybrid, None) => Method::HybridSearch,
+                (method, _) => method,
+            },
             ..*options
         };
-        let quiet = &mut |_: FitProgress| ControlFlow::Continue(());
-        Ok(match &self.network {
-            Some(net) if options.method == Method::Network => {
-                identify_by_network(net, &observation, &options)?
-            }
-            Some(net) => identify_with_network(net, &observation, &options, quiet)?,
-            None => identify(&observation, &options, quiet).map_err(HybridError::from)?,
-        })
+        let network = self.network.as_deref();
+        let go_on = &mut |_| ControlFlow::Continue(());
+        Ok(planner::identify(&observation, &options, network, go_on)?)
     }
 }
 
@@ -208,8 +207,8 @@ impl Trial {
             found: found.params.to_array(),
             interval_90: found.posterior.interval_90,
             residual_px: found.residual_px,
-            novelty: found.novelty.score,
-            outside: found.novelty.is_outside(),
+            out_of_distribution: found.out_of_distribution.score,
+            outside: found.out_of_distribution.is_outside(),
             method: found.method.to_string(),
             simulations: found.simulations,
         }

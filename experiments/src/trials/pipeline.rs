@@ -4,7 +4,7 @@
 use super::strike_case::StrikeCase;
 use super::thrower::Strikes;
 use super::trial_rope;
-use planner::tasks::{Belief, PlanError};
+use planner::plan::{PlanError, PosteriorEnsemble};
 use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
 
@@ -40,16 +40,16 @@ impl PipelineTrial {
     ///
     /// # Errors
     /// What planning refuses.
-    pub fn of(case: &StrikeCase<'_>) -> Result<Self, PlanError> {
+    pub fn of(case: &StrikeCase) -> Result<Self, PlanError> {
         let (thrower, found) = (&case.thrower, case.found.params);
         let truth = thrower.truth;
-        let once = thrower.plan(&truth, 1, Belief::default())?;
+        let once = thrower.plan(&truth, 1, PosteriorEnsemble::default())?;
         let true_rope = thrower.throw(&once)?;
         // A further search begins only where the first was not good enough.
-        let true_rope_longer = if once.error_m <= thrower.options.good_enough_m {
+        let true_rope_longer = if once.predicted_error_m <= thrower.options.good_enough_m {
             true_rope
         } else {
-            thrower.throw(&thrower.plan(&truth, SEARCHES, Belief::default())?)?
+            thrower.throw(&thrower.plan(&truth, SEARCHES, PosteriorEnsemble::default())?)?
         };
         let other = trial_rope(case.seed ^ OTHER, case.index);
         Ok(Self {
@@ -59,8 +59,12 @@ impl PipelineTrial {
             found: found.to_array(),
             true_rope,
             true_rope_longer,
-            identified: thrower.throw(&thrower.plan(&found, SEARCHES, Belief::default())?)?,
-            random: thrower.throw(&thrower.plan(&other, 1, Belief::default())?)?,
+            identified: thrower.throw(&thrower.plan(
+                &found,
+                SEARCHES,
+                PosteriorEnsemble::default(),
+            )?)?,
+            random: thrower.throw(&thrower.plan(&other, 1, PosteriorEnsemble::default())?)?,
         })
     }
 }

@@ -3,7 +3,7 @@
 
 use super::strike_case::StrikeCase;
 use super::thrower::Strikes;
-use planner::tasks::{Belief, PlanError};
+use planner::plan::{PlanError, PosteriorEnsemble};
 use serde::{Deserialize, Serialize};
 use shared_types::ErrorForecast;
 
@@ -52,11 +52,17 @@ impl RobustTrial {
     ///
     /// # Errors
     /// What planning refuses.
-    pub fn of(case: &StrikeCase<'_>) -> Result<Self, PlanError> {
+    pub fn of(case: &StrikeCase) -> Result<Self, PlanError> {
         let (thrower, found) = (&case.thrower, &case.found);
         let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
             let seed = thrower.options.seed;
-            let drawn = Belief::drawn(&found.params, &found.posterior, optimised, FORECAST, seed);
+            let drawn = PosteriorEnsemble::drawn(
+                &found.params,
+                &found.posterior,
+                optimised,
+                FORECAST,
+                seed,
+            );
             let planned = thrower.plan(&found.params, SEARCHES, drawn)?;
             Ok(Foreseen {
                 strike: thrower.throw(&planned)?,

@@ -1,7 +1,7 @@
 //! What in a film the network's answer hangs on, rope by rope.
 
 use super::{FailedTrial, SensitivityMap, TrialRig, in_parallel, trial_rope};
-use planner::phi::{NetworkError, PhiNet};
+use planner::phi::{PhiNet, PredictError};
 use serde::{Deserialize, Serialize};
 
 /// One filmed rope.
@@ -27,8 +27,7 @@ pub fn sensitivity_trials(
     in_parallel(indices, threads, |index| {
         let filmed = rig.film(&trial_rope(seed, index), seed, index)?;
         let features = net.see(&rig.observation(&filmed));
-        let map = SensitivityMap::measure(net, &features.map_err(NetworkError::from)?);
-        let map = map.map_err(NetworkError::from)?;
-        Ok(SensitivityTrial { index, map })
+        let map = SensitivityMap::measure(net, &features.map_err(PredictError::from)?);
+        Ok(SensitivityTrial { index, map: map? })
     })
 }

@@ -1,7 +1,7 @@
 //! Sensitivity of the network's answer: how far each parameter moves when a
 //! keypoint is seen elsewhere for a moment.
 
-use planner::observation::WiggleFeatures;
+use planner::features::WiggleFeatures;
 use planner::phi::{PhiNet, PredictError};
 use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;

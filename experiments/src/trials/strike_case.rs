@@ -3,15 +3,15 @@
 
 use super::thrower::Thrower;
 use super::{FailedTrial, TrialRig, alone, in_parallel, trial_rope};
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
+use planner::identify::IdentifyOptions;
+use planner::plan::{PlanError, PlanOptions};
 use planner::ropes::random_strike_target;
-use planner::sysid::IdentifyOptions;
-use planner::tasks::{PlanError, PlanOptions};
 use shared_types::{RopeEstimate, Task};
 
 /// One rope and target.
 #[derive(Debug)]
-pub struct StrikeCase<'a> {
+pub struct StrikeCase {
     /// Seed of the trials.
     pub(super) seed: u64,
     /// Index of the trial under its seed.
@@ -21,7 +21,7 @@ pub struct StrikeCase<'a> {
     /// The rope as identified from its film.
     pub(super) found: RopeEstimate,
     /// Plans, and throws with the true rope.
-    pub(super) thrower: Thrower<'a>,
+    pub(super) thrower: Thrower,
 }
 
 /// Makes a trial of each of these indices with `make`.
@@ -33,21 +33,20 @@ pub fn strike_trials<T: Send>(
     config: &PlannerConfig,
     options: &IdentifyOptions,
     indices: &[u64],
-    make: impl Fn(&StrikeCase<'_>) -> Result<T, PlanError> + Sync,
+    make: impl Fn(&StrikeCase) -> Result<T, PlanError> + Sync,
 ) -> Result<Vec<T>, FailedTrial> {
     let seed = options.seed;
     in_parallel(indices, options.threads, |index| {
         let truth = trial_rope(seed, index);
         let target_m = random_strike_target((seed << 32) ^ index);
         let filmed = rig.film(&truth, seed, index)?;
-        let task = config.task(Task::Strike, target_m);
         let case = StrikeCase {
             seed,
             index,
             target_m,
             found: rig.fit(&filmed, index, &alone(options))?,
             thrower: Thrower {
-                task: &*task,
+                goal: config.goal(Task::Strike, target_m),
                 options: PlanOptions {
                     seed: seed ^ index,
                     threads: 1,

@@ -131,7 +131,7 @@ mod tests {
             found: truth.map(|v| v * factor),
             interval_90: truth.map(|v| [v * low, v * 1.2]),
             residual_px: 1.0,
-            novelty: 0.0,
+            out_of_distribution: 0.0,
             outside: low > 1.0,
             method: "hybrid-search".to_owned(),
             simulations: 10,

@@ -7,7 +7,7 @@
 //! frames around each.
 
 use super::net::RawOutputs;
-use crate::observation::{FeatureDefinition, WIDTHS};
+use crate::features::{FeatureDefinition, WIDTHS};
 use shared_types::rope::ROPE_PARAMETERS;
 use std::collections::BTreeMap;
 
@@ -281,7 +281,7 @@ impl Encoder {
         RawOutputs {
             mean: sigmoid(third.apply(&hidden)),
             log_variance: self.spread[1].apply(&gelu(self.spread[0].apply(&hidden))),
-            oddity: squares / embedding.len() as f32,
+            out_of_distribution: squares / embedding.len() as f32,
             embedding,
         }
     }

@@ -1,8 +1,8 @@
 //! What a model file says about itself, and whether to believe it.
 
 use super::file::{NotFields, parts, weights};
-use crate::filming::Randomisation;
-use crate::observation::FeatureDefinition;
+use crate::features::FeatureDefinition;
+use crate::synthetic::Randomisation;
 use crate::wiggle::WiggleConfig;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -66,8 +66,9 @@ pub struct PhiMetadata {
     pub wiggle: WiggleConfig,
     /// Meaning of the outputs, in their order.
     pub parameters: Vec<ParameterScale>,
-    /// Oddity that one in a hundred ropes of the ranges exceeds.
-    pub oddity_limit: f64,
+    /// Out-of-distribution score that one in a hundred ropes of the ranges exceeds.
+    #[serde(rename = "oddity_limit")]
+    pub out_of_distribution_limit: f64,
     /// Outputs that the weights must give again.
     pub probe: ProbeOutputs,
     /// How it was trained.

@@ -7,26 +7,21 @@
 //! not for these features and parameters, or were damaged since, are refused.
 
 mod encoder;
-mod estimate;
 mod file;
 mod metadata;
 mod net;
 mod probe;
-mod propose;
 
-pub use estimate::{NetworkError, identify_by_network};
 pub use metadata::{
     FORMAT, METADATA_KEY, ModelError, ParameterScale, PhiMetadata, ProbeOutputs, TrainingRecord,
     graph_sha256, hex,
 };
 pub use net::{PhiNet, PredictError, Prediction, RawOutputs};
-pub use propose::{HybridError, identify_with_network, proposal};
-
 pub use probe::{PARITY, difference, probe};
 
 /// Names of the network's inputs: motion `[n, frames, channels]`, widths `[n, 4]`.
 pub const INPUTS: [&str; 2] = ["motion", "widths"];
 /// Names of its outputs: normalised parameters `[n, 9]`, logarithm of their
-/// variances `[n, 9]`, embedding `[n, 256]`, oddity `[n, 1]`: the mean squared
-/// deviation of the embedding from those of known ropes, in their own deviations.
+/// variances `[n, 9]`, embedding `[n, 256]`, out-of-distribution score `[n, 1]` (named
+/// `oddity` in the graph): the mean squared deviation of the embedding from those of known ropes, in their own deviations.
 pub const OUTPUTS: [&str; 4] = ["mean", "log_variance", "embedding", "oddity"];

@@ -1,13 +1,10 @@
 //! The network of a model file.
 
-use super::NetworkError;
 use super::encoder::Encoder;
 use super::metadata::{ModelError, PhiMetadata};
 use super::probe::{PARITY, difference, probe};
-use crate::observation::{
-    FeatureDefinition, ObserveError, ObservedPoints, ViewPlane, WiggleFeatures, observe,
-};
-use crate::sysid::Observation;
+use crate::features::{FeatureDefinition, ObserveError, ViewPlane, WiggleFeatures, observe};
+use crate::observation::{Observation, ObservedPoints};
 use crate::wiggle::wiggle;
 use arm_model::Limits;
 use arm_model::Pole;
@@ -24,8 +21,8 @@ pub struct Prediction {
     /// Their standard deviations as the network estimates them.
     pub std_dev: [f64; ROPE_PARAMETERS],
     /// How unlike the known ropes this one looks: near 1 for those, above
-    /// [`PhiMetadata::oddity_limit`] for one in a hundred of them.
-    pub oddity: f64,
+    /// [`PhiMetadata::out_of_distribution_limit`] for one in a hundred of them.
+    pub out_of_distribution: f64,
 }
 
 /// The network's outputs as they are, for one observation.
@@ -38,14 +35,14 @@ pub struct RawOutputs {
     /// Embedding.
     pub embedding: Vec<f32>,
     /// Mean squared deviation of the embedding from those of known ropes.
-    pub oddity: f32,
+    pub out_of_distribution: f32,
 }
 
 impl RawOutputs {
     fn is_finite(&self) -> bool {
         let all = self.mean.iter().chain(&self.log_variance);
         all.chain(&self.embedding)
-            .chain([&self.oddity])
+            .chain([&self.out_of_distribution])
             .all(|x| x.is_finite())
     }
 }
@@ -53,6 +50,9 @@ impl RawOutputs {
 /// Why there is no prediction.
 #[derive(Debug, thiserror::Error)]
 pub enum PredictError {
+    /// The film is none that the network can judge.
+    #[error(transparent)]
+    Observe(#[from] ObserveError),
     /// The features are not those the network was trained on.
     #[error("the network was trained on {trained:?}, the observation has {given:?}")]
     OtherFeatures {
@@ -160,6 +160,17 @@ impl PhiNet {
         &self.metadata
     }
 
+    /// Itself, if it reads what a camera shows.
+    ///
+    /// # Errors
+    /// [`ObserveError::NeedsLinkCentres`].
+    pub fn for_camera(self) -> Result<Self, ObserveError> {
+        match self.metadata.features.points {
+            ObservedPoints::ArcLength => Ok(self),
+            ObservedPoints::LinkCentres => Err(ObserveError::NeedsLinkCentres),
+        }
+    }
+
     /// What the network sees of an observation of its wiggle.
     ///
     /// # Errors
@@ -187,9 +198,8 @@ impl PhiNet {
     ///
     /// # Errors
     /// A film that cannot be judged.
-    pub fn look(&self, observation: &Observation<'_>) -> Result<Prediction, NetworkError> {
-        let features = self.see(observation)?;
-        Ok(self.predict(&features)?)
+    pub fn look(&self, observation: &Observation<'_>) -> Result<Prediction, PredictError> {
+        self.predict(&self.see(observation)?)
     }
 
     /// Rope parameters behind features.
@@ -209,7 +219,7 @@ impl PhiNet {
         Ok(Prediction {
             parameters: self.metadata.physical(normalised),
             std_dev,
-            oddity: f64::from(out.oddity),
+            out_of_distribution: f64::from(out.out_of_distribution),
         })
     }
 

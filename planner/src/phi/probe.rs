@@ -3,7 +3,7 @@
 //! The trained network's outputs for it are kept in the file, and computed again when
 //! the file is loaded: weights that give something else show before they are believed.
 
-use crate::observation::{FeatureDefinition, WiggleFeatures};
+use crate::features::{FeatureDefinition, WiggleFeatures};
 
 /// Largest difference between a file's and the trained network's outputs;
 /// relative where the output is above 1.

@@ -2,8 +2,9 @@
 
 use crate::TrainingError;
 use crate::masking::MaskPhase;
-use planner::filming::Randomisation;
-use planner::observation::{FeatureDefinition, ObservedPoints};
+use planner::features::FeatureDefinition;
+use planner::observation::ObservedPoints;
+use planner::synthetic::Randomisation;
 use planner::wiggle::WiggleConfig;
 use serde::{Deserialize, Serialize};
 use shared_types::rope::RANGES;

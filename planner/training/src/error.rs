@@ -1,7 +1,7 @@
 //! Why a step of the training failed.
 
-use planner::filming::NoiseError;
-use planner::observation::ObserveError;
+use planner::features::ObserveError;
+use planner::synthetic::NoiseError;
 use planner::wiggle::WiggleError;
 use rope_sim::SimulateError;
 use std::path::{Path, PathBuf};

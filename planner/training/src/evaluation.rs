@@ -1,6 +1,6 @@
 //! Predictions against the truth on held-out ropes, beside the paper's figures.
 
-use planner::sysid::scale::MassScale;
+use planner::identify::scale::MassScale;
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};

@@ -17,7 +17,7 @@ use burn::module::Module;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor as BurnTensor};
 use nalgebra::{DMatrix, DVector};
-use planner::observation::{FeatureDefinition, WIDTHS};
+use planner::features::{FeatureDefinition, WIDTHS};
 use planner::phi::{
     FORMAT, INPUTS, METADATA_KEY, OUTPUTS, PARITY, ParameterScale, PhiMetadata, ProbeOutputs,
     TrainingRecord, difference, graph_sha256, probe,
@@ -38,19 +38,19 @@ pub struct Familiar {
     mean: Vec<f32>,
     /// Takes a deviation from the mean to numbers of mean square 1, row-major.
     whiten: Vec<f32>,
-    /// Oddity that one in a hundred exceeds.
+    /// Out-of-distribution score that one in a hundred exceeds.
     pub limit: f64,
 }
 
 impl Familiar {
-    /// Measures the embeddings of known ropes, and how odd `others` of the same
-    /// kind seem beside them.
+    /// Measures the embeddings of known ropes, and the scores of `others` of the
+    /// same kind beside them.
     ///
     /// # Errors
     /// Too few of them, or embeddings that are not finite.
     pub fn measure(known: &[Predicted], others: &[Predicted]) -> Result<Self, TrainingError> {
         let wrong = |value: String| TrainingError::Value {
-            key: "ropes for the oddity",
+            key: "ropes for the out-of-distribution score",
             value,
             expected: "2 or more with finite embeddings",
         };
@@ -117,7 +117,7 @@ pub fn to_onnx(state: &State, familiar: &Familiar) -> Result<Vec<u8>, TrainingEr
                 max: range.max,
             })
             .collect(),
-        oddity_limit: familiar.limit,
+        out_of_distribution_limit: familiar.limit,
         probe: probe_outputs(state)?,
         training: TrainingRecord {
             seed: config.training.seed,
@@ -272,7 +272,7 @@ impl GraphWriter {
         x = self.node("Gelu", &[&x], &[]);
         x = self.linear("spread1", &x, &model.spread[1])?;
         self.named("Identity", &[&x], &[], OUTPUTS[1]);
-        self.oddity(&embedding, familiar);
+        self.out_of_distribution(&embedding, familiar);
         Ok(self.graph)
     }
 
@@ -316,7 +316,7 @@ impl GraphWriter {
     }
 
     /// Mean square of the whitened embedding.
-    fn oddity(&mut self, embedding: &str, familiar: &Familiar) {
+    fn out_of_distribution(&mut self, embedding: &str, familiar: &Familiar) {
         let mean = self.floats("familiar.mean", &[EMBEDDING], &familiar.mean);
         let whiten = self.floats("familiar.whiten", &[EMBEDDING, EMBEDDING], &familiar.whiten);
         let share = vec![1.0 / EMBEDDING as f32; EMBEDDING];

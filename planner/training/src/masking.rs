@@ -2,7 +2,7 @@
 //! the training goes on (paper, "Curriculum Masking Schedule").
 
 use crate::TrainingError;
-use planner::observation::WiggleFeatures;
+use planner::features::WiggleFeatures;
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ impl MaskPhase {
 mod tests {
     use super::*;
     use crate::draws::{Purpose, generator};
-    use planner::observation::FeatureDefinition;
+    use planner::features::FeatureDefinition;
 
     fn phase(from: f64, blocks: usize, at_the_beginning: bool) -> MaskPhase {
         MaskPhase {

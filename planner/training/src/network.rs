@@ -19,7 +19,7 @@ use burn::module::Module;
 use burn::nn::{Dropout, DropoutConfig, LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::activation::{gelu, sigmoid};
 use burn::tensor::{Device, Tensor};
-use planner::observation::{FeatureDefinition, WIDTHS};
+use planner::features::{FeatureDefinition, WIDTHS};
 use shared_types::rope::ROPE_PARAMETERS;
 
 /// Kernel of every convolution.

@@ -7,7 +7,7 @@
 //! together; a network that sees it need not learn first to average.
 
 use nalgebra::{DMatrix, DVector};
-use planner::observation::FeatureDefinition;
+use planner::features::FeatureDefinition;
 use serde::{Deserialize, Serialize};
 
 /// Numbers kept.

@@ -7,7 +7,7 @@
 //! so that its input is in metres and radians.
 
 use crate::principal::{PRINCIPAL, Principal};
-use planner::observation::{FeatureDefinition, WIDTHS, WiggleFeatures};
+use planner::features::{FeatureDefinition, WIDTHS, WiggleFeatures};
 use serde::{Deserialize, Serialize};
 
 /// Mean and scale of every channel and width.

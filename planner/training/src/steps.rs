@@ -19,7 +19,7 @@ use phi_training::trainer::{Predicted, Trainer, predict};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use std::path::Path;
 
-/// Films of training ropes whose embeddings the oddity is measured against.
+/// Films of training ropes whose embeddings the out-of-distribution score is measured against.
 const FAMILIAR_FILMS: usize = 2000;
 
 pub(crate) fn dataset(arguments: &DatasetArguments) -> Result<(), TrainingError> {

@@ -15,7 +15,7 @@ use crate::standard::Standard;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
-use planner::observation::WIDTHS;
+use planner::features::WIDTHS;
 use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
 use std::fmt::Write as _;

@@ -139,7 +139,7 @@ fn a_training_learns_resumes_bit_for_bit_and_is_written_as_it_is() {
 
 fn written_as_it_is(state: &State, held_out: &Pool) {
     use phi_training::export::compare;
-    use planner::observation::WIDTHS;
+    use planner::features::WIDTHS;
     use planner::phi::{INPUTS, ModelError, OUTPUTS, PhiNet};
 
     let network = predictions(state, held_out);
@@ -152,7 +152,7 @@ fn written_as_it_is(state: &State, held_out: &Pool) {
         .map(|film| {
             let mut features = studio.held_out(film).unwrap();
             let out = net.run(&features).unwrap();
-            assert!(out.oddity.is_finite());
+            assert!(out.out_of_distribution.is_finite());
             // A prediction is the same numbers in units, inside the ranges.
             let found = net.predict(&features).unwrap();
             let length_m = 0.45 + 0.2 * f64::from(out.mean[1]);
@@ -271,7 +271,7 @@ fn the_shipped_configuration_is_the_papers() {
     config.check().unwrap();
     assert_eq!(
         config.randomisation,
-        planner::filming::Randomisation::default()
+        planner::synthetic::Randomisation::default()
     );
     let wiggle = planner::wiggle::WiggleConfig::default();
     let shipped = config.data.wiggle;

@@ -63,14 +63,14 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> Result<()> {
     }
     write!(
         text,
-        "\n[fit]\nmethod = \"{}\"\nresidual_px = {:.4}\nsimulations = {}\nseed = {}\ntime_offset_s = {:.6}\nout_of_distribution = {}\nnovelty = {:.3}\n",
+        "\n[fit]\nmethod = \"{}\"\nresidual_px = {:.4}\nsimulations = {}\nseed = {}\ntime_offset_s = {:.6}\nout_of_distribution = {}\nout_of_distribution_score = {:.3}\n",
         estimate.method,
         estimate.residual_px,
         estimate.simulations,
         estimate.seed,
         estimate.time_offset_s,
-        estimate.novelty.is_outside(),
-        estimate.novelty.score
+        estimate.out_of_distribution.is_outside(),
+        estimate.out_of_distribution.score
     )?;
     text.push_str(
         "\n# Mean and covariance in the order of the keys above; probability of 20 to 26 links.\n",
@@ -86,7 +86,7 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::rope::{Ambiguity, FitCircumstances, KeypointNoise, Novelty};
+    use shared_types::rope::{Ambiguity, FitCircumstances, KeypointNoise, OutOfDistribution};
 
     const NOISE: KeypointNoise = KeypointNoise {
         sigma_px: 1.0,
@@ -132,7 +132,7 @@ mod tests {
                 camera_position_m: [0.0; 3],
                 camera_rotation_rad: [0.0; 3],
             },
-            novelty: Novelty {
+            out_of_distribution: OutOfDistribution {
                 score: 0.5,
                 limit: 4.0,
                 reasons: Vec::new(),

@@ -5,10 +5,8 @@ use super::rpc::Rpc;
 use crate::camera::StereoCamera;
 use crate::fault::FaultCode;
 use crate::operating_mode::OperatingMode;
-use crate::plan::Plan;
-use crate::rope::{RopeEstimate, RopeParams};
+use crate::rope::RopeParams;
 use arm_model::joint::JointVector;
-use arm_model::limits::Limits;
 use arm_model::trajectory::JointTrajectory;
 use serde::{Deserialize, Serialize};
 
@@ -154,110 +152,6 @@ impl Rpc for CameraRpc {
             event,
             CameraEvent::Progress(_) | CameraEvent::Recording { .. }
         )
-    }
-}
-
-/// Options of an identification.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct IdentifyRequest {
-    /// Start of exposure of the first keypoint frame to use (CLOCK_MONOTONIC, ns).
-    pub first_stamp_ns: u64,
-    /// Keypoint frames to use; they come from the keypoint service.
-    pub frames: u32,
-    /// Calibrated camera.
-    pub camera: Box<StereoCamera>,
-    /// Measured joints: CLOCK_MONOTONIC ns and position (rad).
-    pub joints: Vec<(u64, JointVector)>,
-    /// Sizes seen in the picture.
-    pub appearance: Option<RopeAppearance>,
-    /// Lead mass if somebody weighed it (kg).
-    pub lead_mass_kg: Option<f64>,
-    /// Seed of the random numbers.
-    pub seed: u64,
-}
-
-/// Options of a strike plan.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StrikeOrder {
-    /// Rope to plan for.
-    pub rope: RopeParams,
-    /// Target in the world (m).
-    pub target_m: [f64; 3],
-    /// Limits of the arm.
-    pub limits: Limits,
-    /// Seed of the random numbers.
-    pub seed: u64,
-}
-
-/// A move to the throw's start pose that takes the sway out of the rope.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CalmOrder {
-    /// Rope as identified.
-    pub rope: RopeParams,
-    /// Measured joints since the rope hung still: CLOCK_MONOTONIC ns and
-    /// position (rad). After the last one the arm holds.
-    pub joints: Vec<(u64, JointVector)>,
-    /// When the move will begin (CLOCK_MONOTONIC, ns).
-    pub start_ns: u64,
-    /// Commanded pose the arm holds until then (rad).
-    pub start_q: JointVector,
-    /// Pose at the end (rad).
-    pub end_q: JointVector,
-    /// Limits of the arm.
-    pub limits: Limits,
-}
-
-/// Asks of the planner.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum PlannerRequest {
-    /// Are you there?
-    Ping,
-    /// Fit the nine rope parameters to published keypoints.
-    Identify(Box<IdentifyRequest>),
-    /// Plan a move that takes the sway out of the rope.
-    Calm(Box<CalmOrder>),
-    /// Plan a strike.
-    Strike(Box<StrikeOrder>),
-}
-
-/// Answers of the planner.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum PlannerEvent {
-    /// Here I am.
-    Pong,
-    /// Work goes on.
-    Progress(Progress),
-    /// The rope is identified.
-    Identified(Box<RopeEstimate>),
-    /// The calming move is planned.
-    Calmed {
-        /// The move.
-        trajectory: Box<JointTrajectory>,
-        /// Largest distance of the tip from its place at rest after a plain move
-        /// of the same duration, as simulated (m).
-        plain_sway_m: f64,
-        /// The same after this move (m).
-        calm_sway_m: f64,
-    },
-    /// The throw is planned.
-    Planned(Box<Plan>),
-    /// It did not work.
-    Failed {
-        /// One sentence: what happened and what to do.
-        message: String,
-    },
-}
-
-/// The planner's service.
-#[derive(Debug)]
-pub struct PlannerRpc;
-
-impl Rpc for PlannerRpc {
-    const NAME: &'static str = "wag/v1/planner/control";
-    type Request = PlannerRequest;
-    type Event = PlannerEvent;
-    fn is_last(event: &PlannerEvent) -> bool {
-        !matches!(event, PlannerEvent::Progress(_))
     }
 }
 

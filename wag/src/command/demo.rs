@@ -3,16 +3,17 @@
 
 use super::demo_summary::{DemoRecord, show};
 use super::explain::explain_stop;
-use super::plan::{clear_of_arm, describe, warnings};
+use super::plan::describe;
 use crate::cli::{DemoArgs, TaskName};
 use crate::config;
-use crate::pipeline::{self, ArmLink, CalmInput, Film, RunFolder, Shot};
+use crate::pipeline::{self, ArmLink, Film, RunFolder, SettleInput, Shot};
 use crate::session::Session;
 use anyhow::{Context, anyhow};
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
-use planner::process::PlannerConfig;
-use planner::tasks::check_reach;
+use planner::PlannerConfig;
+use planner::plan::{PlanOptions, PlanRequest, check_reach, clear_of_arm, warnings};
+use planner::service::PlannerRpc;
 use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,12 +21,10 @@ use rig_sim::RigConfig;
 use rig_sim::render::Appearance;
 use run_log::files;
 use serde_json::Value;
-use shared_types::ipc::message::{
-    CameraRpc, PlannerRpc, RigEvent, RigRequest, RigRpc, ScoreResult, StrikeOrder,
-};
+use shared_types::ipc::message::{CameraRpc, RigEvent, RigRequest, RigRpc, ScoreResult};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
-use shared_types::{OperatingMode, Plan, RopeEstimate, StereoCamera};
+use shared_types::{OperatingMode, Plan, RopeEstimate, StereoCamera, Task};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viewer::report;
@@ -33,7 +32,7 @@ use viewer::report;
 /// Speed of moves between poses, as a part of the fastest move.
 ///
 /// Slow enough that the move lasts several periods of the rope's pendulum and
-/// leaves it with millimetres of sway.
+/// leaves it with millimetres of swing.
 const MOVE_SPEED: f64 = 0.04;
 /// The joint that wiggles (0-based).
 const WIGGLE_JOINT: usize = 5;
@@ -126,7 +125,7 @@ fn throw_once(
     let film = demo.wiggle(&motion)?;
     let rope = demo.identify(&film)?;
     let plan = demo.plan(&rope)?;
-    demo.calm(&rope, &film, &motion, &plan)?;
+    demo.settle(&rope, &film, &motion, &plan)?;
     let throw = demo.throw(&plan)?;
     let score = demo.score(&rig_config.appearance());
     demo.compare_with_truth(&throw, score)
@@ -249,6 +248,7 @@ impl<'a> Demo<'a> {
             &self.calibration,
             film,
             tracked.appearance,
+            &self.settings,
             self.record.seed,
             &stage,
         )?;
@@ -264,13 +264,17 @@ impl<'a> Demo<'a> {
     /// Plans the throw with what was identified.
     fn plan(&mut self, rope: &RopeEstimate) -> anyhow::Result<Plan> {
         let stage = Stage::begin("plan", self.quiet);
-        let order = StrikeOrder {
-            rope: rope.params,
-            target_m: self.record.target_m,
-            limits: self.limits.clone(),
+        let options = PlanOptions {
             seed: self.record.seed,
+            ..self.settings.search
         };
-        let plan = pipeline::plan_strike(self.session, &self.planner, order, &stage)?;
+        let goal = self.settings.goal(Task::Strike, self.record.target_m);
+        let request = PlanRequest {
+            limits: self.limits.clone(),
+            cell: self.settings.cell,
+            ..PlanRequest::new(goal, &rope.params, options)
+        };
+        let plan = pipeline::plan(self.session, &self.planner, request, &stage)?;
         files::write_json(&self.folder.file(files::PLAN), &plan)?;
         files::write_trajectory(
             &self.folder.file("plan.csv"),
@@ -289,35 +293,37 @@ impl<'a> Demo<'a> {
     }
 
     /// Turns towards the target so that the rope comes to rest.
-    fn calm(
+    fn settle(
         &mut self,
         rope: &RopeEstimate,
         film: &Film,
         wiggle: &JointTrajectory,
         plan: &Plan,
     ) -> anyhow::Result<()> {
-        let stage = Stage::begin("calm", self.quiet);
+        let stage = Stage::begin("settle", self.quiet);
         let arm_lag_s = {
             let span = [film.motion.start_ns, film.motion.end_ns];
             self.session.received.cycles.joint_lag_s(WIGGLE_JOINT, span)
         };
-        let input = CalmInput {
+        let input = SettleInput {
             rope: rope.params,
             film,
             start_q: wiggle.end(),
             end_q: plan.trajectory.start(),
             limits: &self.limits,
+            cell: self.settings.cell,
+            config: &self.settings.settle,
             arm_lag_s: arm_lag_s.unwrap_or_default(),
         };
-        let calmed = pipeline::calm(self.session, &self.planner, &self.arm, &input, &stage)?;
+        let settled = pipeline::settle(self.session, &self.planner, &self.arm, &input, &stage)?;
         stage.say("waiting for the rope to hang still");
         pipeline::wait_still(self.session, &self.camera, STILL_S)?;
-        self.record.calm = Some(calmed);
+        self.record.settle = Some(settled);
         self.record.arm_lag_s = arm_lag_s;
-        self.record.stages.calm_s = stage.done(&format!(
+        self.record.stages.settle_s = stage.done(&format!(
             "swing {:.1} cm -> {:.1} cm",
-            100.0 * calmed.plain_sway_m,
-            100.0 * calmed.calm_sway_m
+            100.0 * settled.plain_residual_m,
+            100.0 * settled.residual_m
         ));
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! What a demo keeps and shows: every stage's figures, and the truth apart.
 
 use super::latency::loop_table;
-use crate::pipeline::{Calmed, Film, RunFolder, Tracked};
+use crate::pipeline::{Film, RunFolder, Settled, Tracked};
 use anyhow::bail;
 use cli_output::table;
 use comfy_table::Table;
@@ -25,8 +25,8 @@ pub struct StageTimes {
     pub identify_s: f64,
     /// Planning the throw.
     pub plan_s: f64,
-    /// Taking the sway out of the rope.
-    pub calm_s: f64,
+    /// Damping the rope's swing.
+    pub settle_s: f64,
     /// Throwing and filming.
     pub throw_s: f64,
     /// Scoring.
@@ -87,8 +87,8 @@ pub struct DemoRecord {
     /// The identified rope.
     pub identified: Option<RopeEstimate>,
     plan: Option<PlanFigures>,
-    /// What calming did.
-    pub calm: Option<Calmed>,
+    /// What the settling move did.
+    pub settle: Option<Settled>,
     /// How late the arm follows its setpoints, from the wiggle (s).
     pub arm_lag_s: Option<f64>,
     score: Option<ScoreResult>,
@@ -206,7 +206,7 @@ pub fn show(record: &DemoRecord) {
         ("track", s.track_s),
         ("identify", s.identify_s),
         ("plan", s.plan_s),
-        ("calm", s.calm_s),
+        ("settle", s.settle_s),
         ("throw", s.throw_s),
         ("score", s.score_s),
         ("in all", record.wall_s),

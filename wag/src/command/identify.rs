@@ -2,27 +2,21 @@
 
 use super::filmed::{ClampMotion, Filmed};
 use super::learned::Learned;
-use super::network::{asks_network, network_for_camera, no_model_without_network};
+use super::network::{network, no_model_without_network};
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName};
 use crate::config;
 use anyhow::{Context, anyhow};
-use cli_output::{Failure, OrInput, Outcome, Stage, interrupted, table};
+use cli_output::{Failure, OrInput, Outcome, Stage, table};
 use comfy_table::Table;
-use planner::observation::ObservedPoints;
-use planner::phi::{NetworkError, identify_by_network, proposal};
-use planner::process::PlannerConfig;
-use planner::sysid::{
-    Appearance, IdentifyError, IdentifyOptions, Method, Observation, identify_from,
-};
+use planner::PlannerConfig;
+use planner::identify::{IdentifyError, IdentifyOptions, Method};
+use planner::observation::{Appearance, Observation, ObservedPoints};
 use rope_sim::AttachMotion;
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::ipc::message::Progress;
 use shared_types::rope::{Ambiguity, RANGES};
-use shared_types::{KeypointTrack, RopeEstimate, RopeParams, StereoCamera};
-use std::ops::ControlFlow;
-use std::sync::atomic::Ordering;
+use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
 
 /// Keypoints per frame when a video is given.
 const KEYPOINTS: usize = 24;
@@ -82,17 +76,6 @@ fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
 }
 
 fn classify(error: IdentifyError) -> Failure {
-    match &error {
-        IdentifyError::Keypoints(_)
-        | IdentifyError::TooManyLost { .. }
-        | IdentifyError::TooFewFrames { .. }
-        | IdentifyError::MotionTooShort { .. }
-        | IdentifyError::Option { .. } => Failure::input(error),
-        _ => Failure::failed(error),
-    }
-}
-
-fn classify_network(error: NetworkError) -> Failure {
     if error.is_input() {
         Failure::input(error)
     } else {
@@ -137,17 +120,17 @@ fn print_remarks(estimate: &RopeEstimate) {
     for ambiguity in &estimate.posterior.ambiguities {
         println!("the film cannot separate {}", in_words(ambiguity));
     }
-    if estimate.novelty.is_outside() {
+    if estimate.out_of_distribution.is_outside() {
         println!(
             "the rope is outside the known ranges (score {:.1}, limit {:.1}): {}",
-            estimate.novelty.score,
-            estimate.novelty.limit,
-            estimate.novelty.reasons.join("; ")
+            estimate.out_of_distribution.score,
+            estimate.out_of_distribution.limit,
+            estimate.out_of_distribution.reasons.join("; ")
         );
     }
-    if estimate.method.as_str() == planner::sysid::WIDE {
+    if estimate.method.as_str() == planner::identify::WIDE {
         println!("it was fitted again, by a search without ranges");
-    } else if estimate.novelty.is_outside() {
+    } else if estimate.out_of_distribution.is_outside() {
         println!("--method hybrid fits it again by a search without ranges");
     }
 }
@@ -166,9 +149,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let method = method_of(args.method);
     let model = args.model.as_deref();
     no_model_without_network(method, model)?;
-    let net = asks_network(method)
-        .then(|| network_for_camera(model))
-        .transpose()?;
+    let net = method.asks_network().then(|| network(model)).transpose()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
     cli_output::watch_interrupts().or_failed()?;
     let observed = observe(args, quiet)?;
@@ -186,16 +167,10 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         lead_mass_kg: args.lead_mass,
         ..config.identify
     };
-    let estimate = match net {
-        Some(net) if method == Method::Network => {
-            identify_by_network(&net, &observation, &options).map_err(classify_network)?
-        }
-        Some(net) => {
-            let proposed = proposal(&net, &observation, &options).or_failed()?;
-            fitted(&observation, proposed.as_ref(), &options, &stage).map_err(classify)?
-        }
-        None => fitted(&observation, None, &options, &stage).map_err(classify)?,
-    };
+    let estimate = planner::identify(&observation, &options, net.as_ref(), &mut |p| {
+        stage.go_on(&p.into())
+    })
+    .map_err(classify)?;
     let seconds = stage.done(&format!(
         "residual {:.2} px, {} simulations",
         estimate.residual_px, estimate.simulations
@@ -215,30 +190,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         "rope": estimate.params, "std_dev": estimate.std_dev, "residual_px": estimate.residual_px,
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
         "method": estimate.method, "posterior": estimate.posterior,
-        "circumstances": estimate.circumstances, "novelty": estimate.novelty,
-        "out_of_distribution": estimate.novelty.is_outside(), "warnings": observed.warnings,
+        "circumstances": estimate.circumstances, "out_of_distribution_score": estimate.out_of_distribution,
+        "out_of_distribution": estimate.out_of_distribution.is_outside(), "warnings": observed.warnings,
     })))
-}
-
-/// Fits the rope, from one that is proposed if there is one, with progress, until done or
-/// interrupted.
-fn fitted(
-    observation: &Observation<'_>,
-    proposed: Option<&RopeParams>,
-    options: &IdentifyOptions,
-    stage: &Stage,
-) -> Result<RopeEstimate, IdentifyError> {
-    identify_from(observation, proposed, options, &mut |p| {
-        stage.progress(&Progress {
-            done: u32::try_from(p.generation).unwrap_or(u32::MAX),
-            total: u32::try_from(p.generations).unwrap_or(u32::MAX),
-            value: p.residual_px,
-            label: "residual px".to_owned(),
-        });
-        if interrupted().load(Ordering::SeqCst) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })
 }

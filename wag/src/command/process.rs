@@ -91,7 +91,7 @@ pub fn run(args: &ProcessArgs) -> Outcome {
             give_way();
             camera_ingest::preview::run(&read(args).or_input()?, stop).or_failed()
         }
-        ProcessName::Planner => planner::process::run(&read(args).or_input()?, stop).or_failed(),
+        ProcessName::Planner => planner::service::run(&read(args).or_input()?, stop).or_failed(),
         ProcessName::Recorder => {
             run_log::record(&read(args).or_input()?, simulated_rope, stop).or_failed()
         }

@@ -1,6 +1,6 @@
 //! The reach of a rope as a picture.
 
-use planner::tasks::ReachMap;
+use planner::plan::ReachMap;
 use shared_types::RopeParams;
 use std::fmt::Write as _;
 

@@ -8,7 +8,7 @@ use crate::config;
 use anyhow::anyhow;
 use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome};
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
 use planner::wiggle::wiggle;
 use run_log::files;
 use serde_json::{Value, json};

@@ -1,7 +1,7 @@
 //! The kinds of configuration, and what is built in of each.
 
 use arm_model::{Cell, Limits};
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
 use rig_sim::{RigConfig, check};
 use rt_controller::config::ControllerConfig;
 use serde::de::DeserializeOwned;

@@ -208,7 +208,7 @@ fn at<'a>(table: &'a Table, keys: &[String]) -> Option<&'a Value> {
 mod tests {
     use super::*;
     use arm_model::Limits;
-    use planner::process::PlannerConfig;
+    use planner::PlannerConfig;
 
     /// A site's and a rig's folder with these planner files.
     fn folders(site: &str, rig: &str) -> (tempfile::TempDir, Folders) {

@@ -8,7 +8,8 @@ use arm_model::Limits;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::preview::PreviewConfig;
 use camera_ingest::process::CameraConfig;
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
+use planner::service::{PlannerRequest, PlannerRpc};
 use rig_sim::RigConfig;
 use rt_controller::ControllerConfig;
 use rt_controller::set_up::OnDifference;
@@ -16,8 +17,7 @@ use run_log::RecorderConfig;
 use run_log::files;
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{
-    CameraRequest, CameraRpc, ControllerRequest, PlannerRequest, PlannerRpc, RigEvent, RigRequest,
-    RigRpc,
+    CameraRequest, CameraRpc, ControllerRequest, RigEvent, RigRequest, RigRpc,
 };
 use shared_types::ipc::rpc::{Rpc, RpcClient};
 use std::net::{IpAddr, Ipv4Addr};

@@ -5,9 +5,12 @@ use super::observe::Film;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
 use cli_output::Stage;
+use planner::PlannerConfig;
+use planner::identify::IdentifyOptions;
+use planner::plan::PlanRequest;
+use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc};
 use shared_types::ipc::message::{
-    CameraEvent, CameraRequest, CameraRpc, IdentifyRequest, PlannerEvent, PlannerRequest,
-    PlannerRpc, RopeAppearance, ScoreResult, StrikeOrder,
+    CameraEvent, CameraRequest, CameraRpc, RopeAppearance, ScoreResult,
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::{Plan, RopeEstimate, StereoCamera};
@@ -43,7 +46,7 @@ fn ask_camera(
 }
 
 /// Asks the planner; its last event, unless that is a failure.
-fn ask_planner(
+pub(super) fn ask_planner(
     session: &mut Session,
     planner: &Planner,
     request: &PlannerRequest,
@@ -62,7 +65,7 @@ fn ask_planner(
 }
 
 /// An answer to another question.
-fn unexpected(process: &str, event: &impl std::fmt::Debug) -> anyhow::Error {
+pub(super) fn unexpected(process: &str, event: &impl std::fmt::Debug) -> anyhow::Error {
     anyhow!("the {process} process answered with {event:?}")
 }
 
@@ -146,17 +149,21 @@ pub fn identify(
     calibration: &StereoCamera,
     film: &Film,
     appearance: RopeAppearance,
+    settings: &PlannerConfig,
     seed: u64,
     stage: &Stage,
 ) -> anyhow::Result<RopeEstimate> {
     let request = PlannerRequest::Identify(Box::new(IdentifyRequest {
         first_stamp_ns: film.first_stamp_ns,
         frames: film.frames,
-        camera: Box::new(calibration.clone()),
+        camera: calibration.clone(),
         joints: film_joints(session, film)?,
-        appearance: Some(appearance),
-        lead_mass_kg: None,
-        seed,
+        pole: settings.cell.pole,
+        appearance: appearance.into(),
+        options: IdentifyOptions {
+            seed,
+            ..settings.identify
+        },
     }));
     match ask_planner(session, planner, &request, stage)? {
         PlannerEvent::Identified(estimate) => Ok(*estimate),
@@ -164,14 +171,14 @@ pub fn identify(
     }
 }
 
-/// Plans a strike.
-pub fn plan_strike(
+/// Plans a throw.
+pub fn plan(
     session: &mut Session,
     planner: &Planner,
-    order: StrikeOrder,
+    request: PlanRequest,
     stage: &Stage,
 ) -> anyhow::Result<Plan> {
-    let request = PlannerRequest::Strike(Box::new(order));
+    let request = PlannerRequest::Plan(Box::new(request));
     match ask_planner(session, planner, &request, stage)? {
         PlannerEvent::Planned(plan) => Ok(*plan),
         other => Err(unexpected("planner", &other)),

@@ -5,9 +5,9 @@
 use super::{Errors, report, secret_lags};
 use arm_model::response::{Excitation, JointResponse, NotExcited};
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole};
-use planner::response::delay::command_to_target;
-use planner::response::excitation::sweep;
-use planner::response::{Recording, Sample, Setpoint, identify};
+use planner::arm_response::delay::command_to_target;
+use planner::arm_response::excitation::sweep;
+use planner::arm_response::{Recording, Sample, Setpoint, identify};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::clock_map::ClockMap;

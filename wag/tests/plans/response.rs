@@ -6,9 +6,9 @@ use super::{long_tests, run};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
 use arm_model::{ArmResponse, Cell, JOINTS, JointTrajectory, Limits, Pole};
 use hil_tests::virtual_rig::VirtualRig;
-use planner::response::Following;
+use planner::arm_response::Following;
+use planner::plan::{PlanOptions, PlanRequest, Strike, ThrowConfig, ThrowGoal};
 use planner::ropes::{random_rope, random_strike_target};
-use planner::tasks::{Belief, PlanOptions, PlanRequest, Strike, ThrowConfig, plan_throw};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
@@ -98,25 +98,22 @@ fn throws_planned_through_the_response_meet_their_targets() {
         let limits = Limits::default();
         let plan = |following: Option<Following>| -> JointTrajectory {
             let small = !long_tests();
-            let request = PlanRequest {
-                rope,
-                limits: limits.clone(),
-                cell: Cell::default(),
-                options: PlanOptions {
-                    seed,
-                    population: if small { 24 } else { 60 },
-                    generations: small.then_some(12),
-                    searches: if small { 1 } else { 3 },
-                    ..PlanOptions::default()
-                },
-                belief: Belief::default(),
-                following,
+            let options = PlanOptions {
+                seed,
+                population: if small { 24 } else { 60 },
+                generations: small.then_some(12),
+                searches: if small { 1 } else { 3 },
+                ..PlanOptions::default()
             };
-            let task = Strike {
+            let goal = ThrowGoal::Strike(Strike {
                 target_m,
                 config: ThrowConfig::default(),
+            });
+            let request = PlanRequest {
+                following,
+                ..PlanRequest::new(goal, &rope, options)
             };
-            let planned = plan_throw(&task, &request, &mut |_| ControlFlow::Continue(()));
+            let planned = planner::plan(&request, &mut |_| ControlFlow::Continue(()));
             planned.unwrap().trajectory
         };
         let thrown = |plan: &JointTrajectory, joint_lags| {

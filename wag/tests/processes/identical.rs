@@ -6,12 +6,13 @@ use crate::support::{command, send, until};
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, JointTrajectory, JointVector, Limits};
 use camera_ingest::process::CameraConfig;
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
+use planner::plan::{PlanOptions, PlanRequest};
+use planner::service::{PlannerRequest, PlannerRpc};
 use rt_controller::ControllerConfig;
 use rustix::process::Signal;
 use shared_types::ipc::message::{
-    CameraRequest, CameraRpc, ControllerEvent, ControllerRequest, ControllerRpc, PlannerRequest,
-    PlannerRpc, StrikeOrder,
+    CameraRequest, CameraRpc, ControllerEvent, ControllerRequest, ControllerRpc,
 };
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{
@@ -301,22 +302,24 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
 }
 
 fn strike() -> PlannerRequest {
-    PlannerRequest::Strike(Box::new(StrikeOrder {
-        rope: RopeParams {
-            links: 23,
-            length_m: 0.55,
-            joint_damping_nms_per_rad: 0.02,
-            joint_stiffness_nm_per_rad: 0.3,
-            radius_m: 0.006,
-            mass_per_length_kg_per_m: 0.06,
-            lead_mass_kg: 0.06,
-            lead_radius_m: 0.025,
-            link_extra_scale: 1.0,
-        },
-        target_m: [0.95, 0.0, 0.2],
-        limits: Limits::default(),
+    let rope = RopeParams {
+        links: 23,
+        length_m: 0.55,
+        joint_damping_nms_per_rad: 0.02,
+        joint_stiffness_nm_per_rad: 0.3,
+        radius_m: 0.006,
+        mass_per_length_kg_per_m: 0.06,
+        lead_mass_kg: 0.06,
+        lead_radius_m: 0.025,
+        link_extra_scale: 1.0,
+    };
+    let config = PlannerConfig::default();
+    let goal = config.goal(Task::Strike, [0.95, 0.0, 0.2]);
+    let options = PlanOptions {
         seed: 1,
-    }))
+        ..config.search
+    };
+    PlannerRequest::Plan(Box::new(PlanRequest::new(goal, &rope, options)))
 }
 
 /// A client of a service, once its process answers.

@@ -12,7 +12,7 @@ use crate::session::Session;
 use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{Machine, OrInput, Outcome, Stage, table, watch_interrupts};
-use planner::process::PlannerConfig;
+use planner::PlannerConfig;
 use planner::wiggle::wiggle;
 use rig_sim::RigConfig;
 use run_log::files;

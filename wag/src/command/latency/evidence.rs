@@ -3,7 +3,7 @@
 use anyhow::Context;
 use arm_model::ArmResponse;
 use arm_model::response::Excitation;
-use planner::response::delay::TargetDelay;
+use planner::arm_response::delay::TargetDelay;
 use rt_controller::bridge::Latencies;
 use run_log::{Cycles, Run, files};
 use std::path::{Path, PathBuf};

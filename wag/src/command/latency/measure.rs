@@ -10,7 +10,7 @@ use anyhow::anyhow;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
 use cli_output::{Failure, OrInput, Outcome, Stage};
-use planner::response::excitation::sweep;
+use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
 use std::time::Duration;

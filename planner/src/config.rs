@@ -1,0 +1,101 @@
+//! Configuration of the planner.
+
+use crate::identify::IdentifyOptions;
+use crate::plan::{
+    Drape, DrapeConfig, Lob, LobConfig, PlanOptions, Strike, ThrowConfig, ThrowGoal,
+};
+use crate::settle::SettleConfig;
+use crate::wiggle::WiggleConfig;
+use arm_model::Cell;
+use serde::{Deserialize, Serialize};
+use shared_types::Task;
+
+/// Everything the planner can be told. TOML form: keys as the fields; every
+/// table may be left out. Whoever asks makes requests from it; of the planner process
+/// it sets the domain alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannerConfig {
+    /// Shared-memory domain.
+    #[serde(default = "default_domain")]
+    pub domain: String,
+    /// The pole, and what stands around the arm; of a process, its caller's.
+    #[serde(default)]
+    pub cell: Cell,
+    /// Size and rules of identifications.
+    #[serde(default)]
+    pub identify: IdentifyOptions,
+    /// Size of the search for a throw.
+    #[serde(default)]
+    pub search: PlanOptions,
+    /// Tuned values of strikes.
+    #[serde(default)]
+    pub strike: ThrowConfig,
+    /// Tuned values of lobs.
+    #[serde(default)]
+    pub lob: LobConfig,
+    /// Tuned values of drapes.
+    #[serde(default)]
+    pub drape: DrapeConfig,
+    /// The wiggle.
+    #[serde(default)]
+    pub wiggle: WiggleConfig,
+    /// Moves that damp the rope's swing.
+    #[serde(default)]
+    pub settle: SettleConfig,
+}
+
+impl PlannerConfig {
+    /// A task at a target (m), as configured.
+    #[must_use]
+    pub fn goal(&self, kind: Task, target_m: [f64; 3]) -> ThrowGoal {
+        match kind {
+            Task::Strike => ThrowGoal::Strike(Strike {
+                target_m,
+                config: self.strike.clone(),
+            }),
+            Task::Lob => ThrowGoal::Lob(Lob {
+                target_m,
+                config: self.lob.clone(),
+            }),
+            Task::Drape => ThrowGoal::Drape(Drape {
+                target_m,
+                config: self.drape.clone(),
+            }),
+        }
+    }
+}
+
+fn default_domain() -> String {
+    "lab".to_owned()
+}
+
+impl Default for PlannerConfig {
+    fn default() -> Self {
+        Self {
+            domain: default_domain(),
+            cell: Cell::default(),
+            identify: IdentifyOptions::default(),
+            search: PlanOptions::default(),
+            strike: ThrowConfig::default(),
+            lob: LobConfig::default(),
+            drape: DrapeConfig::default(),
+            wiggle: WiggleConfig::default(),
+            settle: SettleConfig::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_file_is_the_default_and_unknown_keys_are_refused() {
+        let empty: PlannerConfig = toml::from_str("").unwrap();
+        assert_eq!(empty, PlannerConfig::default());
+        let written = toml::to_string(&empty).unwrap();
+        assert_eq!(toml::from_str::<PlannerConfig>(&written).unwrap(), empty);
+        assert!(toml::from_str::<PlannerConfig>("[identify]\npopulaton = 3\n").is_err());
+    }
+}

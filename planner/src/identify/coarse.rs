@@ -1,0 +1,139 @@
+//! Pixel distance of many candidates to the film, the camera's place left free.
+//!
+//! A camera 2 cm off shifts the picture by more pixels than most ropes differ. Its best
+//! correction is found for every candidate by one linear solution, whose matrix is the
+//! same for all: how a pixel moves with the camera hardly depends on the rope.
+
+use super::camera_pose::CORRECTIONS;
+use super::coordinates::{CAMERA, CLOCK, Coordinates, LINKS, Point, link_range, simulated_rope};
+use super::error::IdentifyError;
+use super::film::{Fidelity, Film, Instant, Sighting, is_finite, sample_s};
+use crate::workers::map_in_order;
+use nalgebra::{SMatrix, SVector};
+use rope_sim::Rollout;
+use shared_types::RopeParams;
+
+/// Distance given to a candidate that cannot be compared (px).
+pub(super) const INVISIBLE_PX: f64 = 1e4;
+/// Deviation of one sighting against which the camera's prior is weighed (px): large,
+/// because neighbouring sightings err together.
+const SIGHTING_PX: f64 = 20.0;
+/// Step of the camera's corrections (m, rad).
+const STEP: f64 = 1e-4;
+/// Distance beyond which a sighting counts as an outlier (Huber, px).
+const OUTLIER_PX: f64 = 8.0;
+
+type Slopes = SMatrix<f64, 2, CORRECTIONS>;
+
+/// A candidate compared.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Compared {
+    /// Root mean square (Huber) distance (px).
+    pub(super) distance_px: f64,
+    camera: [f64; CORRECTIONS],
+}
+
+impl Compared {
+    /// The candidate with the camera where it fits best.
+    pub(super) fn with_camera(&self, x: &Point) -> Point {
+        let mut x = *x;
+        for (i, c) in self.camera.iter().enumerate() {
+            x[CAMERA + i] = *c;
+        }
+        x
+    }
+}
+
+/// Compares candidates with one film.
+pub(super) struct Comparer<'a> {
+    film: &'a Film<'a>,
+    sightings: Vec<(Sighting, Slopes)>,
+    inverse: SMatrix<f64, CORRECTIONS, CORRECTIONS>,
+}
+
+impl<'a> Comparer<'a> {
+    pub(super) fn new(film: &'a Film<'a>, coordinates: &Coordinates) -> Self {
+        let attach = film.observation.motion.at(0.0).p_m;
+        let nominal = film.viewer.view(&[0.0; CORRECTIONS]);
+        let perturbed = film.viewer.perturbed(&[0.0; CORRECTIONS], STEP);
+        let depth_m = film.observation.camera.to_left(&attach).z.max(0.1);
+        let camera = film.observation.camera;
+        let mut normal = SMatrix::<f64, CORRECTIONS, CORRECTIONS>::from_fn(|i, j| {
+            let weight = (SIGHTING_PX / coordinates.prior_std[CAMERA + i]).powi(2);
+            if i == j { weight } else { 0.0 }
+        });
+        let mut sightings = Vec::new();
+        for sighting in film.grid(Fidelity::Coarse).cells.iter().flatten() {
+            // Where the pixel's ray meets the plane of the clamp.
+            let (origin, ray) = camera.left_ray(sighting.pixel);
+            let forward = ray.dot(&camera.r_w_cam.column(2));
+            let p = origin + ray * (depth_m / forward.max(0.1));
+            let Some(here) = nominal.project(&p) else {
+                continue;
+            };
+            let slopes = Slopes::from_fn(|axis, i| {
+                perturbed[i]
+                    .project(&p)
+                    .map_or(0.0, |moved| (moved[axis] - here[axis]) / STEP)
+            });
+            normal += slopes.tr_mul(&slopes) * sighting.weight;
+            sightings.push((*sighting, slopes));
+        }
+        Self {
+            film,
+            sightings,
+            inverse: normal.try_inverse().unwrap_or_else(SMatrix::zeros),
+        }
+    }
+
+    /// Compares candidates, each with its own link count, the nearest of the ranges.
+    pub(super) fn compare(&self, points: &[Point]) -> Result<Vec<Compared>, IdentifyError> {
+        // Lanes hold ropes of one count: few counts fill them.
+        let (fewest, most) = link_range();
+        let links = |x: &Point| (x[LINKS].round().max(1.0) as u32).clamp(fewest, most);
+        let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links(x))).collect();
+        let rollouts = self.film.simulate(&ropes, Fidelity::Coarse)?;
+        let jobs: Vec<_> = points.iter().zip(&rollouts).collect();
+        Ok(map_in_order(&jobs, self.film.threads, |(x, rollout)| {
+            self.one(x, rollout).unwrap_or(Compared {
+                distance_px: INVISIBLE_PX,
+                camera: [0.0; CORRECTIONS],
+            })
+        }))
+    }
+
+    fn one(&self, x: &Point, rollout: &Rollout) -> Option<Compared> {
+        if !is_finite(rollout) || self.sightings.is_empty() {
+            return None;
+        }
+        let period_s = sample_s(Fidelity::Coarse);
+        let samples = rollout.nodes.frames();
+        let mut residuals = Vec::with_capacity(self.sightings.len());
+        let mut pull = SVector::<f64, CORRECTIONS>::zeros();
+        for (sighting, slopes) in &self.sightings {
+            let now = Instant::new(sighting.time_s - x[CLOCK], period_s, samples);
+            let p = now.position(&rollout.nodes, sighting.along);
+            let [u, v] = self.film.observation.camera.project_left(&p)?;
+            let r = SVector::<f64, 2>::new(u - sighting.pixel[0], v - sighting.pixel[1]);
+            pull += slopes.tr_mul(&r) * sighting.weight;
+            residuals.push(r);
+        }
+        let correction = -self.inverse * pull;
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (r, (sighting, slopes)) in residuals.iter().zip(&self.sightings) {
+            let d = (r + slopes * correction).norm();
+            let loss = if d <= OUTLIER_PX {
+                d * d
+            } else {
+                OUTLIER_PX * (2.0 * d - OUTLIER_PX)
+            };
+            sum += sighting.weight * loss;
+            weights += sighting.weight;
+        }
+        let distance_px = (sum / f64::max(weights, 1e-9)).sqrt();
+        distance_px.is_finite().then_some(Compared {
+            distance_px,
+            camera: correction.into(),
+        })
+    }
+}

@@ -1,0 +1,138 @@
+//! What a wiggle can tell about a rope: its Fisher information before anything is
+//! filmed.
+//!
+//! The normal equations of a perfect fit under a tracker's noise, the clock and the
+//! camera's place unknown as in any identification. Their inverse bounds what any
+//! method can learn from this motion.
+
+use super::camera_pose::CorrectionPrior;
+use super::clock::ClockWindow;
+use super::coordinates::{
+    Coordinates, DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Reach, STIFFNESS, point_of,
+};
+use super::error::IdentifyError;
+use super::film::{Fidelity, Film};
+use super::linear::linearise;
+use super::noise::{AxisNoise, Noise};
+use super::options::IdentifyOptions;
+use crate::observation::{Appearance, Observation, ObservedPoints};
+use crate::synthetic::{FilmNoise, FilmTiming, film};
+use nalgebra::SMatrix;
+use rope_sim::AttachMotion;
+use serde::{Deserialize, Serialize};
+use shared_types::{RopeParams, StereoCamera};
+
+/// Keypoints per frame.
+const KEYPOINTS: usize = 24;
+/// A middling tracker of the paper's noise: along and across the rope (px), and from
+/// frame to frame.
+const NOISE_PX: [f64; 2] = [1.5, 0.75];
+const CORRELATION: f64 = 0.8;
+
+/// Standard deviations that a wiggle leaves to the best possible method.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WiggleInformation {
+    /// Rope length (m).
+    pub length_m: f64,
+    /// Bending stiffness per length over mass per length, relative.
+    pub bending_stiffness: f64,
+    /// Damping per length over mass per length, relative.
+    pub damping: f64,
+    /// Lead mass over mass per length, relative.
+    pub lead_mass: f64,
+    /// Lead radius from its inertia alone (m).
+    pub lead_radius_m: f64,
+    /// Number of links.
+    pub links: f64,
+    /// Mean logarithm of the principal deviations of length (in 0.1 m) and the three
+    /// ratios: what a designed wiggle makes small.
+    pub log_volume: f64,
+}
+
+/// Information of a motion about one rope; `None` where it cannot be simulated or
+/// leaves the camera's half space.
+///
+/// # Errors
+/// What the rope simulator refuses.
+pub fn information(
+    rope: &RopeParams,
+    motion: &dyn AttachMotion,
+    camera: &StereoCamera,
+    exact: bool,
+    threads: usize,
+) -> Result<Option<WiggleInformation>, IdentifyError> {
+    let timing = FilmTiming::default();
+    let filmed = film(
+        rope,
+        motion,
+        camera,
+        KEYPOINTS,
+        &timing,
+        &FilmNoise::default(),
+    )?;
+    let observation = Observation {
+        track: &filmed.track,
+        points: ObservedPoints::ArcLength,
+        camera,
+        motion,
+        appearance: Appearance::default(),
+    };
+    let options = IdentifyOptions {
+        threads,
+        ..IdentifyOptions::default()
+    };
+    let seen = Film::new(&observation, &options);
+    let (fidelity, every) = if exact {
+        (Fidelity::Fine, 1)
+    } else {
+        let every = filmed
+            .track
+            .frames
+            .len()
+            .div_ceil(options.search_frames_max);
+        (Fidelity::Coarse, every)
+    };
+    let clock = ClockWindow {
+        offset_s: 0.0,
+        half_width_s: options.clock_offset_max_s,
+    };
+    let coordinates = Coordinates::new(
+        Appearance::default(),
+        seen.viewer.pixel_m(),
+        clock,
+        &CorrectionPrior::new(&options),
+        Reach::Ranges,
+    );
+    let x = point_of(rope);
+    let (mut at, _) = linearise(&seen, &[x], &[], rope.links, fidelity)?;
+    let Some(Some(at)) = at.pop() else {
+        return Ok(None);
+    };
+    // Frames left out between two that are compared take their correlation along.
+    let in_time = CORRELATION.powi(i32::try_from(every).unwrap_or(1));
+    let noise = Noise {
+        axes: NOISE_PX.map(|sigma_px| AxisNoise {
+            sigma_px,
+            in_time: if exact { in_time } else { 0.0 },
+            along_rope: 0.0,
+        }),
+    };
+    let normal = at.normal(&seen, fidelity, &noise);
+    let covariance = (normal.information + coordinates.prior_information()).try_inverse();
+    Ok(covariance.map(|c| {
+        let deviation = |i: usize| c[(i, i)].max(0.0).sqrt();
+        let told = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS];
+        let unit = [0.1, 1.0, 1.0, 1.0];
+        let block =
+            SMatrix::<f64, 4, 4>::from_fn(|i, j| c[(told[i], told[j])] / (unit[i] * unit[j]));
+        WiggleInformation {
+            length_m: deviation(LENGTH),
+            bending_stiffness: deviation(STIFFNESS),
+            damping: deviation(DAMPING),
+            lead_mass: deviation(LEAD_MASS),
+            lead_radius_m: deviation(LEAD_RADIUS),
+            links: deviation(LINKS),
+            log_volume: block.determinant().max(1e-300).ln() / 8.0,
+        }
+    }))
+}

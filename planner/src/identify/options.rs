@@ -1,0 +1,191 @@
+//! Method, size and rules of an identification.
+
+use super::error::IdentifyError;
+use crate::observation::Observation;
+use serde::{Deserialize, Serialize};
+
+/// How a rope is identified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// A proposal, refined: the network's where the film is one that it can judge, else
+    /// that of a fast search.
+    #[default]
+    Hybrid,
+    /// The proposal of a fast search, refined.
+    HybridSearch,
+    /// The paper's Φ-CMA-ES, refined.
+    Cmaes,
+    /// The network alone.
+    Network,
+}
+
+impl Method {
+    /// Whether it asks a network.
+    #[must_use]
+    pub fn asks_network(self) -> bool {
+        matches!(self, Self::Network | Self::Hybrid)
+    }
+}
+
+/// Size and rules of an identification.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct IdentifyOptions {
+    /// How the start of the refinement is found.
+    pub method: Method,
+    /// Candidates per generation (paper: 60).
+    pub population: usize,
+    /// Most generations (paper: 50).
+    pub generations: usize,
+    /// Whether a search of Φ-CMA-ES stops where it has all but ceased to improve.
+    pub early_stop: bool,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Step of the rope simulation in the search (s).
+    pub search_step_s: f64,
+    /// Step of the rope simulation in the refinement (s).
+    pub step_s: f64,
+    /// Threads.
+    pub threads: usize,
+    /// Most frames that the search compares; the refinement compares all.
+    pub search_frames_max: usize,
+    /// Mass of the lead if it was weighed; fixes the scale of all masses (kg).
+    pub lead_mass_kg: Option<f64>,
+    /// Largest offset between the clocks of arm and camera (s).
+    pub clock_offset_max_s: f64,
+    /// Deviation of the camera's position in each direction (m).
+    pub camera_position_std_m: f64,
+    /// Deviation of the point the camera looks at, in each direction (m).
+    pub camera_look_at_std_m: f64,
+    /// Deviation of the camera's roll (rad).
+    pub camera_roll_std_rad: f64,
+    /// Least deviation of a keypoint, along and across the rope (px): errors that last
+    /// through the film do not show in what a fit leaves over.
+    pub noise_min_px: f64,
+    /// Keypoints below this confidence are not used.
+    pub confidence_min: f64,
+    /// Distance (px) above which a search counts as caught in a local minimum
+    /// and is repeated from other random numbers.
+    pub repeat_above_px: f64,
+    /// Most repeats of the search.
+    pub repeats_max: usize,
+    /// Largest fraction of frames in which the rope may be lost.
+    pub lost_fraction_max: f64,
+    /// Fewest frames.
+    pub frames_min: usize,
+}
+
+impl Default for IdentifyOptions {
+    fn default() -> Self {
+        Self {
+            method: Method::Hybrid,
+            population: 60,
+            generations: 50,
+            early_stop: true,
+            seed: 0,
+            search_step_s: 4e-3,
+            step_s: 2e-3,
+            threads: 2,
+            search_frames_max: 100,
+            lead_mass_kg: None,
+            clock_offset_max_s: 0.4,
+            camera_position_std_m: 0.02,
+            camera_look_at_std_m: 0.02,
+            camera_roll_std_rad: 0.01,
+            noise_min_px: 0.2,
+            confidence_min: 0.2,
+            repeat_above_px: 4.5,
+            repeats_max: 2,
+            lost_fraction_max: 0.05,
+            frames_min: 60,
+        }
+    }
+}
+
+/// Whether a film can be fitted with these options.
+pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyError> {
+    o.track.validate()?;
+    let lost_fraction = o.track.lost_part();
+    if lost_fraction > options.lost_fraction_max {
+        return Err(IdentifyError::TooManyLost {
+            lost_fraction,
+            max: options.lost_fraction_max,
+        });
+    }
+    let found = o.track.frames.len();
+    if found < options.frames_min {
+        return Err(IdentifyError::TooFewFrames {
+            found,
+            min: options.frames_min,
+        });
+    }
+    let film_s = o.track.frames.last().map_or(0.0, |f| f.t_s);
+    let motion_s = o.motion.duration_s();
+    if motion_s < film_s {
+        return Err(IdentifyError::MotionTooShort { motion_s, film_s });
+    }
+    let step = |value: f64| value > 0.0 && value <= 5e-3;
+    const STEP: &str = "above 0 and at most 0.005 s";
+    let deviation = |value: f64| value > 0.0 && value <= 1.0;
+    const DEVIATION: &str = "above 0 and at most 1 (m, rad)";
+    let lead_kg = options.lead_mass_kg.unwrap_or(1.0);
+    let clock_s = options.clock_offset_max_s;
+    let noise_px = options.noise_min_px;
+    let position_m = options.camera_position_std_m;
+    let look_at_m = options.camera_look_at_std_m;
+    let roll_rad = options.camera_roll_std_rad;
+    let rules = [
+        (
+            "search_step_s",
+            options.search_step_s,
+            step(options.search_step_s),
+            STEP,
+        ),
+        ("step_s", options.step_s, step(options.step_s), STEP),
+        (
+            "clock_offset_max_s",
+            clock_s,
+            (1e-3..=1.0).contains(&clock_s),
+            "0.001 to 1 s",
+        ),
+        (
+            "lead_mass_kg",
+            lead_kg,
+            lead_kg > 0.0 && lead_kg < 10.0,
+            "above 0 and below 10 kg",
+        ),
+        (
+            "camera_position_std_m",
+            position_m,
+            deviation(position_m),
+            DEVIATION,
+        ),
+        (
+            "camera_look_at_std_m",
+            look_at_m,
+            deviation(look_at_m),
+            DEVIATION,
+        ),
+        (
+            "camera_roll_std_rad",
+            roll_rad,
+            deviation(roll_rad),
+            DEVIATION,
+        ),
+        (
+            "noise_min_px",
+            noise_px,
+            (0.0..=10.0).contains(&noise_px),
+            "0 to 10 px",
+        ),
+    ];
+    match rules.into_iter().find(|(_, _, holds, _)| !holds) {
+        Some((option, value, _, expected)) => Err(IdentifyError::Option {
+            option,
+            value,
+            expected,
+        }),
+        None => Ok(()),
+    }
+}

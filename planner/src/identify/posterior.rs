@@ -1,0 +1,344 @@
+//! From the fit's coordinates to the nine parameters: what film, ranges and a weighed
+//! lead say together.
+//!
+//! The fit is Gaussian in its coordinates; the ranges are a box in the parameters, and
+//! the common factor of stiffness, damping and masses has no coordinate at all. So
+//! ropes are drawn from the fit, weighed by the ranges, and given a factor drawn from
+//! its own density (see [`super::scale`]). Moments and quantiles are those of the
+//! drawn ropes.
+
+use super::coordinates::{
+    DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, STIFFNESS, link_range, parameter,
+};
+use super::refine::Refined;
+use super::scale::MassScale;
+use crate::observation::Appearance;
+use nalgebra::{SMatrix, SVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use rand_distr::StandardNormal;
+use shared_types::RopeParams;
+use shared_types::rope::{Ambiguity, LINK_COUNTS, RANGES, ROPE_PARAMETERS, RopePosterior};
+
+/// Ropes drawn.
+const DRAWS: usize = 4096;
+/// Effective draws below which no rope of the ranges fits.
+const EFFECTIVE_MIN: f64 = 40.0;
+/// Error of taking the film for linear in the link count (1).
+const LINKS_STD: f64 = 0.5;
+/// Probability of an interval.
+const NINE_TENTHS: f64 = 0.9;
+/// Fraction of the prior's deviation above which a direction was not seen.
+pub(super) const UNSEEN_FRACTION: f64 = 0.7;
+
+/// Coordinates drawn, in this order.
+const DRAWN: [usize; 5] = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS];
+type Vector = SVector<f64, 5>;
+
+/// The parameters' posterior with its likeliest rope.
+#[derive(Debug, Clone)]
+pub(super) struct Inferred {
+    pub(super) params: RopeParams,
+    pub(super) posterior: RopePosterior,
+}
+
+/// One drawn rope.
+struct Draw {
+    values: [f64; ROPE_PARAMETERS],
+    coordinates: Vector,
+    weight: f64,
+}
+
+/// Draws ropes from a fit.
+pub(super) fn posterior(
+    fit: &Refined,
+    appearance: Appearance,
+    pixel_m: f64,
+    lead_mass_kg: Option<f64>,
+    seed: u64,
+) -> Inferred {
+    let counts = count_probabilities(fit);
+    let scale = MassScale::new(lead_mass_kg);
+    let mut draws = draw(fit, &counts, appearance, pixel_m, scale, seed);
+    let total: f64 = draws.iter().map(|d| d.weight).sum();
+    let squares: f64 = draws.iter().map(|d| d.weight * d.weight).sum();
+    let within_ranges = total > 0.0 && total * total / squares >= EFFECTIVE_MIN;
+    if !within_ranges {
+        // The ranges are no part of what is known about a rope outside them.
+        for d in &mut draws {
+            d.weight = 1.0;
+        }
+    }
+    normalise(&mut draws);
+    let links_probability = links_of(&draws);
+    let posterior = summarise(&draws, links_probability, fit);
+    Inferred {
+        params: likeliest(&draws, &posterior, lead_mass_kg),
+        posterior,
+    }
+}
+
+fn normalise(draws: &mut [Draw]) {
+    let total: f64 = draws.iter().map(|d| d.weight).sum();
+    for d in draws {
+        d.weight /= total;
+    }
+}
+
+/// Probability of each link count of the ranges from the fit alone.
+fn count_probabilities(fit: &Refined) -> [f64; LINK_COUNTS] {
+    let variance = fit.covariance[(LINKS, LINKS)] * fit.inflation + LINKS_STD.powi(2);
+    let (low, _) = link_range();
+    let mut count = f64::from(low) - 1.0;
+    let logs: [f64; LINK_COUNTS] = core::array::from_fn(|_| {
+        count += 1.0;
+        -(count - fit.x[LINKS]).powi(2) / (2.0 * variance)
+    });
+    let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights = logs.map(|l| (l - top).exp());
+    let total: f64 = weights.iter().sum();
+    weights.map(|w| w / total)
+}
+
+fn draw(
+    fit: &Refined,
+    counts: &[f64; LINK_COUNTS],
+    appearance: Appearance,
+    pixel_m: f64,
+    scale: MassScale,
+    seed: u64,
+) -> Vec<Draw> {
+    use parameter as p;
+    let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x9057_e210);
+    let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| fit.covariance[(DRAWN[i], DRAWN[j])]);
+    let with_links = Vector::from_fn(|i, _| fit.covariance[(DRAWN[i], LINKS)]);
+    let variance = fit.covariance[(LINKS, LINKS)].max(1e-9);
+    let given_links = (covariance - with_links * with_links.transpose() / variance) * fit.inflation;
+    let root = given_links
+        .cholesky()
+        .map_or_else(SMatrix::zeros, |c| c.l());
+    let (low, _) = link_range();
+    let uniform = |rng: &mut ChaCha12Rng, i: usize| rng.random_range(RANGES[i].min..=RANGES[i].max);
+    (0..DRAWS)
+        .map(|_| {
+            let mut at = rng.random_range(0.0..1.0);
+            let mut links = f64::from(low);
+            for probability in &counts[..LINK_COUNTS - 1] {
+                if at < *probability {
+                    break;
+                }
+                at -= probability;
+                links += 1.0;
+            }
+            let normal = Vector::from_fn(|_, _| rng.sample(StandardNormal));
+            let x = Vector::from_fn(|i, _| fit.x[DRAWN[i]])
+                + with_links * ((links - fit.x[LINKS]) / variance)
+                + root * normal;
+            let s = x[0].max(1e-3) / links;
+            let ratios = [x[1].exp() / s, x[2].exp() / s, x[3].exp()];
+            let drawn = scale.draw(ratios, rng.random_range(0.0..1.0));
+            let mu = drawn.mass_per_length;
+            let radius_m = match appearance.rope_radius_m {
+                Some(seen) => {
+                    let std_dev = Appearance::std_dev_m(seen, pixel_m);
+                    seen + std_dev * rng.sample::<f64, _>(StandardNormal)
+                }
+                None => uniform(&mut rng, p::RADIUS),
+            };
+            let values = [
+                links,
+                x[0],
+                ratios[1] * mu,
+                ratios[0] * mu,
+                radius_m.max(1e-4),
+                mu,
+                ratios[2] * mu,
+                x[4],
+                uniform(&mut rng, p::EXTRA_SCALE),
+            ];
+            let inside = |i: usize| values[i] >= RANGES[i].min && values[i] <= RANGES[i].max;
+            let inside = [p::LENGTH, p::RADIUS, p::LEAD_RADIUS]
+                .into_iter()
+                .all(inside);
+            Draw {
+                values,
+                coordinates: x,
+                weight: if inside { drawn.density } else { 0.0 },
+            }
+        })
+        .collect()
+}
+
+fn links_of(draws: &[Draw]) -> [f64; LINK_COUNTS] {
+    let (low, _) = link_range();
+    let mut out = [0.0; LINK_COUNTS];
+    for d in draws {
+        let index = (d.values[0] - f64::from(low)).round() as usize;
+        out[index.min(LINK_COUNTS - 1)] += d.weight;
+    }
+    out
+}
+
+/// Weighted quantiles of one parameter.
+fn quantiles<const N: usize>(
+    draws: &[Draw],
+    value: impl Fn(&Draw) -> f64,
+    at: [f64; N],
+) -> [f64; N] {
+    let mut sorted: Vec<(f64, f64)> = draws
+        .iter()
+        .filter(|d| d.weight > 0.0)
+        .map(|d| (value(d), d.weight))
+        .collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    at.map(|part| {
+        let mut sum = 0.0;
+        for (value, weight) in &sorted {
+            sum += weight;
+            if sum >= part {
+                return *value;
+            }
+        }
+        sorted.last().map_or(f64::NAN, |s| s.0)
+    })
+}
+
+fn summarise(
+    draws: &[Draw],
+    links_probability: [f64; LINK_COUNTS],
+    fit: &Refined,
+) -> RopePosterior {
+    let mut mean = [0.0; ROPE_PARAMETERS];
+    for d in draws {
+        for (m, v) in mean.iter_mut().zip(d.values) {
+            *m += d.weight * v;
+        }
+    }
+    let mut covariance = [[0.0; ROPE_PARAMETERS]; ROPE_PARAMETERS];
+    for d in draws {
+        for i in 0..ROPE_PARAMETERS {
+            for j in 0..ROPE_PARAMETERS {
+                covariance[i][j] += d.weight * (d.values[i] - mean[i]) * (d.values[j] - mean[j]);
+            }
+        }
+    }
+    let mut interval_90 = core::array::from_fn(|i| quantiles(draws, |d| d.values[i], [0.05, 0.95]));
+    interval_90[parameter::LINKS] = count_interval(&links_probability);
+    RopePosterior {
+        mean,
+        covariance,
+        interval_90,
+        links_probability,
+        ambiguities: ambiguities(&covariance),
+        inflation: fit.inflation,
+    }
+}
+
+/// First and last of the likeliest link counts whose probability is as close to nine
+/// tenths as whole counts allow: with one count more it would be farther off, above or
+/// below. The fewest counts with nine tenths or more would hold the truth too often.
+fn count_interval(probability: &[f64; LINK_COUNTS]) -> [f64; 2] {
+    let (mut first, mut sum) = (0, 0.0);
+    for (i, p) in probability.iter().enumerate() {
+        if *p > sum {
+            (first, sum) = (i, *p);
+        }
+    }
+    let mut last = first;
+    loop {
+        let below = first.checked_sub(1).map_or(-1.0, |i| probability[i]);
+        let above = probability.get(last + 1).copied().unwrap_or(-1.0);
+        let next = below.max(above);
+        if next < 0.0 || (sum + next - NINE_TENTHS).abs() >= (sum - NINE_TENTHS).abs() {
+            break;
+        }
+        sum += next;
+        if above >= below {
+            last += 1;
+        } else {
+            first -= 1;
+        }
+    }
+    let (low, _) = link_range();
+    [first, last].map(|i| f64::from(low) + i as f64)
+}
+
+/// Deviation of the ranges as a prior.
+pub(super) fn prior_std(i: usize) -> f64 {
+    (RANGES[i].max - RANGES[i].min) / 12.0_f64.sqrt()
+}
+
+/// Directions, in prior deviations, along which the film left most of the prior.
+fn ambiguities(covariance: &[[f64; ROPE_PARAMETERS]; ROPE_PARAMETERS]) -> Vec<Ambiguity> {
+    let scaled = SMatrix::<f64, ROPE_PARAMETERS, ROPE_PARAMETERS>::from_fn(|i, j| {
+        covariance[i][j] / (prior_std(i) * prior_std(j))
+    });
+    let eigen = scaled.symmetric_eigen();
+    let mut out: Vec<Ambiguity> = (0..ROPE_PARAMETERS)
+        .map(|k| Ambiguity {
+            direction: core::array::from_fn(|i| eigen.eigenvectors[(i, k)]),
+            kept: eigen.eigenvalues[k].max(0.0).sqrt(),
+        })
+        .filter(|a| a.kept > UNSEEN_FRACTION)
+        .collect();
+    out.sort_by(|a, b| b.kept.total_cmp(&a.kept));
+    out
+}
+
+/// One rope whose ratios are those of the fit: means of the coordinates, medians of the
+/// link count and of the common factor.
+fn likeliest(draws: &[Draw], posterior: &RopePosterior, lead_mass_kg: Option<f64>) -> RopeParams {
+    let mut x = Vector::zeros();
+    for d in draws {
+        x += d.coordinates * d.weight;
+    }
+    // The median, like that of the common factor: the least mean error.
+    let [links] = quantiles(draws, |d| d.values[parameter::LINKS], [0.5]);
+    let [median] = quantiles(draws, |d| d.values[parameter::MASS_PER_LENGTH], [0.5]);
+    let mu = lead_mass_kg.map_or(median, |m| m / x[3].exp());
+    let s = x[0] / links;
+    RopeParams::from_array([
+        links,
+        x[0],
+        mu * x[2].exp() / s,
+        mu * x[1].exp() / s,
+        posterior.mean[parameter::RADIUS],
+        mu,
+        mu * x[3].exp(),
+        x[4],
+        posterior.mean[parameter::EXTRA_SCALE],
+    ])
+}
+
+impl Inferred {
+    /// One standard deviation per parameter, `None` where the film says next to nothing.
+    pub(super) fn std_dev(&self) -> [Option<f64>; ROPE_PARAMETERS] {
+        core::array::from_fn(|i| {
+            let deviation = self.posterior.covariance[i][i].max(0.0).sqrt();
+            (deviation < UNSEEN_FRACTION * prior_std(i)).then_some(deviation)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_of_the_count_hold_what_is_closest_to_nine_tenths() {
+        let sure = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        assert_eq!(count_interval(&sure), [23.0, 23.0]);
+        // Six of seven even counts are 86 %, all of them 100 %.
+        let [low, high] = count_interval(&[1.0 / 7.0; LINK_COUNTS]);
+        assert_eq!(high - low, 5.0);
+        // 80 %, or 95 %.
+        let sloping = [0.5, 0.3, 0.15, 0.05, 0.0, 0.0, 0.0];
+        assert_eq!(count_interval(&sloping), [20.0, 22.0]);
+        // 85 %, or 98 %.
+        let steep = [0.0, 0.0, 0.01, 0.01, 0.13, 0.45, 0.4];
+        assert_eq!(count_interval(&steep), [25.0, 26.0]);
+        // Equal on both sides: one of them, and the middle always.
+        let even = [0.02, 0.06, 0.12, 0.6, 0.12, 0.06, 0.02];
+        assert_eq!(count_interval(&even)[0], 22.0);
+    }
+}

@@ -1,0 +1,108 @@
+//! Refinement of a proposal against every pixel, and how well it is known.
+//!
+//! Gauss-Newton steps under a noise whose size and correlations are estimated from the
+//! residuals themselves, in turns. The covariance is the inverse of the whitened
+//! normal equations, widened where the parts of the film disagree by more than it says.
+
+use super::budget::Budget;
+use super::coordinates::{Coordinates, FREE, LINKS, Point, Square, link_range, middle_links};
+use super::descent::{DescentRules, Iterate, descend, go_on};
+use super::error::IdentifyError;
+use super::film::{Fidelity, Film};
+use super::linear::Normal;
+use super::noise::Noise;
+
+/// Most steps: until the noise is known, with its first estimate, and with the second at
+/// the likeliest link count.
+const FIRST_STEPS: usize = 6;
+const SECOND_STEPS: usize = 5;
+const LAST_STEPS: usize = 4;
+/// A cost lower by less than this is no better: a tenth of a deviation.
+const SETTLED: f64 = 5e-3;
+
+/// A refined fit.
+#[derive(Debug, Clone)]
+pub(super) struct Refined {
+    pub(super) x: Point,
+    /// Covariance of the coordinates, their fitting prior included.
+    pub(super) covariance: Square,
+    /// Root mean square distance between seen and simulated keypoints (px).
+    pub(super) residual_px: f64,
+    pub(super) noise: Noise,
+    /// Factor by which the parts of the film disagree more than the noise says,
+    /// variance; 1 or more.
+    pub(super) inflation: f64,
+}
+
+/// Refines the likeliest of some starts.
+pub(super) fn refine(
+    film: &Film<'_>,
+    coordinates: &Coordinates,
+    start: &Point,
+    noise_px: f64,
+    budget: &mut Budget<'_>,
+) -> Result<Refined, IdentifyError> {
+    let rules = |links: u32, noise: Noise, iterations: usize| DescentRules {
+        fidelity: Fidelity::Fine,
+        links,
+        noise,
+        iterations,
+        settled_below: SETTLED,
+    };
+    let estimate = |w: &Iterate| {
+        Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows).at_least(film.noise_min_px)
+    };
+    let best = |iterates: Vec<Iterate>| {
+        iterates
+            .into_iter()
+            .next()
+            .ok_or(IdentifyError::NothingVisible)
+    };
+
+    let middle = middle_links();
+    let first = rules(middle, Noise::white(noise_px), FIRST_STEPS);
+    let starts = [*start];
+    let mut iterate = best(descend(film, coordinates, &starts, &[], &first, budget)?)?;
+    let second = rules(middle, estimate(&iterate), SECOND_STEPS);
+    let again = Iterate::new(film, coordinates, &second, iterate.x, iterate.at);
+    iterate = best(go_on(film, coordinates, vec![again], &second, budget)?)?;
+    let links = likeliest_links(&iterate.x);
+    let last = rules(links, estimate(&iterate), LAST_STEPS);
+    let (starts, near) = ([iterate.x], [&iterate.at.rows]);
+    iterate = best(descend(film, coordinates, &starts, &near, &last, budget)?)?;
+    let noise = estimate(&iterate);
+    let normal = iterate.at.normal(film, Fidelity::Fine, &noise);
+    let covariance = (normal.information + coordinates.prior_information())
+        .cholesky()
+        .map_or_else(|| coordinates.prior_information(), |f| f.inverse());
+    let inflation = disagreement(&normal, &covariance).max(1.0);
+    Ok(Refined {
+        x: iterate.x,
+        covariance,
+        residual_px: iterate.at.distance_px,
+        noise,
+        inflation,
+    })
+}
+
+/// The link count nearest to a point's, within the ranges.
+fn likeliest_links(x: &Point) -> u32 {
+    let (low, high) = link_range();
+    x[LINKS].round().clamp(f64::from(low), f64::from(high)) as u32
+}
+
+/// Spread of the gradient over the parts of the film, relative to what the normal
+/// equations expect, averaged over all directions.
+fn disagreement(normal: &Normal, covariance: &Square) -> f64 {
+    let parts = normal.parts.len() as f64;
+    if parts < 3.0 {
+        return 1.0;
+    }
+    let mean = normal.gradient / parts;
+    let spread = normal.parts.iter().map(|g| {
+        let d = g - mean;
+        (covariance * d).dot(&d)
+    });
+    let seen = (covariance * normal.information).trace();
+    spread.sum::<f64>() * parts / (parts - 1.0) / seen.clamp(1.0, FREE as f64)
+}

@@ -1,0 +1,68 @@
+//! Whether a plan that keeps every limit is worth throwing.
+
+use shared_types::{Plan, Task};
+
+/// Predicted distances of tip and target above which a plan is reported to be poor, and
+/// above which it should not be thrown (m).
+const MISS_WARN_M: f64 = 0.01;
+const MISS_MAX_M: f64 = 0.05;
+
+/// What is wrong with a plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shortcoming {
+    /// In words, and what to do about it.
+    pub message: String,
+    /// Whether the throw would not do what it is for.
+    pub is_severe: bool,
+}
+
+/// What is wrong with a plan: a strike that misses, another task that fails.
+#[must_use]
+pub fn shortcoming(plan: &Plan) -> Option<Shortcoming> {
+    if plan.task == Task::Strike {
+        return miss(plan.predicted_error_m);
+    }
+    let unmet = plan.verdict.conditions.iter().filter(|c| !c.met);
+    let unmet: Vec<&str> = unmet.map(|c| c.name.as_str()).collect();
+    (!plan.verdict.success).then(|| Shortcoming {
+        message: format!(
+            "the {} is predicted to fail (not met: {}); try another --seed or target",
+            plan.task.name(),
+            unmet.join(", ")
+        ),
+        is_severe: true,
+    })
+}
+
+fn miss(predicted_error_m: f64) -> Option<Shortcoming> {
+    (predicted_error_m > MISS_WARN_M).then(|| Shortcoming {
+        message: format!(
+            "the tip is predicted to miss the target by {:.1} cm; try another --seed or a target closer to the middle of the reach",
+            100.0 * predicted_error_m
+        ),
+        is_severe: predicted_error_m > MISS_MAX_M,
+    })
+}
+
+/// Everything that a person should know before the throw.
+#[must_use]
+pub fn warnings(plan: &Plan) -> Vec<String> {
+    let interrupted = plan
+        .interrupted
+        .then(|| "the search was interrupted: this is the best throw up to then".to_owned());
+    let poor = shortcoming(plan).map(|s| s.message);
+    poor.into_iter().chain(interrupted).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_miss_is_reported_and_a_large_one_is_severe() {
+        assert_eq!(miss(0.004), None);
+        let small = miss(0.03).unwrap();
+        assert!(small.message.contains("3.0 cm") && !small.is_severe);
+        assert!(miss(0.06).unwrap().is_severe);
+    }
+}

@@ -1,0 +1,41 @@
+//! Throws: the tasks, one file each behind one trait, and what they share: the search,
+//! progress, errors, start pose and reach.
+
+mod assess;
+mod config;
+mod drape;
+mod ensemble;
+mod error;
+mod finalists;
+mod goal;
+mod lob;
+mod planning;
+mod reach;
+mod reach_map;
+mod request;
+mod robust;
+mod scene;
+mod setup;
+mod strike;
+mod task;
+#[cfg(test)]
+mod tests;
+mod throw;
+mod trajopt;
+
+pub use assess::{Shortcoming, shortcoming, warnings};
+pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
+pub use drape::{Drape, DrapeConfig};
+pub use ensemble::{PosteriorEnsemble, ropes_of};
+pub use error::{PlanError, PlanProgress};
+pub use goal::ThrowGoal;
+pub use lob::{Lob, LobConfig};
+pub use planning::plan;
+pub use reach::{check_reach, clear_of_arm, start_pose_for};
+pub use reach_map::{GridCell, ReachMap};
+pub use request::PlanRequest;
+pub use scene::PlanarScene;
+pub use strike::Strike;
+pub use task::{ThrowTask, proximity_reward, simulator_for, verdict};
+pub use throw::{ThrowOutcome, ThrowSimulator};
+pub use trajopt::{Clearance, Dimensions, PolePose};

@@ -1,0 +1,178 @@
+//! From a rope and a task to a throw: searches, polish, choice among the finalists.
+
+use super::finalists::Finalist;
+use super::robust::{forecast, least_risk, search_around};
+use super::setup::{Count, Setup};
+use super::{
+    PlanError, PlanOptions, PlanProgress, PlanRequest, ThrowOutcome, check_reach, clear_of_arm,
+};
+use arm_model::JointTrajectory;
+use arm_model::limits::LimitKind;
+use shared_types::plan::trajectory_hash_hex;
+use shared_types::{LimitedBy, Plan, VERSION, Verdict};
+use std::ops::ControlFlow;
+
+/// Plans a throw. Deterministic for a seed, whatever the threads. Interrupted by
+/// `progress`, it plans with what has been found up to then.
+///
+/// # Errors
+/// See [`PlanError`]; an unreachable target is refused before any simulation.
+pub fn plan(
+    request: &PlanRequest,
+    progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+) -> Result<Plan, PlanError> {
+    let target_m = request.goal.task().target_m();
+    request.rope.validate()?;
+    check_options(&request.options)?;
+    check_reach(target_m, request.rope.length_m, &request.cell)?;
+    clear_of_arm(target_m, &request.cell)?;
+    let setup = Setup::new(request)?;
+    let mut count = Count::default();
+    let mut finalists: Vec<Finalist> = Vec::new();
+    for round in 0..request.options.searches.max(1) {
+        let found = setup.search(round, &mut count, progress)?;
+        finalists.extend(setup.compare(found, &mut count)?);
+        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        if !setup.task.polishes() {
+            setup.confirm(&mut finalists, &mut count)?;
+        }
+        let good = finalists.first().is_some_and(|f| setup.is_good(f));
+        if count.interrupted || good {
+            break;
+        }
+    }
+    let is_robust = !request.ensemble.optimised.is_empty() && !count.interrupted;
+    let chosen = if is_robust {
+        let (around, simulations) = least_risk(&setup, &request.ensemble, finalists)?;
+        count.add(simulations);
+        match around {
+            Some(around) => Some(setup.robust(around, &mut count, progress)?),
+            None => None,
+        }
+    } else {
+        finalists.into_iter().next()
+    };
+    let chosen = chosen.ok_or(PlanError::OnlyCollisions {
+        simulations: count.simulations,
+    })?;
+    setup.finish(chosen, count)
+}
+
+fn check_options(options: &PlanOptions) -> Result<(), PlanError> {
+    const STEP: &str = "above 0 and at most 0.005 s";
+    let step = |value: f64| value > 0.0 && value <= 5e-3;
+    let stretch = options.segment_stretch_max;
+    let rules = [
+        ("step_s", options.step_s, step(options.step_s), STEP),
+        (
+            "search_step_s",
+            options.search_step_s,
+            step(options.search_step_s),
+            STEP,
+        ),
+        (
+            "segment_stretch_max",
+            stretch,
+            (1.0..=2.0).contains(&stretch),
+            "from 1 to 2",
+        ),
+        (
+            "generations",
+            0.0,
+            options.generations != Some(0),
+            "1 or more",
+        ),
+    ];
+    match rules.into_iter().find(|(_, _, holds, _)| !holds) {
+        Some((option, value, _, expected)) => Err(PlanError::Option {
+            option,
+            value,
+            expected,
+        }),
+        None => Ok(()),
+    }
+}
+
+impl Setup<'_> {
+    /// The throw near a finalist that has the least risk over the ropes of the ensemble.
+    fn robust(
+        &self,
+        around: Finalist,
+        count: &mut Count,
+        progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+    ) -> Result<Finalist, PlanError> {
+        let (found, simulations) = search_around(self, &self.request.ensemble, &around, progress)?;
+        count.simulations += simulations;
+        let best = self.finalists(found, count)?.into_iter().next();
+        Ok(best.unwrap_or(around))
+    }
+
+    /// The plan as it is written down. The prediction comes from double precision at half
+    /// the step.
+    fn finish(&self, chosen: Finalist, mut count: Count) -> Result<Plan, PlanError> {
+        let (request, trajectory) = (self.request, chosen.trajectory);
+        if let Some(margin) = request.limits.worst_violation(&trajectory) {
+            return Err(PlanError::BreaksLimit {
+                what: margin.describe(),
+            });
+        }
+        let rope = &request.rope;
+        let exact = self.judging.exact().run(&[(rope, &trajectory)])?;
+        count.add(1);
+        let exact = exact.into_iter().find(|o| o.finite);
+        let outcome = exact.unwrap_or(chosen.outcome);
+        let forecast = forecast(self, &request.ensemble, &trajectory)?;
+        count.add(request.ensemble.forecast.len());
+        let verdict = self.task.judge(rope, &outcome);
+        Ok(Plan {
+            version: VERSION.to_owned(),
+            seed: request.options.seed,
+            task: request.goal.kind(),
+            target_m: self.task.target_m(),
+            rope: *rope,
+            predicted_error_m: self.task.error_m(&outcome),
+            predicted_time_s: outcome.closest_s,
+            fitness: self.fitness(rope, &trajectory, &outcome),
+            interrupted: count.interrupted,
+            limited_by: Some(self.limited_by(&trajectory, &outcome, &verdict)),
+            verdict,
+            forecast,
+            arm_response: request.following.as_ref().map(|f| f.source().to_owned()),
+            simulations: count.simulations,
+            resampled: count.resampled,
+            margins: request.limits.margins(&trajectory),
+            trajectory_sha256: trajectory_hash_hex(&trajectory),
+            trajectory,
+        })
+    }
+
+    fn limited_by(
+        &self,
+        trajectory: &JointTrajectory,
+        outcome: &ThrowOutcome,
+        verdict: &Verdict,
+    ) -> LimitedBy {
+        // Plans use 98.5 % of each limit; this much more is hardly room.
+        const LEFT_FRACTION: f64 = 0.03;
+        let error_m = self.task.error_m(outcome);
+        let close = !self.task.polishes() || error_m <= self.request.options.good_enough_m;
+        if !outcome.contacts.none() {
+            return LimitedBy::Contact;
+        }
+        if verdict.success && close {
+            return LimitedBy::Nothing;
+        }
+        let margins = self.request.limits.margins(trajectory);
+        let is_range = |k: LimitKind| matches!(k, LimitKind::PositionMin | LimitKind::PositionMax);
+        let used = |range: bool| {
+            margins.iter().any(|m| {
+                is_range(m.kind) == range && m.left < LEFT_FRACTION * m.limit.abs().max(1e-3)
+            })
+        };
+        match () {
+            () if used(true) => LimitedBy::JointRange,
+            () if used(false) => LimitedBy::ArmSpeed,
+            () => LimitedBy::Budget,
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Start pose of a throw and the bounds of what a tip can reach.
+
+use super::PlanError;
+use arm_model::capsules::arm_at;
+use arm_model::geometry::Capsule;
+use arm_model::joint::START_POSE;
+use arm_model::kinematics::JOINT_ORIGIN_M;
+use arm_model::{Cell, JointVector, Pole};
+use nalgebra::Vector3;
+
+/// Height of the shoulder, the common point of joints 1 to 3 (m).
+const SHOULDER_Z_M: f64 = JOINT_ORIGIN_M[0][2];
+/// What no tip of a thrown rope was seen to exceed, as a distance from the base axis less
+/// the rope's length, is so much short of the pole's reach (m). In the maps of a dozen
+/// random ropes the outermost cells lie 0.88 to 0.97 m out.
+const THROW_SHORT_M: f64 = 0.005;
+
+/// Room that a target needs around arm, pole and column (m).
+const TARGET_ROOM_M: f64 = 0.02;
+
+/// Largest distance from the shoulder to the pole's end (m), down to the millimetre:
+/// upper arm, forearm, and wrist with pole in one line.
+fn pole_end_reach_m(pole: &Pole) -> f64 {
+    let [_, _, above_elbow, elbow, below_elbow, _, flange] = JOINT_ORIGIN_M;
+    let upper_arm_m = above_elbow[1].hypot(elbow[0]);
+    let forearm_m = below_elbow[0].hypot(below_elbow[1]);
+    let end = pole.end_m();
+    // Joint 7 turns a pole that is not in the flange's middle to wherever it reaches most.
+    let wrist_m = (flange[0] + end.xy().norm()).hypot(flange[1] + end.z);
+    ((upper_arm_m + forearm_m + wrist_m) * 1e3).floor() / 1e3
+}
+
+/// [`START_POSE`] with joint 1 turned to the target's bearing, so that joints 2,
+/// 4 and 6 move in the vertical plane through base axis and target.
+#[must_use]
+pub fn start_pose_for(target_m: [f64; 3]) -> JointVector {
+    let mut pose = START_POSE;
+    pose[0] = target_m[1].atan2(target_m[0]);
+    pose
+}
+
+/// Refuses targets in the column, in the base, or where the arm stands before the throw.
+///
+/// # Errors
+/// [`PlanError::InArm`] with the part that the target lies in.
+pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> Result<(), PlanError> {
+    let target = Vector3::from(target_m);
+    let (links, pole) = arm_at(&start_pose_for(target_m), &cell.pole);
+    let near = |capsule: &Capsule| capsule.distance_to_point_m(&target) < TARGET_ROOM_M;
+    let (base, links): (Vec<_>, Vec<_>) = links.iter().partition(|(link, _)| *link <= 1);
+    let part = if cell.column_distance_m(&target) < TARGET_ROOM_M
+        || base.iter().any(|(_, capsule)| near(capsule))
+    {
+        "base"
+    } else if links.iter().any(|(_, capsule)| near(capsule)) || near(&pole) {
+        "links in the start pose"
+    } else {
+        return Ok(());
+    };
+    Err(PlanError::InArm {
+        target_m,
+        part,
+        room_m: TARGET_ROOM_M,
+    })
+}
+
+/// Refuses targets that no throw reaches.
+///
+/// # Errors
+/// A target that is not finite, below the floor, or too far; the latter two with
+/// a nearby point that can be reached.
+pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Result<(), PlanError> {
+    if target_m.iter().any(|v| !v.is_finite()) {
+        return Err(PlanError::TargetNotFinite { target_m });
+    }
+    let [x, y, z] = target_m;
+    let rho = x.hypot(y);
+    let (reach_m, floor_z_m) = (pole_end_reach_m(&cell.pole), cell.floor_z_m);
+    let rho_max = reach_m - THROW_SHORT_M + rope_length_m;
+    let radius_max = reach_m + rope_length_m;
+    let radius = rho.hypot(z - SHOULDER_Z_M);
+    let reason = if rho > rho_max {
+        format!(
+            "{rho:.2} m from the base axis, but a rope of {rope_length_m:.2} m gets to {rho_max:.2} m"
+        )
+    } else if radius > radius_max {
+        format!(
+            "{radius:.2} m from the shoulder, but arm, pole and a rope of {rope_length_m:.2} m together reach {radius_max:.2} m"
+        )
+    } else if z < floor_z_m {
+        format!("below the floor at {floor_z_m} m")
+    } else {
+        return Ok(());
+    };
+    Err(PlanError::Unreachable {
+        target_m,
+        nearest_m: nearest(rho, target_m, rho_max, radius_max, floor_z_m),
+        reason,
+    })
+}
+
+/// A point in reach, on the target's bearing.
+fn nearest(
+    rho: f64,
+    [x, y, z]: [f64; 3],
+    rho_max: f64,
+    radius_max: f64,
+    floor_z_m: f64,
+) -> [f64; 3] {
+    // A little inside each bound, so that the suggestion is accepted itself.
+    const INSIDE: f64 = 0.98;
+    let mut rho_in = rho.min(rho_max * INSIDE);
+    let mut up = z.max(floor_z_m * INSIDE) - SHOULDER_Z_M;
+    let radius = rho_in.hypot(up);
+    let part = (radius_max * INSIDE / radius.max(1e-9)).min(1.0);
+    rho_in *= part;
+    up *= part;
+    let scale = rho_in / rho.max(1e-9);
+    [x * scale, y * scale, SHOULDER_Z_M + up]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_start_pose_turns_the_plane_to_the_target() {
+        let target = [0.8, -0.5, 0.3];
+        let (p, _) = Pole::default().attach_pose(&start_pose_for(target));
+        assert!((p.y.atan2(p.x) - target[1].atan2(target[0])).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_pose_stretches_further_than_the_stated_reach() {
+        let lab = Pole::default();
+        let long = Pole {
+            length_m: 0.35,
+            offset_m: [0.0, 0.02, 0.01],
+            ..lab
+        };
+        for pole in [lab, long] {
+            let (longest, stated) = (longest_m(&pole), pole_end_reach_m(&pole));
+            assert!((longest - stated).abs() < 2e-3, "{longest} {stated}");
+        }
+        assert_eq!(pole_end_reach_m(&lab), 0.955);
+    }
+
+    fn longest_m(pole: &Pole) -> f64 {
+        let mut longest: f64 = 0.0;
+        for a in 0..200 {
+            for b in 0..200 {
+                let q4 = -0.1 + 4.0 * f64::from(a) / 199.0;
+                let q6 = -1.69 + 4.83 * f64::from(b) / 199.0;
+                for q7 in [0.0, core::f64::consts::FRAC_PI_2, core::f64::consts::PI] {
+                    let q = JointVector([0.0, 0.0, 0.0, q4, 0.0, q6, q7]);
+                    let p = pole.attach_pose(&q).0;
+                    longest = longest.max(p.x.hypot(p.z - SHOULDER_Z_M));
+                }
+            }
+        }
+        longest
+    }
+
+    #[test]
+    fn targets_in_the_arm_are_refused() {
+        let cell = Cell::default();
+        let refused = |t| match clear_of_arm(t, &cell) {
+            Err(PlanError::InArm { part, .. }) => part,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(refused([0.0, 0.0, 0.1]), "base");
+        assert_eq!(refused([0.05, -0.05, -0.3]), "base");
+        let links = "links in the start pose";
+        let flange = arm_model::kinematics::flange_pose(&start_pose_for([1.0, 0.0, 0.0])).0;
+        assert_eq!(refused(flange.into()), links);
+        let end = cell.pole.attach_pose(&start_pose_for([0.6, 0.6, 0.0])).0;
+        assert_eq!(refused(end.into()), links);
+        for free in [[1.0, 0.0, 0.4], [0.85, 0.3, -0.1], [1.05, -0.3, 0.6]] {
+            assert!(clear_of_arm(free, &cell).is_ok(), "{free:?}");
+        }
+    }
+
+    #[test]
+    fn far_targets_are_refused_with_an_acceptable_alternative() {
+        let cell = Cell::default();
+        for far in [
+            [2.0, 1.0, 0.3],
+            [0.3, 0.1, 2.5],
+            [0.8, 0.0, -0.9],
+            [1.6, 0.0, 1.2],
+        ] {
+            let Err(PlanError::Unreachable { nearest_m, .. }) = check_reach(far, 0.55, &cell)
+            else {
+                panic!("{far:?} was accepted");
+            };
+            assert!(
+                check_reach(nearest_m, 0.55, &cell).is_ok(),
+                "{far:?} -> {nearest_m:?}"
+            );
+        }
+        assert!(check_reach([1.1, 0.0, 0.45], 0.45, &cell).is_ok());
+        assert!(matches!(
+            check_reach([f64::NAN, 0.0, 0.0], 0.5, &cell),
+            Err(PlanError::TargetNotFinite { .. })
+        ));
+    }
+}

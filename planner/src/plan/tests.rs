@@ -1,0 +1,272 @@
+use super::*;
+use crate::collide::ContactCounts;
+use crate::ropes::random_rope;
+use arm_model::Cell;
+use setup::Setup;
+use std::ops::ControlFlow;
+
+/// A small search for a strike.
+fn request(target_m: [f64; 3]) -> PlanRequest {
+    let goal = ThrowGoal::Strike(Strike {
+        target_m,
+        config: ThrowConfig::default(),
+    });
+    let options = PlanOptions {
+        population: 24,
+        generations: Some(12),
+        searches: 1,
+        ..PlanOptions::default()
+    };
+    PlanRequest::new(goal, &random_rope(11), options)
+}
+
+fn go_on(_: PlanProgress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+#[test]
+fn fitness_is_the_sum_of_its_named_terms() {
+    let r = request([0.9, 0.0, 0.2]);
+    let setup = Setup::new(&r).unwrap();
+    let rest = setup.space.decode(&setup.space.resting()).unwrap();
+    let outcome = ThrowOutcome {
+        closest_m: 0.25,
+        closest_s: 0.7,
+        contacts: ContactCounts {
+            rope_robot: 3,
+            pole_robot: 2,
+            base_region: 1,
+        },
+        finite: true,
+        ..ThrowOutcome::default()
+    };
+    let got = setup.fitness(&r.rope, &rest, &outcome);
+    let want = 0.25 - 1.0 / 1.25 + 3.0 * 0.02 + 2.0 * 0.1 + 0.2;
+    assert!((got - want).abs() < 1e-12);
+    let mut x = setup.space.resting();
+    x[0] += 0.2;
+    let moved = setup.space.decode(&x).unwrap();
+    assert!((setup::joint_motion_rad(&moved) - 0.4).abs() < 1e-12);
+    let lost = ThrowOutcome {
+        finite: false,
+        ..outcome
+    };
+    assert!(setup.fitness(&r.rope, &rest, &lost) > 100.0);
+}
+
+/// A small search alone ends centimetres away; polished it meets the target.
+#[test]
+fn a_small_search_is_polished_onto_the_target_and_keeps_every_limit() {
+    let mut generations = 0;
+    let mut r = request([0.95, 0.25, 0.1]);
+    let found = plan(&r, &mut |p| {
+        generations = p.generation;
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert!(
+        found.predicted_error_m < 5e-4,
+        "{}",
+        found.predicted_error_m
+    );
+    assert_eq!(found.limited_by, Some(shared_types::LimitedBy::Nothing));
+    assert!(found.verdict.success && !found.interrupted);
+    assert_eq!(generations, 12);
+    assert!(found.margins.iter().all(|m| m.left >= 0.0));
+    assert_eq!(found.trajectory.start(), start_pose_for(found.target_m));
+    if let ThrowGoal::Strike(strike) = &mut r.goal {
+        strike.config.robustness.polished = 0;
+    }
+    let rough = plan(&r, &mut go_on).unwrap().predicted_error_m;
+    assert!(rough > found.predicted_error_m, "{rough}");
+}
+
+/// Byte for byte, as it would be written down.
+#[test]
+fn same_plan_for_one_two_and_four_threads() {
+    let mut r = request([0.9, -0.2, 0.3]);
+    r.options.generations = Some(4);
+    let written = |r: &PlanRequest| serde_json::to_vec(&plan(r, &mut go_on).unwrap()).unwrap();
+    r.options.threads = 1;
+    let one = written(&r);
+    for threads in [2, 4] {
+        r.options.threads = threads;
+        assert!(one == written(&r), "{threads} threads");
+    }
+    r.options.seed += 1;
+    assert!(one != written(&r));
+}
+
+#[test]
+fn impossible_requests_are_refused_before_any_simulation() {
+    let mut called = false;
+    let mut refused = |target_m, change: &dyn Fn(&mut PlanRequest)| {
+        let mut r = request(target_m);
+        change(&mut r);
+        let progress = &mut |_: PlanProgress| {
+            called = true;
+            ControlFlow::Continue(())
+        };
+        plan(&r, progress).unwrap_err()
+    };
+    let (far, in_the_base, good) = ([1.8, 0.3, 0.4], [0.0, 0.0, 0.1], [0.9, 0.0, 0.2]);
+    let unchanged = |_: &mut PlanRequest| ();
+    assert!(matches!(
+        refused(far, &unchanged),
+        PlanError::Unreachable { .. }
+    ));
+    assert!(matches!(
+        refused(in_the_base, &unchanged),
+        PlanError::InArm { .. }
+    ));
+    let broken = refused(good, &|r| r.rope.length_m = f64::NAN);
+    assert!(matches!(broken, PlanError::Rope(_)));
+    let error = refused(good, &|r| r.options.step_s = 0.0);
+    assert!(matches!(
+        error,
+        PlanError::Option {
+            option: "step_s",
+            ..
+        }
+    ));
+    assert!(!called);
+}
+
+#[test]
+fn an_interrupted_search_leaves_the_best_so_far() {
+    let mut generations = 0;
+    let found = plan(&request([0.9, 0.0, 0.2]), &mut |p| {
+        generations = p.generation;
+        if p.generation == 2 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    })
+    .unwrap();
+    assert_eq!(generations, 2);
+    assert!(found.interrupted && found.predicted_error_m < 0.3);
+    assert!(found.margins.iter().all(|m| m.left >= 0.0));
+}
+
+/// Scenes stand on the target's bearing, and warm starts are throws the arm can make.
+#[test]
+fn warm_starts_are_executable_at_any_bearing() {
+    let rope = random_rope(3);
+    let goals = [
+        ThrowGoal::Lob(Lob {
+            target_m: [0.7, 0.45, 0.20],
+            config: LobConfig::default(),
+        }),
+        ThrowGoal::Drape(Drape {
+            target_m: [0.65, -0.35, 0.30],
+            config: DrapeConfig::default(),
+        }),
+    ];
+    for goal in goals {
+        let r = PlanRequest::new(goal, &rope, PlanOptions::default());
+        let (task, setup) = (r.goal.task(), Setup::new(&r).unwrap());
+        assert_ne!(setup.start, setup.space.resting(), "{}", task.name());
+        assert!(setup.screen.accepts(&setup.start), "{}", task.name());
+        assert_eq!(
+            task.keep_clear(&r.cell)[0]
+                .pose
+                .translation
+                .vector
+                .y
+                .signum(),
+            task.target_m()[1].signum()
+        );
+    }
+}
+
+/// What a rope on the board, or over the wall, is said to have done.
+#[test]
+fn lobs_and_drapes_are_judged_by_their_conditions() {
+    let rope = random_rope(5);
+    let met =
+        |v: &shared_types::Verdict| -> Vec<bool> { v.conditions.iter().map(|c| c.met).collect() };
+    let lob = Lob {
+        target_m: [0.85, 0.0, 0.20],
+        config: LobConfig::default(),
+    };
+    let mut outcome = ThrowOutcome {
+        finite: true,
+        end_s: 5.0,
+        ..ThrowOutcome::default()
+    };
+    let stay = |since_s| rope_sim::Dwell {
+        total_s: 1.0,
+        inside_since_s: since_s,
+    };
+    outcome.watched.dwell = Some(stay(Some(4.5)));
+    outcome.domino = Some(rope_sim::DominoOutcome {
+        down_at_s: Some(1.2),
+        ..Default::default()
+    });
+    assert_eq!(met(&lob.judge(&rope, &outcome)), [true, false, true]);
+    assert!(!lob.judge(&rope, &outcome).success);
+    outcome.watched.dwell = Some(stay(Some(3.9)));
+    assert!(lob.judge(&rope, &outcome).success);
+    outcome.domino = None;
+    assert_eq!(met(&lob.judge(&rope, &outcome)), [false, true, false]);
+
+    let drape = Drape {
+        target_m: [0.75, 0.0, 0.30],
+        config: DrapeConfig::default(),
+    };
+    let rest = rope_sim::RestMeasures {
+        tip_height_spread_m: 0.02,
+        middle_movement_m: 0.01,
+        tip_m: [0.78, 0.0, 0.1],
+        middle_m: [0.75, 0.0, 0.31],
+    };
+    outcome.watched.rest = Some(rest);
+    outcome.obstacles = vec![rope_sim::ContactSummary {
+        first: Some((1.5, rope_sim::RopePart::Links)),
+    }];
+    assert!(drape.judge(&rope, &outcome).success);
+    assert!((drape.error_m(&outcome) - 0.01).abs() < 1e-12);
+    outcome.watched.rest = Some(rope_sim::RestMeasures {
+        middle_movement_m: 0.04,
+        ..rest
+    });
+    assert_eq!(
+        met(&drape.judge(&rope, &outcome)),
+        [true, false, true, true]
+    );
+    outcome.watched.dwell = Some(stay(None));
+    assert_eq!(met(&drape.judge(&rope, &outcome))[..2], [false, false]);
+}
+
+#[test]
+fn free_times_stay_within_their_range_and_the_plan_within_every_limit() {
+    let mut r = request([0.95, 0.25, 0.1]);
+    r.options.segment_stretch_max = 1.3;
+    let planned = plan(&r, &mut go_on).unwrap();
+    let error_m = planned.predicted_error_m;
+    assert!(error_m < 5e-4, "{error_m}");
+    assert!(r.limits.worst_violation(&planned.trajectory).is_none());
+    let durations = |times_s: &[f64]| times_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>();
+    let mut fixed_s = vec![0.0];
+    fixed_s.extend(r.goal.task().config().waypoint_times_s);
+    let stretches: Vec<f64> = durations(planned.trajectory.times_s())
+        .iter()
+        .zip(durations(&fixed_s))
+        .map(|(is, was)| is / was)
+        .collect();
+    let within = 1.0 / 1.3 - 1e-9..=1.3 + 1e-9;
+    assert!(
+        stretches.iter().all(|s| within.contains(s)),
+        "{stretches:?}"
+    );
+    assert!(
+        stretches.iter().any(|s| (s - 1.0).abs() > 0.01),
+        "{stretches:?}"
+    );
+    for refused in [0.5, 2.5, f64::NAN] {
+        r.options.segment_stretch_max = refused;
+        let error = plan(&r, &mut go_on).unwrap_err();
+        assert!(error.to_string().contains("segment_stretch_max"), "{error}");
+    }
+}

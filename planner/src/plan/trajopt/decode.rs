@@ -1,0 +1,184 @@
+//! From search coordinates to joint trajectories.
+
+use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
+use serde::{Deserialize, Serialize};
+
+/// Free waypoints of a throw (paper: three).
+pub(crate) const WAYPOINTS: usize = 3;
+
+/// Which joints a search moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Dimensions {
+    /// Joints 2, 4 and 6: motion in the plane that joint 1 has turned to the
+    /// target's bearing; 9 coordinates.
+    Planar,
+    /// All joints; 21 coordinates.
+    Full,
+}
+
+impl Dimensions {
+    /// Moved joints, 0-based.
+    #[must_use]
+    pub fn joints(self) -> &'static [usize] {
+        match self {
+            Self::Planar => &[1, 3, 5],
+            Self::Full => &[0, 1, 2, 3, 4, 5, 6],
+        }
+    }
+
+    /// Number of coordinates of the waypoints.
+    #[must_use]
+    pub fn count(self) -> usize {
+        WAYPOINTS * self.joints().len()
+    }
+}
+
+/// The space of throws that leave `start` and pass three waypoints. A point of
+/// it lists the moved joints (rad) of the first waypoint, then of the second and
+/// the third; where the times are free too, then the logarithm of how much each
+/// of the three segments is stretched.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct WaypointSpace {
+    /// Pose at rest from which the throw starts (rad).
+    pub start: JointVector,
+    /// Which joints move.
+    pub dimensions: Dimensions,
+    /// Times of the waypoints after the start (s), increasing.
+    pub times_s: [f64; WAYPOINTS],
+    /// Most by which a segment between these times is stretched or shrunk (1); 1
+    /// where they are fixed, as in the paper.
+    pub stretch_max: f64,
+}
+
+impl WaypointSpace {
+    /// Whether the times of the waypoints are free.
+    pub(crate) fn is_timed(&self) -> bool {
+        self.stretch_max > 1.0
+    }
+
+    /// Number of search coordinates.
+    pub(crate) fn count(&self) -> usize {
+        self.dimensions.count() + if self.is_timed() { WAYPOINTS } else { 0 }
+    }
+
+    /// One value per coordinate: `of_joint` (0-based) for the waypoints, `of_segment`
+    /// for the stretches.
+    fn filled<T: Copy>(&self, of_joint: impl Fn(usize) -> T, of_segment: T) -> Vec<T> {
+        let joints = self.dimensions.joints();
+        let mut out: Vec<T> = (0..WAYPOINTS)
+            .flat_map(|_| joints.iter().map(|&j| of_joint(j)))
+            .collect();
+        out.resize(self.count(), of_segment);
+        out
+    }
+
+    /// The point that stays in the start pose.
+    pub(crate) fn resting(&self) -> Vec<f64> {
+        self.filled(|j| self.start[j], 0.0)
+    }
+
+    /// Ranges of the coordinates as (lower, upper): those of the joints (rad), and of
+    /// the stretches' logarithms.
+    pub(crate) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
+        let most = self.stretch_max.ln();
+        let of_joint = |j: usize| (limits.position_min_rad[j], limits.position_max_rad[j]);
+        self.filled(of_joint, (-most, most)).into_iter().unzip()
+    }
+
+    /// Deviations of a first generation from those of the joints (rad).
+    pub(crate) fn std_dev(&self, of_joints_rad: &JointVector) -> Vec<f64> {
+        // The bounds are three deviations away.
+        self.filled(|j| of_joints_rad[j], self.stretch_max.ln() / 3.0)
+    }
+
+    /// Times of all knots of the spline of a point, start included (s).
+    pub(crate) fn knot_times_s(&self, x: &[f64]) -> [f64; WAYPOINTS + 1] {
+        let mut out = [0.0; WAYPOINTS + 1];
+        out[1..].copy_from_slice(&self.times_s);
+        if self.is_timed() {
+            let (at, fixed) = (self.dimensions.count(), out);
+            for i in 0..WAYPOINTS {
+                let stretch = x.get(at + i).map_or(1.0, |log| libm::exp(*log));
+                out[i + 1] = out[i] + stretch * (fixed[i + 1] - fixed[i]);
+            }
+        }
+        out
+    }
+
+    /// Poses at all knots of the spline, start included (rad). Missing
+    /// coordinates stay at the start pose.
+    pub(crate) fn knots(&self, x: &[f64]) -> [JointVector; WAYPOINTS + 1] {
+        let joints = self.dimensions.joints();
+        let mut out = [self.start; WAYPOINTS + 1];
+        for (knot, part) in out[1..].iter_mut().zip(x.chunks(joints.len())) {
+            for (&j, value) in joints.iter().zip(part) {
+                knot[j] = *value;
+            }
+        }
+        out
+    }
+
+    /// The trajectory of a point.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, waypoint times out of order.
+    pub(crate) fn decode(&self, x: &[f64]) -> Result<JointTrajectory, TrajectoryError> {
+        JointTrajectory::new(&self.knot_times_s(x), &self.knots(x))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use arm_model::joint::START_POSE;
+
+    #[test]
+    fn coordinates_land_on_their_joints_and_waypoints() {
+        for dimensions in [Dimensions::Planar, Dimensions::Full] {
+            let space = WaypointSpace {
+                start: START_POSE,
+                dimensions,
+                times_s: [0.4, 0.8, 1.1],
+                stretch_max: 1.0,
+            };
+            let mut x = space.resting();
+            assert_eq!(x.len(), dimensions.count());
+            let rest = space.decode(&x).unwrap();
+            assert_eq!(rest.start(), rest.end());
+            let per_waypoint = dimensions.joints().len();
+            x[per_waypoint] += 0.25;
+            let moved = space.decode(&x).unwrap();
+            let joint = dimensions.joints()[0];
+            assert!((moved.waypoints()[2][joint] - START_POSE[joint] - 0.25).abs() < 1e-12);
+            assert_eq!(moved.waypoints()[1], START_POSE);
+            assert_eq!(moved.times_s(), &[0.0, 0.4, 0.8, 1.1]);
+        }
+    }
+
+    #[test]
+    fn free_times_stretch_each_segment_and_leave_the_waypoints() {
+        for dimensions in [Dimensions::Planar, Dimensions::Full] {
+            let space = WaypointSpace {
+                start: START_POSE,
+                dimensions,
+                times_s: [0.4, 0.8, 1.1],
+                stretch_max: 1.5,
+            };
+            let mut x = space.resting();
+            assert_eq!(x.len(), dimensions.count() + WAYPOINTS);
+            assert_eq!(space.decode(&x).unwrap().times_s(), &[0.0, 0.4, 0.8, 1.1]);
+            x[dimensions.count() - 1] += 0.25;
+            x[dimensions.count() + 1] = 1.5_f64.ln();
+            let moved = space.decode(&x).unwrap();
+            for (is, wanted) in moved.times_s().iter().zip([0.0, 0.4, 1.0, 1.3]) {
+                assert!((is - wanted).abs() < 1e-12, "{is} s, not {wanted} s");
+            }
+            let last = *dimensions.joints().last().unwrap();
+            assert!((moved.end()[last] - START_POSE[last] - 0.25).abs() < 1e-12);
+            let (low, high) = space.bounds(&Limits::default());
+            assert_eq!((low.len(), high.len()), (x.len(), x.len()));
+            assert!((high[x.len() - 1] - 1.5_f64.ln()).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,21 @@
+//! CMA-ES-traj: the search for joint waypoints of a throw.
+//!
+//! Paper, section "CMA-ES Trajectory Optimization" and appendix "Trajectory
+//! Parameterization and Velocity Filtering": three joint-space waypoints at fixed
+//! times, a cubic spline from the start pose, candidates that break a limit
+//! rejected when they are drawn.
+
+mod decode;
+mod pole;
+mod polish;
+mod screen;
+mod search;
+
+pub use decode::Dimensions;
+pub(crate) use decode::{WAYPOINTS, WaypointSpace};
+pub use pole::PolePose;
+pub(crate) use pole::reach_pose;
+pub(crate) use polish::{Polish, polish};
+pub use screen::Clearance;
+pub(crate) use screen::Screen;
+pub(crate) use search::{Found, SearchOptions, Valued, search};

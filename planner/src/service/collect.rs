@@ -1,0 +1,61 @@
+//! Keypoint frames as they are published, kept until asked for.
+
+use super::error::ServiceError;
+use shared_types::ipc::{Bus, IpcError, KeypointSubscriber};
+use shared_types::keypoints::{KeypointFrame, KeypointTrack};
+use std::collections::VecDeque;
+
+/// Most frames kept; older ones are forgotten.
+const KEEP: usize = 4096;
+
+pub(super) struct Collector {
+    subscriber: KeypointSubscriber,
+    frames: VecDeque<KeypointFrame>,
+}
+
+impl Collector {
+    pub(super) fn open(bus: &Bus) -> Result<Self, IpcError> {
+        Ok(Self {
+            subscriber: bus.keypoint_subscriber()?,
+            frames: VecDeque::new(),
+        })
+    }
+
+    /// Takes in what was published.
+    pub(super) fn drain(&mut self) -> Result<(), IpcError> {
+        loop {
+            let failed = IpcError::transfer("wag/v1/camera/keypoints");
+            let sample = self.subscriber.receive().map_err(failed)?;
+            let Some(sample) = sample else { return Ok(()) };
+            if self.frames.len() == KEEP {
+                self.frames.pop_front();
+            }
+            self.frames.push_back(*sample);
+        }
+    }
+
+    /// The `wanted` frames from the last one stamped `first_stamp_ns` on, time 0
+    /// at that one.
+    pub(super) fn track(
+        &self,
+        first_stamp_ns: u64,
+        wanted: u32,
+    ) -> Result<KeypointTrack, ServiceError> {
+        let wanted = wanted as usize;
+        let start = self
+            .frames
+            .iter()
+            .rposition(|f| f.stamp_ns == first_stamp_ns)
+            .unwrap_or(self.frames.len());
+        let found = (self.frames.len() - start).min(wanted);
+        let missing = ServiceError::MissingKeypoints {
+            found,
+            wanted,
+            first_stamp_ns,
+        };
+        if found < wanted {
+            return Err(missing);
+        }
+        KeypointTrack::from_published(self.frames.range(start..start + wanted)).ok_or(missing)
+    }
+}

@@ -1,0 +1,93 @@
+//! The arm from the moment the rope hung still to the end of a move: measured
+//! joints, a hold, then the move.
+
+use super::error::SettleError;
+use super::request::SettleRequest;
+use arm_model::kinematics::FrameMotion;
+use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector};
+use rope_sim::{AttachMotion, MeasuredArm};
+
+/// Largest distance of a joint from the commanded start pose (rad): above what
+/// gravity and encoders leave, below what matters to the rope.
+const START_TOLERANCE_RAD: f64 = 0.02;
+
+/// What happened before the move.
+#[derive(Debug)]
+pub(super) struct Prelude {
+    measured: MeasuredArm,
+    pub(super) cell: Cell,
+    /// When the move begins (s).
+    pub(super) start_s: f64,
+    /// Measured minus commanded pose at rest (rad). The arm is taken to stand as
+    /// far from its command after the move as before it.
+    pub(super) standing_error: JointVector,
+}
+
+impl Prelude {
+    pub(super) fn new(request: &SettleRequest) -> Result<Self, SettleError> {
+        let measured = MeasuredArm::new(&request.times_s, &request.q, request.cell.pole)?;
+        let last_s = measured.duration_s();
+        let start_s = request.start_s;
+        if !(start_s >= last_s && start_s > 0.0 && start_s.is_finite()) {
+            return Err(SettleError::StartsTooEarly { start_s, last_s });
+        }
+        let standing_error = measured.joints_at(start_s).q - request.start_q;
+        let off = |j: usize| standing_error[j];
+        match (0..JOINTS).find(|&j| off(j).is_nan() || off(j).abs() > START_TOLERANCE_RAD) {
+            Some(j) => Err(SettleError::NotAtStart {
+                joint: j + 1,
+                off_rad: off(j),
+            }),
+            None => Ok(Self {
+                measured,
+                cell: request.cell,
+                start_s,
+                standing_error,
+            }),
+        }
+    }
+
+    /// The arm that makes this move after all that was.
+    pub(super) fn then<'a>(&'a self, trajectory: &'a JointTrajectory) -> ChainedArm<'a> {
+        ChainedArm {
+            prelude: self,
+            trajectory,
+        }
+    }
+}
+
+/// Attach frame of an arm that did what was measured, held, and then follows a
+/// planned move.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ChainedArm<'a> {
+    prelude: &'a Prelude,
+    trajectory: &'a JointTrajectory,
+}
+
+impl ChainedArm<'_> {
+    fn joints_at(&self, t_s: f64) -> JointState {
+        let since_start_s = t_s - self.prelude.start_s;
+        if since_start_s <= 0.0 {
+            return self.prelude.measured.joints_at(t_s);
+        }
+        let mut state = self.trajectory.state_at(since_start_s);
+        state.q = state.q + self.prelude.standing_error;
+        state
+    }
+}
+
+impl AttachMotion for ChainedArm<'_> {
+    fn at(&self, t_s: f64) -> FrameMotion {
+        self.prelude.cell.pole.attach_motion(&self.joints_at(t_s))
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.prelude.start_s + self.trajectory.duration_s()
+    }
+
+    /// Both ends of the move: a clamped spline starts and stops with an
+    /// acceleration.
+    fn acceleration_jumps_s(&self) -> Vec<f64> {
+        vec![self.prelude.start_s, self.duration_s()]
+    }
+}

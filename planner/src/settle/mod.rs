@@ -1,0 +1,135 @@
+//! A move that damps the rope's swing.
+//!
+//! A throw is planned for a rope at rest, but after the wiggle a weakly damped
+//! rope swings for tens of seconds. Once the rope is identified its motion is
+//! known: it is simulated from the moment it hung still, through the measured
+//! joints, into a rest-to-rest move of the arm. Small offsets on the knots of
+//! that move are chosen by least squares so that the rope hangs still at its
+//! end: command shaping for zero residual vibration, with the identified
+//! nonlinear model in the place of a list of frequencies.
+
+mod chain;
+mod clear;
+mod descent;
+mod error;
+mod request;
+mod residual;
+mod shape;
+#[cfg(test)]
+mod tests;
+
+pub use error::SettleError;
+pub use request::{SettleConfig, SettleMove, SettleRequest};
+
+use arm_model::JointTrajectory;
+use chain::Prelude;
+use descent::LeastResidual;
+use residual::{Residual, ResidualSimulator};
+use shape::MoveShape;
+
+/// Fractions of the offsets found that are tried, largest first: where limits or
+/// surroundings forbid the whole, a smaller one still takes out that much of the
+/// vibration.
+const FRACTIONS: [f64; 5] = [0.8, 0.6, 0.4, 0.2, 0.0];
+
+/// Plans a move from `start_q` to `end_q` after which the rope hangs still.
+/// Deterministic, whatever the threads.
+///
+/// # Errors
+/// See [`SettleError`].
+pub fn settle(request: &SettleRequest) -> Result<SettleMove, SettleError> {
+    let config = &request.config;
+    config.check()?;
+    request.rope.validate()?;
+    let prelude = Prelude::new(request)?;
+    let mut best: Option<SettleMove> = None;
+    let mut refused = SettleError::NoDuration;
+    for duration_s in &config.durations_s {
+        match settle_within(request, &prelude, *duration_s) {
+            Ok(found) => {
+                let least = best.as_ref().map_or(f64::INFINITY, |b| b.residual_m);
+                if found.residual_m < least {
+                    best = Some(found);
+                }
+            }
+            Err(error @ (SettleError::BreaksLimit { .. } | SettleError::TooClose { .. })) => {
+                refused = error;
+            }
+            Err(error) => return Err(error),
+        }
+        if best
+            .as_ref()
+            .is_some_and(|b| b.residual_m <= config.residual_max_m)
+        {
+            break;
+        }
+    }
+    best.ok_or(refused)
+}
+
+/// The move of one duration that leaves the least residual vibration.
+fn settle_within(
+    request: &SettleRequest,
+    prelude: &Prelude,
+    duration_s: f64,
+) -> Result<SettleMove, SettleError> {
+    let config = &request.config;
+    let shape = MoveShape::new(request.start_q, request.end_q, duration_s, config.knot_s);
+    let plain = shape.trajectory(&shape.no_offsets())?;
+    if let Some(margin) = request.limits.worst_violation(&plain) {
+        return Err(SettleError::BreaksLimit {
+            what: margin.describe(),
+        });
+    }
+    let simulator = ResidualSimulator::new(&request.rope, prelude, &plain, config.threads)?;
+    let found = descent::least_residual(&shape, &simulator, config)?;
+    choose(request, &shape, &simulator, found)
+}
+
+/// The move with all offsets if limits and surroundings allow it, otherwise the
+/// best of those with a fraction of them.
+fn choose(
+    request: &SettleRequest,
+    shape: &MoveShape,
+    simulator: &ResidualSimulator<'_>,
+    found: LeastResidual,
+) -> Result<SettleMove, SettleError> {
+    let plain_residual_m = found.plain_residual_m;
+    let mut gap_m = f64::NAN;
+    let mut allowed = |trajectory: &JointTrajectory, residual: &Residual| {
+        if !residual.finite || request.limits.worst_violation(trajectory).is_some() {
+            return false;
+        }
+        let room = clear::room(&request.rope, simulator, trajectory, residual);
+        gap_m = room.rope_gap_m;
+        gap_m >= request.config.clearance_m && !room.tool_touches
+    };
+    let whole = shape.trajectory(&found.offsets_rad)?;
+    if allowed(&whole, &found.residual) {
+        return Ok(SettleMove {
+            trajectory: whole,
+            plain_residual_m,
+            residual_m: found.residual.largest_m,
+        });
+    }
+    let scaled = |fraction: f64| -> Vec<f64> {
+        let offsets = found.offsets_rad.iter();
+        offsets.map(|offset| fraction * offset).collect()
+    };
+    let moves = FRACTIONS
+        .into_iter()
+        .map(|fraction| shape.trajectory(&scaled(fraction)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let residuals = simulator.run(&moves)?;
+    moves
+        .into_iter()
+        .zip(&residuals)
+        .filter(|(trajectory, residual)| allowed(trajectory, residual))
+        .min_by(|(_, a), (_, b)| a.largest_m.total_cmp(&b.largest_m))
+        .map(|(trajectory, residual)| SettleMove {
+            trajectory,
+            plain_residual_m,
+            residual_m: residual.largest_m,
+        })
+        .ok_or(SettleError::TooClose { gap_m })
+}
