@@ -4,7 +4,6 @@
 //! what identification leaves open, and as the fraction of those that succeeds.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
-use arm_model::Cell;
 use arm_model::Limits;
 use arm_model::limits::LimitsSpec;
 use clap::Parser;

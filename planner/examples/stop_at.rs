@@ -3,10 +3,9 @@
 //! `stop_at [SEED]`. See `docs/src/adding-a-task.md`.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
-use arm_model::Cell;
-use arm_model::Limits;
 use planner::plan::{
-    Belief, PlanOptions, PlanRequest, ThrowConfig, ThrowOutcome, ThrowTask, plan_throw, verdict,
+    PlanOptions, PlanRequest, Strike, ThrowConfig, ThrowGoal, ThrowOutcome, ThrowTask, plan_task,
+    verdict,
 };
 use planner::ropes::random_rope;
 use shared_types::{RopeParams, Verdict};
@@ -57,28 +56,23 @@ fn main() {
     let seed = std::env::args()
         .nth(1)
         .map_or(1, |s| s.parse().expect("a seed is a number"));
+    let (target_m, config) = ([0.95, 0.0, 0.10], ThrowConfig::default());
     let task = StopAt {
-        target_m: [0.95, 0.0, 0.10],
-        config: ThrowConfig::default(),
+        target_m,
+        config: config.clone(),
     };
-    let request = PlanRequest {
-        rope: random_rope(seed),
-        limits: Limits::default(),
-        cell: Cell::default(),
-        options: PlanOptions {
-            seed,
-            ..PlanOptions::default()
-        },
-        belief: Belief::default(),
-        following: None,
+    let options = PlanOptions {
+        seed,
+        ..PlanOptions::default()
     };
-    let planned = plan_throw(&task, &request, &mut |_| ControlFlow::Continue(()))
+    let goal = ThrowGoal::Strike(Strike { target_m, config });
+    let request = PlanRequest::new(goal, &random_rope(seed), options);
+    let plan = plan_task(&task, &request, &mut |_| ControlFlow::Continue(()))
         .expect("the target is in reach");
     println!(
-        "{:.1} cm from the target at {:.2} m/s after {:.2} s: {:?}",
-        100.0 * planned.error_m,
-        speed_m_s(&planned.outcome),
-        planned.outcome.closest_s,
-        planned.verdict
+        "{:.1} cm from the target after {:.2} s: {:?}",
+        100.0 * plan.predicted_error_m,
+        plan.predicted_time_s,
+        plan.verdict
     );
 }

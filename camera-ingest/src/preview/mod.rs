@@ -193,7 +193,7 @@ impl Ports {
 
     fn publish(&self, found: &PreviewFrame) -> Result<(), IpcError> {
         let sent = self.out.send_copy(*found);
-        sent.map_err(IpcError::transfer("wag/v1/camera/preview"))
+        sent.map_err(IpcError::transfer("wag/v2/camera/preview"))
             .map(|_| ())
     }
 }

@@ -6,7 +6,7 @@ use super::experiment::{Experiment, Sequence};
 use super::picture::beside;
 use super::sensitivity_picture::svg;
 use crate::args::MethodName;
-use crate::network::network_for_camera;
+use crate::network::network;
 use anyhow::anyhow;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome};
@@ -93,7 +93,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
             "these are maps of the network: leave out --method, or name nn"
         )));
     }
-    let net = network_for_camera(args.model.as_deref())?;
+    let net = network(args.model.as_deref())?.for_camera().or_input()?;
     let weights = &net.metadata().graph_sha256;
     let figure = |t: &SensitivityTrial| largest(&t.map);
     let sequence = Sequence {

@@ -30,7 +30,7 @@ pub use ensemble::{PosteriorEnsemble, ropes_of};
 pub use error::{PlanError, PlanProgress};
 pub use goal::ThrowGoal;
 pub use lob::{Lob, LobConfig};
-pub use planning::plan;
+pub use planning::{plan, plan_task};
 pub use reach::{check_reach, clear_of_arm, start_pose_for};
 pub use reach_map::{GridCell, ReachMap};
 pub use request::PlanRequest;

@@ -4,7 +4,8 @@ use super::finalists::Finalist;
 use super::robust::{forecast, least_risk, search_around};
 use super::setup::{Count, Setup};
 use super::{
-    PlanError, PlanOptions, PlanProgress, PlanRequest, ThrowOutcome, check_reach, clear_of_arm,
+    PlanError, PlanOptions, PlanProgress, PlanRequest, ThrowOutcome, ThrowTask, check_reach,
+    clear_of_arm,
 };
 use arm_model::JointTrajectory;
 use arm_model::limits::LimitKind;
@@ -21,12 +22,24 @@ pub fn plan(
     request: &PlanRequest,
     progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
 ) -> Result<Plan, PlanError> {
-    let target_m = request.goal.task().target_m();
+    plan_task(request.goal.task(), request, progress)
+}
+
+/// [`plan`] for a task of one's own, which is written down as the request's goal.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_task(
+    task: &dyn ThrowTask,
+    request: &PlanRequest,
+    progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+) -> Result<Plan, PlanError> {
+    let target_m = task.target_m();
     request.rope.validate()?;
     check_options(&request.options)?;
     check_reach(target_m, request.rope.length_m, &request.cell)?;
     clear_of_arm(target_m, &request.cell)?;
-    let setup = Setup::new(request)?;
+    let setup = Setup::new(task, request)?;
     let mut count = Count::default();
     let mut finalists: Vec<Finalist> = Vec::new();
     for round in 0..request.options.searches.max(1) {

@@ -56,8 +56,10 @@ pub(super) fn joint_motion_rad(trajectory: &JointTrajectory) -> f64 {
 }
 
 impl<'a> Setup<'a> {
-    pub(super) fn new(request: &'a PlanRequest) -> Result<Self, PlanError> {
-        let task = request.goal.task();
+    pub(super) fn new(
+        task: &'a dyn ThrowTask,
+        request: &'a PlanRequest,
+    ) -> Result<Self, PlanError> {
         let config = task.config();
         let space = WaypointSpace {
             start: start_pose_for(task.target_m()),

@@ -1,7 +1,6 @@
 use super::*;
 use crate::collide::ContactCounts;
 use crate::ropes::random_rope;
-use arm_model::Cell;
 use setup::Setup;
 use std::ops::ControlFlow;
 
@@ -27,7 +26,7 @@ fn go_on(_: PlanProgress) -> ControlFlow<()> {
 #[test]
 fn fitness_is_the_sum_of_its_named_terms() {
     let r = request([0.9, 0.0, 0.2]);
-    let setup = Setup::new(&r).unwrap();
+    let setup = Setup::new(r.goal.task(), &r).unwrap();
     let rest = setup.space.decode(&setup.space.resting()).unwrap();
     let outcome = ThrowOutcome {
         closest_m: 0.25,
@@ -165,7 +164,8 @@ fn warm_starts_are_executable_at_any_bearing() {
     ];
     for goal in goals {
         let r = PlanRequest::new(goal, &rope, PlanOptions::default());
-        let (task, setup) = (r.goal.task(), Setup::new(&r).unwrap());
+        let task = r.goal.task();
+        let setup = Setup::new(task, &r).unwrap();
         assert_ne!(setup.start, setup.space.resting(), "{}", task.name());
         assert!(setup.screen.accepts(&setup.start), "{}", task.name());
         assert_eq!(

@@ -46,7 +46,8 @@ type Topic = (&'static str, usize);
 /// A whole wiggle and more.
 const KEYPOINTS: Topic = ("wag/v1/camera/keypoints", 1024);
 /// A second of them. Who comes late wants the newest.
-const PREVIEW: Topic = ("wag/v1/camera/preview", 64);
+// Version 2: its payload carries a keypoint frame.
+const PREVIEW: Topic = ("wag/v2/camera/preview", 64);
 /// Four seconds.
 const CYCLES: Topic = ("wag/v1/controller/cycles", 1024);
 /// Four seconds.

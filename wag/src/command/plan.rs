@@ -4,7 +4,7 @@ use super::reach_picture;
 use crate::cli::PlanArgs;
 use crate::config;
 use anyhow::{Context, anyhow, bail};
-use arm_model::{Cell, Limits};
+use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::arm_response::Following;

@@ -4,7 +4,7 @@
 
 use super::{long_tests, run};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
-use arm_model::{ArmResponse, Cell, JOINTS, JointTrajectory, Limits, Pole};
+use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits, Pole};
 use hil_tests::virtual_rig::VirtualRig;
 use planner::arm_response::Following;
 use planner::plan::{PlanOptions, PlanRequest, Strike, ThrowConfig, ThrowGoal};

@@ -4,7 +4,7 @@
 use super::shell::{arm, read};
 use crate::support::{command, send, until};
 use arm_model::joint::START_POSE;
-use arm_model::{Cell, JointTrajectory, JointVector, Limits};
+use arm_model::{Cell, JointTrajectory, JointVector};
 use camera_ingest::process::CameraConfig;
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest};
@@ -20,7 +20,7 @@ use shared_types::ipc::{
     StateReader,
 };
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MonotonicNs, OperatingMode, RopeParams};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode, RopeParams, Task};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Child;
