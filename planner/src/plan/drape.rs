@@ -159,7 +159,6 @@ impl ThrowTask for Drape {
             }),
             height: true,
             rest_window_s: Some(REST_S),
-            ..Watch::NOTHING
         }
     }
 
