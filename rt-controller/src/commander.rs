@@ -45,7 +45,6 @@ fn holder(pid: Option<u32>) -> String {
 /// The right to command one arm; given up when dropped.
 #[derive(Debug)]
 pub struct CommanderLock {
-    arm: ArmAddress,
     _name: UnixListener,
 }
 
@@ -58,10 +57,7 @@ impl CommanderLock {
         let name = SocketAddr::from_abstract_name(format!("wiggle-and-go/commander/{arm}"))
             .map_err(|reason| CommanderError::Lock { arm, reason })?;
         match UnixListener::bind_addr(&name) {
-            Ok(listener) => Ok(Self {
-                arm,
-                _name: listener,
-            }),
+            Ok(name) => Ok(Self { _name: name }),
             Err(reason) if reason.kind() == ErrorKind::AddrInUse => Err(CommanderError::Taken {
                 arm,
                 pid: UnixStream::connect_addr(&name)
@@ -70,12 +66,6 @@ impl CommanderLock {
             }),
             Err(reason) => Err(CommanderError::Lock { arm, reason }),
         }
-    }
-
-    /// The arm it is for.
-    #[must_use]
-    pub const fn arm(&self) -> ArmAddress {
-        self.arm
     }
 }
 
@@ -89,7 +79,6 @@ mod tests {
         let arm: ArmAddress = "127.0.0.1:1".parse().unwrap();
         let other: ArmAddress = "127.0.0.1:2".parse().unwrap();
         let first = CommanderLock::take(arm).unwrap();
-        assert_eq!(first.arm(), arm);
         let refusal = CommanderLock::take(arm).unwrap_err().to_string();
         let pid = std::process::id();
         assert!(refusal.contains(&format!("process {pid}:")), "{refusal}");

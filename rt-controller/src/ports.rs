@@ -43,7 +43,7 @@ pub struct RtPorts<T> {
     pub broken: BrokenReports,
     /// Events out.
     pub events: Producer<ControlEvent>,
-    /// What each cycle was told, out, before its record.
+    /// The inputs of each cycle, out, before its record.
     pub inputs: Producer<InputRecord>,
     /// Whole states before a cycle, out, before that cycle's record.
     pub states: Producer<Snapshot>,
@@ -82,7 +82,7 @@ impl<T> RtPorts<T> {
         }
     }
 
-    /// Passes on what a cycle was told, before its record. RT-safe.
+    /// Passes on the inputs of a cycle, before its record. RT-safe.
     pub fn put_input(&mut self, input: InputRecord) {
         // When the ring is full, so is that of the records, which counts losses.
         let _ = self.inputs.push(input);
@@ -117,7 +117,7 @@ pub struct BridgePorts<T> {
     pub codes: Consumer<ArmCodes>,
     /// Events in.
     pub events: Consumer<ControlEvent>,
-    /// What each cycle was told, in.
+    /// The inputs of each cycle, in.
     pub inputs: Consumer<InputRecord>,
     /// Whole states, in.
     pub states: Consumer<Snapshot>,
@@ -128,8 +128,8 @@ pub struct BridgePorts<T> {
 }
 
 impl<T> BridgePorts<T> {
-    /// What the cycle of a record was told, joined with that record; `None` if
-    /// it got lost.
+    /// The inputs of the cycle of a record, joined with that record; `None` if
+    /// they got lost.
     pub fn recorded(&mut self, record: CycleRecord) -> Option<RecordedCycle> {
         while self.inputs.peek().ok()?.cycle < record.cycle {
             let _ = self.inputs.pop();

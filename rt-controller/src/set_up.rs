@@ -165,27 +165,27 @@ pub struct ReadyArm {
     pub version: ArmVersion,
 }
 
-/// Hears of every step that was done: its name and its result.
+/// Takes every step that was done: its name and its result.
 pub type OnStep<'a> = &'a mut dyn FnMut(&'static str, &str);
 
 impl SetUp<'_> {
-    /// Sets up the arm behind `session`; `heard` is told each step.
+    /// Sets up the arm behind `session`; each step is `reported`.
     ///
     /// # Errors
-    /// [`SetUpError`]; the step that failed was not told.
+    /// [`SetUpError`]; the step that failed was not reported.
     pub fn run(
         &self,
         session: &mut ArmSession,
-        received: OnStep<'_>,
+        reported: OnStep<'_>,
     ) -> Result<ReadyArm, SetUpError> {
         let version = self.identify(session)?;
-        received(
+        reported(
             "identify",
             &format!("xArm 7, firmware {}", version.firmware),
         );
-        received("reports", &self.match_layout(version.firmware)?);
-        received("tool", &self.match_tool(session)?);
-        received(
+        reported("reports", &self.match_layout(version.firmware)?);
+        reported("tool", &self.match_tool(session)?);
+        reported(
             "tool speed",
             &self.match_tool_speed(session, version.firmware)?,
         );
@@ -201,11 +201,11 @@ impl SetUp<'_> {
             ("state", Command::SetState(StateRequest::Ready)),
         ] {
             session.ask(&command)?;
-            received(name, "taken");
+            reported(name, "taken");
         }
-        received("ready", &format!("{:?}", wait_ready(session)?));
+        reported("ready", &format!("{:?}", wait_ready(session)?));
         let q = wait_still(session)?;
-        received("still", "the arm stands");
+        reported("still", "the arm stands");
         match self.limits.position_violation(&q) {
             Some(j) => Err(SetUpError::OutsideRange {
                 joint: j.saturating_add(1),

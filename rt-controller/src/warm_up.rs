@@ -27,7 +27,8 @@ use shared_types::ipc::{ControllerMode, GuardianBeat, JointReport, OperatorBeat}
 const SWING_RAD: f64 = 0.1;
 
 /// Settings with which nothing that a machine does to the loop stops a motion.
-pub(crate) fn patient() -> ControlSettings {
+#[must_use]
+pub fn patient() -> ControlSettings {
     const EVER_NS: u64 = u64::MAX / 4;
     ControlSettings::from(Thresholds {
         operator_timeout_ns: EVER_NS,
@@ -50,7 +51,7 @@ pub(crate) fn patient() -> ControlSettings {
 ///
 /// # Errors
 /// [`TrajectoryError`]; a defect.
-pub(crate) fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
+pub fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
     let inwards = -SWING_RAD * from[6].signum();
     let (times_s, poses): (Vec<f64>, Vec<JointVector>) = (0..=240)
         .map(|k| {
@@ -62,7 +63,7 @@ pub(crate) fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
     JointTrajectory::new(&times_s, &poses).map(Motion::Spline)
 }
 
-/// The report of an arm that is where it was told to be (rad) by the setpoint due
+/// The report of an arm that is where it was commanded to be (rad) by the setpoint due
 /// at `due_ns`, received at `now_ns`.
 pub(crate) fn report(
     q: JointVector,
@@ -95,7 +96,7 @@ pub struct CacheWarmUp {
 
 impl CacheWarmUp {
     /// A warm-up `ahead_us` before each deadline of a loop with these limits and
-    /// this wire. Not RT-safe.
+    /// this command interface. Not RT-safe.
     ///
     /// # Errors
     /// [`TrajectoryError`]; a defect.

@@ -72,7 +72,7 @@ impl Watch for Touches {
 #[test]
 fn no_cycle_of_a_hundred_thousand_touches_the_heap() {
     let mut watch = Touches::default();
-    let cycles = gauntlet::ways::run(100_000, &mut watch);
+    let cycles = gauntlet::scenarios::run(100_000, &mut watch);
     assert!(cycles >= 100_000);
     assert_eq!(watch.0, 0);
 }

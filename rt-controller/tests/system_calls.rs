@@ -18,19 +18,19 @@
 mod counter;
 mod gauntlet;
 
+use arm_model::Limits;
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, Limits};
 use counter::Calls;
 use gauntlet::Watch;
 use gauntlet::arm::EchoArm;
 use libc::{SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto};
-use rt_controller::control::{ControlCommand, ControlSettings, ControlState, Motion, Thresholds};
+use rt_controller::control::{ControlCommand, ControlSettings, ControlState};
 use rt_controller::driver::CommandMsg;
 use rt_controller::os::{Clock, MonotonicClock, now_ns};
 use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
-use rt_controller::warm_up::CacheWarmUp;
+use rt_controller::warm_up::{CacheWarmUp, patient, swinging};
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, JointReport, OperatorEnd, StateReader,
 };
@@ -97,7 +97,7 @@ impl Watch for Watched {
 fn through_every_mode_and_fault_a_cycle_sleeps_receives_and_sends_once_at_most() {
     let thread = std::thread::spawn(|| {
         let mut watched = Watched::default();
-        gauntlet::ways::run(30_000, &mut watched);
+        gauntlet::scenarios::run(30_000, &mut watched);
         watched.sums
     });
     let sums = thread.join().expect("a cycle called something else");
@@ -138,26 +138,6 @@ struct Running {
     newest: CycleRecord,
 }
 
-/// Nothing that a busy machine does to this test may stop the motion.
-fn patient() -> ControlSettings {
-    const MINUTE_NS: u64 = 60_000_000_000;
-    ControlSettings {
-        arming_required: true,
-        ..ControlSettings::from(Thresholds {
-            operator_timeout_ns: MINUTE_NS,
-            reply_stall_ns: MINUTE_NS,
-            report_stale_ns: MINUTE_NS,
-            report_frozen_ns: MINUTE_NS,
-            tracking_error_max_rad: 10.0,
-            tracking_window_ns: MINUTE_NS,
-            unanswered_max: 250,
-            late_cycles_max: 100_000,
-            missed_cycles_max: 100_000,
-            ..Thresholds::relaxed()
-        })
-    }
-}
-
 fn start_loop(domain: &str) -> Running {
     let mut all = rings();
     let ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
@@ -172,7 +152,13 @@ fn start_loop(domain: &str) -> Running {
             begun: false,
             sums: Sums::default(),
         };
-        let control = ControlState::new(Limits::default(), patient());
+        let control = ControlState::new(
+            Limits::default(),
+            ControlSettings {
+                arming_required: true,
+                ..patient()
+            },
+        );
         let mut rt = RtLoop::new(control, clock, boards, ports);
         let interface = patient().interface;
         rt.set_warm_up(CacheWarmUp::new(Limits::default(), interface, 200).unwrap());
@@ -240,18 +226,6 @@ impl Running {
     }
 }
 
-/// Eight minutes of joint 7, back and forth: armed and moving all the time.
-fn endless() -> Motion {
-    let (times_s, poses): (Vec<f64>, Vec<_>) = (0..240)
-        .map(|k| {
-            let mut q = START_POSE;
-            q[6] = 0.3 * f64::from(k % 2);
-            (2.0 * f64::from(k), q)
-        })
-        .unzip();
-    Motion::Spline(JointTrajectory::new(&times_s, &poses).unwrap())
-}
-
 /// Set for the children that read and wait to be killed.
 const DOMAIN: &str = "WAG_TEST_READER_OF";
 
@@ -264,10 +238,10 @@ fn a_reader_that_waits_to_be_killed() {
     let bus = Bus::join(&domain).unwrap();
     let state = StateReader::open(&bus).unwrap();
     let cycles = bus.cycle_subscriber().unwrap();
-    let mut heard = 0;
-    while heard < 5 {
+    let mut received = 0;
+    while received < 5 {
         while cycles.receive().unwrap().is_some() {
-            heard += 1;
+            received += 1;
         }
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -291,13 +265,13 @@ fn spawn_reader(domain: &str) -> Child {
 /// Says when the child has attached.
 fn attached(child: &mut Child) -> Arc<AtomicBool> {
     let seen = Arc::new(AtomicBool::new(false));
-    let (told, lines) = (
+    let (flag, lines) = (
         Arc::clone(&seen),
         BufReader::new(child.stdout.take().unwrap()),
     );
     std::thread::spawn(move || {
         for line in lines.lines().map_while(Result::ok) {
-            told.fetch_or(line == "attached", Ordering::SeqCst);
+            flag.fetch_or(line == "attached", Ordering::SeqCst);
         }
     });
     seen
@@ -331,7 +305,7 @@ fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
         }),
         None,
     );
-    let motion = Box::new(endless());
+    let motion = Box::new(swinging(START_POSE).unwrap());
     running.command(ControlCommand::Run { id: 1, motion }, None);
     let moves = |r: &CycleRecord| r.mode == ControllerMode::Streaming as u8;
     running.until(&mut beside, moves);

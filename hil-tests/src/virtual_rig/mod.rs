@@ -186,7 +186,7 @@ impl VirtualRig {
         self.with_arm(|arm| arm.inject(fault));
     }
 
-    /// Brings the arm up in the mode of the wire and hands the controller a
+    /// Brings the arm up in the mode of the command interface and hands the controller a
     /// fresh link: what an operator's acknowledgement does after a stop. The
     /// arm may refuse; the controller then finds out by itself.
     ///

@@ -59,7 +59,7 @@ pub trait CycleIo<T> {
     fn new_broken_reports(&mut self) -> u32;
     /// The arm's newest codes, if some came since the last cycle.
     fn new_codes(&mut self) -> Option<ArmCodes>;
-    /// Takes what the cycle was told, before the core is stepped.
+    /// Takes the inputs of the cycle, before the core is stepped.
     fn put_input(&mut self, input: InputRecord);
     /// Shows the state to other processes, its process and its priority filled in
     /// here. The setpoint is out.

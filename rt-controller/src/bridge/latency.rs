@@ -4,7 +4,7 @@ use hdrhistogram::Histogram;
 use shared_types::ipc::CycleRecord;
 use shared_types::ipc::message::{LatencyReport, Percentiles};
 
-/// Largest latency told apart (ns): ten seconds.
+/// Largest latency resolved (ns): ten seconds.
 const MAX_NS: u64 = 10_000_000_000;
 /// Upper edge of the first bin shown (ns).
 const FIRST_BIN_NS: u64 = 1000;

@@ -1,4 +1,4 @@
-//! Hands everything the core was told and answered to whoever records it.
+//! Hands all inputs and outputs of the core to whoever records them.
 
 use crate::control::Motion;
 use crate::recording::chunk::CHUNK_MAX;
@@ -23,7 +23,7 @@ impl RecordingFeed {
         })
     }
 
-    /// A motion is about to be ordered.
+    /// A motion is about to be commanded.
     pub(super) fn motion(&mut self, id: u64, motion: &Motion) {
         self.writer.motion(id, motion);
     }

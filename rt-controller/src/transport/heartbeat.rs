@@ -12,7 +12,7 @@ const GIVE_UP_AFTER_NS: u64 = 90_000_000_000;
 /// What to do about a silent connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Silence {
-    /// Nothing: the arm was heard lately, or asked lately.
+    /// Nothing: a reply came lately, or one was asked for lately.
     Fine,
     /// Ask for the state.
     Ask,
@@ -24,19 +24,19 @@ pub enum Silence {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Heartbeat {
     /// `None` before the first look, from which the silence counts.
-    heard_ns: Option<u64>,
+    received_ns: Option<u64>,
     asked_ns: u64,
 }
 
 impl Heartbeat {
     /// Something was received at `now_ns`.
-    pub fn heard(&mut self, now_ns: u64) {
-        self.heard_ns = self.heard_ns.max(Some(now_ns));
+    pub fn received(&mut self, now_ns: u64) {
+        self.received_ns = self.received_ns.max(Some(now_ns));
     }
 
     /// What is due at `now_ns`; an answer `Ask` counts as asked.
     pub fn due(&mut self, now_ns: u64) -> Silence {
-        let silent_ns = now_ns.saturating_sub(*self.heard_ns.get_or_insert(now_ns));
+        let silent_ns = now_ns.saturating_sub(*self.received_ns.get_or_insert(now_ns));
         if silent_ns > GIVE_UP_AFTER_NS {
             return Silence::GiveUp;
         }
@@ -74,9 +74,9 @@ mod tests {
     #[test]
     fn an_answer_starts_the_silence_anew() {
         let mut heartbeat = Heartbeat::default();
-        heartbeat.heard(0);
+        heartbeat.received(0);
         assert_eq!(heartbeat.due(31 * S), Silence::Ask);
-        heartbeat.heard(32 * S);
+        heartbeat.received(32 * S);
         assert_eq!(heartbeat.due(61 * S), Silence::Fine);
         assert_eq!(heartbeat.due(62 * S), Silence::Ask);
     }

@@ -4,19 +4,10 @@
 use super::{ArmTransport, LinkGone, Sent};
 use crate::control::LinkInput;
 use crate::xarm::{Command, Status};
-use arm_model::JointVector;
 
-/// An arm that is always where it was told to be.
+/// An arm that answers and has no joints.
 #[derive(Debug, Default)]
 pub struct IdealArm {
-    /// Last setpoint (rad).
-    pub q: Option<JointVector>,
-    /// Setpoints taken.
-    pub setpoints: u64,
-    /// Other commands taken.
-    pub requests: u64,
-    /// Status byte of every reply.
-    pub status: Status,
     /// No replies come while this is set.
     pub stalled: bool,
     /// The connection is gone.
@@ -30,14 +21,7 @@ impl ArmTransport for IdealArm {
         if self.gone {
             return Err(LinkGone);
         }
-        for command in commands {
-            match command {
-                Command::ServoJoint(q) => {
-                    self.q = Some(*q);
-                    self.setpoints = self.setpoints.wrapping_add(1);
-                }
-                _ => self.requests = self.requests.wrapping_add(1),
-            }
+        if !commands.is_empty() {
             self.oldest_ns = self.oldest_ns.or(Some(now_ns));
         }
         Ok(Sent::Whole)
@@ -54,7 +38,7 @@ impl ArmTransport for IdealArm {
         }
         self.oldest_ns = None;
         LinkInput {
-            status: Some(self.status),
+            status: Some(Status(0)),
             reply_ns: u32::try_from(waited_ns).unwrap_or(u32::MAX),
             ..LinkInput::default()
         }

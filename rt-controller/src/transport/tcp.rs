@@ -212,7 +212,7 @@ impl<W: ByteStream> TcpLink<W> {
             Ok((0, _)) => Err(LinkGone),
             Ok((n, arrival_ns)) => {
                 self.reader.commit(n);
-                self.heartbeat.heard(now_ns);
+                self.heartbeat.received(now_ns);
                 let came_ns = arrival_ns.map_or(now_ns, |arrival_ns| arrival_ns.min(now_ns));
                 self.take_replies(came_ns, seen)
             }

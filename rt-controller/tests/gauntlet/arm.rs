@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 /// How it answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub(crate) enum Manners {
+pub(crate) enum Replies {
     /// As it should.
     Good,
     /// Not at all.
@@ -26,7 +26,7 @@ pub(crate) enum Manners {
     HangUp,
 }
 
-impl Manners {
+impl Replies {
     const ALL: [Self; 6] = [
         Self::Good,
         Self::Mute,
@@ -41,7 +41,7 @@ impl Manners {
 #[derive(Debug, Clone)]
 pub(crate) struct EchoArm {
     pub(crate) address: SocketAddr,
-    manners: Arc<AtomicU8>,
+    replies: Arc<AtomicU8>,
     received: Arc<AtomicU64>,
     hung_up: Arc<AtomicBool>,
 }
@@ -51,7 +51,7 @@ impl EchoArm {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let arm = Self {
             address: listener.local_addr().unwrap(),
-            manners: Arc::default(),
+            replies: Arc::default(),
             received: Arc::default(),
             hung_up: Arc::default(),
         };
@@ -66,13 +66,13 @@ impl EchoArm {
         arm
     }
 
-    pub(crate) fn be(&self, manners: Manners) {
+    pub(crate) fn be(&self, replies: Replies) {
         self.hung_up.store(false, Ordering::SeqCst);
-        self.manners.store(manners as u8, Ordering::SeqCst);
+        self.replies.store(replies as u8, Ordering::SeqCst);
     }
 
-    fn manners(&self) -> Manners {
-        Manners::ALL[usize::from(self.manners.load(Ordering::SeqCst))]
+    fn replies(&self) -> Replies {
+        Replies::ALL[usize::from(self.replies.load(Ordering::SeqCst))]
     }
 
     /// Requests met so far, on all connections.
@@ -80,9 +80,9 @@ impl EchoArm {
         self.received.load(Ordering::SeqCst)
     }
 
-    /// Whether it has met `asked` requests, each in its manner.
+    /// Whether it has met `asked` requests, each in its way.
     pub(crate) fn is_done_with(&self, asked: u64) -> bool {
-        if self.manners() == Manners::HangUp {
+        if self.replies() == Replies::HangUp {
             return self.hung_up.load(Ordering::SeqCst);
         }
         self.received() >= asked
@@ -108,16 +108,16 @@ impl EchoArm {
 
     /// False when the connection is to be closed.
     fn answer(&self, stream: &mut TcpStream, request: &Request<'_>) -> bool {
-        let manners = self.manners();
-        let status = match manners {
-            Manners::Error => Status(Status::ERROR | Status::NOT_READY),
-            Manners::NotReady => Status(Status::NOT_READY),
-            Manners::Good | Manners::Foreign => Status(0),
-            Manners::Mute => return true,
-            Manners::HangUp => return false,
+        let replies = self.replies();
+        let status = match replies {
+            Replies::Error => Status(Status::ERROR | Status::NOT_READY),
+            Replies::NotReady => Status(Status::NOT_READY),
+            Replies::Good | Replies::Foreign => Status(0),
+            Replies::Mute => return true,
+            Replies::HangUp => return false,
         };
         let mut request = *request;
-        if manners == Manners::Foreign {
+        if replies == Replies::Foreign {
             request.transaction = request.transaction.wrapping_add(1000);
         }
         let mut out = [0; MAX_FRAME_LEN];

@@ -3,9 +3,9 @@
 //! through a [`Watch`].
 
 pub(crate) mod arm;
-pub(crate) mod ways;
+pub(crate) mod scenarios;
 
-use arm::{EchoArm, Manners};
+use arm::{EchoArm, Replies};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits, LimitsSpec};
 use rt_controller::control::{
@@ -50,7 +50,7 @@ pub(crate) type Spoil = fn(&mut JointReport, &JointReport, u32);
 
 /// What goes wrong from now on.
 #[derive(Debug, Default)]
-pub(crate) struct Mood {
+pub(crate) struct Disturbance {
     pub(crate) operator_silent: bool,
     pub(crate) guardian_silent: bool,
     pub(crate) reports_stop: bool,
@@ -74,8 +74,8 @@ pub(crate) struct Bench<'w> {
     pub(crate) now_ns: u64,
     pub(crate) newest: CycleRecord,
     said: JointReport,
-    pub(crate) mood: Mood,
-    mood_cycles: u32,
+    pub(crate) disturbance: Disturbance,
+    disturbed_cycles: u32,
     asked: u64,
     pub(crate) cycles: u64,
     pub(crate) seen: [u64; 6],
@@ -139,8 +139,8 @@ impl<'w> Bench<'w> {
             now_ns,
             newest: CycleRecord::default(),
             said: JointReport::default(),
-            mood: Mood::default(),
-            mood_cycles: 0,
+            disturbance: Disturbance::default(),
+            disturbed_cycles: 0,
             asked: 0,
             cycles: 0,
             seen: [0; 6],
@@ -151,20 +151,20 @@ impl<'w> Bench<'w> {
 
     /// One turn of the loop, and everything that others do meanwhile.
     pub(crate) fn cycle(&mut self) {
-        let missed = std::mem::take(&mut self.mood.missed);
+        let missed = std::mem::take(&mut self.disturbance.missed);
         self.now_ns += self.period_ns * u64::from(missed + 1);
         self.clock.set(self.now_ns);
-        if !self.mood.operator_silent {
+        if !self.disturbance.operator_silent {
             self.operator.beat();
         }
-        if !self.mood.guardian_silent {
+        if !self.disturbance.guardian_silent {
             self.guardian.beat(GuardianBeat {
                 phase: 1,
                 connected: 1,
                 ..GuardianBeat::default()
             });
         }
-        if !self.mood.reports_stop {
+        if !self.disturbance.reports_stop {
             let report = self.report();
             self.rings.reports[0].push(report).unwrap();
         }
@@ -207,14 +207,14 @@ impl<'w> Bench<'w> {
             q: self.newest.q_c,
             ..JointReport::default()
         };
-        match self.mood.reports {
+        match self.disturbance.reports {
             Some(spoil) => {
-                self.mood_cycles += 1;
-                spoil(&mut report, &self.said, self.mood_cycles);
+                self.disturbed_cycles += 1;
+                spoil(&mut report, &self.said, self.disturbed_cycles);
             }
             None => {
                 self.said = report;
-                self.mood_cycles = 0;
+                self.disturbed_cycles = 0;
             }
         }
         report
@@ -255,10 +255,10 @@ impl<'w> Bench<'w> {
 
     /// Everything is well again and the arm is held, over a fresh connection.
     pub(crate) fn recover(&mut self) {
-        self.mood = Mood::default();
+        self.disturbance = Disturbance::default();
         self.operator.hold();
         self.operator.release_stop();
-        self.arm.be(Manners::Good);
+        self.arm.be(Replies::Good);
         // Reports that are well again come before anybody engages the arm: a spoilt
         // one followed by a true one is a jump.
         for _ in 0..3 {

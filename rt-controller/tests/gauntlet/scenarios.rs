@@ -1,6 +1,7 @@
-//! A way to every fault: how the loop is brought to it while it moves.
+//! A fault-injection scenario for every fault: how the loop is brought to it while
+//! it moves.
 
-use super::arm::{EchoArm, Manners};
+use super::arm::{EchoArm, Replies};
 use super::{Bench, Watch};
 use arm_model::joint::START_POSE;
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, LimitsSpec};
@@ -11,8 +12,8 @@ use shared_types::ipc::ControllerMode;
 use shared_types::{Arming, CommandInterface, FaultCode, OperatingMode};
 use std::collections::BTreeSet;
 
-/// A way to a fault.
-enum Way {
+/// A scenario that ends in a fault.
+enum Scenario {
     /// A motion runs and this is done to it.
     Spoilt(fn(&mut Bench<'_>)),
     /// This motion is begun.
@@ -25,15 +26,15 @@ enum Way {
 
 /// Every code has its arm here: a new one has to say how it is met.
 #[allow(clippy::too_many_lines, reason = "one line per code")]
-fn way_to(code: FaultCode) -> Way {
+fn scenario_of(code: FaultCode) -> Scenario {
     use FaultCode as F;
-    use Way::{Motion, Never, Refused, Spoilt};
-    const BRIDGE: Way = Never("the bridge's, before the loop hears of a motion");
+    use Scenario::{Motion, Never, Refused, Spoilt};
+    const BRIDGE: Scenario = Never("the bridge's, before the loop hears of a motion");
     match code {
         F::None => Never("no fault"),
         F::OperatorStop => Spoilt(|b| b.operator.stop()),
-        F::OperatorLost => Spoilt(|b| b.mood.operator_silent = true),
-        F::GuardianLost => Spoilt(|b| b.mood.guardian_silent = true),
+        F::OperatorLost => Spoilt(|b| b.disturbance.operator_silent = true),
+        F::GuardianLost => Spoilt(|b| b.disturbance.guardian_silent = true),
         F::DeadManReleased => Spoilt(|b| b.operator.let_go()),
         F::Disarmed => Spoilt(|b| b.command(ControlCommand::Disarm)),
         F::SetpointNotFinite => Motion(|_| not_finite(), OperatingMode::Throw),
@@ -50,27 +51,31 @@ fn way_to(code: FaultCode) -> Way {
         F::SetpointStep => Motion(|_| spline(1, 2.6, 1.55), OperatingMode::Throw),
         F::SetpointUnstoppable => Motion(|_| spline(6, 2.2, 1.2), OperatingMode::Throw),
         F::OperatingModeExceeded => Motion(|_| spline(1, 3.4, 1.55), OperatingMode::Wiggle),
-        F::DeadlineMissed => Spoilt(|b| b.mood.missed = 7),
-        F::LateCycles => Spoilt(|b| b.mood.missed = 4),
-        F::ReplyStalled => Spoilt(|b| b.arm.be(Manners::Mute)),
-        F::LinkLost => Spoilt(|b| b.arm.be(Manners::HangUp)),
-        F::ArmError => Spoilt(|b| b.arm.be(Manners::Error)),
-        F::ArmNotReady => Spoilt(|b| b.arm.be(Manners::NotReady)),
-        F::SecondCommander => Spoilt(|b| b.arm.be(Manners::Foreign)),
-        F::ReportStale => Spoilt(|b| b.mood.reports_stop = true),
+        F::DeadlineMissed => Spoilt(|b| b.disturbance.missed = 7),
+        F::LateCycles => Spoilt(|b| b.disturbance.missed = 4),
+        F::ReplyStalled => Spoilt(|b| b.arm.be(Replies::Mute)),
+        F::LinkLost => Spoilt(|b| b.arm.be(Replies::HangUp)),
+        F::ArmError => Spoilt(|b| b.arm.be(Replies::Error)),
+        F::ArmNotReady => Spoilt(|b| b.arm.be(Replies::NotReady)),
+        F::SecondCommander => Spoilt(|b| b.arm.be(Replies::Foreign)),
+        F::ReportStale => Spoilt(|b| b.disturbance.reports_stop = true),
         F::ReportFrozen => Spoilt(|b| {
-            b.mood.reports = Some(|r, before, _| (r.q, r.qd) = (before.q, before.qd));
+            b.disturbance.reports = Some(|r, before, _| (r.q, r.qd) = (before.q, before.qd));
         }),
-        F::ReportClock => Spoilt(|b| b.mood.reports = Some(|r, _, _| r.stamp_ns -= 1_000_000_000)),
+        F::ReportClock => {
+            Spoilt(|b| b.disturbance.reports = Some(|r, _, _| r.stamp_ns -= 1_000_000_000))
+        }
         F::ReportBroken => {
-            Spoilt(|b| b.mood.reports = Some(|r, _, _| r.q = JointVector::splat(f64::NAN)))
+            Spoilt(|b| b.disturbance.reports = Some(|r, _, _| r.q = JointVector::splat(f64::NAN)))
         }
         F::TrackingError => Spoilt(|b| {
-            b.mood.reports = Some(|r, _, cycles| r.q[2] += 0.003 * f64::from(cycles));
+            b.disturbance.reports = Some(|r, _, cycles| r.q[2] += 0.003 * f64::from(cycles));
         }),
-        F::JointStuck => Spoilt(|b| b.mood.reports = Some(|r, before, _| r.q[5] = before.q[5])),
-        F::EncoderJump => Spoilt(|b| b.mood.reports = Some(|r, _, _| r.q[3] += 0.3)),
-        F::ArmModeChanged => Spoilt(|b| b.mood.reports = Some(|r, _, _| r.arm_mode = 0)),
+        F::JointStuck => {
+            Spoilt(|b| b.disturbance.reports = Some(|r, before, _| r.q[5] = before.q[5]))
+        }
+        F::EncoderJump => Spoilt(|b| b.disturbance.reports = Some(|r, _, _| r.q[3] += 0.3)),
+        F::ArmModeChanged => Spoilt(|b| b.disturbance.reports = Some(|r, _, _| r.arm_mode = 0)),
         F::StartPoseMismatch => Refused(|b| {
             let from = Bench::pose(3, 0.1);
             let motion = JointTrajectory::hold(from, 1.0).unwrap();
@@ -150,23 +155,23 @@ fn jerky(limits: &Limits) -> Motion {
 /// false where it cannot be brought there.
 fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
     let motions = [swing(), go(&bench.limits)];
-    match way_to(code) {
-        Way::Never(_because) => return false,
-        Way::Refused(ask) => {
+    match scenario_of(code) {
+        Scenario::Never(_because) => return false,
+        Scenario::Refused(ask) => {
             bench.recover();
             bench.cycle();
             ask(bench);
             bench.until_still();
             assert!(bench.met.contains(&(code as u16)), "{code:?}");
         }
-        Way::Motion(make, operating_mode) => {
+        Scenario::Motion(make, operating_mode) => {
             bench.recover();
             bench.last_cause = FaultCode::None;
             bench.begin(make(&bench.limits), operating_mode, 0);
             bench.until_still();
             assert_eq!(bench.last_cause, code);
         }
-        Way::Spoilt(spoil) => {
+        Scenario::Spoilt(spoil) => {
             for motion in motions {
                 bench.recover();
                 bench.hold();
@@ -184,7 +189,7 @@ fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
 }
 
 /// Runs at least `cycles` through every mode and every fault that can be met,
-/// with every wire, and says how many ran.
+/// by every command interface, and says how many ran.
 pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
     let arm = EchoArm::start();
     let (mut met, mut seen, mut ran) = (BTreeSet::new(), [0; 6], 0);
@@ -232,7 +237,7 @@ pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
     assert!(seen.iter().all(|cycles| *cycles > 0), "{seen:?}");
     let expected: BTreeSet<u16> = FaultCode::ALL
         .into_iter()
-        .filter(|code| !matches!(way_to(*code), Way::Never(_)))
+        .filter(|code| !matches!(scenario_of(*code), Scenario::Never(_)))
         .map(|code| code as u16)
         .collect();
     assert_eq!(met, expected);

@@ -10,13 +10,6 @@ use super::violation::Violation;
 use arm_model::{JOINTS, JointState, Limits, exact};
 use shared_types::FaultCode;
 
-/// Brake of all joints from `from` to rest with the jerk of motions the
-/// controller makes itself. RT-safe.
-#[must_use]
-pub fn brake(from: &JointState, limits: &Limits) -> PhasedMotion {
-    brake_with_jerk(from, limits, |j| limits.jerk_max_rad_s3[j])
-}
-
 /// Brake of all joints from `from` to rest; `jerk_max` gives the jerk of each
 /// joint, 0-based (rad/s³). RT-safe.
 #[must_use]
@@ -139,6 +132,10 @@ mod tests {
     use super::*;
     use arm_model::JointVector;
     use proptest::prelude::*;
+
+    fn brake(from: &JointState, limits: &Limits) -> PhasedMotion {
+        brake_with_jerk(from, limits, |j| limits.jerk_max_rad_s3[j])
+    }
 
     proptest! {
         #[test]

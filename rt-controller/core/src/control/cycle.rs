@@ -20,10 +20,8 @@ use serde::{Deserialize, Serialize};
 use shared_types::ipc::{ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts};
 use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 
-/// State of the control cycle. Sized once; stepping never allocates.
-///
-/// An engagement makes it anew, apart from its counters: a recorded run can be
-/// stepped again from any engagement on, see [`ControlState::resume`].
+/// State of the control cycle. Sized once; stepping never allocates. An engagement
+/// makes it anew, apart from its counters.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct ControlState {
     pub(super) limits: Limits,
@@ -46,18 +44,6 @@ impl ControlState {
     /// Offline, nothing known.
     #[must_use]
     pub fn new(limits: Limits, settings: impl Into<ControlSettings>) -> Self {
-        Self::resume(limits, settings, 0, 0)
-    }
-
-    /// Offline after `cycle` cycles and `motions_done` motions: what a record
-    /// that begins later, with an engagement, is stepped again from.
-    #[must_use]
-    pub fn resume(
-        limits: Limits,
-        settings: impl Into<ControlSettings>,
-        cycle: u64,
-        motions_done: u64,
-    ) -> Self {
         let q = JointVector::ZERO;
         let settings = settings.into();
         Self {
@@ -67,8 +53,8 @@ impl ControlState {
             settings,
             state: ModeState::Offline,
             arming: ArmingState::Disarmed,
-            cycle,
-            motions_done,
+            cycle: 0,
+            motions_done: 0,
             commanded: JointState::at_rest(q),
             sent_ns: 0,
             velocity: VelocityInterface::default(),

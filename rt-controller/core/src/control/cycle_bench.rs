@@ -8,9 +8,39 @@ use crate::point_to_point::plan_move;
 use crate::xarm::StateRequest;
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
-use shared_types::ipc::{CauseRecord, JointReport, OperatorBeat};
+use shared_types::ipc::{CauseRecord, GuardianBeat, JointReport, OperatorBeat};
 
 pub(super) const PERIOD_NS: u64 = 4_000_000;
+
+/// A cycle in which all is well: the heartbeats go on and the arm is in `q` (rad).
+pub(super) fn quiet_input(now_ns: u64, count: u64, q: JointVector) -> CycleInput {
+    CycleInput {
+        deadline_ns: now_ns,
+        operator: OperatorBeat {
+            count,
+            ..OperatorBeat::default()
+        },
+        guardian: GuardianBeat {
+            count,
+            ..GuardianBeat::default()
+        },
+        link: LinkInput {
+            status: Some(Status(0)),
+            reply_ns: 1000,
+            ..LinkInput::default()
+        },
+        reports: Some(JointReport {
+            arm_state: 1,
+            arm_mode: 1,
+            stamp_ns: now_ns - 1_000_000,
+            arrival_ns: now_ns - 500_000,
+            q,
+            ..JointReport::default()
+        })
+        .into(),
+        ..CycleInput::default()
+    }
+}
 
 /// A controller with an arm that follows two cycles late.
 pub(super) struct Bench {
@@ -55,28 +85,8 @@ impl Bench {
         self.now_ns += PERIOD_NS * (1 + u64::from(missed));
         self.beat += 1;
         CycleInput {
-            deadline_ns: self.now_ns,
             missed,
-            command: None,
-            operator: OperatorBeat {
-                count: self.beat,
-                ..OperatorBeat::default()
-            },
-            link: LinkInput {
-                status: Some(Status(0)),
-                reply_ns: 1000,
-                ..LinkInput::default()
-            },
-            reports: Some(JointReport {
-                arm_state: 1,
-                arm_mode: 1,
-                stamp_ns: self.now_ns - 1_000_000,
-                arrival_ns: self.now_ns - 500_000,
-                q: self.commanded[2],
-                ..JointReport::default()
-            })
-            .into(),
-            ..CycleInput::default()
+            ..quiet_input(self.now_ns, self.beat, self.commanded[2])
         }
     }
 
@@ -91,10 +101,8 @@ impl Bench {
             };
             self.judge.admit(&q, step_s, &limits, &allowed).unwrap();
             self.sent.push(q);
-            self.commanded = [q, self.commanded[0], self.commanded[1]];
         }
-        self.events.extend(out.events.iter().copied());
-        self.requests.extend(out.request);
+        self.take(&out);
     }
 
     pub(super) fn cycle(&mut self) {
@@ -106,6 +114,10 @@ impl Bench {
     pub(super) fn cycle_unjudged(&mut self, missed: u32) {
         let input = self.input(missed);
         let out = self.state.step(input);
+        self.take(&out);
+    }
+
+    fn take(&mut self, out: &CycleOutput) {
         if let Some(q) = out.setpoint() {
             self.commanded = [q, self.commanded[0], self.commanded[1]];
         }

@@ -97,7 +97,7 @@ pub struct CycleInput {
     pub broken_reports: u32,
 }
 
-/// What the arm is to be told in a cycle.
+/// What is commanded in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ArmCommand {
     /// Be there (rad); servo-position mode.
@@ -159,7 +159,7 @@ pub const EVENTS_PER_CYCLE: usize = 6;
 /// What a cycle wants done.
 #[derive(Debug, Default, PartialEq)]
 pub struct CycleOutput {
-    /// What to tell the arm; at most once per cycle.
+    /// The command for the arm; at most one per cycle.
     pub command: Option<ArmCommand>,
     /// State to ask of the arm.
     pub request: Option<StateRequest>,

@@ -1,4 +1,4 @@
-//! What the arm is told to follow: an uploaded spline or a planned move.
+//! What the arm is commanded to follow: an uploaded spline or a planned move.
 
 use super::phases::PhasedMotion;
 use arm_model::{JointState, JointTrajectory, JointVector};
@@ -48,15 +48,6 @@ impl Motion {
     #[must_use]
     pub fn start(&self) -> JointVector {
         self.state_at(0.0).q
-    }
-
-    /// Pose at the end (rad). RT-safe.
-    #[must_use]
-    pub fn end(&self) -> JointVector {
-        match self {
-            Self::Spline(trajectory) => trajectory.end(),
-            Self::Move { end, .. } => *end,
-        }
     }
 
     /// Number that tells motions apart: FNV-1a over every bit that decides what

@@ -4,9 +4,10 @@
 //!
 //! `WAG_LONG_TESTS=1` runs ten million cycles instead of 300 000.
 
+use super::bench::{PERIOD_NS, quiet_input};
 use super::*;
 use crate::control::record::{record_input, restore_input};
-use crate::control::{ArmCodes, ControlCommand, LinkInput, Thresholds};
+use crate::control::{ArmCodes, ControlCommand, Thresholds};
 use crate::overrun::min_gap_ns;
 use crate::point_to_point::plan_move;
 use arm_model::joint::START_POSE;
@@ -14,9 +15,8 @@ use arm_model::{JOINTS, JointTrajectory, kinematics};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared_types::Arming;
-use shared_types::ipc::{GuardianBeat, InputRecord, JointReport, OperatorBeat, Reports};
+use shared_types::ipc::{InputRecord, JointReport, Reports};
 
-const PERIOD_NS: u64 = 4_000_000;
 const PERIOD_S: f64 = 0.004;
 
 /// Motions that begin in the start pose: gentle, at the limits, and wild.
@@ -59,7 +59,7 @@ struct Chaos {
     /// Instant of the last setpoint.
     sent_ns: u64,
     beat: u64,
-    told: [JointVector; 3],
+    commanded: [JointVector; 3],
 }
 
 impl Chaos {
@@ -71,7 +71,7 @@ impl Chaos {
             now_ns: 1_000_000_000_000,
             sent_ns: 0,
             beat: 0,
-            told: [START_POSE; 3],
+            commanded: [START_POSE; 3],
         }
     }
 
@@ -95,32 +95,9 @@ impl Chaos {
         self.sent_ns = self.now_ns + u64::from(late_ns);
         self.beat += 1;
         let mut input = CycleInput {
-            deadline_ns: self.now_ns,
             missed,
             late_ns,
-            operator: OperatorBeat {
-                count: self.beat,
-                ..OperatorBeat::default()
-            },
-            guardian: GuardianBeat {
-                count: self.beat,
-                ..GuardianBeat::default()
-            },
-            link: LinkInput {
-                status: Some(Status(0)),
-                reply_ns: 1000,
-                ..LinkInput::default()
-            },
-            reports: Some(JointReport {
-                arm_state: 1,
-                arm_mode: 1,
-                stamp_ns: self.now_ns - 1_000_000,
-                arrival_ns: self.now_ns - 500_000,
-                q: self.told[2],
-                ..JointReport::default()
-            })
-            .into(),
-            ..CycleInput::default()
+            ..quiet_input(self.now_ns, self.beat, self.commanded[2])
         };
         input.command = self.command(mode);
         if self.rng.random_ratio(1, 150) {
@@ -200,9 +177,9 @@ impl Chaos {
         }
     }
 
-    fn told(&mut self, out: &CycleOutput) {
+    fn sent(&mut self, out: &CycleOutput) {
         if let Some(q) = out.setpoint() {
-            self.told = [q, self.told[0], self.told[1]];
+            self.commanded = [q, self.commanded[0], self.commanded[1]];
         }
     }
 }
@@ -289,7 +266,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
                 ControlEvent::Engaged => {
                     let hold = state.summary().q_c;
                     judge = Judge::holding(hold, deadline_ns);
-                    chaos.told = [hold; 3];
+                    chaos.commanded = [hold; 3];
                 }
                 ControlEvent::Latched(cause) => {
                     latches += 1;
@@ -307,7 +284,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
             && before != ControllerMode::Offline
             && state.mode() == ControllerMode::Faulted;
         assert_eq!(latches, i32::from(stopped), "{before:?} {:?}", out.events);
-        chaos.told(&out);
+        chaos.sent(&out);
         if let Some(q) = out.setpoint() {
             tally.setpoints += 1;
             let part = judge.take(deadline_ns, q, &limits);
@@ -360,12 +337,11 @@ fn recorded_cycles_step_again_to_the_same_bytes() {
             };
             let engages = matches!(input.command, Some(ControlCommand::Engage { .. }));
             if late.is_none() && engages {
-                late = Some(ControlState::resume(
-                    limits.clone(),
-                    settings(seed),
-                    state.cycle(),
-                    state.motions_done,
-                ));
+                late = Some(ControlState {
+                    cycle: state.cycle,
+                    motions_done: state.motions_done,
+                    ..ControlState::new(limits.clone(), settings(seed))
+                });
             }
             let (out, repeated) = (state.step(input), again.step(restore()));
             assert_eq!(bytes_of(&out), bytes_of(&repeated));
@@ -378,7 +354,7 @@ fn recorded_cycles_step_again_to_the_same_bytes() {
                     assert_eq!(bytes_of(&out), bytes_of(&resumed));
                 }
             }
-            chaos.told(&out);
+            chaos.sent(&out);
         }
     }
 }

@@ -52,7 +52,7 @@ pub enum RestoreError {
     },
 }
 
-/// What cycle number `cycle` was told, as plain data. RT-safe.
+/// The inputs of cycle number `cycle`, as plain data. RT-safe.
 #[must_use]
 pub fn record_input(input: &CycleInput, cycle: u64) -> InputRecord {
     InputRecord {

@@ -22,13 +22,13 @@ pub struct Thresholds {
     /// Largest age of the newest joint report while moving (ns).
     pub report_stale_ns: u64,
     /// Longest time in which joint reports may repeat one value while the arm is
-    /// told to move (ns).
+    /// commanded to move (ns).
     pub report_frozen_ns: u64,
     /// Most broken joint reports in a row.
     pub report_broken_max: u32,
     /// Most times the arm's clock may be followed anew during a motion.
     pub clock_resyncs_max: u32,
-    /// Distance of a measured joint from what it was told within
+    /// Distance of a measured joint from what was commanded within
     /// `tracking_window_ns` (rad).
     pub tracking_error_max_rad: f64,
     /// Longest lag of the arm that is normal (ns).

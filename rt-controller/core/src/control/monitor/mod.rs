@@ -25,13 +25,13 @@ const SETTLE_NS: u64 = 300_000_000;
 
 /// A heartbeat: its count and when it last changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-struct Heard {
+struct Heartbeat {
     count: u64,
     at_ns: u64,
 }
 
-impl Heard {
-    fn hear(&mut self, count: u64, now_ns: u64) {
+impl Heartbeat {
+    fn received(&mut self, count: u64, now_ns: u64) {
         if count != self.count {
             *self = Self {
                 count,
@@ -52,8 +52,8 @@ pub struct Monitor {
     commanded: Commanded,
     reports: ReportWatch,
     engaged_ns: u64,
-    operator: Heard,
-    guardian: Heard,
+    operator: Heartbeat,
+    guardian: Heartbeat,
     counts: RunCounts,
     arm_error: u8,
     arm_warning: u8,
@@ -68,8 +68,8 @@ impl Monitor {
             commanded: Commanded::holding(q),
             reports: ReportWatch::new(),
             engaged_ns: now_ns,
-            operator: Heard::default(),
-            guardian: Heard::default(),
+            operator: Heartbeat::default(),
+            guardian: Heartbeat::default(),
             counts: RunCounts::default(),
             arm_error: 0,
             arm_warning: 0,
@@ -116,7 +116,7 @@ impl Monitor {
         self.reports.deviation(&self.commanded)
     }
 
-    /// How far the arm stands from everything it was told lately (rad).
+    /// How far the arm stands from everything commanded lately (rad).
     #[must_use]
     pub fn tracking_error_rad(&self) -> f64 {
         let window_ns = self.settings.thresholds.tracking_window_ns;
@@ -126,8 +126,8 @@ impl Monitor {
     /// Takes in what came with this cycle.
     pub fn observe(&mut self, input: &CycleInput, limits: &Limits) {
         let now_ns = input.deadline_ns;
-        self.operator.hear(input.operator.count, now_ns);
-        self.guardian.hear(input.guardian.count, now_ns);
+        self.operator.received(input.operator.count, now_ns);
+        self.guardian.received(input.guardian.count, now_ns);
         let (link, counts) = (&input.link, &mut self.counts);
         let add = |count: &mut u32, more: u32| *count = count.saturating_add(more);
         add(&mut counts.missed, input.missed);

@@ -1,5 +1,5 @@
 //! Watches the joint reports: whether they come, live and make sense, and
-//! whether the arm is where it was told to be.
+//! whether the arm is where it was commanded to be.
 
 #![allow(
     clippy::arithmetic_side_effects,
@@ -32,7 +32,7 @@ const FROZEN_RAD: f64 = 5e-3;
 const JUMP_RAD: f64 = 0.02;
 /// Reports farther apart than this are not compared for jumps (s).
 const JUMP_SPAN_MAX_S: f64 = 0.1;
-/// Largest distance of the arm's own target from everything it was told within
+/// Largest distance of the arm's own target from everything commanded within
 /// the window (rad); rounding on the wire is a thousandth of that.
 const TARGET_RAD: f64 = 5e-4;
 /// What a report with a foreign target adds to the suspicion of a second
@@ -50,8 +50,8 @@ struct Still {
     since_ns: u64,
     /// Where (rad).
     at_rad: f64,
-    /// What it was told then (rad).
-    told_rad: f64,
+    /// What was commanded then (rad).
+    commanded_rad: f64,
 }
 
 /// What is remembered of the reports. RT-safe.
@@ -77,7 +77,7 @@ impl ReportWatch {
             still: [Still {
                 since_ns: 0,
                 at_rad: 0.0,
-                told_rad: 0.0,
+                commanded_rad: 0.0,
             }; JOINTS],
             jump: None,
             broken_in_a_row: 0,
@@ -113,11 +113,11 @@ impl ReportWatch {
         limits: &Limits,
     ) -> bool {
         self.broken_in_a_row = 0;
-        let told = commanded.at(report.stamp_ns);
+        let commanded_rad = commanded.at(report.stamp_ns);
         let stands = |j: usize| Still {
             since_ns: report.stamp_ns,
             at_rad: report.q[j],
-            told_rad: told[j],
+            commanded_rad: commanded_rad[j],
         };
         let before = self.newest.replace(*report);
         let Some(before) = before else {
@@ -212,7 +212,7 @@ impl ReportWatch {
             .then(|| Violation::of_time(FaultCode::ReportFrozen, frozen_ns, t.report_frozen_ns))
     }
 
-    /// Whether the arm is somewhere else than it was told.
+    /// Whether the arm is somewhere else than commanded.
     #[must_use]
     pub fn tracking_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Violation> {
         if let Some(jump) = self.jump {
@@ -227,9 +227,9 @@ impl ReportWatch {
         let from_ns = report.stamp_ns.saturating_sub(t.tracking_window_ns);
         let must_show = commanded.at(from_ns);
         for (j, still) in self.still.iter().enumerate() {
-            let told_rad = (must_show[j] - still.told_rad).abs();
+            let commanded_rad = (must_show[j] - still.commanded_rad).abs();
             let off_rad = (must_show[j] - still.at_rad).abs();
-            if still.since_ns < from_ns && told_rad > STUCK_RAD && off_rad > STUCK_RAD {
+            if still.since_ns < from_ns && commanded_rad > STUCK_RAD && off_rad > STUCK_RAD {
                 return Some(Violation::of_joint(
                     FaultCode::JointStuck,
                     j,
@@ -245,7 +245,7 @@ impl ReportWatch {
     }
 
     /// Joint (0-based) whose newest measured position is farthest outside what
-    /// it was told within `window_ns`, and how far (rad).
+    /// commanded within `window_ns`, and how far (rad).
     #[must_use]
     pub fn tracking_error(&self, commanded: &Commanded, window_ns: u64) -> (usize, f64) {
         self.newest.map_or((0, 0.0), |report| {
