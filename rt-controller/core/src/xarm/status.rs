@@ -21,6 +21,12 @@ impl Status {
         self.0 & Self::INVALID != 0
     }
 
+    /// Whether the arm cannot move.
+    #[must_use]
+    pub const fn is_not_ready(self) -> bool {
+        self.0 & Self::NOT_READY != 0
+    }
+
     /// Whether a warning is set; read it with `Command::GetFault`.
     #[must_use]
     pub const fn has_warning(self) -> bool {
@@ -148,7 +154,7 @@ mod tests {
     #[test]
     fn not_ready_is_no_error() {
         let status = Status(0x10);
-        assert!(!status.has_error() && !status.is_invalid());
+        assert!(status.is_not_ready() && !status.has_error() && !status.is_invalid());
         assert!(!status.accepts_motion());
         assert!(Status(0x20).accepts_motion());
     }
