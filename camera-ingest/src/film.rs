@@ -8,7 +8,7 @@ use crate::overlay::{OverlayError, Picture, drawn};
 /// JPEG quality: the lines stay sharp.
 const QUALITY: u8 = 85;
 
-/// The left eye with the keypoints drawn in, frame by frame, as an AVI file's
+/// The left image with the keypoints drawn in, frame by frame, as an AVI file's
 /// bytes. It plays at the mean rate of the frames.
 ///
 /// # Errors

@@ -19,7 +19,7 @@ pub enum FrameError {
     /// Number of bytes does not fit the size.
     #[error("{found} bytes where {width_px}x{height_px} YUYV needs {expected}")]
     Length {
-        /// Pixels per row, both eyes.
+        /// Pixels per row, both images.
         width_px: usize,
         /// Rows.
         height_px: usize,
@@ -39,12 +39,12 @@ pub enum FrameError {
         "it is {}x{} px, the first one {}x{}", found[0], found[1], expected[0], expected[1]
     )]
     Size {
-        /// Width of both eyes and height of this frame.
+        /// Width of both images and height of this frame.
         found: [usize; 2],
         /// Those of the first one.
         expected: [usize; 2],
     },
-    /// Not two eyes side by side.
+    /// Not two images side by side.
     #[error("a width of {0} px is not a side-by-side pair with 4:2:2 chroma (must divide by 4)")]
     Width(usize),
 }
@@ -68,7 +68,7 @@ pub struct EyeFrame {
     pub cr: Vec<u8>,
 }
 
-/// Both eyes side by side, the left eye in the left half.
+/// Both images side by side, the left image in the left half.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StereoFrame(pub EyeFrame);
 
@@ -114,7 +114,7 @@ impl EyeFrame {
         }
     }
 
-    /// One eye's picture by itself.
+    /// One image's picture by itself.
     ///
     /// # Errors
     /// As [`StereoFrame::from_jpeg`].
@@ -124,7 +124,7 @@ impl EyeFrame {
         Ok(planes(&packed, size, size[0], stamp_ns, sequence))
     }
 
-    /// Left eye of a side-by-side JPEG. `room` holds the decoded picture meanwhile;
+    /// Left image of a side-by-side JPEG. `room` holds the decoded picture meanwhile;
     /// whoever keeps it from frame to frame spares the system new pages for each.
     ///
     /// # Errors
@@ -139,8 +139,8 @@ impl EyeFrame {
         Ok(planes(room, size, size[0] / 2, stamp_ns, sequence))
     }
 
-    /// Left eye of side-by-side V4L2 `YUYV`, rows without padding; `size_px` is that of
-    /// both eyes.
+    /// Left image of side-by-side V4L2 `YUYV`, rows without padding; `size_px` is that of
+    /// both images.
     ///
     /// # Errors
     /// As [`StereoFrame::from_yuyv`].
@@ -178,13 +178,13 @@ impl EyeFrame {
 }
 
 impl StereoFrame {
-    /// Left eye.
+    /// Left image.
     #[must_use]
     pub fn left(&self) -> EyeFrame {
         self.0.columns(0, self.0.width_px / 2)
     }
 
-    /// Right eye.
+    /// Right image.
     #[must_use]
     pub fn right(&self) -> EyeFrame {
         let half = self.0.width_px / 2;
@@ -257,7 +257,7 @@ fn decode(bytes: &[u8], packed: &mut Vec<u8>) -> Result<[usize; 2], FrameError> 
     let options = DecoderOptions::new_fast()
         .jpeg_set_out_colorspace(ColorSpace::YCbCr)
         .set_strict_mode(true);
-    // The decoder fills what is missing with grey; the end marker tells.
+    // The decoder fills what is missing with grey; the end marker shows it.
     let end = bytes.iter().rposition(|&b| b != 0).unwrap_or(0);
     if end == 0 || bytes[end - 1..=end] != [0xff, 0xd9] {
         return Err(FrameError::Jpeg(
@@ -376,7 +376,7 @@ mod tests {
 
     #[test]
     fn yuyv_planes_and_halves() {
-        // Two rows, two eyes of two pixels each.
+        // Two rows, two images of two pixels each.
         let bytes: Vec<u8> = (0..16).collect();
         let frame = StereoFrame::from_yuyv(&bytes, [4, 2], 7, 3).unwrap();
         assert_eq!(frame.left().luma, [0, 2, 8, 10]);

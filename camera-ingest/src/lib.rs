@@ -1,13 +1,13 @@
 //! From camera frames to rope keypoints and to the score of a throw.
 //!
-//! Takes frames from a camera ([`live`]), reads recordings ([`source`]) and calibrations ([`calib`]), follows the rope
-//! in the left eye ([`mod@track`]), measures tip and target in stereo ([`mod@score`]),
-//! lets learned models stand in for parts of it (feature `learned`), draws what it found
-//! ([`overlay`], [`film`]), follows the rope while it films ([`preview`]) and says when a rope hangs still
-//! ([`still`]).
+//! Takes frames from a camera ([`live`]), reads recordings ([`source`]) and calibrations
+//! ([`calib`]), tracks the rope in the left image ([`mod@track`]), measures tip and target
+//! in stereo ([`mod@score`]), lets learned models replace parts of it (feature `learned`),
+//! draws the result ([`overlay`], [`film`]), tracks the rope online ([`preview`]) and
+//! detects when it hangs still ([`still`]).
 //!
-//! It is *not* the place for rope physics, identification or planning: it
-//! knows pixels, cameras and colours only.
+//! It is *not* the place for rope physics, identification or planning: it handles pixels,
+//! cameras and colours only.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod calib;

@@ -3,11 +3,11 @@
 use std::io;
 use std::path::Path;
 
-/// Writes beside `path`, then renames: what stood there before stays until the new
+/// Writes next to `path`, then renames: what stood there before stays until the new
 /// file is complete.
 ///
 /// # Errors
-/// What the system says; nothing is left beside `path` then.
+/// The system's reason; nothing is left next to `path` then.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");

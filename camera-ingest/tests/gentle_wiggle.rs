@@ -347,7 +347,7 @@ const SWAY: Motion = Motion {
 };
 
 #[test]
-fn a_lead_hardly_fatter_than_the_rope_is_told_by_its_colour() {
+fn a_lead_hardly_fatter_than_the_rope_is_known_by_its_colour() {
     let colours = [[44.0, 82.0, 160.0], [240.0, 150.0, 30.0]];
     let scene = Scene {
         // A knot near the clamp is the fattest place.
@@ -359,13 +359,13 @@ fn a_lead_hardly_fatter_than_the_rope_is_told_by_its_colour() {
 
 /// Without a width to go by, either, the lead is the free end.
 #[test]
-fn a_lead_of_the_ropes_colour_is_told_by_its_width_or_is_the_free_end() {
+fn a_lead_of_the_ropes_colour_is_known_by_its_width_or_is_the_free_end() {
     for radii_m in [[0.006, 0.017], [0.011, 0.011]] {
         Scene::new(SWAY, 100, [GREEN; 2], radii_m).assert_followed();
     }
 }
 
-/// The same path, told `late_s` later and `aside_m` further to the right.
+/// The same path, reported `late_s` later and `aside_m` further to the right.
 fn moved(path: &ClampPath, late_s: f64, aside_m: f64) -> ClampPath {
     let samples = path.samples().iter().map(|s| ClampSample {
         t_s: s.t_s + late_s,
@@ -376,14 +376,14 @@ fn moved(path: &ClampPath, late_s: f64, aside_m: f64) -> ClampPath {
 }
 
 #[test]
-fn a_clock_and_a_clamp_that_are_off_are_told() {
+fn a_clock_and_a_clamp_that_are_off_are_reported() {
     let mut recording = record(&Scene::new(SWAY, 150, RED_AND_BLUE, RADII_M));
     let path = recording.clamp.clone();
     for (late_s, aside_m) in [(0.0, 0.0), (0.008, 0.002), (-0.012, -0.002)] {
         recording.clamp = moved(&path, late_s, aside_m);
         let found = follow(&recording).clamp.unwrap();
         println!("{late_s} s, {aside_m} m: {found:?}");
-        // A path told late makes the film early.
+        // A path reported late makes the film early.
         let off_s = (found.time_offset_s + late_s).abs();
         let off_m = (found.aside_m + aside_m).abs();
         assert!(off_s < 2.0 * found.time_std_s + 5e-4, "{found:?}");

@@ -1,5 +1,5 @@
 //! The tracker on recordings to which something bad was done: it stays nearly as
-//! exact as on the good ones or says that it lost the rope, and is never wrong
+//! exact as on the good ones or reports that it lost the rope, and is never wrong
 //! with confidence.
 #![cfg(test)]
 #![allow(missing_docs, reason = "a test")]
@@ -11,8 +11,7 @@ mod recording;
 use std::sync::OnceLock;
 
 use alter::SecondRope;
-use camera_ingest::track;
-use camera_ingest::track::{TrackError, TrackOptions};
+use camera_ingest::TrackError;
 use recording::{Wiggle, quantile};
 
 /// A node that is further off is wrong (px).
@@ -25,7 +24,7 @@ struct Clean {
     outcome: Outcome,
 }
 
-/// Both recordings, read and tracked once; empty, said aloud, where they are not.
+/// Both recordings, read and tracked once; empty, with a message, where they are missing.
 fn clean() -> &'static [Clean] {
     static CLEAN: OnceLock<Vec<Clean>> = OnceLock::new();
     CLEAN.get_or_init(|| {
@@ -56,11 +55,7 @@ fn outcome(wiggle: &Wiggle) -> Outcome {
 }
 
 fn tried(wiggle: &Wiggle) -> Result<Outcome, TrackError> {
-    let options = TrackOptions {
-        keypoints: wiggle.nodes(),
-        ..TrackOptions::default()
-    };
-    let result = track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options)?;
+    let result = wiggle.track()?;
     let errors = wiggle.errors(&result);
     let frames = &result.track.frames;
     let kept: Vec<f64> = errors

@@ -7,8 +7,7 @@ mod recording;
 use std::path::Path;
 
 use camera_ingest::source::FrameSource;
-use camera_ingest::track::TrackOptions;
-use camera_ingest::{ScoreOptions, load_camera, open_video, score, track};
+use camera_ingest::{ScoreOptions, load_camera, open_video, score};
 use recording::{Wiggle, folder, quantile, read_npy};
 
 fn truth_json(folder: &Path) -> serde_json::Value {
@@ -23,18 +22,10 @@ fn assert_tracks(name: &str) {
         return;
     };
     let nodes = wiggle.nodes();
-    let options = TrackOptions {
-        keypoints: nodes,
-        ..TrackOptions::default()
-    };
-    let result = track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options).unwrap();
+    let result = wiggle.track().unwrap();
     result.track.validate().unwrap();
     let errors = wiggle.errors(&result).concat();
-    let (median, p95, max) = (
-        quantile(&errors, 0.5),
-        quantile(&errors, 0.95),
-        quantile(&errors, 1.0),
-    );
+    let [median, p95, max] = [0.5, 0.95, 1.0].map(|q| quantile(&errors, q));
     println!("{name}: median {median:.2}, p95 {p95:.2}, max {max:.2} px");
     assert!(
         median <= 1.2 && p95 <= 2.5 && max <= 8.0,

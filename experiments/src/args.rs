@@ -81,7 +81,7 @@ pub struct ResultArgs {
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Result file (JSON); an interrupted run resumes from it. A picture of the result
-    /// (SVG) is drawn beside it.
+    /// (SVG) is drawn next to it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -72,7 +72,7 @@ fn both_methods_find_planted_parameters_in_noise() {
             },
         };
         let mut last = 0;
-        // The camera stands where it is said to, and that is known.
+        // The camera stands where its calibration says, and the fit may rely on it.
         let options = IdentifyOptions {
             method,
             camera_position_std_m: 1e-3,
@@ -97,7 +97,7 @@ fn both_methods_find_planted_parameters_in_noise() {
         let noise = found.circumstances.noise_across;
         assert!((noise.sigma_px - 1.0).abs() < 0.05 && noise.in_time < 0.1);
         assert!(off_m < 4.0 * found.std_dev[1].unwrap());
-        // Neither was the width of the rope seen nor does motion tell it.
+        // The width of the rope was not seen, and motion does not reveal it.
         assert!(found.std_dev[4].is_none() && found.std_dev[8].is_none());
         assert!(!found.out_of_distribution.is_outside(), "{found:?}");
     }
@@ -134,7 +134,7 @@ fn a_misplaced_camera_and_a_late_clock_are_found_out() {
 }
 
 #[test]
-fn intervals_hold_the_truth_about_as_often_as_they_say() {
+fn intervals_contain_the_truth_about_as_often_as_stated() {
     let rig = TrialRig::new(&WiggleConfig::default()).unwrap();
     let indices: Vec<u64> = (0..20).collect();
     let rope = |i| trial_rope(4, i);

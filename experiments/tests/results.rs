@@ -17,7 +17,7 @@ fn report(args: &[&str]) -> Value {
 }
 
 #[test]
-fn trials_are_kept_and_gone_on_with() {
+fn trials_are_kept_and_an_interrupted_run_resumes() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("sysid.json");
     let path = path.to_str().unwrap();
@@ -61,9 +61,9 @@ fn the_network_answers_at_once_and_better_than_the_middle_of_the_ranges() {
     }
 }
 
-/// The network that reads link centres knows their number.
+/// The network that reads link centres recovers their number.
 #[test]
-fn link_centres_tell_the_link_count() {
+fn link_centres_reveal_the_link_count() {
     let model = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../configs/models/phi-nn-links.onnx"
@@ -84,7 +84,7 @@ fn link_centres_tell_the_link_count() {
     assert!(String::from_utf8_lossy(&refused.stdout).contains("only simulated films show"));
 }
 
-/// One rope with each of the nine wiggles, no more than the film tells of its ratios.
+/// One rope with each of the nine wiggles, no better than the film allows.
 #[test]
 fn every_wiggle_of_the_ablation_identifies_a_rope() {
     let report = report(&["wiggle-ablation", "--ropes", "1", "--seed", "5", "--json"]);
@@ -97,8 +97,7 @@ fn every_wiggle_of_the_ablation_identifies_a_rope() {
     }
 }
 
-/// One film: what tells the length is in the picture, what tells the link extra scale is
-/// nowhere.
+/// One film: the length is identifiable from it, the link extra scale is not.
 #[test]
 fn sensitivity_maps_are_drawn_for_every_parameter() {
     let dir = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use super::corners::CornerDetector;
 use super::extrinsics::Sighted;
 use crate::source::{SourceError, StereoSource};
 
-/// Corners both eyes must see for a picture to count.
+/// Corners both images must see for a picture to count.
 const MIN_CORNERS: usize = 6;
 
 /// Why a board cannot be used.
@@ -36,7 +36,7 @@ pub enum BoardError {
     NotFound {
         /// Frames looked at.
         frames: usize,
-        /// Most corners seen by both eyes.
+        /// Most corners seen by both images.
         most: usize,
     },
 }
@@ -116,7 +116,7 @@ impl Board {
         Vector3::from(self.pose.position_m) + self.rotation() * Vector3::new(x, y, 0.0)
     }
 
-    /// Corners seen by both eyes in some frames spread over a recording, in which
+    /// Corners seen by both images in some frames spread over a recording, in which
     /// the board hangs still.
     ///
     /// # Errors

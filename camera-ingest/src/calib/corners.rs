@@ -30,7 +30,7 @@ impl CornerDetector {
         detector.map(Self).map_err(|e| e.to_string())
     }
 
-    /// Corners in one eye's picture: id and raw pixel, integers at pixel centres.
+    /// Corners in one image's picture: id and raw pixel, integers at pixel centres.
     pub(super) fn corners(&self, eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
         let view = calib_targets_charuco::GrayImageView {
             width: eye.width_px,
@@ -73,7 +73,7 @@ impl CornerDetector {
         )
     }
 
-    /// Corners in one eye's picture.
+    /// Corners in one image's picture.
     pub(super) fn corners(&self, _eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
         match *self {}
     }

@@ -1,4 +1,4 @@
-//! Where the camera stands, from points known in the world and seen by both eyes.
+//! Where the camera stands, from points known in the world and seen by both images.
 //!
 //! The points, triangulated with the calibration at hand, are laid on the known
 //! ones (Kabsch); from there the pose that minimises the distances in both raw
@@ -8,12 +8,12 @@ use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 use serde::Serialize;
 use shared_types::StereoCamera;
 
-/// A point known in the world and seen by both eyes.
+/// A point known in the world and seen by both images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighted {
     /// Place in the world (m).
     pub p_w_m: Vector3<f64>,
-    /// Raw pixels in the left and the right eye.
+    /// Raw pixels in the left and the right image.
     pub pixels: [[f64; 2]; 2],
 }
 
@@ -35,13 +35,13 @@ pub struct Extrinsics {
 /// Distances between where points are seen and where they should be.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Residual {
-    /// Points, each seen by both eyes.
+    /// Points, each seen by both images.
     pub points: usize,
-    /// Root of the mean square over both eyes (px).
+    /// Root of the mean square over both images (px).
     pub rms_px: f64,
     /// Largest (px).
     pub worst_px: f64,
-    /// Root of the mean square gap between the two eyes' rays, as pixels: what no
+    /// Root of the mean square gap between the two images' rays, as pixels: what no
     /// place of the camera can explain, only its calibration.
     pub epipolar_px: f64,
 }
@@ -51,19 +51,19 @@ pub struct Residual {
 pub enum ExtrinsicsError {
     /// Too few points.
     #[error(
-        "camera pose: {found} points are seen in both images, at least {LEAST_POINTS} are needed"
+        "camera pose: {found} points are seen in both images, at least {MIN_POINTS} are needed"
     )]
     TooFew {
         /// Points given.
         found: usize,
     },
-    /// The points say nothing about a turn around their line.
+    /// The points do not constrain a rotation about their line.
     #[error("camera pose: the points lie on a line; show them spread over the picture")]
     Line,
     /// The points do not fit together.
     #[error(
         "camera pose: {rms_px:.1} px are left between seen and expected points (limit \
-         {LARGEST_PX} px); check the board's size and pose, and the camera's mode and calibration"
+         {MAX_RESIDUAL_PX} px); check the board's size and pose, and the camera's mode and calibration"
     )]
     Misfit {
         /// Root mean square (px).
@@ -72,16 +72,16 @@ pub enum ExtrinsicsError {
 }
 
 /// Fewest points for a pose.
-const LEAST_POINTS: usize = 6;
+const MIN_POINTS: usize = 6;
 /// Largest residual that is still a fit (px, RMS).
-const LARGEST_PX: f64 = 1.5;
+const MAX_RESIDUAL_PX: f64 = 1.5;
 
 /// Finds the pose of a camera; the one it has does not matter.
 ///
 /// # Errors
 /// Too few points, points on a line, or no pose that fits.
 pub fn solve(camera: &StereoCamera, points: &[Sighted]) -> Result<Extrinsics, ExtrinsicsError> {
-    if points.len() < LEAST_POINTS {
+    if points.len() < MIN_POINTS {
         return Err(ExtrinsicsError::TooFew {
             found: points.len(),
         });
@@ -111,7 +111,7 @@ pub fn solve(camera: &StereoCamera, points: &[Sighted]) -> Result<Extrinsics, Ex
         }
     }
     let residual = residual(&camera, points);
-    if residual.rms_px.is_nan() || residual.rms_px > LARGEST_PX {
+    if residual.rms_px.is_nan() || residual.rms_px > MAX_RESIDUAL_PX {
         return Err(ExtrinsicsError::Misfit {
             rms_px: residual.rms_px,
         });

@@ -1,6 +1,6 @@
 //! The vendor's factory calibration `SNxxxx.conf`.
 //!
-//! Traps of real files that this reader knows: `TY`/`TZ` or `TY_<mode>`, all
+//! Traps of real files that this reader handles: `TY`/`TZ` or `TY_<mode>`, all
 //! distortion zero (a rectified camera, not a corrupt file), lengths in mm,
 //! section names in any case.
 
@@ -12,11 +12,11 @@ use shared_types::{Intrinsics, StereoCamera};
 
 use super::error::{CalibError, read_text, write_text};
 use super::ini::Ini;
-use super::mode::{Eyes, VideoMode};
+use super::mode::{StereoGeometry, VideoMode};
 
 const M_PER_MM: f64 = 1e-3;
 
-pub(super) fn read(path: &Path, mode: VideoMode) -> Result<Eyes, CalibError> {
+pub(super) fn read(path: &Path, mode: VideoMode) -> Result<StereoGeometry, CalibError> {
     let ini = Ini::parse(path, &read_text(path)?)?;
     let stereo = |key: &str| -> Result<f64, CalibError> {
         // Newer files give a value per mode, older ones a single value.
@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path, mode: VideoMode) -> Result<Eyes, CalibError> {
         return Err(ini.bad("STEREO", "Baseline", "must be positive (mm)"));
     }
     let turn = Vector3::new(stereo("RX")?, stereo("CV")?, stereo("RZ")?);
-    Ok(Eyes {
+    Ok(StereoGeometry {
         left: intrinsics(&ini, "LEFT_CAM", mode)?,
         right: intrinsics(&ini, "RIGHT_CAM", mode)?,
         r_right_left: *Rotation3::new(turn).matrix(),

@@ -75,7 +75,7 @@ mod tests {
         assert!((turn - Vector3::new(-9e-4, 6e-3, 1e-3)).norm() < 1e-12);
         assert_eq!((camera.width_px, camera.height_px), (672, 376));
         assert_eq!(camera.left.distortion, [-0.175, 0.028, 0.0, 0.0, 0.0]);
-        // A rectified eye is not corrupt; a global shutter has no line time.
+        // A rectified camera is not corrupt; a global shutter has no line time.
         assert_eq!(camera.right.distortion, [0.0; 5]);
         assert_eq!(camera.line_time_s, 0.0);
         let by_mode = CONF.replace("TY=0.5", "TY_VGA=0.7");

@@ -1,4 +1,4 @@
-//! Video modes, and what a calibration says about one.
+//! Video modes, and what a calibration contains for one.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -7,16 +7,16 @@ use shared_types::Intrinsics;
 /// Video mode of the camera; it names the calibration's sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum VideoMode {
-    /// 2208x1242 per eye.
+    /// 2208x1242 per image.
     #[serde(rename = "2K")]
     TwoK,
-    /// 1920x1080 per eye.
+    /// 1920x1080 per image.
     #[serde(rename = "FHD", alias = "HD1080")]
     FullHd,
-    /// 1280x720 per eye.
+    /// 1280x720 per image.
     #[serde(rename = "HD", alias = "HD720")]
     Hd,
-    /// 672x376 per eye.
+    /// 672x376 per image.
     #[serde(rename = "VGA")]
     Vga,
 }
@@ -33,7 +33,7 @@ impl VideoMode {
         }
     }
 
-    /// Width and height of one eye (px).
+    /// Width and height of one image (px).
     #[must_use]
     pub fn size_px(self) -> (u32, u32) {
         match self {
@@ -45,9 +45,9 @@ impl VideoMode {
     }
 }
 
-/// What a calibration says about one mode: `X_right = R X_left - t`.
+/// What a calibration contains for one mode: `X_right = R X_left - t`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Eyes {
+pub(super) struct StereoGeometry {
     pub(super) left: Intrinsics,
     pub(super) right: Intrinsics,
     pub(super) r_right_left: Matrix3<f64>,

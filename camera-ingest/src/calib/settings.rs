@@ -1,5 +1,5 @@
 //! `camera.toml`: which calibration and mode, the shutter, and where the left
-//! eye stands in the world.
+//! camera stands in the world.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use shared_types::{Shutter, StereoCamera};
 
 use super::error::{CalibError, read_text, write_text};
-use super::mode::{Eyes, VideoMode};
+use super::mode::{StereoGeometry, VideoMode};
 use super::models::ModelFiles;
 
 /// The file's fields.
@@ -16,7 +16,7 @@ use super::models::ModelFiles;
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraSettings {
     pub(super) calibration: PathBuf,
-    /// ROS: the right eye's file, where its name does not follow from the left's.
+    /// ROS: the right image's file, where its name does not follow from the left's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) calibration_right: Option<PathBuf>,
     pub(super) mode: VideoMode,
@@ -117,7 +117,7 @@ impl CameraSettings {
         Matrix3::from_fn(|row, column| self.extrinsics.rotation[row][column])
     }
 
-    pub(super) fn camera(&self, eyes: Eyes) -> StereoCamera {
+    pub(super) fn camera(&self, eyes: StereoGeometry) -> StereoCamera {
         let (width_px, height_px) = self.mode.size_px();
         StereoCamera {
             width_px,

@@ -1,8 +1,8 @@
-//! Calibrations as YAML: ROS `camera_info`, one file per eye, and OpenCV's
+//! Calibrations as YAML: ROS `camera_info`, one file per camera, and OpenCV's
 //! stereo calibration.
 //!
 //! ROS: the stereo geometry is in the rectification matrices and in the right
-//! eye's projection matrix (`P[3] = -fx B`). OpenCV: `M1 D1 M2 D2` and `R T` with
+//! camera's projection matrix (`P[3] = -fx B`). OpenCV: `M1 D1 M2 D2` and `R T` with
 //! `X_right = R X_left + T`, in one file or, as its sample program writes them,
 //! `intrinsics.yml` and `extrinsics.yml`. Lengths are metres.
 
@@ -13,14 +13,18 @@ use shared_types::Intrinsics;
 use yaml_rust2::{Yaml, YamlLoader};
 
 use super::error::{CalibError, read_text};
-use super::mode::{Eyes, VideoMode};
+use super::mode::{StereoGeometry, VideoMode};
 
 /// Baselines of stereo cameras (m); outside it, lengths are no metres.
 const BASELINE_M: [f64; 2] = [0.005, 1.0];
 
-/// Reads a calibration; `right` names the right eye's ROS file, by default the
+/// Reads a calibration; `right` names the right image's ROS file, by default the
 /// left one's name with `left` replaced by `right`.
-pub(super) fn read(path: &Path, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, CalibError> {
+pub(super) fn read(
+    path: &Path,
+    right: Option<&Path>,
+    mode: VideoMode,
+) -> Result<StereoGeometry, CalibError> {
     let file = YamlFile::open(path)?;
     let eyes = if file.has("M1") {
         opencv(&file)?
@@ -144,7 +148,11 @@ impl YamlFile {
     }
 }
 
-fn ros(file: &YamlFile, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, CalibError> {
+fn ros(
+    file: &YamlFile,
+    right: Option<&Path>,
+    mode: VideoMode,
+) -> Result<StereoGeometry, CalibError> {
     let name = file.path.file_name().and_then(|n| n.to_str()).unwrap_or("");
     let beside = match right {
         Some(path) => path.to_owned(),
@@ -184,7 +192,7 @@ fn ros(file: &YamlFile, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, C
     let (r_left, r_right) = (turn(file)?, turn(&other)?);
     let p: [f64; 12] = other.numbers("projection_matrix")?;
     let baseline = Vector3::new(-p[3] / p[0], 0.0, 0.0);
-    Ok(Eyes {
+    Ok(StereoGeometry {
         left: file.intrinsics(names)?,
         right: other.intrinsics(names)?,
         r_right_left: r_right.transpose() * r_left,
@@ -192,7 +200,7 @@ fn ros(file: &YamlFile, right: Option<&Path>, mode: VideoMode) -> Result<Eyes, C
     })
 }
 
-fn opencv(file: &YamlFile) -> Result<Eyes, CalibError> {
+fn opencv(file: &YamlFile) -> Result<StereoGeometry, CalibError> {
     let beside = if file.has("R") && file.has("T") {
         None
     } else {
@@ -201,7 +209,7 @@ fn opencv(file: &YamlFile) -> Result<Eyes, CalibError> {
     let geometry = beside.as_ref().unwrap_or(file);
     let r: [f64; 9] = geometry.numbers("R")?;
     let t: [f64; 3] = geometry.numbers("T")?;
-    Ok(Eyes {
+    Ok(StereoGeometry {
         left: file.intrinsics(["M1", "D1"])?,
         right: file.intrinsics(["M2", "D2"])?,
         r_right_left: Matrix3::from_row_slice(&r),

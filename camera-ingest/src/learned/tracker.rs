@@ -34,8 +34,8 @@ const CHUNK: usize = 24;
 /// Of a chunk's frames this part is shared with the next one.
 const SHARED: usize = 4;
 /// Fewest frames of a chunk, and fewest points that make a rope.
-const LEAST_FRAMES: usize = 2;
-const LEAST_POINTS: usize = 4;
+const MIN_FRAMES: usize = 2;
+const MIN_POINTS: usize = 4;
 
 /// A tracker from an ONNX file (inputs and outputs: `docs/src/camera.md`).
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl OnnxTracker {
             Some(graph.unfit("input", wanted.name, form(&found), form(&least)))
         };
         let refused =
-            too_few(&FRAMES, "T", LEAST_FRAMES).or_else(|| too_few(&QUERIES, "N", LEAST_POINTS));
+            too_few(&FRAMES, "T", MIN_FRAMES).or_else(|| too_few(&QUERIES, "N", MIN_POINTS));
         match refused {
             Some(error) => Err(error),
             None => Ok(Self { graph }),

@@ -23,7 +23,7 @@ pub(super) const CAN_SET_RATE: u32 = 0x1000;
 pub(super) const FLAG_ERROR: u32 = 0x40;
 /// [`Buffer::flags`]: which clock the stamp is of.
 pub(super) const FLAG_CLOCK: u32 = 0xe000;
-/// The value of [`FLAG_CLOCK`] that says CLOCK_MONOTONIC.
+/// The value of [`FLAG_CLOCK`] for CLOCK_MONOTONIC.
 pub(super) const CLOCK_MONOTONIC: u32 = 0x2000;
 /// The ordinary control for gain.
 pub(super) const CONTROL_GAIN: u32 = 0x0098_0913;
@@ -34,7 +34,7 @@ pub(super) const GET_CURRENT: u8 = 0x81;
 /// Extension units: how long the value is.
 pub(super) const GET_LENGTH: u8 = 0x85;
 
-/// A request to the driver with an argument of type `T`; the number tells the kernel
+/// A request to the driver with an argument of type `T`; the number encodes for the kernel
 /// how long `T` is.
 #[derive(Debug)]
 pub(super) struct Request<T> {

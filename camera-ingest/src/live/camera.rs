@@ -24,7 +24,7 @@ pub struct LiveCamera {
 /// A frame in the driver's memory, until the next one is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LiveFrame<'a> {
-    /// Both eyes side by side, `YUYV`.
+    /// Both images side by side, `YUYV`.
     pub bytes: &'a [u8],
     /// The driver's stamp (CLOCK_MONOTONIC, ns). Drivers say that it is the start of
     /// exposure; by default it is when the frame began to arrive.

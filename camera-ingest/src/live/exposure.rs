@@ -1,10 +1,10 @@
 //! Exposure and sensor gain of ZED cameras: not ordinary controls, but registers of
-//! each eye's sensor behind the vendor's extension unit.
+//! each image's sensor behind the vendor's extension unit.
 //!
 //! Facts: the vendor's open capture library. A command is a packet of 384 bytes
 //! (USB 3) or 64 (USB 2): what to do, which bus, address, value; an answer has its
 //! value at byte 17. The registers take raw numbers, whose unit the vendor does not
-//! tell, so the exposure in seconds stays unknown.
+//! document, so the exposure in seconds stays unknown.
 
 use std::io;
 use std::time::Duration;
@@ -24,7 +24,7 @@ const TASK_GET: u8 = 0x51;
 const SYSTEM: u8 = 0xa2;
 /// Buses of the left and right sensor.
 const SENSORS: [u8; 2] = [0xa3, 0xa5];
-/// Image processor's control of each eye, and its bit for automatic exposure.
+/// Image processor's control of each image, and its bit for automatic exposure.
 const CONTROL: [u32; 2] = [0x8018_1033, 0x8018_1833];
 const AUTOMATIC: u8 = 0x02;
 /// Exposure: bits 19..12, 11..4 and 3..0 of the raw number, the last ones on top.
@@ -32,8 +32,8 @@ const EXPOSURE: [u32; 3] = [0x3500, 0x3501, 0x3502];
 /// Gain: bits 23..16, 15..8 and 7..0.
 const GAIN: [u32; 3] = [0x3507, 0x3508, 0x3509];
 /// Least raw exposure.
-const LEAST_EXPOSURE: u32 = 2;
-/// Raw gains that the sensor knows.
+const MIN_EXPOSURE: u32 = 2;
+/// Raw gains that the sensor accepts.
 const GAINS: [[u32; 2]; 4] = [[0, 255], [378, 511], [890, 1023], [1914, 2047]];
 
 /// What the sensors are to be set to.
@@ -60,7 +60,7 @@ impl From<io::Error> for SensorError {
 }
 
 /// Largest raw exposure at a frame rate.
-fn most_exposure(rate_hz: u32) -> u32 {
+fn max_exposure(rate_hz: u32) -> u32 {
     match rate_hz {
         ..=15 => 1550,
         16..=30 => 1100,
@@ -72,11 +72,11 @@ fn most_exposure(rate_hz: u32) -> u32 {
 impl Sensor {
     /// What is out of range, in words.
     pub(super) fn check(self, rate_hz: u32) -> Result<(), String> {
-        let most = most_exposure(rate_hz);
-        if !(LEAST_EXPOSURE..=most).contains(&self.exposure_raw) {
+        let max = max_exposure(rate_hz);
+        if !(MIN_EXPOSURE..=max).contains(&self.exposure_raw) {
             return Err(format!(
-                "exposure_raw is {}, at {rate_hz} frames per second it must be {LEAST_EXPOSURE} to \
-                 {most}",
+                "exposure_raw is {}, at {rate_hz} frames per second it must be {MIN_EXPOSURE} to \
+                 {max}",
                 self.exposure_raw
             ));
         }
@@ -88,7 +88,7 @@ impl Sensor {
         }
     }
 
-    /// Ends automatic exposure, sets both eyes, and reads back whether they took it.
+    /// Ends automatic exposure, sets both images, and reads back whether they took it.
     pub(super) fn apply(self, device: &mut dyn Device) -> Result<(), SensorError> {
         let mut unit = Unit::find(device)?;
         let e = self.exposure_raw;

@@ -42,13 +42,13 @@ pub struct LiveSettings {
     /// Exposure in the sensor's own units, which ends automatic exposure; ZED only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_raw: Option<u32>,
-    /// Gain in the sensor's own units; only beside `exposure_raw`.
+    /// Gain in the sensor's own units; only with `exposure_raw`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor_gain_raw: Option<u32>,
 }
 
 impl LiveSettings {
-    /// Width of both eyes together and height (px).
+    /// Width of both images together and height (px).
     #[must_use]
     pub fn size_px(&self) -> [u32; 2] {
         let (width_px, height_px) = self.mode.size_px();
@@ -86,7 +86,7 @@ impl LiveSettings {
     }
 }
 
-/// Frames that a camera took and nobody got, by reason.
+/// Frames that a camera took and that were lost, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Losses {
     /// Left out of the driver's count: no buffer was free, or the bus was too slow.

@@ -11,8 +11,8 @@ use super::{LiveCamera, LiveError, LiveSettings};
 const SERVICE: &str = "wag/v1/camera/frames";
 /// How long a camera may be silent.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Losses are told at most every so many frames.
-const TELL_EVERY: u64 = 300;
+/// Losses are logged at most every so many frames.
+const LOG_EVERY: u64 = 300;
 
 /// Configuration of the process. TOML form: keys as the fields.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,7 +54,7 @@ pub(super) fn publish(
     let frame_bytes = camera.settings().frame_bytes();
     let publisher = bus.frame_publisher(frame_bytes)?;
     tracing::info!(domain, device = %camera.settings().device.display(), "the camera runs");
-    let mut told = 0;
+    let mut logged = 0;
     while !stop.load(Ordering::Relaxed) {
         let frame = camera.next(PATIENCE)?;
         let mut sample = publisher
@@ -73,9 +73,9 @@ pub(super) fn publish(
             .send()
             .map_err(IpcError::transfer(SERVICE))?;
         let lost = camera.losses();
-        if lost.total() > told && camera.frames().is_multiple_of(TELL_EVERY) {
+        if lost.total() > logged && camera.frames().is_multiple_of(LOG_EVERY) {
             tracing::warn!(?lost, frames = camera.frames(), "the camera loses frames");
-            told = lost.total();
+            logged = lost.total();
         }
     }
     Ok(())

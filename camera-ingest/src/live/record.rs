@@ -40,7 +40,7 @@ pub enum RecordError {
         /// The system's reason.
         source: io::Error,
     },
-    /// It was told to stop.
+    /// It was stopped.
     #[error("stopped after {0} frames; nothing was written")]
     Stopped(u64),
 }

@@ -11,7 +11,7 @@ use super::{LiveError, LiveSettings};
 /// Buffers asked for: a reader may be late by five frames and loses none.
 const BUFFERS: u32 = 6;
 /// With fewer, a hiccup of 30 ms would lose frames.
-const LEAST_BUFFERS: u32 = 4;
+const MIN_BUFFERS: u32 = 4;
 
 /// The talk with a driver before the first frame.
 pub(super) struct Setup<'a> {
@@ -152,7 +152,7 @@ impl Setup<'_> {
             .device
             .map_buffers(BUFFERS)
             .map_err(|e| self.refused("mapping buffers", e))?;
-        if granted < LEAST_BUFFERS {
+        if granted < MIN_BUFFERS {
             return Err(self.granted(
                 "buffers",
                 BUFFERS.to_string(),

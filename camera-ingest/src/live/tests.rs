@@ -1,4 +1,4 @@
-//! A camera that exists in memory only, with a driver that misbehaves as told.
+//! A camera in memory, with a driver that misbehaves on demand.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, VecDeque};
@@ -261,7 +261,7 @@ fn running(change: impl FnOnce(&mut Driver)) -> (LiveCamera, Rc<RefCell<Driver>>
     (camera.unwrap(), driver)
 }
 
-/// What is said when it does not start.
+/// The message when it does not start.
 fn refusal(settings: LiveSettings, change: impl FnOnce(&mut Driver)) -> String {
     camera(settings, change).0.unwrap_err().to_string()
 }
@@ -545,10 +545,10 @@ fn a_recording_reads_back_as_it_was_seen() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
 }
 
-/// Tells somebody to stop when it goes, even in a panic.
-struct Tell<'a>(&'a AtomicBool);
+/// Requests a stop when it is dropped, even in a panic.
+struct StopOnDrop<'a>(&'a AtomicBool);
 
-impl Drop for Tell<'_> {
+impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -565,7 +565,7 @@ fn frames_are_published_until_told_to_stop() {
             let bus = Bus::join(&domain).unwrap();
             let frames = bus.frame_subscriber().unwrap();
             ready.send(()).unwrap();
-            let _told = Tell(&stop);
+            let _stop = StopOnDrop(&stop);
             let (mut seen, began) = (Vec::new(), Instant::now());
             while seen.len() < 3 && began.elapsed() < Duration::from_secs(10) {
                 let Some(sample) = frames.receive().unwrap() else {

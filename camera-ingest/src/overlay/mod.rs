@@ -39,7 +39,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Picture of one eye.
+    /// Picture of one image.
     #[must_use]
     pub fn of(frame: &EyeFrame) -> Self {
         Self {

@@ -4,7 +4,7 @@ use super::{OverlayError, Picture};
 use crate::frame::{EyeFrame, rgb_from_ycc};
 use crate::track::uncovered_scene;
 
-/// Frames that tell what stands still.
+/// Frames that the still scene is made from.
 const SCENE_FRAMES: usize = 61;
 /// Colours that differ by more than this are of another thing (grey levels).
 const OTHER: u32 = 30;
@@ -17,7 +17,7 @@ fn apart(a: [u8; 3], b: [u8; 3]) -> u32 {
 ///
 /// Of frames equally far apart in motion, so that what rests for long counts no more than
 /// what moves; where a wide thing like an arm covers a pixel most of the time all the
-/// same, what goes on beside it is the scene.
+/// same, the scene continues from its neighbourhood.
 ///
 /// # Errors
 /// No frames, or sizes differ.

@@ -1,8 +1,8 @@
 //! The live preview: follows the rope while frames come, and publishes where it is.
 //!
 //! One thread at the lowest priority that looks at the newest frame and lets all others
-//! pass. It copies a frame's left eye out and gives the frame back before it begins to
-//! work, so that it holds none; nobody waits for it. What comes of it is for eyes only:
+//! pass. It copies a frame's left image out and gives the frame back before it begins to
+//! work, so that it holds none; nothing waits for it. The result is for display only:
 //! identification uses the film and its two passes.
 
 mod arm;
@@ -163,7 +163,7 @@ impl Ports {
         })
     }
 
-    /// The left eye of the newest frame; all frames have gone back to the camera then.
+    /// The left image of the newest frame; all frames have gone back to the camera then.
     fn newest(&self) -> Result<Option<Arrived>, IpcError> {
         let failed = IpcError::transfer("wag/v1/camera/frames");
         let mut newest = None;

@@ -9,7 +9,7 @@ use super::arm::{Arm, Knot};
 use crate::frame::EyeFrame;
 use crate::track::{OnePass, TrackError};
 
-/// A longer pause between two frames begins anew (ns).
+/// A longer pause between two frames restarts it (ns).
 const PAUSE_NS: u64 = 1_000_000_000;
 /// A rope that was lost for longer is looked for from the beginning (ns): a hand that
 /// passes takes less.
@@ -102,7 +102,7 @@ impl Preview {
         self.told(state, sequence, stamp_ns, tracked.as_ref())
     }
 
-    /// What to say while no frame comes.
+    /// The message while no frame arrives.
     #[must_use]
     pub fn without_camera(&self) -> PreviewFrame {
         self.told(PreviewState::NoCamera, 0, 0, None)
@@ -115,7 +115,7 @@ impl Preview {
         self.told(PreviewState::Unfit, sequence, stamp_ns, None)
     }
 
-    /// Counts a frame; a camera that began anew or paused shows something else now.
+    /// Counts a frame; a camera that restarted or paused shows another scene.
     fn count(&mut self, sequence: u64, stamp_ns: u64) {
         self.seen += 1;
         if let Some(last) = self.last {

@@ -125,7 +125,7 @@ fn off_px(found: &PreviewFrame, truth: &[[f64; 2]]) -> f64 {
     off.sum::<f64>() / found.rope.points().len() as f64
 }
 
-/// Shows the frames of a swing; what was told of the last one, and the errors of all in
+/// Shows the frames of a swing; the message of the last one, and the errors of all in
 /// which the rope was followed.
 fn show(
     preview: &mut Preview,

@@ -101,13 +101,13 @@ impl Recording {
         }
     }
 
-    /// Whether both eyes were kept.
+    /// Whether both images were kept.
     pub(super) fn has_both(&self) -> bool {
         matches!(&self.frames, Frames::Both(v) if !v.is_empty())
     }
 }
 
-/// A recording of both eyes is a source like any file.
+/// A recording of both images is a source like any file.
 impl FrameSource for Recording {
     fn len(&self) -> usize {
         self.count()

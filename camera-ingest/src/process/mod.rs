@@ -2,7 +2,7 @@
 //! `CameraRpc`, publishes keypoints.
 //!
 //! One thread. While nothing is asked it only keeps up with the camera; a long
-//! piece of work (tracking) lets frames pass by, which slows nobody.
+//! piece of work (tracking) lets frames pass by, which slows no other process.
 
 mod answer;
 mod keep;

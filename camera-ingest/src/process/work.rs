@@ -144,7 +144,7 @@ fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<Camera
         let closest_s = found.as_ref().ok().map(|s| s.time_s);
         write_strobe(recording, closest_s, Path::new(path))
     });
-    // What went wrong first is told; a picture is the lesser loss.
+    // The first error is reported; a picture is the lesser loss.
     let found = found?;
     drawn?;
     Ok(CameraEvent::Scored(found))

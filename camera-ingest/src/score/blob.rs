@@ -1,6 +1,6 @@
 //! Coloured blobs by chroma coverage.
 //!
-//! Chroma tells a lead or a ball from plaster, rope and shadows, and is linear
+//! Chroma separates a lead or a ball from plaster, rope and shadows, and is linear
 //! under motion blur: a pixel covered to a part `a` has chroma `b + a (t - b)`
 //! with the background's `b` and the blob's `t`.
 
@@ -10,11 +10,11 @@ use crate::frame::{EyeFrame, ycc_from_rgb};
 pub(super) type Chroma = [f64; 2];
 
 /// Coverage from which a pixel belongs to a blob.
-const LEAST_COVERAGE: f64 = 0.2;
+const MIN_COVERAGE: f64 = 0.2;
 /// Cosine between a blob's chroma and the one looked for.
-const LEAST_COSINE: f64 = 0.88;
+const MIN_COSINE: f64 = 0.88;
 /// Smallest blob (chroma samples; two pixels each).
-const LEAST_SAMPLES: usize = 8;
+const MIN_SAMPLES: usize = 8;
 
 pub(super) fn chroma_of_rgb(rgb: [u8; 3]) -> Chroma {
     let [_, cb, cr] = ycc_from_rgb(rgb);
@@ -33,7 +33,7 @@ pub(super) enum Behind<'a> {
     Flat(Chroma),
 }
 
-/// Coverage map of one colour in one eye.
+/// Coverage map of one colour in one image.
 #[derive(Debug, Clone)]
 pub(super) struct BlobMap {
     /// Chroma samples per row, each two pixels wide.
@@ -93,11 +93,11 @@ impl BlobMap {
         let mut seen = vec![false; self.values.len()];
         let mut found = Vec::new();
         for start in 0..self.values.len() {
-            if seen[start] || self.values[start] < LEAST_COVERAGE {
+            if seen[start] || self.values[start] < MIN_COVERAGE {
                 continue;
             }
             let members = self.component(start, &mut seen);
-            if members.len() >= LEAST_SAMPLES {
+            if members.len() >= MIN_SAMPLES {
                 found.push(self.measure(&members));
             }
         }
@@ -115,7 +115,7 @@ impl BlobMap {
             for v in y.saturating_sub(1)..=(y + 1).min(height - 1) {
                 for u in x.saturating_sub(1)..=(x + 1).min(self.width - 1) {
                     let next = v * self.width + u;
-                    if !seen[next] && self.values[next] >= LEAST_COVERAGE {
+                    if !seen[next] && self.values[next] >= MIN_COVERAGE {
                         seen[next] = true;
                         open.push(next);
                     }
@@ -174,8 +174,8 @@ fn coverage(seen: Chroma, empty: Chroma, wanted: Chroma) -> f64 {
     let t = [wanted[0] - empty[0], wanted[1] - empty[1]];
     let (dot, tt) = (d[0] * t[0] + d[1] * t[1], t[0] * t[0] + t[1] * t[1]);
     let cosine = dot / (d[0].hypot(d[1]) * tt.sqrt()).max(1e-9);
-    // Against a background of the blob's own colour nothing can be said.
-    if cosine < LEAST_COSINE || tt < 100.0 {
+    // Against a background of the blob's own colour nothing can be inferred.
+    if cosine < MIN_COSINE || tt < 100.0 {
         return 0.0;
     }
     (dot / tt).clamp(0.0, 1.2)

@@ -1,7 +1,7 @@
 //! How near a throw's tip came to the target, from stereo frames.
 //!
 //! Blobs of the tip's colour are found against the median background in both
-//! eyes, paired by epipolar and size checks, triangulated, timed by the row they
+//! images, paired by epipolar and size checks, triangulated, timed by the row they
 //! were seen in and fitted over frames; the distance to the target is minimised
 //! in continuous time.
 
@@ -39,9 +39,9 @@ pub struct Score {
 }
 
 /// Sightings of the tip needed.
-const LEAST_SIGHTINGS: usize = 6;
+const MIN_SIGHTINGS: usize = 6;
 /// Chroma below which a colour counts as grey.
-const LEAST_CHROMA: f64 = 25.0;
+const MIN_CHROMA: f64 = 25.0;
 /// Times looked at between two frames.
 const STEPS_PER_FRAME: i32 = 64;
 
@@ -57,10 +57,10 @@ pub fn score(
     options: &ScoreOptions,
 ) -> Result<Score, ScoreError> {
     let frames = source.len();
-    if frames < LEAST_SIGHTINGS {
+    if frames < MIN_SIGHTINGS {
         return Err(ScoreError::TooShort {
             found: frames,
-            least: LEAST_SIGHTINGS,
+            least: MIN_SIGHTINGS,
         });
     }
     check_colour("tip", tip_rgb)?;
@@ -82,11 +82,11 @@ pub fn score(
             sightings.push(tip);
         }
     }
-    if sightings.len() < LEAST_SIGHTINGS {
+    if sightings.len() < MIN_SIGHTINGS {
         return Err(ScoreError::NotSeen {
             what: "tip",
             seen: sightings.len(),
-            least: LEAST_SIGHTINGS,
+            least: MIN_SIGHTINGS,
         });
     }
     mark_small(&mut sightings);
@@ -96,13 +96,13 @@ pub fn score(
 /// A colour that chroma can find.
 fn check_colour(what: &'static str, rgb: [u8; 3]) -> Result<(), ScoreError> {
     let [cb, cr] = chroma_of_rgb(rgb);
-    if cb.hypot(cr) < LEAST_CHROMA {
+    if cb.hypot(cr) < MIN_CHROMA {
         return Err(ScoreError::Grey { what, rgb });
     }
     Ok(())
 }
 
-/// Where both eyes see a coloured lead that the arm shows at known places:
+/// Where both images see a coloured lead that the arm shows at known places:
 /// `(frame, place in the world in m)`. Frames in which it is not seen are left
 /// out. The camera's place does not matter.
 ///

@@ -7,9 +7,9 @@ use crate::source::SourceError;
 pub struct ScoreOptions {
     /// Frames for the median background.
     pub background_frames: usize,
-    /// Largest distance of the two eyes' rays, in pixels of the image.
+    /// Largest distance of the two images' rays, in pixels of the image.
     pub epipolar_px: f64,
-    /// Largest ratio of the blob's areas in the two eyes.
+    /// Largest ratio of the blob's areas in the two images.
     pub area_ratio: f64,
     /// Nearest and farthest depth looked at (m).
     pub depth_m: [f64; 2],

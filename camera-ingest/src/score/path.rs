@@ -40,7 +40,7 @@ impl Sighting {
 const IMAGE_FRAMES: usize = 5;
 const DEPTH_FRAMES: usize = 11;
 /// A sighting smaller than this part of those around it is cut.
-const LEAST_AREA: f64 = 0.8;
+const MIN_AREA: f64 = 0.8;
 
 /// Marks sightings as cut whose area is smaller than that of the ones around them.
 pub(super) fn mark_small(sightings: &mut [Sighting]) {
@@ -50,7 +50,7 @@ pub(super) fn mark_small(sightings: &mut [Sighting]) {
         let to = (index + DEPTH_FRAMES / 2 + 1).min(areas.len());
         let mut around = areas[from..to].to_vec();
         around.sort_by(f64::total_cmp);
-        if sighting.area_m2 < LEAST_AREA * around[around.len() / 2] {
+        if sighting.area_m2 < MIN_AREA * around[around.len() / 2] {
             sighting.cut();
         }
     }
@@ -200,9 +200,9 @@ fn powers(x: f64, count: usize) -> DVector<f64> {
     )
 }
 
-/// Polynomial with Cauchy weights. `least_scale` keeps the weights sane when the fit
-/// is perfect, `least_error` its covariance.
-fn fit(points: &[Point], degree: usize, least_scale: f64, least_error: f64) -> Option<Fit> {
+/// Polynomial with Cauchy weights. `min_scale` keeps the weights sane when the fit
+/// is perfect, `min_error` its covariance.
+fn fit(points: &[Point], degree: usize, min_scale: f64, min_error: f64) -> Option<Fit> {
     let count = degree.min(points.len().checked_sub(2)?) + 1;
     // Time in units of the window, for the sake of the matrix.
     let unit_s = points.iter().map(|p| p.t_s.abs()).fold(1e-6, f64::max);
@@ -225,7 +225,7 @@ fn fit(points: &[Point], degree: usize, least_scale: f64, least_error: f64) -> O
             .collect();
         let mut sorted: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
         sorted.sort_by(f64::total_cmp);
-        let scale = (1.4826 * sorted[sorted.len() / 2]).max(least_scale);
+        let scale = (1.4826 * sorted[sorted.len() / 2]).max(min_scale);
         let trust: Vec<f64> = residual
             .iter()
             .map(|r| (1.0 / (1.0 + (r / (2.0 * scale)).powi(2))).sqrt())
@@ -244,7 +244,7 @@ fn fit(points: &[Point], degree: usize, least_scale: f64, least_error: f64) -> O
         result = Some(Fit {
             unit_s,
             coefficients,
-            covariance: inverse * (square / freedom).max(least_error * least_error),
+            covariance: inverse * (square / freedom).max(min_error * min_error),
         });
     }
     result

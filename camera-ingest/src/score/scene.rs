@@ -9,12 +9,12 @@ use super::path::{PathError, Sighting};
 use crate::frame::{EyeFrame, StereoFrame};
 use crate::source::StereoSource;
 
-/// The still scene of both eyes.
+/// The still scene of both images.
 pub(super) struct Scene<'a> {
     camera: &'a StereoCamera,
     options: &'a ScoreOptions,
     eyes: [EyeFrame; 2],
-    /// What most of each eye's scene looks like.
+    /// What most of each image's scene looks like.
     middles: [Chroma; 2],
 }
 
@@ -31,7 +31,7 @@ struct Pair {
 pub(super) struct Target {
     pub(super) point_c: Vector3<f64>,
     pub(super) depth_error_m: f64,
-    /// Its image in both eyes.
+    /// Its image in both images.
     blobs: [Blob; 2],
 }
 
@@ -49,11 +49,11 @@ impl Target {
 }
 
 /// Standard errors of a clear blob's place: its centre is good to a tenth of a pixel or
-/// two in each eye.
+/// two in each image.
 pub(super) fn blob_error(camera: &StereoCamera) -> PathError {
-    /// What both eyes share: light, lens, blur (px).
+    /// What both images share: light, lens, blur (px).
     const TOGETHER_PX: f64 = 0.2;
-    /// What each eye has of its own: noise (px).
+    /// What each image has of its own: noise (px).
     const APART_PX: f64 = 0.1;
     let baseline_m = camera.t_right_left_m.x.abs();
     PathError {
@@ -155,7 +155,7 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Raw pixels of the largest blob of a colour that both eyes see.
+    /// Raw pixels of the largest blob of a colour that both images see.
     pub(super) fn largest(&self, eyes: [&EyeFrame; 2], rgb: [u8; 3]) -> Option<[[f64; 2]; 2]> {
         let pairs = self.pairs_in(eyes, rgb).into_iter();
         let largest = pairs.max_by(|a, b| a.left.area_px.total_cmp(&b.left.area_px))?;

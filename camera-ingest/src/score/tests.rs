@@ -38,7 +38,7 @@ fn tip(t_s: f64) -> Vector3<f64> {
     Vector3::new(TARGET[0] + 1.1 * (t_s - 0.25), 0.0, TARGET[2] + 0.05)
 }
 
-/// Balls of 20 mm radius over grey, in both eyes.
+/// Balls of 20 mm radius over grey, in both images.
 fn frame(index: usize, balls: &[(Vector3<f64>, [u8; 3])]) -> StereoFrame {
     let camera = camera();
     let (width, height) = (2 * camera.width_px as usize, camera.height_px as usize);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::error::SourceError;
 use crate::frame::{EyeFrame, StereoFrame};
 
-/// A recording of the left eye, and perhaps of the right one.
+/// A recording of the left image, and perhaps of the right one.
 pub trait FrameSource: std::fmt::Debug {
     /// Number of frames.
     fn len(&self) -> usize;
@@ -15,7 +15,7 @@ pub trait FrameSource: std::fmt::Debug {
         self.len() == 0
     }
 
-    /// Decodes the left eye of one frame.
+    /// Decodes the left image of one frame.
     ///
     /// # Errors
     /// The frame does not exist or is damaged.
@@ -70,7 +70,7 @@ impl StereoSource for Box<dyn StereoSource> {
     }
 }
 
-/// Decodes the left eye of every frame.
+/// Decodes the left image of every frame.
 ///
 /// # Errors
 /// A frame is damaged.

@@ -18,7 +18,7 @@ pub struct ImageSource {
     folder: PathBuf,
     files: Vec<PathBuf>,
     stamps: Vec<Stamp>,
-    /// Both eyes together; `None` until the first picture was read.
+    /// Both images together; `None` until the first picture was read.
     size_px: Option<[usize; 2]>,
 }
 
@@ -102,7 +102,7 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
             REMEDY,
         ));
     }
-    // `frame10` sorts before `frame9`: an order nobody means.
+    // `frame10` sorts before `frame9`: which is never intended.
     for pair in files.windows(2) {
         if let [Some(before), Some(after)] = [counter(&pair[0]), counter(&pair[1])]
             && before >= after

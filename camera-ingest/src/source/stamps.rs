@@ -1,4 +1,4 @@
-//! When each frame of a recording was taken: a CSV beside it, or an even rate.
+//! When each frame of a recording was taken: a CSV next to it, or an even rate.
 
 use std::path::Path;
 

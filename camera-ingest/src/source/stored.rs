@@ -13,7 +13,7 @@ use crate::frame::{EyeFrame, FrameError, StereoFrame};
 pub(super) enum Coding {
     Jpeg,
     Png,
-    /// `YUYV` of this size, both eyes together (px).
+    /// `YUYV` of this size, both images together (px).
     Yuyv([usize; 2]),
 }
 
@@ -61,7 +61,7 @@ pub(super) trait Stored: std::fmt::Debug {
     /// Takes that memory back.
     fn keep(&mut self, _room: Vec<u8>) {}
 
-    /// Whether a frame may be of this size (both eyes, px).
+    /// Whether a frame may be of this size (both images, px).
     fn check_size(&self, _found: [usize; 2]) -> Result<(), FrameError> {
         Ok(())
     }

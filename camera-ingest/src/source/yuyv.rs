@@ -19,7 +19,7 @@ pub struct YuyvSource {
 }
 
 impl YuyvSource {
-    /// Opens a raw file of frames of `size_px` (`[width of both eyes, height]`)
+    /// Opens a raw file of frames of `size_px` (`[width of both images, height]`)
     /// taken every `frame_ns`.
     ///
     /// # Errors
@@ -35,8 +35,8 @@ impl YuyvSource {
         })
     }
 
-    /// Opens a raw file whose name tells its size, as `wiggle_1344x376.yuyv`. Its
-    /// times come from the CSV of the same name beside it (`wiggle_1344x376.csv`)
+    /// Opens a raw file whose name contains its size, as `wiggle_1344x376.yuyv`. Its
+    /// times come from the CSV of the same name next to it (`wiggle_1344x376.csv`)
     /// or else from `rate_hz`.
     ///
     /// # Errors

@@ -10,10 +10,8 @@ mod recording;
 use std::path::PathBuf;
 
 use camera_ingest::learned::{OnnxSegmenter, OnnxTracker};
-use camera_ingest::track::{
-    FirstMask, FirstScene, ModelError, Models, PointTracker, SeenPoint, TrackOptions,
-};
-use camera_ingest::{EyeFrame, TrackResult, track, track_with};
+use camera_ingest::track::{FirstMask, FirstScene, ModelError, Models, PointTracker, SeenPoint};
+use camera_ingest::{EyeFrame, TrackResult};
 use onnx::Axis::{Is, Open};
 use onnx::{Axis, DOUBLE, FLOAT, Graph, by_colour, int, ints, segmenter};
 use recording::{Wiggle, quantile};
@@ -119,25 +117,15 @@ fn a_learned_mask_takes_the_place_of_the_moving_one() {
     let Some(wiggle) = Wiggle::read_first("a1", SHORT) else {
         return;
     };
-    let options = TrackOptions {
-        keypoints: wiggle.nodes(),
-        ..TrackOptions::default()
-    };
     for size in [[Open("H"), Open("W")], [Is(188), Is(336)]] {
         let file = file(&by_colour(size).file());
         let mut segmenter = OnnxSegmenter::load(&file.path).unwrap();
         assert_eq!(segmenter.sha256().len(), 64);
-        let mut models = Models {
+        let result = wiggle.track_with(&mut Models {
             first_mask: Some(&mut segmenter),
             point_tracker: None,
-        };
-        let Wiggle {
-            frames,
-            camera,
-            clamp,
-            ..
-        } = &wiggle;
-        let result = track_with(frames, camera, clamp, &options, &mut models).unwrap();
+        });
+        let result = result.unwrap();
         let [median, p95] = errors(&wiggle, &result);
         println!("by colour: median {median:.2}, p95 {p95:.2} px");
         assert!(median < 1.2 && p95 < 2.5, "{median} {p95}");
@@ -145,17 +133,10 @@ fn a_learned_mask_takes_the_place_of_the_moving_one() {
     // Nothing is rope: it is the learned mask that is used.
     let none = file(&by_prompts([Open("H"), Open("W")], Open("P"), 1e6).file());
     let mut segmenter = OnnxSegmenter::load(&none.path).unwrap();
-    let mut models = Models {
+    let error = wiggle.track_with(&mut Models {
         first_mask: Some(&mut segmenter),
         point_tracker: None,
-    };
-    let error = track_with(
-        &wiggle.frames,
-        &wiggle.camera,
-        &wiggle.clamp,
-        &options,
-        &mut models,
-    );
+    });
     let error = error.unwrap_err().to_string();
     assert!(error.contains("nothing long enough hangs"), "{error}");
 }
@@ -276,30 +257,18 @@ fn followed_points_become_keypoints_and_lost_frames() {
     let Some(wiggle) = Wiggle::read_first("a1", SHORT) else {
         return;
     };
-    let options = TrackOptions {
-        keypoints: wiggle.nodes(),
-        ..TrackOptions::default()
-    };
     let mut told = Told {
         wiggle: &wiggle,
         blind: 40..50,
         long: 60..65,
     };
-    let mut models = Models {
+    let result = wiggle.track_with(&mut Models {
         first_mask: None,
         point_tracker: Some(&mut told),
-    };
-    let result = track_with(
-        &wiggle.frames,
-        &wiggle.camera,
-        &wiggle.clamp,
-        &options,
-        &mut models,
-    )
-    .unwrap();
+    });
+    let result = result.unwrap();
     result.track.validate().unwrap();
-    let built_in = track(&wiggle.frames, &wiggle.camera, &wiggle.clamp, &options).unwrap();
-    assert_eq!(result.appearance, built_in.appearance);
+    assert_eq!(result.appearance, wiggle.track().unwrap().appearance);
     for (index, frame) in result.track.frames.iter().enumerate() {
         let lost = (40..50).contains(&index) || (60..65).contains(&index);
         assert_eq!(frame.lost, lost, "frame {index}");
@@ -319,7 +288,7 @@ fn followed_points_become_keypoints_and_lost_frames() {
     assert!(median < 0.5 && p95 < 1.5, "{median} {p95}");
 }
 
-/// What is said when a file is loaded.
+/// The message when a file is loaded.
 fn refusal<T: std::fmt::Debug>(
     load: fn(&std::path::Path) -> Result<T, ModelError>,
     bytes: &[u8],

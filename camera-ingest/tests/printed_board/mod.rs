@@ -1,4 +1,4 @@
-//! A printed board drawn in both eyes: the drawing knows nothing of the detector but
+//! A printed board drawn in both images: the drawing is independent of the detector but for
 //! the markers' bits.
 
 use calib_targets_charuco::resolve_dictionary;
@@ -98,7 +98,7 @@ fn ink(board: &Board, x: f64, y: f64) -> f64 {
     1.0 - (dictionary.codes()[before] >> bit & 1) as f64
 }
 
-/// One eye's picture, four samples a pixel, with noise.
+/// One image's picture, four samples a pixel, with noise.
 fn eye(
     board: &Board,
     intrinsics: &Intrinsics,

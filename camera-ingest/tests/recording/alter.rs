@@ -100,7 +100,7 @@ impl Wiggle {
         self
     }
 
-    /// A second rope of the same colours swings beside the first one, held by
+    /// A second rope of the same colours swings next to the first one, held by
     /// something else.
     pub(crate) fn doubled(mut self, second: SecondRope, rgb: [[u8; 3]; 2]) -> Self {
         let [rope, lead] = rgb.map(ycc_from_rgb);

@@ -4,10 +4,13 @@
 use std::path::{Path, PathBuf};
 
 use camera_ingest::source::FrameSource;
-use camera_ingest::{ClampPath, EyeFrame, TrackResult, load_camera, open_video};
+use camera_ingest::track::Models;
+use camera_ingest::{
+    ClampPath, EyeFrame, TrackError, TrackOptions, TrackResult, load_camera, open_video, track_with,
+};
 use shared_types::StereoCamera;
 
-/// Folder of a recording; `None`, said aloud, where the data are not there.
+/// Folder of a recording; `None`, with a message, where the data are missing.
 pub(crate) fn folder(name: &str) -> Option<PathBuf> {
     let path = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -40,7 +43,7 @@ pub(crate) fn read_npy(path: &Path) -> (Vec<usize>, Vec<f32>) {
     (shape, values)
 }
 
-/// A wiggle in memory: left eye, camera, clamp and truth.
+/// A wiggle in memory: left image, camera, clamp and truth.
 #[derive(Clone)]
 pub(crate) struct Wiggle {
     pub(crate) frames: Vec<EyeFrame>,
@@ -77,6 +80,20 @@ impl Wiggle {
 
     pub(crate) fn nodes(&self) -> usize {
         self.truth[0].len()
+    }
+
+    /// Tracked with a keypoint for every node.
+    pub(crate) fn track(&self) -> Result<TrackResult, TrackError> {
+        self.track_with(&mut Models::default())
+    }
+
+    /// The same with learned models.
+    pub(crate) fn track_with(&self, models: &mut Models<'_>) -> Result<TrackResult, TrackError> {
+        let options = TrackOptions {
+            keypoints: self.nodes(),
+            ..TrackOptions::default()
+        };
+        track_with(&self.frames, &self.camera, &self.clamp, &options, models)
     }
 
     /// Distance of every keypoint from its node, frame by frame (px).

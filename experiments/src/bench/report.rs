@@ -6,7 +6,7 @@ use cli_output::Machine;
 use serde_json::{Value, json};
 
 /// Prints the machine and the tables, unless `--json` is given, and returns what that
-/// prints: `own` fields beside those of every benchmark.
+/// prints: `own` fields in addition to those of every benchmark.
 pub fn report(
     (args, quiet): (&BenchArgs, bool),
     command: &str,

@@ -21,7 +21,7 @@ use std::sync::atomic::Ordering;
 /// Ropes of a result of identification.
 const IDENTIFIED: u64 = 1000;
 
-/// The planner's built-in configuration, whatever this machine's folders say: results
+/// The planner's built-in configuration, independent of this machine's folders: results
 /// must be the same everywhere.
 pub(crate) fn built_in() -> Result<PlannerConfig, toml::de::Error> {
     toml::from_str(include_str!("../../../configs/planner/planner.toml"))
@@ -166,7 +166,7 @@ impl<'a> Experiment<'a> {
         });
     }
 
-    /// Draws the distributions beside the result file, if there is one.
+    /// Draws the distributions next to the result file, if there is one.
     pub fn picture(&self, axis: &str, curves: Vec<Curve>) -> Outcome<Option<PathBuf>> {
         let (name, seed) = (self.name, self.args.seed);
         let picture = Picture {
@@ -179,7 +179,7 @@ impl<'a> Experiment<'a> {
     }
 
     /// Ends the run: prints its tables, unless `--json` is given, and returns what that
-    /// prints: `own` fields beside those of every result.
+    /// prints: `own` fields in addition to those of every result.
     pub fn finish(
         self,
         summary: &str,

@@ -20,7 +20,7 @@ const ROPES: &str = include_str!("../../../configs/planner/fidelity.toml");
 /// Where the compared throw would have to strike (m).
 const TARGET_M: [f64; 3] = [1.0, 0.0, 0.4];
 
-/// A throw planned for the middle of the ranges: no rope compared knows it.
+/// A throw planned for the middle of the ranges: it favours none of the compared ropes.
 fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
     let options = PlanOptions {
         seed,

@@ -1,5 +1,5 @@
 //! `experiments parameter-importance`: strikes planned with some parameters identified
-//! and the others random, beside the paper's table.
+//! and the others random, next to the paper's table.
 
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;

@@ -1,5 +1,5 @@
 //! `experiments lob-drape`: lobs and drapes planned with identified parameters over 24
-//! ropes, judged in simulation with the true ones, beside the paper's table.
+//! ropes, judged in simulation with the true ones, next to the paper's table.
 
 use super::experiment::{Experiment, Sequence, cm};
 use super::picture::Curve;

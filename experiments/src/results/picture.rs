@@ -55,7 +55,7 @@ pub(super) struct Picture<'a> {
     pub axis: &'a str,
     /// Seed of the ropes.
     pub seed: u64,
-    /// Curves; at most as many as there are colours are told apart.
+    /// Curves; colours repeat beyond nine.
     pub curves: Vec<Curve>,
 }
 
@@ -68,7 +68,7 @@ pub(super) fn beside(result: &Path) -> PathBuf {
 }
 
 impl Picture<'_> {
-    /// Draws beside the result file; nothing where there is none.
+    /// Draws next to the result file; nothing where there is none.
     pub(super) fn write(&self, out: Option<&Path>) -> Outcome<Option<PathBuf>> {
         let Some(path) = out.map(beside) else {
             return Ok(None);

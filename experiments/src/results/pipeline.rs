@@ -1,5 +1,5 @@
 //! `experiments sim-pipeline`: strikes planned with true, identified and random
-//! parameters and thrown with the true rope, beside the paper's table.
+//! parameters and thrown with the true rope, next to the paper's table.
 
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;

@@ -1,5 +1,5 @@
-//! `experiments robust`: strikes planned for every rope it might be beside strikes
-//! planned for the identified one, thrown with the true one, and whether the errors lie
+//! `experiments robust`: strikes planned for the posterior compared with strikes
+//! planned for the identified rope, thrown with the true one, and whether the errors lie
 //! within their forecasts.
 
 use super::experiment::{Experiment, cm};

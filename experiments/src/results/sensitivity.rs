@@ -1,4 +1,4 @@
-//! `experiments sensitivity-maps`: what in a film the network's answer hangs on, as the
+//! `experiments sensitivity-maps`: what in a film the network's answer depends on, as the
 //! paper's activation maps show it: per parameter, the gradient of the answer over every
 //! keypoint at every moment.
 
@@ -18,7 +18,7 @@ use shared_types::rope::RANGES;
 
 /// Films averaged over; the paper shows one.
 const ROPES: u64 = 8;
-/// What the paper says of each parameter's map, order of [`RANGES`].
+/// The paper's description of each parameter's map, order of [`RANGES`].
 const PAPER: [&str; 9] = [
     "earlier", "earlier", "later", "later", "earlier", "later", "later", "earlier", "earlier",
 ];
@@ -27,15 +27,15 @@ const PAPER: [&str; 9] = [
 #[derive(Debug, Serialize)]
 struct Row {
     parameter: &'static str,
-    /// Mean over all moments (parts of the range per metre).
+    /// Mean over all moments (fractions of the range per metre).
     mean_per_m: f64,
-    /// Middle of the moment that tells most (s).
+    /// Middle of the most informative moment (s).
     peak_s: f64,
     /// Time before which half of it lies (s).
     half_before_s: f64,
-    /// Part of it in the last second of the film.
+    /// Fraction of it in the last second of the film.
     last_second: f64,
-    /// Keypoint that tells most, as a part of the rope's length from the clamp.
+    /// Most informative keypoint, as a fraction of the rope's length from the clamp.
     place: f64,
     paper: &'static str,
 }
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_map_is_told_by_where_it_is_largest() {
+    fn a_map_is_summed_up_by_where_it_is_largest() {
         let mut map = SensitivityMap::empty(50, 4);
         for moment in 0..50 {
             map.values[1][moment * 4 + 2] = 1.0;

@@ -26,7 +26,7 @@ fn colour(part: f64) -> String {
     format!("rgb({:.0},{:.0},{:.0})", mixed(0), mixed(1), mixed(2))
 }
 
-/// The maps, each in parts of its largest value, which is told above it.
+/// The maps, each in parts of its largest value, which is printed above it.
 pub(super) fn svg(map: &SensitivityMap, moment_s: f64, films: usize, seed: u64) -> String {
     let rows = RANGES.len().div_ceil(COLUMNS) as f64;
     let width = LEFT + COLUMNS as f64 * (PANEL[0] + GAP[0]);
@@ -35,8 +35,8 @@ pub(super) fn svg(map: &SensitivityMap, moment_s: f64, films: usize, seed: u64) 
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-         <text x=\"{LEFT}\" y=\"24\" font-size=\"15\">What the network's answer hangs on: mean of {films} films, seed {seed}</text>\n\
-         <text x=\"{LEFT}\" y=\"44\" fill=\"#555\">size of the gradient over a keypoint's place; dark: the largest, told in parts of the range per metre</text>\n"
+         <text x=\"{LEFT}\" y=\"24\" font-size=\"15\">What the network's answer depends on: mean of {films} films, seed {seed}</text>\n\
+         <text x=\"{LEFT}\" y=\"44\" fill=\"#555\">size of the gradient over a keypoint's place; dark: the largest, in fractions of the range per metre</text>\n"
     );
     for (parameter, range) in RANGES.iter().enumerate() {
         let (column, row) = (parameter % COLUMNS, parameter / COLUMNS);

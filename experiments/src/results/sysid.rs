@@ -1,4 +1,4 @@
-//! `experiments sysid`: errors of identified parameters beside the paper's, and
+//! `experiments sysid`: errors of identified parameters next to the paper's, and
 //! whether intervals of 90 % hold the truth that often.
 
 use super::experiment::Experiment;

@@ -1,8 +1,8 @@
 //! `experiments wiggle-ablation`: errors of identified parameters with each of the
 //! paper's nine wiggles.
 //!
-//! The same ropes with the same noise of the films for every wiggle. The network knows
-//! one wiggle only, so that a fast search proposes the start for all.
+//! The same ropes with the same noise of the films for every wiggle. The network is
+//! trained on one wiggle only, so that a fast search proposes the start for all.
 
 use super::experiment::{Experiment, Sequence};
 use super::picture::Curve;

@@ -55,7 +55,7 @@ const KEYPOINTS: usize = 24;
 pub struct TrialRig {
     /// Motion of the arm.
     pub motion: PlannedArm,
-    /// Where the camera is said to stand.
+    /// The calibrated camera.
     pub camera: StereoCamera,
     /// Errors of the recordings.
     pub randomisation: Randomisation,
@@ -155,7 +155,7 @@ impl TrialRig {
         Ok(film(rope, &self.motion, camera, layout, &timing, &noise)?)
     }
 
-    /// A film with all that is known beside it.
+    /// A film with its camera and motion.
     #[must_use]
     pub fn observation<'a>(&'a self, filmed: &'a Filmed) -> Observation<'a> {
         Observation {
@@ -181,7 +181,7 @@ impl TrialRig {
         let options = IdentifyOptions {
             seed: options.seed ^ index,
             // As these films are made: nothing but noise that comes and goes, and a
-            // camera as far off as said.
+            // camera as far off as the randomisation puts it.
             noise_min_px: 0.0,
             camera_position_std_m: self.randomisation.camera_position_m.max(1e-4),
             camera_look_at_std_m: self.randomisation.camera_lookat_m.max(1e-4),

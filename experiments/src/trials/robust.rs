@@ -1,5 +1,5 @@
-//! Strikes planned for one identified rope beside strikes planned for every rope it might
-//! be, and whether the forecast holds.
+//! Strikes planned for one identified rope compared with strikes planned for its
+//! posterior, and whether the forecast holds.
 
 use super::strike_case::StrikeCase;
 use super::thrower::Strikes;

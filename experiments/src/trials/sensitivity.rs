@@ -1,4 +1,4 @@
-//! What in a film the network's answer hangs on, rope by rope.
+//! What in a film the network's answer depends on, rope by rope.
 
 use super::{FailedTrial, SensitivityMap, TrialRig, in_parallel, trial_rope};
 use planner::phi::{PhiNet, PredictError};

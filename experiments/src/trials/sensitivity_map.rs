@@ -8,7 +8,7 @@ use shared_types::rope::ROPE_PARAMETERS;
 
 /// Frames moved together: two fifteenths of a second at 60 Hz.
 pub const MOMENT_FRAMES: usize = 8;
-/// How far a keypoint is moved, each way (m): large beside rounding, small beside the
+/// How far a keypoint is moved, each way (m): large compared with rounding, small compared with the
 /// rope's sway.
 const SHIFT_M: f32 = 2e-3;
 
@@ -21,7 +21,7 @@ pub struct SensitivityMap {
     pub keypoints: usize,
     /// Parameter by parameter (order of [`shared_types::rope::RANGES`]), moment by moment,
     /// keypoint by keypoint: length of the parameter's gradient over the keypoint's place,
-    /// in parts of the parameter's range per metre.
+    /// in fractions of the parameter's range per metre.
     pub values: Vec<Vec<f32>>,
 }
 
@@ -111,7 +111,7 @@ impl SensitivityMap {
 }
 
 /// Moves one keypoint of one frame, if the frame was seen, along `axis` (0 forward, 1 up):
-/// its place, those that are told relative to it, and the angles of its segments.
+/// its place, those that are given relative to it, and the angles of its segments.
 fn move_keypoint(
     features: &mut WiggleFeatures,
     frame: usize,
@@ -132,7 +132,7 @@ fn move_keypoint(
     let before: Vec<f32> = (first..last).map(|s| segment_angle(row, s)).collect();
     row[2 * keypoint + axis] += shift_m;
     if keypoint == 0 {
-        // The others are told relative to it, and stay.
+        // The others are given relative to it, and stay.
         for other in 1..keypoints {
             row[2 * other + axis] -= shift_m;
         }

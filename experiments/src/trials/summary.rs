@@ -1,4 +1,4 @@
-//! What trials add up to.
+//! Tables of identified parameters.
 
 use super::{Trial, mean, quantile};
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ pub struct RatioRow {
     pub p90: f64,
 }
 
-/// Everything the trials say.
+/// Summary of all trials.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SysidSummary {
     /// Trials.

@@ -5,7 +5,7 @@
 //! wiggles begin and end nor what its random ones are. Here a sine fades in and out
 //! within 0.8 s, and a random one goes through random poses of joints 2, 4 and 6 (the
 //! planar ones). Large ones may break a limit of the arm; they are simulated all the
-//! same, and [`AblatedWiggle::breaks`] says so.
+//! same, and [`AblatedWiggle::breaks`] reports it.
 
 use super::TrialRig;
 use super::summary::PAPER;
@@ -126,7 +126,7 @@ fn random_wiggle(main: &WiggleConfig, seed: u64) -> Result<JointTrajectory, Wigg
 
 impl TrialRig {
     /// This rig with another wiggle. Its network, if it has one, is not taken along: it
-    /// knows one wiggle only.
+    /// is trained on one wiggle only.
     #[must_use]
     pub fn wiggling(&self, wiggle: &AblatedWiggle) -> Self {
         Self {
