@@ -4,7 +4,7 @@
     cargo run --release -p planner --example cmaes_table > cmaes.csv
     venv/bin/python planner/checks/cmaes_peer.py cmaes.csv
 
-Every line of the table is one run: function, dimensions, seed, population, restarts,
+Every line of the table is one run: function, dimensions, seed, population,
 evaluations until the target, solved. The same runs are made with `cma`. Exit code 1 if
 the median of the evaluations is above 1.1 times that of `cma`, or fewer runs are solved.
 """
@@ -44,29 +44,28 @@ def values(name, x):
     return (x**2 - 10 * np.cos(2 * np.pi * x) + 10).sum(1)
 
 
-def run(name, n, seed, population, restarts):
+def run(name, n, seed, population):
     """Evaluations until the target, and whether it was reached."""
     mean, deviation = START[name]
     spent = 0
-    for again in range(restarts + 1):
-        options = {
-            "popsize": population * 2**again,
-            "seed": 1000 * seed + again + 1,
-            "verbose": -9,
-            "tolfun": 1e-12,
-            "tolfunhist": 1e-12,
-            "tolx": 1e-11,
-        }
-        search = cma.CMAEvolutionStrategy(n * [mean], deviation, options)
-        while not search.stop():
-            x = np.array(search.ask())
-            f = values(name, x)
-            spent += len(f)
-            search.tell(list(x), list(f))
-            if f.min() <= TARGET:
-                return spent, True
-            if spent >= EVALUATIONS_MAX:
-                return spent, False
+    options = {
+        "popsize": population,
+        "seed": 1000 * seed + 1,
+        "verbose": -9,
+        "tolfun": 1e-12,
+        "tolfunhist": 1e-12,
+        "tolx": 1e-11,
+    }
+    search = cma.CMAEvolutionStrategy(n * [mean], deviation, options)
+    while not search.stop():
+        x = np.array(search.ask())
+        f = values(name, x)
+        spent += len(f)
+        search.tell(list(x), list(f))
+        if f.min() <= TARGET:
+            return spent, True
+        if spent >= EVALUATIONS_MAX:
+            return spent, False
     return spent, False
 
 
@@ -74,19 +73,19 @@ def main():
     ours = defaultdict(list)
     with open(sys.argv[1], newline="") as file:
         for row in csv.DictReader(file):
-            key = (row["function"], int(row["dimensions"]), int(row["population"]), int(row["restarts"]))
+            key = (row["function"], int(row["dimensions"]), int(row["population"]))
             ours[key].append((int(row["seed"]), int(row["evaluations"]), row["solved"] == "true"))
     short = False
-    print("function, dimensions, population, restarts: median evaluations here, cma, ratio; solved here, cma")
-    for (name, n, population, restarts), runs in ours.items():
-        theirs = [run(name, n, seed, population, restarts) for seed, _, _ in runs]
+    print("function, dimensions, population: median evaluations here, cma, ratio; solved here, cma")
+    for (name, n, population), runs in ours.items():
+        theirs = [run(name, n, seed, population) for seed, _, _ in runs]
         here = statistics.median([e for _, e, solved in runs if solved] or [EVALUATIONS_MAX])
         there = statistics.median([e for e, solved in theirs if solved] or [EVALUATIONS_MAX])
         solved = sum(s for _, _, s in runs), sum(s for _, s in theirs)
         ok = here <= 1.1 * there and solved[0] >= solved[1]
         short |= not ok
         print(
-            f"{name}, {n}, {population}, {restarts}: {here:.0f} {there:.0f} {here / there:.3f};"
+            f"{name}, {n}, {population}: {here:.0f} {there:.0f} {here / there:.3f};"
             f" {solved[0]} {solved[1]} of {len(runs)}{'' if ok else '  SHORT'}",
             flush=True,
         )

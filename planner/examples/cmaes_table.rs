@@ -2,7 +2,7 @@
 //! `planner/checks/cmaes_peer.py` to compare with the package `cma`.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
-use planner::cmaes::{CmaOptions, RestartRule, Restarted, StopReason};
+use planner::cmaes::{CmaEs, CmaOptions, StopReason};
 
 const TARGET: f64 = 1e-8;
 const EVALUATIONS_MAX: usize = 400_000;
@@ -36,28 +36,22 @@ const CASES: [Case; 5] = [
     }),
 ];
 
-fn line(
-    (name, mean, std_dev, f): &Case,
-    n: usize,
-    population: Option<usize>,
-    restarts: u64,
-    seeds: u64,
-) {
+fn line((name, mean, std_dev, f): &Case, n: usize, population: Option<usize>, seeds: u64) {
     for seed in 0..seeds {
         let mut options = CmaOptions::unbounded(vec![*mean; n], *std_dev, seed);
         options.population = population.unwrap_or(options.population);
         options.stop.fitness_target = TARGET;
         let population = options.population;
-        let mut search =
-            Restarted::new(options, RestartRule::Ipop, EVALUATIONS_MAX).expect("sound options");
-        while search.stop().is_none() && search.runs() <= restarts + 1 {
+        options.stop.generations_max = EVALUATIONS_MAX.div_ceil(population);
+        let mut search = CmaEs::new(options).expect("sound options");
+        while search.stop().is_none() {
             let x = search.ask(&mut |_| true).expect("all is feasible");
             let values: Vec<f64> = x.iter().map(|x| f(x)).collect();
             search.tell(&values).expect("one value per candidate");
         }
         println!(
-            "{name},{n},{seed},{population},{restarts},{},{}",
-            search.evaluations(),
+            "{name},{n},{seed},{population},{},{}",
+            search.generation() * population,
             search.stop() == Some(StopReason::FitnessTarget)
         );
     }
@@ -70,14 +64,11 @@ fn main() {
         .map_or(20, |s| s.parse().expect("a number of seeds"));
     let only = std::env::args().nth(2);
     let wanted = |case: &Case| only.as_ref().is_none_or(|name| name == case.0);
-    println!("function,dimensions,seed,population,restarts,evaluations,solved");
+    println!("function,dimensions,seed,population,evaluations,solved");
     for (n, many) in [(9, 180), (21, 420)] {
         for case in CASES.iter().filter(|case| wanted(case)) {
             let population = (case.0 == "rastrigin").then_some(many);
-            line(case, n, population, 0, seeds);
+            line(case, n, population, seeds);
         }
-    }
-    if wanted(&CASES[4]) {
-        line(&CASES[4], 9, None, 7, seeds);
     }
 }

@@ -135,7 +135,7 @@ impl WiggleConfig {
 }
 
 /// Quintic step from 0 to 1 with zero speed and acceleration at both ends.
-fn smooth_step(x: f64) -> f64 {
+pub(crate) fn smooth_step(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * x * (10.0 + x * (6.0 * x - 15.0))
 }

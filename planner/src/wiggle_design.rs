@@ -129,7 +129,6 @@ pub fn optimise(
         std_dev: vec![0.12, 0.3, 0.6],
         lower: vec![0.05, 0.3, 0.3],
         upper: vec![0.8, 3.0, most_ramp_s],
-        integers: Vec::new(),
         population: 8,
         draws_max: 1,
         seed,

@@ -5,6 +5,7 @@
 //! acceleration, jerk and tool speed that may be used allows, so that every
 //! frequency is as loud as it can safely be. One joint moves at a time.
 
+use crate::wiggle::smooth_step;
 use arm_model::kinematics::tool_speed_m_s;
 use arm_model::response::Excitation;
 use arm_model::trajectory::MAX_WAYPOINTS;
@@ -101,12 +102,6 @@ fn speed_allowed_rad_s(e: &Excitation, limits: &Limits, pole: &Pole, joint: usiz
 /// that would show up as a blow in the jerk.
 fn smooth_min<const N: usize>(values: [f64; N]) -> f64 {
     values.iter().map(|v| v.powi(-4)).sum::<f64>().powf(-0.25)
-}
-
-/// Quintic step from 0 to 1 with zero speed and acceleration at both ends.
-fn smooth_step(x: f64) -> f64 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * x * (10.0 + x * (6.0 * x - 15.0))
 }
 
 /// Phases that the joints' sweeps begin with (rad).

@@ -3,15 +3,11 @@
 //! Rank-one, rank-µ and active (negative-weight) covariance update with
 //! cumulative step-size adaptation, after N. Hansen, "The CMA Evolution Strategy:
 //! A Tutorial" (arXiv:1604.00772); equation numbers below are of that text.
-//! The strategy knows nothing of what it optimises: the caller draws candidates
+//! The strategy does not depend on what it optimises: the caller draws candidates
 //! with [`CmaEs::ask`], values them and gives the values back with
-//! [`CmaEs::tell`]. All random numbers come from one seed. [`Restarted`] starts again
-//! with more candidates where a search has converged, [`SavedSearch`] holds a search
-//! between two generations.
+//! [`CmaEs::tell`]. All random numbers come from one seed.
 
 mod constants;
-mod restart;
-mod saved;
 mod stop;
 mod update;
 
@@ -19,8 +15,6 @@ mod update;
 mod tests;
 
 pub use constants::StrategyConstants;
-pub use restart::{RestartRule, Restarted};
-pub use saved::SavedSearch;
 pub use stop::{StopReason, StopRules};
 
 use nalgebra::{DMatrix, DVector};
@@ -39,11 +33,6 @@ pub struct CmaOptions {
     pub lower: Vec<f64>,
     /// Upper bounds; infinity where there is none.
     pub upper: Vec<f64>,
-    /// Coordinates that stand for integers: candidates are rounded there, and the
-    /// deviation never falls so low that all candidates round to the same number. That
-    /// stretches the covariance: the other coordinates should be about equally scaled,
-    /// or [`StopRules::condition_max`] ends the search.
-    pub integers: Vec<usize>,
     /// Candidates per generation λ, at least 4.
     pub population: usize,
     /// Draws of one candidate before it is pulled towards a feasible point.
@@ -64,7 +53,6 @@ impl CmaOptions {
             std_dev: vec![std_dev; n],
             lower: vec![f64::NEG_INFINITY; n],
             upper: vec![f64::INFINITY; n],
-            integers: Vec::new(),
             population: 4 + (3.0 * (n.max(1) as f64).ln()) as usize,
             draws_max: 100,
             mean,
@@ -96,26 +84,6 @@ pub enum CmaError {
         /// Index of the coordinate.
         coordinate: usize,
     },
-    /// An integer coordinate that there is not.
-    #[error("search options: `integers` names coordinate {coordinate} of {dimensions}")]
-    Integer {
-        /// Index named.
-        coordinate: usize,
-        /// Number of coordinates.
-        dimensions: usize,
-    },
-    /// A saved search is of other options.
-    #[error(
-        "the saved search has {field} {found}, the options have {expected}: resume with the options it was started with"
-    )]
-    Saved {
-        /// What differs.
-        field: &'static str,
-        /// Value of the saved search.
-        found: u64,
-        /// Value of the options.
-        expected: u64,
-    },
     /// Too few candidates per generation.
     #[error("search options: a population of {population} is too small, use 4 or more")]
     Population {
@@ -141,7 +109,7 @@ pub enum CmaError {
 }
 
 /// Best candidate seen so far.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Best {
     /// Its coordinates.
     pub x: Vec<f64>,
@@ -207,12 +175,6 @@ impl CmaEs {
             {
                 return Err(CmaError::Coordinate { coordinate: i });
             }
-        }
-        if let Some(&coordinate) = options.integers.iter().find(|i| **i >= n) {
-            return Err(CmaError::Integer {
-                coordinate,
-                dimensions: n,
-            });
         }
         if options.population < 4 {
             return Err(CmaError::Population {
@@ -385,13 +347,7 @@ impl CmaEs {
         (0..self.mean.len())
             .map(|i| {
                 let x = (self.mean[i] + self.sigma * step[i]) * self.options.std_dev[i];
-                let x = reflect(x, self.options.lower[i], self.options.upper[i]);
-                if self.options.integers.contains(&i) {
-                    x.round()
-                        .clamp(self.options.lower[i].ceil(), self.options.upper[i].floor())
-                } else {
-                    x
-                }
+                reflect(x, self.options.lower[i], self.options.upper[i])
             })
             .collect()
     }

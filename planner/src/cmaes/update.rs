@@ -56,20 +56,8 @@ impl CmaEs {
         // Equation 44, the change limited to a factor of e per generation.
         let growth = k.c_sigma / k.d_sigma * (path_length / k.chi_n - 1.0);
         self.sigma *= growth.min(1.0).exp();
-        self.keep_integers_moving();
         self.decompose();
         self.keep_within_bounds();
-    }
-
-    /// Lifts the deviation of integer coordinates to where about one candidate in
-    /// eighty still rounds to a neighbour of a mean that is an integer.
-    fn keep_integers_moving(&mut self) {
-        const DEVIATION_MIN: f64 = 0.2;
-        for &i in &self.options.integers {
-            let least = DEVIATION_MIN / (self.options.std_dev[i] * self.sigma);
-            let variance = &mut self.covariance[(i, i)];
-            *variance = variance.max(least * least);
-        }
     }
 
     /// `C^(-1/2) y`.

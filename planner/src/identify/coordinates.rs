@@ -44,15 +44,15 @@ pub(super) type Square = SMatrix<f64, FREE, FREE>;
 
 /// Indices into [`RANGES`].
 pub(super) mod parameter {
-    pub(in crate::identify) const LINKS: usize = 0;
-    pub(in crate::identify) const LENGTH: usize = 1;
-    pub(in crate::identify) const DAMPING: usize = 2;
-    pub(in crate::identify) const STIFFNESS: usize = 3;
-    pub(in crate::identify) const RADIUS: usize = 4;
-    pub(in crate::identify) const MASS_PER_LENGTH: usize = 5;
-    pub(in crate::identify) const LEAD_MASS: usize = 6;
-    pub(in crate::identify) const LEAD_RADIUS: usize = 7;
-    pub(in crate::identify) const EXTRA_SCALE: usize = 8;
+    pub(crate) const LINKS: usize = 0;
+    pub(crate) const LENGTH: usize = 1;
+    pub(crate) const DAMPING: usize = 2;
+    pub(crate) const STIFFNESS: usize = 3;
+    pub(crate) const RADIUS: usize = 4;
+    pub(crate) const MASS_PER_LENGTH: usize = 5;
+    pub(crate) const LEAD_MASS: usize = 6;
+    pub(crate) const LEAD_RADIUS: usize = 7;
+    pub(crate) const EXTRA_SCALE: usize = 8;
 }
 
 /// Mass per length of simulated ropes (kg/m): any would do, see the module; small, so

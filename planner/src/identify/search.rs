@@ -58,7 +58,6 @@ fn once(
         std_dev: part(&spread),
         lower: part(&coordinates.lower),
         upper: part(&coordinates.upper),
-        integers: Vec::new(),
         population: options.population,
         draws_max: 1,
         seed,

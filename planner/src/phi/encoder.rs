@@ -6,7 +6,6 @@
 //! Data are frame by frame, so that a convolution is one linear layer over the eight
 //! frames around each.
 
-use super::net::RawOutputs;
 use crate::features::{FeatureDefinition, WIDTHS};
 use shared_types::rope::ROPE_PARAMETERS;
 use std::collections::BTreeMap;
@@ -19,6 +18,28 @@ const BEFORE: usize = 3;
 const PRINCIPAL_FRAMES: usize = 8;
 /// Added to the variance by layer norm.
 const NORM_EPSILON: f32 = 1e-5;
+
+/// The network's outputs as they are, for one observation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawOutputs {
+    /// Normalised parameters.
+    pub mean: Vec<f32>,
+    /// Logarithms of their variances.
+    pub log_variance: Vec<f32>,
+    /// Embedding.
+    pub embedding: Vec<f32>,
+    /// Mean squared deviation of the embedding from those of known ropes.
+    pub out_of_distribution: f32,
+}
+
+impl RawOutputs {
+    pub(super) fn is_finite(&self) -> bool {
+        let all = self.mean.iter().chain(&self.log_variance);
+        all.chain(&self.embedding)
+            .chain([&self.out_of_distribution])
+            .all(|x| x.is_finite())
+    }
+}
 
 /// Weights by name.
 type Weights<'a> = BTreeMap<&'a str, Vec<f32>>;

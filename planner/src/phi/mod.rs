@@ -12,11 +12,12 @@ mod metadata;
 mod net;
 mod probe;
 
+pub use encoder::RawOutputs;
 pub use metadata::{
     FORMAT, METADATA_KEY, ModelError, ParameterScale, PhiMetadata, ProbeOutputs, TrainingRecord,
     graph_sha256, hex,
 };
-pub use net::{PhiNet, PredictError, Prediction, RawOutputs};
+pub use net::{PhiNet, PredictError, Prediction};
 pub use probe::{PARITY, difference, probe};
 
 /// Names of the network's inputs: motion `[n, frames, channels]`, widths `[n, 4]`.

@@ -1,6 +1,6 @@
 //! The network of a model file.
 
-use super::encoder::Encoder;
+use super::encoder::{Encoder, RawOutputs};
 use super::metadata::{ModelError, PhiMetadata};
 use super::probe::{PARITY, difference, probe};
 use crate::features::{FeatureDefinition, ObserveError, ViewPlane, WiggleFeatures, observe};
@@ -23,28 +23,6 @@ pub struct Prediction {
     /// How unlike the known ropes this one looks: near 1 for those, above
     /// [`PhiMetadata::out_of_distribution_limit`] for one in a hundred of them.
     pub out_of_distribution: f64,
-}
-
-/// The network's outputs as they are, for one observation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RawOutputs {
-    /// Normalised parameters.
-    pub mean: Vec<f32>,
-    /// Logarithms of their variances.
-    pub log_variance: Vec<f32>,
-    /// Embedding.
-    pub embedding: Vec<f32>,
-    /// Mean squared deviation of the embedding from those of known ropes.
-    pub out_of_distribution: f32,
-}
-
-impl RawOutputs {
-    fn is_finite(&self) -> bool {
-        let all = self.mean.iter().chain(&self.log_variance);
-        all.chain(&self.embedding)
-            .chain([&self.out_of_distribution])
-            .all(|x| x.is_finite())
-    }
 }
 
 /// Why there is no prediction.

@@ -1,5 +1,6 @@
 //! Shape of the move: a smooth step from start to end with offsets on its knots.
 
+use crate::wiggle::smooth_step;
 use arm_model::{JointTrajectory, JointVector, TrajectoryError};
 
 /// Joints that are offset, 0-based. With the pole down, joint 1 moves the rope's
@@ -20,11 +21,11 @@ impl MoveShape {
     /// Knots about `knot_s` apart.
     pub(super) fn new(start: JointVector, end: JointVector, duration_s: f64, knot_s: f64) -> Self {
         let segments = ((duration_s / knot_s).round() as usize).max(2);
-        let part = |i: usize| i as f64 / segments as f64;
+        let fraction = |i: usize| i as f64 / segments as f64;
         Self {
-            times_s: (0..=segments).map(|i| duration_s * part(i)).collect(),
+            times_s: (0..=segments).map(|i| duration_s * fraction(i)).collect(),
             plain: (0..=segments)
-                .map(|i| start.zip_with(end, |a, b| a + (b - a) * quintic_step(part(i))))
+                .map(|i| start.zip_with(end, |a, b| a + (b - a) * smooth_step(fraction(i))))
                 .collect(),
         }
     }
@@ -47,11 +48,6 @@ impl MoveShape {
         }
         JointTrajectory::new(&self.times_s, &knots)
     }
-}
-
-/// Step from 0 to 1 with zero speed and acceleration at both ends.
-fn quintic_step(x: f64) -> f64 {
-    x * x * x * (10.0 + x * (6.0 * x - 15.0))
 }
 
 #[cfg(test)]

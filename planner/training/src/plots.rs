@@ -2,7 +2,7 @@
 
 use crate::TrainingError;
 use crate::files::write_whole;
-use crate::trainer::Metric;
+use crate::metrics::Metric;
 use plotters::prelude::*;
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use std::path::Path;

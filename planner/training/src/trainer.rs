@@ -6,6 +6,7 @@ use crate::checkpoint::{Optimizer, Progress, State, path_in};
 use crate::config::TrainingConfig;
 use crate::draws::{Purpose, seed_for};
 use crate::files::write_whole;
+use crate::metrics::Metric;
 use crate::network::{Outputs, PhiModel};
 use crate::plots::plot_losses;
 use crate::pool::Pool;
@@ -16,7 +17,6 @@ use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
 use planner::features::WIDTHS;
-use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -26,20 +26,6 @@ use std::path::Path;
 const RATIO_PART: f64 = 0.1;
 /// Films predicted at once.
 const PREDICT_BATCH: usize = 50;
-
-/// A line of `metrics.jsonl`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Metric {
-    /// Steps done.
-    pub step: usize,
-    /// Learning rate of the last of them.
-    pub learning_rate: f64,
-    /// Mean loss since the line before.
-    pub loss: f64,
-    /// Loss on held-out ropes, and mean absolute error of each parameter as a part
-    /// of its range.
-    pub held_out: Option<(f64, [f64; ROPE_PARAMETERS])>,
-}
 
 /// A training's data, folder and machine.
 #[derive(Debug)]

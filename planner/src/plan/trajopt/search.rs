@@ -87,7 +87,6 @@ pub(crate) fn search(
         std_dev: options.std_dev.clone(),
         lower: bounds.0,
         upper: bounds.1,
-        integers: Vec::new(),
         population: options.population,
         draws_max: options.draws_max,
         seed: options.seed,
