@@ -9,8 +9,8 @@
 
 use crate::arm_knots::ArmKnots;
 use crate::knot::{CHANNELS, Knot};
+use crate::lanes::Precision;
 use crate::motion::AttachMotion;
-use crate::rollout::Precision;
 use arm_model::JointState;
 use arm_model::kinematics::FrameMotion;
 

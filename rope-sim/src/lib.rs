@@ -52,10 +52,10 @@ pub use batch::{roll_out, roll_out_in, roll_out_in_with};
 pub use error::SimulateError;
 pub use extras::{AirDrag, RopeExtras};
 pub use frames::{FrameTimes, NodeTrack};
-pub use lanes::Kernel;
+pub use lanes::{Kernel, Precision};
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
-pub use rollout::{Candidate, Outcome, Precision, Rollout, SimOptions, Start};
+pub use rollout::{Candidate, Outcome, Rollout, SimOptions, Start};
 pub use scene::{
     ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, SceneBody, SceneError, Shape,
 };

@@ -3,7 +3,7 @@
 use crate::error::SimulateError;
 use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
-use crate::lanes::Kernel;
+use crate::lanes::Precision;
 use crate::motion::AttachMotion;
 use crate::scene::{ContactSummary, DominoOutcome};
 use crate::unusable::Unusable;
@@ -12,28 +12,6 @@ use shared_types::RopeParams;
 
 /// Most steps of one rollout; more is a mistake in step or horizon.
 const MAX_STEPS: f64 = 1e8;
-
-/// Number type of the simulation. Errors of [`Precision::F32`] level off at 0.01-0.13
-/// mm after seconds of motion; it is about twice as fast.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    /// Single precision.
-    F32,
-    /// Double precision.
-    F64,
-}
-
-impl Precision {
-    /// Fastest kernel of this precision on this processor.
-    #[must_use]
-    pub fn fastest_kernel(self) -> Kernel {
-        let single = self == Self::F32;
-        Kernel::ALL
-            .into_iter()
-            .find(|k| k.is_single_precision() == single && k.is_available())
-            .unwrap_or(Kernel::ScalarF64)
-    }
-}
 
 /// State of the rope at t = 0, at rest in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! The joints' torques, with the predictions of the links they join.
 
-use super::{Elimination, centripetal};
+use super::link::{Elimination, centripetal};
 use crate::algebra::{Quat, Vec3};
 use crate::lanes::Lanes;
 use crate::load::Loads;

@@ -1,6 +1,6 @@
 //! The articulated inertia outboard of a node, and the elimination of one link.
 
-use super::{Elimination, up};
+use super::link::{Elimination, up};
 use crate::algebra::{Mat3, Sym3, Vec3};
 use crate::lanes::Lanes;
 use crate::load::Load;

@@ -4,7 +4,7 @@
 //! Arrays of numbers, left to the compiler to vectorise, were three times slower per
 //! rope than this: whole arrays travel through memory.
 
-use super::{ANGLE_POLYNOMIAL_F32, ANGLE_POLYNOMIAL_F64, Lanes};
+use super::lane::{ANGLE_POLYNOMIAL_F32, ANGLE_POLYNOMIAL_F64, Lanes};
 
 macro_rules! scalar_lane {
     ($scalar:ident, $polynomial:ident) => {

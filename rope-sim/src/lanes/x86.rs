@@ -5,7 +5,7 @@
 //! intrinsics is sound only there, and the types cannot be made anywhere else:
 //! they are private to this module and reach generic code only through `run_*`.
 
-use super::{ANGLE_POLYNOMIAL_F32, ANGLE_POLYNOMIAL_F64, LaneTask, Lanes};
+use super::lane::{ANGLE_POLYNOMIAL_F32, ANGLE_POLYNOMIAL_F64, LaneTask, Lanes};
 use core::arch::x86_64::*;
 use core::ops::{Add, Mul, Neg, Sub};
 

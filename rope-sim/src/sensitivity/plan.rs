@@ -1,6 +1,6 @@
 //! The batch of a call: which rollouts it needs.
 
-use super::{Family, Perturbation, SensitivityError};
+use super::family::{Family, Perturbation, SensitivityError};
 use crate::base_path::steps_between_jumps;
 use crate::batch::roll_out;
 use crate::error::SimulateError;
