@@ -10,6 +10,20 @@
 //! the arm follows its setpoints, and [`preflight`] what it will make of a plan.
 //! [`synthetic`] makes recordings of known ropes with
 //! the errors of real ones. The physics is that of `rope-sim`.
+//!
+//! ```no_run
+//! use planner::plan::PlanRequest;
+//! use planner::{PlannerConfig, ropes::random_rope};
+//! use shared_types::Task;
+//! use std::ops::ControlFlow;
+//!
+//! let config = PlannerConfig::default();
+//! let goal = config.goal(Task::Strike, [0.95, 0.0, 0.2]);
+//! let request = PlanRequest::new(goal, &random_rope(1), config.search);
+//! let plan = planner::plan(&request, &mut |_| ControlFlow::Continue(()))?;
+//! println!("{:.1} mm off", 1e3 * plan.predicted_error_m);
+//! # Ok::<(), planner::plan::PlanError>(())
+//! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 

@@ -330,18 +330,6 @@ impl CmaEs {
         self.resampled
     }
 
-    /// Mean of the search distribution, reflected into the bounds.
-    #[must_use]
-    pub fn mean(&self) -> Vec<f64> {
-        self.point(&DVector::zeros(self.mean.len()))
-    }
-
-    /// Step size σ relative to the start.
-    #[must_use]
-    pub fn sigma(&self) -> f64 {
-        self.sigma
-    }
-
     /// Candidate at a step from the mean, in the caller's coordinates.
     fn point(&self, step: &DVector<f64>) -> Vec<f64> {
         (0..self.mean.len())

@@ -30,12 +30,6 @@ impl MassScale {
         Self { lead_mass_kg }
     }
 
-    /// Whether the scale is known from a weighed lead.
-    #[must_use]
-    pub fn is_weighed(&self) -> bool {
-        self.lead_mass_kg.is_some()
-    }
-
     /// Mass per length for the ratios `[k/µ, c/µ, m_L/µ]`.
     #[must_use]
     pub fn mass_per_length(&self, ratios: [f64; 3]) -> MassPerLength {

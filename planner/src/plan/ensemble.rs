@@ -40,8 +40,7 @@ impl PosteriorEnsemble {
 /// means and covariance, because what a film leaves open is a common factor of
 /// stiffness, damping and masses: ratios stay as sharp as they were identified. The link
 /// count follows its probabilities.
-#[must_use]
-pub fn ropes_of(
+fn ropes_of(
     rope: &RopeParams,
     posterior: &RopePosterior,
     count: usize,

@@ -26,7 +26,7 @@ mod trajopt;
 pub use assess::{Shortcoming, shortcoming, warnings};
 pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
 pub use drape::{Drape, DrapeConfig};
-pub use ensemble::{PosteriorEnsemble, ropes_of};
+pub use ensemble::PosteriorEnsemble;
 pub use error::{PlanError, PlanProgress};
 pub use goal::ThrowGoal;
 pub use lob::{Lob, LobConfig};

@@ -46,7 +46,7 @@ pub struct ReachMap {
 }
 
 /// A cell's throw, and how many passed the cell.
-struct Kept {
+struct Elite {
     x: Vec<f64>,
     passed: u32,
 }
@@ -75,7 +75,7 @@ impl ReachMap {
         let screen = Screen::new(space.clone(), limits.clone(), *cell, config.clearance)?;
         let std_dev = space.std_dev(&JointVector(config.std_dev_rad));
         let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x4ea_c400);
-        let mut archive: BTreeMap<GridCell, Kept> = BTreeMap::new();
+        let mut archive: BTreeMap<GridCell, Elite> = BTreeMap::new();
         let mut throws = 0;
         for _ in 0..ROUNDS {
             let points: Vec<Vec<f64>> = (0..THROWS)
@@ -85,7 +85,7 @@ impl ReachMap {
             throws += u32::try_from(points.len()).unwrap_or(u32::MAX);
             for (x, path) in points.into_iter().zip(paths) {
                 for passed in path {
-                    let kept = archive.entry(passed).or_insert_with(|| Kept {
+                    let kept = archive.entry(passed).or_insert_with(|| Elite {
                         x: x.clone(),
                         passed: 0,
                     });
@@ -153,10 +153,10 @@ fn draw(
     space: &WaypointSpace,
     screen: &Screen,
     std_dev: &[f64],
-    archive: &BTreeMap<GridCell, Kept>,
+    archive: &BTreeMap<GridCell, Elite>,
     rng: &mut ChaCha12Rng,
 ) -> Option<Vec<f64>> {
-    let kept: Vec<&Kept> = archive.values().collect();
+    let kept: Vec<&Elite> = archive.values().collect();
     let parent = kept
         .choose_weighted(rng, |k| 1.0 / f64::from(k.passed.max(1)))
         .ok()
