@@ -16,9 +16,10 @@ use crate::state::Link;
 const LINK_STIFFNESS_N_M: f64 = 1e5;
 /// Stiffness of a lead's surface (N/m): 120 g at 3 m/s push it in by less than 1 mm.
 const LEAD_STIFFNESS_N_M: f64 = 2e6;
-/// Index of a link's contact point at its farther node; the other is that closest to the
+/// Index of a link's contact point at its farther node, and of that closest to the
 /// obstacle.
 const AT_NODE: usize = 0;
+const BETWEEN: usize = 1;
 
 impl<V: Lanes> Contacts<V> {
     /// Adds the contacts' reactions at the predictions to `loads`.
@@ -55,15 +56,13 @@ impl<V: Lanes> Contacts<V> {
         distances_m: [V; 2],
     ) {
         let slot = index * rope.links.len() + link;
-        let points = [
-            self.point_at_node(index, link, rope, distances_m[1]),
-            self.point_between(index, link, rope, distances_m),
-        ];
-        for which in 0..POINTS {
-            match &points[which] {
-                Some(point) => self.press(index, (slot, which), link, point, loads, rope),
-                None => self.release((slot, which)),
-            }
+        match self.point_at_node(index, link, rope, distances_m[1]) {
+            Some(point) => self.press(index, (slot, AT_NODE), link, &point, loads, rope),
+            None => self.release((slot, AT_NODE)),
+        }
+        match self.point_between(index, link, rope, distances_m) {
+            Some(point) => self.press(index, (slot, BETWEEN), link, &point, loads, rope),
+            None => self.release((slot, BETWEEN)),
         }
     }
 
