@@ -10,6 +10,9 @@ use crate::kinematics::{FrameMotion, flange_motion, flange_pose};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Deserializer, Serialize};
 
+/// Part of the rope, measured from the clamp, that lies against the pole's end by
+/// construction (m): it touches nothing.
+pub const CLAMPED_M: f64 = 0.05;
 /// Largest length of anything in a cell (m).
 const LENGTH_MAX_M: f64 = 10.0;
 

@@ -173,9 +173,10 @@ impl Limits {
         Vector3::from(self.0.tcp_offset_m)
     }
 
-    /// Margins to the joint limits, from the exact extrema of the spline.
+    /// All margins of a trajectory: those of the joints from the exact extrema of the
+    /// spline, then that of the tool's speed.
     #[must_use]
-    pub fn joint_margins(&self, trajectory: &JointTrajectory) -> Vec<Margin> {
+    pub fn margins(&self, trajectory: &JointTrajectory) -> Vec<Margin> {
         let mut out = Vec::with_capacity(4 * JOINTS + 1);
         for j in 0..JOINTS {
             let e = trajectory.extrema(j);
@@ -225,6 +226,7 @@ impl Limits {
                 1.0 - e.qdd.value.abs() / a,
             );
         }
+        out.push(self.tcp_margin(trajectory));
         out
     }
 
@@ -264,14 +266,6 @@ impl Limits {
             time_s: best.1,
             left: 1.0 - best.0 / self.0.tcp_speed_max_m_s,
         }
-    }
-
-    /// All margins of a trajectory, joints first, tool speed last.
-    #[must_use]
-    pub fn margins(&self, trajectory: &JointTrajectory) -> Vec<Margin> {
-        let mut out = self.joint_margins(trajectory);
-        out.push(self.tcp_margin(trajectory));
-        out
     }
 
     /// The limit a trajectory breaks most, if it breaks any.

@@ -4,3 +4,24 @@
 
 pub mod scenario;
 pub mod virtual_rig;
+
+use std::num::NonZeroUsize;
+use std::thread;
+
+/// Work for each seed, on all processors; in the order of the seeds.
+///
+/// # Panics
+/// When the work does.
+pub fn for_each_seed<T: Send>(seeds: &[u64], work: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let share = |seeds: &[u64]| -> Vec<T> { seeds.iter().map(|seed| work(*seed)).collect() };
+    let share = &share;
+    thread::scope(|scope| {
+        let shares = seeds.chunks(seeds.len().div_ceil(threads).max(1));
+        let workers: Vec<_> = shares.map(|s| scope.spawn(move || share(s))).collect();
+        let ended = workers.into_iter().map(thread::ScopedJoinHandle::join);
+        ended
+            .flat_map(|done| done.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    })
+}

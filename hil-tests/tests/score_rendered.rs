@@ -5,13 +5,13 @@
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
 use camera_ingest::{ScoreOptions, StereoFrame, score};
+use hil_tests::for_each_seed;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
 use shared_types::StereoCamera;
-use std::num::NonZeroUsize;
 
 /// Frames of a throw; the tip passes the target in the middle of them.
 const FRAMES: u32 = 18;
@@ -172,20 +172,7 @@ fn assert_intervals_hold(config: &CameraConfig) {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
     // The first were looked at while the intervals were made, the others were not.
     let seeds: Vec<u64> = if long { 3000..3020 } else { 100..102 }.collect();
-    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let scores: Vec<Scores> = std::thread::scope(|scope| {
-        let share = |seeds: &[u64]| -> Vec<Scores> {
-            seeds.iter().map(|seed| scores_of(*seed, config)).collect()
-        };
-        let workers: Vec<_> = seeds
-            .chunks(seeds.len().div_ceil(threads))
-            .map(|seeds| scope.spawn(move || share(seeds)))
-            .collect();
-        workers
-            .into_iter()
-            .flat_map(|w| w.join().unwrap())
-            .collect()
-    });
+    let scores = for_each_seed(&seeds, |seed| scores_of(seed, config));
     let held: usize = scores.iter().map(|s| s.held).sum();
     let refused: usize = scores.iter().map(|s| s.refused).sum();
     let mut errors_m: Vec<f64> = scores.iter().flat_map(|s| s.errors_m.clone()).collect();

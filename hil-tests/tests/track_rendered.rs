@@ -6,6 +6,7 @@
 
 use camera_ingest::track::{ClampPath, ClampSample, TrackOptions};
 use camera_ingest::{EyeFrame, StereoFrame, track};
+use hil_tests::for_each_seed;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +14,6 @@ use rig_sim::CameraConfig;
 use rig_sim::hidden::hidden_rope;
 use rig_sim::wiggle_film::{WiggleFilm, attach};
 use shared_types::StereoCamera;
-use std::num::NonZeroUsize;
 
 /// Frames filmed of each rope, dropped ones included: the rise and the middle of a wiggle.
 const FRAMES: usize = 280;
@@ -165,24 +165,6 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
     }
 }
 
-fn outcomes(seeds: &[u64], filming: Filming) -> Vec<Outcome> {
-    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = seeds
-            .chunks(seeds.len().div_ceil(threads))
-            .map(|seeds| {
-                scope.spawn(move || -> Vec<Outcome> {
-                    seeds.iter().map(|seed| outcome(*seed, filming)).collect()
-                })
-            })
-            .collect();
-        workers
-            .into_iter()
-            .flat_map(|w| w.join().unwrap())
-            .collect()
-    })
-}
-
 /// Some thin ropes and one of usual thickness; many with `WAG_LONG_TESTS`.
 fn seeds() -> Vec<u64> {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
@@ -197,7 +179,8 @@ fn seeds() -> Vec<u64> {
 #[test]
 fn a_rope_is_not_lost_where_nothing_hides_it() {
     let seeds = seeds();
-    let all = [Filming::Quiet, Filming::Busy, Filming::Rolling].map(|how| outcomes(&seeds, how));
+    let all = [Filming::Quiet, Filming::Busy, Filming::Rolling]
+        .map(|how| for_each_seed(&seeds, |seed| outcome(seed, how)));
     let mut bad = Vec::new();
     for found in all.iter().flatten() {
         let [median, p95] = found.errors_px;

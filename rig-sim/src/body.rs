@@ -1,13 +1,10 @@
 //! The rig's solid bodies: arm and pole as capsules, the column under the arm.
 
 use arm_model::capsules::{LINK_CAPSULES, arm_at};
+use arm_model::cell::CLAMPED_M;
 use arm_model::geometry::Capsule;
 use arm_model::{Cell, JointVector};
 use nalgebra::Vector3;
-
-/// Part of the rope, measured from the clamp, that lies against the pole's end
-/// by construction (m).
-const CLAMPED_M: f64 = 0.05;
 
 /// Arm and pole in one pose, in their cell.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! True motion of the simulated joints over the last seconds.
 
-use arm_model::{JointState, JointVector};
+use arm_model::JointState;
 use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -52,30 +52,12 @@ impl MotionHistory {
         let first = samples.partition_point(|s| s.at <= after);
         samples.range(first..).copied().collect()
     }
-
-    /// Motion at `at`, linear between samples; `None` outside what is kept.
-    #[must_use]
-    pub fn at(&self, at: MonotonicNs) -> Option<JointState> {
-        let samples = self.samples();
-        let next = samples.partition_point(|s| s.at < at);
-        let after = samples.get(next)?;
-        if after.at == at {
-            return Some(after.state);
-        }
-        let before = samples.get(next.checked_sub(1)?)?;
-        let u = at.since_s(before.at) / after.at.since_s(before.at);
-        let mix = |a: JointVector, b: JointVector| a.zip_with(b, |a, b| a + u * (b - a));
-        Some(JointState {
-            q: mix(before.state.q, after.state.q),
-            qd: mix(before.state.qd, after.state.qd),
-            qdd: mix(before.state.qdd, after.state.qdd),
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::JointVector;
 
     fn sample(ms: u64) -> JointSample {
         JointSample {
@@ -85,15 +67,12 @@ mod tests {
     }
 
     #[test]
-    fn keeps_five_seconds_and_interpolates() {
+    fn keeps_five_seconds() {
         let history = MotionHistory::default();
         assert!(history.latest().is_none());
         history.extend((0..6000).map(sample));
         assert_eq!(history.latest(), Some(sample(5999)));
         assert_eq!(history.since(MonotonicNs(5_990_000_000)).len(), 9);
-        let state = history.at(MonotonicNs(5_000_250_000)).unwrap();
-        assert!((state.q[3] - 5000.25).abs() < 1e-9);
-        assert!(history.at(MonotonicNs(900_000_000)).is_none());
-        assert!(history.at(MonotonicNs(6_000_000_000)).is_none());
+        assert_eq!(history.since(MonotonicNs(0)).first(), Some(&sample(1000)));
     }
 }

@@ -3,12 +3,9 @@
 use super::ContactCounts;
 use super::arm::{ArmShape, Part};
 use arm_model::Cell;
+use arm_model::cell::CLAMPED_M;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
-
-/// Part of the rope, measured from the clamp, that lies against the pole's end
-/// by construction (m).
-const CLAMPED_M: f64 = 0.05;
 
 /// Sizes of the rope that matter for contacts.
 #[derive(Debug, Clone, Copy, PartialEq)]

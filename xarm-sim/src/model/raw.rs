@@ -1,20 +1,8 @@
 //! Registers without a typed command.
 
 use super::ArmModel;
-use arm_model::kinematics::JOINT_QUARTER_TURNS_X;
+use arm_model::kinematics::{JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use rt_controller::xarm::Register;
-
-/// Distances of the vendor's table, modified convention: d and a of each joint
-/// (mm).
-const DH_MM: [[f32; 2]; 7] = [
-    [267.0, 0.0],
-    [0.0, 0.0],
-    [293.0, 0.0],
-    [0.0, 52.5],
-    [342.5, 77.5],
-    [0.0, 0.0],
-    [97.0, 76.0],
-];
 
 impl ArmModel {
     /// Data of the reply to a register without a typed command; `None` when
@@ -49,10 +37,16 @@ fn f32_le(value: &f64) -> [u8; 4] {
     (*value as f32).to_le_bytes()
 }
 
-/// Offset (rad), d (mm), alpha (rad), a (mm) of each joint.
+/// The vendor's table, modified convention: offset (rad), d (mm), alpha (rad), a (mm) of
+/// each joint.
 fn dh_table() -> Vec<u8> {
-    let rows = DH_MM.iter().zip(JOINT_QUARTER_TURNS_X);
-    rows.flat_map(|([d, a], turns)| [0.0, *d, core::f32::consts::FRAC_PI_2 * f32::from(turns), *a])
-        .flat_map(f32::to_le_bytes)
-        .collect()
+    let rows = JOINT_ORIGIN_M.into_iter().zip(JOINT_QUARTER_TURNS_X);
+    rows.flat_map(|([x, y, z], turns)| {
+        let alpha_rad = core::f32::consts::FRAC_PI_2 * f32::from(turns);
+        // One of y and z is zero: a joint is moved along its own axis or along the turned one.
+        let [d_mm, a_mm] = [y.abs() + z, x].map(|m| (m * 1e3) as f32);
+        [0.0, d_mm, alpha_rad, a_mm]
+    })
+    .flat_map(f32::to_le_bytes)
+    .collect()
 }

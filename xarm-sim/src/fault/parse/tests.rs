@@ -19,58 +19,32 @@ fn the_shipped_example_has_every_kind_and_comes_back() {
     assert_eq!(FaultScript::try_from(tables).unwrap(), script);
 }
 
+/// An entry, its fields apart by semicolons; the field that is named, and what is allowed.
+const REFUSED: &str = r#"
+at_s = 1                                                    | `kind`         | "stall"
+at_s = 1; kind = "stal"                                     | `kind`         | "stall"
+kind = "collision"                                          | `at_s`         | first_setpoint
+kind = "collision"; on = "later"                            | `on`           | motion:PERCENT
+kind = "collision"; on = "motion:50"                        | `motion_s`     | a number
+at_s = 1; kind = "stall"                                    | `duration_s`   | a number from 0
+at_s = 1; kind = "joint_stuck"; joint = 8                   | `joint` is 8   | from 1 to 7
+at_s = nan; kind = "collision"                              | `at_s` is nan  | a number
+at_s = 1; kind = "report_stop"; port = "30000"              | `port`         | "realtime"
+at_s = 1; kind = "collision"; duration_s = 1                | `duration_s`   | collision
+at_s = 1; kind = "firmware_changed"; version = "two"        | `version`      | 2.7.1
+"#;
+
 #[test]
 fn errors_name_entry_field_and_what_is_allowed() {
     let fine = "[[fault]]\nat_s = 1\nkind = \"cable_pull\"\nduration_s = 0.5\n";
-    let cases = [
-        ("[[fault]]\nat_s = 1", ["fault 2", "`kind`", "\"stall\""]),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"stal\"",
-            ["fault 2", "`kind`", "\"stall\""],
-        ),
-        (
-            "[[fault]]\nkind = \"collision\"",
-            ["fault 2", "`at_s`", "first_setpoint"],
-        ),
-        (
-            "[[fault]]\nkind = \"collision\"\non = \"later\"",
-            ["fault 2", "`on`", "motion:PERCENT"],
-        ),
-        (
-            "[[fault]]\nkind = \"collision\"\non = \"motion:50\"",
-            ["fault 2", "`motion_s`", "a number"],
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"stall\"",
-            ["fault 2", "`duration_s`", "a number from 0"],
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"joint_stuck\"\njoint = 8",
-            ["fault 2", "`joint` is 8", "from 1 to 7"],
-        ),
-        (
-            "[[fault]]\nat_s = nan\nkind = \"collision\"",
-            ["fault 2", "`at_s` is nan", "a number"],
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"report_stop\"\nport = \"30000\"",
-            ["fault 2", "`port`", "\"realtime\""],
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"collision\"\nduration_s = 1",
-            ["fault 2", "`duration_s`", "collision"],
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"firmware_changed\"\nversion = \"two\"",
-            ["fault 2", "`version`", "2.7.1"],
-        ),
-    ];
-    for (text, words) in cases {
-        let said = format!("{fine}{text}")
-            .parse::<FaultScript>()
-            .unwrap_err()
-            .to_string();
-        assert!(words.iter().all(|w| said.contains(w)), "{text}: {said}");
+    for case in REFUSED.trim().lines() {
+        let [entry, field, allowed] = case.split('|').map(str::trim).collect::<Vec<_>>()[..] else {
+            panic!("{case}");
+        };
+        let text = format!("{fine}[[fault]]\n{}", entry.replace("; ", "\n"));
+        let said = text.parse::<FaultScript>().unwrap_err().to_string();
+        let words = ["fault 2", field, allowed];
+        assert!(words.iter().all(|w| said.contains(w)), "{entry}: {said}");
     }
     let top = "seed = 1".parse::<FaultScript>().unwrap_err().to_string();
     assert!(top.contains("`seed`"), "{top}");
