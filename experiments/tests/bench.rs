@@ -41,7 +41,7 @@ fn bench_rope_prints_one_whole_json_object() {
         .iter()
         .map(|row| row["kernel"].as_str().unwrap())
         .collect();
-    assert!(kernels.contains(&"PortableF32") && kernels.contains(&"ScalarF64"));
+    assert!(kernels.contains(&"ScalarF64"), "{kernels:?}");
     for row in rows("kernels") {
         positive(row, "/lanes");
         positive(row, "/simulated_s_per_cpu_s");
