@@ -43,24 +43,15 @@ impl WorstJoint {
     }
 }
 
-/// One cycle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CycleSample {
-    /// Number.
-    pub cycle: u64,
-    /// Instant its setpoint is for: the planned wake-up, or the real one where
-    /// that was late (CLOCK_MONOTONIC, ns).
-    pub deadline_ns: u64,
-    /// Planned wake-up (CLOCK_MONOTONIC, ns).
-    pub planned_ns: u64,
+/// What is measured of a cycle against limits; or of several, each figure the worst.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Figures {
     /// Mode after it.
     pub mode: ControllerMode,
-    /// Time on the motion (s), negative when none runs.
-    pub trajectory_s: f64,
+    /// Time on the motion (s), while one runs.
+    pub motion_s: Option<f64>,
     /// How fast the path is followed.
     pub speed_override: f64,
-    /// Commanded joints (rad).
-    pub q_c: JointVector,
     /// Commanded joint speed closest to its limit (rad/s).
     pub speed: WorstJoint,
     /// Commanded joint acceleration closest to its limit (rad/s²).
@@ -77,6 +68,22 @@ pub struct CycleSample {
     pub missed: u32,
     /// From the planned wake-up until its setpoint was sent (ms), if one was.
     pub late_ms: Option<f64>,
+}
+
+/// One cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CycleSample {
+    /// Number.
+    pub cycle: u64,
+    /// Instant its setpoint is for: the planned wake-up, or the real one where
+    /// that was late (CLOCK_MONOTONIC, ns).
+    pub deadline_ns: u64,
+    /// Planned wake-up (CLOCK_MONOTONIC, ns).
+    pub planned_ns: u64,
+    /// Commanded joints (rad).
+    pub q_c: JointVector,
+    /// What is measured of it.
+    pub figures: Figures,
     /// Error code of the arm, if it said one.
     pub arm_error: Option<u8>,
 }
@@ -205,23 +212,23 @@ impl Differentiator {
             armed
         };
         let age_ms = |from_ns: u64| input.deadline_ns.saturating_sub(from_ns) as f64 / 1e6;
+        let late_ms = || (f64::from(record.wake_late_ns) + f64::from(record.send_ns)) / 1e6;
         let mut sample = CycleSample {
             cycle: record.cycle,
             deadline_ns: input.deadline_ns.saturating_add(input.late_ns.into()),
             planned_ns: input.deadline_ns,
-            mode,
-            trajectory_s: record.trajectory_s,
-            speed_override: record.speed_override,
             q_c: record.q_c,
-            speed: WorstJoint::default(),
-            acceleration: WorstJoint::default(),
-            tool_m_s: 0.0,
-            tool_max_m_s: settings.speeds.of(operating_mode, limits.tcp_speed_max_m_s),
-            link_ms: input.link.unanswered_ns as f64 / 1e6,
-            report_ms: self.report_ns.map(age_ms),
-            missed: input.missed,
-            late_ms: (record.sent != 0)
-                .then(|| (f64::from(record.wake_late_ns) + f64::from(record.send_ns)) / 1e6),
+            figures: Figures {
+                mode,
+                motion_s: Some(record.trajectory_s).filter(|t| *t >= 0.0),
+                speed_override: record.speed_override,
+                tool_max_m_s: settings.speeds.of(operating_mode, limits.tcp_speed_max_m_s),
+                link_ms: input.link.unanswered_ns as f64 / 1e6,
+                report_ms: self.report_ns.map(age_ms),
+                missed: input.missed,
+                late_ms: (record.sent != 0).then(late_ms),
+                ..Figures::default()
+            },
             arm_error: (input.codes.present != 0 && input.codes.error != 0)
                 .then_some(input.codes.error),
         };
@@ -247,15 +254,16 @@ impl Differentiator {
             if step_s > 0.0 && step_s < APART_MAX_S {
                 let qd = (now.q - before.q) * (1.0 / step_s);
                 now.moved = Some((qd, step_s));
-                sample.speed = WorstJoint::of(&qd, &limits.velocity_max_rad_s);
+                sample.figures.speed = WorstJoint::of(&qd, &limits.velocity_max_rad_s);
                 // Two mean speeds belong to the middles of their steps. What the arm
                 // did before the first setpoint is not known.
                 if let Some((qd_before, step_before_s)) = before.moved {
                     let apart_s = (step_s + step_before_s) / 2.0;
                     let qdd = (qd - qd_before) * (1.0 / apart_s);
-                    sample.acceleration = WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
+                    sample.figures.acceleration =
+                        WorstJoint::of(&qdd, &limits.acceleration_max_rad_s2);
                 }
-                sample.tool_m_s = (now.tool_m - before.tool_m).norm() / step_s;
+                sample.figures.tool_m_s = (now.tool_m - before.tool_m).norm() / step_s;
             }
         }
         self.before = Some(now);
@@ -273,19 +281,8 @@ mod tests {
             cycle: at_ms / 4,
             deadline_ns: at_ms * 1_000_000,
             planned_ns: at_ms * 1_000_000,
-            mode: ControllerMode::Streaming,
-            trajectory_s: 0.0,
-            speed_override: 1.0,
             q_c: q,
-            speed: WorstJoint::default(),
-            acceleration: WorstJoint::default(),
-            tool_m_s: 0.0,
-            tool_max_m_s: 1.0,
-            link_ms: 0.0,
-            report_ms: None,
-            missed: 0,
-            late_ms: Some(0.1),
-            arm_error: None,
+            ..CycleSample::default()
         };
         differentiator.speeds(&mut sample, true, &Limits::default());
         sample
@@ -305,11 +302,11 @@ mod tests {
             .iter()
             .map(|ms| sent(&mut differentiator, *ms, q(*ms)))
             .collect();
-        assert_eq!(seen[0].speed, WorstJoint::default());
-        assert_eq!(seen[1].acceleration, WorstJoint::default());
-        assert!((seen[1].speed.value - (v0 + a * 0.002)).abs() < 1e-9);
+        assert_eq!(seen[0].figures.speed, WorstJoint::default());
+        assert_eq!(seen[1].figures.acceleration, WorstJoint::default());
+        assert!((seen[1].figures.speed.value - (v0 + a * 0.002)).abs() < 1e-9);
         for sample in &seen[2..] {
-            let found = sample.acceleration;
+            let found = sample.figures.acceleration;
             assert!((found.value - a).abs() < 1e-6, "{sample:?}");
         }
     }

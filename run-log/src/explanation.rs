@@ -1,6 +1,6 @@
 //! Why the arm was stopped, or how close it came to it.
 
-use super::cycle_sample::{CycleSample, RunLog, WorstJoint};
+use super::cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 use super::margins::{Margin, smallest_margins};
 use rt_controller::xarm::ErrorCode;
 use serde::Serialize;
@@ -112,33 +112,14 @@ pub struct Late {
     pub next_came_after_ms: Option<f64>,
 }
 
-/// Some cycles around a stop, each figure the worst of them.
+/// Some cycles around a stop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     /// End of the row (ms from the cause).
     pub until_ms: f64,
-    /// Mode at its end.
-    pub mode: ControllerMode,
-    /// Time on the motion at its end (s).
-    pub motion_s: Option<f64>,
-    /// How fast the path is followed at its end.
-    pub speed_override: f64,
-    /// Joint speed (rad/s).
-    pub speed: WorstJoint,
-    /// Joint acceleration (rad/s²).
-    pub acceleration: WorstJoint,
-    /// Tool speed (m/s).
-    pub tool_m_s: f64,
-    /// Tool speed that is allowed (m/s).
-    pub tool_max_m_s: f64,
-    /// Age of the oldest unanswered setpoint (ms).
-    pub link_ms: f64,
-    /// Age of the newest joint report (ms).
-    pub report_ms: Option<f64>,
-    /// Cycles missed.
-    pub missed: u32,
-    /// From planned wake-up to sent (ms).
-    pub late_ms: Option<f64>,
+    /// The worst of them; mode, motion and what is allowed at its end.
+    #[serde(flatten)]
+    pub figures: Figures,
 }
 
 /// Explains a recording.
@@ -291,34 +272,27 @@ fn around(log: &RunLog, stamp_ns: u64) -> Vec<Row> {
 }
 
 fn row(until_ms: f64, samples: &[&CycleSample]) -> Option<Row> {
-    let last = samples.last()?;
-    let worst = |of: fn(&CycleSample) -> WorstJoint| {
-        samples
-            .iter()
-            .map(|m| of(m))
+    let last = samples.last()?.figures;
+    let figures = || samples.iter().map(|m| &m.figures);
+    let worst = |of: fn(&Figures) -> WorstJoint| {
+        figures()
+            .map(of)
             .max_by(|a, b| a.fraction().total_cmp(&b.fraction()))
             .unwrap_or_default()
     };
-    let most = |of: fn(&CycleSample) -> f64| samples.iter().map(|m| of(m)).fold(0.0, f64::max);
+    let most = |of: fn(&Figures) -> Option<f64>| figures().filter_map(of).max_by(f64::total_cmp);
     Some(Row {
         until_ms,
-        mode: last.mode,
-        motion_s: Some(last.trajectory_s).filter(|t| *t >= 0.0),
-        speed_override: last.speed_override,
-        speed: worst(|m| m.speed),
-        acceleration: worst(|m| m.acceleration),
-        tool_m_s: most(|m| m.tool_m_s),
-        tool_max_m_s: last.tool_max_m_s,
-        link_ms: most(|m| m.link_ms),
-        report_ms: samples
-            .iter()
-            .filter_map(|m| m.report_ms)
-            .max_by(f64::total_cmp),
-        missed: samples.iter().map(|m| m.missed).sum(),
-        late_ms: samples
-            .iter()
-            .filter_map(|m| m.late_ms)
-            .max_by(f64::total_cmp),
+        figures: Figures {
+            speed: worst(|f| f.speed),
+            acceleration: worst(|f| f.acceleration),
+            tool_m_s: most(|f| Some(f.tool_m_s)).unwrap_or(0.0),
+            link_ms: most(|f| Some(f.link_ms)).unwrap_or(0.0),
+            report_ms: most(|f| f.report_ms),
+            missed: figures().map(|f| f.missed).sum(),
+            late_ms: most(|f| f.late_ms),
+            ..last
+        },
     })
 }
 
@@ -334,7 +308,7 @@ fn latest(log: &RunLog, stamp_ns: u64) -> Option<Late> {
         .samples
         .iter()
         .filter(|m| (BEGIN_MS..=0.5).contains(&since_ms(m, stamp_ns)))
-        .filter_map(|m| Some((m, m.late_ms?)))
+        .filter_map(|m| Some((m, m.figures.late_ms?)))
         .collect();
     let (at, _) = sent
         .iter()
@@ -346,10 +320,9 @@ fn latest(log: &RunLog, stamp_ns: u64) -> Option<Late> {
         cycle: sample.cycle,
         late_ms,
         next_covered_ms: next.map(|(after, _)| {
-            if sample.trajectory_s >= 0.0 && after.trajectory_s >= sample.trajectory_s {
-                1e3 * (after.trajectory_s - sample.trajectory_s)
-            } else {
-                since_ms(after, sample.deadline_ns)
+            match (sample.figures.motion_s, after.figures.motion_s) {
+                (Some(from_s), Some(to_s)) if to_s >= from_s => 1e3 * (to_s - from_s),
+                _ => since_ms(after, sample.deadline_ns),
             }
         }),
         next_came_after_ms: next
@@ -360,7 +333,7 @@ fn latest(log: &RunLog, stamp_ns: u64) -> Option<Late> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use arm_model::{JointVector, Limits};
+    use arm_model::Limits;
     use rt_controller::control::{ControlSettings, Thresholds};
     use shared_types::ipc::LimitBroken;
 
@@ -371,23 +344,22 @@ mod tests {
             cycle,
             deadline_ns: cycle * PERIOD_NS,
             planned_ns: cycle * PERIOD_NS,
-            mode: if cycle <= 300 {
-                ControllerMode::Streaming
-            } else {
-                ControllerMode::Faulted
+            figures: Figures {
+                mode: if cycle <= 300 {
+                    ControllerMode::Streaming
+                } else {
+                    ControllerMode::Faulted
+                },
+                motion_s: Some(0.5),
+                tool_m_s: f64::from(u8::from(cycle == 299)),
+                tool_max_m_s: 1.2,
+                report_ms: Some(3.0),
+                missed: u32::from(cycle == 290),
+                late_ms: Some(if cycle == 289 { 3.4 } else { 0.2 }),
+                ..Figures::default()
             },
-            trajectory_s: 0.5,
-            speed_override: 1.0,
-            q_c: JointVector::ZERO,
-            speed: WorstJoint::default(),
-            acceleration: WorstJoint::default(),
-            tool_m_s: f64::from(u8::from(cycle == 299)),
-            tool_max_m_s: 1.2,
-            link_ms: 0.0,
-            report_ms: Some(3.0),
-            missed: u32::from(cycle == 290),
-            late_ms: Some(if cycle == 289 { 3.4 } else { 0.2 }),
             arm_error: (cycle == 340).then_some(31),
+            ..CycleSample::default()
         }
     }
 
@@ -432,10 +404,10 @@ mod tests {
         assert!((stop.time_s - 1.196).abs() < 1e-9);
         assert!(!stop.remedy.is_empty());
         // Every cycle from a second before to a second after is in one row.
-        let missed: u32 = stop.around.iter().map(|r| r.missed).sum();
+        let missed: u32 = stop.around.iter().map(|r| r.figures.missed).sum();
         assert_eq!((stop.around.len(), missed), (ROWS_MS.len(), 1));
         let before = stop.around.iter().find(|r| r.until_ms == -4.0).unwrap();
-        assert_eq!(before.tool_m_s, 1.0);
+        assert_eq!(before.figures.tool_m_s, 1.0);
         let late = stop.latest.as_ref().unwrap();
         assert_eq!((late.cycle, late.late_ms), (289, 3.4));
         assert!((late.next_came_after_ms.unwrap() - 0.8).abs() < 1e-9);

@@ -37,7 +37,7 @@ mod page;
 mod run;
 
 pub use command_line::{CommandLine, quoted};
-pub use cycle_sample::{CycleSample, RunLog, WorstJoint};
+pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::Cycles;
 pub use error::{Error, Result};
 pub use explanation::{Broken, Explanation, Late, Row, Stop, explain};

@@ -28,7 +28,7 @@ pub struct Margin {
 pub(crate) fn smallest_margins(log: &RunLog) -> Vec<Margin> {
     let t = &log.settings.thresholds;
     let ms = |ns: u64| ns as f64 / 1e6;
-    let moving = |m: &&CycleSample| m.mode.is_moving();
+    let moving = |m: &&CycleSample| m.figures.mode.is_moving();
     let joint = |what, unit, of: fn(&CycleSample) -> WorstJoint| {
         worst(log, what, unit, log.samples.iter(), move |m| {
             let w = of(m);
@@ -38,10 +38,10 @@ pub(crate) fn smallest_margins(log: &RunLog) -> Vec<Margin> {
     let (link_ms, report_ms) = (ms(t.reply_stall_ns), ms(t.report_stale_ns));
     let missed = f64::from(t.missed_cycles_max);
     [
-        joint("joint speed", "rad/s", |m| m.speed),
-        joint("joint acceleration", "rad/s²", |m| m.acceleration),
+        joint("joint speed", "rad/s", |m| m.figures.speed),
+        joint("joint acceleration", "rad/s²", |m| m.figures.acceleration),
         worst(log, "tool speed", "m/s", log.samples.iter(), |m| {
-            (None, m.tool_m_s, m.tool_max_m_s)
+            (None, m.figures.tool_m_s, m.figures.tool_max_m_s)
         }),
         worst(
             log,
@@ -55,21 +55,21 @@ pub(crate) fn smallest_margins(log: &RunLog) -> Vec<Margin> {
             "unanswered setpoint",
             "ms",
             log.samples.iter(),
-            move |m| (None, m.link_ms, link_ms),
+            move |m| (None, m.figures.link_ms, link_ms),
         ),
         worst(
             log,
             "age of joint reports, moving",
             "ms",
             log.samples.iter().filter(moving),
-            move |m| (None, m.report_ms.unwrap_or(0.0), report_ms),
+            move |m| (None, m.figures.report_ms.unwrap_or(0.0), report_ms),
         ),
         worst(
             log,
             "cycles missed at once, moving",
             "cycles",
             log.samples.iter().filter(moving),
-            move |m| (None, f64::from(m.missed), missed),
+            move |m| (None, f64::from(m.figures.missed), missed),
         ),
     ]
     .into_iter()
@@ -104,7 +104,7 @@ fn worst<'a>(
 fn range(log: &RunLog, sample: &CycleSample) -> (Option<usize>, f64, f64) {
     let limits = &log.limits;
     // A pose is known only when setpoints were ever sent.
-    if sample.speed.joint == 0 {
+    if sample.figures.speed.joint == 0 {
         return (None, 0.0, 0.0);
     }
     (0..JOINTS)

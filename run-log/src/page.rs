@@ -194,19 +194,20 @@ fn around(rows: &[Row]) -> Table {
         header,
         1,
         rows.iter().map(|r| {
+            let f = &r.figures;
             [
                 format!("{:.0}", r.until_ms),
-                r.motion_s.map_or("-".to_owned(), |t| format!("{t:.3}")),
-                format!("{:.2}", r.speed_override),
-                percent(&r.speed),
-                percent(&r.acceleration),
-                format!("{:.3}", r.tool_m_s),
-                format!("{:.2}", r.tool_max_m_s),
-                format!("{:.1}", r.link_ms),
-                r.report_ms.map_or("-".to_owned(), |a| format!("{a:.1}")),
-                r.late_ms.map_or("-".to_owned(), |l| format!("{l:.1}")),
-                r.missed.to_string(),
-                format!("{:?}", r.mode).to_lowercase(),
+                f.motion_s.map_or("-".to_owned(), |t| format!("{t:.3}")),
+                format!("{:.2}", f.speed_override),
+                percent(&f.speed),
+                percent(&f.acceleration),
+                format!("{:.3}", f.tool_m_s),
+                format!("{:.2}", f.tool_max_m_s),
+                format!("{:.1}", f.link_ms),
+                f.report_ms.map_or("-".to_owned(), |a| format!("{a:.1}")),
+                f.late_ms.map_or("-".to_owned(), |l| format!("{l:.1}")),
+                f.missed.to_string(),
+                format!("{:?}", f.mode).to_lowercase(),
             ]
         }),
     )

@@ -3,6 +3,7 @@
 use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
 use crate::config::{Folders, Kind, Layers};
 use anyhow::anyhow;
+use clap::ValueEnum;
 use cli_output::{Failure, OrInput, Outcome, table};
 use serde_json::{Value, json};
 
@@ -61,7 +62,9 @@ fn show(args: &ConfigShowArgs, quiet: bool) -> Outcome<Option<Value>> {
 
 fn check(args: &ConfigCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     let folders = Folders::here().or_input()?;
-    let kinds = args.kind.map_or(Kind::ALL.to_vec(), |kind| vec![kind]);
+    let kinds = args
+        .kind
+        .map_or(Kind::value_variants().to_vec(), |kind| vec![kind]);
     let (mut checked, mut wrong) = (Vec::new(), Vec::new());
     for kind in kinds {
         match Layers::read(kind, &folders, args.run.as_deref()) {

@@ -63,15 +63,6 @@ impl Configured for RigConfig {
 }
 
 impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 5] = [
-        Self::Planner,
-        Self::Limits,
-        Self::Cell,
-        Self::Controller,
-        Self::Rig,
-    ];
-
     /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {

@@ -208,6 +208,7 @@ fn at<'a>(table: &'a Table, keys: &[String]) -> Option<&'a Value> {
 mod tests {
     use super::*;
     use arm_model::Limits;
+    use clap::ValueEnum;
     use planner::PlannerConfig;
 
     /// A site's and a rig's folder with these planner files.
@@ -254,8 +255,8 @@ mod tests {
 
     #[test]
     fn nothing_but_what_is_built_in_are_the_defaults() {
-        for kind in Kind::ALL {
-            Layers::read(kind, &Folders::NONE, None).unwrap();
+        for kind in Kind::value_variants() {
+            Layers::read(*kind, &Folders::NONE, None).unwrap();
         }
         let planner = Layers::read(Kind::Planner, &Folders::NONE, None).unwrap();
         let config: PlannerConfig = planner.get().unwrap();

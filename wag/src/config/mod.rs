@@ -9,6 +9,7 @@ pub use kind::{Configured, Kind};
 pub use layers::{Folders, Layers};
 
 use arm_model::Cell;
+use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -35,9 +36,9 @@ pub fn here<T: Configured>(run: Option<&Path>) -> anyhow::Result<T> {
 /// Refuses to begin with files that cannot be read as what they configure.
 pub fn check_here() -> anyhow::Result<()> {
     let folders = Folders::here()?;
-    Kind::ALL
-        .into_iter()
-        .try_for_each(|kind| Layers::read(kind, &folders, None).map(drop))
+    Kind::value_variants()
+        .iter()
+        .try_for_each(|kind| Layers::read(*kind, &folders, None).map(drop))
 }
 
 /// What is built in alone, whatever this machine's folders say: for results that must be
