@@ -7,10 +7,12 @@
 //! boundary (C35). They are judged here on the setpoints as they will stand on the wire,
 //! or, by velocities, on the motion that follows from them.
 
+mod contact;
 mod rules;
 mod setpoints;
 mod velocity;
 
+pub use contact::tool_contact_s;
 pub use rules::{Fence, FenceError, JudgedArm, Rule, RuleMargin};
 
 use arm_model::{JointTrajectory, Limits};

@@ -3,12 +3,11 @@
 use crate::cli::{CheckArgs, InterfaceName};
 use crate::config;
 use anyhow::{anyhow, ensure};
+use arm_model::Limits;
 use arm_model::limits::{LimitKind, Margin};
-use arm_model::{Cell, JointTrajectory, Limits};
 use cli_output::{Failure, OrInput, Outcome, table};
 use comfy_table::Table;
-use planner::collide::{ArmShape, tool_contacts};
-use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop};
+use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop, tool_contact_s};
 use run_log::files::read_plan;
 use serde_json::{Value, json};
 use shared_types::CommandInterface;
@@ -77,21 +76,6 @@ fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
         },
         speed_factor: args.speed_factor,
         fence,
-    })
-}
-
-/// When pole or wrist first come to arm, column or floor (s), which the arm would only
-/// feel.
-fn tool_contact_s(trajectory: &JointTrajectory, cell: &Cell, period_s: f64) -> Option<f64> {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a trajectory lasts at most ten minutes"
-    )]
-    let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
-    (0..=cycles).map(|k| f64::from(k) * period_s).find(|t| {
-        let arm = ArmShape::at(&trajectory.state_at(*t).q, &cell.pole);
-        !tool_contacts(&arm, cell).none()
     })
 }
 
