@@ -54,7 +54,7 @@ pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -
     }
     let side = |px: usize| {
         let side = u16::try_from(px.div_ceil(scale));
-        side.map_err(|_| Error::Picture("the frame is too large for a JPEG".to_owned()))
+        side.map_err(|_e| Error::Picture("the frame is too large for a JPEG".to_owned()))
     };
     let eye = LeftEye {
         yuyv,

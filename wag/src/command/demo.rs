@@ -115,6 +115,7 @@ fn throw_once(
     quiet: bool,
 ) -> anyhow::Result<()> {
     let mut settings = config::here::<PlannerConfig>(None)?;
+    settings.identify.seed = record.seed;
     settings.identify.camera_position_std_m = CAMERA_STD;
     settings.identify.camera_look_at_std_m = CAMERA_STD;
     settings.identify.camera_roll_std_rad = CAMERA_STD;
@@ -249,7 +250,6 @@ impl<'a> Demo<'a> {
             film,
             tracked.appearance,
             &self.settings,
-            self.record.seed,
             &stage,
         )?;
         files::write_rope_estimate(&self.folder.file(files::ROPE), &rope)?;

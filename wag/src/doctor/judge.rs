@@ -242,8 +242,9 @@ mod tests {
 
     #[test]
     fn each_fact_is_judged_by_itself() {
+        type Case = (fn(&mut Facts), &'static str, Verdict);
         assert!(wrong(&good()).is_empty());
-        let cases: [(fn(&mut Facts), &str, Verdict); 9] = [
+        let cases: [Case; 9] = [
             (|f| f.preempt_rt = false, "kernel", Verdict::Warn),
             (|f| f.priority_max = 79, "real-time priority", Verdict::Warn),
             (|f| f.lock_max_bytes = 8 << 20, "memory lock", Verdict::Warn),

@@ -6,7 +6,6 @@ use crate::session::Session;
 use anyhow::{anyhow, bail};
 use cli_output::Stage;
 use planner::PlannerConfig;
-use planner::identify::IdentifyOptions;
 use planner::plan::PlanRequest;
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc};
 use shared_types::ipc::message::{
@@ -150,7 +149,6 @@ pub fn identify(
     film: &Film,
     appearance: RopeAppearance,
     settings: &PlannerConfig,
-    seed: u64,
     stage: &Stage,
 ) -> anyhow::Result<RopeEstimate> {
     let request = PlannerRequest::Identify(Box::new(IdentifyRequest {
@@ -160,10 +158,7 @@ pub fn identify(
         joints: film_joints(session, film)?,
         pole: settings.cell.pole,
         appearance: appearance.into(),
-        options: IdentifyOptions {
-            seed,
-            ..settings.identify
-        },
+        options: settings.identify,
     }));
     match ask_planner(session, planner, &request, stage)? {
         PlannerEvent::Identified(estimate) => Ok(*estimate),
