@@ -350,9 +350,11 @@ mod tests {
             let (key, _) = text.split_once(' ').unwrap();
             assert!(said.contains(key) && said.contains(allowed), "{said}");
         }
-        let mut config = ControllerConfig::default();
-        config.limits = Some(Limits::default());
-        config.limits_file = Some("x".into());
+        let mut config = ControllerConfig {
+            limits: Some(Limits::default()),
+            limits_file: Some("x".into()),
+            ..ControllerConfig::default()
+        };
         assert!(matches!(
             config.resolve_limits(),
             Err(ConfigError::LimitsTwice)

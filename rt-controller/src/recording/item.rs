@@ -99,7 +99,7 @@ pub enum Item {
 impl Item {
     /// An item of layout 1 in today's: only states were written otherwise. `None`
     /// when the state cannot be read.
-    pub(super) fn from_layout_1(mut self) -> Option<Self> {
+    pub(super) fn into_layout_2(mut self) -> Option<Self> {
         if let Self::Keyframe(keyframe) = &mut self {
             let state =
                 ControlState::read_layout_1(&keyframe.state, |id, hash| keyframe.motion(id, hash))?;

@@ -184,7 +184,7 @@ impl Iterator for LogReader<'_> {
         let item = postcard::take_from_bytes::<Item>(self.items)
             .ok()
             .and_then(|(item, rest)| match self.format {
-                chunk::FORMAT_1 => Some((item.from_layout_1()?, rest)),
+                chunk::FORMAT_1 => Some((item.into_layout_2()?, rest)),
                 _ => Some((item, rest)),
             });
         match item {
