@@ -184,7 +184,8 @@ mod tests {
     #[test]
     fn what_is_no_recording_says_why() {
         let (small, large) = (png(8, 2, 60), png(12, 2, 60));
-        let cases: [(&[(&str, &[u8])], [&str; 2]); 5] = [
+        type Case<'a> = (&'a [(&'a str, &'a [u8])], [&'a str; 2]);
+        let cases: [Case; 5] = [
             (&[("x.txt", b"")], ["PNG or JPEG", "video.avi"]),
             (
                 &[("f1.png", &small), ("f2.png", &large)],

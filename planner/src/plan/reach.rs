@@ -122,6 +122,7 @@ fn nearest(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::f64::consts::{FRAC_PI_2, PI};
 
     #[test]
     fn the_start_pose_turns_the_plane_to_the_target() {
@@ -151,7 +152,7 @@ mod tests {
             for b in 0..200 {
                 let q4 = -0.1 + 4.0 * f64::from(a) / 199.0;
                 let q6 = -1.69 + 4.83 * f64::from(b) / 199.0;
-                for q7 in [0.0, core::f64::consts::FRAC_PI_2, core::f64::consts::PI] {
+                for q7 in [-FRAC_PI_2, 0.0, FRAC_PI_2, PI] {
                     let q = JointVector([0.0, 0.0, 0.0, q4, 0.0, q6, q7]);
                     let p = pole.attach_pose(&q).0;
                     longest = longest.max(p.x.hypot(p.z - SHOULDER_Z_M));
