@@ -350,7 +350,7 @@ mod tests {
             let (key, _) = text.split_once(' ').unwrap();
             assert!(said.contains(key) && said.contains(allowed), "{said}");
         }
-        let mut config = ControllerConfig {
+        let config = ControllerConfig {
             limits: Some(Limits::default()),
             limits_file: Some("x".into()),
             ..ControllerConfig::default()
