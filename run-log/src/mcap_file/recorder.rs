@@ -373,7 +373,8 @@ impl Recorded {
 /// makes of the run's results.
 ///
 /// # Errors
-/// As [`listen`] and [`Recorded::finish`]; what is in the file by then can be recovered.
+/// Shared memory cannot be joined, or the disk takes nothing any more; what is in the file
+/// by then can be recovered.
 pub fn run(config: &RecorderConfig, simulate: SimulateRope, stop: &AtomicBool) -> Result<()> {
     listen(config, stop)?.finish(simulate)
 }
