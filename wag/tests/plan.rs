@@ -44,7 +44,7 @@ fn an_interrupt_leaves_the_best_plan_so_far() {
     assert!(child.wait().unwrap().success(), "{answer}");
     let answer: Value = serde_json::from_str(&answer).unwrap();
     assert_eq!(answer["interrupted"], true);
-    assert!(answer["warnings"].to_string().contains("broken off"));
+    assert!(answer["warnings"].to_string().contains("interrupted"));
     let plan: Value =
         serde_json::from_str(&std::fs::read_to_string(at("plan.json")).unwrap()).unwrap();
     assert_eq!(plan["interrupted"], true);

@@ -158,7 +158,7 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
     let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     for words in [
-        "the run goes on",
+        "the run continues",
         "killed by signal 9",
         "wag record recover",
     ] {
