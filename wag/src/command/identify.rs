@@ -190,7 +190,8 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         "rope": estimate.params, "std_dev": estimate.std_dev, "residual_px": estimate.residual_px,
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
         "method": estimate.method, "posterior": estimate.posterior,
-        "circumstances": estimate.circumstances, "out_of_distribution_score": estimate.out_of_distribution,
-        "out_of_distribution": estimate.out_of_distribution.is_outside(), "warnings": observed.warnings,
+        "circumstances": estimate.circumstances, "warnings": observed.warnings,
+        "out_of_distribution": estimate.out_of_distribution,
+        "out_of_distribution_score": estimate.out_of_distribution.score,
     })))
 }
