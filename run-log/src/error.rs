@@ -35,10 +35,10 @@ pub enum Error {
         .0.display()
     )]
     NoRun(PathBuf),
-    /// A folder without a recording.
+    /// A folder or a file without a recording.
     #[error(
-        "`{}` is no run folder with recorded control cycles: it holds no {} with any (nor {}, \
-         as older versions wrote it)",
+        "`{}` is no run folder or file with recorded control cycles: {} (of older versions {}) \
+         is not there, or its recorder died before it wrote any",
         .0.display(), crate::files::RUN, crate::files::CYCLES
     )]
     NoRecording(PathBuf),

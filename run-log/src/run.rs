@@ -61,14 +61,16 @@ impl Run {
     /// # Errors
     /// [`Error::NoRecording`], or the file cannot be read.
     pub fn recording(&self) -> Result<Recording> {
-        let none = || Error::NoRecording(self.folder.clone());
-        let path = self.recorded.clone().ok_or_else(none)?;
+        let path = self.recorded.clone();
+        let path = path.ok_or_else(|| Error::NoRecording(self.folder.clone()))?;
         let mut bytes = std::fs::read(&path).map_err(Error::read(&path))?;
-        if is_mcap(&bytes) {
+        let of_mcap = is_mcap(&bytes);
+        if of_mcap {
             bytes = replay_bytes(&bytes).at(|| format!("`{}`", path.display()))?;
-            if bytes.is_empty() {
-                return Err(none());
-            }
+        }
+        // On a full disk the recorder leaves its file without a byte.
+        if bytes.is_empty() && (of_mcap || path.ends_with(files::RUN)) {
+            return Err(Error::NoRecording(path));
         }
         Ok(Recording { path, bytes })
     }

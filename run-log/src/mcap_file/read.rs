@@ -141,14 +141,15 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
     (len == told && records.iter().all(allowed)).then_some(records)
 }
 
-/// The exact recording of the control cycles in a file, from the first keyframe on.
+/// The exact recording of the control cycles in a file, from the first keyframe on; empty when
+/// the file was cut or damaged before it began.
 ///
 /// # Errors
 /// [`Error::NotMcap`], [`Error::NoChannel`].
 pub fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut id = None;
     let mut out = Vec::new();
-    walk(bytes, |record| {
+    let walked = walk(bytes, |record| {
         match record {
             Record::Channel(channel) if channel.topic == Channel::Replay.topic() => {
                 id = Some(channel.id);
@@ -164,7 +165,7 @@ pub fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
         }
         Ok(())
     })?;
-    if id.is_none() {
+    if id.is_none() && walked.whole && walked.damaged_chunks == 0 {
         return Err(Error::NoChannel(Channel::Replay.topic()));
     }
     Ok(out)
@@ -177,6 +178,27 @@ mod tests {
     use mcap::records::MessageHeader;
     use std::collections::BTreeMap;
     use std::io::Cursor;
+
+    #[test]
+    fn a_file_cut_before_its_channels_holds_no_cycles() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(crate::files::RUN);
+        let mut file = crate::McapFile::create(&path).unwrap();
+        let message = serde_json::json!({});
+        file.json(Channel::Log, 1, &message).unwrap();
+        file.finish().unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        let run = crate::Run::open(folder.path()).unwrap();
+        for len in [whole.len(), MAGIC.len() + 40, MAGIC.len(), 0] {
+            std::fs::write(&path, &whole[..len]).unwrap();
+            let found = run.recording();
+            assert!(matches!(found, Err(Error::NoRecording(_))), "{len}");
+        }
+        let mut foreign = options().create(Cursor::new(Vec::new())).unwrap();
+        foreign.finish().unwrap();
+        let foreign = foreign.into_inner().into_inner();
+        assert!(matches!(replay_bytes(&foreign), Err(Error::NoChannel(_))));
+    }
 
     #[test]
     fn a_chunk_without_a_checksum_holds_no_more_than_it_tells() {

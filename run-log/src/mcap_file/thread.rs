@@ -51,6 +51,11 @@ impl RunFileThread {
         }
     }
 
+    /// Whether it has ended by itself, which only an error makes it do.
+    pub fn has_died(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
     /// Ends the recording once everything that has come is written.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ pub(crate) const CASES: &[Case] = &[
     ("replay notvideo.avi", 2, &["notvideo.avi", "no recording"]),
     ("replay cut.bin", 2, &["cut.bin", "cut off", "first chunk"]),
     ("replay other.bin", 2, &["other.bin", "layout 9"]),
-    ("replay bare.mcap", 2, &["bare.mcap", "/wag/replay"]),
+    ("replay bare.mcap", 2, &["bare.mcap", "control cycles"]),
     (
         "track --video bare.mcap --out k.json",
         2,
