@@ -80,20 +80,21 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let result = throw_once(&folder, &mut session, &mut record, &rig, quiet);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
-    let kept = session.received.keep_keypoints(folder.path());
+    let keypoints_kept = session.received.keep_keypoints(folder.path());
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
-    files::write_json(&folder.file(files::SUMMARY), &record).or_failed()?;
+    let summary_kept = files::write_json(&folder.file(files::SUMMARY), &record);
     let recorded = session.finish_run_file();
     explain_stop(folder.path(), quiet);
     result
         .with_context(|| format!("run `{}`", folder.path().display()))
         .map_err(Failure::failed)?;
-    kept.or_failed()?;
+    keypoints_kept.or_failed()?;
     if !quiet {
         show(&record);
     }
     keep_report(folder.path(), quiet);
     recorded.or_failed()?;
+    summary_kept.or_failed()?;
     Ok(Some(serde_json::to_value(&record).or_failed()?))
 }
 

@@ -8,7 +8,7 @@ use crate::session::Session;
 use anyhow::anyhow;
 use arm_model::{JointVector, Limits};
 use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
-use run_log::files;
+use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
 use std::net::IpAddr;
@@ -17,7 +17,9 @@ use std::path::{Path, PathBuf};
 /// Part of the arm's speed limits used for the move to the start pose.
 const MOVE_SPEED: f64 = 0.1;
 
-/// Moves an arm to `start` and lets `work` go on; returns the run's folder and what it says.
+/// Moves an arm to `start` and lets `work` go on. When the processes have ended, `conclude`
+/// makes the run's summary from its folder, the received cycles and what `work` returned.
+/// Returns the folder and the summary.
 ///
 /// # Errors
 /// No arm is named; or what went wrong, which the run's summary says too.
@@ -28,6 +30,7 @@ pub fn on_arm(
     (out, name): (Option<&Path>, &str),
     quiet: bool,
     work: impl FnOnce(&mut Session, &ArmLink) -> anyhow::Result<Value>,
+    conclude: impl FnOnce(&Path, Cycles, Value) -> anyhow::Result<Value>,
 ) -> Outcome<(PathBuf, Value)> {
     let Some(ip) = arm.address else {
         return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
@@ -48,17 +51,20 @@ pub fn on_arm(
     };
     let result = worked(&mut session);
     session.end(result.is_ok());
+    let cycles = std::mem::take(&mut session.received.cycles);
+    let epoch_ns = cycles.cycles.first().map_or(0, |c| c.deadline_ns);
+    let result = result.and_then(|value| conclude(folder.path(), cycles, value));
     let mut summary = match &result {
         Ok(value) => value.clone(),
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
     };
-    let first = session.received.cycles.cycles.first();
-    summary["epoch_ns"] = json!(first.map_or(0, |c| c.deadline_ns));
-    files::write_json(&folder.file(files::SUMMARY), &summary).or_failed()?;
+    summary["epoch_ns"] = epoch_ns.into();
+    let kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     let recorded = session.finish_run_file();
     explain_stop(folder.path(), quiet);
     let value = result.or_failed()?;
     recorded.or_failed()?;
+    kept.or_failed()?;
     Ok((folder.path().to_owned(), value))
 }
 

@@ -3,11 +3,12 @@
 use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::config;
 use crate::pipeline::RunFolder;
-use anyhow::anyhow;
+use crate::session::remedy;
+use anyhow::{Context, anyhow};
 use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome, interrupted, watch_interrupts};
 use run_log::files;
-use run_log::{RecorderConfig, Run, RunFileThread};
+use run_log::{Recorded, RecorderConfig, Run, RunFileThread};
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::sync::atomic::Ordering;
@@ -71,12 +72,12 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
         args.seconds
             .is_some_and(|s| began.elapsed().as_secs_f64() >= s)
     };
-    while !interrupted().load(Ordering::SeqCst) && !over() {
+    while !interrupted().load(Ordering::SeqCst) && !over() && !recorder.has_died() {
         std::thread::sleep(Duration::from_millis(20));
     }
-    let recorded = recorder.stop().or_failed()?;
-    let counts = recorded.counts();
-    if counts.chunks == 0 {
+    let recorded = recorder.stop().map_err(anyhow::Error::from);
+    let counts = recorded.as_ref().ok().map(Recorded::counts);
+    if counts.is_some_and(|counts| counts.chunks == 0) {
         // An empty folder goes by itself.
         let _ = std::fs::remove_file(folder.file(files::RUN));
         return Err(Failure::failed(anyhow!(
@@ -84,15 +85,26 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
             those_that_run(&running_controllers())
         )));
     }
-    folder.config("cell", &cell).or_failed()?;
+    let cell_kept = folder.config("cell", &cell);
     let explanation = Run::open(folder.path()).or_failed()?.keep_cause();
-    let summary = json!({
-        "ok": true, "command": "record", "run": folder.path(), "domain": domain,
+    let mut summary = json!({
+        "ok": recorded.is_ok(), "command": "record", "run": folder.path(), "domain": domain,
         "recording": counts, "explanation": explanation,
     });
-    files::write_json(&folder.file(files::SUMMARY), &summary).or_failed()?;
-    recorded.finish(simulated_rope).or_failed()?;
-    if !quiet {
+    if let Err(reason) = &recorded {
+        summary["error"] = format!("{reason:#}").into();
+    }
+    let summary_kept = files::write_json(&folder.file(files::SUMMARY), &summary);
+    // What became of the recording says more than what could not be written next to it.
+    recorded
+        .and_then(|recorded| Ok(recorded.finish(simulated_rope)?))
+        .with_context(|| remedy(&folder.file(files::RUN)))
+        .or_failed()?;
+    cell_kept.or_failed()?;
+    summary_kept.or_failed()?;
+    if let Some(counts) = counts
+        && !quiet
+    {
         println!(
             "{:.1} MB; read it with `wag explain {}`, or open its {}",
             counts.bytes as f64 / 1e6,

@@ -5,7 +5,8 @@ use super::dry_run;
 use super::on_arm::on_arm;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
-use crate::pipeline;
+use crate::pipeline::{self, ArmLink};
+use crate::session::Session;
 use anyhow::anyhow;
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{Failure, OrInput, Outcome, Stage};
@@ -38,7 +39,7 @@ pub fn drive(
         return dry_run::tell(arm, limits, trajectory, name, quiet).map(Some);
     }
     let start = trajectory.start();
-    let (folder, value) = on_arm(arm, limits, start, (out, name), quiet, |session, link| {
+    let work = |session: &mut Session, link: &ArmLink| {
         let stage = Stage::begin("stream", quiet);
         pipeline::latency(session, link)?;
         pipeline::arm_for(session, link, operating_mode)?;
@@ -49,6 +50,10 @@ pub fn drive(
             latency.cycles, latency.missed, latency.reply.p99_us
         ));
         Ok(json!({ "start_ns": span.start_ns, "end_ns": span.end_ns, "latency": latency }))
+    };
+    let place = (out, name);
+    let (folder, value) = on_arm(arm, limits, start, place, quiet, work, |_, _, value| {
+        Ok(value)
     })?;
     if !quiet {
         println!("done; run folder: {}", folder.display());

@@ -10,4 +10,5 @@ use dead_man::DeadMan;
 pub use live::Session;
 use received::Received;
 use run_file::RunFile;
+pub use run_file::remedy;
 pub use supervisor::{ProcessSpec, Supervisor};

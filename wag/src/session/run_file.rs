@@ -1,5 +1,5 @@
-//! The process that records the run as one file. Losing it loses the file's end and
-//! nothing else: no motion is stopped for it.
+//! The process that records the run as one file. When it dies no motion is stopped, but
+//! the exact record of the cycles ends there; the command says so at once, and fails.
 
 use super::{ProcessSpec, Supervisor};
 use anyhow::{Context, anyhow};
@@ -10,6 +10,14 @@ use std::time::{Duration, Instant};
 const BEGIN: Duration = Duration::from_secs(10);
 /// How long it may take to simulate the rope and to write the end of the file.
 const FINISH: Duration = Duration::from_secs(20);
+
+/// What became of a run whose recorder died, and what helps.
+pub fn remedy(file: &Path) -> String {
+    let path = file.display();
+    format!(
+        "the run is kept, but its file `{path}` is not whole; make room if the disk is full, then `wag record recover {path}` repairs it as far as it goes"
+    )
+}
 
 /// A recording under way.
 #[derive(Debug)]
@@ -72,10 +80,7 @@ impl RunFile {
     pub fn finish(mut self) -> anyhow::Result<()> {
         let ended = self.process.finish(FINISH);
         let ended = self.lost.take().map_or(ended, Err);
-        ended.with_context(|| {
-            let path = self.path.display();
-            format!("the run is kept, but its file `{path}` is not whole; `wag record recover {path}` makes it so, without its end")
-        })
+        ended.with_context(|| remedy(&self.path))
     }
 }
 

@@ -27,6 +27,20 @@ pub(super) struct Evidence {
     pub camera_offset_s: Option<f64>,
 }
 
+impl Evidence {
+    /// What a folder's cycles show alone.
+    pub(super) fn of(source: String, folder: &Path, run: Cycles) -> Self {
+        Self {
+            source,
+            folder: folder.to_owned(),
+            has_targets: run.joints.iter().any(|r| r.arm_clock != 0),
+            run,
+            excitation: None,
+            camera_offset_s: None,
+        }
+    }
+}
+
 /// Everything that was found.
 pub(super) struct Findings {
     pub latencies: Latencies,
@@ -42,12 +56,8 @@ pub(super) struct Findings {
 pub(super) fn recorded(run: &Path) -> anyhow::Result<Evidence> {
     let cycles = Run::open(run)?.recording()?.cycles()?;
     Ok(Evidence {
-        source: format!("run {}", run.display()),
-        folder: run.to_owned(),
-        has_targets: cycles.joints.iter().any(|r| r.arm_clock != 0),
-        run: cycles,
-        excitation: None,
         camera_offset_s: camera_offset_s(&run.join(files::ROPE))?,
+        ..Evidence::of(format!("run {}", run.display()), run, cycles)
     })
 }
 

@@ -1,6 +1,6 @@
 //! Moving an arm so that its joints show how they follow.
 
-use super::evidence::{Evidence, recorded};
+use super::evidence::Evidence;
 use crate::cli::LatencyArgs;
 use crate::command::area::require_clear_area;
 use crate::command::on_arm::on_arm;
@@ -56,8 +56,12 @@ pub(super) fn dry_run(args: &LatencyArgs, quiet: bool) -> Outcome<Value> {
     }))
 }
 
-/// Moves the arm and keeps what was recorded.
-pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
+/// Moves the arm; what `conclude` finds in what it did is the run's summary.
+pub(super) fn measure(
+    args: &LatencyArgs,
+    quiet: bool,
+    conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
+) -> Outcome<Value> {
     let Some(address) = args.arm.address else {
         return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
     };
@@ -71,7 +75,7 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
         return Err(Failure::input(anyhow!("name a joint with --joints")));
     };
     let place = (args.out.as_deref(), "latency");
-    let (folder, _) = on_arm(
+    let (_, found) = on_arm(
         &args.arm,
         &limits,
         first.start(),
@@ -88,12 +92,17 @@ pub(super) fn measure(args: &LatencyArgs, quiet: bool) -> Outcome<Evidence> {
             stage.done(&format!("{} joints swept", sweeps.len()));
             Ok(json!({}))
         },
+        |folder, cycles, mut told| {
+            let source = format!("arm {address}:{}", args.arm.ports.command_port);
+            let mut found = conclude(&Evidence {
+                excitation: Some(excitation),
+                ..Evidence::of(source, folder, cycles)
+            })?;
+            found["warnings"] = told["warnings"].take();
+            Ok(found)
+        },
     )?;
-    Ok(Evidence {
-        source: format!("arm {address}:{}", args.arm.ports.command_port),
-        excitation: Some(excitation),
-        ..recorded(&folder).or_failed()?
-    })
+    Ok(found)
 }
 
 /// The sweeps asked for, with their joints (1-based).

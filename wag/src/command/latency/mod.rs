@@ -19,40 +19,42 @@ use planner::arm_response::delay::command_to_target;
 use planner::arm_response::{Recording, Sample, Setpoint, identify};
 use rt_controller::bridge::Latencies;
 use run_log::files;
-use serde_json::Value;
+use serde_json::{Value, json};
 use shared_types::MonotonicNs;
 use std::path::PathBuf;
 
 pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let evidence = match (&args.arm.address, &args.run) {
+    let conclude = |evidence: &Evidence| conclude(args, evidence, quiet);
+    let value = match (&args.arm.address, &args.run) {
         (_, None) if args.arm.dry_run => return measure::dry_run(args, quiet).map(Some),
-        (Some(_), None) => measure::measure(args, quiet)?,
-        (None, Some(run)) => recorded(run).or_input()?,
+        (Some(_), None) => measure::measure(args, quiet, conclude)?,
+        (None, Some(run)) => conclude(&recorded(run).or_input()?).or_failed()?,
         _ => {
             return Err(Failure::input(anyhow!(
                 "say what to measure: --arm ADDR moves an arm (start `wag rig` for a simulated one), --run RUN reads a recorded run"
             )));
         }
     };
-    let findings = examine(&evidence, quiet)?;
-    let known = findings.response.joints.iter().any(|j| j.lag().is_some());
-    let path = response_path(args, &evidence).filter(|_| known);
-    if let Some(path) = &path {
-        files::write_arm_response(path, &findings.response).or_failed()?;
-    }
-    let value = show::json(&findings, &evidence, path.as_deref());
-    if args.arm.address.is_some() {
-        files::write_json(&evidence.folder.join("summary.json"), &value).or_failed()?;
-    }
-    if !quiet {
-        show::print(&findings, &evidence, path.as_deref());
-    }
-    if !known {
+    if value["joints_measured"] == json!([]) {
         return Err(Failure::failed(anyhow!(
             "no joint moved in a way that shows how it follows, so nothing is written; measure with `wag latency --arm ADDR`"
         )));
     }
     Ok(Some(value))
+}
+
+/// Examines what was recorded, writes the response and shows it; returns what was found.
+fn conclude(args: &LatencyArgs, evidence: &Evidence, quiet: bool) -> anyhow::Result<Value> {
+    let findings = examine(evidence, quiet)?;
+    let known = findings.response.joints.iter().any(|j| j.lag().is_some());
+    let path = response_path(args, evidence).filter(|_| known);
+    if let Some(path) = &path {
+        files::write_arm_response(path, &findings.response)?;
+    }
+    if !quiet {
+        show::print(&findings, evidence, path.as_deref());
+    }
+    Ok(show::json(&findings, evidence, path.as_deref()))
 }
 
 /// Where the response goes: a file that was named, or the run folder's own, which is
@@ -62,9 +64,9 @@ fn response_path(args: &LatencyArgs, evidence: &Evidence) -> Option<PathBuf> {
     args.response.clone().or_else(own)
 }
 
-fn examine(evidence: &Evidence, quiet: bool) -> Outcome<Findings> {
+fn examine(evidence: &Evidence, quiet: bool) -> anyhow::Result<Findings> {
     let stage = Stage::begin("identify", quiet);
-    let mut latencies = Latencies::new().or_failed()?;
+    let mut latencies = Latencies::new()?;
     for cycle in &evidence.run.cycles {
         latencies.record(cycle);
     }
@@ -72,8 +74,7 @@ fn examine(evidence: &Evidence, quiet: bool) -> Outcome<Findings> {
     let joints = identify(&recording, |joint| {
         stage.say(format!("joint {} of {JOINTS}", joint + 1));
     })
-    .with_context(|| evidence.source.clone())
-    .or_failed()?;
+    .with_context(|| evidence.source.clone())?;
     let target_delay = evidence
         .has_targets
         .then(|| command_to_target(&recording))
