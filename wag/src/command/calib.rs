@@ -126,15 +126,15 @@ fn check(args: &CalibCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     stage.done(&told(&here));
     if turned_px < here.epipolar_px {
         return Err(Failure::failed(anyhow!(
-            "the eyes see the points {:.2} px apart, and {turned_px:.2} px with the turn between \
-             them reversed: its sign is wrong in the calibration",
+            "both images show the points {:.2} px apart, and {turned_px:.2} px with the turn \
+             between them reversed: its sign is wrong in the calibration",
             here.epipolar_px
         )));
     }
     if here.rms_px > args.limit_px {
         return Err(Failure::failed(anyhow!(
-            "what is seen is {:.2} px (RMS) from where it should be, more than {} px; find the \
-             camera's place anew with `wag calib extrinsics`",
+            "what is seen is {:.2} px (RMS) from where it should be, more than {} px; \
+             estimate the extrinsics again with `wag calib extrinsics`",
             here.rms_px,
             args.limit_px
         )));
