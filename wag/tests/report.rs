@@ -13,7 +13,7 @@ use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
 use shared_types::plan::trajectory_hash_hex;
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::{recording, wag};
+use support::{record, wag};
 
 /// A name and a text that would do harm as markup.
 const HOSTILE: &str = "<script>alert(1)<!--";
@@ -40,9 +40,9 @@ const LAG_S: f64 = 0.02;
 const CYCLES: std::ops::Range<i32> = -125..500;
 const PERIOD_S: f64 = 0.004;
 
-fn recorded(motion: &JointTrajectory) -> Vec<u8> {
+fn record_throw(run: &Path, motion: &JointTrajectory) {
     let begin = MonotonicNs(12_500_000_000);
-    recording(CYCLES.map(|cycle| {
+    let cycles = CYCLES.map(|cycle| {
         let t = f64::from(cycle) * PERIOD_S;
         let streams = (0.0..=1.0).contains(&t);
         let mode = if streams {
@@ -73,7 +73,8 @@ fn recorded(motion: &JointTrajectory) -> Vec<u8> {
             ..JointReport::default()
         });
         one
-    }))
+    });
+    record(run, cycles);
 }
 
 /// A run whose every text tries to get out of its place.
@@ -81,7 +82,7 @@ fn hostile_run(folder: &Path) -> PathBuf {
     let run = folder.join(HOSTILE);
     fs::create_dir(&run).unwrap();
     let motion = throw();
-    fs::write(run.join("cycles.bin"), recorded(&motion)).unwrap();
+    record_throw(&run, &motion);
     fs::write(run.join("params.toml"), ROPE).unwrap();
     let rope: Value = serde_json::to_value(
         toml::from_str::<toml::Table>(ROPE.split("[interval").next().unwrap()).unwrap(),
@@ -238,6 +239,24 @@ fn the_replay_is_the_measured_arm_with_the_rope_on_it() {
     }
 }
 
+/// The recorder died before it wrote a cycle: at a full disk, or killed at once.
+#[test]
+fn a_run_whose_recorder_died_is_shown_without_its_cycles() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = hostile_run(dir.path());
+    let file = run.join("run.mcap");
+    let whole = fs::read(&file).unwrap();
+    for len in [100, 0] {
+        fs::write(&file, &whole[..len]).unwrap();
+        let made = wag(&format!("report {}", run.display()));
+        assert!(made.status.success(), "{len}: {made:?}");
+        let (data, _) = parts(&fs::read_to_string(run.join("report.html")).unwrap());
+        assert_eq!(data["scenes"], json!([]));
+        let missing = data["missing"].to_string();
+        assert!(missing.contains("run.mcap"), "{missing}");
+    }
+}
+
 #[test]
 fn what_is_no_run_or_is_damaged_is_refused_by_name() {
     let dir = tempfile::tempdir().unwrap();
@@ -254,6 +273,7 @@ fn what_is_no_run_or_is_damaged_is_refused_by_name() {
     refused(&empty, "no run folder");
     for (file, text, word) in [
         ("summary.json", "{", "summary.json"),
+        ("run.mcap", "nothing", "run.mcap"),
         ("cycles.bin", "nothing", "cycles.bin"),
         ("params.toml", "links = 0", "params.toml"),
         ("plan.json", "{}", "plan.json"),

@@ -4,7 +4,7 @@
 use super::chromium::Chromium;
 use super::client::Watch;
 use super::fake::{Fake, run_folder};
-use super::support::{recording, wag};
+use super::support::{record, wag};
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
 use rt_controller::recording::RecordedCycle;
@@ -73,7 +73,7 @@ fn throw_folder(run: &Path) {
             ..RecordedCycle::default()
         }
     });
-    std::fs::write(run.join("cycles.bin"), recording(cycles)).unwrap();
+    record(run, cycles);
     let rope = RopeParams::from_array(RANGES.map(|r| 0.5 * (r.min + r.max)));
     std::fs::write(run.join("params.toml"), toml::to_string(&rope).unwrap()).unwrap();
     let summary = json!({ "ok": true, "command": "throw", "target_m": [0.9, 0.1, 0.2] });

@@ -4,6 +4,7 @@
 use arm_model::Limits;
 use rt_controller::control::{ControlState, Thresholds};
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
+use run_log::{Channel, McapFile, files};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::fs;
@@ -109,16 +110,21 @@ pub(crate) fn until_recorded(run: &Path, cycles: usize) {
     });
 }
 
-/// A recording of these cycles as the controller writes it.
-pub(crate) fn recording(cycles: impl IntoIterator<Item = RecordedCycle>) -> Vec<u8> {
+/// Records these cycles in a run folder as the controller and its recorder do.
+pub(crate) fn record(run: &Path, cycles: impl IntoIterator<Item = RecordedCycle>) {
     let control = ControlState::new(Limits::default(), Thresholds::strict());
-    let (mut writer, mut bytes) = (ChunkWriter::default(), Vec::new());
+    let mut writer = ChunkWriter::default();
+    let mut file = McapFile::create(&run.join(files::RUN)).unwrap();
     writer.keyframe(&Snapshot::of(&control).unwrap());
     for cycle in cycles {
-        bytes.extend(writer.cycle(&cycle).unwrap_or_default());
+        if let Some(chunk) = writer.cycle(&cycle) {
+            file.bytes(Channel::Replay, 1, chunk).unwrap();
+        }
     }
-    bytes.extend(writer.flush().unwrap_or_default());
-    bytes
+    if let Some(chunk) = writer.flush() {
+        file.bytes(Channel::Replay, 1, chunk).unwrap();
+    }
+    file.finish().unwrap();
 }
 
 /// `wag rig` on free ports; it ends with the test.
