@@ -48,4 +48,4 @@ pub use mcap_file::{
     replay_bytes,
 };
 pub use page::show;
-pub use run::{Recording, Run};
+pub use run::{CellHere, Recording, Run};

@@ -18,6 +18,23 @@ pub struct Run {
     film: PathBuf,
 }
 
+/// The cell to look at runs in: what is named goes first, then what a run tells itself,
+/// then what holds here.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellHere {
+    /// The cell that holds here.
+    pub cell: Cell,
+    /// Whether it was named on the command line.
+    pub is_named: bool,
+}
+
+impl CellHere {
+    /// The cell of a run whose folder tells `told`.
+    pub fn of_run(&self, told: Option<Cell>) -> Cell {
+        told.filter(|_| !self.is_named).unwrap_or(self.cell)
+    }
+}
+
 /// The exact recording of a run's control cycles.
 #[derive(Debug, Clone)]
 pub struct Recording {

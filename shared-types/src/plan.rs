@@ -1,6 +1,7 @@
 //! A planned throw, as written to `plan.json` and sent to the controller.
 
 use crate::rope::RopeParams;
+use arm_model::cell::Cell;
 use arm_model::limits::Margin;
 use arm_model::trajectory::JointTrajectory;
 use serde::{Deserialize, Serialize};
@@ -94,6 +95,9 @@ pub struct Plan {
     pub target_m: [f64; 3],
     /// Rope the throw was planned for.
     pub rope: RopeParams,
+    /// Cell it was planned for; plans of older versions do not tell it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cell: Option<Cell>,
     /// The joint trajectory, start pose first.
     pub trajectory: JointTrajectory,
     /// Smallest tip-target distance in the planner's simulation (m).

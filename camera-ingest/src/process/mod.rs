@@ -11,7 +11,6 @@ mod work;
 use crate::frame::{EyeFrame, StereoFrame};
 use crate::still::StillDetector;
 use answer::{answer, failed};
-use arm_model::{Cell, Pole};
 use keep::Recording;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress};
@@ -28,9 +27,6 @@ use std::time::{Duration, Instant};
 pub struct CameraConfig {
     /// Shared-memory domain.
     pub domain: String,
-    /// The cell, for its pole.
-    #[serde(default)]
-    pub cell: Cell,
 }
 
 /// Frames that are compared to see motion: a tenth of a second apart at 60 Hz.
@@ -52,7 +48,6 @@ pub fn run(config: &CameraConfig, stop: &AtomicBool) -> Result<(), IpcError> {
     let mut process = Process {
         frames,
         keypoints,
-        pole: config.cell.pole,
         recording: Recording::default(),
         job: None,
     };
@@ -91,7 +86,6 @@ struct Job {
 struct Process {
     frames: FrameSubscriber,
     keypoints: KeypointPublisher,
-    pole: Pole,
     recording: Recording,
     job: Option<Job>,
 }
@@ -106,7 +100,7 @@ impl Process {
                 return answer(&call, &failed(busy));
             }
             CameraRequest::Track { .. } => {
-                let event = work::track(&self.recording, &self.pole, &call, &self.keypoints);
+                let event = work::track(&self.recording, &call, &self.keypoints);
                 return answer(&call, &event);
             }
             CameraRequest::Score { .. } => {

@@ -28,22 +28,21 @@ type Failure = Box<dyn std::error::Error>;
 /// Tracks the rope and publishes its keypoints.
 pub(super) fn track(
     recording: &Recording,
-    pole: &Pole,
     call: &Call<CameraRpc>,
     publisher: &KeypointPublisher,
 ) -> CameraEvent {
-    try_track(recording, pole, call, publisher).unwrap_or_else(failed)
+    try_track(recording, call, publisher).unwrap_or_else(failed)
 }
 
 fn try_track(
     recording: &Recording,
-    pole: &Pole,
     call: &Call<CameraRpc>,
     publisher: &KeypointPublisher,
 ) -> Result<CameraEvent, Failure> {
     let CameraRequest::Track {
         camera,
         joints,
+        pole,
         keypoints,
         overlay,
     } = &call.request

@@ -143,6 +143,7 @@ impl Setup<'_> {
             task: request.goal.kind(),
             target_m: self.task.target_m(),
             rope: *rope,
+            cell: Some(request.cell),
             predicted_error_m: self.task.error_m(&outcome),
             predicted_time_s: outcome.closest_s,
             fitness: self.fitness(rope, &trajectory, &outcome),

@@ -6,6 +6,7 @@ use crate::camera::StereoCamera;
 use crate::fault::FaultCode;
 use crate::operating_mode::OperatingMode;
 use crate::rope::RopeParams;
+use arm_model::cell::Pole;
 use arm_model::joint::JointVector;
 use arm_model::trajectory::JointTrajectory;
 use serde::{Deserialize, Serialize};
@@ -73,6 +74,8 @@ pub enum CameraRequest {
         camera: Box<StereoCamera>,
         /// Measured joints: CLOCK_MONOTONIC ns and position (rad).
         joints: Vec<(u64, JointVector)>,
+        /// The pole that carries the clamp.
+        pole: Pole,
         /// Keypoints per frame.
         keypoints: u32,
         /// Where to write a contact sheet of overlays (PNG), if anywhere.

@@ -22,13 +22,12 @@ pub use facts::domain_of_run;
 pub use preview::{PreviewChild, PreviewProcess};
 
 use crate::report::{arm_points, tenths_mm};
-use arm_model::Cell;
 use ask::{Ask, Asked, Open, Present, hand_over};
 use attached::{Attached, Seen, newest_domain};
-use facts::Facts;
 use http::Site;
 use jitter::Jitter;
 use rope::FollowingRope;
+use run_log::CellHere;
 use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use snapshot::{ControllerView, Snapshot, StopView, note_stop};
@@ -62,7 +61,7 @@ pub enum Wanted {
 pub struct Watcher {
     wanted: Wanted,
     /// Where a run does not tell its own.
-    cell: Cell,
+    here: CellHere,
     site: Arc<Site>,
     asks: mpsc::Receiver<Asked>,
     open: Vec<Open>,
@@ -89,7 +88,7 @@ impl Watcher {
     pub fn start(
         wanted: Wanted,
         bind: SocketAddr,
-        cell: Cell,
+        here: CellHere,
         preview: Option<PreviewChild>,
     ) -> anyhow::Result<(Self, String)> {
         let (sender, asks) = mpsc::channel();
@@ -100,7 +99,7 @@ impl Watcher {
         let (url, site) = http::serve(bind, sender)?;
         let watcher = Self {
             wanted,
-            cell,
+            here,
             site,
             asks,
             open: Vec::new(),
@@ -217,10 +216,11 @@ impl Watcher {
         let attached = self.attached.as_mut();
         let controller = attached.as_ref().and_then(|a| a.controller.as_ref());
         let camera = controller.and_then(|c| c.facts.camera_file());
+        let cell = self.here.of_run(controller.and_then(|c| c.facts.cell));
         let domain = attached.as_ref().map(|a| a.domain.as_str());
         let film = attached.as_ref().and_then(|a| a.film.as_ref());
         let there = film.is_some_and(|film| film.preview.is_there());
-        preview.keep(domain, camera.as_deref(), there);
+        preview.keep(domain, camera.as_deref(), &cell, there);
         if let Some(film) = attached.and_then(|a| a.film.as_mut()) {
             film.lacks_calibration = preview.lacks_camera();
         }
@@ -252,7 +252,7 @@ impl Watcher {
             controller.facts.look();
         }
         let facts = attached.controller.as_ref().map(|c| &c.facts);
-        let pole = cell_of(facts, &self.cell).pole;
+        let pole = self.here.of_run(facts.and_then(|f| f.cell)).pole;
         match facts.and_then(|facts| facts.rope()) {
             Some((rope, name)) => {
                 if self.rope.as_ref().is_none_or(|(r, _)| *r.params() != rope) {
@@ -320,7 +320,7 @@ impl Watcher {
             };
         };
         let facts = attached.controller.as_ref().map(|c| &c.facts);
-        snapshot.cell = cell_of(facts, &self.cell);
+        snapshot.cell = self.here.of_run(facts.and_then(|f| f.cell));
         let folder = facts.and_then(|facts| facts.folder()?.file_name());
         snapshot.title = match folder {
             Some(name) => format!("{} (domain {})", name.display(), attached.domain),
@@ -362,9 +362,4 @@ impl Watcher {
         }
         snapshot
     }
-}
-
-/// The cell of the arm that is watched.
-fn cell_of(facts: Option<&Facts>, otherwise: &Cell) -> Cell {
-    facts.and_then(|facts| facts.cell).unwrap_or(*otherwise)
 }

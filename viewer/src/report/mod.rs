@@ -22,7 +22,7 @@ pub use replay::{arm_points, tenths_mm};
 
 use anyhow::ensure;
 use page::SIZE_MAX_BYTES;
-use run_log::files;
+use run_log::{CellHere, files};
 use std::path::{Path, PathBuf};
 
 /// Name of the report in a run folder.
@@ -40,13 +40,13 @@ pub struct Written {
 }
 
 /// Makes the report of a run folder and writes it to `out`, by default into the
-/// folder.
+/// folder. `here` is the cell of a run that does not tell its own.
 ///
 /// # Errors
 /// The run is no folder of a run, one of its files is wrong, or the report cannot be
 /// written.
-pub fn write(run: &Path, out: Option<&Path>) -> anyhow::Result<Written> {
-    let data = read::read_run(run)?;
+pub fn write(run: &Path, out: Option<&Path>, here: &CellHere) -> anyhow::Result<Written> {
+    let data = read::read_run(run, here)?;
     let html = page::page(&data)?;
     ensure!(
         html.len() <= SIZE_MAX_BYTES,

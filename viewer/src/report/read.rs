@@ -5,7 +5,7 @@ use super::motion::motions;
 use super::replay::{Known, scene};
 use super::{latency, pictures, rope};
 use anyhow::{Context, ensure};
-use run_log::{RopeMotion, Run, explain, files, show};
+use run_log::{CellHere, RopeMotion, Run, explain, files, show};
 use serde_json::Value;
 use std::path::Path;
 
@@ -52,7 +52,7 @@ pub fn simulated_rope(
 }
 
 /// Reads a run.
-pub(crate) fn read_run(run: &Path) -> anyhow::Result<ReportData> {
+pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData> {
     ensure!(
         run.is_dir(),
         "`{}` is no folder; name a run folder as made by wag demo, throw, wiggle or record",
@@ -93,8 +93,7 @@ pub(crate) fn read_run(run: &Path) -> anyhow::Result<ReportData> {
         None => Vec::new(),
     };
     let known = Known {
-        // Runs from before it was recorded were all in the same one.
-        cell: of_run.cell()?.unwrap_or_default(),
+        cell: here.of_run(of_run.cell()?),
         cycles: &cycles,
         // A throw alone has the rope it was planned for.
         rope: params.as_ref().or(plan.as_ref().map(|p| &p.rope)),

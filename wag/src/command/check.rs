@@ -83,7 +83,7 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     let arm = judged_arm(args).or_input()?;
     let plan = read_plan(&args.plan).or_input()?;
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
-    let cell = config::cell().or_input()?;
+    let cell = config::cell_for(&plan).or_input()?;
     let margins = limits.margins(&plan.trajectory);
     let broken: Vec<&Margin> = margins
         .iter()

@@ -1,7 +1,7 @@
 //! `wag config`: which configuration holds here, and which file says so.
 
 use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
-use crate::config::{Folders, Kind, Layers};
+use crate::config::{self, Kind, Layers};
 use anyhow::anyhow;
 use clap::ValueEnum;
 use cli_output::{Failure, OrInput, Outcome, table};
@@ -23,8 +23,7 @@ fn files_of(layers: &Layers) -> Vec<Value> {
 }
 
 fn show(args: &ConfigShowArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let folders = Folders::here().or_input()?;
-    let layers = Layers::read(args.kind, &folders, args.run.as_deref()).or_input()?;
+    let layers = config::layers(args.kind, args.run.as_deref()).or_input()?;
     let told = layers.told();
     if !quiet && args.origin {
         let rows = told.iter().map(|t| {
@@ -61,13 +60,12 @@ fn show(args: &ConfigShowArgs, quiet: bool) -> Outcome<Option<Value>> {
 }
 
 fn check(args: &ConfigCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let folders = Folders::here().or_input()?;
     let kinds = args
         .kind
         .map_or(Kind::value_variants().to_vec(), |kind| vec![kind]);
     let (mut checked, mut wrong) = (Vec::new(), Vec::new());
     for kind in kinds {
-        match Layers::read(kind, &folders, args.run.as_deref()) {
+        match config::layers(kind, args.run.as_deref()) {
             Ok(layers) => {
                 let files: Vec<String> = layers
                     .layers()

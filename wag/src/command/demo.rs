@@ -3,6 +3,7 @@
 
 use super::demo_summary::{DemoRecord, show};
 use super::explain::explain_stop;
+use super::network::warning_of_pole;
 use super::plan::describe;
 use crate::cli::{DemoArgs, TaskName};
 use crate::config;
@@ -100,7 +101,7 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
 
 /// The run as a page to look at. Without it the run is as good as before.
 fn keep_report(run: &Path, quiet: bool) {
-    match report::write(run, None) {
+    match config::cell_here().and_then(|here| report::write(run, None, &here)) {
         Ok(written) if !quiet => println!("report: {}", written.path.display()),
         Ok(_) => {}
         Err(reason) => tracing::warn!("no report was written: {reason:#}"),
@@ -234,6 +235,7 @@ impl<'a> Demo<'a> {
             &self.camera,
             &self.calibration,
             film,
+            self.settings.cell.pole,
             &overlay,
             &stage,
         )?;
@@ -243,6 +245,10 @@ impl<'a> Demo<'a> {
             tracked.ms_per_frame,
             100.0 * tracked.lost_part
         ));
+        let method = self.settings.identify.method;
+        if let Some(warning) = warning_of_pole(method, &self.settings.cell.pole) {
+            self.warn(warning);
+        }
         let stage = Stage::begin("identify", self.quiet);
         let rope = pipeline::identify(
             self.session,
@@ -260,6 +266,14 @@ impl<'a> Demo<'a> {
         ));
         self.record.identified = Some(rope.clone());
         Ok(rope)
+    }
+
+    /// Tells a person, and keeps it in the summary.
+    fn warn(&mut self, warning: &str) {
+        if !self.quiet {
+            eprintln!("warning: {warning}");
+        }
+        self.record.warnings.push(warning.to_owned());
     }
 
     /// Plans the throw with what was identified.
@@ -284,10 +298,7 @@ impl<'a> Demo<'a> {
         )?;
         self.record.stages.plan_s = stage.done(&describe(&plan));
         for warning in warnings(&plan) {
-            if !self.quiet {
-                eprintln!("warning: {warning}");
-            }
-            self.record.warnings.push(warning);
+            self.warn(&warning);
         }
         self.record.set_plan(&plan);
         Ok(plan)

@@ -52,6 +52,11 @@ impl ClampMotion {
         }
     }
 
+    /// The pole that carries the clamp, where its motion is that of joints.
+    pub fn pole(&self) -> Option<&Pole> {
+        matches!(self.told, Told::Joints(..)).then_some(&self.pole)
+    }
+
     /// For the tracker.
     pub fn clamp_path(&self) -> anyhow::Result<ClampPath> {
         let path = match &self.told {
@@ -186,13 +191,8 @@ impl Filmed {
         let motion = if scene.motion.is_given() {
             ClampMotion::read(scene)?
         } else {
-            // The pole it was filmed with, where its folder tells it.
-            let cell = run.cell()?.map_or_else(config::cell, Ok)?;
-            ClampMotion::late(
-                Told::Joints(path.to_owned(), part.joints.clone()),
-                cell,
-                scene,
-            )
+            let told = Told::Joints(path.to_owned(), part.joints.clone());
+            ClampMotion::late(told, config::cell_of(&run)?, scene)
         };
         Ok(Self {
             warnings: part.warnings.clone(),

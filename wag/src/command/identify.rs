@@ -2,7 +2,7 @@
 
 use super::filmed::{ClampMotion, Filmed};
 use super::learned::Learned;
-use super::network::{network, no_model_without_network};
+use super::network::{network, no_model_without_network, warning_of_pole};
 use super::track::track_video;
 use crate::cli::{IdentifyArgs, MethodName};
 use crate::config;
@@ -30,22 +30,31 @@ struct Observed {
     warnings: Vec<String>,
 }
 
-fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
+/// What to know about the pole, where a network is asked.
+fn other_pole(motion: &ClampMotion, method: Method) -> Option<String> {
+    warning_of_pole(method, motion.pole()?).map(str::to_owned)
+}
+
+fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
         let camera = args.scene.camera().or_input()?;
-        let motion = ClampMotion::read(&args.scene).or_input()?;
-        let motion = motion.attach().or_input()?;
+        let clamp = ClampMotion::read(&args.scene).or_input()?;
+        let motion = clamp.attach().or_input()?;
         let fail = || format!("keypoints `{}`", path.display());
         let track: KeypointTrack = serde_json::from_str(&files::read_text(path).or_input()?)
             .with_context(fail)
             .or_input()?;
         track.validate().with_context(fail).or_input()?;
+        let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
+        for warning in &warnings {
+            eprintln!("warning: {warning}");
+        }
         return Ok(Observed {
             track,
             appearance: Appearance::default(),
             camera,
             motion,
-            warnings: Vec::new(),
+            warnings,
         });
     }
     let Some(video) = &args.observation.video else {
@@ -54,6 +63,7 @@ fn observe(args: &IdentifyArgs, quiet: bool) -> Outcome<Observed> {
         )));
     };
     let mut filmed = Filmed::open(video, args.fps, &args.scene)?;
+    filmed.warnings.extend(other_pole(&filmed.motion, method));
     filmed.warn();
     // Before the long work: what the simulator needs of the motion.
     let motion = filmed.motion.attach().or_input()?;
@@ -152,7 +162,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
     let net = method.asks_network().then(|| network(model)).transpose()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
     cli_output::watch_interrupts().or_failed()?;
-    let observed = observe(args, quiet)?;
+    let observed = observe(args, method, quiet)?;
     let stage = Stage::begin("identify", quiet);
     let observation = Observation {
         track: &observed.track,

@@ -51,8 +51,12 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
         RunFolder::refuse_existing(out)?;
     }
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
-    let cell = config::cell().or_input()?;
+    let here = config::cell().or_input()?;
     let domain = chosen_domain(args)?;
+    let cell = match &args.run {
+        Some(run) => config::cell_of(&Run::open(run).or_input()?).or_input()?,
+        None => here,
+    };
     // Goes last, so that no file of the domain stays when this was its last user.
     let _sweep = DomainSweep::new(&domain);
     // A wrong domain leaves no folder behind.

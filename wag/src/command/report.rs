@@ -1,12 +1,14 @@
 //! `wag report`: a run as one HTML file.
 
 use crate::cli::ReportArgs;
+use crate::config;
 use cli_output::{OrInput, Outcome};
 use serde_json::{Value, json};
 use viewer::report;
 
 pub fn run(args: &ReportArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let written = report::write(&args.run, args.out.as_deref()).or_input()?;
+    let here = config::cell_here().or_input()?;
+    let written = report::write(&args.run, args.out.as_deref(), &here).or_input()?;
     if !quiet {
         println!(
             "{} ({:.1} MB)",

@@ -3,6 +3,7 @@
 use crate::cli::RigArgs;
 use crate::config;
 use anyhow::anyhow;
+use arm_model::Cell;
 use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
 use rig_sim::{RigConfig, run_announced};
 use run_log::files;
@@ -31,9 +32,10 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
             "--camera films a rope: add --rope FILE or --rope random"
         )));
     }
+    let cell = config::cell().or_input()?;
     watch_interrupts().or_failed()?;
     match &args.rope {
-        None => arm_alone(args, report_ports, faults, quiet).or_failed()?,
+        None => arm_alone(args, report_ports, faults, cell, quiet).or_failed()?,
         Some(rope) => {
             let mut config = RigConfig {
                 domain: args
@@ -45,7 +47,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
                 command_port: args.command_port,
                 report_ports,
                 faults,
-                cell: config::cell().or_input()?,
+                cell,
                 ..RigConfig::default()
             };
             config.camera.enabled = args.camera.is_some();
@@ -81,6 +83,7 @@ fn arm_alone(
     args: &RigArgs,
     report_ports: [u16; 4],
     faults: FaultScript,
+    cell: Cell,
     quiet: bool,
 ) -> anyhow::Result<()> {
     let arm = SimulatedArm::start(ArmConfig {
@@ -89,6 +92,7 @@ fn arm_alone(
         report_ports,
         seed: args.seed,
         faults,
+        cell: Some(cell),
         ..ArmConfig::default()
     })?;
     announce(args.bind, arm.ports(), quiet);

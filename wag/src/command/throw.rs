@@ -63,6 +63,7 @@ pub fn drive(
 
 pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
+    config::cell_for(&plan).or_input()?;
     require_clear_area(&args.arm, "THROW", quiet)?;
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let run = drive(

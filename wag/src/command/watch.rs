@@ -5,6 +5,7 @@ use crate::config;
 use crate::pipeline::preview_spec;
 use crate::session::Supervisor;
 use anyhow::{Context, anyhow};
+use arm_model::Cell;
 use camera_ingest::load_camera;
 use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
 use serde_json::{Value, json};
@@ -36,8 +37,8 @@ impl Preview {
 }
 
 impl PreviewProcess for Preview {
-    fn start(&mut self, domain: &str, camera: &Path) -> anyhow::Result<()> {
-        let spec = preview_spec(self.folder.path(), domain, camera)?;
+    fn start(&mut self, domain: &str, camera: &Path, cell: &Cell) -> anyhow::Result<()> {
+        let spec = preview_spec(self.folder.path(), domain, camera, *cell)?;
         self.process.start(&spec, self.folder.path())
     }
 
@@ -64,11 +65,11 @@ pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(camera) = &args.camera {
         load_camera(camera).or_input()?;
     }
-    let cell = config::cell().or_input()?;
+    let here = config::cell_here().or_input()?;
     watch_interrupts().or_failed()?;
     let process = args.preview.then(Preview::new).transpose().or_failed()?;
     let preview = process.map(|p| PreviewChild::new(Box::new(p), args.camera.clone()));
-    let (mut watcher, url) = Watcher::start(wanted, args.bind, cell, preview).map_err(|error| {
+    let (mut watcher, url) = Watcher::start(wanted, args.bind, here, preview).map_err(|error| {
         match error.downcast_ref::<IpcError>() {
             Some(IpcError::Domain { .. }) => Failure::input(error),
             _ => Failure::failed(error),

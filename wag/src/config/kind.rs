@@ -63,6 +63,12 @@ impl Configured for RigConfig {
 }
 
 impl Kind {
+    /// Whether its configuration has a table `cell`: the cell that holds, written there for
+    /// the process that reads it.
+    pub fn has_cell(self) -> bool {
+        matches!(self, Self::Planner | Self::Rig)
+    }
+
     /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
@@ -109,11 +115,6 @@ impl Kind {
 
     /// Whether a table can be read as this kind.
     pub fn accepts(self, table: toml::Table) -> Result<(), toml::de::Error> {
-        if table.contains_key("cell") {
-            return Err(toml::de::Error::custom(
-                "`cell` has a file of its own: cell.toml, or --cell FILE",
-            ));
-        }
         match self {
             Self::Planner => table.try_into::<PlannerConfig>().map(drop),
             Self::Limits => table.try_into::<Limits>().map(drop),

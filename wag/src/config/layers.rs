@@ -3,6 +3,7 @@
 use super::kind::{Configured, Kind};
 use super::nearest::suggestion;
 use anyhow::{Context, anyhow, bail};
+use arm_model::Cell;
 use run_log::files::read_text;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -66,6 +67,8 @@ pub struct Layers {
     /// What they configure.
     pub kind: Kind,
     layers: Vec<Layer>,
+    /// Tables `cell` of files of another kind: they set nothing.
+    cells: Vec<(PathBuf, Table)>,
 }
 
 /// One value that holds.
@@ -95,6 +98,7 @@ impl Layers {
         let mut out = Self {
             kind,
             layers: vec![built_in],
+            cells: Vec::new(),
         };
         for (name, folder) in [("site", &folders.site), ("rig", &folders.rig)] {
             let file = folder.as_ref().map(|folder| folder.join(kind.file()));
@@ -112,7 +116,13 @@ impl Layers {
     fn add(&mut self, name: &'static str, path: &Path) -> anyhow::Result<()> {
         let file = || format!("{} file `{}`", self.kind.name(), path.display());
         let text = read_text(path)?;
-        let table: Table = toml::from_str(&text).with_context(file)?;
+        let mut table: Table = toml::from_str(&text).with_context(file)?;
+        if self.kind.has_cell()
+            && let Some(Value::Table(cell)) = table.get("cell").cloned()
+        {
+            table.remove("cell");
+            self.cells.push((path.to_owned(), cell));
+        }
         let layer = Layer {
             name,
             path: path.to_owned(),
@@ -133,6 +143,26 @@ impl Layers {
             return Err(refusal.context(file()));
         }
         self.layers.push(layer);
+        Ok(())
+    }
+
+    /// Refuses a file whose table `cell` says something else than the cell that holds
+    /// `here`: runs write that table, but the cell has a file of its own.
+    pub fn refuse_other_cell(&self, here: fn() -> anyhow::Result<Cell>) -> anyhow::Result<()> {
+        for (path, told) in &self.cells {
+            let file = || format!("{} file `{}`", self.kind.name(), path.display());
+            let cell = here()?;
+            let mut merged = Table::try_from(cell)?;
+            lay_over(&mut merged, told);
+            let told: Cell = merged.try_into().with_context(file)?;
+            if let Some(differs) = difference(&told, &cell)? {
+                return Err(anyhow!(
+                    "`cell` has a file of its own, and {differs}; remove [cell], or pass that \
+                     cell's file (a run's is RUN/config/cell.toml) with --cell"
+                )
+                .context(file()));
+            }
+        }
         Ok(())
     }
 
@@ -171,6 +201,21 @@ impl Layers {
             })
             .collect()
     }
+}
+
+/// The first value in which a cell differs from the one that holds, in words.
+pub fn difference(told: &Cell, here: &Cell) -> anyhow::Result<Option<String>> {
+    let leaves = |cell: &Cell| -> anyhow::Result<_> {
+        let mut leaves = Vec::new();
+        collect(&Table::try_from(cell)?, &mut Vec::new(), &mut leaves);
+        Ok(leaves)
+    };
+    let pairs = leaves(told)?.into_iter().zip(leaves(here)?);
+    let mut differing = pairs.filter(|((_, told), (_, here))| told != here);
+    Ok(differing.next().map(|((keys, told), (_, here))| {
+        let key = keys.join(".");
+        format!("its {key} = {told} is not the {here} of the cell that holds here")
+    }))
 }
 
 /// Values of `upper` in place of those of `lower`, table by table; a list is one value.

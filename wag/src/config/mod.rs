@@ -6,39 +6,84 @@ mod layers;
 mod nearest;
 
 pub use kind::{Configured, Kind};
-pub use layers::{Folders, Layers};
+pub use layers::Layers;
 
+use anyhow::bail;
 use arm_model::Cell;
 use clap::ValueEnum;
+use layers::{Folders, difference};
+use run_log::{CellHere, Run};
+use shared_types::Plan;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// The file of the cell that the command line names.
 static CELL_FILE: OnceLock<PathBuf> = OnceLock::new();
 
+/// The cell, read once: whatever one command computes, starts and writes has the same.
+static CELL: OnceLock<CellHere> = OnceLock::new();
+
 /// Takes the cell's file from the command line; the first one counts.
 pub fn name_cell(file: &Path) {
     let _ = CELL_FILE.set(file.to_owned());
 }
 
+/// The cell to look at runs in: the file named on the command line goes before what a run
+/// tells, the layers after it.
+pub fn cell_here() -> anyhow::Result<CellHere> {
+    if let Some(read) = CELL.get() {
+        return Ok(*read);
+    }
+    let cell = layers(Kind::Cell, None)?.get()?;
+    let is_named = CELL_FILE.get().is_some();
+    Ok(*CELL.get_or_init(|| CellHere { cell, is_named }))
+}
+
 /// The cell that holds here, with the file named on the command line on top.
 pub fn cell() -> anyhow::Result<Cell> {
-    let named = CELL_FILE.get().map(PathBuf::as_path);
-    Layers::read(Kind::Cell, &Folders::here()?, named)?.get()
+    Ok(cell_here()?.cell)
+}
+
+/// The cell of a run.
+pub fn cell_of(run: &Run) -> anyhow::Result<Cell> {
+    Ok(cell_here()?.of_run(run.cell()?))
+}
+
+/// The cell that holds here, for a plan that must have been made for it.
+pub fn cell_for(plan: &Plan) -> anyhow::Result<Cell> {
+    let here = cell()?;
+    if let Some(planned) = &plan.cell
+        && let Some(differs) = difference(planned, &here)?
+    {
+        bail!(
+            "the plan was made for another cell: {differs}; pass the plan's cell with --cell FILE \
+             (a run's is RUN/config/cell.toml), or plan again"
+        );
+    }
+    Ok(here)
+}
+
+/// The layers of a kind here, with `run` on top; on top of the cell's, the file that the
+/// command line names.
+pub fn layers(kind: Kind, run: Option<&Path>) -> anyhow::Result<Layers> {
+    let named = CELL_FILE.get().filter(|_| kind == Kind::Cell);
+    let run = run.or(named.map(PathBuf::as_path));
+    let layers = Layers::read(kind, &Folders::here()?, run)?;
+    layers.refuse_other_cell(cell)?;
+    Ok(layers)
 }
 
 /// What holds here: all layers, with `run` on top, in the cell that holds here.
 pub fn here<T: Configured>(run: Option<&Path>) -> anyhow::Result<T> {
-    let config: T = Layers::read(T::KIND, &Folders::here()?, run)?.get()?;
+    let config: T = layers(T::KIND, run)?.get()?;
     Ok(config.in_cell(cell()?))
 }
 
 /// Refuses to begin with files that cannot be read as what they configure.
 pub fn check_here() -> anyhow::Result<()> {
-    let folders = Folders::here()?;
     Kind::value_variants()
         .iter()
-        .try_for_each(|kind| Layers::read(*kind, &folders, None).map(drop))
+        .try_for_each(|kind| layers(*kind, None).map(drop))
 }
 
 /// What is built in alone, whatever this machine's folders say: for results that must be

@@ -4,7 +4,7 @@ use super::{ArmLink, RunFolder, STARTUP};
 use crate::config;
 use crate::session::{ProcessSpec, Session};
 use anyhow::{Context, anyhow, bail};
-use arm_model::Limits;
+use arm_model::{Cell, Limits};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::preview::PreviewConfig;
 use camera_ingest::process::CameraConfig;
@@ -114,7 +114,6 @@ pub fn start_camera(
 ) -> anyhow::Result<RpcClient<CameraRpc>> {
     let config = CameraConfig {
         domain: folder.domain.clone(),
-        cell: config::cell()?,
     };
     let ping = &CameraRequest::Ping;
     start(session, folder, "camera-ingest", &config, ping)
@@ -135,8 +134,13 @@ pub fn start_planner(
 
 /// The live preview of a domain's rope, to be started by whoever shows it; its
 /// configuration goes into `folder`.
-pub fn preview_spec(folder: &Path, domain: &str, camera: &Path) -> anyhow::Result<ProcessSpec> {
-    let config = PreviewConfig::new(domain, camera.to_owned(), config::cell()?);
+pub fn preview_spec(
+    folder: &Path,
+    domain: &str,
+    camera: &Path,
+    cell: Cell,
+) -> anyhow::Result<ProcessSpec> {
+    let config = PreviewConfig::new(domain, camera.to_owned(), cell);
     let path = folder.join("preview.toml");
     let text = toml::to_string(&config).context("configuration of preview")?;
     files::write_atomic(&path, text.as_bytes())?;

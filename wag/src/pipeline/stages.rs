@@ -4,6 +4,7 @@
 use super::observe::Film;
 use crate::session::Session;
 use anyhow::{anyhow, bail};
+use arm_model::Pole;
 use cli_output::Stage;
 use planner::PlannerConfig;
 use planner::plan::PlanRequest;
@@ -95,6 +96,7 @@ pub fn track(
     camera: &Camera,
     calibration: &StereoCamera,
     film: &Film,
+    pole: Pole,
     overlay: &Path,
     stage: &Stage,
 ) -> anyhow::Result<Tracked> {
@@ -103,6 +105,7 @@ pub fn track(
     let request = CameraRequest::Track {
         camera: Box::new(calibration.clone()),
         joints,
+        pole,
         keypoints: KEYPOINTS,
         overlay: Some(overlay.display().to_string()),
     };

@@ -4,7 +4,7 @@
 use super::shell::{arm, read};
 use crate::support::{command, send, until};
 use arm_model::joint::START_POSE;
-use arm_model::{Cell, JointTrajectory, JointVector};
+use arm_model::{JointTrajectory, JointVector};
 use camera_ingest::process::CameraConfig;
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest};
@@ -145,14 +145,7 @@ impl Play {
         let controller = Part::start(folder, "rt-controller", &config);
         let guardian = Part::start(folder, "guardian", &config);
         let planner = Part::start(folder, "planner", &planner);
-        let camera = Part::start(
-            folder,
-            "camera-ingest",
-            &CameraConfig {
-                domain,
-                cell: Cell::default(),
-            },
-        );
+        let camera = Part::start(folder, "camera-ingest", &CameraConfig { domain });
         let client = open::<ControllerRpc>(&bus, &ControllerRequest::Status);
         let operator = until("the operator's place", PATIENCE, || {
             OperatorEnd::take(&bus).ok()

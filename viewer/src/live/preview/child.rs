@@ -1,6 +1,7 @@
 //! The preview as a child of the page: it runs while somebody watches and at no other
 //! time, and what happens to it happens to nobody else.
 
+use arm_model::Cell;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -10,11 +11,11 @@ const PAUSE: Duration = Duration::from_secs(2);
 
 /// How the preview's process is started and ended.
 pub trait PreviewProcess: Debug {
-    /// Starts it on the camera of a shared-memory domain.
+    /// Starts it on the camera of a shared-memory domain, in the cell it looks at.
     ///
     /// # Errors
     /// It cannot be started.
-    fn start(&mut self, domain: &str, camera: &Path) -> anyhow::Result<()>;
+    fn start(&mut self, domain: &str, camera: &Path, cell: &Cell) -> anyhow::Result<()>;
     /// Looks after it.
     ///
     /// # Errors
@@ -25,10 +26,11 @@ pub trait PreviewProcess: Debug {
 }
 
 /// What it is to look at.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 struct View {
     domain: String,
     camera: PathBuf,
+    cell: Cell,
 }
 
 /// The process, while there is something to look at.
@@ -56,13 +58,20 @@ impl PreviewChild {
         }
     }
 
-    /// Lets it look at this domain through this calibration; call it now and then. One
-    /// that ended is started again, unless `another` is there.
-    pub(crate) fn keep(&mut self, domain: Option<&str>, camera: Option<&Path>, another: bool) {
+    /// Lets it look at this domain through this calibration, in this cell; call it now and
+    /// then. One that ended is started again, unless `another` is there.
+    pub(crate) fn keep(
+        &mut self,
+        domain: Option<&str>,
+        camera: Option<&Path>,
+        cell: &Cell,
+        another: bool,
+    ) {
         let camera = self.camera.as_deref().or(camera);
         let wanted = domain.zip(camera).map(|(domain, camera)| View {
             domain: domain.to_owned(),
             camera: camera.to_owned(),
+            cell: *cell,
         });
         if wanted != self.view {
             self.process.stop();
@@ -79,7 +88,7 @@ impl PreviewChild {
             return;
         }
         self.begun = Some(Instant::now());
-        match self.process.start(&view.domain, &view.camera) {
+        match self.process.start(&view.domain, &view.camera, &view.cell) {
             Ok(()) => self.runs = true,
             Err(reason) => tracing::warn!("there is no preview: {reason:#}"),
         }
