@@ -46,7 +46,8 @@ pub struct Cli {
     #[arg(long, global = true, allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// The cell: the pole on the arm, and what stands around it (TOML, as
-    /// configs/cell/lab.toml); it contains only what differs. Default: the effective one.
+    /// configs/cell/lab.toml); it contains only what differs. Default: that of the
+    /// run, else the effective one.
     #[arg(long, global = true, value_name = "FILE")]
     pub cell: Option<PathBuf>,
     /// Log more to standard error (-v info, -vv debug).

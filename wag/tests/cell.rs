@@ -13,8 +13,11 @@ use planner::ropes::random_rope;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
 use rig_sim::{CameraConfig, RigConfig};
 use rope_sim::{AttachMotion, PlannedArm};
+use serde_json::{Value, json};
+use shared_types::plan::trajectory_hash_hex;
+use std::collections::BTreeMap;
 use std::fmt::Write;
-use support::{said, wag_in};
+use support::{json_in, refused_in, wag_in};
 use xarm_sim::collision::obstacle_depth_m;
 
 const LAB: &str = include_str!("../../configs/cell/lab.toml");
@@ -138,13 +141,75 @@ fn one_file_changes_what_the_commands_compute() {
         shown.contains("pole.length_m") && shown.contains("cell.toml"),
         "{shown}"
     );
+}
 
-    // It has no second home.
-    put("planner.toml", "[cell]\nfloor_z_m = -0.5\n");
-    let refused = wag_in(dir.path(), "config check planner planner.toml");
-    let said = said(&refused);
-    assert!(
-        !refused.status.success() && said.contains("--cell"),
-        "{said}"
-    );
+/// A folder with a cell of another pole, whole and as what differs, and one that is wrong.
+fn folder_of_cells() -> (tempfile::TempDir, Cell) {
+    let dir = tempfile::tempdir().unwrap();
+    let mut other = Cell::default();
+    other.pole.length_m = 0.30;
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    put("cell.toml", "[pole]\nlength_m = 0.30\n");
+    put("wrong.toml", "[pole]\nlength_m = -0.30\n");
+    (dir, other)
+}
+
+#[test]
+fn a_runs_own_configuration_is_taken_in_its_cell_only() {
+    let (dir, other) = folder_of_cells();
+    let table = toml::to_string(&BTreeMap::from([("cell", other)])).unwrap();
+    for kind in ["planner", "rig"] {
+        let file = format!("{kind}.toml");
+        std::fs::write(dir.path().join(&file), &table).unwrap();
+        let check = format!("config check {kind} {file}");
+        let said = refused_in(dir.path(), 2, &check);
+        for word in [&file, "pole.length_m = 0.3", "remove [cell]", "--cell"] {
+            assert!(said.contains(word), "`{word}`: {said}");
+        }
+        json_in(dir.path(), &format!("{check} --cell cell.toml"));
+    }
+    // Of a kind without one it is an unknown key.
+    std::fs::write(dir.path().join("limits.toml"), &table).unwrap();
+    let said = refused_in(dir.path(), 2, "config check limits limits.toml");
+    assert!(said.contains("cell"), "{said}");
+}
+
+#[test]
+fn a_wrong_cell_is_refused_by_all_that_take_one() {
+    let (dir, _) = folder_of_cells();
+    for line in ["config check", "rig --command-port 0", "report ."] {
+        let said = refused_in(dir.path(), 2, &format!("{line} --cell wrong.toml"));
+        assert!(said.contains("wrong.toml"), "{line}: {said}");
+    }
+}
+
+#[test]
+fn a_plan_is_for_the_cell_that_it_was_made_for() {
+    let (dir, other) = folder_of_cells();
+    let mut end = START_POSE;
+    end[6] += 0.1;
+    let motion = JointTrajectory::new(&[0.0, 2.0], &[START_POSE, end]).unwrap();
+    let mut plan = json!({
+        "version": "0", "seed": 1, "task": "strike", "target_m": [0.9, 0.0, 0.4],
+        "rope": random_rope(1), "cell": other, "trajectory": motion,
+        "predicted_error_m": 0.01, "predicted_time_s": 1.0, "fitness": -1.0,
+        "simulations": 1, "resampled": 0, "margins": [],
+        "trajectory_sha256": trajectory_hash_hex(&motion),
+    });
+    let put = |plan: &Value| {
+        std::fs::write(dir.path().join("plan.json"), plan.to_string()).unwrap();
+    };
+    put(&plan);
+    for command in ["check", "throw --dry-run"] {
+        let line = format!("{command} plan.json");
+        let said = refused_in(dir.path(), 2, &line);
+        for word in ["pole.length_m = 0.3", "0.2", "--cell", "plan again"] {
+            assert!(said.contains(word), "`{word}`: {said}");
+        }
+        json_in(dir.path(), &format!("{line} --cell cell.toml"));
+    }
+    // Plans of older versions do not tell it.
+    plan.as_object_mut().unwrap().remove("cell");
+    put(&plan);
+    json_in(dir.path(), "check plan.json");
 }

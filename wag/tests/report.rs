@@ -5,7 +5,7 @@
 mod support;
 
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, Pole};
+use arm_model::{Cell, JointTrajectory, Pole};
 use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
 use shared_types::MonotonicNs;
@@ -183,6 +183,33 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
     let line = format!("report {} --out {}", run.display(), again.display());
     assert!(wag(&line).status.success());
     assert_eq!(fs::read(&again).unwrap(), html.into_bytes());
+}
+
+/// The cell is the one named, else the run's own, else the effective one.
+#[test]
+fn a_run_is_shown_in_its_own_cell_unless_another_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = hostile_run(dir.path());
+    let pole_m = |more: &str| {
+        let made = wag(&format!("report {} {more}", run.display()));
+        assert!(made.status.success(), "{made:?}");
+        let html = fs::read_to_string(run.join("report.html")).unwrap();
+        parts(&html).0["scenes"][0]["cell"]["pole"]["length_m"].clone()
+    };
+    let named = dir.path().join("named.toml");
+    fs::write(&named, "[pole]\nlength_m = 0.25\n").unwrap();
+    let named = format!("--cell {}", named.display());
+    assert_eq!([pole_m(""), pole_m(&named)], [json!(0.20), json!(0.25)]);
+
+    let mut cell = Cell::default();
+    cell.pole.length_m = 0.30;
+    fs::create_dir(run.join("config")).unwrap();
+    fs::write(
+        run.join("config/cell.toml"),
+        toml::to_string(&cell).unwrap(),
+    )
+    .unwrap();
+    assert_eq!([pole_m(""), pole_m(&named)], [json!(0.30), json!(0.25)]);
 }
 
 #[test]
