@@ -32,6 +32,8 @@ mod error;
 mod extras;
 mod frames;
 mod group;
+#[cfg(test)]
+mod isolation;
 mod kernel;
 mod knot;
 mod lanes;

@@ -1,4 +1,4 @@
-//! Slopes against rigid motions, delays and extrapolation; which are refused or flagged.
+//! Slopes against symmetries of the model, rigid motions, delays and extrapolation; which are refused or flagged.
 #![cfg(test)]
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
@@ -18,7 +18,12 @@ use shared_types::rope::RopeError;
 use support::{rope, throw, world};
 
 const LENGTH: usize = 1;
+const DAMPING: usize = 2;
 const STIFFNESS: usize = 3;
+const RADIUS: usize = 4;
+const MASS_PER_LENGTH: usize = 5;
+const LEAD_MASS: usize = 6;
+const EXTRA_SCALE: usize = 8;
 /// Where the lead is watched (m).
 const TARGET: [f64; 3] = [0.45, 0.1, 0.05];
 
@@ -72,6 +77,80 @@ fn slopes(s: &Sensitivity) -> Vec<Vec<Vector3<f64>>> {
 
 fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+/// Central differences of all nodes, per unit of each parameter, which is varied by
+/// `relative` of its value; and those of the distance to the target.
+fn central(indices: &[usize], relative: &[f64], options: &SimOptions) -> Vec<(Vec<f64>, f64)> {
+    let (rope, arm) = (rope(), throw(0.0));
+    let values = rope.to_array();
+    let mut neighbours = Vec::new();
+    for (index, relative) in indices.iter().zip(relative) {
+        let step = relative * values[*index];
+        for signed in [step, -step] {
+            let Perturbation::Rope { rope, .. } = by(&rope, *index, signed) else {
+                unreachable!("a rope is varied")
+            };
+            neighbours.push(Perturbation::Rope {
+                rope,
+                distance: step,
+            });
+        }
+    }
+    let s = run(&rope, &arm, &neighbours, options).unwrap();
+    let nodes = s.slopes(|r| r.nodes.to_f64());
+    let distance = s.slopes(|r| vec![r.watched.to_point.unwrap().distance_m]);
+    let half = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a - b)).collect();
+    let row = |rows: &[Option<Vec<f64>>], k: usize| -> Vec<f64> {
+        half(rows[k].as_ref().unwrap(), rows[k + 1].as_ref().unwrap())
+    };
+    (0..indices.len())
+        .map(|i| (row(&nodes, 2 * i), row(&distance, 2 * i)[0]))
+        .collect()
+}
+
+/// Multiplying stiffness, damping and all masses by one factor changes no motion, so
+/// the logarithmic slopes cancel.
+#[test]
+fn slopes_of_the_scale_symmetry_cancel() {
+    let values = rope().to_array();
+    let scaled = [DAMPING, STIFFNESS, MASS_PER_LENGTH, LEAD_MASS];
+    let (mut sum, mut sum_of_distances) = (vec![0.0; 13 * 23 * 3], 0.0);
+    for (index, (slopes, distance)) in
+        scaled
+            .into_iter()
+            .zip(central(&scaled, &[1e-5; 4], &options()))
+    {
+        assert!(largest(slopes.iter().map(|x| x * values[index])) > 1e-3);
+        for (sum, slope) in sum.iter_mut().zip(slopes) {
+            *sum += slope * values[index];
+        }
+        sum_of_distances += distance * values[index];
+    }
+    let left = largest(sum);
+    assert!(left < 1e-6, "{left} m per unit of the logarithm");
+    assert!(sum_of_distances.abs() < 1e-6, "{sum_of_distances}");
+    // The extra scale rules R_I here: it does little, the radius nothing.
+    let little = central(&[RADIUS, EXTRA_SCALE], &[1e-5; 2], &options());
+    assert_eq!(largest(little[0].0.iter().copied()), 0.0);
+    assert!(largest(little[1].0.iter().copied()) > 0.0);
+}
+
+/// Single precision, which the search for settling moves takes its slopes in, wants larger
+/// steps: these move the tip by millimetres, a hundred times its rounding.
+#[test]
+fn single_precision_comes_close_with_its_larger_steps() {
+    let indices = [LENGTH, DAMPING, STIFFNESS, MASS_PER_LENGTH, LEAD_MASS];
+    let double = central(&indices, &[1e-5; 5], &options());
+    let options = SimOptions {
+        precision: Precision::F32,
+        ..options()
+    };
+    let single = central(&indices, &[5e-3, 5e-2, 2e-2, 2e-2, 2e-2], &options);
+    for (index, ((a, _), (b, _))) in indices.into_iter().zip(double.into_iter().zip(single)) {
+        let error = largest(a.iter().zip(&b).map(|(a, b)| a - b)) / largest(a);
+        assert!(error < 0.02, "parameter {index}: {error}");
+    }
 }
 
 #[test]
