@@ -49,13 +49,16 @@ pub fn roll_out_in(
 /// [`SimOptions::precision`].
 ///
 /// # Errors
-/// As [`roll_out_in`].
+/// As [`roll_out_in`], and a kernel that this processor lacks.
 pub fn roll_out_in_with(
     kernel: Kernel,
     scene: &Scene,
     candidates: &[Candidate],
     options: &SimOptions,
 ) -> Result<Vec<Rollout>, SimulateError> {
+    if !kernel.is_available() {
+        return Err(SimulateError::KernelUnavailable(kernel));
+    }
     check(candidates, options)?;
     scene.check()?;
     let all: Vec<usize> = (0..candidates.len()).collect();

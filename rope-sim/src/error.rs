@@ -1,5 +1,6 @@
 //! Why a simulation is refused.
 
+use crate::lanes::Kernel;
 use crate::scene::SceneError;
 use crate::unusable::Unusable;
 use shared_types::rope::RopeError;
@@ -10,6 +11,9 @@ pub enum SimulateError {
     /// A field of [`crate::SimOptions`] has an unusable value.
     #[error("simulation option {0}")]
     Option(Unusable),
+    /// The kernel asked for needs instructions that this processor lacks.
+    #[error("this processor cannot run the kernel {0:?}")]
+    KernelUnavailable(Kernel),
     /// A frame lies outside the simulated time.
     #[error(
         "frames from {first_s} s to {last_s} s do not fit into the simulated 0 s to {horizon_s} s"

@@ -74,9 +74,9 @@ impl Kernel {
         }
     }
 
-    /// Runs `task` in this form; one that this processor lacks falls back to one rope in
-    /// double precision.
+    /// Runs `task` in this form, which this processor must have.
     pub(crate) fn run<T: LaneTask>(self, task: T) -> T::Output {
+        debug_assert!(self.is_available(), "{self:?}");
         #[cfg(target_arch = "x86_64")]
         match self {
             // SAFETY: the processor has AVX-512 F, DQ, VL, AVX2 and FMA, checked just before.
