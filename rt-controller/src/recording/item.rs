@@ -97,14 +97,16 @@ pub enum Item {
 }
 
 impl Item {
-    /// An item of layout 1 in today's: only states were written otherwise. `None`
-    /// when the state cannot be read.
-    pub(super) fn into_layout_2(mut self) -> Option<Self> {
+    /// An item of layout 1 in today's: only states were written otherwise. One that cannot
+    /// be read is left out, so that [`Keyframe::state`] gives none either.
+    pub(super) fn into_layout_2(mut self) -> Self {
         if let Self::Keyframe(keyframe) = &mut self {
             let state =
-                ControlState::read_layout_1(&keyframe.state, |id, hash| keyframe.motion(id, hash))?;
-            keyframe.state = Snapshot::of(&state)?.as_bytes().to_vec();
+                ControlState::read_layout_1(&keyframe.state, |id, hash| keyframe.motion(id, hash));
+            keyframe.state = state
+                .and_then(|state| Snapshot::of(&state))
+                .map_or_else(Vec::new, |snapshot| snapshot.as_bytes().to_vec());
         }
-        Some(self)
+        self
     }
 }

@@ -181,19 +181,16 @@ impl Iterator for LogReader<'_> {
                 return Some(Read::Flaw(flaw));
             }
         }
-        let item = postcard::take_from_bytes::<Item>(self.items)
-            .ok()
-            .and_then(|(item, rest)| match self.format {
-                chunk::FORMAT_1 => Some((item.into_layout_2()?, rest)),
-                _ => Some((item, rest)),
-            });
-        match item {
-            Some((item, rest)) => {
+        match postcard::take_from_bytes::<Item>(self.items) {
+            Ok((item, rest)) => {
                 self.items = rest;
-                Some(Read::Item(item))
+                Some(Read::Item(match self.format {
+                    chunk::FORMAT_1 => item.into_layout_2(),
+                    _ => item,
+                }))
             }
             // The checksum is right, so it was written by another layout.
-            None => {
+            Err(_) => {
                 self.items = &[];
                 Some(Read::Flaw(Flaw::Damaged {
                     offset: self.chunk_at,
@@ -206,7 +203,7 @@ impl Iterator for LogReader<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ChunkWriter, RecordedCycle};
+    use super::super::{ChunkWriter, Keyframe, RecordedCycle};
     use super::*;
 
     fn recording(cycles: u64) -> Vec<u8> {
@@ -274,6 +271,43 @@ mod tests {
                 before: 2
             }]
         );
+    }
+
+    /// Its cycles are read all the same; only a replay cannot begin there.
+    #[test]
+    fn a_keyframe_that_cannot_be_read_costs_nothing_else_of_its_chunk() {
+        let keyframe = Keyframe {
+            core: "of another time".to_owned(),
+            next_cycle: 1,
+            state: b"no state".to_vec(),
+            motions: Vec::new(),
+        };
+        let mut items = postcard::to_allocvec(&Item::Keyframe(Box::new(keyframe))).unwrap();
+        for cycle in 1..=3 {
+            let mut one = RecordedCycle::default();
+            one.input.cycle = cycle;
+            items.extend(postcard::to_allocvec(&Item::Cycle(Box::new(one))).unwrap());
+        }
+        for format in [chunk::FORMAT_1, chunk::FORMAT] {
+            let mut bytes = Vec::new();
+            chunk::write(&mut bytes, true, 0, 4, &items);
+            bytes[4..6].copy_from_slice(&format.to_le_bytes());
+            let mut crc = crc32fast::Hasher::new();
+            crc.update(&bytes[..20]);
+            crc.update(&items);
+            bytes[20..24].copy_from_slice(&crc.finalize().to_le_bytes());
+            let mut found = Vec::new();
+            for read in LogReader::open(&bytes).unwrap() {
+                match read {
+                    Read::Item(Item::Keyframe(keyframe)) => {
+                        assert!(keyframe.state().is_none(), "layout {format}");
+                    }
+                    Read::Item(Item::Cycle(c)) => found.push(c.input.cycle),
+                    other => panic!("layout {format}: {other:?}"),
+                }
+            }
+            assert_eq!(found, [1, 2, 3], "layout {format}");
+        }
     }
 
     #[test]
