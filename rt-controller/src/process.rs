@@ -73,14 +73,13 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
         broken,
         quit: Arc::clone(&threads.quit),
     };
-    for receiver in [
-        joints.spawn("joint reports", priority),
-        codes.spawn("arm status", None),
-    ] {
-        threads
-            .receivers
-            .push(receiver.map_err(ControllerError::Thread)?);
-    }
+    // Each is kept before the next is spawned: if that fails, it is ended and joined.
+    let receiver = joints.spawn("joint reports", priority);
+    let receiver = receiver.map_err(ControllerError::Thread)?;
+    threads.receivers.push(receiver);
+    let receiver = codes.spawn("arm status", None);
+    let receiver = receiver.map_err(ControllerError::Thread)?;
+    threads.receivers.push(receiver);
     let mut bridge = Bridge::open(
         &bus,
         ArmSettings::of(&config, limits, &settings.thresholds),
