@@ -178,7 +178,7 @@ mod tests {
     /// Over twenty minutes, with gaps of up to a second, it moves in nearly every cycle:
     /// its one motion is never lost.
     #[test]
-    fn the_twin_moves_all_the_time_and_keeps_its_motion() {
+    fn the_shadow_controller_moves_all_the_time_and_keeps_its_motion() {
         for interface in [
             CommandInterface::ServoPosition,
             CommandInterface::JointVelocity,

@@ -6,7 +6,7 @@ use crate::control::Thresholds;
 use crate::control::exchange::ControlCommand;
 use crate::control::limiter::Limiter;
 use arm_model::joint::START_POSE;
-use shared_types::ipc::{JointReport, Reports};
+use shared_types::ipc::{GuardianBeat, JointReport, Reports};
 
 /// Spoils the reports of a swing from its begin and gives the cause.
 fn swing_with(mut spoil: impl FnMut(usize, &mut JointReport)) -> Vec<ControlEvent> {
@@ -20,6 +20,38 @@ fn swing_with(mut spoil: impl FnMut(usize, &mut JointReport)) -> Vec<ControlEven
         bench.step(input);
     }
     bench.events
+}
+
+/// The other benches' guardian always beats.
+#[test]
+fn a_guardian_that_is_not_required_may_never_come() {
+    let mut bench = Bench::offline();
+    let settings = ControlSettings {
+        guardian_required: false,
+        ..Thresholds::relaxed().into()
+    };
+    bench.state = ControlState::new(Limits::default(), settings);
+    let cycles = |bench: &mut Bench, mut command: Option<ControlCommand>, count: usize| {
+        for _ in 0..count {
+            let mut input = bench.input(0);
+            input.guardian = GuardianBeat::default();
+            input.command = command.take();
+            bench.step(input);
+        }
+    };
+    let engage = ControlCommand::Engage { hold: START_POSE };
+    cycles(&mut bench, Some(engage), 101);
+    assert_eq!(bench.state.mode(), ControllerMode::Idle);
+    let run = ControlCommand::Run {
+        id: 7,
+        motion: Box::new(swing()),
+    };
+    // The swing takes 300 cycles; two seconds in all are four times the guardian's timeout.
+    cycles(&mut bench, Some(run), 400);
+    assert_eq!(bench.latched(), None);
+    assert_eq!(bench.state.mode(), ControllerMode::Idle);
+    let finished = |event: &ControlEvent| matches!(event, ControlEvent::Finished { id: 7, .. });
+    assert!(bench.events.iter().any(finished));
 }
 
 #[test]
@@ -170,7 +202,7 @@ fn a_disarmed_or_released_motion_brakes_in_the_very_cycle() {
 }
 
 #[test]
-fn a_tier_slows_nobody_down_silently_but_stops_what_is_too_fast() {
+fn an_operating_mode_slows_nobody_down_silently_but_stops_what_is_too_fast() {
     let mut bench = armed_bench();
     bench.command(ControlCommand::Arm(shared_types::Arming {
         operating_mode: OperatingMode::SetUp,
