@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 pub fn run(args: &DoctorArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let facts = Facts::read(Path::new("/")).with_room(Path::new("."));
+    let facts = Facts::read(Path::new("/")).with_processor_and_room(Path::new("."));
     let mut findings = judge(&facts);
     findings.push(network_finding());
     if let Some(ip) = args.address {

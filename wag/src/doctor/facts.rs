@@ -1,5 +1,6 @@
 //! What the system says about itself in `/proc`, `/sys` and `/dev`.
 
+use rope_sim::{Kernel, Precision};
 use std::path::Path;
 
 /// Capability to raise priorities, a bit of `CapEff`.
@@ -24,6 +25,8 @@ pub struct Facts {
     pub isolated: String,
     /// Clock source.
     pub clock: String,
+    /// What ropes are simulated with.
+    pub rope_kernel: Option<Kernel>,
     /// Runs of this program whose process is gone but whose shared memory is not.
     pub dead_runs: Vec<String>,
     /// Camera devices.
@@ -73,14 +76,16 @@ impl Facts {
                 .into_iter()
                 .filter(|name| name.starts_with("video"))
                 .collect(),
+            rope_kernel: None,
             shared_memory_mb: None,
             disk_mb: None,
         }
     }
 
-    /// Adds what only system calls tell.
-    pub fn with_room(self, folder: &Path) -> Self {
+    /// Adds what no file tells: the processor's vectors, and the room there is.
+    pub fn with_processor_and_room(self, folder: &Path) -> Self {
         Self {
+            rope_kernel: Some(Precision::F32.fastest_kernel()),
             shared_memory_mb: rt_controller::os::shared_memory_free_mb(),
             disk_mb: rustix::fs::statvfs(folder)
                 .ok()

@@ -1,6 +1,7 @@
 //! What the facts about a machine mean for a throw, and what to do about them.
 
 use super::{ArmLine, Facts, Finding, Verdict};
+use rope_sim::Kernel;
 
 /// Priority the control thread asks for.
 const PRIORITY: u64 = 80;
@@ -39,6 +40,16 @@ const fn pass_or_warn(good: bool) -> Verdict {
 pub fn judge(facts: &Facts) -> Vec<Finding> {
     let mut findings = real_time(facts).to_vec();
     findings.extend(room(facts));
+    findings.push(finding(
+        "vector instructions",
+        pass_or_warn(facts.rope_kernel.is_some_and(Kernel::is_single_precision)),
+        match facts.rope_kernel {
+            None => "the system does not say".to_owned(),
+            Some(Kernel::ScalarF64) => "neither AVX2 with FMA nor AVX-512".to_owned(),
+            Some(kernel) => format!("{} rope(s) at a time", kernel.lanes()),
+        },
+        "ropes are simulated one by one without them: identify and plan on another machine",
+    ));
     findings.push(finding(
         "camera",
         pass_or_warn(!facts.cameras.is_empty()),
@@ -219,6 +230,7 @@ mod tests {
             governors: vec!["performance".to_owned()],
             isolated: "3".to_owned(),
             clock: "tsc".to_owned(),
+            rope_kernel: Some(Kernel::Avx2F32),
             dead_runs: Vec::new(),
             cameras: vec!["video0".to_owned()],
             shared_memory_mb: Some(1000),
@@ -244,7 +256,7 @@ mod tests {
     fn each_fact_is_judged_by_itself() {
         type Case = (fn(&mut Facts), &'static str, Verdict);
         assert!(wrong(&good()).is_empty());
-        let cases: [Case; 9] = [
+        let cases: [Case; 10] = [
             (|f| f.preempt_rt = false, "kernel", Verdict::Warn),
             (|f| f.priority_max = 79, "real-time priority", Verdict::Warn),
             (|f| f.lock_max_bytes = 8 << 20, "memory lock", Verdict::Warn),
@@ -257,6 +269,11 @@ mod tests {
             (
                 |f| f.clock = "hpet".to_owned(),
                 "clock source",
+                Verdict::Warn,
+            ),
+            (
+                |f| f.rope_kernel = Some(Kernel::ScalarF64),
+                "vector instructions",
                 Verdict::Warn,
             ),
             (
