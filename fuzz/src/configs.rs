@@ -1,7 +1,7 @@
-//! Configuration: the controller's, and the limits.
+//! Configuration: the controller's, the limits, and the cell.
 
+use arm_model::{ArmResponse, Cell, Limits};
 use rt_controller::ControllerConfig;
-use arm_model::{ArmResponse, Limits};
 
 /// Reads `data` as each kind; what passes its checks resolves, and what was read
 /// can be written and read again.
@@ -29,6 +29,10 @@ pub fn run(data: &[u8]) {
         let written = toml::to_string(&limits).unwrap();
         assert_eq!(toml::from_str::<Limits>(&written).unwrap(), limits);
     }
+    if let Ok(cell) = toml::from_str::<Cell>(text) {
+        let written = toml::to_string(&cell).unwrap();
+        assert_eq!(toml::from_str::<Cell>(&written).unwrap(), cell);
+    }
     if let Ok(response) = toml::from_str::<ArmResponse>(text) {
         let _ = toml::to_string(&response).unwrap();
     }
@@ -40,6 +44,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
     vec![
         toml::to_string(&config).unwrap().into_bytes(),
         toml::to_string(&Limits::default()).unwrap().into_bytes(),
+        toml::to_string(&Cell::default()).unwrap().into_bytes(),
         b"[real_time]\npriority = 80\ncpu = 1\nlock_memory = true\nrequire = true\n".to_vec(),
     ]
 }

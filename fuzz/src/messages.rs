@@ -1,8 +1,17 @@
 //! Messages between the processes: requests and events of every service.
 
+use arm_model::joint::START_POSE;
+use arm_model::{Cell, Limits, Pole};
+use planner::PlannerConfig;
+use planner::observation::Appearance;
+use planner::plan::PlanRequest;
+use planner::ropes::random_rope;
+use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
+use planner::settle::SettleRequest;
+use planner::synthetic::side_camera;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use planner::service::{PlannerEvent, PlannerRequest};
+use shared_types::Task;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, ControllerEvent, ControllerRequest, RigEvent, RigRequest,
 };
@@ -44,16 +53,50 @@ pub fn run(data: &[u8]) {
     }
 }
 
+/// One of each kind that the planner takes.
+fn planner_requests() -> [PlannerRequest; 4] {
+    let config = PlannerConfig::default();
+    let rope = random_rope(1);
+    let goal = config.goal(Task::Strike, [0.95, 0.0, 0.2]);
+    [
+        PlannerRequest::Ping,
+        PlannerRequest::Identify(Box::new(IdentifyRequest {
+            first_stamp_ns: 1_000_000_000,
+            frames: 3,
+            camera: side_camera(),
+            joints: vec![(1_000_000_000, START_POSE)],
+            pole: Pole::default(),
+            appearance: Appearance::default(),
+            options: config.identify,
+        })),
+        PlannerRequest::Plan(Box::new(PlanRequest::new(goal, &rope, config.search))),
+        PlannerRequest::Settle(Box::new(SettleRequest {
+            rope,
+            times_s: vec![0.0],
+            q: vec![START_POSE],
+            start_s: 1.0,
+            start_q: START_POSE,
+            end_q: START_POSE,
+            limits: Limits::default(),
+            cell: Cell::default(),
+            config: config.settle,
+        })),
+    ]
+}
+
 /// Some of each kind.
 pub fn seeds() -> Vec<Vec<u8>> {
+    let planner = planner_requests().map(|r| postcard::to_allocvec(&r).unwrap());
     let with = |kind: u8, body: Vec<u8>| [vec![kind], body].concat();
     let bytes = |value: &ControllerRequest| postcard::to_allocvec(value).unwrap();
-    vec![
+    let mut seeds = vec![
         with(0, bytes(&ControllerRequest::Status)),
         with(0, bytes(&ControllerRequest::Latency)),
         with(8, postcard::to_allocvec(&CycleRecord::default()).unwrap()),
         with(9, postcard::to_allocvec(&InputRecord::default()).unwrap()),
         with(10, postcard::to_allocvec(&CauseRecord::default()).unwrap()),
         with(0, encode("fuzz", &ControllerRequest::Status).unwrap()),
-    ]
+    ];
+    seeds.extend(planner.map(|body| with(2, body)));
+    seeds
 }
