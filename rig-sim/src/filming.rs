@@ -7,13 +7,12 @@ use super::record::Record;
 use crate::render::{Renderer, RopeShape, ScenePose};
 use shared_types::MonotonicNs;
 use shared_types::ipc::{
-    Bus, FrameHeader, FramePublisher, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
+    Bus, FRAME_SERVICE, FrameHeader, FramePublisher, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use xarm_sim::clock;
 
-const SERVICE: &str = "wag/v1/camera/frames";
 /// Delay beyond the camera's latency at which frames are dropped (s).
 const BACKLOG_S: f64 = 0.12;
 /// Longest sleep before `stop` is looked at again.
@@ -125,11 +124,11 @@ fn publish(
 ) -> Result<(), RigError> {
     let mut frame = publisher
         .loan_slice(renderer.frame_bytes())
-        .map_err(IpcError::transfer(SERVICE))?;
+        .map_err(IpcError::transfer(FRAME_SERVICE))?;
     *frame.user_header_mut() = header;
     renderer.render(poses, header.sequence, frame.payload_mut());
     clock::sleep_until(arrives);
-    frame.send().map_err(IpcError::transfer(SERVICE))?;
+    frame.send().map_err(IpcError::transfer(FRAME_SERVICE))?;
     Ok(())
 }
 

@@ -4,11 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use shared_types::ipc::{Bus, FrameHeader, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV};
+use shared_types::ipc::{
+    Bus, FRAME_SERVICE, FrameHeader, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
+};
 
 use super::{LiveCamera, LiveError, LiveSettings};
 
-const SERVICE: &str = "wag/v1/camera/frames";
 /// How long a camera may be silent.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Losses are logged at most every so many frames.
@@ -59,7 +60,7 @@ pub(super) fn publish(
         let frame = camera.next(PATIENCE)?;
         let mut sample = publisher
             .loan_slice_uninit(frame_bytes)
-            .map_err(IpcError::transfer(SERVICE))?;
+            .map_err(IpcError::transfer(FRAME_SERVICE))?;
         *sample.user_header_mut() = FrameHeader {
             version: PAYLOAD_VERSION,
             pixel_format: PIXEL_FORMAT_YUYV,
@@ -71,7 +72,7 @@ pub(super) fn publish(
         sample
             .write_from_slice(frame.bytes)
             .send()
-            .map_err(IpcError::transfer(SERVICE))?;
+            .map_err(IpcError::transfer(FRAME_SERVICE))?;
         let lost = camera.losses();
         if lost.total() > logged && camera.frames().is_multiple_of(LOG_EVERY) {
             tracing::warn!(?lost, frames = camera.frames(), "the camera loses frames");

@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 use arm_model::Cell;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
-    Bus, FrameHeader, FrameSubscriber, IpcError, JointSubscriber, PIXEL_FORMAT_YUYV, PreviewFrame,
-    PreviewPublisher, PreviewState,
+    Bus, FRAME_SERVICE, FrameHeader, FrameSubscriber, IpcError, JOINT_SERVICE, JointSubscriber,
+    PIXEL_FORMAT_YUYV, PREVIEW_SERVICE, PreviewFrame, PreviewPublisher, PreviewState,
 };
 
 use crate::calib::{CalibError, load_camera};
@@ -165,7 +165,7 @@ impl Ports {
 
     /// The left image of the newest frame; all frames have gone back to the camera then.
     fn newest(&self) -> Result<Option<Arrived>, IpcError> {
-        let failed = IpcError::transfer("wag/v1/camera/frames");
+        let failed = IpcError::transfer(FRAME_SERVICE);
         let mut newest = None;
         while let Some(sample) = self.frames.receive().map_err(&failed)? {
             newest = Some(sample);
@@ -184,7 +184,7 @@ impl Ports {
     }
 
     fn take_joints(&self, preview: &mut Preview) -> Result<(), IpcError> {
-        let failed = IpcError::transfer("wag/v1/controller/joints");
+        let failed = IpcError::transfer(JOINT_SERVICE);
         while let Some(report) = self.joints.receive().map_err(&failed)? {
             preview.report(report.stamp_ns, &report.q);
         }
@@ -193,7 +193,7 @@ impl Ports {
 
     fn publish(&self, found: &PreviewFrame) -> Result<(), IpcError> {
         let sent = self.out.send_copy(*found);
-        sent.map_err(IpcError::transfer("wag/v2/camera/preview"))
+        sent.map_err(IpcError::transfer(PREVIEW_SERVICE))
             .map(|_| ())
     }
 }

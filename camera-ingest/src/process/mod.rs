@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress};
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{
-    Bus, FrameHeader, FrameSubscriber, IpcError, KeypointPublisher, PIXEL_FORMAT_YUYV,
+    Bus, FRAME_SERVICE, FrameHeader, FrameSubscriber, IpcError, KeypointPublisher,
+    PIXEL_FORMAT_YUYV,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -127,7 +128,7 @@ impl Process {
     fn take_frames(&mut self) -> Result<bool, IpcError> {
         let mut any = false;
         loop {
-            let failed = IpcError::transfer("wag/v1/camera/frames");
+            let failed = IpcError::transfer(FRAME_SERVICE);
             let sample = self.frames.receive().map_err(failed)?;
             let Some(sample) = sample else { break };
             any = true;

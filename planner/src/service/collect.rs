@@ -1,7 +1,7 @@
 //! Keypoint frames as they are published, kept until asked for.
 
 use super::error::ServiceError;
-use shared_types::ipc::{Bus, IpcError, KeypointSubscriber};
+use shared_types::ipc::{Bus, IpcError, KEYPOINT_SERVICE, KeypointSubscriber};
 use shared_types::keypoints::{KeypointFrame, KeypointTrack};
 use std::collections::VecDeque;
 
@@ -24,7 +24,7 @@ impl Collector {
     /// Takes in what was published.
     pub(super) fn drain(&mut self) -> Result<(), IpcError> {
         loop {
-            let failed = IpcError::transfer("wag/v1/camera/keypoints");
+            let failed = IpcError::transfer(KEYPOINT_SERVICE);
             let sample = self.subscriber.receive().map_err(failed)?;
             let Some(sample) = sample else { return Ok(()) };
             if self.frames.len() == KEEP {

@@ -37,21 +37,28 @@ pub type ChunkPublisher = Publisher<Transport, [u8], ()>;
 /// Receives the chunks of a recording.
 pub type ChunkSubscriber = Subscriber<Transport, [u8], ()>;
 
-const FRAMES: &str = "wag/v1/camera/frames";
+/// Service of [`Bus::frame_publisher`].
+pub const FRAME_SERVICE: &str = "wag/v1/camera/frames";
+/// Service of [`Bus::keypoint_publisher`].
+pub const KEYPOINT_SERVICE: &str = "wag/v1/camera/keypoints";
+/// Service of [`Bus::preview_publisher`].
+// Version 2: its payload carries a keypoint frame.
+pub const PREVIEW_SERVICE: &str = "wag/v2/camera/preview";
+/// Service of [`Bus::joint_publisher`].
+pub const JOINT_SERVICE: &str = "wag/v1/controller/joints";
 const RECORDING: &str = "wag/v1/controller/recording";
 
 /// A service of records: its name, and how many are kept for a subscriber.
 type Topic = (&'static str, usize);
 
 /// A whole wiggle and more.
-const KEYPOINTS: Topic = ("wag/v1/camera/keypoints", 1024);
+const KEYPOINTS: Topic = (KEYPOINT_SERVICE, 1024);
 /// A second of them. Who comes late wants the newest.
-// Version 2: its payload carries a keypoint frame.
-const PREVIEW: Topic = ("wag/v2/camera/preview", 64);
+const PREVIEW: Topic = (PREVIEW_SERVICE, 64);
 /// Four seconds.
 const CYCLES: Topic = ("wag/v1/controller/cycles", 1024);
 /// Four seconds.
-const JOINTS: Topic = ("wag/v1/controller/joints", 1024);
+const JOINTS: Topic = (JOINT_SERVICE, 1024);
 
 /// The run that a record belongs to, its recorder, a page that looks on, the one that works
 /// on frames or previews them, and a recorder that joined late, with its exact recording.
@@ -120,7 +127,7 @@ impl Bus {
     fn frames(
         &self,
     ) -> Result<publish_subscribe::PortFactory<Transport, [u8], FrameHeader>, IpcError> {
-        self.service(FRAMES)?
+        self.service(FRAME_SERVICE)?
             .publish_subscribe::<[u8]>()
             .user_header::<FrameHeader>()
             .max_publishers(1)
@@ -131,7 +138,7 @@ impl Bus {
             .history_size(0)
             .enable_safe_overflow(true)
             .open_or_create()
-            .map_err(open_error(FRAMES))
+            .map_err(open_error(FRAME_SERVICE))
     }
 
     /// Publishes frames of at most `frame_bytes` bytes. One per domain.
@@ -144,7 +151,7 @@ impl Bus {
             .initial_max_slice_len(frame_bytes)
             .max_loaned_samples(1)
             .create()
-            .map_err(open_error(FRAMES))
+            .map_err(open_error(FRAME_SERVICE))
     }
 
     /// Receives frames; a slow reader loses the oldest, never slows the camera.
@@ -156,7 +163,7 @@ impl Bus {
             .subscriber_builder()
             .buffer_size(FRAME_BUFFER)
             .create()
-            .map_err(open_error(FRAMES))
+            .map_err(open_error(FRAME_SERVICE))
     }
 
     fn records<T: core::fmt::Debug + ZeroCopySend + 'static>(

@@ -50,9 +50,10 @@ mod sweep;
 pub use boards::{ControllerBoards, GuardianEnd, OperatorEnd, OperatorReader, StateReader};
 #[cfg(feature = "std")]
 pub use bus::{
-    Bus, ChunkPublisher, ChunkSubscriber, CyclePublisher, CycleSubscriber, FramePublisher,
-    FrameSubscriber, JointPublisher, JointSubscriber, KeypointPublisher, KeypointSubscriber,
-    PreviewPublisher, PreviewSubscriber,
+    Bus, ChunkPublisher, ChunkSubscriber, CyclePublisher, CycleSubscriber, FRAME_SERVICE,
+    FramePublisher, FrameSubscriber, JOINT_SERVICE, JointPublisher, JointSubscriber,
+    KEYPOINT_SERVICE, KeypointPublisher, KeypointSubscriber, PREVIEW_SERVICE, PreviewPublisher,
+    PreviewSubscriber,
 };
 pub use cause::{CauseRecord, LimitBroken, RunCounts};
 #[cfg(feature = "std")]
