@@ -91,8 +91,12 @@ pub fn obstacle_depth_m(
     cell: Option<&Cell>,
     obstacles: &[Obstacle],
 ) -> f64 {
-    /// Balls along a stick.
-    const BALLS: u8 = 4;
+    /// Largest gap between the centres of balls along a stick, in its radii.
+    const GAP_MAX_RADII: f64 = 6.5;
+    /// The same for a stick as thin as a wire (m).
+    const WIRE_GAP_MAX_M: f64 = 0.02;
+    /// Fewest gaps along a stick, and most.
+    const GAPS: (u32, u32) = (4, 1000);
     const TOOL_RADIUS_M: f64 = 0.01;
     let (flange, attitude) = kinematics::flange_pose(q);
     let tool = Capsule {
@@ -113,8 +117,11 @@ pub fn obstacle_depth_m(
         radius_m,
     } in moving
     {
-        for k in 0..=BALLS {
-            let centre = a + (b - a) * (f64::from(k) / f64::from(BALLS));
+        let gap_m = (GAP_MAX_RADII * radius_m).max(WIRE_GAP_MAX_M);
+        let gaps = ((b - a).norm() / gap_m).ceil() as u32;
+        let gaps = gaps.clamp(GAPS.0, GAPS.1);
+        for k in 0..=gaps {
+            let centre = a + (b - a) * (f64::from(k) / f64::from(gaps));
             for obstacle in obstacles.iter().chain(standing.iter().flatten()) {
                 depth_m = depth_m.max(obstacle.depth_m(&centre, radius_m));
             }
@@ -177,5 +184,21 @@ mod tests {
         cell.pole.length_m += 0.1;
         let depth_m = obstacle_depth_m(&q, &Vector3::zeros(), Some(&cell), &[]);
         assert!((depth_m - (pole.radius_m + 0.03)).abs() < 1e-9, "{depth_m}");
+    }
+
+    #[test]
+    fn a_long_pole_meets_a_thin_shelf_anywhere_along_it() {
+        let mut cell = Cell::default();
+        cell.pole.length_m = 1.0;
+        cell.floor_z_m = -2.0;
+        for top_m in [-0.02, -0.2, -0.45, -0.7] {
+            let shelf = Obstacle::Box {
+                min_m: [0.1, -0.1, top_m - 0.06],
+                max_m: [0.3, 0.1, top_m],
+            };
+            let depth_m =
+                obstacle_depth_m(&JointVector::ZERO, &Vector3::zeros(), Some(&cell), &[shelf]);
+            assert!(depth_m > cell.pole.radius_m, "{top_m}: {depth_m}");
+        }
     }
 }
