@@ -10,7 +10,7 @@ use crate::unusable::Unusable;
 use crate::watch::{Watch, Watched};
 use shared_types::RopeParams;
 
-/// Most steps of one rollout; more is a mistake in step or horizon.
+/// Most steps of one rollout, and most frames; more is a mistake in step or horizon.
 const MAX_STEPS: f64 = 1e8;
 
 /// State of the rope at t = 0, at rest in the world.
@@ -168,6 +168,9 @@ fn check_numbers(options: &SimOptions) -> Result<(), Unusable> {
     Unusable::unless("step_s", need, [options.step_s], few)?;
     if options.frames.count > 0 {
         Unusable::unless_positive("frames.period_s", options.frames.period_s)?;
+        let need = "is more than 1e8 frames; lengthen their period";
+        let count = options.frames.count as f64;
+        Unusable::unless("frames.count", need, [count], |count| count <= MAX_STEPS)?;
     }
     options.watch.check(options.horizon_s)?;
     if let Start::Straight { joint0_rotvec } = options.start {

@@ -231,6 +231,10 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         (option(|o| o.step_s = 0.0), ["`step_s` is 0", "above 0"]),
         (option(|o| o.step_s = 1e-12), ["`step_s`", "1e8 steps"]),
         (
+            option(|o| o.frames.count = usize::MAX),
+            ["`frames.count`", "1e8 frames"],
+        ),
+        (
             option(|o| o.horizon_s = f64::NAN),
             ["`horizon_s` is NaN", "finite"],
         ),

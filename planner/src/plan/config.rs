@@ -1,5 +1,6 @@
 //! What is tuned about throws of every task, and the size of their search.
 
+use super::error::PlanError;
 use super::trajopt::{Clearance, Dimensions, WAYPOINTS};
 use crate::collide::ContactCounts;
 use arm_model::JOINTS;
@@ -157,6 +158,72 @@ impl Default for ThrowConfig {
     }
 }
 
+/// Most generations of one search.
+const GENERATIONS_MAX: f64 = 1e7;
+/// Most candidates of one generation, and most draws of one candidate.
+const COUNT_MAX: f64 = 1e4;
+
+impl ThrowConfig {
+    /// Refuses what would hide collisions, or take a search without end.
+    pub(super) fn check(&self) -> Result<(), PlanError> {
+        let within = PlanError::unless_within;
+        for time_s in self.waypoint_times_s {
+            within("waypoint_times_s", time_s, 0.0..=30.0, "from 0 to 30 s")?;
+        }
+        for (option, tail_s) in [
+            ("tail_s", self.tail_s),
+            ("observed_s", self.observed_s),
+            ("contact_tail_s", self.contact_tail_s),
+        ] {
+            within(option, tail_s, 0.0..=30.0, "from 0 to 30 s")?;
+        }
+        let period_s = self.contact_period_s;
+        within(
+            "contact_period_s",
+            period_s,
+            1e-3..=1.0,
+            "from 0.001 to 1 s",
+        )?;
+        for (option, number) in [
+            ("weights.rope_contact", self.weights.rope_contact),
+            ("weights.pole_contact", self.weights.pole_contact),
+            ("weights.base_contact", self.weights.base_contact),
+            ("clearance.tool_m", self.clearance.tool_m),
+        ] {
+            within(option, number, 0.0..=f64::MAX, "finite and 0 or more")?;
+        }
+        PlanError::unless_finite([
+            ("weights.distance_per_m", self.weights.distance_per_m),
+            ("weights.proximity", self.weights.proximity),
+            ("weights.motion_per_rad", self.weights.motion_per_rad),
+            (
+                "weights.speed_excess_per_rad_s",
+                self.weights.speed_excess_per_rad_s,
+            ),
+        ])?;
+        let (generations, draws) = (self.generations as f64, self.draws_max as f64);
+        within(
+            "generations",
+            generations,
+            0.0..=GENERATIONS_MAX,
+            "at most 10000000",
+        )?;
+        within("draws_max", draws, 0.0..=COUNT_MAX, "at most 10000")?;
+        let Robustness {
+            finalists,
+            polished,
+            ..
+        } = self.robustness;
+        for (option, count) in [
+            ("robustness.finalists", finalists),
+            ("robustness.polished", polished),
+        ] {
+            within(option, count as f64, 0.0..=1e3, "at most 1000")?;
+        }
+        Ok(())
+    }
+}
+
 /// Size of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -203,5 +270,31 @@ impl Default for PlanOptions {
             good_enough_m: 1e-3,
             stop_below_m: None,
         }
+    }
+}
+
+impl PlanOptions {
+    /// Refuses what cannot be searched with, or never ends.
+    pub(super) fn check(&self) -> Result<(), PlanError> {
+        let within = PlanError::unless_within;
+        for (option, step_s) in [
+            ("step_s", self.step_s),
+            ("search_step_s", self.search_step_s),
+        ] {
+            let range = f64::MIN_POSITIVE..=5e-3;
+            within(option, step_s, range, "above 0 and at most 0.005 s")?;
+        }
+        let stretch = self.segment_stretch_max;
+        within("segment_stretch_max", stretch, 1.0..=2.0, "from 1 to 2")?;
+        let population = self.population as f64;
+        within("population", population, 4.0..=COUNT_MAX, "from 4 to 10000")?;
+        let generations = self.generations.map_or(1.0, |count| count as f64);
+        within(
+            "generations",
+            generations,
+            1.0..=GENERATIONS_MAX,
+            "from 1 to 10000000",
+        )?;
+        within("searches", self.searches as f64, 0.0..=1e3, "at most 1000")
     }
 }

@@ -5,7 +5,7 @@
 //! the end: its middle on the edge, its tip below it on the far side, at rest.
 
 use super::trajopt::PolePose;
-use super::{PlanarScene, ThrowConfig, ThrowOutcome, ThrowTask, verdict};
+use super::{PlanError, PlanarScene, ThrowConfig, ThrowOutcome, ThrowTask, verdict};
 use crate::collide::Block;
 use arm_model::Cell;
 use nalgebra::Vector3;
@@ -67,6 +67,20 @@ impl Default for DrapeConfig {
             moving_per_m: 0.5,
             condition: 0.3,
         }
+    }
+}
+
+impl DrapeConfig {
+    /// Refuses numbers of its own that are not finite.
+    pub(super) fn check(&self) -> Result<(), PlanError> {
+        PlanError::unless_finite([
+            ("arc_height_m", self.arc_height_m),
+            ("arc_per_m", self.arc_per_m),
+            ("tip_per_m", self.tip_per_m),
+            ("middle_per_m", self.middle_per_m),
+            ("moving_per_m", self.moving_per_m),
+            ("condition", self.condition),
+        ])
     }
 }
 

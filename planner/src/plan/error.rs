@@ -7,6 +7,7 @@ use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
 use shared_types::ipc::message::Progress;
 use shared_types::rope::RopeError;
+use std::ops::RangeInclusive;
 
 /// How far a search has come, reported after every generation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,6 +121,32 @@ pub enum PlanError {
 }
 
 impl PlanError {
+    /// Refuses a number that is not one of the range.
+    pub(super) fn unless_within(
+        option: &'static str,
+        value: f64,
+        range: RangeInclusive<f64>,
+        expected: &'static str,
+    ) -> Result<(), Self> {
+        if range.contains(&value) {
+            return Ok(());
+        }
+        Err(Self::Option {
+            option,
+            value,
+            expected,
+        })
+    }
+
+    /// Refuses numbers that are not finite.
+    pub(super) fn unless_finite(
+        numbers: impl IntoIterator<Item = (&'static str, f64)>,
+    ) -> Result<(), Self> {
+        numbers.into_iter().try_for_each(|(option, value)| {
+            Self::unless_within(option, value, f64::MIN..=f64::MAX, "finite")
+        })
+    }
+
     /// Whether another request would help.
     #[must_use]
     pub fn is_input(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Any of the tasks, as it stands in a request.
 
-use super::{Drape, Lob, Strike, ThrowTask};
+use super::{Drape, Lob, PlanError, Strike, ThrowTask};
 use serde::{Deserialize, Serialize};
 use shared_types::Task;
 
@@ -23,6 +23,15 @@ impl ThrowGoal {
             Self::Strike(task) => task,
             Self::Lob(task) => task,
             Self::Drape(task) => task,
+        }
+    }
+
+    /// Refuses numbers of the task's own that are not finite.
+    pub(super) fn check(&self) -> Result<(), PlanError> {
+        match self {
+            Self::Strike(_) => Ok(()),
+            Self::Lob(task) => task.config.check(),
+            Self::Drape(task) => task.config.check(),
         }
     }
 

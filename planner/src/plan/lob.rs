@@ -7,7 +7,8 @@
 
 use super::trajopt::PolePose;
 use super::{
-    PlanarScene, Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward, verdict,
+    PlanError, PlanarScene, Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward,
+    verdict,
 };
 use crate::collide::Block;
 use arm_model::Cell;
@@ -75,6 +76,18 @@ impl Default for LobConfig {
             stay: 0.4,
             end_per_m: 1.0,
         }
+    }
+}
+
+impl LobConfig {
+    /// Refuses numbers of its own that are not finite.
+    pub(super) fn check(&self) -> Result<(), PlanError> {
+        PlanError::unless_finite([
+            ("dwell_per_s", self.dwell_per_s),
+            ("domino", self.domino),
+            ("stay", self.stay),
+            ("end_per_m", self.end_per_m),
+        ])
     }
 }
 

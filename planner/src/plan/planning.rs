@@ -4,8 +4,7 @@ use super::finalists::Finalist;
 use super::robust::{forecast, least_risk, search_around};
 use super::setup::{Count, Setup};
 use super::{
-    PlanError, PlanOptions, PlanProgress, PlanRequest, ThrowOutcome, ThrowTask, check_reach,
-    clear_of_arm,
+    PlanError, PlanProgress, PlanRequest, ThrowOutcome, ThrowTask, check_reach, clear_of_arm,
 };
 use arm_model::JointTrajectory;
 use arm_model::limits::LimitKind;
@@ -36,7 +35,9 @@ pub fn plan_task(
 ) -> Result<Plan, PlanError> {
     let target_m = task.target_m();
     request.rope.validate()?;
-    check_options(&request.options)?;
+    request.options.check()?;
+    task.config().check()?;
+    request.goal.check()?;
     check_reach(target_m, request.rope.length_m, &request.cell)?;
     clear_of_arm(target_m, &request.cell)?;
     let setup = Setup::new(task, request)?;
@@ -69,41 +70,6 @@ pub fn plan_task(
         simulations: count.simulations,
     })?;
     setup.finish(chosen, count)
-}
-
-fn check_options(options: &PlanOptions) -> Result<(), PlanError> {
-    const STEP: &str = "above 0 and at most 0.005 s";
-    let step = |value: f64| value > 0.0 && value <= 5e-3;
-    let stretch = options.segment_stretch_max;
-    let rules = [
-        ("step_s", options.step_s, step(options.step_s), STEP),
-        (
-            "search_step_s",
-            options.search_step_s,
-            step(options.search_step_s),
-            STEP,
-        ),
-        (
-            "segment_stretch_max",
-            stretch,
-            (1.0..=2.0).contains(&stretch),
-            "from 1 to 2",
-        ),
-        (
-            "generations",
-            0.0,
-            options.generations != Some(0),
-            "1 or more",
-        ),
-    ];
-    match rules.into_iter().find(|(_, _, holds, _)| !holds) {
-        Some((option, value, _, expected)) => Err(PlanError::Option {
-            option,
-            value,
-            expected,
-        }),
-        None => Ok(()),
-    }
 }
 
 impl Setup<'_> {

@@ -56,7 +56,7 @@ impl ReachMap {
     /// the threads.
     ///
     /// # Errors
-    /// A rope that is not physical, limits under which nothing moves.
+    /// A rope that is not physical, a value out of range, limits under which nothing moves.
     pub fn explore(
         rope: &RopeParams,
         limits: &Limits,
@@ -66,6 +66,7 @@ impl ReachMap {
         threads: usize,
     ) -> Result<Self, PlanError> {
         rope.validate()?;
+        config.check()?;
         let space = WaypointSpace {
             start: start_pose_for([1.0, 0.0, 0.0]),
             dimensions: Dimensions::Planar,

@@ -131,6 +131,114 @@ fn impossible_requests_are_refused_before_any_simulation() {
     assert!(!called);
 }
 
+/// Values that would hide collisions, or keep the planner busy for ever.
+#[test]
+fn values_out_of_range_are_refused_by_name() {
+    fn strike(r: &mut PlanRequest) -> &mut ThrowConfig {
+        match &mut r.goal {
+            ThrowGoal::Strike(strike) => &mut strike.config,
+            other => panic!("{other:?}"),
+        }
+    }
+    fn lob(r: &mut PlanRequest, config: LobConfig) {
+        let target_m = r.goal.task().target_m();
+        r.goal = ThrowGoal::Lob(Lob { target_m, config });
+    }
+    fn drape(r: &mut PlanRequest, config: DrapeConfig) {
+        let target_m = r.goal.task().target_m();
+        r.goal = ThrowGoal::Drape(Drape { target_m, config });
+    }
+    type Change = fn(&mut PlanRequest);
+    let cases: [(Change, &str, &str); 17] = [
+        (|r| strike(r).tail_s = 1e9, "tail_s", "30 s"),
+        (|r| strike(r).observed_s = f64::NAN, "observed_s", "30 s"),
+        (
+            |r| strike(r).contact_tail_s = -1e9,
+            "contact_tail_s",
+            "30 s",
+        ),
+        (
+            |r| strike(r).contact_period_s = 0.0,
+            "contact_period_s",
+            "0.001",
+        ),
+        (
+            |r| strike(r).contact_period_s = 1e-12,
+            "contact_period_s",
+            "0.001",
+        ),
+        (
+            |r| strike(r).contact_period_s = 2.0,
+            "contact_period_s",
+            "1 s",
+        ),
+        (
+            |r| strike(r).waypoint_times_s[2] = 1e9,
+            "waypoint_times_s",
+            "30 s",
+        ),
+        (
+            |r| strike(r).weights.pole_contact = -1.0,
+            "weights.pole_contact",
+            "0 or more",
+        ),
+        (
+            |r| strike(r).weights.proximity = f64::NAN,
+            "weights.proximity",
+            "finite",
+        ),
+        (
+            |r| strike(r).clearance.tool_m = f64::NAN,
+            "clearance.tool_m",
+            "finite",
+        ),
+        (|r| strike(r).draws_max = usize::MAX, "draws_max", "10000"),
+        (
+            |r| strike(r).robustness.finalists = usize::MAX,
+            "robustness.finalists",
+            "1000",
+        ),
+        (|r| r.options.population = usize::MAX, "population", "10000"),
+        (|r| r.options.population = 3, "population", "4"),
+        (|r| r.options.generations = Some(0), "generations", "1"),
+        (
+            |r| {
+                lob(
+                    r,
+                    LobConfig {
+                        stay: f64::NAN,
+                        ..LobConfig::default()
+                    },
+                )
+            },
+            "stay",
+            "finite",
+        ),
+        (
+            |r| {
+                drape(
+                    r,
+                    DrapeConfig {
+                        arc_per_m: f64::INFINITY,
+                        ..DrapeConfig::default()
+                    },
+                )
+            },
+            "arc_per_m",
+            "finite",
+        ),
+    ];
+    for (change, key, limit) in cases {
+        let mut r = request([0.9, 0.0, 0.2]);
+        change(&mut r);
+        let error = plan(&r, &mut |_| panic!("{key} was not refused")).unwrap_err();
+        assert!(error.is_input(), "{error}");
+        let sentence = error.to_string();
+        assert!(sentence.contains(&format!("`{key}`")), "{sentence}");
+        assert!(sentence.contains(limit), "{sentence}");
+    }
+}
+
 #[test]
 fn an_interrupted_search_leaves_the_best_so_far() {
     let mut generations = 0;
