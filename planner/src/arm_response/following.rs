@@ -26,6 +26,16 @@ pub enum FollowError {
         /// Joint, 1-based.
         joint: usize,
     },
+    /// A value of a response that was sent is out of range.
+    #[error("the arm's response: `{key}` is {value}, but must be {expected}")]
+    Value {
+        /// Its name.
+        key: &'static str,
+        /// What was sent.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
     /// The motion makes no trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
@@ -33,11 +43,62 @@ pub enum FollowError {
 
 /// How each joint follows the staircase of setpoints of one controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "FollowingForm")]
 pub struct Following {
     joints: [Option<Lag>; JOINTS],
     source: String,
     /// Time from setpoint to setpoint (s).
     period_s: f64,
+}
+
+/// What is sent: the same, not yet checked.
+#[derive(Deserialize)]
+struct FollowingForm {
+    joints: [Option<Lag>; JOINTS],
+    source: String,
+    period_s: f64,
+}
+
+/// The ranges are those of [`ArmResponse`]'s file and of the rate in [`Limits`].
+impl TryFrom<FollowingForm> for Following {
+    type Error = FollowError;
+    fn try_from(form: FollowingForm) -> Result<Self, FollowError> {
+        const HZ: f64 = core::f64::consts::TAU;
+        let within = |key, value: f64, [low, high]: [f64; 2], expected| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(FollowError::Value {
+                key,
+                value,
+                expected,
+            })
+        };
+        let periods_s = [1.0 / 250.0, 1.0 / 30.0];
+        within("period_s", form.period_s, periods_s, "from 1/250 to 1/30 s")?;
+        for lag in form.joints.iter().flatten() {
+            let frequency_rad_s = lag.natural_frequency_rad_s;
+            let frequencies = [0.1 * HZ, 500.0 * HZ];
+            within("dead_time_s", lag.dead_time_s, [0.0, 1.0], "from 0 to 1 s")?;
+            within(
+                "natural_frequency_rad_s",
+                frequency_rad_s,
+                frequencies,
+                "0.1 to 500 Hz",
+            )?;
+            within(
+                "damping_ratio",
+                lag.damping_ratio,
+                [0.01, 10.0],
+                "from 0.01 to 10",
+            )?;
+        }
+        Ok(Self {
+            joints: form.joints,
+            source: form.source,
+            period_s: form.period_s,
+        })
+    }
 }
 
 impl Following {
@@ -171,6 +232,46 @@ mod tests {
         }
         let undelayed = (motion.state_at(0.3).q - command.state_at(0.3).q).max_abs();
         assert!(undelayed > 0.02, "{undelayed}");
+    }
+
+    #[test]
+    fn a_response_that_is_sent_is_checked() {
+        let good = Following::new(&response(&[(3, 0.02, 12.0)]), &Limits::default());
+        let sent = |following: &Following| {
+            let bytes = serde_json::to_vec(following).unwrap();
+            serde_json::from_slice::<Following>(&bytes)
+        };
+        assert!(sent(&good).is_ok());
+        let cases: [(&str, fn(&mut Following, f64), f64); 6] = [
+            ("period_s", |f, v| f.period_s = v, 1e-12),
+            ("period_s", |f, v| f.period_s = v, 1.0),
+            (
+                "dead_time_s",
+                |f, v| f.joints[3].as_mut().unwrap().dead_time_s = v,
+                1e9,
+            ),
+            (
+                "dead_time_s",
+                |f, v| f.joints[3].as_mut().unwrap().dead_time_s = v,
+                -0.1,
+            ),
+            (
+                "natural_frequency_rad_s",
+                |f, v| f.joints[3].as_mut().unwrap().natural_frequency_rad_s = v,
+                0.0,
+            ),
+            (
+                "damping_ratio",
+                |f, v| f.joints[3].as_mut().unwrap().damping_ratio = v,
+                -1.0,
+            ),
+        ];
+        for (key, change, value) in cases {
+            let mut wrong = good.clone();
+            change(&mut wrong, value);
+            let error = sent(&wrong).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
+        }
     }
 
     #[test]
