@@ -8,7 +8,7 @@ use super::descent::Iterate;
 use super::error::IdentifyError;
 use super::film::Film;
 use super::linear;
-use super::options::{IdentifyOptions, check};
+use super::options::IdentifyOptions;
 use super::out_of_distribution::out_of_distribution;
 use super::posterior::posterior;
 use super::propose::{fast_search, from_proposal};
@@ -47,7 +47,6 @@ pub(super) fn fit(
     start: &Start,
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
-    check(observation, options)?;
     let film = Film::new(observation, options);
     let fit = Fit {
         clock: clock_window(

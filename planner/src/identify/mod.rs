@@ -55,23 +55,23 @@ pub fn identify(
     network: Option<&PhiNet>,
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
+    options::check(observation, options)?;
     let start = match options.method {
         Method::Cmaes => Start::Cmaes,
         Method::HybridSearch => Start::FastSearch,
         asks @ (Method::Network | Method::Hybrid) => {
-            let built_in = match network {
-                None => Some(PhiNet::embedded()?),
-                Some(_) => None,
+            let built_in;
+            let net = match network {
+                Some(net) => net,
+                None => {
+                    built_in = PhiNet::embedded()?;
+                    &built_in
+                }
             };
-            match network.or(built_in.as_ref()) {
-                Some(net) if asks == Method::Network => {
-                    return network::estimate(net, observation, options);
-                }
-                Some(net) => {
-                    network::proposal(net, observation)?.map_or(Start::FastSearch, Start::Proposal)
-                }
-                None => Start::FastSearch,
+            if asks == Method::Network {
+                return network::estimate(net, observation, options);
             }
+            network::proposal(net, observation)?.map_or(Start::FastSearch, Start::Proposal)
         }
     };
     fit(observation, options, &start, progress)

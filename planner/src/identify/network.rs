@@ -6,7 +6,7 @@ use super::coarse::{Comparer, INVISIBLE_PX};
 use super::coordinates::{CLOCK, Coordinates, Reach, parameter, point_of};
 use super::error::IdentifyError;
 use super::film::Film;
-use super::options::{IdentifyOptions, check};
+use super::options::IdentifyOptions;
 use super::posterior::{UNSEEN_FRACTION, prior_std};
 use crate::observation::Observation;
 use crate::phi::{PhiNet, PredictError, Prediction};
@@ -185,7 +185,6 @@ fn compare(
     options: &IdentifyOptions,
     rope: &RopeParams,
 ) -> Result<Compared, IdentifyError> {
-    check(observation, options)?;
     let film = Film::new(observation, options);
     let clock = clock_window(
         &film.clamp(),

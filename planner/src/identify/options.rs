@@ -105,6 +105,7 @@ impl Default for IdentifyOptions {
 
 /// Whether a film can be fitted with these options.
 pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyError> {
+    check_options(options)?;
     o.track.validate()?;
     let lost_fraction = o.track.lost_part();
     if lost_fraction > options.lost_fraction_max {
@@ -125,6 +126,11 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
     if motion_s < film_s {
         return Err(IdentifyError::MotionTooShort { motion_s, film_s });
     }
+    Ok(())
+}
+
+/// Refuses what cannot be searched with, never ends, or would pass any film.
+fn check_options(options: &IdentifyOptions) -> Result<(), IdentifyError> {
     let step = |value: f64| value > 0.0 && value <= 5e-3;
     const STEP: &str = "above 0 and at most 0.005 s";
     let deviation = |value: f64| value > 0.0 && value <= 1.0;
@@ -132,6 +138,11 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
     let lead_kg = options.lead_mass_kg.unwrap_or(1.0);
     let clock_s = options.clock_offset_max_s;
     let noise_px = options.noise_min_px;
+    let lost_fraction = options.lost_fraction_max;
+    let count = |option, value: usize, least, most, expected| {
+        let holds = (least..=most).contains(&value);
+        (option, value as f64, holds, expected)
+    };
     let position_m = options.camera_position_std_m;
     let look_at_m = options.camera_look_at_std_m;
     let roll_rad = options.camera_roll_std_rad;
@@ -179,6 +190,41 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
             (0.0..=10.0).contains(&noise_px),
             "0 to 10 px",
         ),
+        count("population", options.population, 4, 10_000, "4 to 10000"),
+        count(
+            "generations",
+            options.generations,
+            1,
+            10_000_000,
+            "1 to 10000000",
+        ),
+        count(
+            "search_frames_max",
+            options.search_frames_max,
+            1,
+            usize::MAX,
+            "1 or more",
+        ),
+        count("repeats_max", options.repeats_max, 0, 100, "at most 100"),
+        count("frames_min", options.frames_min, 1, usize::MAX, "1 or more"),
+        (
+            "lost_fraction_max",
+            lost_fraction,
+            (0.0..=1.0).contains(&lost_fraction),
+            "0 to 1",
+        ),
+        (
+            "confidence_min",
+            options.confidence_min,
+            options.confidence_min.is_finite(),
+            "finite",
+        ),
+        (
+            "repeat_above_px",
+            options.repeat_above_px,
+            options.repeat_above_px.is_finite(),
+            "finite",
+        ),
     ];
     match rules.into_iter().find(|(_, _, holds, _)| !holds) {
         Some((option, value, _, expected)) => Err(IdentifyError::Option {
@@ -187,5 +233,40 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
             expected,
         }),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_out_of_range_are_refused_by_name() {
+        assert!(check_options(&IdentifyOptions::default()).is_ok());
+        type Change = fn(&mut IdentifyOptions);
+        let cases: [(&str, Change); 14] = [
+            ("population", |o| o.population = 3),
+            ("population", |o| o.population = usize::MAX),
+            ("generations", |o| o.generations = 0),
+            ("generations", |o| o.generations = usize::MAX),
+            ("search_frames_max", |o| o.search_frames_max = 0),
+            ("repeats_max", |o| o.repeats_max = usize::MAX),
+            ("frames_min", |o| o.frames_min = 0),
+            ("lost_fraction_max", |o| o.lost_fraction_max = f64::NAN),
+            ("lost_fraction_max", |o| o.lost_fraction_max = 1.5),
+            ("confidence_min", |o| o.confidence_min = f64::NAN),
+            ("repeat_above_px", |o| o.repeat_above_px = f64::INFINITY),
+            ("step_s", |o| o.step_s = 0.0),
+            ("noise_min_px", |o| o.noise_min_px = -1.0),
+            ("lead_mass_kg", |o| o.lead_mass_kg = Some(f64::NAN)),
+        ];
+        for (name, change) in cases {
+            let mut options = IdentifyOptions::default();
+            change(&mut options);
+            match check_options(&options) {
+                Err(IdentifyError::Option { option, .. }) => assert_eq!(option, name),
+                other => panic!("{name}: {other:?}"),
+            }
+        }
     }
 }
