@@ -3,7 +3,7 @@
 //! [`settle`](crate::settle()).
 //!
 //! One thread serves; identification and planning use the machine's other
-//! threads. Progress is streamed after every generation; a caller that leaves
+//! threads. Progress is streamed with every generation or step; a caller that leaves
 //! ends the work.
 
 mod collect;
@@ -72,7 +72,7 @@ fn serve(collector: &mut Collector, client: &Client<'_>) {
         PlannerRequest::Ping => Ok(PlannerEvent::Pong),
         PlannerRequest::Identify(request) => identify(collector, request, client),
         PlannerRequest::Plan(request) => plan(request, client),
-        PlannerRequest::Settle(request) => crate::settle(request)
+        PlannerRequest::Settle(request) => crate::settle(request, &mut |p| client.report(p))
             .map(|found| PlannerEvent::Settled(Box::new(found)))
             .map_err(ServiceError::from),
     };

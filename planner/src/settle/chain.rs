@@ -11,6 +11,9 @@ use rope_sim::{AttachMotion, MeasuredArm};
 /// gravity and encoders leave, below what matters to the rope.
 const START_TOLERANCE_RAD: f64 = 0.02;
 
+/// Latest start of a move (s): all before it is simulated again and again.
+const START_MAX_S: f64 = 1800.0;
+
 /// What happened before the move.
 #[derive(Debug)]
 pub(super) struct Prelude {
@@ -30,6 +33,13 @@ impl Prelude {
         let start_s = request.start_s;
         if !(start_s >= last_s && start_s > 0.0 && start_s.is_finite()) {
             return Err(SettleError::StartsTooEarly { start_s, last_s });
+        }
+        if start_s > START_MAX_S {
+            return Err(SettleError::Value {
+                key: "start_s",
+                value: start_s,
+                expected: "at most half an hour (1800 s)",
+            });
         }
         let standing_error = measured.joints_at(start_s).q - request.start_q;
         let off = |j: usize| standing_error[j];

@@ -2,10 +2,11 @@
 //! batch of simulations.
 
 use super::error::SettleError;
-use super::request::SettleConfig;
+use super::request::{SettleConfig, SettleProgress};
 use super::residual::{Residual, ResidualSimulator};
 use super::shape::MoveShape;
 use nalgebra::{DMatrix, DVector};
+use std::ops::ControlFlow;
 
 /// Step of the finite differences (rad): moves the rope by millimetres, far
 /// above single precision, well within the linear range.
@@ -48,14 +49,23 @@ pub(super) fn least_residual(
     shape: &MoveShape,
     simulator: &ResidualSimulator<'_>,
     config: &SettleConfig,
+    progress: &mut dyn FnMut(SettleProgress) -> ControlFlow<()>,
 ) -> Result<LeastResidual, SettleError> {
     let mut x = DVector::from_vec(shape.no_offsets());
     let mut at = linearise(shape, simulator, config, &x)?.ok_or(SettleError::Diverged)?;
     let plain_residual_m = at.residual.largest_m;
     let mut damping = DAMPING_M_PER_RAD;
-    for _ in 0..config.iterations {
+    for step in 0..config.iterations {
         if at.residual_m2.sqrt() < config.stop_below_rms_m || damping > DAMPING_MAX_M_PER_RAD {
             break;
+        }
+        let report = SettleProgress {
+            step,
+            steps: config.iterations,
+            residual_m: at.residual.largest_m,
+        };
+        if progress(report).is_break() {
+            return Err(SettleError::Cancelled { step });
         }
         let ridge = DMatrix::from_diagonal_element(x.len(), x.len(), damping.powi(2));
         let Some(factor) = (&at.normal + ridge).cholesky() else {

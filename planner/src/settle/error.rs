@@ -70,6 +70,12 @@ pub enum SettleError {
     /// Slopes of the residual vibration could not be taken.
     #[error(transparent)]
     Sensitivity(#[from] SensitivityError),
+    /// The caller broke off.
+    #[error("the settling move was cancelled after step {step}")]
+    Cancelled {
+        /// Gauss-Newton steps done.
+        step: usize,
+    },
     /// The simulated rope blew up.
     #[error("the simulation of the rope diverged; identify the rope again")]
     Diverged,

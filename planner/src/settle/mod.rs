@@ -19,13 +19,14 @@ mod shape;
 mod tests;
 
 pub use error::SettleError;
-pub use request::{SettleConfig, SettleMove, SettleRequest};
+pub use request::{SettleConfig, SettleMove, SettleProgress, SettleRequest};
 
 use arm_model::JointTrajectory;
 use chain::Prelude;
 use descent::LeastResidual;
 use residual::{Residual, ResidualSimulator};
 use shape::MoveShape;
+use std::ops::ControlFlow;
 
 /// Fractions of the offsets found that are tried, largest first: where limits or
 /// surroundings forbid the whole, a smaller one still takes out that much of the
@@ -33,11 +34,14 @@ use shape::MoveShape;
 const FRACTIONS: [f64; 5] = [0.8, 0.6, 0.4, 0.2, 0.0];
 
 /// Plans a move from `start_q` to `end_q` after which the rope hangs still.
-/// Deterministic, whatever the threads.
+/// Deterministic, whatever the threads. `progress` can end it.
 ///
 /// # Errors
 /// See [`SettleError`].
-pub fn settle(request: &SettleRequest) -> Result<SettleMove, SettleError> {
+pub fn settle(
+    request: &SettleRequest,
+    progress: &mut dyn FnMut(SettleProgress) -> ControlFlow<()>,
+) -> Result<SettleMove, SettleError> {
     let config = &request.config;
     config.check()?;
     request.rope.validate()?;
@@ -45,7 +49,7 @@ pub fn settle(request: &SettleRequest) -> Result<SettleMove, SettleError> {
     let mut best: Option<SettleMove> = None;
     let mut refused = SettleError::NoDuration;
     for duration_s in &config.durations_s {
-        match settle_within(request, &prelude, *duration_s) {
+        match settle_within(request, &prelude, *duration_s, progress) {
             Ok(found) => {
                 let least = best.as_ref().map_or(f64::INFINITY, |b| b.residual_m);
                 if found.residual_m < least {
@@ -72,6 +76,7 @@ fn settle_within(
     request: &SettleRequest,
     prelude: &Prelude,
     duration_s: f64,
+    progress: &mut dyn FnMut(SettleProgress) -> ControlFlow<()>,
 ) -> Result<SettleMove, SettleError> {
     let config = &request.config;
     let shape = MoveShape::new(request.start_q, request.end_q, duration_s, config.knot_s);
@@ -82,7 +87,7 @@ fn settle_within(
         });
     }
     let simulator = ResidualSimulator::new(&request.rope, prelude, &plain, config.threads)?;
-    let found = descent::least_residual(&shape, &simulator, config)?;
+    let found = descent::least_residual(&shape, &simulator, config, progress)?;
     choose(request, &shape, &simulator, found)
 }
 

@@ -4,6 +4,7 @@ use super::error::SettleError;
 use arm_model::{Cell, JointTrajectory, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
+use shared_types::ipc::message::Progress;
 
 /// What a settling move starts from and ends in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,6 +79,29 @@ pub struct SettleMove {
     pub residual_m: f64,
 }
 
+/// How far the search for a settling move has come, reported before every Gauss-Newton
+/// step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SettleProgress {
+    /// Steps done for the duration that is tried.
+    pub step: usize,
+    /// Most steps.
+    pub steps: usize,
+    /// Largest distance of the tip from its place at rest after the best move so far (m).
+    pub residual_m: f64,
+}
+
+impl From<SettleProgress> for Progress {
+    fn from(p: SettleProgress) -> Self {
+        Self {
+            done: u32::try_from(p.step).unwrap_or(u32::MAX),
+            total: u32::try_from(p.steps).unwrap_or(u32::MAX),
+            value: 100.0 * p.residual_m,
+            label: "residual cm".to_owned(),
+        }
+    }
+}
+
 impl SettleConfig {
     pub(super) fn check(&self) -> Result<(), SettleError> {
         if self.durations_s.is_empty() {
@@ -94,7 +118,20 @@ impl SettleConfig {
         } else {
             longest_s
         };
+        let (durations, iterations) = (self.durations_s.len(), self.iterations);
         let rules = [
+            (
+                "durations_s",
+                durations as f64,
+                durations <= 10,
+                "at most 10 durations",
+            ),
+            (
+                "iterations",
+                iterations as f64,
+                iterations <= 1000,
+                "at most 1000",
+            ),
             (
                 "durations_s",
                 outside_s,

@@ -115,12 +115,16 @@ fn settled_residual_m(request: &SettleRequest, trajectory: &JointTrajectory) -> 
         .fold(0.0, f64::max)
 }
 
+fn settled(request: &SettleRequest) -> Result<SettleMove, SettleError> {
+    settle(request, &mut |_| ControlFlow::Continue(()))
+}
+
 #[test]
 fn ropes_from_soft_to_stiff_hang_still_after_the_move() {
     for seed in 0..ROPES.len() {
         let (rope, turn_deg) = rope(seed);
         let request = request(rope, turn_deg);
-        let found = settle(&request).unwrap();
+        let found = settled(&request).unwrap();
         let true_m = settled_residual_m(&request, &found.trajectory);
         assert!(found.residual_m < 5e-3 && true_m < 6e-3, "{seed}: {true_m}");
         assert!(request.limits.worst_violation(&found.trajectory).is_none());
@@ -143,7 +147,7 @@ fn a_rope_identified_half_a_percent_wrong_still_loses_most_of_its_swing() {
     for seed in [1, 2] {
         let (rope, turn_deg) = rope(seed);
         let request = request(rope, turn_deg);
-        let found = settle(&request).unwrap();
+        let found = settled(&request).unwrap();
         assert!(found.plain_residual_m > 0.05, "{seed}: nothing to take out");
         for part in [0.995, 1.005] {
             let mut truth = request.clone();
@@ -161,7 +165,7 @@ fn threads_do_not_change_the_move() {
     let with = |threads| {
         let mut request = request(rope, turn_deg);
         request.config.threads = threads;
-        settle(&request).unwrap()
+        settled(&request).unwrap()
     };
     assert_eq!(with(1), with(3));
 }
@@ -171,12 +175,12 @@ fn tight_limits_are_kept_by_taking_out_less() {
     let (rope, _) = rope(2);
     let mut request = request(rope, 0.0);
     request.config.durations_s = vec![3.5];
-    let free = settle(&request).unwrap();
+    let free = settled(&request).unwrap();
     let used = free.trajectory.extrema(5).qdd.value.abs();
     let mut spec = LimitsSpec::from(Limits::default());
     spec.acceleration_max_rad_s2[5] = 0.7 * used;
     request.limits = Limits::try_from(spec.clone()).unwrap();
-    let tight = settle(&request).unwrap();
+    let tight = settled(&request).unwrap();
     assert!(request.limits.worst_violation(&tight.trajectory).is_none());
     assert!(tight.residual_m < 0.6 * tight.plain_residual_m);
     assert!(tight.residual_m > 2.0 * free.residual_m);
@@ -186,7 +190,7 @@ fn tight_limits_are_kept_by_taking_out_less() {
     request.limits = Limits::try_from(spec).unwrap();
     request.end_q = turned(35.0);
     assert!(matches!(
-        settle(&request),
+        settled(&request),
         Err(SettleError::BreaksLimit { .. })
     ));
 }
@@ -196,7 +200,7 @@ fn a_rope_that_would_come_too_near_is_refused() {
     let (rope, _) = rope(1);
     let mut request = request(rope, 0.0);
     request.config.clearance_m = 0.9;
-    match settle(&request) {
+    match settled(&request) {
         Err(SettleError::TooClose { gap_m }) => assert!(gap_m > 0.1 && gap_m < 0.9, "{gap_m}"),
         other => panic!("{other:?}"),
     }
@@ -209,7 +213,7 @@ fn a_wrong_start_is_refused_by_name() {
     let with = |change: &dyn Fn(&mut SettleRequest)| {
         let mut r = good.clone();
         change(&mut r);
-        settle(&r).unwrap_err()
+        settled(&r).unwrap_err()
     };
     assert!(matches!(
         with(&|r| r.start_s = 5.0),
@@ -231,6 +235,29 @@ fn a_wrong_start_is_refused_by_name() {
         with(&|r| r.config.knot_s = 0.0),
         SettleError::Value { key: "knot_s", .. }
     ));
+    let cases: [(&str, &dyn Fn(&mut SettleRequest)); 3] = [
+        ("start_s", &|r| r.start_s = 1e6),
+        ("durations_s", &|r| r.config.durations_s = vec![3.5; 1000]),
+        ("iterations", &|r| r.config.iterations = usize::MAX),
+    ];
+    for (refused, change) in cases {
+        match with(change) {
+            SettleError::Value { key, .. } => assert_eq!(key, refused),
+            other => panic!("{refused}: {other}"),
+        }
+    }
+}
+
+#[test]
+fn a_caller_that_leaves_ends_the_search() {
+    let (rope, turn_deg) = rope(2);
+    let mut steps = Vec::new();
+    let ended = settle(&request(rope, turn_deg), &mut |p| {
+        steps.push(p.step);
+        ControlFlow::Break(())
+    });
+    assert!(matches!(ended, Err(SettleError::Cancelled { step: 0 })));
+    assert_eq!(steps, [0]);
 }
 
 #[test]

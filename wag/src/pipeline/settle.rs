@@ -18,6 +18,8 @@ use std::time::Duration;
 /// Time allowed for planning before the move begins (s); longer after a plan
 /// that came too late. The swing decays meanwhile: to wait spoils nothing.
 const PLANNING_S: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// Time after which the planner's answer is not waited for any longer (s).
+const ANSWER_S: f64 = 60.0;
 /// From the call to the first setpoint, on average (s): half a turn of the
 /// controller's bridge and half a cycle.
 const HANDOVER_S: f64 = 0.005;
@@ -91,7 +93,7 @@ pub fn settle(
         };
         stage.say("planning");
         let request = PlannerRequest::Settle(Box::new(request));
-        let found = match ask_planner(session, planner, &request, stage)? {
+        let found = match ask_planner(session, planner, &request, ANSWER_S, stage)? {
             PlannerEvent::Settled(found) => found,
             other => return Err(unexpected("planner", &other)),
         };

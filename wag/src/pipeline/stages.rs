@@ -19,6 +19,8 @@ use std::time::Duration;
 
 /// Joint reports this much before and after a film are given along (s).
 const JOINT_MARGIN_NS: u64 = 300_000_000;
+/// Time allowed for an identification or a plan (s).
+const PLANNING_S: f64 = 300.0;
 /// Keypoints per frame.
 pub const KEYPOINTS: u32 = 24;
 
@@ -50,9 +52,10 @@ pub(super) fn ask_planner(
     session: &mut Session,
     planner: &Planner,
     request: &PlannerRequest,
+    timeout_s: f64,
     stage: &Stage,
 ) -> anyhow::Result<PlannerEvent> {
-    let timeout = Duration::from_secs(300);
+    let timeout = Duration::from_secs_f64(timeout_s);
     let event = session.ask(planner, request, timeout, |event| {
         if let PlannerEvent::Progress(p) = event {
             stage.progress(p);
@@ -163,7 +166,7 @@ pub fn identify(
         appearance: appearance.into(),
         options: settings.identify,
     }));
-    match ask_planner(session, planner, &request, stage)? {
+    match ask_planner(session, planner, &request, PLANNING_S, stage)? {
         PlannerEvent::Identified(estimate) => Ok(*estimate),
         other => Err(unexpected("planner", &other)),
     }
@@ -177,7 +180,7 @@ pub fn plan(
     stage: &Stage,
 ) -> anyhow::Result<Plan> {
     let request = PlannerRequest::Plan(Box::new(request));
-    match ask_planner(session, planner, &request, stage)? {
+    match ask_planner(session, planner, &request, PLANNING_S, stage)? {
         PlannerEvent::Planned(plan) => Ok(*plan),
         other => Err(unexpected("planner", &other)),
     }
