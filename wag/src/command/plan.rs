@@ -9,8 +9,8 @@ use cli_output::{Failure, OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::plan::{
-    PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, ReachMap, Shortcoming, shortcoming,
-    warnings,
+    PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, ReachMap, Shortcoming, clear_of_arm,
+    shortcoming, warnings,
 };
 use run_log::files;
 use serde_json::{Value, json};
@@ -118,6 +118,7 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let response = args.arm_response.as_deref().map(files::read_arm_response);
     let response = response.transpose().or_input()?;
     if let Some(path) = &args.reach {
+        clear_of_arm(args.target.0, &config.cell).map_err(classify)?;
         reach(path, args, &limits, &config, quiet)?;
     }
     cli_output::watch_interrupts().or_failed()?;

@@ -75,6 +75,11 @@ pub(crate) const CASES: &[Case] = &[
         &["reach", "nearest"],
     ),
     (
+        "plan strike --rope rope.toml --target 0,0,0.1 --reach r.svg --out p.json",
+        2,
+        &["arm's base"],
+    ),
+    (
         "plan strike --rope rope.toml --target 1,0,0.3 --limits limits.toml --out p.json",
         2,
         &["limits.toml", "rate_hz"],
