@@ -116,6 +116,7 @@ pub struct Trial {
     /// Distance of the fit to the keypoints (px).
     pub residual_px: f64,
     /// Out-of-distribution score.
+    #[serde(alias = "novelty")]
     pub out_of_distribution: f64,
     /// Whether the rope was taken for one outside the ranges.
     pub outside: bool,
