@@ -89,6 +89,7 @@ impl IdentifyError {
                 | Self::TooManyLost { .. }
                 | Self::TooFewFrames { .. }
                 | Self::MotionTooShort { .. }
+                | Self::NothingVisible
                 | Self::Option { .. }
                 | Self::Network(PredictError::Observe(_))
         )
