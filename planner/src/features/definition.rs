@@ -104,7 +104,7 @@ pub enum ObserveError {
     },
     /// The clamp does not move as in the wiggle that the features are for.
     #[error(
-        "the clamp does not move as in the wiggle the network was trained on: correlation {correlation:.2} (at least {correlation_min} is needed), sway {:.0} % of the trained one's: film that wiggle, or use --method hybrid",
+        "the clamp does not move as in the wiggle the network was trained on: correlation {correlation:.2} (at least {correlation_min} is needed), its sideways motion {:.0} % of the trained one's: film that wiggle, or use --method hybrid",
         part * 100.0
     )]
     OtherWiggle {

@@ -104,7 +104,7 @@ impl<'a> Viewer<'a> {
 }
 
 impl View<'_> {
-    /// Raw left-eye pixel of a world point; `None` behind the camera.
+    /// Raw left-image pixel of a world point; `None` behind the camera.
     pub(super) fn project(&self, p_w_m: &Vector3<f64>) -> Option<[f64; 2]> {
         self.camera
             .left

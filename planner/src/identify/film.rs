@@ -32,7 +32,7 @@ pub(super) struct Sighting {
     pub(super) time_s: f64,
     /// Place along the rope: 0 the clamp, 1 the lead's centre.
     pub(super) along: f64,
-    /// Raw left-eye pixel.
+    /// Raw left-image pixel.
     pub(super) pixel: [f64; 2],
     /// Weight, 0 to 1.
     pub(super) weight: f64,
