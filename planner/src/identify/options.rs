@@ -3,6 +3,7 @@
 use super::error::IdentifyError;
 use crate::observation::Observation;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// How a rope is identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -130,34 +131,26 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
 }
 
 /// Refuses what cannot be searched with, never ends, or would pass any film.
-fn check_options(options: &IdentifyOptions) -> Result<(), IdentifyError> {
-    let step = |value: f64| value > 0.0 && value <= 5e-3;
+fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
     const STEP: &str = "above 0 and at most 0.005 s";
-    let deviation = |value: f64| value > 0.0 && value <= 1.0;
     const DEVIATION: &str = "above 0 and at most 1 (m, rad)";
-    let lead_kg = options.lead_mass_kg.unwrap_or(1.0);
-    let clock_s = options.clock_offset_max_s;
-    let noise_px = options.noise_min_px;
-    let lost_fraction = options.lost_fraction_max;
-    let count = |option, value: usize, least, most, expected| {
-        let holds = (least..=most).contains(&value);
-        (option, value as f64, holds, expected)
+    let within = |option, value: f64, range: RangeInclusive<f64>, expected| {
+        (option, value, range.contains(&value), expected)
     };
-    let position_m = options.camera_position_std_m;
-    let look_at_m = options.camera_look_at_std_m;
-    let roll_rad = options.camera_roll_std_rad;
+    let count = |option, value: usize, range: RangeInclusive<usize>, expected| {
+        (option, value as f64, range.contains(&value), expected)
+    };
+    let step = |option, value| within(option, value, f64::MIN_POSITIVE..=5e-3, STEP);
+    let deviation = |option, value| within(option, value, f64::MIN_POSITIVE..=1.0, DEVIATION);
+    let finite = |option, value| within(option, value, f64::MIN..=f64::MAX, "finite");
+    let lead_kg = o.lead_mass_kg.unwrap_or(1.0);
     let rules = [
-        (
-            "search_step_s",
-            options.search_step_s,
-            step(options.search_step_s),
-            STEP,
-        ),
-        ("step_s", options.step_s, step(options.step_s), STEP),
-        (
+        step("search_step_s", o.search_step_s),
+        step("step_s", o.step_s),
+        within(
             "clock_offset_max_s",
-            clock_s,
-            (1e-3..=1.0).contains(&clock_s),
+            o.clock_offset_max_s,
+            1e-3..=1.0,
             "0.001 to 1 s",
         ),
         (
@@ -166,65 +159,33 @@ fn check_options(options: &IdentifyOptions) -> Result<(), IdentifyError> {
             lead_kg > 0.0 && lead_kg < 10.0,
             "above 0 and below 10 kg",
         ),
-        (
-            "camera_position_std_m",
-            position_m,
-            deviation(position_m),
-            DEVIATION,
-        ),
-        (
-            "camera_look_at_std_m",
-            look_at_m,
-            deviation(look_at_m),
-            DEVIATION,
-        ),
-        (
-            "camera_roll_std_rad",
-            roll_rad,
-            deviation(roll_rad),
-            DEVIATION,
-        ),
-        (
-            "noise_min_px",
-            noise_px,
-            (0.0..=10.0).contains(&noise_px),
-            "0 to 10 px",
-        ),
-        count("population", options.population, 4, 10_000, "4 to 10000"),
+        deviation("camera_position_std_m", o.camera_position_std_m),
+        deviation("camera_look_at_std_m", o.camera_look_at_std_m),
+        deviation("camera_roll_std_rad", o.camera_roll_std_rad),
+        within("noise_min_px", o.noise_min_px, 0.0..=10.0, "0 to 10 px"),
+        count("population", o.population, 4..=10_000, "4 to 10000"),
         count(
             "generations",
-            options.generations,
-            1,
-            10_000_000,
+            o.generations,
+            1..=10_000_000,
             "1 to 10000000",
         ),
         count(
             "search_frames_max",
-            options.search_frames_max,
-            1,
-            usize::MAX,
+            o.search_frames_max,
+            1..=usize::MAX,
             "1 or more",
         ),
-        count("repeats_max", options.repeats_max, 0, 100, "at most 100"),
-        count("frames_min", options.frames_min, 1, usize::MAX, "1 or more"),
-        (
+        count("repeats_max", o.repeats_max, 0..=100, "at most 100"),
+        count("frames_min", o.frames_min, 1..=usize::MAX, "1 or more"),
+        within(
             "lost_fraction_max",
-            lost_fraction,
-            (0.0..=1.0).contains(&lost_fraction),
+            o.lost_fraction_max,
+            0.0..=1.0,
             "0 to 1",
         ),
-        (
-            "confidence_min",
-            options.confidence_min,
-            options.confidence_min.is_finite(),
-            "finite",
-        ),
-        (
-            "repeat_above_px",
-            options.repeat_above_px,
-            options.repeat_above_px.is_finite(),
-            "finite",
-        ),
+        finite("confidence_min", o.confidence_min),
+        finite("repeat_above_px", o.repeat_above_px),
     ];
     match rules.into_iter().find(|(_, _, holds, _)| !holds) {
         Some((option, value, _, expected)) => Err(IdentifyError::Option {
