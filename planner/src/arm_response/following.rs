@@ -242,7 +242,8 @@ mod tests {
             serde_json::from_slice::<Following>(&bytes)
         };
         assert!(sent(&good).is_ok());
-        let cases: [(&str, fn(&mut Following, f64), f64); 6] = [
+        type Change = fn(&mut Following, f64);
+        let cases: [(&str, Change, f64); 6] = [
             ("period_s", |f, v| f.period_s = v, 1e-12),
             ("period_s", |f, v| f.period_s = v, 1.0),
             (

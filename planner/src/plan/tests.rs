@@ -131,15 +131,16 @@ fn impossible_requests_are_refused_before_any_simulation() {
     assert!(!called);
 }
 
+fn strike(r: &mut PlanRequest) -> &mut ThrowConfig {
+    match &mut r.goal {
+        ThrowGoal::Strike(strike) => &mut strike.config,
+        other => panic!("{other:?}"),
+    }
+}
+
 /// Values that would hide collisions, or keep the planner busy for ever.
 #[test]
 fn values_out_of_range_are_refused_by_name() {
-    fn strike(r: &mut PlanRequest) -> &mut ThrowConfig {
-        match &mut r.goal {
-            ThrowGoal::Strike(strike) => &mut strike.config,
-            other => panic!("{other:?}"),
-        }
-    }
     fn lob(r: &mut PlanRequest, config: LobConfig) {
         let target_m = r.goal.task().target_m();
         r.goal = ThrowGoal::Lob(Lob { target_m, config });

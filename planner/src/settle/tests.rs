@@ -235,13 +235,14 @@ fn a_wrong_start_is_refused_by_name() {
         with(&|r| r.config.knot_s = 0.0),
         SettleError::Value { key: "knot_s", .. }
     ));
-    let cases: [(&str, &dyn Fn(&mut SettleRequest)); 3] = [
-        ("start_s", &|r| r.start_s = 1e6),
-        ("durations_s", &|r| r.config.durations_s = vec![3.5; 1000]),
-        ("iterations", &|r| r.config.iterations = usize::MAX),
+    type Change = fn(&mut SettleRequest);
+    let cases: [(&str, Change); 3] = [
+        ("start_s", |r| r.start_s = 1e6),
+        ("durations_s", |r| r.config.durations_s = vec![3.5; 1000]),
+        ("iterations", |r| r.config.iterations = usize::MAX),
     ];
     for (refused, change) in cases {
-        match with(change) {
+        match with(&change) {
             SettleError::Value { key, .. } => assert_eq!(key, refused),
             other => panic!("{refused}: {other}"),
         }
