@@ -168,7 +168,7 @@ fn check_numbers(options: &SimOptions) -> Result<(), Unusable> {
     Unusable::unless("step_s", need, [options.step_s], few)?;
     if options.frames.count > 0 {
         Unusable::unless_positive("frames.period_s", options.frames.period_s)?;
-        let need = "is more than 1e8 frames; lengthen their period";
+        let need = "more than 1e8 frames; lengthen their period";
         let count = options.frames.count as f64;
         Unusable::unless("frames.count", need, [count], |count| count <= MAX_STEPS)?;
     }
