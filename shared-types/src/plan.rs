@@ -96,7 +96,7 @@ pub struct Plan {
     /// Rope the throw was planned for.
     pub rope: RopeParams,
     /// Cell it was planned for; plans of older versions do not tell it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub cell: Option<Cell>,
     /// The joint trajectory, start pose first.
     pub trajectory: JointTrajectory,
