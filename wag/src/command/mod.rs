@@ -22,7 +22,6 @@ mod network;
 mod on_arm;
 mod plan;
 mod process;
-mod reach_picture;
 mod record;
 mod replay;
 mod report;

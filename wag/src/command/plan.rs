@@ -1,6 +1,5 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
-use super::reach_picture;
 use crate::cli::PlanArgs;
 use crate::config;
 use anyhow::{Context, anyhow, bail};
@@ -89,7 +88,7 @@ fn reach(
         THREADS,
     )
     .map_err(classify)?;
-    let picture = reach_picture::svg(&map, &rope, args.target.0, args.seed);
+    let picture = planner::plan::reach_svg(&map, &rope, args.target.0, args.seed);
     files::write_atomic(path, picture.as_bytes()).or_failed()?;
     stage.done(&format!(
         "{} throws, drawn in `{}`",

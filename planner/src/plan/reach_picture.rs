@@ -1,6 +1,6 @@
 //! The reach of a rope as a picture.
 
-use planner::plan::ReachMap;
+use super::ReachMap;
 use shared_types::RopeParams;
 use std::fmt::Write as _;
 
@@ -23,8 +23,10 @@ fn y(z_m: f64) -> f64 {
     TOP + SCALE * (Z_M[1] - z_m)
 }
 
-/// Cells reached seldom and often, and the target, in the plane of base axis and target.
-pub(super) fn svg(map: &ReachMap, rope: &RopeParams, target_m: [f64; 3], seed: u64) -> String {
+/// An SVG picture of the cells that `rope` reached seldom and often in `map`, which was
+/// explored with `seed`, and of the target (m, world frame), in the plane of both.
+#[must_use]
+pub fn reach_svg(map: &ReachMap, rope: &RopeParams, target_m: [f64; 3], seed: u64) -> String {
     let (width, height) = (x(RHO_M[1]) + 30.0, y(Z_M[0]) + 60.0);
     let edge = SCALE * ReachMap::cell_m();
     let mut out = format!(
