@@ -34,6 +34,7 @@ mod config;
 pub mod features;
 pub mod identify;
 pub mod observation;
+mod out_of_range;
 pub mod phi;
 pub mod plan;
 pub mod preflight;
@@ -47,5 +48,6 @@ pub mod workers;
 
 pub use config::PlannerConfig;
 pub use identify::identify;
+pub use out_of_range::OutOfRange;
 pub use plan::plan;
 pub use settle::settle;

@@ -4,6 +4,7 @@
 //! joint 6 that excites the rope while it stays in view, filmed for 400 frames
 //! at 60 frames a second, the last part of them at rest.
 
+use crate::OutOfRange;
 use crate::collide::{ArmShape, RopeShape, rope_clearance_m};
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
@@ -61,15 +62,8 @@ impl Default for WiggleConfig {
 #[derive(Debug, thiserror::Error)]
 pub enum WiggleError {
     /// A value is out of range.
-    #[error("wiggle: `{key}` is {value}, but must be {expected}")]
-    Value {
-        /// Key in the configuration.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error("wiggle: {0}")]
+    Value(#[from] OutOfRange),
     /// The spline cannot be made.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
@@ -112,16 +106,7 @@ impl WiggleConfig {
                 "at least `duration_s` and at most 10 s",
             ),
         ];
-        for (key, value, holds, expected) in rules {
-            if !holds {
-                return Err(WiggleError::Value {
-                    key,
-                    value,
-                    expected,
-                });
-            }
-        }
-        Ok(())
+        Ok(OutOfRange::check(rules)?)
     }
 
     /// Deflection of joint 6 at `t_s` (rad): `A sin(2π f t)` faded in and out by
@@ -297,7 +282,7 @@ mod tests {
         };
         assert!(matches!(
             wiggle(&wrong, &Limits::default()),
-            Err(WiggleError::Value { key: "ramp_s", .. })
+            Err(WiggleError::Value(OutOfRange { key: "ramp_s", .. }))
         ));
     }
 

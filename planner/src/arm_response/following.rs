@@ -6,6 +6,7 @@
 
 use super::lag::Lag;
 use super::window::Window;
+use crate::OutOfRange;
 use arm_model::trajectory::MAX_WAYPOINTS;
 use arm_model::{ArmResponse, JOINTS, JointTrajectory, JointVector, Limits, TrajectoryError};
 use serde::{Deserialize, Serialize};
@@ -27,15 +28,8 @@ pub enum FollowError {
         joint: usize,
     },
     /// A value of a response that was sent is out of range.
-    #[error("the arm's response: `{key}` is {value}, but must be {expected}")]
-    Value {
-        /// Its name.
-        key: &'static str,
-        /// What was sent.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error("the arm's response: {0}")]
+    Value(#[from] OutOfRange),
     /// The motion makes no trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
@@ -65,14 +59,7 @@ impl TryFrom<FollowingForm> for Following {
     fn try_from(form: FollowingForm) -> Result<Self, FollowError> {
         const HZ: f64 = core::f64::consts::TAU;
         let within = |key, value: f64, [low, high]: [f64; 2], expected| {
-            if (low..=high).contains(&value) {
-                return Ok(());
-            }
-            Err(FollowError::Value {
-                key,
-                value,
-                expected,
-            })
+            OutOfRange::check([(key, value, (low..=high).contains(&value), expected)])
         };
         let periods_s = [1.0 / 250.0, 1.0 / 30.0];
         within("period_s", form.period_s, periods_s, "from 1/250 to 1/30 s")?;

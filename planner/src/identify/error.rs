@@ -1,5 +1,6 @@
 //! Why no rope was identified.
 
+use crate::OutOfRange;
 use crate::cmaes::CmaError;
 use crate::phi::{ModelError, PredictError};
 use rope_sim::SimulateError;
@@ -47,15 +48,8 @@ pub enum IdentifyError {
     )]
     NothingVisible,
     /// An option is out of range.
-    #[error("option `{option}` is {value}, but must be {expected}")]
-    Option {
-        /// Name of the option.
-        option: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error("option {0}")]
+    Option(#[from] OutOfRange),
     /// The search strategy cannot go on.
     #[error(transparent)]
     Search(#[from] CmaError),
@@ -90,7 +84,7 @@ impl IdentifyError {
                 | Self::TooFewFrames { .. }
                 | Self::MotionTooShort { .. }
                 | Self::NothingVisible
-                | Self::Option { .. }
+                | Self::Option(_)
                 | Self::Network(PredictError::Observe(_))
         )
     }

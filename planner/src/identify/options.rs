@@ -1,6 +1,7 @@
 //! Method, size and rules of an identification.
 
 use super::error::IdentifyError;
+use crate::OutOfRange;
 use crate::observation::Observation;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
@@ -187,14 +188,7 @@ fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
         finite("confidence_min", o.confidence_min),
         finite("repeat_above_px", o.repeat_above_px),
     ];
-    match rules.into_iter().find(|(_, _, holds, _)| !holds) {
-        Some((option, value, _, expected)) => Err(IdentifyError::Option {
-            option,
-            value,
-            expected,
-        }),
-        None => Ok(()),
-    }
+    Ok(OutOfRange::check(rules)?)
 }
 
 #[cfg(test)]
@@ -225,7 +219,7 @@ mod tests {
             let mut options = IdentifyOptions::default();
             change(&mut options);
             match check_options(&options) {
-                Err(IdentifyError::Option { option, .. }) => assert_eq!(option, name),
+                Err(IdentifyError::Option(refusal)) => assert_eq!(refusal.key, name),
                 other => panic!("{name}: {other:?}"),
             }
         }

@@ -1,5 +1,6 @@
 //! How far a search for a throw has come, and why there is no plan.
 
+use crate::OutOfRange;
 use crate::arm_response::FollowError;
 use crate::cmaes::CmaError;
 use arm_model::TrajectoryError;
@@ -74,15 +75,8 @@ pub enum PlanError {
     #[error(transparent)]
     Rope(#[from] RopeError),
     /// An option of the search is out of range.
-    #[error("option `{option}` is {value}, but must be {expected}")]
-    Option {
-        /// Name of the option.
-        option: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error("option {0}")]
+    Option(#[from] OutOfRange),
     /// The search strategy cannot go on.
     #[error(transparent)]
     Search(#[from] CmaError),
@@ -123,27 +117,21 @@ pub enum PlanError {
 impl PlanError {
     /// Refuses a number that is not one of the range.
     pub(super) fn unless_within(
-        option: &'static str,
+        key: &'static str,
         value: f64,
         range: RangeInclusive<f64>,
         expected: &'static str,
     ) -> Result<(), Self> {
-        if range.contains(&value) {
-            return Ok(());
-        }
-        Err(Self::Option {
-            option,
-            value,
-            expected,
-        })
+        OutOfRange::check([(key, value, range.contains(&value), expected)])?;
+        Ok(())
     }
 
     /// Refuses numbers that are not finite.
     pub(super) fn unless_finite(
         numbers: impl IntoIterator<Item = (&'static str, f64)>,
     ) -> Result<(), Self> {
-        numbers.into_iter().try_for_each(|(option, value)| {
-            Self::unless_within(option, value, f64::MIN..=f64::MAX, "finite")
+        numbers.into_iter().try_for_each(|(key, value)| {
+            Self::unless_within(key, value, f64::MIN..=f64::MAX, "finite")
         })
     }
 
@@ -157,7 +145,7 @@ impl PlanError {
                 | Self::InArm { .. }
                 | Self::Rope(_)
                 | Self::Follow(_)
-                | Self::Option { .. }
+                | Self::Option(_)
         )
     }
 }

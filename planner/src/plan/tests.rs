@@ -1,4 +1,5 @@
 use super::*;
+use crate::OutOfRange;
 use crate::collide::ContactCounts;
 use crate::ropes::random_rope;
 use setup::Setup;
@@ -123,10 +124,7 @@ fn impossible_requests_are_refused_before_any_simulation() {
     let error = refused(good, &|r| r.options.step_s = 0.0);
     assert!(matches!(
         error,
-        PlanError::Option {
-            option: "step_s",
-            ..
-        }
+        PlanError::Option(OutOfRange { key: "step_s", .. })
     ));
     assert!(!called);
 }

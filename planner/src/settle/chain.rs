@@ -3,6 +3,7 @@
 
 use super::error::SettleError;
 use super::request::SettleRequest;
+use crate::OutOfRange;
 use arm_model::kinematics::FrameMotion;
 use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector};
 use rope_sim::{AttachMotion, MeasuredArm};
@@ -34,13 +35,8 @@ impl Prelude {
         if !(start_s >= last_s && start_s > 0.0 && start_s.is_finite()) {
             return Err(SettleError::StartsTooEarly { start_s, last_s });
         }
-        if start_s > START_MAX_S {
-            return Err(SettleError::Value {
-                key: "start_s",
-                value: start_s,
-                expected: "at most half an hour (1800 s)",
-            });
-        }
+        let expected = "at most half an hour (1800 s)";
+        OutOfRange::check([("start_s", start_s, start_s <= START_MAX_S, expected)])?;
         let standing_error = measured.joints_at(start_s).q - request.start_q;
         let off = |j: usize| standing_error[j];
         match (0..JOINTS).find(|&j| off(j).is_nan() || off(j).abs() > START_TOLERANCE_RAD) {

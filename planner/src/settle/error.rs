@@ -1,5 +1,6 @@
 //! Why there is no settling move.
 
+use crate::OutOfRange;
 use arm_model::TrajectoryError;
 use rope_sim::sensitivity::SensitivityError;
 use rope_sim::{MotionError, SimulateError};
@@ -9,15 +10,8 @@ use shared_types::rope::RopeError;
 #[derive(Debug, thiserror::Error)]
 pub enum SettleError {
     /// A value of the configuration is out of range.
-    #[error("settle: `{key}` is {value}, but must be {expected}")]
-    Value {
-        /// Key in the configuration.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error("settle: {0}")]
+    Value(#[from] OutOfRange),
     /// The configuration names no duration.
     #[error("settle: `durations_s` is empty; name at least one duration")]
     NoDuration,

@@ -1,6 +1,7 @@
 //! What a settling move is planned from, and what comes of it.
 
 use super::error::SettleError;
+use crate::OutOfRange;
 use arm_model::{Cell, JointTrajectory, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
@@ -159,13 +160,6 @@ impl SettleConfig {
                 "from 0 to 1 m",
             ),
         ];
-        match rules.into_iter().find(|(.., holds, _)| !holds) {
-            Some((key, value, _, expected)) => Err(SettleError::Value {
-                key,
-                value,
-                expected,
-            }),
-            None => Ok(()),
-        }
+        Ok(OutOfRange::check(rules)?)
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::OutOfRange;
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
 use arm_model::Cell;
@@ -233,7 +234,7 @@ fn a_wrong_start_is_refused_by_name() {
     ));
     assert!(matches!(
         with(&|r| r.config.knot_s = 0.0),
-        SettleError::Value { key: "knot_s", .. }
+        SettleError::Value(OutOfRange { key: "knot_s", .. })
     ));
     type Change = fn(&mut SettleRequest);
     let cases: [(&str, Change); 3] = [
@@ -243,7 +244,7 @@ fn a_wrong_start_is_refused_by_name() {
     ];
     for (refused, change) in cases {
         match with(&change) {
-            SettleError::Value { key, .. } => assert_eq!(key, refused),
+            SettleError::Value(refusal) => assert_eq!(refusal.key, refused),
             other => panic!("{refused}: {other}"),
         }
     }

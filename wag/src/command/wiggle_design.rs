@@ -26,7 +26,7 @@ fn papers(config: &WiggleConfig) -> WiggleConfig {
 
 fn classify(error: DesignError) -> Failure {
     match error {
-        DesignError::Wiggle(WiggleError::Value { .. } | WiggleError::BreaksLimit { .. }) => {
+        DesignError::Wiggle(WiggleError::Value(_) | WiggleError::BreaksLimit { .. }) => {
             Failure::input(error)
         }
         other => Failure::failed(other),
