@@ -28,7 +28,6 @@
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod arm_response;
-pub mod cmaes;
 pub mod collide;
 mod config;
 pub mod features;

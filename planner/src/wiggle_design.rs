@@ -1,11 +1,11 @@
 //! A wiggle that tells as much as possible about ropes of the ranges, within the arm's
 //! limits and clear of arm and column.
 
-use crate::cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
 use crate::identify::{IdentifyError, WiggleInformation, information};
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, WiggleError, clearance, wiggle};
 use arm_model::{Cell, Limits};
+use cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
 use rope_sim::PlannedArm;
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, StereoCamera};

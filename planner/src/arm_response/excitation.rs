@@ -9,7 +9,7 @@ use crate::wiggle::smooth_step;
 use arm_model::kinematics::tool_speed_m_s;
 use arm_model::response::Excitation;
 use arm_model::trajectory::MAX_WAYPOINTS;
-use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole, TrajectoryError};
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole, TrajectoryError, unit_hint};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -43,7 +43,7 @@ pub enum ExcitationError {
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
     /// The motion breaks a limit of the arm.
-    #[error("the sweep of joint {joint} breaks a limit: {what}; use a smaller `limits_part`")]
+    #[error("the sweep of joint {joint} breaks a limit: {what}; use a smaller `limits_fraction`")]
     BreaksLimit {
         /// Joint, 1-based.
         joint: usize,
@@ -64,7 +64,7 @@ fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
             highest_max_hz,
         ),
         ("amplitude_max_rad", e.amplitude_max_rad, 1e-3, 0.2),
-        ("limits_part", e.limits_part, 0.01, 0.9),
+        ("limits_fraction", e.limits_fraction, 0.01, 0.9),
         (
             "tool_speed_max_m_s",
             e.tool_speed_max_m_s,
@@ -77,7 +77,7 @@ fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
             return Err(ExcitationError::Value {
                 key,
                 value,
-                expected: format!("from {low:.3} to {high:.3}"),
+                expected: format!("from {low:.3} to {high:.3}{}", unit_hint(key, value, high)),
             });
         }
     }
@@ -95,7 +95,7 @@ fn speed_allowed_rad_s(e: &Excitation, limits: &Limits, pole: &Pole, joint: usiz
         .iter()
         .map(|point| tool_speed_m_s(&e.pose_rad, &unit, point))
         .fold(1e-9, f64::max);
-    (e.tool_speed_max_m_s / lever_m).min(e.limits_part * limits.velocity_max_rad_s[joint])
+    (e.tool_speed_max_m_s / lever_m).min(e.limits_fraction * limits.velocity_max_rad_s[joint])
 }
 
 /// A little less than the smallest of some positive numbers, without the kink
@@ -123,7 +123,7 @@ pub fn sweep(
 ) -> Result<JointTrajectory, ExcitationError> {
     check(e, limits)?;
     let speed = PEAK_RESERVE * speed_allowed_rad_s(e, limits, pole, joint);
-    let part = PEAK_RESERVE * e.limits_part;
+    let part = PEAK_RESERVE * e.limits_fraction;
     let acceleration = part * limits.acceleration_max_rad_s2[joint];
     let jerk = part * limits.jerk_max_rad_s3[joint];
     let phase_rad = phases_rad(e.seed)[joint];
@@ -247,9 +247,9 @@ mod tests {
                 },
             ),
             (
-                "limits_part",
+                "limits_fraction",
                 Excitation {
-                    limits_part: 2.0,
+                    limits_fraction: 2.0,
                     ..good
                 },
             ),

@@ -1,8 +1,8 @@
 //! Why no rope was identified.
 
 use crate::OutOfRange;
-use crate::cmaes::CmaError;
 use crate::phi::{ModelError, PredictError};
+use cmaes::CmaError;
 use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
 use shared_types::keypoints::KeypointError;

@@ -109,7 +109,7 @@ impl Default for IdentifyOptions {
 pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyError> {
     check_options(options)?;
     o.track.validate()?;
-    let lost_fraction = o.track.lost_part();
+    let lost_fraction = o.track.lost_fraction();
     if lost_fraction > options.lost_fraction_max {
         return Err(IdentifyError::TooManyLost {
             lost_fraction,

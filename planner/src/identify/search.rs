@@ -11,7 +11,7 @@ use super::coordinates::{CAMERA, Coordinates, Point};
 use super::error::IdentifyError;
 use super::film::Film;
 use super::options::IdentifyOptions;
-use crate::cmaes::{CmaEs, CmaOptions, StopRules};
+use cmaes::{CmaEs, CmaOptions, StopRules};
 
 /// Result of the search.
 #[derive(Debug, Clone, Copy)]

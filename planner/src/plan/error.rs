@@ -2,8 +2,8 @@
 
 use crate::OutOfRange;
 use crate::arm_response::FollowError;
-use crate::cmaes::CmaError;
 use arm_model::TrajectoryError;
+use cmaes::CmaError;
 use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
 use shared_types::ipc::message::Progress;

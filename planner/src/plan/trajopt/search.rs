@@ -3,8 +3,8 @@
 use super::super::error::{PlanError, PlanProgress};
 use super::decode::WaypointSpace;
 use super::screen::Screen;
-use crate::cmaes::{CmaEs, CmaOptions, StopReason, StopRules};
 use arm_model::JointTrajectory;
+use cmaes::{CmaEs, CmaOptions, StopReason, StopRules};
 use std::ops::ControlFlow;
 
 /// Size and spread of a search.

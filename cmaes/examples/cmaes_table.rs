@@ -1,8 +1,8 @@
 //! Runs the planner's CMA-ES on standard functions and prints one line per run, for
-//! `planner/checks/cmaes_peer.py` to compare with the package `cma`.
+//! `cmaes/checks/cmaes_peer.py` to compare with the package `cma`.
 #![allow(clippy::expect_used, reason = "an example may stop with a message")]
 
-use planner::cmaes::{CmaEs, CmaOptions, StopReason};
+use cmaes::{CmaEs, CmaOptions, StopReason};
 
 const TARGET: f64 = 1e-8;
 const EVALUATIONS_MAX: usize = 400_000;
