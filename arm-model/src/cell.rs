@@ -7,6 +7,7 @@
 use crate::geometry::box_distance_m;
 use crate::joint::{JointState, JointVector};
 use crate::kinematics::{FrameMotion, flange_motion, flange_pose};
+use crate::unit::unit_hint;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -55,7 +56,8 @@ fn checked<'de, D: Deserializer<'de>>(
         Ok(value)
     } else {
         Err(serde::de::Error::custom(format_args!(
-            "{value} m is {expected}"
+            "{value} m is {expected}{}",
+            unit_hint("_m", value, LENGTH_MAX_M)
         )))
     }
 }
@@ -72,10 +74,12 @@ fn below_zero<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
 
 fn place<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
     let place = <[f64; 3]>::deserialize(from)?;
-    if place.iter().all(|v| v.abs() <= LENGTH_MAX_M) {
-        Ok(place)
-    } else {
-        Err(serde::de::Error::custom("a coordinate is beyond 10 m"))
+    match place.iter().find(|v| v.is_nan() || v.abs() > LENGTH_MAX_M) {
+        None => Ok(place),
+        Some(far) => Err(serde::de::Error::custom(format_args!(
+            "a coordinate is {far} m, beyond 10 m{}",
+            unit_hint("_m", *far, LENGTH_MAX_M)
+        ))),
     }
 }
 

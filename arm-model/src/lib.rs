@@ -33,6 +33,7 @@ pub mod piece;
 #[cfg(feature = "std")]
 pub mod response;
 pub mod trajectory;
+mod unit;
 
 pub use cell::{Cell, Pole};
 pub use joint::{JOINTS, JointState, JointVector};
@@ -41,3 +42,4 @@ pub use piece::JointPiece;
 #[cfg(feature = "std")]
 pub use response::{ArmResponse, JointResponse, TrackingLag};
 pub use trajectory::{JointTrajectory, TrajectoryError};
+pub use unit::unit_hint;

@@ -7,6 +7,7 @@
 use crate::joint::{JOINTS, JointVector};
 use crate::kinematics;
 use crate::trajectory::JointTrajectory;
+use crate::unit::unit_hint;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -16,6 +17,14 @@ use serde::{Deserialize, Serialize};
 /// Longest path of the tool from one setpoint to the next (m): the vendor's advice, at
 /// which the controller stops.
 pub const STEP_MAX_M: f64 = 0.010;
+
+/// Ranges (rad), speed (rad/s), acceleration (rad/s²) and jerk (rad/s³) of the arm's joints
+/// (vendor manual), rounded up: no limit beyond them makes sense.
+const RATED: [f64; 4] = [6.29, 3.15, 20.01, 500.0];
+/// Speed of the tool at full reach, 0.7 m, while one joint turns as fast as it can (m/s).
+pub const TOOL_SPEED_RATED_M_S: f64 = 2.2;
+/// Longest tool that makes sense (m).
+const TOOL_MAX_M: f64 = 1.0;
 
 /// Limits as written in a file; unchecked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +64,16 @@ pub enum LimitsError {
     EmptyRange {
         /// Joint, 1-based.
         joint: usize,
+    },
+    /// More than the arm is rated for.
+    #[error("`{key}` is {value}, but the arm reaches at most {most}{}", unit_hint(key, *value, *most))]
+    BeyondRating {
+        /// Key in the file.
+        key: &'static str,
+        /// Value found.
+        value: f64,
+        /// Largest value that makes sense.
+        most: f64,
     },
     /// Rate outside what the wire takes.
     #[error("`rate_hz` is {rate_hz}, but the arm takes 30 to 250 setpoints a second")]
@@ -154,6 +173,39 @@ pub struct Margin {
 }
 
 impl Limits {
+    /// Refuses what this arm cannot be limited to: a slip of the unit, mostly.
+    ///
+    /// # Errors
+    /// [`LimitsError::BeyondRating`].
+    pub fn check_rating(&self) -> Result<(), LimitsError> {
+        let [range, speed, acceleration, jerk] = RATED;
+        let rules = [
+            ("position_min_rad", self.position_min_rad.max_abs(), range),
+            ("position_max_rad", self.position_max_rad.max_abs(), range),
+            (
+                "velocity_max_rad_s",
+                self.velocity_max_rad_s.max_abs(),
+                speed,
+            ),
+            (
+                "acceleration_max_rad_s2",
+                self.acceleration_max_rad_s2.max_abs(),
+                acceleration,
+            ),
+            ("jerk_max_rad_s3", self.jerk_max_rad_s3.max_abs(), jerk),
+            (
+                "tcp_speed_max_m_s",
+                self.tcp_speed_max_m_s,
+                TOOL_SPEED_RATED_M_S,
+            ),
+            ("tcp_offset_m", self.tcp_offset().amax(), TOOL_MAX_M),
+        ];
+        match rules.into_iter().find(|(_, value, most)| value > most) {
+            Some((key, value, most)) => Err(LimitsError::BeyondRating { key, value, most }),
+            None => Ok(()),
+        }
+    }
+
     /// Duration of one cycle (s).
     #[must_use]
     pub fn period_s(&self) -> f64 {
@@ -181,50 +233,40 @@ impl Limits {
         for j in 0..JOINTS {
             let e = trajectory.extrema(j);
             let (lo, hi) = (self.0.position_min_rad[j], self.0.position_max_rad[j]);
-            let joint = u8::try_from(j + 1).unwrap_or(u8::MAX);
-            let mut push = |kind, value: f64, limit: f64, time_s, left| {
-                out.push(Margin {
-                    kind,
-                    joint,
-                    value,
-                    limit,
-                    time_s,
-                    left,
-                });
-            };
-            let span = hi - lo;
-            push(
-                LimitKind::PositionMin,
-                e.q_min.value,
-                lo,
-                e.q_min.time_s,
-                (e.q_min.value - lo) / span,
-            );
-            push(
-                LimitKind::PositionMax,
-                e.q_max.value,
-                hi,
-                e.q_max.time_s,
-                (hi - e.q_max.value) / span,
-            );
             let (v, a) = (
                 self.0.velocity_max_rad_s[j],
                 self.0.acceleration_max_rad_s2[j],
             );
-            push(
-                LimitKind::Velocity,
-                e.qd.value,
-                v,
-                e.qd.time_s,
-                1.0 - e.qd.value.abs() / v,
-            );
-            push(
-                LimitKind::Acceleration,
-                e.qdd.value,
-                a,
-                e.qdd.time_s,
-                1.0 - e.qdd.value.abs() / a,
-            );
+            let (span, joint) = (hi - lo, u8::try_from(j + 1).unwrap_or(u8::MAX));
+            let found = [
+                (
+                    LimitKind::PositionMin,
+                    e.q_min,
+                    lo,
+                    (e.q_min.value - lo) / span,
+                ),
+                (
+                    LimitKind::PositionMax,
+                    e.q_max,
+                    hi,
+                    (hi - e.q_max.value) / span,
+                ),
+                (LimitKind::Velocity, e.qd, v, 1.0 - e.qd.value.abs() / v),
+                (
+                    LimitKind::Acceleration,
+                    e.qdd,
+                    a,
+                    1.0 - e.qdd.value.abs() / a,
+                ),
+            ];
+            out.extend(found.map(|(kind, extreme, limit, left)| Margin {
+                kind,
+                joint,
+                value: extreme.value,
+                limit,
+                time_s: extreme.time_s,
+                left,
+            }));
         }
         out.push(self.tcp_margin(trajectory));
         out
@@ -300,31 +342,16 @@ impl Margin {
     }
 }
 
+#[cfg(feature = "std")]
 impl Default for Limits {
-    /// xArm 7, the narrower ranges of the 1305 model (vendor manual and SDK):
-    /// 180 deg/s, 1146 deg/s², 28647 deg/s³, tool speed 1.2 m/s in servo mode.
+    /// Those of `configs/robot/xarm7.toml`.
     fn default() -> Self {
-        let full = core::f64::consts::TAU;
-        Self(LimitsSpec {
-            position_min_rad: JointVector([
-                -full, -2.042_035, -full, -0.104_72, -full, -1.692_969, -full,
-            ]),
-            position_max_rad: JointVector([
-                full,
-                2.024_581,
-                full,
-                3.926_99,
-                full,
-                core::f64::consts::PI,
-                full,
-            ]),
-            velocity_max_rad_s: JointVector::splat(core::f64::consts::PI),
-            acceleration_max_rad_s2: JointVector::splat(20.0),
-            jerk_max_rad_s3: JointVector::splat(500.0),
-            tcp_speed_max_m_s: 1.2,
-            tcp_offset_m: [0.0; 3],
-            rate_hz: 250.0,
-        })
+        #[allow(clippy::expect_used, reason = "a file of this crate's own sources")]
+        static XARM7: std::sync::LazyLock<Limits> = std::sync::LazyLock::new(|| {
+            toml::from_str(include_str!("../../configs/robot/xarm7.toml"))
+                .expect("configs/robot/xarm7.toml are limits")
+        });
+        XARM7.clone()
     }
 }
 
@@ -378,5 +405,16 @@ mod tests {
             Limits::try_from(spec),
             Err(LimitsError::Rate { .. })
         ));
+        let beyond = |change: fn(&mut LimitsSpec)| {
+            let mut spec = LimitsSpec::from(Limits::default());
+            change(&mut spec);
+            let limits = Limits::try_from(spec).unwrap();
+            limits.check_rating().unwrap_err().to_string()
+        };
+        assert_eq!(Limits::default().check_rating(), Ok(()));
+        let said = beyond(|spec| spec.tcp_speed_max_m_s = 900.0);
+        assert!(said.contains("2.2") && said.contains("in mm?"), "{said}");
+        let said = beyond(|spec| spec.velocity_max_rad_s[6] = 180.0);
+        assert!(said.contains("in degrees?"), "{said}");
     }
 }

@@ -1,6 +1,6 @@
 //! How a command fails: its exit code and its one sentence.
 
-use std::fmt;
+use std::{fmt, io};
 
 /// A failed command.
 #[derive(Debug)]
@@ -35,6 +35,30 @@ impl Failure {
             class: Class::Failed,
             error: error.into(),
         }
+    }
+
+    /// Bad input, or else a failure of the work.
+    pub fn of(is_input: bool, error: impl Into<anyhow::Error>) -> Self {
+        if is_input {
+            Self::input(error)
+        } else {
+            Self::failed(error)
+        }
+    }
+
+    /// A server that could not be: an address that this machine does not have is bad input.
+    pub fn of_server(error: impl Into<anyhow::Error>) -> Self {
+        let error = error.into();
+        let of_system =
+            |e: &(dyn std::error::Error + 'static)| Some(e.downcast_ref::<io::Error>()?.kind());
+        let none_such = io::ErrorKind::AddrNotAvailable;
+        Self::of(
+            error
+                .chain()
+                .filter_map(of_system)
+                .any(|kind| kind == none_such),
+            error,
+        )
     }
 
     /// Process exit code.

@@ -158,7 +158,7 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
     Outcome {
         seed,
         filming,
-        lost: found.track.lost_part(),
+        lost: found.track.lost_fraction(),
         doubted: doubted as f64 / found.track.frames.len() as f64,
         errors_px: [part(50), part(95)],
         confident_px,

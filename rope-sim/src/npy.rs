@@ -1,4 +1,4 @@
-//! NumPy's `.npy` files: C-ordered `float64` out, `float32` or `float64` in.
+//! NumPy's `.npy` files: C-ordered `float32` or `float64` out, `float32` or `float64` in.
 //!
 //! Layout (NumPy enhancement proposal 1): `\x93NUMPY`, version, header length, a
 //! Python dictionary as text, padding to 64 bytes, the numbers.
@@ -32,14 +32,31 @@ pub enum NpyError {
 ///
 /// # Errors
 /// Whatever the writer reports; `InvalidInput` if the shape does not hold the values.
-pub fn write_f64(mut out: impl Write, shape: &[usize], values: &[f64]) -> io::Result<()> {
+pub fn write_f64(out: impl Write, shape: &[usize], values: &[f64]) -> io::Result<()> {
+    write(out, shape, "<f8", values.iter().map(|v| v.to_le_bytes()))
+}
+
+/// Writes `values` (C order) with `shape` as little-endian `float32`.
+///
+/// # Errors
+/// As [`write_f64`].
+pub fn write_f32(out: impl Write, shape: &[usize], values: &[f32]) -> io::Result<()> {
+    write(out, shape, "<f4", values.iter().map(|v| v.to_le_bytes()))
+}
+
+fn write<const N: usize>(
+    mut out: impl Write,
+    shape: &[usize],
+    kind: &str,
+    values: impl ExactSizeIterator<Item = [u8; N]>,
+) -> io::Result<()> {
     if shape.iter().product::<usize>() != values.len() {
         let what = format!("shape {shape:?} does not hold {} values", values.len());
         return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
     }
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut header = format!(
-        "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}",
+        "{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}), }}",
         sizes.trim_end()
     );
     let unpadded = 10 + header.len() + 1;
@@ -53,10 +70,7 @@ pub fn write_f64(mut out: impl Write, shape: &[usize], values: &[f64]) -> io::Re
     out.write_all(b"\x93NUMPY\x01\x00")?;
     out.write_all(&length.to_le_bytes())?;
     out.write_all(header.as_bytes())?;
-    let mut bytes = Vec::with_capacity(values.len() * 8);
-    for value in values {
-        bytes.extend_from_slice(&value.to_le_bytes());
-    }
+    let bytes: Vec<u8> = values.flatten().collect();
     out.write_all(&bytes)
 }
 
@@ -135,6 +149,9 @@ mod tests {
                 }
             );
         }
+        let mut file = Vec::new();
+        write_f32(&mut file, &[2], &[0.5, -1.25]).unwrap();
+        assert_eq!(read(&file[..]).unwrap().values, [0.5, -1.25]);
     }
 
     #[test]

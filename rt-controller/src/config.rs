@@ -7,6 +7,7 @@ use crate::os::RealTimeSettings;
 use crate::set_up::OnDifference;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::Limits;
+use arm_model::limits::LimitsError;
 use serde::{Deserialize, Serialize};
 use shared_types::CommandInterface;
 use std::net::{IpAddr, Ipv4Addr};
@@ -39,6 +40,9 @@ pub enum ConfigError {
     /// Limits given twice.
     #[error("give either `limits_file` or a table `[limits]`, not both")]
     LimitsTwice,
+    /// Limits beyond what the arm is rated for.
+    #[error("limits: {0}")]
+    Limits(#[from] LimitsError),
     /// A threshold makes no sense.
     #[error("`{key}` is {found}, it must be {allowed}")]
     Threshold {
@@ -268,12 +272,14 @@ impl ControllerConfig {
     /// # Errors
     /// [`ConfigError`].
     pub fn resolve_limits(&self) -> Result<Limits, ConfigError> {
-        match (&self.limits_file, &self.limits) {
-            (Some(_), Some(_)) => Err(ConfigError::LimitsTwice),
-            (Some(path), None) => read_toml(path),
-            (None, Some(limits)) => Ok(limits.clone()),
-            (None, None) => Ok(Limits::default()),
-        }
+        let limits = match (&self.limits_file, &self.limits) {
+            (Some(_), Some(_)) => return Err(ConfigError::LimitsTwice),
+            (Some(path), None) => read_toml(path)?,
+            (None, Some(limits)) => limits.clone(),
+            (None, None) => Limits::default(),
+        };
+        limits.check_rating()?;
+        Ok(limits)
     }
 
     /// Settings of the control core.

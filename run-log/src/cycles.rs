@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// Table of the control cycles of a run, as `wag export csv` writes it.
-const CYCLES_TABLE: &str = "cycles.csv";
+pub const CYCLES_TABLE: &str = "cycles.csv";
 /// Table of its measured joints.
 const JOINTS_TABLE: &str = "joints.csv";
 /// Columns of [`CYCLES_TABLE`].

@@ -38,7 +38,7 @@ mod run;
 
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
-pub use cycles::Cycles;
+pub use cycles::{CYCLES_TABLE, Cycles};
 pub use error::{Error, Result};
 pub use explanation::{Broken, Explanation, Late, Row, Stop, explain};
 pub use margins::Margin;

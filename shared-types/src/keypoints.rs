@@ -202,7 +202,7 @@ impl KeypointTrack {
 
     /// Part of the frames in which the rope was lost (0 to 1).
     #[must_use]
-    pub fn lost_part(&self) -> f64 {
+    pub fn lost_fraction(&self) -> f64 {
         let lost = self.frames.iter().filter(|f| f.lost).count();
         lost as f64 / self.frames.len().max(1) as f64
     }

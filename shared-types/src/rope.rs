@@ -1,5 +1,6 @@
 //! The nine rope parameters (the paper's ξ) with their ranges.
 
+use arm_model::unit_hint;
 use serde::{Deserialize, Serialize};
 
 /// Number of rope parameters.
@@ -96,7 +97,7 @@ pub const RANGES: [ParameterRange; ROPE_PARAMETERS] = [
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RopeError {
     /// A value is NaN, infinite, or not physical.
-    #[error("rope parameter `{key}` is {value}, but must be a finite number from {min} to {max}")]
+    #[error("rope parameter `{key}` is {value}, but must be a finite number from {min} to {max}{}", unit_hint(key, *value, *max))]
     OutOfBounds {
         /// Key in `rope.toml`.
         key: &'static str,

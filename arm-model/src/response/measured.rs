@@ -106,7 +106,8 @@ pub struct Excitation {
     /// Largest amplitude (rad).
     pub amplitude_max_rad: f64,
     /// Part of the arm's joint speed, acceleration and jerk that is used.
-    pub limits_part: f64,
+    #[serde(alias = "limits_part")]
+    pub limits_fraction: f64,
     /// Largest speed of flange and pole (m/s).
     pub tool_speed_max_m_s: f64,
 }
@@ -121,7 +122,7 @@ impl Default for Excitation {
             lowest_hz: 0.8,
             highest_hz: 18.0,
             amplitude_max_rad: 0.05,
-            limits_part: 0.5,
+            limits_fraction: 0.5,
             tool_speed_max_m_s: 0.25,
         }
     }

@@ -2,7 +2,7 @@
 
 use super::child::{Process, Role};
 use super::flight::Flight;
-use super::stand::{PATIENCE, Stand, execute, patient, swing};
+use super::stand::{PATIENCE, Stand, alone, execute, patient, swing};
 use rt_controller::xarm::ArmState;
 use shared_types::ipc::message::ControllerEvent;
 use shared_types::{FaultCode, MonotonicNs, OperatingMode};
@@ -54,6 +54,7 @@ fn stopped_at(events: &[TimedEvent], from: MonotonicNs) -> Option<MonotonicNs> {
 /// Rounds in which the machine stood still before the kill are not kills.
 #[test]
 fn fault_28_a_killed_controller_is_met_by_the_guardian_within_20_ms() {
+    alone();
     let mut reactions_ms = Vec::new();
     for round in 0..ROUNDS_MAX {
         let mut stand = Stand::with(&format!("killed_{round}"), ArmConfig::default(), |config| {

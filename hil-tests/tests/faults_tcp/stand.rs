@@ -14,17 +14,28 @@ use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
 use shared_types::plan::trajectory_hash;
 use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::cell::OnceCell;
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::{Duration, Instant};
 use xarm_sim::{ArmConfig, FaultScript, SimulatedArm, clock};
 
-/// Stands take turns: each has a control loop of its own to keep punctual.
-static TURNS: Mutex<()> = Mutex::new(());
+/// Stands go side by side, each in a domain and on ports of its own; one whose times are
+/// judged goes alone.
+static TURNS: RwLock<()> = RwLock::new(());
 
 thread_local! {
     /// The turn of this thread's test, until the thread ends.
-    static ALONE: MutexGuard<'static, ()> =
-        TURNS.lock().unwrap_or_else(PoisonError::into_inner);
+    static ALONE: OnceCell<RwLockWriteGuard<'static, ()>> = const { OnceCell::new() };
+    static BESIDE_OTHERS: RwLockReadGuard<'static, ()> =
+        TURNS.read().unwrap_or_else(PoisonError::into_inner);
+}
+
+/// No other stand is there until this test has ended.
+pub fn alone() {
+    let turn = || TURNS.write().unwrap_or_else(PoisonError::into_inner);
+    ALONE.with(|alone| {
+        alone.get_or_init(turn);
+    });
 }
 
 /// Longest wait for anything.
@@ -35,10 +46,14 @@ const TURN: Duration = Duration::from_millis(2);
 /// A swing of three joints out and back, twice, 2.4 s; its fastest joint reaches
 /// 0.8 rad/s.
 pub fn swing(from: JointVector) -> JointTrajectory {
+    swings(from, 2)
+}
+
+fn swings(from: JointVector, count: usize) -> JointTrajectory {
     let mut out = from;
     (out[1], out[3], out[5]) = (out[1] + 0.08, out[3] - 0.08, out[5] + 0.25);
-    let times = [0.0, 0.6, 1.2, 1.8, 2.4];
-    JointTrajectory::new(&times, &[from, out, from, out, from]).unwrap()
+    let (times, poses) = ([0.0, 0.6, 1.2, 1.8, 2.4], [from, out, from, out, from]);
+    JointTrajectory::new(&times[..=2 * count], &poses[..=2 * count]).unwrap()
 }
 
 pub fn execute(trajectory: &JointTrajectory) -> ControllerRequest {
@@ -120,7 +135,9 @@ impl Stand {
     /// A stand with an arm and changes to the controller's configuration of its
     /// own.
     pub fn with(name: &str, arm: ArmConfig, change: impl FnOnce(&mut ControllerConfig)) -> Self {
-        ALONE.with(|_turn| ());
+        if ALONE.with(|alone| alone.get().is_none()) {
+            BESIDE_OTHERS.with(|_turn| ());
+        }
         let arm = SimulatedArm::start(ArmConfig {
             command_port: 0,
             report_ports: [0; 4],
@@ -384,10 +401,16 @@ impl Stand {
         );
     }
 
-    /// After an acknowledgement the arm works as before.
+    /// After an acknowledgement the arm works as before, as one swing shows.
     pub fn works_again(&mut self) {
         self.make_ready();
-        self.throws();
+        let once = swings(self.commanded(), 1);
+        assert_eq!(self.arm_for(OperatingMode::Throw), ControllerEvent::Done);
+        let answer = self.ask(&execute(&once));
+        assert!(
+            matches!(answer, ControllerEvent::Finished { .. }),
+            "{answer:?}"
+        );
     }
 
     /// Works again, and that was all.

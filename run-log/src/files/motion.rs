@@ -14,6 +14,9 @@ pub struct JointsCsv {
     pub q: Vec<JointVector>,
 }
 
+/// No joint of the arm turns as far as this (rad).
+const JOINT_MAX_RAD: f64 = 7.5;
+
 /// Reads a CSV whose first columns are those of `header`, all numbers finite
 /// and the first one increasing.
 fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
@@ -76,6 +79,18 @@ fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
 /// The file cannot be read, or a line of it is wrong.
 pub fn read_joints(path: &Path) -> Result<JointsCsv> {
     let rows = read_table(path, &["t", "q1", "q2", "q3", "q4", "q5", "q6", "q7"])?;
+    for (i, row) in rows.iter().enumerate() {
+        if let Some(q) = row[1..].iter().find(|q| q.abs() > JOINT_MAX_RAD) {
+            return Err(Error::Table {
+                path: path.to_owned(),
+                problem: format!(
+                    " line {}: a joint at {q} rad, but none turns beyond {JOINT_MAX_RAD} rad; \
+                     is the file in degrees?",
+                    i + 2
+                ),
+            });
+        }
+    }
     Ok(JointsCsv {
         times_s: rows.iter().map(|r| r[0]).collect(),
         q: rows
@@ -192,6 +207,8 @@ mod tests {
         let order = refused(&format!("{head}1,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n"));
         assert!(order.contains("does not come after"), "{order}");
         assert!(refused(head).contains("at least two rows"));
+        let degrees = refused(&format!("{head}0,0,0,0,0,0,0,0\n1,0,0,90,0,0,0,0\n"));
+        assert!(degrees.contains("line 3") && degrees.contains("in degrees"));
         let short = refused(&format!("{head}0,0,0\n"));
         assert!(short.contains("line 2"), "{short}");
     }

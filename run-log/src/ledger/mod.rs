@@ -30,7 +30,7 @@ pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {
         let mut runs: Vec<PathBuf> = inside
             .flatten()
             .map(|entry| entry.path())
-            .filter(|path| path.is_dir())
+            .filter(|path| is_run(path))
             .collect();
         runs.sort();
         found.append(&mut runs);
@@ -38,9 +38,10 @@ pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {
     found.iter().map(|run| read(run)).collect()
 }
 
-/// Whether a folder is a run's own: it says how it was made or what came of it.
-fn is_run(folder: &Path) -> bool {
-    [files::COMMAND, files::SUMMARY]
+/// Whether a folder is a run's own: it says how it was made or what came of it, or holds
+/// its recording.
+pub fn is_run(folder: &Path) -> bool {
+    [files::COMMAND, files::SUMMARY, files::RUN, files::CYCLES]
         .iter()
         .any(|file| folder.join(file).is_file())
 }

@@ -123,7 +123,7 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
         ..TrackOptions::default()
     };
     let found = track(&frames, &camera, &clamp, &options).unwrap();
-    assert_eq!(found.track.lost_part(), 0.0);
+    assert_eq!(found.track.lost_fraction(), 0.0);
     let mut errors_px: Vec<f64> = Vec::new();
     for (frame, truth) in found.track.frames.iter().zip(&shown) {
         for (point, node) in frame.points.iter().zip(&truth.nodes) {

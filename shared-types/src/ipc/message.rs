@@ -127,7 +127,7 @@ pub enum CameraEvent {
         /// Frames published.
         frames: u32,
         /// Part of the frames in which the rope was lost (0 to 1).
-        lost_part: f64,
+        lost_fraction: f64,
         /// Sizes and colours.
         appearance: RopeAppearance,
         /// Processing time per frame (ms).

@@ -14,14 +14,26 @@ use control_core::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use control_core::xarm::{Command, Protocol};
 use core::alloc::{GlobalAlloc, Layout};
 use core::sync::atomic::{AtomicUsize, Ordering};
-use arm_model::{JointVector, Limits};
+use arm_model::{JointVector, Limits, LimitsSpec};
 
 const PERIOD_NS: u64 = 4_000_000;
 const POSE: JointVector = JointVector([0.0, -0.3, 0.0, 0.8, 0.0, 1.1, 0.0]);
 
 #[unsafe(no_mangle)]
 extern "C" fn main() -> i32 {
-    let mut control = ControlState::new(Limits::default(), Thresholds::relaxed());
+    let Ok(limits) = Limits::try_from(LimitsSpec {
+        position_min_rad: JointVector::splat(-6.0),
+        position_max_rad: JointVector::splat(6.0),
+        velocity_max_rad_s: JointVector::splat(3.0),
+        acceleration_max_rad_s2: JointVector::splat(20.0),
+        jerk_max_rad_s3: JointVector::splat(500.0),
+        tcp_speed_max_m_s: 1.2,
+        tcp_offset_m: [0.0; 3],
+        rate_hz: 250.0,
+    }) else {
+        return 2;
+    };
+    let mut control = ControlState::new(limits, Thresholds::relaxed());
     let mut command = Some(ControlCommand::Engage { hold: POSE });
     let mut held = 0;
     for cycle in 1..=1000_u64 {

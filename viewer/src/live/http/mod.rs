@@ -91,8 +91,9 @@ pub(crate) fn serve(
     bind: SocketAddr,
     asks: mpsc::Sender<Asked>,
 ) -> anyhow::Result<(String, Arc<Site>)> {
-    let listener = TcpListener::bind(bind)
-        .with_context(|| format!("cannot listen on {bind}; name another port with --bind"))?;
+    let listener = TcpListener::bind(bind).with_context(|| {
+        format!("cannot listen on {bind}; name another address or port with --bind")
+    })?;
     let bound = listener.local_addr().context("the server's own address")?;
     let token = Token::draw()?;
     let url = format!("http://{bound}/{}/", token.as_str());
