@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
 use planner::identify::Method;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// Reproduce a result of the paper, or measure how fast this machine runs a part of the
@@ -30,6 +31,10 @@ pub struct Cli {
 pub enum Command {
     /// Measure how fast this machine runs a part of the system.
     Bench(BenchArgs),
+    /// Film simulated wiggles in drawn rooms, with the truth in their pixels.
+    Rooms(RoomsArgs),
+    /// Count the wiggles in drawn rooms that the tracker follows, refuses and gets wrong.
+    TrackRooms(TrackRoomsArgs),
     /// A result of the paper.
     #[command(flatten)]
     Result(ResultCommand),
@@ -84,6 +89,65 @@ pub struct ResultArgs {
     /// (SVG) is drawn next to it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `experiments rooms`.
+#[derive(Debug, Args)]
+pub struct RoomsArgs {
+    /// How hard it is to see the rope.
+    #[arg(long, value_enum, default_value_t = KindName::Ordinary)]
+    pub kind: KindName,
+    /// Seeds, one or from-to. Even seeds from 1000000 on are reserved for judging.
+    #[arg(long, value_name = "A-B", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// Folder for the films, each in a folder of its own named KIND-SEED.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Threads; the films do not depend on them. Default: one a processor.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// Arguments of `experiments track-rooms`.
+#[derive(Debug, Args)]
+pub struct TrackRoomsArgs {
+    /// How hard it is to see the rope.
+    #[arg(long, value_enum, default_value_t = KindName::Ordinary)]
+    pub kind: KindName,
+    /// Seeds, one or from-to. Even seeds from 1000000 on are reserved for judging.
+    #[arg(long, value_name = "A-B", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// Folder of films, as `experiments rooms` writes them; missing ones are rendered into
+    /// it. Left out, each film is rendered anew and removed.
+    #[arg(long, value_name = "DIR")]
+    pub films: Option<PathBuf>,
+    /// Folder for the results, a file a seed; an interrupted run resumes from it. Name a
+    /// new one for another tracker.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Threads; the results do not depend on them. Default: one a processor.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// Kinds of room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum KindName {
+    /// As people have them; the rope stands out from the wall.
+    Ordinary,
+    /// With a rope in the wall's colour, somebody who walks by, cables, or glare.
+    Hard,
+}
+
+/// `7` or `1-20`.
+fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let (from, to) = text.split_once('-').unwrap_or((text, text));
+    match (from.trim().parse::<u64>(), to.trim().parse::<u64>()) {
+        (Ok(from), Ok(to)) if from <= to => Ok(from..=to),
+        _ => Err(format!(
+            "`{text}` is neither a seed nor two, the smaller first: 7 or 1-20"
+        )),
+    }
 }
 
 /// How to identify, as `wag identify --method`.

@@ -16,6 +16,7 @@ mod bench;
 mod network;
 mod report;
 mod results;
+mod rooms;
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -28,6 +29,8 @@ fn main() -> ExitCode {
     cli_output::start_logging(cli.verbose);
     let outcome = match &cli.command {
         args::Command::Bench(bench) => bench::run(bench, cli.json),
+        args::Command::Rooms(args) => rooms::run(args, cli.json),
+        args::Command::TrackRooms(args) => rooms::track::run(args, cli.json),
         args::Command::Result(result) => results::run(result, cli.json),
     };
     cli_output::finish(outcome, cli.json)

@@ -95,5 +95,5 @@ fn bench_track_reports_times_and_memory_of_a_recording() {
         (frames_mb..frames_mb + 200.0).contains(&peak_mb),
         "{peak_mb} MB"
     );
-    assert!((0.0..=1.0).contains(&report["lost_part"].as_f64().unwrap()));
+    assert!((0.0..=1.0).contains(&report["lost_fraction"].as_f64().unwrap()));
 }

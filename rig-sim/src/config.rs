@@ -4,12 +4,24 @@ use super::camera::CameraConfig;
 use super::error::RigError;
 use crate::hidden::hidden_rope;
 use crate::render::Appearance;
+use crate::room::{Kind, Room, RopeSurface};
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, StereoCamera};
 use std::net::IpAddr;
 use xarm_sim::{ArmConfig, FaultScript, Firmware, Intake, JointLag, Obstacle};
+
+/// Rooms the rig may stand in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RoomChoice {
+    /// A bright one with a plain wall, without shadows of moving things.
+    #[default]
+    Plain,
+    /// The seed's [`Kind::Ordinary`] room.
+    Ordinary,
+}
 
 /// Set-up of the simulated rig. Every key has a default; `seed` alone gives a
 /// new rope, new colours and slightly different joints.
@@ -50,6 +62,8 @@ pub struct RigConfig {
     pub rope: Option<RopeParams>,
     /// Colours; left out, they are drawn from the seed.
     pub appearance: Option<Appearance>,
+    /// The room the camera sees behind the arm.
+    pub room: RoomChoice,
     /// Centre of the target ball in the world (m); left out, there is none.
     pub target_m: Option<[f64; 3]>,
     /// The stereo camera.
@@ -82,6 +96,7 @@ impl Default for RigConfig {
             initial_q,
             rope: None,
             appearance: None,
+            room: RoomChoice::Plain,
             target_m: None,
             camera: CameraConfig::default(),
         }
@@ -95,11 +110,31 @@ impl RigConfig {
         self.rope.unwrap_or_else(|| hidden_rope(self.seed))
     }
 
+    /// The drawn room, where one was chosen: with the camera's own noise, and with a plain
+    /// rope where its colours are given.
+    #[must_use]
+    pub fn drawn_room(&self) -> Option<Room> {
+        let mut room = match self.room {
+            RoomChoice::Plain => return None,
+            RoomChoice::Ordinary => Room::draw(self.seed, Kind::Ordinary),
+        };
+        room.picture.noise_levels = self.camera.noise_levels;
+        if let Some(colours) = &self.appearance {
+            room.rope = RopeSurface::plain(colours.rope_rgb, colours.lead_rgb);
+        }
+        Some(room)
+    }
+
     /// Colours of rope, lead, target and wall.
     #[must_use]
     pub fn appearance(&self) -> Appearance {
+        let own = Appearance::from_seed(self.seed);
         self.appearance
-            .unwrap_or_else(|| Appearance::from_seed(self.seed))
+            .or_else(|| {
+                self.drawn_room()
+                    .map(|room| room.appearance(own.target_rgb))
+            })
+            .unwrap_or(own)
     }
 
     /// The camera's exact calibration and place.
@@ -188,5 +223,19 @@ mod tests {
         assert!(toml::from_str::<RigConfig>("sed = 7").is_err());
         let back: RigConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();
         assert_eq!(back, config);
+    }
+
+    #[test]
+    fn a_drawn_room_is_the_seeds_and_given_colours_win() {
+        assert_eq!(RigConfig::default().drawn_room(), None);
+        let mut config: RigConfig = toml::from_str("seed = 7\nroom = \"ordinary\"").unwrap();
+        let room = config.drawn_room().unwrap();
+        assert_eq!(room.wall, Room::draw(7, Kind::Ordinary).wall);
+        assert_eq!(config.appearance().rope_rgb, room.rope.rope.rgb);
+        assert_eq!(config.appearance().lead_rgb, room.rope.tip.rgb);
+        let given = Appearance::from_seed(3);
+        config.appearance = Some(given);
+        assert_eq!(config.appearance(), given);
+        assert_eq!(config.drawn_room().unwrap().rope.rope.rgb, given.rope_rgb);
     }
 }

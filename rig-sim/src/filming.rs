@@ -5,10 +5,10 @@ use super::config::RigConfig;
 use super::error::RigError;
 use super::record::Record;
 use crate::render::{Renderer, RopeShape, ScenePose};
-use shared_types::MonotonicNs;
 use shared_types::ipc::{
     Bus, FRAME_SERVICE, FrameHeader, FramePublisher, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
+use shared_types::{MonotonicNs, StereoCamera};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use xarm_sim::clock;
@@ -22,14 +22,7 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Result<(), RigError> {
     let bus = Bus::join(&config.domain)?;
     let camera = config.stereo_camera();
-    let mut renderer = Renderer::new(
-        &camera,
-        &config.cell,
-        RopeShape::from(&config.rope()),
-        config.appearance(),
-        config.camera.noise_levels,
-        config.seed,
-    );
+    let mut renderer = renderer(config, &camera);
     let publisher = bus.frame_publisher(renderer.frame_bytes())?;
     let mut shutter = Shutter {
         start: clock::now(),
@@ -64,6 +57,29 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
         shutter.next(clock::now(), config.camera.latency_s + BACKLOG_S);
     }
     Ok(())
+}
+
+/// Draws the chosen room.
+fn renderer(config: &RigConfig, camera: &StereoCamera) -> Renderer {
+    let (rope, seed) = (RopeShape::from(&config.rope()), config.seed);
+    let appearance = config.appearance();
+    match config.drawn_room() {
+        Some(room) => {
+            let rate_hz = config.camera.frame_rate_hz;
+            Renderer::in_room(
+                camera,
+                &config.cell,
+                rope,
+                &room,
+                (appearance.target_rgb, rate_hz),
+                seed,
+            )
+        }
+        None => {
+            let noise = config.camera.noise_levels;
+            Renderer::new(camera, &config.cell, rope, appearance, noise, seed)
+        }
+    }
 }
 
 /// When frames are taken.

@@ -11,6 +11,7 @@
 
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
+mod as_seen;
 pub mod body;
 mod camera;
 mod config;
@@ -20,11 +21,13 @@ pub mod hidden;
 mod physics;
 mod record;
 pub mod render;
+pub mod room;
+pub mod room_film;
 mod service;
 pub mod wiggle_film;
 
 pub use camera::{CameraConfig, Resolution};
-pub use config::{RigConfig, check};
+pub use config::{RigConfig, RoomChoice, check};
 pub use error::RigError;
 
 use nalgebra::Vector3;

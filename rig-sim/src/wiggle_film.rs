@@ -2,6 +2,7 @@
 //! the same film whatever else the machine does.
 
 use crate::CameraConfig;
+use crate::as_seen::as_seen;
 use crate::hidden::hidden_rope;
 use crate::render::{Appearance, Renderer, RopeShape, ScenePose};
 use arm_model::joint::START_POSE;
@@ -118,25 +119,6 @@ impl WiggleFilm {
         })
     }
 
-    /// A node's place in the middle of the exposure of the row that shows it; `all` lie
-    /// evenly over the frame's time.
-    fn as_seen(&self, all: &[ScenePose], node: usize) -> Vector3<f64> {
-        let at = |t_s: f64| {
-            let place = t_s / self.camera.frame_time_s() * all.len() as f64 - 0.5;
-            let place = place.clamp(0.0, (all.len() - 1) as f64);
-            let before = (place as usize).min(all.len().saturating_sub(2));
-            let [a, b] = [before, (before + 1).min(all.len() - 1)].map(|i| all[i].nodes[node]);
-            a + (b - a) * (place - before as f64)
-        };
-        let mut row = f64::from(self.camera.height_px) / 2.0;
-        // A node moves far less than a row in a row's time.
-        for _ in 0..4 {
-            let seen = self.camera.project_left(&at(self.camera.row_time_s(row)));
-            row = seen.map_or(row, |[_, v]| v);
-        }
-        at(self.camera.row_time_s(row))
-    }
-
     fn pose(&mut self, t_s: f64) -> ScenePose {
         // The simulation counts from the first frame on, whose rope hangs still.
         let first_s = self.late_s;
@@ -167,7 +149,10 @@ impl Iterator for WiggleFilm {
         let mut yuyv = vec![0; self.renderer.frame_bytes()];
         self.renderer.render(&drawn, self.next, &mut yuyv);
         self.next += 1;
-        let nodes = (0..all[0].nodes.len()).map(|node| self.as_seen(&all, node));
+        let nodes = (0..all[0].nodes.len()).map(|node| {
+            let places_m: Vec<_> = all.iter().map(|pose| pose.nodes[node]).collect();
+            as_seen(&self.camera, &places_m)
+        });
         Some(Frame {
             start_s,
             yuyv,

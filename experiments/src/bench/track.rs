@@ -36,7 +36,7 @@ struct Pass {
     decoding: Spent,
     tracking: Spent,
     stages: [Duration; 3],
-    lost_part: f64,
+    lost_fraction: f64,
 }
 
 impl Pass {
@@ -56,7 +56,7 @@ impl Pass {
             decoding,
             tracking,
             stages: [times.background, times.first_frame, times.follow],
-            lost_part: result.track.lost_part(),
+            lost_fraction: result.track.lost_fraction(),
         })
     }
 
@@ -124,7 +124,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         "together_wall_ms": per_frame(together.wall_s),
         "stages_wall_ms": stages, "limit_ms": LIMIT_MS,
         "within_limit": per_frame(together.cpu_s) <= LIMIT_MS,
-        "peak_memory_mb": peak_mb, "limit_mb": LIMIT_MB, "lost_part": least.lost_part,
+        "peak_memory_mb": peak_mb, "limit_mb": LIMIT_MB, "lost_fraction": least.lost_fraction,
     });
     Ok(report((args, quiet), "bench track", own, || {
         println!("{frames} frames of `{}`", folder.display());

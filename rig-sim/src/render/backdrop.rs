@@ -1,16 +1,12 @@
-//! The room behind the robot: plaster wall, floor, the column under the arm, a
+//! The plain room behind the robot: plaster wall, floor, the column under the arm, a
 //! cabinet and a whiteboard. Nothing in it moves, so it is cast once per eye.
 
-use super::colour::{Ycc, ycc};
-use super::eye::{Eye, Vignette};
 use super::texture::{fractal, noise};
 use arm_model::Cell;
 use nalgebra::Vector3;
 
 /// Distance of the wall behind the arm's base (m).
 const WALL_Y_M: f64 = 0.95;
-/// Rays per pixel along u and v.
-const RAYS: u32 = 2;
 
 /// Colour in video levels while light is still being added up.
 type Rgb = Vector3<f64>;
@@ -100,13 +96,13 @@ fn whiteboard(p: &Vector3<f64>, normal: &Vector3<f64>, _: f64) -> Rgb {
 }
 
 /// The room of a cell, with its wall colour.
-pub(super) struct Room {
+pub(super) struct PlainRoom {
     wall_rgb: Rgb,
     floor_z_m: f64,
     furniture: [Cuboid; 4],
 }
 
-impl Room {
+impl PlainRoom {
     pub(super) fn new(wall_rgb: [u8; 3], cell: &Cell) -> Self {
         Self {
             wall_rgb: Rgb::from(wall_rgb.map(f64::from)),
@@ -140,7 +136,7 @@ impl Room {
     }
 
     /// Colour where a ray ends.
-    fn look(&self, origin: &Vector3<f64>, ray: &Vector3<f64>) -> Rgb {
+    pub(super) fn look(&self, origin: &Vector3<f64>, ray: &Vector3<f64>) -> Rgb {
         let nearest = self
             .furniture
             .iter()
@@ -159,27 +155,6 @@ impl Room {
         } else {
             Rgb::repeat(90.0)
         }
-    }
-
-    /// The room as one eye sees it, row by row, with the lens's vignetting.
-    pub(super) fn cast(&self, eye: &Eye, vignette: &Vignette) -> Vec<Ycc> {
-        let (width, height) = eye.size_px();
-        let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(RAYS) - 0.5;
-        let mut picture = Vec::with_capacity(width * height);
-        for v in 0..height {
-            for u in 0..width {
-                let mut sum = Rgb::zeros();
-                for i in 0..RAYS * RAYS {
-                    let pixel = [u as f64 + offset(i % RAYS), v as f64 + offset(i / RAYS)];
-                    let (origin, ray) = eye.ray(pixel);
-                    sum += self.look(&origin, &ray);
-                }
-                let mean = sum / f64::from(RAYS * RAYS);
-                let dim = vignette.at(u as f32, v as f32);
-                picture.push(ycc([mean.x, mean.y, mean.z].map(|c| c as f32 * dim)));
-            }
-        }
-        picture
     }
 }
 

@@ -1,9 +1,10 @@
 //! The moving things as strokes: arm and pole, rope and lead, target ball.
 
 use super::appearance::Appearance;
-use super::colour::ycc;
 use super::eye::Eye;
-use super::stroke::{Material, Stroke, Strokes};
+use super::lighting::Lighting;
+use super::solid::{Material, Solid};
+use super::stroke::Strokes;
 use crate::body::ArmBody;
 use arm_model::{Cell, JointVector};
 use nalgebra::Vector3;
@@ -53,64 +54,59 @@ pub(super) struct Spell {
     /// Sub-frames before it.
     pub(super) first: usize,
     pub(super) arm: Strokes,
-    pub(super) target: Strokes,
+    /// What else stands or moves there.
+    pub(super) others: Strokes,
     pub(super) ropes: Vec<Strokes>,
 }
 
-/// What one eye has to draw for the sub-frames `poses`, in order.
-pub(super) fn spells(
-    eye: &Eye,
-    poses: &[ScenePose],
-    cell: &Cell,
-    rope: RopeShape,
-    appearance: &Appearance,
-    target_m: Option<Vector3<f64>>,
-) -> Vec<Spell> {
-    // A pole's end out of view does not move in the picture.
-    let pole_end = |pose: &ScenePose| {
-        let end = cell.pole.attach_pose(&pose.q).0;
-        eye.project(&end).unwrap_or_default()
-    };
-    let mut began = poses.first().map(pole_end).unwrap_or_default();
-    let together = |_: &ScenePose, next: &ScenePose| {
-        let now = pole_end(next);
-        let near = (now[0] - began[0]).hypot(now[1] - began[1]) < ARM_STEP_PX;
-        if !near {
-            began = now;
-        }
-        near
-    };
-    let mut next = 0;
-    let mut first_of = |spell: &[ScenePose]| {
-        next += spell.len();
-        next - spell.len()
-    };
-    poses
-        .chunk_by(together)
-        .map(|spell| Spell {
-            first: first_of(spell),
-            arm: arm_strokes(eye, cell, &spell[spell.len() / 2].q),
-            target: target_m
-                .into_iter()
-                .flat_map(|at| target_strokes(eye, cell, &at, appearance))
-                .collect(),
-            ropes: spell
-                .iter()
-                .map(|pose| rope_strokes(eye, &pose.nodes, rope, appearance))
-                .collect(),
-        })
-        .collect()
+/// What is drawn anew in each frame.
+#[derive(Debug)]
+pub(super) struct Cast<'a> {
+    pub(super) cell: &'a Cell,
+    pub(super) rope: &'a RopeLook,
+    /// All but arm and rope.
+    pub(super) others: &'a [Solid],
 }
 
-fn material(rgb: [u8; 3], gloss: f32) -> Material {
-    Material {
-        colour: ycc(rgb.map(f32::from)),
-        gloss,
+impl Cast<'_> {
+    /// What one eye has to draw for the sub-frames `poses`, in order.
+    pub(super) fn spells(&self, eye: &Eye, light: &Lighting, poses: &[ScenePose]) -> Vec<Spell> {
+        // A pole's end out of view does not move in the picture.
+        let pole_end = |pose: &ScenePose| {
+            let end = self.cell.pole.attach_pose(&pose.q).0;
+            eye.project(&end).unwrap_or_default()
+        };
+        let mut began = poses.first().map(pole_end).unwrap_or_default();
+        let together = |_: &ScenePose, next: &ScenePose| {
+            let now = pole_end(next);
+            let near = (now[0] - began[0]).hypot(now[1] - began[1]) < ARM_STEP_PX;
+            if !near {
+                began = now;
+            }
+            near
+        };
+        let mut next = 0;
+        let mut first_of = |spell: &[ScenePose]| {
+            next += spell.len();
+            next - spell.len()
+        };
+        poses
+            .chunk_by(together)
+            .map(|spell| Spell {
+                first: first_of(spell),
+                arm: Strokes::of(eye, light, arm_solids(self.cell, &spell[spell.len() / 2].q)),
+                others: Strokes::of(eye, light, self.others.iter().copied()),
+                ropes: spell
+                    .iter()
+                    .map(|pose| Strokes::of(eye, light, self.rope.solids(&pose.nodes)))
+                    .collect(),
+            })
+            .collect()
     }
 }
 
 /// Links in white with grey joints, a black flange, a carbon pole.
-fn arm_strokes(eye: &Eye, cell: &Cell, q: &JointVector) -> Strokes {
+pub(super) fn arm_solids(cell: &Cell, q: &JointVector) -> Vec<Solid> {
     const WHITE: [u8; 3] = [226, 228, 230];
     const GREY: [u8; 3] = [148, 151, 156];
     const DARK: [u8; 3] = [58, 60, 64];
@@ -124,57 +120,75 @@ fn arm_strokes(eye: &Eye, cell: &Cell, q: &JointVector) -> Strokes {
     let collar = pole.b_m + (pole.a_m - pole.b_m).normalize() * 0.012;
     let foot = |x: f64| Vector3::new(x, 0.0, 0.012);
     links
-        .filter_map(|(c, rgb)| {
+        .map(|(c, rgb)| {
             // The base's capsule reaches into the column it stands on.
             let sunk = Vector3::z() * (c.radius_m - c.a_m.z).max(0.0);
             let a = if rgb == BASE { c.a_m + sunk } else { c.a_m };
-            Stroke::new(eye, &a, &c.b_m, c.radius_m, material(rgb, 46.0))
+            Solid::new(&a, &c.b_m, c.radius_m, Material::plain(rgb, 46.0))
         })
-        .chain(Stroke::new(
-            eye,
-            &foot(-0.07),
-            &foot(0.07),
-            0.012,
-            material(GREY, 46.0),
-        ))
-        .chain(Stroke::new(
-            eye,
-            &pole.a_m,
-            &pole.b_m,
-            pole.radius_m,
-            material(DARK, 60.0),
-        ))
-        .chain(Stroke::new(
-            eye,
-            &collar,
-            &pole.b_m,
-            0.011,
-            material(GREY, 70.0),
-        ))
+        .chain([
+            Solid::new(
+                &foot(-0.07),
+                &foot(0.07),
+                0.012,
+                Material::plain(GREY, 46.0),
+            ),
+            Solid::new(
+                &pole.a_m,
+                &pole.b_m,
+                pole.radius_m,
+                Material::plain(DARK, 60.0),
+            ),
+            Solid::new(&collar, &pole.b_m, 0.011, Material::plain(GREY, 70.0)),
+        ])
         .collect()
 }
 
-/// The rope along a smooth curve through its nodes, and the lead at its end.
-fn rope_strokes(
-    eye: &Eye,
-    nodes: &[Vector3<f64>],
-    rope: RopeShape,
-    appearance: &Appearance,
-) -> Strokes {
-    let Some(lead_at) = nodes.last() else {
-        return Strokes::from_iter([]);
-    };
-    let cord = material(appearance.rope_rgb, 10.0);
-    let lead = material(appearance.lead_rgb, 55.0);
-    let line = centreline(nodes);
-    line.windows(2)
-        .filter_map(|p| Stroke::new(eye, &p[0], &p[1], rope.radius_m, cord))
-        .chain(Stroke::new(eye, lead_at, lead_at, rope.lead_radius_m, lead))
-        .collect()
+/// Sizes and surfaces of the rope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RopeLook {
+    /// Its sizes.
+    pub(crate) shape: RopeShape,
+    /// Its surface.
+    pub(crate) cord: Material,
+    /// The lead's surface.
+    pub(crate) lead: Material,
 }
 
-/// Catmull-Rom curve through the nodes, sampled finely.
-fn centreline(nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+impl RopeLook {
+    /// A rope of one colour, a little glossy.
+    pub(super) fn plain(shape: RopeShape, appearance: &Appearance) -> Self {
+        Self {
+            shape,
+            cord: Material::plain(appearance.rope_rgb, 10.0),
+            lead: Material::plain(appearance.lead_rgb, 55.0),
+        }
+    }
+
+    /// The rope along a smooth curve through its nodes, and the lead at its end.
+    pub(super) fn solids(&self, nodes: &[Vector3<f64>]) -> Vec<Solid> {
+        let Some(lead_at) = nodes.last() else {
+            return Vec::new();
+        };
+        let lead = Solid::new(lead_at, lead_at, self.shape.lead_radius_m, self.lead);
+        Solid::chain(&centreline(nodes), self.shape.radius_m, self.cord)
+            .chain([lead])
+            .collect()
+    }
+
+    /// As [`RopeLook::solids`], straight from node to node: enough for a shadow.
+    pub(super) fn coarse_solids(&self, nodes: &[Vector3<f64>]) -> Vec<Solid> {
+        let lead = nodes
+            .last()
+            .map(|at| Solid::new(at, at, self.shape.lead_radius_m, self.lead));
+        Solid::chain(nodes, self.shape.radius_m, self.cord)
+            .chain(lead)
+            .collect()
+    }
+}
+
+/// Catmull-Rom curve through the nodes, sampled finely: what is drawn of a rope.
+pub(crate) fn centreline(nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let n = nodes.len();
     let mut line = Vec::with_capacity(n * PIECES_PER_LINK);
     for i in 1..n {
@@ -202,33 +216,19 @@ fn centreline(nodes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 /// The ball, its rod down to the floor, and a foot.
-fn target_strokes(
-    eye: &Eye,
-    cell: &Cell,
-    at: &Vector3<f64>,
-    appearance: &Appearance,
-) -> Vec<Stroke> {
+pub(super) fn target_solids(cell: &Cell, at: &Vector3<f64>, appearance: &Appearance) -> Vec<Solid> {
     /// The lens bends long straight things; short pieces follow it.
     const ROD_PIECES: i32 = 12;
-    let rod = material([96, 98, 102], 40.0);
+    let rod = Material::plain([96, 98, 102], 40.0);
     let foot = Vector3::new(at.x, at.y, cell.floor_z_m + 0.01);
     let point = |i: i32| at + (foot - at) * (f64::from(i) / f64::from(ROD_PIECES));
     let foot_end = |dx: f64| foot + Vector3::new(dx, 0.0, 0.0);
+    let ball = Material::plain(appearance.target_rgb, 55.0);
     (0..ROD_PIECES)
-        .filter_map(|i| Stroke::new(eye, &point(i), &point(i + 1), STAND_RADIUS_M, rod))
-        .chain(Stroke::new(
-            eye,
-            &foot_end(-0.06),
-            &foot_end(0.06),
-            0.010,
-            rod,
-        ))
-        .chain(Stroke::new(
-            eye,
-            at,
-            at,
-            TARGET_RADIUS_M,
-            material(appearance.target_rgb, 55.0),
-        ))
+        .map(|i| Solid::new(&point(i), &point(i + 1), STAND_RADIUS_M, rod))
+        .chain([
+            Solid::new(&foot_end(-0.06), &foot_end(0.06), 0.010, rod),
+            Solid::new(at, at, TARGET_RADIUS_M, ball),
+        ])
         .collect()
 }

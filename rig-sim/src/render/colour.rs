@@ -1,22 +1,22 @@
 //! Colours as the camera delivers them: full-range BT.601.
 
 /// Luma 0 to 255 and the two chroma differences about 0.
-pub(super) type Ycc = [f32; 3];
+pub(crate) type Ycc = [f32; 3];
 
 /// Luma and chroma of 8-bit video RGB.
-pub(super) fn ycc(rgb: [f32; 3]) -> Ycc {
+pub(crate) fn ycc(rgb: [f32; 3]) -> Ycc {
     let [r, g, b] = rgb;
     let y = 0.299 * r + 0.587 * g + 0.114 * b;
     [y, (b - y) / 1.772, (r - y) / 1.402]
 }
 
 /// A surface's colour under light: `shade` scales it, `gloss` adds white.
-pub(super) fn lit([y, cb, cr]: Ycc, shade: f32, gloss: f32) -> Ycc {
+pub(crate) fn lit([y, cb, cr]: Ycc, shade: f32, gloss: f32) -> Ycc {
     [y * shade + gloss, cb * shade, cr * shade]
 }
 
 /// Linear mixture, `u` of the second colour.
-pub(super) fn mix(a: Ycc, b: Ycc, u: f32) -> Ycc {
+pub(crate) fn mix(a: Ycc, b: Ycc, u: f32) -> Ycc {
     [
         a[0] + u * (b[0] - a[0]),
         a[1] + u * (b[1] - a[1]),

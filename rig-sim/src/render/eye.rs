@@ -62,6 +62,11 @@ impl Eye {
         self.see(p_w_m).map(|seen| seen.pixel)
     }
 
+    /// A direction in the world as this eye sees it: right, down, ahead.
+    pub(super) fn turned(&self, way: &Vector3<f64>) -> Vector3<f64> {
+        self.r_cam_w * way
+    }
+
     /// Raw pixel, depth and scale of a world point; `None` if nearer than 5 cm
     /// to the camera's plane or far outside the lens's field, where distortion
     /// polynomials fold back.
@@ -108,11 +113,16 @@ impl Vignette {
     const CORNER_LOSS: f32 = 0.24;
 
     pub(super) fn of(eye: &Eye) -> Self {
+        Self::with_loss(eye, Self::CORNER_LOSS)
+    }
+
+    /// That loses this part of the light in the corners.
+    pub(super) fn with_loss(eye: &Eye, corner_loss: f32) -> Self {
         let (w, h) = eye.size_px();
         let centre = [w as f32 / 2.0, h as f32 / 2.0];
         Self {
             centre,
-            per_px2: Self::CORNER_LOSS / (centre[0] * centre[0] + centre[1] * centre[1]),
+            per_px2: corner_loss / (centre[0] * centre[0] + centre[1] * centre[1]),
         }
     }
 

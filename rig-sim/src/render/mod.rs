@@ -7,23 +7,38 @@
 //! edge, motion blur is the mean of sub-frames over the exposure, and the sensor
 //! adds vignetting and noise. Cost follows the pixels that change.
 //!
-//! Simplified: spheres project as circles (true within 0.4 px), no cast shadows
-//! of moving things, blur averaged in video levels. With a rolling shutter a row shows the
+//! The plain room has no shadows of moving things. In a drawn room ([`crate::room`]) each
+//! lamp has a picture of them of its own (`lamp_view`), and a pixel of the backdrop is
+//! darkened by what stands between it and the lamp (`shade_map`).
+//!
+//! Simplified: spheres project as circles (true within 0.4 px), moving things cast no
+//! shadows on each other, blur averaged in video levels. With a rolling shutter a row shows the
 //! sub-frames of its own exposure.
 
 mod appearance;
 mod backdrop;
 mod bodies;
-mod colour;
+mod canvas;
+pub(crate) mod colour;
 mod eye;
+mod lamp_view;
 mod layer;
+mod lighting;
 mod scene;
 mod sensor;
+mod shade_map;
+#[cfg(test)]
+mod shadow_tests;
+mod shadows;
 mod shutter;
+pub(crate) mod solid;
 mod stroke;
-mod texture;
+mod surroundings;
+pub(crate) mod texture;
+pub(crate) mod weave;
 
 pub use appearance::Appearance;
+pub(crate) use bodies::centreline;
 pub use bodies::{RopeShape, ScenePose};
 pub use eye::Eye;
 pub use scene::Renderer;

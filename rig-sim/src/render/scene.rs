@@ -1,13 +1,16 @@
 //! Drawing one frame: the moving things over the room, both eyes side by side.
 
 use super::appearance::Appearance;
-use super::backdrop::Room;
-use super::bodies::{RopeShape, ScenePose, Spell, spells};
-use super::colour::Ycc;
-use super::eye::{Eye, Vignette};
-use super::layer::{RowLayer, composite};
-use super::sensor::{Sensor, pack_yuyv};
+use super::bodies::{Cast, RopeLook, RopeShape, ScenePose, target_solids};
+use super::canvas::EyeCanvas;
+use super::eye::Eye;
+use super::lamp_view::LampView;
+use super::sensor::{Sensor, brighten};
+use super::shadows::Shadows;
 use super::shutter::RowTimes;
+use super::surroundings::{View, rope_look};
+use crate::room::bystander::Bystanders;
+use crate::room::{Picture, Room};
 use arm_model::Cell;
 use nalgebra::Vector3;
 use shared_types::StereoCamera;
@@ -16,35 +19,42 @@ use shared_types::StereoCamera;
 const SUB_FRAME_STEP_PX: f64 = 1.0;
 /// Most sub-frames averaged over a row's exposure.
 const MAX_SUB_FRAMES: usize = 12;
+/// Rows of a rolling shutter that share their shadows.
+const BAND_ROWS: usize = 64;
 
 /// Draws frames of one camera looking at one rig.
 #[derive(Debug)]
 pub struct Renderer {
     eyes: [EyeCanvas; 2],
     cell: Cell,
-    rope: RopeShape,
+    rope: RopeLook,
     appearance: Appearance,
     sensor: Sensor,
     rows: RowTimes,
     target_m: Option<Vector3<f64>>,
     size_px: (usize, usize),
+    shadows: Shadows,
+    life: Life,
+    drawn_px: usize,
 }
 
-/// What one eye keeps between frames.
-#[derive(Debug)]
-struct EyeCanvas {
-    eye: Eye,
-    vignette: Vignette,
-    room: Vec<Ycc>,
-    room_yuyv: Vec<u8>,
-    arm: RowLayer,
-    target: RowLayer,
-    rope: RowLayer,
-    sum: Vec<Ycc>,
+/// What changes in a room by itself.
+#[derive(Debug, Default)]
+struct Life {
+    bystanders: Bystanders,
+    /// What the camera adds, and how many frames it takes a second.
+    picture: Option<(Picture, f64)>,
+}
+
+impl Life {
+    /// Start of a frame (s).
+    fn time_s(&self, sequence: u64) -> f64 {
+        self.picture.map_or(0.0, |(_, hz)| sequence as f64 / hz)
+    }
 }
 
 impl Renderer {
-    /// Prepares both eyes; casting the room takes about a second.
+    /// Prepares both eyes before the plain room; casting it takes about a second.
     /// `noise_levels` is the luma noise's standard deviation in levels of 255.
     #[must_use]
     pub fn new(
@@ -55,18 +65,57 @@ impl Renderer {
         noise_levels: f32,
         seed: u64,
     ) -> Self {
-        let room = Room::new(appearance.wall_rgb, cell);
-        let eyes = [Eye::left(camera), Eye::right(camera)].map(|eye| EyeCanvas::new(eye, &room));
+        let eyes = [Eye::left(camera), Eye::right(camera)]
+            .map(|eye| EyeCanvas::new(eye, View::plain(&eye, &appearance, cell)));
         let size_px = eyes[0].eye.size_px();
         Self {
             eyes,
             cell: *cell,
-            rope,
+            rope: RopeLook::plain(rope, &appearance),
             appearance,
             sensor: Sensor::new(noise_levels, size_px.0 * 4, seed),
             rows: RowTimes::of(camera),
             target_m: None,
             size_px,
+            shadows: Shadows::of(Vec::new()),
+            life: Life::default(),
+            drawn_px: 0,
+        }
+    }
+
+    /// Prepares both eyes in a drawn room, which has a surface for the rope and noise of
+    /// its own; casting it takes a few seconds.
+    #[must_use]
+    pub fn in_room(
+        camera: &StereoCamera,
+        cell: &Cell,
+        rope: RopeShape,
+        room: &Room,
+        (target_rgb, frame_rate_hz): ([u8; 3], f64),
+        seed: u64,
+    ) -> Self {
+        let lamps = room.still.lamps.iter();
+        let lamps: Vec<_> = lamps
+            .map(|lamp| LampView::of(lamp, room.still.wall_y_m))
+            .collect();
+        let eyes = [Eye::left(camera), Eye::right(camera)]
+            .map(|eye| EyeCanvas::new(eye, View::of(&eye, room, &lamps)));
+        let size_px = eyes[0].eye.size_px();
+        Self {
+            eyes,
+            cell: *cell,
+            rope: rope_look(room, rope),
+            appearance: room.appearance(target_rgb),
+            sensor: Sensor::new(room.picture.noise_levels, size_px.0 * 4, seed),
+            rows: RowTimes::of(camera),
+            target_m: None,
+            size_px,
+            shadows: Shadows::of(lamps),
+            life: Life {
+                bystanders: room.bystanders.clone(),
+                picture: Some((room.picture, frame_rate_hz)),
+            },
+            drawn_px: 0,
         }
     }
 
@@ -74,6 +123,13 @@ impl Renderer {
     #[must_use]
     pub fn frame_bytes(&self) -> usize {
         self.size_px.0 * self.size_px.1 * 4
+    }
+
+    /// Pixels of the last frame that were not copied from the room as it stands: what a
+    /// frame costs.
+    #[must_use]
+    pub fn drawn_px(&self) -> usize {
+        self.drawn_px
     }
 
     /// Puts the target ball at a place in the world (m), or takes it away.
@@ -104,142 +160,50 @@ impl Renderer {
     pub fn render(&mut self, poses: &[ScenePose], sequence: u64, out: &mut [u8]) {
         let (width, height) = self.size_px;
         let row_bytes = width * 4;
-        for (side, canvas) in self.eyes.iter_mut().enumerate() {
-            let spells = spells(
-                &canvas.eye,
-                poses,
-                &self.cell,
-                self.rope,
-                &self.appearance,
-                self.target_m,
-            );
-            let rows = out.chunks_exact_mut(row_bytes).take(height).enumerate();
-            for (v, row) in rows {
-                canvas.draw_row(
-                    v,
-                    &spells,
-                    |i| self.rows.weight(v, i, poses.len()),
-                    &mut row[side * width * 2..(side + 1) * width * 2],
-                );
+        let begins_s = self.life.time_s(sequence);
+        let mut others = self.life.bystanders.at(begins_s);
+        let target = self.target_m;
+        others.extend(
+            target
+                .into_iter()
+                .flat_map(|at| target_solids(&self.cell, &at, &self.appearance)),
+        );
+        let cast = Cast {
+            cell: &self.cell,
+            rope: &self.rope,
+            others: &others,
+        };
+        let spells = self
+            .eyes
+            .each_ref()
+            .map(|canvas| cast.spells(&canvas.eye, &canvas.view.light, poses));
+        let weight_of = |v: usize, i: usize| self.rows.weight(v, i, poses.len());
+        // All rows of a global shutter share their shadows.
+        let together = if self.rows.exposures() > 1.0 {
+            BAND_ROWS
+        } else {
+            height
+        };
+        self.drawn_px = 0;
+        self.shadows.begin(&cast, poses);
+        let bands = out[..height * row_bytes].chunks_mut(together * row_bytes);
+        for (first, band) in (0..height).step_by(together).zip(bands) {
+            let middle = (first + together / 2).min(height - 1);
+            self.shadows.cast(&cast, poses, |i| weight_of(middle, i));
+            for (v, row) in (first..).zip(band.chunks_exact_mut(row_bytes)) {
+                let halves = row.chunks_exact_mut(width * 2);
+                for ((canvas, spells), half) in self.eyes.iter_mut().zip(&spells).zip(halves) {
+                    let covers = self.shadows.covers();
+                    self.drawn_px += canvas.draw_row(v, spells, covers, |i| weight_of(v, i), half);
+                }
+            }
+        }
+        if let Some((picture, _)) = self.life.picture {
+            let row_s = |v: usize| begins_s + self.rows.opens_s(v);
+            for (v, row) in out.chunks_exact_mut(row_bytes).take(height).enumerate() {
+                brighten(row, picture.gain(row_s(v)) as f32);
             }
         }
         self.sensor.expose(out, row_bytes, sequence);
     }
-}
-
-impl EyeCanvas {
-    fn new(eye: Eye, room: &Room) -> Self {
-        let vignette = Vignette::of(&eye);
-        let room = room.cast(&eye, &vignette);
-        let mut room_yuyv = vec![0; room.len() * 2];
-        pack_yuyv(&room, &mut room_yuyv);
-        let width = eye.size_px().0;
-        Self {
-            eye,
-            vignette,
-            room,
-            room_yuyv,
-            arm: RowLayer::new(width),
-            target: RowLayer::new(width),
-            rope: RowLayer::new(width),
-            sum: vec![[0.0; 3]; width],
-        }
-    }
-
-    /// Draws row `v` of this eye: the room, and over it the mean of the sub-frames,
-    /// each with its weight in this row, where any of them has something.
-    fn draw_row(
-        &mut self,
-        v: usize,
-        spells: &[Spell],
-        weight_of: impl Fn(usize) -> f32,
-        out: &mut [u8],
-    ) {
-        let width = self.eye.size_px().0;
-        out.copy_from_slice(&self.room_yuyv[v * width * 2..(v + 1) * width * 2]);
-        let (mut from, mut to) = (width, 0);
-        let mut total = 0.0;
-        for spell in spells {
-            let weights = spell.first..spell.first + spell.ropes.len();
-            let still: f32 = weights.clone().map(&weight_of).sum();
-            if still <= 0.0 {
-                continue;
-            }
-            total += still;
-            spell.arm.draw_row(v, &mut self.arm);
-            spell.target.draw_row(v, &mut self.target);
-            // What stands still counts once, with the weight of the whole spell;
-            for (low, high) in apart(self.arm.used(), self.target.used()) {
-                self.add_still(v, (low, high), still);
-                (from, to) = (from.min(low), to.max(high));
-            }
-            // each rope adds only what it changes.
-            for (rope, weight) in spell.ropes.iter().zip(weights.map(&weight_of)) {
-                if weight > 0.0 {
-                    rope.draw_row(v, &mut self.rope);
-                    let (low, high) = self.rope.used();
-                    self.add_rope(v, (low, high), weight);
-                    (from, to) = (from.min(low), to.max(high));
-                }
-            }
-        }
-        if from >= to {
-            return;
-        }
-        // Chroma belongs to pairs of pixels.
-        let (from, to) = (from & !1, ((to + 1) & !1).min(width));
-        let room = &self.room[v * width..(v + 1) * width];
-        let share = 1.0 / total;
-        for u in from..to {
-            // Light was gathered before the lens dims it; the room's is dimmed.
-            let dim = self.vignette.at(u as f32, v as f32) * share;
-            for i in 0..3 {
-                self.sum[u][i] = room[u][i] + self.sum[u][i] * dim;
-            }
-        }
-        pack_yuyv(&self.sum[from..to], &mut out[from * 2..to * 2]);
-        self.sum[from..to].fill([0.0; 3]);
-    }
-
-    /// The room's colour at a pixel before the lens dims it.
-    fn behind(&self, u: usize, v: usize) -> Ycc {
-        let dim = self.vignette.at(u as f32, v as f32);
-        self.room[v * self.arm.width() + u].map(|c| c / dim)
-    }
-
-    /// Adds what arm and target change against the room, `weight` times.
-    fn add_still(&mut self, v: usize, (low, high): (usize, usize), weight: f32) {
-        for u in low..high {
-            let behind = self.behind(u, v);
-            let seen = composite([&self.arm, &self.target], u, behind);
-            for i in 0..3 {
-                self.sum[u][i] += (seen[i] - behind[i]) * weight;
-            }
-        }
-    }
-
-    /// Adds what the rope changes against arm, target and room, `weight` times.
-    fn add_rope(&mut self, v: usize, (low, high): (usize, usize), weight: f32) {
-        for u in low..high {
-            if self.rope.cell(u).cover > 0.0 {
-                let behind = self.behind(u, v);
-                let without = composite([&self.arm, &self.target], u, behind);
-                let with = composite([&self.arm, &self.target, &self.rope], u, behind);
-                for i in 0..3 {
-                    self.sum[u][i] += (with[i] - without[i]) * weight;
-                }
-            }
-        }
-    }
-}
-
-/// Two spans as spans that do not overlap, empty ones left out.
-fn apart(a: (usize, usize), b: (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
-    let overlap = a.0 < b.1 && b.0 < a.1;
-    let spans = if overlap {
-        [(a.0.min(b.0), a.1.max(b.1)), (0, 0)]
-    } else {
-        [a, b]
-    };
-    spans.into_iter().filter(|(low, high)| low < high)
 }

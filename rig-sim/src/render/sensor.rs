@@ -47,6 +47,18 @@ impl Sensor {
     }
 }
 
+/// Makes a row of YUYV brighter or darker.
+pub(super) fn brighten(row: &mut [u8], gain: f32) {
+    let table = |centre: f32| -> [u8; 256] {
+        core::array::from_fn(|v| (centre + (v as f32 - centre) * gain + 0.5) as u8)
+    };
+    let (luma, chroma) = (table(0.0), table(128.0));
+    for [y, c] in row.as_chunks_mut::<2>().0 {
+        *y = luma[usize::from(*y)];
+        *c = chroma[usize::from(*c)];
+    }
+}
+
 /// Packs pixel pairs into `Y0 Cb Y1 Cr`; `out` holds two bytes a pixel.
 pub(super) fn pack_yuyv(pixels: &[[f32; 3]], out: &mut [u8]) {
     let level = |v: f32| (v + 0.5) as u8;

@@ -9,6 +9,8 @@ pub(super) struct RowTimes {
     open: f64,
     /// Parts of it by which a row is later than the one above.
     per_row: f64,
+    /// The frame's time (s).
+    frame_s: f64,
 }
 
 impl RowTimes {
@@ -17,7 +19,13 @@ impl RowTimes {
         Self {
             open: camera.exposure_s / frame_s,
             per_row: camera.line_time_s / frame_s,
+            frame_s,
         }
+    }
+
+    /// When row `v` begins to gather light (s).
+    pub(super) fn opens_s(self, v: usize) -> f64 {
+        self.per_row * v as f64 * self.frame_s
     }
 
     /// How many exposures the whole frame takes.

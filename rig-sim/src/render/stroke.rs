@@ -4,22 +4,9 @@
 use super::colour::{Ycc, lit};
 use super::eye::Eye;
 use super::layer::{Cell, RowLayer};
-use nalgebra::Vector3;
-
-/// How a surface answers the light.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Material {
-    /// Colour when lit squarely.
-    pub(super) colour: Ycc,
-    /// Luma of the highlight.
-    pub(super) gloss: f32,
-}
-
-/// Towards the light, in the picture: right, down, towards the camera.
-const LIGHT: [f32; 3] = [-0.42, -0.70, 0.58];
-/// Light from everywhere and from the lamp, relative to a surface's colour.
-const AMBIENT: f32 = 0.50;
-const LAMP: f32 = 0.58;
+use super::lighting::Lighting;
+use super::solid::{Material, Solid};
+use super::weave::Weave;
 
 /// A capsule projected into one eye.
 #[derive(Debug, Clone, Copy)]
@@ -31,13 +18,15 @@ pub(super) struct Stroke {
     depth_m: [f32; 2],
     radius_m: f32,
     material: Material,
+    arc_m: [f32; 2],
     rows: (usize, usize),
 }
 
-/// Strokes of one body, and the rows they touch together.
+/// Strokes of one body under one light, and the rows they touch together.
 #[derive(Debug)]
 pub(super) struct Strokes {
     all: Vec<Stroke>,
+    light: Lighting,
     rows: (usize, usize),
 }
 
@@ -48,33 +37,30 @@ impl Strokes {
         let touches = |(top, bottom): (usize, usize)| top <= v && v < bottom;
         if touches(self.rows) {
             for stroke in self.all.iter().filter(|s| touches(s.rows)) {
-                stroke.draw_row(v, layer);
+                stroke.draw_row(v, &self.light, layer);
             }
+        }
+    }
+
+    /// What an eye sees of a body.
+    pub(super) fn of(eye: &Eye, light: &Lighting, solids: impl IntoIterator<Item = Solid>) -> Self {
+        let seen = solids.into_iter().filter_map(|s| Stroke::new(eye, &s));
+        let all: Vec<_> = seen.collect();
+        let rows = all.iter().fold((usize::MAX, 0), |(top, bottom), s| {
+            (top.min(s.rows.0), bottom.max(s.rows.1))
+        });
+        Self {
+            all,
+            light: *light,
+            rows,
         }
     }
 }
 
-impl FromIterator<Stroke> for Strokes {
-    fn from_iter<I: IntoIterator<Item = Stroke>>(strokes: I) -> Self {
-        let all: Vec<_> = strokes.into_iter().collect();
-        let rows = all.iter().fold((usize::MAX, 0), |(top, bottom), s| {
-            (top.min(s.rows.0), bottom.max(s.rows.1))
-        });
-        Self { all, rows }
-    }
-}
-
 impl Stroke {
-    /// The capsule around the segment from `a_m` to `b_m` (world), if in front
-    /// of the eye.
-    pub(super) fn new(
-        eye: &Eye,
-        a_m: &Vector3<f64>,
-        b_m: &Vector3<f64>,
-        radius_m: f64,
-        material: Material,
-    ) -> Option<Self> {
-        let (a, b) = (eye.see(a_m)?, eye.see(b_m)?);
+    /// The capsule in the picture, if in front of the eye.
+    fn new(eye: &Eye, solid: &Solid) -> Option<Self> {
+        let (a, b) = (eye.see(&solid.a_m)?, eye.see(&solid.b_m)?);
         let along_px = [
             (b.pixel[0] - a.pixel[0]) as f32,
             (b.pixel[1] - a.pixel[1]) as f32,
@@ -84,10 +70,11 @@ impl Stroke {
             a_px: a.pixel.map(|v| v as f32),
             along_px,
             per_length2: if length2 > 1e-9 { 1.0 / length2 } else { 0.0 },
-            radius_px: [a, b].map(|end| (end.px_per_m * radius_m) as f32),
+            radius_px: [a, b].map(|end| (end.px_per_m * solid.radius_m) as f32),
             depth_m: [a.depth_m as f32, b.depth_m as f32],
-            radius_m: radius_m as f32,
-            material,
+            radius_m: solid.radius_m as f32,
+            material: solid.material,
+            arc_m: solid.arc_m.map(|v| v as f32),
             rows: (0, 0),
         };
         stroke.rows = stroke.find_rows(eye.size_px().1);
@@ -123,7 +110,7 @@ impl Stroke {
         (from, ((high.floor() + 1.0).max(0.0) as usize).min(width))
     }
 
-    fn draw_row(&self, v: usize, layer: &mut RowLayer) {
+    fn draw_row(&self, v: usize, light: &Lighting, layer: &mut RowLayer) {
         let dv = v as f32 - self.a_px[1];
         let (from, to) = self.columns(v as f32, layer.width());
         for u in from..to {
@@ -147,23 +134,34 @@ impl Stroke {
                 Cell {
                     cover,
                     depth_m: depth - facing * self.radius_m,
-                    colour: self.shade([nu, nv, facing]),
+                    colour: self.shade(light, self.colour(t, [nu, nv]), [nu, nv, facing]),
                 },
             );
         }
     }
 
+    /// The surface's own colour at a part of its length, off its axis by a part of its
+    /// radius (right, down).
+    fn colour(&self, t: f32, [nu, nv]: [f32; 2]) -> Ycc {
+        if self.material.weave == Weave::Plain {
+            return self.material.colour;
+        }
+        let arc_m = self.arc_m[0] + t * (self.arc_m[1] - self.arc_m[0]);
+        let per_length = self.per_length2.sqrt();
+        let across = (nv * self.along_px[0] - nu * self.along_px[1]) * per_length;
+        self.material.weave.at(self.material.colour, arc_m, across)
+    }
+
     /// Lambert's law with a highlight halfway between lamp and camera.
-    fn shade(&self, normal: [f32; 3]) -> Ycc {
-        const HALFWAY: [f32; 3] = [-0.236, -0.394, 0.888];
+    fn shade(&self, light: &Lighting, colour: Ycc, normal: [f32; 3]) -> Ycc {
         let dot =
             |l: [f32; 3]| (l[0] * normal[0] + l[1] * normal[1] + l[2] * normal[2]).clamp(0.0, 1.0);
-        let mirror = dot(HALFWAY);
+        let mirror = dot(light.halfway);
         let mirror = mirror * mirror * mirror * mirror;
         let mirror = mirror * mirror * mirror;
         lit(
-            self.material.colour,
-            AMBIENT + LAMP * dot(LIGHT),
+            colour,
+            light.ambient + light.lamp * dot(light.towards),
             self.material.gloss * mirror * mirror,
         )
     }

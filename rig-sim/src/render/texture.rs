@@ -1,7 +1,7 @@
 //! Surface textures without pictures: hashed lattice noise.
 
 /// A fixed pseudo-random number in -1..1 for a lattice point.
-fn lattice(x: i64, y: i64, seed: u64) -> f64 {
+pub(crate) fn lattice(x: i64, y: i64, seed: u64) -> f64 {
     // SplitMix64 finaliser over the mixed coordinates.
     let mut h = seed
         ^ x.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -13,7 +13,7 @@ fn lattice(x: i64, y: i64, seed: u64) -> f64 {
 }
 
 /// Smooth noise in -1..1, one bump per unit of `x` and `y`.
-pub(super) fn noise(x: f64, y: f64, seed: u64) -> f64 {
+pub(crate) fn noise(x: f64, y: f64, seed: u64) -> f64 {
     let (x0, y0) = (x.floor(), y.floor());
     let (i, j) = (x0 as i64, y0 as i64);
     let ease = |t: f64| t * t * (3.0 - 2.0 * t);
@@ -27,7 +27,7 @@ pub(super) fn noise(x: f64, y: f64, seed: u64) -> f64 {
 }
 
 /// Sum of `octaves` of [`noise`], each twice as fine and half as strong.
-pub(super) fn fractal(x: f64, y: f64, octaves: u32, seed: u64) -> f64 {
+pub(crate) fn fractal(x: f64, y: f64, octaves: u32, seed: u64) -> f64 {
     let (mut sum, mut scale, mut weight) = (0.0, 1.0, 0.5);
     for octave in 0..octaves {
         sum += weight * noise(x * scale, y * scale, seed.wrapping_add(u64::from(octave)));

@@ -1,0 +1,168 @@
+//! `experiments track-rooms`: how many films in drawn rooms the tracker follows.
+
+use super::fate::{Fate, Tracked};
+use super::folder;
+use super::folder_of;
+use super::score::Score;
+use super::side_by_side::each;
+use super::summary::{Row, rows};
+use crate::args::TrackRoomsArgs;
+use anyhow::{Context, ensure};
+use arm_model::Pole;
+use camera_ingest::source::read_film;
+use camera_ingest::track::{Models, TrackError};
+use camera_ingest::{TrackOptions, load_camera, open_video, track_film};
+use cli_output::table::numbers;
+use cli_output::{OrInput, Outcome, Stage};
+use rig_sim::room::Kind;
+use rope_sim::{MeasuredArm, npy};
+use run_log::files;
+use serde_json::{Value, json};
+use shared_types::KeypointTrack;
+use std::path::Path;
+
+/// Tracks the film in a folder as `wag track` does: the only call of the tracker here.
+fn follow(folder: &Path) -> anyhow::Result<Result<KeypointTrack, TrackError>> {
+    let mut video = open_video(&folder.join("video.avi"), None)?;
+    let camera = load_camera(&folder.join("camera.toml"))?;
+    let joints = files::read_joints(&folder.join("joints_measured.csv"))?;
+    let arm = MeasuredArm::new(&joints.times_s, &joints.q, Pole::default())?;
+    let eyes = read_film(&mut video)?;
+    let tracked = track_film(
+        eyes.film(),
+        &camera,
+        &arm,
+        &TrackOptions::default(),
+        &mut Models::default(),
+    );
+    Ok(tracked.map(|result| result.track))
+}
+
+/// The true curve of each frame in a folder (raw px of the left image).
+fn truth(folder: &Path) -> anyhow::Result<Vec<Vec<[f64; 2]>>> {
+    let path = folder.join("truth_nodes_left_px.npy");
+    let fail = || format!("`{}`", path.display());
+    let array = npy::read(std::fs::File::open(&path).with_context(fail)?).with_context(fail)?;
+    let [_, points, 2] = array.shape[..] else {
+        anyhow::bail!(
+            "{}: shape {:?} is not (frames, points, 2)",
+            fail(),
+            array.shape
+        );
+    };
+    let pairs = array.values.as_chunks::<2>().0;
+    Ok(pairs.chunks(points.max(1)).map(<[_]>::to_vec).collect())
+}
+
+/// Renders a film where there is none yet, tracks it and scores it.
+fn judge(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Tracked> {
+    let scene = match folder::scene(folder)? {
+        Some(scene) => scene,
+        None => folder::write(folder, seed, kind)?,
+    };
+    ensure!(
+        scene.seed == seed && scene.kind == kind.name(),
+        "`{}` has the film of {} seed {}",
+        folder.display(),
+        scene.kind,
+        scene.seed
+    );
+    let fate = match follow(folder)? {
+        Ok(track) => Score::of(&track, &truth(folder)?).map_or_else(
+            || Fate::Refused("the rope is lost in all frames".to_owned()),
+            Fate::Tracked,
+        ),
+        Err(refusal) => Fate::Refused(format!("{:#}", anyhow::Error::new(refusal))),
+    };
+    Ok(Tracked {
+        version: shared_types::VERSION.to_owned(),
+        scene,
+        fate,
+    })
+}
+
+/// The result kept for a seed, or a new one.
+fn result(args: &TrackRoomsArgs, seed: u64, kind: Kind) -> anyhow::Result<Tracked> {
+    let kept = args
+        .out
+        .as_deref()
+        .map(|out| out.join(format!("{}-{seed}.json", kind.name())));
+    if let Some(path) = kept.as_deref().filter(|path| path.exists()) {
+        let fail = || format!("result `{}`", path.display());
+        let found: Tracked = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
+        ensure!(
+            found.version == shared_types::VERSION,
+            "{} is of version {}: name another folder with --out, or remove it",
+            fail(),
+            found.version
+        );
+        return Ok(found);
+    }
+    let tracked = match &args.films {
+        Some(films) => judge(&folder_of(films, kind, seed), seed, kind)?,
+        None => judge(tempfile::tempdir()?.path(), seed, kind)?,
+    };
+    if let Some(path) = kept {
+        std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+        files::write_json(&path, &tracked)?;
+    }
+    Ok(tracked)
+}
+
+/// Tracks films. The value is what `--json` prints.
+pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
+    let kind = Kind::from(args.kind);
+    let stage = Stage::begin("track-rooms", quiet);
+    let seeds: Vec<u64> = args.seeds.clone().collect();
+    let all = each(&seeds, args.threads, |seed| {
+        let tracked = result(args, seed, kind)?;
+        stage.say(format!("seed {seed}"));
+        Ok(tracked)
+    })
+    .or_input()?;
+    let seconds = stage.done(&format!("{} films", all.len()));
+    let rows = rows(&all);
+    if !quiet {
+        print(&rows);
+        for film in all.iter().filter(|f| !f.is_followed()) {
+            println!("{}", film.said());
+        }
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "track-rooms", "kind": kind, "films": all,
+        "table": rows, "seconds": seconds,
+    })))
+}
+
+fn print(rows: &[Row]) {
+    let header = [
+        "films",
+        "n",
+        "followed",
+        "refused",
+        "wrong",
+        "others",
+        "followed (%)",
+        "wrong (%)",
+    ];
+    let part = |[value, low, high]: [f64; 3]| {
+        let percent = |v: f64| format!("{:.0}", 100.0 * v);
+        format!("{} ({}-{})", percent(value), percent(low), percent(high))
+    };
+    let cells = rows.iter().map(|row| {
+        [
+            row.films.clone(),
+            row.n.to_string(),
+            row.followed.to_string(),
+            row.refused.to_string(),
+            row.wrong.to_string(),
+            row.others().to_string(),
+            part(row.followed_part),
+            part(row.wrong_part),
+        ]
+    });
+    println!("{}", numbers(header, 0, cells));
+    println!(
+        "in brackets: 95 % limits (Wilson); wrong: 5 frames or more with a trusted keypoint more than 10 px off"
+    );
+}
