@@ -1,4 +1,4 @@
-//! A film of the keypoints: Motion-JPEG in an AVI, for any player.
+//! Films as files: Motion-JPEG in an AVI, for any player and for [`crate::open_video`].
 
 use shared_types::KeypointTrack;
 
@@ -35,14 +35,43 @@ pub fn keypoint_film(frames: &[EyeFrame], track: &KeypointTrack) -> Result<Vec<u
     avi(&jpegs, [width, height], frame_us).ok_or(large)
 }
 
-fn jpeg(picture: &Picture, [width, height]: [u16; 2]) -> Result<Vec<u8>, OverlayError> {
+fn jpeg(picture: &Picture, size_px: [u16; 2]) -> Result<Vec<u8>, OverlayError> {
+    encoded(&picture.rgb, size_px, QUALITY, jpeg_encoder::ColorType::Rgb)
+}
+
+fn encoded(
+    pixels: &[u8],
+    [width, height]: [u16; 2],
+    quality: u8,
+    colours: jpeg_encoder::ColorType,
+) -> Result<Vec<u8>, OverlayError> {
     let mut bytes = Vec::new();
-    let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, QUALITY);
+    let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, quality);
     encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_2_1);
     encoder
-        .encode(&picture.rgb, width, height, jpeg_encoder::ColorType::Rgb)
+        .encode(pixels, width, height, colours)
         .map_err(|_e| OverlayError::Input("frames of a film must have one size"))?;
     Ok(bytes)
+}
+
+/// A frame of packed YUYV, `size_px` wide and high, as a JPEG of a quality from 1 to 100.
+///
+/// # Errors
+/// The bytes are not those of a frame of this size.
+pub fn jpeg_of_yuyv(yuyv: &[u8], size_px: [u16; 2], quality: u8) -> Result<Vec<u8>, OverlayError> {
+    let pairs = yuyv.as_chunks::<4>().0.iter();
+    let pixels: Vec<u8> = pairs
+        .flat_map(|[y0, cb, y1, cr]| [*y0, *cb, *cr, *y1, *cb, *cr])
+        .collect();
+    encoded(&pixels, size_px, quality, jpeg_encoder::ColorType::Ycbcr)
+}
+
+/// JPEGs of one size as an AVI file's bytes, `frame_us` apart.
+///
+/// # Errors
+/// No frames, or more than a file holds.
+pub fn film(jpegs: &[Vec<u8>], size_px: [u16; 2], frame_us: u32) -> Result<Vec<u8>, OverlayError> {
+    avi(jpegs, size_px, frame_us).ok_or(OverlayError::Input("no frames, or too many for a film"))
 }
 
 /// A chunk: code, length, body, padding to an even length. `None` beyond 4 GiB.

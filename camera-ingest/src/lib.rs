@@ -31,5 +31,6 @@ pub use frame::{EyeFrame, StereoFrame};
 pub use score::{Score, ScoreError, ScoreOptions, score};
 pub use source::{FrameSource, SourceError, StereoSource, open_video};
 pub use track::{
-    ClampPath, RopeAppearance, TrackError, TrackOptions, TrackResult, track, track_with,
+    ClampPath, Film, RopeAppearance, TrackError, TrackOptions, TrackResult, track, track_film,
+    track_with,
 };

@@ -86,7 +86,7 @@ fn a_camera_that_looks_elsewhere() {
 }
 
 #[test]
-fn another_size() {
+fn another_size_and_too_few_frames() {
     let Some(mut wiggle) = Wiggle::read_first("a1", FRAMES) else {
         return;
     };
@@ -97,6 +97,12 @@ fn another_size() {
     small.cr.truncate(small.width_px * small.height_px / 2);
     let error = refusal(&wiggle).to_string();
     assert!(error.contains("frame 5 is [672, 374] px"), "{error}");
+    wiggle.frames.truncate(1);
+    let error = refusal(&wiggle).to_string();
+    assert!(
+        error.ends_with("frames is 1, it must be at least 8"),
+        "{error}"
+    );
 }
 
 /// Where the bodies of an AVI's frames lie.

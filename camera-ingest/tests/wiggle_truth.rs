@@ -38,7 +38,7 @@ fn assert_tracks(name: &str) {
         .copied()
         .collect();
     assert!(quantile(&tip, 0.95) <= 4.0, "tip {}", quantile(&tip, 0.95));
-    assert!(result.track.lost_part() < 1e-9);
+    assert!(result.track.lost_fraction() < 1e-9);
 
     let rope = &truth_json(&folder)["rope"];
     let number = |key: &str| rope[key].as_f64().unwrap();

@@ -124,7 +124,7 @@ pub enum Command {
 /// Arguments of `wag demo`.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// What the throw is for.
+    /// What the throw is for; the rig has a scene for strikes only so far.
     #[arg(long, value_enum, default_value_t = TaskName::Strike)]
     pub task: TaskName,
     /// Seed of the hidden rope, the target, the noise and every search.
@@ -148,8 +148,10 @@ pub enum TaskName {
     /// The tip passes through the target.
     Strike,
     /// The tip lands on a board and stays.
+    #[value(hide = true)]
     Lob,
     /// The rope comes to hang over a wall.
+    #[value(hide = true)]
     Drape,
 }
 
@@ -405,6 +407,14 @@ mod tests {
             of(&["wag", "check", "p", "--seed", "3"]).unwrap().seed,
             Some(3)
         );
+        for line in ["ledger --seed 3", "ledger --seed-is 3", "--seed 3 ledger"] {
+            let line = ["wag"].into_iter().chain(line.split(' '));
+            let Command::Ledger(args) = Cli::try_parse_from(line).unwrap().command else {
+                panic!("another command");
+            };
+            assert_eq!(args.seed, Some(3));
+        }
+        of(&["wag", "ledger", "compare", "a", "b", "--seed", "3"]).unwrap();
         for bad in ["-1", "1.5", "x"] {
             let said = of(&["wag", "demo", "--seed", bad]).unwrap_err().to_string();
             assert!(said.contains("whole number from 0"), "{said}");
@@ -414,7 +424,7 @@ mod tests {
     #[test]
     fn masses_and_hosts_are_checked() {
         assert_eq!(mass_kg("0.05"), Ok(0.05));
-        for bad in ["nan", "-1", "0", "inf", "heavy"] {
+        for bad in ["nan", "-1", "0", "50", "heavy"] {
             assert!(mass_kg(bad).is_err(), "{bad}");
         }
         assert_eq!(host("192.168.1.7"), Ok("192.168.1.7".parse().unwrap()));

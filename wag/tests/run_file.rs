@@ -78,6 +78,8 @@ fn a_run_lies_in_one_file_that_replays_to_the_bit() {
     python_agrees(&file);
     let replayed = json(&format!("replay {}", run.display()))["replay"].clone();
     assert_eq!(replayed["differing_bytes"], 0, "{replayed}");
+    let nowhere = wag(&format!("export csv {} --out none", run.display()));
+    assert_eq!(nowhere.status.code(), Some(2), "a folder that is not there");
     let tables = json(&format!("export csv {}", run.display()));
     assert_eq!(tables["cycles"], replayed["cycles"]);
     let rows = fs::read_to_string(run.join("cycles.csv")).unwrap();
@@ -101,9 +103,12 @@ fn a_run_lies_in_one_file_that_replays_to_the_bit() {
     ledger_knows(folder.path(), &run);
 }
 
-/// The run is listed, told how it was made, and a broken folder beside it hides nothing.
+/// The run is listed, told how it was made, a broken one beside it hides nothing, and a folder
+/// that is none is left out.
 fn ledger_knows(runs: &Path, run: &Path) {
-    fs::create_dir(runs.join("broken")).unwrap();
+    fs::create_dir_all(runs.join("broken/no-run")).unwrap();
+    fs::create_dir(runs.join("no-run")).unwrap();
+    fs::write(runs.join("broken/command.json"), "{").unwrap();
     let (csv, places) = (runs.join("runs.csv"), runs.display());
     let told = json(&format!("ledger {places} --csv {}", csv.display()));
     let listed = told["runs"].as_array().unwrap();

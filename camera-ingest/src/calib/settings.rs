@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use arm_model::unit_hint;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use shared_types::{Shutter, StereoCamera};
@@ -54,12 +55,16 @@ pub fn load_model_files(path: &Path) -> Result<ModelFiles, CalibError> {
     Ok(read(path)?.models.within(folder))
 }
 
+/// Farthest that a camera stands from the arm's base, in each direction (m).
+const FAR_M: f64 = 20.0;
+
 /// Times of the shutter (exposure, row to row, s) and the camera's place make sense.
 fn check_place(times_s: [f64; 2], r: &Matrix3<f64>, position_m: &[f64; 3]) -> Result<(), String> {
     // 0.2 s is longer than any frame of any mode.
     for (name, value) in ["exposure_s", "line_time_s"].into_iter().zip(times_s) {
         if !(0.0..=0.2).contains(&value) {
-            return Err(format!("{name} = {value} must lie in 0 to 0.2 s"));
+            let hint = unit_hint(name, value, 0.2);
+            return Err(format!("{name} = {value} must lie in 0 to 0.2 s{hint}"));
         }
     }
     let off = (r * r.transpose() - Matrix3::identity()).norm();
@@ -70,10 +75,13 @@ fn check_place(times_s: [f64; 2], r: &Matrix3<f64>, position_m: &[f64; 3]) -> Re
             r.determinant()
         ));
     }
-    if position_m.iter().any(|v| !v.is_finite()) {
-        return Err("extrinsics.position_m must be finite (m)".to_owned());
+    match position_m.iter().find(|v| v.is_nan() || v.abs() > FAR_M) {
+        None => Ok(()),
+        Some(far) => Err(format!(
+            "extrinsics.position_m has a coordinate of {far} m, but at most {FAR_M} m make sense{}",
+            unit_hint("position_m", *far, FAR_M)
+        )),
     }
-    Ok(())
 }
 
 /// Whether a camera that was not read by [`super::load_camera`] can be one.

@@ -80,7 +80,7 @@ fn try_track(
     Ok(CameraEvent::Tracked {
         first_stamp_ns: recording.first_stamp_ns(),
         frames: u32::try_from(frames.len())?,
-        lost_part: result.track.lost_part(),
+        lost_fraction: result.track.lost_fraction(),
         appearance,
         ms_per_frame,
     })

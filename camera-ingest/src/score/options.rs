@@ -77,3 +77,12 @@ pub enum ScoreError {
         least: usize,
     },
 }
+
+impl ScoreError {
+    /// Whether film or colour cannot be scored as given; else something was looked for and
+    /// not found.
+    #[must_use]
+    pub fn is_input(&self) -> bool {
+        !matches!(self, Self::NotSeen { .. })
+    }
+}

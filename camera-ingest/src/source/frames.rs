@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::error::SourceError;
 use crate::frame::{EyeFrame, StereoFrame};
+use crate::track::Film;
 
 /// A recording of the left image, and perhaps of the right one.
 pub trait FrameSource: std::fmt::Debug {
@@ -68,6 +69,70 @@ impl StereoSource for Box<dyn StereoSource> {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
         (**self).read(index)
     }
+}
+
+/// Frames of the left image, and of the right one those that [`Film::needs_right`].
+#[derive(Debug, Clone)]
+pub struct BothEyes {
+    /// Left image, all frames.
+    pub left: Vec<EyeFrame>,
+    /// Right image; none where the recording has none.
+    pub right: Vec<EyeFrame>,
+}
+
+impl BothEyes {
+    /// For the tracker.
+    #[must_use]
+    pub fn film(&self) -> Film<'_> {
+        Film {
+            left: &self.left,
+            right: &self.right,
+        }
+    }
+}
+
+/// A recording of both images, or of the left one.
+#[derive(Debug)]
+pub enum AnySource {
+    /// Both.
+    Both(Box<dyn StereoSource>),
+    /// The left one.
+    Left(Box<dyn FrameSource>),
+}
+
+impl AnySource {
+    /// Decodes what a tracker looks at.
+    ///
+    /// # Errors
+    /// A frame is damaged.
+    pub fn read(&mut self) -> Result<BothEyes, SourceError> {
+        match self {
+            Self::Both(source) => read_film(&mut **source),
+            Self::Left(source) => Ok(BothEyes {
+                left: read_left(&mut **source)?,
+                right: Vec::new(),
+            }),
+        }
+    }
+}
+
+/// Decodes what a tracker looks at of both images.
+///
+/// # Errors
+/// A frame is damaged.
+pub fn read_film(source: &mut dyn StereoSource) -> Result<BothEyes, SourceError> {
+    let count = source.len();
+    let (mut left, mut right) = (Vec::with_capacity(count), Vec::new());
+    for index in 0..count {
+        if Film::needs_right(index, count) {
+            let frame = source.read(index)?;
+            left.push(frame.left());
+            right.push(frame.right());
+        } else {
+            left.push(source.read_left(index)?);
+        }
+    }
+    Ok(BothEyes { left, right })
 }
 
 /// Decodes the left image of every frame.

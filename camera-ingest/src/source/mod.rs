@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 pub use avi::AviSource;
 pub use error::SourceError;
-pub use frames::{FrameSource, StereoSource, read_left};
+pub use frames::{AnySource, BothEyes, FrameSource, StereoSource, read_film, read_left};
 pub use images::ImageSource;
 pub use yuyv::YuyvSource;
 

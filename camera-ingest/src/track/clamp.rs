@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use arm_model::{JointVector, Pole};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rope_sim::AttachMotion;
 
 /// Why a path of the clamp is refused.
 #[derive(Debug, thiserror::Error)]
@@ -68,6 +69,25 @@ impl ClampPath {
             return Err(ClampError::Samples("its times do not increase"));
         }
         Ok(Self { samples })
+    }
+
+    /// Along a motion that ends, every 2 ms; time 0 is the motion's.
+    pub(super) fn of(motion: &dyn AttachMotion) -> Self {
+        const STEP_S: f64 = 2e-3;
+        const LONGEST_S: f64 = 600.0;
+        let count = (motion.duration_s().min(LONGEST_S) / STEP_S) as usize;
+        let sample = |i: usize| {
+            let t_s = i as f64 * STEP_S;
+            let frame = motion.at(t_s);
+            ClampSample {
+                t_s,
+                p_w_m: frame.p_m,
+                pole_w: frame.r.column(2).into(),
+            }
+        };
+        Self {
+            samples: (0..=count).map(sample).collect(),
+        }
     }
 
     /// From joint positions in order of time (t = 0: first frame), through the kinematics

@@ -16,6 +16,7 @@ mod clamp;
 mod covered;
 mod curve;
 mod evidence;
+mod explain;
 mod first_frame;
 mod follow;
 mod geodesic;
@@ -38,6 +39,7 @@ use std::time::{Duration, Instant};
 pub use appearance::RopeAppearance;
 use background::{Background, frames_by_motion};
 pub use clamp::{ClampError, ClampPath, ClampSample};
+pub use explain::Film;
 use first_frame::{FirstLook, Place};
 use follow::{Follower, NODES, RopeModel};
 pub use models::{FirstMask, FirstScene, ModelError, Models, Moving, PointTracker, SeenPoint};
@@ -46,6 +48,7 @@ use outline::{Circle, Contrast};
 use plane::RopePlane;
 pub use refusal::TrackError;
 use refusal::check;
+use rope_sim::AttachMotion;
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 use state::State;
@@ -118,6 +121,33 @@ pub fn track(
     options: &TrackOptions,
 ) -> Result<TrackResult, TrackError> {
     track_with(frames, camera, clamp, options, &mut Models::default())
+}
+
+/// Tracks the rope through a film of one eye or both: by explaining it, and where no
+/// simulated rope does, or with learned models, by following it from frame to frame as
+/// [`track_with()`].
+///
+/// `motion` is the attach frame's, t = 0 at the first frame's start of exposure.
+///
+/// # Errors
+/// As [`track_with()`].
+pub fn track_film(
+    film: Film<'_>,
+    camera: &StereoCamera,
+    motion: &dyn AttachMotion,
+    options: &TrackOptions,
+    models: &mut Models<'_>,
+) -> Result<TrackResult, TrackError> {
+    check(film.left, camera, options)?;
+    if models.first_mask.is_none() && models.point_tracker.is_none() {
+        match explain::explain(film, camera, motion, options) {
+            Ok(result) => return Ok(result),
+            Err(reason) => {
+                tracing::info!(%reason, "no simulated rope explains the film: following it");
+            }
+        }
+    }
+    track_with(film.left, camera, &ClampPath::of(motion), options, models)
 }
 
 /// As [`track()`], with learned models in the place of its parts.

@@ -12,7 +12,7 @@ use crate::frame::EyeFrame;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrackError {
     /// Too few frames, or too many or few keypoints.
-    #[error("tracking: {what} is {found}, it must be {least} to {most}")]
+    #[error("tracking: {what} is {found}, it must be {}", allowed(*least, *most))]
     Range {
         /// `frames` or an option's name.
         what: &'static str,
@@ -25,7 +25,7 @@ pub enum TrackError {
     },
     /// Frames differ from the camera's size.
     #[error(
-        "tracking: frame {frame} is {found:?} px, the camera's mode gives {expected:?} px per eye; \
+        "tracking: frame {frame} is {found:?} px, the camera's mode gives {expected:?} px per image; \
          is the `mode` in camera.toml the one recorded?"
     )]
     Size {
@@ -80,6 +80,15 @@ pub enum TrackError {
     Model(#[from] ModelError),
 }
 
+impl TrackError {
+    /// Whether film, camera and motion cannot be tracked as given; else the rope was looked
+    /// for and not found.
+    #[must_use]
+    pub fn is_input(&self) -> bool {
+        !matches!(self, Self::NoRope { .. } | Self::MostlyLost { .. })
+    }
+}
+
 impl From<NotFound> for TrackError {
     fn from(reason: NotFound) -> Self {
         match reason {
@@ -88,6 +97,13 @@ impl From<NotFound> for TrackError {
             NotFound::NoMask(error) => Self::Model(error),
         }
     }
+}
+
+fn allowed(least: usize, most: usize) -> String {
+    if most == usize::MAX {
+        return format!("at least {least}");
+    }
+    format!("{least} to {most}")
 }
 
 pub(super) fn check(

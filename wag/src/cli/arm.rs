@@ -32,7 +32,7 @@ pub struct ArmArgs {
     /// address that is not this machine unless this is given.
     #[arg(long, alias = "confirm")]
     pub yes: bool,
-    /// Limits of the arm; default: the built-in xArm 7.
+    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
     #[arg(long)]
     pub limits: Option<PathBuf>,
     /// Check the motion against the limits and stop there: connects to nothing,

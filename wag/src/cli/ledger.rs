@@ -23,8 +23,8 @@ pub struct LedgerArgs {
     #[arg(long, value_name = "NAME")]
     pub command: Option<String>,
     /// Only runs of this seed.
-    #[arg(long, value_name = "SEED", allow_negative_numbers = true, value_parser = seed)]
-    pub seed_is: Option<u64>,
+    #[arg(long, global = true, alias = "seed-is", allow_negative_numbers = true, value_parser = seed)]
+    pub seed: Option<u64>,
     /// Only runs of the plan whose hash has this prefix.
     #[arg(long, value_name = "HASH")]
     pub plan: Option<String>,

@@ -14,10 +14,11 @@ pub struct PlanArgs {
     /// Target x,y,z in the arm's base frame (m).
     #[arg(long, allow_hyphen_values = true)]
     pub target: Point,
-    /// Limits of the arm; default: the built-in xArm 7.
+    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
     #[arg(long)]
     pub limits: Option<PathBuf>,
-    /// Tuned values of the planner (TOML); default: the built-in ones.
+    /// Tuned values of the planner (TOML), laid over the effective ones (`wag config show
+    /// planner`).
     #[arg(long)]
     pub config: Option<PathBuf>,
     /// Seed of the search.
@@ -64,7 +65,7 @@ pub enum InterfaceName {
 pub struct CheckArgs {
     /// The plan.
     pub plan: PathBuf,
-    /// Limits of the arm; default: the built-in xArm 7.
+    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
     #[arg(long)]
     pub limits: Option<PathBuf>,
     /// Command interface: how setpoints reach the arm.

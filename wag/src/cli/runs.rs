@@ -1,5 +1,6 @@
 //! The commands that look at one run.
 
+use super::values::span_s;
 use clap::{Args, Subcommand};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -19,9 +20,9 @@ pub struct RecordArgs {
     #[arg(long)]
     pub domain: Option<String>,
     /// Stop after this long (s); default: on Ctrl-C.
-    #[arg(long)]
+    #[arg(long, value_parser = span_s)]
     pub seconds: Option<f64>,
-    /// Limits of the arm, stored in the recording; default: the effective ones.
+    /// Limits of the arm (TOML), laid over the effective ones and stored in the recording.
     #[arg(long)]
     pub limits: Option<PathBuf>,
     /// Folder for the run; it must not exist. Default: runs/TIME-record.
@@ -75,7 +76,7 @@ pub struct WatchArgs {
     #[arg(long, value_name = "camera.toml", requires = "preview")]
     pub camera: Option<PathBuf>,
     /// Stop after this long (s); default: on Ctrl-C.
-    #[arg(long)]
+    #[arg(long, value_parser = span_s)]
     pub seconds: Option<f64>,
 }
 

@@ -19,11 +19,19 @@ pub(super) fn offset_ms(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A span of time (s).
+pub(super) fn span_s(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(span) if span > 0.0 && f64::is_finite(span) => Ok(span),
+        _ => Err("a time is a number above zero, in s".to_owned()),
+    }
+}
+
 /// A mass (kg).
 pub(super) fn mass_kg(text: &str) -> Result<f64, String> {
     match text.parse() {
-        Ok(mass) if mass > 0.0 && f64::is_finite(mass) => Ok(mass),
-        _ => Err("a mass is a number above 0, in kg".to_owned()),
+        Ok(mass) if mass > 0.0 && mass < 10.0 => Ok(mass),
+        _ => Err("a lead's mass is a number above 0 and below 10, in kg".to_owned()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `wag calib`: where the camera stands, from a printed board or from the lead that
 //! the arm shows at known places.
 
+use super::score::not_scored;
 use crate::cli::{CalibCheckArgs, CalibCommand, ExtrinsicsArgs, ShownArgs};
 use anyhow::{Context, anyhow};
 use camera_ingest::calib::board::{Board, BoardError};
@@ -66,8 +67,7 @@ fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<S
             let shown = read_shown(path, video.len()).or_input()?;
             let options = ScoreOptions::default();
             sight_lead(&mut video, camera, rgb.0, &shown, &options)
-                .with_context(|| format!("video `{}`", args.film.video.display()))
-                .or_failed()
+                .map_err(|error| not_scored(error, &args.film.video))
         }
         _ => Err(Failure::input(anyhow!(
             "name what the camera is shown: --board, or --lead with --lead-rgb"

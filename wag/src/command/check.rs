@@ -4,8 +4,8 @@ use crate::cli::{CheckArgs, InterfaceName};
 use crate::config;
 use anyhow::{anyhow, ensure};
 use arm_model::Limits;
-use arm_model::limits::{LimitKind, Margin};
-use cli_output::{Failure, OrInput, Outcome, table};
+use arm_model::limits::{LimitKind, Margin, TOOL_SPEED_RATED_M_S};
+use cli_output::{Failure, OrInput, Outcome, output, table};
 use comfy_table::Table;
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop, tool_contact_s};
 use run_log::files::read_plan;
@@ -60,8 +60,9 @@ fn rule_table(margins: &[RuleMargin]) -> Table {
 /// What the arm is set up to judge by.
 fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
     ensure!(
-        args.speed_factor > 0.0 && args.speed_factor.is_finite(),
-        "--speed-factor is {}, but must be above 0",
+        args.speed_factor > 0.0 && args.speed_factor <= TOOL_SPEED_RATED_M_S,
+        "--speed-factor is {}, but must be above 0 and at most {TOOL_SPEED_RATED_M_S}: it is a \
+         factor of 1 m/s",
         args.speed_factor
     );
     let fence = match args.fence.as_deref() {
@@ -94,10 +95,14 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
         println!("{}\n\n{}", margin_table(&margins), rule_table(&judged));
     }
     let refuse = |what: String| {
-        Err(Failure::failed(anyhow!(
-            "plan `{}` {what}",
-            args.plan.display()
-        )))
+        let error = format!("plan `{}` {what}", args.plan.display());
+        if quiet {
+            output::object(&json!({
+                "ok": false, "error": error, "command": "check", "interface": arm.interface,
+                "margins": margins, "arm": judged,
+            }));
+        }
+        Err(Failure::failed(anyhow!(error)))
     };
     let stop = first_stop(&judged);
     let arm_says = stop.map_or_else(

@@ -243,7 +243,7 @@ impl<'a> Demo<'a> {
         self.record.stages.track_s = stage.done(&format!(
             "{:.1} ms a frame, rope lost in {:.1} %",
             tracked.ms_per_frame,
-            100.0 * tracked.lost_part
+            100.0 * tracked.lost_fraction
         ));
         let method = self.settings.identify.method;
         if let Some(warning) = warning_of_pole(method, &self.settings.cell.pole) {

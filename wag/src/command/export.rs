@@ -3,7 +3,7 @@
 use crate::cli::{ExportCommand, ExportCsvArgs};
 use anyhow::anyhow;
 use cli_output::{Failure, OrInput, Outcome};
-use run_log::Run;
+use run_log::{CYCLES_TABLE, Run, files};
 use serde_json::{Value, json};
 
 pub fn run(command: &ExportCommand, quiet: bool) -> Outcome<Option<Value>> {
@@ -23,6 +23,7 @@ fn csv(args: &ExportCsvArgs, quiet: bool) -> Outcome<Option<Value>> {
     let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
     let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
     let out = args.out.as_deref().unwrap_or(run.folder());
+    files::check_writable(&out.join(CYCLES_TABLE)).or_input()?;
     let [cycles, joints] = recorded.write_tables(out, epoch_ns).or_failed()?;
     if !quiet {
         println!(

@@ -4,8 +4,8 @@ use crate::cli::SceneArgs;
 use crate::config;
 use anyhow::{Context, anyhow, ensure};
 use arm_model::{Cell, Pole};
-use camera_ingest::source::{read_left, run_file};
-use camera_ingest::{ClampPath, EyeFrame, FrameSource, load_camera, open_video};
+use camera_ingest::source::{AnySource, BothEyes, run_file};
+use camera_ingest::{load_camera, open_video};
 use cli_output::{OrInput, Outcome};
 use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
 use run_log::Run;
@@ -57,20 +57,7 @@ impl ClampMotion {
         matches!(self.told, Told::Joints(..)).then_some(&self.pole)
     }
 
-    /// For the tracker.
-    pub fn clamp_path(&self) -> anyhow::Result<ClampPath> {
-        let path = match &self.told {
-            Told::Joints(path, csv) => {
-                let samples: Vec<_> = csv.times_s.iter().copied().zip(csv.q.clone()).collect();
-                ClampPath::from_joints(&samples, &self.pole)
-                    .with_context(|| format!("`{}`", path.display()))?
-            }
-            Told::Pose(path) => ClampPath::from_pose_csv(path)?,
-        };
-        Ok(path.since(-self.late_s))
-    }
-
-    /// For the simulator.
+    /// For tracker and simulator.
     pub fn attach(&self) -> anyhow::Result<Box<dyn AttachMotion>> {
         match &self.told {
             Told::Joints(path, csv) => {
@@ -105,7 +92,7 @@ pub fn read_pose(path: &Path) -> anyhow::Result<Vec<PoseRow>> {
 /// A film of a rope.
 #[derive(Debug)]
 pub struct Filmed {
-    source: Box<dyn FrameSource>,
+    source: AnySource,
     /// Where it is from.
     pub path: PathBuf,
     /// What filmed it.
@@ -158,7 +145,7 @@ impl Filmed {
         Ok(Self {
             camera: scene.camera()?,
             motion: ClampMotion::read(scene)?,
-            source: Box::new(open_video(video, rate_hz)?),
+            source: AnySource::Both(open_video(video, rate_hz)?),
             path: video.to_owned(),
             warnings: Vec::new(),
         })
@@ -196,7 +183,7 @@ impl Filmed {
         };
         Ok(Self {
             warnings: part.warnings.clone(),
-            source: Box::new(part),
+            source: AnySource::Left(Box::new(part)),
             path: path.to_owned(),
             camera,
             motion,
@@ -211,8 +198,8 @@ impl Filmed {
     }
 
     /// Its frames, in memory.
-    pub fn frames(&mut self) -> Outcome<Vec<EyeFrame>> {
-        read_left(&mut *self.source).or_input()
+    pub fn frames(&mut self) -> Outcome<BothEyes> {
+        self.source.read().or_input()
     }
 }
 

@@ -86,11 +86,7 @@ fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed
 }
 
 fn classify(error: IdentifyError) -> Failure {
-    if error.is_input() {
-        Failure::input(error)
-    } else {
-        Failure::failed(error)
-    }
+    Failure::of(error.is_input(), error)
 }
 
 /// Identified parameters as a table.
@@ -113,7 +109,7 @@ fn parameter_table(estimate: &RopeEstimate) -> Table {
     table::numbers(header, 1, rows)
 }
 
-/// A combination of parameters that the film leaves open, in words.
+/// What the film leaves open, in words: a parameter, or a combination of some.
 fn in_words(ambiguity: &Ambiguity) -> String {
     const PART: f64 = 0.3;
     let parts: Vec<String> = RANGES
@@ -122,13 +118,16 @@ fn in_words(ambiguity: &Ambiguity) -> String {
         .filter(|(_, part)| part.abs() > PART)
         .map(|(range, part)| format!("{}{}", if part < 0.0 { "-" } else { "+" }, range.label))
         .collect();
-    parts.join(" ")
+    match parts.as_slice() {
+        [one] => format!("does not tell {}", &one[1..]),
+        _ => format!("cannot separate {}", parts.join(" ")),
+    }
 }
 
 /// What a person should know beside the numbers.
 fn print_remarks(estimate: &RopeEstimate) {
     for ambiguity in &estimate.posterior.ambiguities {
-        println!("the film cannot separate {}", in_words(ambiguity));
+        println!("the film {}", in_words(ambiguity));
     }
     if estimate.out_of_distribution.is_outside() {
         println!(

@@ -116,12 +116,14 @@ impl Learned {
     }
 }
 
-/// A model's fault is bad input, a film's is not.
+/// What cannot be tracked as it was given is bad input; a rope that was looked for and not
+/// found is not.
 pub fn classify(error: TrackError, video: &Path) -> Failure {
     match error {
         TrackError::Model(error) => refused(error),
-        error => Failure::failed(
-            anyhow::Error::new(error).context(format!("video `{}`", video.display())),
-        ),
+        error => {
+            let video = format!("video `{}`", video.display());
+            Failure::of(error.is_input(), anyhow::Error::new(error).context(video))
+        }
     }
 }

@@ -20,11 +20,11 @@ pub fn run(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
 }
 
 fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let places = if args.places.is_empty() {
-        vec![PathBuf::from(RUNS)]
-    } else {
-        args.places.clone()
-    };
+    let mut places = args.places.clone();
+    // Before the first run the default folder is not there, which is no mistake.
+    if places.is_empty() && Path::new(RUNS).exists() {
+        places.push(PathBuf::from(RUNS));
+    }
     let mut entries = ledger::find(&places).or_input()?;
     let plan = args.plan.as_ref().map(|hash| hash.to_lowercase());
     entries.retain(|e| {
@@ -33,7 +33,7 @@ fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
                 .command
                 .as_deref()
                 .is_none_or(|c| e.command() == Some(c))
-            && args.seed_is.is_none_or(|seed| e.seed == Some(seed))
+            && args.seed.is_none_or(|seed| e.seed == Some(seed))
             && plan.as_deref().is_none_or(|hash| {
                 e.plan_sha256
                     .as_ref()
@@ -44,7 +44,9 @@ fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
         let text = ledger::csv(&entries).or_failed()?;
         files::write_atomic(path, &text).or_failed()?;
     }
-    if !quiet {
+    if !quiet && entries.is_empty() {
+        println!("no runs: name run folders or folders of them, or make one with `wag demo`");
+    } else if !quiet {
         println!("{}", ledger::table(&entries));
         for entry in &entries {
             for problem in &entry.problems {
@@ -59,14 +61,13 @@ fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
 }
 
 fn known(run: &Path) -> Outcome<Entry> {
-    if run.is_dir() {
-        ledger::read(run).or_input()
-    } else {
-        Err(Failure::input(anyhow!(
-            "`{}` is no folder; name a run folder",
-            run.display()
-        )))
+    if ledger::is_run(run) {
+        return ledger::read(run).or_input();
     }
+    Err(Failure::input(anyhow!(
+        "`{}` is no run folder; `wag ledger` lists those of `{RUNS}`",
+        run.display()
+    )))
 }
 
 fn compare(args: &LedgerCompareArgs, quiet: bool) -> Outcome<Option<Value>> {

@@ -25,11 +25,7 @@ pub fn not_there(task: &str) -> Failure {
 
 /// Bad requests are the caller's; everything else is a failure of the work.
 fn classify(error: PlanError) -> Failure {
-    if error.is_input() {
-        Failure::input(error)
-    } else {
-        Failure::failed(error)
-    }
+    Failure::of(error.is_input(), error)
 }
 
 /// Refuses a plan that would not do what it is for, unless that is wanted.

@@ -42,11 +42,6 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(RecordCommand::Recover(args)) = &args.instead {
         return recover(args, quiet);
     }
-    if args.seconds.is_some_and(|s| !s.is_finite() || s <= 0.0) {
-        return Err(Failure::input(anyhow!(
-            "--seconds must be a number above zero"
-        )));
-    }
     if let Some(out) = &args.out {
         RunFolder::refuse_existing(out)?;
     }

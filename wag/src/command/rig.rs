@@ -35,7 +35,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
     let cell = config::cell().or_input()?;
     watch_interrupts().or_failed()?;
     match &args.rope {
-        None => arm_alone(args, report_ports, faults, cell, quiet).or_failed()?,
+        None => arm_alone(args, report_ports, faults, cell, quiet).map_err(Failure::of_server)?,
         Some(rope) => {
             let mut config = RigConfig {
                 domain: args
@@ -57,7 +57,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
             // Goes last: nothing of the domain stays once the rig is gone.
             let _sweep = DomainSweep::new(&config.domain);
             let announce = |ports| announce(config.bind, ports, quiet);
-            run_announced(&config, interrupted(), announce).or_failed()?;
+            run_announced(&config, interrupted(), announce).map_err(Failure::of_server)?;
         }
     }
     Ok(None)

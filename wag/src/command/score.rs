@@ -1,10 +1,16 @@
 //! `wag score`: closest approach of tip and target from stereo video.
 
 use crate::cli::ScoreArgs;
-use anyhow::Context;
-use camera_ingest::{ScoreOptions, load_camera, open_video, score};
-use cli_output::{OrInput, Outcome, Stage};
+use camera_ingest::{ScoreError, ScoreOptions, load_camera, open_video, score};
+use cli_output::{Failure, OrInput, Outcome, Stage};
 use serde_json::{Value, json};
+use std::path::Path;
+
+/// Bad input, or a marker that was looked for and not found.
+pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
+    let video = format!("video `{}`", video.display());
+    Failure::of(error.is_input(), anyhow::Error::new(error).context(video))
+}
 
 pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
     let camera = load_camera(&args.film.camera).or_input()?;
@@ -17,8 +23,7 @@ pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
         args.target_rgb.0,
         &ScoreOptions::default(),
     )
-    .with_context(|| format!("video `{}`", args.film.video.display()))
-    .or_failed()?;
+    .map_err(|error| not_scored(error, &args.film.video))?;
     let line = format!(
         "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s",
         1e3 * found.closest_m,

@@ -4,6 +4,7 @@ use super::filmed::read_pose;
 use crate::cli::{PrecisionName, SimRopeArgs, SimThrowArgs};
 use crate::config;
 use anyhow::{Context, anyhow, ensure};
+use arm_model::unit_hint;
 use cli_output::{Failure, OrInput, Outcome};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome as SimOutcome, PoseTrack, Precision,
@@ -35,7 +36,8 @@ fn simulate(
 fn check_step(dt: f64) -> anyhow::Result<()> {
     ensure!(
         dt.is_finite() && (1e-7..=0.02).contains(&dt),
-        "--dt is {dt} s, but must be from 1e-7 to 0.02 s"
+        "--dt is {dt} s, but must be from 1e-7 to 0.02 s{}",
+        unit_hint("dt_s", dt, 0.02)
     );
     Ok(())
 }

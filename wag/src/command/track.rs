@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
-use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_with};
+use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_film};
 use cli_output::{Failure, OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
@@ -33,19 +33,22 @@ pub fn track_video(
     keypoints: usize,
     stage: &Stage,
 ) -> Outcome<TrackedVideo> {
-    let clamp = filmed.motion.clamp_path().or_input()?;
+    let motion = filmed.motion.attach().or_input()?;
     stage.say("reading frames");
-    let frames = filmed.frames()?;
-    stage.say(format!("tracking through {} frames", frames.len()));
+    let eyes = filmed.frames()?;
+    stage.say(format!("tracking through {} frames", eyes.left.len()));
     let options = TrackOptions {
         keypoints,
         lead_px: learned.lead_px(),
         ..TrackOptions::default()
     };
-    let models = &mut learned.models();
-    let result = track_with(&frames, &filmed.camera, &clamp, &options, models)
+    let (film, models) = (eyes.film(), &mut learned.models());
+    let result = track_film(film, &filmed.camera, &*motion, &options, models)
         .map_err(|error| classify(error, &filmed.path))?;
-    Ok(TrackedVideo { frames, result })
+    Ok(TrackedVideo {
+        frames: eyes.left,
+        result,
+    })
 }
 
 /// A film for a name that ends in `.avi`, else a contact sheet.

@@ -4,7 +4,7 @@ use crate::cli::WatchArgs;
 use crate::config;
 use crate::pipeline::preview_spec;
 use crate::session::Supervisor;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use arm_model::Cell;
 use camera_ingest::load_camera;
 use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
@@ -52,11 +52,6 @@ impl PreviewProcess for Preview {
 }
 
 pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
-    if args.seconds.is_some_and(|s| !s.is_finite() || s <= 0.0) {
-        return Err(Failure::input(anyhow!(
-            "--seconds must be a number above zero"
-        )));
-    }
     let wanted = match (&args.run, &args.domain) {
         (Some(run), _) => Wanted::Domain(domain_of_run(run).or_input()?, Some(run.clone())),
         (None, Some(domain)) => Wanted::Domain(domain.clone(), None),
@@ -72,7 +67,7 @@ pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let (mut watcher, url) = Watcher::start(wanted, args.bind, here, preview).map_err(|error| {
         match error.downcast_ref::<IpcError>() {
             Some(IpcError::Domain { .. }) => Failure::input(error),
-            _ => Failure::failed(error),
+            _ => Failure::of_server(error),
         }
     })?;
     // Whatever happens here may wait; what is watched may not.

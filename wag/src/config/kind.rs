@@ -69,55 +69,61 @@ impl Kind {
         matches!(self, Self::Planner | Self::Rig)
     }
 
+    /// Its name in messages, its file in a site's or a rig's folder, and where its built-in
+    /// text is in the sources, with that text.
+    fn about(self) -> [&'static str; 4] {
+        macro_rules! built_in {
+            ($name:literal, $file:literal, $path:literal) => {
+                [
+                    $name,
+                    $file,
+                    $path,
+                    include_str!(concat!("../../../", $path)),
+                ]
+            };
+        }
+        match self {
+            Self::Planner => built_in!("planner", "planner.toml", "configs/planner/planner.toml"),
+            Self::Limits => built_in!("limits", "limits.toml", "configs/robot/xarm7.toml"),
+            Self::Cell => built_in!("cell", "cell.toml", "configs/cell/lab.toml"),
+            Self::Controller => {
+                built_in!(
+                    "controller",
+                    "rt-controller.toml",
+                    "configs/rt/controller.toml"
+                )
+            }
+            Self::Rig => built_in!("rig", "rig.toml", "configs/rig/demo.toml"),
+        }
+    }
+
     /// Its name in messages.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Planner => "planner",
-            Self::Limits => "limits",
-            Self::Cell => "cell",
-            Self::Controller => "controller",
-            Self::Rig => "rig",
-        }
+        self.about()[0]
     }
 
     /// Its file in a site's or a rig's folder.
     pub fn file(self) -> &'static str {
-        match self {
-            Self::Planner => "planner.toml",
-            Self::Limits => "limits.toml",
-            Self::Cell => "cell.toml",
-            Self::Controller => "rt-controller.toml",
-            Self::Rig => "rig.toml",
-        }
+        self.about()[1]
     }
 
     /// Where its built-in text is in the sources.
     pub fn built_in_path(self) -> &'static str {
-        match self {
-            Self::Planner => "configs/planner/planner.toml",
-            Self::Limits => "configs/robot/xarm7.toml",
-            Self::Cell => "configs/cell/lab.toml",
-            Self::Controller => "configs/rt/controller.toml",
-            Self::Rig => "configs/rig/demo.toml",
-        }
+        self.about()[2]
     }
 
     /// Its built-in text.
     pub fn built_in(self) -> &'static str {
-        match self {
-            Self::Planner => include_str!("../../../configs/planner/planner.toml"),
-            Self::Limits => include_str!("../../../configs/robot/xarm7.toml"),
-            Self::Cell => include_str!("../../../configs/cell/lab.toml"),
-            Self::Controller => include_str!("../../../configs/rt/controller.toml"),
-            Self::Rig => include_str!("../../../configs/rig/demo.toml"),
-        }
+        self.about()[3]
     }
 
     /// Whether a table can be read as this kind.
     pub fn accepts(self, table: toml::Table) -> Result<(), toml::de::Error> {
         match self {
             Self::Planner => table.try_into::<PlannerConfig>().map(drop),
-            Self::Limits => table.try_into::<Limits>().map(drop),
+            Self::Limits => table
+                .try_into::<Limits>()
+                .and_then(|limits| limits.check_rating().map_err(toml::de::Error::custom)),
             Self::Cell => table.try_into::<Cell>().map(drop),
             Self::Controller => table.try_into::<ControllerConfig>().map(drop),
             Self::Rig => table

@@ -85,7 +85,7 @@ pub fn wait_still(session: &mut Session, camera: &Camera, timeout_s: f64) -> any
 #[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct Tracked {
     /// Part of the frames in which the rope was lost (0 to 1).
-    pub lost_part: f64,
+    pub lost_fraction: f64,
     /// Sizes of rope and lead.
     #[serde(flatten)]
     pub appearance: RopeAppearance,
@@ -114,12 +114,12 @@ pub fn track(
     };
     match ask_camera(session, camera, &request, 60.0, Some(stage))? {
         CameraEvent::Tracked {
-            lost_part,
+            lost_fraction,
             appearance,
             ms_per_frame,
             ..
         } => Ok(Tracked {
-            lost_part,
+            lost_fraction,
             appearance,
             ms_per_frame,
         }),

@@ -60,6 +60,7 @@ pub(crate) fn prepare() -> tempfile::TempDir {
     put("other.bin", &format!("WAGR\u{9}{}", "\0".repeat(40)));
     put("camera.toml", "calibration = \"none.conf\"\n");
     put("limits.toml", "rate_hz = -250\n");
+    put("mm.toml", "tcp_speed_max_m_s = 900\n");
     put("slip.toml", "tcp_sped_max_m_s = 0.5\n");
     put(
         "faults.toml",

@@ -37,6 +37,7 @@ pub(crate) const CASES: &[Case] = &[
     ),
     ("rig --report-ports 1,2", 2, &["four ports"]),
     ("rig --bind here", 2, &["--bind"]),
+    ("rig --bind 192.0.2.7", 2, &["192.0.2.7"]),
     ("rig --faults f.toml", 2, &["f.toml"]),
     ("rig --faults text.toml", 2, &["text.toml", "TOML"]),
     (
@@ -57,6 +58,11 @@ pub(crate) const CASES: &[Case] = &[
         "config check limits slip.toml",
         2,
         &["slip.toml", "line 1", "did you mean `tcp_speed_max_m_s`?"],
+    ),
+    (
+        "config check limits mm.toml",
+        2,
+        &["mm.toml", "`tcp_speed_max_m_s` is 900", "2.2", "in mm?"],
     ),
     (
         "config show planner none.toml",

@@ -59,8 +59,14 @@ fn a_port_in_use_is_named_with_a_remedy() {
 }
 
 #[test]
-fn json_errors_are_json() {
+fn json_errors_are_json_and_no_runs_are_no_error() {
     let dir = tempfile::tempdir().unwrap();
+    let ledger = wag_in(dir.path(), "ledger");
+    let said = String::from_utf8_lossy(&ledger.stdout);
+    assert!(
+        ledger.status.success() && said.contains("no runs"),
+        "{said}"
+    );
     let output = wag_in(dir.path(), "check none.json --json");
     let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(told["ok"], false);

@@ -106,6 +106,16 @@ pub(crate) const CASES: &[Case] = &[
         &["boundary", "in y"],
     ),
     ("check none.json --speed-factor 0", 2, &["--speed-factor"]),
+    (
+        "check none.json --speed-factor 100",
+        2,
+        &["--speed-factor", "1 m/s"],
+    ),
+    (
+        "identify --keypoints k.json --lead-mass 50 --out r.toml",
+        2,
+        &["--lead-mass", "kg"],
+    ),
     ("check damaged.json", 2, &["damaged.json"]),
     (
         "score --video notvideo.avi --camera camera.toml --tip-rgb 1,2,300 --target-rgb 0,0,0",

@@ -121,12 +121,15 @@ pub(super) fn print(findings: &Findings, evidence: &Evidence, path: Option<&Path
             slow.join(",")
         );
     }
+    let known = findings.response.joints.iter().any(|j| j.lag().is_some());
     match path {
         Some(path) => println!("Written to {}.", path.display()),
-        None => println!(
+        None if known => println!(
             "Not written: {} is kept; name another file with --response.",
             evidence.folder.join(RESPONSE_FILE).display()
         ),
+        // What this comes to is the command's failure.
+        None => {}
     }
 }
 

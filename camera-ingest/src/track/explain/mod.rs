@@ -1,0 +1,322 @@
+//! Finding the rope by explaining the film.
+//!
+//! One hypothesis about the rope, simulated under the arm's own motion and projected
+//! through the camera, is compared with the whole film at once. What it explains can be no
+//! shadow, cable or piece of furniture: they do not hang on the clamp and swing as a rope
+//! does. The film is then read off along it: a few pixels across the hypothesis, frame by
+//! frame, and its two ends where the mean picture along the rope has them.
+
+mod colour;
+mod curve;
+mod disc;
+mod ends;
+mod evidence;
+mod field;
+mod hypothesis;
+mod read;
+mod reading;
+mod round;
+mod search;
+
+use std::time::Instant;
+
+use rope_sim::AttachMotion;
+use shared_types::keypoints::TrackedFrame;
+use shared_types::{KeypointTrack, StereoCamera};
+
+use super::clamp::ClampPath;
+use super::lateral::Across;
+use super::plane::RopePlane;
+use super::timing;
+use super::{RopeAppearance, TrackOptions, TrackResult, TrackTimes};
+use crate::frame::{EyeFrame, rgb_from_ycc};
+use colour::{CHROMA_WEIGHT, Colour};
+use evidence::Scene;
+use hypothesis::{Curve, Fidelity, Seen, Side, simulate};
+use read::{NODES, Reader};
+use reading::Reading;
+use search::{Climb, Comparison, Found, Moment, SearchError, Searcher};
+
+/// Frames that are searched, and every which of them in blurred evidence.
+const SEARCHED: usize = 100;
+const BLURRED_EVERY: usize = 3;
+const BLUR_PX: usize = 4;
+const COARSE: Comparison = Comparison {
+    points: 24,
+    side_px: 22.0,
+    price: 0.2,
+    fidelity: Fidelity::COARSE,
+};
+const FINE: Comparison = Comparison {
+    points: 40,
+    side_px: 9.0,
+    price: 0.3,
+    fidelity: Fidelity::FINE,
+};
+const LAST_CLIMB: Climb = Climb {
+    spreads: 0.15,
+    generations: 40,
+    population: 16,
+    seed: 8,
+};
+/// Evidence of the rope, in the middle over nodes and frames and in the least evident
+/// tenth of either, below which a hypothesis explains too little.
+const LEAST_EVIDENT: [f64; 3] = [0.35, 0.12, 0.12];
+/// A frame with less than this part of the usual evidence is lost.
+const LOST: f64 = 0.2;
+/// Nodes at the clamp that show the pole as much as the rope.
+const CLAMP_NODES: usize = 2;
+
+/// A film of one eye, or of both.
+#[derive(Debug, Clone, Copy)]
+pub struct Film<'a> {
+    /// Left image, all frames.
+    pub left: &'a [EyeFrame],
+    /// Right image: frames with the stamps of left ones, those of which
+    /// [`Film::needs_right`] is true; none for a film of one eye.
+    pub right: &'a [EyeFrame],
+}
+
+impl Film<'_> {
+    /// Whether of the frame at an index, of so many, the right image helps.
+    #[must_use]
+    pub fn needs_right(index: usize, frames: usize) -> bool {
+        index.is_multiple_of((frames / SEARCHED).max(1))
+    }
+}
+
+/// Why a film is not explained.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Unexplained {
+    /// The best rope is hardly to be seen where it should be.
+    #[error(
+        "the best rope explains {found:.2?} of what is seen (middle, least nodes, least frames)"
+    )]
+    TooLittle {
+        /// Evidence found.
+        found: [f64; 3],
+    },
+    /// The camera does not see the clamp.
+    #[error("the camera does not see the clamp")]
+    OutOfSight,
+    /// The motion cannot be simulated.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+}
+
+/// Tracks the rope through a film by explaining it.
+///
+/// `motion` is the attach frame's, t = 0 at the first frame. Keypoints are raw left pixels at
+/// equal distances along the rope.
+pub(super) fn explain(
+    film: Film<'_>,
+    camera: &StereoCamera,
+    motion: &dyn AttachMotion,
+    options: &TrackOptions,
+) -> Result<TrackResult, Unexplained> {
+    let start = Instant::now();
+    let times_s: Vec<f64> = film
+        .left
+        .iter()
+        .map(|f| (f.stamp_ns - film.left[0].stamp_ns) as f64 * 1e-9)
+        .collect();
+    let scene = Scene::of(film.left, options.background_frames);
+    let moments = moments(film, &scene, &times_s, options);
+    let background = start.elapsed();
+
+    let start = Instant::now();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let found = hypothesise(&moments, camera, motion, threads)?;
+    drop(moments);
+    let searching = start.elapsed();
+
+    let start = Instant::now();
+    let film_s = times_s[times_s.len() - 1];
+    let rollouts =
+        simulate(&[found.x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
+    let seen = Seen::new(&found.x, &rollouts[0], camera).ok_or(Unexplained::OutOfSight)?;
+    let mut curves = Vec::with_capacity(times_s.len());
+    for t_s in &times_s {
+        let mut curve = Curve::default();
+        if !seen.curve(*t_s, Side::Left, NODES, &mut curve) {
+            return Err(Unexplained::OutOfSight);
+        }
+        curves.push(curve.points);
+    }
+    let reading = Reader::new(&scene, film.left, curves).read();
+    let usual = usual_evidence(&reading, options.keypoints)?;
+    let mut result = result(
+        &reading,
+        usual,
+        &times_s,
+        (camera, motion),
+        options.keypoints,
+    )
+    .ok_or(Unexplained::OutOfSight)?;
+    result.appearance.noise = scene.noise();
+    result.times = TrackTimes {
+        background,
+        first_frame: searching,
+        follow: start.elapsed(),
+    };
+    Ok(result)
+}
+
+/// Evidence of frames spread over the film.
+fn moments(film: Film<'_>, left: &Scene, times_s: &[f64], options: &TrackOptions) -> Vec<Moment> {
+    let searched = |i: &usize| Film::needs_right(*i, times_s.len());
+    let mut moments: Vec<Moment> = (0..times_s.len())
+        .filter(searched)
+        .map(|i| Moment {
+            t_s: times_s[i],
+            maps: vec![(Side::Left, left.map(&film.left[i]))],
+        })
+        .collect();
+    // A median of fewer shows the rope.
+    if film.right.len() >= options.background_frames {
+        let right = Scene::of(film.right, options.background_frames);
+        let chosen = (0..times_s.len()).filter(searched);
+        for (moment, i) in moments.iter_mut().zip(chosen) {
+            let stamp_ns = film.left[i].stamp_ns;
+            if let Ok(at) = film.right.binary_search_by_key(&stamp_ns, |f| f.stamp_ns) {
+                moment.maps.push((Side::Right, right.map(&film.right[at])));
+            }
+        }
+    }
+    moments
+}
+
+/// The hypothesis that explains most.
+fn hypothesise(
+    moments: &[Moment],
+    camera: &StereoCamera,
+    motion: &dyn AttachMotion,
+    threads: usize,
+) -> Result<Found, SearchError> {
+    let blurred: Vec<Moment> = moments
+        .iter()
+        .step_by(BLURRED_EVERY)
+        .map(|m| Moment {
+            t_s: m.t_s,
+            maps: m
+                .maps
+                .iter()
+                .map(|(s, map)| (*s, map.blurred(BLUR_PX)))
+                .collect(),
+        })
+        .collect();
+    let coarse = Searcher {
+        moments: &blurred,
+        camera,
+        motion,
+        comparison: COARSE,
+        threads,
+    };
+    let found = coarse.search()?;
+    let fine = Searcher {
+        moments,
+        comparison: FINE,
+        ..coarse
+    };
+    let start = fine.scored(vec![found.x])?;
+    fine.climb(start[0], LAST_CLIMB)
+}
+
+fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = (values.len().saturating_sub(1)) as f64 * q;
+    values.get(at as usize).copied().unwrap_or(0.0)
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// How evident the rope is in most frames, if it is evident enough along all of it and in
+/// nearly all of them.
+fn usual_evidence(reading: &Reading, keypoints: usize) -> Result<f64, Unexplained> {
+    let evident: Vec<Vec<f64>> = (0..reading.frames())
+        .map(|i| reading.places(i, keypoints).1)
+        .collect();
+    let frames: Vec<f64> = evident.iter().map(|f| mean(f)).collect();
+    let node = |k: usize| mean(&evident.iter().map(|f| f[k]).collect::<Vec<_>>());
+    // The first keypoint is the pole's as much as the rope's.
+    let nodes: Vec<f64> = (1..keypoints).map(node).collect();
+    let usual = quantile(frames.clone(), 0.5);
+    let found = [usual, quantile(nodes, 0.1), quantile(frames, 0.1)];
+    tracing::debug!(
+        ?found,
+        "evidence of the rope: middle, least nodes, least frames"
+    );
+    if found.iter().zip(LEAST_EVIDENT).any(|(f, least)| *f < least) {
+        return Err(Unexplained::TooLittle { found });
+    }
+    Ok(usual)
+}
+
+/// Keypoints, looks and the clamp's time and place from what was read.
+fn result(
+    reading: &Reading,
+    usual: f64,
+    times_s: &[f64],
+    (camera, motion): (&StereoCamera, &dyn AttachMotion),
+    keypoints: usize,
+) -> Option<TrackResult> {
+    let plane = RopePlane::fit(camera, &ClampPath::of(motion), times_s[times_s.len() - 1])?;
+    let mut frames = Vec::with_capacity(times_s.len());
+    let mut clamps = Vec::new();
+    let mut residual = Vec::with_capacity(times_s.len());
+    let of_usual = |e: f64| (e / usual).min(1.0);
+    for (i, t_s) in times_s.iter().enumerate() {
+        let (points, evident) = reading.places(i, keypoints);
+        let lost = mean(&evident) < LOST * usual;
+        let (nodes, seen) = reading.places(i, NODES);
+        let across: Vec<Across> = nodes
+            .iter()
+            .zip(&seen)
+            .map(|(p, e)| Across {
+                point: plane.point_at(*p),
+                confidence: of_usual(*e),
+                rival: 0.0,
+            })
+            .collect();
+        if !lost && let Some(clamp) = timing::seen_clamp(&across, CLAMP_NODES) {
+            clamps.push((*t_s, clamp));
+        }
+        residual.push(1.0 - mean(&evident));
+        frames.push(TrackedFrame {
+            t_s: *t_s,
+            points,
+            confidence: evident.into_iter().map(of_usual).collect(),
+            lost,
+        });
+    }
+    let told = |t_s: f64| {
+        let seen = |t_s: f64| camera.project_left(&motion.at(t_s).p_m);
+        let row = seen(t_s).map_or(0.0, |[_, v]| v);
+        plane.point_at(seen(t_s + camera.row_time_s(row)).unwrap_or([f64::NAN; 2]))
+    };
+    let at_rest = reading.places(0, NODES).0;
+    let at_rest: Vec<_> = at_rest.iter().map(|p| plane.point_at(*p)).collect();
+    let [rope_radius_m, lead_radius_m] = reading.radii_px.map(|px| px / plane.px_per_m);
+    Some(TrackResult {
+        track: KeypointTrack { keypoints, frames },
+        appearance: RopeAppearance {
+            rope_radius_m,
+            lead_radius_m,
+            length_m: curve::length_px(&at_rest),
+            rope_rgb: rgb(&reading.rope),
+            lead_rgb: rgb(&reading.tip),
+            noise: 0.0,
+        },
+        residual,
+        clamp: timing::fit(&clamps, 1.0 / plane.px_per_m, told),
+        times: TrackTimes::default(),
+    })
+}
+
+/// The first of some colours.
+fn rgb(colours: &[Colour]) -> [u8; 3] {
+    let [y, cb, cr] = colours.first().copied().unwrap_or_default();
+    rgb_from_ycc([y, 128.0 + cb / CHROMA_WEIGHT, 128.0 + cr / CHROMA_WEIGHT])
+}

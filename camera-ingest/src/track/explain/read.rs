@@ -1,0 +1,381 @@
+//! Reads the film off along the hypothesis: curve, ends and tip weight in every frame.
+
+use super::colour::{Colour, colour_at, coverage, groups, presence};
+use super::curve::{from_end, normals};
+use super::disc::Disc;
+use super::ends::{End, EndPicture};
+use super::evidence::Scene;
+use super::field::{Look, Offset, moved, offsets, smooth_field, smoothed};
+use super::reading::Reading;
+use super::round::{self, Profile, Round};
+use crate::frame::EyeFrame;
+
+/// Places along the rope.
+pub(super) const NODES: usize = 64;
+
+/// Reach of the first look across the hypothesis, and of the second across what was found.
+const FIRST_REACH: usize = 14;
+const SECOND_REACH: usize = 9;
+/// Half the width assumed before it is known (px).
+const UNKNOWN_HALF_PX: f64 = 3.0;
+/// Stiffness of the offsets over time and along the rope, at the first and second look.
+const FIRST_STIFFNESS: [f64; 2] = [2.0, 1.0];
+const SECOND_STIFFNESS: [f64; 2] = [0.5, 0.5];
+/// Of so many frames one is learnt from.
+const LEARN_EVERY: usize = 3;
+/// Yarns of a rope, and sides of a tip weight, of different colour.
+const ROPE_COLOURS: usize = 3;
+const TIP_COLOURS: usize = 2;
+/// The tip weight is looked for this far from where the curve ends, at first and when its
+/// colours are known (px).
+const TIP_REACH_PX: [f64; 2] = [8.0, 5.0];
+/// A cylinder that leaves less than this part of the contrast unexplained tells where the
+/// rope's middle is; one that leaves less than the second, how thick it is.
+const CYLINDER: f64 = 0.015;
+const CYLINDER_WIDTH: f64 = 0.05;
+/// Stiffness of its offsets over time, and their pull to the curve's end.
+const TIP_STIFFNESS: f64 = 0.3;
+const TIP_PULL: f64 = 0.02;
+
+/// One frame and how bright it is.
+struct Lit<'a> {
+    frame: &'a EyeFrame,
+    gain: f32,
+}
+
+/// The film of one eye, and the hypothesis's curves in it.
+pub(super) struct Reader<'a> {
+    scene: &'a Scene,
+    frames: Vec<Lit<'a>>,
+    curves: Vec<Vec<[f64; 2]>>,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        frames: &'a [EyeFrame],
+        curves: Vec<Vec<[f64; 2]>>,
+    ) -> Self {
+        let lit = |frame| Lit {
+            frame,
+            gain: scene.gain(frame),
+        };
+        Self {
+            scene,
+            frames: frames.iter().map(lit).collect(),
+            curves,
+        }
+    }
+
+    /// Colour in the scene's light, and the scene's there.
+    fn colours(&self, lit: &Lit<'_>, p: [f64; 2]) -> Option<(Colour, Colour)> {
+        Some((colour_at(lit.frame, lit.gain, p)?, self.scene.colour_at(p)?))
+    }
+
+    fn unexplained(&self, lit: &Lit<'_>, p: [f64; 2]) -> f32 {
+        self.colours(lit, p)
+            .map_or(0.0, |(seen, behind)| self.scene.unexplained(seen, behind))
+    }
+
+    /// Evidence of things of some colours.
+    fn present(&self, lit: &Lit<'_>, colours: &[Colour], p: [f64; 2]) -> f32 {
+        let noise = self.scene.noise();
+        self.colours(lit, p).map_or(0.0, |(seen, behind)| {
+            presence(coverage(seen, behind, colours, noise))
+        })
+    }
+
+    /// Reads all frames.
+    pub(super) fn read(mut self) -> Reading {
+        // First, whatever the scene does not explain.
+        let look = Look {
+            reach: FIRST_REACH,
+            half_width_px: UNKNOWN_HALF_PX,
+            jump: 0.02,
+        };
+        self.follow(look, FIRST_STIFFNESS, None, |reader, lit, p| {
+            reader.unexplained(lit, p)
+        });
+        let rope = groups(&self.rope_samples(), ROPE_COLOURS);
+        let mut end = self.mean_picture(false).end();
+        let start_px = self.mean_picture(true).start_px();
+        // Then what has the rope's colours.
+        let look = Look {
+            reach: SECOND_REACH,
+            half_width_px: end.rope_half_px,
+            jump: 0.05,
+        };
+        let evident = self.follow(look, SECOND_STIFFNESS, Some(&end), |reader, lit, p| {
+            reader.present(lit, &rope, p)
+        });
+        let still = self.still_frames();
+        let round = self.round(&still);
+        if round.left < CYLINDER {
+            self.shift(round.middle_px);
+        }
+        let rope_px = if round.left < CYLINDER_WIDTH {
+            round.radius_px
+        } else {
+            end.rope_half_px
+        };
+        // First roughly, then with the size that the mean picture of all weights has.
+        let none = vec![(Offset::NONE, Offset::NONE); self.frames.len()];
+        let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
+        let both = [&rope[..], &tip].concat();
+        if let Some([offset_px, radius_px]) = self.tip_disc(&end, &both, &tips) {
+            end.centre_px += median_px(&tips) + offset_px;
+            end.radius_px = radius_px;
+        }
+        let (tip, mut tips) = self.tips(&end, &tips, (&rope, TIP_REACH_PX[1]));
+        // Where they are on average, the mean picture has told.
+        let usual_px = median_px(&tips);
+        tips.iter_mut().for_each(|(along, _)| along.px -= usual_px);
+        Reading {
+            curves: self.curves,
+            evident,
+            start_px,
+            end,
+            tips,
+            radii_px: [rope_px, end.radius_px.max(rope_px)],
+            rope,
+            tip,
+        }
+    }
+
+    /// Moves all curves to the evidence, but for what the tip weight hides; gives how
+    /// evident each node was.
+    fn follow(
+        &mut self,
+        look: Look,
+        [over_time, along]: [f64; 2],
+        end: Option<&End>,
+        at: impl Fn(&Self, &Lit<'_>, [f64; 2]) -> f32,
+    ) -> Vec<Vec<f64>> {
+        let normals: Vec<_> = self.curves.iter().map(|c| normals(c)).collect();
+        let frames = self.frames.iter().zip(&self.curves).zip(&normals);
+        let mut field: Vec<Vec<Offset>> = frames
+            .map(|((lit, curve), normals)| offsets(curve, normals, look, |p| at(self, lit, p)))
+            .collect();
+        let evident = field
+            .iter()
+            .map(|f| f.iter().map(|o| o.weight).collect())
+            .collect();
+        if let Some(end) = end {
+            for (offsets, curve) in field.iter_mut().zip(&self.curves) {
+                hide_behind(end, curve, offsets);
+            }
+        }
+        smooth_field(&mut field, over_time, along);
+        for ((curve, normals), offsets) in self.curves.iter_mut().zip(&normals).zip(&field) {
+            *curve = moved(curve, normals, offsets);
+        }
+        evident
+    }
+
+    /// The quarter of the frames in which the rope moves least.
+    fn still_frames(&self) -> Vec<usize> {
+        let moved = |i: usize| {
+            let [before, now] = [&self.curves[i.saturating_sub(1)], &self.curves[i]];
+            let ways = before.iter().zip(now);
+            ways.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+                .sum::<f64>()
+        };
+        let mut order: Vec<(f64, usize)> = (1..self.curves.len()).map(|i| (moved(i), i)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        order
+            .into_iter()
+            .map(|(_, i)| i)
+            .take(self.curves.len().div_ceil(4))
+            .collect()
+    }
+
+    /// The rope's cross section in some frames, but for its ends.
+    fn round(&self, still: &[usize]) -> Round {
+        let mut profile = Profile {
+            seen: [0.0; _],
+            behind: [0.0; _],
+        };
+        let mut counts = profile.seen;
+        for &i in still {
+            let (lit, curve) = (&self.frames[i], &self.curves[i]);
+            for (p, n) in curve
+                .iter()
+                .zip(normals(curve))
+                .take(NODES * 3 / 4)
+                .skip(NODES / 6)
+            {
+                for (k, count) in counts.iter_mut().enumerate() {
+                    let aside = (k as f64 - round::REACH as f64) * round::STEP_PX;
+                    let place = [p[0] + n[0] * aside, p[1] + n[1] * aside];
+                    if let Some((seen, behind)) = self.colours(lit, place) {
+                        profile.seen[k] += f64::from(seen[0]);
+                        profile.behind[k] += f64::from(behind[0]);
+                        *count += 1.0;
+                    }
+                }
+            }
+        }
+        for (k, count) in counts.into_iter().enumerate() {
+            profile.seen[k] /= f64::max(count, 1.0);
+            profile.behind[k] /= f64::max(count, 1.0);
+        }
+        round::fit(&profile)
+    }
+
+    /// Moves all curves along their normals.
+    fn shift(&mut self, px: f64) {
+        for curve in &mut self.curves {
+            let normals = normals(curve);
+            for (p, n) in curve.iter_mut().zip(normals) {
+                *p = [p[0] + n[0] * px, p[1] + n[1] * px];
+            }
+        }
+    }
+
+    /// Centre and radius of the tip weight in the mean picture around where it was found.
+    fn tip_disc(
+        &self,
+        end: &End,
+        colours: &[Colour],
+        places: &[(Offset, Offset)],
+    ) -> Option<[f64; 2]> {
+        let mut picture = EndPicture::new(30, 30, 24);
+        let noise = self.scene.noise();
+        let found = self.frames.iter().zip(&self.curves).zip(places);
+        for ((lit, curve), (along, across)) in found.step_by(LEARN_EVERY) {
+            let (c, t) = from_end(curve, end.centre_px + along.px);
+            let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
+            // Straight on both sides: the weight hides how the rope bends there.
+            let axis: Vec<[f64; 2]> = (0..5)
+                .map(|i| {
+                    let back = 10.0 * f64::from(4 - i);
+                    [c[0] - t[0] * back, c[1] - t[1] * back]
+                })
+                .collect();
+            picture.add(&axis, |p| {
+                let (seen, behind) = self.colours(lit, p)?;
+                Some((coverage(seen, behind, colours, noise), seen))
+            });
+        }
+        picture.disc()
+    }
+
+    /// Colours where the rope is evident, but for its ends, across half its width.
+    fn rope_samples(&self) -> Vec<Colour> {
+        let mut samples = Vec::new();
+        for (lit, curve) in self.frames.iter().zip(&self.curves).step_by(LEARN_EVERY) {
+            for (p, n) in curve
+                .iter()
+                .zip(normals(curve))
+                .take(NODES * 7 / 8)
+                .skip(NODES / 8)
+            {
+                for aside in [-2.0, 0.0, 2.0] {
+                    self.sample(
+                        lit,
+                        [p[0] + n[0] * aside, p[1] + n[1] * aside],
+                        &mut samples,
+                    );
+                }
+            }
+        }
+        samples
+    }
+
+    fn sample(&self, lit: &Lit<'_>, p: [f64; 2], samples: &mut Vec<Colour>) {
+        if let Some((seen, behind)) = self.colours(lit, p)
+            && self.scene.unexplained(seen, behind) > 0.6
+        {
+            samples.push(seen);
+        }
+    }
+
+    /// Mean picture around the free end, or around the clamp.
+    fn mean_picture(&self, clamp: bool) -> EndPicture {
+        let mut picture = if clamp {
+            EndPicture::new(45, 25, 10)
+        } else {
+            EndPicture::new(45, 45, 24)
+        };
+        for (lit, curve) in self.frames.iter().zip(&self.curves).step_by(LEARN_EVERY) {
+            let mut curve = curve.clone();
+            if clamp {
+                curve.reverse();
+            }
+            picture.add(&curve, |p| {
+                let (seen, behind) = self.colours(lit, p)?;
+                Some((self.scene.unexplained(seen, behind), seen))
+            });
+        }
+        picture
+    }
+
+    /// The tip weight's colours, learnt where it was found before, and its place along and
+    /// across the curve in each frame; it may also have the colours of the rope before it.
+    fn tips(
+        &self,
+        end: &End,
+        before: &[(Offset, Offset)],
+        (rope, reach_px): (&[Colour], f64),
+    ) -> (Vec<Colour>, Vec<(Offset, Offset)>) {
+        let colours = groups(&self.tip_samples(end, before), TIP_COLOURS);
+        let looked_for = [&colours[..], rope].concat();
+        let frames = self.frames.iter().zip(&self.curves);
+        let (along, across): (Vec<Offset>, Vec<Offset>) = frames
+            .map(|(lit, curve)| {
+                let (centre, t) = from_end(curve, end.centre_px);
+                let disc = Disc {
+                    centre,
+                    radius_px: end.radius_px,
+                    outwards: t,
+                    reach_px,
+                };
+                let (o, weight) = disc.find(|p| self.present(lit, &looked_for, p));
+                let offset = |px| Offset { px, weight };
+                (
+                    offset(o[0] * t[0] + o[1] * t[1]),
+                    offset(o[1] * t[0] - o[0] * t[1]),
+                )
+            })
+            .unzip();
+        let smooth = |offsets: &[Offset]| smoothed(offsets, TIP_STIFFNESS, TIP_PULL);
+        let places = smooth(&along).into_iter().zip(smooth(&across));
+        (colours, places.collect())
+    }
+
+    /// Colours around the tip weight's centre where it was found.
+    fn tip_samples(&self, end: &End, places: &[(Offset, Offset)]) -> Vec<Colour> {
+        let mut samples = Vec::new();
+        let found = self.frames.iter().zip(&self.curves).zip(places);
+        for ((lit, curve), (along, across)) in found.step_by(LEARN_EVERY) {
+            let (c, t) = from_end(curve, end.centre_px + along.px);
+            let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
+            let r = 0.4 * end.radius_px;
+            for (x, y) in [(0.0, 0.0), (r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r)] {
+                self.sample(lit, [c[0] + x, c[1] + y], &mut samples);
+            }
+        }
+        samples
+    }
+}
+
+/// How far along the curve the tip weight is usually found.
+fn median_px(tips: &[(Offset, Offset)]) -> f64 {
+    let mut along: Vec<f64> = tips.iter().map(|(along, _)| along.px).collect();
+    along.sort_by(f64::total_cmp);
+    along.get(along.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The tip weight hides the rope: what is read there is not the rope's.
+fn hide_behind(end: &End, curve: &[[f64; 2]], offsets: &mut [Offset]) {
+    let mut from_end_px = -end.centre_px;
+    for node in (0..curve.len()).rev() {
+        if from_end_px < end.radius_px {
+            offsets[node].weight *= 0.02;
+        }
+        if node > 0 {
+            let (a, b) = (curve[node - 1], curve[node]);
+            from_end_px += (b[0] - a[0]).hypot(b[1] - a[1]);
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What was read off a film: a curve in every frame, and its two ends.
+
+use super::colour::Colour;
+use super::curve::{at_part, from_end, length_px};
+use super::ends::End;
+use super::field::Offset;
+
+/// The curve's last part bends to the tip weight's centre.
+const BEND: f64 = 0.1;
+
+/// What was read.
+#[derive(Debug)]
+pub(super) struct Reading {
+    /// Curves of all frames, from the hypothesis's clamp to its end.
+    pub(super) curves: Vec<Vec<[f64; 2]>>,
+    /// How evident the rope is at each of their nodes, 0 to 1.
+    pub(super) evident: Vec<Vec<f64>>,
+    /// Where the rope begins, from the hypothesis's clamp on (px).
+    pub(super) start_px: f64,
+    pub(super) end: End,
+    /// The tip weight in each frame, along and across the curve from its usual place.
+    pub(super) tips: Vec<(Offset, Offset)>,
+    /// Half the rope's width, and the tip weight's radius (px).
+    pub(super) radii_px: [f64; 2],
+    pub(super) rope: Vec<Colour>,
+    pub(super) tip: Vec<Colour>,
+}
+
+impl Reading {
+    /// Number of frames.
+    pub(super) fn frames(&self) -> usize {
+        self.curves.len()
+    }
+
+    /// `count` places of a frame at equal distances along the rope, from the clamp to the
+    /// tip weight's centre, and how evident it is at each.
+    pub(super) fn places(&self, frame: usize, count: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
+        let (curve, evident) = (&self.curves[frame], &self.evident[frame]);
+        let (along, across) = self.tips[frame];
+        let length = length_px(curve);
+        let first = self.start_px / length;
+        let last = 1.0 + (self.end.centre_px + along.px) / length;
+        let weight_begins = 1.0 + (self.end.centre_px - self.end.radius_px) / length;
+        let (_, t) = from_end(curve, self.end.centre_px);
+        let place = |k: usize| {
+            let part = k as f64 / (count - 1) as f64;
+            let at = first + part * (last - first);
+            let p = at_part(curve, at);
+            let bend = across.px * ((part - 1.0 + BEND) / BEND).max(0.0);
+            let evidence = if at > weight_begins {
+                across.weight
+            } else {
+                local_mean(evident, at)
+            };
+            ([p[0] - t[1] * bend, p[1] + t[0] * bend], evidence)
+        };
+        (0..count).map(place).unzip()
+    }
+}
+
+/// Mean over the nodes around a part of the curve.
+fn local_mean(values: &[f64], part: f64) -> f64 {
+    let last = values.len() - 1;
+    let at = (part.clamp(0.0, 1.0) * last as f64).round() as usize;
+    let near = &values[at.saturating_sub(2)..(at + 3).min(values.len())];
+    near.iter().sum::<f64>() / near.len() as f64
+}
