@@ -1,7 +1,8 @@
 //! Frames kept in memory for tracking or scoring.
 
 use crate::frame::{EyeFrame, StereoFrame};
-use crate::source::{FrameSource, SourceError, StereoSource};
+use crate::source::{BothEyes, FrameSource, SourceError, StereoSource};
+use crate::track::Film;
 use shared_types::ipc::message::CameraEvent;
 use std::path::PathBuf;
 
@@ -10,7 +11,8 @@ const MAX_FRAMES: u32 = 3600;
 
 #[derive(Debug)]
 enum Frames {
-    Left(Vec<EyeFrame>),
+    /// What the tracker looks at: the right image of some frames only.
+    Film(BothEyes),
     Both(Vec<StereoFrame>),
 }
 
@@ -37,7 +39,7 @@ impl Recording {
             frames: if both_eyes {
                 Frames::Both(Vec::new())
             } else {
-                Frames::Left(Vec::new())
+                Frames::Film(BothEyes::default())
             },
             first_sequence: 0,
             last_sequence: 0,
@@ -51,7 +53,7 @@ impl Recording {
 
     fn count(&self) -> usize {
         match &self.frames {
-            Frames::Left(v) => v.len(),
+            Frames::Film(film) => film.left.len(),
             Frames::Both(v) => v.len(),
         }
     }
@@ -78,7 +80,12 @@ impl Recording {
         }
         self.last_sequence = frame.0.sequence;
         match &mut self.frames {
-            Frames::Left(v) => v.push(frame.left()),
+            Frames::Film(film) => {
+                if Film::needs_right(film.left.len(), self.wanted as usize) {
+                    film.right.push(frame.right());
+                }
+                film.left.push(frame.left());
+            }
             Frames::Both(v) => v.push(frame),
         }
         u32::try_from(self.count()).unwrap_or(u32::MAX)
@@ -93,11 +100,11 @@ impl Recording {
         })
     }
 
-    /// The left-eye frames, if that is what was kept.
-    pub(super) fn left(&self) -> Option<&[EyeFrame]> {
+    /// The frames for the tracker, if that is what was kept.
+    pub(super) fn film(&self) -> Option<Film<'_>> {
         match &self.frames {
-            Frames::Left(v) if !v.is_empty() => Some(v),
-            Frames::Left(_) | Frames::Both(_) => None,
+            Frames::Film(film) if !film.left.is_empty() => Some(film.film()),
+            Frames::Film(_) | Frames::Both(_) => None,
         }
     }
 
@@ -122,7 +129,7 @@ impl StereoSource for Recording {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
         let frame = match &self.frames {
             Frames::Both(v) => v.get(index),
-            Frames::Left(_) => None,
+            Frames::Film(_) => None,
         };
         frame.cloned().ok_or_else(|| SourceError::OutOfRange {
             path: PathBuf::from("recording in memory"),
@@ -144,7 +151,7 @@ mod tests {
     #[test]
     fn counts_kept_and_dropped_frames() {
         let mut r = Recording::begin(3, false);
-        assert!(r.finished().is_none() && r.left().is_none());
+        assert!(r.finished().is_none() && r.film().is_none());
         r.keep(frame(10));
         r.keep(frame(11));
         assert_eq!(r.keep(frame(14)), 3);
@@ -156,8 +163,8 @@ mod tests {
                 dropped: 2
             })
         );
-        assert_eq!(r.left().map(<[_]>::len), Some(3));
-        assert!(r.read(0).is_err(), "the right eye was not kept");
+        assert_eq!(r.film().map(|f| (f.left.len(), f.right.len())), Some((3, 3)));
+        assert!(r.read(0).is_err(), "right images were kept for the tracker only");
     }
 
     #[test]
@@ -165,7 +172,7 @@ mod tests {
         let mut r = Recording::begin(2, true);
         r.keep(frame(1));
         r.keep(frame(2));
-        assert!(r.has_both() && r.left().is_none());
+        assert!(r.has_both() && r.film().is_none());
         assert_eq!(r.read(1).unwrap(), frame(2));
         assert!(r.read(2).is_err());
     }

@@ -6,7 +6,7 @@ use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
-use crate::track::{ClampPath, TrackOptions, TrackResult, track as track_frames};
+use crate::track::{TrackOptions, TrackResult, track_film};
 use arm_model::{JointVector, Pole};
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{
@@ -49,9 +49,10 @@ fn try_track(
     else {
         return Err("not a request to track".into());
     };
-    let frames = recording
-        .left()
-        .ok_or("nothing is recorded for tracking; record first, left image only")?;
+    let film = recording
+        .film()
+        .ok_or("nothing is recorded for tracking; record first, for the tracker")?;
+    let frames = film.left;
     let progress = Progress {
         done: 0,
         total: 1,
@@ -60,12 +61,12 @@ fn try_track(
     };
     answer(call, &CameraEvent::Progress(progress));
     let began = Instant::now();
-    let clamp = clamp_path(joints, recording.first_stamp_ns(), pole)?;
+    let motion = attach_motion(joints, recording.first_stamp_ns(), pole)?;
     let options = TrackOptions {
         keypoints: *keypoints as usize,
         ..TrackOptions::default()
     };
-    let result = track_frames(frames, camera, &clamp, &options)?;
+    let result = track_film(film, camera, &motion, &options)?;
     let ms_per_frame = began.elapsed().as_secs_f64() * 1e3 / frames.len() as f64;
     publish(frames, &result, publisher)?;
     if let Some(path) = overlay {

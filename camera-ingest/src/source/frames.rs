@@ -72,7 +72,7 @@ impl StereoSource for Box<dyn StereoSource> {
 }
 
 /// Frames of the left image, and of the right one those that [`Film::needs_right`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct BothEyes {
     /// Left image, all frames.
     pub left: Vec<EyeFrame>,

@@ -43,6 +43,8 @@ pub struct Session {
 
 /// How often the operator's heartbeat is written.
 const BEAT_EVERY: Duration = Duration::from_millis(20);
+/// How long the arm's codes are waited for after a stop.
+const CODES_WITHIN: Duration = Duration::from_millis(1000);
 
 impl Session {
     /// Joins shared memory under `domain`; children log into `log_folder`.
@@ -248,10 +250,29 @@ impl Session {
             && !done
         {
             operator.stop();
+            self.await_arm_codes();
         }
         let _ = self.received.drain();
         self.supervisor.stop();
         self.bus.remove_leftovers();
+    }
+
+    /// Why the arm stopped is in its slow reports only (5 Hz); the record goes on until one
+    /// has come, so that it can explain the stop.
+    fn await_arm_codes(&mut self) {
+        let began = Instant::now();
+        let _ = self.received.drain();
+        let seen = self.received.cycles.cycles.len();
+        while began.elapsed() < CODES_WITHIN && self.supervisor.check_arm().is_ok() {
+            if self.received.drain().is_err() {
+                return;
+            }
+            let after = self.received.cycles.cycles.iter().skip(seen);
+            if after.into_iter().any(|c| c.input.codes.present != 0) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 }
 
