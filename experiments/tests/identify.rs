@@ -274,7 +274,11 @@ fn true_keypoints_of(folder: &Path) -> KeypointTrack {
             lost: false,
         })
         .collect();
-    KeypointTrack { keypoints, frames }
+    KeypointTrack {
+        keypoints,
+        frames,
+        doubts: Vec::new(),
+    }
 }
 
 /// MuJoCo's rope has links of solid cylinders, so its true radius counts for

@@ -113,6 +113,9 @@ pub struct KeypointTrack {
     pub keypoints: usize,
     /// The frames in order of time.
     pub frames: Vec<TrackedFrame>,
+    /// Why the track should not be relied on; none where it may be.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
 }
 
 /// Why a keypoint track is refused.
@@ -158,6 +161,7 @@ impl KeypointTrack {
         Some(Self {
             keypoints,
             frames: frames.map(|f| f.tracked(first_stamp_ns)).collect(),
+            doubts: Vec::new(),
         })
     }
 
@@ -222,6 +226,7 @@ mod tests {
         KeypointTrack {
             keypoints: 3,
             frames: vec![frame(0.0), frame(0.5)],
+            doubts: Vec::new(),
         }
     }
 

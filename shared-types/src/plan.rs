@@ -122,6 +122,9 @@ pub struct Plan {
     /// that does exactly what it is told.
     #[serde(default)]
     pub arm_response: Option<String>,
+    /// Why the track that its rope was identified from should not be relied on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// Simulations used.
     pub simulations: u32,
     /// Candidates drawn again because they broke a limit.

@@ -163,8 +163,14 @@ mod tests {
                 dropped: 2
             })
         );
-        assert_eq!(r.film().map(|f| (f.left.len(), f.right.len())), Some((3, 3)));
-        assert!(r.read(0).is_err(), "right images were kept for the tracker only");
+        assert_eq!(
+            r.film().map(|f| (f.left.len(), f.right.len())),
+            Some((3, 3))
+        );
+        assert!(
+            r.read(0).is_err(),
+            "right images were kept for the tracker only"
+        );
     }
 
     #[test]

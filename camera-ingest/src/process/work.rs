@@ -6,8 +6,9 @@ use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
-use crate::track::{TrackOptions, TrackResult, track_film};
+use crate::track::{Models, TrackOptions, TrackResult, track_film};
 use arm_model::{JointVector, Pole};
+use rope_sim::MeasuredArm;
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
@@ -66,7 +67,7 @@ fn try_track(
         keypoints: *keypoints as usize,
         ..TrackOptions::default()
     };
-    let result = track_film(film, camera, &motion, &options)?;
+    let result = track_film(film, camera, &motion, &options, &mut Models::default())?;
     let ms_per_frame = began.elapsed().as_secs_f64() * 1e3 / frames.len() as f64;
     publish(frames, &result, publisher)?;
     if let Some(path) = overlay {
@@ -84,20 +85,20 @@ fn try_track(
         lost_fraction: result.track.lost_fraction(),
         appearance,
         ms_per_frame,
+        doubts: result.track.doubts,
     })
 }
 
 /// The clamp's motion, time 0 at the first frame.
-fn clamp_path(
+fn attach_motion(
     joints: &[(u64, JointVector)],
     first_stamp_ns: u64,
     pole: &Pole,
-) -> Result<ClampPath, Failure> {
-    let samples: Vec<(f64, JointVector)> = joints
-        .iter()
-        .map(|(t, q)| (MonotonicNs(*t).since_s(MonotonicNs(first_stamp_ns)), *q))
-        .collect();
-    Ok(ClampPath::from_joints(&samples, pole)?)
+) -> Result<MeasuredArm, Failure> {
+    let since_s = |t: &u64| MonotonicNs(*t).since_s(MonotonicNs(first_stamp_ns));
+    let (times_s, q): (Vec<f64>, Vec<JointVector>) =
+        joints.iter().map(|(t, q)| (since_s(t), *q)).unzip();
+    Ok(MeasuredArm::new(&times_s, &q, *pole)?)
 }
 
 fn publish(

@@ -72,6 +72,11 @@ pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSou
     if raw {
         return Ok(Box::new(YuyvSource::open_named(path, rate_hz)?));
     }
+    // Its times count as much when it is named itself as when its folder is.
+    let csv = path.with_file_name("timestamps.csv");
+    if rate_hz.is_none() && path.ends_with("video.avi") && csv.exists() {
+        return Ok(Box::new(AviSource::open(path, Some(&csv))?));
+    }
     open_film(path, rate_hz)
 }
 

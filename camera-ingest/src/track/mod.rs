@@ -13,6 +13,7 @@ mod appearance;
 mod background;
 mod by_points;
 mod clamp;
+mod confirmation;
 mod covered;
 mod curve;
 mod evidence;
@@ -39,6 +40,7 @@ use std::time::{Duration, Instant};
 pub use appearance::RopeAppearance;
 use background::{Background, frames_by_motion};
 pub use clamp::{ClampError, ClampPath, ClampSample};
+pub use confirmation::Confirmation;
 pub use explain::Film;
 use first_frame::{FirstLook, Place};
 use follow::{Follower, NODES, RopeModel};
@@ -101,6 +103,8 @@ pub struct TrackResult {
     /// Whether the film bears out time and place of the clamp; `None` where the clamp
     /// hardly moves or the rope below it is seen too seldom.
     pub clamp: Option<ClampFit>,
+    /// Whether the track may be relied on.
+    pub confirmation: Confirmation,
     /// Where the time went.
     pub times: TrackTimes,
 }
@@ -220,6 +224,7 @@ pub fn track_with(
         track: KeypointTrack {
             keypoints: options.keypoints,
             frames: tracked,
+            doubts: Vec::new(),
         },
         clamp,
         residual: states.iter().map(|s| 1.0 - s.score()).collect(),
@@ -230,6 +235,11 @@ pub fn track_with(
             rope_rgb: appearance::rgb(follower.model.rope.0),
             lead_rgb: appearance::rgb(follower.model.lead.0),
             noise: background.noise,
+        },
+        confirmation: Confirmation {
+            doubted: lost as f64 / frames.len() as f64,
+            tip: 1.0,
+            second_image: None,
         },
         times: TrackTimes {
             background: background_time,

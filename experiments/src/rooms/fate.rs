@@ -21,12 +21,14 @@ pub(super) struct Tracked {
     pub(super) version: String,
     pub(super) scene: Scene,
     pub(super) fate: Fate,
+    /// Why the tracker would not rely on it.
+    pub(super) doubts: Vec<String>,
 }
 
 impl Tracked {
-    /// Whether the tracker followed the rope.
+    /// Whether the tracker followed the rope, and relies on that.
     pub(super) fn is_followed(&self) -> bool {
-        matches!(&self.fate, Fate::Tracked(score) if score.follows())
+        matches!(&self.fate, Fate::Tracked(score) if score.follows()) && self.doubts.is_empty()
     }
 
     /// One line about it.
@@ -40,8 +42,18 @@ impl Tracked {
             Fate::Refused(reason) => format!("{about}: refused: {reason}"),
             Fate::Tracked(s) => format!(
                 "{about}: median {:.2}, 95th percentile {:.2}, at the tip {:.2}, largest {:.0} \
-                 px; lost {}, wrong {} of {} frames",
-                s.median_px, s.p95_px, s.tip_p95_px, s.max_px, s.lost, s.wrong, s.frames
+                 px; lost {}, wrong {} of {} frames{}",
+                s.median_px,
+                s.p95_px,
+                s.tip_p95_px,
+                s.max_px,
+                s.lost,
+                s.wrong,
+                s.frames,
+                self.doubts
+                    .iter()
+                    .map(|d| format!("; in doubt: {d}"))
+                    .collect::<String>()
             ),
         }
     }

@@ -15,6 +15,10 @@ const TRUSTED: f64 = 0.5;
 /// Frames with such a node that make a film wrong.
 const WRONG_FRAMES: usize = 5;
 
+/// Classes of confidence, and how near to the curve a keypoint of full confidence lies (px).
+pub(super) const CONFIDENCES: usize = 10;
+const NEAR_PX: f64 = 3.0;
+
 /// Errors of one film.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Score {
@@ -28,6 +32,8 @@ pub(super) struct Score {
     pub(super) lost: usize,
     /// Frames with a trusted node far off.
     pub(super) wrong: usize,
+    /// Keypoints of each class of confidence, and how many of them lie near the curve.
+    pub(super) reliability: [[u64; 2]; CONFIDENCES],
 }
 
 impl Score {
@@ -35,6 +41,7 @@ impl Score {
     /// lost in all of them.
     pub(super) fn of(track: &KeypointTrack, truth_px: &[Vec<[f64; 2]>]) -> Option<Self> {
         let (mut errors, mut tips, mut lost, mut wrong) = (Vec::new(), Vec::new(), 0, 0);
+        let mut reliability = [[0; 2]; CONFIDENCES];
         for (frame, truth) in track.frames.iter().zip(truth_px) {
             if frame.lost {
                 lost += 1;
@@ -42,6 +49,11 @@ impl Score {
             }
             let off: Vec<f64> = frame.points.iter().map(|p| from_curve(*p, truth)).collect();
             let mut pairs = off.iter().zip(&frame.confidence);
+            for (e, trust) in pairs.clone() {
+                let class = ((trust * CONFIDENCES as f64) as usize).min(CONFIDENCES - 1);
+                reliability[class][0] += 1;
+                reliability[class][1] += u64::from(*e <= NEAR_PX);
+            }
             wrong += usize::from(pairs.any(|(e, trust)| *e > WRONG_PX && *trust > TRUSTED));
             if let (Some(found), Some(tip)) = (frame.points.last(), truth.last()) {
                 tips.push((found[0] - tip[0]).hypot(found[1] - tip[1]));
@@ -56,6 +68,7 @@ impl Score {
             frames: truth_px.len(),
             lost,
             wrong,
+            reliability,
         })
     }
 
@@ -103,6 +116,7 @@ mod tests {
         let track = KeypointTrack {
             keypoints: 5,
             frames: (0..100).map(frame).collect(),
+            doubts: Vec::new(),
         };
         Score::of(&track, &vec![truth.clone(); 100])
     }

@@ -1,6 +1,7 @@
 //! Films counted by what they show.
 
 use super::fate::{Fate, Tracked};
+use super::score::CONFIDENCES;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -15,6 +16,8 @@ pub(super) struct Row {
     pub(super) n: usize,
     pub(super) followed: usize,
     pub(super) refused: usize,
+    /// Films whose track the tracker would not rely on.
+    pub(super) flagged: usize,
     /// Films in which the tracker was sure of what is not so.
     pub(super) wrong: usize,
     /// Part followed, and its 95 % limits.
@@ -25,13 +28,14 @@ pub(super) struct Row {
 
 impl Row {
     fn of<'a>(films: String, members: impl IntoIterator<Item = &'a Tracked>) -> Self {
-        let (mut n, mut followed, mut refused, mut wrong) = (0, 0, 0, 0);
+        let (mut n, mut followed, mut refused, mut flagged, mut wrong) = (0, 0, 0, 0, 0);
         for film in members {
             n += 1;
             followed += usize::from(film.is_followed());
             match &film.fate {
                 Fate::Refused(_) => refused += 1,
-                Fate::Tracked(score) => wrong += usize::from(score.misleads()),
+                Fate::Tracked(score) if score.misleads() => wrong += 1,
+                Fate::Tracked(_) => flagged += usize::from(!film.doubts.is_empty()),
             }
         }
         Self {
@@ -39,16 +43,35 @@ impl Row {
             n,
             followed,
             refused,
+            flagged,
             wrong,
             followed_part: wilson(followed, n),
             wrong_part: wilson(wrong, n),
         }
     }
 
-    /// Films neither followed, nor refused, nor wrong.
+    /// Films neither followed, nor refused, nor flagged, nor wrong.
     pub(super) fn others(&self) -> usize {
-        self.n - self.followed - self.refused - self.wrong
+        self.n - self.followed - self.refused - self.flagged - self.wrong
     }
+}
+
+/// Of the keypoints of so much confidence (tenths, all films) how many there are, and the
+/// part that lies near the curve.
+pub(super) fn reliability(all: &[Tracked]) -> Vec<(f64, u64, f64)> {
+    let mut sums = [[0_u64; 2]; CONFIDENCES];
+    for film in all {
+        if let Fate::Tracked(score) = &film.fate {
+            for (sum, found) in sums.iter_mut().zip(score.reliability) {
+                *sum = [sum[0] + found[0], sum[1] + found[1]];
+            }
+        }
+    }
+    let row = |(k, [n, near]): (usize, &[u64; 2])| {
+        let from = k as f64 / CONFIDENCES as f64;
+        (from, *n, *near as f64 / (*n).max(1) as f64)
+    };
+    sums.iter().enumerate().map(row).collect()
 }
 
 /// All films, then those of each wall, rope, shadow, shutter and hardship.

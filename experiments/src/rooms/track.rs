@@ -5,7 +5,7 @@ use super::folder;
 use super::folder_of;
 use super::score::Score;
 use super::side_by_side::each;
-use super::summary::{Row, rows};
+use super::summary::{Row, reliability, rows};
 use crate::args::TrackRoomsArgs;
 use anyhow::{Context, ensure};
 use arm_model::Pole;
@@ -67,17 +67,24 @@ fn judge(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Tracked> {
         scene.kind,
         scene.seed
     );
-    let fate = match follow(folder)? {
-        Ok(track) => Score::of(&track, &truth(folder)?).map_or_else(
-            || Fate::Refused("the rope is lost in all frames".to_owned()),
-            Fate::Tracked,
-        ),
-        Err(refusal) => Fate::Refused(format!("{:#}", anyhow::Error::new(refusal))),
+    let (fate, doubts) = match follow(folder)? {
+        Ok(track) => {
+            let fate = Score::of(&track, &truth(folder)?).map_or_else(
+                || Fate::Refused("the rope is lost in all frames".to_owned()),
+                Fate::Tracked,
+            );
+            (fate, track.doubts)
+        }
+        Err(refusal) => {
+            let reason = format!("{:#}", anyhow::Error::new(refusal));
+            (Fate::Refused(reason), Vec::new())
+        }
     };
     Ok(Tracked {
         version: shared_types::VERSION.to_owned(),
         scene,
         fate,
+        doubts,
     })
 }
 
@@ -124,13 +131,20 @@ pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rows = rows(&all);
     if !quiet {
         print(&rows);
+        for (from, n, near) in reliability(&all) {
+            println!(
+                "confidence {from:.1} to {:.1}: {n} keypoints, {:.1} % within 3 px",
+                from + 0.1,
+                100.0 * near
+            );
+        }
         for film in all.iter().filter(|f| !f.is_followed()) {
             println!("{}", film.said());
         }
     }
     Ok(Some(json!({
         "ok": true, "command": "track-rooms", "kind": kind, "films": all,
-        "table": rows, "seconds": seconds,
+        "table": rows, "reliability": reliability(&all), "seconds": seconds,
     })))
 }
 
@@ -140,6 +154,7 @@ fn print(rows: &[Row]) {
         "n",
         "followed",
         "refused",
+        "flagged",
         "wrong",
         "others",
         "followed (%)",
@@ -155,6 +170,7 @@ fn print(rows: &[Row]) {
             row.n.to_string(),
             row.followed.to_string(),
             row.refused.to_string(),
+            row.flagged.to_string(),
             row.wrong.to_string(),
             row.others().to_string(),
             part(row.followed_part),

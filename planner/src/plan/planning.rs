@@ -117,6 +117,7 @@ impl Setup<'_> {
             limited_by: Some(self.limited_by(&trajectory, &outcome, &verdict)),
             verdict,
             forecast,
+            doubts: Vec::new(),
             arm_response: request.following.as_ref().map(|f| f.source().to_owned()),
             simulations: count.simulations,
             resampled: count.resampled,

@@ -86,7 +86,11 @@ pub fn project(
         errors.advance();
     }
     Filmed {
-        track: KeypointTrack { keypoints, frames },
+        track: KeypointTrack {
+            keypoints,
+            frames,
+            doubts: Vec::new(),
+        },
         appearance: appearance(film, camera, &real, depth_m, noise),
     }
 }

@@ -14,7 +14,7 @@ pub use atomic::{check_writable, write_atomic, write_json};
 pub use cell::read_cell;
 pub use motion::{JointsCsv, PoseSample, read_joints, read_pose, write_joints, write_trajectory};
 pub use plan::read_plan;
-pub use rope::{read_posterior, read_rope, write_rope_estimate};
+pub use rope::{read_doubts, read_posterior, read_rope, write_rope_estimate};
 pub use text::{read_json, read_text};
 
 /// File of a run folder that holds the whole run.

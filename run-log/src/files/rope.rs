@@ -41,11 +41,31 @@ pub fn read_posterior(path: &Path) -> Result<Option<RopePosterior>> {
     Ok(Some(posterior.try_into().at(fail)?))
 }
 
-/// Writes an identified rope.
+/// Reads why the track that the rope was identified from should not be relied on; empty
+/// where it may be, and for a rope that was not identified.
+///
+/// # Errors
+/// The file cannot be read, or its table is not as it should be.
+pub fn read_doubts(path: &Path) -> Result<Vec<String>> {
+    let fail = || {
+        format!(
+            "rope file `{}`, `doubts` in its table `fit`",
+            path.display()
+        )
+    };
+    let table: toml::Table = toml::from_str(&read_text(path)?).at(fail)?;
+    let doubts = table.get("fit").and_then(|fit| fit.get("doubts")).cloned();
+    doubts
+        .map_or(Ok(Vec::new()), toml::Value::try_into)
+        .at(fail)
+}
+
+/// Writes an identified rope, and why the track that it was identified from should not be
+/// relied on.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> Result<()> {
+pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate, doubts: &[String]) -> Result<()> {
     let mut text = format!(
         "# Rope parameters identified by wag {}; SI units, radians.\n",
         shared_types::VERSION
@@ -72,6 +92,9 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate) -> Result<()> {
         estimate.out_of_distribution.is_outside(),
         estimate.out_of_distribution.score
     )?;
+    if !doubts.is_empty() {
+        writeln!(text, "doubts = {}", toml::Value::try_from(doubts)?)?;
+    }
     text.push_str(
         "\n# Mean and covariance in the order of the keys above; probability of 20 to 26 links.\n",
     );
@@ -144,7 +167,11 @@ mod tests {
     fn an_identified_rope_can_be_read_as_a_rope() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("rope.toml");
-        write_rope_estimate(&path, &estimate()).unwrap();
+        let doubts = ["the rope's \"end\" is not confirmed".to_owned()];
+        write_rope_estimate(&path, &estimate(), &doubts).unwrap();
+        assert_eq!(read_doubts(&path).unwrap(), doubts);
+        write_rope_estimate(&path, &estimate(), &[]).unwrap();
+        assert!(read_doubts(&path).unwrap().is_empty());
         assert_eq!(read_rope(&path).unwrap(), estimate().params);
         let posterior = read_posterior(&path).unwrap();
         assert_eq!(posterior, Some(estimate().posterior));

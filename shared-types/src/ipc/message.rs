@@ -132,6 +132,8 @@ pub enum CameraEvent {
         appearance: RopeAppearance,
         /// Processing time per frame (ms).
         ms_per_frame: f64,
+        /// Why the track should not be relied on; none where it may be.
+        doubts: Vec<String>,
     },
     /// The throw is measured.
     Scored(ScoreResult),

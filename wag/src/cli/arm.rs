@@ -73,6 +73,9 @@ pub struct WiggleArgs {
 pub struct ThrowArgs {
     /// The plan.
     pub plan: PathBuf,
+    /// Go on although the track of the rope is in doubt.
+    #[arg(long)]
+    pub accept_unconfirmed: bool,
     /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,

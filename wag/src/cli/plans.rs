@@ -11,6 +11,9 @@ pub struct PlanArgs {
     /// Rope parameters.
     #[arg(long)]
     pub rope: PathBuf,
+    /// Go on although the track of the rope is in doubt.
+    #[arg(long)]
+    pub accept_unconfirmed: bool,
     /// Target x,y,z in the arm's base frame (m).
     #[arg(long, allow_hyphen_values = true)]
     pub target: Point,

@@ -5,6 +5,7 @@ use super::demo_summary::{DemoRecord, show};
 use super::explain::explain_stop;
 use super::network::warning_of_pole;
 use super::plan::describe;
+use super::unconfirmed::confirm;
 use crate::cli::{DemoArgs, TaskName};
 use crate::config;
 use crate::pipeline::{self, ArmLink, Film, RunFolder, SettleInput, Shot};
@@ -78,7 +79,7 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let began = Instant::now();
     let mut record = DemoRecord::new(args.seed, target_m, &folder);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    let result = throw_once(&folder, &mut session, &mut record, &rig, quiet);
+    let result = throw_once(&folder, &mut session, &mut record, &rig, (args, quiet));
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let keypoints_kept = session.received.keep_keypoints(folder.path());
@@ -114,7 +115,7 @@ fn throw_once(
     session: &mut Session,
     record: &mut DemoRecord,
     rig: &RigConfig,
-    quiet: bool,
+    (args, quiet): (&DemoArgs, bool),
 ) -> anyhow::Result<()> {
     let mut settings = config::here::<PlannerConfig>(None)?;
     settings.identify.seed = record.seed;
@@ -126,7 +127,7 @@ fn throw_once(
     let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
     demo.bring_up(&motion)?;
     let film = demo.wiggle(&motion)?;
-    let rope = demo.identify(&film)?;
+    let rope = demo.identify(&film, args.accept_unconfirmed)?;
     let plan = demo.plan(&rope)?;
     demo.settle(&rope, &film, &motion, &plan)?;
     let throw = demo.throw(&plan)?;
@@ -227,7 +228,7 @@ impl<'a> Demo<'a> {
     }
 
     /// Tracks the rope through the film and fits its parameters.
-    fn identify(&mut self, film: &Film) -> anyhow::Result<RopeEstimate> {
+    fn identify(&mut self, film: &Film, accept_unconfirmed: bool) -> anyhow::Result<RopeEstimate> {
         let stage = Stage::begin("track", self.quiet);
         let overlay = self.folder.file("wiggle.png");
         let tracked = pipeline::track(
@@ -239,12 +240,14 @@ impl<'a> Demo<'a> {
             &overlay,
             &stage,
         )?;
-        self.record.track = Some(tracked);
+        self.record.track = Some(tracked.clone());
         self.record.stages.track_s = stage.done(&format!(
             "{:.1} ms a frame, rope lost in {:.1} %",
             tracked.ms_per_frame,
             100.0 * tracked.lost_fraction
         ));
+        let look = format!("look at `{}`", overlay.display());
+        confirm(&tracked.doubts, accept_unconfirmed, &look)?;
         let method = self.settings.identify.method;
         if let Some(warning) = warning_of_pole(method, &self.settings.cell.pole) {
             self.warn(warning);
@@ -259,7 +262,7 @@ impl<'a> Demo<'a> {
             &self.settings,
             &stage,
         )?;
-        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope)?;
+        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope, &tracked.doubts)?;
         self.record.stages.identify_s = stage.done(&format!(
             "length {:.3} m, residual {:.2} px, {} simulations",
             rope.params.length_m, rope.residual_px, rope.simulations

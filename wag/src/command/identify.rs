@@ -3,7 +3,9 @@
 use super::filmed::{ClampMotion, Filmed};
 use super::learned::Learned;
 use super::network::{network, no_model_without_network, warning_of_pole};
-use super::track::track_video;
+use super::plan::LOOK;
+use super::track::{TrackedVideo, overlay, track_video};
+use super::unconfirmed::confirm;
 use crate::cli::{IdentifyArgs, MethodName};
 use crate::config;
 use anyhow::{Context, anyhow};
@@ -45,6 +47,7 @@ fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed
             .with_context(fail)
             .or_input()?;
         track.validate().with_context(fail).or_input()?;
+        confirm(&track.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
         let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
         for warning in &warnings {
             eprintln!("warning: {warning}");
@@ -70,14 +73,22 @@ fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed
     let stage = Stage::begin("track", quiet);
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(None, file, &filmed.camera)?;
-    let tracked = track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?.result;
-    stage.done(&format!("{} frames", tracked.track.frames.len()));
+    let TrackedVideo { frames, result } =
+        track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
+    stage.done(&format!("{} frames", frames.len()));
+    if !result.track.doubts.is_empty() {
+        let sheet = args.out.with_extension("track.png");
+        let picture = overlay(&sheet, &frames, &result.track).or_failed()?;
+        files::write_atomic(&sheet, &picture).or_failed()?;
+        let look = format!("look at `{}`", sheet.display());
+        confirm(&result.track.doubts, args.accept_unconfirmed, &look).or_failed()?;
+    }
     let appearance = Appearance {
-        rope_radius_m: Some(tracked.appearance.rope_radius_m),
-        lead_radius_m: Some(tracked.appearance.lead_radius_m),
+        rope_radius_m: Some(result.appearance.rope_radius_m),
+        lead_radius_m: Some(result.appearance.lead_radius_m),
     };
     Ok(Observed {
-        track: tracked.track,
+        track: result.track,
         appearance,
         camera: filmed.camera,
         motion,
@@ -184,7 +195,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         "residual {:.2} px, {} simulations",
         estimate.residual_px, estimate.simulations
     ));
-    files::write_rope_estimate(&args.out, &estimate).or_failed()?;
+    files::write_rope_estimate(&args.out, &estimate, &observed.track.doubts).or_failed()?;
     if !quiet {
         println!(
             "{}\nresidual {:.2} px -> `{}`",
@@ -200,6 +211,7 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
         "method": estimate.method, "posterior": estimate.posterior,
         "circumstances": estimate.circumstances, "warnings": observed.warnings,
+        "doubts": observed.track.doubts,
         "out_of_distribution": estimate.out_of_distribution,
         "out_of_distribution_score": estimate.out_of_distribution.score,
     })))

@@ -30,6 +30,7 @@ mod score;
 mod sim;
 mod throw;
 mod track;
+mod unconfirmed;
 mod watch;
 mod wiggle;
 mod wiggle_design;

@@ -1,5 +1,6 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
+use super::unconfirmed::confirm;
 use crate::cli::PlanArgs;
 use crate::config;
 use anyhow::{Context, anyhow, bail};
@@ -38,6 +39,10 @@ fn check_fault(plan: &Plan, args: &PlanArgs) -> anyhow::Result<()> {
         _ => Ok(()),
     }
 }
+
+/// Where a doubt about an identified rope can be looked at.
+pub const LOOK: &str =
+    "look at an overlay of the film that it was identified from (`wag track --overlay`)";
 
 /// Ropes that a forecast is made with.
 const FORECAST_ROPES: usize = 64;
@@ -107,6 +112,8 @@ pub fn describe(plan: &Plan) -> String {
 /// Plans a throw of a task.
 pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
+    let doubts = files::read_doubts(&args.rope).or_input()?;
+    confirm(&doubts, args.accept_unconfirmed, LOOK).or_failed()?;
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
     let ensemble = ensemble(args).or_input()?;
@@ -133,7 +140,8 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
         ensemble,
         following: response.map(|r| Following::new(&r, &limits)),
     };
-    let plan = planner::plan(&request, &mut |p| stage.go_on(&p.into())).map_err(classify)?;
+    let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p.into())).map_err(classify)?;
+    plan.doubts = doubts;
     let warnings = warnings(&plan);
     check_fault(&plan, args).or_failed()?;
     stage.done(&describe(&plan));

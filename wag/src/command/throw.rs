@@ -3,6 +3,8 @@
 use super::area::require_clear_area;
 use super::dry_run;
 use super::on_arm::on_arm;
+use super::plan::LOOK;
+use super::unconfirmed::confirm;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmLink};
@@ -63,6 +65,7 @@ pub fn drive(
 
 pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
+    confirm(&plan.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(&plan).or_input()?;
     require_clear_area(&args.arm, "THROW", quiet)?;
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;

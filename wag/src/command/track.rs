@@ -52,7 +52,7 @@ pub fn track_video(
 }
 
 /// A film for a name that ends in `.avi`, else a contact sheet.
-fn overlay(
+pub fn overlay(
     path: &Path,
     frames: &[EyeFrame],
     track: &KeypointTrack,
@@ -113,11 +113,8 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     let seconds = stage.done(&format!(
         "{count} frames, rope lost in {lost}, unconfirmed in {doubted}"
     ));
-    if lost + doubted > count * 4 / 5 {
-        let doubt = "the rope was hardly ever seen for sure: look at an overlay, and whether \
-                     camera and motion are those of this film";
-        eprintln!("warning: {doubt}");
-        filmed.warnings.push(doubt.to_owned());
+    for doubt in &result.track.doubts {
+        eprintln!("warning: in doubt: {doubt}");
     }
     if !quiet {
         if let Some(clamp) = result.clamp {
@@ -131,7 +128,7 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     }
     Ok(Some(json!({
         "ok": true, "command": "track", "out": args.out, "frames": count,
-        "lost": lost, "doubted": doubted, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),
+        "lost": lost, "doubted": doubted, "doubts": result.track.doubts, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),
         "rope_radius_m": result.appearance.rope_radius_m,
         "lead_radius_m": result.appearance.lead_radius_m,
         "clamp": result.clamp.map(|c| json!({

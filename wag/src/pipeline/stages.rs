@@ -82,7 +82,7 @@ pub fn wait_still(session: &mut Session, camera: &Camera, timeout_s: f64) -> any
 }
 
 /// What tracking found.
-#[derive(Debug, Clone, Copy, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Tracked {
     /// Part of the frames in which the rope was lost (0 to 1).
     pub lost_fraction: f64,
@@ -91,6 +91,9 @@ pub struct Tracked {
     pub appearance: RopeAppearance,
     /// Processing time per frame (ms).
     pub ms_per_frame: f64,
+    /// Why the track should not be relied on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
 }
 
 /// Tracks the rope through the film; keypoints go out over shared memory.
@@ -117,11 +120,13 @@ pub fn track(
             lost_fraction,
             appearance,
             ms_per_frame,
+            doubts,
             ..
         } => Ok(Tracked {
             lost_fraction,
             appearance,
             ms_per_frame,
+            doubts,
         }),
         other => Err(unexpected("camera", &other)),
     }

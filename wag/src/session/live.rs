@@ -43,8 +43,8 @@ pub struct Session {
 
 /// How often the operator's heartbeat is written.
 const BEAT_EVERY: Duration = Duration::from_millis(20);
-/// How long the arm's codes are waited for after a stop.
-const CODES_WITHIN: Duration = Duration::from_millis(1000);
+/// Two and a half periods of the reports that have the arm's codes (5 Hz).
+const CODES_WITHIN: Duration = Duration::from_millis(500);
 
 impl Session {
     /// Joins shared memory under `domain`; children log into `log_folder`.
@@ -257,20 +257,14 @@ impl Session {
         self.bus.remove_leftovers();
     }
 
-    /// Why the arm stopped is in its slow reports only (5 Hz); the record goes on until one
-    /// has come, so that it can explain the stop.
+    /// Why the arm stopped is in its slow reports only; the record goes on until two of them
+    /// must have come, so that it can explain the stop.
     fn await_arm_codes(&mut self) {
         let began = Instant::now();
-        let _ = self.received.drain();
-        let seen = self.received.cycles.cycles.len();
-        while began.elapsed() < CODES_WITHIN && self.supervisor.check_arm().is_ok() {
-            if self.received.drain().is_err() {
-                return;
-            }
-            let after = self.received.cycles.cycles.iter().skip(seen);
-            if after.into_iter().any(|c| c.input.codes.present != 0) {
-                return;
-            }
+        while began.elapsed() < CODES_WITHIN
+            && self.supervisor.check_arm().is_ok()
+            && self.received.drain().is_ok()
+        {
             std::thread::sleep(Duration::from_millis(5));
         }
     }

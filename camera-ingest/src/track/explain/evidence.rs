@@ -5,7 +5,8 @@
 //! change of hue counts fully, brightening half, darkening hardly.
 
 use super::super::background::{Background, frames_by_motion};
-use super::colour::{CHROMA_WEIGHT, Colour, colour_at};
+use super::bulk::Bulk;
+use super::colour::{CHROMA_WEIGHT, Colour, colour_at, coverage, presence};
 use crate::frame::EyeFrame;
 use crate::vectors::widest;
 
@@ -51,9 +52,36 @@ impl Scene {
         ((distance(seen, behind) - zero) / (full - zero)).clamp(0.0, 1.0)
     }
 
-    /// Evidence in all of a frame.
+    /// Evidence (0 to 1) at a place of a frame that something of these colours is there.
+    pub(super) fn present(
+        &self,
+        frame: &EyeFrame,
+        gain: f32,
+        colours: &[Colour],
+        p: [f64; 2],
+    ) -> f32 {
+        let seen = colour_at(frame, gain, p).zip(self.colour_at(p));
+        seen.map_or(0.0, |(seen, behind)| {
+            presence(coverage(seen, behind, colours, self.noise()))
+        })
+    }
+
+    /// Evidence that what is seen at a pixel is not the scene.
+    pub(super) fn unexplained_at(&self, frame: &EyeFrame, gain: f32, [u, v]: [usize; 2]) -> f32 {
+        let colour = |frame: &EyeFrame, gain: f32| -> Colour {
+            let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
+            let chroma = |c: f32| CHROMA_WEIGHT * (c - 128.0) / gain;
+            [y / gain, chroma(cb), chroma(cr)]
+        };
+        self.unexplained(colour(frame, gain), colour(&self.background.image, 1.0))
+    }
+
+    /// Evidence in all of a frame, but for what is too large to be a rope.
     pub(super) fn map(&self, frame: &EyeFrame) -> EvidenceMap {
-        EvidenceMap::of(frame, &self.background, self.gain(frame))
+        let gain = self.gain(frame);
+        let mut map = EvidenceMap::of(frame, &self.background, gain);
+        map.leave_out(&Bulk::of(frame, gain, self));
+        map
     }
 }
 
@@ -122,6 +150,20 @@ impl EvidenceMap {
             width,
             height,
             values,
+        }
+    }
+
+    fn leave_out(&mut self, bulk: &Bulk) {
+        let cell_px = bulk.cell_px();
+        for (v, row) in self.values.chunks_exact_mut(self.width).enumerate() {
+            for (cell, values) in row.chunks_mut(cell_px).enumerate() {
+                let count = bulk.at([(cell * cell_px) as f64, v as f64]);
+                if count < 1.0 {
+                    for value in values {
+                        *value = (f32::from(*value) * count) as u8;
+                    }
+                }
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 //! does. The film is then read off along it: a few pixels across the hypothesis, frame by
 //! frame, and its two ends where the mean picture along the rope has them.
 
+mod bulk;
 mod colour;
 mod curve;
 mod disc;
@@ -17,6 +18,7 @@ mod read;
 mod reading;
 mod round;
 mod search;
+mod witness;
 
 use std::time::Instant;
 
@@ -25,6 +27,7 @@ use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 
 use super::clamp::ClampPath;
+use super::confirmation::{Confirmation, DOUBT};
 use super::lateral::Across;
 use super::plane::RopePlane;
 use super::timing;
@@ -36,6 +39,7 @@ use hypothesis::{Curve, Fidelity, Seen, Side, simulate};
 use read::{NODES, Reader};
 use reading::Reading;
 use search::{Climb, Comparison, Found, Moment, SearchError, Searcher};
+use witness::{Sight, Testimony};
 
 /// Frames that are searched, and every which of them in blurred evidence.
 const SEARCHED: usize = 100;
@@ -64,6 +68,8 @@ const LAST_CLIMB: Climb = Climb {
 const LEAST_EVIDENT: [f64; 3] = [0.35, 0.12, 0.12];
 /// A frame with less than this part of the usual evidence is lost.
 const LOST: f64 = 0.2;
+/// Nothing seen is more certain than this.
+const MOST_CONFIDENT: f64 = 0.98;
 /// Nodes at the clamp that show the pole as much as the rope.
 const CLAMP_NODES: usize = 2;
 
@@ -121,7 +127,10 @@ pub(super) fn explain(
         .map(|f| (f.stamp_ns - film.left[0].stamp_ns) as f64 * 1e-9)
         .collect();
     let scene = Scene::of(film.left, options.background_frames);
-    let moments = moments(film, &scene, &times_s, options);
+    // A median of fewer shows the rope.
+    let right = (film.right.len() >= options.background_frames)
+        .then(|| Scene::of(film.right, options.background_frames));
+    let moments = moments(film, (&scene, right.as_ref()), &times_s);
     let background = start.elapsed();
 
     let start = Instant::now();
@@ -135,24 +144,25 @@ pub(super) fn explain(
     let rollouts =
         simulate(&[found.x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
     let seen = Seen::new(&found.x, &rollouts[0], camera).ok_or(Unexplained::OutOfSight)?;
-    let mut curves = Vec::with_capacity(times_s.len());
-    for t_s in &times_s {
-        let mut curve = Curve::default();
-        if !seen.curve(*t_s, Side::Left, NODES, &mut curve) {
-            return Err(Unexplained::OutOfSight);
-        }
-        curves.push(curve.points);
-    }
-    let reading = Reader::new(&scene, film.left, curves).read();
+    let curves = times_s
+        .iter()
+        .map(|t_s| curve_at(&seen, *t_s, Side::Left))
+        .collect::<Option<Vec<_>>>()
+        .ok_or(Unexplained::OutOfSight)?;
+    let reading = Reader::new(&scene, film.left, curves.clone()).read();
+    let testimony = right.and_then(|right| {
+        let sights = sights(film, &seen, &times_s, &curves, &reading.curves);
+        Testimony::of(&right, &sights, &reading.rope, reading.end.rope_half_px)
+    });
     let usual = usual_evidence(&reading, options.keypoints)?;
-    let mut result = result(
-        &reading,
+    let read = Read {
+        reading: &reading,
         usual,
-        &times_s,
-        (camera, motion),
-        options.keypoints,
-    )
-    .ok_or(Unexplained::OutOfSight)?;
+        testimony: testimony.as_ref(),
+        times_s: &times_s,
+    };
+    let mut result =
+        result(&read, (camera, motion), options.keypoints).ok_or(Unexplained::OutOfSight)?;
     result.appearance.noise = scene.noise();
     result.times = TrackTimes {
         background,
@@ -162,28 +172,61 @@ pub(super) fn explain(
     Ok(result)
 }
 
-/// Evidence of frames spread over the film.
-fn moments(film: Film<'_>, left: &Scene, times_s: &[f64], options: &TrackOptions) -> Vec<Moment> {
-    let searched = |i: &usize| Film::needs_right(*i, times_s.len());
-    let mut moments: Vec<Moment> = (0..times_s.len())
-        .filter(searched)
-        .map(|i| Moment {
-            t_s: times_s[i],
-            maps: vec![(Side::Left, left.map(&film.left[i]))],
-        })
-        .collect();
-    // A median of fewer shows the rope.
-    if film.right.len() >= options.background_frames {
-        let right = Scene::of(film.right, options.background_frames);
-        let chosen = (0..times_s.len()).filter(searched);
-        for (moment, i) in moments.iter_mut().zip(chosen) {
-            let stamp_ns = film.left[i].stamp_ns;
-            if let Ok(at) = film.right.binary_search_by_key(&stamp_ns, |f| f.stamp_ns) {
-                moment.maps.push((Side::Right, right.map(&film.right[at])));
-            }
+/// The hypothesis in one frame.
+fn curve_at(seen: &Seen<'_>, t_s: f64, side: Side) -> Option<Vec<[f64; 2]>> {
+    let mut curve = Curve::default();
+    seen.curve(t_s, side, NODES, &mut curve)
+        .then_some(curve.points)
+}
+
+/// Where the right images should show what was read off the left ones: as far from the
+/// hypothesis as there.
+fn sights<'a>(
+    film: Film<'a>,
+    seen: &Seen<'_>,
+    times_s: &[f64],
+    before: &[Vec<[f64; 2]>],
+    read: &[Vec<[f64; 2]>],
+) -> Vec<Sight<'a>> {
+    let sight = |frame: &'a EyeFrame| {
+        let index = film
+            .left
+            .binary_search_by_key(&frame.stamp_ns, |f| f.stamp_ns)
+            .ok()?;
+        let mut curve = curve_at(seen, times_s[index], Side::Right)?;
+        let moved = before[index].iter().zip(&read[index]);
+        for (p, (a, b)) in curve.iter_mut().zip(moved) {
+            *p = [p[0] + b[0] - a[0], p[1] + b[1] - a[1]];
         }
-    }
-    moments
+        Some(Sight {
+            index,
+            frame,
+            curve,
+        })
+    };
+    film.right.iter().filter_map(sight).collect()
+}
+
+/// Evidence of frames spread over the film.
+fn moments(
+    film: Film<'_>,
+    (left, right): (&Scene, Option<&Scene>),
+    times_s: &[f64],
+) -> Vec<Moment> {
+    let searched = (0..times_s.len()).filter(|i| Film::needs_right(*i, times_s.len()));
+    let moment = |i: usize| {
+        let mut maps = vec![(Side::Left, left.map(&film.left[i]))];
+        let stamp_ns = film.left[i].stamp_ns;
+        let at = film.right.binary_search_by_key(&stamp_ns, |f| f.stamp_ns);
+        if let (Some(scene), Ok(at)) = (right, at) {
+            maps.push((Side::Right, scene.map(&film.right[at])));
+        }
+        Moment {
+            t_s: times_s[i],
+            maps,
+        }
+    };
+    searched.map(moment).collect()
 }
 
 /// The hypothesis that explains most.
@@ -254,42 +297,85 @@ fn usual_evidence(reading: &Reading, keypoints: usize) -> Result<f64, Unexplaine
     Ok(usual)
 }
 
+/// What was read off a film, and what speaks for it.
+struct Read<'a> {
+    reading: &'a Reading,
+    /// How evident the rope is in most frames.
+    usual: f64,
+    testimony: Option<&'a Testimony>,
+    times_s: &'a [f64],
+}
+
+impl Read<'_> {
+    /// Keypoints of a frame, and how evident the rope is at each.
+    fn frame(&self, index: usize, keypoints: usize) -> (TrackedFrame, Vec<f64>) {
+        let (points, evident) = self.reading.places(index, keypoints);
+        let confirmed = self.testimony.map_or(1.0, |t| t.around(index));
+        let confidence = |(k, e): (usize, &f64)| {
+            let part = k as f64 / (keypoints - 1) as f64;
+            let along = self.testimony.map_or(1.0, |t| t.along(part));
+            (e / self.usual).min(1.0) * confirmed.max(along).min(MOST_CONFIDENT)
+        };
+        let frame = TrackedFrame {
+            t_s: self.times_s[index],
+            points,
+            confidence: evident.iter().enumerate().map(confidence).collect(),
+            lost: mean(&evident) < LOST * self.usual,
+        };
+        (frame, evident)
+    }
+
+    fn confirmation(&self, frames: &[TrackedFrame]) -> Confirmation {
+        let all = frames.iter().flat_map(|f| &f.confidence);
+        let doubted = all.clone().filter(|c| **c < DOUBT).count();
+        let tips = self.reading.tips.iter().map(|(_, across)| across.weight);
+        Confirmation {
+            doubted: doubted as f64 / all.count().max(1) as f64,
+            tip: quantile(tips.collect(), 0.5),
+            second_image: self.testimony.map(Testimony::confirmed),
+        }
+    }
+}
+
 /// Keypoints, looks and the clamp's time and place from what was read.
 fn result(
-    reading: &Reading,
-    usual: f64,
-    times_s: &[f64],
+    read: &Read<'_>,
     (camera, motion): (&StereoCamera, &dyn AttachMotion),
     keypoints: usize,
 ) -> Option<TrackResult> {
+    let Read {
+        reading, times_s, ..
+    } = *read;
     let plane = RopePlane::fit(camera, &ClampPath::of(motion), times_s[times_s.len() - 1])?;
     let mut frames = Vec::with_capacity(times_s.len());
     let mut clamps = Vec::new();
     let mut residual = Vec::with_capacity(times_s.len());
-    let of_usual = |e: f64| (e / usual).min(1.0);
     for (i, t_s) in times_s.iter().enumerate() {
-        let (points, evident) = reading.places(i, keypoints);
-        let lost = mean(&evident) < LOST * usual;
+        let (frame, evident) = read.frame(i, keypoints);
         let (nodes, seen) = reading.places(i, NODES);
         let across: Vec<Across> = nodes
             .iter()
             .zip(&seen)
             .map(|(p, e)| Across {
                 point: plane.point_at(*p),
-                confidence: of_usual(*e),
+                confidence: (e / read.usual).min(1.0),
                 rival: 0.0,
             })
             .collect();
-        if !lost && let Some(clamp) = timing::seen_clamp(&across, CLAMP_NODES) {
+        if !frame.lost
+            && let Some(clamp) = timing::seen_clamp(&across, CLAMP_NODES)
+        {
             clamps.push((*t_s, clamp));
         }
         residual.push(1.0 - mean(&evident));
-        frames.push(TrackedFrame {
-            t_s: *t_s,
-            points,
-            confidence: evident.into_iter().map(of_usual).collect(),
-            lost,
-        });
+        frames.push(frame);
+    }
+    let confirmation = read.confirmation(&frames);
+    let doubts = confirmation.doubts();
+    if !doubts.is_empty() {
+        // Nothing is certain in a track that is in doubt as a whole.
+        let all = frames.iter_mut().flat_map(|f| &mut f.confidence);
+        all.for_each(|c| *c *= DOUBT);
     }
     let told = |t_s: f64| {
         let seen = |t_s: f64| camera.project_left(&motion.at(t_s).p_m);
@@ -300,7 +386,11 @@ fn result(
     let at_rest: Vec<_> = at_rest.iter().map(|p| plane.point_at(*p)).collect();
     let [rope_radius_m, lead_radius_m] = reading.radii_px.map(|px| px / plane.px_per_m);
     Some(TrackResult {
-        track: KeypointTrack { keypoints, frames },
+        track: KeypointTrack {
+            keypoints,
+            frames,
+            doubts,
+        },
         appearance: RopeAppearance {
             rope_radius_m,
             lead_radius_m,
@@ -310,6 +400,7 @@ fn result(
             noise: 0.0,
         },
         residual,
+        confirmation,
         clamp: timing::fit(&clamps, 1.0 / plane.px_per_m, told),
         times: TrackTimes::default(),
     })

@@ -1,6 +1,7 @@
 //! Reads the film off along the hypothesis: curve, ends and tip weight in every frame.
 
-use super::colour::{Colour, colour_at, coverage, groups, presence};
+use super::bulk::Bulk;
+use super::colour::{Colour, colour_at, coverage, groups};
 use super::curve::{from_end, normals};
 use super::disc::Disc;
 use super::ends::{End, EndPicture};
@@ -37,10 +38,11 @@ const CYLINDER_WIDTH: f64 = 0.05;
 const TIP_STIFFNESS: f64 = 0.3;
 const TIP_PULL: f64 = 0.02;
 
-/// One frame and how bright it is.
+/// One frame, how bright it is, and what in it is too large to be a rope.
 struct Lit<'a> {
     frame: &'a EyeFrame,
     gain: f32,
+    bulk: Bulk,
 }
 
 /// The film of one eye, and the hypothesis's curves in it.
@@ -56,9 +58,13 @@ impl<'a> Reader<'a> {
         frames: &'a [EyeFrame],
         curves: Vec<Vec<[f64; 2]>>,
     ) -> Self {
-        let lit = |frame| Lit {
-            frame,
-            gain: scene.gain(frame),
+        let lit = |frame| {
+            let gain = scene.gain(frame);
+            Lit {
+                frame,
+                gain,
+                bulk: Bulk::of(frame, gain, scene),
+            }
         };
         Self {
             scene,
@@ -73,16 +79,14 @@ impl<'a> Reader<'a> {
     }
 
     fn unexplained(&self, lit: &Lit<'_>, p: [f64; 2]) -> f32 {
-        self.colours(lit, p)
-            .map_or(0.0, |(seen, behind)| self.scene.unexplained(seen, behind))
+        self.colours(lit, p).map_or(0.0, |(seen, behind)| {
+            self.scene.unexplained(seen, behind) * lit.bulk.at(p)
+        })
     }
 
     /// Evidence of things of some colours.
     fn present(&self, lit: &Lit<'_>, colours: &[Colour], p: [f64; 2]) -> f32 {
-        let noise = self.scene.noise();
-        self.colours(lit, p).map_or(0.0, |(seen, behind)| {
-            presence(coverage(seen, behind, colours, noise))
-        })
+        self.scene.present(lit.frame, lit.gain, colours, p)
     }
 
     /// Reads all frames.
@@ -284,7 +288,7 @@ impl<'a> Reader<'a> {
 
     fn sample(&self, lit: &Lit<'_>, p: [f64; 2], samples: &mut Vec<Colour>) {
         if let Some((seen, behind)) = self.colours(lit, p)
-            && self.scene.unexplained(seen, behind) > 0.6
+            && self.scene.unexplained(seen, behind) * lit.bulk.at(p) > 0.6
         {
             samples.push(seen);
         }
@@ -304,7 +308,7 @@ impl<'a> Reader<'a> {
             }
             picture.add(&curve, |p| {
                 let (seen, behind) = self.colours(lit, p)?;
-                Some((self.scene.unexplained(seen, behind), seen))
+                Some((self.scene.unexplained(seen, behind) * lit.bulk.at(p), seen))
             });
         }
         picture
