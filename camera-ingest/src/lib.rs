@@ -2,7 +2,7 @@
 //!
 //! Takes frames from a camera ([`live`]), reads recordings ([`source`]) and calibrations
 //! ([`calib`]), tracks the rope in the left image ([`mod@track`]), measures tip and target
-//! in stereo ([`mod@score`]), lets learned models replace parts of it (feature `learned`),
+//! in stereo ([`mod@score`]), lets a learned tracker read the film (feature `learned`),
 //! draws the result ([`overlay`], [`film`]), tracks the rope online ([`preview`]) and
 //! detects when it hangs still ([`still`]).
 //!
@@ -30,7 +30,4 @@ pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
 pub use score::{Score, ScoreError, ScoreOptions, score};
 pub use source::{FrameSource, SourceError, StereoSource, open_video};
-pub use track::{
-    ClampPath, Film, RopeAppearance, TrackError, TrackOptions, TrackResult, track, track_film,
-    track_with,
-};
+pub use track::{Film, RopeAppearance, TrackError, TrackOptions, TrackResult, track};

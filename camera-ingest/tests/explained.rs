@@ -7,36 +7,9 @@ mod recording;
 
 use std::path::{Path, PathBuf};
 
-use arm_model::{JointVector, Pole};
 use camera_ingest::source::read_film;
-use camera_ingest::track::Models;
-use camera_ingest::{TrackOptions, TrackResult, load_camera, open_video, track_film};
-use recording::{quantile, read_npy};
-use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
-
-fn rows(path: &Path) -> Vec<Vec<f64>> {
-    let text = std::fs::read_to_string(path).unwrap();
-    let row = |line: &str| line.split(',').map(|c| c.trim().parse().unwrap()).collect();
-    text.lines().skip(1).map(row).collect()
-}
-
-fn motion(folder: &Path) -> Box<dyn AttachMotion> {
-    let joints = folder.join("joints_measured.csv");
-    if !joints.exists() {
-        let pose = |r: &Vec<f64>| PoseRow {
-            t_s: r[0],
-            p_m: [r[1], r[2], r[3]],
-            q_wxyz: [r[4], r[5], r[6], r[7]],
-        };
-        let poses: Vec<PoseRow> = rows(&folder.join("pose.csv")).iter().map(pose).collect();
-        return Box::new(PoseTrack::new(&poses).unwrap());
-    }
-    let rows = rows(&joints);
-    let times_s: Vec<f64> = rows.iter().map(|r| r[0]).collect();
-    let q = |r: &Vec<f64>| JointVector::from(core::array::from_fn(|i| r[i + 1]));
-    let q: Vec<JointVector> = rows.iter().map(q).collect();
-    Box::new(MeasuredArm::new(&times_s, &q, Pole::default()).unwrap())
-}
+use camera_ingest::{TrackOptions, TrackResult, load_camera, open_video, track};
+use recording::{motion, quantile, read_npy};
 
 /// Distance of a point from a polyline.
 fn off_px(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
@@ -57,14 +30,8 @@ fn tracked(folder: &Path, both: bool) -> TrackResult {
         eyes.right.clear();
     }
     let camera = load_camera(&folder.join("camera.toml")).unwrap();
-    track_film(
-        eyes.film(),
-        &camera,
-        &*motion(folder),
-        &TrackOptions::default(),
-        &mut Models::default(),
-    )
-    .unwrap()
+    let options = TrackOptions::default();
+    track(eyes.film(), &camera, &*motion(folder), &options).unwrap()
 }
 
 /// The bounds of `checks/track_scenes.py`: median, 95th percentile, the tip's 95th

@@ -209,8 +209,8 @@ fn a_second_rope_moves_beside() {
             let what = format!("{second:?}");
             let altered = clean.wiggle.clone().doubled(*second, rgb);
             match tried(&altered) {
-                Err(TrackError::MostlyLost { lost, frames, .. }) => {
-                    println!("{}, {what}: {lost} of {frames} lost, refused", clean.name);
+                Err(TrackError::NoRope { evident, .. }) => {
+                    println!("{}, {what}: refused, {evident:.2?} evident", clean.name);
                     // It is seldom in the way.
                     assert!(second.away_px.abs() < 90.0, "{}, {what}", clean.name);
                 }

@@ -190,9 +190,6 @@ pub struct BenchArgs {
     /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
     #[arg(long)]
     pub video: Option<PathBuf>,
-    /// `track`: the online tracker.
-    #[arg(long)]
-    pub live: bool,
 }
 
 /// Benchmarks known by name.

@@ -77,18 +77,15 @@ fn bench_track_reports_times_and_memory_of_a_recording() {
     }
     let report = report(&["track", "--video", data]);
     assert_eq!(report["command"], "bench track");
-    assert_eq!(
-        (&report["limit_ms"], &report["limit_mb"]),
-        (&3.0.into(), &400.0.into())
-    );
+    assert_eq!(report["limit_mb"], 400.0);
     let together = positive(&report, "/together_cpu_ms");
     let decoding = positive(&report, "/decoding_cpu_ms");
     assert!(together >= decoding.max(positive(&report, "/tracking_cpu_ms")));
-    assert_eq!(report["within_limit"], together <= 3.0);
-    for stage in ["background", "first_frame", "following"] {
-        positive(&report, &format!("/stages_wall_ms/{stage}"));
-    }
-    // The frames alone: luma and chroma of one image of the pair.
+    let stages = ["background", "searching", "reading"];
+    let stages = stages.map(|stage| positive(&report, &format!("/stages_wall_ms/{stage}")));
+    let tracking = positive(&report, "/together_wall_ms");
+    assert!(stages.iter().sum::<f64>() <= tracking, "{report}");
+    // The frames alone: luma and chroma of the left images.
     let frames_mb = positive(&report, "/frames") * (672 * 376 * 2) as f64 / 1e6;
     let peak_mb = positive(&report, "/peak_memory_mb");
     assert!(

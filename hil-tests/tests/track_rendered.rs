@@ -4,15 +4,15 @@
 #![cfg(test)]
 #![allow(missing_docs, reason = "a test")]
 
-use camera_ingest::track::{ClampPath, ClampSample, TrackOptions};
-use camera_ingest::{EyeFrame, StereoFrame, track};
+use arm_model::Pole;
+use camera_ingest::{EyeFrame, Film, StereoFrame, TrackOptions, track};
 use hil_tests::for_each_seed;
-use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::CameraConfig;
 use rig_sim::hidden::hidden_rope;
-use rig_sim::wiggle_film::{WiggleFilm, attach};
+use rig_sim::wiggle_film::{WiggleFilm, joints};
+use rope_sim::MeasuredArm;
 use shared_types::StereoCamera;
 
 /// Frames filmed of each rope, dropped ones included: the rise and the middle of a wiggle.
@@ -29,21 +29,16 @@ const STILL: f64 = 20.0;
 struct Filmed {
     frames: Vec<EyeFrame>,
     truth: Vec<Vec<[f64; 2]>>,
-    clamp: ClampPath,
+    arm: MeasuredArm,
     camera: StereoCamera,
 }
 
-fn clamp(until_s: f64, first_s: f64) -> ClampPath {
-    let samples = (0..).map(|i| f64::from(i) * 1e-3);
-    let samples = samples.take_while(|t| *t < until_s).map(|t_s| {
-        let frame = attach(t_s + first_s);
-        ClampSample {
-            t_s,
-            p_w_m: frame.p_m,
-            pole_w: frame.r * Vector3::z(),
-        }
-    });
-    ClampPath::new(samples.collect()).unwrap()
+/// Joints as the arm reports them, time 0 at the first frame.
+fn arm(until_s: f64, first_s: f64) -> MeasuredArm {
+    let times_s = (0..).map(|i| f64::from(i) * 4e-3);
+    let times_s: Vec<f64> = times_s.take_while(|t| *t < until_s).collect();
+    let q: Vec<_> = times_s.iter().map(|t| joints(t + first_s)).collect();
+    MeasuredArm::new(&times_s, &q, Pole::default()).unwrap()
 }
 
 /// Films the wiggle of a seed's rope; `keep` says which frames arrive.
@@ -67,7 +62,7 @@ fn film(config: &CameraConfig, seed: u64, mut keep: impl FnMut(usize) -> bool) -
     Filmed {
         frames,
         truth,
-        clamp: clamp(FRAMES as f64 / config.frame_rate_hz + 0.1, first_s),
+        arm: arm(FRAMES as f64 / config.frame_rate_hz + 0.1, first_s),
         camera,
     }
 }
@@ -124,7 +119,11 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
         keypoints: filmed.truth[0].len(),
         ..TrackOptions::default()
     };
-    let found = match track(&filmed.frames, &filmed.camera, &filmed.clamp, &options) {
+    let film = Film {
+        left: &filmed.frames,
+        right: &[],
+    };
+    let found = match track(film, &filmed.camera, &filmed.arm, &options) {
         Ok(found) => found,
         Err(error) => {
             println!("seed {seed}, {filming:?}: {error}");

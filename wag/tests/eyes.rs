@@ -10,8 +10,7 @@ use arm_model::joint::START_POSE;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::frame::StereoFrame;
 use camera_ingest::source::read_film;
-use camera_ingest::track::Models;
-use camera_ingest::{TrackOptions, load_camera, open_video, track_film};
+use camera_ingest::{TrackOptions, load_camera, open_video, track};
 use nalgebra::{Rotation3, Vector3};
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
@@ -97,15 +96,9 @@ fn keypoints(from: &Path) -> KeypointTrack {
         keypoints: 20,
         ..TrackOptions::default()
     };
-    track_film(
-        eyes.film(),
-        &camera,
-        &motion,
-        &options,
-        &mut Models::default(),
-    )
-    .unwrap()
-    .track
+    track(eyes.film(), &camera, &motion, &options)
+        .unwrap()
+        .track
 }
 
 #[test]

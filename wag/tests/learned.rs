@@ -1,4 +1,4 @@
-//! Learned models for `wag track`: from the command line or `camera.toml`, told in the
+//! A learned tracker for `wag track`: from the command line or `camera.toml`, told in the
 //! report, refused with a clear line.
 #![cfg(test)]
 
@@ -7,8 +7,10 @@ mod onnx;
 mod support;
 
 use onnx::Axis::{Is, Open};
+use onnx::{FLOAT, Graph};
 use planner::phi::graph_sha256;
 use serde_json::Value;
+use shared_types::KeypointTrack;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use support::{said, wag_in};
@@ -25,18 +27,26 @@ fn wiggle() -> Option<PathBuf> {
     path.exists().then(|| path.to_owned())
 }
 
-/// A folder with two segmenters, no model, and the wiggle's camera, which names one.
+/// A folder with two trackers, another model, no model, and the wiggle's camera, which names
+/// a tracker.
 fn folder(wiggle: &Path) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let put = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
-    put("open.onnx", &onnx::by_colour([Open("H"), Open("W")]).file());
-    put("half.onnx", &onnx::by_colour([Is(188), Is(336)]).file());
+    let steady = |size, shift| onnx::steady(size, Open("N"), shift, &[0.9; 8]).file();
+    put("open.onnx", &steady([Open("H"), Open("W")], [0.0, 0.0]));
+    put("half.onnx", &steady([Is(188), Is(336)], [0.1, 0.0]));
+    let size = [Is(1), Is(3), Open("H"), Open("W")];
+    let other = Graph::default()
+        .input("image", FLOAT, &size)
+        .output("mask", FLOAT, &size)
+        .node("Identity", &["image"], "mask", &[]);
+    put("other.onnx", &other.file());
     put("none.onnx", b"no model");
     std::fs::copy(wiggle.join("camera.conf"), dir.path().join("camera.conf")).unwrap();
     let camera = std::fs::read_to_string(wiggle.join("camera.toml")).unwrap();
     let with = |models: &str| format!("{camera}\n[models]\n{models}\n").into_bytes();
-    put("camera.toml", &with("segmenter = \"half.onnx\""));
-    put("misspelt.toml", &with("segmentor = \"half.onnx\""));
+    put("camera.toml", &with("tracker = \"half.onnx\""));
+    put("misspelt.toml", &with("trakcer = \"half.onnx\""));
     dir
 }
 
@@ -58,12 +68,13 @@ fn track(folder: &Path, wiggle: &Path, more: &str) -> Output {
 fn the_report_tells_who_did_what() {
     let Some(wiggle) = wiggle() else { return };
     let dir = folder(&wiggle);
+    // How far the models say that the rope goes to the right in eight frames (px).
     let cases = [
         ("", None),
-        ("--camera camera.toml", Some("half.onnx")),
+        ("--camera camera.toml", Some(("half.onnx", 1.4))),
         (
-            "--camera camera.toml --segmenter open.onnx",
-            Some("open.onnx"),
+            "--camera camera.toml --tracker open.onnx",
+            Some(("open.onnx", 0.0)),
         ),
     ];
     for (more, model) in cases {
@@ -71,16 +82,27 @@ fn the_report_tells_who_did_what() {
         assert!(output.status.success(), "{}", said(&output));
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(report["lost"], 0, "{report}");
-        assert_eq!(report["models"]["following"]["by"], "built-in");
-        let mask = &report["models"]["first_mask"];
-        let Some(model) = model else {
-            assert_eq!(mask["by"], "built-in");
+        let reading = &report["models"]["reading"];
+        let Some((model, moved_px)) = model else {
+            assert_eq!(reading["by"], "built-in");
             continue;
         };
-        assert_eq!(mask["by"], "model");
-        assert!(mask["file"].as_str().unwrap().ends_with(model), "{mask}");
+        assert_eq!(reading["by"], "model");
+        assert!(
+            reading["file"].as_str().unwrap().ends_with(model),
+            "{reading}"
+        );
         let bytes = std::fs::read(dir.path().join(model)).unwrap();
-        assert_eq!(mask["sha256"], graph_sha256(&bytes));
+        assert_eq!(reading["sha256"], graph_sha256(&bytes));
+        let text = std::fs::read_to_string(dir.path().join("keypoints.json")).unwrap();
+        let track: KeypointTrack = serde_json::from_str(&text).unwrap();
+        for (a, b) in track.frames[0].points.iter().zip(&track.frames[7].points) {
+            assert!(
+                (b[0] - a[0] - moved_px).abs() < 0.02,
+                "{model}: {a:?} {b:?}"
+            );
+            assert!((b[1] - a[1]).abs() < 0.02, "{model}: {a:?} {b:?}");
+        }
     }
 }
 
@@ -88,21 +110,14 @@ fn the_report_tells_who_did_what() {
 fn what_does_not_fit_is_refused() {
     let Some(wiggle) = wiggle() else { return };
     let dir = folder(&wiggle);
-    let cases: [(&str, &[&str]); 8] = [
-        ("--segmenter nowhere.onnx", &["nowhere.onnx", "path"]),
-        ("--segmenter none.onnx", &["none.onnx", "ONNX file?"]),
+    let cases: [(&str, &[&str]); 4] = [
+        ("--tracker nowhere.onnx", &["nowhere.onnx", "path"]),
+        ("--tracker none.onnx", &["none.onnx", "ONNX file?"]),
         (
-            "--tracker open.onnx",
-            &["open.onnx", "`image`", "`frames`, `queries`"],
+            "--tracker other.onnx",
+            &["other.onnx", "`image`", "`frames`, `queries`"],
         ),
-        ("--lead-px 300,250", &["--lead-px", "--segmenter"]),
-        (
-            "--segmenter open.onnx --lead-px 700,250",
-            &["700,250", "672x376"],
-        ),
-        ("--lead-px 300", &["--lead-px", "U,V"]),
-        ("--lead-px 300,nan", &["--lead-px", "finite"]),
-        ("--camera misspelt.toml", &["misspelt.toml", "segmentor"]),
+        ("--camera misspelt.toml", &["misspelt.toml", "trakcer"]),
     ];
     for (more, words) in cases {
         let output = track(dir.path(), &wiggle, more);

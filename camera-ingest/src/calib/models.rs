@@ -1,4 +1,4 @@
-//! `[models]` in `camera.toml`: learned models that stand in for parts of the tracker.
+//! `[models]` in `camera.toml`: a learned model that stands in for a part of the tracker.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelFiles {
-    /// For the mask of the first frame.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub segmenter: Option<PathBuf>,
-    /// For following points from frame to frame.
+    /// For following points of the rope through the film.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tracker: Option<PathBuf>,
 }
@@ -24,10 +21,8 @@ impl ModelFiles {
 
     /// With the paths taken relative to a folder.
     pub(super) fn within(self, folder: &Path) -> Self {
-        let within = |path: Option<PathBuf>| path.map(|p| folder.join(p));
         Self {
-            segmenter: within(self.segmenter),
-            tracker: within(self.tracker),
+            tracker: self.tracker.map(|p| folder.join(p)),
         }
     }
 }

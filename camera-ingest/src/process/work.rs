@@ -6,7 +6,7 @@ use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
-use crate::track::{Models, TrackOptions, TrackResult, track_film};
+use crate::track::{TrackOptions, TrackResult};
 use arm_model::{JointVector, Pole};
 use rope_sim::MeasuredArm;
 use shared_types::ipc::KeypointPublisher;
@@ -67,7 +67,7 @@ fn try_track(
         keypoints: *keypoints as usize,
         ..TrackOptions::default()
     };
-    let result = track_film(film, camera, &motion, &options, &mut Models::default())?;
+    let result = crate::track::track(film, camera, &motion, &options)?;
     let ms_per_frame = began.elapsed().as_secs_f64() * 1e3 / frames.len() as f64;
     publish(frames, &result, publisher)?;
     if let Some(path) = overlay {
@@ -89,7 +89,7 @@ fn try_track(
     })
 }
 
-/// The clamp's motion, time 0 at the first frame.
+/// The attach frame's motion, time 0 at the first frame.
 fn attach_motion(
     joints: &[(u64, JointVector)],
     first_stamp_ns: u64,

@@ -7,7 +7,6 @@ use super::curve::{add, normals, scale};
 use super::follow::NODES;
 use super::outline::Contrast;
 use super::plane::{Point, RopePlane};
-use crate::frame::rgb_from_ycc;
 
 /// Ropes are thinner than this (radius, m).
 const WIDEST_ROPE_M: f64 = 0.015;
@@ -78,8 +77,4 @@ pub(super) fn rope_radius_m(
         }
     };
     Some((edge(-1)? + edge(1)?) * step_m / 2.0)
-}
-
-pub(super) fn rgb(colour: [f32; 3]) -> [u8; 3] {
-    rgb_from_ycc(colour)
 }

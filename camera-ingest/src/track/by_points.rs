@@ -1,96 +1,111 @@
 //! The rope from points that somebody else followed.
-//!
-//! The points stand in for the frame-by-frame measuring only: the curve through
-//! them is smoothed, held at the clamp, kept at the rope's length and given up
-//! where too little of it is seen or its length is another rope's.
 
-use super::curve::{add, length, resample, scale, smooth, sub};
-use super::follow::{
-    ANCHOR, Follower, LEAST_LEAD, LOST_BELOW, NODES, SMOOTHING, UNSEEN_WEIGHT, mean,
-};
-use super::models::{ModelError, PointTracker, SeenPoint, check_count};
-use super::plane::Point;
-use super::state::State;
+use super::confirmation::doubted;
+use super::models::{PointTracker, SeenPoint, check_count};
+use super::{TrackError, TrackResult};
 use crate::frame::EyeFrame;
+use shared_types::keypoints::TrackedFrame;
 
 /// Points asked for where the tracker follows any number.
 const POINTS: usize = 32;
-/// Part of the length by which the curve through the points may differ before the
-/// frame is lost.
-const OTHER_LENGTH: f64 = 0.15;
+/// A frame in which less than this part of the points is visible is lost.
+const LEAST_VISIBLE: f64 = 0.25;
 
-/// The rope in every frame, from its state in the first one.
-pub(super) fn follow(
-    follower: &Follower<'_>,
-    frames: &[EyeFrame],
-    times_s: &[f64],
-    first: State,
-    tracker: &mut dyn PointTracker,
-) -> Result<Vec<State>, ModelError> {
-    let count = tracker.points().unwrap_or(POINTS).max(2);
-    let points: Vec<[f64; 2]> = resample(&first.curve, length(&first.curve), count)
-        .iter()
-        .map(|p| follower.plane.to_pixel(*p))
-        .collect();
-    let seen = tracker.follow(frames, &points)?;
-    check_count("frames", seen.len(), frames.len())?;
-    for seen in &seen {
-        check_count("points of a frame", seen.len(), count)?;
-    }
-    let mut states = vec![first];
-    for (seen, &t_s) in seen.iter().zip(times_s).skip(1) {
-        let next = state(follower, seen, t_s, &states[states.len() - 1]);
-        states.push(next);
-    }
-    Ok(states)
-}
-
-/// The curve through the points of one frame.
-fn state(follower: &Follower<'_>, seen: &[SeenPoint], t_s: f64, before: &State) -> State {
-    let points: Vec<Point> = seen
-        .iter()
-        .map(|s| follower.plane.point_at(s.pixel))
-        .collect();
-    let visible: Vec<f64> = seen.iter().map(|s| s.visible).collect();
-    let confidence: Vec<f64> = (0..NODES)
-        .map(|node| between(&visible, node, |a, b, part| a + (b - a) * part))
-        .collect();
-    let mut places: Vec<Point> = (0..NODES)
-        .map(|node| between(&points, node, |a, b, part| add(a, scale(sub(b, a), part))))
-        .collect();
-    let mut weights: Vec<f64> = confidence
-        .iter()
-        .map(|c| (c * c).max(UNSEEN_WEIGHT))
-        .collect();
-    places[0] = follower.clamp_at(t_s);
-    weights[0] = ANCHOR;
-    let fitted = smooth(&places, &weights, SMOOTHING);
-    let lead_seen = confidence[NODES - 1] > LEAST_LEAD;
-    let off = (length(&fitted) / follower.model.length_m - 1.0).abs();
-    let long = follower.plausible_length(length(&fitted), lead_seen);
-    let curve = resample(&fitted, long, NODES);
-    let lost = mean(&confidence) < LOST_BELOW || off > OTHER_LENGTH;
-    let dt = t_s - before.t_s;
-    let velocity = curve
-        .iter()
-        .zip(&before.curve)
-        .map(|(now, then)| scale(sub(*now, *then), 1.0 / dt))
-        .collect();
-    State {
-        t_s,
-        curve,
-        velocity,
-        confidence,
-        lost,
-        hidden: false,
-        ambiguous: false,
-        clamp: None,
+impl TrackResult {
+    /// The same rope as a point tracker sees it: asked for points spread evenly over the
+    /// keypoints of the first frame, it says where they are in every one. `frames` are
+    /// those that were tracked; visibility becomes confidence.
+    ///
+    /// # Errors
+    /// The tracker gives no answer, or hardly sees the rope in most frames.
+    pub fn by_points(
+        mut self,
+        frames: &[EyeFrame],
+        tracker: &mut dyn PointTracker,
+    ) -> Result<Self, TrackError> {
+        let tracked = &mut self.track.frames;
+        let count = tracker.points().unwrap_or(POINTS).max(2);
+        let certain = |pixel: &[f64; 2]| SeenPoint {
+            pixel: *pixel,
+            visible: 1.0,
+        };
+        let first: Vec<SeenPoint> = tracked[0].points.iter().map(certain).collect();
+        let asked: Vec<[f64; 2]> = evenly(&first, count).iter().map(|s| s.pixel).collect();
+        let seen = tracker.follow(frames, &asked)?;
+        check_count("frames", seen.len(), tracked.len())?;
+        for (index, (frame, seen)) in tracked.iter_mut().zip(&seen).enumerate() {
+            check_count("points of a frame", seen.len(), count)?;
+            let visible = seen.iter().map(|s| s.visible).sum::<f64>() / count as f64;
+            let points = evenly(seen, self.track.keypoints);
+            *frame = TrackedFrame {
+                t_s: frame.t_s,
+                points: points.iter().map(|s| s.pixel).collect(),
+                confidence: points.iter().map(|s| s.visible.clamp(0.0, 1.0)).collect(),
+                lost: visible < LEAST_VISIBLE,
+            };
+            self.residual[index] = 1.0 - visible;
+        }
+        let lost = tracked.iter().filter(|f| f.lost).count();
+        if lost * 2 > tracked.len() {
+            return Err(TrackError::MostlyLost {
+                lost,
+                frames: tracked.len(),
+                first: tracked.iter().position(|f| f.lost).unwrap_or(0),
+            });
+        }
+        self.confirmation.doubted = doubted(tracked);
+        self.track.doubts = self.confirmation.doubts();
+        Ok(self)
     }
 }
 
-/// Value at a node of the curve from values spread evenly along it.
-fn between<T: Copy>(values: &[T], node: usize, mix: impl Fn(T, T, f64) -> T) -> T {
-    let at = node as f64 * (values.len() - 1) as f64 / (NODES - 1) as f64;
-    let left = (at as usize).min(values.len() - 2);
-    mix(values[left], values[left + 1], at - left as f64)
+/// `count` points at equal distances along some.
+fn evenly(points: &[SeenPoint], count: usize) -> Vec<SeenPoint> {
+    let mut along_px = vec![0.0];
+    for w in points.windows(2) {
+        let [a, b] = [w[0].pixel, w[1].pixel];
+        along_px.push(along_px[along_px.len() - 1] + (b[0] - a[0]).hypot(b[1] - a[1]));
+    }
+    let last = points.len() - 1;
+    let place = |k: usize| {
+        let wanted_px = along_px[last] * k as f64 / (count - 1) as f64;
+        let after = along_px.partition_point(|s| *s < wanted_px).clamp(1, last);
+        let (a, b) = (points[after - 1], points[after]);
+        let step_px = (along_px[after] - along_px[after - 1]).max(1e-9);
+        let part = ((wanted_px - along_px[after - 1]) / step_px).clamp(0.0, 1.0);
+        SeenPoint {
+            pixel: [0, 1].map(|i| a.pixel[i] + part * (b.pixel[i] - a.pixel[i])),
+            visible: a.visible + part * (b.visible - a.visible),
+        }
+    };
+    (0..count).map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_spread_evenly_along_the_rope() {
+        let point = |x, y, visible| SeenPoint {
+            pixel: [x, y],
+            visible,
+        };
+        let bent = [
+            point(0.0, 0.0, 1.0),
+            point(3.0, 0.0, 1.0),
+            point(3.0, 1.0, 0.0),
+        ];
+        let wanted = [
+            point(0.0, 0.0, 1.0),
+            point(2.0, 0.0, 1.0),
+            point(3.0, 1.0, 0.0),
+        ];
+        assert_eq!(evenly(&bent, 3), wanted);
+        // All in one place: no distance to divide by.
+        assert_eq!(
+            evenly(&[point(5.0, 5.0, 1.0); 4], 2),
+            [point(5.0, 5.0, 1.0); 2]
+        );
+    }
 }

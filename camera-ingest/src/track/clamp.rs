@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use arm_model::kinematics::FrameMotion;
 use arm_model::{JointVector, Pole};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rope_sim::AttachMotion;
@@ -69,25 +70,6 @@ impl ClampPath {
             return Err(ClampError::Samples("its times do not increase"));
         }
         Ok(Self { samples })
-    }
-
-    /// Along a motion that ends, every 2 ms; time 0 is the motion's.
-    pub(super) fn of(motion: &dyn AttachMotion) -> Self {
-        const STEP_S: f64 = 2e-3;
-        const LONGEST_S: f64 = 600.0;
-        let count = (motion.duration_s().min(LONGEST_S) / STEP_S) as usize;
-        let sample = |i: usize| {
-            let t_s = i as f64 * STEP_S;
-            let frame = motion.at(t_s);
-            ClampSample {
-                t_s,
-                p_w_m: frame.p_m,
-                pole_w: frame.r.column(2).into(),
-            }
-        };
-        Self {
-            samples: (0..=count).map(sample).collect(),
-        }
     }
 
     /// From joint positions in order of time (t = 0: first frame), through the kinematics
@@ -189,6 +171,18 @@ impl ClampPath {
             t_s,
             p_w_m: a.p_w_m.lerp(&b.p_w_m, part),
             pole_w: a.pole_w.lerp(&b.pole_w, part).normalize(),
+        }
+    }
+}
+
+impl AttachMotion for ClampPath {
+    fn at(&self, t_s: f64) -> FrameMotion {
+        let ClampSample { p_w_m, pole_w, .. } = ClampPath::at(self, t_s);
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &pole_w);
+        FrameMotion {
+            p_m: p_w_m,
+            r: turn.unwrap_or_default().to_rotation_matrix().into_inner(),
+            ..FrameMotion::world()
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Whether a track may be relied on.
 
+use shared_types::keypoints::TrackedFrame;
 use std::fmt;
 
 /// Confidence below which a keypoint is in doubt.
@@ -70,6 +71,13 @@ impl Confirmation {
             .map(|doubt| doubt.to_string())
             .collect()
     }
+}
+
+/// Part of all keypoints that are in doubt.
+pub(super) fn doubted(frames: &[TrackedFrame]) -> f64 {
+    let all = frames.iter().flat_map(|f| &f.confidence);
+    let doubted = all.clone().filter(|c| **c < DOUBT).count();
+    doubted as f64 / all.count().max(1) as f64
 }
 
 #[cfg(test)]

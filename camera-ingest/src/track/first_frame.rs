@@ -62,6 +62,7 @@ pub(super) struct Place<'a> {
     /// The clamp in this frame.
     pub(super) clamp: ClampSample,
     /// Where the lead's centre is, if somebody knows (raw pixel).
+    #[expect(dead_code, reason = "nobody knows")]
     pub(super) lead_px: Option<[f64; 2]>,
 }
 
@@ -78,7 +79,7 @@ pub(super) fn find(
         camera,
         plane,
         clamp,
-        lead_px,
+        ..
     } = place;
     let gain = background.gain(frame);
     let width = frame.width_px;
@@ -93,8 +94,6 @@ pub(super) fn find(
         empty: &background.image,
         gain,
         noise: background.noise,
-        clamp_px,
-        lead_px: *lead_px,
     };
     let mut mask = masker.mask(&scene).map_err(NotFound::NoMask)?;
     check_count("pixels of a mask", mask.len(), frame.luma.len()).map_err(NotFound::NoMask)?;

@@ -12,7 +12,6 @@ use super::lead;
 use super::outline::{Circle, Contrast, RopeEnd};
 use super::plane::{Point, RopePlane};
 use super::state::State;
-use super::timing::seen_clamp;
 use crate::frame::EyeFrame;
 
 /// Nodes of the tracked curve.
@@ -49,8 +48,6 @@ const NOTICE_PX: f64 = 24.0;
 const RIVAL: f64 = 0.6;
 /// Part of the lead's area that, seen in one place beside it, can be another lead.
 const RIVAL_LEAD: f64 = 0.5;
-/// Coverage from which a node is seen for sure.
-pub(super) const SEEN: f64 = 0.5;
 /// Part of the coverage of most nodes below which one may be covered by something; a thin
 /// rope in motion is seen less everywhere.
 const UNSEEN: f64 = 0.5;
@@ -250,7 +247,6 @@ impl Follower<'_> {
             lost,
             hidden,
             ambiguous,
-            clamp: seen_clamp(&found, first),
         }
     }
 

@@ -1,12 +1,11 @@
 //! Following the rope through a recording.
 //!
-//! Two passes, since a wiggle is recorded before anybody asks for keypoints:
-//! the median over frames spread over the recording is the scene without rope;
-//! the first frame, in which the rope hangs still, gives centreline, lead and
-//! colours; from there the curve is followed frame by frame, predicted,
-//! measured across, smoothed and anchored at the clamp (known from the arm) and
-//! the lead. After a gap, a loss, or when something like the rope came near, the
-//! rope is looked for anew and followed back to where both ways agree.
+//! A wiggle is recorded before anybody asks for keypoints, so the whole film is looked at
+//! at once: the median over frames spread over it is the scene without rope, and of
+//! many simulated ropes, hung on the clamp as the arm moved it, one explains what the
+//! scene does not (`explain`). Along it the film is read off frame by frame.
+//! A learned tracker of points may stand in for the reading
+//! ([`TrackResult::by_points`]).
 
 mod anew;
 mod appearance;
@@ -28,23 +27,21 @@ mod moving;
 mod one_pass;
 mod outline;
 mod plane;
-mod pursuit;
 mod refusal;
 mod sight;
 mod state;
 mod timing;
-mod ways;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 pub use appearance::RopeAppearance;
 use background::{Background, frames_by_motion};
 pub use clamp::{ClampError, ClampPath, ClampSample};
 pub use confirmation::Confirmation;
 pub use explain::Film;
-use first_frame::{FirstLook, Place};
+use first_frame::FirstLook;
 use follow::{Follower, NODES, RopeModel};
-pub use models::{FirstMask, FirstScene, ModelError, Models, Moving, PointTracker, SeenPoint};
+pub use models::{ModelError, PointTracker, SeenPoint};
 pub use one_pass::OnePass;
 use outline::{Circle, Contrast};
 use plane::RopePlane;
@@ -65,9 +62,6 @@ pub struct TrackOptions {
     pub keypoints: usize,
     /// Frames for the median background.
     pub background_frames: usize,
-    /// Where the lead's centre hangs in the first frame, if somebody knows (raw pixel
-    /// of the left eye): a hint for a learned mask.
-    pub lead_px: Option<[f64; 2]>,
 }
 
 impl Default for TrackOptions {
@@ -75,7 +69,6 @@ impl Default for TrackOptions {
         Self {
             keypoints: 24,
             background_frames: 31,
-            lead_px: None,
         }
     }
 }
@@ -85,10 +78,10 @@ impl Default for TrackOptions {
 pub struct TrackTimes {
     /// Median background.
     pub background: Duration,
-    /// Finding the rope in the first frame.
-    pub first_frame: Duration,
-    /// Following it through all frames.
-    pub follow: Duration,
+    /// Searching for the rope that explains the film.
+    pub searching: Duration,
+    /// Reading the film off along it.
+    pub reading: Duration,
 }
 
 /// Keypoints and what was learnt on the way.
@@ -96,9 +89,9 @@ pub struct TrackTimes {
 pub struct TrackResult {
     /// The keypoints.
     pub track: KeypointTrack,
-    /// What the rope looks like at rest.
+    /// What the rope looks like.
     pub appearance: RopeAppearance,
-    /// Per frame: part of the rope's coverage not found (0 = all seen).
+    /// Per frame: part of the rope that is not evident (0 = all seen).
     pub residual: Vec<f64>,
     /// Whether the film bears out time and place of the clamp; `None` where the clamp
     /// hardly moves or the rope below it is seen too seldom.
@@ -109,144 +102,23 @@ pub struct TrackResult {
     pub times: TrackTimes,
 }
 
-/// Follows the rope through a recording.
+/// Tracks the rope through a film of one eye or both.
 ///
-/// `frames` are left-eye images, the first with the rope hanging still; time 0
-/// of `clamp` is the first frame's start of exposure. Keypoints are raw left
-/// pixels, uniform in arc length on the rope's plane.
+/// `motion` is the attach frame's, time 0 at the first frame's start of exposure; `camera`
+/// is known to a degree and a centimetre or so. Keypoints are raw left pixels at equal
+/// distances along the rope, clamp first, the lead's centre last.
 ///
 /// # Errors
-/// Bad input, no rope found in the first frame, or the rope lost in most frames.
-/// Losing it in some is no error: those frames are marked `lost`.
+/// Bad input, or no simulated rope explains the film. Losing the rope in some frames is
+/// no error: they are marked `lost`.
 pub fn track(
-    frames: &[EyeFrame],
-    camera: &StereoCamera,
-    clamp: &ClampPath,
-    options: &TrackOptions,
-) -> Result<TrackResult, TrackError> {
-    track_with(frames, camera, clamp, options, &mut Models::default())
-}
-
-/// Tracks the rope through a film of one eye or both: by explaining it, and where no
-/// simulated rope does, or with learned models, by following it from frame to frame as
-/// [`track_with()`].
-///
-/// `motion` is the attach frame's, t = 0 at the first frame's start of exposure.
-///
-/// # Errors
-/// As [`track_with()`].
-pub fn track_film(
     film: Film<'_>,
     camera: &StereoCamera,
     motion: &dyn AttachMotion,
     options: &TrackOptions,
-    models: &mut Models<'_>,
 ) -> Result<TrackResult, TrackError> {
-    check(film.left, camera, options)?;
-    if models.first_mask.is_none() && models.point_tracker.is_none() {
-        match explain::explain(film, camera, motion, options) {
-            Ok(result) => return Ok(result),
-            Err(reason) => {
-                tracing::info!(%reason, "no simulated rope explains the film: following it");
-            }
-        }
-    }
-    track_with(film.left, camera, &ClampPath::of(motion), options, models)
-}
-
-/// As [`track()`], with learned models in the place of its parts.
-///
-/// # Errors
-/// As [`track()`], or a model that gives no answer.
-pub fn track_with(
-    frames: &[EyeFrame],
-    camera: &StereoCamera,
-    clamp: &ClampPath,
-    options: &TrackOptions,
-    models: &mut Models<'_>,
-) -> Result<TrackResult, TrackError> {
-    check(frames, camera, options)?;
-    let times_s: Vec<f64> = frames
-        .iter()
-        .map(|f| (f.stamp_ns - frames[0].stamp_ns) as f64 * 1e-9)
-        .collect();
-    let start = Instant::now();
-    let background =
-        Background::uncovered(frames, &frames_by_motion(frames, options.background_frames));
-    let background_time = start.elapsed();
-
-    let start = Instant::now();
-    let until_s = times_s[frames.len() - 1];
-    let plane = RopePlane::fit(camera, clamp, until_s).ok_or(TrackError::ClampOutside {
-        u: f64::NAN,
-        v: f64::NAN,
-    })?;
-    let place = Place {
-        background: &background,
-        camera,
-        plane: &plane,
-        clamp: clamp.at(0.0),
-        lead_px: options.lead_px,
-    };
-    let mut built_in = Moving;
-    let masker = match &mut models.first_mask {
-        Some(learned) => &mut **learned,
-        None => &mut built_in as &mut dyn FirstMask,
-    };
-    let look = first_frame::find(&frames[0], &place, masker, None)?;
-    let (follower, first) = learn(&frames[0], camera, clamp, &plane, &background, &look);
-    let first_time = start.elapsed();
-
-    let start = Instant::now();
-    let states = match &mut models.point_tracker {
-        Some(tracker) => by_points::follow(&follower, frames, &times_s, first, &mut **tracker)?,
-        None => pursuit::pursue(&follower, frames, &times_s, first),
-    };
-    let lost = states.iter().filter(|s| s.lost).count();
-    if lost * 2 > states.len() {
-        return Err(TrackError::MostlyLost {
-            lost,
-            frames: states.len(),
-            first: states.iter().position(|s| s.lost).unwrap_or(0),
-        });
-    }
-    let seen: Vec<_> = states
-        .iter()
-        .filter(|s| !s.lost && !s.ambiguous)
-        .filter_map(|s| Some((s.t_s, s.clamp?)))
-        .collect();
-    let clamp = timing::fit(&seen, 1.0 / plane.px_per_m, |t_s| follower.clamp_at(t_s));
-    let tracked = states
-        .iter()
-        .map(|s| keypoints(s, &plane, options.keypoints))
-        .collect();
-    Ok(TrackResult {
-        track: KeypointTrack {
-            keypoints: options.keypoints,
-            frames: tracked,
-            doubts: Vec::new(),
-        },
-        clamp,
-        residual: states.iter().map(|s| 1.0 - s.score()).collect(),
-        appearance: RopeAppearance {
-            rope_radius_m: follower.model.rope_radius_m,
-            lead_radius_m: follower.model.lead_radius_m,
-            length_m: follower.model.length_m,
-            rope_rgb: appearance::rgb(follower.model.rope.0),
-            lead_rgb: appearance::rgb(follower.model.lead.0),
-            noise: background.noise,
-        },
-        confirmation: Confirmation {
-            doubted: lost as f64 / frames.len() as f64,
-            tip: 1.0,
-            second_image: None,
-        },
-        times: TrackTimes {
-            background: background_time,
-            first_frame: first_time,
-            follow: start.elapsed(),
-        },
-    })
+    check(film.left, camera, motion, options)?;
+    explain::explain(film, camera, motion, options)
 }
 
 /// `count` indices spread over `0..len`.

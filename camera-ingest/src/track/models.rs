@@ -1,11 +1,7 @@
-//! The two places where something learned may stand in for the built-in tracker.
-//!
-//! [`FirstMask`] says which pixels of the first frame are rope and lead;
-//! [`PointTracker`] follows points through the film. What is built in
-//! ([`Moving`], the pursuit) knows the scene without rope; what is learned may
-//! look at pictures only.
+//! Where something learned may stand in for the built-in tracker: a [`PointTracker`]
+//! follows points of the rope through the film.
 
-use super::moving::moving;
+pub(super) use super::moving::{FirstMask, FirstScene, Moving};
 use crate::frame::EyeFrame;
 
 /// Why a learned model gives no answer.
@@ -81,43 +77,6 @@ pub enum ModelError {
     },
 }
 
-/// What is known when the first frame is looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct FirstScene<'a> {
-    /// The frame; the rope hangs still in it.
-    pub frame: &'a EyeFrame,
-    /// The scene without rope.
-    pub empty: &'a EyeFrame,
-    /// Brightness of the frame relative to the scene without rope.
-    pub gain: f32,
-    /// Typical distance of a still pixel from the scene without rope (grey levels).
-    pub noise: f32,
-    /// Where the rope leaves the clamp (raw pixel).
-    pub clamp_px: [f64; 2],
-    /// Where the lead's centre is, if somebody knows (raw pixel).
-    pub lead_px: Option<[f64; 2]>,
-}
-
-/// Says which pixels of the first frame are rope and lead.
-pub trait FirstMask {
-    /// One value a pixel, row by row. More than the rope may be in it: what does not
-    /// hang on the clamp, or lies beyond the lead, is left out later.
-    ///
-    /// # Errors
-    /// No answer.
-    fn mask(&mut self, scene: &FirstScene<'_>) -> Result<Vec<bool>, ModelError>;
-}
-
-/// What differs from the scene without rope: the built-in mask.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Moving;
-
-impl FirstMask for Moving {
-    fn mask(&mut self, scene: &FirstScene<'_>) -> Result<Vec<bool>, ModelError> {
-        Ok(moving(scene))
-    }
-}
-
 /// A followed point in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenPoint {
@@ -141,24 +100,6 @@ pub trait PointTracker {
         frames: &[EyeFrame],
         points: &[[f64; 2]],
     ) -> Result<Vec<Vec<SeenPoint>>, ModelError>;
-}
-
-/// What stands in for the built-in tracker; by default nothing.
-#[derive(Default)]
-pub struct Models<'a> {
-    /// For the mask of the first frame.
-    pub first_mask: Option<&'a mut dyn FirstMask>,
-    /// For following the rope from frame to frame.
-    pub point_tracker: Option<&'a mut dyn PointTracker>,
-}
-
-impl core::fmt::Debug for Models<'_> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Models")
-            .field("first_mask", &self.first_mask.is_some())
-            .field("point_tracker", &self.point_tracker.is_some())
-            .finish()
-    }
 }
 
 /// That a model gave as many values as it must.

@@ -1,7 +1,41 @@
 //! What differs from the scene without rope.
 
-use super::models::FirstScene;
+use super::models::ModelError;
+use crate::frame::EyeFrame;
 use crate::vectors::widest;
+
+/// What is known when the first frame is looked at.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FirstScene<'a> {
+    /// The frame; the rope hangs still in it.
+    pub(super) frame: &'a EyeFrame,
+    /// The scene without rope.
+    pub(super) empty: &'a EyeFrame,
+    /// Brightness of the frame relative to the scene without rope.
+    pub(super) gain: f32,
+    /// Typical distance of a still pixel from the scene without rope (grey levels).
+    pub(super) noise: f32,
+}
+
+/// Says which pixels of the first frame are rope and lead.
+pub(super) trait FirstMask {
+    /// One value a pixel, row by row. More than the rope may be in it: what does not
+    /// hang on the clamp, or lies beyond the lead, is left out later.
+    ///
+    /// # Errors
+    /// No answer.
+    fn mask(&mut self, scene: &FirstScene<'_>) -> Result<Vec<bool>, ModelError>;
+}
+
+/// What differs from the scene without rope: the built-in mask.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Moving;
+
+impl FirstMask for Moving {
+    fn mask(&mut self, scene: &FirstScene<'_>) -> Result<Vec<bool>, ModelError> {
+        Ok(moving(scene))
+    }
+}
 
 /// Threshold of the moving mask in units of the image noise.
 const MASK_NOISE: f32 = 2.5;
@@ -99,8 +133,6 @@ mod tests {
             empty: &empty,
             gain,
             noise: 1.0,
-            clamp_px: [0.0; 2],
-            lead_px: None,
         };
         let mask = moving(&scene);
         let square = |u: usize, v: usize| -> f32 {

@@ -6,14 +6,13 @@
 //! and lengths along the rope are true lengths.
 
 use nalgebra::{Matrix2, Vector3};
+use rope_sim::AttachMotion;
 use shared_types::{Intrinsics, StereoCamera};
-
-use super::clamp::ClampPath;
 
 /// A point or displacement on the rope's plane (m).
 pub(super) type Point = [f64; 2];
 
-/// Clamp paths shorter than this say nothing about the plane (m, std).
+/// Ways of the clamp shorter than this say nothing about the plane (m, std).
 const LEAST_SPREAD_M: f64 = 0.005;
 /// A plane seen flatter than this is of no use (cosine of the angle between
 /// the camera's view and the plane's normal).
@@ -36,14 +35,18 @@ impl RopePlane {
     /// Plane through the clamp at t = 0, along the clamp's main horizontal
     /// motion until `until_s`; facing the camera if the clamp hardly moves.
     /// `None` when the clamp is behind the camera.
-    pub(super) fn fit(camera: &StereoCamera, clamp: &ClampPath, until_s: f64) -> Option<Self> {
+    pub(super) fn fit(
+        camera: &StereoCamera,
+        clamp: &dyn AttachMotion,
+        until_s: f64,
+    ) -> Option<Self> {
         let view_w = camera.r_w_cam.column(2).into_owned();
         let facing = camera.r_w_cam.column(0).into_owned();
         let right_w = main_direction(clamp, until_s)
             .map(|d| if d.dot(&facing) < 0.0 { -d } else { d })
             .filter(|d| d.cross(&Vector3::z()).dot(&view_w).abs() > LEAST_FACING)
             .or_else(|| horizontal(&facing))?;
-        let origin_c = camera.to_left(&clamp.at(0.0).p_w_m);
+        let origin_c = camera.to_left(&clamp.at(0.0).p_m);
         if origin_c.z < 0.05 {
             return None;
         }
@@ -87,10 +90,10 @@ fn horizontal(v: &Vector3<f64>) -> Option<Vector3<f64>> {
 }
 
 /// Horizontal direction in which the clamp moves most.
-fn main_direction(clamp: &ClampPath, until_s: f64) -> Option<Vector3<f64>> {
+fn main_direction(clamp: &dyn AttachMotion, until_s: f64) -> Option<Vector3<f64>> {
     const SAMPLES: u32 = 200;
     let points: Vec<Vector3<f64>> = (0..=SAMPLES)
-        .map(|i| clamp.at(until_s * f64::from(i) / f64::from(SAMPLES)).p_w_m)
+        .map(|i| clamp.at(until_s * f64::from(i) / f64::from(SAMPLES)).p_m)
         .collect();
     let count = f64::from(SAMPLES + 1);
     let mean = points.iter().sum::<Vector3<f64>>() / count;

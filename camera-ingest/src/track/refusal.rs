@@ -1,5 +1,6 @@
 //! What is refused, and why.
 
+use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
 use shared_types::keypoints::MAX_KEYPOINTS;
 
@@ -7,6 +8,9 @@ use super::TrackOptions;
 use super::first_frame::NotFound;
 use super::models::ModelError;
 use crate::frame::EyeFrame;
+
+/// The clamp may be this far outside the image: the search turns the camera so far (px).
+const BESIDE_PX: f64 = 20.0;
 
 /// Why a recording cannot be tracked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,7 +49,7 @@ pub enum TrackError {
     /// The clamp cannot be seen.
     #[error(
         "tracking: in the first frame (frame 0) the clamp should be at pixel ({u:.0}, {v:.0}), outside the \
-         image; check the camera's extrinsics and the clamp's path"
+         image; check the camera's place in camera.toml, and joints or poses"
     )]
     ClampOutside {
         /// Pixel column.
@@ -53,19 +57,41 @@ pub enum TrackError {
         /// Pixel row.
         v: f64,
     },
-    /// No rope in the first frame.
+    /// No rope is explanation enough.
     #[error(
-        "tracking: nothing long enough hangs on the clamp in the first frame (frame 0; longest {longest_m:.3} \
-         m); the rope must hang still at first, move later, and differ from what is behind it"
+        "tracking: no rope hanging on the clamp explains what is seen: the best one is evident in \
+         {:.0} % of its length in the usual frame (it must be {:.0} %), in {:.0} % of the frames \
+         where it is seen least ({:.0} %), and by {:.0} % in the worst frames ({:.0} %); check \
+         the camera's place in camera.toml, that joints or poses and film are of the same \
+         motion, and that the rope is in view all the time and differs from what is behind it",
+        100.0 * evident[0], 100.0 * least[0], 100.0 * evident[1], 100.0 * least[1],
+        100.0 * evident[2], 100.0 * least[2]
     )]
     NoRope {
-        /// Longest moving thing that hangs on the clamp (m).
-        longest_m: f64,
+        /// How evident the best rope is, 0 to 1: in the middle over the frames, at its
+        /// least evident places, in its least evident frames.
+        evident: [f64; 3],
+        /// How evident it must be in each respect.
+        least: [f64; 3],
     },
-    /// The rope cannot be followed.
+    /// A part of the rope would be behind the camera.
     #[error(
-        "tracking: the rope is lost in {lost} of {frames} frames, first in frame {first}; does it \
-         leave the image, or does something cover it?"
+        "tracking: the rope found would swing behind the camera; check the camera's place in \
+         camera.toml and the motion"
+    )]
+    BehindCamera,
+    /// The motion cannot be simulated.
+    #[error(
+        "tracking: no rope can be simulated under this motion: {reason}; check the joints or poses"
+    )]
+    Motion {
+        /// What the simulation says.
+        reason: String,
+    },
+    /// A learned tracker does not see the rope.
+    #[error(
+        "tracking: the learned tracker sees less than a quarter of the rope in {lost} of {frames} \
+         frames, first in frame {first}; track without it, or with another one"
     )]
     MostlyLost {
         /// Frames in which it is lost.
@@ -93,7 +119,10 @@ impl From<NotFound> for TrackError {
     fn from(reason: NotFound) -> Self {
         match reason {
             NotFound::ClampOutside([u, v]) => Self::ClampOutside { u, v },
-            NotFound::NothingHangs(longest_m) => Self::NoRope { longest_m },
+            NotFound::NothingHangs(_) => Self::NoRope {
+                evident: [0.0; 3],
+                least: [0.0; 3],
+            },
             NotFound::NoMask(error) => Self::Model(error),
         }
     }
@@ -109,6 +138,7 @@ fn allowed(least: usize, most: usize) -> String {
 pub(super) fn check(
     frames: &[EyeFrame],
     camera: &StereoCamera,
+    motion: &dyn AttachMotion,
     options: &TrackOptions,
 ) -> Result<(), TrackError> {
     range("frames", frames.len(), 8, usize::MAX)?;
@@ -118,7 +148,20 @@ pub(super) fn check(
         let before = index.checked_sub(1).map(|before| &frames[before]);
         check_frame(index, before, frame, camera)?;
     }
-    Ok(())
+    check_clamp(camera, motion)
+}
+
+/// The clamp is in the first frame, or so little beside it that the camera need only turn
+/// a little.
+fn check_clamp(camera: &StereoCamera, motion: &dyn AttachMotion) -> Result<(), TrackError> {
+    let [u, v] = camera
+        .project_left(&motion.at(0.0).p_m)
+        .unwrap_or([f64::NAN; 2]);
+    let near = |x: f64, size: u32| (-BESIDE_PX..=f64::from(size - 1) + BESIDE_PX).contains(&x);
+    if near(u, camera.width_px) && near(v, camera.height_px) {
+        return Ok(());
+    }
+    Err(TrackError::ClampOutside { u, v })
 }
 
 fn range(what: &'static str, found: usize, least: usize, most: usize) -> Result<(), TrackError> {

@@ -3,7 +3,6 @@
 use super::curve::{norm, sub};
 use super::follow::mean;
 use super::plane::Point;
-use super::timing::SeenClamp;
 
 /// Confidence of what is in doubt, at most.
 const DOUBTFUL: f64 = 0.5;
@@ -24,8 +23,6 @@ pub(super) struct State {
     /// Something that looks like the rope or its lead is so near that one may
     /// have been taken for the other.
     pub(super) ambiguous: bool,
-    /// The clamp as the rope below it shows it.
-    pub(super) clamp: Option<SeenClamp>,
 }
 
 impl State {
@@ -44,7 +41,6 @@ impl State {
             lost: false,
             hidden: false,
             ambiguous: false,
-            clamp: None,
         }
     }
 

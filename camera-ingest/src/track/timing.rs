@@ -1,9 +1,9 @@
 //! Whether arm and camera tell the same time and place, from the wiggle itself.
 //!
-//! The tracker holds the curve at the clamp where the arm says it is. But the rope below
-//! the clamp is seen, not told: continued upwards it shows where the clamp was. Across
-//! the rope, what is seen and what is told differ by a constant where clamp or camera
-//! stand elsewhere, and in step with the clamp's speed where the clocks differ. A part
+//! The arm says where the clamp is. The rope below the clamp is seen, not told:
+//! continued upwards it shows where the clamp was. Across the rope, what is seen and what
+//! is told differ by a constant where clamp or camera stand elsewhere, and in step with
+//! the clamp's speed where the clocks differ. A part
 //! in step with its acceleration is let go, for so does the rope bend. Along the rope
 //! nothing is known.
 //!
@@ -13,7 +13,6 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::lateral::Across;
 use super::plane::Point;
 
 /// The rope is continued from these parts of it (of its nodes).
@@ -51,6 +50,14 @@ pub struct ClampFit {
     pub frames: usize,
 }
 
+/// A place of the rope as it is seen in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SeenNode {
+    pub(super) point: Point,
+    /// How evident the rope is there, 0 to 1.
+    pub(super) confidence: f64,
+}
+
 /// The clamp in one frame, where the rope shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SeenClamp {
@@ -62,7 +69,7 @@ pub(super) struct SeenClamp {
 
 /// Continues the rope's first part, without its hidden nodes before `first`, up to the
 /// clamp. `None` where too little of it is seen.
-pub(super) fn seen_clamp(nodes: &[Across], first: usize) -> Option<SeenClamp> {
+pub(super) fn seen_clamp(nodes: &[SeenNode], first: usize) -> Option<SeenClamp> {
     let (short, along) = continued(nodes, first, PARTS[0])?;
     let (long, _) = continued(nodes, first, PARTS[1])?;
     let length = along[0].hypot(along[1]);
@@ -77,7 +84,7 @@ pub(super) fn seen_clamp(nodes: &[Across], first: usize) -> Option<SeenClamp> {
 }
 
 /// Place and direction of a parabola through a part of the nodes at the first one.
-fn continued(nodes: &[Across], first: usize, part: f64) -> Option<(Point, Point)> {
+fn continued(nodes: &[SeenNode], first: usize, part: f64) -> Option<(Point, Point)> {
     let end = first + (part * nodes.len() as f64).round() as usize;
     let clear: Vec<(f64, Point)> = nodes
         .iter()
@@ -270,20 +277,19 @@ mod tests {
     fn the_rope_is_continued_to_the_clamp() {
         let node = |i: usize, confidence: f64| {
             let s = i as f64;
-            Across {
+            SeenNode {
                 point: [0.3 + 0.002 * s + 1e-5 * s * s, 0.1 + 0.008 * s],
                 confidence,
-                rival: 0.0,
             }
         };
-        let nodes: Vec<Across> = (0..64).map(|i| node(i, f64::from(i > 1))).collect();
+        let nodes: Vec<SeenNode> = (0..64).map(|i| node(i, f64::from(i > 1))).collect();
         let seen = seen_clamp(&nodes, 2).unwrap();
         for at in seen.at {
             assert!((at[0] - 0.3).abs() < 1e-9 && (at[1] - 0.1).abs() < 1e-9);
         }
         assert!((seen.across[0] * 0.002 + seen.across[1] * 0.008).abs() < 1e-9);
         assert!(seen.across[0] > 0.0);
-        let hidden: Vec<Across> = (0..64).map(|i| node(i, 0.2)).collect();
+        let hidden: Vec<SeenNode> = (0..64).map(|i| node(i, 0.2)).collect();
         assert_eq!(seen_clamp(&hidden, 2), None);
     }
 }

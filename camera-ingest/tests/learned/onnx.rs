@@ -121,30 +121,58 @@ impl Graph {
     }
 }
 
-/// Inputs and output of a segmenter of pictures `[H, W]` and `P` prompts.
-pub(crate) fn segmenter([h, w]: [Axis; 2], p: Axis) -> Graph {
-    Graph::default()
-        .input("image", FLOAT, &[Axis::Is(1), Axis::Is(3), h, w])
-        .input("points", FLOAT, &[Axis::Is(1), p, Axis::Is(2)])
-        .input("labels", FLOAT, &[Axis::Is(1), p])
-        .output("mask", FLOAT, &[Axis::Is(1), Axis::Is(1), h, w])
-}
+/// Where a point is seen worse than this, [`steady()`] has it a pixel of its picture too far
+/// to the right.
+const POORLY: f32 = 0.5;
 
-/// Rope is what is redder than blue; prompts count nothing.
-pub(crate) fn by_colour(size: [Axis; 2]) -> Graph {
-    segmenter(size, Axis::Open("P"))
-        .floats("weight", &[1, 3, 1, 1], &[1.0, 0.0, -1.0])
-        .floats("bias", &[1], &[-0.2])
-        .floats("nothing", &[], &[0.0])
-        .node(
-            "Conv",
-            &["image", "weight", "bias"],
-            "colour",
-            &[ints("kernel_shape", &[1, 1])],
+/// Points move by `shift` a frame (pixels of its picture), whatever is seen; they are
+/// seen as well as `visible` says of each frame of a chunk.
+pub(crate) fn steady(size: [Axis; 2], n: Axis, shift: [f32; 2], visible: &[f32]) -> Graph {
+    let t = visible.len() as u64;
+    let moved: Vec<f32> = (0..visible.len())
+        .flat_map(|frame| {
+            let [x, y] = shift.map(|s| s * frame as f32);
+            [x + f32::from(visible[frame] < POORLY), y]
+        })
+        .collect();
+    Graph::default()
+        .input(
+            "frames",
+            FLOAT,
+            &[Axis::Is(1), Axis::Is(t), Axis::Is(3), size[0], size[1]],
         )
-        .node("ReduceSum", &["points"], "p", &[int("keepdims", 0)])
-        .node("ReduceSum", &["labels"], "l", &[int("keepdims", 0)])
-        .node("Add", &["p", "l"], "sum", &[])
-        .node("Mul", &["sum", "nothing"], "zero", &[])
-        .node("Add", &["colour", "zero"], "mask", &[])
+        .input("queries", FLOAT, &[Axis::Is(1), n, Axis::Is(3)])
+        .output("tracks", FLOAT, &[Axis::Is(1), Axis::Is(t), n, Axis::Is(2)])
+        .output("visibility", FLOAT, &[Axis::Is(1), Axis::Is(t), n])
+        .floats("moved", &[1, t, 1, 2], &moved)
+        .floats("shift", &[1, 1, 1, 2], &shift)
+        .floats("visible", &[1, t, 1], visible)
+        .floats("nothing", &[], &[0.0])
+        .integers("axis0", &[0])
+        .integers("axis1", &[1])
+        .integers("axis2", &[2])
+        .integers("axis3", &[3])
+        .node(
+            "Slice",
+            &["queries", "axis0", "axis1", "axis2"],
+            "when",
+            &[],
+        )
+        .node(
+            "Slice",
+            &["queries", "axis1", "axis3", "axis2"],
+            "where",
+            &[],
+        )
+        .node("Unsqueeze", &["when", "axis1"], "when4", &[])
+        .node("Unsqueeze", &["where", "axis1"], "where4", &[])
+        .node("Mul", &["when4", "shift"], "before", &[])
+        .node("Sub", &["where4", "before"], "origin", &[])
+        .node("ReduceMean", &["frames"], "light", &[int("keepdims", 0)])
+        .node("Mul", &["light", "nothing"], "dark", &[])
+        .node("Add", &["origin", "moved"], "places", &[])
+        .node("Add", &["places", "dark"], "tracks", &[])
+        .node("Transpose", &["when"], "flat", &[ints("perm", &[0, 2, 1])])
+        .node("Mul", &["flat", "nothing"], "zero", &[])
+        .node("Add", &["visible", "zero"], "visibility", &[])
 }

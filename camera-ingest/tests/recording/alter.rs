@@ -3,8 +3,7 @@
 
 use super::Wiggle;
 use camera_ingest::EyeFrame;
-use camera_ingest::track::ClampSample;
-use camera_ingest::{ClampPath, frame::ycc_from_rgb};
+use camera_ingest::frame::ycc_from_rgb;
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -238,13 +237,12 @@ impl Wiggle {
         let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
         self.camera.r_w_cam = mirror * self.camera.r_w_cam * mirror;
         self.camera.p_w_cam_m = mirror * self.camera.p_w_cam_m;
-        let samples = self.clamp.samples().iter();
-        let samples = samples.map(|s| ClampSample {
-            p_w_m: mirror * s.p_w_m,
-            pole_w: mirror * s.pole_w,
-            ..*s
-        });
-        self.clamp = ClampPath::new(samples.collect()).unwrap();
+        for pose in &mut self.poses {
+            pose.p_m[0] = -pose.p_m[0];
+            // Turns about axes in the mirror go the other way round.
+            let [w, x, y, z] = pose.q_wxyz;
+            pose.q_wxyz = [w, x, -y, -z];
+        }
         self
     }
 

@@ -3,11 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
+use arm_model::{JointVector, Pole};
 use camera_ingest::source::FrameSource;
-use camera_ingest::track::Models;
 use camera_ingest::{
-    ClampPath, EyeFrame, TrackError, TrackOptions, TrackResult, load_camera, open_video, track_with,
+    EyeFrame, Film, TrackError, TrackOptions, TrackResult, load_camera, open_video, track,
 };
+use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
 use shared_types::StereoCamera;
 
 /// Folder of a recording; `None`, with a message, where the data are missing.
@@ -43,12 +44,44 @@ pub(crate) fn read_npy(path: &Path) -> (Vec<usize>, Vec<f32>) {
     (shape, values)
 }
 
+/// The numbers of a table without its head.
+fn rows(path: &Path) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let row = |line: &str| line.split(',').map(|c| c.trim().parse().unwrap()).collect();
+    text.lines().skip(1).map(row).collect()
+}
+
+/// Poses of the attach frame, `t,x,y,z,qw,qx,qy,qz`.
+fn read_poses(path: &Path) -> Vec<PoseRow> {
+    let pose = |r: &Vec<f64>| PoseRow {
+        t_s: r[0],
+        p_m: [r[1], r[2], r[3]],
+        q_wxyz: [r[4], r[5], r[6], r[7]],
+    };
+    rows(path).iter().map(pose).collect()
+}
+
+/// The attach frame's motion in a folder: from measured joints where there are some, else
+/// from poses.
+pub(crate) fn motion(folder: &Path) -> Box<dyn AttachMotion> {
+    let joints = folder.join("joints_measured.csv");
+    if !joints.exists() {
+        return Box::new(PoseTrack::new(&read_poses(&folder.join("pose.csv"))).unwrap());
+    }
+    let rows = rows(&joints);
+    let times_s: Vec<f64> = rows.iter().map(|r| r[0]).collect();
+    let q = |r: &Vec<f64>| JointVector::from(core::array::from_fn(|i| r[i + 1]));
+    let q: Vec<JointVector> = rows.iter().map(q).collect();
+    Box::new(MeasuredArm::new(&times_s, &q, Pole::default()).unwrap())
+}
+
 /// A wiggle in memory: left image, camera, clamp and truth.
 #[derive(Clone)]
 pub(crate) struct Wiggle {
     pub(crate) frames: Vec<EyeFrame>,
     pub(crate) camera: StereoCamera,
-    pub(crate) clamp: ClampPath,
+    /// Poses of the clamp.
+    pub(crate) poses: Vec<PoseRow>,
     /// Pixels of the nodes per frame.
     pub(crate) truth: Vec<Vec<[f64; 2]>>,
 }
@@ -69,7 +102,7 @@ impl Wiggle {
         Some(Self {
             frames: (0..count).map(|i| video.read(i).unwrap().left()).collect(),
             camera: load_camera(&folder.join("camera.toml")).unwrap(),
-            clamp: ClampPath::from_pose_csv(&folder.join("pose.csv")).unwrap(),
+            poses: read_poses(&folder.join("pose.csv")),
             truth: truth
                 .chunks_exact(2 * shape[1])
                 .take(count)
@@ -84,16 +117,16 @@ impl Wiggle {
 
     /// Tracked with a keypoint for every node.
     pub(crate) fn track(&self) -> Result<TrackResult, TrackError> {
-        self.track_with(&mut Models::default())
-    }
-
-    /// The same with learned models.
-    pub(crate) fn track_with(&self, models: &mut Models<'_>) -> Result<TrackResult, TrackError> {
         let options = TrackOptions {
             keypoints: self.nodes(),
             ..TrackOptions::default()
         };
-        track_with(&self.frames, &self.camera, &self.clamp, &options, models)
+        let motion = PoseTrack::new(&self.poses).unwrap();
+        let film = Film {
+            left: &self.frames,
+            right: &[],
+        };
+        track(film, &self.camera, &motion, &options)
     }
 
     /// Distance of every keypoint from its node, frame by frame (px).

@@ -4,7 +4,6 @@
 //! is 0 whatever the figures are.
 
 mod identify;
-mod live;
 mod plan;
 mod report;
 mod rope;

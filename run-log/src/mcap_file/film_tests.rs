@@ -6,9 +6,10 @@ use crate::mcap_file::image::left_jpeg;
 use crate::mcap_file::messages;
 use crate::mcap_file::writer::McapFile;
 use arm_model::Pole;
-use camera_ingest::{ClampPath, TrackOptions, track};
+use camera_ingest::{Film, TrackOptions, track};
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{Frame, WiggleFilm, joints};
+use rope_sim::MeasuredArm;
 use shared_types::ipc::{CycleRecord, FrameHeader, JointReport, PIXEL_FORMAT_YUYV};
 
 /// Monotonic time at which the wiggle begins (ns).
@@ -107,14 +108,7 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
     let first_s = part.joints.times_s[0];
     assert!((-0.5..-0.35).contains(&first_s), "{first_s}");
 
-    let samples: Vec<_> = part
-        .joints
-        .times_s
-        .iter()
-        .copied()
-        .zip(part.joints.q.clone())
-        .collect();
-    let clamp = ClampPath::from_joints(&samples, &Pole::default()).unwrap();
+    let arm = MeasuredArm::new(&part.joints.times_s, &part.joints.q, Pole::default()).unwrap();
     let frames: Vec<EyeFrame> = (0..part.len())
         .map(|i| part.read_left(i).unwrap())
         .collect();
@@ -122,7 +116,11 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
         keypoints: shown[0].nodes.len(),
         ..TrackOptions::default()
     };
-    let found = track(&frames, &camera, &clamp, &options).unwrap();
+    let film = Film {
+        left: &frames,
+        right: &[],
+    };
+    let found = track(film, &camera, &arm, &options).unwrap();
     assert_eq!(found.track.lost_fraction(), 0.0);
     let mut errors_px: Vec<f64> = Vec::new();
     for (frame, truth) in found.track.frames.iter().zip(&shown) {

@@ -1,7 +1,7 @@
 //! Arguments of what looks: film, track, score, calib.
 
 use super::SceneArgs;
-use super::values::{Colour, Pixel, rate_hz};
+use super::values::{Colour, rate_hz};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -67,7 +67,7 @@ pub struct TrackArgs {
     /// Keypoints per frame.
     #[arg(long, default_value_t = 20)]
     pub keypoints: usize,
-    /// Learned models.
+    /// Learned model.
     #[command(flatten)]
     pub models: ModelArgs,
     /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
@@ -78,21 +78,13 @@ pub struct TrackArgs {
     pub out: PathBuf,
 }
 
-/// Learned models instead of parts of the tracker.
+/// A learned model instead of a part of the tracker.
 #[derive(Debug, Args)]
 pub struct ModelArgs {
-    /// ONNX segmenter for the first frame's mask, instead of the one camera.toml names
-    /// or the built-in one.
-    #[arg(long, value_name = "ONNX")]
-    pub segmenter: Option<PathBuf>,
-    /// ONNX point tracker, instead of the one camera.toml names
-    /// or the built-in one.
+    /// ONNX point tracker that follows the rope through the film once it is found, instead
+    /// of the one camera.toml names or the built-in reading.
     #[arg(long, value_name = "ONNX")]
     pub tracker: Option<PathBuf>,
-    /// Centre of the lead in the first frame of the left image (pixel U,V): a
-    /// prompt for the segmenter.
-    #[arg(long, value_name = "U,V")]
-    pub lead_px: Option<Pixel>,
 }
 
 /// A stereo film and what filmed it.

@@ -64,18 +64,6 @@ fn listed<T: FromStr, const N: usize>(
         .ok_or_else(|| format!("`{text}` must be {what}"))
 }
 
-/// A pixel `U,V`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pixel(pub [f64; 2]);
-
-impl FromStr for Pixel {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let fits = |x: &f64| x.is_finite() && *x >= 0.0;
-        listed(text, "two finite numbers U,V, none below 0", fits).map(Self)
-    }
-}
-
 /// Three finite numbers `x,y,z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point(pub [f64; 3]);

@@ -72,7 +72,7 @@ fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed
     let motion = filmed.motion.attach().or_input()?;
     let stage = Stage::begin("track", quiet);
     let file = args.scene.camera.as_deref();
-    let mut learned = Learned::load(None, file, &filmed.camera)?;
+    let mut learned = Learned::load(None, file)?;
     let TrackedVideo { frames, result } =
         track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
     stage.done(&format!("{} frames", frames.len()));

@@ -1,22 +1,18 @@
-//! Learned models in the place of the tracker's parts.
+//! A learned tracker of points in the place of the tracker's reading.
 
 use crate::cli::ModelArgs;
-use anyhow::anyhow;
 use camera_ingest::TrackError;
 use camera_ingest::calib::load_model_files;
-use camera_ingest::learned::{OnnxSegmenter, OnnxTracker};
-use camera_ingest::track::{ModelError, Models};
+use camera_ingest::learned::OnnxTracker;
+use camera_ingest::track::ModelError;
 use cli_output::{Failure, OrInput, Outcome};
 use serde_json::{Value, json};
-use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 
-/// The models that are used; what there is none for is built in.
+/// The model that is used; without one, the film is read as it is built in.
 #[derive(Debug)]
 pub struct Learned {
-    segmenter: Option<(PathBuf, OnnxSegmenter)>,
     tracker: Option<(PathBuf, OnnxTracker)>,
-    lead_px: Option<[f64; 2]>,
 }
 
 /// Bad input where it is the file's fault.
@@ -32,87 +28,33 @@ fn refused(error: ModelError) -> Failure {
     }
 }
 
-fn load<T>(
-    path: Option<PathBuf>,
-    load: impl Fn(&Path) -> Result<T, ModelError>,
-) -> Outcome<Option<(PathBuf, T)>> {
-    let Some(path) = path else { return Ok(None) };
-    let model = load(&path).map_err(refused)?;
-    Ok(Some((path, model)))
-}
-
-/// Which file does a part's work, if not this program itself.
-fn who(model: Option<(&Path, &str)>) -> Value {
-    model.map_or_else(
-        || json!({ "by": "built-in" }),
-        |(path, sha256)| json!({ "by": "model", "file": path, "sha256": sha256 }),
-    )
-}
-
-/// A prompt nobody reads, or beside the picture, is a mistake.
-fn check_lead(lead_px: Option<[f64; 2]>, read: bool, camera: &StereoCamera) -> Outcome {
-    let Some([u, v]) = lead_px else { return Ok(()) };
-    if !read {
-        return Err(Failure::input(anyhow!(
-            "--lead-px is a prompt for a segmenter: name one with --segmenter"
-        )));
-    }
-    if !camera.contains([u, v]) {
-        return Err(Failure::input(anyhow!(
-            "--lead-px {u},{v} lies outside the left image's {}x{} px",
-            camera.width_px,
-            camera.height_px
-        )));
-    }
-    Ok(())
-}
-
 impl Learned {
-    /// The models that the command line names, or else `camera.toml`; `camera` is what
-    /// that file says.
+    /// The model that the command line names, or else `camera.toml`.
     ///
     /// # Errors
     /// Why a file is refused.
-    pub fn load(
-        args: Option<&ModelArgs>,
-        file: Option<&Path>,
-        camera: &StereoCamera,
-    ) -> Outcome<Self> {
+    pub fn load(args: Option<&ModelArgs>, file: Option<&Path>) -> Outcome<Self> {
         let files = file.map(load_model_files).transpose().or_input()?;
-        let files = files.unwrap_or_default();
-        let named = |pick: fn(&ModelArgs) -> &Option<PathBuf>| args.and_then(|a| pick(a).clone());
-        let segmenter = named(|a| &a.segmenter).or(files.segmenter);
-        let tracker = named(|a| &a.tracker).or(files.tracker);
-        let lead_px = args.and_then(|a| a.lead_px).map(|pixel| pixel.0);
-        check_lead(lead_px, segmenter.is_some(), camera)?;
+        let tracker = args.and_then(|a| a.tracker.clone());
+        let path = tracker.or(files.unwrap_or_default().tracker);
+        let load = |path: PathBuf| OnnxTracker::load(&path).map(|model| (path, model));
         Ok(Self {
-            segmenter: load(segmenter, OnnxSegmenter::load)?,
-            tracker: load(tracker, OnnxTracker::load)?,
-            lead_px,
+            tracker: path.map(load).transpose().map_err(refused)?,
         })
     }
 
-    /// What the tracker takes.
-    pub fn models(&mut self) -> Models<'_> {
-        Models {
-            first_mask: self.segmenter.as_mut().map(|(_, model)| model as _),
-            point_tracker: self.tracker.as_mut().map(|(_, model)| model as _),
-        }
+    /// The tracker of points, if there is one.
+    pub fn tracker(&mut self) -> Option<&mut OnnxTracker> {
+        self.tracker.as_mut().map(|(_, model)| model)
     }
 
-    /// Where the lead's centre is, if somebody said.
-    pub fn lead_px(&self) -> Option<[f64; 2]> {
-        self.lead_px
-    }
-
-    /// Who did what, for machines.
+    /// Who read the film, for machines.
     pub fn report(&self) -> Value {
-        let segmenter = self.segmenter.as_ref();
-        let tracker = self.tracker.as_ref();
-        json!({
-            "first_mask": who(segmenter.map(|(path, m)| (path.as_path(), m.sha256()))),
-            "following": who(tracker.map(|(path, m)| (path.as_path(), m.sha256()))),
-        })
+        let by = self.tracker.as_ref().map_or_else(
+            || json!({ "by": "built-in" }),
+            |(path, model)| json!({ "by": "model", "file": path, "sha256": model.sha256() }),
+        );
+        json!({ "reading": by })
     }
 }
 

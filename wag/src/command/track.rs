@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
-use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track_film};
+use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track};
 use cli_output::{Failure, OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
@@ -26,7 +26,7 @@ pub struct TrackedVideo {
     pub result: TrackResult,
 }
 
-/// Tracks the rope through a film, with learned models where there are any.
+/// Tracks the rope through a film; a learned tracker reads it where there is one.
 pub fn track_video(
     filmed: &mut Filmed,
     learned: &mut Learned,
@@ -39,11 +39,14 @@ pub fn track_video(
     stage.say(format!("tracking through {} frames", eyes.left.len()));
     let options = TrackOptions {
         keypoints,
-        lead_px: learned.lead_px(),
         ..TrackOptions::default()
     };
-    let (film, models) = (eyes.film(), &mut learned.models());
-    let result = track_film(film, &filmed.camera, &*motion, &options, models)
+    let explained = track(eyes.film(), &filmed.camera, &*motion, &options);
+    let result = explained
+        .and_then(|result| match learned.tracker() {
+            Some(tracker) => result.by_points(&eyes.left, tracker),
+            None => Ok(result),
+        })
         .map_err(|error| classify(error, &filmed.path))?;
     Ok(TrackedVideo {
         frames: eyes.left,
@@ -95,7 +98,7 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     let mut filmed = Filmed::open(&args.video, args.fps, &args.scene)?;
     filmed.warn();
     let file = args.scene.camera.as_deref();
-    let mut learned = Learned::load(Some(&args.models), file, &filmed.camera)?;
+    let mut learned = Learned::load(Some(&args.models), file)?;
     let stage = Stage::begin("track", quiet);
     let tracked = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
     let (frames, result) = (&tracked.frames, &tracked.result);

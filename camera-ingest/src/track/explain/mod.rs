@@ -26,12 +26,10 @@ use rope_sim::AttachMotion;
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 
-use super::clamp::ClampPath;
-use super::confirmation::{Confirmation, DOUBT};
-use super::lateral::Across;
+use super::confirmation::{Confirmation, DOUBT, doubted};
 use super::plane::RopePlane;
-use super::timing;
-use super::{RopeAppearance, TrackOptions, TrackResult, TrackTimes};
+use super::timing::{self, SeenNode};
+use super::{RopeAppearance, TrackError, TrackOptions, TrackResult, TrackTimes};
 use crate::frame::{EyeFrame, rgb_from_ycc};
 use colour::{CHROMA_WEIGHT, Colour};
 use evidence::Scene;
@@ -91,23 +89,12 @@ impl Film<'_> {
     }
 }
 
-/// Why a film is not explained.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum Unexplained {
-    /// The best rope is hardly to be seen where it should be.
-    #[error(
-        "the best rope explains {found:.2?} of what is seen (middle, least nodes, least frames)"
-    )]
-    TooLittle {
-        /// Evidence found.
-        found: [f64; 3],
-    },
-    /// The camera does not see the clamp.
-    #[error("the camera does not see the clamp")]
-    OutOfSight,
-    /// The motion cannot be simulated.
-    #[error(transparent)]
-    Search(#[from] SearchError),
+impl From<SearchError> for TrackError {
+    fn from(error: SearchError) -> Self {
+        Self::Motion {
+            reason: error.to_string(),
+        }
+    }
 }
 
 /// Tracks the rope through a film by explaining it.
@@ -119,7 +106,7 @@ pub(super) fn explain(
     camera: &StereoCamera,
     motion: &dyn AttachMotion,
     options: &TrackOptions,
-) -> Result<TrackResult, Unexplained> {
+) -> Result<TrackResult, TrackError> {
     let start = Instant::now();
     let times_s: Vec<f64> = film
         .left
@@ -143,12 +130,12 @@ pub(super) fn explain(
     let film_s = times_s[times_s.len() - 1];
     let rollouts =
         simulate(&[found.x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
-    let seen = Seen::new(&found.x, &rollouts[0], camera).ok_or(Unexplained::OutOfSight)?;
+    let seen = Seen::new(&found.x, &rollouts[0], camera).ok_or(TrackError::BehindCamera)?;
     let curves = times_s
         .iter()
         .map(|t_s| curve_at(&seen, *t_s, Side::Left))
         .collect::<Option<Vec<_>>>()
-        .ok_or(Unexplained::OutOfSight)?;
+        .ok_or(TrackError::BehindCamera)?;
     let reading = Reader::new(&scene, film.left, curves.clone()).read();
     let testimony = right.and_then(|right| {
         let sights = sights(film, &seen, &times_s, &curves, &reading.curves);
@@ -162,12 +149,12 @@ pub(super) fn explain(
         times_s: &times_s,
     };
     let mut result =
-        result(&read, (camera, motion), options.keypoints).ok_or(Unexplained::OutOfSight)?;
+        result(&read, (camera, motion), options.keypoints).ok_or(TrackError::BehindCamera)?;
     result.appearance.noise = scene.noise();
     result.times = TrackTimes {
         background,
-        first_frame: searching,
-        follow: start.elapsed(),
+        searching,
+        reading: start.elapsed(),
     };
     Ok(result)
 }
@@ -277,7 +264,7 @@ fn mean(values: &[f64]) -> f64 {
 
 /// How evident the rope is in most frames, if it is evident enough along all of it and in
 /// nearly all of them.
-fn usual_evidence(reading: &Reading, keypoints: usize) -> Result<f64, Unexplained> {
+fn usual_evidence(reading: &Reading, keypoints: usize) -> Result<f64, TrackError> {
     let evident: Vec<Vec<f64>> = (0..reading.frames())
         .map(|i| reading.places(i, keypoints).1)
         .collect();
@@ -292,7 +279,10 @@ fn usual_evidence(reading: &Reading, keypoints: usize) -> Result<f64, Unexplaine
         "evidence of the rope: middle, least nodes, least frames"
     );
     if found.iter().zip(LEAST_EVIDENT).any(|(f, least)| *f < least) {
-        return Err(Unexplained::TooLittle { found });
+        return Err(TrackError::NoRope {
+            evident: found,
+            least: LEAST_EVIDENT,
+        });
     }
     Ok(usual)
 }
@@ -326,11 +316,9 @@ impl Read<'_> {
     }
 
     fn confirmation(&self, frames: &[TrackedFrame]) -> Confirmation {
-        let all = frames.iter().flat_map(|f| &f.confidence);
-        let doubted = all.clone().filter(|c| **c < DOUBT).count();
         let tips = self.reading.tips.iter().map(|(_, across)| across.weight);
         Confirmation {
-            doubted: doubted as f64 / all.count().max(1) as f64,
+            doubted: doubted(frames),
             tip: quantile(tips.collect(), 0.5),
             second_image: self.testimony.map(Testimony::confirmed),
         }
@@ -346,20 +334,19 @@ fn result(
     let Read {
         reading, times_s, ..
     } = *read;
-    let plane = RopePlane::fit(camera, &ClampPath::of(motion), times_s[times_s.len() - 1])?;
+    let plane = RopePlane::fit(camera, motion, times_s[times_s.len() - 1])?;
     let mut frames = Vec::with_capacity(times_s.len());
     let mut clamps = Vec::new();
     let mut residual = Vec::with_capacity(times_s.len());
     for (i, t_s) in times_s.iter().enumerate() {
         let (frame, evident) = read.frame(i, keypoints);
         let (nodes, seen) = reading.places(i, NODES);
-        let across: Vec<Across> = nodes
+        let across: Vec<SeenNode> = nodes
             .iter()
             .zip(&seen)
-            .map(|(p, e)| Across {
+            .map(|(p, e)| SeenNode {
                 point: plane.point_at(*p),
                 confidence: (e / read.usual).min(1.0),
-                rival: 0.0,
             })
             .collect();
         if !frame.lost
