@@ -4,16 +4,15 @@
 #![cfg(test)]
 #![allow(missing_docs, reason = "a test")]
 
-use arm_model::Pole;
-use camera_ingest::{EyeFrame, Film, StereoFrame, TrackOptions, track};
+#[path = "track_rendered/film.rs"]
+mod film;
+
+use film::{Filmed, Take};
 use hil_tests::for_each_seed;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::CameraConfig;
 use rig_sim::hidden::hidden_rope;
-use rig_sim::wiggle_film::{WiggleFilm, joints};
-use rope_sim::MeasuredArm;
-use shared_types::StereoCamera;
 
 /// Frames filmed of each rope, dropped ones included: the rise and the middle of a wiggle.
 const FRAMES: usize = 280;
@@ -25,47 +24,6 @@ const STALLS: f64 = 0.01;
 const STALL_FRAMES: usize = 9;
 /// Frames filmed before the wiggle.
 const STILL: f64 = 20.0;
-
-struct Filmed {
-    frames: Vec<EyeFrame>,
-    truth: Vec<Vec<[f64; 2]>>,
-    arm: MeasuredArm,
-    camera: StereoCamera,
-}
-
-/// Joints as the arm reports them, time 0 at the first frame.
-fn arm(until_s: f64, first_s: f64) -> MeasuredArm {
-    let times_s = (0..).map(|i| f64::from(i) * 4e-3);
-    let times_s: Vec<f64> = times_s.take_while(|t| *t < until_s).collect();
-    let q: Vec<_> = times_s.iter().map(|t| joints(t + first_s)).collect();
-    MeasuredArm::new(&times_s, &q, Pole::default()).unwrap()
-}
-
-/// Films the wiggle of a seed's rope; `keep` says which frames arrive.
-fn film(config: &CameraConfig, seed: u64, mut keep: impl FnMut(usize) -> bool) -> Filmed {
-    let camera = config.stereo_camera();
-    let size = [2 * camera.width_px as usize, camera.height_px as usize];
-    // Every seed meets the frames at another phase.
-    let first_s = -(STILL + (seed % 7) as f64 / 7.0) / config.frame_rate_hz;
-    let film = WiggleFilm::new(config, seed, None, first_s).unwrap();
-    let (mut frames, mut truth) = (Vec::new(), Vec::new());
-    for (index, frame) in film.take(FRAMES).enumerate() {
-        if index > 0 && !keep(index) {
-            continue;
-        }
-        let stamp_ns = 1_000_000_000 + ((frame.start_s - first_s) * 1e9).round() as u64;
-        let stereo = StereoFrame::from_yuyv(&frame.yuyv, size, stamp_ns, index as u64).unwrap();
-        frames.push(stereo.left());
-        let pixels = frame.nodes.iter().map(|p| camera.project_left(p).unwrap());
-        truth.push(pixels.collect());
-    }
-    Filmed {
-        frames,
-        truth,
-        arm: arm(FRAMES as f64 / config.frame_rate_hz + 0.1, first_s),
-        camera,
-    }
-}
 
 /// Drops frames one by one and, now and then, some in a row.
 fn busy_machine(seed: u64) -> impl FnMut(usize) -> bool {
@@ -112,18 +70,17 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
         },
         ..CameraConfig::default()
     };
-    let filmed = film(&config, seed, |index| {
+    let take = Take {
+        seed,
+        radii_m: None,
+        // Every seed meets the frames at another phase.
+        still: STILL + (seed % 7) as f64 / 7.0,
+        frames: FRAMES,
+    };
+    let filmed = Filmed::of(&config, take, |index| {
         filming != Filming::Busy || arrives(index)
     });
-    let options = TrackOptions {
-        keypoints: filmed.truth[0].len(),
-        ..TrackOptions::default()
-    };
-    let film = Film {
-        left: &filmed.frames,
-        right: &[],
-    };
-    let found = match track(film, &filmed.camera, &filmed.arm, &options) {
+    let found = match filmed.track(&filmed.arm(0.0)) {
         Ok(found) => found,
         Err(error) => {
             println!("seed {seed}, {filming:?}: {error}");
@@ -139,16 +96,19 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
     };
     let (mut errors_px, mut confident_px) = (Vec::new(), 0.0_f64);
     let mut doubted = 0;
-    for (frame, truth) in found.track.frames.iter().zip(&filmed.truth) {
+    for (index, frame) in found.track.frames.iter().enumerate() {
         doubted += usize::from(frame.lost || frame.confidence.iter().all(|c| *c <= 0.5));
         if frame.lost {
             continue;
         }
-        for (i, (a, b)) in frame.points.iter().zip(truth).enumerate() {
-            let off = (a[0] - b[0]).hypot(a[1] - b[1]);
-            errors_px.push(off);
-            if frame.confidence[i] > 0.5 {
-                confident_px = confident_px.max(off);
+        for (off, confidence) in filmed
+            .errors_px(&found, index)
+            .iter()
+            .zip(&frame.confidence)
+        {
+            errors_px.push(*off);
+            if *confidence > 0.5 {
+                confident_px = confident_px.max(*off);
             }
         }
     }
@@ -199,4 +159,81 @@ fn a_rope_is_not_lost_where_nothing_hides_it() {
         }
     }
     assert!(bad.is_empty(), "{bad:?}");
+}
+
+/// A quiet film of a rope of usual thickness.
+fn usual(radii_m: Option<[f64; 2]>) -> Filmed {
+    let take = Take {
+        seed: 7,
+        radii_m,
+        still: STILL,
+        frames: 180,
+    };
+    Filmed::of(&CameraConfig::default(), take, |_| true)
+}
+
+#[test]
+fn a_clock_and_a_clamp_that_are_off_are_reported() {
+    let mut filmed = usual(None);
+    let right = filmed.camera.r_w_cam.column(0).into_owned();
+    let place_m = filmed.camera.p_w_cam_m;
+    for (late_s, aside_m) in [(0.0, 0.0), (0.008, 0.002), (-0.012, -0.002)] {
+        // A camera told further to the left sees the clamp further to the right.
+        filmed.camera.p_w_cam_m = place_m + right * aside_m;
+        let found = filmed.track(&filmed.arm(late_s)).unwrap().clamp.unwrap();
+        println!("{late_s} s, {aside_m} m: {found:?}");
+        // A motion reported late makes the film early.
+        let off_s = (found.time_offset_s + late_s).abs();
+        let off_m = (found.aside_m - aside_m).abs();
+        assert!(off_s < 2.0 * found.time_std_s + 5e-4, "{found:?}");
+        assert!(off_m < 2.0 * found.aside_std_m + 5e-4, "{found:?}");
+        assert!(
+            found.time_std_s < 3e-3 && found.aside_std_m < 2e-3,
+            "{found:?}"
+        );
+        assert!(found.frames > 100, "{found:?}");
+    }
+}
+
+#[test]
+fn a_rope_behind_something_is_lost_only_there() {
+    let mut filmed = usual(None);
+    let hidden = 90..96;
+    for frame in &mut filmed.frames[hidden.clone()] {
+        frame.luma.fill(90);
+        frame.cb.fill(128);
+        frame.cr.fill(128);
+    }
+    let found = filmed.track(&filmed.arm(0.0)).unwrap();
+    for (index, frame) in found.track.frames.iter().enumerate() {
+        assert_eq!(frame.lost, hidden.contains(&index), "frame {index}");
+        let errors = filmed.errors_px(&found, index);
+        let most = errors.into_iter().fold(0.0, f64::max);
+        assert!(frame.lost || most < 8.0, "frame {index}: {most:.1} px");
+    }
+}
+
+#[test]
+fn rope_and_lead_look_as_thick_as_they_are() {
+    // Slender, a fat lead, a lead hardly fatter than the rope.
+    for radii_m in [[0.004, 0.020], [0.006, 0.035], [0.011, 0.0125]] {
+        let filmed = usual(Some(radii_m));
+        let found = filmed.track(&filmed.arm(0.0)).unwrap();
+        let seen = &found.appearance;
+        println!("{radii_m:?}: {seen:?}");
+        let told_m = [seen.rope_radius_m, seen.lead_radius_m];
+        for (told_m, true_m) in told_m.into_iter().zip(radii_m) {
+            assert!((told_m - true_m).abs() < 1.5e-3, "{radii_m:?}: {seen:?}");
+        }
+        let length_m = filmed.length_m;
+        assert!(
+            (seen.length_m / length_m - 1.0).abs() < 0.02,
+            "{length_m}: {seen:?}"
+        );
+        let all: Vec<f64> = (0..filmed.frames.len())
+            .flat_map(|i| filmed.errors_px(&found, i))
+            .collect();
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        assert!(mean < 1.5, "{radii_m:?}: {mean:.2} px");
+    }
 }
