@@ -7,6 +7,7 @@
 #[path = "track_rendered/film.rs"]
 mod film;
 
+use camera_ingest::EyeFrame;
 use film::{Filmed, Take};
 use hil_tests::for_each_seed;
 use rand::{RngExt, SeedableRng};
@@ -196,44 +197,49 @@ fn a_clock_and_a_clamp_that_are_off_are_reported() {
 }
 
 #[test]
-fn a_rope_behind_something_is_lost_only_there() {
+fn a_rope_that_is_not_there_for_a_while_is_lost_only_then() {
     let mut filmed = usual(None);
     let hidden = 90..96;
+    let empty = filmed.scene();
     for frame in &mut filmed.frames[hidden.clone()] {
-        frame.luma.fill(90);
-        frame.cb.fill(128);
-        frame.cr.fill(128);
+        *frame = EyeFrame {
+            stamp_ns: frame.stamp_ns,
+            sequence: frame.sequence,
+            ..empty.clone()
+        };
     }
     let found = filmed.track(&filmed.arm(0.0)).unwrap();
-    for (index, frame) in found.track.frames.iter().enumerate() {
-        assert_eq!(frame.lost, hidden.contains(&index), "frame {index}");
-        let errors = filmed.errors_px(&found, index);
-        let most = errors.into_iter().fold(0.0, f64::max);
-        assert!(frame.lost || most < 8.0, "frame {index}: {most:.1} px");
-    }
+    let lost = |i: &usize| found.track.frames[*i].lost;
+    let lost: Vec<usize> = (0..filmed.frames.len()).filter(lost).collect();
+    assert_eq!(lost, hidden.clone().collect::<Vec<_>>());
+    let seen = (0..filmed.frames.len()).filter(|i| !hidden.contains(i));
+    let mut errors_px: Vec<f64> = seen.flat_map(|i| filmed.errors_px(&found, i)).collect();
+    errors_px.sort_by(f64::total_cmp);
+    let p95_px = errors_px[errors_px.len() * 95 / 100];
+    println!("95th percentile {p95_px:.2} px");
+    assert!(p95_px < 3.0, "{p95_px:.2} px");
 }
 
 #[test]
 fn rope_and_lead_look_as_thick_as_they_are() {
     // Slender, a fat lead, a lead hardly fatter than the rope.
+    let mut bad = Vec::new();
     for radii_m in [[0.004, 0.020], [0.006, 0.035], [0.011, 0.0125]] {
         let filmed = usual(Some(radii_m));
         let found = filmed.track(&filmed.arm(0.0)).unwrap();
         let seen = &found.appearance;
-        println!("{radii_m:?}: {seen:?}");
-        let told_m = [seen.rope_radius_m, seen.lead_radius_m];
-        for (told_m, true_m) in told_m.into_iter().zip(radii_m) {
-            assert!((told_m - true_m).abs() < 1.5e-3, "{radii_m:?}: {seen:?}");
-        }
-        let length_m = filmed.length_m;
-        assert!(
-            (seen.length_m / length_m - 1.0).abs() < 0.02,
-            "{length_m}: {seen:?}"
-        );
         let all: Vec<f64> = (0..filmed.frames.len())
             .flat_map(|i| filmed.errors_px(&found, i))
             .collect();
-        let mean = all.iter().sum::<f64>() / all.len() as f64;
-        assert!(mean < 1.5, "{radii_m:?}: {mean:.2} px");
+        let mean_px = all.iter().sum::<f64>() / all.len() as f64;
+        println!("{radii_m:?}: {seen:?}, {mean_px:.2} px");
+        let told_m = [seen.rope_radius_m, seen.lead_radius_m];
+        let mut radii = told_m.into_iter().zip(radii_m);
+        let long = (seen.length_m / filmed.length_m - 1.0).abs();
+        if !radii.all(|(told, truth)| (told - truth).abs() < 1.5e-3) || long > 0.02 || mean_px > 1.5
+        {
+            bad.push(radii_m);
+        }
     }
+    assert!(bad.is_empty(), "{bad:?}");
 }

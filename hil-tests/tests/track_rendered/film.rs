@@ -92,6 +92,25 @@ impl Filmed {
         track(film, &self.camera, arm, &options)
     }
 
+    /// What is behind the rope, but for where it hardly moves: the median over the motion.
+    pub(crate) fn scene(&self) -> EyeFrame {
+        let moving: Vec<&EyeFrame> = self.frames.iter().skip(60).step_by(4).collect();
+        let plane = |pick: fn(&EyeFrame) -> &Vec<u8>| -> Vec<u8> {
+            let at = |at: usize| {
+                let mut values: Vec<u8> = moving.iter().map(|f| pick(f)[at]).collect();
+                values.sort_unstable();
+                values[values.len() / 2]
+            };
+            (0..pick(moving[0]).len()).map(at).collect()
+        };
+        EyeFrame {
+            luma: plane(|f| &f.luma),
+            cb: plane(|f| &f.cb),
+            cr: plane(|f| &f.cr),
+            ..moving[0].clone()
+        }
+    }
+
     /// Distances of a frame's keypoints from its nodes (px).
     pub(crate) fn errors_px(&self, found: &TrackResult, frame: usize) -> Vec<f64> {
         let pairs = found.track.frames[frame]
