@@ -10,7 +10,7 @@ const DOUBTED_MOST: f64 = 0.25;
 /// How far the tip weight must stand out from what surrounds it, in the middle frame.
 const TIP_LEAST: f64 = 0.25;
 /// Part of the rope that the second image must show where the first one says.
-const CONFIRMED_LEAST: f64 = 0.6;
+const CONFIRMED_LEAST: f64 = 0.8;
 
 /// What speaks for a track.
 #[derive(Debug, Clone, Copy, PartialEq)]

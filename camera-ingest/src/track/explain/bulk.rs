@@ -14,7 +14,7 @@ const AROUND: usize = 4;
 const EVERY: usize = 4;
 /// Part of the surroundings from which evidence begins to count less, and from which it
 /// counts nothing.
-const FILLED: [f32; 2] = [0.25, 0.45];
+const FILLED: [f32; 2] = [0.45, 0.7];
 
 /// How far evidence counts, in cells of one frame.
 #[derive(Debug, Clone)]

@@ -55,6 +55,11 @@ fn square_distance(a: &Colour, b: &Colour) -> f32 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
 }
 
+/// Whether two colours are those of different things, however they are lit.
+pub(super) fn are_apart(a: &Colour, b: &Colour) -> bool {
+    square_distance(a, b) > (1.5 * APART).powi(2)
+}
+
 fn median(of: &[&Colour]) -> Colour {
     core::array::from_fn(|k| {
         let mut values: Vec<f32> = of.iter().map(|c| c[k]).collect();

@@ -15,6 +15,9 @@ const BRIGHTER: f32 = 0.5;
 const DARKER: f32 = 0.02;
 /// Evidence begins and is full at so many times the noise.
 const LEVELS: [f32; 2] = [1.5, 6.0];
+/// A still scene differs by less than what compression leaves around things that move
+/// (levels).
+const QUIETEST: f32 = 3.5;
 /// Keeps black from having a colour (squared levels).
 const BLACK: f32 = 100.0;
 
@@ -27,9 +30,9 @@ pub(super) struct Scene {
 impl Scene {
     /// The median over frames in which much has moved.
     pub(super) fn of(frames: &[EyeFrame], count: usize) -> Self {
-        Self {
-            background: Background::uncovered(frames, &frames_by_motion(frames, count)),
-        }
+        let mut background = Background::uncovered(frames, &frames_by_motion(frames, count));
+        background.noise = background.noise.max(QUIETEST);
+        Self { background }
     }
 
     pub(super) fn noise(&self) -> f32 {

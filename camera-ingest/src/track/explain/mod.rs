@@ -10,6 +10,7 @@ mod bulk;
 mod colour;
 mod curve;
 mod disc;
+mod end;
 mod ends;
 mod evidence;
 mod field;

@@ -1,10 +1,11 @@
 //! Reads the film off along the hypothesis: curve, ends and tip weight in every frame.
 
 use super::bulk::Bulk;
-use super::colour::{Colour, colour_at, coverage, groups};
+use super::colour::{Colour, are_apart, colour_at, coverage, groups};
 use super::curve::{from_end, normals};
 use super::disc::Disc;
-use super::ends::{End, EndPicture};
+use super::end::{self, End};
+use super::ends::EndPicture;
 use super::evidence::Scene;
 use super::field::{Look, Offset, moved, offsets, smooth_field, smoothed};
 use super::reading::Reading;
@@ -27,6 +28,10 @@ const LEARN_EVERY: usize = 3;
 /// Yarns of a rope, and sides of a tip weight, of different colour.
 const ROPE_COLOURS: usize = 3;
 const TIP_COLOURS: usize = 2;
+/// The tip weight's centre lies within this of the hypothesis's end (px).
+const END_REACH_PX: f64 = 24.0;
+/// It covers as much of the picture as the rope, at least nearly.
+const COVERED: f64 = 0.85;
 /// The tip weight is looked for this far from where the curve ends, at first and when its
 /// colours are known (px).
 const TIP_REACH_PX: [f64; 2] = [8.0, 5.0];
@@ -101,8 +106,11 @@ impl<'a> Reader<'a> {
             reader.unexplained(lit, p)
         });
         let rope = groups(&self.rope_samples(), ROPE_COLOURS);
-        let mut end = self.mean_picture(false).end();
-        let start_px = self.mean_picture(true).start_px();
+        let picture = self.mean_picture(false);
+        let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
+        // The hypothesis knows where the clamp is, but for the camera's place; the picture
+        // shows where the rope comes out of it, but for caps and knots: halfway.
+        let start_px = 0.5 * self.mean_picture(true).start_px();
         // Then what has the rope's colours.
         let look = Look {
             reach: SECOND_REACH,
@@ -126,10 +134,9 @@ impl<'a> Reader<'a> {
         let none = vec![(Offset::NONE, Offset::NONE); self.frames.len()];
         let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
         let both = [&rope[..], &tip].concat();
-        if let Some([offset_px, radius_px]) = self.tip_disc(&end, &both, &tips) {
-            end.centre_px += median_px(&tips) + offset_px;
-            end.radius_px = radius_px;
-        }
+        let disc = self.tip_disc(&end, &both, &tips);
+        end.centre_px += median_px(&tips) + disc.centre_px;
+        end.radius_px = disc.radius_px;
         let (tip, mut tips) = self.tips(&end, &tips, (&rope, TIP_REACH_PX[1]));
         // Where they are on average, the mean picture has told.
         let usual_px = median_px(&tips);
@@ -237,12 +244,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Centre and radius of the tip weight in the mean picture around where it was found.
-    fn tip_disc(
-        &self,
-        end: &End,
-        colours: &[Colour],
-        places: &[(Offset, Offset)],
-    ) -> Option<[f64; 2]> {
+    fn tip_disc(&self, end: &End, colours: &[Colour], places: &[(Offset, Offset)]) -> End {
         let mut picture = EndPicture::new(30, 30, 24);
         let noise = self.scene.noise();
         let found = self.frames.iter().zip(&self.curves).zip(places);
@@ -261,7 +263,8 @@ impl<'a> Reader<'a> {
                 Some((coverage(seen, behind, colours, noise), seen))
             });
         }
-        picture.disc()
+        let rope_half_px = picture.rope_half_px().min(end.rope_half_px);
+        end::find(&picture, rope_half_px, TIP_REACH_PX[0], COVERED)
     }
 
     /// Colours where the rope is evident, but for its ends, across half its width.
@@ -323,7 +326,14 @@ impl<'a> Reader<'a> {
         (rope, reach_px): (&[Colour], f64),
     ) -> (Vec<Colour>, Vec<(Offset, Offset)>) {
         let colours = groups(&self.tip_samples(end, before), TIP_COLOURS);
-        let looked_for = [&colours[..], rope].concat();
+        // Where it has colours of its own, the rope's would only blur where it begins.
+        let is_own = |c: &&Colour| rope.iter().all(|r| are_apart(c, r));
+        let own: Vec<Colour> = colours.iter().filter(is_own).copied().collect();
+        let looked_for = if own.is_empty() {
+            [&colours[..], rope].concat()
+        } else {
+            own
+        };
         let frames = self.frames.iter().zip(&self.curves);
         let (along, across): (Vec<Offset>, Vec<Offset>) = frames
             .map(|(lit, curve)| {

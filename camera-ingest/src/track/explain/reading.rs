@@ -2,7 +2,7 @@
 
 use super::colour::Colour;
 use super::curve::{at_part, from_end, length_px};
-use super::ends::End;
+use super::end::End;
 use super::field::Offset;
 
 /// The curve's last part bends to the tip weight's centre.

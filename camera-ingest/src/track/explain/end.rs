@@ -1,0 +1,122 @@
+//! The rope's free end in the mean picture: a band that ends in a disc.
+
+use nalgebra::{Matrix3, Matrix3x2, Vector3};
+
+use super::ends::EndPicture;
+
+/// Where the tip weight is, from the hypothesis's end on (px).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct End {
+    pub(super) centre_px: f64,
+    pub(super) radius_px: f64,
+    /// Half the rope's width.
+    pub(super) rope_half_px: f64,
+}
+
+/// Radii that are tried, and steps of the two rounds (px).
+const RADII_PX: [f64; 2] = [1.5, 17.0];
+const STEPS_PX: [f64; 2] = [1.0, 0.25];
+/// An edge is blurred over so much (px).
+const BLUR_PX: f64 = 1.5;
+
+/// The end of a rope of this half width that fits the evidence best; the centre lies within
+/// `reach_px` of the curve's end, and the disc is at least `least` times as evident as the
+/// rope.
+pub(super) fn find(picture: &EndPicture, rope_half_px: f64, reach_px: f64, least: f64) -> End {
+    let fit = |centre_px: f64, radius_px: f64| {
+        let end = End {
+            centre_px,
+            radius_px,
+            rope_half_px,
+        };
+        (misfit(picture, &end, least), end)
+    };
+    let grid = |low: f64, high: f64, step: f64| {
+        let count = ((high - low) / step).round().max(0.0) as usize;
+        (0..=count).map(move |i| low + step * i as f64)
+    };
+    let least =
+        |ends: &mut dyn Iterator<Item = (f64, End)>| ends.min_by(|a, b| a.0.total_cmp(&b.0));
+    let [coarse, fine] = STEPS_PX;
+    let [smallest, largest] = RADII_PX;
+    let mut all = grid(-reach_px, reach_px, coarse)
+        .flat_map(|c| grid(smallest, largest, coarse).map(move |r| (c, r)))
+        .map(|(c, r)| fit(c, r));
+    let Some((_, rough)) = least(&mut all) else {
+        return fit(0.0, rope_half_px).1;
+    };
+    let mut near = grid(rough.centre_px - coarse, rough.centre_px + coarse, fine)
+        .flat_map(|c| {
+            let radii = grid(rough.radius_px - coarse, rough.radius_px + coarse, fine);
+            radii.map(move |r| (c, r))
+        })
+        .map(|(c, r)| fit(c, r));
+    least(&mut near).map_or(rough, |(_, end)| end)
+}
+
+/// How much of a pixel lies within an edge that is so far away (px, inside positive).
+fn inside(px: f64) -> f64 {
+    (px / BLUR_PX + 0.5).clamp(0.0, 1.0)
+}
+
+/// What a band and a disc, each evenly evident, leave of the picture's evidence (sum of
+/// squares).
+fn misfit(picture: &EndPicture, end: &End, least: f64) -> f64 {
+    let (mut normal, mut sums, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    for (along, across, evidence) in picture.places() {
+        let disc = inside(end.radius_px - (along - end.centre_px).hypot(across));
+        let band = inside(end.rope_half_px - across.abs()) * inside(end.centre_px - along);
+        let model = Vector3::new(1.0, disc, band * (1.0 - disc));
+        normal += model * model.transpose();
+        sums += model * evidence;
+        square += evidence * evidence;
+    }
+    let ridge = Matrix3::identity() * 1e-6;
+    let levels = (normal + ridge).try_inverse().unwrap_or_default() * sums;
+    if levels[1] >= least * levels[2].max(0.0) {
+        return square - sums.dot(&levels);
+    }
+    // As evident as it must be at least: one level for both.
+    let both = Matrix3x2::new(1.0, 0.0, 0.0, least, 0.0, 1.0);
+    let (normal, sums) = (both.tr_mul(&(normal * both)), both.tr_mul(&sums));
+    let levels = normal.try_inverse().unwrap_or_default() * sums;
+    square - sums.dot(&levels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve that ends at the origin, drawn straight down, and its mean picture.
+    fn picture(evidence: impl Fn([f64; 2]) -> f32) -> EndPicture {
+        let mut picture = EndPicture::new(45, 45, 24);
+        let curve: Vec<[f64; 2]> = (0..20).map(|i| [0.0, 5.0 * f64::from(i - 19)]).collect();
+        picture.add(&curve, |p| Some((evidence(p), [0.0; 3])));
+        picture
+    }
+
+    #[test]
+    fn weights_are_found_with_their_size() {
+        for (centre, radius, rope, faint) in [
+            (3.0, 9.0, 3.0, 1.0),
+            (-4.5, 5.0, 2.5, 1.0),
+            // Hardly evident, or hardly thicker than the rope.
+            (2.0, 8.0, 3.0, 0.25),
+            (6.0, 3.5, 3.0, 1.0),
+        ] {
+            let picture = picture(|[u, v]| {
+                let disc = (radius - u.hypot(v - centre) + 0.5).clamp(0.0, 1.0);
+                let band = (rope - u.abs() + 0.5).clamp(0.0, 1.0);
+                let band = if v < centre { band } else { 0.0 };
+                (0.05 + 0.9 * (disc * faint + (1.0 - disc) * band)) as f32
+            });
+            let found = find(&picture, picture.rope_half_px(), 12.0, 0.0);
+            let off = [
+                found.centre_px - centre,
+                found.radius_px - radius,
+                found.rope_half_px - rope,
+            ];
+            assert!(off.iter().all(|o| o.abs() < 0.6), "{found:?}: {off:?}");
+        }
+    }
+}
