@@ -17,6 +17,7 @@ use shared_types::RopeParams;
 
 /// A rope in double precision that follows its attach frame step by step. Advancing
 /// it does not allocate.
+#[derive(Clone)]
 pub struct LiveRope {
     params: RopeParams,
     rope: RopeLanes<f64>,

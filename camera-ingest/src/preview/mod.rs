@@ -1,15 +1,19 @@
 //! The live preview: follows the rope while frames come, and publishes where it is.
 //!
-//! One thread at the lowest priority that looks at the newest frame and lets all others
-//! pass. It copies a frame's left image out and gives the frame back before it begins to
-//! work, so that it holds none; nothing waits for it. The result is for display only:
-//! identification uses the film and its two passes.
+//! It looks at the newest frame and lets all others pass. It copies a frame's left image
+//! out and gives the frame back before it begins to work, so that it holds none; nothing
+//! waits for it. In frames of a motion that began from rest it looks for a hypothesis about
+//! the rope, as the tracker of films does, on a thread of its own; once there is one, it
+//! simulates that rope under the joints as they are reported. The result is for display
+//! only: identification uses the film.
 
 mod arm;
+mod follower;
 mod step;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use arm_model::Cell;
@@ -22,7 +26,7 @@ use shared_types::ipc::{
 use crate::calib::{CalibError, load_camera};
 use crate::frame::EyeFrame;
 use crate::track::{TrackError, TrackOptions};
-pub use step::Preview;
+pub use step::{Answer, Preview, Search};
 
 /// Pause between two looks for a frame.
 const TURN: Duration = Duration::from_millis(2);
@@ -75,12 +79,16 @@ pub enum PreviewError {
     /// Shared memory failed.
     #[error(transparent)]
     Ipc(#[from] IpcError),
+    /// The system gives no thread.
+    #[error("cannot start the thread that looks for the rope: {0}")]
+    Thread(#[source] std::io::Error),
 }
 
 /// Runs until `stop` is set.
 ///
 /// # Errors
-/// No calibration, a bad number of keypoints, or shared memory that cannot be used.
+/// No calibration, a bad number of keypoints, shared memory that cannot be used, or no
+/// thread to look for the rope.
 pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError> {
     let camera = load_camera(&config.camera)?;
     let eye_px = [camera.width_px, camera.height_px];
@@ -88,8 +96,10 @@ pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError
     let bus = Bus::join(&config.domain)?;
     let ports = Ports::open(&bus)?;
     tracing::info!(domain = config.domain, "preview is ready");
+    let mut searcher = Searcher::default();
     let (mut heard, mut state) = (Instant::now(), None);
     while !stop.load(Ordering::Relaxed) {
+        searcher.look_after(&mut preview)?;
         let found = match ports.newest()? {
             Some(Arrived::Left(frame)) => {
                 heard = Instant::now();
@@ -104,7 +114,7 @@ pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError
                 // Reports would pile up and be lost.
                 ports.take_joints(&mut preview)?;
                 if heard.elapsed() < SILENCE {
-                    std::thread::sleep(TURN);
+                    thread::sleep(TURN);
                     continue;
                 }
                 heard = Instant::now();
@@ -138,6 +148,30 @@ fn tell(found: &PreviewFrame, [width_px, height_px]: [u32; 2]) {
         PreviewState::Looking | PreviewState::Following => {
             tracing::info!(frame = found.rope.sequence, "{words}");
         }
+    }
+}
+
+/// Looks for the rope on one thread, which has this one's priority.
+#[derive(Debug, Default)]
+struct Searcher(Option<JoinHandle<Answer>>);
+
+impl Searcher {
+    /// Brings an answer, and starts the next search that is due.
+    fn look_after(&mut self, preview: &mut Preview) -> Result<(), PreviewError> {
+        if let Some(thread) = self.0.take_if(|thread| thread.is_finished()) {
+            match thread.join() {
+                Ok(answer) => preview.take(answer),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+        if self.0.is_none()
+            && let Some(search) = preview.search()
+        {
+            let thread = thread::Builder::new().name("search".to_owned());
+            let thread = thread.spawn(|| search.run());
+            self.0 = Some(thread.map_err(PreviewError::Thread)?);
+        }
+        Ok(())
     }
 }
 

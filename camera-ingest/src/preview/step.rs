@@ -1,31 +1,31 @@
-//! What the preview makes of frames and poses as they come: no clock, no shared memory.
+//! What the preview makes of frames and poses as they come: no clock, no shared memory, no
+//! threads.
 
 use arm_model::{JointVector, Pole};
+use rope_sim::MeasuredArm;
 use shared_types::StereoCamera;
 use shared_types::ipc::{PreviewFrame, PreviewState};
 use shared_types::keypoints::{KeypointFrame, TrackedFrame};
 
-use super::arm::{Arm, Knot};
+use super::arm::Arm;
+use super::follower::Follower;
 use crate::frame::EyeFrame;
-use crate::track::{OnePass, TrackError};
+use crate::track::{Known, NoRope, TrackError, check_keypoints};
 
 /// A longer pause between two frames restarts it (ns).
 const PAUSE_NS: u64 = 1_000_000_000;
 /// A rope that was lost for longer is looked for from the beginning (ns): a hand that
 /// passes takes less.
 const LOST_NS: u64 = 3_000_000_000;
-/// A clamp further from the rope's plane leaves it (m): the rope would seem longer or
-/// shorter by more than the tracker allows.
-const OFF_PLANE_M: f64 = 0.05;
-/// While the rope is looked for: a clamp that was moved that far (m) and has stood there
-/// for so long (ns). The rope would be looked for where it hung before.
-const ELSEWHERE_M: f64 = 0.05;
-const STOOD_NS: u64 = 500_000_000;
-/// While the rope is looked for in a scene that is known: so often it is looked for where
-/// it is now (ns), for it may have been poorly seen where it was.
-const AGAIN_NS: u64 = 2_000_000_000;
-/// While the rope is followed only the clamp's last second counts (ns).
-const PAST_NS: u64 = 1_000_000_000;
+/// The arm must have stood for so long before it moves: the rope hangs still (ns).
+const REST_NS: u64 = 500_000_000;
+/// Frames in which the rope is looked for, and how far apart they are (ns).
+const FRAMES: usize = 100;
+const PERIOD_NS: u64 = 55_000_000;
+/// A joint must have moved by this much in them (rad).
+const ENOUGH_RAD: f64 = 0.05;
+/// Joint reports kept from before the first of them (ns).
+const BEFORE_NS: u64 = 200_000_000;
 
 /// A frame that was looked at.
 #[derive(Debug, Clone, Copy)]
@@ -34,34 +34,51 @@ struct Last {
     stamp_ns: u64,
 }
 
-/// How much is forgotten.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Forget {
-    /// The rope; what is behind it is known.
-    Rope,
-    /// The scene, too.
-    All,
+#[derive(Debug)]
+enum Stage {
+    /// Takes frames: the newest one while the arm stands, then all of a motion.
+    Collecting(Vec<EyeFrame>),
+    /// Somebody looks for the rope in them, the first of which began at `zero_ns`.
+    Searching { zero_ns: u64 },
+    Following(Box<Follower>),
 }
 
-/// What is known of the tracker's present attempt.
-#[derive(Debug, Clone, Copy)]
-struct Attempt {
-    /// Its first frame.
-    zero_ns: u64,
-    /// The frame in which the rope is looked for first, and the clamp in it.
-    rest_ns: u64,
-    clamp: Knot,
-    /// Since when the rope is lost.
-    lost_ns: Option<u64>,
+/// A search for the rope, which takes seconds.
+#[derive(Debug)]
+pub struct Search {
+    attempt: u32,
+    frames: Vec<EyeFrame>,
+    camera: StereoCamera,
+    motion: MeasuredArm,
+}
+
+/// What came of a [`Search`].
+#[derive(Debug)]
+pub struct Answer {
+    attempt: u32,
+    found: Result<Known, NoRope>,
+}
+
+impl Search {
+    /// Looks for the rope, on this thread.
+    #[must_use]
+    pub fn run(self) -> Answer {
+        Answer {
+            attempt: self.attempt,
+            found: Known::find(&self.frames, &self.camera, &self.motion),
+        }
+    }
 }
 
 /// Follows the rope in whatever frames it is given.
 #[derive(Debug)]
 pub struct Preview {
-    tracker: OnePass,
-    pole: Pole,
+    camera: StereoCamera,
+    keypoints: usize,
     arm: Arm,
-    attempt: Option<Attempt>,
+    stage: Stage,
+    /// Whether anything was seen since it began anew.
+    begun: bool,
     last: Option<Last>,
     seen: u64,
     skipped: u64,
@@ -75,11 +92,13 @@ impl Preview {
     /// # Errors
     /// Too many or few keypoints.
     pub fn new(camera: StereoCamera, pole: Pole, keypoints: usize) -> Result<Self, TrackError> {
+        check_keypoints(keypoints)?;
         Ok(Self {
-            tracker: OnePass::new(camera, keypoints)?,
-            pole,
-            arm: Arm::default(),
-            attempt: None,
+            camera,
+            keypoints,
+            arm: Arm::new(pole),
+            stage: Stage::Collecting(Vec::new()),
+            begun: false,
             last: None,
             seen: 0,
             skipped: 0,
@@ -89,9 +108,7 @@ impl Preview {
 
     /// Takes in the arm's joints as measured (CLOCK_MONOTONIC ns, rad).
     pub fn report(&mut self, stamp_ns: u64, q: &JointVector) {
-        if let Some(knot) = Knot::of_joints(stamp_ns, q, &self.pole) {
-            self.arm.put(knot);
-        }
+        self.arm.put(stamp_ns, *q);
     }
 
     /// Looks at a frame. `sequence` is the camera's count: what it leaves out was skipped.
@@ -115,6 +132,55 @@ impl Preview {
         self.told(PreviewState::Unfit, sequence, stamp_ns, None)
     }
 
+    /// The search that is due, once. Frames and reports may go on coming while it runs.
+    pub fn search(&mut self) -> Option<Search> {
+        let frames = match &mut self.stage {
+            Stage::Collecting(frames) if frames.len() == FRAMES => std::mem::take(frames),
+            _ => return None,
+        };
+        let zero_ns = frames[0].stamp_ns;
+        match self.arm.motion(zero_ns) {
+            Ok(motion) => {
+                self.stage = Stage::Searching { zero_ns };
+                Some(Search {
+                    attempt: self.restarts,
+                    frames,
+                    camera: self.camera.clone(),
+                    motion,
+                })
+            }
+            Err(reason) => {
+                tracing::debug!(%reason, "joint reports");
+                self.begin_anew("the joint reports are no motion");
+                None
+            }
+        }
+    }
+
+    /// Takes in what came of a search. It is of no use where the preview began anew since.
+    pub fn take(&mut self, answer: Answer) {
+        let Stage::Searching { zero_ns } = self.stage else {
+            return;
+        };
+        if answer.attempt != self.restarts {
+            return;
+        }
+        let known = match answer.found {
+            Ok(known) => known,
+            Err(reason) => {
+                tracing::info!(%reason, "no rope found");
+                return self.begin_anew("no simulated rope explains the frames");
+            }
+        };
+        match Follower::new(known, zero_ns, &self.arm) {
+            Ok(follower) => self.stage = Stage::Following(Box::new(follower)),
+            Err(reason) => {
+                tracing::debug!(%reason, "the rope that was found");
+                self.begin_anew("the rope that was found cannot be simulated");
+            }
+        }
+    }
+
     /// Counts a frame; a camera that restarted or paused shows another scene.
     fn count(&mut self, sequence: u64, stamp_ns: u64) {
         self.seen += 1;
@@ -133,113 +199,53 @@ impl Preview {
 
     /// Forgets scene and rope.
     fn begin_anew(&mut self, why: &'static str) {
-        if self.attempt.take().is_some() {
-            self.restarts = self.restarts.saturating_add(1);
+        if std::mem::take(&mut self.begun) {
+            self.restarts = self.restarts.wrapping_add(1);
             tracing::info!("restarts: {why}");
         }
-        self.tracker.begin_anew();
-    }
-
-    /// Why what is known of scene or rope is of no use any more.
-    fn outdated(&mut self, stamp_ns: u64) -> Option<(Forget, &'static str)> {
-        let jumped = self.arm.take_jump();
-        let (attempt, clamp) = (self.attempt?, self.arm.newest()?);
-        if jumped {
-            return Some((Forget::Rope, "the arm is elsewhere than its path leads to"));
-        }
-        let lost = |since: u64| stamp_ns.saturating_sub(since) > LOST_NS;
-        if attempt.lost_ns.is_some_and(lost) {
-            return Some((Forget::All, "the rope is lost"));
-        }
-        if let Some(off_m) = self.tracker.off_plane_m(&clamp.p_w_m) {
-            let why = (Forget::Rope, "the clamp left the plane of the rope");
-            return (off_m > OFF_PLANE_M).then_some(why);
-        }
-        let moved = (clamp.p_w_m - attempt.clamp.p_w_m).norm() > ELSEWHERE_M;
-        if moved && self.arm.stood_ns() > STOOD_NS {
-            return Some((Forget::Rope, "the arm stands elsewhere"));
-        }
-        let full = (
-            Forget::All,
-            "the rope was not found in half a minute of motion",
-        );
-        self.arm.is_full().then_some(full)
+        self.stage = Stage::Collecting(Vec::new());
     }
 
     fn track(&mut self, frame: EyeFrame) -> (PreviewState, Option<TrackedFrame>) {
-        let stamp_ns = frame.stamp_ns;
-        let clamp = self.arm.newest().copied();
-        let Some(clamp) = clamp.filter(|_| self.arm.is_known_at(stamp_ns)) else {
+        let size = [frame.width_px, frame.height_px];
+        if size != [self.camera.width_px, self.camera.height_px].map(|px| px as usize) {
+            self.begin_anew("a frame has another size");
+            return (PreviewState::Unfit, None);
+        }
+        if !self.arm.is_known_at(frame.stamp_ns) {
             self.begin_anew("the arm's pose is unknown");
             return (PreviewState::NoArm, None);
-        };
-        match self.outdated(stamp_ns) {
-            Some((Forget::Rope, why)) if self.tracker.knows_scene() => {
-                self.restarts = self.restarts.saturating_add(1);
-                tracing::info!("detects the rope again: {why}");
-                self.learn_anew(stamp_ns, clamp);
-            }
-            Some((_, why)) => self.begin_anew(why),
-            None => self.look_again(stamp_ns, clamp),
         }
-        let attempt = *self.attempt.get_or_insert_with(|| {
-            self.arm.forget_before(stamp_ns);
-            Attempt {
-                zero_ns: stamp_ns,
-                rest_ns: stamp_ns,
-                clamp,
-                lost_ns: None,
-            }
-        });
-        let Ok(path) = self.arm.since(attempt.zero_ns) else {
-            return (PreviewState::NoArm, None);
-        };
-        match self.tracker.see(frame, &path) {
-            Ok(None) => {
-                self.note_lost(None);
+        if self.arm.take_jump() {
+            self.begin_anew("the arm is elsewhere than its path leads to");
+        }
+        if self.arm.is_full() {
+            self.begin_anew("the search took too long");
+        }
+        self.begun = true;
+        let stamp_ns = frame.stamp_ns;
+        match &mut self.stage {
+            Stage::Collecting(frames) => {
+                collect(frames, &mut self.arm, frame);
                 (PreviewState::Looking, None)
             }
-            Ok(Some(tracked)) => {
-                self.note_lost(tracked.lost.then_some(stamp_ns));
-                self.arm.forget_before(stamp_ns.saturating_sub(PAST_NS));
-                (PreviewState::Following, Some(tracked))
+            Stage::Searching { .. } => (PreviewState::Looking, None),
+            Stage::Following(follower) => {
+                let seen = follower.see(&frame, &mut self.arm, self.keypoints);
+                let lost = |since_ns| stamp_ns - since_ns > LOST_NS;
+                let is_lost = follower.lost_ns().is_some_and(lost);
+                match seen {
+                    Ok(tracked) if !is_lost => {
+                        return (PreviewState::Following, Some(tracked));
+                    }
+                    Ok(_) => self.begin_anew("the rope is lost"),
+                    Err(reason) => {
+                        tracing::debug!(%reason, "the rope");
+                        self.begin_anew("the rope cannot be simulated further");
+                    }
+                }
+                (PreviewState::Looking, None)
             }
-            Err(error) => {
-                self.begin_anew("a frame was refused");
-                tracing::debug!("{error}");
-                (PreviewState::Unfit, None)
-            }
-        }
-    }
-
-    /// Learns the rope from the frame at hand.
-    fn learn_anew(&mut self, stamp_ns: u64, clamp: Knot) {
-        self.tracker.learn_anew();
-        self.arm.forget_before(stamp_ns);
-        if let Some(attempt) = &mut self.attempt {
-            *attempt = Attempt {
-                zero_ns: attempt.zero_ns,
-                rest_ns: stamp_ns,
-                clamp,
-                lost_ns: None,
-            };
-        }
-    }
-
-    /// The rope of a scene that is known was looked for long enough where it was.
-    fn look_again(&mut self, stamp_ns: u64, clamp: Knot) {
-        let Some(attempt) = self.attempt else { return };
-        let looks = self.tracker.off_plane_m(&clamp.p_w_m).is_none();
-        let long = stamp_ns.saturating_sub(attempt.rest_ns) > AGAIN_NS;
-        if looks && long && self.tracker.knows_scene() {
-            self.learn_anew(stamp_ns, clamp);
-        }
-    }
-
-    /// Keeps since when the rope is lost; `now_ns` when it is.
-    fn note_lost(&mut self, now_ns: Option<u64>) {
-        if let Some(attempt) = &mut self.attempt {
-            attempt.lost_ns = now_ns.map(|now| attempt.lost_ns.unwrap_or(now));
         }
     }
 
@@ -263,6 +269,38 @@ impl Preview {
             rope: tracked.map_or(nothing, |t| KeypointFrame::new(sequence, stamp_ns, t)),
             ..PreviewFrame::default()
         }
+    }
+}
+
+/// Takes in a frame while the rope is unknown: the newest one of a rest, then those of the
+/// motion that follows it.
+fn collect(frames: &mut Vec<EyeFrame>, arm: &mut Arm, frame: EyeFrame) {
+    let stood = |since_ns, at_ns| {
+        let stands = arm.stands_since_ns();
+        stands.is_some_and(|stands_ns| stands_ns + since_ns <= at_ns)
+    };
+    let now_ns = frame.stamp_ns;
+    let Some((first_ns, last_ns)) = frames
+        .first()
+        .zip(frames.last())
+        .map(|(first, last)| (first.stamp_ns, last.stamp_ns))
+    else {
+        if stood(REST_NS, now_ns) {
+            frames.push(frame);
+        }
+        arm.forget_before(now_ns.saturating_sub(BEFORE_NS));
+        return;
+    };
+    if now_ns < last_ns + PERIOD_NS || frames.len() == FRAMES {
+        return;
+    }
+    if stood(0, first_ns) {
+        frames.clear();
+        arm.forget_before(now_ns.saturating_sub(BEFORE_NS));
+    }
+    frames.push(frame);
+    if frames.len() == FRAMES && arm.reach_rad() < ENOUGH_RAD {
+        frames.clear();
     }
 }
 

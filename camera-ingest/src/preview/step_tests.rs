@@ -1,4 +1,4 @@
-//! The stepping logic on frames drawn from formulas.
+//! What begins and ends a search; ropes are in `hil-tests/tests/preview_rendered.rs`.
 
 use super::*;
 use arm_model::Pole;
@@ -6,224 +6,110 @@ use arm_model::joint::START_POSE;
 use nalgebra::{Matrix3, Vector3};
 use shared_types::{Intrinsics, Shutter};
 
-const WIDTH: usize = 672;
-const HEIGHT: usize = 376;
+const SIZE: [usize; 2] = [64, 48];
 const FRAME_NS: u64 = 16_666_667;
-const NODES: usize = 41;
-const LENGTH_M: f64 = 0.5;
 
-fn camera() -> StereoCamera {
+fn preview() -> Preview {
     let eye = Intrinsics {
-        fx: 350.0,
-        fy: 350.0,
-        cx: 335.5,
-        cy: 187.5,
+        fx: 35.0,
+        fy: 35.0,
+        cx: 31.5,
+        cy: 23.5,
         distortion: [0.0; 5],
     };
-    StereoCamera {
-        width_px: WIDTH as u32,
-        height_px: HEIGHT as u32,
+    let camera = StereoCamera {
+        width_px: SIZE[0] as u32,
+        height_px: SIZE[1] as u32,
         left: eye,
         right: eye,
         r_right_left: Matrix3::identity(),
         t_right_left_m: Vector3::new(0.063, 0.0, 0.0),
         r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
-        p_w_cam_m: Vector3::new(0.0, -0.95, 0.55),
+        p_w_cam_m: Vector3::new(0.7, -1.4, 0.3),
         shutter: Shutter::Global,
         exposure_s: 0.004,
         line_time_s: 0.0,
-    }
+    };
+    Preview::new(camera, Pole::default(), 21).unwrap()
 }
 
 /// The `index`-th frame of an empty wall.
 fn wall(index: u64) -> EyeFrame {
-    let level = |i: usize| {
-        let (u, v) = ((i % WIDTH) as f64, (i / WIDTH) as f64);
-        (140.0 + 14.0 * (u / 31.0).sin() * (v / 23.0).cos()) as u8
-    };
     EyeFrame {
         stamp_ns: 1_000_000_000 + index * FRAME_NS,
         sequence: index,
-        luma: (0..WIDTH * HEIGHT).map(level).collect(),
-        ..EyeFrame::grey([WIDTH, HEIGHT], 0)
+        ..EyeFrame::grey(SIZE, 140)
     }
 }
 
-/// Paints a disc of one colour.
-fn dot(frame: &mut EyeFrame, [u, v]: [f64; 2], radius_px: f64, ycc: [u8; 3]) {
-    let span = |x: f64, n: usize| {
-        let at = |x: f64| (x.max(0.0) as usize).min(n - 1);
-        at(x - radius_px)..=at(x + radius_px + 1.0)
-    };
-    for y in span(v, HEIGHT) {
-        for x in span(u, WIDTH) {
-            if (x as f64 - u).hypot(y as f64 - v) <= radius_px {
-                frame.luma[y * WIDTH + x] = ycc[0];
-                frame.cb[y * (WIDTH / 2) + x / 2] = ycc[1];
-                frame.cr[y * (WIDTH / 2) + x / 2] = ycc[2];
-            }
+/// Shows frames of a wall under an arm whose joint 6 swings with this amplitude (rad) from
+/// a second on; the index of the frame after which a search was due.
+fn swing(preview: &mut Preview, amplitude_rad: f64, frames: u64) -> Option<(u64, Search)> {
+    for index in 0..frames {
+        let frame = wall(index);
+        for part in 1..5 {
+            let stamp_ns = frame.stamp_ns - FRAME_NS + part * FRAME_NS / 4;
+            let since_s = (stamp_ns as f64 * 1e-9 - 2.0).max(0.0);
+            let mut q = START_POSE;
+            q[5] += amplitude_rad * since_s.min(1.0) * (7.0 * since_s).sin();
+            preview.report(stamp_ns, &q);
+        }
+        assert_eq!(preview.see(frame).state(), PreviewState::Looking);
+        if let Some(search) = preview.search() {
+            return Some((index, search));
         }
     }
-}
-
-/// A rope on a clamp that swings from `still_s` on.
-struct Swing {
-    still_s: f64,
-    /// Of the clamp away from the camera (m).
-    away_m: f64,
-    hidden: bool,
-}
-
-impl Swing {
-    fn clamp(&self, t_s: f64) -> Vector3<f64> {
-        let since_s = (t_s - self.still_s).max(0.0);
-        Vector3::new(0.04 * (5.0 * since_s).sin(), self.away_m, 0.85)
-    }
-
-    /// The frame, and where the rope is in it.
-    fn frame(&self, index: u64) -> (EyeFrame, Vec<[f64; 2]>) {
-        let t_s = index as f64 * FRAME_NS as f64 * 1e-9;
-        let since_s = (t_s - self.still_s).max(0.0);
-        let mut p = self.clamp(t_s);
-        let mut nodes = vec![p];
-        for i in 1..NODES {
-            let part = (i as f64 - 0.5) / (NODES - 1) as f64;
-            let angle = 0.5 * part * (5.0 * since_s - 0.8 * part).sin() * since_s.min(1.0);
-            p += Vector3::new(angle.sin(), 0.0, -angle.cos()) * (LENGTH_M / (NODES - 1) as f64);
-            nodes.push(p);
-        }
-        let camera = camera();
-        let pixels: Vec<[f64; 2]> = nodes
-            .iter()
-            .map(|p| camera.project_left(p).unwrap())
-            .collect();
-        let mut frame = wall(index);
-        if !self.hidden {
-            for pair in pixels.windows(2) {
-                for k in 0..8 {
-                    let s = f64::from(k) / 8.0;
-                    let at = [0, 1].map(|c| pair[0][c] + s * (pair[1][c] - pair[0][c]));
-                    dot(&mut frame, at, 2.2, [70, 90, 200]);
-                }
-            }
-            dot(&mut frame, pixels[NODES - 1], 7.5, [200, 60, 110]);
-        }
-        (frame, pixels)
-    }
-}
-
-/// A report of the clamp.
-fn hold(preview: &mut Preview, stamp_ns: u64, clamp: Vector3<f64>) {
-    preview.arm.put(Knot::new(stamp_ns, clamp, Vector3::z()));
-}
-
-/// Mean distance of the keypoints from the true rope (px).
-fn off_px(found: &PreviewFrame, truth: &[[f64; 2]]) -> f64 {
-    let step = (NODES - 1) / (found.rope.points().len() - 1);
-    let pairs = found.rope.points().iter().zip(truth.iter().step_by(step));
-    let off = pairs.map(|(p, t)| (f64::from(p[0]) - t[0]).hypot(f64::from(p[1]) - t[1]));
-    off.sum::<f64>() / found.rope.points().len() as f64
-}
-
-/// Shows the frames of a swing; the message of the last one, and the errors of all in
-/// which the rope was followed.
-fn show(
-    preview: &mut Preview,
-    swing: &Swing,
-    frames: core::ops::Range<u64>,
-) -> (PreviewFrame, Vec<f64>) {
-    let (mut last, mut off) = (preview.without_camera(), Vec::new());
-    for index in frames {
-        let (frame, truth) = swing.frame(index);
-        let seen_s = index as f64 * FRAME_NS as f64 * 1e-9 + 0.002;
-        hold(preview, frame.stamp_ns + 2_000_000, swing.clamp(seen_s));
-        last = preview.see(frame);
-        if last.state() == PreviewState::Following && !last.rope.is_lost() {
-            off.push(off_px(&last, &truth));
-        }
-    }
-    (last, off)
+    None
 }
 
 #[test]
-fn a_swinging_rope_is_followed_found_where_the_arm_goes_and_given_up_when_it_is_gone() {
-    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
-    let mut swing = Swing {
-        still_s: 0.5,
-        away_m: 0.0,
-        hidden: false,
+fn a_motion_from_rest_is_searched_and_nothing_else() {
+    let (index, search) = swing(&mut preview(), 0.2, 600).unwrap();
+    let searched_s = PERIOD_NS as f64 * 1e-9 * FRAMES as f64;
+    let after_s = index as f64 / 60.0;
+    assert!((after_s - 1.0 - searched_s).abs() < 1.2, "{after_s}");
+    assert_eq!(search.frames.len(), FRAMES);
+    let rest = search.motion.joints_at(0.0);
+    assert!((rest.q - START_POSE).max_abs() < 1e-6);
+    let mut standing = preview();
+    assert!(swing(&mut standing, 0.0, 900).is_none());
+    let Stage::Collecting(frames) = &standing.stage else {
+        panic!("{:?}", standing.stage);
     };
-    let (last, off) = show(&mut preview, &swing, 0..150);
-    assert_eq!(last.state(), PreviewState::Following);
-    assert_eq!((last.seen, last.skipped, last.restarts), (150, 0, 0));
-    assert_eq!(last.rope.count, 21);
-    assert!(off.len() > 60, "{} frames followed", off.len());
-    let most = off.iter().copied().fold(0.0, f64::max);
-    assert!(most < 2.0, "{most} px off");
-    // The arm turns: the rope swings in another plane, nearer to the wall.
-    for _ in 0..30 {
-        swing.away_m += 0.003;
-        let next = preview.seen;
-        show(&mut preview, &swing, next..next + 1);
-    }
-    let (last, off) = show(&mut preview, &swing, 180..240);
-    assert_eq!(last.state(), PreviewState::Following);
-    assert!(last.restarts >= 1 && off.len() > 20, "{last:?}");
-    assert!(off[off.len() - 1] < 2.0, "{off:?}");
-    // Somebody takes it off.
-    let before = last.restarts;
-    swing.hidden = true;
-    let (gone, _) = show(&mut preview, &swing, 240..270);
-    assert_eq!((gone.state(), gone.rope.lost), (PreviewState::Following, 1));
-    let (gone, _) = show(&mut preview, &swing, 270..460);
-    assert_eq!(gone.restarts, before + 1);
-    assert_eq!((gone.state(), gone.rope.count), (PreviewState::Looking, 0));
+    assert_eq!(frames.len(), 1, "copies are not kept");
+    assert!(swing(&mut preview(), 0.02, 900).is_none(), "too little");
 }
 
 #[test]
-fn frames_left_out_are_counted_and_do_not_stop_it() {
-    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
-    let swing = Swing {
-        still_s: 0.5,
-        away_m: 0.0,
-        hidden: false,
-    };
-    show(&mut preview, &swing, 0..120);
-    // Half a second in which it did not run, then every third frame; reports wait.
-    for index in 120..150 {
-        let stamp_ns = wall(index).stamp_ns;
-        hold(
-            &mut preview,
-            stamp_ns,
-            swing.clamp((stamp_ns - 1_000_000_000) as f64 * 1e-9),
-        );
-    }
-    for index in (150..300).step_by(3) {
-        show(&mut preview, &swing, index..index + 1);
-    }
-    let (last, off) = show(&mut preview, &swing, 300..301);
-    assert_eq!((last.seen, last.skipped), (171, 130));
-    assert_eq!(
-        (last.state(), last.restarts, last.rope.lost),
-        (PreviewState::Following, 0, 0)
-    );
-    assert!(off[0] < 3.0, "{off:?}");
+fn an_answer_counts_if_nothing_began_anew_since_and_no_rope_is_none() {
+    let mut preview = preview();
+    let (index, search) = swing(&mut preview, 0.2, 600).unwrap();
+    let answer = search.run();
+    assert!(answer.found.is_err(), "there is no rope");
+    let restarted = preview.see(EyeFrame {
+        sequence: 0,
+        ..wall(index + 1)
+    });
+    assert_eq!(restarted.restarts, 1);
+    preview.take(answer);
+    assert_eq!(preview.restarts, 1);
+    let mut preview = super::tests::preview();
+    let (_, search) = swing(&mut preview, 0.2, 600).unwrap();
+    preview.take(search.run());
+    assert_eq!(preview.restarts, 1);
+    assert!(matches!(&preview.stage, Stage::Collecting(frames) if frames.is_empty()));
 }
 
 /// One that has seen `frames` frames of a wall under an arm that stands.
 fn looking(frames: u64) -> Preview {
-    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
-    for index in 0..frames {
-        let frame = wall(index);
-        preview.report(frame.stamp_ns, &START_POSE);
-        assert_eq!(preview.see(frame).state(), PreviewState::Looking);
-    }
+    let mut preview = preview();
+    assert!(swing(&mut preview, 0.0, frames).is_none());
     preview
 }
 
 #[test]
 fn without_a_camera_or_an_arm_it_waits_and_says_so() {
-    let mut preview = Preview::new(camera(), Pole::default(), 21).unwrap();
+    let mut preview = preview();
     assert_eq!(preview.without_camera().state(), PreviewState::NoCamera);
     let found = preview.see(wall(0));
     assert_eq!((found.state(), found.seen), (PreviewState::NoArm, 1));
@@ -247,7 +133,6 @@ fn without_a_camera_or_an_arm_it_waits_and_says_so() {
 #[test]
 fn a_camera_that_begins_anew_or_pauses_and_an_arm_that_jumps_are_noticed() {
     let mut preview = looking(5);
-    preview.report(wall(3).stamp_ns + 1, &START_POSE);
     let again = preview.see(EyeFrame {
         sequence: 0,
         ..wall(6)
@@ -277,5 +162,6 @@ fn frames_of_another_camera_are_said_to_be_unfit_and_end_with_the_next_that_fits
     assert_eq!(preview.see(narrow).state(), PreviewState::Unfit);
     assert_eq!(preview.unfit(4, wall(4).stamp_ns).restarts, 1);
     assert_eq!(preview.see(wall(5)).state(), PreviewState::Looking);
-    assert!(Preview::new(camera(), Pole::default(), 1).is_err());
+    let camera = preview.camera;
+    assert!(Preview::new(camera, Pole::default(), 1).is_err());
 }

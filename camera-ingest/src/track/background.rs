@@ -1,7 +1,5 @@
 //! The scene without the rope, and how noisy it is.
 
-use std::ops::Range;
-
 use super::covered;
 use crate::frame::EyeFrame;
 use crate::vectors::widest;
@@ -42,28 +40,6 @@ impl Background {
         let lit: Vec<_> = chosen.iter().map(lit).collect();
         covered::uncover(&mut background.image, &lit);
         background
-    }
-
-    /// Renews some rows: their median over some frames.
-    pub(super) fn renew(&mut self, frames: &[EyeFrame], rows: Range<usize>) {
-        let renew = |plane: fn(&mut EyeFrame) -> &mut Vec<u8>,
-                     seen: fn(&EyeFrame) -> &Vec<u8>,
-                     image: &mut EyeFrame,
-                     width: usize| {
-            let part = rows.start * width..rows.end * width;
-            let planes: Vec<&[u8]> = frames.iter().map(|f| &seen(f)[part.clone()]).collect();
-            plane(image)[part].copy_from_slice(&medians(&planes));
-        };
-        let image = &mut self.image;
-        let width = image.width_px;
-        renew(|f| &mut f.luma, |f| &f.luma, image, width);
-        renew(|f| &mut f.cb, |f| &f.cb, image, width / 2);
-        renew(|f| &mut f.cr, |f| &f.cr, image, width / 2);
-    }
-
-    /// Measures the noise anew, about a frame.
-    pub(super) fn measure_noise(&mut self, frame: &EyeFrame) {
-        self.noise = noise_about(&self.image, frame);
     }
 
     /// Brightness of a frame relative to the background (automatic exposure
@@ -152,7 +128,7 @@ pub(super) fn frames_by_motion(frames: &[EyeFrame], count: usize) -> Vec<usize> 
 }
 
 /// Part of the pixels that changed by more than noise, on every fourth row.
-pub(super) fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
+fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
     /// Grey levels, for the sum of two pixels.
     const THRESHOLD: u16 = 40;
     let (mut count, mut all) = (0_u32, 0_u32);

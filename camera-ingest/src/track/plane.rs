@@ -69,11 +69,6 @@ impl RopePlane {
         self.eye.distort(p.x / z, p.y / z)
     }
 
-    /// Distance of a point in the left optical frame from the plane (m).
-    pub(super) fn off_m(&self, p_c: &Vector3<f64>) -> f64 {
-        self.normal_c.dot(&(p_c - self.origin_c)).abs()
-    }
-
     /// Point of the plane seen at a raw pixel.
     pub(super) fn point_at(&self, pixel: [f64; 2]) -> Point {
         let [x, y] = self.eye.undistort(pixel);

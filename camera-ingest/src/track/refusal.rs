@@ -176,12 +176,12 @@ fn range(what: &'static str, found: usize, least: usize, most: usize) -> Result<
     })
 }
 
-pub(super) fn check_keypoints(count: usize) -> Result<(), TrackError> {
+pub(crate) fn check_keypoints(count: usize) -> Result<(), TrackError> {
     range("keypoints", count, 2, MAX_KEYPOINTS)
 }
 
 /// The `index`-th frame has the camera's size and is later than the one before.
-pub(super) fn check_frame(
+fn check_frame(
     index: usize,
     before: Option<&EyeFrame>,
     frame: &EyeFrame,

@@ -65,7 +65,8 @@ impl Fidelity {
     };
 }
 
-fn rope(x: &Point, links: u32) -> RopeParams {
+/// The rope, with masses of which only the ratios show.
+pub(super) fn rope(x: &Point, links: u32) -> RopeParams {
     let link_m = x[LENGTH] / f64::from(links);
     let stiffness = MASS_PER_LENGTH * x[STIFFNESS].exp() / link_m;
     RopeParams {
@@ -104,6 +105,15 @@ pub(super) fn simulate(
     rope_sim::roll_out(&candidates, &options)
 }
 
+/// The camera as the hypothesis has it.
+pub(super) fn turned(x: &Point, camera: &StereoCamera) -> StereoCamera {
+    let turn = Rotation3::new(Vector3::new(x[TURN], x[TURN + 1], x[TURN + 2]));
+    StereoCamera {
+        r_w_cam: camera.r_w_cam * turn.matrix(),
+        ..camera.clone()
+    }
+}
+
 /// Left or right image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
@@ -125,13 +135,9 @@ impl<'a> Seen<'a> {
         if matches!(rollout.outcome, Outcome::Diverged) {
             return None;
         }
-        let turn = Rotation3::new(Vector3::new(x[TURN], x[TURN + 1], x[TURN + 2]));
         Some(Self {
             rollout,
-            camera: StereoCamera {
-                r_w_cam: camera.r_w_cam * turn.matrix(),
-                ..camera.clone()
-            },
+            camera: turned(x, camera),
             clock_s: x[CLOCK],
         })
     }
@@ -161,25 +167,8 @@ impl<'a> Seen<'a> {
     /// Pixels of `count` points at equal distances along the rope, clamp first, in the
     /// frame that begins at `t_s`; false where a part is behind the camera.
     pub(super) fn curve(&self, t_s: f64, side: Side, count: usize, out: &mut Curve) -> bool {
-        out.nodes.clear();
-        let middle = f64::from(self.camera.height_px) / 2.0;
-        for node in 0..self.rollout.nodes.nodes() {
-            let Some(mut pixel) = self.project(&self.node(t_s, middle, node), side) else {
-                return false;
-            };
-            if self.camera.line_time_s > 0.0 {
-                // A node moves far less than a row in a row's time.
-                for _ in 0..2 {
-                    match self.project(&self.node(t_s, pixel[1], node), side) {
-                        Some(again) => pixel = again,
-                        None => return false,
-                    }
-                }
-            }
-            out.nodes.push(pixel);
-        }
-        out.spread(count);
-        true
+        let pixel = |node, row| self.project(&self.node(t_s, row, node), side);
+        out.fill(&self.camera, self.rollout.nodes.nodes(), count, pixel)
     }
 }
 
@@ -191,6 +180,30 @@ pub(super) struct Curve {
 }
 
 impl Curve {
+    /// `count` points between the pixels of `nodes` nodes; `pixel` gives that of a node as
+    /// it is when a row is exposed. False where a part is behind the camera.
+    pub(super) fn fill(
+        &mut self,
+        camera: &StereoCamera,
+        nodes: usize,
+        count: usize,
+        pixel: impl Fn(usize, f64) -> Option<[f64; 2]>,
+    ) -> bool {
+        self.nodes.clear();
+        let middle = f64::from(camera.height_px) / 2.0;
+        // A node moves far less than a row in a row's time.
+        let looks = if camera.line_time_s > 0.0 { 3 } else { 1 };
+        for node in 0..nodes {
+            let look = |seen: [f64; 2], _| pixel(node, seen[1]);
+            let Some(seen) = (0..looks).try_fold([0.0, middle], look) else {
+                return false;
+            };
+            self.nodes.push(seen);
+        }
+        self.spread(count);
+        true
+    }
+
     /// Points at equal distances: cubic (Catmull-Rom) through the nodes.
     fn spread(&mut self, count: usize) {
         let last = self.nodes.len() - 1;
