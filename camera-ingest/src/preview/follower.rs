@@ -79,9 +79,7 @@ impl Follower {
             .see(frame, [&first, shown.nodes()], keypoints)
             .filter(|_| shown.is_finite())
             .ok_or(Gone::OutOfSight)?;
-        self.lost_ns = seen
-            .lost
-            .then_some(self.lost_ns.unwrap_or(frame.stamp_ns));
+        self.lost_ns = seen.lost.then_some(self.lost_ns.unwrap_or(frame.stamp_ns));
         Ok(seen)
     }
 

@@ -19,9 +19,9 @@ const PAUSE_NS: u64 = 1_000_000_000;
 const LOST_NS: u64 = 3_000_000_000;
 /// The arm must have stood for so long before it moves: the rope hangs still (ns).
 const REST_NS: u64 = 500_000_000;
-/// Frames in which the rope is looked for, and how far apart they are (ns).
+/// Frames in which the rope is looked for, and how far apart they are at least (ns).
 const FRAMES: usize = 100;
-const PERIOD_NS: u64 = 55_000_000;
+const PERIOD_NS: u64 = 60_000_000;
 /// A joint must have moved by this much in them (rad).
 const ENOUGH_RAD: f64 = 0.05;
 /// Joint reports kept from before the first of them (ns).
@@ -39,7 +39,9 @@ enum Stage {
     /// Takes frames: the newest one while the arm stands, then all of a motion.
     Collecting(Vec<EyeFrame>),
     /// Somebody looks for the rope in them, the first of which began at `zero_ns`.
-    Searching { zero_ns: u64 },
+    Searching {
+        zero_ns: u64,
+    },
     Following(Box<Follower>),
 }
 

@@ -67,9 +67,8 @@ pub struct WatchArgs {
     /// lets other machines watch and stop the arm, without encryption.
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:0")]
     pub bind: SocketAddr,
-    /// Track the rope in the camera's frames online and draw its keypoints. A
-    /// process of the lowest priority does it, on one core, while this page is
-    /// served.
+    /// Find the rope in the first seconds of a motion and draw its keypoints from
+    /// then on. A process of the lowest priority does it while this page is served.
     #[arg(long)]
     pub preview: bool,
     /// Calibration for the preview; default: camera.toml in the run folder.

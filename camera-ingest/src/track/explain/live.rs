@@ -12,7 +12,7 @@ use super::hypothesis::{CLOCK, Curve, Fidelity, Seen, Side, rope, simulate, turn
 use super::read::{NODES, Reader};
 use super::search::SearchError;
 use super::{Film, TrackOptions, Unexplained};
-use super::{hypothesise, mean, moments, quantile, usual_evidence};
+use super::{curve_at, hypothesise, mean, moments, quantile, usual_evidence};
 use crate::frame::EyeFrame;
 
 /// Evidence is looked for so far to either side of a keypoint (px).
@@ -63,22 +63,16 @@ impl Known {
             right: &[],
         };
         let scene = Scene::of(frames, options.background_frames);
-        let x = hypothesise(
-            &moments(film, &scene, &times_s, &options),
-            camera,
-            motion,
-            1,
-        )?
-        .x;
+        let moments = moments(film, (&scene, None), &times_s);
+        let x = hypothesise(&moments, camera, motion, 1)?.x;
+        drop(moments);
         let rollouts =
             simulate(&[x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
         let seen = Seen::new(&x, &rollouts[0], camera).ok_or(Unexplained::OutOfSight)?;
-        let curve = |t_s: &f64| {
-            let mut curve = Curve::default();
-            let visible = seen.curve(*t_s, Side::Left, NODES, &mut curve);
-            visible.then_some(curve.points)
-        };
-        let curves: Option<Vec<_>> = times_s.iter().map(curve).collect();
+        let curves: Option<Vec<_>> = times_s
+            .iter()
+            .map(|t_s| curve_at(&seen, *t_s, Side::Left))
+            .collect();
         let curves = curves.ok_or(Unexplained::OutOfSight)?;
         let reading = Reader::new(&scene, frames, curves.clone()).read();
         usual_evidence(&reading, options.keypoints)?;
@@ -140,10 +134,7 @@ impl Known {
         Some(TrackedFrame {
             t_s: 0.0,
             lost: mean(&evident) < LOST * self.usual,
-            confidence: evident
-                .iter()
-                .map(|e| (e / self.usual).min(1.0))
-                .collect(),
+            confidence: evident.iter().map(|e| (e / self.usual).min(1.0)).collect(),
             points,
         })
     }
