@@ -10,7 +10,7 @@ use shared_types::keypoints::{KeypointFrame, TrackedFrame};
 use super::arm::Arm;
 use super::follower::Follower;
 use crate::frame::EyeFrame;
-use crate::track::{Known, NoRope, TrackError, check_keypoints};
+use crate::track::{Known, TrackError, check_keypoints};
 
 /// A longer pause between two frames restarts it (ns).
 const PAUSE_NS: u64 = 1_000_000_000;
@@ -58,7 +58,7 @@ pub struct Search {
 #[derive(Debug)]
 pub struct Answer {
     attempt: u32,
-    found: Result<Known, NoRope>,
+    found: Result<Known, TrackError>,
 }
 
 impl Search {

@@ -1,7 +1,6 @@
 //! Where something learned may stand in for the built-in tracker: a [`PointTracker`]
 //! follows points of the rope through the film.
 
-pub(super) use super::moving::{FirstMask, FirstScene, Moving};
 use crate::frame::EyeFrame;
 
 /// Why a learned model gives no answer.

@@ -1,7 +1,7 @@
 //! The plane in which the rope swings.
 //!
-//! A wiggle moves the rope in one vertical plane (within 1-2 cm). All tracker
-//! geometry lives on it, in metres: x to the right as the camera sees it, y
+//! A wiggle moves the rope in one vertical plane (within 1-2 cm). What is measured in
+//! metres lies on it: x to the right as the camera sees it, y
 //! down. Lens distortion and perspective are thereby dealt with in one place,
 //! and lengths along the rope are true lengths.
 
@@ -18,7 +18,7 @@ const LEAST_SPREAD_M: f64 = 0.005;
 /// the camera's view and the plane's normal).
 const LEAST_FACING: f64 = 0.35;
 
-/// Map between plane (m) and raw left-eye pixels.
+/// Map from raw left-eye pixels to the plane (m).
 #[derive(Debug, Clone)]
 pub(super) struct RopePlane {
     eye: Intrinsics,
@@ -60,13 +60,6 @@ impl RopePlane {
             right_c,
             down_c,
         })
-    }
-
-    /// Raw pixel of a point of the plane.
-    pub(super) fn to_pixel(&self, [x, y]: Point) -> [f64; 2] {
-        let p = self.origin_c + self.right_c * x + self.down_c * y;
-        let z = p.z.max(1e-3);
-        self.eye.distort(p.x / z, p.y / z)
     }
 
     /// Point of the plane seen at a raw pixel.

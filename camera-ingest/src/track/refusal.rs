@@ -5,7 +5,6 @@ use shared_types::StereoCamera;
 use shared_types::keypoints::MAX_KEYPOINTS;
 
 use super::TrackOptions;
-use super::first_frame::NotFound;
 use super::models::ModelError;
 use crate::frame::EyeFrame;
 
@@ -112,19 +111,6 @@ impl TrackError {
     #[must_use]
     pub fn is_input(&self) -> bool {
         !matches!(self, Self::NoRope { .. } | Self::MostlyLost { .. })
-    }
-}
-
-impl From<NotFound> for TrackError {
-    fn from(reason: NotFound) -> Self {
-        match reason {
-            NotFound::ClampOutside([u, v]) => Self::ClampOutside { u, v },
-            NotFound::NothingHangs(_) => Self::NoRope {
-                evident: [0.0; 3],
-                least: [0.0; 3],
-            },
-            NotFound::NoMask(error) => Self::Model(error),
-        }
     }
 }
 

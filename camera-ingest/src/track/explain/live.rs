@@ -11,7 +11,7 @@ use super::evidence::Scene;
 use super::hypothesis::{CLOCK, Curve, Fidelity, Seen, Side, rope, simulate, turned};
 use super::read::{NODES, Reader};
 use super::search::SearchError;
-use super::{Film, TrackOptions, Unexplained};
+use super::{Film, TrackError, TrackOptions};
 use super::{curve_at, hypothesise, mean, moments, quantile, usual_evidence};
 use crate::frame::EyeFrame;
 
@@ -19,17 +19,6 @@ use crate::frame::EyeFrame;
 const BESIDE_PX: [f64; 5] = [0.0, -2.0, 2.0, -4.0, 4.0];
 /// A frame with less than this part of the usual evidence is lost.
 const LOST: f64 = 0.4;
-
-/// No rope explains the frames.
-#[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-pub(crate) struct NoRope(#[from] Unexplained);
-
-impl From<SearchError> for NoRope {
-    fn from(reason: SearchError) -> Self {
-        Self(reason.into())
-    }
-}
 
 /// A rope that explains the frames it was found in.
 #[derive(Debug)]
@@ -52,7 +41,7 @@ impl Known {
         frames: &[EyeFrame],
         camera: &StereoCamera,
         motion: &dyn AttachMotion,
-    ) -> Result<Self, NoRope> {
+    ) -> Result<Self, TrackError> {
         let options = TrackOptions::default();
         let zero = MonotonicNs(frames[0].stamp_ns);
         let since_zero = |f: &EyeFrame| MonotonicNs(f.stamp_ns).since_s(zero);
@@ -68,12 +57,12 @@ impl Known {
         drop(moments);
         let rollouts =
             simulate(&[x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
-        let seen = Seen::new(&x, &rollouts[0], camera).ok_or(Unexplained::OutOfSight)?;
+        let seen = Seen::new(&x, &rollouts[0], camera).ok_or(TrackError::BehindCamera)?;
         let curves: Option<Vec<_>> = times_s
             .iter()
             .map(|t_s| curve_at(&seen, *t_s, Side::Left))
             .collect();
-        let curves = curves.ok_or(Unexplained::OutOfSight)?;
+        let curves = curves.ok_or(TrackError::BehindCamera)?;
         let reading = Reader::new(&scene, frames, curves.clone()).read();
         usual_evidence(&reading, options.keypoints)?;
         let length = mean(&curves.iter().map(|c| length_px(c)).collect::<Vec<_>>());

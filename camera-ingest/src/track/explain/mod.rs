@@ -36,7 +36,7 @@ use crate::frame::{EyeFrame, rgb_from_ycc};
 use colour::{CHROMA_WEIGHT, Colour};
 use evidence::Scene;
 use hypothesis::{Curve, Fidelity, Seen, Side, simulate};
-pub(crate) use live::{Known, NoRope};
+pub(crate) use live::Known;
 use read::{NODES, Reader};
 use reading::Reading;
 use search::{Climb, Comparison, Found, Moment, SearchError, Searcher};
