@@ -121,6 +121,19 @@ fn pictures_and_raw_files_are_tracked_like_the_film() {
     };
     assert!(track("raw_1344x376.yuyv", "drawn/film.avi") == expected);
     assert!(track(".", "drawn/sheet.png") == expected);
+    let doubted = KeypointTrack {
+        doubts: vec!["the rope's end is not confirmed".to_owned()],
+        ..expected
+    };
+    let text = serde_json::to_string(&doubted).unwrap();
+    fs::write(dir.path().join("doubted.json"), text).unwrap();
+    let line =
+        "identify --keypoints doubted.json --camera camera.toml --pose pose.csv --out r.toml";
+    let said = refused_in(dir.path(), 1, line);
+    assert!(
+        said.contains("end is not confirmed") && said.contains("--accept-unconfirmed"),
+        "{said}"
+    );
     let film = open_video(&dir.path().join("drawn/film.avi"), None).unwrap();
     assert_eq!(film.len(), FRAMES);
     let sheet = fs::read(dir.path().join("drawn/sheet.png")).unwrap();

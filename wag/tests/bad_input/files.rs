@@ -48,6 +48,10 @@ pub(crate) fn prepare() -> tempfile::TempDir {
         "nan.toml",
         &ROPE.replace("radius_m = 0.0055", "radius_m = nan"),
     );
+    put(
+        "doubted.toml",
+        &format!("{ROPE}[fit]\ndoubts = [\"the rope's end is not confirmed\"]\n"),
+    );
     put("text.toml", "this is not toml");
     put("damaged.json", "{\"version\": ");
     put(

@@ -45,6 +45,11 @@ pub(crate) const CASES: &[Case] = &[
         &["--keypoints"],
     ),
     (
+        "plan strike --rope doubted.toml --target 0.8,0,0.3 --out p.json",
+        1,
+        &["in doubt", "end is not confirmed", "--accept-unconfirmed"],
+    ),
+    (
         "identify --keypoints k.json --video v.avi --camera camera.toml --pose pose.csv --out r.toml",
         2,
         &["cannot be used with"],
