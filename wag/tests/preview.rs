@@ -269,7 +269,7 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
         assert_eq!(stage.told().state(), PreviewState::Following);
     }
     let drawn = until("a picture with keypoints", || {
-        let picture = over(&url);
+        let mut picture = over(&url);
         // The page shows a picture one picture later.
         for _ in 0..4 {
             stage.told();
