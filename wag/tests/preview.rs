@@ -201,7 +201,6 @@ impl Stage {
             height_px: self.camera.height_px,
             sequence: self.sequence,
             stamp_ns: Self::stamp_ns(start_s),
-            ..FrameHeader::default()
         };
         frame.payload_mut().copy_from_slice(&filmed.yuyv);
         frame.send().unwrap();
