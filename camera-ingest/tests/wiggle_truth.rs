@@ -18,7 +18,7 @@ fn truth_json(folder: &Path) -> serde_json::Value {
 /// percentile 2.5 px, no node off by more than 8 px, tip 95th percentile 4 px.
 fn assert_tracks(name: &str) {
     let Some(folder) = folder(name) else { return };
-    let Some(wiggle) = Wiggle::read(name) else {
+    let Some(wiggle) = Wiggle::read_both(name) else {
         return;
     };
     let nodes = wiggle.nodes();

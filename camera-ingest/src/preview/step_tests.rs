@@ -70,7 +70,8 @@ fn a_motion_from_rest_is_searched_and_nothing_else() {
     assert!((after_s - 1.0 - searched_s).abs() < 1.2, "{after_s}");
     assert_eq!(search.frames.len(), FRAMES);
     let rest = search.motion.joints_at(0.0);
-    assert!((rest.q - START_POSE).max_abs() < 1e-6);
+    let off_rad = (rest.q - START_POSE).max_abs();
+    assert!(off_rad < 1e-4, "smoothed by {off_rad} rad");
     let mut standing = preview();
     assert!(swing(&mut standing, 0.0, 900).is_none());
     let Stage::Collecting(frames) = &standing.stage else {

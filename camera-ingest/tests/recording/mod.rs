@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use arm_model::{JointVector, Pole};
-use camera_ingest::source::FrameSource;
+use camera_ingest::source::{FrameSource, read_film};
 use camera_ingest::{
     EyeFrame, Film, TrackError, TrackOptions, TrackResult, load_camera, open_video, track,
 };
@@ -79,6 +79,8 @@ pub(crate) fn motion(folder: &Path) -> Box<dyn AttachMotion> {
 #[derive(Clone)]
 pub(crate) struct Wiggle {
     pub(crate) frames: Vec<EyeFrame>,
+    /// Right images, where a test looks at them.
+    pub(crate) right: Vec<EyeFrame>,
     pub(crate) camera: StereoCamera,
     /// Poses of the clamp.
     pub(crate) poses: Vec<PoseRow>,
@@ -92,6 +94,15 @@ impl Wiggle {
         Self::read_first(name, usize::MAX)
     }
 
+    /// Reads both images of a recording.
+    pub(crate) fn read_both(name: &str) -> Option<Self> {
+        let mut video = open_video(&folder(name)?, None).unwrap();
+        Some(Self {
+            right: read_film(&mut *video).unwrap().right,
+            ..Self::read(name)?
+        })
+    }
+
     /// Reads the first frames of a recording, `most` of them.
     pub(crate) fn read_first(name: &str, most: usize) -> Option<Self> {
         let folder = folder(name)?;
@@ -101,6 +112,7 @@ impl Wiggle {
         let count = most.min(video.len());
         Some(Self {
             frames: (0..count).map(|i| video.read(i).unwrap().left()).collect(),
+            right: Vec::new(),
             camera: load_camera(&folder.join("camera.toml")).unwrap(),
             poses: read_poses(&folder.join("pose.csv")),
             truth: truth
@@ -124,7 +136,7 @@ impl Wiggle {
         let motion = PoseTrack::new(&self.poses).unwrap();
         let film = Film {
             left: &self.frames,
-            right: &[],
+            right: &self.right,
         };
         track(film, &self.camera, &motion, &options)
     }

@@ -24,9 +24,12 @@ pub(crate) struct Take {
     pub(crate) frames: usize,
 }
 
-/// A film of the left image.
+/// A film as a tracker looks at it.
 pub(crate) struct Filmed {
+    /// Left images.
     pub(crate) frames: Vec<EyeFrame>,
+    /// Right images of some of them.
+    right: Vec<EyeFrame>,
     /// Pixels of the rope's nodes in each frame.
     pub(crate) truth: Vec<Vec<[f64; 2]>>,
     pub(crate) camera: StereoCamera,
@@ -49,19 +52,23 @@ impl Filmed {
         let first_s = -take.still / config.frame_rate_hz;
         let film = WiggleFilm::new(config, take.seed, take.radii_m, first_s).unwrap();
         let length_m = film.rope.length_m;
-        let (mut frames, mut truth) = (Vec::new(), Vec::new());
+        let (mut frames, mut right, mut truth) = (Vec::new(), Vec::new(), Vec::new());
         for (index, frame) in film.take(take.frames).enumerate() {
             if index > 0 && !keep(index) {
                 continue;
             }
             let stamp_ns = 1_000_000_000 + ((frame.start_s - first_s) * 1e9).round() as u64;
             let stereo = StereoFrame::from_yuyv(&frame.yuyv, size, stamp_ns, index as u64).unwrap();
+            if Film::needs_right(frames.len(), take.frames) {
+                right.push(stereo.right());
+            }
             frames.push(stereo.left());
             let pixels = frame.nodes.iter().map(|p| camera.project_left(p).unwrap());
             truth.push(pixels.collect());
         }
         Self {
             frames,
+            right,
             truth,
             camera,
             length_m,
@@ -87,7 +94,7 @@ impl Filmed {
         };
         let film = Film {
             left: &self.frames,
-            right: &[],
+            right: &self.right,
         };
         track(film, &self.camera, arm, &options)
     }

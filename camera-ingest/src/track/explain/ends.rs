@@ -117,8 +117,8 @@ impl EndPicture {
 
     /// Where the rope begins, from the clamp of the hypothesis on (px): the colour of the
     /// pole or of what clamps the rope begins there. For a picture whose curves end at the
-    /// clamp; 0 where no such change is seen.
-    pub(super) fn start_px(&self) -> f64 {
+    /// clamp; `None` where no such change is seen.
+    pub(super) fn start_px(&self) -> Option<f64> {
         /// How far off the camera's file may put the clamp (px).
         const OFF_PX: usize = 9;
         /// Rows compared on either side.
@@ -142,7 +142,7 @@ impl EndPicture {
             here >= beside && here > (0.5 * most).max(2.0 * OTHER_COLOUR)
         };
         // The first one from the rope's side.
-        near.into_iter().find(is_top).map_or(0.0, |row| {
+        near.into_iter().find(is_top).map(|row| {
             let off = |row: usize| row as f64 - 0.5 - self.before as f64;
             let weight = |row: usize| step(row).powi(4);
             let beside = row - 2..=row + 2;

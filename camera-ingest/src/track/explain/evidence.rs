@@ -259,7 +259,7 @@ mod tests {
             cr: vec![150; 32],
             ..EyeFrame::grey([8, 8], 160)
         };
-        frame.luma[8 * 4 + 4] = 172;
+        frame.luma[8 * 4 + 4] = 184;
         let map = scene.map(&frame);
         let seen = colour_at(&frame, 1.0, [4.0, 4.0]).unwrap();
         let one = scene.unexplained(seen, scene.colour_at([4.0, 4.0]).unwrap());

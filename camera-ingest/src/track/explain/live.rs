@@ -12,7 +12,7 @@ use super::hypothesis::{CLOCK, Curve, Fidelity, Seen, Side, rope, simulate, turn
 use super::read::{NODES, Reader};
 use super::search::SearchError;
 use super::{Film, TrackError, TrackOptions};
-use super::{curve_at, hypothesise, mean, moments, quantile, usual_evidence};
+use super::{curve_at, hypothesise, mean, moments, quantile, told_px, usual_evidence};
 use crate::frame::EyeFrame;
 
 /// Evidence is looked for so far to either side of a keypoint (px).
@@ -63,7 +63,8 @@ impl Known {
             .map(|t_s| curve_at(&seen, *t_s, Side::Left))
             .collect();
         let curves = curves.ok_or(TrackError::BehindCamera)?;
-        let reading = Reader::new(&scene, frames, curves.clone()).read();
+        let reading = Reader::new(&scene, frames, curves.clone())
+            .read(told_px(&curves, &times_s, camera, motion));
         usual_evidence(&reading, options.keypoints)?;
         let length = mean(&curves.iter().map(|c| length_px(c)).collect::<Vec<_>>());
         let mut known = Self {

@@ -139,7 +139,8 @@ pub(super) fn explain(
         .map(|t_s| curve_at(&seen, *t_s, Side::Left))
         .collect::<Option<Vec<_>>>()
         .ok_or(TrackError::BehindCamera)?;
-    let reading = Reader::new(&scene, film.left, curves.clone()).read();
+    let reading = Reader::new(&scene, film.left, curves.clone())
+        .read(told_px(&curves, &times_s, camera, motion));
     let testimony = right.and_then(|right| {
         let sights = sights(film, &seen, &times_s, &curves, &reading.curves);
         Testimony::of(&right, &sights, &reading.rope, reading.end.rope_half_px)
@@ -160,6 +161,22 @@ pub(super) fn explain(
         reading: start.elapsed(),
     };
     Ok(result)
+}
+
+/// Where the arm and the camera's file put the clamp, along the hypothesis from its beginning
+/// on (px, median of the frames).
+fn told_px(
+    curves: &[Vec<[f64; 2]>],
+    times_s: &[f64],
+    camera: &StereoCamera,
+    motion: &dyn AttachMotion,
+) -> f64 {
+    let along = |(curve, t_s): (&Vec<[f64; 2]>, &f64)| {
+        let told = camera.project_left(&motion.at(*t_s).p_m)?;
+        let (t, _) = curve::tangent(curve, 0, 2);
+        Some((told[0] - curve[0][0]) * t[0] + (told[1] - curve[0][1]) * t[1])
+    };
+    quantile(curves.iter().zip(times_s).filter_map(along).collect(), 0.5)
 }
 
 /// The hypothesis in one frame.

@@ -39,6 +39,8 @@ const TIP_REACH_PX: [f64; 2] = [8.0, 5.0];
 /// rope's middle is; one that leaves less than the second, how thick it is.
 const CYLINDER: f64 = 0.015;
 const CYLINDER_WIDTH: f64 = 0.05;
+/// Colours are sampled for pairs of pixels: they reach beyond an edge by so much.
+const BLEED_PX: f64 = 0.5;
 /// Stiffness of its offsets over time, and their pull to the curve's end.
 const TIP_STIFFNESS: f64 = 0.3;
 const TIP_PULL: f64 = 0.02;
@@ -94,8 +96,9 @@ impl<'a> Reader<'a> {
         self.scene.present(lit.frame, lit.gain, colours, p)
     }
 
-    /// Reads all frames.
-    pub(super) fn read(mut self) -> Reading {
+    /// Reads all frames. `told_px` is where the arm says that the rope begins, from the
+    /// curves' beginning on.
+    pub(super) fn read(mut self, told_px: f64) -> Reading {
         // First, whatever the scene does not explain.
         let look = Look {
             reach: FIRST_REACH,
@@ -108,9 +111,10 @@ impl<'a> Reader<'a> {
         let rope = groups(&self.rope_samples(), ROPE_COLOURS);
         let picture = self.mean_picture(false);
         let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
-        // The hypothesis knows where the clamp is, but for the camera's place; the picture
-        // shows where the rope comes out of it, but for caps and knots: halfway.
-        let start_px = 0.5 * self.mean_picture(true).start_px();
+        // The arm says where the clamp is, but for the camera's place; the picture shows where
+        // the rope comes out of it, but for caps and knots: halfway.
+        let seen_px = self.mean_picture(true).start_px();
+        let start_px = seen_px.map_or(told_px, |seen| f64::midpoint(seen, told_px));
         // Then what has the rope's colours.
         let look = Look {
             reach: SECOND_REACH,
@@ -147,7 +151,7 @@ impl<'a> Reader<'a> {
             start_px,
             end,
             tips,
-            radii_px: [rope_px, end.radius_px.max(rope_px)],
+            radii_px: [rope_px, (end.radius_px - BLEED_PX).max(rope_px)],
             rope,
             tip,
         }
