@@ -123,7 +123,7 @@ pub struct Plan {
     #[serde(default)]
     pub arm_response: Option<String>,
     /// Why the track that its rope was identified from should not be relied on.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub doubts: Vec<String>,
     /// Simulations used.
     pub simulations: u32,
