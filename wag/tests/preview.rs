@@ -243,7 +243,10 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
     let mut stage = Stage::new(&Bus::join(&domain).unwrap());
     let (page, url) = watch(&domain, &camera);
     let pid = || process_of(&page.0.id().to_string(), "preview").unwrap();
-    assert_eq!(stage.told().state(), PreviewState::Looking);
+    // A frame may come to it before the first joints do.
+    until("a preview that looks for the rope", || {
+        (stage.told().state() == PreviewState::Looking).then_some(())
+    });
     // Killed, it is started again by the page.
     let first = pid();
     send(first, Signal::KILL);
