@@ -43,6 +43,8 @@ const CYLINDER_WIDTH: f64 = 0.05;
 const BLEED_PX: f64 = 0.5;
 /// Where the rope is seen to begin counts within this of where the arm says it does (px).
 const START_PX: f64 = 4.0;
+/// How much of the difference counts.
+const SEEN_PART: f64 = 0.25;
 /// Stiffness of its offsets over time, and their pull to the curve's end.
 const TIP_STIFFNESS: f64 = 0.3;
 const TIP_PULL: f64 = 0.02;
@@ -114,10 +116,10 @@ impl<'a> Reader<'a> {
         let picture = self.mean_picture(false);
         let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
         // The arm says where the clamp is, but for the camera's place; the picture shows where
-        // the rope comes out of it, but for caps and knots: halfway, if both are near.
+        // the rope comes out of it, but for caps and knots, and counts less.
         let seen_px = self.mean_picture(true).start_px();
         let seen_px = seen_px.filter(|seen| (seen - told_px).abs() <= START_PX);
-        let start_px = seen_px.map_or(told_px, |seen| f64::midpoint(seen, told_px));
+        let start_px = seen_px.map_or(told_px, |seen| told_px + SEEN_PART * (seen - told_px));
         // Then what has the rope's colours.
         let look = Look {
             reach: SECOND_REACH,
