@@ -58,25 +58,32 @@ impl Bulk {
     }
 }
 
-/// From evidence and number of looks per cell.
+/// From evidence and number of looks per cell: means over the surroundings, from sums over
+/// all cells above and to the left.
 fn counts(filled: &[[f32; 2]], columns: usize, rows: usize) -> Vec<f32> {
     let [low, high] = FILLED;
-    let near = |at: usize, count: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(count);
-    let mut out = Vec::with_capacity(filled.len());
+    let wide = columns + 1;
+    let mut sums = vec![[0.0_f32; 2]; wide * (rows + 1)];
     for row in 0..rows {
+        let mut line = [0.0; 2];
         for column in 0..columns {
-            let (mut sum, mut looks) = (0.0, 0.0);
-            for r in near(row, rows) {
-                for [evidence, count] in &filled[r * columns..][near(column, columns)] {
-                    sum += evidence;
-                    looks += count;
-                }
+            for k in 0..2 {
+                line[k] += filled[row * columns + column][k];
+                sums[(row + 1) * wide + column + 1][k] = sums[row * wide + column + 1][k] + line[k];
             }
-            let part = sum / looks.max(1.0);
-            out.push(((high - part) / (high - low)).clamp(0.0, 1.0));
         }
     }
-    out
+    let near = |at: usize, count: usize| (at.saturating_sub(AROUND), (at + AROUND + 1).min(count));
+    let count = |at: usize| {
+        let ((top, bottom), (left, right)) =
+            (near(at / columns, rows), near(at % columns, columns));
+        let [evidence, looks] = [0, 1].map(|k| {
+            let sum = |row: usize, column: usize| sums[row * wide + column][k];
+            sum(bottom, right) - sum(top, right) - sum(bottom, left) + sum(top, left)
+        });
+        ((high - evidence / looks.max(1.0)) / (high - low)).clamp(0.0, 1.0)
+    };
+    (0..columns * rows).map(count).collect()
 }
 
 #[cfg(test)]

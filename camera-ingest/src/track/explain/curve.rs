@@ -53,6 +53,32 @@ pub(super) fn from_end(points: &[[f64; 2]], s_px: f64) -> ([f64; 2], [f64; 2]) {
     (points[0], [0.0, 1.0])
 }
 
+/// A curve whose points lie where they do along another one: at the same parts of its length.
+pub(super) fn respaced(points: &[[f64; 2]], like: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let along = |points: &[[f64; 2]]| -> Vec<f64> {
+        let mut sums = vec![0.0];
+        for w in points.windows(2) {
+            let step = (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
+            sums.push(sums[sums.len() - 1] + step);
+        }
+        sums
+    };
+    let (here, there) = (along(points), along(like));
+    let last = here.len() - 1;
+    let scale = here[last] / there[last].max(1e-9);
+    let mut i = 0;
+    let place = |s: &f64| {
+        let s = s * scale;
+        while i + 2 < here.len() && here[i + 1] < s {
+            i += 1;
+        }
+        let w = (s - here[i]) / (here[i + 1] - here[i]).max(1e-9);
+        let (a, b) = (points[i], points[i + 1]);
+        [a[0] + (b[0] - a[0]) * w, a[1] + (b[1] - a[1]) * w]
+    };
+    there.iter().map(place).collect()
+}
+
 /// Place at a part of the points' count, drawn on beyond the last one: 0 first, 1 last.
 pub(super) fn at_part(points: &[[f64; 2]], part: f64) -> [f64; 2] {
     let last = points.len() - 1;
@@ -80,5 +106,8 @@ mod tests {
         assert_eq!(at_part(&line, 1.1), [3.0, 22.0]);
         assert_eq!(at_part(&line, -0.1), [3.0, -2.0]);
         assert_eq!(normals(&line)[4], [-1.0, 0.0]);
+        // Unevenly spaced, and twice as long.
+        let uneven: Vec<[f64; 2]> = (0..11).map(|i| [0.0, 0.4 * f64::from(i * i)]).collect();
+        assert_eq!(respaced(&uneven, &line)[5], [0.0, 20.0]);
     }
 }

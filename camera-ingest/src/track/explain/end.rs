@@ -1,4 +1,4 @@
-//! The rope's free end in the mean picture: a band that ends in a disc.
+//! The rope's free end in the median picture: a band that ends in a disc.
 
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
@@ -13,9 +13,24 @@ pub(super) struct End {
     pub(super) rope_half_px: f64,
 }
 
-/// Radii that are tried, and steps of the two rounds (px).
-const RADII_PX: [f64; 2] = [1.5, 17.0];
-const STEPS_PX: [f64; 2] = [1.0, 0.25];
+impl End {
+    /// How many of a curve's points the tip weight does not hide.
+    pub(super) fn nodes_shown(&self, curve: &[[f64; 2]]) -> usize {
+        let mut from_end_px = -self.centre_px;
+        for node in (1..curve.len()).rev() {
+            if from_end_px >= self.radius_px {
+                return node + 1;
+            }
+            let (a, b) = (curve[node - 1], curve[node]);
+            from_end_px += (b[0] - a[0]).hypot(b[1] - a[1]);
+        }
+        1
+    }
+}
+
+/// Radii that are tried, and steps of the rounds (px).
+const RADII_PX: [f64; 2] = [1.5, 17.5];
+const STEPS_PX: [f64; 3] = [2.0, 0.67, 0.22];
 /// An edge is blurred over so much (px).
 const BLUR_PX: f64 = 1.5;
 
@@ -35,23 +50,21 @@ pub(super) fn find(picture: &EndPicture, rope_half_px: f64, reach_px: f64, least
         let count = ((high - low) / step).round().max(0.0) as usize;
         (0..=count).map(move |i| low + step * i as f64)
     };
-    let least =
-        |ends: &mut dyn Iterator<Item = (f64, End)>| ends.min_by(|a, b| a.0.total_cmp(&b.0));
-    let [coarse, fine] = STEPS_PX;
-    let [smallest, largest] = RADII_PX;
-    let mut all = grid(-reach_px, reach_px, coarse)
-        .flat_map(|c| grid(smallest, largest, coarse).map(move |r| (c, r)))
-        .map(|(c, r)| fit(c, r));
-    let Some((_, rough)) = least(&mut all) else {
-        return fit(0.0, rope_half_px).1;
+    let best = |centres: [f64; 2], radii: [f64; 2], step: f64| {
+        grid(centres[0], centres[1], step)
+            .flat_map(|c| grid(radii[0], radii[1], step).map(move |r| (c, r)))
+            .map(|(c, r)| fit(c, r))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(fit(0.0, rope_half_px).1, |(_, end)| end)
     };
-    let mut near = grid(rough.centre_px - coarse, rough.centre_px + coarse, fine)
-        .flat_map(|c| {
-            let radii = grid(rough.radius_px - coarse, rough.radius_px + coarse, fine);
-            radii.map(move |r| (c, r))
-        })
-        .map(|(c, r)| fit(c, r));
-    least(&mut near).map_or(rough, |(_, end)| end)
+    let mut end = best([-reach_px, reach_px], RADII_PX, STEPS_PX[0]);
+    for pair in STEPS_PX.windows(2) {
+        let around = |px: f64| [px - pair[0], px + pair[0]];
+        let [smallest, largest] = around(end.radius_px);
+        let radii = [smallest.max(RADII_PX[0]), largest];
+        end = best(around(end.centre_px), radii, pair[1]);
+    }
+    end
 }
 
 /// How much of a pixel lies within an edge that is so far away (px, inside positive).
@@ -85,14 +98,19 @@ fn misfit(picture: &EndPicture, end: &End, least: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ends::{EndFrames, Window};
     use super::*;
 
     /// A curve that ends at the origin, drawn straight down, and its mean picture.
     fn picture(evidence: impl Fn([f64; 2]) -> f32) -> EndPicture {
-        let mut picture = EndPicture::new(45, 45, 24);
+        let mut frames = EndFrames::new(Window {
+            before: 45,
+            beyond: 45,
+            reach: 24,
+        });
         let curve: Vec<[f64; 2]> = (0..20).map(|i| [0.0, 5.0 * f64::from(i - 19)]).collect();
-        picture.add(&curve, |p| Some((evidence(p), [0.0; 3])));
-        picture
+        frames.add(&curve, |p| Some((evidence(p), [0.0; 3])));
+        frames.picture()
     }
 
     #[test]

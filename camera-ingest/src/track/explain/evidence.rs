@@ -7,6 +7,7 @@
 use super::super::background::{Background, frames_by_motion};
 use super::bulk::Bulk;
 use super::colour::{CHROMA_WEIGHT, Colour, colour_at, coverage, presence};
+use super::read::Lit;
 use crate::frame::EyeFrame;
 use crate::vectors::widest;
 
@@ -80,10 +81,9 @@ impl Scene {
     }
 
     /// Evidence in all of a frame, but for what is too large to be a rope.
-    pub(super) fn map(&self, frame: &EyeFrame) -> EvidenceMap {
-        let gain = self.gain(frame);
-        let mut map = EvidenceMap::of(frame, &self.background, gain);
-        map.leave_out(&Bulk::of(frame, gain, self));
+    pub(super) fn map(&self, lit: &Lit<'_>) -> EvidenceMap {
+        let mut map = EvidenceMap::of(lit.frame, &self.background, lit.gain);
+        map.leave_out(&lit.bulk);
         map
     }
 }
@@ -260,7 +260,7 @@ mod tests {
             ..EyeFrame::grey([8, 8], 160)
         };
         frame.luma[8 * 4 + 4] = 184;
-        let map = scene.map(&frame);
+        let map = scene.map(&Lit::of(&frame, &scene));
         let seen = colour_at(&frame, 1.0, [4.0, 4.0]).unwrap();
         let one = scene.unexplained(seen, scene.colour_at([4.0, 4.0]).unwrap());
         assert!(one > 0.3 && (map.at([4.0, 4.0]) - one).abs() < 0.005);

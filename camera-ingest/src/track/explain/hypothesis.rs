@@ -53,11 +53,6 @@ impl Fidelity {
         step_s: 2e-3,
         precision: Precision::F32,
     };
-    pub(super) const FINE: Self = Self {
-        links: 16,
-        step_s: 1e-3,
-        precision: Precision::F32,
-    };
     pub(super) const FINAL: Self = Self {
         links: 24,
         step_s: 1e-3,

@@ -8,11 +8,11 @@ use shared_types::{MonotonicNs, RopeParams, StereoCamera};
 use super::colour::colour_at;
 use super::curve::{at_part, length_px, normals};
 use super::evidence::Scene;
-use super::hypothesis::{CLOCK, Curve, Fidelity, Seen, Side, rope, simulate, turned};
-use super::read::{NODES, Reader};
-use super::search::SearchError;
+use super::explainer::Explainer;
+use super::hypothesis::{CLOCK, Curve, Fidelity, rope, turned};
+use super::read::{Lit, NODES};
 use super::{Film, TrackError, TrackOptions};
-use super::{curve_at, hypothesise, mean, moments, quantile, told_px, usual_evidence};
+use super::{mean, moments, quantile, usual_evidence};
 use crate::frame::EyeFrame;
 
 /// Evidence is looked for so far to either side of a keypoint (px).
@@ -46,25 +46,26 @@ impl Known {
         let zero = MonotonicNs(frames[0].stamp_ns);
         let since_zero = |f: &EyeFrame| MonotonicNs(f.stamp_ns).since_s(zero);
         let times_s: Vec<f64> = frames.iter().map(since_zero).collect();
-        let film_s = times_s[times_s.len() - 1];
         let film = Film {
             left: frames,
             right: &[],
         };
         let scene = Scene::of(frames, options.background_frames);
-        let moments = moments(film, (&scene, None), &times_s);
-        let x = hypothesise(&moments, camera, motion, 1)?.x;
+        let lit: Vec<Lit<'_>> = frames.iter().map(|f| Lit::of(f, &scene)).collect();
+        let moments = moments(film, &lit, (&scene, None), &times_s);
+        let explainer = Explainer {
+            scene: &scene,
+            frames: &lit,
+            times_s: &times_s,
+            camera,
+            motion,
+            threads: 1,
+        };
+        let x = explainer.hypothesis(&moments)?;
         drop(moments);
-        let rollouts =
-            simulate(&[x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
-        let seen = Seen::new(&x, &rollouts[0], camera).ok_or(TrackError::BehindCamera)?;
-        let curves: Option<Vec<_>> = times_s
-            .iter()
-            .map(|t_s| curve_at(&seen, *t_s, Side::Left))
-            .collect();
-        let curves = curves.ok_or(TrackError::BehindCamera)?;
-        let reading = Reader::new(&scene, frames, curves.clone())
-            .read(told_px(&curves, &times_s, camera, motion));
+        let curves = explainer.told(&x, Fidelity::FINAL, 1)?;
+        let reading = explainer.read(curves.clone(), 1);
+        drop(lit);
         usual_evidence(&reading, options.keypoints)?;
         let length = mean(&curves.iter().map(|c| length_px(c)).collect::<Vec<_>>());
         let mut known = Self {

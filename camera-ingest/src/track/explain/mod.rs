@@ -3,8 +3,9 @@
 //! One hypothesis about the rope, simulated under the arm's own motion and projected
 //! through the camera, is compared with the whole film at once. What it explains can be no
 //! shadow, cable or piece of furniture: they do not hang on the clamp and swing as a rope
-//! does. The film is then read off along it: a few pixels across the hypothesis, frame by
-//! frame, and its two ends where the mean picture along the rope has them.
+//! does. The film is read off along it: a few pixels across the hypothesis, frame by
+//! frame, and its two ends where the median picture along the rope has them; to that the
+//! hypothesis is fitted, and the film read off again.
 
 mod bulk;
 mod colour;
@@ -13,11 +14,13 @@ mod disc;
 mod end;
 mod ends;
 mod evidence;
+mod explainer;
 mod field;
 mod hypothesis;
 mod live;
 mod read;
 mod reading;
+mod refine;
 mod round;
 mod search;
 mod witness;
@@ -35,35 +38,16 @@ use super::{RopeAppearance, TrackError, TrackOptions, TrackResult, TrackTimes};
 use crate::frame::{EyeFrame, rgb_from_ycc};
 use colour::{CHROMA_WEIGHT, Colour};
 use evidence::Scene;
-use hypothesis::{Curve, Fidelity, Seen, Side, simulate};
+use explainer::{Explainer, curve_at};
+use hypothesis::{Fidelity, Seen, Side, simulate};
 pub(crate) use live::Known;
-use read::{NODES, Reader};
+use read::{Lit, NODES};
 use reading::Reading;
-use search::{Climb, Comparison, Found, Moment, SearchError, Searcher};
+use search::{Moment, SearchError};
 use witness::{Sight, Testimony};
 
-/// Frames that are searched, and every which of them in blurred evidence.
+/// Frames that are searched.
 const SEARCHED: usize = 100;
-const BLURRED_EVERY: usize = 3;
-const BLUR_PX: usize = 4;
-const COARSE: Comparison = Comparison {
-    points: 24,
-    side_px: 22.0,
-    price: 0.2,
-    fidelity: Fidelity::COARSE,
-};
-const FINE: Comparison = Comparison {
-    points: 40,
-    side_px: 9.0,
-    price: 0.3,
-    fidelity: Fidelity::FINE,
-};
-const LAST_CLIMB: Climb = Climb {
-    spreads: 0.15,
-    generations: 40,
-    population: 16,
-    seed: 8,
-};
 /// Evidence of the rope, in the middle over nodes and frames and in the least evident
 /// tenth of either, below which a hypothesis explains too little.
 const LEAST_EVIDENT: [f64; 3] = [0.35, 0.12, 0.12];
@@ -120,31 +104,37 @@ pub(super) fn explain(
     // A median of fewer shows the rope.
     let right = (film.right.len() >= options.background_frames)
         .then(|| Scene::of(film.right, options.background_frames));
-    let moments = moments(film, (&scene, right.as_ref()), &times_s);
+    let lit: Vec<Lit<'_>> = film.left.iter().map(|f| Lit::of(f, &scene)).collect();
+    let moments = moments(film, &lit, (&scene, right.as_ref()), &times_s);
     let background = start.elapsed();
 
     let start = Instant::now();
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let found = hypothesise(&moments, camera, motion, threads)?;
+    let explainer = Explainer {
+        scene: &scene,
+        frames: &lit,
+        times_s: &times_s,
+        camera,
+        motion,
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let x = explainer.hypothesis(&moments)?;
     drop(moments);
     let searching = start.elapsed();
 
     let start = Instant::now();
-    let film_s = times_s[times_s.len() - 1];
-    let rollouts =
-        simulate(&[found.x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
-    let seen = Seen::new(&found.x, &rollouts[0], camera).ok_or(TrackError::BehindCamera)?;
-    let curves = times_s
-        .iter()
-        .map(|t_s| curve_at(&seen, *t_s, Side::Left))
-        .collect::<Option<Vec<_>>>()
-        .ok_or(TrackError::BehindCamera)?;
-    let reading = Reader::new(&scene, film.left, curves.clone())
-        .read(told_px(&curves, &times_s, camera, motion));
-    let testimony = right.and_then(|right| {
-        let sights = sights(film, &seen, &times_s, &curves, &reading.curves);
-        Testimony::of(&right, &sights, &reading.rope, reading.end.rope_half_px)
-    });
+    let curves = explainer.told(&x, Fidelity::FINAL, 1)?;
+    let reading = explainer.read(curves.clone(), 1);
+    let testimony = match right {
+        Some(right) => {
+            let film_s = explainer.film_s();
+            let rollouts =
+                simulate(&[x], Fidelity::FINAL, motion, film_s, 1).map_err(SearchError::from)?;
+            let seen = Seen::new(&x, &rollouts[0], camera).ok_or(TrackError::BehindCamera)?;
+            let sights = sights(film, &seen, &times_s, &curves, &reading.curves);
+            Testimony::of(&right, &sights, &reading.rope, reading.end.rope_half_px)
+        }
+        None => None,
+    };
     let usual = usual_evidence(&reading, options.keypoints)?;
     let read = Read {
         reading: &reading,
@@ -161,29 +151,6 @@ pub(super) fn explain(
         reading: start.elapsed(),
     };
     Ok(result)
-}
-
-/// Where the arm and the camera's file put the clamp, along the hypothesis from its beginning
-/// on (px, median of the frames).
-fn told_px(
-    curves: &[Vec<[f64; 2]>],
-    times_s: &[f64],
-    camera: &StereoCamera,
-    motion: &dyn AttachMotion,
-) -> f64 {
-    let along = |(curve, t_s): (&Vec<[f64; 2]>, &f64)| {
-        let told = camera.project_left(&motion.at(*t_s).p_m)?;
-        let (t, _) = curve::tangent(curve, 0, 2);
-        Some((told[0] - curve[0][0]) * t[0] + (told[1] - curve[0][1]) * t[1])
-    };
-    quantile(curves.iter().zip(times_s).filter_map(along).collect(), 0.5)
-}
-
-/// The hypothesis in one frame.
-fn curve_at(seen: &Seen<'_>, t_s: f64, side: Side) -> Option<Vec<[f64; 2]>> {
-    let mut curve = Curve::default();
-    seen.curve(t_s, side, NODES, &mut curve)
-        .then_some(curve.points)
 }
 
 /// Where the right images should show what was read off the left ones: as far from the
@@ -217,16 +184,17 @@ fn sights<'a>(
 /// Evidence of frames spread over the film.
 fn moments(
     film: Film<'_>,
+    lit: &[Lit<'_>],
     (left, right): (&Scene, Option<&Scene>),
     times_s: &[f64],
 ) -> Vec<Moment> {
     let searched = (0..times_s.len()).filter(|i| Film::needs_right(*i, times_s.len()));
     let moment = |i: usize| {
-        let mut maps = vec![(Side::Left, left.map(&film.left[i]))];
+        let mut maps = vec![(Side::Left, left.map(&lit[i]))];
         let stamp_ns = film.left[i].stamp_ns;
         let at = film.right.binary_search_by_key(&stamp_ns, |f| f.stamp_ns);
         if let (Some(scene), Ok(at)) = (right, at) {
-            maps.push((Side::Right, scene.map(&film.right[at])));
+            maps.push((Side::Right, scene.map(&Lit::of(&film.right[at], scene))));
         }
         Moment {
             t_s: times_s[i],
@@ -234,42 +202,6 @@ fn moments(
         }
     };
     searched.map(moment).collect()
-}
-
-/// The hypothesis that explains most.
-fn hypothesise(
-    moments: &[Moment],
-    camera: &StereoCamera,
-    motion: &dyn AttachMotion,
-    threads: usize,
-) -> Result<Found, SearchError> {
-    let blurred: Vec<Moment> = moments
-        .iter()
-        .step_by(BLURRED_EVERY)
-        .map(|m| Moment {
-            t_s: m.t_s,
-            maps: m
-                .maps
-                .iter()
-                .map(|(s, map)| (*s, map.blurred(BLUR_PX)))
-                .collect(),
-        })
-        .collect();
-    let coarse = Searcher {
-        moments: &blurred,
-        camera,
-        motion,
-        comparison: COARSE,
-        threads,
-    };
-    let found = coarse.search()?;
-    let fine = Searcher {
-        moments,
-        comparison: FINE,
-        ..coarse
-    };
-    let start = fine.scored(vec![found.x])?;
-    fine.climb(start[0], LAST_CLIMB)
 }
 
 fn quantile(mut values: Vec<f64>, q: f64) -> f64 {

@@ -2,10 +2,10 @@
 
 use super::bulk::Bulk;
 use super::colour::{Colour, are_apart, colour_at, coverage, groups};
-use super::curve::{from_end, normals};
+use super::curve::{from_end, normals, respaced};
 use super::disc::Disc;
 use super::end::{self, End};
-use super::ends::EndPicture;
+use super::ends::{EndFrames, EndPicture, Window};
 use super::evidence::Scene;
 use super::field::{Look, Offset, moved, offsets, smooth_field, smoothed};
 use super::reading::Reading;
@@ -23,8 +23,26 @@ const UNKNOWN_HALF_PX: f64 = 3.0;
 /// Stiffness of the offsets over time and along the rope, at the first and second look.
 const FIRST_STIFFNESS: [f64; 2] = [2.0, 1.0];
 const SECOND_STIFFNESS: [f64; 2] = [0.5, 0.5];
-/// Of so many frames one is learnt from.
-const LEARN_EVERY: usize = 3;
+/// Weight of what is seen where the tip weight hides the rope.
+const HIDDEN: f64 = 0.02;
+/// Around the free end, the tip weight found there, and the clamp.
+const FREE_END: Window = Window {
+    before: 45,
+    beyond: 45,
+    reach: 24,
+};
+const TIP: Window = Window {
+    before: 30,
+    beyond: 30,
+    reach: 24,
+};
+const CLAMP_END: Window = Window {
+    before: 45,
+    beyond: 25,
+    reach: 10,
+};
+/// Colours and ends are learnt from about so many frames.
+const LEARNT: usize = 64;
 /// Yarns of a rope, and sides of a tip weight, of different colour.
 const ROPE_COLOURS: usize = 3;
 const TIP_COLOURS: usize = 2;
@@ -39,8 +57,6 @@ const TIP_REACH_PX: [f64; 2] = [8.0, 5.0];
 /// rope's middle is; one that leaves less than the second, how thick it is.
 const CYLINDER: f64 = 0.015;
 const CYLINDER_WIDTH: f64 = 0.05;
-/// Colours are sampled for pairs of pixels: they reach beyond an edge by so much.
-const BLEED_PX: f64 = 0.5;
 /// Where the rope is seen to begin counts within this of where the arm says it does (px).
 const START_PX: f64 = 4.0;
 /// How much of the difference counts.
@@ -50,38 +66,50 @@ const TIP_STIFFNESS: f64 = 0.3;
 const TIP_PULL: f64 = 0.02;
 
 /// One frame, how bright it is, and what in it is too large to be a rope.
-struct Lit<'a> {
-    frame: &'a EyeFrame,
-    gain: f32,
-    bulk: Bulk,
+pub(super) struct Lit<'a> {
+    pub(super) frame: &'a EyeFrame,
+    pub(super) gain: f32,
+    pub(super) bulk: Bulk,
 }
 
-/// The film of one eye, and the hypothesis's curves in it.
+impl<'a> Lit<'a> {
+    pub(super) fn of(frame: &'a EyeFrame, scene: &Scene) -> Self {
+        let gain = scene.gain(frame);
+        Self {
+            frame,
+            gain,
+            bulk: Bulk::of(frame, gain, scene),
+        }
+    }
+}
+
+/// Frames of one eye, and the hypothesis's curves in them.
 pub(super) struct Reader<'a> {
     scene: &'a Scene,
-    frames: Vec<Lit<'a>>,
+    frames: Vec<&'a Lit<'a>>,
     curves: Vec<Vec<[f64; 2]>>,
+    /// Offsets in frames further apart in time have less to do with each other.
+    apart: f64,
 }
 
 impl<'a> Reader<'a> {
+    /// Of every so manieth frame of a film.
     pub(super) fn new(
         scene: &'a Scene,
-        frames: &'a [EyeFrame],
+        frames: Vec<&'a Lit<'a>>,
+        every: usize,
         curves: Vec<Vec<[f64; 2]>>,
     ) -> Self {
-        let lit = |frame| {
-            let gain = scene.gain(frame);
-            Lit {
-                frame,
-                gain,
-                bulk: Bulk::of(frame, gain, scene),
-            }
-        };
         Self {
             scene,
-            frames: frames.iter().map(lit).collect(),
+            frames,
             curves,
+            apart: (every as f64).powi(3),
         }
+    }
+
+    fn learn_every(&self) -> usize {
+        (self.frames.len() / LEARNT).max(1)
     }
 
     /// Colour in the scene's light, and the scene's there.
@@ -109,15 +137,19 @@ impl<'a> Reader<'a> {
             half_width_px: UNKNOWN_HALF_PX,
             jump: 0.02,
         };
-        self.follow(look, FIRST_STIFFNESS, None, |reader, lit, p| {
-            reader.unexplained(lit, p)
-        });
+        let hypothesis = self.curves.clone();
+        let field = self.look(look, |reader, lit, p| reader.unexplained(lit, p));
+        self.follow(field.clone(), FIRST_STIFFNESS, None);
         let rope = groups(&self.rope_samples(), ROPE_COLOURS);
-        let picture = self.mean_picture(false);
+        let picture = self.picture(&FREE_END, |curve| curve.to_vec());
         let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
+        // A weight thicker than the look is wide draws it to one of its sides.
+        self.curves = hypothesis;
+        self.follow(field, FIRST_STIFFNESS, Some(&end));
         // The arm says where the clamp is, but for the camera's place; the picture shows where
         // the rope comes out of it, but for caps and knots, and counts less.
-        let seen_px = self.mean_picture(true).start_px();
+        let clamp_last = |curve: &[[f64; 2]]| curve.iter().rev().copied().collect();
+        let seen_px = self.picture(&CLAMP_END, clamp_last).start_px();
         let seen_px = seen_px.filter(|seen| (seen - told_px).abs() <= START_PX);
         let start_px = seen_px.map_or(told_px, |seen| told_px + SEEN_PART * (seen - told_px));
         // Then what has the rope's colours.
@@ -126,9 +158,12 @@ impl<'a> Reader<'a> {
             half_width_px: end.rope_half_px,
             jump: 0.05,
         };
-        let evident = self.follow(look, SECOND_STIFFNESS, Some(&end), |reader, lit, p| {
-            reader.present(lit, &rope, p)
-        });
+        let field = self.look(look, |reader, lit, p| reader.present(lit, &rope, p));
+        let evident = field
+            .iter()
+            .map(|f| f.iter().map(|o| o.weight).collect())
+            .collect();
+        self.follow(field, SECOND_STIFFNESS, Some(&end));
         let still = self.still_frames();
         let round = self.round(&still);
         if round.left < CYLINDER {
@@ -139,7 +174,7 @@ impl<'a> Reader<'a> {
         } else {
             end.rope_half_px
         };
-        // First roughly, then with the size that the mean picture of all weights has.
+        // First roughly, then with the size that the median picture of all weights has.
         let none = vec![(Offset::NONE, Offset::NONE); self.frames.len()];
         let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
         let both = [&rope[..], &tip].concat();
@@ -147,7 +182,7 @@ impl<'a> Reader<'a> {
         end.centre_px += median_px(&tips) + disc.centre_px;
         end.radius_px = disc.radius_px;
         let (tip, mut tips) = self.tips(&end, &tips, (&rope, TIP_REACH_PX[1]));
-        // Where they are on average, the mean picture has told.
+        // Where they are on average, the median picture has told.
         let usual_px = median_px(&tips);
         tips.iter_mut().for_each(|(along, _)| along.px -= usual_px);
         Reading {
@@ -156,40 +191,38 @@ impl<'a> Reader<'a> {
             start_px,
             end,
             tips,
-            radii_px: [rope_px, (end.radius_px - BLEED_PX).max(rope_px)],
+            radii_px: [rope_px, end.radius_px.max(rope_px)],
             rope,
             tip,
         }
     }
 
-    /// Moves all curves to the evidence, but for what the tip weight hides; gives how
-    /// evident each node was.
+    /// Where evidence lies across the curves.
+    fn look(&self, look: Look, at: impl Fn(&Self, &Lit<'_>, [f64; 2]) -> f32) -> Vec<Vec<Offset>> {
+        let frames = self.frames.iter().zip(&self.curves);
+        frames
+            .map(|(lit, curve)| offsets(curve, &normals(curve), look, |p| at(self, lit, p)))
+            .collect()
+    }
+
+    /// Moves all curves to what was seen, but for what the tip weight hides.
     fn follow(
         &mut self,
-        look: Look,
+        mut field: Vec<Vec<Offset>>,
         [over_time, along]: [f64; 2],
         end: Option<&End>,
-        at: impl Fn(&Self, &Lit<'_>, [f64; 2]) -> f32,
-    ) -> Vec<Vec<f64>> {
-        let normals: Vec<_> = self.curves.iter().map(|c| normals(c)).collect();
-        let frames = self.frames.iter().zip(&self.curves).zip(&normals);
-        let mut field: Vec<Vec<Offset>> = frames
-            .map(|((lit, curve), normals)| offsets(curve, normals, look, |p| at(self, lit, p)))
-            .collect();
-        let evident = field
-            .iter()
-            .map(|f| f.iter().map(|o| o.weight).collect())
-            .collect();
+    ) {
         if let Some(end) = end {
             for (offsets, curve) in field.iter_mut().zip(&self.curves) {
-                hide_behind(end, curve, offsets);
+                for offset in &mut offsets[end.nodes_shown(curve)..] {
+                    offset.weight *= HIDDEN;
+                }
             }
         }
-        smooth_field(&mut field, over_time, along);
-        for ((curve, normals), offsets) in self.curves.iter_mut().zip(&normals).zip(&field) {
-            *curve = moved(curve, normals, offsets);
+        smooth_field(&mut field, over_time / self.apart, along);
+        for (curve, offsets) in self.curves.iter_mut().zip(&field) {
+            *curve = respaced(&moved(curve, &normals(curve), offsets), curve);
         }
-        evident
     }
 
     /// The quarter of the frames in which the rope moves least.
@@ -252,12 +285,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Centre and radius of the tip weight in the mean picture around where it was found.
+    /// Centre and radius of the tip weight in the median picture around where it was found.
     fn tip_disc(&self, end: &End, colours: &[Colour], places: &[(Offset, Offset)]) -> End {
-        let mut picture = EndPicture::new(30, 30, 24);
+        let mut frames = EndFrames::new(TIP);
         let noise = self.scene.noise();
         let found = self.frames.iter().zip(&self.curves).zip(places);
-        for ((lit, curve), (along, across)) in found.step_by(LEARN_EVERY) {
+        for ((lit, curve), (along, across)) in found.step_by(self.learn_every()) {
             let (c, t) = from_end(curve, end.centre_px + along.px);
             let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
             // Straight on both sides: the weight hides how the rope bends there.
@@ -267,11 +300,12 @@ impl<'a> Reader<'a> {
                     [c[0] - t[0] * back, c[1] - t[1] * back]
                 })
                 .collect();
-            picture.add(&axis, |p| {
+            frames.add(&axis, |p| {
                 let (seen, behind) = self.colours(lit, p)?;
                 Some((coverage(seen, behind, colours, noise), seen))
             });
         }
+        let picture = frames.picture();
         let rope_half_px = picture.rope_half_px().min(end.rope_half_px);
         end::find(&picture, rope_half_px, TIP_REACH_PX[0], COVERED)
     }
@@ -279,7 +313,12 @@ impl<'a> Reader<'a> {
     /// Colours where the rope is evident, but for its ends, across half its width.
     fn rope_samples(&self) -> Vec<Colour> {
         let mut samples = Vec::new();
-        for (lit, curve) in self.frames.iter().zip(&self.curves).step_by(LEARN_EVERY) {
+        for (lit, curve) in self
+            .frames
+            .iter()
+            .zip(&self.curves)
+            .step_by(self.learn_every())
+        {
             for (p, n) in curve
                 .iter()
                 .zip(normals(curve))
@@ -306,24 +345,25 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Mean picture around the free end, or around the clamp.
-    fn mean_picture(&self, clamp: bool) -> EndPicture {
-        let mut picture = if clamp {
-            EndPicture::new(45, 25, 10)
-        } else {
-            EndPicture::new(45, 45, 24)
-        };
-        for (lit, curve) in self.frames.iter().zip(&self.curves).step_by(LEARN_EVERY) {
-            let mut curve = curve.clone();
-            if clamp {
-                curve.reverse();
-            }
-            picture.add(&curve, |p| {
+    /// Median picture around one end, which `turned` puts last.
+    fn picture(
+        &self,
+        window: &Window,
+        turned: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
+    ) -> EndPicture {
+        let mut frames = EndFrames::new(*window);
+        for (lit, curve) in self
+            .frames
+            .iter()
+            .zip(&self.curves)
+            .step_by(self.learn_every())
+        {
+            frames.add(&turned(curve), |p| {
                 let (seen, behind) = self.colours(lit, p)?;
                 Some((self.scene.unexplained(seen, behind) * lit.bulk.at(p), seen))
             });
         }
-        picture
+        frames.picture()
     }
 
     /// The tip weight's colours, learnt where it was found before, and its place along and
@@ -370,7 +410,7 @@ impl<'a> Reader<'a> {
     fn tip_samples(&self, end: &End, places: &[(Offset, Offset)]) -> Vec<Colour> {
         let mut samples = Vec::new();
         let found = self.frames.iter().zip(&self.curves).zip(places);
-        for ((lit, curve), (along, across)) in found.step_by(LEARN_EVERY) {
+        for ((lit, curve), (along, across)) in found.step_by(self.learn_every()) {
             let (c, t) = from_end(curve, end.centre_px + along.px);
             let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
             let r = 0.4 * end.radius_px;
@@ -387,18 +427,4 @@ fn median_px(tips: &[(Offset, Offset)]) -> f64 {
     let mut along: Vec<f64> = tips.iter().map(|(along, _)| along.px).collect();
     along.sort_by(f64::total_cmp);
     along.get(along.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// The tip weight hides the rope: what is read there is not the rope's.
-fn hide_behind(end: &End, curve: &[[f64; 2]], offsets: &mut [Offset]) {
-    let mut from_end_px = -end.centre_px;
-    for node in (0..curve.len()).rev() {
-        if from_end_px < end.radius_px {
-            offsets[node].weight *= 0.02;
-        }
-        if node > 0 {
-            let (a, b) = (curve[node - 1], curve[node]);
-            from_end_px += (b[0] - a[0]).hypot(b[1] - a[1]);
-        }
-    }
 }

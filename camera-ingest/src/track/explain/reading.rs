@@ -5,9 +5,6 @@ use super::curve::{at_part, from_end, length_px};
 use super::end::End;
 use super::field::Offset;
 
-/// The curve's last part bends to the tip weight's centre.
-const BEND: f64 = 0.1;
-
 /// What was read.
 #[derive(Debug)]
 pub(super) struct Reading {
@@ -32,27 +29,34 @@ impl Reading {
         self.curves.len()
     }
 
+    /// The tip weight's centre in a frame (px).
+    pub(super) fn tip_px(&self, frame: usize) -> [f64; 2] {
+        let (along, across) = self.tips[frame];
+        let curve = &self.curves[frame];
+        let (p, _) = from_end(curve, self.end.centre_px + along.px);
+        let (_, t) = from_end(curve, self.end.centre_px);
+        [p[0] - t[1] * across.px, p[1] + t[0] * across.px]
+    }
+
     /// `count` places of a frame at equal distances along the rope, from the clamp to the
-    /// tip weight's centre, and how evident it is at each.
+    /// tip weight's centre, and how evident it is at each. What the weight hides is straight.
     pub(super) fn places(&self, frame: usize, count: usize) -> (Vec<[f64; 2]>, Vec<f64>) {
         let (curve, evident) = (&self.curves[frame], &self.evident[frame]);
         let (along, across) = self.tips[frame];
         let length = length_px(curve);
         let first = self.start_px / length;
         let last = 1.0 + (self.end.centre_px + along.px) / length;
-        let weight_begins = 1.0 + (self.end.centre_px - self.end.radius_px) / length;
-        let (_, t) = from_end(curve, self.end.centre_px);
+        let shown = self.end.nodes_shown(curve) - 1;
+        let edge = shown as f64 / (curve.len() - 1) as f64;
+        let (edge_px, tip_px) = (curve[shown], self.tip_px(frame));
         let place = |k: usize| {
-            let part = k as f64 / (count - 1) as f64;
-            let at = first + part * (last - first);
-            let p = at_part(curve, at);
-            let bend = across.px * ((part - 1.0 + BEND) / BEND).max(0.0);
-            let evidence = if at > weight_begins {
-                across.weight
-            } else {
-                local_mean(evident, at)
-            };
-            ([p[0] - t[1] * bend, p[1] + t[0] * bend], evidence)
+            let at = first + (last - first) * k as f64 / (count - 1) as f64;
+            if at <= edge {
+                return (at_part(curve, at), local_mean(evident, at));
+            }
+            let w = (at - edge) / (last - edge);
+            let [u, v] = [0, 1].map(|i| edge_px[i] + (tip_px[i] - edge_px[i]) * w);
+            ([u, v], across.weight)
         };
         (0..count).map(place).unzip()
     }

@@ -35,6 +35,9 @@ const UPPER: [f64; 6] = [4.0, 12.0, 255.0, 300.0, 1.4, 2.5];
 const RADII_PX: [f64; 4] = [2.0, 4.0, 6.5, 9.0];
 const DIRECTIONS_RAD: [f64; 4] = [-0.9, -0.3, 0.3, 0.9];
 const ROUNDS: usize = 40;
+/// Of two cylinders that fit alike the one nearer to the curve is taken: what a pixel aside
+/// costs, as a part of the contrast.
+const ASIDE: f64 = 0.004;
 
 fn place_px(sample: usize) -> f64 {
     (sample as f64 - REACH as f64) * STEP_PX
@@ -82,25 +85,29 @@ fn residual(c: &Cylinder, profile: &Profile) -> SVector<f64, SAMPLES> {
 /// The cylinder that fits best.
 pub(super) fn fit(profile: &Profile) -> Round {
     let middle = profile.seen[REACH];
-    let mut best: Option<(f64, Cylinder)> = None;
-    for (radius_px, direction) in RADII_PX
-        .into_iter()
-        .flat_map(|r| DIRECTIONS_RAD.map(|d| (r, d)))
-    {
-        let start = Cylinder::from([0.0, radius_px, 0.3 * middle, 0.7 * middle, direction, 0.8]);
-        let (cost, found) = descend(start, profile);
-        if best.is_none_or(|(least, _)| cost < least) {
-            best = Some((cost, found));
-        }
-    }
-    let (cost, c) = best.unwrap_or((f64::INFINITY, Cylinder::zeros()));
     let contrast = |i: usize| (profile.seen[i] - profile.behind[i]).abs();
     let contrast = (0..SAMPLES).map(contrast).fold(1.0, f64::max);
-    Round {
-        middle_px: c[0],
-        radius_px: c[1],
-        left: (cost / SAMPLES as f64).sqrt() / contrast,
-    }
+    let starts = RADII_PX
+        .into_iter()
+        .flat_map(|r| DIRECTIONS_RAD.map(|d| (r, d)));
+    let round = |(radius_px, direction)| {
+        let start = Cylinder::from([0.0, radius_px, 0.3 * middle, 0.7 * middle, direction, 0.8]);
+        let (cost, c) = descend(start, profile);
+        Round {
+            middle_px: c[0],
+            radius_px: c[1],
+            left: (cost / SAMPLES as f64).sqrt() / contrast,
+        }
+    };
+    let price = |round: &Round| round.left + ASIDE * round.middle_px.abs();
+    starts
+        .map(round)
+        .min_by(|a, b| price(a).total_cmp(&price(b)))
+        .unwrap_or(Round {
+            middle_px: 0.0,
+            radius_px: 0.0,
+            left: f64::INFINITY,
+        })
 }
 
 /// Levenberg-Marquardt in the box.

@@ -15,10 +15,9 @@ use rand_chacha::ChaCha12Rng;
 use rope_sim::{AttachMotion, SimulateError};
 use shared_types::StereoCamera;
 
-/// Hypotheses drawn at first, and how many of them are improved, in two rounds.
+/// Hypotheses drawn at first, and how many of them are improved.
 const BANK: usize = 128;
 const STARTS: usize = 4;
-const FINALISTS: usize = 2;
 /// Two starts are apart if one of the rope's numbers differs by so many spreads.
 const APART: f64 = 0.7;
 /// How widely the bank is drawn about the middle, for the rope and for the camera.
@@ -27,8 +26,11 @@ const BANK_SPREADS: [f64; 2] = [1.7, 0.7];
 const PRIOR: f64 = 0.015;
 /// Weight of the least evident tenth of the rope.
 const WEAKEST: f64 = 0.3;
-/// A climb ends when so many generations have gained less than this.
-const STALLED: (usize, f64) = (8, 0.003);
+/// How widely and how long a climb looks; as many ropes as are simulated side by side.
+const CLIMB_SPREADS: f64 = 0.6;
+const GENERATIONS: usize = 8;
+const POPULATION: usize = 16;
+const CLIMB_SEED: u64 = 2;
 
 /// Evidence of one moment.
 #[derive(Debug)]
@@ -37,6 +39,17 @@ pub(super) struct Moment {
     pub(super) t_s: f64,
     /// Left image's, and the right one's where there is one.
     pub(super) maps: Vec<(Side, EvidenceMap)>,
+}
+
+impl Moment {
+    /// With evidence spread over so many pixels to every side.
+    pub(super) fn blurred(&self, reach_px: usize) -> Self {
+        let blurred = |(side, map): &(Side, EvidenceMap)| (*side, map.blurred(reach_px));
+        Self {
+            t_s: self.t_s,
+            maps: self.maps.iter().map(blurred).collect(),
+        }
+    }
 }
 
 /// How a curve is compared with evidence.
@@ -77,18 +90,9 @@ pub(super) struct Searcher<'a> {
     pub(super) threads: usize,
 }
 
-/// How widely and how long a climb looks.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Climb {
-    pub(super) spreads: f64,
-    pub(super) generations: usize,
-    pub(super) population: usize,
-    pub(super) seed: u64,
-}
-
 impl Searcher<'_> {
-    /// From a bank of ropes to the best one.
-    pub(super) fn search(&self) -> Result<Found, SearchError> {
+    /// From a bank of ropes to some good ones.
+    pub(super) fn search(&self) -> Result<Vec<Found>, SearchError> {
         let mut starts: Vec<Found> = Vec::new();
         for found in self.bank()? {
             let apart =
@@ -100,21 +104,10 @@ impl Searcher<'_> {
                 break;
             }
         }
-        let rounds = [(STARTS, 0.6, 10, 12, 2), (FINALISTS, 0.4, 24, 16, 20)];
-        for (count, spreads, generations, population, seed) in rounds {
-            starts.truncate(count);
-            for (start, seed) in starts.iter_mut().zip(seed..) {
-                let climb = Climb {
-                    spreads,
-                    generations,
-                    population,
-                    seed,
-                };
-                *start = self.climb(*start, climb)?;
-            }
-            starts.sort_by(|a, b| b.score.total_cmp(&a.score));
-        }
-        Ok(starts[0])
+        let seeded = starts.into_iter().zip(CLIMB_SEED..);
+        seeded
+            .map(|(start, seed)| self.climb(start, seed))
+            .collect()
     }
 
     /// Ropes drawn about the middle, the best first.
@@ -132,23 +125,22 @@ impl Searcher<'_> {
     }
 
     /// The best hypothesis near a start.
-    pub(super) fn climb(&self, start: Found, how: Climb) -> Result<Found, SearchError> {
+    fn climb(&self, start: Found, seed: u64) -> Result<Found, SearchError> {
         let mut strategy = CmaEs::new(CmaOptions {
             mean: start.x.to_vec(),
-            std_dev: SPREAD.iter().map(|s| s * how.spreads).collect(),
+            std_dev: SPREAD.iter().map(|s| s * CLIMB_SPREADS).collect(),
             lower: LOWER.to_vec(),
             upper: UPPER.to_vec(),
-            population: how.population,
+            population: POPULATION,
             draws_max: 1,
-            seed: how.seed,
+            seed,
             stop: StopRules {
-                generations_max: how.generations,
+                generations_max: GENERATIONS,
                 ..StopRules::default()
             },
         })?;
         let mut best = start;
-        let mut history = vec![best.score];
-        loop {
+        while strategy.stop().is_none() {
             let asked = strategy.ask(&mut |_| true)?;
             let point = |x: &Vec<f64>| core::array::from_fn(|i| x[i]);
             let all = self.scored(asked.iter().map(point).collect())?;
@@ -158,15 +150,8 @@ impl Searcher<'_> {
                     best = found;
                 }
             }
-            history.push(best.score);
-            let (window, gain) = STALLED;
-            let before = history.len().checked_sub(window + 1);
-            let stalled =
-                history.len() > 12 && before.is_some_and(|i| best.score - history[i] < gain);
-            if stalled || strategy.stop().is_some() {
-                return Ok(best);
-            }
         }
+        Ok(best)
     }
 
     /// How much each of some hypotheses explains; the same for any number of threads.

@@ -1,0 +1,210 @@
+//! Fits a hypothesis to what was read along it, by least squares.
+//!
+//! What was read off lies within a few pixels of the hypothesis: distances across the curve,
+//! and the tip weight's place, fall with its numbers as smoothly as the simulated rope moves.
+//! Levenberg-Marquardt with Cauchy's weights, by which what is far off (a passer-by's edge, a
+//! stretch that was read off something else) counts little.
+
+use nalgebra::{SMatrix, SVector};
+use rope_sim::AttachMotion;
+use shared_types::StereoCamera;
+
+use super::curve::normals;
+use super::hypothesis::{
+    Curve, FREE, Fidelity, LOWER, Point, SPREAD, Seen, Side, TURN, UPPER, simulate,
+};
+use super::quantile;
+use super::read::NODES;
+use super::reading::Reading;
+use super::search::SearchError;
+
+/// Steps at most, and the part of the misfit that one must gain.
+const STEPS: usize = 5;
+const GAIN: f64 = 0.01;
+/// Every which node is compared.
+const EVERY: usize = 4;
+/// Weight of the tip weight's place against a node's.
+const TIP: f64 = 2.0;
+/// What the camera's turns and the clock cost, per squared spread and frame (px²).
+const PRIOR: f64 = 0.1;
+/// Slopes are taken over this part of a number's spread.
+const SLOPE: f64 = 0.03;
+/// Cauchy's scale in medians of the distance, and at least (px).
+const SCALE: f64 = 2.0;
+const LEAST_SCALE_PX: f64 = 0.3;
+/// Dampings tried side by side.
+const DAMPINGS: [f64; 8] = [1e-5, 1e-3, 1e-2, 0.1, 0.5, 3.0, 30.0, 300.0];
+
+type Normal = SMatrix<f64, FREE, FREE>;
+type Vector = SVector<f64, FREE>;
+
+/// What was read off one frame.
+#[derive(Debug)]
+pub(super) struct Sighting {
+    t_s: f64,
+    /// Index, place, unit normal and weight of nodes.
+    nodes: Vec<(usize, [f64; 2], [f64; 2], f64)>,
+    tip_px: [f64; 2],
+    tip_weight: f64,
+}
+
+impl Sighting {
+    pub(super) fn of(reading: &Reading, frame: usize, t_s: f64) -> Self {
+        let curve = &reading.curves[frame];
+        let normals = normals(curve);
+        let shown = reading.end.nodes_shown(curve);
+        let node = |k: usize| (k, curve[k], normals[k], reading.evident[frame][k]);
+        Self {
+            t_s,
+            nodes: (EVERY / 2..shown).step_by(EVERY).map(node).collect(),
+            tip_px: reading.tip_px(frame),
+            tip_weight: TIP * reading.tips[frame].1.weight,
+        }
+    }
+
+    /// Distance (px) and weight of all that is compared.
+    fn misses(&self, seen: &Seen<'_>, curve: &mut Curve, out: &mut Vec<[f64; 2]>) -> bool {
+        if !seen.curve(self.t_s, Side::Left, NODES, curve) {
+            return false;
+        }
+        let points = &curve.points;
+        out.extend(self.nodes.iter().map(|(k, p, n, weight)| {
+            let off = [points[*k][0] - p[0], points[*k][1] - p[1]];
+            [off[0] * n[0] + off[1] * n[1], *weight]
+        }));
+        let end = points[NODES - 1];
+        out.extend([0, 1].map(|i| [end[i] - self.tip_px[i], self.tip_weight]));
+        true
+    }
+}
+
+/// What a hypothesis is fitted to.
+pub(super) struct Fit<'a> {
+    pub(super) sightings: &'a [Sighting],
+    pub(super) camera: &'a StereoCamera,
+    pub(super) motion: &'a dyn AttachMotion,
+    pub(super) fidelity: Fidelity,
+    pub(super) film_s: f64,
+    pub(super) threads: usize,
+}
+
+impl Fit<'_> {
+    /// The hypothesis near another one that fits best.
+    pub(super) fn refined(&self, mut x: Point) -> Result<Point, SearchError> {
+        let Some(mut misses) = self.misses(&[x])?.pop().flatten() else {
+            return Ok(x);
+        };
+        for _ in 0..STEPS {
+            let sizes = misses.iter().map(|[px, _]| px.abs()).collect();
+            let scale_px = (SCALE * quantile(sizes, 0.5)).max(LEAST_SCALE_PX);
+            let Some((normal, slope)) = self.linearised(&x, &misses, scale_px)? else {
+                break;
+            };
+            let next: Vec<Point> = DAMPINGS
+                .iter()
+                .filter_map(|damping| {
+                    let damped = normal + Normal::from_diagonal(&(normal.diagonal() * *damping));
+                    let step = damped.cholesky()?.solve(&slope);
+                    let moved = |i: usize| (x[i] - step[i] * SPREAD[i]).clamp(LOWER[i], UPPER[i]);
+                    Some(core::array::from_fn(moved))
+                })
+                .collect();
+            let before = self.misfit(&x, &misses, scale_px);
+            let tried = next.iter().zip(self.misses(&next)?);
+            let best = tried
+                .filter_map(|(x, misses)| {
+                    let misses = misses?;
+                    Some((self.misfit(x, &misses, scale_px), *x, misses))
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            match best {
+                Some((after, better, there)) if after < before => {
+                    (x, misses) = (better, there);
+                    if before - after < GAIN * before {
+                        break;
+                    }
+                }
+                _ => break,
+            }
+        }
+        Ok(x)
+    }
+
+    /// Distances of some hypotheses; `None` for those that cannot be looked at.
+    fn misses(&self, points: &[Point]) -> Result<Vec<Option<Vec<[f64; 2]>>>, SearchError> {
+        let rollouts = simulate(
+            points,
+            self.fidelity,
+            self.motion,
+            self.film_s,
+            self.threads,
+        )?;
+        let mut curve = Curve::default();
+        let mut misses = |(x, rollout)| {
+            let seen = Seen::new(x, rollout, self.camera)?;
+            let mut out = Vec::new();
+            let mut frames = self.sightings.iter();
+            frames
+                .all(|s| s.misses(&seen, &mut curve, &mut out))
+                .then_some(out)
+        };
+        Ok(points.iter().zip(&rollouts).map(&mut misses).collect())
+    }
+
+    fn prior(&self) -> f64 {
+        PRIOR * self.sightings.len() as f64
+    }
+
+    /// Cauchy's: squares near 0, hardly more further off.
+    fn misfit(&self, x: &Point, misses: &[[f64; 2]], scale_px: f64) -> f64 {
+        let scale2 = scale_px * scale_px;
+        let cost = |[px, weight]: &[f64; 2]| weight * scale2 * (px * px / scale2).ln_1p();
+        let prior: f64 = (TURN..FREE).map(|i| (x[i] / SPREAD[i]).powi(2)).sum();
+        misses.iter().map(cost).sum::<f64>() + self.prior() * prior
+    }
+
+    /// Normal equations about a hypothesis, its numbers in spreads; `None` where a slope
+    /// cannot be taken.
+    fn linearised(
+        &self,
+        x: &Point,
+        misses: &[[f64; 2]],
+        scale_px: f64,
+    ) -> Result<Option<(Normal, Vector)>, SearchError> {
+        let moved = |i: usize| {
+            let mut moved = *x;
+            // Towards the middle of the box.
+            let sign = if x[i] > 0.5 * (LOWER[i] + UPPER[i]) {
+                -1.0
+            } else {
+                1.0
+            };
+            moved[i] += sign * SLOPE * SPREAD[i];
+            (moved, sign * SLOPE)
+        };
+        let moved: Vec<(Point, f64)> = (0..FREE).map(moved).collect();
+        let points: Vec<Point> = moved.iter().map(|(x, _)| *x).collect();
+        let Some(beside) = self
+            .misses(&points)?
+            .into_iter()
+            .collect::<Option<Vec<_>>>()
+        else {
+            return Ok(None);
+        };
+        let (mut normal, mut slope) = (Normal::zeros(), Vector::zeros());
+        for (row, [px, weight]) in misses.iter().enumerate() {
+            let weight = weight / (1.0 + (px / scale_px).powi(2));
+            let slopes = Vector::from_fn(|i, _| (beside[i][row][0] - px) / moved[i].1);
+            normal += slopes * slopes.transpose() * weight;
+            slope += slopes * (weight * px);
+        }
+        for i in 0..FREE {
+            normal[(i, i)] += 1e-9;
+            if i >= TURN {
+                normal[(i, i)] += self.prior();
+                slope[i] += self.prior() * x[i] / SPREAD[i];
+            }
+        }
+        Ok(Some((normal, slope)))
+    }
+}
