@@ -213,11 +213,11 @@ fn a_rope_that_is_not_there_for_a_while_is_lost_only_then() {
     let lost: Vec<usize> = (0..filmed.frames.len()).filter(lost).collect();
     assert_eq!(lost, hidden.clone().collect::<Vec<_>>());
     let seen = (0..filmed.frames.len()).filter(|i| !hidden.contains(i));
-    let mut errors_px: Vec<f64> = seen.flat_map(|i| filmed.off_curve_px(&found, i)).collect();
+    let mut errors_px: Vec<f64> = seen.flat_map(|i| filmed.errors_px(&found, i)).collect();
     errors_px.sort_by(f64::total_cmp);
     let p95_px = errors_px[errors_px.len() * 95 / 100];
     println!("95th percentile {p95_px:.2} px");
-    assert!(p95_px < 2.5, "{p95_px:.2} px");
+    assert!(p95_px < 3.0, "{p95_px:.2} px");
 }
 
 #[test]

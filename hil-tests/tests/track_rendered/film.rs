@@ -128,20 +128,4 @@ impl Filmed {
             .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
             .collect()
     }
-
-    /// Distances of a frame's keypoints from the true curve (px).
-    pub(crate) fn off_curve_px(&self, found: &TrackResult, frame: usize) -> Vec<f64> {
-        let curve = &self.truth[frame];
-        let off = |[u, v]: &[f64; 2]| {
-            let pieces = curve.windows(2).map(|ends| {
-                let (a, b) = (ends[0], ends[1]);
-                let (du, dv) = (b[0] - a[0], b[1] - a[1]);
-                let along = ((u - a[0]) * du + (v - a[1]) * dv) / (du * du + dv * dv).max(1e-9);
-                let along = along.clamp(0.0, 1.0);
-                (u - a[0] - along * du).hypot(v - a[1] - along * dv)
-            });
-            pieces.fold(f64::INFINITY, f64::min)
-        };
-        found.track.frames[frame].points.iter().map(off).collect()
-    }
 }

@@ -178,7 +178,7 @@ impl<'a> Reader<'a> {
         let none = vec![(Offset::NONE, Offset::NONE); self.frames.len()];
         let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
         let both = [&rope[..], &tip].concat();
-        let disc = self.tip_disc(&end, &both, &tips);
+        let disc = self.tip_disc(&still, &end, &both, &tips);
         end.centre_px += median_px(&tips) + disc.centre_px;
         end.radius_px = disc.radius_px;
         let (tip, mut tips) = self.tips(&end, &tips, (&rope, TIP_REACH_PX[1]));
@@ -285,12 +285,19 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Centre and radius of the tip weight in the median picture around where it was found.
-    fn tip_disc(&self, end: &End, colours: &[Colour], places: &[(Offset, Offset)]) -> End {
+    /// Centre and radius of the tip weight in the median picture of some frames around where
+    /// it was found.
+    fn tip_disc(
+        &self,
+        still: &[usize],
+        end: &End,
+        colours: &[Colour],
+        places: &[(Offset, Offset)],
+    ) -> End {
         let mut frames = EndFrames::new(TIP);
         let noise = self.scene.noise();
-        let found = self.frames.iter().zip(&self.curves).zip(places);
-        for ((lit, curve), (along, across)) in found.step_by(self.learn_every()) {
+        for &i in still {
+            let (lit, curve, (along, across)) = (&self.frames[i], &self.curves[i], places[i]);
             let (c, t) = from_end(curve, end.centre_px + along.px);
             let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
             // Straight on both sides: the weight hides how the rope bends there.
