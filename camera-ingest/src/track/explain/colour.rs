@@ -14,7 +14,7 @@ const APART: f32 = 30.0;
 /// Groups with a smaller share are not the thing's own.
 const LEAST_SHARE: f32 = 0.07;
 /// A round thing is lit from one side.
-const SHADES: [f32; 5] = [0.7, 0.85, 1.0, 1.15, 1.3];
+pub(super) const SHADES: [f32; 5] = [0.7, 0.85, 1.0, 1.15, 1.3];
 /// Coverage from which a pixel is the thing's edge, and what is added until it is the
 /// thing: its sides must count alike however they are lit.
 const EDGE: [f32; 2] = [0.1, 0.3];
@@ -122,9 +122,18 @@ pub(super) fn groups(samples: &[Colour], count: usize) -> Vec<Colour> {
 /// How much of a pixel one of some colours covers, 0 to 1: the mixture of it with what is
 /// behind that comes nearest to what is seen, held down by what is left and where both
 /// differ by hardly more than the noise.
-pub(super) fn coverage(seen: Colour, behind: Colour, colours: &[Colour], noise: f32) -> f32 {
+pub(super) fn coverage(
+    seen: Colour,
+    behind: Colour,
+    colours: &[Colour],
+    shades: &[f32],
+    noise: f32,
+) -> f32 {
     let mut best = 0.0_f32;
-    for (colour, shade) in colours.iter().flat_map(|c| SHADES.map(|s| (c, s))) {
+    for (colour, shade) in colours
+        .iter()
+        .flat_map(|c| shades.iter().map(move |s| (c, *s)))
+    {
         let (mut seen2, mut whole2, mut product) = (0.0, 0.0, 0.0);
         for k in 0..3 {
             let (d, whole) = (seen[k] - behind[k], colour[k] * shade - behind[k]);
@@ -167,11 +176,11 @@ mod tests {
     fn half_a_mixture_is_half_covered_and_a_shadow_is_not() {
         let (wall, rope) = ([160.0, 4.0, 2.0], [110.0, -40.0, 90.0]);
         let mixed = core::array::from_fn(|k| 0.5 * (wall[k] + rope[k]));
-        let covered = coverage(mixed, wall, &[rope], 2.0);
+        let covered = coverage(mixed, wall, &[rope], &SHADES, 2.0);
         assert!((covered - 0.5).abs() < 0.1, "{covered}");
         let shadow = wall.map(|c| 0.6 * c);
-        assert_eq!(presence(coverage(shadow, wall, &[rope], 2.0)), 0.0);
-        assert!(coverage(rope, wall, &[rope], 2.0) > 0.95);
+        assert_eq!(presence(coverage(shadow, wall, &[rope], &SHADES, 2.0)), 0.0);
+        assert!(coverage(rope, wall, &[rope], &SHADES, 2.0) > 0.95);
     }
 
     #[test]

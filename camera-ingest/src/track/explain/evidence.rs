@@ -6,7 +6,7 @@
 
 use super::super::background::{Background, frames_by_motion};
 use super::bulk::Bulk;
-use super::colour::{CHROMA_WEIGHT, Colour, colour_at, coverage, presence};
+use super::colour::{CHROMA_WEIGHT, Colour, SHADES, colour_at, coverage, presence};
 use super::read::Lit;
 use crate::frame::EyeFrame;
 use crate::vectors::widest;
@@ -66,7 +66,7 @@ impl Scene {
     ) -> f32 {
         let seen = colour_at(frame, gain, p).zip(self.colour_at(p));
         seen.map_or(0.0, |(seen, behind)| {
-            presence(coverage(seen, behind, colours, self.noise()))
+            presence(coverage(seen, behind, colours, &SHADES, self.noise()))
         })
     }
 

@@ -61,6 +61,9 @@ const CYLINDER_WIDTH: f64 = 0.05;
 const START_PX: f64 = 4.0;
 /// How much of the difference counts.
 const SEEN_PART: f64 = 0.25;
+/// Shades in which its size is measured: in wider ones, a pixel half covered passes for a
+/// whole one.
+const SIZED_SHADES: [f32; 3] = [0.85, 1.0, 1.15];
 /// Stiffness of its offsets over time, and their pull to the curve's end.
 const TIP_STIFFNESS: f64 = 0.3;
 const TIP_PULL: f64 = 0.02;
@@ -309,7 +312,7 @@ impl<'a> Reader<'a> {
                 .collect();
             frames.add(&axis, |p| {
                 let (seen, behind) = self.colours(lit, p)?;
-                Some((coverage(seen, behind, colours, noise), seen))
+                Some((coverage(seen, behind, colours, &SIZED_SHADES, noise), seen))
             });
         }
         let picture = frames.picture();
