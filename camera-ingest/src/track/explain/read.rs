@@ -1,7 +1,7 @@
 //! Reads the film off along the hypothesis: curve, ends and tip weight in every frame.
 
 use super::bulk::Bulk;
-use super::colour::{Colour, are_apart, colour_at, coverage, groups};
+use super::colour::{Colour, SHADES, are_apart, colour_at, coverage, groups};
 use super::curve::{from_end, normals, respaced};
 use super::disc::Disc;
 use super::end::{self, End};
@@ -61,8 +61,8 @@ const CYLINDER_WIDTH: f64 = 0.05;
 const START_PX: f64 = 4.0;
 /// How much of the difference counts.
 const SEEN_PART: f64 = 0.25;
-/// Shades in which its size is measured: in wider ones, a pixel half covered passes for a
-/// whole one.
+/// Shades in which its size is measured: in wider ones, by which its place is found better, a
+/// pixel half covered passes for a whole one.
 const SIZED_SHADES: [f32; 3] = [0.85, 1.0, 1.15];
 /// Stiffness of its offsets over time, and their pull to the curve's end.
 const TIP_STIFFNESS: f64 = 0.3;
@@ -181,7 +181,8 @@ impl<'a> Reader<'a> {
         let none = vec![(Offset::NONE, Offset::NONE); self.frames.len()];
         let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
         let both = [&rope[..], &tip].concat();
-        let disc = self.tip_disc(&still, &end, &both, &tips);
+        let disc = self.tip_disc(&still, &end, (&both, &SHADES), &tips);
+        let sized = self.tip_disc(&still, &end, (&both, &SIZED_SHADES), &tips);
         end.centre_px += median_px(&tips) + disc.centre_px;
         end.radius_px = disc.radius_px;
         let (tip, mut tips) = self.tips(&end, &tips, (&rope, TIP_REACH_PX[1]));
@@ -194,7 +195,7 @@ impl<'a> Reader<'a> {
             start_px,
             end,
             tips,
-            radii_px: [rope_px, end.radius_px.max(rope_px)],
+            radii_px: [rope_px, sized.radius_px.max(rope_px)],
             rope,
             tip,
         }
@@ -294,7 +295,7 @@ impl<'a> Reader<'a> {
         &self,
         still: &[usize],
         end: &End,
-        colours: &[Colour],
+        (colours, shades): (&[Colour], &[f32]),
         places: &[(Offset, Offset)],
     ) -> End {
         let mut frames = EndFrames::new(TIP);
@@ -312,7 +313,7 @@ impl<'a> Reader<'a> {
                 .collect();
             frames.add(&axis, |p| {
                 let (seen, behind) = self.colours(lit, p)?;
-                Some((coverage(seen, behind, colours, &SIZED_SHADES, noise), seen))
+                Some((coverage(seen, behind, colours, shades, noise), seen))
             });
         }
         let picture = frames.picture();

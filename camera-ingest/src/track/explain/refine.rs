@@ -208,3 +208,106 @@ impl Fit<'_> {
         Ok(Some((normal, slope)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::explainer::curve_at;
+    use super::super::hypothesis::{LENGTH, MIDDLE, STIFFNESS};
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+    use rope_sim::{PoseRow, PoseTrack};
+    use shared_types::{Intrinsics, Shutter};
+
+    /// Looks along y at the clamp, from two metres off.
+    fn camera() -> StereoCamera {
+        let eye = Intrinsics {
+            fx: 700.0,
+            fy: 700.0,
+            cx: 336.0,
+            cy: 188.0,
+            distortion: [0.0; 5],
+        };
+        StereoCamera {
+            width_px: 672,
+            height_px: 376,
+            left: eye,
+            right: eye,
+            r_right_left: Matrix3::identity(),
+            t_right_left_m: Vector3::new(0.12, 0.0, 0.0),
+            r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
+            p_w_cam_m: Vector3::new(0.0, -2.0, 0.8),
+            shutter: Shutter::Global,
+            exposure_s: 0.0,
+            line_time_s: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_rope_is_found_again_among_places_read_off_something_else() {
+        let row = |i: i32| {
+            let t_s = f64::from(i) * 0.02;
+            PoseRow {
+                t_s,
+                p_m: [0.06 * (7.0 * t_s).sin() * (2.0 * t_s).min(1.0), 0.0, 1.1],
+                q_wxyz: [1.0, 0.0, 0.0, 0.0],
+            }
+        };
+        let motion = PoseTrack::new(&(0..=160).map(row).collect::<Vec<_>>()).unwrap();
+        let camera = camera();
+        let mut truth = MIDDLE;
+        truth[TURN + 1] = 0.004;
+        let film_s = 3.0;
+        let curves = |x: &Point| -> Vec<(f64, Vec<[f64; 2]>)> {
+            let rollouts = simulate(&[*x], Fidelity::COARSE, &motion, film_s, 1).unwrap();
+            let seen = Seen::new(x, &rollouts[0], &camera).unwrap();
+            let times_s = (0..30).map(|i| 0.1 * f64::from(i));
+            times_s
+                .map(|t_s| (t_s, curve_at(&seen, t_s, Side::Left).unwrap()))
+                .collect()
+        };
+        let sighting = |(t_s, curve): &(f64, Vec<[f64; 2]>)| {
+            let normals = normals(curve);
+            let node = |k: usize| {
+                // Every sixth place shows something twelve pixels to the side.
+                let aside = if (k + (t_s * 10.0) as usize) % 6 == 0 {
+                    12.0
+                } else {
+                    0.0
+                };
+                let (p, n) = (curve[k], normals[k]);
+                (k, [p[0] + n[0] * aside, p[1] + n[1] * aside], n, 1.0)
+            };
+            Sighting {
+                t_s: *t_s,
+                nodes: (EVERY / 2..NODES).step_by(EVERY).map(node).collect(),
+                tip_px: curve[NODES - 1],
+                tip_weight: TIP,
+            }
+        };
+        let there = curves(&truth);
+        let fit = Fit {
+            sightings: &there.iter().map(sighting).collect::<Vec<_>>(),
+            camera: &camera,
+            motion: &motion,
+            fidelity: Fidelity::COARSE,
+            film_s,
+            threads: 1,
+        };
+        let mut x = truth;
+        x[LENGTH] += 0.02;
+        x[STIFFNESS] += 0.7;
+        x[TURN] = -0.005;
+        let worst_px = |x: &Point| {
+            let pairs = there.iter().zip(curves(x));
+            let off = pairs.flat_map(|((_, a), (_, b))| a.clone().into_iter().zip(b));
+            off.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+                .fold(0.0, f64::max)
+        };
+        assert!(worst_px(&x) > 4.0, "{}", worst_px(&x));
+        for _ in 0..2 {
+            x = fit.refined(x).unwrap();
+        }
+        assert!(worst_px(&x) < 0.5, "{x:?}: {}", worst_px(&x));
+        assert!((x[LENGTH] - truth[LENGTH]).abs() < 1e-3, "{x:?}");
+    }
+}
