@@ -269,7 +269,7 @@ mod tests {
             let normals = normals(curve);
             let node = |k: usize| {
                 // Every sixth place shows something twelve pixels to the side.
-                let aside = if (k + (t_s * 10.0) as usize) % 6 == 0 {
+                let aside = if (k + (t_s * 10.0) as usize).is_multiple_of(6) {
                     12.0
                 } else {
                     0.0
