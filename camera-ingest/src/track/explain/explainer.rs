@@ -3,6 +3,7 @@
 use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
 
+use super::evidence::Scene;
 use super::hypothesis::{Curve, Fidelity, Point, SPREAD, Seen, Side, simulate};
 use super::read::{Lit, NODES, Reader};
 use super::reading::Reading;
@@ -28,7 +29,7 @@ const SETTLED: f64 = 0.02;
 
 /// The film of one eye, and what moves the rope in it.
 pub(super) struct Explainer<'a> {
-    pub(super) scene: &'a super::evidence::Scene,
+    pub(super) scene: &'a Scene,
     pub(super) frames: &'a [Lit<'a>],
     /// Starts of the frames' exposures.
     pub(super) times_s: &'a [f64],
@@ -119,7 +120,7 @@ impl Explainer<'_> {
         self.times_s[self.times_s.len() - 1]
     }
 
-    /// Curves of a hypothesis in every so manieth frame.
+    /// Curves of a hypothesis in each `every`-th frame.
     pub(super) fn told(
         &self,
         x: &Point,
@@ -136,7 +137,7 @@ impl Explainer<'_> {
             .ok_or(TrackError::BehindCamera)
     }
 
-    /// Reads every so manieth frame off along curves.
+    /// Reads each `every`-th frame off along curves.
     pub(super) fn read(&self, curves: Vec<Vec<[f64; 2]>>, every: usize) -> Reading {
         let told_px = self.clamp_px(&curves, every);
         let frames = self.frames.iter().step_by(every).collect();

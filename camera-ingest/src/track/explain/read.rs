@@ -96,7 +96,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Of every so manieth frame of a film.
+    /// Of each `every`-th frame of a film.
     pub(super) fn new(
         scene: &'a Scene,
         frames: Vec<&'a Lit<'a>>,
