@@ -1,21 +1,11 @@
 //! `experiments bench`: complete, clean JSON.
 #![cfg(test)]
 
+mod support;
+
 use serde_json::Value;
 use std::path::Path;
-use std::process::Command;
-
-/// The one JSON object that a benchmark prints.
-fn report(args: &[&str]) -> Value {
-    let output = Command::new(env!("CARGO_BIN_EXE_experiments"))
-        .args(["bench", "--quick", "--json"])
-        .args(args)
-        .output()
-        .unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{args:?}: {errors}");
-    serde_json::from_slice(&output.stdout).expect("standard output is JSON")
-}
+use support::report;
 
 /// The number at `path`, which must be there, finite and above zero.
 fn positive(value: &Value, path: &str) -> f64 {
@@ -27,7 +17,7 @@ fn positive(value: &Value, path: &str) -> f64 {
 
 #[test]
 fn bench_rope_prints_one_whole_json_object() {
-    let report = report(&["rope", "--seed", "9"]);
+    let report = report("bench rope --quick --seed 9");
     assert_eq!(report["ok"], true);
     assert_eq!(report["command"], "bench rope");
     assert_eq!(report["seed"], 9);
@@ -75,7 +65,7 @@ fn bench_track_reports_times_and_memory_of_a_recording() {
         println!("skipped: {data} not found");
         return;
     }
-    let report = report(&["track", "--video", data]);
+    let report = report(&format!("bench track --quick --video {data}"));
     assert_eq!(report["command"], "bench track");
     assert_eq!(report["limit_mb"], 400.0);
     let together = positive(&report, "/together_cpu_ms");
@@ -93,4 +83,34 @@ fn bench_track_reports_times_and_memory_of_a_recording() {
         "{peak_mb} MB"
     );
     assert!((0.0..=1.0).contains(&report["lost_fraction"].as_f64().unwrap()));
+}
+
+#[test]
+fn bench_identify_prints_every_method() {
+    let report = report("bench identify --quick");
+    assert_eq!(report["command"], "bench identify");
+    let methods = report["methods"].as_array().unwrap();
+    let names: Vec<&str> = methods
+        .iter()
+        .map(|m| m["method"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["nn", "hybrid", "cmaes"]);
+    for row in methods {
+        assert!(row["wall_s"].as_f64().unwrap() > 0.0);
+        assert!(row["limit_wall_s"].as_f64().unwrap() > 0.0);
+    }
+    assert!(methods[2]["simulations"].as_f64().unwrap() >= 3000.0);
+}
+
+#[test]
+fn bench_plan_splits_the_time_of_every_task() {
+    let report = report("bench plan --quick");
+    let tasks = report["tasks"].as_array().unwrap();
+    assert_eq!(tasks.len(), 3);
+    for row in tasks {
+        assert!(row["rollouts_per_s"].as_f64().unwrap() > 0.0);
+        let parts = ["rope_part", "contacts_part", "search_part"];
+        let whole: f64 = parts.iter().map(|p| row[p].as_f64().unwrap()).sum();
+        assert!((whole - 1.0).abs() < 1e-9, "{row}");
+    }
 }

@@ -3,11 +3,11 @@
 #![cfg(test)]
 
 use arm_model::{JointTrajectory, Limits, Pole};
-use experiments::trials::{TrialRig, mean, outside_rope, summarise, trial_rope};
+use experiments::trials::{TrialRig, mean, summarise};
 use planner::identify;
 use planner::identify::{IdentifyError, IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
-use planner::ropes::random_rope;
+use planner::ropes::{outside_rope, random_rope, trial_rope};
 use planner::synthetic::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::wiggle::{WiggleConfig, wiggle};
 use rope_sim::{PlannedArm, PoseRow, PoseTrack};

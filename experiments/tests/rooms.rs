@@ -2,24 +2,14 @@
 //! that an interrupted run resumes from.
 #![cfg(test)]
 
+mod support;
+
 use camera_ingest::source::FrameSource;
 use camera_ingest::{load_camera, open_video};
 use run_log::files::read_joints;
-use serde_json::Value;
 use std::fs::File;
 use std::path::Path;
-use std::process::Command;
-
-fn run(args: &[&str]) -> Value {
-    let output = Command::new(env!("CARGO_BIN_EXE_experiments"))
-        .arg("--json")
-        .args(args)
-        .output()
-        .unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{args:?}: {errors}");
-    serde_json::from_slice(&output.stdout).expect("standard output is JSON")
-}
+use support::report;
 
 /// What there is of a film is what a camera's and an arm's would be.
 fn is_read(folder: &Path) {
@@ -46,24 +36,16 @@ fn is_read(folder: &Path) {
 #[test]
 fn a_film_is_read_tracked_once_and_counted() {
     let dir = tempfile::tempdir().unwrap();
-    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let path = |name: &str| dir.path().join(name).display().to_string();
     let (films, results) = (path("films"), path("results"));
-    let rendered = run(&["rooms", "--seeds", "10", "--out", &films]);
+    let rendered = report(&format!("rooms --seeds 10 --out {films}"));
     assert_eq!(
         (&rendered["films"], &rendered["ok"]),
         (&1.into(), &true.into())
     );
     is_read(&dir.path().join("films/ordinary-10"));
-    let track = [
-        "track-rooms",
-        "--seeds",
-        "10",
-        "--films",
-        &films,
-        "--out",
-        &results,
-    ];
-    let first = run(&track);
+    let track = format!("track-rooms --seeds 10 --films {films} --out {results}");
+    let first = report(&track);
     let row = &first["table"][0];
     assert_eq!((&row["films"], &row["n"]), (&"all".into(), &1.into()));
     assert_eq!(first["films"][0]["scene"]["seed"], 10);
@@ -73,6 +55,6 @@ fn a_film_is_read_tracked_once_and_counted() {
     let marked = text.replace("\"wall\": \"", "\"wall\": \"kept ");
     assert_ne!(marked, text);
     std::fs::write(&kept, marked).unwrap();
-    let wall = run(&track)["films"][0]["scene"]["wall"].clone();
+    let wall = report(&track)["films"][0]["scene"]["wall"].clone();
     assert!(wall.as_str().unwrap().starts_with("kept "), "{wall}");
 }

@@ -4,10 +4,11 @@ use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
 use crate::network::{network, with_network};
-use cli_output::table::numbers;
+use crate::report::{Column, print_table};
 use cli_output::{Machine, OrInput, Outcome, Stage};
-use experiments::trials::{TrialRig, trial_rope};
+use experiments::trials::TrialRig;
 use planner::identify::{IdentifyOptions, Method};
+use planner::ropes::trial_rope;
 use planner::synthetic::Filmed;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -25,6 +26,14 @@ struct Row {
     limit_wall_s: f64,
     within_limit: bool,
 }
+
+const TABLE: [Column<Row>; 5] = [
+    ("method", |row| row.method.to_owned()),
+    ("wall (s)", |row| format!("{:.4}", row.wall_s)),
+    ("processor (s)", |row| format!("{:.4}", row.cpu_s)),
+    ("simulations", |row| format!("{:.0}", row.simulations)),
+    ("limit", |row| verdict(row.limit_wall_s, row.within_limit)),
+];
 
 /// Ropes and runs of each.
 fn extent(quick: bool) -> (u64, usize) {
@@ -98,22 +107,6 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let own = json!({ "methods": rows });
     Ok(report((args, quiet), "bench identify", own, || {
         println!("seed {}", args.seed);
-        let lines = rows.iter().map(|row| {
-            [
-                row.method.to_owned(),
-                format!("{:.4}", row.wall_s),
-                format!("{:.4}", row.cpu_s),
-                format!("{:.0}", row.simulations),
-                verdict(row.limit_wall_s, row.within_limit),
-            ]
-        });
-        let header = [
-            "method",
-            "wall (s)",
-            "processor (s)",
-            "simulations",
-            "limit",
-        ];
-        println!("{}", numbers(header, 1, lines));
+        print_table(&rows, 1, TABLE);
     }))
 }

@@ -3,7 +3,7 @@
 use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
-use cli_output::table::numbers;
+use crate::report::{Column, print_table};
 use cli_output::{OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest, ThrowSimulator, simulator_for};
@@ -39,6 +39,22 @@ struct Row {
     search_part: f64,
     limit_wall_s: f64,
     within_limit: bool,
+}
+
+const TABLE: [Column<Row>; 9] = [
+    ("task", |row| row.task.to_owned()),
+    ("wall (s)", |row| format!("{:.2}", row.wall_s)),
+    ("processor (s)", |row| format!("{:.2}", row.cpu_s)),
+    ("simulations", |row| row.simulations.to_string()),
+    ("rollouts per s", |row| format!("{:.0}", row.rollouts_per_s)),
+    ("rope", |row| percent(row.rope_part)),
+    ("contacts with the arm", |row| percent(row.contacts_part)),
+    ("search", |row| percent(row.search_part)),
+    ("limit", |row| verdict(row.limit_wall_s, row.within_limit)),
+];
+
+fn percent(fraction: f64) -> String {
+    format!("{:.0} %", 100.0 * fraction)
 }
 
 fn measure(
@@ -103,31 +119,6 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let own = json!({ "tasks": rows });
     Ok(report((args, quiet), "bench plan", own, || {
         println!("seed {}", args.seed);
-        let percent = |fraction: f64| format!("{:.0} %", 100.0 * fraction);
-        let lines = rows.iter().map(|row| {
-            [
-                row.task.to_owned(),
-                format!("{:.2}", row.wall_s),
-                format!("{:.2}", row.cpu_s),
-                row.simulations.to_string(),
-                format!("{:.0}", row.rollouts_per_s),
-                percent(row.rope_part),
-                percent(row.contacts_part),
-                percent(row.search_part),
-                verdict(row.limit_wall_s, row.within_limit),
-            ]
-        });
-        let header = [
-            "task",
-            "wall (s)",
-            "processor (s)",
-            "simulations",
-            "rollouts per s",
-            "rope",
-            "contacts with the arm",
-            "search",
-            "limit",
-        ];
-        println!("{}", numbers(header, 1, lines));
+        print_table(&rows, 1, TABLE);
     }))
 }

@@ -102,10 +102,10 @@ impl<'a> Experiment<'a> {
     }
 
     /// Makes the trials of a sequence, or goes on with those of an earlier run.
-    pub fn trials<T: Serialize + DeserializeOwned, E: Into<anyhow::Error>>(
+    pub fn trials<T: Serialize + DeserializeOwned>(
         &self,
         sequence: Sequence<T>,
-        mut make: impl FnMut(&[u64]) -> Result<Vec<T>, E>,
+        make: impl Fn(&[u64]) -> anyhow::Result<Vec<T>>,
     ) -> Outcome<Vec<T>> {
         let out = self.args.out.as_deref();
         let count = sequence.count;

@@ -3,6 +3,7 @@
 //! Trials are kept in a result file with their seed and version; an interrupted run
 //! resumes from it.
 
+mod ablated_wiggles;
 mod checkpoint;
 pub(crate) mod experiment;
 mod fidelity;
@@ -13,7 +14,10 @@ mod picture;
 mod pipeline;
 mod robust;
 mod sensitivity;
+mod sensitivity_map;
 mod sensitivity_picture;
+mod spectra;
+mod strikes;
 mod sysid;
 mod wiggles;
 

@@ -6,7 +6,8 @@
 use super::experiment::Experiment;
 use super::picture::Curve;
 use cli_output::Outcome;
-use experiments::trials::{Trial, area_under_curve, mean, outside_rope, trial_rope};
+use experiments::trials::{Trial, area_under_curve, mean};
+use planner::ropes::{outside_rope, trial_rope};
 use serde_json::{Value, json};
 
 /// Fraction of some trials flagged as out of distribution.

@@ -4,13 +4,80 @@
 
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;
+use super::strikes::{StrikeCase, Strikes, strike_trials};
+use crate::report::{Column, print_table};
 use cli_output::Outcome;
-use cli_output::table::numbers;
-use experiments::trials::{Foreseen, RobustTrial, mean, quantile, strike_trials};
-use serde::Serialize;
+use experiments::trials::{mean, quantile};
+use planner::plan::{PlanError, PosteriorEnsemble};
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use shared_types::ErrorForecast;
 
 const ROPES: u64 = 200;
+/// Ropes that a robust plan is optimised over, and that a forecast is made with.
+const OPTIMISED: usize = 16;
+const FORECAST: usize = 64;
+/// Searches of a plan.
+const SEARCHES: usize = 3;
+
+/// One strike and what was to be expected of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Foreseen {
+    /// What it did.
+    strike: Strikes,
+    /// What the posterior of the rope let expect; `None` where no drawn rope could be
+    /// simulated.
+    forecast: Option<ErrorForecast>,
+}
+
+impl Foreseen {
+    /// Whether the error lies within its forecast interval.
+    fn is_covered(&self) -> bool {
+        self.forecast.is_some_and(|f| {
+            let [low, high] = f.interval_90_m;
+            (low..=high).contains(&self.strike.error_m)
+        })
+    }
+}
+
+/// One rope and target.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct RobustTrial {
+    index: u64,
+    target_m: [f64; 3],
+    /// Planned with the identified parameters.
+    plain: Foreseen,
+    /// Planned with sixteen ropes of the posterior.
+    robust: Foreseen,
+}
+
+impl RobustTrial {
+    /// Plans and throws.
+    fn of(case: &StrikeCase) -> Result<Self, PlanError> {
+        let (thrower, found) = (&case.thrower, &case.found);
+        let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
+            let seed = thrower.options.seed;
+            let drawn = PosteriorEnsemble::drawn(
+                &found.params,
+                &found.posterior,
+                optimised,
+                FORECAST,
+                seed,
+            );
+            let planned = thrower.plan_for(&found.params, SEARCHES, drawn)?;
+            Ok(Foreseen {
+                strike: thrower.throw(&planned)?,
+                forecast: planned.forecast,
+            })
+        };
+        Ok(Self {
+            index: case.index,
+            target_m: case.target_m,
+            plain: foreseen(0)?,
+            robust: foreseen(OPTIMISED)?,
+        })
+    }
+}
 
 /// One way of planning.
 #[derive(Debug, Serialize)]
@@ -24,6 +91,19 @@ struct Row {
     /// Median width of that interval (m).
     width_m: f64,
 }
+
+const TABLE: [Column<Row>; 6] = [
+    ("tip-target distance (cm), planned", |row| {
+        row.planned.to_owned()
+    }),
+    ("median", |row| cm(row.median_m)),
+    ("p90", |row| cm(row.p90_m)),
+    ("max", |row| cm(row.max_m)),
+    ("within its 90 % interval", |row| {
+        format!("{:.1} %", 100.0 * row.covered)
+    }),
+    ("median width of that", |row| cm(row.width_m)),
+];
 
 /// A way of planning, with its errors as a curve.
 fn row(
@@ -49,16 +129,10 @@ fn row(
 }
 
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
-    let Experiment {
-        config,
-        rig,
-        options,
-        ..
-    } = &experiment;
     let figure = |t: &RobustTrial| 100.0 * t.robust.strike.error_m;
     let sequence = experiment.sequence(ROPES, 2, (figure, "ropes, cm robust"));
     let trials = experiment.trials(sequence, |batch| {
-        strike_trials(rig, config, options, batch, RobustTrial::of)
+        strike_trials(&experiment, batch, RobustTrial::of)
     })?;
     let (rows, curves): (Vec<Row>, Vec<Curve>) = [
         row(&trials, "for the identified rope", |t| t.plain),
@@ -69,27 +143,34 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let picture = experiment.picture("distance of tip and target (cm)", curves)?;
     let own = json!({ "ropes": trials.len(), "rows": rows });
     let summary = format!("{} ropes", trials.len());
-    experiment.finish(&summary, picture, own, || print(&rows))
+    experiment.finish(&summary, picture, own, || print_table(&rows, 1, TABLE))
 }
 
-fn print(rows: &[Row]) {
-    let lines = rows.iter().map(|row| {
-        [
-            row.planned.to_owned(),
-            cm(row.median_m),
-            cm(row.p90_m),
-            cm(row.max_m),
-            format!("{:.1} %", 100.0 * row.covered),
-            cm(row.width_m),
-        ]
-    });
-    let header = [
-        "tip-target distance (cm), planned",
-        "median",
-        "p90",
-        "max",
-        "within its 90 % interval",
-        "median width of that",
-    ];
-    println!("{}", numbers(header, 1, lines));
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_covered_within_its_interval_only() {
+        let of = |error_m: f64| Foreseen {
+            strike: Strikes {
+                error_m,
+                predicted_m: 0.0,
+                simulations: 1,
+            },
+            forecast: Some(ErrorForecast {
+                ropes: 64,
+                mean_m: 0.01,
+                median_m: 0.01,
+                interval_90_m: [0.002, 0.02],
+            }),
+        };
+        assert!(of(0.002).is_covered() && of(0.02).is_covered());
+        assert!(!of(0.0019).is_covered() && !of(0.021).is_covered());
+        let blind = Foreseen {
+            forecast: None,
+            ..of(0.01)
+        };
+        assert!(!blind.is_covered());
+    }
 }

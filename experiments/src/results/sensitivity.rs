@@ -4,15 +4,17 @@
 
 use super::experiment::{Experiment, Sequence};
 use super::picture::beside;
+use super::sensitivity_map::{MOMENT_FRAMES, SensitivityMap};
 use super::sensitivity_picture::svg;
 use crate::args::MethodName;
 use crate::network::network;
+use crate::report::{Column, print_table};
 use anyhow::anyhow;
-use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome};
-use experiments::trials::{MOMENT_FRAMES, SensitivityMap, SensitivityTrial, sensitivity_trials};
+use experiments::trials::in_parallel;
+use planner::ropes::trial_rope;
 use run_log::files;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use shared_types::rope::RANGES;
 
@@ -22,6 +24,14 @@ const ROPES: u64 = 8;
 const PAPER: [&str; 9] = [
     "earlier", "earlier", "later", "later", "earlier", "later", "later", "earlier", "earlier",
 ];
+
+/// One filmed rope.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct SensitivityTrial {
+    index: u64,
+    /// The network's sensitivities for this film.
+    map: SensitivityMap,
+}
 
 /// One parameter's map in a few numbers.
 #[derive(Debug, Serialize)]
@@ -39,6 +49,20 @@ struct Row {
     place: f64,
     paper: &'static str,
 }
+
+const TABLE: [Column<Row>; 7] = [
+    ("parameter", |row| row.parameter.to_owned()),
+    ("range per metre", |row| format!("{:.2}", row.mean_per_m)),
+    ("peak (s)", |row| format!("{:.1}", row.peak_s)),
+    ("half before (s)", |row| format!("{:.1}", row.half_before_s)),
+    ("last second (%)", |row| {
+        format!("{:.0}", 100.0 * row.last_second)
+    }),
+    ("place on the rope (%)", |row| {
+        format!("{:.0}", 100.0 * row.place)
+    }),
+    ("paper's peak", |row| row.paper.to_owned()),
+];
 
 fn rows(map: &SensitivityMap, moment_s: f64) -> Vec<Row> {
     let most = |values: &[f64]| -> usize {
@@ -85,9 +109,7 @@ fn mean(trials: &[SensitivityTrial]) -> Option<SensitivityMap> {
 }
 
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
-    let Experiment {
-        args, rig, options, ..
-    } = &experiment;
+    let args = experiment.args;
     if !matches!(args.method, MethodName::Hybrid | MethodName::Nn) {
         return Err(Failure::input(anyhow!(
             "these are maps of the network: leave out --method, or name nn"
@@ -100,8 +122,14 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         method: format!("network {weights}"),
         ..experiment.sequence(ROPES, 1, (figure, "films, most per m"))
     };
+    let (rig, seed) = (&experiment.rig, args.seed);
     let trials = experiment.trials(sequence, |batch| {
-        sensitivity_trials(rig, &net, args.seed, batch, options.threads)
+        in_parallel(batch, experiment.options.threads, |index| {
+            let filmed = rig.film(&trial_rope(seed, index), seed, index)?;
+            let features = net.see(&rig.observation(&filmed))?;
+            let map = SensitivityMap::measure(&net, &features)?;
+            Ok(SensitivityTrial { index, map })
+        })
     })?;
     let map = mean(&trials)
         .ok_or_else(|| Failure::input(anyhow!("--ropes is 0, but must be 1 or more")))?;
@@ -118,7 +146,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     });
     let drawn = picture.clone();
     experiment.finish(&format!("{} films", trials.len()), picture, own, || {
-        print(&rows);
+        print_table(&rows, 1, TABLE);
         if let Some(path) = drawn {
             println!("drawn in `{}`", path.display());
         }
@@ -127,30 +155,6 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
 
 fn largest(map: &SensitivityMap) -> f64 {
     f64::from(map.values.iter().flatten().copied().fold(0.0, f32::max))
-}
-
-fn print(rows: &[Row]) {
-    let lines = rows.iter().map(|row| {
-        [
-            row.parameter.to_owned(),
-            format!("{:.2}", row.mean_per_m),
-            format!("{:.1}", row.peak_s),
-            format!("{:.1}", row.half_before_s),
-            format!("{:.0}", 100.0 * row.last_second),
-            format!("{:.0}", 100.0 * row.place),
-            row.paper.to_owned(),
-        ]
-    });
-    let header = [
-        "parameter",
-        "range per metre",
-        "peak (s)",
-        "half before (s)",
-        "last second (%)",
-        "place on the rope (%)",
-        "paper's peak",
-    ];
-    println!("{}", numbers(header, 1, lines));
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Sensitivity maps as a picture: one panel per parameter, time to the right, the rope from
 //! the clamp down to the lead.
 
-use experiments::trials::SensitivityMap;
+use super::sensitivity_map::SensitivityMap;
 use shared_types::rope::RANGES;
 use std::fmt::Write as _;
 

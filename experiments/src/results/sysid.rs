@@ -3,11 +3,34 @@
 
 use super::experiment::Experiment;
 use super::picture::Curve;
+use crate::report::{Column, print_table};
 use cli_output::Outcome;
-use cli_output::table::numbers;
-use experiments::trials::{SysidSummary, Trial, summarise, trial_rope};
+use experiments::trials::{ParameterRow, RatioRow, SysidSummary, Trial, summarise};
+use planner::ropes::trial_rope;
 use serde_json::{Value, json};
-use shared_types::rope::RANGES;
+use shared_types::rope::{ParameterRange, RANGES};
+
+const PARAMETERS: [Column<(ParameterRow, ParameterRange)>; 8] = [
+    ("mean absolute error", |(row, _)| row.label.clone()),
+    ("here", |(row, _)| format!("{:.4}", row.mean_error)),
+    ("median here", |(row, _)| format!("{:.4}", row.median_error)),
+    ("paper's network", |(row, _)| format!("{:.4}", row.paper)),
+    ("middle of range", |(row, _)| format!("{:.4}", row.middle)),
+    ("best possible", |(row, _)| {
+        let best = row.best_possible.map(|b| format!("{b:.4}"));
+        best.unwrap_or_else(|| "-".to_owned())
+    }),
+    ("90 % interval holds (%)", |(row, _)| {
+        format!("{:.1}", 100.0 * row.coverage)
+    }),
+    ("unit", |(_, range)| range.unit.to_owned()),
+];
+
+const RATIOS: [Column<RatioRow>; 3] = [
+    ("error of ratios", |row| row.label.clone()),
+    ("median (%)", |row| format!("{:.2}", 100.0 * row.median)),
+    ("p90 (%)", |row| format!("{:.2}", 100.0 * row.p90)),
+];
 
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let seed = experiment.args.seed;
@@ -31,39 +54,11 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
 }
 
 fn print(summary: &SysidSummary) {
-    let rows = summary.parameters.iter().zip(RANGES).map(|(row, range)| {
-        [
-            row.label.clone(),
-            format!("{:.4}", row.mean_error),
-            format!("{:.4}", row.median_error),
-            format!("{:.4}", row.paper),
-            format!("{:.4}", row.middle),
-            row.best_possible
-                .map_or_else(|| "-".to_owned(), |b| format!("{b:.4}")),
-            format!("{:.1}", 100.0 * row.coverage),
-            range.unit.to_owned(),
-        ]
-    });
-    let header = [
-        "mean absolute error",
-        "here",
-        "median here",
-        "paper's network",
-        "middle of range",
-        "best possible",
-        "90 % interval holds (%)",
-        "unit",
-    ];
-    println!("{}", numbers(header, 1, rows));
-    let rows = summary.ratios.iter().map(|row| {
-        [
-            row.label.clone(),
-            format!("{:.2}", 100.0 * row.median),
-            format!("{:.2}", 100.0 * row.p90),
-        ]
-    });
-    let header = ["error of ratios", "median (%)", "p90 (%)"];
-    println!("\n{}", numbers(header, 0, rows));
+    let parameters: Vec<(ParameterRow, ParameterRange)> =
+        summary.parameters.iter().cloned().zip(RANGES).collect();
+    print_table(&parameters, 1, PARAMETERS);
+    println!();
+    print_table(&summary.ratios, 0, RATIOS);
     println!(
         "\n{} ropes of the ranges, {:.1} % flagged as out of distribution, residual {:.2} px, {:.0} simulations each",
         summary.trials,

@@ -4,16 +4,17 @@
 //! The same ropes with the same noise of the films for every wiggle. The network is
 //! trained on one wiggle only, so that a fast search proposes the start for all.
 
+use super::ablated_wiggles::{AblatedWiggle, ablated_wiggles};
 use super::experiment::{Experiment, Sequence};
 use super::picture::Curve;
 use crate::args::MethodName;
 use anyhow::anyhow;
+use arm_model::Pole;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome};
-use experiments::trials::{
-    AblatedWiggle, SysidSummary, Trial, TrialRig, ablated_wiggles, mean, run as trials, summarise,
-    trial_rope,
-};
+use experiments::trials::{SysidSummary, Trial, TrialRig, mean, run as trials, summarise};
+use planner::ropes::trial_rope;
+use rope_sim::PlannedArm;
 use serde_json::{Value, json};
 use shared_types::rope::RANGES;
 
@@ -55,7 +56,13 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         )));
     }
     let wiggles = ablated_wiggles(&config.wiggle).or_failed()?;
-    let rigs: Vec<TrialRig> = wiggles.iter().map(|w| rig.wiggling(w)).collect();
+    // The network is not taken along: it is trained on one wiggle only.
+    let wiggling = |w: &AblatedWiggle| TrialRig {
+        motion: PlannedArm::new(w.trajectory, Pole::default()),
+        network: None,
+        ..rig.clone()
+    };
+    let rigs: Vec<TrialRig> = wiggles.iter().map(wiggling).collect();
     let sequence = Sequence {
         method: format!("{}, {ropes} ropes", asked.method),
         count: ropes * wiggles.len() as u64,
@@ -70,7 +77,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
             let indices: Vec<u64> = one_wiggle.iter().map(|i| i % ropes).collect();
             made.extend(trials(&rigs[which], rope, &indices, options)?);
         }
-        Ok::<_, anyhow::Error>(made)
+        Ok(made)
     })?;
     let each = usize::try_from(ropes).or_failed()?;
     let summaries: Vec<SysidSummary> = all.chunks(each).map(summarise).collect();

@@ -1,7 +1,8 @@
 //! Work on many seeds at once, one thread each.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use anyhow::Context;
+use planner::workers::map_in_order;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 /// Does `work` for each seed, on so many threads (default: one a processor). The results
@@ -12,39 +13,17 @@ pub(super) fn each<T: Send>(
     work: impl Fn(u64) -> anyhow::Result<T> + Sync,
 ) -> anyhow::Result<Vec<T>> {
     let own = thread::available_parallelism().map_or(1, usize::from);
-    let threads = threads.map_or(own, usize::from).min(seeds.len());
-    let (next, failed) = (AtomicUsize::new(0), Mutex::new(None));
-    let worker = || {
-        let mut done = Vec::new();
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            let Some(seed) = seeds.get(i) else {
-                return done;
-            };
-            match work(*seed) {
-                Ok(result) => done.push((i, result)),
-                Err(error) => {
-                    next.store(seeds.len(), Ordering::Relaxed);
-                    let error = error.context(format!("seed {seed}"));
-                    if let Ok(mut failed) = failed.lock() {
-                        failed.get_or_insert(error);
-                    }
-                }
-            }
+    let failed = AtomicBool::new(false);
+    let results = map_in_order(seeds, threads.map_or(own, usize::from), |seed| {
+        if failed.load(Ordering::Relaxed) {
+            return None;
         }
-    };
-    let mut all: Vec<(usize, T)> = thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
-        let ended = workers.into_iter().map(thread::ScopedJoinHandle::join);
-        ended
-            .flat_map(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
+        let result = work(*seed).with_context(|| format!("seed {seed}"));
+        failed.fetch_or(result.is_err(), Ordering::Relaxed);
+        Some(result)
     });
-    if let Some(error) = failed.into_inner().unwrap_or_else(|e| e.into_inner()) {
-        return Err(error);
-    }
-    all.sort_by_key(|(i, _)| *i);
-    Ok(all.into_iter().map(|(_, result)| result).collect())
+    // What was not begun comes with a failure.
+    results.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

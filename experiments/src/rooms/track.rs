@@ -7,11 +7,11 @@ use super::score::Score;
 use super::side_by_side::each;
 use super::summary::{Row, reliability, rows};
 use crate::args::TrackRoomsArgs;
+use crate::report::{Column, print_table};
 use anyhow::{Context, ensure};
 use arm_model::Pole;
 use camera_ingest::source::read_film;
 use camera_ingest::{TrackError, TrackOptions, load_camera, open_video, track};
-use cli_output::table::numbers;
 use cli_output::{OrInput, Outcome, Stage};
 use rig_sim::room::Kind;
 use rope_sim::{MeasuredArm, npy};
@@ -19,6 +19,24 @@ use run_log::files;
 use serde_json::{Value, json};
 use shared_types::KeypointTrack;
 use std::path::Path;
+
+const TABLE: [Column<Row>; 9] = [
+    ("films", |row| row.films.clone()),
+    ("n", |row| row.n.to_string()),
+    ("followed", |row| row.followed.to_string()),
+    ("refused", |row| row.refused.to_string()),
+    ("flagged", |row| row.flagged.to_string()),
+    ("wrong", |row| row.wrong.to_string()),
+    ("others", |row| row.others().to_string()),
+    ("followed (%)", |row| percent(row.followed_part)),
+    ("wrong (%)", |row| percent(row.wrong_part)),
+];
+
+/// A part with its limits in brackets.
+fn percent([value, low, high]: [f64; 3]) -> String {
+    let [value, low, high] = [value, low, high].map(|part| 100.0 * part);
+    format!("{value:.0} ({low:.0}-{high:.0})")
+}
 
 /// Tracks the film in a folder as `wag track` does: the only call of the tracker here.
 fn follow(folder: &Path) -> anyhow::Result<Result<KeypointTrack, TrackError>> {
@@ -123,7 +141,10 @@ pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
     let seconds = stage.done(&format!("{} films", all.len()));
     let rows = rows(&all);
     if !quiet {
-        print(&rows);
+        print_table(&rows, 0, TABLE);
+        println!(
+            "in brackets: 95 % limits (Wilson); wrong: 5 frames or more with a trusted keypoint more than 10 px off"
+        );
         for (from, n, near) in reliability(&all) {
             println!(
                 "confidence {from:.1} to {:.1}: {n} keypoints, {:.1} % within 3 px",
@@ -139,39 +160,4 @@ pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
         "ok": true, "command": "track-rooms", "kind": kind, "films": all,
         "table": rows, "reliability": reliability(&all), "seconds": seconds,
     })))
-}
-
-fn print(rows: &[Row]) {
-    let header = [
-        "films",
-        "n",
-        "followed",
-        "refused",
-        "flagged",
-        "wrong",
-        "others",
-        "followed (%)",
-        "wrong (%)",
-    ];
-    let part = |[value, low, high]: [f64; 3]| {
-        let percent = |v: f64| format!("{:.0}", 100.0 * v);
-        format!("{} ({}-{})", percent(value), percent(low), percent(high))
-    };
-    let cells = rows.iter().map(|row| {
-        [
-            row.films.clone(),
-            row.n.to_string(),
-            row.followed.to_string(),
-            row.refused.to_string(),
-            row.flagged.to_string(),
-            row.wrong.to_string(),
-            row.others().to_string(),
-            part(row.followed_part),
-            part(row.wrong_part),
-        ]
-    });
-    println!("{}", numbers(header, 0, cells));
-    println!(
-        "in brackets: 95 % limits (Wilson); wrong: 5 frames or more with a trusted keypoint more than 10 px off"
-    );
 }

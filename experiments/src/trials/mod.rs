@@ -2,42 +2,20 @@
 //! to: errors per parameter, errors of the ratios that matter for a throw, and how
 //! often intervals hold the truth.
 
-mod fidelity;
-mod importance;
-mod lob_drape;
-mod pipeline;
-mod robust;
-mod sensitivity;
-mod sensitivity_map;
 mod statistics;
-mod strike_case;
 mod summary;
-mod thrower;
-mod wiggles;
 
-pub use fidelity::{FidelityConfig, FidelityRow, RealRope, middle_rope};
-pub use importance::ImportanceTrial;
-pub use lob_drape::{LobDrapeConfig, LobDrapeTrial, lob_drape_trials};
-pub use pipeline::PipelineTrial;
-pub use robust::{Foreseen, RobustTrial};
-pub use sensitivity::{SensitivityTrial, sensitivity_trials};
-pub use sensitivity_map::{MOMENT_FRAMES, SensitivityMap};
 pub use statistics::{Spread, area_under_curve, mean, quantile};
-pub use strike_case::{StrikeCase, strike_trials};
-pub use summary::{ParameterRow, RatioRow, SysidSummary, summarise};
-pub use thrower::Strikes;
-pub use wiggles::{AblatedWiggle, ablated_wiggles};
+pub use summary::{PAPER, ParameterRow, RatioRow, SysidSummary, summarise};
 
 use planner::observation::{Observation, ObservedPoints};
-use planner::phi::{PhiNet, PredictError};
+use planner::phi::PhiNet;
 use planner::ropes::TRIAL_SALT;
-pub use planner::ropes::{outside_rope, trial_rope};
 use planner::synthetic::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
 
-use arm_model::Limits;
-use arm_model::Pole;
+use anyhow::Context;
+use arm_model::{Limits, Pole};
 use planner::identify::{IdentifyError, IdentifyOptions, Method};
-use planner::plan::PlanError;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
 use planner::workers::map_in_order;
 use rope_sim::{PlannedArm, SimulateError};
@@ -48,7 +26,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// Keypoints per frame.
-const KEYPOINTS: usize = 24;
+pub const KEYPOINTS: usize = 24;
 
 /// How ropes are filmed in trials.
 #[derive(Debug, Clone)]
@@ -64,42 +42,6 @@ pub struct TrialRig {
     /// The network, for [`Method::Network`] and what the hybrid starts from; without one
     /// the hybrid starts from a search.
     pub network: Option<Arc<PhiNet>>,
-}
-
-/// Why a trial could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum TrialError {
-    /// The film could not be simulated.
-    #[error(transparent)]
-    Film(#[from] SimulateError),
-    /// The film has no frame.
-    #[error("the film has no frame; film longer")]
-    EmptyFilm,
-    /// Network or fit failed.
-    #[error(transparent)]
-    Identify(#[from] IdentifyError),
-    /// The network gave no answer.
-    #[error(transparent)]
-    Network(#[from] PredictError),
-    /// A throw could not be planned.
-    #[error(transparent)]
-    Plan(Box<PlanError>),
-}
-
-impl From<PlanError> for TrialError {
-    fn from(error: PlanError) -> Self {
-        Self::Plan(Box::new(error))
-    }
-}
-
-/// The first of several trials that could not be made.
-#[derive(Debug, thiserror::Error)]
-#[error("trial {index}: {source}")]
-pub struct FailedTrial {
-    /// Index of the trial.
-    pub index: u64,
-    /// What is wrong.
-    pub source: TrialError,
 }
 
 /// One identified rope with its truth. Arrays are in the order of the parameter ranges.
@@ -145,7 +87,7 @@ impl TrialRig {
     ///
     /// # Errors
     /// What the simulator refuses.
-    pub fn film(&self, rope: &RopeParams, seed: u64, index: u64) -> Result<Filmed, TrialError> {
+    pub fn film(&self, rope: &RopeParams, seed: u64, index: u64) -> Result<Filmed, SimulateError> {
         let noise = self.randomisation.draw(seed ^ TRIAL_SALT, index);
         let timing = FilmTiming::default();
         let layout = match self.points {
@@ -153,7 +95,7 @@ impl TrialRig {
             ObservedPoints::LinkCentres => KeypointLayout::LinkCentres,
         };
         let camera = &self.camera;
-        Ok(film(rope, &self.motion, camera, layout, &timing, &noise)?)
+        film(rope, &self.motion, camera, layout, &timing, &noise)
     }
 
     /// A film with its camera and motion.
@@ -177,7 +119,7 @@ impl TrialRig {
         filmed: &Filmed,
         index: u64,
         options: &IdentifyOptions,
-    ) -> Result<RopeEstimate, TrialError> {
+    ) -> Result<RopeEstimate, IdentifyError> {
         let observation = self.observation(filmed);
         let options = IdentifyOptions {
             seed: options.seed ^ index,
@@ -194,14 +136,13 @@ impl TrialRig {
         };
         let network = self.network.as_deref();
         let go_on = &mut |_| ControlFlow::Continue(());
-        Ok(planner::identify(&observation, &options, network, go_on)?)
+        planner::identify(&observation, &options, network, go_on)
     }
 }
 
 impl Trial {
     /// A trial from a rope and what was found.
-    #[must_use]
-    pub fn new(index: u64, truth: &RopeParams, found: &RopeEstimate) -> Self {
+    fn new(index: u64, truth: &RopeParams, found: &RopeEstimate) -> Self {
         Self {
             index,
             truth: truth.to_array(),
@@ -218,12 +159,15 @@ impl Trial {
 
 /// Makes the trials with these indices, in parallel; in their order, whatever the
 /// threads.
-fn in_parallel<T: Send>(
+///
+/// # Errors
+/// The first trial that cannot be made.
+pub fn in_parallel<T: Send>(
     indices: &[u64],
     threads: usize,
-    make: impl Fn(u64) -> Result<T, TrialError> + Sync,
-) -> Result<Vec<T>, FailedTrial> {
-    let trial = |&index: &u64| make(index).map_err(|source| FailedTrial { index, source });
+    make: impl Fn(u64) -> anyhow::Result<T> + Sync,
+) -> anyhow::Result<Vec<T>> {
+    let trial = |&index: &u64| make(index).with_context(|| format!("trial {index}"));
     map_in_order(indices, threads, trial).into_iter().collect()
 }
 
@@ -236,7 +180,7 @@ pub fn run(
     rope: impl Fn(u64) -> RopeParams + Sync,
     indices: &[u64],
     options: &IdentifyOptions,
-) -> Result<Vec<Trial>, FailedTrial> {
+) -> anyhow::Result<Vec<Trial>> {
     in_parallel(indices, options.threads, |index| {
         let truth = rope(index);
         let filmed = rig.film(&truth, options.seed, index)?;
@@ -246,7 +190,8 @@ pub fn run(
 }
 
 /// One of several trials that are made at once.
-fn alone(options: &IdentifyOptions) -> IdentifyOptions {
+#[must_use]
+pub fn alone(options: &IdentifyOptions) -> IdentifyOptions {
     IdentifyOptions {
         threads: 1,
         ..*options

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 
 /// Errors of the paper's network: mean absolute, in the order of [`RANGES`].
-pub(super) const PAPER: [f64; ROPE_PARAMETERS] = [
+pub const PAPER: [f64; ROPE_PARAMETERS] = [
     0.098, 0.006, 0.010, 0.111, 0.002, 0.007, 0.005, 0.008, 0.152,
 ];
 /// Best possible mean absolute errors of what no film shows, all ratios known exactly.

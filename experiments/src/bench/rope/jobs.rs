@@ -1,10 +1,10 @@
 //! The two jobs the simulator exists for, on all cores.
 
 use super::Extent;
-use super::workload::{Workload, roll_out, throw_options};
-use crate::bench::spent::least;
+use super::workload::{Workload, throw_options, timed};
+use crate::report::Column;
 use rope_sim::{
-    Candidate, FrameTimes, Kernel, Outcome, Precision, SimOptions, SimulateError, Watch,
+    Candidate, FrameTimes, Kernel, Outcome, Precision, Scene, SimOptions, SimulateError, Watch,
 };
 use serde::Serialize;
 
@@ -23,41 +23,53 @@ struct Job<'a> {
 }
 
 /// One job with one kernel.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct JobRow {
     /// `throw` or `wiggle`.
-    pub job: &'static str,
-    /// Kernel.
-    pub kernel: String,
+    job: &'static str,
+    kernel: String,
     /// Candidates run.
-    pub candidates: usize,
+    candidates: usize,
     /// Simulated time of each (s).
-    pub horizon_s: f64,
-    /// Step (s).
-    pub step_s: f64,
-    /// Threads.
-    pub threads: usize,
+    horizon_s: f64,
+    step_s: f64,
+    threads: usize,
     /// Processor time of all threads (s).
-    pub cpu_s: f64,
-    /// Wall time (s).
-    pub wall_s: f64,
+    cpu_s: f64,
+    wall_s: f64,
     /// Rollouts per second of wall time.
-    pub rollouts_per_s: f64,
+    rollouts_per_s: f64,
     /// Rollouts that blew up and were repeated at a quarter of the step.
-    pub repeated: usize,
+    repeated: usize,
     /// Rollouts that blew up even then.
-    pub diverged: usize,
+    diverged: usize,
     /// Processor time these candidates may take (s); none for other kernels.
-    pub limit_cpu_s: Option<f64>,
-    /// Whether they took no more.
-    pub within_limit: Option<bool>,
+    limit_cpu_s: Option<f64>,
+    within_limit: Option<bool>,
 }
+
+pub const TABLE: [Column<JobRow>; 7] = [
+    ("job", |row| {
+        let step_ms = 1e3 * row.step_s;
+        let (candidates, horizon_s) = (row.candidates, row.horizon_s);
+        format!("{}: {candidates} x {horizon_s} s at {step_ms} ms", row.job)
+    }),
+    ("CPU (s)", |row| format!("{:.2}", row.cpu_s)),
+    ("wall (s)", |row| format!("{:.2}", row.wall_s)),
+    ("rollouts per s", |row| format!("{:.0}", row.rollouts_per_s)),
+    ("repeated/diverged", |row| {
+        format!("{}/{}", row.repeated, row.diverged)
+    }),
+    ("kernel", |row| row.kernel.clone()),
+    ("limit", |row| match (row.limit_cpu_s, row.within_limit) {
+        (Some(limit), Some(true)) => format!("{limit:.2} s kept"),
+        (Some(limit), Some(false)) => format!("{limit:.2} s exceeded"),
+        _ => "none".to_owned(),
+    }),
+];
 
 /// Measures both jobs with the fastest single-precision kernel, and with AVX2 if that
 /// is another one.
-///
-/// # Errors
-/// What the simulator refuses.
 pub fn measure(
     workload: &Workload,
     extent: Extent,
@@ -118,9 +130,9 @@ fn wiggle_job(workload: &Workload, extent: Extent) -> Job<'_> {
 }
 
 fn measure_one(kernel: Kernel, job: &Job, extent: Extent) -> Result<JobRow, SimulateError> {
-    let (spent, (_, rollouts)) = least(extent.repeats, || {
-        roll_out(kernel, &job.candidates, &job.options)
-    })?;
+    let (scene, candidates) = (&Scene::EMPTY, &job.candidates);
+    let timed = timed(extent.repeats, scene, kernel, candidates, &job.options)?;
+    let (spent, rollouts) = (timed.spent, timed.rollouts);
     let count = |outcome| rollouts.iter().filter(|r| r.outcome == outcome).count();
     let factor = match kernel {
         Kernel::Avx512F32 => Some(1.0),

@@ -3,16 +3,16 @@
 
 mod jobs;
 mod kernels;
-mod report;
 mod scaling;
 mod workload;
 
 use crate::args::BenchArgs;
-use crate::bench;
+use crate::bench::report::report;
+use crate::report::print_table;
 use cli_output::{OrInput, Outcome, Stage};
 use serde::Serialize;
 use serde_json::Value;
-use workload::Workload;
+use workload::{LINKS, Workload};
 
 /// How much is measured.
 #[derive(Debug, Clone, Copy)]
@@ -25,17 +25,8 @@ struct Extent {
 
 impl Extent {
     fn of(quick: bool) -> Self {
-        if quick {
-            Self {
-                repeats: 1,
-                divisor: 20,
-            }
-        } else {
-            Self {
-                repeats: 5,
-                divisor: 1,
-            }
-        }
+        let (repeats, divisor) = if quick { (1, 20) } else { (5, 1) };
+        Self { repeats, divisor }
     }
 
     /// A count of candidates at this extent, at least one.
@@ -71,30 +62,41 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         links.rows.len(),
         candidates.len()
     ));
-    let report = Report {
+    let measured = Report {
         repeats: extent.repeats,
         kernels,
         jobs,
         links,
         candidates,
     };
-    let own = serde_json::to_value(&report).or_failed()?;
-    Ok(bench::report::report(
-        (args, quiet),
-        "bench rope",
-        own,
-        || {
-            println!(
-                "seed {}, least processor time of {}{}",
-                args.seed,
-                extent.repeats,
-                if args.quick {
-                    "; quick: few candidates, rough figures"
-                } else {
-                    ""
-                }
-            );
-            report.print();
-        },
-    ))
+    let own = serde_json::to_value(&measured).or_failed()?;
+    Ok(report((args, quiet), "bench rope", own, || {
+        let rough = if args.quick {
+            "; quick: few candidates, rough figures"
+        } else {
+            ""
+        };
+        println!(
+            "seed {}, least processor time of {}{rough}",
+            args.seed, extent.repeats
+        );
+        measured.print();
+    }))
+}
+
+impl Report {
+    fn print(&self) {
+        println!("\nOne thread, {LINKS} links, processor time per rope-step:");
+        print_table(&self.kernels, 0, kernels::TABLE);
+        println!("\nJobs on all cores:");
+        print_table(&self.jobs, 2, jobs::TABLE);
+        println!("\nCost against links, one thread:");
+        print_table(&self.links.rows, 0, scaling::LINKS_TABLE);
+        println!(
+            "line: {:.2} ns per link-step + {:.0} ns, R² = {:.5}",
+            self.links.slope_ns_per_link_step, self.links.intercept_ns, self.links.r_squared
+        );
+        println!("\nCost against candidates, one thread, arm spline each:");
+        print_table(&self.candidates, 0, scaling::CANDIDATES_TABLE);
+    }
 }

@@ -1,9 +1,9 @@
 //! How cost grows with the links of a rope and with the candidates of a batch.
 
 use super::Extent;
-use super::workload::{LINKS, Workload, roll_out, throw_options};
-use crate::bench::spent::least;
-use rope_sim::{Candidate, Outcome, Precision, SimOptions, SimulateError, Start};
+use super::workload::{LINKS, Workload, released, throw_options, timed};
+use crate::report::Column;
+use rope_sim::{Candidate, Outcome, Precision, Rollout, Scene, SimulateError};
 use serde::Serialize;
 use shared_types::RopeParams;
 
@@ -17,24 +17,33 @@ const GROUPS: usize = 8;
 const HORIZON_S: f64 = 0.25;
 
 /// Cost at one link count, one thread.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct LinkRow {
-    /// Links per rope.
-    pub links: u32,
-    /// Per rollout (µs).
-    pub us_per_rollout: f64,
-    /// Per rope and step (ns).
-    pub ns_per_rope_step: f64,
-    /// Per link and step (ns).
-    pub ns_per_link_step: f64,
+    links: u32,
+    us_per_rollout: f64,
+    ns_per_rope_step: f64,
+    ns_per_link_step: f64,
     /// Rollouts repeated at a quarter of the step; their time is in the figures.
-    pub repeated: usize,
+    repeated: usize,
 }
 
+pub const LINKS_TABLE: [Column<LinkRow>; 5] = [
+    ("links", |row| row.links.to_string()),
+    ("per rollout (µs)", |row| {
+        format!("{:.1}", row.us_per_rollout)
+    }),
+    ("per rope-step (ns)", |row| {
+        format!("{:.0}", row.ns_per_rope_step)
+    }),
+    ("per link-step (ns)", |row| {
+        format!("{:.2}", row.ns_per_link_step)
+    }),
+    ("repeated", |row| row.repeated.to_string()),
+];
+
 /// Cost over links with the straight line through it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct LinkScaling {
-    /// By link count.
     pub rows: Vec<LinkRow>,
     /// Slope of the line through ns per rope-step (ns per link-step).
     pub slope_ns_per_link_step: f64,
@@ -45,32 +54,31 @@ pub struct LinkScaling {
 }
 
 /// Cost of one batch size, one thread.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct CandidateRow {
-    /// Candidates in the batch.
-    pub candidates: usize,
-    /// Per batch (ms of processor time).
-    pub ms_per_batch: f64,
-    /// Per rollout (µs).
-    pub us_per_rollout: f64,
-    /// Per rope and step (ns).
-    pub ns_per_rope_step: f64,
+    candidates: usize,
+    ms_per_batch: f64,
+    us_per_rollout: f64,
+    ns_per_rope_step: f64,
 }
+
+pub const CANDIDATES_TABLE: [Column<CandidateRow>; 4] = [
+    ("candidates", |row| row.candidates.to_string()),
+    ("per batch (ms)", |row| format!("{:.2}", row.ms_per_batch)),
+    ("per rollout (µs)", |row| {
+        format!("{:.1}", row.us_per_rollout)
+    }),
+    ("per rope-step (ns)", |row| {
+        format!("{:.0}", row.ns_per_rope_step)
+    }),
+];
 
 /// Ropes that hang from a standing frame and swing, cut into more and more links. A
 /// finer cut of the same rope has stiffer joints, so that it bends alike.
-///
-/// # Errors
-/// What the simulator refuses.
 pub fn over_links(workload: &Workload, extent: Extent) -> Result<LinkScaling, SimulateError> {
     let kernel = Precision::F32.fastest_kernel();
     let count = kernel.lanes() * extent.share(GROUPS);
-    let options = SimOptions {
-        start: Start::Straight {
-            joint0_rotvec: [0.2, 0.4, 0.1],
-        },
-        ..throw_options(HORIZON_S, 1)
-    };
+    let options = released([0.2, 0.4, 0.1], throw_options(HORIZON_S, 1));
     let mut rows = Vec::new();
     for links in LINK_COUNTS {
         let ropes: Vec<RopeParams> = workload.ropes[..count]
@@ -81,18 +89,14 @@ pub fn over_links(workload: &Workload, extent: Extent) -> Result<LinkScaling, Si
             .iter()
             .map(|rope| Candidate::new(rope, &workload.still))
             .collect();
-        let (spent, (rope_steps, rollouts)) =
-            least(extent.repeats, || roll_out(kernel, &candidates, &options))?;
-        let ns_per_rope_step = 1e9 * spent.cpu_s / rope_steps;
+        let timed = timed(extent.repeats, &Scene::EMPTY, kernel, &candidates, &options)?;
+        let repeated = |r: &&Rollout| r.outcome != Outcome::Clean;
         rows.push(LinkRow {
             links,
-            us_per_rollout: 1e6 * spent.cpu_s / count as f64,
-            ns_per_rope_step,
-            ns_per_link_step: ns_per_rope_step / f64::from(links),
-            repeated: rollouts
-                .iter()
-                .filter(|r| r.outcome != Outcome::Clean)
-                .count(),
+            us_per_rollout: 1e6 * timed.spent.cpu_s / count as f64,
+            ns_per_rope_step: timed.ns_per_rope_step,
+            ns_per_link_step: timed.ns_per_rope_step / f64::from(links),
+            repeated: timed.rollouts.iter().filter(repeated).count(),
         });
     }
     let points: Vec<[f64; 2]> = rows
@@ -120,9 +124,6 @@ fn cut_into(rope: &RopeParams, links: u32) -> RopeParams {
 }
 
 /// Batches of throws, each candidate on an arm spline of its own.
-///
-/// # Errors
-/// What the simulator refuses.
 pub fn over_candidates(
     workload: &Workload,
     extent: Extent,
@@ -134,13 +135,12 @@ pub fn over_candidates(
         .filter(|count| *count * extent.divisor <= 4096)
         .map(|count| {
             let candidates = workload.throwing(count);
-            let (spent, (rope_steps, _)) =
-                least(extent.repeats, || roll_out(kernel, &candidates, &options))?;
+            let timed = timed(extent.repeats, &Scene::EMPTY, kernel, &candidates, &options)?;
             Ok(CandidateRow {
                 candidates: count,
-                ms_per_batch: 1e3 * spent.cpu_s,
-                us_per_rollout: 1e6 * spent.cpu_s / count as f64,
-                ns_per_rope_step: 1e9 * spent.cpu_s / rope_steps,
+                ms_per_batch: 1e3 * timed.spent.cpu_s,
+                us_per_rollout: 1e6 * timed.spent.cpu_s / count as f64,
+                ns_per_rope_step: timed.ns_per_rope_step,
             })
         })
         .collect()

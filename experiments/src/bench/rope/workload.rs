@@ -1,12 +1,13 @@
 //! The ropes and motions that are simulated, all drawn from one seed.
 
+use crate::bench::spent::{Spent, least};
 use arm_model::trajectory::TrajectoryError;
 use arm_model::{JointTrajectory, JointVector, Pole};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Kernel, Obstacle, PlannedArm, Precision, Rollout, Scene,
-    Shape, SimOptions, SimulateError, Start, Watch, roll_out_in_with,
+    AttachMotion, Candidate, Kernel, Obstacle, PlannedArm, Precision, Rollout, Scene, SimOptions,
+    SimulateError, Start, Watch, roll_out_in_with,
 };
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
@@ -40,9 +41,6 @@ pub struct Workload {
 
 impl Workload {
     /// Draws everything from `seed`.
-    ///
-    /// # Errors
-    /// A spline that cannot be made, which would be a fault of this program.
     pub fn new(seed: u64) -> Result<Self, TrajectoryError> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let ropes = (0..ROPES).map(|_| rope(&mut random)).collect();
@@ -80,52 +78,53 @@ impl Workload {
     /// A floor this far below the clamp of the arm that stands still.
     pub fn floor(&self, below_m: f64) -> Scene {
         let clamp_m = self.still.at(0.0).p_m;
-        let top_m = [clamp_m.x, clamp_m.y, clamp_m.z - below_m];
-        Scene {
-            obstacles: vec![Obstacle::fixed(Shape::HalfSpace, top_m, FRICTION)],
-            domino: None,
-        }
+        Scene::with(vec![Obstacle::floor(clamp_m.z - below_m, FRICTION)])
     }
 }
 
 /// Throws: steps of 0.5 ms, closest approach watched, nothing recorded.
 pub fn throw_options(horizon_s: f64, threads: usize) -> SimOptions {
     SimOptions {
-        step_s: 5e-4,
-        precision: Precision::F32,
-        start: Start::Equilibrium,
-        frames: FrameTimes::NONE,
         watch: Watch::point(TARGET_M),
-        horizon_s,
         threads,
+        ..SimOptions::new(5e-4, Precision::F32, horizon_s)
     }
 }
 
-/// Simulates and returns how many rope-steps that were, repeats not counted.
-///
-/// # Errors
-/// What the simulator refuses.
-pub fn roll_out(
-    kernel: Kernel,
-    candidates: &[Candidate],
-    options: &SimOptions,
-) -> Result<(f64, Vec<Rollout>), SimulateError> {
-    roll_out_in(&Scene::EMPTY, kernel, candidates, options)
+/// The same from a straight rope whose first joint is turned (rad).
+pub fn released(joint0_rotvec: [f64; 3], options: SimOptions) -> SimOptions {
+    SimOptions {
+        start: Start::Straight { joint0_rotvec },
+        ..options
+    }
 }
 
-/// As [`roll_out`], among obstacles.
-///
-/// # Errors
-/// What the simulator refuses.
-pub fn roll_out_in(
+/// A batch simulated several times.
+pub struct Timed {
+    /// Least times of one simulation.
+    pub spent: Spent,
+    /// Processor time per rope and step (ns), repeats not counted as steps.
+    pub ns_per_rope_step: f64,
+    pub rollouts: Vec<Rollout>,
+}
+
+/// Simulates a batch so many times.
+pub fn timed(
+    repeats: usize,
     scene: &Scene,
     kernel: Kernel,
     candidates: &[Candidate],
     options: &SimOptions,
-) -> Result<(f64, Vec<Rollout>), SimulateError> {
-    let rollouts = roll_out_in_with(kernel, scene, candidates, options)?;
+) -> Result<Timed, SimulateError> {
+    let (spent, rollouts) = least(repeats, || {
+        roll_out_in_with(kernel, scene, candidates, options)
+    })?;
     let rope_steps = options.horizon_s / options.step_s * rollouts.len() as f64;
-    Ok((rope_steps, rollouts))
+    Ok(Timed {
+        spent,
+        ns_per_rope_step: 1e9 * spent.cpu_s / rope_steps,
+        rollouts,
+    })
 }
 
 fn rope(random: &mut ChaCha8Rng) -> RopeParams {
@@ -137,29 +136,31 @@ fn rope(random: &mut ChaCha8Rng) -> RopeParams {
 }
 
 fn throw(random: &mut ChaCha8Rng) -> Result<PlannedArm, TrajectoryError> {
-    let times_s: Vec<f64> = (0..7).map(|i| 0.15 * f64::from(i)).collect();
     let mut q = POSE;
-    let waypoints: Vec<JointVector> = times_s
-        .iter()
-        .map(|_| {
-            for joint in [1, 3, 5] {
-                q[joint] += random.random_range(-0.15..0.15);
-            }
-            JointVector(q)
-        })
-        .collect();
-    JointTrajectory::new(&times_s, &waypoints).map(|throw| PlannedArm::new(throw, Pole::default()))
+    spline(7, 0.15, |_| {
+        for joint in [1, 3, 5] {
+            q[joint] += random.random_range(-0.15..0.15);
+        }
+        q
+    })
 }
 
 fn wiggle() -> Result<PlannedArm, TrajectoryError> {
-    let times_s: Vec<f64> = (0..50).map(|i| 0.1 * f64::from(i)).collect();
-    let waypoints: Vec<JointVector> = times_s
-        .iter()
-        .map(|t| {
-            let mut q = POSE;
-            q[5] += 25_f64.to_radians() * (core::f64::consts::TAU * 0.75 * t).sin();
-            JointVector(q)
-        })
-        .collect();
-    JointTrajectory::new(&times_s, &waypoints).map(|throw| PlannedArm::new(throw, Pole::default()))
+    spline(50, 0.1, |t_s| {
+        let mut q = POSE;
+        q[5] += 25_f64.to_radians() * (core::f64::consts::TAU * 0.75 * t_s).sin();
+        q
+    })
+}
+
+/// An arm through the poses of so many times, which are `period_s` apart.
+fn spline(
+    count: u32,
+    period_s: f64,
+    pose: impl FnMut(f64) -> [f64; 7],
+) -> Result<PlannedArm, TrajectoryError> {
+    let times_s: Vec<f64> = (0..count).map(|i| period_s * f64::from(i)).collect();
+    let poses = times_s.iter().copied().map(pose);
+    let waypoints: Vec<JointVector> = poses.map(JointVector).collect();
+    JointTrajectory::new(&times_s, &waypoints).map(|path| PlannedArm::new(path, Pole::default()))
 }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use shared_types::rope::ROPE_PARAMETERS;
 
 /// Frames moved together: two fifteenths of a second at 60 Hz.
-pub const MOMENT_FRAMES: usize = 8;
+pub(super) const MOMENT_FRAMES: usize = 8;
 /// How far a keypoint is moved, each way (m): large compared with rounding, small compared with the
 /// rope's sway.
 const SHIFT_M: f32 = 2e-3;
 
 /// Sensitivities of every parameter to every keypoint at every moment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SensitivityMap {
+pub(super) struct SensitivityMap {
     /// Moments of [`MOMENT_FRAMES`] frames each; frames left over are left out.
     pub moments: usize,
     /// Keypoints from the clamp to the lead.
@@ -27,7 +27,6 @@ pub struct SensitivityMap {
 
 impl SensitivityMap {
     /// A map of zeros.
-    #[must_use]
     pub fn empty(moments: usize, keypoints: usize) -> Self {
         Self {
             moments,
@@ -38,9 +37,6 @@ impl SensitivityMap {
 
     /// Asks `net` about `features` with every keypoint moved forward, back, up and down at
     /// every moment.
-    ///
-    /// # Errors
-    /// What the network refuses.
     pub fn measure(net: &PhiNet, features: &WiggleFeatures) -> Result<Self, PredictError> {
         let definition = features.definition;
         let mut map = Self::empty(definition.frames / MOMENT_FRAMES, definition.keypoints);
@@ -83,7 +79,6 @@ impl SensitivityMap {
     }
 
     /// Root of the sum of squares over the keypoints, moment by moment.
-    #[must_use]
     pub fn over_time(&self, parameter: usize) -> Vec<f64> {
         let size = |row: &[f32]| {
             row.iter()
@@ -98,7 +93,6 @@ impl SensitivityMap {
     }
 
     /// The same over the moments, keypoint by keypoint.
-    #[must_use]
     pub fn along_rope(&self, parameter: usize) -> Vec<f64> {
         let mut squares = vec![0.0; self.keypoints];
         for row in self.values[parameter].chunks(self.keypoints) {
@@ -153,8 +147,9 @@ fn segment_angle(row: &[f32], segment: usize) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{TrialRig, trial_rope};
     use super::*;
+    use experiments::trials::TrialRig;
+    use planner::ropes::trial_rope;
     use planner::wiggle::WiggleConfig;
 
     fn seen() -> (PhiNet, WiggleFeatures) {

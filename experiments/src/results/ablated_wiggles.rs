@@ -7,13 +7,11 @@
 //! planar ones). Large ones may break a limit of the arm; they are simulated all the
 //! same, and [`AblatedWiggle::breaks`] reports it.
 
-use super::TrialRig;
-use super::summary::PAPER;
-use arm_model::{JointTrajectory, JointVector, Limits, Pole};
+use arm_model::{JointTrajectory, JointVector, Limits};
+use experiments::trials::PAPER;
 use planner::wiggle::{WiggleConfig, WiggleError, unlimited};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
-use rope_sim::PlannedArm;
 use shared_types::rope::ROPE_PARAMETERS;
 
 /// The paper's mean absolute errors with one wiggle: thousandths of the parameters' units,
@@ -46,21 +44,18 @@ const SEED: u64 = 0x0b1a_7100;
 
 /// One wiggle of the ablation.
 #[derive(Debug, Clone)]
-pub struct AblatedWiggle {
+pub(super) struct AblatedWiggle {
     /// What it is.
     pub name: String,
     /// Mean absolute errors of the paper's network, order of the parameter ranges.
     pub paper: [f64; ROPE_PARAMETERS],
     /// Limit of the arm that it breaks, if one.
     pub breaks: Option<String>,
-    trajectory: JointTrajectory,
+    pub trajectory: JointTrajectory,
 }
 
 /// The nine wiggles; `main` is the configured one.
-///
-/// # Errors
-/// If one cannot be made.
-pub fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, WiggleError> {
+pub(super) fn ablated_wiggles(main: &WiggleConfig) -> Result<Vec<AblatedWiggle>, WiggleError> {
     let limits = Limits::default();
     let one = |name, paper, trajectory: Result<JointTrajectory, WiggleError>| {
         let trajectory = trajectory?;
@@ -122,19 +117,6 @@ fn random_wiggle(main: &WiggleConfig, seed: u64) -> Result<JointTrajectory, Wigg
     times_s.push(main.filmed_s.max(time_s));
     poses.push(main.pose_rad);
     Ok(JointTrajectory::new(&times_s, &poses)?)
-}
-
-impl TrialRig {
-    /// This rig with another wiggle. Its network, if it has one, is not taken along: it
-    /// is trained on one wiggle only.
-    #[must_use]
-    pub fn wiggling(&self, wiggle: &AblatedWiggle) -> Self {
-        Self {
-            motion: PlannedArm::new(wiggle.trajectory, Pole::default()),
-            network: None,
-            ..self.clone()
-        }
-    }
 }
 
 #[cfg(test)]
