@@ -4,7 +4,7 @@ use crate::base_path::{BasePath, Interval, NotFinite};
 use crate::contact::Starting;
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
-use crate::group::{GroupTask, Member, MemberResult};
+use crate::group::{GroupTask, Member};
 use crate::knot::attitude;
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
@@ -57,7 +57,9 @@ pub fn roll_out_in_with(
     options: &SimOptions,
 ) -> Result<Vec<Rollout>, SimulateError> {
     if !kernel.is_available() {
-        return Err(SimulateError::KernelUnavailable(kernel));
+        return Err(SimulateError::new(format_args!(
+            "this processor cannot run the kernel {kernel:?}"
+        )));
     }
     check(candidates, options)?;
     scene.check()?;
@@ -69,44 +71,33 @@ pub fn roll_out_in_with(
         options,
         step_s: options.step_s,
     };
-    let mut results = batch.run(&all)?;
-    let failed: Vec<usize> = all.into_iter().filter(|i| !results[*i].survived).collect();
-    let mut rollouts: Vec<Rollout> = results
-        .drain(..)
-        .map(|r| rollout(r, Outcome::Clean))
-        .collect();
+    let mut rollouts = batch.run(&all)?;
+    let diverged = |index: &usize| rollouts[*index].outcome == Outcome::Diverged;
+    let failed: Vec<usize> = all.into_iter().filter(diverged).collect();
     if !failed.is_empty() {
         let batch = Batch {
             step_s: options.step_s / REPEAT_DIVISOR,
             ..batch
         };
-        for (index, result) in failed.iter().zip(batch.run(&failed)?) {
-            rollouts[*index] = rollout(result, Outcome::RerunAtQuarterStep);
+        for (index, mut repeated) in failed.iter().zip(batch.run(&failed)?) {
+            if repeated.outcome == Outcome::Clean {
+                repeated.outcome = Outcome::RerunAtQuarterStep;
+            } else {
+                forget_measures(&mut repeated);
+            }
+            rollouts[*index] = repeated;
         }
     }
     Ok(rollouts)
 }
 
-fn rollout(mut result: MemberResult, success: Outcome) -> Rollout {
-    if result.survived {
-        return Rollout {
-            nodes: result.nodes,
-            watched: result.watched,
-            peak_tip_speed_m_s: result.peak_tip_speed_m_s,
-            outcome: success,
-            contacts: result.contacts,
-            domino: result.domino,
-        };
-    }
-    result.nodes.hold_last_finite();
-    Rollout {
-        nodes: result.nodes,
-        watched: Watched::default(),
-        peak_tip_speed_m_s: 0.0,
-        outcome: Outcome::Diverged,
-        contacts: vec![ContactSummary::default(); result.contacts.len()],
-        domino: result.domino.map(|_| DominoOutcome::default()),
-    }
+/// Leaves of a rollout that blew up what is finite.
+fn forget_measures(rollout: &mut Rollout) {
+    rollout.nodes.hold_last_finite();
+    rollout.watched = Watched::default();
+    rollout.peak_tip_speed_m_s = 0.0;
+    rollout.contacts.fill(ContactSummary::default());
+    rollout.domino = rollout.domino.map(|_| DominoOutcome::default());
 }
 
 /// Candidates to run with one kernel and step.
@@ -123,15 +114,15 @@ type SharedPath = OnceLock<Result<BasePath, NotFinite>>;
 
 impl Batch<'_> {
     /// Runs the candidates with these indices; results in the same order.
-    fn run(&self, indices: &[usize]) -> Result<Vec<MemberResult>, SimulateError> {
+    fn run(&self, indices: &[usize]) -> Result<Vec<Rollout>, SimulateError> {
         let groups = self.groups(indices);
         let shared = self.shared_paths(indices);
         let threads = self.options.threads.clamp(1, groups.len().max(1));
-        let mut results: Vec<Option<MemberResult>> = Vec::new();
+        let mut results: Vec<Option<Rollout>> = Vec::new();
         results.resize_with(self.candidates.len(), || None);
         let next = AtomicUsize::new(0);
         // A refusal comes with its group: whichever worker met it, the first one counts.
-        let work = || -> Result<Vec<(usize, MemberResult)>, (usize, SimulateError)> {
+        let work = || -> Result<Vec<(usize, Rollout)>, (usize, SimulateError)> {
             let mut out = Vec::new();
             let mut memory = Vec::new();
             loop {
@@ -148,20 +139,24 @@ impl Batch<'_> {
             let handles: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
             finished.push(work());
             for handle in handles {
-                let panicked = (usize::MAX, SimulateError::WorkerPanicked);
+                let panicked = (usize::MAX, SimulateError::worker_panicked());
                 finished.push(handle.join().unwrap_or(Err(panicked)));
             }
         });
         let refusals = finished.iter().filter_map(|part| part.as_ref().err());
         if let Some((_, error)) = refusals.min_by_key(|(group, _)| *group) {
-            return Err(*error);
+            return Err(error.clone());
         }
         for (index, result) in finished.into_iter().flatten().flatten() {
             results[index] = Some(result);
         }
         indices
             .iter()
-            .map(|i| results[*i].take().ok_or(SimulateError::WorkerPanicked))
+            .map(|i| {
+                results[*i]
+                    .take()
+                    .ok_or_else(SimulateError::worker_panicked)
+            })
             .collect()
     }
 
@@ -202,7 +197,7 @@ impl Batch<'_> {
         group: &[usize],
         shared: &BTreeMap<usize, SharedPath>,
         memory: &mut Vec<Vec<Interval>>,
-    ) -> Result<Vec<MemberResult>, SimulateError> {
+    ) -> Result<Vec<Rollout>, SimulateError> {
         let build =
             |motion, memory| BasePath::new_in(memory, motion, self.step_s, self.options.horizon_s);
         let slot_of = |motion| address(motion).and_then(|address| shared.get(&address));
@@ -222,10 +217,7 @@ impl Batch<'_> {
             };
             let path = path
                 .as_ref()
-                .map_err(|bad| SimulateError::MotionNotFinite {
-                    candidate: *index,
-                    time_s: bad.time_s,
-                })?;
+                .map_err(|bad| SimulateError::motion_not_finite(*index, bad.time_s))?;
             let links = start_attitudes(candidate, path, self.options.start);
             let starting = Starting {
                 candidate: *index,

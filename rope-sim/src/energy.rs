@@ -5,10 +5,10 @@
 //! equations: its drift shows errors of the equations, not of the time stepping.
 
 use crate::algebra::{Quat, Vec3};
+use crate::extra_loads::MassLanes;
 use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, GRAVITY_M_S2, step};
 use crate::load::{LinkLoads, Load, Loads};
-use crate::mass_distribution::MassLanes;
 use crate::scheme::Scheme;
 use crate::state::{BaseLanes, Link, RopeLanes};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};

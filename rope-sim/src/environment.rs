@@ -4,12 +4,11 @@
 use crate::algebra::Quat;
 use crate::clock::{BaseState, Clock};
 use crate::contact::{Contacts, LOOK_PERIOD, Node, Predicted, StepEnd, corrected, predicted};
-use crate::drag::DragLanes;
+use crate::extra_loads::{DragLanes, MassLanes};
 use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, StepReport, step};
 use crate::lanes::Lanes;
 use crate::load::{LinkLoads, Load, Loads, Unloaded};
-use crate::mass_distribution::MassLanes;
 use crate::scheme::Scheme;
 use crate::state::{Link, RopeLanes};
 use nalgebra::{UnitQuaternion, Vector3};

@@ -1,98 +1,69 @@
 //! Why a simulation is refused.
 
-use crate::lanes::Kernel;
-use crate::scene::SceneError;
-use crate::unusable::Unusable;
-use shared_types::rope::RopeError;
+use core::fmt::Display;
 
-/// Why [`crate::roll_out`] gave nothing.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum SimulateError {
-    /// A field of [`crate::SimOptions`] has an unusable value.
-    #[error("simulation option {0}")]
-    Option(Unusable),
-    /// The kernel asked for needs instructions that this processor lacks.
-    #[error("this processor cannot run the kernel {0:?}")]
-    KernelUnavailable(Kernel),
-    /// A frame lies outside the simulated time.
-    #[error(
-        "frames from {first_s} s to {last_s} s do not fit into the simulated 0 s to {horizon_s} s"
-    )]
-    FramesOutsideHorizon {
-        /// Time of the first frame (s).
-        first_s: f64,
-        /// Time of the last frame (s).
-        last_s: f64,
-        /// End of the simulation (s).
-        horizon_s: f64,
-    },
-    /// A rope is not physical.
-    #[error("candidate {candidate}: {source}")]
-    Rope {
-        /// Index of the candidate, from 0.
-        candidate: usize,
-        /// Which parameter, and its limits.
-        source: RopeError,
-    },
-    /// A field of [`crate::RopeExtras`] or [`crate::AirDrag`] is unusable.
-    #[error("candidate {candidate}: {unusable}")]
-    Extras {
-        /// Index of the candidate, from 0.
-        candidate: usize,
-        /// The number.
-        unusable: Unusable,
-    },
-    /// The scene cannot be simulated.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// A motion ends before the simulation does and is not known to hold.
-    #[error(
-        "candidate {candidate}: its motion ends at {ends_s} s, before the horizon of {horizon_s} s"
-    )]
-    MotionTooShort {
-        /// Index of the candidate, from 0.
-        candidate: usize,
-        /// End of the motion (s).
-        ends_s: f64,
-        /// End of the simulation (s).
-        horizon_s: f64,
-    },
-    /// A motion gave NaN or infinity.
-    #[error("candidate {candidate}: its attach motion is not finite at {time_s} s")]
-    MotionNotFinite {
-        /// Index of the candidate, from 0.
-        candidate: usize,
-        /// When (s).
-        time_s: f64,
-    },
-    /// A worker thread ended without a result: a fault of this program.
-    #[error("a simulation thread ended without a result; this is a fault of the program")]
-    WorkerPanicked,
+/// Why [`crate::roll_out`] gave nothing: which option, body of the scene or candidate cannot
+/// be simulated, and what it would have to be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}{reason}", candidate.map_or_else(String::new, |index| format!("candidate {index}: ")))]
+pub struct SimulateError {
+    /// Index of the candidate at fault, from 0, if one is.
+    pub candidate: Option<usize>,
+    reason: String,
 }
 
 impl SimulateError {
-    /// Index of the candidate at fault, if one is.
-    #[must_use]
-    pub fn candidate(mut self) -> Option<usize> {
-        self.candidate_mut().copied()
-    }
-
-    /// The same with another index for the candidate at fault.
-    pub(crate) fn of_candidate(mut self, index: usize) -> Self {
-        if let Some(candidate) = self.candidate_mut() {
-            *candidate = index;
-        }
-        self
-    }
-
-    fn candidate_mut(&mut self) -> Option<&mut usize> {
-        match self {
-            Self::Rope { candidate, .. }
-            | Self::Extras { candidate, .. }
-            | Self::MotionTooShort { candidate, .. }
-            | Self::MotionNotFinite { candidate, .. }
-            | Self::Scene(SceneError::StartsInside { candidate, .. }) => Some(candidate),
-            _ => None,
+    /// Of an option or the scene.
+    pub(crate) fn new(reason: impl Display) -> Self {
+        Self {
+            candidate: None,
+            reason: reason.to_string(),
         }
     }
+
+    /// Of one candidate.
+    pub(crate) fn of(candidate: usize, reason: impl Display) -> Self {
+        Self {
+            candidate: Some(candidate),
+            ..Self::new(reason)
+        }
+    }
+
+    /// A worker thread ended without a result: a fault of this program.
+    pub(crate) fn worker_panicked() -> Self {
+        Self::new("a simulation thread ended without a result; this is a fault of the program")
+    }
+
+    /// `motion` of a candidate gave NaN or infinity.
+    pub(crate) fn motion_not_finite(candidate: usize, time_s: f64) -> Self {
+        Self::of(
+            candidate,
+            format_args!("its attach motion is not finite at {time_s} s"),
+        )
+    }
+}
+
+/// Refuses the first of a field's numbers that is not as it must be.
+pub(crate) fn refuse_unless(
+    field: &str,
+    need: &str,
+    numbers: impl IntoIterator<Item = f64>,
+    usable: impl Fn(f64) -> bool,
+) -> Result<(), String> {
+    match numbers.into_iter().find(|value| !usable(*value)) {
+        Some(value) => Err(format!("`{field}` is {value}: {need}")),
+        None => Ok(()),
+    }
+}
+
+pub(crate) fn refuse_unless_finite(
+    field: &str,
+    numbers: impl IntoIterator<Item = f64>,
+) -> Result<(), String> {
+    refuse_unless(field, "must be finite", numbers, f64::is_finite)
+}
+
+pub(crate) fn refuse_unless_positive(field: &str, number: f64) -> Result<(), String> {
+    let need = "must be finite and above 0";
+    refuse_unless(field, need, [number], |v| v.is_finite() && v > 0.0)
 }

@@ -1,7 +1,7 @@
 //! What a rope may have beyond the paper's nine parameters: air drag, a rest curvature
 //! and mass that is uneven along it. Off by default.
 
-use crate::unusable::Unusable;
+use crate::error::refuse_unless;
 
 /// Drag of still air on the links and the lead, quadratic in the speed.
 ///
@@ -56,12 +56,12 @@ impl RopeExtras {
         1.0 + self.mass_slope * (2.0 * place - 1.0)
     }
 
-    pub(crate) fn check(&self) -> Result<(), Unusable> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let curvature = self.rest_curvature_per_m;
         let need = "must be a number of at most 1000 rad/m";
-        Unusable::unless("rest_curvature_per_m", need, curvature, |v| v.abs() <= 1e3)?;
+        refuse_unless("rest_curvature_per_m", need, curvature, |v| v.abs() <= 1e3)?;
         let need = "must be from -0.95 to 0.95";
-        Unusable::unless("mass_slope", need, [self.mass_slope], |v| v.abs() <= 0.95)?;
+        refuse_unless("mass_slope", need, [self.mass_slope], |v| v.abs() <= 0.95)?;
         let Some(drag) = self.air_drag else {
             return Ok(());
         };
@@ -72,7 +72,7 @@ impl RopeExtras {
             ("lead_coefficient", drag.lead_coefficient),
         ] {
             let need = "must be from 0 to 10 000";
-            Unusable::unless(field, need, [number], |v| (0.0..=1e4).contains(&v))?;
+            refuse_unless(field, need, [number], |v| (0.0..=1e4).contains(&v))?;
         }
         Ok(())
     }

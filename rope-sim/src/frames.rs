@@ -121,33 +121,26 @@ impl NodeTrack {
         }
     }
 
-    pub(crate) fn set(&mut self, frame: usize, node: usize, position_m: [f64; 3]) {
-        let at = (frame * self.nodes + node) * 3;
-        for (axis, x) in position_m.into_iter().enumerate() {
-            match &mut self.numbers {
-                Numbers::F32(v) => v[at + axis] = x as f32,
-                Numbers::F64(v) => v[at + axis] = x,
-            }
-        }
-    }
-
     /// Repeats the last frame that is finite over all later ones, so that a failed
     /// rollout never hands out NaN. Without any finite frame all become zero.
     pub(crate) fn hold_last_finite(&mut self) {
-        let frames = self.frames();
-        let is_finite = |track: &Self, f: usize| {
-            (0..track.nodes).all(|n| track.position(f, n).iter().all(|x| x.is_finite()))
-        };
-        let good = (0..frames).take_while(|f| is_finite(self, *f)).count();
-        for frame in good..frames {
-            for node in 0..self.nodes {
-                let held = if good == 0 {
-                    Vector3::zeros()
-                } else {
-                    self.position(good - 1, node)
-                };
-                self.set(frame, node, held.into());
-            }
+        let per_frame = self.nodes * 3;
+        match &mut self.numbers {
+            Numbers::F32(v) => hold_last_finite(v, per_frame),
+            Numbers::F64(v) => hold_last_finite(v, per_frame),
+        }
+    }
+}
+
+fn hold_last_finite<T: Copy + Default + Into<f64>>(numbers: &mut [T], per_frame: usize) {
+    let is_finite = |frame: &&[T]| frame.iter().all(|x| (*x).into().is_finite());
+    let good = per_frame * numbers.chunks(per_frame).take_while(is_finite).count();
+    if good == 0 {
+        numbers.fill(T::default());
+    }
+    for start in (good..numbers.len()).step_by(per_frame) {
+        if good > 0 {
+            numbers.copy_within(good - per_frame..good, start);
         }
     }
 }

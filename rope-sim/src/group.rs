@@ -10,9 +10,10 @@ use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
 use crate::load::Unloaded;
-use crate::scene::{ContactSummary, DominoOutcome, Scene};
+use crate::rollout::{Outcome, Rollout};
+use crate::scene::Scene;
 use crate::state::{Link, RopeLanes};
-use crate::watch::{Watch, Watched, Watcher};
+use crate::watch::{Watch, Watcher};
 use shared_types::RopeParams;
 
 /// Steps between health checks.
@@ -32,16 +33,6 @@ pub(crate) struct Member<'a> {
     pub(crate) links: Vec<[f64; 4]>,
 }
 
-/// What a rope of a group did.
-pub(crate) struct MemberResult {
-    pub(crate) nodes: NodeTrack,
-    pub(crate) watched: Watched,
-    pub(crate) peak_tip_speed_m_s: f64,
-    pub(crate) survived: bool,
-    pub(crate) contacts: Vec<ContactSummary>,
-    pub(crate) domino: Option<DominoOutcome>,
-}
-
 /// The work of one group; at most as many members as the kernel has lanes, all with
 /// the same number of links.
 /// With `ALONE` there is nothing but the rope: the loop is compiled without a trace of
@@ -57,7 +48,8 @@ pub(crate) struct GroupTask<'a, const ALONE: bool> {
 }
 
 impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
-    type Output = Vec<MemberResult>;
+    /// Those that blew up are [`Outcome::Diverged`]; their numbers may not be finite.
+    type Output = Vec<Rollout>;
 
     #[inline(always)]
     fn run<V: Lanes>(self) -> Self::Output {
@@ -141,13 +133,17 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
 
         let mut tracks = recorder.tracks.into_iter();
         (0..count)
-            .map(|lane| MemberResult {
+            .map(|lane| Rollout {
                 nodes: tracks
                     .next()
                     .unwrap_or_else(|| NodeTrack::zeros(0, n + 1, false)),
                 watched: watcher.watched(lane, paths[lane]),
                 peak_tip_speed_m_s: watcher.peak_speed_m_s(lane),
-                survived: health.alive[lane],
+                outcome: if health.alive[lane] {
+                    Outcome::Clean
+                } else {
+                    Outcome::Diverged
+                },
                 contacts: environment
                     .as_ref()
                     .map_or_else(Vec::new, |e| e.contacts.summaries_of(lane)),

@@ -23,23 +23,20 @@ mod base_path;
 mod batch;
 mod clock;
 mod contact;
-mod drag;
 #[cfg(test)]
 mod energy;
 mod environment;
 mod equilibrium;
 mod error;
+mod extra_loads;
 mod extras;
 mod frames;
 mod group;
-#[cfg(test)]
-mod isolation;
 mod kernel;
 mod knot;
 mod lanes;
 mod live;
 mod load;
-mod mass_distribution;
 mod motion;
 pub mod npy;
 mod rollout;
@@ -47,7 +44,6 @@ mod scene;
 mod scheme;
 pub mod sensitivity;
 mod state;
-mod unusable;
 mod watch;
 
 pub use batch::{roll_out, roll_out_in, roll_out_in_with};
@@ -58,8 +54,5 @@ pub use lanes::{Kernel, Precision};
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
 pub use rollout::{Candidate, Outcome, Rollout, SimOptions, Start};
-pub use scene::{
-    ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, SceneBody, SceneError, Shape,
-};
-pub use unusable::Unusable;
+pub use scene::{ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, Shape};
 pub use watch::{BoxRegion, ClosestApproach, Dwell, RestMeasures, Watch, Watched};

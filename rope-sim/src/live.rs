@@ -3,14 +3,13 @@
 use crate::algebra::Vec3;
 use crate::clock::BaseState;
 use crate::equilibrium::hanging_links;
-use crate::error::SimulateError;
+use crate::error::{SimulateError, refuse_unless_positive};
 use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes, run_scalar};
 use crate::load::Unloaded;
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{Link, RopeLanes};
-use crate::unusable::Unusable;
 use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
@@ -52,16 +51,11 @@ impl LiveRope {
         attach: &FrameMotion,
         step_s: f64,
     ) -> Result<Self, SimulateError> {
-        rope.validate().map_err(|source| SimulateError::Rope {
-            candidate: 0,
-            source,
-        })?;
-        Unusable::unless_positive("step_s", step_s).map_err(SimulateError::Option)?;
+        rope.validate().map_err(|e| SimulateError::of(0, e))?;
+        let option = |e| SimulateError::new(format_args!("simulation option {e}"));
+        refuse_unless_positive("step_s", step_s).map_err(option)?;
         if !(attach.p_m.sum() + attach.r.sum()).is_finite() {
-            return Err(SimulateError::MotionNotFinite {
-                candidate: 0,
-                time_s: 0.0,
-            });
+            return Err(SimulateError::motion_not_finite(0, 0.0));
         }
         let mut links: Vec<Link<f64>> = Vec::new();
         for q in hanging_links(rope, &RopeExtras::NONE, &attach.r) {
@@ -261,16 +255,9 @@ mod tests {
     fn bad_input_is_named() {
         let world = FrameMotion::world();
         let bad = RopeParams { links: 0, ..rope() };
-        assert!(matches!(
-            LiveRope::new(&bad, &world, 1e-3),
-            Err(SimulateError::Rope { .. })
-        ));
-        assert!(matches!(
-            LiveRope::new(&rope(), &world, 0.0),
-            Err(SimulateError::Option(Unusable {
-                field: "step_s",
-                ..
-            }))
-        ));
+        for (rope, step_s, field) in [(bad, 1e-3, "`links`"), (rope(), 0.0, "`step_s`")] {
+            let refusal = LiveRope::new(&rope, &world, step_s).unwrap_err();
+            assert!(refusal.to_string().contains(field), "{refusal}");
+        }
     }
 }

@@ -1,12 +1,11 @@
 //! What is simulated, how, and what comes back.
 
-use crate::error::SimulateError;
+use crate::error::{SimulateError, refuse_unless, refuse_unless_finite, refuse_unless_positive};
 use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Precision;
 use crate::motion::AttachMotion;
 use crate::scene::{ContactSummary, DominoOutcome};
-use crate::unusable::Unusable;
 use crate::watch::{Watch, Watched};
 use shared_types::RopeParams;
 
@@ -122,59 +121,49 @@ pub struct Rollout {
 
 /// Checks options and candidates, by name.
 pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<(), SimulateError> {
-    check_numbers(options).map_err(SimulateError::Option)?;
+    let option = |unusable| SimulateError::new(format_args!("simulation option {unusable}"));
+    check_numbers(options).map_err(option)?;
+    let horizon_s = options.horizon_s;
     if options.frames.count > 0 {
+        let first_s = options.frames.first_s;
         let last_s = options.frames.time_s(options.frames.count - 1);
-        if !(options.frames.first_s >= 0.0 && last_s <= options.horizon_s + 1e-9) {
-            return Err(SimulateError::FramesOutsideHorizon {
-                first_s: options.frames.first_s,
-                last_s,
-                horizon_s: options.horizon_s,
-            });
+        if !(first_s >= 0.0 && last_s <= horizon_s + 1e-9) {
+            return Err(SimulateError::new(format_args!(
+                "frames from {first_s} s to {last_s} s do not fit into the simulated 0 s to {horizon_s} s"
+            )));
         }
     }
     for (index, candidate) in candidates.iter().enumerate() {
-        candidate
-            .rope
-            .validate()
-            .map_err(|source| SimulateError::Rope {
-                candidate: index,
-                source,
-            })?;
-        let unusable = |unusable| SimulateError::Extras {
-            candidate: index,
-            unusable,
-        };
-        candidate.extras.check().map_err(unusable)?;
+        let rope = candidate.rope.validate();
+        rope.map_err(|e| SimulateError::of(index, e))?;
+        let extras = candidate.extras.check();
+        extras.map_err(|e| SimulateError::of(index, e))?;
         let ends_s = candidate.motion.duration_s();
-        let long_enough = candidate.motion.holds_after_end() || ends_s >= options.horizon_s - 1e-9;
-        if !long_enough {
-            let horizon_s = options.horizon_s;
-            return Err(SimulateError::MotionTooShort {
-                candidate: index,
-                ends_s,
-                horizon_s,
-            });
+        if !candidate.motion.holds_after_end() && ends_s < horizon_s - 1e-9 {
+            return Err(SimulateError::of(
+                index,
+                format_args!("its motion ends at {ends_s} s, before the horizon of {horizon_s} s"),
+            ));
         }
     }
     Ok(())
 }
 
-fn check_numbers(options: &SimOptions) -> Result<(), Unusable> {
-    Unusable::unless_positive("step_s", options.step_s)?;
-    Unusable::unless_positive("horizon_s", options.horizon_s)?;
+fn check_numbers(options: &SimOptions) -> Result<(), String> {
+    refuse_unless_positive("step_s", options.step_s)?;
+    refuse_unless_positive("horizon_s", options.horizon_s)?;
     let need = "gives more than 1e8 steps; shorten the horizon or lengthen the step";
     let few = |step_s| options.horizon_s / step_s <= MAX_STEPS;
-    Unusable::unless("step_s", need, [options.step_s], few)?;
+    refuse_unless("step_s", need, [options.step_s], few)?;
     if options.frames.count > 0 {
-        Unusable::unless_positive("frames.period_s", options.frames.period_s)?;
+        refuse_unless_positive("frames.period_s", options.frames.period_s)?;
         let need = "more than 1e8 frames; lengthen their period";
         let count = options.frames.count as f64;
-        Unusable::unless("frames.count", need, [count], |count| count <= MAX_STEPS)?;
+        refuse_unless("frames.count", need, [count], |count| count <= MAX_STEPS)?;
     }
     options.watch.check(options.horizon_s)?;
     if let Start::Straight { joint0_rotvec } = options.start {
-        Unusable::unless_finite("start.joint0_rotvec", joint0_rotvec)?;
+        refuse_unless_finite("start.joint0_rotvec", joint0_rotvec)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::nodes::{Node, Predicted};
-use super::summary::{StepEnd, Tally};
+use super::summary::{StepEnd, note_touch};
 use super::touch::{Point, Touch};
 use super::{Contacts, POINTS, middle};
 use crate::algebra::Vec3;
@@ -181,7 +181,7 @@ impl<V: Lanes> Contacts<V> {
                 continue;
             }
             let body = &self.bodies[index];
-            let mut tally = Tally::none();
+            let mut forces = [V::splat(0.0); 2];
             for link in 0..count {
                 for which in 0..POINTS {
                     let slot = index * count + link;
@@ -191,7 +191,8 @@ impl<V: Lanes> Contacts<V> {
                     let touch = &mut self.touches[slot][which];
                     let (force, at) = touch.settle(body, &nodes[link], links[link].w, scheme);
                     let is_lead = which == AT_NODE && link + 1 == count;
-                    tally.add(touch.force, is_lead);
+                    let largest = &mut forces[usize::from(is_lead)];
+                    *largest = largest.max(touch.force);
                     if body.rocks
                         && let Some(domino) = &mut self.domino
                     {
@@ -199,7 +200,7 @@ impl<V: Lanes> Contacts<V> {
                     }
                 }
             }
-            self.summaries.add(index, &tally, lanes);
+            note_touch(&mut self.summaries[index], forces, lanes);
         }
         if let Some(domino) = &mut self.domino {
             domino.advance(lanes);

@@ -29,7 +29,6 @@ use crate::state::RopeLanes;
 use body::Body;
 use rocking::RockingBlocks;
 use shared_types::RopeParams;
-use summary::Summaries;
 use touch::Touch;
 
 /// Steps between two looks at how far everything is.
@@ -60,7 +59,8 @@ pub(crate) struct Contacts<V> {
     /// Positive in lanes that are about to touch.
     pub(crate) imminent: V,
     domino: Option<RockingBlocks<V>>,
-    summaries: Summaries,
+    /// By body, then lane.
+    summaries: Vec<Vec<ContactSummary>>,
 }
 
 impl<V: Lanes> Contacts<V> {
@@ -98,7 +98,7 @@ impl<V: Lanes> Contacts<V> {
             idle: vec![[true; POINTS]; count * links],
             near: vec![V::splat(0.0); count],
             engaged: vec![false; count],
-            summaries: Summaries::new(count, ropes.len()),
+            summaries: vec![vec![ContactSummary::default(); ropes.len()]; count],
             bodies,
             reach: V::splat(0.0),
             radius,
@@ -143,7 +143,8 @@ impl<V: Lanes> Contacts<V> {
     /// What one lane did with each obstacle.
     pub(crate) fn summaries_of(&self, lane: usize) -> Vec<ContactSummary> {
         let obstacles = self.bodies.len() - usize::from(self.domino.is_some());
-        self.summaries.of(lane, obstacles)
+        let of_obstacles = self.summaries.iter().take(obstacles);
+        of_obstacles.map(|by_lane| by_lane[lane]).collect()
     }
 
     /// What became of one lane's domino.

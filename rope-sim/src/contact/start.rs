@@ -4,7 +4,8 @@ use super::body::Body;
 use super::middle;
 use super::rocking::RockingBlocks;
 use crate::algebra::Vec3;
-use crate::scene::{Scene, SceneBody, SceneError};
+use crate::error::SimulateError;
+use crate::scene::Scene;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 
@@ -23,15 +24,15 @@ pub(crate) struct Starting<'a> {
 impl Starting<'_> {
     /// # Errors
     /// The first body of the scene that the rope is in.
-    pub(crate) fn check(&self, scene: &Scene) -> Result<(), SceneError> {
+    pub(crate) fn check(&self, scene: &Scene) -> Result<(), SimulateError> {
         let nodes = self.nodes_m();
         for (index, obstacle) in scene.obstacles.iter().enumerate() {
             let body = Body::new(obstacle, [0.0; 3]);
-            self.check_body(&body, &nodes, SceneBody::Obstacle(index))?;
+            self.check_body(&body, &nodes, &format!("obstacle {index}"))?;
         }
         if let Some(domino) = &scene.domino {
             let body = RockingBlocks::new(domino, 1, [0.0; 3]).body();
-            self.check_body(&body, &nodes, SceneBody::Domino)?;
+            self.check_body(&body, &nodes, "the domino")?;
         }
         Ok(())
     }
@@ -52,8 +53,8 @@ impl Starting<'_> {
         &self,
         body: &Body<f64>,
         nodes: &[Vec3<f64>],
-        name: SceneBody,
-    ) -> Result<(), SceneError> {
+        name: &str,
+    ) -> Result<(), SimulateError> {
         for (link, ends) in nodes.windows(2).enumerate() {
             let &[near, far] = ends else { continue };
             let is_last = link + 1 == self.links.len();
@@ -68,12 +69,13 @@ impl Starting<'_> {
                 depth_m = depth_m.max(self.rope.radius_m - body.distance(at).0);
             }
             if depth_m > TOUCH_M {
-                return Err(SceneError::StartsInside {
-                    candidate: self.candidate,
-                    body: name,
-                    link,
-                    depth_m,
-                });
+                return Err(SimulateError::of(
+                    self.candidate,
+                    format_args!(
+                        "at the start its rope is {depth_m} m deep in {name}, at link {link}; \
+                         start it outside"
+                    ),
+                ));
             }
         }
         Ok(())

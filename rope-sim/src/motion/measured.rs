@@ -1,6 +1,6 @@
 //! The arm as its joint encoders reported it.
 
-use super::{AttachMotion, MotionError, check_times};
+use super::{AttachMotion, MotionError, check_times, not_finite};
 use arm_model::kinematics::FrameMotion;
 use arm_model::{JOINTS, JointState, JointVector, Pole};
 
@@ -36,28 +36,22 @@ impl MeasuredArm {
     /// more than ten minutes, numbers that are not finite.
     pub fn new(times_s: &[f64], q: &[JointVector], pole: Pole) -> Result<Self, MotionError> {
         if times_s.len() != q.len() {
-            return Err(MotionError::LengthMismatch {
-                times: times_s.len(),
-                samples: q.len(),
-            });
+            return Err(MotionError(format!(
+                "`times_s` has {} entries but `q` has {}",
+                times_s.len(),
+                q.len()
+            )));
         }
-        if q.len() < 8 {
-            return Err(MotionError::TooFewSamples {
-                found: q.len(),
-                needed: 8,
-            });
-        }
-        check_times(times_s.iter().copied())?;
+        check_times(8, times_s.iter().copied())?;
         if let Some(index) = q.iter().position(|v| !v.is_finite()) {
-            return Err(MotionError::NotFinite { index });
+            return Err(not_finite(index));
         }
         let (first_s, last_s) = (times_s[0], times_s[times_s.len() - 1]);
         let span_s = last_s - first_s;
         if span_s > MAX_SPAN_S {
-            return Err(MotionError::TooLong {
-                span_s,
-                max_s: MAX_SPAN_S,
-            });
+            return Err(MotionError(format!(
+                "the samples span {span_s} s; at most {MAX_SPAN_S} s are accepted"
+            )));
         }
         let control = fit(first_s, span_s, times_s, q);
         Ok(Self {
@@ -279,18 +273,16 @@ mod tests {
 
     #[test]
     fn bad_logs_are_named() {
-        let (times, joints) = samples(0.0);
-        let refusal = |change: fn(&mut Vec<f64>, &mut Vec<JointVector>)| {
-            let (mut times, mut joints) = (times.clone(), joints.clone());
+        let bad: [(fn(&mut Vec<f64>, &mut Vec<JointVector>), &str); 3] = [
+            (|times, _| times.truncate(9), "`times_s` has 9 entries"),
+            (|_, joints| joints[12][3] = f64::NAN, "sample 12 holds"),
+            (|times, _| times[6] = times[4], "sample 6 is not after"),
+        ];
+        for (change, words) in bad {
+            let (mut times, mut joints) = samples(0.0);
             change(&mut times, &mut joints);
-            MeasuredArm::new(&times, &joints, Pole::default()).unwrap_err()
-        };
-        let shorter = refusal(|times, _| times.truncate(9));
-        assert!(matches!(shorter, MotionError::LengthMismatch { .. }));
-        let nan = refusal(|_, joints| joints[12][3] = f64::NAN);
-        assert_eq!(nan, MotionError::NotFinite { index: 12 });
-        let backwards = refusal(|times, _| times[6] = times[4]);
-        assert!(matches!(backwards, MotionError::TimeOrder { index: 6, .. }));
-        assert!(backwards.to_string().contains("sample 6"), "{backwards}");
+            let refusal = MeasuredArm::new(&times, &joints, Pole::default()).unwrap_err();
+            assert!(refusal.to_string().contains(words), "{refusal}");
+        }
     }
 }

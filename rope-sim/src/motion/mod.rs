@@ -65,74 +65,37 @@ impl core::fmt::Debug for dyn AttachMotion + '_ {
     }
 }
 
-/// Why a motion cannot be built.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum MotionError {
-    /// Too few samples to say anything about acceleration.
-    #[error("a motion needs at least {needed} samples, found {found}")]
-    TooFewSamples {
-        /// Samples given.
-        found: usize,
-        /// Samples needed.
-        needed: usize,
-    },
-    /// As many times as samples are needed.
-    #[error("`times_s` has {times} entries but `q` has {samples}")]
-    LengthMismatch {
-        /// Entries in `times_s`.
-        times: usize,
-        /// Entries in `q`.
-        samples: usize,
-    },
-    /// A number is NaN or infinite.
-    #[error("sample {index} holds a number that is not finite")]
-    NotFinite {
-        /// Index of the sample, from 0.
-        index: usize,
-    },
-    /// Times must increase.
-    #[error("time {time_s} s of sample {index} is not after {before_s} s of the one before")]
-    TimeOrder {
-        /// Index of the sample, from 0.
-        index: usize,
-        /// Its time (s).
-        time_s: f64,
-        /// Time of the sample before (s).
-        before_s: f64,
-    },
-    /// An attitude is not a unit quaternion, not even nearly.
-    #[error("quaternion of sample {index} has length {norm}; it must be 1 within 1 %")]
-    NotAnAttitude {
-        /// Index of the sample, from 0.
-        index: usize,
-        /// Length found.
-        norm: f64,
-    },
-    /// The samples span more time than a motion may.
-    #[error("the samples span {span_s} s; at most {max_s} s are accepted")]
-    TooLong {
-        /// Time from first to last sample (s).
-        span_s: f64,
-        /// Longest accepted (s).
-        max_s: f64,
-    },
-}
+/// Why a motion cannot be built: which of its samples are unusable, and what they must be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct MotionError(String);
 
-/// Checks that times are finite and increase.
-fn check_times(times_s: impl IntoIterator<Item = f64>) -> Result<(), MotionError> {
+/// Checks that a motion has enough samples, at times that are finite and increase.
+fn check_times(
+    needed: usize,
+    times_s: impl ExactSizeIterator<Item = f64>,
+) -> Result<(), MotionError> {
+    let found = times_s.len();
+    if found < needed {
+        return Err(MotionError(format!(
+            "a motion needs at least {needed} samples, found {found}"
+        )));
+    }
     let mut before_s = f64::NEG_INFINITY;
-    for (index, time_s) in times_s.into_iter().enumerate() {
+    for (index, time_s) in times_s.enumerate() {
         if !time_s.is_finite() {
-            return Err(MotionError::NotFinite { index });
+            return Err(not_finite(index));
         }
         if time_s <= before_s {
-            return Err(MotionError::TimeOrder {
-                index,
-                time_s,
-                before_s,
-            });
+            return Err(MotionError(format!(
+                "time {time_s} s of sample {index} is not after {before_s} s of the one before"
+            )));
         }
         before_s = time_s;
     }
     Ok(())
+}
+
+fn not_finite(index: usize) -> MotionError {
+    MotionError(format!("sample {index} holds a number that is not finite"))
 }

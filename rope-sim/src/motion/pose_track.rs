@@ -1,6 +1,6 @@
 //! Attach frame from sampled poses, joined by a C2 spline.
 
-use super::{AttachMotion, MotionError, check_times};
+use super::{AttachMotion, MotionError, check_times, not_finite};
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -35,22 +35,18 @@ impl PoseTrack {
     /// Fewer than four rows, times that do not increase, numbers that are not
     /// finite, quaternions far from unit length.
     pub fn new(rows: &[PoseRow]) -> Result<Self, MotionError> {
-        if rows.len() < 4 {
-            return Err(MotionError::TooFewSamples {
-                found: rows.len(),
-                needed: 4,
-            });
-        }
-        check_times(rows.iter().map(|r| r.t_s))?;
+        check_times(4, rows.iter().map(|r| r.t_s))?;
         let mut values: Vec<[f64; 7]> = Vec::with_capacity(rows.len());
         for (index, row) in rows.iter().enumerate() {
             let [x, y, z] = row.p_m;
             let norm = row.q_wxyz.iter().map(|v| v * v).sum::<f64>().sqrt();
             if !(x.is_finite() && y.is_finite() && z.is_finite() && norm.is_finite()) {
-                return Err(MotionError::NotFinite { index });
+                return Err(not_finite(index));
             }
             if (norm - 1.0).abs() > 0.01 {
-                return Err(MotionError::NotAnAttitude { index, norm });
+                return Err(MotionError(format!(
+                    "quaternion of sample {index} has length {norm}; it must be 1 within 1 %"
+                )));
             }
             let mut q = row.q_wxyz.map(|v| v / norm);
             if let Some(before) = values.last() {
@@ -231,23 +227,17 @@ mod tests {
         let with = |index: usize, change: fn(&mut PoseRow)| {
             let mut rows = rows.clone();
             change(&mut rows[index]);
-            PoseTrack::new(&rows).unwrap_err()
+            PoseTrack::new(&rows)
         };
-        assert!(matches!(
-            with(3, |r| r.t_s = 1.0),
-            MotionError::TimeOrder { index: 3, .. }
-        ));
-        assert_eq!(
-            with(4, |r| r.p_m[1] = f64::NAN),
-            MotionError::NotFinite { index: 4 }
-        );
-        assert!(matches!(
-            with(5, |r| r.q_wxyz = [0.5; 4].map(|v: f64| v * 3.0)),
-            MotionError::NotAnAttitude { index: 5, .. }
-        ));
-        assert!(matches!(
-            PoseTrack::new(&rows[..3]),
-            Err(MotionError::TooFewSamples { .. })
-        ));
+        let tripled = |r: &mut PoseRow| r.q_wxyz = r.q_wxyz.map(|v| v * 3.0);
+        for (track, words) in [
+            (with(3, |r| r.t_s = 1.0), "sample 3 is not after"),
+            (with(4, |r| r.p_m[1] = f64::NAN), "sample 4 holds"),
+            (with(5, tripled), "quaternion of sample 5"),
+            (PoseTrack::new(&rows[..3]), "at least 4 samples, found 3"),
+        ] {
+            let refusal = track.unwrap_err().to_string();
+            assert!(refusal.contains(words), "{refusal}");
+        }
     }
 }

@@ -2,8 +2,6 @@
 
 mod check;
 
-pub use check::{SceneBody, SceneError};
-
 use nalgebra::Isometry3;
 
 /// Convex body, in a frame of its own.

@@ -6,14 +6,13 @@
 //! slopes would be wrong by its size over the step of the difference.
 
 mod family;
-mod plan;
 
 pub use family::{Family, Perturbation, SensitivityError};
 
-use crate::batch::REPEAT_DIVISOR;
+use crate::batch::{REPEAT_DIVISOR, roll_out};
 use crate::error::SimulateError;
 use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, check};
-use plan::Plan;
+use family::{Member, common_step_s};
 
 /// Largest difference between the times of two closest approaches for them to be the
 /// same one (s); beyond it a neighbour passes the target on another part of its way.
@@ -46,7 +45,8 @@ pub struct Sensitivity {
 /// See [`SensitivityError`].
 pub fn sensitivity(family: &Family, options: &SimOptions) -> Result<Sensitivity, SensitivityError> {
     let mut all = sensitivities(core::slice::from_ref(family), options)?;
-    all.pop().ok_or(SimulateError::WorkerPanicked.into())
+    all.pop()
+        .ok_or_else(|| SimulateError::worker_panicked().into())
 }
 
 /// Simulates every base with its neighbours, as one batch; results in the order of
@@ -63,53 +63,74 @@ pub fn sensitivities(
 ) -> Result<Vec<Sensitivity>, SensitivityError> {
     let bases: Vec<Candidate> = families.iter().map(|f| f.base).collect();
     check(&bases, options)?;
-    let plan = Plan::new(families)?;
-    plan.check(options)?;
-    let everyone: Vec<usize> = (0..plan.members.len()).collect();
-    let mut rollouts = plan.run(&everyone, options)?;
-    let blew_up = |family: &std::ops::Range<usize>| {
-        let mut rollouts = rollouts[family.clone()].iter();
-        rollouts.any(|r| r.outcome != Outcome::Clean)
+    let mut members = Vec::new();
+    for (index, family) in families.iter().enumerate() {
+        members.extend(family.members(index)?);
+    }
+    let everyone: Vec<&Member> = members.iter().collect();
+    let mut rollouts = simulate(&everyone, &members, options)?;
+    let mut blew_up = vec![false; families.len()];
+    for (member, rollout) in members.iter().zip(&rollouts) {
+        blew_up[member.family] |= rollout.outcome != Outcome::Clean;
+    }
+    let quarter = SimOptions {
+        step_s: options.step_s / REPEAT_DIVISOR,
+        ..*options
     };
-    let again: Vec<usize> = plan
-        .families
-        .iter()
-        .filter(|f| blew_up(f))
-        .cloned()
-        .flatten()
-        .collect();
-    if !again.is_empty() {
-        let quarter = SimOptions {
-            step_s: options.step_s / REPEAT_DIVISOR,
-            ..*options
-        };
-        for (index, rollout) in again.iter().zip(plan.run(&again, &quarter)?) {
-            rollouts[*index] = rollout;
+    let again = || {
+        members
+            .iter()
+            .enumerate()
+            .filter(|(_, m)| blew_up[m.family])
+    };
+    let repeated: Vec<&Member> = again().map(|(_, member)| member).collect();
+    if !repeated.is_empty() {
+        for ((at, _), rollout) in again().zip(simulate(&repeated, &members, &quarter)?) {
+            rollouts[at] = rollout;
         }
     }
-    let mut rollouts = rollouts.into_iter();
-    let collected = plan.families.iter().filter_map(|family| {
-        let members = &plan.members[family.start + 1..family.end];
-        let base = rollouts.next()?;
-        let neighbours = members.iter().zip(rollouts.by_ref());
-        let mut collected = Sensitivity {
-            neighbours: neighbours
-                .map(|(member, rollout)| Neighbour {
-                    distance: member.distance,
-                    valid: [&base, &rollout]
-                        .iter()
-                        .all(|r| r.outcome == Outcome::Clean),
-                    rollout,
-                })
-                .collect(),
-            base,
-        };
-        if again.contains(&family.start) {
-            collected.mark_repeated();
+    let mut all: Vec<Sensitivity> = Vec::with_capacity(families.len());
+    for (member, rollout) in members.iter().zip(rollouts) {
+        match (member.neighbour, all.last_mut()) {
+            (Some((_, distance)), Some(of)) => of.neighbours.push(Neighbour {
+                distance,
+                valid: [&of.base, &rollout]
+                    .iter()
+                    .all(|r| r.outcome == Outcome::Clean),
+                rollout,
+            }),
+            _ => all.push(Sensitivity {
+                base: rollout,
+                neighbours: Vec::new(),
+            }),
         }
-        Some(collected)
-    });
-    Ok(collected.collect())
+    }
+    for (sensitivity, repeated) in all.iter_mut().zip(blew_up) {
+        if repeated {
+            sensitivity.mark_repeated();
+        }
+    }
+    Ok(all)
+}
+
+/// Simulates some of the members in steps of at most [`SimOptions::step_s`] with which all
+/// of them step like their bases.
+fn simulate(
+    some: &[&Member<'_>],
+    all: &[Member<'_>],
+    options: &SimOptions,
+) -> Result<Vec<Rollout>, SensitivityError> {
+    let options = SimOptions {
+        step_s: common_step_s(all, options.step_s, options.horizon_s)?,
+        ..*options
+    };
+    let candidates: Vec<Candidate> = some.iter().map(|member| member.candidate).collect();
+    roll_out(&candidates, &options).map_err(|error| {
+        match error.candidate.and_then(|at| some.get(at)) {
+            Some(member) => member.blame(error),
+            None => SensitivityError::Base(error),
+        }
+    })
 }
 
 impl Sensitivity {

@@ -145,6 +145,7 @@ fn squared_distance<V: Lanes>(p: [Vec3<V>; 2], q: [Vec3<V>; 2]) -> V {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cubic::steps_along;
     use super::*;
 
     /// Closest approach of a path with its velocity, in `steps` steps of `h`.
@@ -155,13 +156,7 @@ mod tests {
         steps: u32,
     ) -> ClosestApproach {
         let mut recorder = ApproachRecorder::new(target, state(0.0));
-        for i in 1..=steps {
-            let tip = TipStep {
-                before: state(f64::from(i - 1) * h),
-                after: state(f64::from(i) * h),
-                h,
-                running: 1.0,
-            };
+        for (i, tip) in (1_u32..).zip(steps_along(state, h, steps)) {
             recorder.after_step(f64::from(i), &tip);
         }
         recorder.closest(0, [1.0, 0.0, 0.0], |step| (step as f64 * h, h))

@@ -155,6 +155,21 @@ impl<V: Lanes> BestStep<V> {
     }
 }
 
+/// The steps of a lead with this position and velocity over time.
+#[cfg(test)]
+pub(super) fn steps_along(
+    state: impl Fn(f64) -> [Vec3<f64>; 2],
+    h_s: f64,
+    count: u32,
+) -> impl Iterator<Item = TipStep<f64>> {
+    (0..count).map(move |i| TipStep {
+        before: state(f64::from(i) * h_s),
+        after: state(f64::from(i + 1) * h_s),
+        h: h_s,
+        running: 1.0,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

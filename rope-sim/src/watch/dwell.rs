@@ -203,6 +203,7 @@ impl DwellRecorder {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cubic::steps_along;
     use super::*;
 
     fn stay(
@@ -217,15 +218,8 @@ mod tests {
             [x.sub(Vec3(0.2, 0.0, -0.1)), v]
         };
         let mut recorder = DwellRecorder::new(region, origin, shifted(0.0)[0], 1);
-        for i in 1..=steps {
-            let span = (f64::from(i - 1) * h, f64::from(i) * h);
-            let tip = TipStep {
-                before: shifted(span.0),
-                after: shifted(span.1),
-                h,
-                running: 1.0,
-            };
-            recorder.after_step(&tip, |_| span);
+        for (i, tip) in (0_u32..).zip(steps_along(shifted, h, steps)) {
+            recorder.after_step(&tip, |_| (f64::from(i) * h, f64::from(i + 1) * h));
         }
         recorder.dwell(0)
     }

@@ -64,6 +64,7 @@ fn highest(cubic: &Cubic) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cubic::steps_along;
     use super::*;
 
     /// Thrown up at 3 m/s from 1 m, long enough to fall below the start.
@@ -77,13 +78,7 @@ mod tests {
             ]
         };
         let mut recorder = HeightRecorder::new(state(0.0));
-        for i in 1..=100 {
-            let tip = TipStep {
-                before: state(f64::from(i - 1) * h),
-                after: state(f64::from(i) * h),
-                h,
-                running: 1.0,
-            };
+        for (i, tip) in (1_u32..).zip(steps_along(state, h, 100)) {
             recorder.after_step(f64::from(i), &tip);
         }
         let highest_m = recorder.highest(0, |step| (step as f64 * h, h));
@@ -93,15 +88,11 @@ mod tests {
     #[test]
     fn a_lead_that_stands_still_has_one_height() {
         let still = [Vec3(0.0, 0.0, 0.25), Vec3(0.0, 0.0, 0.0)];
-        let tip = TipStep {
-            before: still,
-            after: still,
-            h: 1e-3,
-            running: 1.0,
-        };
-        assert_eq!(span(&tip), (0.25, 0.25));
         let mut recorder = HeightRecorder::new(still);
-        recorder.after_step(1.0, &tip);
+        for tip in steps_along(|_| still, 1e-3, 1) {
+            assert_eq!(span(&tip), (0.25, 0.25));
+            recorder.after_step(1.0, &tip);
+        }
         let highest_m = recorder.highest(0, |step| (step as f64 * 1e-3, 1e-3));
         assert_eq!(highest_m, 0.25);
     }

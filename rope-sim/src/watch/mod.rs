@@ -17,9 +17,9 @@ pub use rest::RestMeasures;
 use crate::algebra::Vec3;
 use crate::base_path::BasePath;
 use crate::clock::Clock;
+use crate::error::{refuse_unless, refuse_unless_finite};
 use crate::lanes::Lanes;
 use crate::state::Link;
-use crate::unusable::Unusable;
 use approach::{ApproachRecorder, Target};
 use cubic::TipStep;
 use dwell::DwellRecorder;
@@ -85,18 +85,18 @@ impl Watch {
     }
 
     /// Refuses what cannot be measured within `horizon_s`, by name.
-    pub(crate) fn check(&self, horizon_s: f64) -> Result<(), Unusable> {
-        Unusable::unless_finite("watch.point_m", self.point_m.into_iter().flatten())?;
+    pub(crate) fn check(&self, horizon_s: f64) -> Result<(), String> {
+        refuse_unless_finite("watch.point_m", self.point_m.into_iter().flatten())?;
         let ends = self.segment_m.into_iter().flatten().flatten();
-        Unusable::unless_finite("watch.segment_m", ends)?;
+        refuse_unless_finite("watch.segment_m", ends)?;
         if let Some(region) = self.dwell_in {
-            Unusable::unless_finite("watch.dwell_in.center_m", region.center_m)?;
-            Unusable::unless_finite("watch.dwell_in.yaw_rad", [region.yaw_rad])?;
+            refuse_unless_finite("watch.dwell_in.center_m", region.center_m)?;
+            refuse_unless_finite("watch.dwell_in.yaw_rad", [region.yaw_rad])?;
             let field = "watch.dwell_in.half_m";
-            Unusable::unless(field, "must be above 0", region.half_m, |v| v > 0.0)?;
+            refuse_unless(field, "must be above 0", region.half_m, |v| v > 0.0)?;
         }
         let need = "must be above 0 and at most the horizon";
-        Unusable::unless("watch.rest_window_s", need, self.rest_window_s, |v| {
+        refuse_unless("watch.rest_window_s", need, self.rest_window_s, |v| {
             v > 0.0 && v <= horizon_s
         })
     }
@@ -258,7 +258,8 @@ mod tests {
             ("watch.rest_window_s", lately(nan)),
         ];
         for (name, watch) in wrong {
-            assert_eq!(watch.check(2.0).unwrap_err().field, name);
+            let refusal = watch.check(2.0).unwrap_err();
+            assert!(refusal.starts_with(&format!("`{name}` is ")), "{refusal}");
         }
     }
 }
