@@ -1,7 +1,7 @@
 //! Batches of simulations: grouping into lanes, threads, repeats of what blew up.
 
 use crate::base_path::{BasePath, Interval, NotFinite};
-use crate::contact::Starting;
+use crate::contact::check_start;
 use crate::equilibrium::hanging_links;
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member};
@@ -219,13 +219,8 @@ impl Batch<'_> {
                 .as_ref()
                 .map_err(|bad| SimulateError::motion_not_finite(*index, bad.time_s))?;
             let links = start_attitudes(candidate, path, self.options.start);
-            let starting = Starting {
-                candidate: *index,
-                rope: candidate.rope,
-                attach_m: &path.start.p_m,
-                links: &links,
-            };
-            starting.check(self.scene)?;
+            check_start(self.scene, candidate.rope, &path.start.p_m, &links)
+                .map_err(|reason| SimulateError::of(*index, reason))?;
             members.push(Member {
                 rope: candidate.rope,
                 path,

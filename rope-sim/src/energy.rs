@@ -4,57 +4,27 @@
 //! Runge-Kutta method of order four over it is a second integrator for the same
 //! equations: its drift shows errors of the equations, not of the time stepping.
 
-use crate::algebra::{Quat, Vec3};
+use crate::clock::BaseState;
 use crate::extra_loads::MassLanes;
 use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, GRAVITY_M_S2, step};
-use crate::load::{LinkLoads, Load, Loads};
-use crate::scheme::Scheme;
-use crate::state::{BaseLanes, Link, RopeLanes};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use crate::load::LinkLoads;
+use crate::scheme::{Phase, Scheme};
+use crate::state::{Link, RopeLanes};
+use arm_model::kinematics::FrameMotion;
+use nalgebra::{DVector, Quaternion, UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 
-/// Attitude and angular velocity of one link (world frame, rad/s).
-#[derive(Clone, Copy)]
-struct Pose {
-    q: Quaternion<f64>,
-    w: Vector3<f64>,
+/// Numbers per link in a state: attitude, scalar first, and angular velocity (world frame,
+/// rad/s); or their rates.
+const PER_LINK: usize = 7;
+
+fn attitude(link: &[f64]) -> Quaternion<f64> {
+    Quaternion::new(link[0], link[1], link[2], link[3])
 }
 
-/// Rates of [`Pose`].
-#[derive(Clone, Copy)]
-struct Rate {
-    q: Quaternion<f64>,
-    w: Vector3<f64>,
-}
-
-/// A step of no length: predictions and corrections do nothing, and what stays is
-/// the exact acceleration.
-fn still_scheme() -> Scheme<f64> {
-    Scheme {
-        al_to_a: 0.0,
-        a_to_a: 0.0,
-        a_to_w: 0.0,
-        next_to_w: 0.0,
-        h: 0.0,
-        a_to_phi: 0.0,
-        next_to_phi: 0.0,
-        correct_w: 0.0,
-        correct_half_phi: 0.0,
-        correct_a: 0.0,
-        centripetal: 0.0,
-    }
-}
-
-/// A frame that stands still in the world.
-fn fixed_base() -> BaseLanes<f64> {
-    let none = Vec3(0.0, 0.0, 0.0);
-    BaseLanes {
-        q: Quat::identity(),
-        w: none,
-        alpha: none,
-        a: none,
-    }
+fn spin(link: &[f64]) -> Vector3<f64> {
+    Vector3::new(link[4], link[5], link[6])
 }
 
 /// A rope as the kernel has it.
@@ -63,106 +33,81 @@ struct Model {
     masses: MassLanes<f64>,
 }
 
-/// What the links carry, and nothing else.
-struct Carried(LinkLoads<f64>);
-
-impl Loads<f64> for Carried {
-    const PRESENT: bool = true;
-    fn on_link(&self, link: usize) -> Option<&Load<f64>> {
-        self.0.on_link(link)
-    }
-    fn rest_turn(&self) -> Quat<f64> {
-        Quat::identity()
-    }
-}
-
-/// Rates of the state by the kernel's elimination.
-fn rates(model: &Model, state: &[Pose]) -> Vec<Rate> {
+/// Rates of the state by the kernel's elimination, below a frame that stands still.
+fn rates(model: &Model, state: &DVector<f64>) -> DVector<f64> {
     let rope = &model.rope;
-    let mut links: Vec<Link<f64>> = state
-        .iter()
-        .map(|pose| {
-            let mut link = Link::at_rest();
-            link.q.set(0, [pose.q.w, pose.q.i, pose.q.j, pose.q.k]);
-            link.w = Vec3(pose.w.x, pose.w.y, pose.w.z);
-            link
-        })
-        .collect();
+    let states = state.as_slice().chunks(PER_LINK);
+    let mut links: Vec<Link<f64>> = Vec::new();
+    for of in states.clone() {
+        let mut link = Link::at_rest();
+        link.q.set(0, [of[0], of[1], of[2], of[3]]);
+        link.w.set(0, [of[4], of[5], of[6]]);
+        links.push(link);
+    }
     let mut scratch = vec![Elimination::empty(); links.len()];
-    let (base, scheme) = (fixed_base(), still_scheme());
+    let base = BaseState::of(&FrameMotion::world()).dynamics;
+    // In a step of no length predictions and corrections do nothing, and what stays is the
+    // exact acceleration.
+    let mut scheme = Scheme::new();
+    scheme.set(0, 0.0, Phase::Regular);
     // The second pass starts from the first one's accelerations, whereupon the tiny
     // resistance has nothing left to resist.
-    let mut carried = Carried(LinkLoads::new(links.len()));
+    let mut carried = LinkLoads::new(links.len());
     for _ in 0..2 {
-        carried.0.clear();
+        carried.clear();
         for (index, link) in links.iter().enumerate() {
             let span = link.q.down(rope.link_length);
             let load = model.masses.on_link(index, link, span, &scheme);
-            carried.0.add(index, &load);
+            carried.add(index, &load);
         }
         step(&mut links, &mut scratch, rope, &base, &scheme, &carried);
     }
-    links
-        .iter()
-        .zip(state)
-        .map(|(link, pose)| Rate {
-            q: Quaternion::from_imag(pose.w) * pose.q * 0.5,
-            w: Vector3::from(link.al.get(0)),
-        })
-        .collect()
+    let rates = links.iter().zip(states).flat_map(|(link, of)| {
+        let q = Quaternion::from_imag(spin(of)) * attitude(of) * 0.5;
+        let [x, y, z] = link.al.get(0);
+        [q.w, q.i, q.j, q.k, x, y, z]
+    });
+    DVector::from_iterator(state.len(), rates)
 }
 
-fn moved(state: &[Pose], rates: &[Rate], h_s: f64) -> Vec<Pose> {
-    let mut out = state.to_vec();
-    for (pose, rate) in out.iter_mut().zip(rates) {
-        pose.q += rate.q * h_s;
-        pose.w += rate.w * h_s;
-    }
-    out
-}
-
-fn runge_kutta_step(model: &Model, state: &mut [Pose], h_s: f64) {
+fn runge_kutta_step(model: &Model, state: &mut DVector<f64>, h_s: f64) {
     let k1 = rates(model, state);
-    let k2 = rates(model, &moved(state, &k1, 0.5 * h_s));
-    let k3 = rates(model, &moved(state, &k2, 0.5 * h_s));
-    let k4 = rates(model, &moved(state, &k3, h_s));
-    for ((pose, (k1, k2)), (k3, k4)) in state
-        .iter_mut()
-        .zip(k1.iter().zip(&k2))
-        .zip(k3.iter().zip(&k4))
-    {
-        pose.q += (k1.q + (k2.q + k3.q) * 2.0 + k4.q) * (h_s / 6.0);
-        pose.q /= pose.q.norm();
-        pose.w += (k1.w + (k2.w + k3.w) * 2.0 + k4.w) * (h_s / 6.0);
+    let k2 = rates(model, &(&*state + &k1 * (0.5 * h_s)));
+    let k3 = rates(model, &(&*state + &k2 * (0.5 * h_s)));
+    let k4 = rates(model, &(&*state + &k3 * h_s));
+    *state += (k1 + (k2 + k3) * 2.0 + k4) * (h_s / 6.0);
+    for link in state.as_mut_slice().chunks_mut(PER_LINK) {
+        let norm = attitude(link).norm();
+        link[..4].iter_mut().for_each(|x| *x /= norm);
     }
 }
 
 /// Kinetic, gravity and spring energy (J), and the kinetic part, from the model's
 /// definition alone: all quantities of every link, spin and twist included.
-fn energy_j(rope: &RopeParams, mass_slope: f64, state: &[Pose]) -> (f64, f64) {
+fn energy_j(rope: &RopeParams, mass_slope: f64, state: &DVector<f64>) -> (f64, f64) {
     let s = rope.link_length_m();
     let mut place = 0.5 / f64::from(rope.links);
     let (mut kinetic, mut potential) = (0.0, 0.0);
-    let (mut at, mut velocity) = (Vector3::zeros(), Vector3::zeros());
+    let (mut at, mut velocity, mut w) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
     let mut parent = UnitQuaternion::identity();
-    for pose in state {
+    for link in state.as_slice().chunks(PER_LINK) {
         let mass = rope.link_mass_kg() * (1.0 - mass_slope + 2.0 * mass_slope * place);
         place += 1.0 / f64::from(rope.links);
-        let attitude = UnitQuaternion::from_quaternion(pose.q);
+        w = spin(link);
+        let attitude = UnitQuaternion::from_quaternion(attitude(link));
         let span = attitude * Vector3::new(0.0, 0.0, -s);
-        let centre_velocity: Vector3<f64> = velocity + pose.w.cross(&span) * 0.5;
+        let centre_velocity: Vector3<f64> = velocity + w.cross(&span) * 0.5;
         kinetic += 0.5 * mass * centre_velocity.norm_squared()
-            + 0.5 * rope.link_inertia_kg_m2() * pose.w.norm_squared();
+            + 0.5 * rope.link_inertia_kg_m2() * w.norm_squared();
         potential += mass * GRAVITY_M_S2 * (at + span * 0.5_f64).z;
         let angle = attitude.angle_to(&parent);
         potential += 0.5 * rope.joint_stiffness_nm_per_rad * angle * angle;
         at += span;
-        velocity += pose.w.cross(&span);
+        velocity += w.cross(&span);
         parent = attitude;
     }
-    let spin = state.last().map_or(Vector3::zeros(), |pose| pose.w);
     kinetic += 0.5 * rope.lead_mass_kg * velocity.norm_squared()
-        + 0.5 * rope.lead_inertia_kg_m2() * spin.norm_squared();
+        + 0.5 * rope.lead_inertia_kg_m2() * w.norm_squared();
     potential += rope.lead_mass_kg * GRAVITY_M_S2 * at.z;
     (kinetic + potential, kinetic)
 }
@@ -181,16 +126,13 @@ fn drift(mass_slope: f64) -> f64 {
     masses.set(0, &params, &extras);
     let model = Model { rope, masses };
     // Bent and twisted along its length, and turning about all three axes.
-    let mut state: Vec<Pose> = (0..22)
-        .map(|i| {
-            let along = f64::from(i) / 21.0;
-            let turn = Vector3::new(0.9 * along, 0.5, -0.6 * along);
-            Pose {
-                q: UnitQuaternion::from_scaled_axis(turn).into_inner(),
-                w: Vector3::new(2.0, -1.0 + 3.0 * along, 1.5),
-            }
-        })
-        .collect();
+    let links = (0..22).flat_map(|i| {
+        let along = f64::from(i) / 21.0;
+        let turn = Vector3::new(0.9 * along, 0.5, -0.6 * along);
+        let q = UnitQuaternion::from_scaled_axis(turn);
+        [q.w, q.i, q.j, q.k, 2.0, -1.0 + 3.0 * along, 1.5]
+    });
+    let mut state = DVector::from_iterator(22 * PER_LINK, links);
     let (start, mut most_kinetic) = energy_j(&params, mass_slope, &state);
     let h_s = 4e-5;
     let mut worst: f64 = 0.0;

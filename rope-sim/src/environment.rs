@@ -1,14 +1,13 @@
 //! What a group of ropes meets besides gravity: obstacles, air, its own rest shape and
 //! mass distribution.
 
-use crate::algebra::Quat;
 use crate::clock::{BaseState, Clock};
 use crate::contact::{Contacts, LOOK_PERIOD, Node, Predicted, StepEnd, corrected, predicted};
 use crate::extra_loads::{DragLanes, MassLanes};
 use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, StepReport, step};
 use crate::lanes::Lanes;
-use crate::load::{LinkLoads, Load, Loads, Unloaded};
+use crate::load::{LinkLoads, Unloaded};
 use crate::scheme::Scheme;
 use crate::state::{Link, RopeLanes};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -20,7 +19,6 @@ pub(crate) struct Environment<V> {
     pub(crate) contacts: Contacts<V>,
     drag: Option<DragLanes<V>>,
     masses: Option<MassLanes<V>>,
-    rest_turn: Quat<V>,
     is_curved: bool,
     nodes: Vec<Node<V>>,
     loads: LinkLoads<V>,
@@ -30,18 +28,6 @@ pub(crate) struct Environment<V> {
     restarting: bool,
 }
 
-impl<V: Lanes> Loads<V> for Environment<V> {
-    const PRESENT: bool = true;
-    #[inline(always)]
-    fn on_link(&self, link: usize) -> Option<&Load<V>> {
-        self.loads.on_link(link)
-    }
-    #[inline(always)]
-    fn rest_turn(&self) -> Quat<V> {
-        self.rest_turn
-    }
-}
-
 impl<V: Lanes> Environment<V> {
     /// Air, rest shape and mass distribution of `ropes`, one per lane, among `contacts`.
     #[inline(always)]
@@ -49,7 +35,7 @@ impl<V: Lanes> Environment<V> {
         let links = ropes.first().map_or(0, |(r, _)| r.links as usize);
         let mut drag = DragLanes::none();
         let mut masses = MassLanes::uniform(links);
-        let mut rest_turn = Quat::identity();
+        let mut loads = LinkLoads::new(links);
         for lane in 0..V::COUNT {
             let Some((rope, extras)) = ropes.get(lane).or_else(|| ropes.last()) else {
                 continue;
@@ -58,7 +44,7 @@ impl<V: Lanes> Environment<V> {
             masses.set(lane, rope, extras);
             let curvature = Vector3::from(extras.rest_curvature_per_m);
             let q = UnitQuaternion::from_scaled_axis(curvature * rope.link_length_m());
-            rest_turn.set(lane, [q.w, q.i, q.j, q.k]);
+            loads.rest_turn.set(lane, [q.w, q.i, q.j, q.k]);
         }
         let any_drag = ropes.iter().any(|(_, e)| e.air_drag.is_some());
         let any_slope = ropes.iter().any(|(_, e)| e.mass_slope.abs() > 0.0);
@@ -67,12 +53,11 @@ impl<V: Lanes> Environment<V> {
             contacts,
             drag: any_drag.then_some(drag),
             masses: any_slope.then_some(masses),
-            rest_turn,
             is_curved: ropes
                 .iter()
                 .any(|(_, e)| e.rest_curvature_per_m.iter().any(bends)),
             nodes: vec![Node::zero(); links],
-            loads: LinkLoads::new(links),
+            loads,
             steps: 0,
             ends: Vec::with_capacity(ropes.len()),
             restarting: false,
@@ -118,7 +103,7 @@ impl<V: Lanes> Environment<V> {
                 };
                 self.contacts.load(&mut self.loads, predicted);
             }
-            let report = step(links, scratch, rope, &attach.dynamics, scheme, &*self);
+            let report = step(links, scratch, rope, &attach.dynamics, scheme, &self.loads);
             if in_contact {
                 corrected(&mut self.nodes, links, rope, attach);
                 self.read_clock(clock);

@@ -77,44 +77,6 @@ impl<V: Lanes> Load<V> {
     }
 }
 
-/// The loads of one step as they come together, link by link.
-pub(crate) struct LinkLoads<V> {
-    loads: Vec<Load<V>>,
-    /// Whether a link has any.
-    present: Vec<bool>,
-}
-
-impl<V: Lanes> LinkLoads<V> {
-    #[inline(always)]
-    pub(crate) fn new(links: usize) -> Self {
-        Self {
-            loads: vec![Load::none(); links],
-            present: vec![false; links],
-        }
-    }
-
-    /// Takes all loads off.
-    #[inline(always)]
-    pub(crate) fn clear(&mut self) {
-        self.present.fill(false);
-    }
-
-    #[inline(always)]
-    pub(crate) fn add(&mut self, link: usize, load: &Load<V>) {
-        self.loads[link] = if self.present[link] {
-            self.loads[link].plus(load)
-        } else {
-            *load
-        };
-        self.present[link] = true;
-    }
-
-    #[inline(always)]
-    pub(crate) fn on_link(&self, link: usize) -> Option<&Load<V>> {
-        self.present[link].then(|| &self.loads[link])
-    }
-}
-
 /// What the kernel asks about the loads of one step.
 pub(crate) trait Loads<V> {
     /// Whether there are any. If so, the links are predicted before the step, because
@@ -138,5 +100,53 @@ impl<V: Lanes> Loads<V> for Unloaded {
     #[inline(always)]
     fn rest_turn(&self) -> Quat<V> {
         Quat::identity()
+    }
+}
+
+/// The loads of one step as they come together, link by link.
+pub(crate) struct LinkLoads<V> {
+    loads: Vec<Load<V>>,
+    /// Whether a link has any.
+    present: Vec<bool>,
+    pub(crate) rest_turn: Quat<V>,
+}
+
+impl<V: Lanes> LinkLoads<V> {
+    /// No loads on a rope that rests straight.
+    #[inline(always)]
+    pub(crate) fn new(links: usize) -> Self {
+        Self {
+            loads: vec![Load::none(); links],
+            present: vec![false; links],
+            rest_turn: Quat::identity(),
+        }
+    }
+
+    /// Takes all loads off.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.present.fill(false);
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, link: usize, load: &Load<V>) {
+        self.loads[link] = if self.present[link] {
+            self.loads[link].plus(load)
+        } else {
+            *load
+        };
+        self.present[link] = true;
+    }
+}
+
+impl<V: Lanes> Loads<V> for LinkLoads<V> {
+    const PRESENT: bool = true;
+    #[inline(always)]
+    fn on_link(&self, link: usize) -> Option<&Load<V>> {
+        self.present[link].then(|| &self.loads[link])
+    }
+    #[inline(always)]
+    fn rest_turn(&self) -> Quat<V> {
+        self.rest_turn
     }
 }

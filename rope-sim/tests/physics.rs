@@ -5,9 +5,11 @@
 mod support;
 
 use nalgebra::{Rotation3, Vector3};
-use rope_sim::{FrameTimes, Precision, Scene, SimOptions, Start};
+use rope_sim::{AttachMotion, FrameTimes, Precision, Scene, SimOptions, Start};
 use shared_types::RopeParams;
-use support::{options, pendulum, released, simulate, still, throw, tips, world};
+use support::{
+    assert_derivatives, options, pendulum, released, simulate, still, throw, tips, world,
+};
 
 /// One rigid link is a pendulum; its period at any amplitude is an arithmetic-geometric
 /// mean.
@@ -108,4 +110,13 @@ fn scaling_all_forces_and_masses_changes_nothing() {
     for (x, y) in a.nodes.to_f64().into_iter().zip(b.nodes.to_f64()) {
         assert!((x - y).abs() < 1e-9);
     }
+}
+
+#[test]
+fn a_planned_arms_derivatives_are_those_of_its_pose_and_it_holds_outside() {
+    let arm = throw(0.0);
+    assert_derivatives(&arm, [0.05, 0.13, 0.3, 0.4]);
+    assert_eq!(arm.at(-1.0).v_m_s.norm(), 0.0);
+    let end_s = arm.duration_s();
+    assert_eq!(arm.at(9.0).p_m, arm.at(end_s + 1e-9).p_m);
 }

@@ -20,7 +20,7 @@ mod summary;
 mod touch;
 
 pub(crate) use nodes::{Node, Predicted, corrected, predicted};
-pub(crate) use start::Starting;
+pub(crate) use start::check_start;
 pub(crate) use summary::StepEnd;
 
 use crate::lanes::Lanes;

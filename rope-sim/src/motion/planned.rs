@@ -48,34 +48,3 @@ impl AttachMotion for PlannedArm {
         vec![0.0, self.trajectory.duration_s()]
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use arm_model::JointVector;
-
-    #[test]
-    fn derivatives_are_those_of_the_pose() {
-        let waypoints = [
-            JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
-            JointVector([0.3, -0.2, 0.4, 0.7, -0.5, 1.1, 0.6]),
-            JointVector([0.1, -0.5, 0.2, 1.0, 0.3, 1.6, -0.4]),
-        ];
-        let arm = PlannedArm::new(
-            JointTrajectory::new(&[0.0, 0.5, 1.1], &waypoints).unwrap(),
-            Pole::default(),
-        );
-        let d = 1e-5;
-        for t in [0.1, 0.33, 0.7, 1.0] {
-            let (before, now, after) = (arm.at(t - d), arm.at(t), arm.at(t + d));
-            let v = (after.p_m - before.p_m) / (2.0 * d);
-            let a = (after.v_m_s - before.v_m_s) / (2.0 * d);
-            let alpha = (after.w_rad_s - before.w_rad_s) / (2.0 * d);
-            assert!((v - now.v_m_s).norm() < 1e-6);
-            assert!((a - now.a_m_s2).norm() < 1e-4);
-            assert!((alpha - now.alpha_rad_s2).norm() < 1e-4);
-        }
-        assert_eq!(arm.at(-1.0).v_m_s.norm(), 0.0);
-        assert_eq!(arm.at(9.0).p_m, arm.at(1.1 + 1e-9).p_m);
-    }
-}
