@@ -10,11 +10,26 @@ use planner::observation::{Appearance, Observation, ObservedPoints};
 use planner::ropes::{outside_rope, random_rope, trial_rope};
 use planner::synthetic::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::wiggle::{WiggleConfig, wiggle};
-use rope_sim::{PlannedArm, PoseRow, PoseTrack};
+use rope_sim::{AttachMotion, PlannedArm, PoseRow, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
-use shared_types::{KeypointTrack, RopeParams};
+use shared_types::{KeypointTrack, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
 use std::path::Path;
+
+/// Keypoints seen by the camera at the side, spread over the rope, of unknown width.
+fn observed<'a>(
+    track: &'a KeypointTrack,
+    camera: &'a StereoCamera,
+    motion: &'a dyn AttachMotion,
+) -> Observation<'a> {
+    Observation {
+        track,
+        points: ObservedPoints::ArcLength,
+        camera,
+        motion,
+        appearance: Appearance::default(),
+    }
+}
 
 fn wiggling_arm() -> PlannedArm {
     PlannedArm::new(
@@ -62,14 +77,11 @@ fn both_methods_find_planted_parameters_in_noise() {
         };
         let film = filmed(&rope, &noise);
         let observation = Observation {
-            track: &film.track,
-            points: ObservedPoints::ArcLength,
-            camera: &camera,
-            motion: &arm,
             appearance: Appearance {
                 rope_radius_m: None,
                 ..film.appearance
             },
+            ..observed(&film.track, &camera, &arm)
         };
         let mut last = 0;
         // The camera stands where its calibration says, and the fit may rely on it.
@@ -213,16 +225,12 @@ fn useless_films_are_refused_with_the_reason() {
         .unwrap()
         .track;
     let refuse = |track: &KeypointTrack, motion: &PlannedArm| {
-        let observation = Observation {
-            track,
-            points: ObservedPoints::ArcLength,
-            camera: &camera,
-            motion,
-            appearance: Appearance::default(),
-        };
-        identify(&observation, &quick(0, 2), None, &mut |_| {
-            panic!("the film must be refused before any simulation")
-        })
+        identify(
+            &observed(track, &camera, motion),
+            &quick(0, 2),
+            None,
+            &mut |_| panic!("the film must be refused before any simulation"),
+        )
         .unwrap_err()
     };
     assert!(matches!(
@@ -297,14 +305,11 @@ fn the_recorded_rope_is_identified_from_its_true_keypoints() {
     let motion = pose_of(folder);
     let track = true_keypoints_of(folder);
     let observation = Observation {
-        track: &track,
-        points: ObservedPoints::ArcLength,
-        camera: &camera,
-        motion: &motion,
         appearance: Appearance {
             rope_radius_m: Some(0.0055),
             lead_radius_m: Some(0.02),
         },
+        ..observed(&track, &camera, &motion)
     };
     let found = identify(&observation, &quick(0, 2), None, &mut |_| {
         ControlFlow::Continue(())

@@ -2,7 +2,8 @@
 #![cfg(test)]
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
-use arm_model::kinematics::FrameMotion;
+mod support;
+
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rope_sim::{
@@ -11,39 +12,19 @@ use rope_sim::{
 };
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
+use support::pushed::{Broken, Pushed};
 
-/// Shakes along x with a constant acceleration that flips at every `period_s / 2`.
-#[derive(Debug, Clone)]
-struct Shake {
-    acceleration_m_s2: f64,
-    period_s: f64,
-}
-
-impl AttachMotion for Shake {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        let half = self.period_s / 2.0;
-        let (whole, part) = ((t_s / half).floor(), t_s.rem_euclid(half));
-        let falling = whole.rem_euclid(2.0) > 0.5;
-        let a = self.acceleration_m_s2;
-        let sign = if falling { -1.0 } else { 1.0 };
-        let done = 0.5 * a * half * half * whole;
-        let x = if falling {
-            a * half * part - 0.5 * a * part * part
-        } else {
-            0.5 * a * part * part
-        };
-        let v = if falling { a * (half - part) } else { a * part };
-        FrameMotion {
-            p_m: Vector3::new(done + x, 0.0, 1.0),
-            v_m_s: Vector3::new(v, 0.0, 0.0),
-            a_m_s2: Vector3::new(sign * a, 0.0, 0.0),
-            ..FrameMotion::world()
-        }
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        (0..200)
-            .map(|i| f64::from(i) * self.period_s / 2.0)
-            .collect()
+/// Shakes along x with a constant acceleration that flips at every `period_s / 2`, above the
+/// origin.
+fn shake(acceleration_m_s2: f64, period_s: f64) -> Pushed {
+    let push = Vector3::x() * acceleration_m_s2;
+    let piece = |i: u32| {
+        let flipped = if i.is_multiple_of(2) { push } else { -push };
+        (f64::from(i + 1) * period_s / 2.0, flipped)
+    };
+    Pushed {
+        from_m: Vector3::z(),
+        ..Pushed::from_origin((0..200).map(piece).collect())
     }
 }
 
@@ -79,14 +60,11 @@ fn arbitrary_rope() -> impl Strategy<Value = RopeParams> {
     })
 }
 
-fn arbitrary_shake() -> impl Strategy<Value = Shake> {
-    (1.0f64..40.0, 0.02f64..0.3).prop_map(|(acceleration_m_s2, period_s)| Shake {
-        acceleration_m_s2,
-        period_s,
-    })
+fn arbitrary_shake() -> impl Strategy<Value = Pushed> {
+    (1.0f64..40.0, 0.02f64..0.3).prop_map(|(a_m_s2, period_s)| shake(a_m_s2, period_s))
 }
 
-fn run(kernel: Kernel, ropes: &[(RopeParams, Shake)], threads: usize) -> Vec<Rollout> {
+fn run(kernel: Kernel, ropes: &[(RopeParams, Pushed)], threads: usize) -> Vec<Rollout> {
     let candidates: Vec<Candidate> = ropes
         .iter()
         .map(|(rope, motion)| Candidate::new(rope, motion))
@@ -133,17 +111,10 @@ fn rope() -> RopeParams {
     RopeParams::from_array([20.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0])
 }
 
-fn shake(acceleration_m_s2: f64) -> Shake {
-    Shake {
-        acceleration_m_s2,
-        period_s: 0.1,
-    }
-}
-
 #[test]
 fn a_rope_that_blows_up_is_flagged_and_harms_nobody() {
-    let gentle = (rope(), shake(3.0));
-    let absurd = (rope(), shake(1e7));
+    let gentle = (rope(), shake(3.0, 0.1));
+    let absurd = (rope(), shake(1e7, 0.1));
     for kernel in Kernel::ALL.into_iter().filter(|k| k.is_available()) {
         let together = run(kernel, &[gentle.clone(), absurd.clone(), gentle.clone()], 2);
         let alone = run(kernel, core::slice::from_ref(&gentle), 1);
@@ -158,7 +129,7 @@ fn a_rope_that_blows_up_is_flagged_and_harms_nobody() {
 
 #[test]
 fn sharing_a_motion_changes_nothing() {
-    let shake = shake(12.0);
+    let shake = shake(12.0, 0.1);
     let copy = shake.clone();
     let rope = rope();
     let shared = [Candidate::new(&rope, &shake), Candidate::new(&rope, &shake)];
@@ -169,28 +140,14 @@ fn sharing_a_motion_changes_nothing() {
     );
 }
 
-struct Broken;
-
-impl AttachMotion for Broken {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        let x = if t_s > 0.03 { f64::NAN } else { 0.0 };
-        FrameMotion {
-            v_m_s: Vector3::new(x, 0.0, 0.0),
-            ..FrameMotion::world()
-        }
-    }
-    fn duration_s(&self) -> f64 {
-        0.05
-    }
-    fn holds_after_end(&self) -> bool {
-        false
-    }
-}
-
 /// What a person reads: the candidate, the field, the value, what is allowed.
 #[test]
 fn what_cannot_be_simulated_is_refused_by_name() {
-    let (good, shake, base) = (rope(), shake(1.0), options(1));
+    let (good, shake, base) = (rope(), shake(1.0, 0.1), options(1));
+    let broken = Broken {
+        ends_s: 0.05,
+        nan_from_s: 0.03,
+    };
     let rope = |change: fn(&mut RopeParams)| {
         let mut rope = good;
         change(&mut rope);
@@ -217,13 +174,13 @@ fn what_cannot_be_simulated_is_refused_by_name() {
             ["mass_per_length_kg_per_m", "-0.05"],
         ),
         (
-            (good, &Broken, base),
+            (good, &broken, base),
             [
                 "candidate 1: its motion ends at 0.05 s",
                 "horizon of 0.07 s",
             ],
         ),
-        ((good, &Broken, long), [named, "motion is not finite"]),
+        ((good, &broken, long), [named, "motion is not finite"]),
         (
             option(|o| o.frames.period_s = 0.1),
             ["frames from 0.003 s", "0.07 s"],

@@ -4,58 +4,20 @@
 
 mod support;
 
-use arm_model::kinematics::FrameMotion;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AttachMotion, Candidate, Obstacle, Outcome, Precision, Rollout, RopePart, Scene, Shape,
-    SimOptions, roll_out_in,
+    Candidate, Obstacle, Outcome, Precision, Rollout, RopePart, Scene, Shape, SimOptions,
+    roll_out_in,
 };
 use shared_types::RopeParams;
-use support::contact::{WALL_HALF_M, Whip, random_rope, wall};
+use support::contact::{WALL_HALF_M, random_rope, random_whip, wall};
+use support::pushed::Pushed;
 use support::{G_M_S2, options, released, simulate, still};
 
 fn rope() -> RopeParams {
     RopeParams::from_array([22.0, 0.55, 0.02, 0.1, 0.005, 0.06, 0.12, 0.03, 0.8])
-}
-
-/// A frame that falls freely from rest for a while, then brakes to a halt.
-struct Drop {
-    from_m: f64,
-    fall_s: f64,
-    brake_m_s2: f64,
-}
-
-impl Drop {
-    fn halt_s(&self) -> f64 {
-        self.fall_s * (1.0 + G_M_S2 / self.brake_m_s2)
-    }
-}
-
-impl AttachMotion for Drop {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        let fall = t_s.min(self.fall_s);
-        let brake = t_s.clamp(self.fall_s, self.halt_s()) - self.fall_s;
-        let v = G_M_S2 * fall;
-        let a = match t_s {
-            t if t < self.fall_s => -G_M_S2,
-            t if t < self.halt_s() => self.brake_m_s2,
-            _ => 0.0,
-        };
-        let fallen = 0.5 * v * fall + (v - 0.5 * self.brake_m_s2 * brake) * brake;
-        FrameMotion {
-            p_m: Vector3::z() * (self.from_m - fallen),
-            v_m_s: Vector3::z() * (self.brake_m_s2 * brake - v),
-            a_m_s2: Vector3::z() * a,
-            // Off the vertical: a straight rope pushed from above would be a rod.
-            r: Rotation3::from_axis_angle(&Vector3::y_axis(), 0.1).into_inner(),
-            ..FrameMotion::world()
-        }
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        vec![self.fall_s, self.halt_s()]
-    }
 }
 
 #[test]
@@ -63,11 +25,17 @@ fn a_dropped_lead_sinks_less_than_a_millimetre_and_settles() {
     let rope = rope();
     let floor = Scene::with(vec![Obstacle::floor(0.0, 0.6)]);
     let fall_s = (2.0 * 0.5 / G_M_S2).sqrt();
-    // After half a metre of free fall the lead meets the floor; the frame follows a little.
-    let motion = Drop {
-        from_m: 0.5 + rope.length_m + rope.lead_radius_m,
-        fall_s,
-        brake_m_s2: 60.0,
+    // After half a metre of free fall the lead meets the floor; the frame brakes to a halt.
+    let (brake_m_s2, height_m) = (60.0, 0.5 + rope.length_m + rope.lead_radius_m);
+    let halt_s = fall_s * (1.0 + G_M_S2 / brake_m_s2);
+    let motion = Pushed {
+        from_m: Vector3::z() * height_m,
+        // Off the vertical: a straight rope pushed from above would be a rod.
+        r: Rotation3::from_axis_angle(&Vector3::y_axis(), 0.1),
+        pieces: vec![
+            (fall_s, -Vector3::z() * G_M_S2),
+            (halt_s, Vector3::z() * brake_m_s2),
+        ],
     };
     for precision in [Precision::F64, Precision::F32] {
         let run = simulate(&floor, &rope, &motion, &options(precision, 3.0, 50.0));
@@ -163,7 +131,7 @@ struct Throws {
 fn random_throws(count: usize, seed: u64) -> Throws {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let ropes: Vec<RopeParams> = (0..count).map(|_| random_rope(&mut rng, 22.0)).collect();
-    let whips: Vec<Whip> = (0..count).map(|_| Whip::random(&mut rng)).collect();
+    let whips: Vec<Pushed> = (0..count).map(|_| random_whip(&mut rng)).collect();
     let candidates: Vec<_> = ropes
         .iter()
         .zip(&whips)

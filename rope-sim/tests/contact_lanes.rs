@@ -14,8 +14,9 @@ use rope_sim::{
     SimOptions, roll_out_in_with,
 };
 use shared_types::RopeParams;
-use support::contact::{Whip, random_rope, wall};
+use support::contact::{random_rope, random_whip, wall};
 use support::options;
+use support::pushed::Pushed;
 
 /// A wall with a floor beside it and a domino.
 fn crowded() -> Scene {
@@ -47,17 +48,17 @@ fn extras(index: usize) -> RopeExtras {
     }
 }
 
-fn throws(seed: u64) -> Vec<(RopeParams, Whip)> {
+fn throws(seed: u64) -> Vec<(RopeParams, Pushed)> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     (0..20)
         .map(|i| {
             let links = if i % 5 == 4 { 21.0 } else { 20.0 };
-            (random_rope(&mut rng, links), Whip::random(&mut rng))
+            (random_rope(&mut rng, links), random_whip(&mut rng))
         })
         .collect()
 }
 
-fn candidates(throws: &[(RopeParams, Whip)]) -> Vec<Candidate<'_>> {
+fn candidates(throws: &[(RopeParams, Pushed)]) -> Vec<Candidate<'_>> {
     let numbered = throws.iter().enumerate();
     numbered
         .map(|(i, (rope, whip))| Candidate::new(rope, whip).with_extras(extras(i)))

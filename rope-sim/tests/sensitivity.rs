@@ -14,6 +14,7 @@ use rope_sim::{
     roll_out,
 };
 use shared_types::RopeParams;
+use support::pushed::{Broken, Pushed};
 use support::{rope, throw, world};
 
 const LENGTH: usize = 1;
@@ -296,23 +297,13 @@ fn families_always_step_alike() {
     assert_eq!(largest(slopes[1].clone().unwrap()), 0.0);
 }
 
-/// Its acceleration jumps at a given time.
-struct Jerk(Option<f64>);
-
-impl AttachMotion for Jerk {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        let t = self.0.map_or(0.0, |jump_s| (t_s - jump_s).max(0.0));
-        let a = if t > 0.0 { 3.0 } else { 0.0 };
-        FrameMotion {
-            p_m: Vector3::x() * (1.5 * t * t),
-            v_m_s: Vector3::x() * (3.0 * t),
-            a_m_s2: Vector3::x() * a,
-            ..FrameMotion::world()
-        }
-    }
-    fn acceleration_jumps_s(&self) -> Vec<f64> {
-        self.0.into_iter().collect()
-    }
+/// Still until its acceleration jumps.
+fn jerk(jump_s: f64) -> Pushed {
+    let pieces = [
+        (jump_s, Vector3::zeros()),
+        (f64::INFINITY, Vector3::x() * 3.0),
+    ];
+    Pushed::from_origin(pieces.to_vec())
 }
 
 /// A jump on the grid of steps, moved a little, would add a step to one side.
@@ -320,13 +311,8 @@ impl AttachMotion for Jerk {
 fn moved_jumps_do_not_change_the_number_of_steps() {
     let rope = rope();
     let around = |distance: f64| {
-        let later = Jerk(Some(0.2 + distance));
-        run(
-            &rope,
-            &Jerk(Some(0.2)),
-            &[towards(&later, distance)],
-            &options(),
-        )
+        let later = jerk(0.2 + distance);
+        run(&rope, &jerk(0.2), &[towards(&later, distance)], &options())
     };
     let near = slopes(&around(1e-5).unwrap()).remove(0);
     let wide = slopes(&around(4e-5).unwrap()).remove(0);
@@ -336,40 +322,13 @@ fn moved_jumps_do_not_change_the_number_of_steps() {
     let off = (wide[last] - near[last]).norm();
     assert!(off < 1e-3, "{off}");
     // Four steps further there is no common number of steps.
-    let smooth = Jerk(None);
-    let never = run(
-        &rope,
-        &Jerk(Some(0.2)),
-        &[towards(&smooth, 1.0)],
-        &options(),
-    );
+    let never = run(&rope, &jerk(0.2), &[towards(&world, 1.0)], &options());
     for refused in [around(2e-3), never] {
         let said = refused.unwrap_err().to_string();
         assert!(
             said.starts_with("base 0, neighbour 0: the acceleration"),
             "{said}"
         );
-    }
-}
-
-/// Ends early, and is not finite at its end.
-struct Broken {
-    ends_s: f64,
-}
-
-impl AttachMotion for Broken {
-    fn at(&self, t_s: f64) -> FrameMotion {
-        let x = if t_s > 0.5 { f64::NAN } else { 0.0 };
-        FrameMotion {
-            p_m: Vector3::new(x, 0.0, 0.0),
-            ..FrameMotion::world()
-        }
-    }
-    fn duration_s(&self) -> f64 {
-        self.ends_s
-    }
-    fn holds_after_end(&self) -> bool {
-        false
     }
 }
 
@@ -385,7 +344,10 @@ fn bad_input_is_named_with_base_and_neighbour() {
         distance: 1.0,
     };
     let linkless = RopeParams { links: 0, ..rope };
-    let (short, nan) = (Broken { ends_s: 0.3 }, Broken { ends_s: 9.0 });
+    let [short, nan] = [0.3, 9.0].map(|ends_s| Broken {
+        ends_s,
+        nan_from_s: 0.5,
+    });
     let first = Family {
         base: Candidate::new(&rope, &world),
         perturbations: &[good],

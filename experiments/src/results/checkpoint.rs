@@ -9,13 +9,10 @@ use std::path::Path;
 /// The file of one result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Checkpoint<T> {
-    /// Name of the result.
     pub name: String,
-    /// Version of the program.
     pub version: String,
     /// Seed of ropes, films and searches.
     pub seed: u64,
-    /// Method asked for.
     pub method: String,
     /// Trials in the order of their indices.
     pub trials: Vec<T>,

@@ -4,7 +4,7 @@ use super::checkpoint::Checkpoint;
 use super::picture::{Curve, Picture};
 use crate::args::ResultArgs;
 use crate::network::with_network;
-use crate::report::joined;
+use crate::report::{Column, joined, print_table};
 use anyhow::anyhow;
 use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
 use experiments::trials::{Trial, TrialRig, run as identify_all};
@@ -176,6 +176,22 @@ impl<'a> Experiment<'a> {
             curves,
         };
         picture.write(self.args.out.as_deref())
+    }
+
+    /// Ends a run of so many ropes whose result is the rows of a table, each a curve over
+    /// `axis`.
+    pub fn finish_rows<R: Serialize, const N: usize>(
+        self,
+        ropes: usize,
+        (rows, curves): (Vec<R>, Vec<Curve>),
+        axis: &str,
+        table: [Column<R>; N],
+    ) -> Outcome<Option<Value>> {
+        let picture = self.picture(axis, curves)?;
+        let own = json!({ "ropes": ropes, "rows": rows });
+        self.finish(&format!("{ropes} ropes"), picture, own, || {
+            print_table(&rows, 1, table);
+        })
     }
 
     /// Ends the run: prints its tables, unless `--json` is given, and returns what that

@@ -4,13 +4,13 @@
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;
 use super::strikes::{StrikeCase, Thrower, strike_trials};
-use crate::report::{Column, print_table};
+use crate::report::Column;
 use cli_output::Outcome;
 use experiments::trials::Spread;
 use planner::plan::PlanError;
 use planner::ropes::trial_rope;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 use shared_types::RopeParams;
 
 /// Ropes of the paper's table.
@@ -50,7 +50,6 @@ struct ImportanceTrial {
 }
 
 impl ImportanceTrial {
-    /// Plans and throws.
     fn of(case: &StrikeCase) -> Result<Self, PlanError> {
         let (thrower, found) = (&case.thrower, &case.found.params);
         let whole = thrower.plan(found, 1)?;
@@ -149,12 +148,8 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let trials = experiment.trials(sequence, |batch| {
         strike_trials(&experiment, batch, ImportanceTrial::of)
     })?;
-    let (rows, curves) = rows(&trials);
     let axis = "distance of tip and target (cm); dashed: the paper's mean";
-    let picture = experiment.picture(axis, curves)?;
-    let own = json!({ "ropes": trials.len(), "rows": rows });
-    let summary = format!("{} ropes", trials.len());
-    experiment.finish(&summary, picture, own, || print_table(&rows, 1, TABLE))
+    experiment.finish_rows(trials.len(), rows(&trials), axis, TABLE)
 }
 
 #[cfg(test)]

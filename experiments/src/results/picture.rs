@@ -49,11 +49,9 @@ impl Curve {
 
 /// A picture of several curves over one axis of powers of ten.
 pub(super) struct Picture<'a> {
-    /// Name of the result.
     pub name: &'a str,
     /// What is along the axis, with its unit.
     pub axis: &'a str,
-    /// Seed of the ropes.
     pub seed: u64,
     /// Curves; colours repeat beyond nine.
     pub curves: Vec<Curve>,

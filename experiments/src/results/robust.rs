@@ -5,12 +5,12 @@
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;
 use super::strikes::{StrikeCase, Strikes, strike_trials};
-use crate::report::{Column, print_table};
+use crate::report::Column;
 use cli_output::Outcome;
 use experiments::trials::{mean, quantile};
 use planner::plan::{PlanError, PosteriorEnsemble};
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 use shared_types::ErrorForecast;
 
 const ROPES: u64 = 200;
@@ -52,7 +52,6 @@ struct RobustTrial {
 }
 
 impl RobustTrial {
-    /// Plans and throws.
     fn of(case: &StrikeCase) -> Result<Self, PlanError> {
         let (thrower, found) = (&case.thrower, &case.found);
         let foreseen = |optimised: usize| -> Result<Foreseen, PlanError> {
@@ -134,16 +133,12 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let trials = experiment.trials(sequence, |batch| {
         strike_trials(&experiment, batch, RobustTrial::of)
     })?;
-    let (rows, curves): (Vec<Row>, Vec<Curve>) = [
+    let rows = [
         row(&trials, "for the identified rope", |t| t.plain),
         row(&trials, "for sixteen it might be", |t| t.robust),
-    ]
-    .into_iter()
-    .unzip();
-    let picture = experiment.picture("distance of tip and target (cm)", curves)?;
-    let own = json!({ "ropes": trials.len(), "rows": rows });
-    let summary = format!("{} ropes", trials.len());
-    experiment.finish(&summary, picture, own, || print_table(&rows, 1, TABLE))
+    ];
+    let axis = "distance of tip and target (cm)";
+    experiment.finish_rows(trials.len(), rows.into_iter().unzip(), axis, TABLE)
 }
 
 #[cfg(test)]

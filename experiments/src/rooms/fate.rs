@@ -1,4 +1,4 @@
-//! What became of a film.
+//! What became of films.
 
 use super::folder::Scene;
 use super::score::Score;
@@ -17,7 +17,6 @@ pub(super) enum Fate {
 /// A film and what became of it, as kept in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Tracked {
-    /// Version of the program.
     pub(super) version: String,
     pub(super) scene: Scene,
     pub(super) fate: Fate,

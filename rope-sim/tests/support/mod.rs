@@ -7,6 +7,7 @@
 
 pub mod contact;
 pub mod fling;
+pub mod pushed;
 pub mod truth;
 
 use arm_model::kinematics::FrameMotion;

@@ -9,7 +9,6 @@ use serde::Serialize;
 
 /// Lane groups per measurement: many enough that starting up does not count.
 const GROUPS: usize = 16;
-/// Simulated time (s).
 const HORIZON_S: f64 = 1.0;
 /// Height of the clamp above a floor that ropes fall on (m).
 const BELOW_M: f64 = 0.3;

@@ -35,7 +35,6 @@ impl Extent {
     }
 }
 
-/// Everything measured.
 #[derive(Debug, Serialize)]
 struct Report {
     repeats: usize,

@@ -7,13 +7,10 @@ use rope_sim::{Candidate, Outcome, Precision, Rollout, Scene, SimulateError};
 use serde::Serialize;
 use shared_types::RopeParams;
 
-/// Link counts measured.
 const LINK_COUNTS: [u32; 6] = [5, 10, 22, 50, 100, 200];
-/// Batch sizes measured.
 const CANDIDATE_COUNTS: [usize; 7] = [1, 4, 16, 64, 256, 1024, 4096];
 /// Lane groups per link count.
 const GROUPS: usize = 8;
-/// Simulated time (s).
 const HORIZON_S: f64 = 0.25;
 
 /// Cost at one link count, one thread.
