@@ -60,6 +60,16 @@ impl<V: Lanes> Vec3<V> {
             V::select_less(a, b, then.2, otherwise.2),
         )
     }
+    /// Smaller of each component.
+    #[inline(always)]
+    pub(crate) fn min(self, o: Self) -> Self {
+        Self(self.0.min(o.0), self.1.min(o.1), self.2.min(o.2))
+    }
+    /// Larger of each component.
+    #[inline(always)]
+    pub(crate) fn max(self, o: Self) -> Self {
+        Self(self.0.max(o.0), self.1.max(o.1), self.2.max(o.2))
+    }
     /// `c + self x o`.
     #[inline(always)]
     pub(crate) fn cross_add(self, o: Self, c: Self) -> Self {

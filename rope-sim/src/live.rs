@@ -187,20 +187,6 @@ mod tests {
         RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
     }
 
-    #[test]
-    fn stays_in_equilibrium_under_a_tilted_frame() {
-        let tilt = Rotation3::from_euler_angles(0.3, 0.9, 0.2);
-        let attach = FrameMotion {
-            r: tilt.into_inner(),
-            ..FrameMotion::world()
-        };
-        let mut live = LiveRope::new(&rope(), &attach, 1e-3).unwrap();
-        let before = live.nodes()[22];
-        live.advance(&|_| attach, 1.0);
-        let moved = live.nodes()[22] - before;
-        assert!(moved.norm() < 1e-9, "{moved}");
-    }
-
     /// Swings along x, starting and ending softly.
     fn swing(t_s: f64) -> FrameMotion {
         let (s, c) = (TAU * t_s).sin_cos();

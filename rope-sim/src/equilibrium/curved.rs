@@ -159,62 +159,20 @@ mod tests {
     use super::*;
     use crate::extras::RopeExtras;
 
-    fn rope() -> RopeParams {
-        RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0])
-    }
-
-    fn attach() -> Matrix3<f64> {
-        Rotation3::from_euler_angles(0.4, 0.7, -1.0).into_inner()
-    }
-
-    fn curved(curvature_per_m: [f64; 3]) -> Vec<[f64; 4]> {
-        let extras = RopeExtras {
-            rest_curvature_per_m: curvature_per_m,
-            ..RopeExtras::NONE
-        };
-        hanging_links(&rope(), &extras, &attach())
-    }
-
     #[test]
     fn no_curvature_is_the_plane_curve() {
-        let weight_nm = weights_nm(&rope(), &RopeExtras::NONE);
-        let straight = hanging_straight(&rope(), &weight_nm, &attach());
-        let almost = curved([1e-12, 0.0, 0.0]);
+        let rope = RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0]);
+        let attach = Rotation3::from_euler_angles(0.4, 0.7, -1.0).into_inner();
+        let weight_nm = weights_nm(&rope, &RopeExtras::NONE);
+        let straight = hanging_straight(&rope, &weight_nm, &attach);
+        let extras = RopeExtras {
+            rest_curvature_per_m: [1e-12, 0.0, 0.0],
+            ..RopeExtras::NONE
+        };
+        let almost = hanging_links(&rope, &extras, &attach);
         for (a, b) in straight.iter().zip(&almost) {
             let same: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
             assert!(same.abs() > 1.0 - 1e-12);
-        }
-    }
-
-    /// Moment of everything beyond a joint about it, by lever arms, is its spring's.
-    #[test]
-    fn torque_balances_at_every_joint() {
-        let (rope, curvature) = (rope(), [1.5, 2.5, 0.7]);
-        let links: Vec<UnitQuaternion<f64>> = curved(curvature)
-            .into_iter()
-            .map(|[w, x, y, z]| UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
-            .collect();
-        let s = rope.link_length_m();
-        let rest = UnitQuaternion::from_scaled_axis(Vector3::from(curvature) * s);
-        let rotation = Rotation3::from_matrix_unchecked(attach());
-        let mut before = UnitQuaternion::from_rotation_matrix(&rotation);
-        for i in 0..links.len() {
-            let mut at = Vector3::zeros();
-            let mut moment = Vector3::zeros();
-            let weight = Vector3::z() * -9.81;
-            for q in &links[i..] {
-                let way = q * -Vector3::z() * s;
-                moment += (at + way * 0.5).cross(&weight) * rope.link_mass_kg();
-                at += way;
-            }
-            moment += at.cross(&weight) * rope.lead_mass_kg;
-            let strain = (links[i] * (before * rest).inverse()).scaled_axis();
-            let spring = strain * -rope.joint_stiffness_nm_per_rad;
-            assert!(
-                (spring + moment).norm() < 1e-8,
-                "joint {i}: {spring} {moment}"
-            );
-            before = links[i];
         }
     }
 }

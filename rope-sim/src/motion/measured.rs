@@ -273,7 +273,8 @@ mod tests {
 
     #[test]
     fn bad_logs_are_named() {
-        let bad: [(fn(&mut Vec<f64>, &mut Vec<JointVector>), &str); 3] = [
+        type Spoil = fn(&mut Vec<f64>, &mut Vec<JointVector>);
+        let bad: [(Spoil, &str); 3] = [
             (|times, _| times.truncate(9), "`times_s` has 9 entries"),
             (|_, joints| joints[12][3] = f64::NAN, "sample 12 holds"),
             (|times, _| times[6] = times[4], "sample 6 is not after"),

@@ -4,7 +4,7 @@
 //! not enough. Every step is rated by a straight line in place of its path; the best
 //! step's states are kept and refined afterwards on their cubic Hermite.
 
-use super::cubic::{BestStep, Cubic, TipStep};
+use super::cubic::{BestStep, TipStep};
 use crate::algebra::Vec3;
 use crate::lanes::Lanes;
 
@@ -90,26 +90,16 @@ impl<V: Lanes> ApproachRecorder<V> {
         time_of_step: impl Fn(usize) -> (f64, f64),
     ) -> ClosestApproach {
         let (cubic, start_s) = self.best.cubic(lane, time_of_step);
-        approach_to(&cubic, start_s, origin_m, |x| self.target.foot(x))
-    }
-}
-
-/// Approach of a step's path to the shape described by `foot`, see [`Cubic::nearest`].
-fn approach_to(
-    cubic: &Cubic,
-    start_s: f64,
-    origin_m: [f64; 3],
-    foot: impl Fn([f64; 3]) -> [f64; 3],
-) -> ClosestApproach {
-    let u = cubic.nearest(&foot);
-    let tip = cubic.at(u);
-    let foot = foot(tip);
-    let squared: f64 = (0..3).map(|i| (tip[i] - foot[i]).powi(2)).sum();
-    ClosestApproach {
-        distance_m: squared.sqrt(),
-        time_s: start_s + cubic.h_s * u,
-        tip_m: core::array::from_fn(|i| tip[i] + origin_m[i]),
-        velocity_m_s: cubic.velocity(u),
+        let u = cubic.nearest(|x| self.target.foot(x));
+        let tip = cubic.at(u);
+        let foot = self.target.foot(tip);
+        let squared: f64 = (0..3).map(|i| (tip[i] - foot[i]).powi(2)).sum();
+        ClosestApproach {
+            distance_m: squared.sqrt(),
+            time_s: start_s + cubic.h_s * u,
+            tip_m: core::array::from_fn(|i| tip[i] + origin_m[i]),
+            velocity_m_s: cubic.velocity(u),
+        }
     }
 }
 

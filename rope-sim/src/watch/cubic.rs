@@ -123,22 +123,12 @@ impl<V: Lanes> BestStep<V> {
     #[inline(always)]
     pub(super) fn offer(&mut self, rating: V, count: f64, tip: &TipStep<V>) {
         let rating = V::select_less(V::splat(0.0), tip.running, rating, self.rating);
-        let better = |new: V, old: V| V::select_less(rating, self.rating, new, old);
-        let keep = |new: Vec3<V>, old: Vec3<V>| {
-            Vec3(
-                better(new.0, old.0),
-                better(new.1, old.1),
-                better(new.2, old.2),
-            )
-        };
-        self.states = [
-            keep(tip.before[0], self.states[0]),
-            keep(tip.before[1], self.states[1]),
-            keep(tip.after[0], self.states[2]),
-            keep(tip.after[1], self.states[3]),
-        ];
-        self.step = better(V::splat(count), self.step);
-        self.rating = better(rating, self.rating);
+        let new = [tip.before[0], tip.before[1], tip.after[0], tip.after[1]];
+        for (kept, state) in self.states.iter_mut().zip(new) {
+            *kept = Vec3::select_less(rating, self.rating, state, *kept);
+        }
+        self.step = V::select_less(rating, self.rating, V::splat(count), self.step);
+        self.rating = V::select_less(rating, self.rating, rating, self.rating);
     }
 
     /// Path within one lane's best step and the time at which that step starts (s);

@@ -143,8 +143,8 @@ impl DwellRecorder {
             let local = Vec3(d.0.fma(cos, d.1 * sin), d.1.fma(cos, -(d.0 * sin)), d.2);
             let l: Vec3<V> = low.unwrap_or(local);
             let h: Vec3<V> = high.unwrap_or(local);
-            low = Some(Vec3(l.0.min(local.0), l.1.min(local.1), l.2.min(local.2)));
-            high = Some(Vec3(h.0.max(local.0), h.1.max(local.1), h.2.max(local.2)));
+            low = Some(l.min(local));
+            high = Some(h.max(local));
         }
         let (low, high) = (low.unwrap_or(center), high.unwrap_or(center));
         let [a, b, c] = self.half.map(V::splat);

@@ -1,36 +1,7 @@
 //! Highest place of the lead, in continuous time.
 
-use super::cubic::{BestStep, Cubic, TipStep};
-use crate::algebra::Vec3;
+use super::cubic::{Cubic, TipStep};
 use crate::lanes::Lanes;
-
-/// The step with the highest point.
-pub(super) struct HeightRecorder<V> {
-    /// Rated by negative height.
-    highest: BestStep<V>,
-}
-
-impl<V: Lanes> HeightRecorder<V> {
-    #[inline(always)]
-    pub(super) fn new(tip: [Vec3<V>; 2]) -> Self {
-        Self {
-            highest: BestStep::new(tip),
-        }
-    }
-
-    /// Takes in step number `count`.
-    #[inline(always)]
-    pub(super) fn after_step(&mut self, count: f64, tip: &TipStep<V>) {
-        let (_, high) = span(tip);
-        self.highest.offer(-high, count, tip);
-    }
-
-    /// Greatest height of one lane, relative to the clock's origin (m).
-    #[inline(always)]
-    pub(super) fn highest(&self, lane: usize, time_of_step: impl Fn(usize) -> (f64, f64)) -> f64 {
-        highest(&self.highest.cubic(lane, time_of_step).0)
-    }
-}
 
 /// Lowest and highest z within a step: its ends and the apex of the parabola through
 /// the end with the step's mean acceleration.
@@ -46,7 +17,7 @@ pub(super) fn span<V: Lanes>(tip: &TipStep<V>) -> (V, V) {
 }
 
 /// Largest z within a step.
-fn highest(cubic: &Cubic) -> f64 {
+pub(super) fn highest(cubic: &Cubic) -> f64 {
     let [z0, v0, z1, v1] = cubic.states.map(|s| s[2]);
     let (w0, w1) = (v0 * cubic.h_s, v1 * cubic.h_s);
     // Rate per fraction: a u² + b u + w0.
@@ -64,36 +35,39 @@ fn highest(cubic: &Cubic) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cubic::steps_along;
+    use super::super::cubic::{BestStep, steps_along};
     use super::*;
+    use crate::algebra::Vec3;
+
+    /// The step of least negative height, as the watcher keeps it, holds the highest place.
+    fn highest_m(state: impl Fn(f64) -> [Vec3<f64>; 2], h_s: f64, count: u32) -> f64 {
+        let mut best = BestStep::new(state(0.0));
+        for (i, tip) in (1_u32..).zip(steps_along(state, h_s, count)) {
+            best.offer(-span(&tip).1, f64::from(i), &tip);
+        }
+        highest(&best.cubic(0, |step| (step as f64 * h_s, h_s)).0)
+    }
 
     /// Thrown up at 3 m/s from 1 m, long enough to fall below the start.
     #[test]
     fn a_throw_peaks_where_the_formula_says() {
-        let (h, g) = (7e-3, 9.81);
-        let state = |t: f64| {
+        let g = 9.81;
+        let thrown = |t: f64| {
             [
                 Vec3(0.0, 0.0, 1.0 + t * (3.0 - 0.5 * g * t)),
                 Vec3(0.0, 0.0, 3.0 - g * t),
             ]
         };
-        let mut recorder = HeightRecorder::new(state(0.0));
-        for (i, tip) in (1_u32..).zip(steps_along(state, h, 100)) {
-            recorder.after_step(f64::from(i), &tip);
-        }
-        let highest_m = recorder.highest(0, |step| (step as f64 * h, h));
+        let highest_m = highest_m(thrown, 7e-3, 100);
         assert!((highest_m - (1.0 + 4.5 / g)).abs() < 1e-12, "{highest_m}");
     }
 
     #[test]
     fn a_lead_that_stands_still_has_one_height() {
-        let still = [Vec3(0.0, 0.0, 0.25), Vec3(0.0, 0.0, 0.0)];
-        let mut recorder = HeightRecorder::new(still);
-        for tip in steps_along(|_| still, 1e-3, 1) {
+        let still = |_: f64| [Vec3(0.0, 0.0, 0.25), Vec3(0.0, 0.0, 0.0)];
+        assert_eq!(highest_m(still, 1e-3, 1), 0.25);
+        for tip in steps_along(still, 1e-3, 1) {
             assert_eq!(span(&tip), (0.25, 0.25));
-            recorder.after_step(1.0, &tip);
         }
-        let highest_m = recorder.highest(0, |step| (step as f64 * 1e-3, 1e-3));
-        assert_eq!(highest_m, 0.25);
     }
 }

@@ -21,9 +21,8 @@ use crate::error::{refuse_unless, refuse_unless_finite};
 use crate::lanes::Lanes;
 use crate::state::Link;
 use approach::{ApproachRecorder, Target};
-use cubic::TipStep;
+use cubic::{BestStep, TipStep};
 use dwell::DwellRecorder;
-use height::HeightRecorder;
 use rest::RestRecorder;
 
 /// What to measure in every rollout of a batch; nothing by default.
@@ -113,7 +112,8 @@ pub(crate) struct Watcher<V> {
     to_point: Option<ApproachRecorder<V>>,
     to_segment: Option<ApproachRecorder<V>>,
     dwell: Option<DwellRecorder>,
-    height: Option<HeightRecorder<V>>,
+    /// The step with the highest place, rated by negative height.
+    highest: Option<BestStep<V>>,
     rest: Option<RestRecorder<V>>,
 }
 
@@ -139,7 +139,7 @@ impl<V: Lanes> Watcher<V> {
             dwell: watch
                 .dwell_in
                 .map(|region| DwellRecorder::new(&region, origin_m, tip[0], lanes)),
-            height: watch.height.then(|| HeightRecorder::new(tip)),
+            highest: watch.height.then(|| BestStep::new(tip)),
             rest: watch
                 .rest_window_s
                 .map(|window_s| RestRecorder::new(horizon_s - window_s, lanes)),
@@ -177,8 +177,9 @@ impl<V: Lanes> Watcher<V> {
         if let Some(dwell) = &mut self.dwell {
             dwell.after_step(&step, |lane| clock.span_s(lane));
         }
-        if let Some(height) = &mut self.height {
-            height.after_step(self.count, &step);
+        if let Some(highest) = &mut self.highest {
+            let (_, high) = height::span(&step);
+            highest.offer(-high, self.count, &step);
         }
         if let Some(rest) = &mut self.rest {
             rest.after_step(&step, attach, links, link_length, self.lanes, |lane| {
@@ -205,9 +206,9 @@ impl<V: Lanes> Watcher<V> {
             to_segment: self.to_segment.as_ref().map(closest),
             dwell: self.dwell.as_ref().map(|r| r.dwell(lane)),
             highest_m: self
-                .height
+                .highest
                 .as_ref()
-                .map(|r| r.highest(lane, time_of_step) + origin_m[2]),
+                .map(|best| height::highest(&best.cubic(lane, time_of_step).0) + origin_m[2]),
             rest: self.rest.as_ref().map(|r| r.measures(lane, origin_m)),
         }
     }

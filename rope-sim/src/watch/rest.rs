@@ -81,25 +81,21 @@ impl<V: Lanes> RestRecorder<V> {
             }
         }
         let counts = V::select_less(zero, self.begun, tip.running, zero);
-        let keep = |new: V, old: V| V::select_less(zero, counts, new, old);
-        let keep3 = |new: Vec3<V>, old: Vec3<V>| {
-            Vec3(keep(new.0, old.0), keep(new.1, old.1), keep(new.2, old.2))
-        };
         let (low, high) = span(tip);
         // Of the first step only the end lies in the window for sure.
         let end = tip.after[0].2;
         let low = V::select_less(zero, before, low, end);
         let high = V::select_less(zero, before, high, end);
+        let [lowest, highest] = self.height;
         self.height = [
-            keep(low.min(self.height[0]), self.height[0]),
-            keep(high.max(self.height[1]), self.height[1]),
+            V::select_less(zero, counts, low.min(lowest), lowest),
+            V::select_less(zero, counts, high.max(highest), highest),
         ];
         let m = attach.add(middle(links, link_length));
-        let (l, h) = (self.low, self.high);
-        self.low = keep3(Vec3(m.0.min(l.0), m.1.min(l.1), m.2.min(l.2)), l);
-        self.high = keep3(Vec3(m.0.max(h.0), m.1.max(h.1), m.2.max(h.2)), h);
-        self.middle = keep3(m, self.middle);
-        self.tip = keep3(tip.after[0], self.tip);
+        self.low = Vec3::select_less(zero, counts, m.min(self.low), self.low);
+        self.high = Vec3::select_less(zero, counts, m.max(self.high), self.high);
+        self.middle = Vec3::select_less(zero, counts, m, self.middle);
+        self.tip = Vec3::select_less(zero, counts, tip.after[0], self.tip);
     }
 
     /// Measures of one lane; `origin_m` is the clock's origin.
