@@ -10,12 +10,13 @@
 use crate::session::{ArmSession, SessionError};
 use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport};
 use crate::xarm::{
-    ArmState, ArmVersion, Command, ErrorCode, Firmware, JointQuery, Mode, ReplyData, ReportReader,
-    StateRequest, TcpPose, VersionError,
+    ArmState, ArmVersion, Command, Firmware, JointQuery, Mode, ReplyData, ReportReader,
+    StateRequest, TcpPose,
 };
 use arm_model::{JointVector, Limits};
 use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
+use shared_types::FaultCode;
 use std::io::Read;
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
@@ -35,6 +36,9 @@ const READY_TIMEOUT: Duration = Duration::from_secs(3);
 /// Longest wait for a status report; five come a second.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// What to do about a difference that is refused.
+const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
+
 /// What is done about an arm that is configured otherwise than the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -47,98 +51,26 @@ pub enum OnDifference {
     Set,
 }
 
-/// Why the arm could not be set up.
+/// Why the arm could not be set up: what was found, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum SetUpError {
-    /// It did not answer, or not sensibly.
-    #[error(transparent)]
-    Session(#[from] SessionError),
-    /// Another arm, or a firmware that cannot be driven.
-    #[error("the arm at {arm} says `{text}`: {reason}")]
-    Version {
-        /// Address.
-        arm: SocketAddr,
-        /// Its version text.
-        text: String,
-        /// Why it is refused.
-        reason: VersionError,
-    },
-    /// Reports of another size than this firmware sends: fields may lie elsewhere.
-    #[error(
-        "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
-    )]
-    Layout {
-        /// Port.
-        port: u16,
-        /// Firmware that the arm names.
-        firmware: Firmware,
-        /// Size found (bytes).
-        found: usize,
-        /// Sizes known for this firmware (bytes).
-        expected: String,
-    },
-    /// The configured joint range is wider than the arm's.
-    #[error(
-        "joint {joint} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms"
-    )]
-    Range {
-        /// Joint, 1-based.
-        joint: usize,
-        /// Configured limit (rad).
-        limit_rad: f64,
-    },
-    /// The tool configured in the arm is another one.
-    #[error(
-        "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: set one to the other (`on_difference = \"set\"` sets the arm)"
-    )]
-    Tool {
-        /// In the arm (m).
-        arm_m: [f64; 3],
-        /// In the limits (m).
-        configured_m: [f64; 3],
-    },
-    /// The tool speed limit of the arm is another one.
-    #[error(
-        "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: set one to the other (`on_difference = \"set\"` sets the arm)"
-    )]
-    ToolSpeed {
-        /// In the arm (m/s).
-        arm_m_s: f64,
-        /// In the limits (m/s).
-        configured_m_s: f64,
-    },
-    /// The status report cannot be read.
-    #[error("no status report from the arm at {address} ({reason}): check the report ports")]
-    NoStatus {
-        /// Address tried.
-        address: SocketAddr,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// An error that clearing does not remove.
-    #[error("the arm keeps its error {0}")]
-    ArmError(ErrorCode),
-    /// The arm does not become ready.
-    #[error(
-        "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
-    )]
-    NotReady {
-        /// State it stays in.
-        state: ArmState,
-    },
-    /// The arm moves by itself.
-    #[error("the arm does not stand still: stop other programs that move it")]
-    Restless,
-    /// The pose is outside the configured limits.
-    #[error(
-        "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
-    )]
-    OutsideRange {
-        /// Joint, 1-based.
-        joint: usize,
-        /// Where it stands (rad).
-        q_rad: f64,
-    },
+#[error("{message}")]
+pub struct SetUpError {
+    /// The fault code nearest to it.
+    pub fault: FaultCode,
+    message: String,
+}
+
+impl SetUpError {
+    fn new(fault: FaultCode, message: impl Into<String>) -> Self {
+        let message = message.into();
+        Self { fault, message }
+    }
+}
+
+impl From<SessionError> for SetUpError {
+    fn from(error: SessionError) -> Self {
+        Self::new(FaultCode::LinkLost, error.to_string())
+    }
 }
 
 /// What an arm is set up for.
@@ -207,10 +139,14 @@ impl SetUp<'_> {
         let q = wait_still(session)?;
         reported("still", "the arm stands");
         match self.limits.position_violation(&q) {
-            Some(j) => Err(SetUpError::OutsideRange {
-                joint: j.saturating_add(1),
-                q_rad: q[j],
-            }),
+            Some(j) => Err(SetUpError::new(
+                FaultCode::SetpointPosition,
+                format!(
+                    "joint {} stands at {:.4} rad, outside its range: move it back with the vendor's tool",
+                    j.saturating_add(1),
+                    q[j]
+                ),
+            )),
             None => Ok(ReadyArm { q, version }),
         }
     }
@@ -222,36 +158,41 @@ impl SetUp<'_> {
             _ => String::new(),
         };
         let checked = ArmVersion::parse(&text).and_then(|v| v.check().map(|()| v));
-        let version = checked.map_err(|reason| SetUpError::Version {
-            arm: session.address(),
-            text,
-            reason,
+        let version = checked.map_err(|reason| {
+            let arm = session.address();
+            let message = format!("the arm at {arm} says `{text}`: {reason}");
+            SetUpError::new(FaultCode::UnsupportedFirmware, message)
         })?;
         // Every firmware that passes is new enough for protocol 3.
         session.keep_heartbeat();
         match version.wider_than_the_arm(self.limits) {
-            Some((joint, limit_rad)) => Err(SetUpError::Range {
-                joint: joint.saturating_add(1),
-                limit_rad,
-            }),
+            Some((joint, limit_rad)) => Err(SetUpError::new(
+                FaultCode::ArmDiffers,
+                format!(
+                    "joint {} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms",
+                    joint.saturating_add(1)
+                ),
+            )),
             None => Ok(version),
         }
     }
 
     /// Compares the size of the reports with what the firmware is known to send.
     fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
-        let refuse = |address: SocketAddr, found, sizes: &RangeInclusive<usize>| {
-            let (least, most) = (sizes.start(), sizes.end());
-            Err(SetUpError::Layout {
-                port: address.port(),
-                firmware,
-                found,
-                expected: if least == most {
-                    least.to_string()
-                } else {
-                    format!("{least} to {most}")
-                },
-            })
+        // Fields may lie elsewhere in reports of another size.
+        let refuse = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
+            let (port, least, most) = (address.port(), sizes.start(), sizes.end());
+            let expected = if least == most {
+                least.to_string()
+            } else {
+                format!("{least} to {most}")
+            };
+            Err(SetUpError::new(
+                FaultCode::UnsupportedFirmware,
+                format!(
+                    "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
+                ),
+            ))
         };
         let status = read_report(self.status)?.len();
         let sizes = firmware.rich_sizes();
@@ -276,13 +217,8 @@ impl SetUp<'_> {
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
         let status = read_report(self.status)?;
-        let arm_m = NormalReport::parse(&status)
-            .map_err(|e| SetUpError::NoStatus {
-                address: self.status,
-                reason: std::io::Error::other(e.to_string()),
-            })?
-            .tcp_offset
-            .position_m;
+        let report = NormalReport::parse(&status).map_err(|e| no_status(self.status, e))?;
+        let arm_m = report.tcp_offset.position_m;
         let apart_m = arm_m
             .iter()
             .zip(&configured_m)
@@ -293,10 +229,12 @@ impl SetUp<'_> {
             return Ok(format!("{configured_m:?} m as configured"));
         }
         match self.on_difference {
-            OnDifference::Refuse => Err(SetUpError::Tool {
-                arm_m,
-                configured_m,
-            }),
+            OnDifference::Refuse => Err(SetUpError::new(
+                FaultCode::ArmDiffers,
+                format!(
+                    "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: {SET_ONE}"
+                ),
+            )),
             OnDifference::Set => {
                 session.ask(&Command::TcpOffset(TcpPose {
                     position_m: configured_m,
@@ -326,10 +264,12 @@ impl SetUp<'_> {
             return Ok(format!("{configured_m_s:.3} m/s as configured"));
         }
         if self.on_difference == OnDifference::Refuse || !settable {
-            return Err(SetUpError::ToolSpeed {
-                arm_m_s,
-                configured_m_s,
-            });
+            return Err(SetUpError::new(
+                FaultCode::ArmDiffers,
+                format!(
+                    "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
+                ),
+            ));
         }
         let factor = configured_m_s / SPEED_AT_FACTOR_ONE_M_S;
         session.ask(&Command::SetSpeedLimitFactor(factor))?;
@@ -337,10 +277,16 @@ impl SetUp<'_> {
     }
 }
 
+fn no_status(address: SocketAddr, reason: impl core::fmt::Display) -> SetUpError {
+    SetUpError::new(
+        FaultCode::LinkLost,
+        format!("no status report from the arm at {address} ({reason}): check the report ports"),
+    )
+}
+
 /// The newest report of a port; one comes at once with every connection.
 fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
-    let fail = |reason| SetUpError::NoStatus { address, reason };
-    let other = |e: &dyn std::error::Error| fail(std::io::Error::other(e.to_string()));
+    let fail = |reason: std::io::Error| no_status(address, reason);
     let mut stream = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).map_err(fail)?;
     stream
         .set_read_timeout(Some(REPORT_TIMEOUT))
@@ -348,7 +294,7 @@ fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
     let mut reader = ReportReader::new();
     let mut received = 0;
     while received <= MAX_REPORT_LEN {
-        if let Some(frame) = reader.next_report().map_err(|e| other(&e))? {
+        if let Some(frame) = reader.next_report().map_err(|e| no_status(address, e))? {
             return Ok(frame.to_vec());
         }
         match stream.read(reader.space()).map_err(fail)? {
@@ -372,9 +318,15 @@ fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {
         }
         if began.elapsed() > READY_TIMEOUT {
             return Err(if error.is_none() {
-                SetUpError::NotReady { state }
+                SetUpError::new(
+                    FaultCode::ArmNotReady,
+                    format!(
+                        "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
+                    ),
+                )
             } else {
-                SetUpError::ArmError(error)
+                let message = format!("the arm keeps its error {error}");
+                SetUpError::new(FaultCode::ArmError, message)
             });
         }
         std::thread::sleep(STILL_INTERVAL);
@@ -395,5 +347,8 @@ fn wait_still(session: &mut ArmSession) -> Result<JointVector, SetUpError> {
         before = Some(q);
         std::thread::sleep(STILL_INTERVAL);
     }
-    Err(SetUpError::Restless)
+    Err(SetUpError::new(
+        FaultCode::ArmNotReady,
+        "the arm does not stand still: stop other programs that move it",
+    ))
 }

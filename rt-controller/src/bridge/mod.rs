@@ -19,6 +19,7 @@ use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
 use crate::ports::{BridgePorts, Retired};
+use crate::recording::ChunkWriter;
 use crate::session::ArmSession;
 use crate::set_up::OnDifference;
 use crate::transport::tcp::{LinkSettings, TcpLink};
@@ -86,23 +87,24 @@ impl ArmSettings {
 }
 
 /// A call that is answered later.
-enum Open {
-    /// Motions in order; the last one is what was asked for.
+struct Open {
+    call: ControllerCall,
+    awaits: Awaited,
+}
+
+/// What answers it.
+enum Awaited {
+    /// The end of motions in order; the last one is what was asked for.
     Motion {
-        call: ControllerCall,
         id: u64,
         next: VecDeque<Box<Motion>>,
     },
-    /// Answered when the controller is armed.
-    Arming { call: ControllerCall },
-    /// Answered when the arm is latched.
-    Stop { call: ControllerCall },
-    /// Answered when the loop holds the arm and joint reports come.
-    Engagement {
-        call: ControllerCall,
-        engaged: bool,
-        until: Instant,
-    },
+    /// The controller is armed.
+    Armed,
+    /// The arm is latched.
+    Stopped,
+    /// The loop holds the arm, and joint reports come.
+    Engaged { held: bool, until: Instant },
 }
 
 /// The bridge and all it owns. Lives in the thread that opened it.
@@ -204,7 +206,7 @@ impl Bridge {
 
     /// Hands out what is recorded but not sent yet; the last thing to do.
     pub fn end_recording(&mut self) {
-        self.recording.flush();
+        self.recording.add(ChunkWriter::flush);
     }
 
     /// Asks the loop to brake and latch.
@@ -228,10 +230,10 @@ impl Bridge {
             self.newest = record;
             failed = self.cycles.send_copy(record).err().or(failed);
             if let Some(state) = self.ports.state_before(record.cycle) {
-                self.recording.state(&state);
+                self.recording.add(|writer| writer.keyframe(&state));
             }
             if let Some(cycle) = self.ports.recorded(record) {
-                self.recording.cycle(&cycle);
+                self.recording.add(|writer| writer.cycle(&cycle));
             }
         }
         while let Ok(report) = self.ports.reports.pop() {
@@ -273,32 +275,44 @@ impl Bridge {
             ControlEvent::Engaged => {
                 self.arm_error = ErrorCode::NONE;
                 for open in &mut self.open {
-                    if let Open::Engagement { engaged, .. } = open {
-                        *engaged = true;
+                    if let Awaited::Engaged { held, .. } = &mut open.awaits {
+                        *held = true;
                     }
                 }
             }
             ControlEvent::Started { id, start_ns } => {
-                if let Some(Open::Motion { call, next, .. }) = self.motion(id)
-                    && next.is_empty()
-                {
-                    answer(call, &ControllerEvent::Started { start_ns });
+                for open in &self.open {
+                    if matches!(&open.awaits, Awaited::Motion { id: its, next } if *its == id && next.is_empty())
+                    {
+                        answer(&open.call, &ControllerEvent::Started { start_ns });
+                    }
                 }
             }
             ControlEvent::Finished {
                 id,
                 start_ns,
                 end_ns,
-            } => self.on_finished(id, start_ns, end_ns),
-            ControlEvent::Refused { id, fault } => self.on_refused(id, fault),
+            } => self.on_finished(id, &ControllerEvent::Finished { start_ns, end_ns }),
+            ControlEvent::Refused { id, fault } => {
+                let refused = |awaits: &mut Awaited| match (awaits, id) {
+                    (Awaited::Motion { id, .. }, Some(refused)) => *id == refused,
+                    (Awaited::Armed | Awaited::Engaged { .. }, None) => true,
+                    _ => false,
+                };
+                for open in self.take(refused) {
+                    refuse(&open.call, fault, "");
+                }
+            }
             ControlEvent::Latched(cause) => {
-                self.recording.cause(&cause);
+                self.recording.writer.cause(&cause);
                 self.on_latched(cause.fault(), cause.cycle);
             }
             ControlEvent::Armed(arming) => {
                 tracing::info!(?arming, "armed");
                 self.operating_mode = Some(arming.operating_mode);
-                self.settle_armings(|call| answer(call, &ControllerEvent::Done));
+                for open in self.take(|awaits| matches!(awaits, Awaited::Armed)) {
+                    answer(&open.call, &ControllerEvent::Done);
+                }
             }
             ControlEvent::Disarmed { fault } => {
                 tracing::info!(?fault, "disarmed");
@@ -307,60 +321,31 @@ impl Bridge {
         }
     }
 
-    fn motion(&mut self, motion: u64) -> Option<&mut Open> {
-        self.open
-            .iter_mut()
-            .find(|open| matches!(open, Open::Motion { id, .. } if *id == motion))
+    /// Takes the open calls that await something of this kind.
+    fn take(&mut self, kind: impl Fn(&mut Awaited) -> bool) -> Vec<Open> {
+        let taken = self.open.extract_if(.., |open| kind(&mut open.awaits));
+        taken.collect()
     }
 
-    /// Takes the call of a motion, if it is still open.
-    fn take_motion(&mut self, motion: u64) -> Option<Open> {
-        let at = self
-            .open
-            .iter()
-            .position(|open| matches!(open, Open::Motion { id, .. } if *id == motion))?;
-        Some(self.open.swap_remove(at))
-    }
-
-    fn on_finished(&mut self, id: u64, start_ns: u64, end_ns: u64) {
-        let Some(Open::Motion { call, mut next, .. }) = self.take_motion(id) else {
-            return;
-        };
-        match next.pop_front() {
-            None => answer(&call, &ControllerEvent::Finished { start_ns, end_ns }),
-            Some(motion) => self.begin(call, motion, next),
-        }
-    }
-
-    fn on_refused(&mut self, id: Option<u64>, fault: FaultCode) {
-        match id {
-            Some(id) => {
-                if let Some(Open::Motion { call, .. }) = self.take_motion(id) {
-                    refuse(&call, fault, "");
-                }
-            }
-            None => {
-                self.settle_armings(|call| refuse(call, fault, ""));
-                self.open.retain(|open| {
-                    let Open::Engagement { call, .. } = open else {
-                        return true;
-                    };
-                    refuse(call, fault, "");
-                    false
-                });
+    /// Goes on to the next motion of a call, or answers it.
+    fn on_finished(&mut self, finished: u64, event: &ControllerEvent) {
+        let its =
+            |awaits: &mut Awaited| matches!(awaits, Awaited::Motion { id, .. } if *id == finished);
+        for Open { call, awaits } in self.take(its) {
+            let Awaited::Motion { mut next, .. } = awaits else {
+                continue;
+            };
+            match next.pop_front() {
+                None => answer(&call, event),
+                Some(motion) => self.begin(call, motion, next),
             }
         }
     }
 
-    /// Tells everybody who asked for an arming what came of it.
-    fn settle_armings(&mut self, tell: impl Fn(&ControllerCall)) {
-        self.open.retain(|open| match open {
-            Open::Arming { call } => {
-                tell(call);
-                false
-            }
-            Open::Engagement { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
-        });
+    /// Whether a motion is under way for a caller.
+    fn moves(&self) -> bool {
+        let motion = |open: &Open| matches!(open.awaits, Awaited::Motion { .. });
+        self.open.iter().any(motion)
     }
 
     fn on_latched(&mut self, fault: FaultCode, cycle: u64) {
@@ -374,21 +359,17 @@ impl Bridge {
         if !self.arm_error.is_none() {
             fault = FaultCode::ArmError;
         }
-        let moved = self
-            .open
-            .iter()
-            .any(|open| matches!(open, Open::Motion { .. }));
-        if fault == FaultCode::OperatorStop && !moved {
+        if fault == FaultCode::OperatorStop && !self.moves() {
             // How every session ends: nothing moved, nothing is wrong.
             tracing::info!(cycle, "commanded to stop at rest");
         } else {
             tracing::warn!(?fault, cycle, arm_error = %self.arm_error, "stopped");
         }
-        for open in self.open.drain(..) {
-            match open {
-                Open::Motion { call, .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
-                Open::Stop { call } => answer(&call, &ControllerEvent::Done),
-                Open::Engagement { call, .. } | Open::Arming { call } => refuse(&call, fault, ""),
+        for Open { call, awaits } in self.open.drain(..) {
+            match awaits {
+                Awaited::Motion { .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
+                Awaited::Stopped => answer(&call, &ControllerEvent::Done),
+                Awaited::Engaged { .. } | Awaited::Armed => refuse(&call, fault, ""),
             }
         }
     }
@@ -403,9 +384,12 @@ impl Bridge {
     fn begin(&mut self, call: ControllerCall, motion: Box<Motion>, next: VecDeque<Box<Motion>>) {
         self.last_id += 1;
         let id = self.last_id;
-        self.recording.motion(id, &motion);
+        self.recording.writer.motion(id, &motion);
         match self.command(ControlCommand::Run { id, motion }, None) {
-            Ok(()) => self.open.push(Open::Motion { call, id, next }),
+            Ok(()) => {
+                let awaits = Awaited::Motion { id, next };
+                self.open.push(Open { call, awaits });
+            }
             Err(fault) => refuse(&call, fault, ""),
         }
     }
@@ -416,23 +400,16 @@ impl Bridge {
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
-        self.open.retain(|open| match open {
-            Open::Engagement {
-                call,
-                engaged: true,
-                ..
-            } if fresh => {
-                answer(call, &ControllerEvent::Done);
-                false
-            }
-            Open::Engagement { call, until, .. } if Instant::now() > *until => {
-                refuse(call, FaultCode::ReportStale, "");
-                false
-            }
-            Open::Engagement { .. }
-            | Open::Arming { .. }
-            | Open::Motion { .. }
-            | Open::Stop { .. } => true,
-        });
+        let done =
+            |awaits: &mut Awaited| matches!(awaits, Awaited::Engaged { held: true, .. }) && fresh;
+        for open in self.take(done) {
+            answer(&open.call, &ControllerEvent::Done);
+        }
+        let now = Instant::now();
+        for open in
+            self.take(|awaits| matches!(awaits, Awaited::Engaged { until, .. } if now > *until))
+        {
+            refuse(&open.call, FaultCode::ReportStale, "");
+        }
     }
 }

@@ -1,15 +1,15 @@
 //! What each request of the controller's service leads to.
 
 use super::answers::{ControllerCall, answer, refuse};
-use super::{Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
+use super::{Awaited, Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
 use crate::control::{ControlCommand, Motion};
 use crate::os::now_ns;
 use crate::point_to_point::{MoveError, plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
-use crate::transport::command_interface::arm_mode;
 use crate::transport::tcp::TcpLink;
+use crate::xarm::Mode;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
@@ -116,10 +116,7 @@ impl Bridge {
             expires_ns: now_ns().saturating_add(ARMED_FOR_NS),
             area_clear,
         };
-        match self.command(ControlCommand::Arm(arming), None) {
-            Ok(()) => self.open.push(Open::Arming { call }),
-            Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
-        }
+        self.pass_on(call, ControlCommand::Arm(arming), None, Awaited::Armed);
     }
 
     fn serve_stop(&mut self, call: ControllerCall) {
@@ -130,10 +127,23 @@ impl Bridge {
             ControllerMode::Idle
             | ControllerMode::Moving
             | ControllerMode::Streaming
-            | ControllerMode::Braking => match self.command(ControlCommand::Stop, None) {
-                Ok(()) => self.open.push(Open::Stop { call }),
-                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
-            },
+            | ControllerMode::Braking => {
+                self.pass_on(call, ControlCommand::Stop, None, Awaited::Stopped);
+            }
+        }
+    }
+
+    /// Hands a command to the loop; what it `awaits` will answer the call.
+    fn pass_on(
+        &mut self,
+        call: ControllerCall,
+        command: ControlCommand,
+        link: Option<Box<TcpLink>>,
+        awaits: Awaited,
+    ) {
+        match self.command(command, link) {
+            Ok(()) => self.open.push(Open { call, awaits }),
+            Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
         }
     }
 
@@ -141,14 +151,11 @@ impl Bridge {
     /// link to the loop. Nothing moves meanwhile, so waiting is harmless.
     fn set_up(&mut self, call: ControllerCall) {
         match self.prepare(&call) {
-            Ok((hold, link)) => match self.command(ControlCommand::Engage { hold }, Some(link)) {
-                Ok(()) => self.open.push(Open::Engagement {
-                    call,
-                    engaged: false,
-                    until: Instant::now() + REPORT_WAIT,
-                }),
-                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
-            },
+            Ok((hold, link)) => {
+                let until = Instant::now() + REPORT_WAIT;
+                let awaits = Awaited::Engaged { held: false, until };
+                self.pass_on(call, ControlCommand::Engage { hold }, Some(link), awaits);
+            }
             Err((fault, detail)) => refuse(&call, fault, &detail),
         }
     }
@@ -166,7 +173,7 @@ impl Bridge {
         }
         let plan = SetUp {
             limits: &self.arm.limits,
-            mode: arm_mode(self.arm.interface),
+            mode: Mode::from_code(self.arm.interface.arm_mode()),
             status: self.arm.status,
             joints: self.arm.joints,
             on_difference: self.arm.on_difference,
@@ -190,18 +197,14 @@ impl Bridge {
                 })?;
                 Ok((ready.q, Box::new(link)))
             })
-            .map_err(|error| (fault_of(&error), error.to_string()))
+            .map_err(|error| (error.fault, error.to_string()))
     }
 
     /// Whether a motion may be asked for; refuses the call otherwise.
     fn may_move(&self, call: &ControllerCall) -> bool {
-        let busy = self
-            .open
-            .iter()
-            .any(|open| matches!(open, Open::Motion { .. }));
         if self.mode() != ControllerMode::Idle {
             self.wrong_mode(call, "motions begin when it is Idle");
-        } else if busy {
+        } else if self.moves() {
             refuse(call, FaultCode::WrongMode, "another motion is under way");
         } else {
             return true;
@@ -286,19 +289,5 @@ impl Bridge {
         }
         motions.push_back(Box::new(motion));
         Ok(motions)
-    }
-}
-
-/// The fault code nearest to what went wrong while the arm was set up.
-fn fault_of(error: &SetUpError) -> FaultCode {
-    match error {
-        SetUpError::Session(_) | SetUpError::NoStatus { .. } => FaultCode::LinkLost,
-        SetUpError::Version { .. } | SetUpError::Layout { .. } => FaultCode::UnsupportedFirmware,
-        SetUpError::Range { .. } | SetUpError::Tool { .. } | SetUpError::ToolSpeed { .. } => {
-            FaultCode::ArmDiffers
-        }
-        SetUpError::ArmError(_) => FaultCode::ArmError,
-        SetUpError::NotReady { .. } | SetUpError::Restless => FaultCode::ArmNotReady,
-        SetUpError::OutsideRange { .. } => FaultCode::SetpointPosition,
     }
 }

@@ -93,17 +93,7 @@ fn set_up_thread(config: &ControllerConfig) -> Result<(), ControllerError> {
         cpu: None,
         ..config.real_time.clone()
     };
-    let warnings: Vec<String> = enter_real_time(&settings)
-        .iter()
-        .map(ToString::to_string)
-        .collect();
-    for warning in &warnings {
-        tracing::warn!("{warning}");
-    }
-    if settings.require && !warnings.is_empty() {
-        return Err(ControllerError::NotRealTime(warnings));
-    }
-    Ok(())
+    ControllerError::unless_real_time(&settings, enter_real_time(&settings)).map(drop)
 }
 
 /// Runs the watchdog: its connection to the arm, the controller it watches.

@@ -55,13 +55,7 @@ mod tests {
 
     #[test]
     fn it_takes_as_long_as_it_is_told_to() {
-        let ordinary = RealTimeSettings {
-            priority: None,
-            cpu: None,
-            lock_memory: false,
-            require: false,
-            warm_up_us: 0,
-        };
+        let ordinary = RealTimeSettings::ordinary();
         let [period, span] = [1, 20].map(Duration::from_millis);
         let spans_ns = bare_slice(&ordinary, 50_000, period, span).unwrap();
         assert_eq!(spans_ns.len(), 20);

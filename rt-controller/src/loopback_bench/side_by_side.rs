@@ -64,7 +64,7 @@ impl SideBySide {
         }
         let _load = Load::begin(&loaded)?;
         let domain = format!("bench-rt-{}", std::process::id());
-        let mut bench = LoopbackBench::new(&domain, real_time.clone())?;
+        let mut bench = LoopbackBench::new(&domain, &real_time)?;
         let mut measured = Self {
             ours: Vec::new(),
             bare: Vec::new(),

@@ -402,9 +402,5 @@ mod bench;
 mod tests;
 
 #[cfg(test)]
-#[path = "reaction_tests.rs"]
-mod reaction_tests;
-
-#[cfg(test)]
 #[path = "random_tests.rs"]
 mod random_tests;

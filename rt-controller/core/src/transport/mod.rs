@@ -1,7 +1,6 @@
 //! How setpoints reach an arm and replies come back: what the cycle asks of a
 //! command link. Sockets are not here.
 
-pub mod command_interface;
 pub mod slot;
 
 use crate::control::LinkInput;

@@ -1,6 +1,5 @@
 //! The place of the loop's command link: empty, connected, or just broken.
 
-use super::command_interface::request;
 use super::{ArmTransport, MAX_COMMANDS};
 use crate::control::{ArmCommand, LinkInput};
 use crate::xarm::{Command, StateRequest};
@@ -67,5 +66,49 @@ impl<T: ArmTransport> LinkSlot<T> {
             let _ = commands.push(command);
         }
         self.lost |= link.send(&commands, now_ns).is_err();
+    }
+}
+
+/// The request that carries `command`: register 29 for positions, register 81 with a
+/// duration (firmware 1.8) for velocities. `None` for a command of the other
+/// interface, which must never be sent in this mode. RT-safe.
+fn request(interface: CommandInterface, command: &ArmCommand) -> Option<Command> {
+    match (interface, command) {
+        (CommandInterface::ServoPosition, ArmCommand::Position(q)) => Some(Command::ServoJoint(*q)),
+        // Without a duration the arm would move on for ever.
+        (CommandInterface::JointVelocity, ArmCommand::Velocity { qd, duration_s })
+            if *duration_s > 0.0 =>
+        {
+            Some(Command::JointVelocity {
+                velocity: *qd,
+                // Each joint takes its own velocity at once; waiting for the
+                // slowest would bend the path.
+                synchronised: false,
+                duration_s: Some(*duration_s),
+            })
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use CommandInterface::{JointVelocity, ServoPosition};
+    use arm_model::JointVector;
+
+    #[test]
+    fn each_interface_carries_its_own_commands_only() {
+        let q = JointVector::splat(0.3);
+        let position = ArmCommand::Position(q);
+        let velocity = |duration_s| ArmCommand::Velocity { qd: q, duration_s };
+        let servo = Some(Command::ServoJoint(q));
+        assert_eq!(request(ServoPosition, &position), servo);
+        assert_eq!(request(ServoPosition, &velocity(0.012)), None);
+        assert_eq!(request(JointVelocity, &position), None);
+        assert!(request(JointVelocity, &velocity(0.012)).is_some());
+        for endless in [0.0, -1.0, f64::NAN] {
+            assert_eq!(request(JointVelocity, &velocity(endless)), None);
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Typed data of replies, in SI units.
 
-use super::bytes::{ByteReader, ByteWriter, EmitError};
+use super::bytes::{ByteReader, EmitError, Fields};
 use super::command::{Command, JointQuery};
-use super::frame::{self, Reply};
+use super::frame::{Reply, Request, emit_frame};
 use super::pose::TcpPose;
 use super::status::ArmState;
 use arm_model::JointVector;
@@ -130,20 +130,27 @@ impl ReplyData {
         if reply.status.is_invalid() {
             return Err(ReplyError::Invalid { register: asked });
         }
-        Self::parse_data(command, reply.data).ok_or(ReplyError::TooShort {
-            register: asked,
-            given: reply.data.len(),
-        })
+        let mut data = Self::blank(command);
+        let mut bytes = ByteReader::new(reply.data);
+        data.fields(&mut bytes);
+        if bytes.found_all() {
+            Ok(data)
+        } else {
+            Err(ReplyError::TooShort {
+                register: asked,
+                given: reply.data.len(),
+            })
+        }
     }
 
-    fn parse_data(command: &Command, data: &[u8]) -> Option<Self> {
-        let mut bytes = ByteReader::new(data);
-        Some(match command {
-            Command::Version | Command::SerialNumbers => Self::Text(Text(bytes.array()?)),
-            Command::GetState => Self::State(ArmState::from_code(bytes.u8()?)),
+    /// What the reply to `command` holds, its values not known yet.
+    fn blank(command: &Command) -> Self {
+        match command {
+            Command::Version | Command::SerialNumbers => Self::Text(Text([0; TEXT_LEN])),
+            Command::GetState => Self::State(ArmState::default()),
             Command::GetFault => Self::Fault {
-                error: bytes.u8()?,
-                warning: bytes.u8()?,
+                error: 0,
+                warning: 0,
             },
             Command::MoveJoint {
                 checked: Some(_), ..
@@ -151,48 +158,46 @@ impl ReplyData {
             | Command::MoveHome {
                 checked: Some(_), ..
             } => Self::CheckedMove {
-                buffered: bytes.u16_be()?,
-                result: bytes.u8()?,
+                buffered: 0,
+                result: 0,
             },
             Command::Buffered
             | Command::MoveJoint { .. }
             | Command::MoveHome { .. }
             | Command::JointJerk(_)
-            | Command::JointAcceleration(_) => Self::Buffered(bytes.u16_be()?),
-            Command::TcpPose | Command::ForwardKinematics(_) => {
-                Self::Pose(TcpPose::parse(&mut bytes)?)
-            }
-            Command::JointPosition(JointQuery::Commanded) => Self::Joints(bytes.joints()?),
+            | Command::JointAcceleration(_) => Self::Buffered(0),
+            Command::TcpPose | Command::ForwardKinematics(_) => Self::Pose(TcpPose::default()),
+            Command::JointPosition(JointQuery::Commanded) => Self::Joints(JointVector::ZERO),
             Command::JointPosition(JointQuery::Quantities { quantities, .. }) => {
-                let mut next = |index| {
-                    if *quantities > index {
-                        bytes.joints()
-                    } else {
-                        Some(JointVector::ZERO)
-                    }
-                };
                 Self::JointMotion {
                     quantities: *quantities,
-                    position: next(0)?,
-                    velocity: next(1)?,
-                    effort: next(2)?,
+                    position: JointVector::ZERO,
+                    velocity: JointVector::ZERO,
+                    effort: JointVector::ZERO,
                 }
             }
-            Command::JointLimitTest(_) => Self::OutsideLimits(bytes.u8()? != 0),
-            Command::GetSpeedLimitFactor => Self::SpeedLimitFactor(bytes.f32_le()?),
+            Command::JointLimitTest(_) => Self::OutsideLimits(false),
+            Command::GetSpeedLimitFactor => Self::SpeedLimitFactor(0.0),
             _ => Self::None,
-        })
+        }
     }
 
-    fn emit_data(&self, out: &mut ByteWriter<'_>) -> Result<(), EmitError> {
+    fn fields(&mut self, wire: &mut impl Fields) {
         match self {
-            Self::None => Ok(()),
-            Self::Text(text) => out.bytes(&text.0),
-            Self::State(state) => out.u8(state.code()),
-            Self::Buffered(count) => out.u16_be(*count),
-            Self::Fault { error, warning } => out.bytes(&[*error, *warning]),
-            Self::Pose(pose) => pose.emit(out),
-            Self::Joints(q) => out.joints(q),
+            Self::None => {}
+            Self::Text(text) => wire.array(&mut text.0),
+            Self::State(state) => {
+                let mut code = state.code();
+                wire.u8(&mut code);
+                *state = ArmState::from_code(code);
+            }
+            Self::Buffered(count) => wire.u16_be(count),
+            Self::Fault { error, warning } => {
+                wire.u8(error);
+                wire.u8(warning);
+            }
+            Self::Pose(pose) => pose.fields(wire),
+            Self::Joints(q) => wire.joints(q),
             Self::JointMotion {
                 quantities,
                 position,
@@ -201,39 +206,32 @@ impl ReplyData {
             } => [position, velocity, effort]
                 .into_iter()
                 .take(usize::from(*quantities))
-                .try_for_each(|v| out.joints(v)),
-            Self::OutsideLimits(outside) => out.u8(u8::from(*outside)),
-            Self::SpeedLimitFactor(factor) => out.f32_le(*factor),
+                .for_each(|v| wire.joints(v)),
+            Self::OutsideLimits(outside) => wire.flag(outside),
+            Self::SpeedLimitFactor(factor) => wire.f32_le(factor),
             Self::CheckedMove { buffered, result } => {
-                out.u16_be(*buffered)?;
-                out.u8(*result)
+                wire.u16_be(buffered);
+                wire.u8(result);
             }
         }
     }
 
     /// Writes the whole reply frame to the front of `out` and returns its
-    /// length; [`frame::MAX_FRAME_LEN`] bytes are always enough.
+    /// length; [`MAX_FRAME_LEN`](super::frame::MAX_FRAME_LEN) bytes are always enough.
     ///
     /// # Errors
     /// [`EmitError::BufferTooSmall`].
     pub fn emit(
         &self,
         out: &mut [u8],
-        request: &frame::Request<'_>,
+        request: &Request<'_>,
         status: super::Status,
     ) -> Result<usize, EmitError> {
-        let mut data = [0; frame::MAX_BODY_LEN];
-        let mut writer = ByteWriter::new(&mut data);
-        self.emit_data(&mut writer)?;
-        let len = writer.len();
-        Reply {
-            transaction: request.transaction,
-            protocol: request.protocol,
-            register: request.register,
-            status,
-            data: data.get(..len).unwrap_or_default(),
-        }
-        .emit(out)
+        emit_frame(out, request.transaction, request.protocol, |body| {
+            body.bytes(&[request.register, status.0]);
+            let mut data = *self;
+            data.fields(body);
+        })
     }
 }
 

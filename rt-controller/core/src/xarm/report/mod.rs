@@ -20,7 +20,7 @@ pub use periodic::{
 };
 pub use realtime::{REALTIME_REPORT_LEN, RealtimeReport};
 
-use super::bytes::{ByteReader, ByteWriter, EmitError};
+use super::bytes::{ByteReader, ByteWriter, EmitError, Fields};
 use super::status::{ArmState, Mode};
 
 /// Longest report frame.
@@ -36,27 +36,42 @@ pub struct ReportTooShort {
     pub needed: usize,
 }
 
+/// The size of the frame, which it begins with; not looked at when read.
+fn size_field(wire: &mut impl Fields, size: usize) {
+    wire.u32_be(&mut u32::try_from(size).unwrap_or(u32::MAX));
+}
+
 /// The byte that holds state (low nibble) and mode (high nibble).
-fn emit_state(out: &mut ByteWriter<'_>, state: ArmState, mode: Mode) -> Result<(), EmitError> {
-    out.u8((state.code() & 0x0F) | (mode.code() << 4))
+fn state_field(wire: &mut impl Fields, state: &mut ArmState, mode: &mut Mode) {
+    let mut byte = (state.code() & 0x0F) | (mode.code() << 4);
+    wire.u8(&mut byte);
+    (*state, *mode) = (ArmState::from_code(byte & 0x0F), Mode::from_code(byte >> 4));
 }
 
-fn parse_state(bytes: &mut ByteReader<'_>) -> Option<(ArmState, Mode)> {
-    let byte = bytes.u8()?;
-    Some((ArmState::from_code(byte & 0x0F), Mode::from_code(byte >> 4)))
+/// Writes the `fields` of a report to the front of `out`; returns their length.
+fn emit<T: Clone>(
+    report: &T,
+    out: &mut [u8],
+    fields: impl FnOnce(&mut T, &mut ByteWriter<'_>),
+) -> Result<usize, EmitError> {
+    let mut writer = ByteWriter::new(out);
+    fields(&mut report.clone(), &mut writer);
+    writer.finish()
 }
 
-/// Reads a frame of at least `needed` bytes.
-fn parse<'a, T>(
-    frame: &'a [u8],
+/// Reads the `fields` of a report from a frame of at least `needed` bytes.
+fn parse<T: Default>(
+    frame: &[u8],
     needed: usize,
-    read: impl FnOnce(&'a [u8]) -> Option<T>,
+    fields: impl FnOnce(&mut T, &mut ByteReader<'_>),
 ) -> Result<T, ReportTooShort> {
     let given = frame.len();
-    (given >= needed)
-        .then(|| read(frame))
-        .flatten()
-        .ok_or(ReportTooShort { given, needed })
+    if given < needed {
+        return Err(ReportTooShort { given, needed });
+    }
+    let mut report = T::default();
+    fields(&mut report, &mut ByteReader::new(frame));
+    Ok(report)
 }
 
 #[cfg(test)]
