@@ -7,7 +7,7 @@
 //! | arm status | 5 Hz report connection | ordinary |
 //! | bridge (the caller's) | services, histograms, set-up connection | ordinary |
 
-use crate::bridge::{ArmSettings, Bridge};
+use crate::bridge::Bridge;
 use crate::config::ControllerConfig;
 use crate::control::ControlState;
 use crate::error::ControllerError;
@@ -86,17 +86,15 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     };
     // Each is kept before the next is spawned: if that fails, it is ended and joined.
     let receiver = joints.spawn("joint reports", priority);
-    let receiver = receiver.map_err(ControllerError::Thread)?;
-    threads.receivers.push(receiver);
+    threads
+        .receivers
+        .push(receiver.map_err(ControllerError::Thread)?);
     let receiver = codes.spawn("arm status", None);
-    let receiver = receiver.map_err(ControllerError::Thread)?;
-    threads.receivers.push(receiver);
-    let mut bridge = Bridge::open(
-        &bus,
-        ArmSettings::of(&config, limits, &settings.thresholds),
-        warnings,
-        rings.bridge,
-    )?;
+    threads
+        .receivers
+        .push(receiver.map_err(ControllerError::Thread)?);
+    let held_to = (limits, settings.thresholds);
+    let mut bridge = Bridge::open(&bus, config, held_to, warnings, rings.bridge)?;
     serve(&mut bridge, &threads, stop)
 }
 

@@ -60,16 +60,17 @@ pub struct SetUpError {
     message: String,
 }
 
-impl SetUpError {
-    fn new(fault: FaultCode, message: impl Into<String>) -> Self {
-        let message = message.into();
-        Self { fault, message }
-    }
+/// Refuses an arm.
+fn refuse<T>(fault: FaultCode, message: String) -> Result<T, SetUpError> {
+    Err(SetUpError { fault, message })
 }
 
 impl From<SessionError> for SetUpError {
     fn from(error: SessionError) -> Self {
-        Self::new(FaultCode::LinkLost, error.to_string())
+        Self {
+            fault: FaultCode::LinkLost,
+            message: error.to_string(),
+        }
     }
 }
 
@@ -139,14 +140,13 @@ impl SetUp<'_> {
         let q = wait_still(session)?;
         reported("still", "the arm stands");
         match self.limits.position_violation(&q) {
-            Some(j) => Err(SetUpError::new(
-                FaultCode::SetpointPosition,
-                format!(
-                    "joint {} stands at {:.4} rad, outside its range: move it back with the vendor's tool",
-                    j.saturating_add(1),
-                    q[j]
-                ),
-            )),
+            Some(j) => {
+                let (joint, q_rad) = (j.saturating_add(1), q[j]);
+                let message = format!(
+                    "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
+                );
+                refuse(FaultCode::SetpointPosition, message)
+            }
             None => Ok(ReadyArm { q, version }),
         }
     }
@@ -158,21 +158,21 @@ impl SetUp<'_> {
             _ => String::new(),
         };
         let checked = ArmVersion::parse(&text).and_then(|v| v.check().map(|()| v));
-        let version = checked.map_err(|reason| {
+        let version = checked.or_else(|reason| {
             let arm = session.address();
             let message = format!("the arm at {arm} says `{text}`: {reason}");
-            SetUpError::new(FaultCode::UnsupportedFirmware, message)
+            refuse(FaultCode::UnsupportedFirmware, message)
         })?;
         // Every firmware that passes is new enough for protocol 3.
         session.keep_heartbeat();
         match version.wider_than_the_arm(self.limits) {
-            Some((joint, limit_rad)) => Err(SetUpError::new(
-                FaultCode::ArmDiffers,
-                format!(
-                    "joint {} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms",
-                    joint.saturating_add(1)
-                ),
-            )),
+            Some((j, limit_rad)) => {
+                let joint = j.saturating_add(1);
+                let message = format!(
+                    "joint {joint} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms"
+                );
+                refuse(FaultCode::ArmDiffers, message)
+            }
             None => Ok(version),
         }
     }
@@ -180,25 +180,23 @@ impl SetUp<'_> {
     /// Compares the size of the reports with what the firmware is known to send.
     fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
         // Fields may lie elsewhere in reports of another size.
-        let refuse = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
+        let other_size = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
             let (port, least, most) = (address.port(), sizes.start(), sizes.end());
             let expected = if least == most {
                 least.to_string()
             } else {
                 format!("{least} to {most}")
             };
-            Err(SetUpError::new(
-                FaultCode::UnsupportedFirmware,
-                format!(
-                    "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
-                ),
-            ))
+            let message = format!(
+                "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
+            );
+            refuse(FaultCode::UnsupportedFirmware, message)
         };
         let status = read_report(self.status)?.len();
         let sizes = firmware.rich_sizes();
         // The normal report is the same everywhere.
         if status != NORMAL_REPORT_LEN && !sizes.contains(&status) {
-            return refuse(self.status, status, &sizes);
+            return other_size(self.status, status, &sizes);
         }
         let sizes = firmware.realtime_sizes();
         match read_report(self.joints) {
@@ -206,7 +204,7 @@ impl SetUp<'_> {
                 "{} and {status} bytes, as of {firmware}",
                 report.len()
             )),
-            Ok(report) => refuse(self.joints, report.len(), &sizes),
+            Ok(report) => other_size(self.joints, report.len(), &sizes),
             // As many clients as it takes are there: the 100 Hz report serves.
             Err(reason) => Ok(format!(
                 "{status} bytes, as of {firmware}; no real-time report ({reason})"
@@ -217,7 +215,7 @@ impl SetUp<'_> {
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
         let status = read_report(self.status)?;
-        let report = NormalReport::parse(&status).map_err(|e| no_status(self.status, e))?;
+        let report = NormalReport::parse(&status).or_else(|e| no_status(self.status, e))?;
         let arm_m = report.tcp_offset.position_m;
         let apart_m = arm_m
             .iter()
@@ -229,12 +227,12 @@ impl SetUp<'_> {
             return Ok(format!("{configured_m:?} m as configured"));
         }
         match self.on_difference {
-            OnDifference::Refuse => Err(SetUpError::new(
-                FaultCode::ArmDiffers,
-                format!(
+            OnDifference::Refuse => {
+                let message = format!(
                     "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: {SET_ONE}"
-                ),
-            )),
+                );
+                refuse(FaultCode::ArmDiffers, message)
+            }
             OnDifference::Set => {
                 session.ask(&Command::TcpOffset(TcpPose {
                     position_m: configured_m,
@@ -264,12 +262,10 @@ impl SetUp<'_> {
             return Ok(format!("{configured_m_s:.3} m/s as configured"));
         }
         if self.on_difference == OnDifference::Refuse || !settable {
-            return Err(SetUpError::new(
-                FaultCode::ArmDiffers,
-                format!(
-                    "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
-                ),
-            ));
+            let message = format!(
+                "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
+            );
+            return refuse(FaultCode::ArmDiffers, message);
         }
         let factor = configured_m_s / SPEED_AT_FACTOR_ONE_M_S;
         session.ask(&Command::SetSpeedLimitFactor(factor))?;
@@ -277,27 +273,27 @@ impl SetUp<'_> {
     }
 }
 
-fn no_status(address: SocketAddr, reason: impl core::fmt::Display) -> SetUpError {
-    SetUpError::new(
-        FaultCode::LinkLost,
-        format!("no status report from the arm at {address} ({reason}): check the report ports"),
-    )
+fn no_status<T>(address: SocketAddr, reason: impl core::fmt::Display) -> Result<T, SetUpError> {
+    let message =
+        format!("no status report from the arm at {address} ({reason}): check the report ports");
+    refuse(FaultCode::LinkLost, message)
 }
 
 /// The newest report of a port; one comes at once with every connection.
 fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
-    let fail = |reason: std::io::Error| no_status(address, reason);
-    let mut stream = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).map_err(fail)?;
-    stream
-        .set_read_timeout(Some(REPORT_TIMEOUT))
-        .map_err(fail)?;
+    let connected = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).and_then(|stream| {
+        stream.set_read_timeout(Some(REPORT_TIMEOUT))?;
+        Ok(stream)
+    });
+    let mut stream = connected.or_else(|e| no_status(address, e))?;
     let mut reader = ReportReader::new();
     let mut received = 0;
     while received <= MAX_REPORT_LEN {
-        if let Some(frame) = reader.next_report().map_err(|e| no_status(address, e))? {
+        if let Some(frame) = reader.next_report().or_else(|e| no_status(address, e))? {
             return Ok(frame.to_vec());
         }
-        match stream.read(reader.space()).map_err(fail)? {
+        let read = stream.read(reader.space());
+        match read.or_else(|e| no_status(address, e))? {
             0 => break,
             n => {
                 reader.commit(n);
@@ -305,7 +301,10 @@ fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
             }
         }
     }
-    Err(fail(std::io::ErrorKind::UnexpectedEof.into()))
+    no_status(
+        address,
+        std::io::Error::from(std::io::ErrorKind::UnexpectedEof),
+    )
 }
 
 fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {
@@ -317,17 +316,14 @@ fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {
             return Ok(state);
         }
         if began.elapsed() > READY_TIMEOUT {
-            return Err(if error.is_none() {
-                SetUpError::new(
-                    FaultCode::ArmNotReady,
-                    format!(
-                        "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
-                    ),
-                )
-            } else {
+            if !error.is_none() {
                 let message = format!("the arm keeps its error {error}");
-                SetUpError::new(FaultCode::ArmError, message)
-            });
+                return refuse(FaultCode::ArmError, message);
+            }
+            let message = format!(
+                "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
+            );
+            return refuse(FaultCode::ArmNotReady, message);
         }
         std::thread::sleep(STILL_INTERVAL);
     }
@@ -347,8 +343,6 @@ fn wait_still(session: &mut ArmSession) -> Result<JointVector, SetUpError> {
         before = Some(q);
         std::thread::sleep(STILL_INTERVAL);
     }
-    Err(SetUpError::new(
-        FaultCode::ArmNotReady,
-        "the arm does not stand still: stop other programs that move it",
-    ))
+    let message = "the arm does not stand still: stop other programs that move it";
+    refuse(FaultCode::ArmNotReady, message.to_owned())
 }

@@ -21,8 +21,7 @@ use crate::os::now_ns;
 use crate::ports::{BridgePorts, Retired};
 use crate::recording::ChunkWriter;
 use crate::session::ArmSession;
-use crate::set_up::OnDifference;
-use crate::transport::tcp::{LinkSettings, TcpLink};
+use crate::transport::tcp::TcpLink;
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
 use arm_model::Limits;
@@ -33,7 +32,7 @@ use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
     Bus, ControllerMode, CyclePublisher, CycleRecord, JointPublisher, JointReport,
 };
-use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{FaultCode, OperatingMode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -45,46 +44,6 @@ const SET_UP_TIMEOUT: Duration = Duration::from_secs(2);
 const QUESTION_TIMEOUT: Duration = Duration::from_millis(200);
 /// Longest wait of a bring-up for the first joint report.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
-
-/// The arm, how it is set up, and what it is held to.
-#[derive(Debug, Clone)]
-pub struct ArmSettings {
-    /// Command port.
-    pub command: SocketAddr,
-    /// Port with its status.
-    pub status: SocketAddr,
-    /// Port with its joint reports.
-    pub joints: SocketAddr,
-    /// Limits it is held to.
-    pub limits: Limits,
-    /// What to do when it is configured otherwise.
-    pub on_difference: OnDifference,
-    /// How setpoints reach it.
-    pub interface: CommandInterface,
-    /// How its slowness is met.
-    pub link: LinkSettings,
-    /// Largest age of a joint report that counts as fresh (ns).
-    pub report_stale_ns: u64,
-}
-
-impl ArmSettings {
-    /// Of a checked configuration.
-    #[must_use]
-    pub fn of(config: &ControllerConfig, limits: Limits, thresholds: &Thresholds) -> Self {
-        let [status, _] = config.status_ports;
-        let period_ns = MonotonicNs(0).plus_s(limits.period_s()).0;
-        Self {
-            command: SocketAddr::new(config.arm, config.command_port),
-            status: SocketAddr::new(config.arm, status),
-            joints: SocketAddr::new(config.arm, config.report_port),
-            limits,
-            on_difference: config.on_difference,
-            interface: config.command_interface,
-            link: LinkSettings::new(thresholds.unanswered_max, period_ns),
-            report_stale_ns: thresholds.report_stale_ns,
-        }
-    }
-}
 
 /// A call that is answered later.
 struct Open {
@@ -109,7 +68,9 @@ enum Awaited {
 
 /// The bridge and all it owns. Lives in the thread that opened it.
 pub struct Bridge {
-    arm: ArmSettings,
+    config: ControllerConfig,
+    limits: Limits,
+    thresholds: Thresholds,
     commander: Option<CommanderLock>,
     warnings: Vec<String>,
     ports: BridgePorts<TcpLink>,
@@ -132,26 +93,30 @@ pub struct Bridge {
 impl core::fmt::Debug for Bridge {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Bridge")
-            .field("arm", &self.arm.command)
+            .field("arm", &self.config.arm)
             .field("open", &self.open.len())
             .finish_non_exhaustive()
     }
 }
 
 impl Bridge {
-    /// Opens all services. `warnings` are the real-time properties that could
+    /// Opens all services of a controller with a checked configuration, the limits and
+    /// thresholds that it names. `warnings` are the real-time properties that could
     /// not be had, in words.
     ///
     /// # Errors
     /// [`ControllerError`].
     pub fn open(
         bus: &Bus,
-        arm: ArmSettings,
+        config: ControllerConfig,
+        (limits, thresholds): (Limits, Thresholds),
         warnings: Vec<String>,
         ports: BridgePorts<TcpLink>,
     ) -> Result<Self, ControllerError> {
         Ok(Self {
-            arm,
+            config,
+            limits,
+            thresholds,
             commander: None,
             warnings,
             ports,
@@ -169,6 +134,11 @@ impl Bridge {
             operating_mode: None,
             last_id: 0,
         })
+    }
+
+    /// Where the arm takes commands.
+    fn command_port(&self) -> SocketAddr {
+        SocketAddr::new(self.config.arm, self.config.command_port)
     }
 
     /// Mode of the loop, as of its newest record.
@@ -216,8 +186,8 @@ impl Bridge {
 
     /// Asks the arm itself to stop, when there is no loop any more.
     pub fn stop_arm(&mut self) {
-        let asked =
-            ArmSession::connect(self.arm.command, QUESTION_TIMEOUT).and_then(|mut s| s.stop_arm());
+        let asked = ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
+            .and_then(|mut s| s.stop_arm());
         if let Err(reason) = asked {
             tracing::error!(%reason, "the arm could not be asked to stop");
         }
@@ -375,7 +345,7 @@ impl Bridge {
     }
 
     fn ask_error(&self) -> ErrorCode {
-        ArmSession::connect(self.arm.command, QUESTION_TIMEOUT)
+        ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
             .and_then(|mut session| session.error_code())
             .unwrap_or(ErrorCode::NONE)
     }
@@ -396,7 +366,7 @@ impl Bridge {
 
     /// Answers bring-ups whose arm is held and reports its joints.
     fn settle_engagements(&mut self) {
-        let stale_ns = self.arm.report_stale_ns;
+        let stale_ns = self.thresholds.report_stale_ns;
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);

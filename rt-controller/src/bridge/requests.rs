@@ -5,17 +5,18 @@ use super::{Awaited, Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
 use crate::control::{ControlCommand, Motion};
 use crate::os::now_ns;
-use crate::point_to_point::{MoveError, plan_move, verify};
+use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
-use crate::transport::tcp::TcpLink;
+use crate::transport::tcp::{LinkSettings, TcpLink};
 use crate::xarm::Mode;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{Arming, FaultCode, OperatingMode};
+use shared_types::{Arming, FaultCode, MonotonicNs, OperatingMode};
 use std::collections::VecDeque;
+use std::net::SocketAddr;
 use std::time::Instant;
 
 /// Largest distance of the held pose from the start of a plan (rad): 0.5 deg.
@@ -29,7 +30,7 @@ const TO_START_SPEED_PART: f64 = 0.05;
 
 impl Bridge {
     pub(super) fn serve(&mut self, call: ControllerCall) {
-        match &call.request {
+        match call.request {
             ControllerRequest::Status => self.status(&call),
             ControllerRequest::Latency => {
                 let report = Box::new(self.latencies.take());
@@ -46,37 +47,33 @@ impl Bridge {
                 ControllerMode::Faulted => self.set_up(call),
                 _ => self.wrong_mode(&call, "there is no fault to acknowledge"),
             },
-            ControllerRequest::MoveTo { q, speed_part } => {
-                let (q, speed_part) = (*q, *speed_part);
-                self.serve_move(call, q, speed_part);
-            }
+            ControllerRequest::MoveTo { q, speed_part } => self.serve_move(call, q, speed_part),
             ControllerRequest::Arm {
                 operating_mode,
                 area_clear,
-            } => {
-                let (operating_mode, area_clear) = (*operating_mode, *area_clear);
-                self.serve_arming(call, operating_mode, area_clear);
-            }
+            } => self.serve_arming(call, operating_mode, area_clear),
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => answer(&call, &ControllerEvent::Done),
                 Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
             },
             ControllerRequest::Announce { sha256 } => {
-                let sha256 = *sha256;
                 self.uploads.serve_announcement(call, sha256);
             }
-            ControllerRequest::Upload { trajectory, sha256 } => {
-                self.uploads.serve_upload(&call, trajectory, *sha256);
-            }
+            ControllerRequest::Upload {
+                ref trajectory,
+                sha256,
+            } => self.uploads.serve_upload(&call, trajectory, sha256),
             ControllerRequest::ExecuteUploaded { sha256 } => {
-                let sha256 = *sha256;
                 match self.uploads.plan(&sha256).copied() {
                     Some(trajectory) => self.serve_execute(call, &trajectory, &sha256),
                     None => self.wrong_mode(&call, "there is no uploaded plan with this hash"),
                 }
             }
-            ControllerRequest::Execute { trajectory, sha256 } => {
-                let (trajectory, sha256) = (trajectory.clone(), *sha256);
+            ControllerRequest::Execute {
+                ref trajectory,
+                sha256,
+            } => {
+                let trajectory = trajectory.clone();
                 self.serve_execute(call, &trajectory, &sha256);
             }
         }
@@ -165,19 +162,23 @@ impl Bridge {
         &mut self,
         call: &ControllerCall,
     ) -> Result<(JointVector, Box<TcpLink>), (FaultCode, String)> {
-        let command = self.arm.command;
+        let command = self.command_port();
         if self.commander.is_none() {
             let lock = CommanderLock::take(command)
                 .map_err(|e| (FaultCode::SecondCommander, e.to_string()))?;
             self.commander = Some(lock);
         }
+        let config = &self.config;
+        let [status, _] = config.status_ports;
         let plan = SetUp {
-            limits: &self.arm.limits,
-            mode: Mode::from_code(self.arm.interface.arm_mode()),
-            status: self.arm.status,
-            joints: self.arm.joints,
-            on_difference: self.arm.on_difference,
+            limits: &self.limits,
+            mode: Mode::from_code(config.command_interface.arm_mode()),
+            status: SocketAddr::new(config.arm, status),
+            joints: SocketAddr::new(config.arm, config.report_port),
+            on_difference: config.on_difference,
         };
+        let period_ns = MonotonicNs(0).plus_s(self.limits.period_s()).0;
+        let link = LinkSettings::new(self.thresholds.unanswered_max, period_ns);
         let mut step_done = |name: &'static str, result: &str| {
             tracing::info!(step = name, result, "setting up the arm");
             let step = ControllerEvent::Step {
@@ -190,7 +191,7 @@ impl Bridge {
             .map_err(SetUpError::from)
             .and_then(|mut session| {
                 let ready = plan.run(&mut session, &mut step_done)?;
-                let link = TcpLink::connect(command, SET_UP_TIMEOUT, self.arm.link);
+                let link = TcpLink::connect(command, SET_UP_TIMEOUT, link);
                 let link = link.map_err(|reason| SessionError::Connect {
                     address: command,
                     reason,
@@ -216,18 +217,9 @@ impl Bridge {
         if !self.may_move(&call) {
             return;
         }
-        match plan_move(&self.newest.q_c, &q, speed_part, &self.arm.limits) {
+        match plan_move(&self.newest.q_c, &q, speed_part, &self.limits) {
             Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
-            Err(error) => {
-                let fault = match error {
-                    MoveError::TargetOutsideRange { .. } => FaultCode::SetpointPosition,
-                    MoveError::Limit(fault) => fault,
-                    MoveError::SpeedPart { .. } | MoveError::Generator { .. } => {
-                        FaultCode::PlanOutOfLimits
-                    }
-                };
-                refuse(&call, fault, &error.to_string());
-            }
+            Err(error) => refuse(&call, error.fault, &error.to_string()),
         }
     }
 
@@ -258,12 +250,12 @@ impl Bridge {
         if trajectory_hash(trajectory) != *sha256 {
             return Err((FaultCode::PlanHashMismatch, String::new()));
         }
-        if let Some(margin) = self.arm.limits.worst_violation(trajectory) {
+        if let Some(margin) = self.limits.worst_violation(trajectory) {
             let detail = format!("the plan breaks a limit: {}", margin.describe());
             return Err((FaultCode::PlanOutOfLimits, detail));
         }
         let motion = Motion::Spline(*trajectory);
-        if let Err(fault) = verify(&motion, &self.arm.limits) {
+        if let Err(fault) = verify(&motion, &self.limits) {
             return Err((FaultCode::PlanOutOfLimits, fault.explain().to_owned()));
         }
         let held = self.newest.q_c;
@@ -282,7 +274,7 @@ impl Bridge {
                 &held,
                 &trajectory.start(),
                 TO_START_SPEED_PART,
-                &self.arm.limits,
+                &self.limits,
             )
             .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
             motions.push_back(Box::new(to_start));

@@ -9,22 +9,10 @@ use std::time::Duration;
 /// Samples at the begin of a slice that do not count, as for the loop.
 const WARM_UP: usize = 5;
 
-/// Why there are no figures of it.
+/// Why there are no figures of it, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum CyclictestError {
-    /// The program is missing.
-    #[error(
-        "`cyclictest` is not installed, so there is nothing to compare with: \
-         install it with `apt-get install rt-tests`"
-    )]
-    Missing,
-    /// It cannot be started.
-    #[error("`cyclictest` cannot be started: {0}")]
-    Start(std::io::Error),
-    /// It refused.
-    #[error("`cyclictest` measured nothing ({0}): run this as root or allow real-time priorities")]
-    Refused(String),
-}
+#[error("{0}")]
+pub struct CyclictestError(String);
 
 /// How it is run.
 #[derive(Debug, Clone)]
@@ -68,9 +56,13 @@ impl Cyclictest {
                 .join()
                 .unwrap_or_else(|_| Err(std::io::Error::other("its thread panicked")))
         });
-        let output = output.map_err(|e| match e.kind() {
-            ErrorKind::NotFound => CyclictestError::Missing,
-            _ => CyclictestError::Start(e),
+        let output = output.map_err(|e| {
+            CyclictestError(match e.kind() {
+                ErrorKind::NotFound => "`cyclictest` is not installed, so there is nothing to \
+                    compare with: install it with `apt-get install rt-tests`"
+                    .to_owned(),
+                _ => format!("`cyclictest` cannot be started: {e}"),
+            })
         })?;
         let samples = samples(&String::from_utf8_lossy(&output.stdout));
         if output.status.success() && samples.len() > WARM_UP {
@@ -78,25 +70,21 @@ impl Cyclictest {
         }
         let said = String::from_utf8_lossy(&output.stderr);
         let last = said.lines().rfind(|line| !line.trim().is_empty());
-        Err(CyclictestError::Refused(
-            last.unwrap_or("no reason given").trim().to_owned(),
-        ))
+        Err(CyclictestError(format!(
+            "`cyclictest` measured nothing ({}): run this as root or allow real-time priorities",
+            last.unwrap_or("no reason given").trim()
+        )))
     }
 }
 
 /// Third column of the lines `thread: count: lateness`.
 fn samples(text: &str) -> Vec<u64> {
     let sample = |line: &str| {
-        let mut numbers = line.split(':').map(|part| part.trim().parse::<u64>());
-        match (
-            numbers.next(),
-            numbers.next(),
-            numbers.next(),
-            numbers.next(),
-        ) {
-            (Some(Ok(_)), Some(Ok(_)), Some(Ok(late_ns)), None) => Some(late_ns),
-            _ => None,
-        }
+        let numbers = line.split(':').map(|part| part.trim().parse::<u64>().ok());
+        let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
+        <[u64; 3]>::try_from(numbers)
+            .ok()
+            .map(|[_, _, late_ns]| late_ns)
     };
     text.lines().filter_map(sample).collect()
 }

@@ -114,20 +114,9 @@ macro_rules! add_fields {
 pub fn cycle_fields(record: &CycleRecord) -> Vec<Field> {
     let mut fields = Fields::default();
     add_fields!(fields, "", record, CycleRecord {
-        version: whole,
-        mode: whole,
-        sent: whole,
-        fault: whole,
-        cycle: whole,
-        deadline_ns: whole,
-        reply_ns: whole,
-        missed: whole,
-        trajectory_s: real,
-        q_c: joints,
-        q: joints,
-        q_stamp_ns: whole,
-        speed_override: real,
-        qd_sent: joints
+        version: whole, mode: whole, sent: whole, fault: whole, cycle: whole, deadline_ns: whole,
+        reply_ns: whole, missed: whole, trajectory_s: real, q_c: joints, q: joints,
+        q_stamp_ns: whole, speed_override: real, qd_sent: joints
     } but { wake_late_ns, compute_ns, send_ns, dropped });
     fields.0
 }
@@ -137,34 +126,16 @@ pub fn cycle_fields(record: &CycleRecord) -> Vec<Field> {
 pub fn cause_fields(cause: &CauseRecord) -> Vec<Field> {
     let mut fields = Fields::default();
     add_fields!(fields, "cause.", cause, CauseRecord {
-        version: whole,
-        code: whole,
-        arm_error: whole,
-        arm_warning: whole,
-        mode: whole,
-        path: whole,
-        stop_arm: whole,
-        operating_mode: whole,
-        second_code: whole,
-        cycle: whole,
-        stamp_ns: whole,
-        rest_cycle: whole,
-        motion_id: whole,
-        trajectory_s: real
+        version: whole, code: whole, arm_error: whole, arm_warning: whole, mode: whole,
+        path: whole, stop_arm: whole, operating_mode: whole, second_code: whole, cycle: whole,
+        stamp_ns: whole, rest_cycle: whole, motion_id: whole, trajectory_s: real
     } but { reserved, limit, counts });
     add_fields!(fields, "cause.limit.", &cause.limit, LimitBroken {
-        joint: whole,
-        value: real,
-        limit: real
+        joint: whole, value: real, limit: real
     } but { reserved });
     add_fields!(fields, "cause.counts.", &cause.counts, RunCounts {
-        missed: whole,
-        duplicates: whole,
-        out_of_order: whole,
-        skipped: whole,
-        broken_reports: whole,
-        clock_resyncs: whole,
-        warnings: whole
+        missed: whole, duplicates: whole, out_of_order: whole, skipped: whole,
+        broken_reports: whole, clock_resyncs: whole, warnings: whole
     } but { reserved });
     fields.0
 }

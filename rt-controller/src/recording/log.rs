@@ -2,7 +2,6 @@
 
 use super::chunk::{self, Front};
 use super::item::Item;
-use core::fmt;
 
 /// Why bytes are no recording at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -32,9 +31,10 @@ pub enum LogError {
 }
 
 /// A place where a recording does not go on as it should.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Flaw {
     /// Chunks that never reached the file.
+    #[error("{chunks} chunk(s) before chunk {before} never reached the file")]
     Lost {
         /// How many.
         chunks: u32,
@@ -42,6 +42,7 @@ pub enum Flaw {
         before: u32,
     },
     /// Bytes that are no chunk, or one with a wrong checksum.
+    #[error("{bytes} bytes from byte {offset} on are damaged")]
     Damaged {
         /// Where they begin in the file.
         offset: usize,
@@ -49,30 +50,15 @@ pub enum Flaw {
         bytes: usize,
     },
     /// The file ends within a chunk.
+    #[error(
+        "the file ends within a chunk: the last {bytes} bytes, from byte {offset} on, cannot be read"
+    )]
     Cut {
         /// Where that chunk begins in the file.
         offset: usize,
         /// Bytes of it that are there.
         bytes: usize,
     },
-}
-
-impl fmt::Display for Flaw {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Lost { chunks, before } => write!(
-                f,
-                "{chunks} chunk(s) before chunk {before} never reached the file"
-            ),
-            Self::Damaged { offset, bytes } => {
-                write!(f, "{bytes} bytes from byte {offset} on are damaged")
-            }
-            Self::Cut { offset, bytes } => write!(
-                f,
-                "the file ends within a chunk: the last {bytes} bytes, from byte {offset} on, cannot be read"
-            ),
-        }
-    }
 }
 
 /// What comes next in a recording.

@@ -5,14 +5,14 @@ use rt_controller::xarm::frame::{MAX_FRAME_LEN, Request};
 use rt_controller::xarm::{FrameReader, ReplyData, Status};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// How it answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Replies {
     /// As it should.
+    #[default]
     Good,
     /// Not at all.
     Mute,
@@ -26,22 +26,11 @@ pub(crate) enum Replies {
     HangUp,
 }
 
-impl Replies {
-    const ALL: [Self; 6] = [
-        Self::Good,
-        Self::Mute,
-        Self::Error,
-        Self::NotReady,
-        Self::Foreign,
-        Self::HangUp,
-    ];
-}
-
 /// The arm; its thread ends with the process.
 #[derive(Debug, Clone)]
 pub(crate) struct EchoArm {
     pub(crate) address: SocketAddr,
-    replies: Arc<AtomicU8>,
+    replies: Arc<Mutex<Replies>>,
     received: Arc<AtomicU64>,
     hung_up: Arc<AtomicBool>,
 }
@@ -68,11 +57,11 @@ impl EchoArm {
 
     pub(crate) fn be(&self, replies: Replies) {
         self.hung_up.store(false, Ordering::SeqCst);
-        self.replies.store(replies as u8, Ordering::SeqCst);
+        *self.replies.lock().unwrap() = replies;
     }
 
     fn replies(&self) -> Replies {
-        Replies::ALL[usize::from(self.replies.load(Ordering::SeqCst))]
+        *self.replies.lock().unwrap()
     }
 
     /// Requests met so far, on all connections.

@@ -10,64 +10,44 @@ use arm_model::joint::START_POSE;
 use rand::{RngExt, SeedableRng};
 use shared_types::ipc::{GuardianBeat, Reports};
 
-#[test]
-fn a_trajectory_is_streamed_at_its_planned_times() {
-    let mut bench = Bench::holding();
-    bench.sent.clear();
-    let motion = swing();
-    bench.run(motion.clone());
-    assert_eq!(bench.state.mode(), ControllerMode::Streaming);
-    let start = bench.now_ns;
-    bench.cycles_until_still();
-    assert_eq!(bench.state.mode(), ControllerMode::Idle);
-    let end = start + 1_200_000_000;
-    assert_eq!(
-        bench.events,
-        [
-            ControlEvent::Started {
-                id: 7,
-                start_ns: start
-            },
-            ControlEvent::Finished {
-                id: 7,
-                start_ns: start,
-                end_ns: end
-            }
-        ]
-    );
-    for (k, q) in (0..301_u32).zip(&bench.sent) {
-        let expected = motion.state_at(f64::from(k) * 0.004).q;
-        assert!((*q - expected).max_abs() < 1e-9, "cycle {k}");
-    }
-}
-
 /// A motion that begins in a late cycle keeps to the deadlines all the same: its
 /// punctual setpoints lie at whole periods of it.
 #[test]
-fn a_motion_that_begins_late_is_on_time_from_its_second_setpoint_on() {
-    let mut bench = Bench::holding();
-    bench.sent.clear();
-    let motion = swing();
-    let mut input = bench.input(0);
-    let start = input.deadline_ns;
-    input.late_ns = 1_300_000;
-    input.command = Some(ControlCommand::Run {
-        id: 7,
-        motion: Box::new(motion.clone()),
-    });
-    bench.step(input);
-    bench.cycles_until_still();
-    let end = bench.events.iter().find_map(|event| match event {
-        ControlEvent::Finished {
-            start_ns, end_ns, ..
-        } => Some((*start_ns, *end_ns)),
-        _ => None,
-    });
-    assert_eq!(end, Some((start, start + 1_200_000_000)));
-    for (k, q) in (0..301_u32).zip(&bench.sent) {
-        let t_s = if k == 0 { 0.0013 } else { f64::from(k) * 0.004 };
-        let expected = motion.state_at(t_s).q;
-        assert!((*q - expected).max_abs() < 1e-9, "cycle {k}");
+fn a_trajectory_is_streamed_at_its_planned_times_also_when_it_begins_late() {
+    for (late_ns, first_s) in [(0, 0.0), (1_300_000, 0.0013)] {
+        let mut bench = Bench::holding();
+        bench.sent.clear();
+        let motion = swing();
+        let mut input = bench.input(0);
+        input.late_ns = late_ns;
+        let (id, start_ns) = (7, input.deadline_ns);
+        input.command = Some(ControlCommand::Run {
+            id,
+            motion: Box::new(motion.clone()),
+        });
+        bench.step(input);
+        assert_eq!(bench.state.mode(), ControllerMode::Streaming);
+        bench.cycles_until_still();
+        assert_eq!(bench.state.mode(), ControllerMode::Idle);
+        let end_ns = start_ns + 1_200_000_000;
+        let finished = ControlEvent::Finished {
+            id,
+            start_ns,
+            end_ns,
+        };
+        assert_eq!(
+            bench.events,
+            [ControlEvent::Started { id, start_ns }, finished]
+        );
+        for (k, q) in (0..301_u32).zip(&bench.sent) {
+            let t_s = if k == 0 {
+                first_s
+            } else {
+                f64::from(k) * 0.004
+            };
+            let expected = motion.state_at(t_s).q;
+            assert!((*q - expected).max_abs() < 1e-9, "cycle {k}");
+        }
     }
 }
 

@@ -9,17 +9,18 @@ mod parameters;
 
 pub use parameters::CommandError;
 
-/// State to go to (register 12).
+/// State to go to (register 12), by its number on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
 pub enum StateRequest {
-    /// 0: ready; also clears the error code.
-    Ready,
-    /// 3: pause.
-    Pause,
-    /// 4: stop.
-    Stop,
-    /// 6: decelerated stop.
-    DeceleratedStop,
+    /// Ready; also clears the error code.
+    Ready = 0,
+    /// Pause.
+    Pause = 3,
+    /// Stop.
+    Stop = 4,
+    /// Decelerated stop.
+    DeceleratedStop = 6,
 }
 
 /// Which joint angles register 42 is asked for.
@@ -215,22 +216,13 @@ impl Command {
 
 impl StateRequest {
     const fn code(self) -> u8 {
-        match self {
-            Self::Ready => 0,
-            Self::Pause => 3,
-            Self::Stop => 4,
-            Self::DeceleratedStop => 6,
-        }
+        self as u8
     }
 
-    const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Ready),
-            3 => Some(Self::Pause),
-            4 => Some(Self::Stop),
-            6 => Some(Self::DeceleratedStop),
-            _ => None,
-        }
+    fn from_code(code: u8) -> Option<Self> {
+        [Self::Ready, Self::Pause, Self::Stop, Self::DeceleratedStop]
+            .into_iter()
+            .find(|state| state.code() == code)
     }
 }
 

@@ -22,41 +22,38 @@ pub const MAX_FRAME_LEN: usize = HEADER_LEN + MAX_BODY_LEN;
 /// Register number of a feedback push, which no request has.
 pub const FEEDBACK_REGISTER: u8 = 0xFF;
 
-/// Protocol id of a frame.
+/// Protocol id of a frame, by its number on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u16)]
 pub enum Protocol {
-    /// 0: standard Modbus TCP.
-    Modbus,
-    /// 1: the heartbeat option of the Python SDK; is never answered.
-    Heartbeat,
-    /// 2: the private protocol.
-    Private,
-    /// 3: the private protocol, firmware 1.8.6 and later.
-    PrivateHeartbeat,
+    /// Standard Modbus TCP.
+    Modbus = 0,
+    /// The heartbeat option of the Python SDK; is never answered.
+    Heartbeat = 1,
+    /// The private protocol.
+    Private = 2,
+    /// The private protocol, firmware 1.8.6 and later.
+    PrivateHeartbeat = 3,
 }
 
 impl Protocol {
     /// From the number on the wire, `None` for one that no peer sends.
     #[must_use]
-    pub const fn from_code(code: u16) -> Option<Self> {
-        match code {
-            0 => Some(Self::Modbus),
-            1 => Some(Self::Heartbeat),
-            2 => Some(Self::Private),
-            3 => Some(Self::PrivateHeartbeat),
-            _ => None,
-        }
+    pub fn from_code(code: u16) -> Option<Self> {
+        [
+            Self::Modbus,
+            Self::Heartbeat,
+            Self::Private,
+            Self::PrivateHeartbeat,
+        ]
+        .into_iter()
+        .find(|protocol| protocol.code() == code)
     }
 
     /// The number on the wire.
     #[must_use]
     pub const fn code(self) -> u16 {
-        match self {
-            Self::Modbus => 0,
-            Self::Heartbeat => 1,
-            Self::Private => 2,
-            Self::PrivateHeartbeat => 3,
-        }
+        self as u16
     }
 }
 

@@ -241,7 +241,6 @@ mod tests {
     use crate::xarm::frame::{MAX_FRAME_LEN, Protocol, Request};
     use crate::xarm::status::Status;
     use crate::xarm::stream::FrameReader;
-    use proptest::prelude::*;
 
     fn through_the_wire(command: &Command, data: ReplyData) -> Result<ReplyData, ReplyError> {
         let request = Request {
@@ -323,26 +322,5 @@ mod tests {
     fn text_is_cut_and_terminated() {
         let long = "x".repeat(60);
         assert_eq!(Text::new(&long).as_str().len(), TEXT_LEN - 1);
-    }
-
-    proptest! {
-        #[test]
-        fn arbitrary_data_never_panic(
-            register in any::<u8>(),
-            parameters in prop::collection::vec(any::<u8>(), 0..60),
-            data in prop::collection::vec(any::<u8>(), 0..120),
-            status in any::<u8>(),
-        ) {
-            if let Ok(command) = Command::parse(register, &parameters) {
-                let reply = Reply {
-                    transaction: 1,
-                    protocol: Protocol::Private,
-                    register,
-                    status: Status(status),
-                    data: &data,
-                };
-                let _ = ReplyData::parse(&command, &reply);
-            }
-        }
     }
 }

@@ -287,24 +287,6 @@ mod tests {
             }
             prop_assert_eq!(got, frames);
         }
-
-        #[test]
-        fn arbitrary_bytes_never_panic_and_never_fill_the_buffer(
-            bytes in prop::collection::vec(any::<u8>(), 0..6000),
-        ) {
-            let mut frames = FrameReader::new();
-            let mut reports = ReportReader::new();
-            for chunk in bytes.chunks(700) {
-                frames.feed(chunk);
-                reports.feed(chunk);
-                while let Ok(Some(frame)) = frames.next_frame() {
-                    let _ = (frame.as_request(), frame.as_reply());
-                }
-                while let Ok(Some(_)) = reports.next_report() {}
-                prop_assert!(frames.next_frame().is_err() || !frames.space().is_empty());
-                prop_assert!(reports.next_report().is_err() || !reports.space().is_empty());
-            }
-        }
     }
 
     #[test]

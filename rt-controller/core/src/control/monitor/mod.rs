@@ -66,7 +66,7 @@ impl Monitor {
         Self {
             settings,
             commanded: Commanded::holding(q),
-            reports: ReportWatch::new(),
+            reports: ReportWatch::default(),
             engaged_ns: now_ns,
             operator: Heartbeat::default(),
             guardian: Heartbeat::default(),

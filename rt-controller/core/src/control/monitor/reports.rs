@@ -55,7 +55,7 @@ struct Still {
 }
 
 /// What is remembered of the reports. RT-safe.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReportWatch {
     newest: Option<JointReport>,
     /// Since when the values are the same, to the bit (stamp, ns).
@@ -68,24 +68,6 @@ pub struct ReportWatch {
 }
 
 impl ReportWatch {
-    /// Nothing seen yet.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            newest: None,
-            frozen_since_ns: 0,
-            still: [Still {
-                since_ns: 0,
-                at_rad: 0.0,
-                commanded_rad: 0.0,
-            }; JOINTS],
-            jump: None,
-            broken_in_a_row: 0,
-            resyncs: 0,
-            suspicion: 0,
-        }
-    }
-
     /// Newest good report.
     #[must_use]
     pub const fn newest(&self) -> Option<&JointReport> {
@@ -145,15 +127,9 @@ impl ReportWatch {
         self.jump = self.jump.or_else(|| jump(&before, report, limits));
         let from_ns = report.stamp_ns.saturating_sub(window_ns);
         // Only the report with the arm's own clock names its target.
-        let foreign = report.arm_clock != 0
-            && commanded
-                .farthest(
-                    &report.q_target,
-                    from_ns,
-                    report.stamp_ns.max(report.arrival_ns),
-                )
-                .1
-                > TARGET_RAD;
+        let until_ns = report.stamp_ns.max(report.arrival_ns);
+        let (_, off_rad) = commanded.farthest(&report.q_target, from_ns, until_ns);
+        let foreign = report.arm_clock != 0 && off_rad > TARGET_RAD;
         // A report that repeats itself says nothing new.
         let repeats =
             report.q == before.q && report.qd == before.qd && report.q_target == before.q_target;
@@ -189,20 +165,12 @@ impl ReportWatch {
     #[must_use]
     pub fn stream_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Violation> {
         if self.broken_in_a_row >= t.report_broken_max {
-            let (found, most) = (self.broken_in_a_row, t.report_broken_max);
-            return Some(Violation::new(
-                FaultCode::ReportBroken,
-                f64::from(found),
-                f64::from(most),
-            ));
+            let (found, most) = (self.broken_in_a_row.into(), t.report_broken_max.into());
+            return Some(Violation::new(FaultCode::ReportBroken, found, most));
         }
         if self.resyncs > t.clock_resyncs_max {
-            let (found, most) = (self.resyncs, t.clock_resyncs_max);
-            return Some(Violation::new(
-                FaultCode::ReportClock,
-                f64::from(found),
-                f64::from(most),
-            ));
+            let (found, most) = (self.resyncs.into(), t.clock_resyncs_max.into());
+            return Some(Violation::new(FaultCode::ReportClock, found, most));
         }
         let report = self.newest.as_ref()?;
         let frozen_ns = report.stamp_ns.saturating_sub(self.frozen_since_ns);
@@ -230,12 +198,8 @@ impl ReportWatch {
             let commanded_rad = (must_show[j] - still.commanded_rad).abs();
             let off_rad = (must_show[j] - still.at_rad).abs();
             if still.since_ns < from_ns && commanded_rad > STUCK_RAD && off_rad > STUCK_RAD {
-                return Some(Violation::of_joint(
-                    FaultCode::JointStuck,
-                    j,
-                    off_rad,
-                    STUCK_RAD,
-                ));
+                let fault = FaultCode::JointStuck;
+                return Some(Violation::of_joint(fault, j, off_rad, STUCK_RAD));
             }
         }
         let (joint, off_rad) = self.tracking_error(commanded, t.tracking_window_ns);
@@ -260,12 +224,6 @@ impl ReportWatch {
     pub fn deviation(&self, commanded: &Commanded) -> JointVector {
         self.newest
             .map_or(JointVector::ZERO, |r| commanded.at(r.stamp_ns) - r.q)
-    }
-}
-
-impl Default for ReportWatch {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
