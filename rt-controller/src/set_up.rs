@@ -89,20 +89,11 @@ pub struct SetUp<'a> {
     pub on_difference: OnDifference,
 }
 
-/// An arm that is ready.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReadyArm {
-    /// Where it stands (rad).
-    pub q: JointVector,
-    /// What it is.
-    pub version: ArmVersion,
-}
-
 /// Takes every step that was done: its name and its result.
 pub type OnStep<'a> = &'a mut dyn FnMut(&'static str, &str);
 
 impl SetUp<'_> {
-    /// Sets up the arm behind `session`; each step is `reported`.
+    /// Sets up the arm behind `session`; each step is `reported`. Where it stands (rad).
     ///
     /// # Errors
     /// [`SetUpError`]; the step that failed was not reported.
@@ -110,7 +101,7 @@ impl SetUp<'_> {
         &self,
         session: &mut ArmSession,
         reported: OnStep<'_>,
-    ) -> Result<ReadyArm, SetUpError> {
+    ) -> Result<JointVector, SetUpError> {
         let version = self.identify(session)?;
         reported(
             "identify",
@@ -147,7 +138,7 @@ impl SetUp<'_> {
                 );
                 refuse(FaultCode::SetpointPosition, message)
             }
-            None => Ok(ReadyArm { q, version }),
+            None => Ok(q),
         }
     }
 

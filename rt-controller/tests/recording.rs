@@ -7,7 +7,7 @@ mod random_run;
 
 use random_run::{record_run, record_run_with};
 use rt_controller::recording::{Item, LogReader, Read, RecordedCycle, replay};
-use shared_types::FaultCode;
+use std::collections::BTreeSet;
 
 /// Cycles of ten minutes at 250 Hz.
 const TEN_MINUTES: u64 = 150_000;
@@ -30,21 +30,13 @@ fn ten_minutes_with_faults_replay_to_the_bit_and_stay_small() {
     assert!(found.states > 500, "{}", found.states);
     assert!(found.causes > 20, "{}", found.causes);
     assert!(run.len() < 150_000_000);
-}
-
-#[test]
-fn a_run_meets_many_kinds_of_faults() {
-    let run = record_run(2, 60_000);
-    let mut kinds: Vec<FaultCode> = LogReader::open(&run)
+    let kinds: BTreeSet<u16> = LogReader::open(&run)
         .unwrap()
         .filter_map(|read| match read {
-            Read::Item(Item::Cause(cause)) => Some(cause.fault()),
+            Read::Item(Item::Cause(cause)) => Some(cause.code),
             Read::Item(_) | Read::Flaw(_) => None,
         })
         .collect();
-    kinds.sort_by_key(|f| *f as u16);
-    kinds.dedup();
-    println!("{kinds:?}");
     assert!(kinds.len() >= 5, "{kinds:?}");
 }
 

@@ -27,7 +27,7 @@ use libc::{SYS_clock_nanosleep, SYS_recvmsg, SYS_sendto};
 use rt_controller::control::{ControlCommand, ControlSettings, ControlState};
 use rt_controller::driver::CommandMsg;
 use rt_controller::os::{Clock, MonotonicClock, now_ns};
-use rt_controller::ports::{BridgePorts, Rings, rings};
+use rt_controller::ports::{Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::warm_up::{CacheWarmUp, patient, swinging};
@@ -184,10 +184,6 @@ struct Beside {
 }
 
 impl Running {
-    fn bridge(&mut self) -> &mut BridgePorts<TcpLink> {
-        &mut self.rings.bridge
-    }
-
     /// Turns the bridge until `done` or for ten seconds.
     fn until(&mut self, beside: &mut Beside, mut done: impl FnMut(&CycleRecord) -> bool) {
         let began = Instant::now();
@@ -219,10 +215,8 @@ impl Running {
     }
 
     fn command(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
-        self.bridge()
-            .commands
-            .push(CommandMsg { command, link })
-            .unwrap();
+        let commands = &mut self.rings.bridge.commands;
+        commands.push(CommandMsg { command, link }).unwrap();
     }
 }
 
@@ -287,10 +281,15 @@ fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
         operator: OperatorEnd::take(&bus).unwrap(),
         bus,
     };
-    let arm = EchoArm::start();
+    let mut arm = EchoArm::start();
+    let address = arm.address();
+    std::thread::spawn(move || {
+        arm.accept();
+        while arm.meet(1) {}
+    });
     running.until(&mut beside, |newest| newest.cycle > 3);
     let settings = LinkSettings::new(250, 4_000_000);
-    let link = TcpLink::connect(arm.address, Duration::from_secs(5), settings).unwrap();
+    let link = TcpLink::connect(address, Duration::from_secs(5), settings).unwrap();
     running.command(
         ControlCommand::Engage { hold: START_POSE },
         Some(Box::new(link)),

@@ -18,7 +18,7 @@ use crate::control::{ArmCodes, ControlCommand, ControlEvent, Motion, Thresholds}
 use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
-use crate::ports::{BridgePorts, Retired};
+use crate::ports::BridgePorts;
 use crate::recording::ChunkWriter;
 use crate::session::ArmSession;
 use crate::transport::tcp::TcpLink;
@@ -151,12 +151,7 @@ impl Bridge {
     /// milliseconds.
     pub fn turn(&mut self) {
         self.publish();
-        while let Ok(retired) = self.ports.retired.pop() {
-            match retired {
-                Retired::Motion(motion) => drop(motion),
-                Retired::Link(link) => drop(link),
-            }
-        }
+        while self.ports.retired.pop().is_ok() {}
         while let Ok(event) = self.ports.events.pop() {
             self.on_event(event);
         }

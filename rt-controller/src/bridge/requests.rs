@@ -190,13 +190,10 @@ impl Bridge {
         ArmSession::connect(command, SET_UP_TIMEOUT)
             .map_err(SetUpError::from)
             .and_then(|mut session| {
-                let ready = plan.run(&mut session, &mut step_done)?;
+                let q = plan.run(&mut session, &mut step_done)?;
                 let link = TcpLink::connect(command, SET_UP_TIMEOUT, link);
-                let link = link.map_err(|reason| SessionError::Connect {
-                    address: command,
-                    reason,
-                })?;
-                Ok((ready.q, Box::new(link)))
+                let link = link.map_err(|reason| SessionError::Connect(command, reason))?;
+                Ok((q, Box::new(link)))
             })
             .map_err(|error| (error.fault, error.to_string()))
     }

@@ -11,10 +11,7 @@ use std::time::Duration;
 
 /// Durations (ns) of the cycles of a bare loop that reads the clock for
 /// `work_ns`, every `period` for `span`. Blocks for as long.
-///
-/// # Errors
-/// [`LoopbackError`], when the system has no more threads.
-pub fn bare_slice(
+pub(super) fn bare_slice(
     real_time: &RealTimeSettings,
     work_ns: u64,
     period: Duration,

@@ -22,10 +22,7 @@ use crate::transport::tcp::{LinkSettings, TcpLink};
 use crate::warm_up::{patient, report, swinging};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits, TrajectoryError};
-pub use bare::bare_slice;
-pub use cyclictest::{Cyclictest, CyclictestError};
 use link::{TimedLink, start_answerer};
-pub use load::Load;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{
     Bus, ControllerMode, CycleRecord, DomainSweep, IpcError, JointReport, OperatorEnd,
@@ -113,7 +110,8 @@ impl CycleTimes {
 
 /// The loop in its thread, at rest between slices.
 #[derive(Debug)]
-pub struct LoopbackBench {
+struct LoopbackBench {
+    /// Real-time properties that could not be had, in words.
     warnings: Vec<String>,
     go: Option<mpsc::Sender<()>>,
     quit: Arc<AtomicBool>,
@@ -138,11 +136,8 @@ pub struct LoopbackBench {
 
 impl LoopbackBench {
     /// Sets the loop up in a shared-memory domain of its own. It takes what it
-    /// can have of `real_time`; see [`warnings`](Self::warnings).
-    ///
-    /// # Errors
-    /// [`LoopbackError`].
-    pub fn new(domain: &str, real_time: &RealTimeSettings) -> Result<Self, LoopbackError> {
+    /// can have of `real_time`; see `warnings`.
+    fn new(domain: &str, real_time: &RealTimeSettings) -> Result<Self, LoopbackError> {
         let sweep = DomainSweep::new(domain);
         let bus = Bus::join(domain)?;
         let limits = Limits::default();
@@ -184,18 +179,9 @@ impl LoopbackBench {
         })
     }
 
-    /// Real-time properties that could not be had, in words.
-    #[must_use]
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
     /// Runs the loop for `span`, then lets it rest; times of the cycles in which
     /// it moved.
-    ///
-    /// # Errors
-    /// [`LoopbackError`].
-    pub fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, LoopbackError> {
+    fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, LoopbackError> {
         self.quit.store(false, Ordering::Relaxed);
         let go = self.go.as_ref().ok_or(LoopbackError::Ended)?;
         go.send(()).map_err(|_gone| LoopbackError::Ended)?;
@@ -318,7 +304,7 @@ mod tests {
             ..RealTimeSettings::ordinary()
         };
         let mut bench = LoopbackBench::new(&domain, &settings).unwrap();
-        assert!(bench.warnings().is_empty());
+        assert!(bench.warnings.is_empty());
         for _ in 0..3 {
             // Something else has the core in between.
             std::thread::sleep(Duration::from_millis(300));

@@ -4,7 +4,6 @@ use super::*;
 use crate::control::exchange::ControlCommand;
 use crate::control::limiter::{Allowance, Limiter};
 use crate::control::{LinkInput, Thresholds};
-use crate::point_to_point::plan_move;
 use crate::xarm::StateRequest;
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
@@ -155,12 +154,6 @@ pub(super) fn swing() -> Motion {
     (up[5], up[1]) = (up[5] - 0.6, up[1] - 0.2);
     let times = [0.0, 0.6, 1.2];
     Motion::Spline(JointTrajectory::new(&times, &[START_POSE, up, START_POSE]).unwrap())
-}
-
-pub(super) fn go() -> Motion {
-    let mut to = START_POSE;
-    (to[0], to[3]) = (0.5, 1.9);
-    plan_move(&START_POSE, &to, 0.2, &Limits::default()).unwrap()
 }
 
 pub(super) fn cause_in(events: &[ControlEvent]) -> Option<CauseRecord> {

@@ -1,7 +1,7 @@
 //! Motions, commands and what goes wrong on the way, over whole cycles in virtual time.
 //! How each fault is met is asserted on the simulated rig (`hil-tests/tests/faults`).
 
-use super::bench::{Bench, cause_in, go, swing};
+use super::bench::{Bench, cause_in, swing};
 use super::*;
 use crate::control::Thresholds;
 use crate::control::exchange::ControlCommand;
@@ -48,35 +48,6 @@ fn a_trajectory_is_streamed_at_its_planned_times_also_when_it_begins_late() {
             let expected = motion.state_at(t_s).q;
             assert!((*q - expected).max_abs() < 1e-9, "cycle {k}");
         }
-    }
-}
-
-#[test]
-fn commands_that_do_not_fit_are_refused() {
-    let mut bench = Bench::offline();
-    bench.run(swing());
-    bench.command(ControlCommand::Engage {
-        hold: JointVector::splat(f64::NAN),
-    });
-    assert!(
-        bench
-            .events
-            .iter()
-            .all(|e| matches!(e, ControlEvent::Refused { .. }))
-    );
-    let mut bench = Bench::holding();
-    bench.run(swing());
-    bench.run(go());
-    let mut bench2 = Bench::holding();
-    bench2.run(Motion::Spline(
-        JointTrajectory::hold(JointVector::splat(0.1), 1.0).unwrap(),
-    ));
-    for (bench, fault) in [
-        (bench, FaultCode::WrongMode),
-        (bench2, FaultCode::StartPoseMismatch),
-    ] {
-        let id = Some(7);
-        assert!(bench.events.contains(&ControlEvent::Refused { id, fault }));
     }
 }
 
@@ -173,57 +144,12 @@ fn a_slowed_motion_is_braked_when_something_worse_comes() {
     assert_eq!(bench.requests.len(), 0);
 }
 
-fn armed_bench() -> Bench {
-    Bench::holding_with(ControlSettings {
-        arming_required: true,
-        ..Thresholds::relaxed().into()
-    })
-}
-
-fn throw_arming(bench: &Bench) -> ControlCommand {
-    ControlCommand::Arm(shared_types::Arming {
-        operating_mode: OperatingMode::Throw,
-        expires_ns: bench.now_ns + 8_000_000_000,
-        area_clear: true,
-    })
-}
-
-#[test]
-fn a_throw_is_armed_for_one_shot_and_nothing_re_arms_it() {
-    let mut bench = armed_bench();
-    let refused = |fault| ControlEvent::Refused { id: Some(7), fault };
-    bench.run(swing());
-    assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    let command = throw_arming(&bench);
-    bench.command(command);
-    bench.run(swing());
-    bench.cycles_until_still();
-    assert!(bench.events.contains(&ControlEvent::Disarmed {
-        fault: FaultCode::None
-    }));
-    bench.events.clear();
-    bench.run(swing());
-    assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    // Expiry and the dead-man switch disarm while idle.
-    for released in [0, 1] {
-        let command = throw_arming(&bench);
-        bench.command(command);
-        let mut input = bench.input(0);
-        input.operator.released = released;
-        if released == 0 {
-            bench.now_ns += 8_000_000_000;
-            input = bench.input(0);
-        }
-        bench.step(input);
-        bench.events.clear();
-        bench.run(swing());
-        assert_eq!(bench.events, [refused(FaultCode::NotArmed)]);
-    }
-}
-
 #[test]
 fn an_operating_mode_slows_nobody_down_silently_but_stops_what_is_too_fast() {
-    let mut bench = armed_bench();
+    let mut bench = Bench::holding_with(ControlSettings {
+        arming_required: true,
+        ..Thresholds::relaxed().into()
+    });
     bench.command(ControlCommand::Arm(shared_types::Arming {
         operating_mode: OperatingMode::SetUp,
         expires_ns: u64::MAX,

@@ -98,12 +98,9 @@ pub enum ReplyError {
         /// Register of the request.
         asked: u8,
     },
-    /// The controller says that the result means nothing.
-    #[error("the controller could not answer register {register:#04x}")]
-    Invalid {
-        /// Register of the request.
-        register: u8,
-    },
+    /// The controller says that the result for this register means nothing.
+    #[error("the controller could not answer register {0:#04x}")]
+    Invalid(u8),
     /// Fewer data than the register has.
     #[error("reply to register {register:#04x} has {given} data bytes: too few")]
     TooShort {
@@ -128,19 +125,16 @@ impl ReplyData {
             });
         }
         if reply.status.is_invalid() {
-            return Err(ReplyError::Invalid { register: asked });
+            return Err(ReplyError::Invalid(asked));
         }
         let mut data = Self::blank(command);
         let mut bytes = ByteReader::new(reply.data);
         data.fields(&mut bytes);
-        if bytes.found_all() {
-            Ok(data)
-        } else {
-            Err(ReplyError::TooShort {
-                register: asked,
-                given: reply.data.len(),
-            })
-        }
+        let too_short = ReplyError::TooShort {
+            register: asked,
+            given: reply.data.len(),
+        };
+        bytes.found_all().then_some(data).ok_or(too_short)
     }
 
     /// What the reply to `command` holds, its values not known yet.

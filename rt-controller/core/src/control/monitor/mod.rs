@@ -183,18 +183,26 @@ impl Monitor {
             .or_else(|| pick(self.arm_fault()))
             .or_else(|| pick(self.commander_fault(input)))
             .or_else(|| pick(stall(&input.link, t.reply_stall_ns)))
-            .or_else(|| pick((input.operator.stop != 0).then(stop)))
+            .or_else(|| {
+                pick(
+                    (input.operator.stop != 0).then_some(Violation::plain(FaultCode::OperatorStop)),
+                )
+            })
             .or_else(|| {
                 if !mode.is_moving() {
                     return None;
                 }
-                pick(gap(missed, t.missed_cycles_max))
-                    .or_else(|| pick(self.operator_fault(input)))
-                    .or_else(|| pick(late(missed, t.late_cycles_max)))
-                    .or_else(|| pick(self.reports.stream_fault(&self.commanded, t)))
-                    .or_else(|| pick(self.reports.stale(now_ns, t)))
-                    .or_else(|| pick(self.reports.tracking_fault(&self.commanded, t)))
-                    .or_else(|| pick(self.guardian_silent(now_ns)))
+                pick(skipped(
+                    FaultCode::DeadlineMissed,
+                    missed,
+                    t.missed_cycles_max,
+                ))
+                .or_else(|| pick(self.operator_fault(input)))
+                .or_else(|| pick(skipped(FaultCode::LateCycles, missed, t.late_cycles_max)))
+                .or_else(|| pick(self.reports.stream_fault(&self.commanded, t)))
+                .or_else(|| pick(self.reports.stale(now_ns, t)))
+                .or_else(|| pick(self.reports.tracking_fault(&self.commanded, t)))
+                .or_else(|| pick(self.guardian_silent(now_ns)))
             })
     }
 
@@ -209,13 +217,12 @@ impl Monitor {
         // States 1 (moving) and 2 (ready) follow setpoints.
         let serving = report.arm_mode == self.settings.interface.arm_mode()
             && matches!(report.arm_state, 1 | 2);
-        (settled && !serving).then(|| {
-            Violation::new(
-                FaultCode::ArmModeChanged,
-                report.arm_mode.into(),
-                self.settings.interface.arm_mode().into(),
-            )
-        })
+        let (found, expected) = (
+            report.arm_mode.into(),
+            self.settings.interface.arm_mode().into(),
+        );
+        let changed = Violation::new(FaultCode::ArmModeChanged, found, expected);
+        (settled && !serving).then_some(changed)
     }
 
     fn commander_fault(&self, input: &CycleInput) -> Option<Violation> {
@@ -248,23 +255,14 @@ impl Monitor {
     }
 }
 
-fn stop() -> Violation {
-    Violation::plain(FaultCode::OperatorStop)
-}
-
 fn stall(link: &LinkInput, most_ns: u64) -> Option<Violation> {
     (link.unanswered_ns > most_ns)
         .then(|| Violation::of_time(FaultCode::ReplyStalled, link.unanswered_ns, most_ns))
 }
 
-/// So many cycles missed that the arm has stood still meanwhile.
-fn gap(missed: u32, most: u32) -> Option<Violation> {
-    (missed > most).then(|| Violation::new(FaultCode::DeadlineMissed, missed.into(), most.into()))
-}
-
-/// Some cycles missed.
-fn late(missed: u32, most: u32) -> Option<Violation> {
-    (missed > most).then(|| Violation::new(FaultCode::LateCycles, missed.into(), most.into()))
+/// Cycles missed: some, or so many that the arm has stood still meanwhile.
+fn skipped(fault: FaultCode, missed: u32, most: u32) -> Option<Violation> {
+    (missed > most).then(|| Violation::new(fault, missed.into(), most.into()))
 }
 
 /// Faults the command link itself shows.
