@@ -7,6 +7,7 @@
 //! the arm shall be set. Order of the recovery as in the vendor's manual: clear
 //! error, enable, mode, state.
 
+use crate::config::ControllerConfig;
 use crate::session::{ArmSession, SessionError};
 use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport};
 use crate::xarm::{
@@ -77,16 +78,10 @@ impl From<SessionError> for SetUpError {
 /// What an arm is set up for.
 #[derive(Debug, Clone, Copy)]
 pub struct SetUp<'a> {
-    /// Limits the controller is configured for.
+    /// A checked configuration.
+    pub config: &'a ControllerConfig,
+    /// The limits that it names.
     pub limits: &'a Limits,
-    /// Mode in which it takes setpoints.
-    pub mode: Mode,
-    /// Port with normal or rich reports.
-    pub status: SocketAddr,
-    /// Port with real-time reports.
-    pub joints: SocketAddr,
-    /// What to do about differences.
-    pub on_difference: OnDifference,
 }
 
 /// Takes every step that was done: its name and its result.
@@ -113,6 +108,7 @@ impl SetUp<'_> {
             "tool speed",
             &self.match_tool_speed(session, version.firmware)?,
         );
+        let mode = Mode::from_code(self.config.command_interface.arm_mode());
         let enable = Command::MotionEnable {
             joint: Command::ALL_JOINTS,
             enable: true,
@@ -121,7 +117,7 @@ impl SetUp<'_> {
             ("clear error", Command::CleanError),
             ("clear warning", Command::CleanWarning),
             ("enable", enable),
-            ("mode", Command::SetMode(self.mode)),
+            ("mode", Command::SetMode(mode)),
             ("state", Command::SetState(StateRequest::Ready)),
         ] {
             session.ask(&command)?;
@@ -140,6 +136,12 @@ impl SetUp<'_> {
             }
             None => Ok(q),
         }
+    }
+
+    /// Port with normal or rich reports.
+    fn status(&self) -> SocketAddr {
+        let [status, _] = self.config.status_ports;
+        SocketAddr::new(self.config.arm, status)
     }
 
     /// Reads the version and refuses what cannot be driven.
@@ -183,19 +185,20 @@ impl SetUp<'_> {
             );
             refuse(FaultCode::UnsupportedFirmware, message)
         };
-        let status = read_report(self.status)?.len();
+        let status = read_report(self.status())?.len();
         let sizes = firmware.rich_sizes();
         // The normal report is the same everywhere.
         if status != NORMAL_REPORT_LEN && !sizes.contains(&status) {
-            return other_size(self.status, status, &sizes);
+            return other_size(self.status(), status, &sizes);
         }
         let sizes = firmware.realtime_sizes();
-        match read_report(self.joints) {
+        let joints = SocketAddr::new(self.config.arm, self.config.report_port);
+        match read_report(joints) {
             Ok(report) if sizes.contains(&report.len()) => Ok(format!(
                 "{} and {status} bytes, as of {firmware}",
                 report.len()
             )),
-            Ok(report) => other_size(self.joints, report.len(), &sizes),
+            Ok(report) => other_size(joints, report.len(), &sizes),
             // As many clients as it takes are there: the 100 Hz report serves.
             Err(reason) => Ok(format!(
                 "{status} bytes, as of {firmware}; no real-time report ({reason})"
@@ -205,8 +208,8 @@ impl SetUp<'_> {
 
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
-        let status = read_report(self.status)?;
-        let report = NormalReport::parse(&status).or_else(|e| no_status(self.status, e))?;
+        let status = read_report(self.status())?;
+        let report = NormalReport::parse(&status).or_else(|e| no_status(self.status(), e))?;
         let arm_m = report.tcp_offset.position_m;
         let apart_m = arm_m
             .iter()
@@ -217,7 +220,7 @@ impl SetUp<'_> {
         if apart_m <= OFFSET_EQUAL_M && arm_m.iter().all(|v| v.is_finite()) {
             return Ok(format!("{configured_m:?} m as configured"));
         }
-        match self.on_difference {
+        match self.config.on_difference {
             OnDifference::Refuse => {
                 let message = format!(
                     "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: {SET_ONE}"
@@ -252,7 +255,7 @@ impl SetUp<'_> {
         if (arm_m_s - configured_m_s).abs() <= SPEED_EQUAL_M_S {
             return Ok(format!("{configured_m_s:.3} m/s as configured"));
         }
-        if self.on_difference == OnDifference::Refuse || !settable {
+        if self.config.on_difference == OnDifference::Refuse || !settable {
             let message = format!(
                 "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
             );

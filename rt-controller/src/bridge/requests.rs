@@ -9,14 +9,12 @@ use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
 use crate::transport::tcp::{LinkSettings, TcpLink};
-use crate::xarm::Mode;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
 use shared_types::{Arming, FaultCode, MonotonicNs, OperatingMode};
 use std::collections::VecDeque;
-use std::net::SocketAddr;
 use std::time::Instant;
 
 /// Largest distance of the held pose from the start of a plan (rad): 0.5 deg.
@@ -168,14 +166,9 @@ impl Bridge {
                 .map_err(|e| (FaultCode::SecondCommander, e.to_string()))?;
             self.commander = Some(lock);
         }
-        let config = &self.config;
-        let [status, _] = config.status_ports;
         let plan = SetUp {
+            config: &self.config,
             limits: &self.limits,
-            mode: Mode::from_code(config.command_interface.arm_mode()),
-            status: SocketAddr::new(config.arm, status),
-            joints: SocketAddr::new(config.arm, config.report_port),
-            on_difference: config.on_difference,
         };
         let period_ns = MonotonicNs(0).plus_s(self.limits.period_s()).0;
         let link = LinkSettings::new(self.thresholds.unanswered_max, period_ns);

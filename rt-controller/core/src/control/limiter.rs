@@ -214,6 +214,8 @@ mod tests {
     use arm_model::JointTrajectory;
     use arm_model::joint::START_POSE;
 
+    use FaultCode as F;
+
     const PERIOD_S: f64 = 0.004;
     const STREAMED: Allowance = Allowance {
         tcp_speed_max_m_s: 1.2,
@@ -261,9 +263,9 @@ mod tests {
             (at_limit, 5, Ok(())),
             (at_limit, 7, Ok(())),
             (at_limit, 1000, Ok(())),
-            (above, 1000, Err(FaultCode::SetpointAcceleration)),
-            (swing(6, 3.2, 1.5), 1000, Err(FaultCode::SetpointVelocity)),
-            (swing(0, by, 1.0), 1000, Err(FaultCode::SetpointTcpSpeed)),
+            (above, 1000, Err(F::SetpointAcceleration)),
+            (swing(6, 3.2, 1.5), 1000, Err(F::SetpointVelocity)),
+            (swing(0, by, 1.0), 1000, Err(F::SetpointTcpSpeed)),
             (swing(0, by * 0.94, 1.0), 9, Ok(())),
         ] {
             assert_eq!(run(&trajectory, &limits, every), expected);
@@ -295,31 +297,14 @@ mod tests {
             ..STREAMED
         };
         let quick = 0.5 * PERIOD_S * PERIOD_S * 20.0;
+        let outside = -0.2 - START_POSE[3];
         for (j, by_rad, step_s, allowed, fault) in [
-            (
-                6,
-                0.001,
-                PERIOD_S,
-                STREAMED,
-                FaultCode::SetpointAcceleration,
-            ),
-            (
-                3,
-                f64::NAN,
-                PERIOD_S,
-                STREAMED,
-                FaultCode::SetpointNotFinite,
-            ),
-            (0, 0.0, 0.0, STREAMED, FaultCode::SetpointNotFinite),
-            (
-                3,
-                -0.2 - START_POSE[3],
-                PERIOD_S,
-                STREAMED,
-                FaultCode::SetpointPosition,
-            ),
-            (0, quick, PERIOD_S, slow, FaultCode::OperatingModeExceeded),
-            (6, 0.11, 0.2, STREAMED, FaultCode::DeadlineMissed),
+            (6, 0.001, PERIOD_S, STREAMED, F::SetpointAcceleration),
+            (3, f64::NAN, PERIOD_S, STREAMED, F::SetpointNotFinite),
+            (0, 0.0, 0.0, STREAMED, F::SetpointNotFinite),
+            (3, outside, PERIOD_S, STREAMED, F::SetpointPosition),
+            (0, quick, PERIOD_S, slow, F::OperatingModeExceeded),
+            (6, 0.11, 0.2, STREAMED, F::DeadlineMissed),
         ] {
             assert_eq!(step(j, by_rad, step_s, allowed).unwrap_err().fault, fault);
         }
@@ -340,7 +325,7 @@ mod tests {
         };
         let by_rad = 10.0 * PERIOD_S * PERIOD_S;
         let found = step(6, by_rad, PERIOD_S, own).unwrap_err();
-        assert_eq!((found.fault, found.joint), (FaultCode::SetpointJerk, 7));
+        assert_eq!((found.fault, found.joint), (F::SetpointJerk, 7));
         assert!((found.value - 2500.0).abs() < 1e-3 && found.limit == 500.0);
         assert_eq!(step(6, by_rad, PERIOD_S, STREAMED), Ok(()));
     }

@@ -242,11 +242,9 @@ fn settings(seed: u64) -> ControlSettings {
 
 #[derive(Debug, Default)]
 struct Tally {
-    cycles: u64,
-    setpoints: u64,
     stops: u64,
-    hard: u64,
-    by_code: std::collections::BTreeMap<u16, u64>,
+    codes: std::collections::BTreeSet<u16>,
+    /// Largest part of a limit that was used.
     worst: f64,
 }
 
@@ -289,9 +287,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
                 ControlEvent::Latched(cause) => {
                     latches += 1;
                     tally.stops += 1;
-                    let by_setpoint = (10..20).contains(&cause.second_code);
-                    tally.hard += u64::from(by_setpoint);
-                    *tally.by_code.entry(cause.code).or_default() += 1;
+                    tally.codes.insert(cause.code);
                     assert!(cause.cycle <= cause.rest_cycle && cause.code != 0);
                 }
                 _ => {}
@@ -304,12 +300,10 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
         assert_eq!(latches, i32::from(stopped), "{before:?} {:?}", out.events);
         chaos.sent(&out);
         if let Some(q) = out.setpoint() {
-            tally.setpoints += 1;
             let part = judge.take(deadline_ns, q, &limits);
             tally.worst = tally.worst.max(part);
             assert!(part <= 1.0 + 2e-9, "seed {seed}: {part} of a limit");
         }
-        tally.cycles += 1;
     }
 }
 
@@ -326,7 +320,7 @@ fn any_number_of_random_cycles_keep_every_limit() {
     }
     println!("{tally:?}");
     if !cfg!(miri) {
-        assert!(tally.stops > 100 * runs / 30 && tally.by_code.len() > 12);
+        assert!(tally.stops > 100 * runs / 30 && tally.codes.len() > 12);
     }
 }
 

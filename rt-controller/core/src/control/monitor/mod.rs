@@ -12,7 +12,6 @@ use super::reaction::{StopCategory, reaction};
 use super::settings::ControlSettings;
 use super::violation::Violation;
 use arm_model::{JointVector, Limits};
-use history::Commanded;
 use reports::ReportWatch;
 use serde::{Deserialize, Serialize};
 use shared_types::FaultCode;
@@ -49,7 +48,6 @@ impl Heartbeat {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Monitor {
     settings: ControlSettings,
-    commanded: Commanded,
     reports: ReportWatch,
     engaged_ns: u64,
     operator: Heartbeat,
@@ -65,8 +63,7 @@ impl Monitor {
     pub fn new(settings: ControlSettings, now_ns: u64, q: JointVector) -> Self {
         Self {
             settings,
-            commanded: Commanded::holding(q),
-            reports: ReportWatch::default(),
+            reports: ReportWatch::holding(q),
             engaged_ns: now_ns,
             operator: Heartbeat::default(),
             guardian: Heartbeat::default(),
@@ -84,7 +81,7 @@ impl Monitor {
 
     /// A setpoint was sent.
     pub fn sent(&mut self, deadline_ns: u64, q: JointVector) {
-        self.commanded.push(deadline_ns, q);
+        self.reports.sent(deadline_ns, q);
     }
 
     /// A setpoint was held back: too many wait for their reply.
@@ -113,14 +110,14 @@ impl Monitor {
     /// Commanded less measured joints at the time of the newest report (rad).
     #[must_use]
     pub fn deviation(&self) -> JointVector {
-        self.reports.deviation(&self.commanded)
+        self.reports.deviation()
     }
 
     /// How far the arm stands from everything commanded lately (rad).
     #[must_use]
     pub fn tracking_error_rad(&self) -> f64 {
         let window_ns = self.settings.thresholds.tracking_window_ns;
-        self.reports.tracking_error(&self.commanded, window_ns).1
+        self.reports.tracking_error(window_ns).1
     }
 
     /// Takes in what came with this cycle.
@@ -141,9 +138,7 @@ impl Monitor {
         let window_ns = self.settings.thresholds.tracking_window_ns;
         for report in input.reports.as_slice() {
             if report.q.is_finite() && report.qd.is_finite() {
-                let resync = self
-                    .reports
-                    .take(report, &self.commanded, window_ns, limits);
+                let resync = self.reports.take(report, window_ns, limits);
                 add(&mut self.counts.clock_resyncs, resync.into());
             } else {
                 self.reports.broken(1);
@@ -199,9 +194,9 @@ impl Monitor {
                 ))
                 .or_else(|| pick(self.operator_fault(input)))
                 .or_else(|| pick(skipped(FaultCode::LateCycles, missed, t.late_cycles_max)))
-                .or_else(|| pick(self.reports.stream_fault(&self.commanded, t)))
+                .or_else(|| pick(self.reports.stream_fault(t)))
                 .or_else(|| pick(self.reports.stale(now_ns, t)))
-                .or_else(|| pick(self.reports.tracking_fault(&self.commanded, t)))
+                .or_else(|| pick(self.reports.tracking_fault(t)))
                 .or_else(|| pick(self.guardian_silent(now_ns)))
             })
     }

@@ -11,6 +11,37 @@
 //! zero and skipped when read. Values are f32 on the wire, little-endian;
 //! sizes and integers big-endian.
 
+/// The two directions of a report that has at least `$least` bytes, from its `fields`.
+macro_rules! both_directions {
+    ($Report:ident, $least:expr) => {
+        impl $Report {
+            /// Writes the report to the front of `out` and returns its length.
+            ///
+            /// # Errors
+            /// [`EmitError::BufferTooSmall`].
+            pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
+                let (mut report, mut wire) = (*self, ByteWriter::new(out));
+                report.fields(&mut wire);
+                wire.finish()
+            }
+
+            /// Reads a frame; one of a later firmware may have more bytes. RT-safe.
+            ///
+            /// # Errors
+            /// [`ReportTooShort`].
+            pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
+                let (given, needed) = (frame.len(), $least);
+                if given < needed {
+                    return Err(ReportTooShort { given, needed });
+                }
+                let mut report = Self::default();
+                report.fields(&mut ByteReader::new(frame));
+                Ok(report)
+            }
+        }
+    };
+}
+
 mod periodic;
 mod realtime;
 
@@ -20,7 +51,7 @@ pub use periodic::{
 };
 pub use realtime::{REALTIME_REPORT_LEN, RealtimeReport};
 
-use super::bytes::{ByteReader, ByteWriter, EmitError, Fields};
+use super::bytes::Fields;
 use super::status::{ArmState, Mode};
 
 /// Longest report frame.
@@ -46,32 +77,6 @@ fn state_field(wire: &mut impl Fields, state: &mut ArmState, mode: &mut Mode) {
     let mut byte = (state.code() & 0x0F) | (mode.code() << 4);
     wire.u8(&mut byte);
     (*state, *mode) = (ArmState::from_code(byte & 0x0F), Mode::from_code(byte >> 4));
-}
-
-/// Writes the `fields` of a report to the front of `out`; returns their length.
-fn emit<T: Clone>(
-    report: &T,
-    out: &mut [u8],
-    fields: impl FnOnce(&mut T, &mut ByteWriter<'_>),
-) -> Result<usize, EmitError> {
-    let mut writer = ByteWriter::new(out);
-    fields(&mut report.clone(), &mut writer);
-    writer.finish()
-}
-
-/// Reads the `fields` of a report from a frame of at least `needed` bytes.
-fn parse<T: Default>(
-    frame: &[u8],
-    needed: usize,
-    fields: impl FnOnce(&mut T, &mut ByteReader<'_>),
-) -> Result<T, ReportTooShort> {
-    let given = frame.len();
-    if given < needed {
-        return Err(ReportTooShort { given, needed });
-    }
-    let mut report = T::default();
-    fields(&mut report, &mut ByteReader::new(frame));
-    Ok(report)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The reports that share a layout: real (30003), normal (30001), rich (30002).
 
-use super::{ReportTooShort, emit, parse, size_field, state_field};
-use crate::xarm::bytes::{EmitError, Fields};
+use super::{ReportTooShort, size_field, state_field};
+use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError, Fields};
 use crate::xarm::error_code::ErrorCode;
 use crate::xarm::pose::TcpPose;
 use crate::xarm::status::{ArmState, Mode};
@@ -37,7 +37,12 @@ pub struct BasicReport {
 }
 
 impl BasicReport {
-    fn fields(&mut self, wire: &mut impl Fields, size: usize) {
+    fn fields(&mut self, wire: &mut impl Fields) {
+        self.begin(wire, BASIC_LEN);
+    }
+
+    /// The fields of a report of `size` bytes that begins with these.
+    fn begin(&mut self, wire: &mut impl Fields, size: usize) {
         size_field(wire, size);
         state_field(wire, &mut self.state, &mut self.mode);
         wire.u16_be(&mut self.buffered);
@@ -45,17 +50,9 @@ impl BasicReport {
         self.tcp.fields(wire);
         wire.joints(&mut self.torque_nm);
     }
-
-    /// Parses the common part of any of the three reports.
-    ///
-    /// # Errors
-    /// [`ReportTooShort`] below 87 bytes.
-    pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        parse(frame, BASIC_LEN, |report: &mut Self, wire| {
-            report.fields(wire, BASIC_LEN);
-        })
-    }
 }
+
+both_directions!(BasicReport, BASIC_LEN);
 
 /// Report of port 30003, 100 Hz. It has no error code.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -69,26 +66,9 @@ pub struct ForceReport {
 }
 
 impl ForceReport {
-    /// Writes [`FORCE_REPORT_LEN`] bytes and returns that.
-    ///
-    /// # Errors
-    /// [`EmitError::BufferTooSmall`].
-    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
-        emit(self, out, |report, wire| report.fields(wire))
-    }
-
-    /// Parses a frame; forces that older firmware leaves out are zero.
-    ///
-    /// # Errors
-    /// [`ReportTooShort`].
-    pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        parse(frame, BASIC_LEN, |report: &mut Self, wire| {
-            report.fields(wire);
-        })
-    }
-
+    /// Forces that older firmware leaves out are zero.
     fn fields(&mut self, wire: &mut impl Fields) {
-        self.basic.fields(wire, FORCE_REPORT_LEN);
+        self.basic.begin(wire, FORCE_REPORT_LEN);
         for force in [&mut self.external_force, &mut self.raw_force] {
             if wire.has(true, 4 * force.len()) {
                 wire.f32s_le(force);
@@ -96,6 +76,8 @@ impl ForceReport {
         }
     }
 }
+
+both_directions!(ForceReport, BASIC_LEN);
 
 /// Report of port 30001, 5 Hz; also the first part of the rich one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -125,28 +107,13 @@ pub struct NormalReport {
 }
 
 impl NormalReport {
-    /// Writes [`NORMAL_REPORT_LEN`] bytes and returns that.
-    ///
-    /// # Errors
-    /// [`EmitError::BufferTooSmall`].
-    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
-        emit(self, out, |report, wire| {
-            report.fields(wire, NORMAL_REPORT_LEN);
-        })
+    fn fields(&mut self, wire: &mut impl Fields) {
+        self.begin(wire, NORMAL_REPORT_LEN);
     }
 
-    /// Parses a frame of port 30001, or the same part of one of port 30002.
-    ///
-    /// # Errors
-    /// [`ReportTooShort`].
-    pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        parse(frame, NORMAL_REPORT_LEN, |report: &mut Self, wire| {
-            report.fields(wire, NORMAL_REPORT_LEN);
-        })
-    }
-
-    fn fields(&mut self, wire: &mut impl Fields, size: usize) {
-        self.basic.fields(wire, size);
+    /// The fields of a report of `size` bytes that begins with these.
+    fn begin(&mut self, wire: &mut impl Fields, size: usize) {
+        self.basic.begin(wire, size);
         wire.u8(&mut self.brakes_released);
         wire.u8(&mut self.enabled);
         wire.u8(&mut self.error.0);
@@ -159,6 +126,8 @@ impl NormalReport {
         wire.f32s_le(&mut self.gravity);
     }
 }
+
+both_directions!(NormalReport, NORMAL_REPORT_LEN);
 
 /// Report of port 30002, 5 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -198,27 +167,9 @@ pub struct RichReport {
 const ROTATION: [f64; 2] = [2.3, 2.7];
 
 impl RichReport {
-    /// Writes [`RICH_REPORT_LEN`] bytes and returns that.
-    ///
-    /// # Errors
-    /// [`EmitError::BufferTooSmall`].
-    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
-        emit(self, out, |report, wire| report.fields(wire))
-    }
-
-    /// Parses a frame.
-    ///
-    /// # Errors
-    /// [`ReportTooShort`].
-    pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        parse(frame, RICH_REPORT_LEN, |report: &mut Self, wire| {
-            report.fields(wire);
-        })
-    }
-
     /// Least jerk, acceleration and speed are zero.
     fn fields(&mut self, wire: &mut impl Fields) {
-        self.normal.fields(wire, RICH_REPORT_LEN);
+        self.normal.begin(wire, RICH_REPORT_LEN);
         // Type 7 with 7 axes, then the two marks.
         wire.array(&mut [7, 7, 0xAA, 0x55, 0, 0]);
         wire.array(&mut self.firmware);
@@ -250,3 +201,5 @@ impl RichReport {
         wire.skip_to(RICH_REPORT_LEN);
     }
 }
+
+both_directions!(RichReport, RICH_REPORT_LEN);

@@ -1,8 +1,8 @@
 //! The real-time report of port 30000, the only one with measured velocity and
 //! a time stamp of the controller.
 
-use super::{ReportTooShort, emit, parse, size_field, state_field};
-use crate::xarm::bytes::{EmitError, Fields};
+use super::{ReportTooShort, size_field, state_field};
+use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError, Fields};
 use crate::xarm::pose::TcpPose;
 use crate::xarm::status::{ArmState, Mode};
 use arm_model::{JointState, JointVector};
@@ -64,24 +64,6 @@ impl RealtimeReport {
             && self.mode.code() <= LARGEST_CODES.1
     }
 
-    /// Writes [`REALTIME_REPORT_LEN`] bytes and returns that.
-    ///
-    /// # Errors
-    /// [`EmitError::BufferTooSmall`].
-    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
-        emit(self, out, |report, wire| report.fields(wire))
-    }
-
-    /// Parses a frame. RT-safe.
-    ///
-    /// # Errors
-    /// [`ReportTooShort`].
-    pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        parse(frame, REALTIME_REPORT_LEN, |report: &mut Self, wire| {
-            report.fields(wire);
-        })
-    }
-
     fn fields(&mut self, wire: &mut impl Fields) {
         size_field(wire, REALTIME_REPORT_LEN);
         wire.u64_be(&mut self.time_us);
@@ -103,3 +85,5 @@ impl RealtimeReport {
         wire.skip_to(REALTIME_REPORT_LEN);
     }
 }
+
+both_directions!(RealtimeReport, REALTIME_REPORT_LEN);
