@@ -13,9 +13,10 @@ use rt_controller::control::{
 };
 use rt_controller::driver::CommandMsg;
 use rt_controller::os::Clock;
-use rt_controller::ports::{Rings, rings};
+use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use rtrb::Producer;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, GuardianBeat, GuardianEnd, JointReport,
     OperatorEnd,
@@ -63,7 +64,8 @@ pub(crate) struct Disturbance {
 pub(crate) struct Bench<'w> {
     rt: RtLoop<TcpLink, Hand>,
     clock: Rc<Cell<u64>>,
-    rings: Rings<TcpLink>,
+    bridge: BridgePorts<TcpLink>,
+    reports: Producer<JointReport>,
     pub(crate) arm: EchoArm,
     pub(crate) operator: OperatorEnd,
     guardian: GuardianEnd,
@@ -109,15 +111,20 @@ impl<'w> Bench<'w> {
             ..Limits::default().into()
         })
         .unwrap();
-        let mut all = rings();
-        let rt_ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
+        let Rings {
+            rt: ports,
+            bridge,
+            reports: [reports, _],
+            ..
+        } = rings();
         let now_ns = 1_000_000_000_000;
         let clock = Rc::new(Cell::new(now_ns));
         let control = ControlState::new(limits.clone(), settings(interface));
         Self {
-            rt: RtLoop::new(control, Hand(Rc::clone(&clock)), boards, rt_ports),
+            rt: RtLoop::new(control, Hand(Rc::clone(&clock)), boards, ports),
             clock,
-            rings: all,
+            bridge,
+            reports,
             arm: EchoArm::start(),
             operator: OperatorEnd::take(&bus).unwrap(),
             guardian: GuardianEnd::take(&bus).unwrap(),
@@ -154,18 +161,18 @@ impl<'w> Bench<'w> {
         }
         if !self.disturbance.reports_stop {
             let report = self.report();
-            self.rings.reports[0].push(report).unwrap();
+            self.reports.push(report).unwrap();
         }
         let (rt, now_ns) = (&mut self.rt, self.now_ns);
         self.watch.around(&mut || {
             rt.cycle(now_ns, missed, now_ns);
         });
         self.cycles += 1;
-        self.newest = self.rings.bridge.records.pop().unwrap();
+        self.newest = self.bridge.records.pop().unwrap();
         self.seen[usize::from(self.newest.mode)] += 1;
-        while self.rings.bridge.retired.pop().is_ok() {}
+        while self.bridge.retired.pop().is_ok() {}
         let mut asked = u64::from(self.newest.sent);
-        while let Ok(event) = self.rings.bridge.events.pop() {
+        while let Ok(event) = self.bridge.events.pop() {
             let code = match event {
                 ControlEvent::Latched(cause) => {
                     self.last_cause = cause.fault();
@@ -207,11 +214,8 @@ impl<'w> Bench<'w> {
     }
 
     fn send(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
-        self.rings
-            .bridge
-            .commands
-            .push(CommandMsg { command, link })
-            .unwrap();
+        let message = CommandMsg { command, link };
+        self.bridge.commands.push(message).unwrap();
         self.cycle();
     }
 

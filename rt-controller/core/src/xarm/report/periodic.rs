@@ -11,6 +11,8 @@ use arm_model::{JOINTS, JointVector};
 const BASIC_LEN: usize = 87;
 /// Bytes of a report of port 30003.
 pub const FORCE_REPORT_LEN: usize = 135;
+/// Bytes of one of the two forces in it.
+const FORCE_LEN: usize = (FORCE_REPORT_LEN - BASIC_LEN) / 2;
 /// Bytes of a report of port 30001.
 pub const NORMAL_REPORT_LEN: usize = 145;
 /// Bytes of a report of port 30002, firmware 2.4 to 2.7.1.
@@ -70,7 +72,7 @@ impl ForceReport {
     fn fields(&mut self, wire: &mut impl Fields) {
         self.basic.begin(wire, FORCE_REPORT_LEN);
         for force in [&mut self.external_force, &mut self.raw_force] {
-            if wire.has(true, 4 * force.len()) {
+            if wire.has(true, FORCE_LEN) {
                 wire.f32s_le(force);
             }
         }
