@@ -247,7 +247,9 @@ impl Bridge {
             }
             ControlEvent::Started { id, start_ns } => {
                 for open in &self.open {
-                    if matches!(&open.awaits, Awaited::Motion { id: its, next } if *its == id && next.is_empty())
+                    if let Awaited::Motion { id: its, next } = &open.awaits
+                        && *its == id
+                        && next.is_empty()
                     {
                         answer(&open.call, &ControllerEvent::Started { start_ns });
                     }
@@ -259,7 +261,7 @@ impl Bridge {
                 end_ns,
             } => self.on_finished(id, &ControllerEvent::Finished { start_ns, end_ns }),
             ControlEvent::Refused { id, fault } => {
-                let refused = |awaits: &mut Awaited| match (awaits, id) {
+                let refused = |awaits: &Awaited| match (awaits, id) {
                     (Awaited::Motion { id, .. }, Some(refused)) => *id == refused,
                     (Awaited::Armed | Awaited::Engaged { .. }, None) => true,
                     _ => false,
@@ -287,15 +289,14 @@ impl Bridge {
     }
 
     /// Takes the open calls that await something of this kind.
-    fn take(&mut self, kind: impl Fn(&mut Awaited) -> bool) -> Vec<Open> {
-        let taken = self.open.extract_if(.., |open| kind(&mut open.awaits));
+    fn take(&mut self, kind: impl Fn(&Awaited) -> bool) -> Vec<Open> {
+        let taken = self.open.extract_if(.., |open| kind(&open.awaits));
         taken.collect()
     }
 
     /// Goes on to the next motion of a call, or answers it.
     fn on_finished(&mut self, finished: u64, event: &ControllerEvent) {
-        let its =
-            |awaits: &mut Awaited| matches!(awaits, Awaited::Motion { id, .. } if *id == finished);
+        let its = |a: &Awaited| matches!(a, Awaited::Motion { id, .. } if *id == finished);
         for Open { call, awaits } in self.take(its) {
             let Awaited::Motion { mut next, .. } = awaits else {
                 continue;
@@ -365,15 +366,13 @@ impl Bridge {
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
-        let done =
-            |awaits: &mut Awaited| matches!(awaits, Awaited::Engaged { held: true, .. }) && fresh;
-        for open in self.take(done) {
+        let held = |a: &Awaited| matches!(a, Awaited::Engaged { held: true, .. });
+        for open in self.take(|awaits| held(awaits) && fresh) {
             answer(&open.call, &ControllerEvent::Done);
         }
         let now = Instant::now();
-        for open in
-            self.take(|awaits| matches!(awaits, Awaited::Engaged { until, .. } if now > *until))
-        {
+        let late = |a: &Awaited| matches!(a, Awaited::Engaged { until, .. } if now > *until);
+        for open in self.take(late) {
             refuse(&open.call, FaultCode::ReportStale, "");
         }
     }
