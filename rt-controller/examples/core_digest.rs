@@ -7,6 +7,6 @@
 mod random_run;
 
 fn main() {
-    let run = random_run::record_run(11, 20_000);
-    println!("{:08x}", crc32fast::hash(&run.bytes));
+    let recording = random_run::record_run(11, 20_000);
+    println!("{:08x}", crc32fast::hash(&recording));
 }

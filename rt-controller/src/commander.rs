@@ -12,35 +12,10 @@ use std::net::SocketAddr as ArmAddress;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
 
-/// Why this process may not command an arm.
+/// Why this process may not command an arm: who does, or what the system said.
 #[derive(Debug, thiserror::Error)]
-pub enum CommanderError {
-    /// Another process of this machine does.
-    #[error(
-        "the arm at {arm} already has a commander on this machine, {}: end it first", holder(*.pid)
-    )]
-    Taken {
-        /// Arm.
-        arm: ArmAddress,
-        /// Process that commands it, if the system says.
-        pid: Option<u32>,
-    },
-    /// The system gives no lock.
-    #[error("cannot lock the arm at {arm} for this process: {reason}")]
-    Lock {
-        /// Arm.
-        arm: ArmAddress,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-}
-
-fn holder(pid: Option<u32>) -> String {
-    pid.map_or_else(
-        || "a process that does not show itself".to_owned(),
-        |pid| format!("process {pid}"),
-    )
-}
+#[error("{0}")]
+pub struct CommanderError(String);
 
 /// The right to command one arm; given up when dropped.
 #[derive(Debug)]
@@ -54,19 +29,30 @@ impl CommanderLock {
     /// # Errors
     /// [`CommanderError`], with the process that has it.
     pub fn take(arm: ArmAddress) -> Result<Self, CommanderError> {
-        let name = SocketAddr::from_abstract_name(format!("wiggle-and-go/commander/{arm}"))
-            .map_err(|reason| CommanderError::Lock { arm, reason })?;
-        match UnixListener::bind_addr(&name) {
-            Ok(name) => Ok(Self { _name: name }),
-            Err(reason) if reason.kind() == ErrorKind::AddrInUse => Err(CommanderError::Taken {
-                arm,
-                pid: UnixStream::connect_addr(&name)
-                    .ok()
-                    .and_then(|stream| peer_pid(&stream)),
-            }),
-            Err(reason) => Err(CommanderError::Lock { arm, reason }),
+        let name = SocketAddr::from_abstract_name(format!("wiggle-and-go/commander/{arm}"));
+        let taken = name.and_then(|name| match UnixListener::bind_addr(&name) {
+            Err(reason) if reason.kind() == ErrorKind::AddrInUse => Ok(Err(holder(&name))),
+            bound => bound.map(Ok),
+        });
+        match taken {
+            Ok(Ok(name)) => Ok(Self { _name: name }),
+            Ok(Err(holder)) => Err(CommanderError(format!(
+                "the arm at {arm} already has a commander on this machine, {holder}: end it first"
+            ))),
+            Err(reason) => Err(CommanderError(format!(
+                "cannot lock the arm at {arm} for this process: {reason}"
+            ))),
         }
     }
+}
+
+/// Who has taken a name.
+fn holder(name: &SocketAddr) -> String {
+    let stream = UnixStream::connect_addr(name).ok();
+    stream.and_then(|stream| peer_pid(&stream)).map_or_else(
+        || "a process that does not show itself".to_owned(),
+        |pid| format!("process {pid}"),
+    )
 }
 
 #[cfg(test)]

@@ -7,7 +7,6 @@ use crate::os::RealTimeSettings;
 use crate::set_up::OnDifference;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::Limits;
-use arm_model::limits::LimitsError;
 use serde::{Deserialize, Serialize};
 use shared_types::CommandInterface;
 use std::net::{IpAddr, Ipv4Addr};
@@ -18,48 +17,11 @@ const WARM_UP_MAX_US: u32 = 1000;
 /// Key of the one time that has a maximum of its own.
 const WINDOW_KEY: &str = "tracking_window_ms";
 
-/// Why a configuration is refused.
+/// Why a configuration is refused: the file or the key, what is wrong and what would be
+/// allowed.
 #[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// A file cannot be read.
-    #[error("cannot read {path}: {reason}")]
-    Read {
-        /// File.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// A file is no configuration.
-    #[error("{path} is not a valid configuration: {reason}")]
-    Parse {
-        /// File.
-        path: PathBuf,
-        /// What is wrong, with line and key.
-        reason: Box<toml::de::Error>,
-    },
-    /// Limits given twice.
-    #[error("give either `limits_file` or a table `[limits]`, not both")]
-    LimitsTwice,
-    /// Limits beyond what the arm is rated for.
-    #[error("limits: {0}")]
-    Limits(#[from] LimitsError),
-    /// A threshold makes no sense.
-    #[error("`{key}` is {found}, it must be {allowed}")]
-    Threshold {
-        /// Key.
-        key: String,
-        /// Value found.
-        found: f64,
-        /// What would be allowed.
-        allowed: &'static str,
-    },
-    /// A priority that does not exist.
-    #[error("`real_time.priority` is {found}, it must be 11 to 99 (absent for none)")]
-    Priority {
-        /// Value found.
-        found: u8,
-    },
-}
+#[error("{0}")]
+pub struct ConfigError(String);
 
 /// Configuration of the controller; TOML keys as the fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -165,7 +127,7 @@ impl ThresholdSettings {
     /// Checked thresholds for the arm at `arm`.
     ///
     /// # Errors
-    /// [`ConfigError::Threshold`].
+    /// [`ConfigError`].
     pub fn checked(&self, arm: IpAddr) -> Result<Thresholds, ConfigError> {
         let profile = self.profile.unwrap_or(if arm.is_loopback() {
             Profile::Relaxed
@@ -176,49 +138,13 @@ impl ThresholdSettings {
             Profile::Strict => Thresholds::strict(),
             Profile::Relaxed => Thresholds::relaxed(),
         };
-        let mut checked = Thresholds {
-            tracking_error_max_rad: self
-                .tracking_error_max_rad
-                .unwrap_or(base.tracking_error_max_rad),
-            unanswered_max: self.unanswered_max.unwrap_or(base.unanswered_max),
-            late_cycles_max: self.late_cycles_max.unwrap_or(base.late_cycles_max),
-            missed_cycles_max: self.missed_cycles_max.unwrap_or(base.missed_cycles_max),
-            ..base
-        };
-        let (error, unanswered) = (checked.tracking_error_max_rad, checked.unanswered_max);
-        let key = "thresholds.tracking_error_max_rad";
-        let allowed = "above 0 and at most 1 rad";
-        require(error > 0.0 && error <= 1.0, key, error, allowed)?;
-        let key = "thresholds.unanswered_max";
-        require(unanswered > 0, key, unanswered, "at least 1")?;
-        let c = &mut checked;
-        for (key, found_ms, span_ns) in [
-            (
-                "operator_timeout_ms",
-                self.operator_timeout_ms,
-                &mut c.operator_timeout_ns,
-            ),
-            (
-                "guardian_timeout_ms",
-                self.guardian_timeout_ms,
-                &mut c.guardian_timeout_ns,
-            ),
-            ("reply_stall_ms", self.reply_stall_ms, &mut c.reply_stall_ns),
-            (
-                "report_stale_ms",
-                self.report_stale_ms,
-                &mut c.report_stale_ns,
-            ),
-            (
-                "report_frozen_ms",
-                self.report_frozen_ms,
-                &mut c.report_frozen_ns,
-            ),
-            (
-                WINDOW_KEY,
-                self.tracking_window_ms,
-                &mut c.tracking_window_ns,
-            ),
+        for (key, found_ms) in [
+            ("operator_timeout_ms", self.operator_timeout_ms),
+            ("guardian_timeout_ms", self.guardian_timeout_ms),
+            ("reply_stall_ms", self.reply_stall_ms),
+            ("report_stale_ms", self.report_stale_ms),
+            ("report_frozen_ms", self.report_frozen_ms),
+            (WINDOW_KEY, self.tracking_window_ms),
         ] {
             let Some(ms) = found_ms else {
                 continue;
@@ -231,8 +157,29 @@ impl ThresholdSettings {
             };
             let key = format!("thresholds.{key}");
             require((4.0..=most_ms).contains(&ms), &key, ms, allowed)?;
-            *span_ns = (ms * 1e6) as u64;
         }
+        let ns = |found_ms: Option<f64>, base_ns| found_ms.map_or(base_ns, |ms| (ms * 1e6) as u64);
+        let checked = Thresholds {
+            operator_timeout_ns: ns(self.operator_timeout_ms, base.operator_timeout_ns),
+            guardian_timeout_ns: ns(self.guardian_timeout_ms, base.guardian_timeout_ns),
+            reply_stall_ns: ns(self.reply_stall_ms, base.reply_stall_ns),
+            unanswered_max: self.unanswered_max.unwrap_or(base.unanswered_max),
+            report_stale_ns: ns(self.report_stale_ms, base.report_stale_ns),
+            report_frozen_ns: ns(self.report_frozen_ms, base.report_frozen_ns),
+            tracking_error_max_rad: self
+                .tracking_error_max_rad
+                .unwrap_or(base.tracking_error_max_rad),
+            tracking_window_ns: ns(self.tracking_window_ms, base.tracking_window_ns),
+            late_cycles_max: self.late_cycles_max.unwrap_or(base.late_cycles_max),
+            missed_cycles_max: self.missed_cycles_max.unwrap_or(base.missed_cycles_max),
+            ..base
+        };
+        let (error, unanswered) = (checked.tracking_error_max_rad, checked.unanswered_max);
+        let key = "thresholds.tracking_error_max_rad";
+        let allowed = "above 0 and at most 1 rad";
+        require(error > 0.0 && error <= 1.0, key, error, allowed)?;
+        let key = "thresholds.unanswered_max";
+        require(unanswered > 0, key, unanswered, "at least 1")?;
         Ok(checked)
     }
 }
@@ -247,11 +194,10 @@ fn require(
     if holds {
         return Ok(());
     }
-    Err(ConfigError::Threshold {
-        key: key.to_owned(),
-        found: found.into(),
-        allowed,
-    })
+    let found = found.into();
+    Err(ConfigError(format!(
+        "`{key}` is {found}, it must be {allowed}"
+    )))
 }
 
 impl ControllerConfig {
@@ -273,12 +219,16 @@ impl ControllerConfig {
     /// [`ConfigError`].
     pub fn resolve_limits(&self) -> Result<Limits, ConfigError> {
         let limits = match (&self.limits_file, &self.limits) {
-            (Some(_), Some(_)) => return Err(ConfigError::LimitsTwice),
+            (Some(_), Some(_)) => {
+                let twice = "give either `limits_file` or a table `[limits]`, not both";
+                return Err(ConfigError(twice.to_owned()));
+            }
             (Some(path), None) => read_toml(path)?,
             (None, Some(limits)) => limits.clone(),
             (None, None) => Limits::default(),
         };
-        limits.check_rating()?;
+        let rated = limits.check_rating();
+        rated.map_err(|reason| ConfigError(format!("limits: {reason}")))?;
         Ok(limits)
     }
 
@@ -307,21 +257,20 @@ impl ControllerConfig {
         let holds = warm_up_us <= WARM_UP_MAX_US;
         require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;
         match self.real_time.priority {
-            Some(found) if !(11..=99).contains(&found) => Err(ConfigError::Priority { found }),
+            Some(found) if !(11..=99).contains(&found) => Err(ConfigError(format!(
+                "`real_time.priority` is {found}, it must be 11 to 99 (absent for none)"
+            ))),
             _ => Ok(()),
         }
     }
 }
 
 fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ConfigError> {
-    let text = std::fs::read_to_string(path).map_err(|reason| ConfigError::Read {
-        path: path.to_owned(),
-        reason,
-    })?;
-    toml::from_str(&text).map_err(|reason| ConfigError::Parse {
-        path: path.to_owned(),
-        reason: Box::new(reason),
-    })
+    let path_of = path.display();
+    let text = std::fs::read_to_string(path)
+        .map_err(|reason| ConfigError(format!("cannot read {path_of}: {reason}")))?;
+    toml::from_str(&text)
+        .map_err(|reason| ConfigError(format!("{path_of} is not a valid configuration: {reason}")))
 }
 
 #[cfg(test)]
@@ -361,10 +310,8 @@ mod tests {
             limits_file: Some("x".into()),
             ..ControllerConfig::default()
         };
-        assert!(matches!(
-            config.resolve_limits(),
-            Err(ConfigError::LimitsTwice)
-        ));
+        let twice = config.resolve_limits().unwrap_err().to_string();
+        assert!(twice.contains("not both"), "{twice}");
     }
 
     #[test]

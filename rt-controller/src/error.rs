@@ -1,6 +1,7 @@
 //! Why the controller process ends.
 
 use crate::config::ConfigError;
+use crate::os::RealTimeSettings;
 use shared_types::ipc::IpcError;
 
 /// Why the controller cannot run, or could not go on.
@@ -37,4 +38,24 @@ pub enum ControllerError {
     /// A histogram could not be made.
     #[error("cannot make a latency histogram: {0}")]
     Histogram(#[from] hdrhistogram::CreationError),
+}
+
+impl ControllerError {
+    /// Reports the real-time properties that could not be had; a refusal where they
+    /// are required.
+    ///
+    /// # Errors
+    /// [`Self::NotRealTime`].
+    pub(crate) fn unless_real_time(
+        settings: &RealTimeSettings,
+        warnings: Vec<String>,
+    ) -> Result<Vec<String>, Self> {
+        for warning in &warnings {
+            tracing::warn!("{warning}");
+        }
+        if settings.require && !warnings.is_empty() {
+            return Err(Self::NotRealTime(warnings));
+        }
+        Ok(warnings)
+    }
 }

@@ -1,23 +1,21 @@
 //! The in-process rings between the control loop and the other threads:
 //! single-producer single-consumer, lock-free, sized once.
 
-use crate::control::{ArmCodes, ControlEvent, ControlState, CycleOutput, Motion};
+use crate::control::{ArmCodes, ControlEvent, Motion};
 use crate::driver::CommandMsg;
 use crate::recording::{RecordedCycle, Snapshot};
 use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
-use shared_types::ipc::{CycleRecord, InputRecord, JointReport, Reports};
+use shared_types::ipc::{CycleRecord, InputRecord, JointReport};
 
 /// Cycle records kept while the bridge is busy: sixteen seconds at 250 Hz.
 const RECORDS: usize = 4096;
 /// Whole states kept for the bridge, one a second.
 const STATES: usize = 4;
-/// Cycles from one whole state to the next.
-const STATE_EVERY: u64 = 250;
 /// Joint reports kept for the bridge: the same time.
 const REPORTS: usize = 4096;
 /// Joint reports kept for the loop; it takes them all every cycle.
-const NEWEST_REPORTS: usize = 16;
+pub(crate) const NEWEST_REPORTS: usize = 16;
 /// Commands, events and retired things are few.
 const FEW: usize = 64;
 
@@ -53,57 +51,6 @@ pub struct RtPorts<T> {
     pub retired: Producer<Retired<T>>,
     /// Records lost so far because the bridge was too slow.
     pub dropped: u32,
-}
-
-impl<T> RtPorts<T> {
-    /// The joint reports that came since the last call; bounded. RT-safe.
-    pub fn new_reports(&mut self) -> Reports {
-        let mut reports = Reports::default();
-        for report in (0..NEWEST_REPORTS).map_while(|_| self.reports.pop().ok()) {
-            reports.push(report);
-        }
-        reports
-    }
-
-    /// The newest codes that came since the last call; bounded. RT-safe.
-    pub fn newest_codes(&mut self) -> Option<ArmCodes> {
-        (0..NEWEST_REPORTS)
-            .map_while(|_| self.codes.pop().ok())
-            .last()
-    }
-
-    /// Passes on the whole state once a second, before a cycle. RT-safe.
-    pub fn put_state(&mut self, control: &ControlState) {
-        if control.cycle().is_multiple_of(STATE_EVERY)
-            && !self.states.is_full()
-            && let Some(snapshot) = Snapshot::of(control)
-        {
-            let _ = self.states.push(snapshot);
-        }
-    }
-
-    /// Passes on the inputs of a cycle, before its record. RT-safe.
-    pub fn put_input(&mut self, input: InputRecord) {
-        // When the ring is full, so is that of the records, which counts losses.
-        let _ = self.inputs.push(input);
-    }
-
-    /// Passes on what a cycle produced, its record first. RT-safe.
-    pub fn put_out(&mut self, out: CycleOutput) {
-        let record = CycleRecord {
-            dropped: self.dropped,
-            ..out.record
-        };
-        if self.records.push(record).is_err() {
-            self.dropped = self.dropped.saturating_add(1);
-        }
-        for event in out.events {
-            let _ = self.events.push(event);
-        }
-        for motion in out.retired {
-            let _ = self.retired.push(Retired::Motion(motion));
-        }
-    }
 }
 
 /// The bridge's ends.

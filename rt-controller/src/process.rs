@@ -7,14 +7,15 @@
 //! | arm status | 5 Hz report connection | ordinary |
 //! | bridge (the caller's) | services, histograms, set-up connection | ordinary |
 
-use crate::bridge::{ArmSettings, Bridge};
+use crate::bridge::Bridge;
 use crate::config::ControllerConfig;
 use crate::control::ControlState;
 use crate::error::ControllerError;
-use crate::os::{MonotonicClock, enter_real_time, shared_memory_free_mb};
+use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, shared_memory_free_mb};
 use crate::ports::{RtPorts, rings};
 use crate::report_stream::{ReportStream, code_decoder, joint_decoder};
 use crate::rt_loop::RtLoop;
+use crate::transport::ArmTransport;
 use crate::transport::tcp::TcpLink;
 use crate::warm_up::CacheWarmUp;
 use shared_types::ipc::{Bus, ControllerBoards, DomainSweep, IpcError};
@@ -55,7 +56,17 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     let mut threads = Threads::default();
     let control = ControlState::new(limits.clone(), settings);
     let broken = rings.rt.broken.clone();
-    let warnings = threads.start_loop(&config, control, rings.rt)?;
+    let quit = Arc::clone(&threads.quit);
+    let body = move |mut rt: RtLoop<TcpLink, MonotonicClock>| {
+        // A panic is a defect; caught here, the bridge can still stop the arm.
+        if catch_unwind(AssertUnwindSafe(|| rt.run(&quit))).is_err() {
+            tracing::error!("the control loop panicked");
+        }
+    };
+    let real_time = &config.real_time;
+    let (thread, warnings) = start_loop(&config.domain, real_time, control, rings.rt, body)?;
+    threads.control_loop = Some(thread);
+    let warnings = ControllerError::unless_real_time(real_time, warnings)?;
     let joints = ReportStream {
         arm: config.arm,
         ports: vec![config.report_port, config.fallback_report_port],
@@ -75,17 +86,15 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     };
     // Each is kept before the next is spawned: if that fails, it is ended and joined.
     let receiver = joints.spawn("joint reports", priority);
-    let receiver = receiver.map_err(ControllerError::Thread)?;
-    threads.receivers.push(receiver);
+    threads
+        .receivers
+        .push(receiver.map_err(ControllerError::Thread)?);
     let receiver = codes.spawn("arm status", None);
-    let receiver = receiver.map_err(ControllerError::Thread)?;
-    threads.receivers.push(receiver);
-    let mut bridge = Bridge::open(
-        &bus,
-        ArmSettings::of(&config, limits, &settings.thresholds),
-        warnings,
-        rings.bridge,
-    )?;
+    threads
+        .receivers
+        .push(receiver.map_err(ControllerError::Thread)?);
+    let held_to = (limits, settings.thresholds);
+    let mut bridge = Bridge::open(&bus, config, held_to, warnings, rings.bridge)?;
     serve(&mut bridge, &threads, stop)
 }
 
@@ -155,12 +164,8 @@ struct Threads {
 impl Drop for Threads {
     fn drop(&mut self) {
         self.quit.store(true, Ordering::Relaxed);
-        for thread in self
-            .control_loop
-            .take()
-            .into_iter()
-            .chain(self.receivers.drain(..))
-        {
+        let control_loop = self.control_loop.take().into_iter();
+        for thread in control_loop.chain(self.receivers.drain(..)) {
             if thread.join().is_err() {
                 tracing::error!("a thread of the controller panicked");
             }
@@ -174,56 +179,47 @@ impl Threads {
             .as_ref()
             .is_some_and(|thread| !thread.is_finished())
     }
+}
 
-    /// Starts the control loop and waits until it is set up; what could not be
-    /// had is returned in words.
-    fn start_loop(
-        &mut self,
-        config: &ControllerConfig,
-        control: ControlState,
-        ports: RtPorts<TcpLink>,
-    ) -> Result<Vec<String>, ControllerError> {
-        let (domain, settings) = (config.domain.clone(), config.real_time.clone());
-        let quit = Arc::clone(&self.quit);
-        let (ready, wait) = mpsc::channel();
-        let ahead_us = config.real_time.warm_up_us;
-        let warm_up = CacheWarmUp::new(config.resolve_limits()?, control.interface(), ahead_us)?;
-        let body = move || {
-            // Blackboard handles stay in the thread that made them.
-            let boards = match Bus::join(&domain).and_then(|bus| create_boards(&bus)) {
-                Ok(boards) => boards,
-                Err(error) => {
-                    let _ = ready.send(Err(error));
-                    return;
-                }
-            };
-            let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
-            rt.set_warm_up(warm_up);
-            let warnings = enter_real_time(&settings);
-            rt.set_real_time(
-                warnings.is_empty() && settings.priority.is_some() && settings.lock_memory,
-            );
-            let words: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-            let _ = ready.send(Ok(words));
-            // A panic is a defect; caught here, the bridge can still stop the arm.
-            if catch_unwind(AssertUnwindSafe(|| rt.run(&quit))).is_err() {
-                tracing::error!("the control loop panicked");
+/// Starts a thread with a control loop in it, which `body` runs, and waits until it is
+/// set up; what could not be had is returned in words.
+pub(crate) fn start_loop<T: ArmTransport + Send + 'static>(
+    domain: &str,
+    settings: &RealTimeSettings,
+    control: ControlState,
+    ports: RtPorts<T>,
+    body: impl FnOnce(RtLoop<T, MonotonicClock>) + Send + 'static,
+) -> Result<(JoinHandle<()>, Vec<String>), ControllerError> {
+    let (domain, settings) = (domain.to_owned(), settings.clone());
+    let (limits, interface) = (control.limits().clone(), control.interface());
+    let warm_up = CacheWarmUp::new(limits, interface, settings.warm_up_us)?;
+    let (ready, wait) = mpsc::channel();
+    let thread = move || {
+        // Blackboard handles stay in the thread that made them.
+        let boards = match Bus::join(&domain).and_then(|bus| create_boards(&bus)) {
+            Ok(boards) => boards,
+            Err(error) => {
+                let _ = ready.send(Err(error));
+                return;
             }
         };
-        let thread = std::thread::Builder::new()
-            .name(CONTROL_THREAD.to_owned())
-            .spawn(body)
-            .map_err(ControllerError::Thread)?;
-        self.control_loop = Some(thread);
-        let warnings = wait.recv().map_err(|_gone| ControllerError::LoopEnded)??;
-        for warning in &warnings {
-            tracing::warn!("{warning}");
-        }
-        if config.real_time.require && !warnings.is_empty() {
-            return Err(ControllerError::NotRealTime(warnings));
-        }
-        Ok(warnings)
-    }
+        let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
+        rt.set_warm_up(warm_up);
+        let warnings = enter_real_time(&settings);
+        rt.set_real_time(
+            warnings.is_empty() && settings.priority.is_some() && settings.lock_memory,
+        );
+        let _ = ready.send(Ok(warnings));
+        body(rt);
+    };
+    let thread = std::thread::Builder::new()
+        .name(CONTROL_THREAD.to_owned())
+        .spawn(thread)
+        .map_err(ControllerError::Thread)?;
+    let warnings = wait.recv().map_err(|_gone| {
+        ControllerError::Thread(std::io::Error::other("the control loop ended at once"))
+    })??;
+    Ok((thread, warnings))
 }
 
 #[cfg(test)]

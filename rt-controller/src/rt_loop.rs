@@ -21,13 +21,18 @@
 use crate::control::{ArmCodes, ControlState, CycleOutput};
 use crate::driver::{CommandMsg, CycleDriver, CycleIo};
 use crate::os::Clock;
-use crate::ports::{Retired, RtPorts};
+use crate::ports::{NEWEST_REPORTS, Retired, RtPorts};
+use crate::recording::Snapshot;
 use crate::transport::ArmTransport;
 use crate::warm_up::CacheWarmUp;
 use shared_types::ipc::{
-    ControllerBoards, ControllerState, GuardianBeat, InputRecord, OperatorBeat, Reports,
+    ControllerBoards, ControllerState, CycleRecord, GuardianBeat, InputRecord, OperatorBeat,
+    Reports,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Cycles from one whole state that is passed on to the next.
+const STATE_EVERY: u64 = 250;
 
 /// The loop and all it owns.
 #[derive(Debug)]
@@ -55,19 +60,20 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         control: ControlState,
         clock: C,
         boards: ControllerBoards,
-        mut ports: RtPorts<T>,
+        ports: RtPorts<T>,
     ) -> Self {
-        ports.put_state(&control);
+        let mut io = RtIo {
+            broken: ports.broken.count(),
+            clock,
+            boards,
+            ports,
+            pid: std::process::id(),
+            real_time: false,
+        };
+        io.put_state(&control);
         Self {
-            driver: CycleDriver::new(control, clock.now_ns()),
-            io: RtIo {
-                broken: ports.broken.count(),
-                clock,
-                boards,
-                ports,
-                pid: std::process::id(),
-                real_time: false,
-            },
+            driver: CycleDriver::new(control, io.now_ns()),
+            io,
             warm_up: None,
         }
     }
@@ -141,7 +147,11 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
     }
 
     fn new_reports(&mut self) -> Reports {
-        self.ports.new_reports()
+        let mut reports = Reports::default();
+        for report in (0..NEWEST_REPORTS).map_while(|_| self.ports.reports.pop().ok()) {
+            reports.push(report);
+        }
+        reports
     }
 
     fn new_broken_reports(&mut self) -> u32 {
@@ -150,11 +160,14 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
     }
 
     fn new_codes(&mut self) -> Option<ArmCodes> {
-        self.ports.newest_codes()
+        (0..NEWEST_REPORTS)
+            .map_while(|_| self.ports.codes.pop().ok())
+            .last()
     }
 
     fn put_input(&mut self, input: InputRecord) {
-        self.ports.put_input(input);
+        // When the ring is full, so is that of the records, which counts losses.
+        let _ = self.ports.inputs.push(input);
     }
 
     fn publish(&mut self, state: ControllerState) {
@@ -166,11 +179,29 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
     }
 
     fn put_output(&mut self, out: CycleOutput) {
-        self.ports.put_out(out);
+        let ports = &mut self.ports;
+        let record = CycleRecord {
+            dropped: ports.dropped,
+            ..out.record
+        };
+        if ports.records.push(record).is_err() {
+            ports.dropped = ports.dropped.saturating_add(1);
+        }
+        for event in out.events {
+            let _ = ports.events.push(event);
+        }
+        for motion in out.retired {
+            let _ = ports.retired.push(Retired::Motion(motion));
+        }
     }
 
     fn put_state(&mut self, control: &ControlState) {
-        self.ports.put_state(control);
+        if control.cycle().is_multiple_of(STATE_EVERY)
+            && !self.ports.states.is_full()
+            && let Some(snapshot) = Snapshot::of(control)
+        {
+            let _ = self.ports.states.push(snapshot);
+        }
     }
 
     fn retire_link(&mut self, link: Box<T>) {

@@ -18,23 +18,11 @@ use std::time::{Duration, Instant};
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
     /// No connection.
-    #[error(
-        "cannot connect to the arm at {address} ({reason}): check power, cable, address and port"
-    )]
-    Connect {
-        /// Address tried.
-        address: SocketAddr,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error("cannot connect to the arm at {0} ({1}): check power, cable, address and port")]
+    Connect(SocketAddr, std::io::Error),
     /// The connection failed on the way.
-    #[error("the arm did not answer {command:?} ({reason}): check the cable and try again")]
-    Transfer {
-        /// Request.
-        command: Box<Command>,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error("the arm did not answer {0:?} ({1}): check the cable and try again")]
+    Transfer(Box<Command>, std::io::Error),
     /// The stream makes no sense.
     #[error("the arm's answers make no sense: {0}; is this the command port?")]
     Broken(#[from] BrokenStream),
@@ -69,7 +57,7 @@ impl ArmSession {
         };
         Ok(Self {
             address,
-            stream: open().map_err(|reason| SessionError::Connect { address, reason })?,
+            stream: open().map_err(|reason| SessionError::Connect(address, reason))?,
             reader: FrameReader::new(),
             transaction: 0,
             protocol: Protocol::Private,
@@ -89,10 +77,7 @@ impl ArmSession {
     /// # Errors
     /// [`SessionError`]; after one, open a new session.
     pub fn ask(&mut self, command: &Command) -> Result<ReplyData, SessionError> {
-        let fail = |reason| SessionError::Transfer {
-            command: Box::new(*command),
-            reason,
-        };
+        let fail = |reason| SessionError::Transfer(Box::new(*command), reason);
         self.transaction = next_transaction(self.transaction);
         let mut frame = [0; MAX_FRAME_LEN];
         let len = emit_command(&mut frame, self.transaction, self.protocol, command)

@@ -7,15 +7,17 @@
 //! the arm shall be set. Order of the recovery as in the vendor's manual: clear
 //! error, enable, mode, state.
 
+use crate::config::ControllerConfig;
 use crate::session::{ArmSession, SessionError};
 use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport};
 use crate::xarm::{
-    ArmState, ArmVersion, Command, ErrorCode, Firmware, JointQuery, Mode, ReplyData, ReportReader,
-    StateRequest, TcpPose, VersionError,
+    ArmState, ArmVersion, Command, Firmware, JointQuery, Mode, ReplyData, ReportReader,
+    StateRequest, TcpPose,
 };
 use arm_model::{JointVector, Limits};
 use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
+use shared_types::FaultCode;
 use std::io::Read;
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
@@ -35,6 +37,9 @@ const READY_TIMEOUT: Duration = Duration::from_secs(3);
 /// Longest wait for a status report; five come a second.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// What to do about a difference that is refused.
+const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
+
 /// What is done about an arm that is configured otherwise than the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -47,129 +52,43 @@ pub enum OnDifference {
     Set,
 }
 
-/// Why the arm could not be set up.
+/// Why the arm could not be set up: what was found, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum SetUpError {
-    /// It did not answer, or not sensibly.
-    #[error(transparent)]
-    Session(#[from] SessionError),
-    /// Another arm, or a firmware that cannot be driven.
-    #[error("the arm at {arm} says `{text}`: {reason}")]
-    Version {
-        /// Address.
-        arm: SocketAddr,
-        /// Its version text.
-        text: String,
-        /// Why it is refused.
-        reason: VersionError,
-    },
-    /// Reports of another size than this firmware sends: fields may lie elsewhere.
-    #[error(
-        "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
-    )]
-    Layout {
-        /// Port.
-        port: u16,
-        /// Firmware that the arm names.
-        firmware: Firmware,
-        /// Size found (bytes).
-        found: usize,
-        /// Sizes known for this firmware (bytes).
-        expected: String,
-    },
-    /// The configured joint range is wider than the arm's.
-    #[error(
-        "joint {joint} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms"
-    )]
-    Range {
-        /// Joint, 1-based.
-        joint: usize,
-        /// Configured limit (rad).
-        limit_rad: f64,
-    },
-    /// The tool configured in the arm is another one.
-    #[error(
-        "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: set one to the other (`on_difference = \"set\"` sets the arm)"
-    )]
-    Tool {
-        /// In the arm (m).
-        arm_m: [f64; 3],
-        /// In the limits (m).
-        configured_m: [f64; 3],
-    },
-    /// The tool speed limit of the arm is another one.
-    #[error(
-        "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: set one to the other (`on_difference = \"set\"` sets the arm)"
-    )]
-    ToolSpeed {
-        /// In the arm (m/s).
-        arm_m_s: f64,
-        /// In the limits (m/s).
-        configured_m_s: f64,
-    },
-    /// The status report cannot be read.
-    #[error("no status report from the arm at {address} ({reason}): check the report ports")]
-    NoStatus {
-        /// Address tried.
-        address: SocketAddr,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// An error that clearing does not remove.
-    #[error("the arm keeps its error {0}")]
-    ArmError(ErrorCode),
-    /// The arm does not become ready.
-    #[error(
-        "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
-    )]
-    NotReady {
-        /// State it stays in.
-        state: ArmState,
-    },
-    /// The arm moves by itself.
-    #[error("the arm does not stand still: stop other programs that move it")]
-    Restless,
-    /// The pose is outside the configured limits.
-    #[error(
-        "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
-    )]
-    OutsideRange {
-        /// Joint, 1-based.
-        joint: usize,
-        /// Where it stands (rad).
-        q_rad: f64,
-    },
+#[error("{message}")]
+pub struct SetUpError {
+    /// The fault code nearest to it.
+    pub fault: FaultCode,
+    message: String,
+}
+
+/// Refuses an arm.
+fn refuse<T>(fault: FaultCode, message: String) -> Result<T, SetUpError> {
+    Err(SetUpError { fault, message })
+}
+
+impl From<SessionError> for SetUpError {
+    fn from(error: SessionError) -> Self {
+        Self {
+            fault: FaultCode::LinkLost,
+            message: error.to_string(),
+        }
+    }
 }
 
 /// What an arm is set up for.
 #[derive(Debug, Clone, Copy)]
 pub struct SetUp<'a> {
-    /// Limits the controller is configured for.
+    /// A checked configuration.
+    pub config: &'a ControllerConfig,
+    /// The limits that it names.
     pub limits: &'a Limits,
-    /// Mode in which it takes setpoints.
-    pub mode: Mode,
-    /// Port with normal or rich reports.
-    pub status: SocketAddr,
-    /// Port with real-time reports.
-    pub joints: SocketAddr,
-    /// What to do about differences.
-    pub on_difference: OnDifference,
-}
-
-/// An arm that is ready.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReadyArm {
-    /// Where it stands (rad).
-    pub q: JointVector,
-    /// What it is.
-    pub version: ArmVersion,
 }
 
 /// Takes every step that was done: its name and its result.
 pub type OnStep<'a> = &'a mut dyn FnMut(&'static str, &str);
 
 impl SetUp<'_> {
-    /// Sets up the arm behind `session`; each step is `reported`.
+    /// Sets up the arm behind `session`; each step is `reported`. Where it stands (rad).
     ///
     /// # Errors
     /// [`SetUpError`]; the step that failed was not reported.
@@ -177,7 +96,7 @@ impl SetUp<'_> {
         &self,
         session: &mut ArmSession,
         reported: OnStep<'_>,
-    ) -> Result<ReadyArm, SetUpError> {
+    ) -> Result<JointVector, SetUpError> {
         let version = self.identify(session)?;
         reported(
             "identify",
@@ -189,6 +108,7 @@ impl SetUp<'_> {
             "tool speed",
             &self.match_tool_speed(session, version.firmware)?,
         );
+        let mode = Mode::from_code(self.config.command_interface.arm_mode());
         let enable = Command::MotionEnable {
             joint: Command::ALL_JOINTS,
             enable: true,
@@ -197,7 +117,7 @@ impl SetUp<'_> {
             ("clear error", Command::CleanError),
             ("clear warning", Command::CleanWarning),
             ("enable", enable),
-            ("mode", Command::SetMode(self.mode)),
+            ("mode", Command::SetMode(mode)),
             ("state", Command::SetState(StateRequest::Ready)),
         ] {
             session.ask(&command)?;
@@ -207,12 +127,21 @@ impl SetUp<'_> {
         let q = wait_still(session)?;
         reported("still", "the arm stands");
         match self.limits.position_violation(&q) {
-            Some(j) => Err(SetUpError::OutsideRange {
-                joint: j.saturating_add(1),
-                q_rad: q[j],
-            }),
-            None => Ok(ReadyArm { q, version }),
+            Some(j) => {
+                let (joint, q_rad) = (j.saturating_add(1), q[j]);
+                let message = format!(
+                    "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
+                );
+                refuse(FaultCode::SetpointPosition, message)
+            }
+            None => Ok(q),
         }
+    }
+
+    /// Port with normal or rich reports.
+    fn status(&self) -> SocketAddr {
+        let [status, _] = self.config.status_ports;
+        SocketAddr::new(self.config.arm, status)
     }
 
     /// Reads the version and refuses what cannot be driven.
@@ -222,50 +151,54 @@ impl SetUp<'_> {
             _ => String::new(),
         };
         let checked = ArmVersion::parse(&text).and_then(|v| v.check().map(|()| v));
-        let version = checked.map_err(|reason| SetUpError::Version {
-            arm: session.address(),
-            text,
-            reason,
+        let version = checked.or_else(|reason| {
+            let arm = session.address();
+            let message = format!("the arm at {arm} says `{text}`: {reason}");
+            refuse(FaultCode::UnsupportedFirmware, message)
         })?;
         // Every firmware that passes is new enough for protocol 3.
         session.keep_heartbeat();
         match version.wider_than_the_arm(self.limits) {
-            Some((joint, limit_rad)) => Err(SetUpError::Range {
-                joint: joint.saturating_add(1),
-                limit_rad,
-            }),
+            Some((j, limit_rad)) => {
+                let joint = j.saturating_add(1);
+                let message = format!(
+                    "joint {joint} may move to {limit_rad:.4} rad by the configured limits, but this arm's range ends earlier: use limits of 1305 arms"
+                );
+                refuse(FaultCode::ArmDiffers, message)
+            }
             None => Ok(version),
         }
     }
 
     /// Compares the size of the reports with what the firmware is known to send.
     fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
-        let refuse = |address: SocketAddr, found, sizes: &RangeInclusive<usize>| {
-            let (least, most) = (sizes.start(), sizes.end());
-            Err(SetUpError::Layout {
-                port: address.port(),
-                firmware,
-                found,
-                expected: if least == most {
-                    least.to_string()
-                } else {
-                    format!("{least} to {most}")
-                },
-            })
+        // Fields may lie elsewhere in reports of another size.
+        let other_size = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
+            let (port, least, most) = (address.port(), sizes.start(), sizes.end());
+            let expected = if least == most {
+                least.to_string()
+            } else {
+                format!("{least} to {most}")
+            };
+            let message = format!(
+                "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
+            );
+            refuse(FaultCode::UnsupportedFirmware, message)
         };
-        let status = read_report(self.status)?.len();
+        let status = read_report(self.status())?.len();
         let sizes = firmware.rich_sizes();
         // The normal report is the same everywhere.
         if status != NORMAL_REPORT_LEN && !sizes.contains(&status) {
-            return refuse(self.status, status, &sizes);
+            return other_size(self.status(), status, &sizes);
         }
         let sizes = firmware.realtime_sizes();
-        match read_report(self.joints) {
+        let joints = SocketAddr::new(self.config.arm, self.config.report_port);
+        match read_report(joints) {
             Ok(report) if sizes.contains(&report.len()) => Ok(format!(
                 "{} and {status} bytes, as of {firmware}",
                 report.len()
             )),
-            Ok(report) => refuse(self.joints, report.len(), &sizes),
+            Ok(report) => other_size(joints, report.len(), &sizes),
             // As many clients as it takes are there: the 100 Hz report serves.
             Err(reason) => Ok(format!(
                 "{status} bytes, as of {firmware}; no real-time report ({reason})"
@@ -275,14 +208,9 @@ impl SetUp<'_> {
 
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
-        let status = read_report(self.status)?;
-        let arm_m = NormalReport::parse(&status)
-            .map_err(|e| SetUpError::NoStatus {
-                address: self.status,
-                reason: std::io::Error::other(e.to_string()),
-            })?
-            .tcp_offset
-            .position_m;
+        let status = read_report(self.status())?;
+        let report = NormalReport::parse(&status).or_else(|e| no_status(self.status(), e))?;
+        let arm_m = report.tcp_offset.position_m;
         let apart_m = arm_m
             .iter()
             .zip(&configured_m)
@@ -292,11 +220,13 @@ impl SetUp<'_> {
         if apart_m <= OFFSET_EQUAL_M && arm_m.iter().all(|v| v.is_finite()) {
             return Ok(format!("{configured_m:?} m as configured"));
         }
-        match self.on_difference {
-            OnDifference::Refuse => Err(SetUpError::Tool {
-                arm_m,
-                configured_m,
-            }),
+        match self.config.on_difference {
+            OnDifference::Refuse => {
+                let message = format!(
+                    "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: {SET_ONE}"
+                );
+                refuse(FaultCode::ArmDiffers, message)
+            }
             OnDifference::Set => {
                 session.ask(&Command::TcpOffset(TcpPose {
                     position_m: configured_m,
@@ -325,11 +255,11 @@ impl SetUp<'_> {
         if (arm_m_s - configured_m_s).abs() <= SPEED_EQUAL_M_S {
             return Ok(format!("{configured_m_s:.3} m/s as configured"));
         }
-        if self.on_difference == OnDifference::Refuse || !settable {
-            return Err(SetUpError::ToolSpeed {
-                arm_m_s,
-                configured_m_s,
-            });
+        if self.config.on_difference == OnDifference::Refuse || !settable {
+            let message = format!(
+                "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
+            );
+            return refuse(FaultCode::ArmDiffers, message);
         }
         let factor = configured_m_s / SPEED_AT_FACTOR_ONE_M_S;
         session.ask(&Command::SetSpeedLimitFactor(factor))?;
@@ -337,21 +267,27 @@ impl SetUp<'_> {
     }
 }
 
+fn no_status<T>(address: SocketAddr, reason: impl core::fmt::Display) -> Result<T, SetUpError> {
+    let message =
+        format!("no status report from the arm at {address} ({reason}): check the report ports");
+    refuse(FaultCode::LinkLost, message)
+}
+
 /// The newest report of a port; one comes at once with every connection.
 fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
-    let fail = |reason| SetUpError::NoStatus { address, reason };
-    let other = |e: &dyn std::error::Error| fail(std::io::Error::other(e.to_string()));
-    let mut stream = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).map_err(fail)?;
-    stream
-        .set_read_timeout(Some(REPORT_TIMEOUT))
-        .map_err(fail)?;
+    let connected = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).and_then(|stream| {
+        stream.set_read_timeout(Some(REPORT_TIMEOUT))?;
+        Ok(stream)
+    });
+    let mut stream = connected.or_else(|e| no_status(address, e))?;
     let mut reader = ReportReader::new();
     let mut received = 0;
     while received <= MAX_REPORT_LEN {
-        if let Some(frame) = reader.next_report().map_err(|e| other(&e))? {
+        if let Some(frame) = reader.next_report().or_else(|e| no_status(address, e))? {
             return Ok(frame.to_vec());
         }
-        match stream.read(reader.space()).map_err(fail)? {
+        let read = stream.read(reader.space());
+        match read.or_else(|e| no_status(address, e))? {
             0 => break,
             n => {
                 reader.commit(n);
@@ -359,7 +295,10 @@ fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
             }
         }
     }
-    Err(fail(std::io::ErrorKind::UnexpectedEof.into()))
+    no_status(
+        address,
+        std::io::Error::from(std::io::ErrorKind::UnexpectedEof),
+    )
 }
 
 fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {
@@ -371,11 +310,14 @@ fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {
             return Ok(state);
         }
         if began.elapsed() > READY_TIMEOUT {
-            return Err(if error.is_none() {
-                SetUpError::NotReady { state }
-            } else {
-                SetUpError::ArmError(error)
-            });
+            if !error.is_none() {
+                let message = format!("the arm keeps its error {error}");
+                return refuse(FaultCode::ArmError, message);
+            }
+            let message = format!(
+                "the arm does not become ready (state {state:?}): release its emergency stop, or use the vendor's tool to see why"
+            );
+            return refuse(FaultCode::ArmNotReady, message);
         }
         std::thread::sleep(STILL_INTERVAL);
     }
@@ -395,5 +337,6 @@ fn wait_still(session: &mut ArmSession) -> Result<JointVector, SetUpError> {
         before = Some(q);
         std::thread::sleep(STILL_INTERVAL);
     }
-    Err(SetUpError::Restless)
+    let message = "the arm does not stand still: stop other programs that move it";
+    refuse(FaultCode::ArmNotReady, message.to_owned())
 }

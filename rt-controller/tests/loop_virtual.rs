@@ -19,7 +19,6 @@ use rt_controller::warm_up::CacheWarmUp;
 use shared_types::FaultCode;
 use shared_types::ipc::{Bus, ControllerBoards, CycleRecord};
 use std::cell::Cell;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -27,53 +26,35 @@ const PERIOD_NS: u64 = 4_000_000;
 const BEGIN_NS: u64 = 1_000_000_000_000;
 
 /// Time that passes while the loop sleeps; every so often it oversleeps, by the
-/// next of `late_ns`, or is held up by the next of `held_ns` right after its
-/// wake-up. Sets `quit` after `sleeps`.
+/// next of `late_ns`. Sets `quit` after `sleeps`.
 struct LateClock {
-    now_ns: Rc<Cell<u64>>,
+    now_ns: Cell<u64>,
     late_ns: Vec<u64>,
-    held_ns: Vec<u64>,
-    /// Whether the wake-up has been looked at.
-    woke: Cell<bool>,
     sleeps: usize,
     quit: Arc<AtomicBool>,
 }
 
 impl Clock for LateClock {
     fn now_ns(&self) -> u64 {
-        let now_ns = self.now_ns.get();
-        let held_ns = if self.woke.replace(true) {
-            0
-        } else {
-            self.held_ns.get(self.sleeps).copied().unwrap_or_default()
-        };
         // A look at the clock takes time, too.
-        self.now_ns.set(now_ns + 1 + held_ns);
-        now_ns
+        self.now_ns.replace(self.now_ns.get() + 1)
     }
 
     fn sleep_until(&mut self, deadline_ns: u64) {
         let late_ns = self.late_ns.get(self.sleeps).copied().unwrap_or_default();
         self.now_ns
             .set(self.now_ns.get().max(deadline_ns) + late_ns);
-        self.woke.set(false);
         self.sleeps = self.sleeps.saturating_sub(1);
         self.quit.store(self.sleeps == 0, Ordering::Relaxed);
     }
 }
 
-/// Runs the loop with an arm for as many cycles as `late_ns` has entries.
-fn run(name: &str, arm: IdealArm, late_ns: Vec<u64>) -> (Vec<CycleRecord>, BridgePorts<IdealArm>) {
-    run_so(name, arm, late_ns, Vec::new(), 0)
-}
-
-/// The same, held up after its wake-ups by `held_ns`, warming up `ahead_us`
-/// before each deadline.
-fn run_so(
+/// Runs the loop with an arm for as many cycles as `late_ns` has entries, warming up
+/// `ahead_us` before each deadline.
+fn run(
     name: &str,
     arm: IdealArm,
     late_ns: Vec<u64>,
-    held_ns: Vec<u64>,
     ahead_us: u32,
 ) -> (Vec<CycleRecord>, BridgePorts<IdealArm>) {
     let bus = Bus::join(&format!("test_{name}_{}", std::process::id())).unwrap();
@@ -100,11 +81,9 @@ fn run_so(
         .unwrap();
     let quit = Arc::new(AtomicBool::new(false));
     let clock = LateClock {
-        now_ns: Rc::new(Cell::new(BEGIN_NS)),
+        now_ns: Cell::new(BEGIN_NS),
         sleeps: late_ns.len(),
         late_ns,
-        held_ns,
-        woke: Cell::new(true),
         quit: Arc::clone(&quit),
     };
     let control = ControlState::new(Limits::default(), thresholds);
@@ -128,7 +107,7 @@ fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
     // Microseconds late, entries consumed from the back.
     let late_us = [0, 30, 3900, 0, 0, 9_500, 200, 0, 1200, 0, 799, 801, 0, 0];
     let late_ns = late_us.map(|us: u64| us * 1000).to_vec();
-    let (records, mut bridge) = run("late", IdealArm::default(), late_ns);
+    let (records, mut bridge) = run("late", IdealArm::default(), late_ns, 0);
     assert_eq!(records.len(), late_us.len());
     let mut cycles = 0;
     for pair in records.windows(2) {
@@ -152,10 +131,7 @@ fn a_late_machine_loses_cycles_but_neither_phase_nor_distance() {
 fn a_warm_up_takes_lateness_away_and_changes_nothing_else() {
     let late_us = [0, 30, 150, 0, 0, 90, 9_500, 0, 199, 0, 400, 0, 3_990, 0];
     let late_ns = late_us.map(|us: u64| us * 1000).to_vec();
-    let so = |name, ahead_us| {
-        let arm = IdealArm::default();
-        run_so(name, arm, late_ns.clone(), Vec::new(), ahead_us)
-    };
+    let so = |name, ahead_us| run(name, IdealArm::default(), late_ns.clone(), ahead_us);
     let (plain, _) = so("plain", 0);
     let (early, mut bridge) = so("early", 200);
     assert_eq!(latched(&mut bridge), None);
@@ -182,31 +158,12 @@ fn a_warm_up_takes_lateness_away_and_changes_nothing_else() {
 }
 
 #[test]
-fn a_setpoint_that_grows_old_before_its_send_does_not_go_out() {
-    // Microseconds, entries consumed from the back: after the sleep that they
-    // stand for, so the first of them belongs to nobody.
-    let held_us = [0, 0, 150, 0, 3500, 0, 0, 300, 250, 0, 0, 0];
-    let held_ns = held_us.map(|us: u64| us * 1000).to_vec();
-    let arm = IdealArm::default();
-    let (records, mut bridge) = run_so("held", arm, vec![0; held_us.len()], held_ns, 0);
-    let went: Vec<(bool, u32)> = records.iter().map(|r| (r.send_ns > 0, r.missed)).collect();
-    let held: Vec<usize> = (0..went.len())
-        .filter(|k| !went[*k].0 && records[*k].sent == 1)
-        .collect();
-    assert_eq!(held.len(), 3, "{went:?}");
-    // Each counts as missed for the one behind it.
-    let missed: Vec<u32> = held.iter().map(|k| went[k + 1].1).collect();
-    assert_eq!(missed, [1, 2, 1], "{went:?}");
-    assert_eq!(latched(&mut bridge), None);
-}
-
-#[test]
 fn a_stalled_link_is_latched_and_a_broken_one_never_engaged() {
     let stalled = IdealArm {
         stalled: true,
         ..IdealArm::default()
     };
-    let (records, mut bridge) = run("stalled", stalled, vec![0; 20]);
+    let (records, mut bridge) = run("stalled", stalled, vec![0; 20], 0);
     assert_eq!(latched(&mut bridge), Some(FaultCode::ReplyStalled));
     // 20 ms without a reply: noticed in the sixth cycle after the first setpoint.
     assert_eq!(records.iter().filter(|r| r.sent == 1).count(), 6);
@@ -214,7 +171,7 @@ fn a_stalled_link_is_latched_and_a_broken_one_never_engaged() {
         gone: true,
         ..IdealArm::default()
     };
-    let (records, mut bridge) = run("gone", gone, vec![0; 20]);
+    let (records, mut bridge) = run("gone", gone, vec![0; 20], 0);
     let (id, fault) = (None, FaultCode::LinkLost);
     assert_eq!(bridge.events.pop(), Ok(ControlEvent::Refused { id, fault }));
     assert!(records.iter().all(|r| r.sent == 0));

@@ -31,8 +31,10 @@ use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::warm_up::{CacheWarmUp, patient, swinging};
+use rtrb::Producer;
 use shared_types::ipc::{
-    Bus, ControllerBoards, ControllerMode, CycleRecord, JointReport, OperatorEnd, StateReader,
+    Bus, ControllerBoards, ControllerMode, CyclePublisher, CycleRecord, JointReport, OperatorEnd,
+    StateReader,
 };
 use shared_types::{Arming, OperatingMode};
 use std::io::{BufRead, BufReader};
@@ -130,35 +132,42 @@ impl Clock for CountedClock {
     }
 }
 
-/// A running loop in a thread of its own, and what the bridge would hold.
+/// A running loop in a thread of its own, and what the bridge would hold: it passes
+/// records on to whoever listens.
 struct Running {
     thread: JoinHandle<Sums>,
     quit: Arc<AtomicBool>,
-    rings: Rings<TcpLink>,
+    bridge: BridgePorts<TcpLink>,
+    reports: Producer<JointReport>,
     newest: CycleRecord,
+    bus: Bus,
+    cycles: CyclePublisher,
+    operator: OperatorEnd,
 }
 
 fn start_loop(domain: &str) -> Running {
-    let mut all = rings();
-    let ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
+    let Rings {
+        rt: ports,
+        bridge,
+        reports: [reports, _],
+        ..
+    } = rings();
     let quit = Arc::new(AtomicBool::new(false));
-    let (its_quit, domain) = (Arc::clone(&quit), domain.to_owned());
+    let (its_quit, its_domain) = (Arc::clone(&quit), domain.to_owned());
     let (ready, wait) = std::sync::mpsc::channel();
     let thread = std::thread::spawn(move || {
-        let bus = Bus::join(&domain).unwrap();
+        let bus = Bus::join(&its_domain).unwrap();
         let boards = ControllerBoards::create(&bus).unwrap();
         let clock = CountedClock {
             inner: MonotonicClock,
             begun: false,
             sums: Sums::default(),
         };
-        let control = ControlState::new(
-            Limits::default(),
-            ControlSettings {
-                arming_required: true,
-                ..patient()
-            },
-        );
+        let settings = ControlSettings {
+            arming_required: true,
+            ..patient()
+        };
+        let control = ControlState::new(Limits::default(), settings);
         let mut rt = RtLoop::new(control, clock, boards, ports);
         let interface = patient().interface;
         rt.set_warm_up(CacheWarmUp::new(Limits::default(), interface, 200).unwrap());
@@ -168,43 +177,34 @@ fn start_loop(domain: &str) -> Running {
         rt.clock().sums.clone()
     });
     wait.recv().unwrap();
+    let bus = Bus::join(domain).unwrap();
     Running {
         thread,
         quit,
-        rings: all,
+        bridge,
+        reports,
         newest: CycleRecord::default(),
+        cycles: bus.cycle_publisher().unwrap(),
+        operator: OperatorEnd::take(&bus).unwrap(),
+        bus,
     }
-}
-
-/// What the bridge does beside: passes records on to whoever listens.
-struct Beside {
-    bus: Bus,
-    cycles: shared_types::ipc::CyclePublisher,
-    operator: OperatorEnd,
 }
 
 impl Running {
-    fn bridge(&mut self) -> &mut BridgePorts<TcpLink> {
-        &mut self.rings.bridge
-    }
-
-    /// Turns the bridge until `done` or for ten seconds.
-    fn until(&mut self, beside: &mut Beside, mut done: impl FnMut(&CycleRecord) -> bool) {
+    /// Turns the bridge until `done` or for a minute.
+    fn until(&mut self, mut done: impl FnMut(&CycleRecord) -> bool) {
         let began = Instant::now();
         while !done(&self.newest) {
             assert!(!self.thread.is_finished(), "the loop ended");
-            assert!(
-                began.elapsed() < Duration::from_secs(60),
-                "{:?}",
-                self.newest
-            );
-            beside.operator.beat();
-            while let Ok(record) = self.rings.bridge.records.pop() {
+            let waited = began.elapsed();
+            assert!(waited < Duration::from_secs(60), "{:?}", self.newest);
+            self.operator.beat();
+            while let Ok(record) = self.bridge.records.pop() {
                 self.newest = record;
-                beside.cycles.send_copy(record).unwrap();
+                self.cycles.send_copy(record).unwrap();
             }
-            while self.rings.bridge.retired.pop().is_ok() {}
-            while self.rings.bridge.events.pop().is_ok() {}
+            while self.bridge.retired.pop().is_ok() {}
+            while self.bridge.events.pop().is_ok() {}
             let report = JointReport {
                 arm_state: 1,
                 arm_mode: 1,
@@ -213,16 +213,14 @@ impl Running {
                 q: self.newest.q_c,
                 ..JointReport::default()
             };
-            let _ = self.rings.reports[0].push(report);
+            let _ = self.reports.push(report);
             std::thread::sleep(Duration::from_millis(2));
         }
     }
 
     fn command(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
-        self.bridge()
-            .commands
-            .push(CommandMsg { command, link })
-            .unwrap();
+        let message = CommandMsg { command, link };
+        self.bridge.commands.push(message).unwrap();
     }
 }
 
@@ -281,52 +279,45 @@ fn attached(child: &mut Child) -> Arc<AtomicBool> {
 fn readers_that_come_and_are_killed_while_an_armed_arm_moves_change_no_call() {
     let domain = format!("test_calls_{}", std::process::id());
     let mut running = start_loop(&domain);
-    let bus = Bus::join(&domain).unwrap();
-    let mut beside = Beside {
-        cycles: bus.cycle_publisher().unwrap(),
-        operator: OperatorEnd::take(&bus).unwrap(),
-        bus,
-    };
-    let arm = EchoArm::start();
-    running.until(&mut beside, |newest| newest.cycle > 3);
+    let mut arm = EchoArm::start();
+    let address = arm.address();
+    std::thread::spawn(move || {
+        arm.accept();
+        while arm.meet(1) {}
+    });
+    running.until(|newest| newest.cycle > 3);
     let settings = LinkSettings::new(250, 4_000_000);
-    let link = TcpLink::connect(arm.address, Duration::from_secs(5), settings).unwrap();
-    running.command(
-        ControlCommand::Engage { hold: START_POSE },
-        Some(Box::new(link)),
-    );
+    let link = TcpLink::connect(address, Duration::from_secs(5), settings).unwrap();
+    let engage = ControlCommand::Engage { hold: START_POSE };
+    running.command(engage, Some(Box::new(link)));
     let engaged = |r: &CycleRecord| r.mode == ControllerMode::Idle as u8;
-    running.until(&mut beside, engaged);
-    running.command(
-        ControlCommand::Arm(Arming {
-            operating_mode: OperatingMode::Throw,
-            expires_ns: now_ns() + 10_000_000_000,
-            area_clear: true,
-        }),
-        None,
-    );
+    running.until(engaged);
+    let arm_for_a_throw = ControlCommand::Arm(Arming {
+        operating_mode: OperatingMode::Throw,
+        expires_ns: now_ns() + 10_000_000_000,
+        area_clear: true,
+    });
+    running.command(arm_for_a_throw, None);
     let motion = Box::new(swinging(START_POSE).unwrap());
     running.command(ControlCommand::Run { id: 1, motion }, None);
     let moves = |r: &CycleRecord| r.mode == ControllerMode::Streaming as u8;
-    running.until(&mut beside, moves);
+    running.until(moves);
     for _ in 0..5 {
         let mut child = spawn_reader(&domain);
         let is_there = attached(&mut child);
-        running.until(&mut beside, |_| is_there.load(Ordering::SeqCst));
+        running.until(|_| is_there.load(Ordering::SeqCst));
         let at = running.newest.cycle;
-        running.until(&mut beside, |r| r.cycle > at + 50);
+        running.until(|r| r.cycle > at + 50);
         child.kill().unwrap();
         child.wait().unwrap();
-        beside.bus.remove_leftovers();
+        running.bus.remove_leftovers();
         let at = running.newest.cycle;
-        running.until(&mut beside, |r| r.cycle > at + 50);
+        running.until(|r| r.cycle > at + 50);
         assert!(moves(&running.newest), "{:?}", running.newest);
     }
     running.quit.store(true, Ordering::SeqCst);
-    let sums = running
-        .thread
-        .join()
-        .expect("a cycle called something else");
+    let joined = running.thread.join();
+    let sums = joined.expect("a cycle called something else");
     println!("{sums:?}");
     assert!(sums.cycles >= 500, "{sums:?}");
     // Not one cycle without its receive once there is a link.

@@ -28,10 +28,9 @@ use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, ControlState, Motion};
 use rt_controller::driver::{CommandMsg, CycleDriver};
-use rt_controller::transport::command_interface::arm_mode;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::{Command, Protocol};
+use rt_controller::xarm::{Command, Mode, Protocol};
 use shared_types::MonotonicNs;
 use shared_types::ipc::{CauseRecord, ControllerMode, CycleRecord, InputRecord, RunCounts};
 use std::collections::VecDeque;
@@ -193,7 +192,7 @@ impl VirtualRig {
     /// # Errors
     /// [`ConnectRefused`] when the arm cannot be reached.
     pub fn bring_up(&mut self) -> Result<(), ConnectRefused> {
-        let mode = arm_mode(self.config.settings.interface);
+        let mode = Mode::from_code(self.config.settings.interface.arm_mode());
         let mut session = VirtualStream::connect(&self.around.network, Service::Commands)?;
         for (id, command) in scenario::bring_up(mode).iter().enumerate() {
             ask(&mut session, id, command);

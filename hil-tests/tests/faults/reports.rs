@@ -123,10 +123,7 @@ fn fault_18_firmware_without_a_known_report_is_refused() {
         let text = format!("7,7,XS1305,AC1304,v{firmware}");
         ArmVersion::parse(&text).unwrap().check()
     };
-    assert!(matches!(check("1.12.0"), Err(VersionError::TooOld { .. })));
-    assert!(matches!(
-        check("3.0.0"),
-        Err(VersionError::UnknownLayout { .. })
-    ));
+    assert!(matches!(check("1.12.0"), Err(VersionError::TooOld(_))));
+    assert!(matches!(check("3.0.0"), Err(VersionError::UnknownLayout(_))));
     assert_eq!(check("2.8.2"), Ok(()));
 }

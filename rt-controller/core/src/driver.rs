@@ -23,10 +23,12 @@
 )]
 
 use crate::control::record::record_input;
-use crate::control::{ArmCodes, ControlCommand, ControlState, CycleInput, CycleOutput};
+use crate::control::{
+    ArmCodes, ArmCommand, ControlCommand, ControlState, CycleInput, CycleOutput, LinkInput,
+};
 use crate::overrun::{StaleSetpointDrop, Wake, after_wake, next_wake, setpoint_late_ns};
-use crate::transport::ArmTransport;
-use crate::transport::slot::LinkSlot;
+use crate::transport::{ArmTransport, MAX_COMMANDS, request};
+use crate::xarm::{Command, StateRequest};
 use alloc::boxed::Box;
 use shared_types::MonotonicNs;
 use shared_types::ipc::{ControllerState, GuardianBeat, InputRecord, OperatorBeat, Reports};
@@ -76,7 +78,10 @@ pub trait CycleIo<T> {
 #[derive(Debug)]
 pub struct CycleDriver<T> {
     control: ControlState,
-    link: LinkSlot<T>,
+    /// Links are made and dropped elsewhere.
+    link: Option<Box<T>>,
+    /// The last send failed.
+    link_lost: bool,
     held: StaleSetpointDrop,
     next: Wake,
     period_ns: u64,
@@ -87,7 +92,8 @@ impl<T: ArmTransport> CycleDriver<T> {
     #[must_use]
     pub fn new(control: ControlState, now_ns: u64) -> Self {
         let mut driver = Self {
-            link: LinkSlot::new(control.interface()),
+            link: None,
+            link_lost: false,
             held: StaleSetpointDrop::default(),
             next: Wake {
                 deadline_ns: 0,
@@ -117,7 +123,7 @@ impl<T: ArmTransport> CycleDriver<T> {
     /// Whether there is a command link.
     #[must_use]
     pub const fn is_connected(&self) -> bool {
-        self.link.is_connected()
+        self.link.is_some()
     }
 
     /// When the next cycle is due (CLOCK_MONOTONIC, ns).
@@ -154,7 +160,7 @@ impl<T: ArmTransport> CycleDriver<T> {
         let computed_ns = io.now_ns();
         let held = out.command.is_some() && self.held.holds(woke_ns, computed_ns, self.period_ns);
         let command = out.command.filter(|_| !held);
-        self.link.send(command, out.request, computed_ns);
+        self.send(command, out.request, computed_ns);
         let sent_ns = io.now_ns();
 
         out.record.wake_late_ns = span_ns(deadline_ns, woke_ns);
@@ -170,18 +176,46 @@ impl<T: ArmTransport> CycleDriver<T> {
         if held { deadline_ns } else { computed_ns }
     }
 
-    fn take_in(&mut self, deadline_ns: u64, missed: u32, io: &mut impl CycleIo<T>) -> CycleInput {
-        let mut message = io.next_command();
-        if let Some(fresh) = message.as_mut().and_then(|m| m.link.take())
-            && let Some(old) = self.link.replace(Some(fresh))
-        {
+    /// Puts a fresh link, or none, in the place of the present one.
+    fn replace_link(&mut self, fresh: Option<Box<T>>, io: &mut impl CycleIo<T>) {
+        self.link_lost = false;
+        if let Some(old) = core::mem::replace(&mut self.link, fresh) {
             io.retire_link(old);
         }
-        let link = self.link.poll(io.now_ns());
-        if link.lost
-            && let Some(broken) = self.link.replace(None)
-        {
-            io.retire_link(broken);
+    }
+
+    /// Sends a cycle's command and request for a state, in this order and at once. Called
+    /// every cycle: without a command a question of the link's own may go out.
+    fn send(&mut self, command: Option<ArmCommand>, state: Option<StateRequest>, now_ns: u64) {
+        let interface = self.control.interface();
+        let Some(link) = self.link.as_mut() else {
+            return;
+        };
+        let setpoint = command.and_then(|c| request(interface, &c));
+        let state = state.map(Command::SetState);
+        let mut commands: heapless::Vec<Command, MAX_COMMANDS> = heapless::Vec::new();
+        for command in [setpoint, state].into_iter().flatten() {
+            // Two at most: they fit.
+            let _ = commands.push(command);
+        }
+        self.link_lost |= link.send(&commands, now_ns).is_err();
+    }
+
+    fn take_in(&mut self, deadline_ns: u64, missed: u32, io: &mut impl CycleIo<T>) -> CycleInput {
+        let mut message = io.next_command();
+        if let Some(fresh) = message.as_mut().and_then(|m| m.link.take()) {
+            self.replace_link(Some(fresh), io);
+        }
+        // No link at all is a lost one.
+        let none = LinkInput {
+            lost: true,
+            ..LinkInput::default()
+        };
+        let now_ns = io.now_ns();
+        let mut link = self.link.as_mut().map_or(none, |link| link.poll(now_ns));
+        link.lost |= self.link_lost;
+        if link.lost {
+            self.replace_link(None, io);
         }
         let reports = io.new_reports();
         CycleInput {

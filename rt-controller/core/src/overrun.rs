@@ -122,41 +122,27 @@ mod tests {
 
     const P: u64 = 4_000_000;
 
-    #[test]
-    fn punctual_cycles_follow_each_other() {
-        let wake = next_wake(10 * P, 10 * P + 50_000, 10 * P + 150_000, P);
-        assert_eq!(
-            wake,
-            Wake {
-                deadline_ns: 11 * P,
-                missed: 0
-            }
-        );
+    fn at(periods: u64, missed: u32) -> Wake {
+        let deadline_ns = periods * P;
+        Wake {
+            deadline_ns,
+            missed,
+        }
     }
 
     #[test]
-    fn a_late_wake_skips_what_would_come_too_close() {
-        // Woke 3.5 ms late: the next deadline is only 0.5 ms away.
-        let wake = next_wake(10 * P, 10 * P + 3_500_000, 10 * P + 3_600_000, P);
-        assert_eq!(
-            wake,
-            Wake {
-                deadline_ns: 12 * P,
-                missed: 1
-            }
-        );
+    fn punctual_cycles_follow_each_other_and_a_late_wake_skips_what_would_come_too_close() {
+        // Woke 0.05 and 3.5 ms late: in the second case the next deadline is only
+        // 0.5 ms away.
+        for (woke_us, ended_us, next) in [(50, 150, at(11, 0)), (3500, 3600, at(12, 1))] {
+            let [woke_ns, ended_ns] = [woke_us, ended_us].map(|us| 10 * P + us * 1000);
+            assert_eq!(next_wake(10 * P, woke_ns, ended_ns, P), next);
+        }
     }
 
     #[test]
     fn a_long_sleep_loses_whole_cycles_and_keeps_the_phase() {
-        let wake = after_wake(10 * P, 13 * P + 700_000, P);
-        assert_eq!(
-            wake,
-            Wake {
-                deadline_ns: 13 * P,
-                missed: 3
-            }
-        );
+        assert_eq!(after_wake(10 * P, 13 * P + 700_000, P), at(13, 3));
         assert_eq!(after_wake(10 * P, 10 * P - 5, P).missed, 0);
     }
 

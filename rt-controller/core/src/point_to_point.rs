@@ -21,32 +21,19 @@ const SLOWER: f64 = 0.85;
 /// Attempts; the last one is at a hundredth of the speed.
 const ATTEMPTS: u32 = 30;
 
-/// Why a move cannot be planned.
+/// Why a move cannot be planned: the fault code nearest to it, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MoveError {
-    /// The target is no pose inside the joint ranges.
-    #[error("joint {joint} of the target, {q_rad:.4} rad, is outside its range")]
-    TargetOutsideRange {
-        /// Joint, 1-based.
-        joint: usize,
-        /// Value asked for (rad).
-        q_rad: f64,
-    },
-    /// Part of speed outside (0, 1].
-    #[error("`speed_part` is {found}, it must be above 0 and at most 1")]
-    SpeedPart {
-        /// Value found.
-        found: f64,
-    },
-    /// The generator failed.
-    #[error("no jerk-limited move was found ({reason}); try another pose")]
-    Generator {
-        /// What it said.
-        reason: String,
-    },
-    /// The planned move breaks a limit even when slow.
-    #[error("the move would break a limit: {}", .0.explain())]
-    Limit(FaultCode),
+#[error("{message}")]
+pub struct MoveError {
+    /// The fault code.
+    pub fault: FaultCode,
+    message: String,
+}
+
+impl MoveError {
+    const fn new(fault: FaultCode, message: String) -> Self {
+        Self { fault, message }
+    }
 }
 
 /// Plans a move that rests at `from` and at `to` (rad), `speed_part` (0 to 1] as
@@ -61,13 +48,13 @@ pub fn plan_move(
     limits: &Limits,
 ) -> Result<Motion, MoveError> {
     if !(speed_part > 0.0 && speed_part <= 1.0) {
-        return Err(MoveError::SpeedPart { found: speed_part });
+        let message = format!("`speed_part` is {speed_part}, it must be above 0 and at most 1");
+        return Err(MoveError::new(FaultCode::PlanOutOfLimits, message));
     }
     if let Some(j) = limits.position_violation(to) {
-        return Err(MoveError::TargetOutsideRange {
-            joint: j + 1,
-            q_rad: to[j],
-        });
+        let (joint, q_rad) = (j + 1, to[j]);
+        let message = format!("joint {joint} of the target, {q_rad:.4} rad, is outside its range");
+        return Err(MoveError::new(FaultCode::SetpointPosition, message));
     }
     let mut part = speed_part;
     let mut broken = FaultCode::SetpointTcpSpeed;
@@ -79,7 +66,8 @@ pub fn plan_move(
         }
         part *= SLOWER;
     }
-    Err(MoveError::Limit(broken))
+    let message = format!("the move would break a limit: {}", broken.explain());
+    Err(MoveError::new(broken, message))
 }
 
 /// Runs the motion through the limiter at the wire's rate.
@@ -129,7 +117,10 @@ fn generate(
     }
     let mut generator = Ruckig::<JOINTS, ThrowErrorHandler>::new(None, limits.period_s());
     let mut trajectory = Trajectory::<JOINTS>::new(None);
-    let failed = |reason: String| MoveError::Generator { reason };
+    let failed = |reason: String| {
+        let message = format!("no jerk-limited move was found ({reason}); try another pose");
+        MoveError::new(FaultCode::PlanOutOfLimits, message)
+    };
     let result = generator
         .calculate(&input, &mut trajectory)
         .map_err(|e| failed(e.to_string()))?;
@@ -140,21 +131,23 @@ fn generate(
         .profiles
         .first()
         .ok_or_else(|| failed(String::from("it is empty")))?;
-    let mut axes = [AxisPhases::default(); JOINTS];
-    for (j, (axis, profile)) in axes.iter_mut().zip(profiles.iter()).enumerate() {
+    let axes = core::array::from_fn(|j| {
+        let start = AxisState {
+            q: from[j],
+            ..AxisState::default()
+        };
         let mut phases = [Phase::default(); MAX_PHASES];
-        for (phase, (t, jerk)) in phases.iter_mut().zip(profile.t.iter().zip(&profile.j)) {
+        let parts = profiles
+            .get(j)
+            .map(|profile| profile.t.iter().zip(&profile.j));
+        for (phase, (t, jerk)) in phases.iter_mut().zip(parts.into_iter().flatten()) {
             *phase = Phase {
                 duration_s: *t,
                 jerk_rad_s3: *jerk,
             };
         }
-        let start = AxisState {
-            q: from[j],
-            ..AxisState::default()
-        };
-        *axis = AxisPhases::new(start, phases);
-    }
+        AxisPhases::new(start, phases)
+    });
     let phases = PhasedMotion::new(axes);
     let arrives = phases.state_at(phases.duration_s() + 1.0).q - *to;
     if !(arrives.is_finite() && arrives.max_abs() < 1e-9) {
@@ -214,24 +207,21 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         let limits = Limits::default();
-        let plan = |to, part| plan_move(&START_POSE, &to, part, &limits);
-        assert!(matches!(
-            plan(START_POSE, 0.0),
-            Err(MoveError::SpeedPart { .. })
-        ));
-        assert!(matches!(
-            plan(START_POSE, f64::NAN),
-            Err(MoveError::SpeedPart { .. })
-        ));
-        let bad = JointVector([0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert!(matches!(
-            plan(bad, 0.5),
-            Err(MoveError::TargetOutsideRange { joint: 2, .. })
-        ));
-        let nan = JointVector::splat(f64::NAN);
-        assert!(matches!(
-            plan(nan, 0.5),
-            Err(MoveError::TargetOutsideRange { joint: 1, .. })
-        ));
+        let joint_2 = JointVector([0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        for (to, part, fault, said) in [
+            (START_POSE, 0.0, FaultCode::PlanOutOfLimits, "is 0,"),
+            (START_POSE, f64::NAN, FaultCode::PlanOutOfLimits, "is NaN"),
+            (joint_2, 0.5, FaultCode::SetpointPosition, "joint 2 "),
+            (
+                JointVector::splat(f64::NAN),
+                0.5,
+                FaultCode::SetpointPosition,
+                "joint 1 ",
+            ),
+        ] {
+            let error = plan_move(&START_POSE, &to, part, &limits).unwrap_err();
+            assert_eq!(error.fault, fault);
+            assert!(error.to_string().contains(said), "{error}");
+        }
     }
 }

@@ -198,7 +198,7 @@ pub fn arm_codes(frame: &[u8], arrival_ns: u64) -> Option<ArmCodes> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::xarm::{ArmState, Mode, TcpPose};
+    use crate::xarm::{ArmState, Mode};
     use arm_model::JointState;
 
     fn frame(q: f64, size: usize) -> Vec<u8> {
@@ -207,15 +207,9 @@ mod tests {
             time_us: 5_000_000,
             state: ArmState::Moving,
             mode: Mode::Servo,
-            buffered: 0,
             target: at,
             actual: at,
-            current_a: JointVector::ZERO,
-            torque_nm: JointVector::ZERO,
-            target_tcp: TcpPose::default(),
-            target_twist: TcpPose::default(),
-            actual_tcp: TcpPose::default(),
-            actual_twist: TcpPose::default(),
+            ..RealtimeReport::default()
         };
         let mut bytes = vec![0; MAX_REPORT_LEN];
         report.emit(&mut bytes).unwrap();

@@ -12,10 +12,8 @@ const FIRST_BIN_NS: u64 = 1000;
 /// Histograms since they were last taken.
 #[derive(Debug)]
 pub struct Latencies {
-    wake: Histogram<u64>,
-    compute: Histogram<u64>,
-    send: Histogram<u64>,
-    reply: Histogram<u64>,
+    /// Of wake-up, compute, send and reply.
+    histograms: [Histogram<u64>; 4],
     cycles: u64,
     missed: u64,
     longest_miss: u32,
@@ -27,12 +25,9 @@ impl Latencies {
     /// # Errors
     /// Never for the bounds used here; they are the library's to refuse.
     pub fn new() -> Result<Self, hdrhistogram::CreationError> {
-        let empty = || Histogram::new_with_bounds(1, MAX_NS, 3);
+        let empty = Histogram::new_with_bounds(1, MAX_NS, 3)?;
         Ok(Self {
-            wake: empty()?,
-            compute: empty()?,
-            send: empty()?,
-            reply: empty()?,
+            histograms: [(); 4].map(|()| empty.clone()),
             cycles: 0,
             missed: 0,
             longest_miss: 0,
@@ -44,24 +39,26 @@ impl Latencies {
         self.cycles += 1;
         self.missed += u64::from(r.missed);
         self.longest_miss = self.longest_miss.max(r.missed);
-        self.wake.saturating_record(u64::from(r.wake_late_ns));
-        self.compute.saturating_record(u64::from(r.compute_ns));
+        let [wake, compute, send, reply] = &mut self.histograms;
+        wake.saturating_record(u64::from(r.wake_late_ns));
+        compute.saturating_record(u64::from(r.compute_ns));
         if r.sent != 0 {
-            self.send.saturating_record(u64::from(r.send_ns));
+            send.saturating_record(u64::from(r.send_ns));
         }
         if r.reply_ns != 0 {
-            self.reply.saturating_record(u64::from(r.reply_ns));
+            reply.saturating_record(u64::from(r.reply_ns));
         }
     }
 
     /// What was seen so far.
     #[must_use]
     pub fn report(&self) -> LatencyReport {
+        let [wake, compute, send, reply] = self.histograms.each_ref().map(percentiles);
         LatencyReport {
-            wake: percentiles(&self.wake),
-            compute: percentiles(&self.compute),
-            send: percentiles(&self.send),
-            reply: percentiles(&self.reply),
+            wake,
+            compute,
+            send,
+            reply,
             cycles: self.cycles,
             missed: self.missed,
             longest_miss: self.longest_miss,
@@ -72,16 +69,13 @@ impl Latencies {
     /// (µs), each twice the one before, and how many fell into it.
     #[must_use]
     pub fn bins(&self) -> [Vec<(f64, u64)>; 4] {
-        [&self.wake, &self.compute, &self.send, &self.reply].map(|histogram| {
+        self.histograms.each_ref().map(|histogram| {
             // An empty histogram would give one bin of nothing.
-            histogram
-                .iter_log(FIRST_BIN_NS, 2.0)
-                .filter(|_| !histogram.is_empty())
+            let bins = histogram.iter_log(FIRST_BIN_NS, 2.0);
+            bins.filter(|_| !histogram.is_empty())
                 .map(|bin| {
-                    (
-                        us(bin.value_iterated_to()),
-                        bin.count_since_last_iteration(),
-                    )
+                    let edge_us = us(bin.value_iterated_to());
+                    (edge_us, bin.count_since_last_iteration())
                 })
                 .collect()
         })
@@ -90,14 +84,7 @@ impl Latencies {
     /// The report, after which everything starts from zero.
     pub(super) fn take(&mut self) -> LatencyReport {
         let report = self.report();
-        for histogram in [
-            &mut self.wake,
-            &mut self.compute,
-            &mut self.send,
-            &mut self.reply,
-        ] {
-            histogram.reset();
-        }
+        self.histograms.iter_mut().for_each(Histogram::reset);
         (self.cycles, self.missed, self.longest_miss) = (0, 0, 0);
         report
     }

@@ -18,10 +18,10 @@ use crate::control::{ArmCodes, ControlCommand, ControlEvent, Motion, Thresholds}
 use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
-use crate::ports::{BridgePorts, Retired};
+use crate::ports::BridgePorts;
+use crate::recording::ChunkWriter;
 use crate::session::ArmSession;
-use crate::set_up::OnDifference;
-use crate::transport::tcp::{LinkSettings, TcpLink};
+use crate::transport::tcp::TcpLink;
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
 use arm_model::Limits;
@@ -32,7 +32,7 @@ use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
     Bus, ControllerMode, CyclePublisher, CycleRecord, JointPublisher, JointReport,
 };
-use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{FaultCode, OperatingMode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -45,69 +45,32 @@ const QUESTION_TIMEOUT: Duration = Duration::from_millis(200);
 /// Longest wait of a bring-up for the first joint report.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
 
-/// The arm, how it is set up, and what it is held to.
-#[derive(Debug, Clone)]
-pub struct ArmSettings {
-    /// Command port.
-    pub command: SocketAddr,
-    /// Port with its status.
-    pub status: SocketAddr,
-    /// Port with its joint reports.
-    pub joints: SocketAddr,
-    /// Limits it is held to.
-    pub limits: Limits,
-    /// What to do when it is configured otherwise.
-    pub on_difference: OnDifference,
-    /// How setpoints reach it.
-    pub interface: CommandInterface,
-    /// How its slowness is met.
-    pub link: LinkSettings,
-    /// Largest age of a joint report that counts as fresh (ns).
-    pub report_stale_ns: u64,
-}
-
-impl ArmSettings {
-    /// Of a checked configuration.
-    #[must_use]
-    pub fn of(config: &ControllerConfig, limits: Limits, thresholds: &Thresholds) -> Self {
-        let [status, _] = config.status_ports;
-        let period_ns = MonotonicNs(0).plus_s(limits.period_s()).0;
-        Self {
-            command: SocketAddr::new(config.arm, config.command_port),
-            status: SocketAddr::new(config.arm, status),
-            joints: SocketAddr::new(config.arm, config.report_port),
-            limits,
-            on_difference: config.on_difference,
-            interface: config.command_interface,
-            link: LinkSettings::new(thresholds.unanswered_max, period_ns),
-            report_stale_ns: thresholds.report_stale_ns,
-        }
-    }
-}
-
 /// A call that is answered later.
-enum Open {
-    /// Motions in order; the last one is what was asked for.
+struct Open {
+    call: ControllerCall,
+    awaits: Awaited,
+}
+
+/// What answers it.
+enum Awaited {
+    /// The end of motions in order; the last one is what was asked for.
     Motion {
-        call: ControllerCall,
         id: u64,
         next: VecDeque<Box<Motion>>,
     },
-    /// Answered when the controller is armed.
-    Arming { call: ControllerCall },
-    /// Answered when the arm is latched.
-    Stop { call: ControllerCall },
-    /// Answered when the loop holds the arm and joint reports come.
-    Engagement {
-        call: ControllerCall,
-        engaged: bool,
-        until: Instant,
-    },
+    /// The controller is armed.
+    Armed,
+    /// The arm is latched.
+    Stopped,
+    /// The loop holds the arm, and joint reports come.
+    Engaged { held: bool, until: Instant },
 }
 
 /// The bridge and all it owns. Lives in the thread that opened it.
 pub struct Bridge {
-    arm: ArmSettings,
+    config: ControllerConfig,
+    limits: Limits,
+    thresholds: Thresholds,
     commander: Option<CommanderLock>,
     warnings: Vec<String>,
     ports: BridgePorts<TcpLink>,
@@ -130,26 +93,30 @@ pub struct Bridge {
 impl core::fmt::Debug for Bridge {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Bridge")
-            .field("arm", &self.arm.command)
+            .field("arm", &self.config.arm)
             .field("open", &self.open.len())
             .finish_non_exhaustive()
     }
 }
 
 impl Bridge {
-    /// Opens all services. `warnings` are the real-time properties that could
+    /// Opens all services of a controller with a checked configuration, the limits and
+    /// thresholds that it names. `warnings` are the real-time properties that could
     /// not be had, in words.
     ///
     /// # Errors
     /// [`ControllerError`].
     pub fn open(
         bus: &Bus,
-        arm: ArmSettings,
+        config: ControllerConfig,
+        (limits, thresholds): (Limits, Thresholds),
         warnings: Vec<String>,
         ports: BridgePorts<TcpLink>,
     ) -> Result<Self, ControllerError> {
         Ok(Self {
-            arm,
+            config,
+            limits,
+            thresholds,
             commander: None,
             warnings,
             ports,
@@ -169,6 +136,11 @@ impl Bridge {
         })
     }
 
+    /// Where the arm takes commands.
+    fn command_port(&self) -> SocketAddr {
+        SocketAddr::new(self.config.arm, self.config.command_port)
+    }
+
     /// Mode of the loop, as of its newest record.
     #[must_use]
     pub fn mode(&self) -> ControllerMode {
@@ -179,12 +151,7 @@ impl Bridge {
     /// milliseconds.
     pub fn turn(&mut self) {
         self.publish();
-        while let Ok(retired) = self.ports.retired.pop() {
-            match retired {
-                Retired::Motion(motion) => drop(motion),
-                Retired::Link(link) => drop(link),
-            }
-        }
+        while self.ports.retired.pop().is_ok() {}
         while let Ok(event) = self.ports.events.pop() {
             self.on_event(event);
         }
@@ -204,7 +171,7 @@ impl Bridge {
 
     /// Hands out what is recorded but not sent yet; the last thing to do.
     pub fn end_recording(&mut self) {
-        self.recording.flush();
+        self.recording.add(ChunkWriter::flush);
     }
 
     /// Asks the loop to brake and latch.
@@ -214,8 +181,8 @@ impl Bridge {
 
     /// Asks the arm itself to stop, when there is no loop any more.
     pub fn stop_arm(&mut self) {
-        let asked =
-            ArmSession::connect(self.arm.command, QUESTION_TIMEOUT).and_then(|mut s| s.stop_arm());
+        let asked = ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
+            .and_then(|mut s| s.stop_arm());
         if let Err(reason) = asked {
             tracing::error!(%reason, "the arm could not be asked to stop");
         }
@@ -228,10 +195,10 @@ impl Bridge {
             self.newest = record;
             failed = self.cycles.send_copy(record).err().or(failed);
             if let Some(state) = self.ports.state_before(record.cycle) {
-                self.recording.state(&state);
+                self.recording.add(|writer| writer.keyframe(&state));
             }
             if let Some(cycle) = self.ports.recorded(record) {
-                self.recording.cycle(&cycle);
+                self.recording.add(|writer| writer.cycle(&cycle));
             }
         }
         while let Ok(report) = self.ports.reports.pop() {
@@ -273,32 +240,46 @@ impl Bridge {
             ControlEvent::Engaged => {
                 self.arm_error = ErrorCode::NONE;
                 for open in &mut self.open {
-                    if let Open::Engagement { engaged, .. } = open {
-                        *engaged = true;
+                    if let Awaited::Engaged { held, .. } = &mut open.awaits {
+                        *held = true;
                     }
                 }
             }
             ControlEvent::Started { id, start_ns } => {
-                if let Some(Open::Motion { call, next, .. }) = self.motion(id)
-                    && next.is_empty()
-                {
-                    answer(call, &ControllerEvent::Started { start_ns });
+                for open in &self.open {
+                    if let Awaited::Motion { id: its, next } = &open.awaits
+                        && *its == id
+                        && next.is_empty()
+                    {
+                        answer(&open.call, &ControllerEvent::Started { start_ns });
+                    }
                 }
             }
             ControlEvent::Finished {
                 id,
                 start_ns,
                 end_ns,
-            } => self.on_finished(id, start_ns, end_ns),
-            ControlEvent::Refused { id, fault } => self.on_refused(id, fault),
+            } => self.on_finished(id, &ControllerEvent::Finished { start_ns, end_ns }),
+            ControlEvent::Refused { id, fault } => {
+                let refused = |awaits: &Awaited| match (awaits, id) {
+                    (Awaited::Motion { id, .. }, Some(refused)) => *id == refused,
+                    (Awaited::Armed | Awaited::Engaged { .. }, None) => true,
+                    _ => false,
+                };
+                for open in self.take(refused) {
+                    refuse(&open.call, fault, "");
+                }
+            }
             ControlEvent::Latched(cause) => {
-                self.recording.cause(&cause);
+                self.recording.writer.cause(&cause);
                 self.on_latched(cause.fault(), cause.cycle);
             }
             ControlEvent::Armed(arming) => {
                 tracing::info!(?arming, "armed");
                 self.operating_mode = Some(arming.operating_mode);
-                self.settle_armings(|call| answer(call, &ControllerEvent::Done));
+                for open in self.take(|awaits| matches!(awaits, Awaited::Armed)) {
+                    answer(&open.call, &ControllerEvent::Done);
+                }
             }
             ControlEvent::Disarmed { fault } => {
                 tracing::info!(?fault, "disarmed");
@@ -307,60 +288,30 @@ impl Bridge {
         }
     }
 
-    fn motion(&mut self, motion: u64) -> Option<&mut Open> {
-        self.open
-            .iter_mut()
-            .find(|open| matches!(open, Open::Motion { id, .. } if *id == motion))
+    /// Takes the open calls that await something of this kind.
+    fn take(&mut self, kind: impl Fn(&Awaited) -> bool) -> Vec<Open> {
+        let taken = self.open.extract_if(.., |open| kind(&open.awaits));
+        taken.collect()
     }
 
-    /// Takes the call of a motion, if it is still open.
-    fn take_motion(&mut self, motion: u64) -> Option<Open> {
-        let at = self
-            .open
-            .iter()
-            .position(|open| matches!(open, Open::Motion { id, .. } if *id == motion))?;
-        Some(self.open.swap_remove(at))
-    }
-
-    fn on_finished(&mut self, id: u64, start_ns: u64, end_ns: u64) {
-        let Some(Open::Motion { call, mut next, .. }) = self.take_motion(id) else {
-            return;
-        };
-        match next.pop_front() {
-            None => answer(&call, &ControllerEvent::Finished { start_ns, end_ns }),
-            Some(motion) => self.begin(call, motion, next),
-        }
-    }
-
-    fn on_refused(&mut self, id: Option<u64>, fault: FaultCode) {
-        match id {
-            Some(id) => {
-                if let Some(Open::Motion { call, .. }) = self.take_motion(id) {
-                    refuse(&call, fault, "");
-                }
-            }
-            None => {
-                self.settle_armings(|call| refuse(call, fault, ""));
-                self.open.retain(|open| {
-                    let Open::Engagement { call, .. } = open else {
-                        return true;
-                    };
-                    refuse(call, fault, "");
-                    false
-                });
+    /// Goes on to the next motion of a call, or answers it.
+    fn on_finished(&mut self, finished: u64, event: &ControllerEvent) {
+        let its = |a: &Awaited| matches!(a, Awaited::Motion { id, .. } if *id == finished);
+        for Open { call, awaits } in self.take(its) {
+            let Awaited::Motion { mut next, .. } = awaits else {
+                continue;
+            };
+            match next.pop_front() {
+                None => answer(&call, event),
+                Some(motion) => self.begin(call, motion, next),
             }
         }
     }
 
-    /// Tells everybody who asked for an arming what came of it.
-    fn settle_armings(&mut self, tell: impl Fn(&ControllerCall)) {
-        self.open.retain(|open| match open {
-            Open::Arming { call } => {
-                tell(call);
-                false
-            }
-            Open::Engagement { .. } | Open::Motion { .. } | Open::Stop { .. } => true,
-        });
+    /// Whether a motion is under way for a caller.
+    fn moves(&self) -> bool {
+        let motion = |open: &Open| matches!(open.awaits, Awaited::Motion { .. });
+        self.open.iter().any(motion)
     }
 
     fn on_latched(&mut self, fault: FaultCode, cycle: u64) {
@@ -374,27 +325,23 @@ impl Bridge {
         if !self.arm_error.is_none() {
             fault = FaultCode::ArmError;
         }
-        let moved = self
-            .open
-            .iter()
-            .any(|open| matches!(open, Open::Motion { .. }));
-        if fault == FaultCode::OperatorStop && !moved {
+        if fault == FaultCode::OperatorStop && !self.moves() {
             // How every session ends: nothing moved, nothing is wrong.
             tracing::info!(cycle, "commanded to stop at rest");
         } else {
             tracing::warn!(?fault, cycle, arm_error = %self.arm_error, "stopped");
         }
-        for open in self.open.drain(..) {
-            match open {
-                Open::Motion { call, .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
-                Open::Stop { call } => answer(&call, &ControllerEvent::Done),
-                Open::Engagement { call, .. } | Open::Arming { call } => refuse(&call, fault, ""),
+        for Open { call, awaits } in self.open.drain(..) {
+            match awaits {
+                Awaited::Motion { .. } => answer(&call, &stopped(fault, cycle, self.arm_error)),
+                Awaited::Stopped => answer(&call, &ControllerEvent::Done),
+                Awaited::Engaged { .. } | Awaited::Armed => refuse(&call, fault, ""),
             }
         }
     }
 
     fn ask_error(&self) -> ErrorCode {
-        ArmSession::connect(self.arm.command, QUESTION_TIMEOUT)
+        ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
             .and_then(|mut session| session.error_code())
             .unwrap_or(ErrorCode::NONE)
     }
@@ -403,36 +350,30 @@ impl Bridge {
     fn begin(&mut self, call: ControllerCall, motion: Box<Motion>, next: VecDeque<Box<Motion>>) {
         self.last_id += 1;
         let id = self.last_id;
-        self.recording.motion(id, &motion);
+        self.recording.writer.motion(id, &motion);
         match self.command(ControlCommand::Run { id, motion }, None) {
-            Ok(()) => self.open.push(Open::Motion { call, id, next }),
+            Ok(()) => {
+                let awaits = Awaited::Motion { id, next };
+                self.open.push(Open { call, awaits });
+            }
             Err(fault) => refuse(&call, fault, ""),
         }
     }
 
     /// Answers bring-ups whose arm is held and reports its joints.
     fn settle_engagements(&mut self) {
-        let stale_ns = self.arm.report_stale_ns;
+        let stale_ns = self.thresholds.report_stale_ns;
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
-        self.open.retain(|open| match open {
-            Open::Engagement {
-                call,
-                engaged: true,
-                ..
-            } if fresh => {
-                answer(call, &ControllerEvent::Done);
-                false
-            }
-            Open::Engagement { call, until, .. } if Instant::now() > *until => {
-                refuse(call, FaultCode::ReportStale, "");
-                false
-            }
-            Open::Engagement { .. }
-            | Open::Arming { .. }
-            | Open::Motion { .. }
-            | Open::Stop { .. } => true,
-        });
+        let held = |a: &Awaited| matches!(a, Awaited::Engaged { held: true, .. });
+        for open in self.take(|awaits| held(awaits) && fresh) {
+            answer(&open.call, &ControllerEvent::Done);
+        }
+        let now = Instant::now();
+        let late = |a: &Awaited| matches!(a, Awaited::Engaged { until, .. } if now > *until);
+        for open in self.take(late) {
+            refuse(&open.call, FaultCode::ReportStale, "");
+        }
     }
 }

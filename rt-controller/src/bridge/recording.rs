@@ -1,15 +1,14 @@
 //! Hands all inputs and outputs of the core to whoever records them.
 
-use crate::control::Motion;
+use crate::recording::ChunkWriter;
 use crate::recording::chunk::CHUNK_MAX;
-use crate::recording::{ChunkWriter, RecordedCycle, Snapshot};
-use shared_types::ipc::{Bus, CauseRecord, ChunkPublisher, IpcError};
+use shared_types::ipc::{Bus, ChunkPublisher, IpcError};
 
 /// Packs chunks and publishes them. A chunk that cannot be sent is counted and
 /// dropped: its number is missing in the recording.
 #[derive(Debug)]
 pub(super) struct RecordingFeed {
-    writer: ChunkWriter,
+    pub(super) writer: ChunkWriter,
     publisher: ChunkPublisher,
     unsent: u64,
 }
@@ -23,39 +22,13 @@ impl RecordingFeed {
         })
     }
 
-    /// A motion is about to be commanded.
-    pub(super) fn motion(&mut self, id: u64, motion: &Motion) {
-        self.writer.motion(id, motion);
-    }
-
-    /// The arm was stopped.
-    pub(super) fn cause(&mut self, cause: &CauseRecord) {
-        self.writer.cause(cause);
-    }
-
-    /// The state before the next cycle.
-    pub(super) fn state(&mut self, snapshot: &Snapshot) {
-        let chunk = self.writer.keyframe(snapshot);
-        Self::send(&self.publisher, chunk, &mut self.unsent);
-    }
-
-    /// A cycle.
-    pub(super) fn cycle(&mut self, cycle: &RecordedCycle) {
-        let chunk = self.writer.cycle(cycle);
-        Self::send(&self.publisher, chunk, &mut self.unsent);
-    }
-
-    /// Sends what has been collected so far.
-    pub(super) fn flush(&mut self) {
-        let chunk = self.writer.flush();
-        Self::send(&self.publisher, chunk, &mut self.unsent);
-    }
-
-    fn send(publisher: &ChunkPublisher, chunk: Option<&[u8]>, unsent: &mut u64) {
-        let Some(chunk) = chunk else {
+    /// Adds to the recording, and sends the chunk that ends with it, if one does.
+    pub(super) fn add(&mut self, add: impl FnOnce(&mut ChunkWriter) -> Option<&[u8]>) {
+        let Some(chunk) = add(&mut self.writer) else {
             return;
         };
-        let sent = publisher
+        let sent = self
+            .publisher
             .loan_slice_uninit(chunk.len())
             .map_err(|e| format!("{e:?}"))
             .and_then(|sample| {
@@ -65,9 +38,9 @@ impl RecordingFeed {
                     .map_err(|e| format!("{e:?}"))
             });
         if let Err(reason) = sent {
-            *unsent += 1;
+            self.unsent += 1;
             // Once is enough; the gap in the recording tells how many.
-            if *unsent == 1 {
+            if self.unsent == 1 {
                 tracing::warn!(%reason, "a chunk of the recording could not be sent");
             }
         }

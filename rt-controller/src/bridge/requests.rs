@@ -1,20 +1,19 @@
 //! What each request of the controller's service leads to.
 
 use super::answers::{ControllerCall, answer, refuse};
-use super::{Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
+use super::{Awaited, Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
 use crate::control::{ControlCommand, Motion};
 use crate::os::now_ns;
-use crate::point_to_point::{MoveError, plan_move, verify};
+use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
-use crate::transport::command_interface::arm_mode;
-use crate::transport::tcp::TcpLink;
+use crate::transport::tcp::{LinkSettings, TcpLink};
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{Arming, FaultCode, OperatingMode};
+use shared_types::{Arming, FaultCode, MonotonicNs, OperatingMode};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -29,7 +28,7 @@ const TO_START_SPEED_PART: f64 = 0.05;
 
 impl Bridge {
     pub(super) fn serve(&mut self, call: ControllerCall) {
-        match &call.request {
+        match call.request {
             ControllerRequest::Status => self.status(&call),
             ControllerRequest::Latency => {
                 let report = Box::new(self.latencies.take());
@@ -46,37 +45,33 @@ impl Bridge {
                 ControllerMode::Faulted => self.set_up(call),
                 _ => self.wrong_mode(&call, "there is no fault to acknowledge"),
             },
-            ControllerRequest::MoveTo { q, speed_part } => {
-                let (q, speed_part) = (*q, *speed_part);
-                self.serve_move(call, q, speed_part);
-            }
+            ControllerRequest::MoveTo { q, speed_part } => self.serve_move(call, q, speed_part),
             ControllerRequest::Arm {
                 operating_mode,
                 area_clear,
-            } => {
-                let (operating_mode, area_clear) = (*operating_mode, *area_clear);
-                self.serve_arming(call, operating_mode, area_clear);
-            }
+            } => self.serve_arming(call, operating_mode, area_clear),
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => answer(&call, &ControllerEvent::Done),
                 Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
             },
             ControllerRequest::Announce { sha256 } => {
-                let sha256 = *sha256;
                 self.uploads.serve_announcement(call, sha256);
             }
-            ControllerRequest::Upload { trajectory, sha256 } => {
-                self.uploads.serve_upload(&call, trajectory, *sha256);
-            }
+            ControllerRequest::Upload {
+                ref trajectory,
+                sha256,
+            } => self.uploads.serve_upload(&call, trajectory, sha256),
             ControllerRequest::ExecuteUploaded { sha256 } => {
-                let sha256 = *sha256;
                 match self.uploads.plan(&sha256).copied() {
                     Some(trajectory) => self.serve_execute(call, &trajectory, &sha256),
                     None => self.wrong_mode(&call, "there is no uploaded plan with this hash"),
                 }
             }
-            ControllerRequest::Execute { trajectory, sha256 } => {
-                let (trajectory, sha256) = (trajectory.clone(), *sha256);
+            ControllerRequest::Execute {
+                ref trajectory,
+                sha256,
+            } => {
+                let trajectory = trajectory.clone();
                 self.serve_execute(call, &trajectory, &sha256);
             }
         }
@@ -116,10 +111,7 @@ impl Bridge {
             expires_ns: now_ns().saturating_add(ARMED_FOR_NS),
             area_clear,
         };
-        match self.command(ControlCommand::Arm(arming), None) {
-            Ok(()) => self.open.push(Open::Arming { call }),
-            Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
-        }
+        self.pass_on(call, ControlCommand::Arm(arming), None, Awaited::Armed);
     }
 
     fn serve_stop(&mut self, call: ControllerCall) {
@@ -130,10 +122,23 @@ impl Bridge {
             ControllerMode::Idle
             | ControllerMode::Moving
             | ControllerMode::Streaming
-            | ControllerMode::Braking => match self.command(ControlCommand::Stop, None) {
-                Ok(()) => self.open.push(Open::Stop { call }),
-                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
-            },
+            | ControllerMode::Braking => {
+                self.pass_on(call, ControlCommand::Stop, None, Awaited::Stopped);
+            }
+        }
+    }
+
+    /// Hands a command to the loop; what it `awaits` will answer the call.
+    fn pass_on(
+        &mut self,
+        call: ControllerCall,
+        command: ControlCommand,
+        link: Option<Box<TcpLink>>,
+        awaits: Awaited,
+    ) {
+        match self.command(command, link) {
+            Ok(()) => self.open.push(Open { call, awaits }),
+            Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
         }
     }
 
@@ -141,14 +146,11 @@ impl Bridge {
     /// link to the loop. Nothing moves meanwhile, so waiting is harmless.
     fn set_up(&mut self, call: ControllerCall) {
         match self.prepare(&call) {
-            Ok((hold, link)) => match self.command(ControlCommand::Engage { hold }, Some(link)) {
-                Ok(()) => self.open.push(Open::Engagement {
-                    call,
-                    engaged: false,
-                    until: Instant::now() + REPORT_WAIT,
-                }),
-                Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
-            },
+            Ok((hold, link)) => {
+                let until = Instant::now() + REPORT_WAIT;
+                let awaits = Awaited::Engaged { held: false, until };
+                self.pass_on(call, ControlCommand::Engage { hold }, Some(link), awaits);
+            }
             Err((fault, detail)) => refuse(&call, fault, &detail),
         }
     }
@@ -158,19 +160,18 @@ impl Bridge {
         &mut self,
         call: &ControllerCall,
     ) -> Result<(JointVector, Box<TcpLink>), (FaultCode, String)> {
-        let command = self.arm.command;
+        let command = self.command_port();
         if self.commander.is_none() {
             let lock = CommanderLock::take(command)
                 .map_err(|e| (FaultCode::SecondCommander, e.to_string()))?;
             self.commander = Some(lock);
         }
         let plan = SetUp {
-            limits: &self.arm.limits,
-            mode: arm_mode(self.arm.interface),
-            status: self.arm.status,
-            joints: self.arm.joints,
-            on_difference: self.arm.on_difference,
+            config: &self.config,
+            limits: &self.limits,
         };
+        let period_ns = MonotonicNs(0).plus_s(self.limits.period_s()).0;
+        let link = LinkSettings::new(self.thresholds.unanswered_max, period_ns);
         let mut step_done = |name: &'static str, result: &str| {
             tracing::info!(step = name, result, "setting up the arm");
             let step = ControllerEvent::Step {
@@ -182,26 +183,19 @@ impl Bridge {
         ArmSession::connect(command, SET_UP_TIMEOUT)
             .map_err(SetUpError::from)
             .and_then(|mut session| {
-                let ready = plan.run(&mut session, &mut step_done)?;
-                let link = TcpLink::connect(command, SET_UP_TIMEOUT, self.arm.link);
-                let link = link.map_err(|reason| SessionError::Connect {
-                    address: command,
-                    reason,
-                })?;
-                Ok((ready.q, Box::new(link)))
+                let q = plan.run(&mut session, &mut step_done)?;
+                let link = TcpLink::connect(command, SET_UP_TIMEOUT, link);
+                let link = link.map_err(|reason| SessionError::Connect(command, reason))?;
+                Ok((q, Box::new(link)))
             })
-            .map_err(|error| (fault_of(&error), error.to_string()))
+            .map_err(|error| (error.fault, error.to_string()))
     }
 
     /// Whether a motion may be asked for; refuses the call otherwise.
     fn may_move(&self, call: &ControllerCall) -> bool {
-        let busy = self
-            .open
-            .iter()
-            .any(|open| matches!(open, Open::Motion { .. }));
         if self.mode() != ControllerMode::Idle {
             self.wrong_mode(call, "motions begin when it is Idle");
-        } else if busy {
+        } else if self.moves() {
             refuse(call, FaultCode::WrongMode, "another motion is under way");
         } else {
             return true;
@@ -213,18 +207,9 @@ impl Bridge {
         if !self.may_move(&call) {
             return;
         }
-        match plan_move(&self.newest.q_c, &q, speed_part, &self.arm.limits) {
+        match plan_move(&self.newest.q_c, &q, speed_part, &self.limits) {
             Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
-            Err(error) => {
-                let fault = match error {
-                    MoveError::TargetOutsideRange { .. } => FaultCode::SetpointPosition,
-                    MoveError::Limit(fault) => fault,
-                    MoveError::SpeedPart { .. } | MoveError::Generator { .. } => {
-                        FaultCode::PlanOutOfLimits
-                    }
-                };
-                refuse(&call, fault, &error.to_string());
-            }
+            Err(error) => refuse(&call, error.fault, &error.to_string()),
         }
     }
 
@@ -255,12 +240,12 @@ impl Bridge {
         if trajectory_hash(trajectory) != *sha256 {
             return Err((FaultCode::PlanHashMismatch, String::new()));
         }
-        if let Some(margin) = self.arm.limits.worst_violation(trajectory) {
+        if let Some(margin) = self.limits.worst_violation(trajectory) {
             let detail = format!("the plan breaks a limit: {}", margin.describe());
             return Err((FaultCode::PlanOutOfLimits, detail));
         }
         let motion = Motion::Spline(*trajectory);
-        if let Err(fault) = verify(&motion, &self.arm.limits) {
+        if let Err(fault) = verify(&motion, &self.limits) {
             return Err((FaultCode::PlanOutOfLimits, fault.explain().to_owned()));
         }
         let held = self.newest.q_c;
@@ -279,26 +264,12 @@ impl Bridge {
                 &held,
                 &trajectory.start(),
                 TO_START_SPEED_PART,
-                &self.arm.limits,
+                &self.limits,
             )
             .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
             motions.push_back(Box::new(to_start));
         }
         motions.push_back(Box::new(motion));
         Ok(motions)
-    }
-}
-
-/// The fault code nearest to what went wrong while the arm was set up.
-fn fault_of(error: &SetUpError) -> FaultCode {
-    match error {
-        SetUpError::Session(_) | SetUpError::NoStatus { .. } => FaultCode::LinkLost,
-        SetUpError::Version { .. } | SetUpError::Layout { .. } => FaultCode::UnsupportedFirmware,
-        SetUpError::Range { .. } | SetUpError::Tool { .. } | SetUpError::ToolSpeed { .. } => {
-            FaultCode::ArmDiffers
-        }
-        SetUpError::ArmError(_) => FaultCode::ArmError,
-        SetUpError::NotReady { .. } | SetUpError::Restless => FaultCode::ArmNotReady,
-        SetUpError::OutsideRange { .. } => FaultCode::SetpointPosition,
     }
 }

@@ -11,10 +11,7 @@ use std::time::Duration;
 
 /// Durations (ns) of the cycles of a bare loop that reads the clock for
 /// `work_ns`, every `period` for `span`. Blocks for as long.
-///
-/// # Errors
-/// [`LoopbackError`], when the system has no more threads.
-pub fn bare_slice(
+pub(super) fn bare_slice(
     real_time: &RealTimeSettings,
     work_ns: u64,
     period: Duration,
@@ -55,13 +52,7 @@ mod tests {
 
     #[test]
     fn it_takes_as_long_as_it_is_told_to() {
-        let ordinary = RealTimeSettings {
-            priority: None,
-            cpu: None,
-            lock_memory: false,
-            require: false,
-            warm_up_us: 0,
-        };
+        let ordinary = RealTimeSettings::ordinary();
         let [period, span] = [1, 20].map(Duration::from_millis);
         let spans_ns = bare_slice(&ordinary, 50_000, period, span).unwrap();
         assert_eq!(spans_ns.len(), 20);

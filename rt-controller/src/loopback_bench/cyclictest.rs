@@ -1,102 +1,70 @@
 //! `cyclictest` of the `rt-tests` package, the kernel developers' own measure of
 //! how late a thread wakes.
 
+use super::{SideBySide, WARM_UP};
 use crate::os::schedule::run_on;
 use std::io::ErrorKind;
 use std::process::Command;
 use std::time::Duration;
 
-/// Samples at the begin of a slice that do not count, as for the loop.
-const WARM_UP: usize = 5;
-
-/// Why there are no figures of it.
-#[derive(Debug, thiserror::Error)]
-pub enum CyclictestError {
-    /// The program is missing.
-    #[error(
-        "`cyclictest` is not installed, so there is nothing to compare with: \
-         install it with `apt-get install rt-tests`"
-    )]
-    Missing,
-    /// It cannot be started.
-    #[error("`cyclictest` cannot be started: {0}")]
-    Start(std::io::Error),
-    /// It refused.
-    #[error("`cyclictest` measured nothing ({0}): run this as root or allow real-time priorities")]
-    Refused(String),
-}
-
-/// How it is run.
-#[derive(Debug, Clone)]
-pub struct Cyclictest {
-    /// `SCHED_FIFO` priority.
-    pub priority: u8,
-    /// Core of its measuring thread.
-    pub cpu: usize,
-    /// Cores it may use for anything else.
-    pub others: Vec<usize>,
-    /// Interval.
-    pub period: Duration,
-}
-
-impl Cyclictest {
-    /// Lateness of each wake-up within `span` (ns).
-    ///
-    /// # Errors
-    /// [`CyclictestError`].
-    pub fn slice(&self, span: Duration) -> Result<Vec<u64>, CyclictestError> {
-        let loops = span.as_micros() / self.period.as_micros().max(1);
-        let mut command = Command::new("cyclictest");
-        command
-            .args(["--verbose", "--nsecs", "--mlockall", "--distance=0"])
-            .arg(format!("--priority={}", self.priority))
-            .arg(format!("--interval={}", self.period.as_micros()))
-            .arg(format!("--affinity={}", self.cpu))
-            .arg(format!("--loops={}", loops + WARM_UP as u128));
-        if let Some(main) = self.others.first() {
-            command.arg(format!("--mainaffinity={main}"));
-        }
-        let cpus: Vec<usize> = self.others.iter().copied().chain([self.cpu]).collect();
-        // It uses the cores of the thread that starts it, so that thread must
-        // have them all.
-        let output = std::thread::scope(|scope| {
-            let start = scope.spawn(|| {
-                run_on(&cpus)?;
-                command.output()
-            });
-            start
-                .join()
-                .unwrap_or_else(|_| Err(std::io::Error::other("its thread panicked")))
-        });
-        let output = output.map_err(|e| match e.kind() {
-            ErrorKind::NotFound => CyclictestError::Missing,
-            _ => CyclictestError::Start(e),
-        })?;
-        let samples = samples(&String::from_utf8_lossy(&output.stdout));
-        if output.status.success() && samples.len() > WARM_UP {
-            return Ok(samples.get(WARM_UP..).unwrap_or_default().to_vec());
-        }
-        let said = String::from_utf8_lossy(&output.stderr);
-        let last = said.lines().rfind(|line| !line.trim().is_empty());
-        Err(CyclictestError::Refused(
-            last.unwrap_or("no reason given").trim().to_owned(),
-        ))
+/// Lateness of each wake-up of its thread on core `cpu` within `span` (ns), with the
+/// priority and the interval of the loop; everything else of it stays on the cores
+/// `others`. Else why there are no figures, and what to do.
+pub(super) fn lateness_ns(
+    cpu: usize,
+    others: &[usize],
+    span: Duration,
+) -> Result<Vec<u64>, String> {
+    let interval_us = SideBySide::PERIOD.as_micros();
+    let loops = span.as_micros() / interval_us.max(1) + WARM_UP as u128;
+    let mut command = Command::new("cyclictest");
+    command
+        .args(["--verbose", "--nsecs", "--mlockall", "--distance=0"])
+        .arg(format!("--priority={}", SideBySide::PRIORITY))
+        .arg(format!("--interval={interval_us}"))
+        .arg(format!("--affinity={cpu}"))
+        .arg(format!("--loops={loops}"));
+    if let Some(main) = others.first() {
+        command.arg(format!("--mainaffinity={main}"));
     }
+    let cpus: Vec<usize> = others.iter().copied().chain([cpu]).collect();
+    // It uses the cores of the thread that starts it, so that thread must
+    // have them all.
+    let output = std::thread::scope(|scope| {
+        let start = scope.spawn(|| {
+            run_on(&cpus)?;
+            command.output()
+        });
+        start
+            .join()
+            .unwrap_or_else(|_| Err(std::io::Error::other("its thread panicked")))
+    });
+    let output = output.map_err(|e| match e.kind() {
+        ErrorKind::NotFound => "`cyclictest` is not installed, so there is nothing to compare \
+            with: install it with `apt-get install rt-tests`"
+            .to_owned(),
+        _ => format!("`cyclictest` cannot be started: {e}"),
+    })?;
+    let samples = samples(&String::from_utf8_lossy(&output.stdout));
+    if output.status.success() && samples.len() > WARM_UP {
+        return Ok(samples.get(WARM_UP..).unwrap_or_default().to_vec());
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    let last = said.lines().rfind(|line| !line.trim().is_empty());
+    let said = last.unwrap_or("no reason given").trim();
+    Err(format!(
+        "`cyclictest` measured nothing ({said}): run this as root or allow real-time priorities"
+    ))
 }
 
 /// Third column of the lines `thread: count: lateness`.
 fn samples(text: &str) -> Vec<u64> {
     let sample = |line: &str| {
-        let mut numbers = line.split(':').map(|part| part.trim().parse::<u64>());
-        match (
-            numbers.next(),
-            numbers.next(),
-            numbers.next(),
-            numbers.next(),
-        ) {
-            (Some(Ok(_)), Some(Ok(_)), Some(Ok(late_ns)), None) => Some(late_ns),
-            _ => None,
-        }
+        let numbers = line.split(':').map(|part| part.trim().parse::<u64>().ok());
+        let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
+        <[u64; 3]>::try_from(numbers)
+            .ok()
+            .map(|[_, _, late_ns]| late_ns)
     };
     text.lines().filter_map(sample).collect()
 }

@@ -10,17 +10,14 @@ const WALK_BYTES: usize = 64 << 20;
 
 /// Threads that compute and touch memory until this is dropped.
 #[derive(Debug)]
-pub struct Load {
+pub(super) struct Load {
     quit: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Load {
     /// One thread on each of `cpus`.
-    ///
-    /// # Errors
-    /// When the system has no more threads.
-    pub fn begin(cpus: &[usize]) -> std::io::Result<Self> {
+    pub(super) fn begin(cpus: &[usize]) -> std::io::Result<Self> {
         let quit = Arc::new(AtomicBool::new(false));
         let mut load = Self {
             quit: Arc::clone(&quit),

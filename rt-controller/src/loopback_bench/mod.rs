@@ -6,40 +6,35 @@
 //! thread answers each request and does nothing else. The loop runs in slices,
 //! so that something else can have its core in between.
 
-mod answerer;
 mod bare;
 mod cyclictest;
+mod link;
 mod load;
 mod side_by_side;
-mod timed_link;
-mod times;
 
 use crate::control::{ControlCommand, ControlState};
 use crate::driver::CommandMsg;
-use crate::os::{MonotonicClock, RealTimeSettings, enter_real_time, now_ns};
+use crate::error::ControllerError;
+use crate::os::{RealTimeSettings, now_ns};
 use crate::ports::{BridgePorts, rings};
-use crate::rt_loop::RtLoop;
+use crate::process::start_loop;
 use crate::transport::tcp::{LinkSettings, TcpLink};
-use crate::warm_up::{CacheWarmUp, patient, report, swinging};
-use answerer::Answerer;
+use crate::warm_up::{patient, report, swinging};
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits, TrajectoryError};
-pub use bare::bare_slice;
-pub use cyclictest::{Cyclictest, CyclictestError};
-pub use load::Load;
+use link::{TimedLink, start_answerer};
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{
-    Bus, ControllerBoards, ControllerMode, DomainSweep, IpcError, JointReport, OperatorEnd,
+    Bus, ControllerMode, CycleRecord, DomainSweep, IpcError, JointReport, OperatorEnd,
 };
 use shared_types::{FaultCode, MonotonicNs};
 pub use side_by_side::SideBySide;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use timed_link::TimedLink;
-pub use times::CycleTimes;
 
 /// Pause between two turns of the part that the bridge would do.
 const TURN: Duration = Duration::from_millis(2);
@@ -59,6 +54,9 @@ pub enum LoopbackError {
     /// No shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
+    /// The loop cannot be set up.
+    #[error(transparent)]
+    Loop(#[from] ControllerError),
     /// No socket or thread.
     #[error("the loopback bench cannot begin: {0}")]
     System(#[from] std::io::Error),
@@ -82,16 +80,41 @@ pub enum LoopbackError {
     Ended,
 }
 
-/// A slice to run.
-struct Go {
-    quit: Arc<AtomicBool>,
+/// Times of one cycle (ns).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CycleTimes {
+    /// From the deadline to the first instruction after the sleep.
+    pub wake_ns: u64,
+    /// The receive call and what it brought.
+    pub receive_ns: u64,
+    /// Everything else up to the setpoint: inputs, core, record.
+    pub compute_ns: u64,
+    /// The send call.
+    pub send_ns: u64,
+    /// Cycles skipped before this one.
+    pub missed: u32,
+}
+
+impl CycleTimes {
+    /// Of a cycle whose poll took `poll_ns`.
+    fn of(record: &CycleRecord, poll_ns: u32) -> Self {
+        Self {
+            wake_ns: record.wake_late_ns.into(),
+            receive_ns: poll_ns.into(),
+            compute_ns: record.compute_ns.saturating_sub(poll_ns).into(),
+            send_ns: record.send_ns.saturating_sub(record.compute_ns).into(),
+            missed: record.missed,
+        }
+    }
 }
 
 /// The loop in its thread, at rest between slices.
 #[derive(Debug)]
-pub struct LoopbackBench {
+struct LoopbackBench {
+    /// Real-time properties that could not be had, in words.
     warnings: Vec<String>,
-    go: Option<mpsc::Sender<Go>>,
+    go: Option<mpsc::Sender<()>>,
+    quit: Arc<AtomicBool>,
     rested: mpsc::Receiver<()>,
     thread: Option<JoinHandle<()>>,
     bridge: BridgePorts<TimedLink>,
@@ -99,7 +122,7 @@ pub struct LoopbackBench {
     polls: Option<Producer<u32>>,
     polled: Consumer<u32>,
     operator: OperatorEnd,
-    answerer: Answerer,
+    answerer: SocketAddr,
     period_ns: u64,
     mode: ControllerMode,
     fault: FaultCode,
@@ -113,11 +136,8 @@ pub struct LoopbackBench {
 
 impl LoopbackBench {
     /// Sets the loop up in a shared-memory domain of its own. It takes what it
-    /// can have of `real_time`; see [`warnings`](Self::warnings).
-    ///
-    /// # Errors
-    /// [`LoopbackError`].
-    pub fn new(domain: &str, real_time: RealTimeSettings) -> Result<Self, LoopbackError> {
+    /// can have of `real_time`; see `warnings`.
+    fn new(domain: &str, real_time: &RealTimeSettings) -> Result<Self, LoopbackError> {
         let sweep = DomainSweep::new(domain);
         let bus = Bus::join(domain)?;
         let limits = Limits::default();
@@ -125,40 +145,21 @@ impl LoopbackBench {
         let all = rings();
         let [reports_to_loop, _] = all.reports;
         let (polls, polled) = RingBuffer::new(POLLS);
-        let (go, begin) = mpsc::channel::<Go>();
+        let (go, begin) = mpsc::channel();
         let (rest, rested) = mpsc::channel();
-        let (ready, wait) = mpsc::channel();
-        let (control, ports, its_domain) = (
-            ControlState::new(limits.clone(), patient()),
-            all.rt,
-            domain.to_owned(),
-        );
-        let warm_up = CacheWarmUp::new(limits, patient().interface, real_time.warm_up_us)?;
-        let body = move || {
-            let boards = Bus::join(&its_domain).and_then(|bus| ControllerBoards::create(&bus));
-            let boards = match boards {
-                Ok(boards) => boards,
-                Err(error) => {
-                    let _ = ready.send(Err(error));
-                    return;
-                }
-            };
-            let mut rt = RtLoop::new(control, MonotonicClock, boards, ports);
-            rt.set_warm_up(warm_up);
-            let warnings = enter_real_time(&real_time);
-            let _ = ready.send(Ok(warnings.iter().map(ToString::to_string).collect()));
-            while let Ok(Go { quit }) = begin.recv() {
-                rt.run(&quit);
+        let quit = Arc::new(AtomicBool::new(false));
+        let its_quit = Arc::clone(&quit);
+        let control = ControlState::new(limits, patient());
+        let (thread, warnings) = start_loop(domain, real_time, control, all.rt, move |mut rt| {
+            while begin.recv().is_ok() {
+                rt.run(&its_quit);
                 let _ = rest.send(());
             }
-        };
-        let thread = std::thread::Builder::new()
-            .name("control loop".to_owned())
-            .spawn(body)?;
-        let warnings = wait.recv().map_err(|_gone| LoopbackError::Ended)??;
+        })?;
         Ok(Self {
             warnings,
             go: Some(go),
+            quit,
             rested,
             thread: Some(thread),
             bridge: all.bridge,
@@ -166,7 +167,7 @@ impl LoopbackBench {
             polls: Some(polls),
             polled,
             operator: OperatorEnd::take(&bus)?,
-            answerer: Answerer::start()?,
+            answerer: start_answerer()?,
             period_ns,
             mode: ControllerMode::Offline,
             fault: FaultCode::None,
@@ -178,26 +179,14 @@ impl LoopbackBench {
         })
     }
 
-    /// Real-time properties that could not be had, in words.
-    #[must_use]
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
     /// Runs the loop for `span`, then lets it rest; times of the cycles in which
     /// it moved.
-    ///
-    /// # Errors
-    /// [`LoopbackError`].
-    pub fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, LoopbackError> {
-        let quit = Arc::new(AtomicBool::new(false));
+    fn slice(&mut self, span: Duration) -> Result<Vec<CycleTimes>, LoopbackError> {
+        self.quit.store(false, Ordering::Relaxed);
         let go = self.go.as_ref().ok_or(LoopbackError::Ended)?;
-        go.send(Go {
-            quit: Arc::clone(&quit),
-        })
-        .map_err(|_gone| LoopbackError::Ended)?;
+        go.send(()).map_err(|_gone| LoopbackError::Ended)?;
         let ran = self.follow(span);
-        quit.store(true, Ordering::Relaxed);
+        self.quit.store(true, Ordering::Relaxed);
         self.rested.recv().map_err(|_gone| LoopbackError::Ended)?;
         let mut times = ran?;
         times.drain(..WARM_UP.min(times.len()));
@@ -264,44 +253,32 @@ impl LoopbackBench {
 
     /// Orders what leads to a moving arm from where the loop is.
     fn prompt(&mut self) -> Result<(), LoopbackError> {
-        let message = match self.mode {
+        let mut link = None;
+        let command = match self.mode {
             // Acknowledged: the bench measures, whatever the machine did to it.
-            ControllerMode::Faulted => CommandMsg {
-                command: ControlCommand::Engage { hold: self.q },
-                link: None,
-            },
+            ControllerMode::Faulted => ControlCommand::Engage { hold: self.q },
             ControllerMode::Offline => {
                 let Some(polls) = self.polls.take() else {
                     return Err(self.still());
                 };
                 let settings = LinkSettings::new(250, self.period_ns);
-                let address = self.answerer.address();
-                let link = TcpLink::connect(address, CONNECT_TIMEOUT, settings)?;
-                CommandMsg {
-                    command: ControlCommand::Engage { hold: START_POSE },
-                    link: Some(Box::new(TimedLink::new(link, polls))),
-                }
+                let tcp = TcpLink::connect(self.answerer, CONNECT_TIMEOUT, settings)?;
+                link = Some(Box::new(TimedLink::new(tcp, polls)));
+                ControlCommand::Engage { hold: START_POSE }
             }
             ControllerMode::Idle => {
                 self.motions += 1;
-                let motion = Box::new(swinging(self.q)?);
-                let command = ControlCommand::Run {
+                ControlCommand::Run {
                     id: self.motions,
-                    motion,
-                };
-                CommandMsg {
-                    command,
-                    link: None,
+                    motion: Box::new(swinging(self.q)?),
                 }
             }
             ControllerMode::Moving | ControllerMode::Streaming | ControllerMode::Braking => {
                 return Ok(());
             }
         };
-        self.bridge
-            .commands
-            .push(message)
-            .map_err(|_full| LoopbackError::Ended)
+        let pushed = self.bridge.commands.push(CommandMsg { command, link });
+        pushed.map_err(|_full| LoopbackError::Ended)
     }
 }
 
@@ -322,15 +299,12 @@ mod tests {
     #[test]
     fn it_runs_in_slices_and_times_every_cycle_in_parts() {
         let domain = format!("test_loopback_{}", std::process::id());
-        let ordinary = RealTimeSettings {
-            priority: None,
-            cpu: None,
-            lock_memory: false,
-            require: false,
+        let settings = RealTimeSettings {
             warm_up_us: 100,
+            ..RealTimeSettings::ordinary()
         };
-        let mut bench = LoopbackBench::new(&domain, ordinary).unwrap();
-        assert!(bench.warnings().is_empty());
+        let mut bench = LoopbackBench::new(&domain, &settings).unwrap();
+        assert!(bench.warnings.is_empty());
         for _ in 0..3 {
             // Something else has the core in between.
             std::thread::sleep(Duration::from_millis(300));

@@ -3,9 +3,10 @@
 //! They take turns of a second each on one core, so that all meet the same neighbours;
 //! all other cores are kept busy meanwhile.
 
-use super::{
-    CycleTimes, Cyclictest, CyclictestError, Load, LoopbackBench, LoopbackError, bare_slice,
-};
+use super::bare::bare_slice;
+use super::cyclictest::lateness_ns;
+use super::load::Load;
+use super::{CycleTimes, LoopbackBench, LoopbackError};
 use crate::os::RealTimeSettings;
 use crate::os::schedule::run_on;
 use std::fs::{File, OpenOptions};
@@ -20,7 +21,7 @@ pub struct SideBySide {
     /// How long a loop took that does nothing for as long as ours computes (ns).
     pub bare: Vec<u64>,
     /// How late `cyclictest` woke (ns), or why there is nothing of it.
-    pub cyclictest: Result<Vec<u64>, CyclictestError>,
+    pub cyclictest: Result<Vec<u64>, String>,
     /// Cores that were kept busy.
     pub loaded: Vec<usize>,
     /// Real-time properties that could not be had.
@@ -52,25 +53,19 @@ impl SideBySide {
             cpu: Some(cpu),
             ..RealTimeSettings::default()
         };
-        let rival = Cyclictest {
-            priority: Self::PRIORITY,
-            cpu,
-            others: loaded.clone(),
-            period: Self::PERIOD,
-        };
         // What this process starts besides stays off the loop's core.
         if !loaded.is_empty() {
             run_on(&loaded)?;
         }
         let _load = Load::begin(&loaded)?;
         let domain = format!("bench-rt-{}", std::process::id());
-        let mut bench = LoopbackBench::new(&domain, real_time.clone())?;
+        let mut bench = LoopbackBench::new(&domain, &real_time)?;
         let mut measured = Self {
             ours: Vec::new(),
             bare: Vec::new(),
             cyclictest: Ok(Vec::new()),
             loaded,
-            warnings: bench.warnings().to_vec(),
+            warnings: bench.warnings.clone(),
         };
         for turn in 0..seconds {
             say(turn);
@@ -79,7 +74,7 @@ impl SideBySide {
             let bare = bare_slice(&real_time, work_ns, Self::PERIOD, Self::SLICE)?;
             measured.bare.extend(bare);
             if let Ok(late_ns) = &mut measured.cyclictest {
-                match rival.slice(Self::SLICE) {
+                match lateness_ns(cpu, &measured.loaded, Self::SLICE) {
                     Ok(more) => late_ns.extend(more),
                     Err(reason) => measured.cyclictest = Err(reason),
                 }

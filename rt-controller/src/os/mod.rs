@@ -10,4 +10,4 @@ pub mod schedule;
 
 pub use clock::{Clock, MonotonicClock, now_ns};
 pub use room::shared_memory_free_mb;
-pub use schedule::{RealTimeSettings, SetupWarning, enter_real_time};
+pub use schedule::{RealTimeSettings, enter_real_time};

@@ -104,6 +104,15 @@ impl ProcessWatch {
 mod tests {
     use super::*;
     use std::process::{Command, Stdio};
+    use std::time::Duration;
+
+    /// Whether it comes true within two seconds.
+    fn soon(holds: impl Fn() -> bool) -> bool {
+        (0..2000).any(|_| {
+            std::thread::sleep(Duration::from_millis(1));
+            holds()
+        })
+    }
 
     #[test]
     fn an_ended_thread_is_seen() {
@@ -126,13 +135,7 @@ mod tests {
         drop(end);
         thread.join().unwrap();
         // The system lets go of a thread a moment after it was joined.
-        for _ in 0..2000 {
-            if !thread_lives(me, id) {
-                break;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
-        assert!(!thread_lives(me, id));
+        assert!(soon(|| !thread_lives(me, id)));
     }
 
     #[test]
@@ -145,13 +148,8 @@ mod tests {
         let watch = ProcessWatch::new(child.id()).unwrap();
         assert!(!watch.has_ended());
         child.kill().unwrap();
-        for _ in 0..2000 {
-            if watch.has_ended() {
-                break;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
-        assert!(watch.has_ended(), "seen although nobody waited for it");
+        let seen = soon(|| watch.has_ended());
+        assert!(seen, "although nobody waited for it");
         let pid = child.id();
         child.wait().unwrap();
         assert!(ProcessWatch::new(pid).is_err(), "there is no such process");

@@ -5,6 +5,7 @@
 //! when it comes in; that is the time reported.
 
 use super::clock::{now_ns, realtime_ns};
+use super::schedule::done;
 use std::io::{Error, Result};
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
@@ -21,7 +22,7 @@ pub fn stamp_arrivals(stream: &TcpStream) -> Result<()> {
     let size = u32::try_from(size_of::<libc::c_int>()).unwrap_or(4);
     // SAFETY: the descriptor is open while `stream` lives; `on` is a valid int
     // of the size passed.
-    let code = unsafe {
+    done(unsafe {
         libc::setsockopt(
             stream.as_raw_fd(),
             libc::SOL_SOCKET,
@@ -29,12 +30,7 @@ pub fn stamp_arrivals(stream: &TcpStream) -> Result<()> {
             (&raw const on).cast(),
             size,
         )
-    };
-    if code == 0 {
-        Ok(())
-    } else {
-        Err(Error::last_os_error())
-    }
+    })
 }
 
 /// Receives into `buffer`: how many bytes, and when the last of them arrived

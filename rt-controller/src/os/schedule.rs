@@ -34,69 +34,62 @@ impl Default for RealTimeSettings {
     }
 }
 
-/// A real-time property that could not be had.
-#[derive(Debug, thiserror::Error)]
-pub enum SetupWarning {
-    /// Ordinary scheduling.
-    #[error(
-        "no real-time priority {priority} ({reason}): other programs can delay setpoints; \
-         allow it with `ulimit -r {priority}` or run the controller with CAP_SYS_NICE"
-    )]
-    Priority {
-        /// Priority asked for.
-        priority: u8,
-        /// What the system said.
-        reason: Error,
-    },
-    /// Pageable memory.
-    #[error(
-        "memory is not locked ({reason}): a page fault can delay setpoints; \
-         allow it with `ulimit -l unlimited` or run the controller with CAP_IPC_LOCK"
-    )]
-    Memory {
-        /// What the system said.
-        reason: Error,
-    },
-    /// Any core.
-    #[error("cannot run on core {cpu} alone ({reason}): choose a core that exists")]
-    Affinity {
-        /// Core asked for.
-        cpu: usize,
-        /// What the system said.
-        reason: Error,
-    },
+#[cfg(test)]
+impl RealTimeSettings {
+    /// An ordinary thread.
+    pub(crate) fn ordinary() -> Self {
+        Self {
+            priority: None,
+            lock_memory: false,
+            warm_up_us: 0,
+            ..Self::default()
+        }
+    }
 }
 
 /// Applies `settings` to the calling thread (memory: to the process) and
-/// returns what could not be had. Call it before the loop; not RT-safe.
+/// returns what could not be had, in words. Call it before the loop; not RT-safe.
 #[must_use]
-pub fn enter_real_time(settings: &RealTimeSettings) -> Vec<SetupWarning> {
+pub fn enter_real_time(settings: &RealTimeSettings) -> Vec<String> {
     let mut warnings = Vec::new();
     if settings.lock_memory
         && let Err(reason) = lock_memory()
     {
-        warnings.push(SetupWarning::Memory { reason });
+        warnings.push(format!(
+            "memory is not locked ({reason}): a page fault can delay setpoints; \
+             allow it with `ulimit -l unlimited` or run the controller with CAP_IPC_LOCK"
+        ));
     }
     if let Some(cpu) = settings.cpu
         && let Err(reason) = run_on(&[cpu])
     {
-        warnings.push(SetupWarning::Affinity { cpu, reason });
+        warnings.push(format!(
+            "cannot run on core {cpu} alone ({reason}): choose a core that exists"
+        ));
     }
     if let Some(priority) = settings.priority
         && let Err(reason) = set_fifo(priority)
     {
-        warnings.push(SetupWarning::Priority { priority, reason });
+        warnings.push(format!(
+            "no real-time priority {priority} ({reason}): other programs can delay setpoints; \
+             allow it with `ulimit -r {priority}` or run the controller with CAP_SYS_NICE"
+        ));
     }
     touch_stack();
     warnings
 }
 
-fn lock_memory() -> Result<(), Error> {
-    // SAFETY: takes flags only and changes no memory content.
-    match unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } {
+/// What a system call that gives 0 for success said.
+pub(super) fn done(code: libc::c_int) -> Result<(), Error> {
+    match code {
         0 => Ok(()),
         _ => Err(Error::last_os_error()),
     }
+}
+
+fn lock_memory() -> Result<(), Error> {
+    // SAFETY: takes flags only and changes no memory content.
+    done(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
 }
 
 /// `SCHED_FIFO` for the calling thread.
@@ -109,10 +102,7 @@ pub fn set_fifo(priority: u8) -> Result<(), Error> {
     };
     // SAFETY: pid 0 is the calling thread; `parameters` is a valid sched_param
     // for the duration of the call.
-    match unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } {
-        0 => Ok(()),
-        _ => Err(Error::last_os_error()),
-    }
+    done(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) })
 }
 
 /// Runs the calling thread, and threads it starts later, on `cpus` only.
@@ -131,10 +121,7 @@ pub fn run_on(cpus: &[usize]) -> Result<(), Error> {
         unsafe { libc::CPU_SET(*cpu, &mut set) };
     }
     // SAFETY: pid 0 is the calling thread; the size is that of the set passed.
-    match unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) } {
-        0 => Ok(()),
-        _ => Err(Error::last_os_error()),
-    }
+    done(unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) })
 }
 
 /// Touches the stack the loop will use, so that its pages are there.
@@ -152,18 +139,10 @@ mod tests {
         let settings = RealTimeSettings {
             priority: Some(200),
             cpu: Some(1_000_000),
-            lock_memory: false,
-            require: false,
-            warm_up_us: 0,
+            ..RealTimeSettings::ordinary()
         };
-        let words: Vec<String> = std::thread::spawn(move || {
-            enter_real_time(&settings)
-                .iter()
-                .map(ToString::to_string)
-                .collect()
-        })
-        .join()
-        .unwrap();
+        let entered = std::thread::spawn(move || enter_real_time(&settings));
+        let words = entered.join().unwrap();
         assert_eq!(words.len(), 2, "{words:?}");
         assert!(words[0].contains("core 1000000") && words[1].contains("priority 200"));
     }

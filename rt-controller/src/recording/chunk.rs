@@ -36,8 +36,6 @@ pub struct Header {
     pub sequence: u32,
     /// Number of items.
     pub items: u32,
-    /// Bytes of the items.
-    pub payload_len: usize,
 }
 
 /// What is found at the front of some bytes.
@@ -49,8 +47,6 @@ pub enum Front<'a> {
         header: Header,
         /// Its items.
         payload: &'a [u8],
-        /// Bytes of header and items.
-        len: usize,
     },
     /// The beginning of a chunk, or nothing.
     Cut,
@@ -114,10 +110,8 @@ pub fn read(bytes: &[u8]) -> Front<'_> {
             keyframe: u16_at(head, 6) & KEYFRAME != 0,
             sequence: u32_at(head, 8),
             items: u32_at(head, 12),
-            payload_len,
         },
         payload,
-        len: HEADER_LEN + payload_len,
     }
 }
 
@@ -140,17 +134,16 @@ fn checksum(head: &[u8], payload: &[u8]) -> u32 {
 }
 
 fn u16_at(bytes: &[u8], at: usize) -> u16 {
-    bytes
-        .get(at..)
-        .and_then(|b| b.first_chunk())
-        .map_or(0, |b| u16::from_le_bytes(*b))
+    u16::from_le_bytes(array_at(bytes, at))
 }
 
 fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    bytes
-        .get(at..)
-        .and_then(|b| b.first_chunk())
-        .map_or(0, |b| u32::from_le_bytes(*b))
+    u32::from_le_bytes(array_at(bytes, at))
+}
+
+fn array_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    let rest = bytes.get(at..).unwrap_or_default();
+    rest.first_chunk().copied().unwrap_or([0; N])
 }
 
 #[cfg(test)]
@@ -166,19 +159,15 @@ mod tests {
     #[test]
     fn a_chunk_comes_back() {
         let bytes = chunk();
-        let Front::Chunk {
-            header,
-            payload,
-            len,
-        } = read(&bytes)
-        else {
+        let Front::Chunk { header, payload } = read(&bytes) else {
             panic!("{:?}", read(&bytes));
         };
         assert_eq!(
             (header.keyframe, header.sequence, header.items),
             (true, 7, 2)
         );
-        assert_eq!((payload, len), (&b"two items"[..], bytes.len()));
+        assert_eq!(payload, b"two items");
+        assert_eq!(bytes.len(), HEADER_LEN + payload.len());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Cycle and cause records field by field, bit by bit.
 
-use shared_types::ipc::{CauseRecord, CycleRecord};
+use shared_types::ipc::{CauseRecord, CycleRecord, LimitBroken, RunCounts};
 
 /// One number of a record.
 #[derive(Debug, Clone, Copy)]
@@ -92,103 +92,51 @@ impl Fields {
         self.add(name, None, Number::Real(value));
     }
 
-    fn joints(&mut self, name: &'static str, values: &arm_model::JointVector) {
+    fn joints(&mut self, name: &'static str, values: arm_model::JointVector) {
         for (j, value) in values.iter().enumerate() {
             self.add(name, Some(j + 1), Number::Real(*value));
         }
     }
 }
 
+/// Adds every field of a record that is not left out. Each one is named, so that a new
+/// field cannot be forgotten here.
+macro_rules! add_fields {
+    ($fields:ident, $prefix:literal, $record:expr, $Record:ident { $($name:ident: $kind:ident),+ } but { $($out:ident),* }) => {
+        let $Record { $($name,)+ $($out: _),* } = $record;
+        $($fields.$kind(concat!($prefix, stringify!($name)), *$name);)+
+    };
+}
+
 /// Every number of a cycle's record that the core decides. Left out are the
 /// four the loop fills in afterwards: three timings and the count of losses.
 #[must_use]
 pub fn cycle_fields(record: &CycleRecord) -> Vec<Field> {
-    // Named one by one, so that a new field cannot be forgotten here.
-    let CycleRecord {
-        version,
-        mode,
-        sent,
-        fault,
-        cycle,
-        deadline_ns,
-        wake_late_ns: _,
-        compute_ns: _,
-        send_ns: _,
-        reply_ns,
-        missed,
-        dropped: _,
-        trajectory_s,
-        q_c,
-        q,
-        q_stamp_ns,
-        speed_override,
-        qd_sent,
-    } = record;
     let mut fields = Fields::default();
-    fields.whole("version", *version);
-    fields.whole("mode", *mode);
-    fields.whole("sent", *sent);
-    fields.whole("fault", *fault);
-    fields.whole("cycle", *cycle);
-    fields.whole("deadline_ns", *deadline_ns);
-    fields.whole("reply_ns", *reply_ns);
-    fields.whole("missed", *missed);
-    fields.real("trajectory_s", *trajectory_s);
-    fields.joints("q_c", q_c);
-    fields.joints("q", q);
-    fields.whole("q_stamp_ns", *q_stamp_ns);
-    fields.real("speed_override", *speed_override);
-    fields.joints("qd_sent", qd_sent);
+    add_fields!(fields, "", record, CycleRecord {
+        version: whole, mode: whole, sent: whole, fault: whole, cycle: whole, deadline_ns: whole,
+        reply_ns: whole, missed: whole, trajectory_s: real, q_c: joints, q: joints,
+        q_stamp_ns: whole, speed_override: real, qd_sent: joints
+    } but { wake_late_ns, compute_ns, send_ns, dropped });
     fields.0
 }
 
 /// Every number of a cause.
 #[must_use]
 pub fn cause_fields(cause: &CauseRecord) -> Vec<Field> {
-    let CauseRecord {
-        version,
-        code,
-        arm_error,
-        arm_warning,
-        mode,
-        path,
-        stop_arm,
-        operating_mode,
-        second_code,
-        reserved: _,
-        cycle,
-        stamp_ns,
-        rest_cycle,
-        motion_id,
-        trajectory_s,
-        limit,
-        counts,
-    } = cause;
     let mut fields = Fields::default();
-    fields.whole("cause.version", *version);
-    fields.whole("cause.code", *code);
-    fields.whole("cause.arm_error", *arm_error);
-    fields.whole("cause.arm_warning", *arm_warning);
-    fields.whole("cause.mode", *mode);
-    fields.whole("cause.path", *path);
-    fields.whole("cause.stop_arm", *stop_arm);
-    fields.whole("cause.operating_mode", *operating_mode);
-    fields.whole("cause.second_code", *second_code);
-    fields.whole("cause.cycle", *cycle);
-    fields.whole("cause.stamp_ns", *stamp_ns);
-    fields.whole("cause.rest_cycle", *rest_cycle);
-    fields.whole("cause.motion_id", *motion_id);
-    fields.real("cause.trajectory_s", *trajectory_s);
-    fields.whole("cause.limit.joint", limit.joint);
-    fields.real("cause.limit.value", limit.value);
-    fields.real("cause.limit.limit", limit.limit);
-    fields.whole("cause.counts.missed", counts.missed);
-    fields.whole("cause.counts.duplicates", counts.duplicates);
-    fields.whole("cause.counts.out_of_order", counts.out_of_order);
-    fields.whole("cause.counts.skipped", counts.skipped);
-    fields.whole("cause.counts.broken_reports", counts.broken_reports);
-    fields.whole("cause.counts.clock_resyncs", counts.clock_resyncs);
-    fields.whole("cause.counts.warnings", counts.warnings);
+    add_fields!(fields, "cause.", cause, CauseRecord {
+        version: whole, code: whole, arm_error: whole, arm_warning: whole, mode: whole,
+        path: whole, stop_arm: whole, operating_mode: whole, second_code: whole, cycle: whole,
+        stamp_ns: whole, rest_cycle: whole, motion_id: whole, trajectory_s: real
+    } but { reserved, limit, counts });
+    add_fields!(fields, "cause.limit.", &cause.limit, LimitBroken {
+        joint: whole, value: real, limit: real
+    } but { reserved });
+    add_fields!(fields, "cause.counts.", &cause.counts, RunCounts {
+        missed: whole, duplicates: whole, out_of_order: whole, skipped: whole,
+        broken_reports: whole, clock_resyncs: whole, warnings: whole
+    } but { reserved });
     fields.0
 }
 

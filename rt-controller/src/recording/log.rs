@@ -2,7 +2,6 @@
 
 use super::chunk::{self, Front};
 use super::item::Item;
-use core::fmt;
 
 /// Why bytes are no recording at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -13,28 +12,23 @@ pub enum LogError {
     /// Something else.
     #[error("this is no recording of control cycles: it does not begin with a chunk")]
     Foreign,
-    /// Another version.
+    /// Another layout.
     #[error(
-        "the recording has layout {found}, this program reads layouts {} and {}; use the version of `wag` that made it",
-        chunk::FORMAT_1,
-        chunk::FORMAT
+        "the recording has layout {0}, this program reads layouts {known_1} and {known_2}; use the version of `wag` that made it",
+        known_1 = chunk::FORMAT_1,
+        known_2 = chunk::FORMAT
     )]
-    Format {
-        /// Layout found.
-        found: u16,
-    },
-    /// The first chunk is not whole.
-    #[error("the recording is cut off within its first chunk ({bytes} bytes): nothing can be read")]
-    Cut {
-        /// Bytes there are.
-        bytes: usize,
-    },
+    Format(u16),
+    /// The first chunk is not whole; so many bytes are there.
+    #[error("the recording is cut off within its first chunk ({0} bytes): nothing can be read")]
+    Cut(usize),
 }
 
 /// A place where a recording does not go on as it should.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Flaw {
     /// Chunks that never reached the file.
+    #[error("{chunks} chunk(s) before chunk {before} never reached the file")]
     Lost {
         /// How many.
         chunks: u32,
@@ -42,6 +36,7 @@ pub enum Flaw {
         before: u32,
     },
     /// Bytes that are no chunk, or one with a wrong checksum.
+    #[error("{bytes} bytes from byte {offset} on are damaged")]
     Damaged {
         /// Where they begin in the file.
         offset: usize,
@@ -49,30 +44,15 @@ pub enum Flaw {
         bytes: usize,
     },
     /// The file ends within a chunk.
+    #[error(
+        "the file ends within a chunk: the last {bytes} bytes, from byte {offset} on, cannot be read"
+    )]
     Cut {
         /// Where that chunk begins in the file.
         offset: usize,
         /// Bytes of it that are there.
         bytes: usize,
     },
-}
-
-impl fmt::Display for Flaw {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Lost { chunks, before } => write!(
-                f,
-                "{chunks} chunk(s) before chunk {before} never reached the file"
-            ),
-            Self::Damaged { offset, bytes } => {
-                write!(f, "{bytes} bytes from byte {offset} on are damaged")
-            }
-            Self::Cut { offset, bytes } => write!(
-                f,
-                "the file ends within a chunk: the last {bytes} bytes, from byte {offset} on, cannot be read"
-            ),
-        }
-    }
 }
 
 /// What comes next in a recording.
@@ -105,9 +85,9 @@ impl<'a> LogReader<'a> {
     pub fn open(bytes: &'a [u8]) -> Result<Self, LogError> {
         match chunk::read(bytes) {
             _ if bytes.is_empty() => Err(LogError::Empty),
-            Front::OtherFormat(found) => Err(LogError::Format { found }),
+            Front::OtherFormat(found) => Err(LogError::Format(found)),
             Front::Cut if chunk::distance_to_next(bytes) == bytes.len() => {
-                Err(LogError::Cut { bytes: bytes.len() })
+                Err(LogError::Cut(bytes.len()))
             }
             // A damaged first chunk does not matter if others follow.
             Front::Damaged if chunk::distance_to_next(bytes) == bytes.len() => {
@@ -136,15 +116,11 @@ impl<'a> LogReader<'a> {
     fn next_chunk(&mut self) -> Option<Option<Flaw>> {
         let rest = self.bytes.get(self.offset..).filter(|r| !r.is_empty())?;
         match chunk::read(rest) {
-            Front::Chunk {
-                header,
-                payload,
-                len,
-            } => {
+            Front::Chunk { header, payload } => {
                 self.chunk_at = self.offset;
                 self.items = payload;
                 self.format = header.format;
-                self.offset += len;
+                self.offset += chunk::HEADER_LEN + payload.len();
                 let expected = self.next_sequence.unwrap_or(header.sequence);
                 self.next_sequence = Some(header.sequence.wrapping_add(1));
                 // A controller that starts anew counts from zero again.
@@ -243,7 +219,7 @@ mod tests {
         }
         assert_eq!(
             LogReader::open(&bytes[..first - 1]).unwrap_err(),
-            LogError::Cut { bytes: first - 1 }
+            LogError::Cut(first - 1)
         );
     }
 
@@ -317,6 +293,6 @@ mod tests {
         assert_eq!(open(b"t,q1,q2\n0,0,0\n and so on"), LogError::Foreign);
         let mut other = recording(1);
         other[4] = 9;
-        assert_eq!(open(&other), LogError::Format { found: 9 });
+        assert_eq!(open(&other), LogError::Format(9));
     }
 }

@@ -10,6 +10,7 @@ use super::item::{Item, Keyframe, RecordedCycle, Snapshot};
 use super::log::{Flaw, LogError, LogReader, Read};
 use crate::control::record::{RestoreError, restore_input};
 use crate::control::{ControlEvent, ControlState, Motion};
+use shared_types::FaultCode;
 use shared_types::ipc::CauseRecord;
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -158,8 +159,8 @@ impl Player {
         };
         let input = match restore_input(&cycle.input, motion_of) {
             Ok(input) => input,
-            Err(error @ RestoreError::Version { .. }) => return Err(ReplayError::Restore(error)),
-            Err(error @ (RestoreError::Command { .. } | RestoreError::Motion { .. })) => {
+            Err(error @ RestoreError::Version(..)) => return Err(ReplayError::Restore(error)),
+            Err(error @ (RestoreError::Command { .. } | RestoreError::Motion(..))) => {
                 self.state = None;
                 self.gap(error.to_string(), true);
                 self.found.skipped += 1;
@@ -236,26 +237,25 @@ impl Player {
                 }
                 // The recording may end, or have a gap, before it got there.
                 None if !self.is_whole(at, at.saturating_add(CAUSE_WITHIN)) => {}
-                None => self.found.differs(at, one_sided("no cause", &now.fault())),
+                None => self.found.differs(at, one_sided(None, Some(now.fault()))),
             }
         }
         for then in core::mem::take(&mut self.recorded) {
             let at = then.rest_cycle;
             if at >= from_cycle && self.is_whole(at, at) {
-                let mut unequal = one_sided("no cause", &then.fault());
-                core::mem::swap(&mut unequal.recorded, &mut unequal.replayed);
-                self.found.differs(at, unequal);
+                self.found.differs(at, one_sided(Some(then.fault()), None));
             }
         }
     }
 }
 
-/// A cause that only the replay has.
-fn one_sided(recorded: &str, replayed: &shared_types::FaultCode) -> Unequal {
+/// A cause that only one of the two has.
+fn one_sided(recorded: Option<FaultCode>, replayed: Option<FaultCode>) -> Unequal {
+    let show = |fault: Option<FaultCode>| fault.map_or("no cause".to_owned(), |f| format!("{f:?}"));
     Unequal {
         field: "cause".to_owned(),
-        recorded: recorded.to_owned(),
-        replayed: format!("{replayed:?}"),
+        recorded: show(recorded),
+        replayed: show(replayed),
         bytes: u32::try_from(size_of::<CauseRecord>()).unwrap_or(u32::MAX),
     }
 }

@@ -10,25 +10,12 @@ use crate::xarm::frame::next_transaction;
 /// slot of an id never changes.
 const WINDOW: usize = 256;
 
-/// What became of a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Fate {
-    /// Nothing sent in this slot yet.
-    #[default]
-    Unused,
-    /// No reply yet.
-    Open,
-    /// A later command was answered first; its own reply may still come.
-    Overtaken,
-    /// Answered.
-    Answered,
-}
-
 #[derive(Debug, Clone, Copy, Default)]
 struct Sent {
+    /// 0 where nothing was sent yet.
     id: u16,
     sent_ns: u64,
-    fate: Fate,
+    answered: bool,
 }
 
 /// What a reply means.
@@ -51,13 +38,14 @@ pub enum Matched {
 }
 
 /// The commands sent last. Fixed size, RT-safe.
+///
+/// A reply overtakes all commands before its own, so the open ones are always the
+/// newest.
 #[derive(Debug, Clone)]
 pub struct InFlight {
     sent: [Sent; WINDOW],
     /// Id of the next command.
     next: u16,
-    /// Id of the oldest command that is open, `next` if none is.
-    oldest: u16,
     open: u16,
 }
 
@@ -66,7 +54,6 @@ impl Default for InFlight {
         Self {
             sent: [Sent::default(); WINDOW],
             next: 1,
-            oldest: 1,
             open: 0,
         }
     }
@@ -88,89 +75,62 @@ impl InFlight {
     /// When the oldest open command was sent (ns).
     #[must_use]
     pub fn oldest_ns(&self) -> Option<u64> {
-        (self.open > 0)
-            .then(|| self.slot(self.oldest))
-            .flatten()
-            .map(|sent| sent.sent_ns)
+        let back = self.next.wrapping_sub(self.open);
+        // Ids wrap to 1.
+        let oldest = if self.open < self.next {
+            back
+        } else {
+            back.wrapping_sub(1)
+        };
+        let slot = self.sent.get(place(oldest))?;
+        (self.open > 0 && slot.id == oldest).then_some(slot.sent_ns)
+    }
+
+    /// How many commands ago `id` was the next one.
+    const fn age(&self, id: u16) -> u16 {
+        let age = self.next.wrapping_sub(id);
+        if id < self.next {
+            age
+        } else {
+            age.wrapping_sub(1)
+        }
     }
 
     /// The command with [`next_id`](Self::next_id) was sent at `now_ns`.
     pub fn sent(&mut self, now_ns: u64) {
         let id = self.next;
-        if self.open == 0 {
-            self.oldest = id;
+        let slot = self.sent.get(place(id)).copied().unwrap_or_default();
+        if slot.id != 0 {
+            // A whole window without any reply: the oldest is given up.
+            self.open = self.open.min(self.age(slot.id).saturating_sub(1));
         }
         if let Some(slot) = self.sent.get_mut(place(id)) {
-            if slot.fate == Fate::Open {
-                // A whole window without any reply: the oldest is given up.
-                self.open = self.open.saturating_sub(1);
-            }
             *slot = Sent {
                 id,
                 sent_ns: now_ns,
-                fate: Fate::Open,
+                answered: false,
             };
             self.open = self.open.saturating_add(1);
         }
         self.next = next_transaction(id);
-        self.settle();
     }
 
     /// A reply with transaction `id` came.
     pub fn reply(&mut self, id: u16) -> Matched {
-        let Some(Sent { sent_ns, fate, .. }) = self.slot(id).copied() else {
+        let (age, open) = (self.age(id), self.open);
+        let slot = self.sent.get_mut(place(id));
+        let Some(sent) = slot.filter(|sent| id != 0 && sent.id == id) else {
             return Matched::Foreign;
         };
-        let matched = match fate {
-            Fate::Unused => return Matched::Foreign,
-            Fate::Answered => return Matched::Duplicate,
-            Fate::Overtaken => Matched::OutOfOrder { sent_ns },
-            Fate::Open if id == self.oldest => Matched::InOrder { sent_ns },
-            Fate::Open => {
-                self.overtake(id);
-                Matched::OutOfOrder { sent_ns }
-            }
-        };
-        if fate == Fate::Open {
-            self.open = self.open.saturating_sub(1);
+        if core::mem::replace(&mut sent.answered, true) {
+            return Matched::Duplicate;
         }
-        self.mark(id, Fate::Answered);
-        self.settle();
-        matched
-    }
-
-    fn slot(&self, id: u16) -> Option<&Sent> {
-        self.sent.get(place(id)).filter(|sent| sent.id == id)
-    }
-
-    fn mark(&mut self, id: u16, fate: Fate) {
-        if let Some(slot) = self.sent.get_mut(place(id)) {
-            slot.fate = fate;
-        }
-    }
-
-    /// Every open command before `id` counts as overtaken.
-    fn overtake(&mut self, id: u16) {
-        for _ in 0..WINDOW {
-            if self.oldest == id {
-                return;
-            }
-            if self.slot(self.oldest).is_some_and(|s| s.fate == Fate::Open) {
-                self.mark(self.oldest, Fate::Overtaken);
-                self.open = self.open.saturating_sub(1);
-            }
-            self.oldest = next_transaction(self.oldest);
-        }
-    }
-
-    /// Moves `oldest` on to the oldest open command.
-    fn settle(&mut self) {
-        for _ in 0..WINDOW {
-            let open = self.slot(self.oldest).is_some_and(|s| s.fate == Fate::Open);
-            if open || self.oldest == self.next {
-                return;
-            }
-            self.oldest = next_transaction(self.oldest);
+        let sent_ns = sent.sent_ns;
+        self.open = open.min(age.saturating_sub(1));
+        if age == open {
+            Matched::InOrder { sent_ns }
+        } else {
+            Matched::OutOfOrder { sent_ns }
         }
     }
 }
@@ -221,7 +181,7 @@ mod tests {
         fn counts_are_right_over_the_wrap(
             begin in 65_000_u16..65_535, steps in prop::collection::vec((any::<bool>(), 0_usize..20), 1..1500),
         ) {
-            let mut f = InFlight { next: begin, oldest: begin, ..InFlight::default() };
+            let mut f = InFlight { next: begin, ..InFlight::default() };
             let mut sent: Vec<(u16, u64, bool)> = Vec::new(); // id, time, answered
             let mut answered_up_to = 0;
             for (k, (send, back)) in steps.into_iter().enumerate() {

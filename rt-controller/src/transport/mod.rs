@@ -18,9 +18,7 @@ pub mod in_flight;
 pub mod sim;
 pub mod tcp;
 
-pub use control_core::transport::{
-    ArmTransport, LinkGone, MAX_COMMANDS, Sent, command_interface, slot,
-};
+pub use control_core::transport::{ArmTransport, LinkGone, MAX_COMMANDS, Sent};
 
 /// A connected stream of bytes that never makes its user wait: a socket, or a
 /// cable in virtual time.

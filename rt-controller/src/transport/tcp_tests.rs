@@ -1,6 +1,6 @@
 use super::*;
 use crate::os::now_ns;
-use crate::xarm::{Reply, ReplyData, StateRequest};
+use crate::xarm::{ReplyData, StateRequest};
 use arm_model::JointVector;
 use std::io::Read;
 use std::net::TcpListener;
@@ -74,23 +74,6 @@ fn late_replies_are_matched_by_id_and_status_bits_add_up() {
 }
 
 #[test]
-fn a_reply_that_was_never_asked_for_is_counted() {
-    let (mut link, mut peer) = pair();
-    let mut out = [0; MAX_FRAME_LEN];
-    let n = Reply {
-        transaction: 77,
-        protocol: Protocol::Private,
-        register: 29,
-        status: Status(0),
-        data: &[],
-    }
-    .emit(&mut out)
-    .unwrap();
-    peer.write_all(&out[..n]).unwrap();
-    assert_eq!(poll_until(&mut link, 1, |s| s.foreign > 0).foreign, 1);
-}
-
-#[test]
 fn setpoints_neither_bunch_nor_pile_up_but_a_stop_always_goes_out() {
     let (mut link, peer) = pair();
     let q = Command::ServoJoint(JointVector::ZERO);
@@ -109,22 +92,6 @@ fn setpoints_neither_bunch_nor_pile_up_but_a_stop_always_goes_out() {
     assert_eq!(seen.unanswered_ns, 16_000_000);
     drop(peer);
     assert!(poll_until(&mut link, 1, |s| s.lost).lost);
-}
-
-#[test]
-fn a_frame_taken_in_part_is_finished_before_the_next_begins() {
-    let (mut link, mut peer) = pair();
-    let q = Command::ServoJoint(JointVector::splat(0.2));
-    let mut frame = [0; MAX_FRAME_LEN];
-    let n = emit_command(&mut frame, 1, Protocol::PrivateHeartbeat, &q).unwrap();
-    // As if the network had taken the first ten bytes only.
-    link.stream.write_all(&frame[..10]).unwrap();
-    link.rest = heapless::Vec::from_slice(&frame[10..n]).unwrap();
-    link.in_flight.sent(0);
-    assert_eq!(link.send(&[q], 1000), Ok(Sent::Skipped));
-    assert_eq!(link.send(&[q], 2000), Ok(Sent::Whole));
-    let answers = replies(&mut peer, 2, Status(0));
-    assert_eq!(answers.len(), 2);
 }
 
 #[test]

@@ -5,12 +5,10 @@ use rt_controller::xarm::frame::{MAX_FRAME_LEN, Request};
 use rt_controller::xarm::{FrameReader, ReplyData, Status};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::time::Duration;
 
 /// How it answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
 pub(crate) enum Replies {
     /// As it should.
     Good,
@@ -26,104 +24,80 @@ pub(crate) enum Replies {
     HangUp,
 }
 
-impl Replies {
-    const ALL: [Self; 6] = [
-        Self::Good,
-        Self::Mute,
-        Self::Error,
-        Self::NotReady,
-        Self::Foreign,
-        Self::HangUp,
-    ];
-}
-
-/// The arm; its thread ends with the process.
-#[derive(Debug, Clone)]
+/// The arm and the one connection to it.
+#[derive(Debug)]
 pub(crate) struct EchoArm {
-    pub(crate) address: SocketAddr,
-    replies: Arc<AtomicU8>,
-    received: Arc<AtomicU64>,
-    hung_up: Arc<AtomicBool>,
+    listener: TcpListener,
+    link: Option<TcpStream>,
+    reader: FrameReader,
+    pub(crate) replies: Replies,
 }
 
 impl EchoArm {
     pub(crate) fn start() -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let arm = Self {
-            address: listener.local_addr().unwrap(),
-            replies: Arc::default(),
-            received: Arc::default(),
-            hung_up: Arc::default(),
-        };
-        let its = arm.clone();
-        std::thread::spawn(move || {
-            for stream in listener.incoming() {
-                if !its.serve(stream.unwrap()) {
-                    its.hung_up.store(true, Ordering::SeqCst);
-                }
-            }
-        });
-        arm
-    }
-
-    pub(crate) fn be(&self, replies: Replies) {
-        self.hung_up.store(false, Ordering::SeqCst);
-        self.replies.store(replies as u8, Ordering::SeqCst);
-    }
-
-    fn replies(&self) -> Replies {
-        Replies::ALL[usize::from(self.replies.load(Ordering::SeqCst))]
-    }
-
-    /// Requests met so far, on all connections.
-    pub(crate) fn received(&self) -> u64 {
-        self.received.load(Ordering::SeqCst)
-    }
-
-    /// Whether it has met `asked` requests, each in its way.
-    pub(crate) fn is_done_with(&self, asked: u64) -> bool {
-        if self.replies() == Replies::HangUp {
-            return self.hung_up.load(Ordering::SeqCst);
+        Self {
+            listener: TcpListener::bind("127.0.0.1:0").unwrap(),
+            link: None,
+            reader: FrameReader::new(),
+            replies: Replies::Good,
         }
-        self.received() >= asked
     }
 
-    /// False when it closed the connection itself.
-    fn serve(&self, mut stream: TcpStream) -> bool {
-        stream.set_nodelay(true).unwrap();
-        let mut reader = FrameReader::new();
-        while let Ok(n @ 1..) = stream.read(reader.space()) {
-            reader.commit(n);
-            while let Ok(Some(frame)) = reader.next_frame() {
-                let request = frame.as_request().unwrap();
-                let goes_on = self.answer(&mut stream, &request);
-                self.received.fetch_add(1, Ordering::SeqCst);
-                if !goes_on {
-                    return false;
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.listener.local_addr().unwrap()
+    }
+
+    /// Takes the next connection; the one before is over.
+    pub(crate) fn accept(&mut self) {
+        let (link, _) = self.listener.accept().unwrap();
+        link.set_nodelay(true).unwrap();
+        link.set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
+        (self.link, self.reader) = (Some(link), FrameReader::new());
+    }
+
+    /// Waits for `count` requests and meets each in its way; false once there is no
+    /// connection any more.
+    pub(crate) fn meet(&mut self, count: u64) -> bool {
+        let mut met = 0;
+        while met < count {
+            let Some(link) = &mut self.link else {
+                return false;
+            };
+            let goes_on = match self.reader.next_frame().unwrap() {
+                Some(frame) => {
+                    met += 1;
+                    answer(link, self.replies, frame.as_request().unwrap())
                 }
+                None => {
+                    let received = link.read(self.reader.space()).unwrap();
+                    self.reader.commit(received);
+                    received > 0
+                }
+            };
+            if !goes_on {
+                self.link = None;
             }
         }
         true
     }
+}
 
-    /// False when the connection is to be closed.
-    fn answer(&self, stream: &mut TcpStream, request: &Request<'_>) -> bool {
-        let replies = self.replies();
-        let status = match replies {
-            Replies::Error => Status(Status::ERROR | Status::NOT_READY),
-            Replies::NotReady => Status(Status::NOT_READY),
-            Replies::Good | Replies::Foreign => Status(0),
-            Replies::Mute => return true,
-            Replies::HangUp => return false,
-        };
-        let mut request = *request;
-        if replies == Replies::Foreign {
-            request.transaction = request.transaction.wrapping_add(1000);
-        }
-        let mut out = [0; MAX_FRAME_LEN];
-        let n = ReplyData::None.emit(&mut out, &request, status).unwrap();
-        // The other end may have gone; that is seen when it is read from.
-        let _ = stream.write_all(&out[..n]);
-        true
+/// False when the connection is to be closed.
+fn answer(link: &mut TcpStream, replies: Replies, mut request: Request<'_>) -> bool {
+    let status = match replies {
+        Replies::Error => Status(Status::ERROR | Status::NOT_READY),
+        Replies::NotReady => Status(Status::NOT_READY),
+        Replies::Good | Replies::Foreign => Status(0),
+        Replies::Mute => return true,
+        Replies::HangUp => return false,
+    };
+    if replies == Replies::Foreign {
+        request.transaction = request.transaction.wrapping_add(1000);
     }
+    let mut out = [0; MAX_FRAME_LEN];
+    let n = ReplyData::None.emit(&mut out, &request, status).unwrap();
+    // The other end may have gone; that is seen when it is read from.
+    let _ = link.write_all(&out[..n]);
+    true
 }

@@ -13,9 +13,10 @@ use rt_controller::control::{
 };
 use rt_controller::driver::CommandMsg;
 use rt_controller::os::Clock;
-use rt_controller::ports::{Rings, rings};
+use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use rtrb::Producer;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, GuardianBeat, GuardianEnd, JointReport,
     OperatorEnd,
@@ -24,7 +25,7 @@ use shared_types::{Arming, CommandInterface, FaultCode, OperatingMode};
 use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::rc::Rc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Sees every cycle.
 pub(crate) trait Watch {
@@ -63,7 +64,8 @@ pub(crate) struct Disturbance {
 pub(crate) struct Bench<'w> {
     rt: RtLoop<TcpLink, Hand>,
     clock: Rc<Cell<u64>>,
-    rings: Rings<TcpLink>,
+    bridge: BridgePorts<TcpLink>,
+    reports: Producer<JointReport>,
     pub(crate) arm: EchoArm,
     pub(crate) operator: OperatorEnd,
     guardian: GuardianEnd,
@@ -76,7 +78,6 @@ pub(crate) struct Bench<'w> {
     said: JointReport,
     pub(crate) disturbance: Disturbance,
     disturbed_cycles: u32,
-    asked: u64,
     pub(crate) cycles: u64,
     pub(crate) seen: [u64; 6],
     /// Causes of stops and refusals so far.
@@ -84,17 +85,12 @@ pub(crate) struct Bench<'w> {
     pub(crate) last_cause: FaultCode,
 }
 
-const UNANSWERED_MAX: u16 = 200;
-
 fn settings(interface: CommandInterface) -> ControlSettings {
     ControlSettings {
         interface,
         arming_required: true,
         guardian_required: true,
         ..ControlSettings::from(Thresholds {
-            // The arm's thread is waited for now and then only.
-            reply_stall_ns: 400_000_000,
-            unanswered_max: UNANSWERED_MAX,
             late_cycles_max: 2,
             ..Thresholds::relaxed()
         })
@@ -102,12 +98,7 @@ fn settings(interface: CommandInterface) -> ControlSettings {
 }
 
 impl<'w> Bench<'w> {
-    pub(crate) fn new(
-        interface: CommandInterface,
-        rate_hz: f64,
-        arm: &EchoArm,
-        watch: &'w mut dyn Watch,
-    ) -> Self {
+    pub(crate) fn new(interface: CommandInterface, rate_hz: f64, watch: &'w mut dyn Watch) -> Self {
         let name = format!(
             "test_gauntlet_{}_{}_{rate_hz}",
             std::process::id(),
@@ -120,16 +111,21 @@ impl<'w> Bench<'w> {
             ..Limits::default().into()
         })
         .unwrap();
-        let mut all = rings();
-        let rt_ports = std::mem::replace(&mut all.rt, rings::<TcpLink>().rt);
+        let Rings {
+            rt: ports,
+            bridge,
+            reports: [reports, _],
+            ..
+        } = rings();
         let now_ns = 1_000_000_000_000;
         let clock = Rc::new(Cell::new(now_ns));
         let control = ControlState::new(limits.clone(), settings(interface));
         Self {
-            rt: RtLoop::new(control, Hand(Rc::clone(&clock)), boards, rt_ports),
+            rt: RtLoop::new(control, Hand(Rc::clone(&clock)), boards, ports),
             clock,
-            rings: all,
-            arm: arm.clone(),
+            bridge,
+            reports,
+            arm: EchoArm::start(),
             operator: OperatorEnd::take(&bus).unwrap(),
             guardian: GuardianEnd::take(&bus).unwrap(),
             watch,
@@ -141,7 +137,6 @@ impl<'w> Bench<'w> {
             said: JointReport::default(),
             disturbance: Disturbance::default(),
             disturbed_cycles: 0,
-            asked: 0,
             cycles: 0,
             seen: [0; 6],
             met: BTreeSet::new(),
@@ -166,36 +161,30 @@ impl<'w> Bench<'w> {
         }
         if !self.disturbance.reports_stop {
             let report = self.report();
-            self.rings.reports[0].push(report).unwrap();
+            self.reports.push(report).unwrap();
         }
         let (rt, now_ns) = (&mut self.rt, self.now_ns);
         self.watch.around(&mut || {
             rt.cycle(now_ns, missed, now_ns);
         });
         self.cycles += 1;
-        self.newest = self.rings.bridge.records.pop().unwrap();
+        self.newest = self.bridge.records.pop().unwrap();
         self.seen[usize::from(self.newest.mode)] += 1;
-        self.asked += u64::from(self.newest.sent);
-        while self.rings.bridge.retired.pop().is_ok() {}
-        while let Ok(event) = self.rings.bridge.events.pop() {
-            self.take(&event);
+        while self.bridge.retired.pop().is_ok() {}
+        let mut asked = u64::from(self.newest.sent);
+        while let Ok(event) = self.bridge.events.pop() {
+            let code = match event {
+                ControlEvent::Latched(cause) => {
+                    self.last_cause = cause.fault();
+                    asked += u64::from(cause.stop_arm);
+                    cause.fault()
+                }
+                ControlEvent::Refused { fault, .. } | ControlEvent::Disarmed { fault } => fault,
+                _ => continue,
+            };
+            self.met.insert(code as u16);
         }
-        if self.cycles.is_multiple_of(16) {
-            self.wait_for_the_arm();
-        }
-    }
-
-    fn take(&mut self, event: &ControlEvent) {
-        let code = match event {
-            ControlEvent::Latched(cause) => {
-                self.last_cause = cause.fault();
-                self.asked += u64::from(cause.stop_arm);
-                cause.fault()
-            }
-            ControlEvent::Refused { fault, .. } | ControlEvent::Disarmed { fault } => *fault,
-            _ => return,
-        };
-        self.met.insert(code as u16);
+        self.arm.meet(asked);
     }
 
     fn report(&mut self) -> JointReport {
@@ -220,32 +209,13 @@ impl<'w> Bench<'w> {
         report
     }
 
-    /// Lets the arm's thread catch up, and the system deliver its answers; in the loop
-    /// no time passes meanwhile.
-    fn wait_for_the_arm(&mut self) {
-        const PAUSE: Duration = Duration::from_micros(50);
-        let began = Instant::now();
-        std::thread::sleep(PAUSE);
-        while self.linked() && !self.arm.is_done_with(self.asked) {
-            assert!(began.elapsed() < Duration::from_secs(20), "no answer");
-            std::thread::sleep(PAUSE);
-        }
-    }
-
-    fn linked(&self) -> bool {
-        ![ControllerMode::Offline, ControllerMode::Faulted].contains(&self.mode())
-    }
-
     pub(crate) fn command(&mut self, command: ControlCommand) {
         self.send(command, None);
     }
 
     fn send(&mut self, command: ControlCommand, link: Option<Box<TcpLink>>) {
-        self.rings
-            .bridge
-            .commands
-            .push(CommandMsg { command, link })
-            .unwrap();
+        let message = CommandMsg { command, link };
+        self.bridge.commands.push(message).unwrap();
         self.cycle();
     }
 
@@ -258,16 +228,17 @@ impl<'w> Bench<'w> {
         self.disturbance = Disturbance::default();
         self.operator.hold();
         self.operator.release_stop();
-        self.arm.be(Replies::Good);
+        self.arm.replies = Replies::Good;
         // Reports that are well again come before anybody engages the arm: a spoilt
         // one followed by a true one is a jump.
         for _ in 0..3 {
             self.cycle();
         }
-        self.asked = self.arm.received();
-        let settings = LinkSettings::new(UNANSWERED_MAX, self.period_ns);
+        let most = Thresholds::relaxed().unanswered_max;
+        let settings = LinkSettings::new(most, self.period_ns);
         let timeout = Duration::from_secs(5);
-        let link = TcpLink::connect(self.arm.address, timeout, settings).unwrap();
+        let link = TcpLink::connect(self.arm.address(), timeout, settings).unwrap();
+        self.arm.accept();
         self.newest.q_c = START_POSE;
         let hold = ControlCommand::Engage { hold: START_POSE };
         self.send(hold, Some(Box::new(link)));

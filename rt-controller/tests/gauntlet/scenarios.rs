@@ -1,7 +1,7 @@
 //! A fault-injection scenario for every fault: how the loop is brought to it while
 //! it moves.
 
-use super::arm::{EchoArm, Replies};
+use super::arm::Replies;
 use super::{Bench, Watch};
 use arm_model::joint::START_POSE;
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, LimitsSpec};
@@ -53,11 +53,11 @@ fn scenario_of(code: FaultCode) -> Scenario {
         F::OperatingModeExceeded => Motion(|_| spline(1, 3.4, 1.55), OperatingMode::Wiggle),
         F::DeadlineMissed => Spoilt(|b| b.disturbance.missed = 7),
         F::LateCycles => Spoilt(|b| b.disturbance.missed = 4),
-        F::ReplyStalled => Spoilt(|b| b.arm.be(Replies::Mute)),
-        F::LinkLost => Spoilt(|b| b.arm.be(Replies::HangUp)),
-        F::ArmError => Spoilt(|b| b.arm.be(Replies::Error)),
-        F::ArmNotReady => Spoilt(|b| b.arm.be(Replies::NotReady)),
-        F::SecondCommander => Spoilt(|b| b.arm.be(Replies::Foreign)),
+        F::ReplyStalled => Spoilt(|b| b.arm.replies = Replies::Mute),
+        F::LinkLost => Spoilt(|b| b.arm.replies = Replies::HangUp),
+        F::ArmError => Spoilt(|b| b.arm.replies = Replies::Error),
+        F::ArmNotReady => Spoilt(|b| b.arm.replies = Replies::NotReady),
+        F::SecondCommander => Spoilt(|b| b.arm.replies = Replies::Foreign),
         F::ReportStale => Spoilt(|b| b.disturbance.reports_stop = true),
         F::ReportFrozen => Spoilt(|b| {
             b.disturbance.reports = Some(|r, before, _| (r.q, r.qd) = (before.q, before.qd));
@@ -191,7 +191,6 @@ fn lead_to(bench: &mut Bench<'_>, code: FaultCode) -> bool {
 /// Runs at least `cycles` through every mode and every fault that can be met,
 /// by every command interface, and says how many ran.
 pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
-    let arm = EchoArm::start();
     let (mut met, mut seen, mut ran) = (BTreeSet::new(), [0; 6], 0);
     // At 250 Hz the tool's speed limit comes before its largest step, at 100 Hz
     // after it.
@@ -213,7 +212,7 @@ pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
         ),
     ];
     for (interface, rate_hz, hidden) in set_ups {
-        let mut bench = Bench::new(interface, rate_hz, &arm, watch);
+        let mut bench = Bench::new(interface, rate_hz, watch);
         for _ in 0..5 {
             bench.cycle();
         }

@@ -29,37 +29,19 @@ const KEYFRAME_EVERY: u64 = 250;
 /// How late the imagined arm follows (cycles).
 const LAG: usize = 3;
 
-/// A recorded run.
-pub(crate) struct Run {
-    /// The recording, as it would lie on the disk.
-    pub(crate) bytes: Vec<u8>,
+/// A recorded run, as it would lie on the disk.
+pub(crate) fn record_run(seed: u64, cycles: u64) -> Vec<u8> {
+    record_run_with(seed, cycles, 0..0, |_| ())
 }
 
-/// A run as it happened.
-pub(crate) fn record_run(seed: u64, cycles: u64) -> Run {
-    record_run_with(seed, cycles, |_| ())
-}
-
-/// A run of which every record is changed by `change`.
+/// A run of which the cycles `lost` are not recorded and every other is changed by
+/// `change`.
 pub(crate) fn record_run_with(
-    seed: u64,
-    cycles: u64,
-    change: impl FnMut(&mut RecordedCycle),
-) -> Run {
-    run(seed, cycles, 0..0, change)
-}
-
-/// A run of which some records got lost.
-pub(crate) fn record_run_dropping(seed: u64, cycles: u64, lost: Range<u64>) -> Run {
-    run(seed, cycles, lost, |_| ())
-}
-
-fn run(
     seed: u64,
     cycles: u64,
     lost: Range<u64>,
     mut change: impl FnMut(&mut RecordedCycle),
-) -> Run {
+) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer = ChunkWriter::default();
     let mut control = ControlState::new(Limits::default(), Thresholds::strict());
@@ -92,7 +74,7 @@ fn run(
         }
     }
     bytes.extend(writer.flush().unwrap_or_default());
-    Run { bytes }
+    bytes
 }
 
 /// An arm that follows late, an operator, and bad luck.

@@ -18,16 +18,10 @@ pub fn brake_with_jerk(
     limits: &Limits,
     jerk_max: impl Fn(usize) -> f64,
 ) -> PhasedMotion {
-    let mut axes = [AxisPhases::default(); JOINTS];
-    for (j, axis) in axes.iter_mut().enumerate() {
-        let start = AxisState {
-            q: from.q[j],
-            qd: from.qd[j],
-            qdd: from.qdd[j],
-        };
-        *axis = brake_axis(start, limits.acceleration_max_rad_s2[j], jerk_max(j));
-    }
-    PhasedMotion::new(axes)
+    PhasedMotion::new(core::array::from_fn(|j| {
+        let acceleration_max = limits.acceleration_max_rad_s2[j];
+        brake_axis(AxisState::of(from, j), acceleration_max, jerk_max(j))
+    }))
 }
 
 /// The joint (0-based) and the end (rad) of its range that even the hardest
@@ -39,11 +33,7 @@ pub fn brake_with_jerk(
 pub fn unstoppable(from: &JointState, limits: &Limits) -> Option<(usize, f64, f64)> {
     let hardest = 1.0 / limits.period_s();
     (0..JOINTS).find_map(|j| {
-        let start = AxisState {
-            q: from.q[j],
-            qd: from.qd[j],
-            qdd: from.qdd[j],
-        };
+        let start = AxisState::of(from, j);
         let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
         let acceleration = limits.acceleration_max_rad_s2[j];
         let passes = |jerk: f64| {

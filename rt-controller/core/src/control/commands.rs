@@ -30,43 +30,33 @@ impl ControlState {
         out: &mut CycleOutput,
     ) {
         let deadline_ns = input.deadline_ns;
-        match command {
+        let done = match command {
             // Given before this very cycle's stop, so it acknowledges nothing.
-            ControlCommand::Engage { .. } if before != self.mode() => {
-                let fault = FaultCode::WrongMode;
-                emit(out, ControlEvent::Refused { id: None, fault });
-            }
-            ControlCommand::Engage { hold } => match self.engage(hold, input) {
-                Ok(()) => emit(out, ControlEvent::Engaged),
-                Err(fault) => emit(out, ControlEvent::Refused { id: None, fault }),
-            },
-            ControlCommand::Run { id, motion } => self.run(id, motion, input, out),
+            ControlCommand::Engage { .. } if before != self.mode() => Err(FaultCode::WrongMode),
+            ControlCommand::Engage { hold } => self.engage(hold, input),
+            ControlCommand::Arm(arming) => self.arm(arming, input),
+            ControlCommand::Run { id, motion } => return self.run(id, motion, input, out),
             ControlCommand::Stop => {
-                self.react(Violation::plain(FaultCode::OperatorStop), deadline_ns, out)
+                return self.react(Violation::plain(FaultCode::OperatorStop), deadline_ns, out);
             }
-            ControlCommand::Arm(arming) => self.arm(arming, input, out),
             ControlCommand::Disarm if self.mode().is_moving() => {
-                self.react(Violation::plain(FaultCode::Disarmed), deadline_ns, out);
+                return self.react(Violation::plain(FaultCode::Disarmed), deadline_ns, out);
             }
-            ControlCommand::Disarm => self.disarm(FaultCode::None, out),
-        }
+            ControlCommand::Disarm => return self.disarm(FaultCode::None, out),
+        };
+        let refused = |fault| ControlEvent::Refused { id: None, fault };
+        emit(out, done.unwrap_or_else(refused));
     }
 
-    fn arm(&mut self, arming: Arming, input: &CycleInput, out: &mut CycleOutput) {
-        let taken = if self.mode() != ControllerMode::Idle {
-            Err(FaultCode::WrongMode)
-        } else if input.operator.released != 0 {
-            Err(FaultCode::DeadManReleased)
-        } else {
-            self.arming.arm(arming, input.deadline_ns)
-        };
-        emit(
-            out,
-            match taken {
-                Ok(arming) => ControlEvent::Armed(arming),
-                Err(fault) => ControlEvent::Refused { id: None, fault },
-            },
-        );
+    fn arm(&mut self, arming: Arming, input: &CycleInput) -> Result<ControlEvent, FaultCode> {
+        if self.mode() != ControllerMode::Idle {
+            return Err(FaultCode::WrongMode);
+        }
+        if input.operator.released != 0 {
+            return Err(FaultCode::DeadManReleased);
+        }
+        let armed = self.arming.arm(arming, input.deadline_ns);
+        armed.map(ControlEvent::Armed)
     }
 
     pub(super) fn disarm(&mut self, fault: FaultCode, out: &mut CycleOutput) {
@@ -75,7 +65,7 @@ impl ControlState {
         }
     }
 
-    fn engage(&mut self, hold: JointVector, input: &CycleInput) -> Result<(), FaultCode> {
+    fn engage(&mut self, hold: JointVector, input: &CycleInput) -> Result<ControlEvent, FaultCode> {
         if input.link.lost {
             // A link that broke on its way here.
             return Err(FaultCode::LinkLost);
@@ -97,7 +87,7 @@ impl ControlState {
         self.sent_ns = MonotonicNs(deadline_ns).plus_s(-self.period_s()).0;
         self.monitor = Monitor::new(self.settings, deadline_ns, hold);
         self.monitor.observe(input, &self.limits);
-        Ok(())
+        Ok(ControlEvent::Engaged)
     }
 
     fn run(&mut self, id: u64, motion: Box<Motion>, input: &CycleInput, out: &mut CycleOutput) {
@@ -121,13 +111,8 @@ impl ControlState {
                 emit(out, ControlEvent::Started { id, start_ns });
             }
             Err(fault) => {
-                emit(
-                    out,
-                    ControlEvent::Refused {
-                        id: Some(id),
-                        fault,
-                    },
-                );
+                let id = Some(id);
+                emit(out, ControlEvent::Refused { id, fault });
                 give_back(out, motion);
             }
         }

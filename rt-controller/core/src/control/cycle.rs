@@ -288,15 +288,12 @@ impl ControlState {
             if self.arming == ArmingState::Spent {
                 self.disarm(FaultCode::None, out);
             }
-            let end_ns = deadline_ns;
-            emit(
-                out,
-                ControlEvent::Finished {
-                    id,
-                    start_ns,
-                    end_ns,
-                },
-            );
+            let finished = ControlEvent::Finished {
+                id,
+                start_ns,
+                end_ns: deadline_ns,
+            };
+            emit(out, finished);
         }
         Ok(())
     }
@@ -400,10 +397,6 @@ mod bench;
 #[cfg(test)]
 #[path = "cycle_tests.rs"]
 mod tests;
-
-#[cfg(test)]
-#[path = "reaction_tests.rs"]
-mod reaction_tests;
 
 #[cfg(test)]
 #[path = "random_tests.rs"]

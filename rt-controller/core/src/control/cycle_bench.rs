@@ -4,7 +4,6 @@ use super::*;
 use crate::control::exchange::ControlCommand;
 use crate::control::limiter::{Allowance, Limiter};
 use crate::control::{LinkInput, Thresholds};
-use crate::point_to_point::plan_move;
 use crate::xarm::StateRequest;
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
@@ -57,10 +56,14 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn offline() -> Self {
+        Self::of(Thresholds::relaxed())
+    }
+
+    fn of(settings: impl Into<ControlSettings>) -> Self {
         let limits = Limits::default();
         Self {
             judge: Limiter::at_rest(START_POSE, &limits),
-            state: ControlState::new(limits, Thresholds::relaxed()),
+            state: ControlState::new(limits, settings),
             now_ns: 1_000_000_000_000,
             beat: 0,
             commanded: [START_POSE; 3],
@@ -71,11 +74,13 @@ impl Bench {
     }
 
     pub(super) fn holding() -> Self {
-        let mut bench = Self::offline();
+        Self::holding_with(Thresholds::relaxed())
+    }
+
+    pub(super) fn holding_with(settings: impl Into<ControlSettings>) -> Self {
+        let mut bench = Self::of(settings);
         bench.command(ControlCommand::Engage { hold: START_POSE });
-        for _ in 0..100 {
-            bench.cycle();
-        }
+        bench.cycles(100);
         assert_eq!(bench.state.mode(), ControllerMode::Idle);
         bench.events.clear();
         bench
@@ -101,8 +106,10 @@ impl Bench {
             };
             self.judge.admit(&q, step_s, &limits, &allowed).unwrap();
             self.sent.push(q);
+            self.commanded = [q, self.commanded[0], self.commanded[1]];
         }
-        self.take(&out);
+        self.events.extend(out.events);
+        self.requests.extend(out.request);
     }
 
     pub(super) fn cycle(&mut self) {
@@ -110,19 +117,8 @@ impl Bench {
         self.step(input);
     }
 
-    /// Where the judge's even steps do not fit.
-    pub(super) fn cycle_unjudged(&mut self, missed: u32) {
-        let input = self.input(missed);
-        let out = self.state.step(input);
-        self.take(&out);
-    }
-
-    fn take(&mut self, out: &CycleOutput) {
-        if let Some(q) = out.setpoint() {
-            self.commanded = [q, self.commanded[0], self.commanded[1]];
-        }
-        self.events.extend(out.events.iter().copied());
-        self.requests.extend(out.request);
+    pub(super) fn cycles(&mut self, count: usize) {
+        (0..count).for_each(|_| self.cycle());
     }
 
     pub(super) fn command(&mut self, command: ControlCommand) {
@@ -158,12 +154,6 @@ pub(super) fn swing() -> Motion {
     (up[5], up[1]) = (up[5] - 0.6, up[1] - 0.2);
     let times = [0.0, 0.6, 1.2];
     Motion::Spline(JointTrajectory::new(&times, &[START_POSE, up, START_POSE]).unwrap())
-}
-
-pub(super) fn go() -> Motion {
-    let mut to = START_POSE;
-    (to[0], to[3]) = (0.5, 1.9);
-    plan_move(&START_POSE, &to, 0.2, &Limits::default()).unwrap()
 }
 
 pub(super) fn cause_in(events: &[ControlEvent]) -> Option<CauseRecord> {

@@ -99,33 +99,21 @@ impl Limiter {
         let jerk = (qdd - self.qdd) * (3.0 / (step_s + self.step_s + self.step_before_s));
         for j in 0..JOINTS {
             check_position(j, q[j], limits)?;
-            let steepest = limits.acceleration_max_rad_s2[j] / limits.period_s();
+            let speed_max = limits.velocity_max_rad_s[j];
+            let acceleration_max = limits.acceleration_max_rad_s2[j];
             let jerk_max = if streamed_left > 0 {
-                limits.jerk_max_rad_s3[j] + steepest
+                limits.jerk_max_rad_s3[j] + acceleration_max / limits.period_s()
             } else {
                 limits.jerk_max_rad_s3[j]
             };
-            for (order, (fault, value, limit)) in [
-                (
-                    FaultCode::SetpointVelocity,
-                    qd[j],
-                    limits.velocity_max_rad_s[j],
-                ),
-                (
-                    FaultCode::SetpointAcceleration,
-                    qdd[j],
-                    limits.acceleration_max_rad_s2[j],
-                ),
+            let checks = [
+                (FaultCode::SetpointVelocity, qd[j], speed_max),
+                (FaultCode::SetpointAcceleration, qdd[j], acceleration_max),
                 (FaultCode::SetpointJerk, jerk[j], jerk_max),
-            ]
-            .into_iter()
-            .enumerate()
-            {
-                if !within(
-                    value,
-                    limit,
-                    ROUNDING.get(order + 1).copied().unwrap_or(0.0),
-                ) {
+            ];
+            let [_, rounding @ ..] = ROUNDING;
+            for ((fault, value, limit), slack) in checks.into_iter().zip(rounding) {
+                if !within(value, limit, slack) {
                     return Err(Violation::of_joint(fault, j, value, limit));
                 }
             }
@@ -180,12 +168,8 @@ fn check_position(j: usize, q_rad: f64, limits: &Limits) -> Result<(), Violation
         return Ok(());
     }
     let limit = if q_rad < low { low } else { high };
-    Err(Violation::of_joint(
-        FaultCode::SetpointPosition,
-        j,
-        q_rad,
-        limit,
-    ))
+    let fault = FaultCode::SetpointPosition;
+    Err(Violation::of_joint(fault, j, q_rad, limit))
 }
 
 fn check_tool(
@@ -230,6 +214,8 @@ mod tests {
     use arm_model::JointTrajectory;
     use arm_model::joint::START_POSE;
 
+    use FaultCode as F;
+
     const PERIOD_S: f64 = 0.004;
     const STREAMED: Allowance = Allowance {
         tcp_speed_max_m_s: 1.2,
@@ -263,110 +249,84 @@ mod tests {
     }
 
     /// A single clamped segment has its largest acceleration, `6 x / T²`, as a
-    /// step at both ends: exactly at the limit it must pass, above it must not.
+    /// step at both ends: exactly at the limit it must pass, above it must not. Its
+    /// peak speed is `1.5 x / T`. Joint 1 swings the flange round the base at its
+    /// distance from it.
     #[test]
-    fn a_spline_at_its_acceleration_limit_passes_and_above_it_fails() {
+    fn splines_at_a_limit_pass_and_above_it_fail() {
         let limits = Limits::default();
-        for every in [5, 7, 1000] {
-            let at_limit = swing(6, 20.0 * 0.25 / 6.0, 0.5);
-            assert_eq!(run(&at_limit, &limits, every), Ok(()));
-            let above = swing(6, 20.6 * 0.25 / 6.0, 0.5);
-            assert_eq!(
-                run(&above, &limits, 1000),
-                Err(FaultCode::SetpointAcceleration)
-            );
-        }
-    }
-
-    #[test]
-    fn speed_of_joint_and_tool_is_limited() {
-        let limits = Limits::default();
-        // Peak speed of a clamped segment is 1.5 x / T.
-        assert_eq!(
-            run(&swing(6, 3.2, 1.5), &limits, 1000),
-            Err(FaultCode::SetpointVelocity)
-        );
-        // Joint 1 swings the flange round the base at its distance from it.
         let reach_m = kinematics::flange_pose(&START_POSE).0.xy().norm();
         let by = 1.05 * 1.2 / reach_m / 1.5;
-        assert_eq!(
-            run(&swing(0, by, 1.0), &limits, 1000),
-            Err(FaultCode::SetpointTcpSpeed)
-        );
-        assert_eq!(run(&swing(0, by * 0.94, 1.0), &limits, 9), Ok(()));
+        let at_limit = swing(6, 20.0 * 0.25 / 6.0, 0.5);
+        let above = swing(6, 20.6 * 0.25 / 6.0, 0.5);
+        for (trajectory, every, expected) in [
+            (at_limit, 5, Ok(())),
+            (at_limit, 7, Ok(())),
+            (at_limit, 1000, Ok(())),
+            (above, 1000, Err(F::SetpointAcceleration)),
+            (swing(6, 3.2, 1.5), 1000, Err(F::SetpointVelocity)),
+            (swing(0, by, 1.0), 1000, Err(F::SetpointTcpSpeed)),
+            (swing(0, by * 0.94, 1.0), 9, Ok(())),
+        ] {
+            assert_eq!(run(&trajectory, &limits, every), expected);
+        }
     }
 
-    #[test]
-    fn a_jump_or_nonsense_never_passes_and_leaves_no_trace() {
+    /// Joint `j` moved by `by_rad` within `step_s`, from rest.
+    fn step(j: usize, by_rad: f64, step_s: f64, allowed: Allowance) -> Result<(), Violation> {
         let limits = Limits::default();
+        let mut q = START_POSE;
+        q[j] += by_rad;
         let at_rest = Limiter::at_rest(START_POSE, &limits);
-        let moved = |joint: usize, q_rad: f64| {
-            let mut q = START_POSE;
-            q[joint] = q_rad;
-            q
+        let mut limiter = at_rest;
+        let taken = limiter.admit(&q, step_s, &limits, &allowed);
+        assert!(
+            taken.is_ok() || limiter == at_rest,
+            "a refusal leaves no trace"
+        );
+        taken
+    }
+
+    /// An operating mode is slower than the limits. 200 ms of silence: 90 mrad can be
+    /// reached at 180 deg/s within 1/30 s, 110 cannot, although either is slow over the
+    /// whole pause.
+    #[test]
+    fn a_jump_or_nonsense_never_passes() {
+        let slow = Allowance {
+            tcp_speed_max_m_s: 0.01,
+            ..STREAMED
         };
-        for (q, step_s, fault) in [
-            (
-                moved(6, START_POSE[6] + 0.001),
-                PERIOD_S,
-                FaultCode::SetpointAcceleration,
-            ),
-            (moved(3, f64::NAN), PERIOD_S, FaultCode::SetpointNotFinite),
-            (START_POSE, 0.0, FaultCode::SetpointNotFinite),
-            (moved(3, -0.2), PERIOD_S, FaultCode::SetpointPosition),
+        let quick = 0.5 * PERIOD_S * PERIOD_S * 20.0;
+        let outside = -0.2 - START_POSE[3];
+        for (j, by_rad, step_s, allowed, fault) in [
+            (6, 0.001, PERIOD_S, STREAMED, F::SetpointAcceleration),
+            (3, f64::NAN, PERIOD_S, STREAMED, F::SetpointNotFinite),
+            (0, 0.0, 0.0, STREAMED, F::SetpointNotFinite),
+            (3, outside, PERIOD_S, STREAMED, F::SetpointPosition),
+            (0, quick, PERIOD_S, slow, F::OperatingModeExceeded),
+            (6, 0.11, 0.2, STREAMED, F::DeadlineMissed),
         ] {
-            let mut limiter = at_rest;
-            let found = limiter.admit(&q, step_s, &limits, &STREAMED).unwrap_err();
-            assert_eq!(found.fault, fault);
-            assert_eq!(limiter, at_rest);
+            assert_eq!(step(j, by_rad, step_s, allowed).unwrap_err().fault, fault);
         }
+        assert_eq!(
+            step(6, 0.11, 0.2, STREAMED).unwrap_err().value.round(),
+            49.0
+        );
+        assert_eq!(step(6, 0.09, 0.2, STREAMED), Ok(()));
     }
 
     /// A setpoint whose jerk alone is too large for a motion of the controller's
     /// own passes as part of an uploaded trajectory.
     #[test]
     fn only_streamed_trajectories_may_step_their_acceleration() {
-        let limits = Limits::default();
-        let mut q = START_POSE;
-        q[6] += 10.0 * PERIOD_S * PERIOD_S;
         let own = Allowance {
             streamed: false,
             ..STREAMED
         };
-        let mut limiter = Limiter::at_rest(START_POSE, &limits);
-        let found = limiter.admit(&q, PERIOD_S, &limits, &own).unwrap_err();
-        assert_eq!((found.fault, found.joint), (FaultCode::SetpointJerk, 7));
+        let by_rad = 10.0 * PERIOD_S * PERIOD_S;
+        let found = step(6, by_rad, PERIOD_S, own).unwrap_err();
+        assert_eq!((found.fault, found.joint), (F::SetpointJerk, 7));
         assert!((found.value - 2500.0).abs() < 1e-3 && found.limit == 500.0);
-        limiter.admit(&q, PERIOD_S, &limits, &STREAMED).unwrap();
-    }
-
-    /// 200 ms of silence: 90 mrad can be reached at 180 deg/s within 1/30 s, 110
-    /// cannot, although either is slow over the whole pause.
-    #[test]
-    fn after_a_pause_the_arm_sets_out_from_rest() {
-        let limits = Limits::default();
-        let step = |rad: f64, step_s: f64| {
-            let mut q = START_POSE;
-            q[6] += rad;
-            let mut limiter = Limiter::at_rest(START_POSE, &limits);
-            let taken = limiter.admit(&q, step_s, &limits, &STREAMED);
-            taken.map_err(|found| (found.fault, found.value.round()))
-        };
-        assert_eq!(step(0.09, 0.2), Ok(()));
-        assert_eq!(step(0.11, 0.2), Err((FaultCode::DeadlineMissed, 49.0)));
-    }
-
-    #[test]
-    fn an_operating_mode_is_slower_than_the_limits() {
-        let limits = Limits::default();
-        let mut q = START_POSE;
-        q[0] += 0.5 * PERIOD_S * PERIOD_S * 20.0;
-        let slow = Allowance {
-            tcp_speed_max_m_s: 0.01,
-            streamed: true,
-        };
-        let mut limiter = Limiter::at_rest(START_POSE, &limits);
-        let found = limiter.admit(&q, PERIOD_S, &limits, &slow).unwrap_err();
-        assert_eq!(found.fault, FaultCode::OperatingModeExceeded);
+        assert_eq!(step(6, by_rad, PERIOD_S, STREAMED), Ok(()));
     }
 }

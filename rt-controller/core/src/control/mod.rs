@@ -24,7 +24,6 @@ mod commands;
 pub mod cycle;
 pub mod exchange;
 mod faults;
-mod layout_1;
 pub mod limiter;
 pub mod mode;
 pub mod monitor;

@@ -31,6 +31,15 @@ pub struct AxisState {
 }
 
 impl AxisState {
+    /// Of joint `j` (0-based).
+    pub(super) fn of(state: &JointState, j: usize) -> Self {
+        Self {
+            q: state.q[j],
+            qd: state.qd[j],
+            qdd: state.qdd[j],
+        }
+    }
+
     /// State after `t_s` of constant jerk.
     fn after(self, t_s: f64, jerk_rad_s3: f64) -> Self {
         Self {

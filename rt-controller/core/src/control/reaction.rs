@@ -96,20 +96,4 @@ mod tests {
             assert_eq!(reaction(fault).path, StopCategory::CutOff, "{fault:?}");
         }
     }
-
-    #[test]
-    fn what_the_operator_withdraws_is_braked_and_the_arm_stays_ready() {
-        for fault in [
-            FaultCode::OperatorStop,
-            FaultCode::DeadManReleased,
-            FaultCode::Disarmed,
-        ] {
-            let how = reaction(fault);
-            assert_eq!(
-                (how.path, how.stop_arm),
-                (StopCategory::JointSpace, false),
-                "{fault:?}"
-            );
-        }
-    }
 }

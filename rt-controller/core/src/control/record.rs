@@ -20,14 +20,9 @@ const LOST: u8 = 2;
 /// Why a recorded input cannot be stepped again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum RestoreError {
-    /// Another layout.
-    #[error("cycle {cycle} was recorded in layout {found}, this program reads {PAYLOAD_VERSION}")]
-    Version {
-        /// Cycle.
-        cycle: u64,
-        /// Layout found.
-        found: u32,
-    },
+    /// A cycle of another layout.
+    #[error("cycle {0} was recorded in layout {1}, this program reads {PAYLOAD_VERSION}")]
+    Version(u64, u32),
     /// A number that stands for no command.
     #[error(
         "cycle {cycle} holds the unknown command {kind} (operating mode {operating_mode}); the record is damaged"
@@ -40,16 +35,9 @@ pub enum RestoreError {
         /// Operating mode found.
         operating_mode: u8,
     },
-    /// The motion was not stored.
-    #[error("motion {id} (fingerprint {hash:016x}) of cycle {cycle} was not recorded")]
-    Motion {
-        /// Cycle.
-        cycle: u64,
-        /// Number of the motion.
-        id: u64,
-        /// Its fingerprint.
-        hash: u64,
-    },
+    /// The motion of this number and fingerprint was not stored.
+    #[error("motion {1} (fingerprint {2:016x}) of cycle {0} was not recorded")]
+    Motion(u64, u64, u64),
 }
 
 /// The inputs of cycle number `cycle`, as plain data. RT-safe.
@@ -142,10 +130,7 @@ pub fn restore_input(
     motion_of: impl FnOnce(u64, u64) -> Option<Box<Motion>>,
 ) -> Result<CycleInput, RestoreError> {
     if record.version != PAYLOAD_VERSION {
-        return Err(RestoreError::Version {
-            cycle: record.cycle,
-            found: record.version,
-        });
+        return Err(RestoreError::Version(record.cycle, record.version));
     }
     let link = &record.link;
     Ok(CycleInput {
@@ -194,11 +179,8 @@ fn restore_command(
             CommandKind::Engage => ControlCommand::Engage { hold: command.hold },
             CommandKind::Run => {
                 let (id, hash) = (command.motion_id, command.motion_hash);
-                let motion = motion_of(id, hash).ok_or(RestoreError::Motion {
-                    cycle: record.cycle,
-                    id,
-                    hash,
-                })?;
+                let missing = RestoreError::Motion(record.cycle, id, hash);
+                let motion = motion_of(id, hash).ok_or(missing)?;
                 ControlCommand::Run { id, motion }
             }
             CommandKind::Stop => ControlCommand::Stop,

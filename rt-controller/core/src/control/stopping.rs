@@ -89,42 +89,23 @@ pub struct StopFrom<'a> {
 /// where it breaks a limit. RT-safe.
 #[must_use]
 pub fn choose_stop(from: &StopFrom<'_>, path: StopCategory, limits: &Limits) -> Stop {
-    let slow = || {
-        SLOW_S.into_iter().map(|duration_s| {
-            Stop::OnPath(SlowDown {
-                from_s: from.motion_s,
-                duration_s,
-            })
-        })
+    let from_s = from.motion_s;
+    let slow = SLOW_S.map(|duration_s| SlowDown { from_s, duration_s });
+    let slow = slow.into_iter().map(Stop::OnPath);
+    let brake = |jerk_max: &dyn Fn(usize) -> f64| {
+        Stop::JointSpace(brake_with_jerk(from.state, limits, jerk_max))
     };
-    let hardest = 1.0 / limits.period_s();
-    let brakes = || {
-        let own = HARDER.into_iter().map(|factor| {
-            Stop::JointSpace(brake_with_jerk(from.state, limits, |j| {
-                limits.jerk_max_rad_s3[j] * factor
-            }))
-        });
-        let hard = core::iter::once_with(|| {
-            Stop::JointSpace(brake_with_jerk(from.state, limits, |j| {
-                limits.acceleration_max_rad_s2[j] * hardest
-            }))
-        });
-        own.chain(hard)
-    };
+    let harder = |factor: f64| brake(&|j| limits.jerk_max_rad_s3[j] * factor);
+    let hardest = || brake(&|j| limits.acceleration_max_rad_s2[j] * (1.0 / limits.period_s()));
+    let brakes = HARDER.into_iter().map(harder);
+    let brakes = brakes.chain(core::iter::once_with(hardest));
+    let keeps_limits = |stop: &Stop| holds(from, stop, limits);
     let found = if path == StopCategory::OnPath {
-        slow()
-            .chain(brakes())
-            .find(|stop| holds(from, stop, limits))
+        slow.chain(brakes).find(keeps_limits)
     } else {
-        brakes()
-            .chain(slow())
-            .find(|stop| holds(from, stop, limits))
+        brakes.chain(slow).find(keeps_limits)
     };
-    found.unwrap_or_else(|| {
-        Stop::JointSpace(brake_with_jerk(from.state, limits, |j| {
-            limits.jerk_max_rad_s3[j]
-        }))
-    })
+    found.unwrap_or_else(|| harder(1.0))
 }
 
 /// Whether a stop keeps every limit on the grid of coming cycles.

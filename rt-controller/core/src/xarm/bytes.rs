@@ -1,6 +1,10 @@
-//! Checked cursors over byte slices, in the byte orders of this protocol.
+//! The fields of a message, in the byte orders of this protocol.
+//!
+//! A message lists its [`Fields`] once: a [`ByteWriter`] copies them to the wire, a
+//! [`ByteReader`] sets them from there. Neither leaves its slice: both go on to the
+//! end and then say whether there was room, or bytes, for all of them.
 
-use arm_model::{JOINTS, JointVector};
+use arm_model::JointVector;
 
 /// Why a frame could not be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -8,7 +12,7 @@ pub enum EmitError {
     /// The slice given is too short for the frame.
     #[error("buffer of {given} bytes is too small for the frame; give at least {needed}")]
     BufferTooSmall {
-        /// Bytes needed up to the field that did not fit.
+        /// Bytes of the frame.
         needed: usize,
         /// Bytes given.
         given: usize,
@@ -18,9 +22,80 @@ pub enum EmitError {
 /// Millimetres in a metre; the wire's lengths are in mm.
 const MM_PER_M: f64 = 1e3;
 
-/// Writes fields one after the other, never past the end of its slice.
+/// One direction over the fields of a message, in the order of the wire.
+pub(super) trait Fields {
+    /// A field of plain bytes: written as they are, or set.
+    fn array<const N: usize>(&mut self, field: &mut [u8; N]);
+
+    /// Goes on at the absolute offset `end` if that is ahead; what lies between is
+    /// written as zeros.
+    fn skip_to(&mut self, end: usize);
+
+    /// Whether an optional field of `len` bytes is there: if it is `present` when
+    /// written, if as many bytes are left when read.
+    fn has(&self, present: bool, len: usize) -> bool;
+
+    fn u8(&mut self, value: &mut u8) {
+        let mut bytes = [*value];
+        self.array(&mut bytes);
+        [*value] = bytes;
+    }
+
+    fn flag(&mut self, value: &mut bool) {
+        let mut byte = u8::from(*value);
+        self.u8(&mut byte);
+        *value = byte != 0;
+    }
+
+    fn u16_be(&mut self, value: &mut u16) {
+        let mut bytes = value.to_be_bytes();
+        self.array(&mut bytes);
+        *value = u16::from_be_bytes(bytes);
+    }
+
+    fn u32_be(&mut self, value: &mut u32) {
+        let mut bytes = value.to_be_bytes();
+        self.array(&mut bytes);
+        *value = u32::from_be_bytes(bytes);
+    }
+
+    fn u64_be(&mut self, value: &mut u64) {
+        let mut bytes = value.to_be_bytes();
+        self.array(&mut bytes);
+        *value = u64::from_be_bytes(bytes);
+    }
+
+    /// An f32 of the wire; more digits than it holds are rounded away.
+    fn f32_le(&mut self, value: &mut f64) {
+        let mut bytes = (*value as f32).to_le_bytes();
+        self.array(&mut bytes);
+        *value = f64::from(f32::from_le_bytes(bytes));
+    }
+
+    fn f32s_le(&mut self, values: &mut [f64]) {
+        values.iter_mut().for_each(|v| self.f32_le(v));
+    }
+
+    /// A length (m), in mm on the wire.
+    fn length(&mut self, value_m: &mut f64) {
+        let mut value_mm = *value_m * MM_PER_M;
+        self.f32_le(&mut value_mm);
+        *value_m = value_mm / MM_PER_M;
+    }
+
+    fn lengths(&mut self, values_m: &mut [f64]) {
+        values_m.iter_mut().for_each(|v| self.length(v));
+    }
+
+    fn joints(&mut self, value: &mut JointVector) {
+        self.f32s_le(&mut value.0);
+    }
+}
+
+/// Writes fields one after the other.
 pub(super) struct ByteWriter<'a> {
     out: &'a mut [u8],
+    /// Bytes of the fields so far, with those that did not fit.
     len: usize,
 }
 
@@ -29,129 +104,73 @@ impl<'a> ByteWriter<'a> {
         Self { out, len: 0 }
     }
 
-    /// Bytes written so far.
-    pub(super) fn len(&self) -> usize {
-        self.len
-    }
-
-    pub(super) fn bytes(&mut self, field: &[u8]) -> Result<(), EmitError> {
-        let given = self.out.len();
+    pub(super) fn bytes(&mut self, field: &[u8]) {
         let end = self.len.saturating_add(field.len());
-        self.out
-            .get_mut(self.len..end)
-            .ok_or(EmitError::BufferTooSmall { needed: end, given })?
-            .copy_from_slice(field);
+        if let Some(room) = self.out.get_mut(self.len..end) {
+            room.copy_from_slice(field);
+        }
         self.len = end;
-        Ok(())
     }
 
-    /// Zeros up to the absolute offset `end`; nothing if already there.
-    pub(super) fn zeros_to(&mut self, end: usize) -> Result<(), EmitError> {
-        let given = self.out.len();
-        let end = end.max(self.len);
-        self.out
-            .get_mut(self.len..end)
-            .ok_or(EmitError::BufferTooSmall { needed: end, given })?
-            .fill(0);
-        self.len = end;
-        Ok(())
-    }
-
-    pub(super) fn u8(&mut self, value: u8) -> Result<(), EmitError> {
-        self.bytes(&[value])
-    }
-
-    pub(super) fn u16_be(&mut self, value: u16) -> Result<(), EmitError> {
-        self.bytes(&value.to_be_bytes())
-    }
-
-    pub(super) fn u32_be(&mut self, value: u32) -> Result<(), EmitError> {
-        self.bytes(&value.to_be_bytes())
-    }
-
-    pub(super) fn u64_be(&mut self, value: u64) -> Result<(), EmitError> {
-        self.bytes(&value.to_be_bytes())
-    }
-
-    /// An f32 of the wire; more digits than it holds are rounded away.
-    pub(super) fn f32_le(&mut self, value: f64) -> Result<(), EmitError> {
-        self.bytes(&(value as f32).to_le_bytes())
-    }
-
-    pub(super) fn f32s_le(&mut self, values: &[f64]) -> Result<(), EmitError> {
-        values.iter().try_for_each(|v| self.f32_le(*v))
-    }
-
-    /// A length (m), in mm on the wire.
-    pub(super) fn length(&mut self, value_m: f64) -> Result<(), EmitError> {
-        self.f32_le(value_m * MM_PER_M)
-    }
-
-    pub(super) fn joints(&mut self, value: &JointVector) -> Result<(), EmitError> {
-        self.f32s_le(&value.0)
+    /// Bytes written, if all of them fitted.
+    pub(super) fn finish(self) -> Result<usize, EmitError> {
+        let (needed, given) = (self.len, self.out.len());
+        if needed > given {
+            return Err(EmitError::BufferTooSmall { needed, given });
+        }
+        Ok(needed)
     }
 }
 
-/// Reads fields one after the other; `None` past the end.
+impl Fields for ByteWriter<'_> {
+    fn array<const N: usize>(&mut self, field: &mut [u8; N]) {
+        self.bytes(field);
+    }
+
+    fn skip_to(&mut self, end: usize) {
+        let end = end.max(self.len);
+        if let Some(gap) = self.out.get_mut(self.len..end) {
+            gap.fill(0);
+        }
+        self.len = end;
+    }
+
+    fn has(&self, present: bool, _len: usize) -> bool {
+        present
+    }
+}
+
+/// Reads fields one after the other; those past the end stay as they were.
 pub(super) struct ByteReader<'a> {
-    rest: &'a [u8],
+    bytes: &'a [u8],
+    at: usize,
 }
 
 impl<'a> ByteReader<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes }
+        Self { bytes, at: 0 }
     }
 
-    /// Starts at an absolute offset of `bytes`.
-    pub(super) fn at(bytes: &'a [u8], offset: usize) -> Option<Self> {
-        bytes.get(offset..).map(Self::new)
+    /// Whether every field was there.
+    pub(super) fn found_all(&self) -> bool {
+        self.at <= self.bytes.len()
     }
+}
 
-    /// Bytes not read yet.
-    pub(super) fn rest(&self) -> &'a [u8] {
-        self.rest
-    }
-
-    pub(super) fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (head, rest) = self.rest.split_first_chunk::<N>()?;
-        self.rest = rest;
-        Some(*head)
-    }
-
-    pub(super) fn u8(&mut self) -> Option<u8> {
-        self.array::<1>().map(|[b]| b)
-    }
-
-    pub(super) fn u16_be(&mut self) -> Option<u16> {
-        self.array().map(u16::from_be_bytes)
-    }
-
-    pub(super) fn u32_be(&mut self) -> Option<u32> {
-        self.array().map(u32::from_be_bytes)
-    }
-
-    pub(super) fn u64_be(&mut self) -> Option<u64> {
-        self.array().map(u64::from_be_bytes)
-    }
-
-    pub(super) fn f32_le(&mut self) -> Option<f64> {
-        self.array().map(|b| f64::from(f32::from_le_bytes(b)))
-    }
-
-    pub(super) fn f32s_le<const N: usize>(&mut self) -> Option<[f64; N]> {
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = self.f32_le()?;
+impl Fields for ByteReader<'_> {
+    fn array<const N: usize>(&mut self, field: &mut [u8; N]) {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        if let Some(found) = rest.first_chunk() {
+            *field = *found;
         }
-        Some(values)
+        self.at = self.at.saturating_add(N);
     }
 
-    /// A length (m) from mm on the wire.
-    pub(super) fn length(&mut self) -> Option<f64> {
-        self.f32_le().map(|mm| mm / MM_PER_M)
+    fn skip_to(&mut self, end: usize) {
+        self.at = self.at.max(end);
     }
 
-    pub(super) fn joints(&mut self) -> Option<JointVector> {
-        self.f32s_le::<JOINTS>().map(JointVector)
+    fn has(&self, _present: bool, len: usize) -> bool {
+        self.bytes.len().saturating_sub(self.at) >= len
     }
 }

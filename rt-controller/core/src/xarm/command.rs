@@ -1,29 +1,26 @@
 //! Typed requests: what a client may ask, in SI units.
 
-use super::bytes::{ByteWriter, EmitError};
 use super::pose::TcpPose;
 use super::register::Register;
 use super::status::Mode;
 use arm_model::JointVector;
 
-mod parse;
+mod parameters;
 
-pub use parse::CommandError;
+pub use parameters::CommandError;
 
-/// Type number of the linear speed limit factor in registers 232 and 233.
-const SPEED_FACTOR_PARAMETER: u8 = 1;
-
-/// State to go to (register 12).
+/// State to go to (register 12), by its number on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
 pub enum StateRequest {
-    /// 0: ready; also clears the error code.
-    Ready,
-    /// 3: pause.
-    Pause,
-    /// 4: stop.
-    Stop,
-    /// 6: decelerated stop.
-    DeceleratedStop,
+    /// Ready; also clears the error code.
+    Ready = 0,
+    /// Pause.
+    Pause = 3,
+    /// Stop.
+    Stop = 4,
+    /// Decelerated stop.
+    DeceleratedStop = 6,
 }
 
 /// Which joint angles register 42 is asked for.
@@ -47,6 +44,24 @@ impl JointQuery {
         quantities: 1,
         targets: false,
     };
+
+    /// The parameter, which the first query has none of.
+    const fn byte(self) -> Option<u8> {
+        match self {
+            Self::Commanded => None,
+            Self::Quantities {
+                quantities,
+                targets,
+            } => Some((quantities & 0x0F) | if targets { 0x10 } else { 0 }),
+        }
+    }
+
+    fn of_byte(byte: Option<u8>) -> Self {
+        byte.map_or(Self::Commanded, |byte| Self::Quantities {
+            quantities: byte & 0x0F,
+            targets: byte & 0xF0 != 0,
+        })
+    }
 }
 
 /// A request. Registers without a variant are configuration this system never
@@ -197,151 +212,18 @@ impl Command {
     pub const fn is_setpoint(&self) -> bool {
         matches!(self, Self::ServoJoint(_) | Self::JointVelocity { .. })
     }
-
-    /// Writes the parameters. RT-safe.
-    pub(super) fn emit_parameters(&self, out: &mut ByteWriter<'_>) -> Result<(), EmitError> {
-        match self {
-            Self::Version
-            | Self::SerialNumbers
-            | Self::GetState
-            | Self::Buffered
-            | Self::GetFault
-            | Self::CleanError
-            | Self::CleanWarning
-            | Self::TcpPose
-            | Self::FeedbackCheck
-            | Self::JointPosition(JointQuery::Commanded) => Ok(()),
-            Self::MotionEnable {
-                joint,
-                enable: flag,
-            }
-            | Self::Brake {
-                joint,
-                release: flag,
-            } => out.bytes(&[*joint, u8::from(*flag)]),
-            Self::SetState(state) => out.u8(state.code()),
-            Self::SetMode(mode) => out.u8(mode.code()),
-            Self::CollisionSensitivity(byte)
-            | Self::TeachSensitivity(byte)
-            | Self::FeedbackMask(byte) => out.u8(*byte),
-            Self::MoveJoint {
-                target,
-                speed_rad_s,
-                acceleration_rad_s2,
-                checked,
-            } => {
-                out.joints(target)?;
-                emit_move(out, *speed_rad_s, *acceleration_rad_s2, *checked)
-            }
-            Self::MoveHome {
-                speed_rad_s,
-                acceleration_rad_s2,
-                checked,
-            } => emit_move(out, *speed_rad_s, *acceleration_rad_s2, *checked),
-            Self::ServoJoint(target) => {
-                out.joints(target)?;
-                out.f32s_le(&[0.0; 3])
-            }
-            Self::JointJerk(value) | Self::JointAcceleration(value) => out.f32_le(*value),
-            Self::TcpOffset(pose) => pose.emit(out),
-            Self::TcpLoad { mass_kg, centre_m } => {
-                out.f32_le(*mass_kg)?;
-                centre_m.iter().try_for_each(|v| out.length(*v))
-            }
-            Self::JointPosition(JointQuery::Quantities {
-                quantities,
-                targets,
-            }) => out.u8((quantities & 0x0F) | if *targets { 0x10 } else { 0 }),
-            Self::ForwardKinematics(q) | Self::JointLimitTest(q) => out.joints(q),
-            Self::JointVelocity {
-                velocity,
-                synchronised,
-                duration_s,
-            } => {
-                out.joints(velocity)?;
-                out.u8(u8::from(*synchronised))?;
-                duration_s.map_or(Ok(()), |duration_s| out.f32_le(duration_s))
-            }
-            Self::SetSpeedLimitFactor(factor) => {
-                out.u8(SPEED_FACTOR_PARAMETER)?;
-                out.f32_le(*factor)
-            }
-            Self::GetSpeedLimitFactor => out.u8(SPEED_FACTOR_PARAMETER),
-        }
-    }
-
-    /// Whether every number is finite and every choice one that exists.
-    #[must_use]
-    pub fn is_well_formed(&self) -> bool {
-        match self {
-            Self::MotionEnable { joint, .. } | Self::Brake { joint, .. } => {
-                (1..=Self::ALL_JOINTS).contains(joint)
-            }
-            Self::MoveJoint {
-                target,
-                speed_rad_s,
-                acceleration_rad_s2,
-                ..
-            } => target.is_finite() && speed_rad_s.is_finite() && acceleration_rad_s2.is_finite(),
-            Self::MoveHome {
-                speed_rad_s,
-                acceleration_rad_s2,
-                ..
-            } => speed_rad_s.is_finite() && acceleration_rad_s2.is_finite(),
-            Self::ServoJoint(q) | Self::ForwardKinematics(q) | Self::JointLimitTest(q) => {
-                q.is_finite()
-            }
-            Self::JointJerk(v) | Self::JointAcceleration(v) | Self::SetSpeedLimitFactor(v) => {
-                v.is_finite() && *v > 0.0
-            }
-            Self::TcpOffset(pose) => pose.is_finite(),
-            Self::TcpLoad { mass_kg, centre_m } => {
-                mass_kg.is_finite() && *mass_kg >= 0.0 && centre_m.iter().all(|v| v.is_finite())
-            }
-            Self::CollisionSensitivity(level) => *level <= 5,
-            Self::TeachSensitivity(level) => (1..=5).contains(level),
-            Self::JointVelocity {
-                velocity,
-                duration_s,
-                ..
-            } => velocity.is_finite() && duration_s.is_none_or(f64::is_finite),
-            Self::JointPosition(JointQuery::Quantities { quantities, .. }) => {
-                (1..=3).contains(quantities)
-            }
-            _ => true,
-        }
-    }
 }
 
 impl StateRequest {
     const fn code(self) -> u8 {
-        match self {
-            Self::Ready => 0,
-            Self::Pause => 3,
-            Self::Stop => 4,
-            Self::DeceleratedStop => 6,
-        }
+        self as u8
     }
 
-    const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Ready),
-            3 => Some(Self::Pause),
-            4 => Some(Self::Stop),
-            6 => Some(Self::DeceleratedStop),
-            _ => None,
-        }
+    fn from_code(code: u8) -> Option<Self> {
+        [Self::Ready, Self::Pause, Self::Stop, Self::DeceleratedStop]
+            .into_iter()
+            .find(|state| state.code() == code)
     }
-}
-
-fn emit_move(
-    out: &mut ByteWriter<'_>,
-    speed_rad_s: f64,
-    acceleration_rad_s2: f64,
-    checked: Option<u8>,
-) -> Result<(), EmitError> {
-    out.f32s_le(&[speed_rad_s, acceleration_rad_s2, 0.0])?;
-    checked.map_or(Ok(()), |check| out.u8(check))
 }
 
 #[cfg(test)]

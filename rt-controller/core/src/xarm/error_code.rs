@@ -9,92 +9,6 @@ use core::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct ErrorCode(pub u8);
 
-/// What went wrong and what to do, by code (vendor manual, error tables).
-const TABLE: &[(u8, &str, &str)] = &[
-    (1, "emergency stop button on the control box", RELEASE),
-    (2, "emergency stop input", RELEASE),
-    (3, "three-state switch stop", RELEASE),
-    (10, "servo error", POWER),
-    (11, "servo of joint 1", POWER),
-    (12, "servo of joint 2", POWER),
-    (13, "servo of joint 3", POWER),
-    (14, "servo of joint 4", POWER),
-    (15, "servo of joint 5", POWER),
-    (16, "servo of joint 6", POWER),
-    (17, "servo of joint 7", POWER),
-    (18, "force-torque sensor communication", CABLE),
-    (19, "end module communication", CABLE),
-    (21, "kinematics", "plan a motion away from singular poses"),
-    (
-        22,
-        "self collision",
-        "plan a motion in which links keep their distance",
-    ),
-    (
-        23,
-        "joint angle limit",
-        "keep the setpoints inside the joint ranges",
-    ),
-    (
-        24,
-        "speed limit of the command",
-        "slow the motion down, or start the stream at the present pose",
-    ),
-    (25, "planning", "change the target or the speed of the move"),
-    (26, "real-time system", POWER),
-    (27, "command reply error", CABLE),
-    (28, "end module communication", CABLE),
-    (29, "other error", "look at the controller's own log"),
-    (30, "feedback speed over limit", "slow the motion down"),
-    (
-        31,
-        "collision or abnormal motor current",
-        "clear the workspace; check the configured load",
-    ),
-    (33, "controller GPIO", CABLE),
-    (
-        35,
-        "safety boundary",
-        "plan inside the boundary, or move it",
-    ),
-    (
-        36,
-        "too many delayed commands",
-        "send fewer commands; check the network",
-    ),
-    (
-        37,
-        "abnormal motion in hand guiding",
-        "check the configured load",
-    ),
-    (38, "abnormal joint angle", POWER),
-    (39, "power board link", POWER),
-    (
-        40,
-        "no inverse kinematics solution",
-        "change the target pose",
-    ),
-    (
-        44,
-        "serial number and firmware do not match",
-        "update the firmware",
-    ),
-    (50, "force-torque sensor", CABLE),
-    (51, "force-torque sensor", CABLE),
-    (52, "force-torque sensor", CABLE),
-    (53, "force-torque sensor", CABLE),
-    (
-        60,
-        "linear speed limit of the tool in servo mode",
-        "slow the throw down, or raise the speed limit factor of the arm",
-    ),
-    (110, "base board link", CABLE),
-    (111, "external RS485 link", CABLE),
-];
-const RELEASE: &str = "release the stop, then recover";
-const POWER: &str = "recover; if it stays, power the control box off and on";
-const CABLE: &str = "check the cable and the device, then recover";
-
 impl ErrorCode {
     /// No error.
     pub const NONE: Self = Self(0);
@@ -115,23 +29,74 @@ impl ErrorCode {
         self.0 == 0
     }
 
-    /// What the code means.
+    /// What the code means (vendor manual, error tables).
     #[must_use]
-    pub fn name(self) -> &'static str {
-        self.entry().map_or("unknown error", |(_, name, _)| *name)
+    pub const fn name(self) -> &'static str {
+        match self.0 {
+            1 => "emergency stop button on the control box",
+            2 => "emergency stop input",
+            3 => "three-state switch stop",
+            10 => "servo error",
+            11 => "servo of joint 1",
+            12 => "servo of joint 2",
+            13 => "servo of joint 3",
+            14 => "servo of joint 4",
+            15 => "servo of joint 5",
+            16 => "servo of joint 6",
+            17 => "servo of joint 7",
+            18 => "force-torque sensor communication",
+            19 | 28 => "end module communication",
+            21 => "kinematics",
+            22 => "self collision",
+            23 => "joint angle limit",
+            24 => "speed limit of the command",
+            25 => "planning",
+            26 => "real-time system",
+            27 => "command reply error",
+            29 => "other error",
+            30 => "feedback speed over limit",
+            31 => "collision or abnormal motor current",
+            33 => "controller GPIO",
+            35 => "safety boundary",
+            36 => "too many delayed commands",
+            37 => "abnormal motion in hand guiding",
+            38 => "abnormal joint angle",
+            39 => "power board link",
+            40 => "no inverse kinematics solution",
+            44 => "serial number and firmware do not match",
+            50..=53 => "force-torque sensor",
+            60 => "linear speed limit of the tool in servo mode",
+            110 => "base board link",
+            111 => "external RS485 link",
+            _ => "unknown error",
+        }
     }
 
     /// What to do about it.
     #[must_use]
-    pub fn remedy(self) -> &'static str {
-        self.entry().map_or(
-            "look the code up in the vendor's manual",
-            |(_, _, remedy)| *remedy,
-        )
-    }
-
-    fn entry(self) -> Option<&'static (u8, &'static str, &'static str)> {
-        TABLE.iter().find(|(code, _, _)| *code == self.0)
+    pub const fn remedy(self) -> &'static str {
+        match self.0 {
+            1..=3 => "release the stop, then recover",
+            10..=17 | 26 | 38 | 39 => "recover; if it stays, power the control box off and on",
+            18 | 19 | 27 | 28 | 33 | 50..=53 | 110 | 111 => {
+                "check the cable and the device, then recover"
+            }
+            21 => "plan a motion away from singular poses",
+            22 => "plan a motion in which links keep their distance",
+            23 => "keep the setpoints inside the joint ranges",
+            24 => "slow the motion down, or start the stream at the present pose",
+            25 => "change the target or the speed of the move",
+            29 => "look at the controller's own log",
+            30 => "slow the motion down",
+            31 => "clear the workspace; check the configured load",
+            35 => "plan inside the boundary, or move it",
+            36 => "send fewer commands; check the network",
+            37 => "check the configured load",
+            40 => "change the target pose",
+            44 => "update the firmware",
+            60 => "slow the throw down, or raise the speed limit factor of the arm",
+            _ => "look the code up in the vendor's manual",
+        }
     }
 }
 
@@ -158,7 +123,10 @@ mod tests {
     }
 
     #[test]
-    fn no_code_is_listed_twice() {
-        assert!(TABLE.windows(2).all(|w| w[0].0 < w[1].0));
+    fn what_has_a_name_has_a_remedy() {
+        let [name, remedy] = [ErrorCode(0).name(), ErrorCode(0).remedy()];
+        for code in (0..=u8::MAX).map(ErrorCode) {
+            assert_eq!(code.name() == name, code.remedy() == remedy, "{code}");
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! | 6 | register, echoed |
 //! | 7.. | request: parameters; reply: status byte, then data |
 
-use super::bytes::{ByteReader, ByteWriter, EmitError};
+use super::bytes::{ByteWriter, EmitError};
 use super::command::Command;
 use super::status::Status;
 
@@ -22,41 +22,38 @@ pub const MAX_FRAME_LEN: usize = HEADER_LEN + MAX_BODY_LEN;
 /// Register number of a feedback push, which no request has.
 pub const FEEDBACK_REGISTER: u8 = 0xFF;
 
-/// Protocol id of a frame.
+/// Protocol id of a frame, by its number on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u16)]
 pub enum Protocol {
-    /// 0: standard Modbus TCP.
-    Modbus,
-    /// 1: the heartbeat option of the Python SDK; is never answered.
-    Heartbeat,
-    /// 2: the private protocol.
-    Private,
-    /// 3: the private protocol, firmware 1.8.6 and later.
-    PrivateHeartbeat,
+    /// Standard Modbus TCP.
+    Modbus = 0,
+    /// The heartbeat option of the Python SDK; is never answered.
+    Heartbeat = 1,
+    /// The private protocol.
+    Private = 2,
+    /// The private protocol, firmware 1.8.6 and later.
+    PrivateHeartbeat = 3,
 }
 
 impl Protocol {
     /// From the number on the wire, `None` for one that no peer sends.
     #[must_use]
-    pub const fn from_code(code: u16) -> Option<Self> {
-        match code {
-            0 => Some(Self::Modbus),
-            1 => Some(Self::Heartbeat),
-            2 => Some(Self::Private),
-            3 => Some(Self::PrivateHeartbeat),
-            _ => None,
-        }
+    pub fn from_code(code: u16) -> Option<Self> {
+        [
+            Self::Modbus,
+            Self::Heartbeat,
+            Self::Private,
+            Self::PrivateHeartbeat,
+        ]
+        .into_iter()
+        .find(|protocol| protocol.code() == code)
     }
 
     /// The number on the wire.
     #[must_use]
     pub const fn code(self) -> u16 {
-        match self {
-            Self::Modbus => 0,
-            Self::Heartbeat => 1,
-            Self::Private => 2,
-            Self::PrivateHeartbeat => 3,
-        }
+        self as u16
     }
 }
 
@@ -115,13 +112,15 @@ impl<'a> Frame<'a> {
     /// The frame as a reply; `None` when register or status is missing.
     #[must_use]
     pub fn as_reply(&self) -> Option<Reply<'a>> {
-        let mut bytes = ByteReader::new(self.body);
+        let [register, status, data @ ..] = self.body else {
+            return None;
+        };
         Some(Reply {
             transaction: self.transaction,
             protocol: self.protocol,
-            register: bytes.u8()?,
-            status: Status(bytes.u8()?),
-            data: bytes.rest(),
+            register: *register,
+            status: Status(*status),
+            data,
         })
     }
 }
@@ -133,8 +132,8 @@ impl Request<'_> {
     /// [`EmitError::BufferTooSmall`].
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
         emit_frame(out, self.transaction, self.protocol, |body| {
-            body.u8(self.register)?;
-            body.bytes(self.parameters)
+            body.bytes(&[self.register]);
+            body.bytes(self.parameters);
         })
     }
 }
@@ -146,9 +145,8 @@ impl Reply<'_> {
     /// [`EmitError::BufferTooSmall`].
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
         emit_frame(out, self.transaction, self.protocol, |body| {
-            body.u8(self.register)?;
-            body.u8(self.status.0)?;
-            body.bytes(self.data)
+            body.bytes(&[self.register, self.status.0]);
+            body.bytes(self.data);
         })
     }
 }
@@ -165,8 +163,9 @@ pub fn emit_command(
     command: &Command,
 ) -> Result<usize, EmitError> {
     emit_frame(out, transaction, protocol, |body| {
-        body.u8(command.register().code())?;
-        command.emit_parameters(body)
+        body.bytes(&[command.register().code()]);
+        let mut command = *command;
+        command.fields(body);
     })
 }
 
@@ -180,27 +179,23 @@ pub const fn next_transaction(id: u16) -> u16 {
 }
 
 /// Writes header and body; the length field is known only after the body.
-fn emit_frame(
+pub(super) fn emit_frame(
     out: &mut [u8],
     transaction: u16,
     protocol: Protocol,
-    body: impl FnOnce(&mut ByteWriter<'_>) -> Result<(), EmitError>,
+    body: impl FnOnce(&mut ByteWriter<'_>),
 ) -> Result<usize, EmitError> {
-    let given = out.len();
-    let too_small = |needed: usize| EmitError::BufferTooSmall { needed, given };
-    let (header, rest) = out
-        .split_at_mut_checked(HEADER_LEN)
-        .ok_or(too_small(HEADER_LEN))?;
-    let mut writer = ByteWriter::new(rest);
-    body(&mut writer).map_err(|EmitError::BufferTooSmall { needed, .. }| {
-        too_small(needed.saturating_add(HEADER_LEN))
-    })?;
-    let body_len = writer.len();
-    let mut header = ByteWriter::new(header);
-    header.u16_be(transaction)?;
-    header.u16_be(protocol.code())?;
-    header.u16_be(u16::try_from(body_len).unwrap_or(u16::MAX))?;
-    Ok(body_len.saturating_add(HEADER_LEN))
+    let mut writer = ByteWriter::new(&mut *out);
+    writer.bytes(&transaction.to_be_bytes());
+    writer.bytes(&protocol.code().to_be_bytes());
+    writer.bytes(&[0; 2]);
+    body(&mut writer);
+    let len = writer.finish()?;
+    let body_len = u16::try_from(len.saturating_sub(HEADER_LEN)).unwrap_or(u16::MAX);
+    if let Some(field) = out.get_mut(4..HEADER_LEN) {
+        field.copy_from_slice(&body_len.to_be_bytes());
+    }
+    Ok(len)
 }
 
 #[cfg(test)]

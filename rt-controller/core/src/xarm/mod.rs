@@ -56,3 +56,49 @@ pub const COMMAND_PORT: u16 = 502;
 /// TCP ports of the report servers: real-time (250 Hz), normal (5 Hz), rich
 /// (5 Hz) and real (100 Hz).
 pub const REPORT_PORTS: [u16; 4] = [30000, 30001, 30002, 30003];
+
+#[cfg(test)]
+mod tests {
+    use super::report::{BasicReport, ForceReport, NormalReport, RealtimeReport, RichReport};
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn arbitrary_bytes_never_panic_and_never_fill_a_buffer(
+            bytes in prop::collection::vec(any::<u8>(), 0..6000),
+            (register, status) in any::<(u8, u8)>(),
+            text in ".{0,60}",
+        ) {
+            let _ = ArmVersion::parse(&text).map(|v| v.check());
+            let (mut frames, mut reports) = (FrameReader::new(), ReportReader::new());
+            for chunk in bytes.chunks(700) {
+                frames.feed(chunk);
+                reports.feed(chunk);
+                while let Ok(Some(frame)) = frames.next_frame() {
+                    let _ = (frame.as_request(), frame.as_reply());
+                }
+                while let Ok(Some(_)) = reports.next_report() {}
+                prop_assert!(frames.next_frame().is_err() || !frames.space().is_empty());
+                prop_assert!(reports.next_report().is_err() || !reports.space().is_empty());
+            }
+            // Reports and messages are shorter than that.
+            let bytes = &bytes[..bytes.len() % 900];
+            let _ = (BasicReport::parse(bytes), ForceReport::parse(bytes), NormalReport::parse(bytes));
+            let _ = (RichReport::parse(bytes), RealtimeReport::parse(bytes));
+            let (parameters, data) = bytes.split_at(bytes.len() % 120);
+            if let Ok(command) = Command::parse(register, parameters) {
+                prop_assert_eq!(command.register().code(), register);
+                prop_assert!(command.is_well_formed());
+                let reply = Reply {
+                    transaction: 1,
+                    protocol: Protocol::Private,
+                    register,
+                    status: Status(status),
+                    data,
+                };
+                let _ = ReplyData::parse(&command, &reply);
+            }
+        }
+    }
+}

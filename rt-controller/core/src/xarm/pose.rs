@@ -1,6 +1,6 @@
 //! Pose of the tool centre point as the arm writes it.
 
-use super::bytes::{ByteReader, ByteWriter, EmitError};
+use super::bytes::Fields;
 use arm_model::kinematics;
 use nalgebra::{Matrix3, Vector3};
 
@@ -43,16 +43,9 @@ impl TcpPose {
         self.position_m.iter().all(|v| v.is_finite()) && self.rpy_rad.iter().all(|v| v.is_finite())
     }
 
-    pub(super) fn emit(&self, out: &mut ByteWriter<'_>) -> Result<(), EmitError> {
-        self.position_m.iter().try_for_each(|v| out.length(*v))?;
-        out.f32s_le(&self.rpy_rad)
-    }
-
-    pub(super) fn parse(bytes: &mut ByteReader<'_>) -> Option<Self> {
-        Some(Self {
-            position_m: [bytes.length()?, bytes.length()?, bytes.length()?],
-            rpy_rad: bytes.f32s_le()?,
-        })
+    pub(super) fn fields(&mut self, wire: &mut impl Fields) {
+        wire.lengths(&mut self.position_m);
+        wire.f32s_le(&mut self.rpy_rad);
     }
 }
 

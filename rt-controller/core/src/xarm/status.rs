@@ -47,7 +47,7 @@ impl Status {
 }
 
 /// State of the arm, as register 13 and the reports give it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ArmState {
     /// 1: moving.
     Moving,
@@ -56,6 +56,7 @@ pub enum ArmState {
     /// 3: paused.
     Paused,
     /// 4: stopped; every error leads here.
+    #[default]
     Stopped,
     /// 5: mode or configuration changed; needs `SetState(Ready)`.
     NeedsReset,
@@ -102,9 +103,10 @@ impl ArmState {
 }
 
 /// Mode of the arm (register 19).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
     /// 0: the arm's own planner; default after boot and after an error.
+    #[default]
     Position,
     /// 1: servo, for streamed joint setpoints.
     Servo,

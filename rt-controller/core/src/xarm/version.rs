@@ -107,32 +107,20 @@ pub enum VersionError {
     /// Text of another form.
     #[error("its version text has an unknown form; is this an xArm?")]
     Text,
-    /// Another arm.
-    #[error("it is a type {kind} arm with {axes} axes; this controller drives the xArm 7 (type 7)")]
-    OtherArm {
-        /// Type.
-        kind: u8,
-        /// Axes.
-        axes: u8,
-    },
+    /// Another arm, by its type and number of axes.
+    #[error("it is a type {0} arm with {1} axes; this controller drives the xArm 7 (type 7)")]
+    OtherArm(u8, u8),
     /// Reports with measured speeds are missing.
     #[error(
-        "its firmware {firmware} is too old: {needed} or newer is needed for the 250 Hz report; update it with the vendor's tool"
+        "its firmware {0} is too old: {needed} or newer is needed for the 250 Hz report; update it with the vendor's tool",
+        needed = Firmware::REALTIME_REPORT
     )]
-    TooOld {
-        /// Found.
-        firmware: Firmware,
-        /// Needed.
-        needed: Firmware,
-    },
+    TooOld(Firmware),
     /// A generation whose report layouts are not known.
     #[error(
-        "its firmware {firmware} is newer than the report layouts known here (generation 2); install a version 2 firmware or a newer controller"
+        "its firmware {0} is newer than the report layouts known here (generation 2); install a version 2 firmware or a newer controller"
     )]
-    UnknownLayout {
-        /// Found.
-        firmware: Firmware,
-    },
+    UnknownLayout(Firmware),
 }
 
 /// Joint 2 and joint 4 of arms numbered 1305 and up end earlier (rad).
@@ -169,17 +157,13 @@ impl ArmVersion {
     pub fn check(&self) -> Result<(), VersionError> {
         let firmware = self.firmware;
         if (self.axes, self.kind) != (7, 7) {
-            return Err(VersionError::OtherArm {
-                kind: self.kind,
-                axes: self.axes,
-            });
+            return Err(VersionError::OtherArm(self.kind, self.axes));
         }
         if firmware < Firmware::REALTIME_REPORT {
-            let needed = Firmware::REALTIME_REPORT;
-            return Err(VersionError::TooOld { firmware, needed });
+            return Err(VersionError::TooOld(firmware));
         }
         if firmware.major > 2 {
-            return Err(VersionError::UnknownLayout { firmware });
+            return Err(VersionError::UnknownLayout(firmware));
         }
         Ok(())
     }
@@ -215,7 +199,6 @@ const ROUNDING_RAD: f64 = 2e-6;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     #[test]
     fn the_vendors_example_is_understood() {
@@ -248,12 +231,5 @@ mod tests {
         assert!(realtime(8, 2).contains(&804));
         assert!(Firmware::new(2, 8, 2).rich_sizes().contains(&587));
         assert!(!Firmware::new(2, 3, 0).rich_sizes().contains(&574));
-    }
-
-    proptest! {
-        #[test]
-        fn arbitrary_text_never_panics(text in ".{0,60}") {
-            let _ = ArmVersion::parse(&text).map(|v| v.check());
-        }
     }
 }

@@ -16,7 +16,7 @@ const LENGTH: usize = 2 * HALF;
 const HALF: usize = 32;
 
 /// Fixed size, oldest overwritten. RT-safe.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Commanded {
     sent: [[(u64, JointVector); HALF]; 2],
     next: usize,

@@ -12,7 +12,6 @@ use super::reaction::{StopCategory, reaction};
 use super::settings::ControlSettings;
 use super::violation::Violation;
 use arm_model::{JointVector, Limits};
-use history::Commanded;
 use reports::ReportWatch;
 use serde::{Deserialize, Serialize};
 use shared_types::FaultCode;
@@ -49,7 +48,6 @@ impl Heartbeat {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Monitor {
     settings: ControlSettings,
-    commanded: Commanded,
     reports: ReportWatch,
     engaged_ns: u64,
     operator: Heartbeat,
@@ -65,8 +63,7 @@ impl Monitor {
     pub fn new(settings: ControlSettings, now_ns: u64, q: JointVector) -> Self {
         Self {
             settings,
-            commanded: Commanded::holding(q),
-            reports: ReportWatch::new(),
+            reports: ReportWatch::holding(q),
             engaged_ns: now_ns,
             operator: Heartbeat::default(),
             guardian: Heartbeat::default(),
@@ -84,7 +81,7 @@ impl Monitor {
 
     /// A setpoint was sent.
     pub fn sent(&mut self, deadline_ns: u64, q: JointVector) {
-        self.commanded.push(deadline_ns, q);
+        self.reports.sent(deadline_ns, q);
     }
 
     /// A setpoint was held back: too many wait for their reply.
@@ -113,14 +110,14 @@ impl Monitor {
     /// Commanded less measured joints at the time of the newest report (rad).
     #[must_use]
     pub fn deviation(&self) -> JointVector {
-        self.reports.deviation(&self.commanded)
+        self.reports.deviation()
     }
 
     /// How far the arm stands from everything commanded lately (rad).
     #[must_use]
     pub fn tracking_error_rad(&self) -> f64 {
         let window_ns = self.settings.thresholds.tracking_window_ns;
-        self.reports.tracking_error(&self.commanded, window_ns).1
+        self.reports.tracking_error(window_ns).1
     }
 
     /// Takes in what came with this cycle.
@@ -141,9 +138,7 @@ impl Monitor {
         let window_ns = self.settings.thresholds.tracking_window_ns;
         for report in input.reports.as_slice() {
             if report.q.is_finite() && report.qd.is_finite() {
-                let resync = self
-                    .reports
-                    .take(report, &self.commanded, window_ns, limits);
+                let resync = self.reports.take(report, window_ns, limits);
                 add(&mut self.counts.clock_resyncs, resync.into());
             } else {
                 self.reports.broken(1);
@@ -183,18 +178,26 @@ impl Monitor {
             .or_else(|| pick(self.arm_fault()))
             .or_else(|| pick(self.commander_fault(input)))
             .or_else(|| pick(stall(&input.link, t.reply_stall_ns)))
-            .or_else(|| pick((input.operator.stop != 0).then(stop)))
+            .or_else(|| {
+                pick(
+                    (input.operator.stop != 0).then_some(Violation::plain(FaultCode::OperatorStop)),
+                )
+            })
             .or_else(|| {
                 if !mode.is_moving() {
                     return None;
                 }
-                pick(gap(missed, t.missed_cycles_max))
-                    .or_else(|| pick(self.operator_fault(input)))
-                    .or_else(|| pick(late(missed, t.late_cycles_max)))
-                    .or_else(|| pick(self.reports.stream_fault(&self.commanded, t)))
-                    .or_else(|| pick(self.reports.stale(now_ns, t)))
-                    .or_else(|| pick(self.reports.tracking_fault(&self.commanded, t)))
-                    .or_else(|| pick(self.guardian_silent(now_ns)))
+                pick(skipped(
+                    FaultCode::DeadlineMissed,
+                    missed,
+                    t.missed_cycles_max,
+                ))
+                .or_else(|| pick(self.operator_fault(input)))
+                .or_else(|| pick(skipped(FaultCode::LateCycles, missed, t.late_cycles_max)))
+                .or_else(|| pick(self.reports.stream_fault(t)))
+                .or_else(|| pick(self.reports.stale(now_ns, t)))
+                .or_else(|| pick(self.reports.tracking_fault(t)))
+                .or_else(|| pick(self.guardian_silent(now_ns)))
             })
     }
 
@@ -209,13 +212,12 @@ impl Monitor {
         // States 1 (moving) and 2 (ready) follow setpoints.
         let serving = report.arm_mode == self.settings.interface.arm_mode()
             && matches!(report.arm_state, 1 | 2);
-        (settled && !serving).then(|| {
-            Violation::new(
-                FaultCode::ArmModeChanged,
-                report.arm_mode.into(),
-                self.settings.interface.arm_mode().into(),
-            )
-        })
+        let (found, expected) = (
+            report.arm_mode.into(),
+            self.settings.interface.arm_mode().into(),
+        );
+        let changed = Violation::new(FaultCode::ArmModeChanged, found, expected);
+        (settled && !serving).then_some(changed)
     }
 
     fn commander_fault(&self, input: &CycleInput) -> Option<Violation> {
@@ -248,23 +250,14 @@ impl Monitor {
     }
 }
 
-fn stop() -> Violation {
-    Violation::plain(FaultCode::OperatorStop)
-}
-
 fn stall(link: &LinkInput, most_ns: u64) -> Option<Violation> {
     (link.unanswered_ns > most_ns)
         .then(|| Violation::of_time(FaultCode::ReplyStalled, link.unanswered_ns, most_ns))
 }
 
-/// So many cycles missed that the arm has stood still meanwhile.
-fn gap(missed: u32, most: u32) -> Option<Violation> {
-    (missed > most).then(|| Violation::new(FaultCode::DeadlineMissed, missed.into(), most.into()))
-}
-
-/// Some cycles missed.
-fn late(missed: u32, most: u32) -> Option<Violation> {
-    (missed > most).then(|| Violation::new(FaultCode::LateCycles, missed.into(), most.into()))
+/// Cycles missed: some, or so many that the arm has stood still meanwhile.
+fn skipped(fault: FaultCode, missed: u32, most: u32) -> Option<Violation> {
+    (missed > most).then(|| Violation::new(fault, missed.into(), most.into()))
 }
 
 /// Faults the command link itself shows.

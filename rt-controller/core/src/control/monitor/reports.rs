@@ -54,9 +54,10 @@ struct Still {
     commanded_rad: f64,
 }
 
-/// What is remembered of the reports. RT-safe.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// What is remembered of the reports, and of what was commanded. RT-safe.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReportWatch {
+    commanded: Commanded,
     newest: Option<JointReport>,
     /// Since when the values are the same, to the bit (stamp, ns).
     frozen_since_ns: u64,
@@ -68,22 +69,18 @@ pub struct ReportWatch {
 }
 
 impl ReportWatch {
-    /// Nothing seen yet.
+    /// Nothing seen yet; the arm holds `q` (rad).
     #[must_use]
-    pub const fn new() -> Self {
+    pub fn holding(q: JointVector) -> Self {
         Self {
-            newest: None,
-            frozen_since_ns: 0,
-            still: [Still {
-                since_ns: 0,
-                at_rad: 0.0,
-                commanded_rad: 0.0,
-            }; JOINTS],
-            jump: None,
-            broken_in_a_row: 0,
-            resyncs: 0,
-            suspicion: 0,
+            commanded: Commanded::holding(q),
+            ..Self::default()
         }
+    }
+
+    /// A setpoint was sent.
+    pub fn sent(&mut self, deadline_ns: u64, q: JointVector) {
+        self.commanded.push(deadline_ns, q);
     }
 
     /// Newest good report.
@@ -105,15 +102,9 @@ impl ReportWatch {
 
     /// A report came that can be used; true when its clock had to be followed
     /// anew.
-    pub fn take(
-        &mut self,
-        report: &JointReport,
-        commanded: &Commanded,
-        window_ns: u64,
-        limits: &Limits,
-    ) -> bool {
+    pub fn take(&mut self, report: &JointReport, window_ns: u64, limits: &Limits) -> bool {
         self.broken_in_a_row = 0;
-        let commanded_rad = commanded.at(report.stamp_ns);
+        let commanded_rad = self.commanded.at(report.stamp_ns);
         let stands = |j: usize| Still {
             since_ns: report.stamp_ns,
             at_rad: report.q[j],
@@ -145,15 +136,9 @@ impl ReportWatch {
         self.jump = self.jump.or_else(|| jump(&before, report, limits));
         let from_ns = report.stamp_ns.saturating_sub(window_ns);
         // Only the report with the arm's own clock names its target.
-        let foreign = report.arm_clock != 0
-            && commanded
-                .farthest(
-                    &report.q_target,
-                    from_ns,
-                    report.stamp_ns.max(report.arrival_ns),
-                )
-                .1
-                > TARGET_RAD;
+        let until_ns = report.stamp_ns.max(report.arrival_ns);
+        let (_, off_rad) = self.commanded.farthest(&report.q_target, from_ns, until_ns);
+        let foreign = report.arm_clock != 0 && off_rad > TARGET_RAD;
         // A report that repeats itself says nothing new.
         let repeats =
             report.q == before.q && report.qd == before.qd && report.q_target == before.q_target;
@@ -187,34 +172,28 @@ impl ReportWatch {
 
     /// Whether the stream itself cannot be trusted.
     #[must_use]
-    pub fn stream_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Violation> {
+    pub fn stream_fault(&self, t: &Thresholds) -> Option<Violation> {
         if self.broken_in_a_row >= t.report_broken_max {
-            let (found, most) = (self.broken_in_a_row, t.report_broken_max);
-            return Some(Violation::new(
-                FaultCode::ReportBroken,
-                f64::from(found),
-                f64::from(most),
-            ));
+            let (found, most) = (self.broken_in_a_row.into(), t.report_broken_max.into());
+            return Some(Violation::new(FaultCode::ReportBroken, found, most));
         }
         if self.resyncs > t.clock_resyncs_max {
-            let (found, most) = (self.resyncs, t.clock_resyncs_max);
-            return Some(Violation::new(
-                FaultCode::ReportClock,
-                f64::from(found),
-                f64::from(most),
-            ));
+            let (found, most) = (self.resyncs.into(), t.clock_resyncs_max.into());
+            return Some(Violation::new(FaultCode::ReportClock, found, most));
         }
         let report = self.newest.as_ref()?;
         let frozen_ns = report.stamp_ns.saturating_sub(self.frozen_since_ns);
-        let must_show = commanded.at(report.stamp_ns.saturating_sub(t.tracking_window_ns));
-        let moved_rad = (must_show - commanded.at(self.frozen_since_ns)).max_abs();
+        let must_show = self
+            .commanded
+            .at(report.stamp_ns.saturating_sub(t.tracking_window_ns));
+        let moved_rad = (must_show - self.commanded.at(self.frozen_since_ns)).max_abs();
         (frozen_ns > t.report_frozen_ns.max(t.tracking_window_ns) && moved_rad > FROZEN_RAD)
             .then(|| Violation::of_time(FaultCode::ReportFrozen, frozen_ns, t.report_frozen_ns))
     }
 
     /// Whether the arm is somewhere else than commanded.
     #[must_use]
-    pub fn tracking_fault(&self, commanded: &Commanded, t: &Thresholds) -> Option<Violation> {
+    pub fn tracking_fault(&self, t: &Thresholds) -> Option<Violation> {
         if let Some(jump) = self.jump {
             return Some(jump);
         }
@@ -225,20 +204,16 @@ impl ReportWatch {
             return None;
         }
         let from_ns = report.stamp_ns.saturating_sub(t.tracking_window_ns);
-        let must_show = commanded.at(from_ns);
+        let must_show = self.commanded.at(from_ns);
         for (j, still) in self.still.iter().enumerate() {
             let commanded_rad = (must_show[j] - still.commanded_rad).abs();
             let off_rad = (must_show[j] - still.at_rad).abs();
             if still.since_ns < from_ns && commanded_rad > STUCK_RAD && off_rad > STUCK_RAD {
-                return Some(Violation::of_joint(
-                    FaultCode::JointStuck,
-                    j,
-                    off_rad,
-                    STUCK_RAD,
-                ));
+                let fault = FaultCode::JointStuck;
+                return Some(Violation::of_joint(fault, j, off_rad, STUCK_RAD));
             }
         }
-        let (joint, off_rad) = self.tracking_error(commanded, t.tracking_window_ns);
+        let (joint, off_rad) = self.tracking_error(t.tracking_window_ns);
         let most = t.tracking_error_max_rad;
         (off_rad > most)
             .then(|| Violation::of_joint(FaultCode::TrackingError, joint, off_rad, most))
@@ -247,25 +222,20 @@ impl ReportWatch {
     /// Joint (0-based) whose newest measured position is farthest outside what
     /// commanded within `window_ns`, and how far (rad).
     #[must_use]
-    pub fn tracking_error(&self, commanded: &Commanded, window_ns: u64) -> (usize, f64) {
+    pub fn tracking_error(&self, window_ns: u64) -> (usize, f64) {
         self.newest.map_or((0, 0.0), |report| {
             let from_ns = report.stamp_ns.saturating_sub(window_ns);
-            commanded.farthest(&report.q, from_ns, report.stamp_ns.max(report.arrival_ns))
+            self.commanded
+                .farthest(&report.q, from_ns, report.stamp_ns.max(report.arrival_ns))
         })
     }
 
     /// How far the newest measured pose is behind what was commanded when it was
     /// measured (rad).
     #[must_use]
-    pub fn deviation(&self, commanded: &Commanded) -> JointVector {
+    pub fn deviation(&self) -> JointVector {
         self.newest
-            .map_or(JointVector::ZERO, |r| commanded.at(r.stamp_ns) - r.q)
-    }
-}
-
-impl Default for ReportWatch {
-    fn default() -> Self {
-        Self::new()
+            .map_or(JointVector::ZERO, |r| self.commanded.at(r.stamp_ns) - r.q)
     }
 }
 

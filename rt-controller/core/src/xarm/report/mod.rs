@@ -11,6 +11,37 @@
 //! zero and skipped when read. Values are f32 on the wire, little-endian;
 //! sizes and integers big-endian.
 
+/// The two directions of a report that has at least `$least` bytes, from its `fields`.
+macro_rules! both_directions {
+    ($Report:ident, $least:expr) => {
+        impl $Report {
+            /// Writes the report to the front of `out` and returns its length.
+            ///
+            /// # Errors
+            /// [`EmitError::BufferTooSmall`].
+            pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
+                let (mut report, mut wire) = (*self, ByteWriter::new(out));
+                report.fields(&mut wire);
+                wire.finish()
+            }
+
+            /// Reads a frame; one of a later firmware may have more bytes. RT-safe.
+            ///
+            /// # Errors
+            /// [`ReportTooShort`].
+            pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
+                let (given, needed) = (frame.len(), $least);
+                if given < needed {
+                    return Err(ReportTooShort { given, needed });
+                }
+                let mut report = Self::default();
+                report.fields(&mut ByteReader::new(frame));
+                Ok(report)
+            }
+        }
+    };
+}
+
 mod periodic;
 mod realtime;
 
@@ -20,7 +51,7 @@ pub use periodic::{
 };
 pub use realtime::{REALTIME_REPORT_LEN, RealtimeReport};
 
-use super::bytes::{ByteReader, ByteWriter, EmitError};
+use super::bytes::Fields;
 use super::status::{ArmState, Mode};
 
 /// Longest report frame.
@@ -36,27 +67,16 @@ pub struct ReportTooShort {
     pub needed: usize,
 }
 
+/// The size of the frame, which it begins with; not looked at when read.
+fn size_field(wire: &mut impl Fields, size: usize) {
+    wire.u32_be(&mut u32::try_from(size).unwrap_or(u32::MAX));
+}
+
 /// The byte that holds state (low nibble) and mode (high nibble).
-fn emit_state(out: &mut ByteWriter<'_>, state: ArmState, mode: Mode) -> Result<(), EmitError> {
-    out.u8((state.code() & 0x0F) | (mode.code() << 4))
-}
-
-fn parse_state(bytes: &mut ByteReader<'_>) -> Option<(ArmState, Mode)> {
-    let byte = bytes.u8()?;
-    Some((ArmState::from_code(byte & 0x0F), Mode::from_code(byte >> 4)))
-}
-
-/// Reads a frame of at least `needed` bytes.
-fn parse<'a, T>(
-    frame: &'a [u8],
-    needed: usize,
-    read: impl FnOnce(&'a [u8]) -> Option<T>,
-) -> Result<T, ReportTooShort> {
-    let given = frame.len();
-    (given >= needed)
-        .then(|| read(frame))
-        .flatten()
-        .ok_or(ReportTooShort { given, needed })
+fn state_field(wire: &mut impl Fields, state: &mut ArmState, mode: &mut Mode) {
+    let mut byte = (state.code() & 0x0F) | (mode.code() << 4);
+    wire.u8(&mut byte);
+    (*state, *mode) = (ArmState::from_code(byte & 0x0F), Mode::from_code(byte >> 4));
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The real-time report of port 30000, the only one with measured velocity and
 //! a time stamp of the controller.
 
-use super::{ReportTooShort, emit_state, parse, parse_state};
-use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError};
+use super::{ReportTooShort, size_field, state_field};
+use crate::xarm::bytes::{ByteReader, ByteWriter, EmitError, Fields};
 use crate::xarm::pose::TcpPose;
 use crate::xarm::status::{ArmState, Mode};
 use arm_model::{JointState, JointVector};
@@ -10,15 +10,14 @@ use arm_model::{JointState, JointVector};
 /// Bytes of a report of port 30000, firmware 2.1 to 2.7.
 pub const REALTIME_REPORT_LEN: usize = 784;
 
-/// Offsets (bytes).
-mod offset {
-    pub(super) const TARGET: usize = 32;
-    pub(super) const TARGET_POSE: usize = 424;
-    pub(super) const ACTUAL_POSE: usize = 472;
-}
+/// Offset of the target joint states (bytes).
+const TARGET: usize = 32;
+
+/// Offset of the poses (bytes).
+const POSES: usize = 424;
 
 /// Report of port 30000, 250 Hz.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RealtimeReport {
     /// Time of the controller's own clock (µs).
     pub time_us: u64,
@@ -65,75 +64,26 @@ impl RealtimeReport {
             && self.mode.code() <= LARGEST_CODES.1
     }
 
-    /// Writes [`REALTIME_REPORT_LEN`] bytes and returns that.
-    ///
-    /// # Errors
-    /// [`EmitError::BufferTooSmall`].
-    pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
-        let mut out = ByteWriter::new(out);
-        out.u32_be(u32::try_from(REALTIME_REPORT_LEN).unwrap_or(u32::MAX))?;
-        out.u64_be(self.time_us)?;
-        emit_state(&mut out, self.state, self.mode)?;
-        out.u16_be(self.buffered)?;
-        out.zeros_to(offset::TARGET)?;
-        for joints in [
-            &self.target.q,
-            &self.target.qd,
-            &self.target.qdd,
-            &self.actual.q,
-            &self.actual.qd,
-            &self.actual.qdd,
-            &self.current_a,
-            &self.torque_nm,
-        ] {
-            out.joints(joints)?;
+    fn fields(&mut self, wire: &mut impl Fields) {
+        size_field(wire, REALTIME_REPORT_LEN);
+        wire.u64_be(&mut self.time_us);
+        state_field(wire, &mut self.state, &mut self.mode);
+        wire.u16_be(&mut self.buffered);
+        wire.skip_to(TARGET);
+        for motion in [&mut self.target, &mut self.actual] {
+            wire.joints(&mut motion.q);
+            wire.joints(&mut motion.qd);
+            wire.joints(&mut motion.qdd);
         }
-        out.zeros_to(offset::TARGET_POSE)?;
-        self.target_tcp.emit(&mut out)?;
-        self.target_twist.emit(&mut out)?;
-        self.actual_tcp.emit(&mut out)?;
-        self.actual_twist.emit(&mut out)?;
-        out.zeros_to(REALTIME_REPORT_LEN)?;
-        Ok(out.len())
-    }
-
-    /// Parses a frame. RT-safe.
-    ///
-    /// # Errors
-    /// [`ReportTooShort`].
-    pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
-        parse(frame, REALTIME_REPORT_LEN, Self::read)
-    }
-
-    fn read(frame: &[u8]) -> Option<Self> {
-        let mut head = ByteReader::at(frame, 4)?;
-        let time_us = head.u64_be()?;
-        let (state, mode) = parse_state(&mut head)?;
-        let buffered = head.u16_be()?;
-        let mut joints = ByteReader::at(frame, offset::TARGET)?;
-        let mut motion = || {
-            Some(JointState {
-                q: joints.joints()?,
-                qd: joints.joints()?,
-                qdd: joints.joints()?,
-            })
-        };
-        let (target, actual) = (motion()?, motion()?);
-        let mut target_pose = ByteReader::at(frame, offset::TARGET_POSE)?;
-        let mut actual_pose = ByteReader::at(frame, offset::ACTUAL_POSE)?;
-        Some(Self {
-            time_us,
-            state,
-            mode,
-            buffered,
-            target,
-            actual,
-            current_a: joints.joints()?,
-            torque_nm: joints.joints()?,
-            target_tcp: TcpPose::parse(&mut target_pose)?,
-            target_twist: TcpPose::parse(&mut target_pose)?,
-            actual_tcp: TcpPose::parse(&mut actual_pose)?,
-            actual_twist: TcpPose::parse(&mut actual_pose)?,
-        })
+        wire.joints(&mut self.current_a);
+        wire.joints(&mut self.torque_nm);
+        wire.skip_to(POSES);
+        self.target_tcp.fields(wire);
+        self.target_twist.fields(wire);
+        self.actual_tcp.fields(wire);
+        self.actual_twist.fields(wire);
+        wire.skip_to(REALTIME_REPORT_LEN);
     }
 }
+
+both_directions!(RealtimeReport, REALTIME_REPORT_LEN);
