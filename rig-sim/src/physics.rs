@@ -7,7 +7,7 @@ use arm_model::{Cell, JointPiece, JointState};
 use rope_sim::LiveRope;
 use shared_types::{MonotonicNs, RopeParams};
 use std::sync::atomic::{AtomicBool, Ordering};
-use xarm_sim::{JointSample, MotionHistory, clock};
+use xarm_sim::{History, JointSample, clock};
 
 /// Step of the rope's integration (s).
 const STEP_S: f64 = 1e-4;
@@ -21,7 +21,7 @@ const GAP_S: f64 = 0.1;
 pub(super) fn run(
     rope: &RopeParams,
     cell: &Cell,
-    arm: &MotionHistory,
+    arm: &History<JointSample>,
     record: &Record,
     stop: &AtomicBool,
 ) -> Result<(), RigError> {

@@ -3,7 +3,7 @@
 
 use super::ArmEndpoint;
 use super::client::{Client, Damage, Service};
-use crate::fault::FaultKind;
+use crate::fault::{FaultKind, ReportPort};
 use crate::reports::ReportKind;
 use rand::Rng;
 use shared_types::MonotonicNs;
@@ -31,11 +31,15 @@ impl ArmEndpoint {
         if client.due <= now {
             client.due = now.plus_s(period_s);
         }
-        let port = kind.index();
-        if self.is_dark() || self.faults.any(|f| stops(f, port)) {
+        let own = |port: &ReportPort| port.covers(kind.index());
+        let stops =
+            |fault: &FaultKind| matches!(fault, FaultKind::ReportStop { port } if own(port));
+        let freezes =
+            |fault: &FaultKind| matches!(fault, FaultKind::ReportFreeze { port } if own(port));
+        if self.is_dark() || self.faults.any(stops) {
             return;
         }
-        let frozen = self.faults.any(|f| freezes(f, port)) && !client.last_report.is_empty();
+        let frozen = self.faults.any(freezes) && !client.last_report.is_empty();
         let mut frame = if frozen {
             client.last_report.clone()
         } else {
@@ -65,12 +69,4 @@ impl ArmEndpoint {
             Damage::Garbage => self.rng.fill_bytes(&mut frame[4..]),
         }
     }
-}
-
-fn stops(fault: &FaultKind, index: usize) -> bool {
-    matches!(fault, FaultKind::ReportStop { port } if port.covers(index))
-}
-
-fn freezes(fault: &FaultKind, index: usize) -> bool {
-    matches!(fault, FaultKind::ReportFreeze { port } if port.covers(index))
 }

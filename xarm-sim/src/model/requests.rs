@@ -2,48 +2,53 @@
 
 use super::*;
 use arm_model::kinematics;
-use rt_controller::xarm::JointQuery;
 use rt_controller::xarm::reply::Text;
+use rt_controller::xarm::{JointQuery, Request};
 
 /// Version text of a real arm before its firmware: 7 axes, type 7, 1305 arm.
 const MODEL: &str = "7,7,XS1305,AC1304,v";
 /// Serial numbers of arm and control box, a NUL between them.
 const SERIAL_NUMBERS: &str = "XS130500000000\0AC130400000000";
 impl ArmModel {
-    /// Takes a request as it came from the wire at `at` and gives the reply.
-    pub fn request(&mut self, at: MonotonicNs, register: u8, parameters: &[u8]) -> Answer {
-        self.request_from(None, at, register, parameters)
-    }
-
-    /// The same for a request of a known client (its number, transaction id).
+    /// Takes a request as it came from the wire at `at` and gives the reply. It is of the
+    /// client of number `client`.
     pub(crate) fn request_from(
         &mut self,
-        origin: Option<(u32, u16)>,
+        client: u32,
         at: MonotonicNs,
-        register: u8,
-        parameters: &[u8],
+        request: &Request<'_>,
     ) -> Answer {
-        self.origin = origin;
-        self.arrived = self.arrived.max(at);
-        let answer = match Command::parse(register, parameters) {
-            Ok(command) if !self.knows(&command) => {
-                self.refuse(&CommandError::UnknownRegister(register), parameters)
+        let (register, parameters) = (request.register, request.parameters);
+        let origin = (client, request.transaction);
+        self.on_behalf_of(origin, at, |model| {
+            match Command::parse(register, parameters) {
+                Ok(command) if !model.knows(&command) => {
+                    model.refuse(&CommandError::UnknownRegister(register), parameters)
+                }
+                Ok(command) => model.command(at, &command),
+                Err(error) => model.refuse(&error, parameters),
             }
-            Ok(command) => self.command(at, &command),
-            Err(error) => self.refuse(&error, parameters),
-        };
-        self.tell_state();
-        self.origin = None;
-        answer
+        })
     }
 
     /// A command of the client of number `client` outside any connection.
     pub(crate) fn command_from(&mut self, client: u32, at: MonotonicNs, command: &Command) {
-        self.origin = Some((client, 0));
+        self.on_behalf_of((client, 0), at, |model| model.command(at, command));
+    }
+
+    /// Executes what a client (its number, transaction id) sent, arrived at `at`.
+    fn on_behalf_of(
+        &mut self,
+        origin: (u32, u16),
+        at: MonotonicNs,
+        execute: impl FnOnce(&mut Self) -> Answer,
+    ) -> Answer {
+        self.origin = Some(origin);
         self.arrived = self.arrived.max(at);
-        self.command(at, command);
+        let answer = execute(self);
         self.tell_state();
         self.origin = None;
+        answer
     }
 
     /// Whether a command to this register would be taken up as a setpoint or
