@@ -96,19 +96,9 @@ fn rope_and_lead_lie_where_the_camera_model_puts_them() {
     let nodes = pose(0.0).nodes;
     for side in 0..2 {
         for link in nodes[2..20].windows(2) {
-            let (a, b) = (
-                project(&camera, side, &link[0]),
-                project(&camera, side, &link[1]),
-            );
+            let [a, b] = [0, 1].map(|end| project(&camera, side, &link[end]));
             let v = a[1].ceil();
-            let want = a[0] + (b[0] - a[0]) * (v - a[1]) / (b[1] - a[1]);
-            let (mut weight, mut moment) = (0.0, 0.0);
-            for u in want as usize - 9..want as usize + 10 {
-                let w = full[side].covered(&empty[side], u, v as usize);
-                weight += w;
-                moment += w * u as f64;
-            }
-            let error = moment / weight - want;
+            let [error, weight] = crossing(&full[side], &empty[side], [a, b], v as usize, 9);
             assert!(
                 error.abs() < 0.35,
                 "eye {side} row {v}: off by {error:.3} px"
@@ -122,6 +112,25 @@ fn rope_and_lead_lie_where_the_camera_model_puts_them() {
         assert!(error < 0.35, "lead in eye {side} off by {error:.3} px");
         assert!(area > 90.0, "lead of {area} px in eye {side}");
     }
+}
+
+/// By how much row `v` of what is new is off the line from `a` to `b`, and how wide it is
+/// (px), within `reach` pixels.
+fn crossing(
+    full: &Picture,
+    empty: &Picture,
+    [a, b]: [[f64; 2]; 2],
+    v: usize,
+    reach: usize,
+) -> [f64; 2] {
+    let want = a[0] + (b[0] - a[0]) * (v as f64 - a[1]) / (b[1] - a[1]);
+    let (mut weight, mut moment) = (0.0, 0.0);
+    for u in want as usize - reach..=want as usize + reach {
+        let w = full.covered(empty, u, v);
+        weight += w;
+        moment += w * u as f64;
+    }
+    [moment / weight - want, weight]
 }
 
 /// Centroid and area of what has turned blue within `reach` pixels: the lead,
@@ -163,25 +172,13 @@ fn a_rolling_shutter_shows_each_row_at_its_own_time() {
         .map(|v| (v, camera.row_time_s(v as f64)))
     {
         for side in 0..2 {
-            let pixels = at(t_s)
-                .nodes
-                .iter()
-                .map(|p| project(&camera, side, p))
-                .collect::<Vec<_>>();
-            let crossed = pixels[2..21]
-                .windows(2)
-                .find(|w| w[0][1] <= v as f64 && v as f64 <= w[1][1]);
-            let Some([a, b]) = crossed.map(|w| [w[0], w[1]]) else {
+            let nodes = at(t_s).nodes;
+            let pixels: Vec<_> = nodes.iter().map(|p| project(&camera, side, p)).collect();
+            let mut links = pixels[2..21].windows(2).map(|w| [w[0], w[1]]);
+            let Some([a, b]) = links.find(|[a, b]| a[1] <= v as f64 && v as f64 <= b[1]) else {
                 continue;
             };
-            let want = a[0] + (b[0] - a[0]) * (v as f64 - a[1]) / (b[1] - a[1]);
-            let (mut weight, mut moment) = (0.0, 0.0);
-            for u in want as usize - 16..want as usize + 17 {
-                let w = full[side].covered(&empty[side], u, v);
-                weight += w;
-                moment += w * u as f64;
-            }
-            let error = moment / weight - want;
+            let [error, weight] = crossing(&full[side], &empty[side], [a, b], v, 16);
             assert!(
                 error.abs() < 0.5,
                 "eye {side} row {v}: off by {error:.2} px"
