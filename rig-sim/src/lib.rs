@@ -11,9 +11,9 @@
 
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
-pub mod body;
 mod camera;
 mod config;
+mod contact;
 mod error;
 mod exposure;
 mod filming;

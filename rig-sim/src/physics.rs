@@ -1,6 +1,6 @@
 //! The rope on the arm's true motion, a few milliseconds behind real time.
 
-use super::body::ArmBody;
+use super::contact::touches;
 use super::error::RigError;
 use super::record::{Moment, Record};
 use arm_model::{Cell, JointPiece, JointState};
@@ -87,12 +87,11 @@ impl Physics {
         if !nodes.iter().all(|p| p.sum().is_finite()) {
             return Err(RigError::RopeDiverged);
         }
-        let body = ArmBody::at(&next.state.q, &self.cell);
-        let (radius_m, lead_m) = (self.rope.radius_m, self.rope.lead_radius_m);
+        let radii_m = [self.rope.radius_m, self.rope.lead_radius_m];
         Ok(Moment {
             at: next.at,
             q: next.state.q,
-            touched: body.is_touched_by(&nodes, radius_m, lead_m),
+            touched: touches(&nodes, radii_m, &next.state.q, &self.cell),
             nodes,
         })
     }

@@ -1,6 +1,6 @@
 //! What every stop, and every fault that is no stop, must look like.
 
-use super::limits;
+use super::limits::{self, EVER};
 use super::stage::{INTERFACES, Stage};
 use arm_model::JointVector;
 use rt_controller::control::reaction::StopCategory;
@@ -95,9 +95,9 @@ impl Stage {
         // What a dead link delivers later is no setpoint any more.
         let wire_until = match want.path {
             StopCategory::CutOff => MonotonicNs(cause.stamp_ns),
-            _ => MonotonicNs(u64::MAX),
+            _ => EVER,
         };
-        limits::assert_kept(self, wire_until);
+        limits::assert_kept(self, wire_until, 0.0);
         self.assert_standstill(&cause);
         self.assert_nothing_moves_it();
         assert_eq!(
@@ -193,7 +193,7 @@ impl Stage {
     /// Asserts that the throw went on to its end, within all limits, as if
     /// nothing had happened.
     pub(crate) fn assert_undisturbed(&self) {
-        self.assert_finished();
+        self.assert_finished(0.0);
         self.assert_same_path();
     }
 
@@ -206,41 +206,22 @@ impl Stage {
         assert!(path(self) == path(&undisturbed), "another path");
     }
 
-    /// Asserts that the throw went on to its end, within all limits.
-    pub(crate) fn assert_finished(&self) {
-        self.assert_ended();
-        limits::assert_kept(self, MonotonicNs(u64::MAX));
-    }
-
-    /// The same where setpoints may arrive a little beside the instant they are
-    /// for.
-    pub(crate) fn assert_finished_with_jitter(&self, jitter_s: f64) {
-        self.assert_ended();
-        limits::assert_kept_with_jitter(self, jitter_s);
-    }
-
-    /// Asserts that one motion went on to its end, within all limits.
-    pub(crate) fn assert_all_went_well(&self) {
-        self.assert_one_motion();
-        limits::assert_kept(self, MonotonicNs(u64::MAX));
-    }
-
-    fn assert_one_motion(&self) {
-        self.assert_mode(ControllerMode::Idle);
-        assert_eq!(
-            (self.finished(), self.rig.log.causes.len()),
-            (1, 0),
-            "{:?}",
-            self.via
-        );
-    }
-
-    fn assert_ended(&self) {
-        self.assert_one_motion();
+    /// Asserts that the throw went on to its end, within all limits; setpoints may arrive
+    /// `jitter_s` beside the instant they are for.
+    pub(crate) fn assert_finished(&self, jitter_s: f64) {
+        self.assert_one_motion(jitter_s);
         assert_eq!(self.arm_errors(), [0_u8; 0]);
         let off = self.rig.with_arm(|arm| arm.model().true_motion().q) - self.throw.end();
         assert!(off.max_abs() < 2e-3, "{:?}: ends {off:?} off", self.via);
         assert!(self.speed() < STANDING_RAD_S);
+    }
+
+    /// Asserts that one motion went on to its end, within all limits.
+    pub(crate) fn assert_one_motion(&self, jitter_s: f64) {
+        self.assert_mode(ControllerMode::Idle);
+        let found = (self.finished(), self.rig.log.causes.len());
+        assert_eq!(found, (1, 0), "{:?}", self.via);
+        limits::assert_kept(self, EVER, jitter_s);
     }
 
     /// Asserts that nothing moved and that the last motion was refused for

@@ -10,19 +10,13 @@ use shared_types::{CommandInterface, MonotonicNs};
 /// floats.
 const ON_THE_WIRE: [f64; 3] = [2e-4, 0.2, 200.0];
 
-/// Asserts every limit over all setpoints so far, as computed; and over those
-/// that reached the arm before `wire_until`, as it got them.
-pub(crate) fn assert_kept(stage: &Stage, wire_until: MonotonicNs) {
-    assert_all(stage, wire_until, 0.0);
-}
+/// No moment: what arrives at any time counts.
+pub(crate) const EVER: MonotonicNs = MonotonicNs(u64::MAX);
 
-/// The same where commands may arrive `jitter_s` beside the instant they were
-/// meant for.
-pub(crate) fn assert_kept_with_jitter(stage: &Stage, jitter_s: f64) {
-    assert_all(stage, MonotonicNs(u64::MAX), jitter_s);
-}
-
-fn assert_all(stage: &Stage, wire_until: MonotonicNs, jitter_s: f64) {
+/// Asserts every limit over all setpoints so far, as computed; and over those that reached
+/// the arm before `wire_until`, as it got them, up to `jitter_s` beside the instant they
+/// were meant for.
+pub(crate) fn assert_kept(stage: &Stage, wire_until: MonotonicNs, jitter_s: f64) {
     let log = &stage.rig.log;
     assert_computed(&Limits::default(), log.inputs.iter().zip(&log.records));
     match stage.via {

@@ -66,7 +66,7 @@ fn fault_01_a_stall_of_190_ms_ends_in_a_stop_and_not_in_a_burst() {
 fn fault_01_a_stall_that_is_over_in_a_cycle_is_borne() {
     for via in INTERFACES {
         let stage = Stage::thrown(via, &mid_throw("stall, duration_s = 0.005"));
-        stage.assert_finished_with_jitter(0.006);
+        stage.assert_finished(0.006);
         stage.assert_same_path();
     }
 }

@@ -19,7 +19,7 @@ fn fault_02_a_single_late_wake_up_costs_its_setpoints_and_no_more() {
     for via in INTERFACES {
         for late_us in [300, 900, 2000, 3900, 4300, 6000, 7900, 8000] {
             let stage = Stage::disturbed(via, 0.5, |rig| rig.oversleep([late_us * 1000]));
-            stage.assert_finished();
+            stage.assert_finished(0.0);
             let missed = stage.rig.counts().missed;
             assert_eq!(missed > 0, late_us > 800, "{late_us} us: {missed} missed");
             assert_on_time(&stage);
@@ -46,7 +46,7 @@ fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
     for via in INTERFACES {
         for first_us in [500, 1500, 2500, 3500, 3900] {
             let pairs = (0..60).flat_map(|k| [first_us * MS / 1000, (k % 4) * 900_000, 0]);
-            Stage::disturbed(via, 0.2, |rig| rig.oversleep(pairs)).assert_finished();
+            Stage::disturbed(via, 0.2, |rig| rig.oversleep(pairs)).assert_finished(0.0);
         }
     }
 }
@@ -62,7 +62,7 @@ fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
             let times = if held_us < 4000 { 40 } else { 1 };
             let often = (0..times).flat_map(|k| [held_us * 1000, (k % 4) * held_us * 250, 0, 0, 0]);
             let stage = Stage::disturbed(via, 0.2, |rig| rig.hold_up(often));
-            stage.assert_finished_with_jitter(0.2e-3);
+            stage.assert_finished(0.2e-3);
             let missed = stage.rig.counts().missed;
             assert_eq!(missed > 0, held_us > 200, "{held_us} us: {missed} missed");
             assert_on_time(&stage);
@@ -154,7 +154,7 @@ fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
             out.record.send_ns = did.send_ns;
             assert_eq!(out.record, *did);
         }
-        stage.assert_finished();
+        stage.assert_finished(0.0);
     }
 }
 
@@ -183,7 +183,7 @@ fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
                     _ => rng.random_range(4 * MS..6 * MS),
                 }));
             stage.finish();
-            stage.assert_finished_with_jitter(0.000_201);
+            stage.assert_finished(0.000_201);
             assert!(stage.rig.counts().missed > 10);
         }
     }
@@ -228,7 +228,7 @@ fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
             let minute = JointTrajectory::new(&times, &poses).unwrap();
             stage.rig.start(Motion::Spline(minute));
             stage.rig.run_for(61.0);
-            stage.assert_all_went_well();
+            stage.assert_one_motion(0.0);
             // 62 s are 15 500 cycles, of which a thousandth slips.
             let counters = stage.rig.with_arm(|arm| arm.model().counters());
             let slipped = counters.dropped + counters.repeated;

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rt_controller::control::reaction::StopCategory;
 use rt_controller::control::{ControlCommand, ControlEvent, Motion};
 use shared_types::ipc::ControllerMode;
-use shared_types::{CommandInterface, FaultCode, MonotonicNs};
+use shared_types::{CommandInterface, FaultCode};
 
 /// Limits that a throw of each interface uses fully. An arm that follows velocities
 /// makes its own jerk and cannot follow steps of the full acceleration closely.
@@ -85,7 +85,7 @@ fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
     let found = (cause.cycle, cause.stop_arm, cause.second_code);
     assert_eq!(found, at_once, "{cause:?}");
     assert_eq!(stage.rig.mode(), ControllerMode::Faulted);
-    limits::assert_kept(stage, MonotonicNs(u64::MAX));
+    limits::assert_kept(stage, limits::EVER, 0.0);
     assert!(stage.speed() < 1e-3, "{}", stage.speed());
 }
 

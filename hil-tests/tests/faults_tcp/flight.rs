@@ -32,12 +32,6 @@ pub struct Flight {
     at_rest: Vec<(MonotonicNs, MonotonicNs)>,
 }
 
-impl Default for Flight {
-    fn default() -> Self {
-        Self::new(Limits::default(), CommandInterface::default())
-    }
-}
-
 impl Flight {
     pub fn new(limits: Limits, interface: CommandInterface) -> Self {
         Self {

@@ -453,9 +453,8 @@ impl Stand {
                 Read::Flaw(flaw) => panic!("{flaw}"),
             }
         }
-        let flight = std::mem::take(&mut self.flight);
-        flight.check();
-        flight
+        self.flight.check();
+        self.flight
     }
 }
 

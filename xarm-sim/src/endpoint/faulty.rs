@@ -125,7 +125,7 @@ impl ArmEndpoint {
     fn damage(&mut self, port: ReportPort, frames: u32, damage: Damage) {
         for client in self.clients.values_mut() {
             if let Service::Reports(kind) = client.service
-                && port.covers(kind.index())
+                && port.covers(kind as usize)
             {
                 client.damage.push_back((damage, frames));
             }

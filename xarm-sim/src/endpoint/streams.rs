@@ -31,7 +31,7 @@ impl ArmEndpoint {
         if client.due <= now {
             client.due = now.plus_s(period_s);
         }
-        let own = |port: &ReportPort| port.covers(kind.index());
+        let own = |port: &ReportPort| port.covers(kind as usize);
         let stops =
             |fault: &FaultKind| matches!(fault, FaultKind::ReportStop { port } if own(port));
         let freezes =

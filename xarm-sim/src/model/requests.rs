@@ -1,14 +1,53 @@
 //! What each request does to the controller.
 
 use super::*;
-use arm_model::kinematics;
+use arm_model::kinematics::{self, JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use rt_controller::xarm::reply::Text;
-use rt_controller::xarm::{JointQuery, Request};
+use rt_controller::xarm::{EmitError, JointQuery, Reply, Request};
 
 /// Version text of a real arm before its firmware: 7 axes, type 7, 1305 arm.
 const MODEL: &str = "7,7,XS1305,AC1304,v";
 /// Serial numbers of arm and control box, a NUL between them.
 const SERIAL_NUMBERS: &str = "XS130500000000\0AC130400000000";
+
+/// Data of a reply.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnswerData {
+    /// Of a register with a typed reply.
+    Typed(ReplyData),
+    /// Of any other, as sent.
+    Raw(Vec<u8>),
+}
+
+/// Reply to a request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// Status byte.
+    pub status: Status,
+    /// Data.
+    pub data: AnswerData,
+}
+
+impl Answer {
+    /// Writes the reply to `request` to the front of `out`; returns its length.
+    ///
+    /// # Errors
+    /// [`EmitError::BufferTooSmall`].
+    pub fn emit(&self, out: &mut [u8], request: &Request<'_>) -> Result<usize, EmitError> {
+        match &self.data {
+            AnswerData::Typed(data) => data.emit(out, request, self.status),
+            AnswerData::Raw(data) => Reply {
+                transaction: request.transaction,
+                protocol: request.protocol,
+                register: request.register,
+                status: self.status,
+                data,
+            }
+            .emit(out),
+        }
+    }
+}
+
 impl ArmModel {
     /// Takes a request as it came from the wire at `at` and gives the reply. It is of the
     /// client of number `client`.
@@ -101,6 +140,33 @@ impl ArmModel {
         answer
     }
 
+    /// Data of the reply to a register without a typed command; `None` when
+    /// this controller does not know what to do with it.
+    fn raw(&mut self, register: Register, parameters: &[u8]) -> Option<Vec<u8>> {
+        Some(match register {
+            Register::ReportedEffort => vec![u8::from(self.settings.reports_current)],
+            Register::GetReducedMode => vec![u8::from(self.settings.reduced.on)],
+            Register::ReducedState => self.settings.reduced_state(),
+            Register::JointTorque => self.effort_nm().iter().flat_map(f32_le).collect(),
+            Register::DhTable => dh_table(),
+            Register::PowerBoardVersion => vec![0; 6],
+            Register::HardwareTypes => vec![0; 2],
+            Register::SaveConfiguration => {
+                self.saved = self.settings;
+                Vec::new()
+            }
+            Register::ClearConfiguration => {
+                self.saved = Settings::factory(&self.config);
+                self.settings = self.saved;
+                Vec::new()
+            }
+            register => {
+                self.settings.set_raw(register, parameters)?;
+                Vec::new()
+            }
+        })
+    }
+
     /// Executes a command that arrived at `at`.
     pub fn command(&mut self, at: MonotonicNs, command: &Command) -> Answer {
         if !matches!(
@@ -175,4 +241,22 @@ impl ArmModel {
         let offset = &self.settings.tcp_offset;
         TcpPose::from_frame(&(p + r * offset.position()), &(r * offset.attitude()))
     }
+}
+
+fn f32_le(value: &f64) -> [u8; 4] {
+    (*value as f32).to_le_bytes()
+}
+
+/// The vendor's table, modified convention: offset (rad), d (mm), alpha (rad), a (mm) of
+/// each joint.
+fn dh_table() -> Vec<u8> {
+    let rows = JOINT_ORIGIN_M.into_iter().zip(JOINT_QUARTER_TURNS_X);
+    rows.flat_map(|([x, y, z], turns)| {
+        let alpha_rad = core::f32::consts::FRAC_PI_2 * f32::from(turns);
+        // One of y and z is zero: a joint is moved along its own axis or along the turned one.
+        let [d_mm, a_mm] = [y.abs() + z, x].map(|m| (m * 1e3) as f32);
+        [0.0, d_mm, alpha_rad, a_mm]
+    })
+    .flat_map(f32::to_le_bytes)
+    .collect()
 }
