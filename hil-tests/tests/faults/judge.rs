@@ -14,48 +14,33 @@ const STANDING_RAD_S: f64 = 1e-3;
 /// Longest time from the cause to standstill (s).
 const STOP_WITHIN_S: f64 = 1.5;
 
-/// What a stop is expected to be.
+/// What a stop is expected to be: for which fault, how, and whether the arm is asked to stop.
 #[derive(Clone, Copy)]
-pub(crate) struct Stop {
-    pub(crate) fault: FaultCode,
-    pub(crate) path: StopCategory,
-    /// The arm is asked to stop.
-    pub(crate) stop_arm: bool,
-}
-
-impl Stop {
-    const fn of(fault: FaultCode, path: StopCategory, stop_arm: bool) -> Self {
-        Self {
-            fault,
-            path,
-            stop_arm,
-        }
-    }
-}
+pub(crate) struct Stop(FaultCode, StopCategory, bool);
 
 /// Slowed along the path.
 pub(crate) const fn slowed(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::OnPath, false)
+    Stop(fault, StopCategory::OnPath, false)
 }
 
 /// Braked in joint space.
 pub(crate) const fn braked(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::JointSpace, false)
+    Stop(fault, StopCategory::JointSpace, false)
 }
 
 /// Braked, then the arm asked to stop.
 pub(crate) const fn braked_and_stopped(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::JointSpace, true)
+    Stop(fault, StopCategory::JointSpace, true)
 }
 
 /// No setpoints any more, the arm asked to stop.
 pub(crate) const fn stopped(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::CutOff, true)
+    Stop(fault, StopCategory::CutOff, true)
 }
 
 /// No setpoints any more; the arm has stopped by itself or cannot hear.
 pub(crate) const fn silenced(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::CutOff, false)
+    Stop(fault, StopCategory::CutOff, false)
 }
 
 /// A throw by each interface with a fault of a script: it stops as wanted, is noticed
@@ -93,7 +78,7 @@ impl Stage {
     pub(crate) fn assert_stop(&mut self, want: Stop) -> CauseRecord {
         let cause = self.assert_one_cause(want);
         // What a dead link delivers later is no setpoint any more.
-        let wire_until = match want.path {
+        let wire_until = match want.1 {
             StopCategory::CutOff => MonotonicNs(cause.stamp_ns),
             _ => EVER,
         };
@@ -108,18 +93,18 @@ impl Stage {
         cause
     }
 
-    fn assert_one_cause(&self, want: Stop) -> CauseRecord {
+    fn assert_one_cause(&self, Stop(fault, path, stop_arm): Stop) -> CauseRecord {
         let causes = &self.rig.log.causes;
         let [cause] = causes[..] else {
-            panic!("{:?} {:?}: {causes:?}", self.via, want.fault);
+            panic!("{:?} {fault:?}: {causes:?}", self.via);
         };
         let said = (cause.fault(), cause.path, cause.stop_arm != 0);
-        let wanted = (want.fault, want.path as u8, want.stop_arm);
+        let wanted = (fault, path as u8, stop_arm);
         assert_eq!(said, wanted, "{:?}: {cause:?}", self.via);
         assert!(cause.cycle <= cause.rest_cycle && cause.motion_id > 0);
         let (value, limit) = (cause.limit.value, cause.limit.limit);
         // Codes that are no excess: an error shows how near the speed limit was.
-        let excess = !matches!(want.fault, FaultCode::ArmError | FaultCode::ArmModeChanged);
+        let excess = !matches!(fault, FaultCode::ArmError | FaultCode::ArmModeChanged);
         assert!(!excess || value >= limit, "{value} of {limit}: {cause:?}");
         cause
     }

@@ -2,7 +2,7 @@
 //! it.
 
 use super::ArmEndpoint;
-use super::client::{Client, Damage, Service};
+use super::client::{Client, Service};
 use crate::fault::{FaultKind, ReportPort};
 use crate::reports::ReportKind;
 use rand::Rng;
@@ -56,17 +56,19 @@ impl ArmEndpoint {
         client.push(now, frame);
     }
 
-    fn spoil(&mut self, frame: &mut Vec<u8>, damage: Damage, kind: ReportKind) {
+    fn spoil(&mut self, frame: &mut Vec<u8>, damage: FaultKind, kind: ReportKind) {
+        let mut put_angle = |joint: u8, value: f32| {
+            let at = kind.joint_offset(usize::from(joint).saturating_sub(1));
+            frame[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        };
         match damage {
-            Damage::Torn { keep_bytes } => frame.truncate(keep_bytes),
-            Damage::Length { claim_bytes } => {
+            FaultKind::ReportNan { joint, .. } => put_angle(joint, f32::NAN),
+            FaultKind::ReportInfinity { joint, .. } => put_angle(joint, f32::INFINITY),
+            FaultKind::ReportTorn { keep_bytes, .. } => frame.truncate(keep_bytes.into()),
+            FaultKind::ReportLength { claim_bytes, .. } => {
                 frame[..4].copy_from_slice(&claim_bytes.to_be_bytes());
             }
-            Damage::Angle { joint, value } => {
-                let at = kind.joint_offset(joint);
-                frame[at..at + 4].copy_from_slice(&value.to_le_bytes());
-            }
-            Damage::Garbage => self.rng.fill_bytes(&mut frame[4..]),
+            _ => self.rng.fill_bytes(&mut frame[4..]),
         }
     }
 }

@@ -11,4 +11,4 @@ mod script;
 pub use kind::{FaultKind, ForeignWish, PortSet, ReportPort};
 pub use script::{Fault, FaultScript, FaultScriptError, Trigger};
 
-pub(super) use runner::{FaultRunner, Progress, Transition};
+pub(super) use runner::{FaultRunner, Progress};

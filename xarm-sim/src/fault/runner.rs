@@ -20,15 +20,6 @@ pub(crate) struct Progress {
     pub(crate) speed_rad_s: f64,
 }
 
-/// A fault of the script begins or ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Transition {
-    /// Entry of the script, from 1.
-    pub(crate) entry: usize,
-    pub(crate) kind: FaultKind,
-    pub(crate) begins: bool,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Waiting,
@@ -70,17 +61,18 @@ impl FaultRunner {
         self.active().any(like)
     }
 
-    /// What begins and ends at `now`, in the order of the script.
-    pub(crate) fn update(&mut self, now: MonotonicNs, seen: Progress) -> Vec<Transition> {
+    /// What begins (or ends) at `now`, in the order of the script: the entry's number from
+    /// 1, its kind, and whether it begins.
+    pub(crate) fn update(
+        &mut self,
+        now: MonotonicNs,
+        seen: Progress,
+    ) -> Vec<(usize, FaultKind, bool)> {
         self.motion.update(now, seen.speed_rad_s);
         let motion = &self.motion;
         let mut changes = Vec::new();
         for (index, (fault, stage)) in self.entries.iter_mut().enumerate() {
-            let change = |begins| Transition {
-                entry: index + 1,
-                kind: fault.kind,
-                begins,
-            };
+            let change = |begins| (index + 1, fault.kind, begins);
             if *stage == Stage::Waiting && is_due(fault.trigger, now, seen, motion) {
                 changes.push(change(true));
                 *stage = if fault.kind.lasts() == Lasts::Moment {
@@ -156,9 +148,12 @@ mod tests {
                 setpoints: ms / 4,
                 speed_rad_s: speed(elapsed_s),
             };
-            for change in runner.update(MonotonicNs(ms * 1_000_000), progress) {
-                seen.push((ms, change.entry, change.begins));
-            }
+            let changes = runner.update(MonotonicNs(ms * 1_000_000), progress);
+            seen.extend(
+                changes
+                    .iter()
+                    .map(|(entry, _, begins)| (ms, *entry, *begins)),
+            );
         }
         seen
     }
