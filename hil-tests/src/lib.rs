@@ -1,8 +1,9 @@
 //! What the tests of the whole system share: the controller and the simulated arm in
-//! virtual time, and scenarios of faults.
+//! virtual time, scenarios of faults, and a judge of setpoints.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod scenario;
+pub mod setpoint_limits;
 pub mod virtual_rig;
 
 use std::num::NonZeroUsize;

@@ -4,10 +4,13 @@ use arm_model::{JointTrajectory, JointVector, TrajectoryError};
 use rt_controller::control::Motion;
 use rt_controller::xarm::{Command, Mode, StateRequest};
 
-/// An entry of a fault script: when, then what.
+/// An entry of a fault script: when, then the kind of the fault and its fields, as in
+/// `entry("at_s = 0.5", "stall, duration_s = 0.19")`.
 #[must_use]
-pub fn entry(on: &str, rest: &str) -> String {
-    format!("[[fault]]\n{on}\n{rest}\n")
+pub fn entry(when: &str, fault: &str) -> String {
+    let (kind, fields) = fault.split_once(", ").unwrap_or((fault, ""));
+    let fields = fields.replace(", ", "\n");
+    format!("[[fault]]\n{when}\nkind = '{kind}'\n{fields}\n")
 }
 
 /// What brings an arm up in a mode, whatever was before.

@@ -10,28 +10,27 @@ use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::report::{ForceReport, NormalReport, RealtimeReport, RichReport};
 use rt_controller::xarm::{
-    ArmState, Command, ErrorCode, FrameReader, JointQuery, Mode, Protocol, ReplyData, ReportReader,
+    ArmState, Command, FrameReader, JointQuery, Mode, Protocol, ReplyData, ReportReader,
     StateRequest, Status,
 };
 use shared_types::MonotonicNs;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpStream};
 use std::time::Duration;
+use xarm_sim::clock;
 use xarm_sim::fault::{FaultKind, PortSet};
-use xarm_sim::{ArmConfig, ArmEvent, ArmStartError, Fault, SimulatedArm, Trigger, clock};
+use xarm_sim::{ArmConfig, ArmEvent, ArmStartError, Fault, JointSample, SimulatedArm, Trigger};
 
-fn start() -> SimulatedArm {
-    start_at(JointVector::ZERO)
-}
-
-fn start_at(initial_q: JointVector) -> SimulatedArm {
+fn try_start(command_port: u16) -> Result<SimulatedArm, ArmStartError> {
     SimulatedArm::start(ArmConfig {
-        command_port: 0,
+        command_port,
         report_ports: [0; 4],
-        initial_q,
         ..ArmConfig::default()
     })
-    .unwrap()
+}
+
+fn start() -> SimulatedArm {
+    try_start(0).unwrap()
 }
 
 fn connect(port: u16) -> TcpStream {
@@ -90,33 +89,11 @@ impl Client {
         }
     }
 
-    fn error(&mut self) -> ErrorCode {
-        match self.ask(&Command::GetFault).1 {
-            ReplyData::Fault { error, .. } => ErrorCode(error),
-            other => panic!("{other:?}"),
-        }
-    }
-
     fn q(&mut self) -> JointVector {
         match self.ask(&Command::JointPosition(JointQuery::MEASURED)).1 {
             ReplyData::JointMotion { position, .. } => position,
             other => panic!("{other:?}"),
         }
-    }
-
-    /// Streams one joint from the present reference at 250 Hz until an error.
-    fn stream_until_error(&mut self, from: JointVector, joint: usize, speed_rad_s: f64) {
-        let mut q = from;
-        let mut due = clock::now();
-        for _ in 0..400 {
-            q[joint] += speed_rad_s * 0.004;
-            if self.ask(&Command::ServoJoint(q)).0.has_error() {
-                return;
-            }
-            due = due.plus_s(0.004);
-            clock::sleep_until(due);
-        }
-        panic!("no error in 400 setpoints");
     }
 }
 
@@ -306,50 +283,6 @@ fn faults_of_the_wire_reach_the_sockets() {
     assert_eq!(Client::new(&arm).state(), ArmState::Stopped);
 }
 
-/// A burst of setpoints far above 250 Hz ends at the newest one.
-#[test]
-fn only_the_newest_setpoint_counts() {
-    let arm = start();
-    let mut client = Client::new(&arm);
-    client.bring_up(Mode::Servo);
-    let mut q = JointVector::ZERO;
-    for k in 1..=50 {
-        q[6] = 5e-4 * f64::from(k);
-        assert_eq!(client.ask(&Command::ServoJoint(q)).0, Status(0));
-    }
-    wait_s(0.3);
-    assert!((client.q()[6] - 0.025).abs() < 1e-4);
-    assert_eq!(client.error(), ErrorCode::NONE);
-}
-
-#[test]
-fn limits_raise_their_codes_and_can_be_recovered_from() {
-    let mut stretched = JointVector::ZERO;
-    (stretched[1], stretched[3], stretched[5]) = (0.8, 2.4, 1.6);
-    // Joint, speed, code: joint 6 reaches its range, joint 7 is too fast, and
-    // joint 1 moves the flange, 0.66 m away, at 1.5 m/s.
-    let cases = [
-        (5, 3.0, ErrorCode::JOINT_LIMIT),
-        (6, 3.5, ErrorCode::SPEED_LIMIT),
-        (0, 2.3, ErrorCode::TCP_SPEED_LIMIT),
-    ];
-    for (joint, speed_rad_s, code) in cases {
-        let arm = start_at(stretched);
-        let mut client = Client::new(&arm);
-        client.bring_up(Mode::Servo);
-        client.stream_until_error(stretched, joint, speed_rad_s);
-        assert_eq!(client.error(), code, "joint {}", joint + 1);
-        assert_eq!(client.state(), ArmState::Stopped);
-        wait_s(0.4);
-        client.bring_up(Mode::Servo);
-        let mut q = client.q();
-        q[joint] -= 0.01 * speed_rad_s.signum();
-        assert_eq!(client.ask(&Command::ServoJoint(q)).0, Status(0));
-        wait_s(0.3);
-        assert!((client.q() - q).max_abs() < 1e-3);
-    }
-}
-
 #[test]
 fn reports_come_at_once_and_agree_with_the_commands() {
     let arm = start();
@@ -391,11 +324,8 @@ fn history_is_gapless_and_on_the_monotonic_clock() {
     Client::new(&arm).state();
     let samples = arm.history().since(MonotonicNs(0));
     assert!(samples.len() >= 295, "{}", samples.len());
-    assert!(
-        samples
-            .windows(2)
-            .all(|w| w[1].at.0 - w[0].at.0 == 1_000_000)
-    );
+    let gapless = |w: &[JointSample]| w[1].at.0 - w[0].at.0 == 1_000_000;
+    assert!(samples.windows(2).all(gapless));
     let last = samples.last().unwrap().at;
     assert!(last.since_s(now) > -0.001, "{} s behind", now.since_s(last));
 }
@@ -415,20 +345,10 @@ fn a_slow_reader_blocks_nobody() {
 fn a_port_in_use_is_named_with_its_remedy() {
     let arm = start();
     let taken = arm.ports().command;
-    let error = SimulatedArm::start(ArmConfig {
-        command_port: taken,
-        report_ports: [0; 4],
-        ..ArmConfig::default()
-    })
-    .unwrap_err();
+    let error = try_start(taken).unwrap_err();
     assert!(matches!(error, ArmStartError::PortInUse { port, .. } if port == taken));
     assert!(error.to_string().contains("choose another port"), "{error}");
     // Stopping frees it.
     arm.stop();
-    SimulatedArm::start(ArmConfig {
-        command_port: taken,
-        report_ports: [0; 4],
-        ..ArmConfig::default()
-    })
-    .unwrap();
+    try_start(taken).unwrap();
 }

@@ -8,13 +8,14 @@ use std::time::Instant;
 
 use arm_model::joint::START_POSE;
 use arm_model::kinematics::FrameMotion;
-use arm_model::{Cell, JointState, JointVector, Pole};
+use arm_model::{Cell, JointVector, Pole};
 use camera_ingest::StereoFrame;
 use camera_ingest::preview::Preview;
 use nalgebra::Vector3;
 use rig_sim::CameraConfig;
 use rig_sim::hidden::hidden_rope;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
+use rig_sim::wiggle_film::attach_of;
 use rope_sim::LiveRope;
 use shared_types::StereoCamera;
 use shared_types::ipc::{PreviewFrame, PreviewState};
@@ -39,13 +40,7 @@ fn joints(t_s: f64) -> JointVector {
 }
 
 fn attach(t_s: f64) -> FrameMotion {
-    const H: f64 = 1e-3;
-    let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
-    Pole::default().attach_motion(&JointState {
-        q: now,
-        qd: (after - before).map(|d| d / (2.0 * H)),
-        qdd: (after + before - now - now).map(|d| d / (H * H)),
-    })
+    attach_of(joints, t_s)
 }
 
 /// The rig's rope, filmed, and a preview that is told what the arm does.

@@ -4,16 +4,16 @@
 
 use arm_model::joint::START_POSE;
 use camera_ingest::StereoFrame;
+use hil_tests::scenario::bring_up;
 use nalgebra::Vector3;
 use rig_sim::RigConfig;
-use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::{Command, Mode, Protocol, StateRequest};
+use rt_controller::session::ArmSession;
+use rt_controller::xarm::{Command, Mode};
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, FrameHeader, IpcError};
-use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use xarm_sim::clock;
@@ -146,14 +146,6 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
     });
 }
 
-/// Sends one command and waits for its reply.
-fn command(stream: &mut TcpStream, transaction: u16, command: &Command) {
-    let mut bytes = [0; MAX_FRAME_LEN];
-    let n = emit_command(&mut bytes, transaction, Protocol::Private, command).unwrap();
-    stream.write_all(&bytes[..n]).unwrap();
-    assert!(stream.read(&mut bytes).unwrap() > 0);
-}
-
 #[test]
 fn the_rope_swings_when_the_arm_moves() {
     let mut config = RigConfig {
@@ -169,24 +161,17 @@ fn the_rope_swings_when_the_arm_moves() {
         let RigEvent::Ports { command: port, .. } = ask(&client, &RigRequest::Ports) else {
             panic!("no ports");
         };
-        let mut arm = TcpStream::connect((config.bind, port)).unwrap();
-        arm.set_nodelay(true).unwrap();
+        let address = SocketAddr::new(config.bind, port);
+        let mut arm = ArmSession::connect(address, PATIENCE).unwrap();
         let from_ns = clock::now().0;
-        for (transaction, request) in (1..).zip([
-            Command::MotionEnable {
-                joint: Command::ALL_JOINTS,
-                enable: true,
-            },
-            Command::SetMode(Mode::Position),
-            Command::SetState(StateRequest::Ready),
-            Command::MoveJoint {
-                target: START_POSE,
-                speed_rad_s: 1.0,
-                acceleration_rad_s2: 10.0,
-                checked: None,
-            },
-        ]) {
-            command(&mut arm, transaction, &request);
+        let go = Command::MoveJoint {
+            target: START_POSE,
+            speed_rad_s: 1.0,
+            acceleration_rad_s2: 10.0,
+            checked: None,
+        };
+        for command in bring_up(Mode::Position).iter().chain([&go]) {
+            arm.ask(command).unwrap();
         }
         std::thread::sleep(Duration::from_millis(800));
         let to_ns = clock::now().0;

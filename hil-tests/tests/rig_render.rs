@@ -4,7 +4,7 @@
 
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
-use camera_ingest::StereoFrame;
+use camera_ingest::{EyeFrame, StereoFrame};
 use nalgebra::Vector3;
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
@@ -46,37 +46,25 @@ fn without_rope() -> ScenePose {
     }
 }
 
-/// One eye as YCbCr per pixel, row by row.
-struct Picture {
-    width: usize,
-    pixels: Vec<[f64; 3]>,
+/// What both eyes see.
+fn both(renderer: &mut Renderer, camera: &StereoCamera, poses: &[ScenePose]) -> [EyeFrame; 2] {
+    let mut bytes = vec![0; renderer.frame_bytes()];
+    renderer.render(poses, 0, &mut bytes);
+    let size = [camera.width_px as usize * 2, camera.height_px as usize];
+    let frame = StereoFrame::from_yuyv(&bytes, size, 0, 0).unwrap();
+    [frame.left(), frame.right()]
 }
 
-impl Picture {
-    fn both(renderer: &mut Renderer, camera: &StereoCamera, poses: &[ScenePose]) -> [Self; 2] {
-        let mut bytes = vec![0; renderer.frame_bytes()];
-        renderer.render(poses, 0, &mut bytes);
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        let frame = StereoFrame::from_yuyv(&bytes, [width * 2, height], 0, 0).unwrap();
-        [frame.left(), frame.right()].map(|eye| Self {
-            width,
-            pixels: (0..height)
-                .flat_map(|v| (0..width).map(move |u| (u, v)))
-                .map(|(u, v)| eye.ycc(u, v).map(f64::from))
-                .collect(),
-        })
-    }
+fn ycc(eye: &EyeFrame, u: usize, v: usize) -> [f64; 3] {
+    eye.ycc(u, v).map(f64::from)
+}
 
-    /// How much of the pixel something new covers: full from a difference on
-    /// that every shaded side of the rope has against the wall.
-    fn covered(&self, before: &Self, u: usize, v: usize) -> f64 {
-        let (a, b) = (
-            self.pixels[v * self.width + u],
-            before.pixels[v * self.width + u],
-        );
-        let d: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
-        (d.sqrt() / 60.0).min(1.0)
-    }
+/// How much of a pixel something new covers: full from a difference on that every
+/// shaded side of the rope has against the wall.
+fn covered(full: &EyeFrame, empty: &EyeFrame, u: usize, v: usize) -> f64 {
+    let (a, b) = (ycc(full, u, v), ycc(empty, u, v));
+    let d: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
+    (d.sqrt() / 60.0).min(1.0)
 }
 
 fn project(camera: &StereoCamera, side: usize, p: &Vector3<f64>) -> [f64; 2] {
@@ -91,24 +79,14 @@ fn project(camera: &StereoCamera, side: usize, p: &Vector3<f64>) -> [f64; 2] {
 fn rope_and_lead_lie_where_the_camera_model_puts_them() {
     let camera = CameraConfig::default().stereo_camera();
     let mut renderer = renderer(&camera, 0.0);
-    let empty = Picture::both(&mut renderer, &camera, &[without_rope()]);
-    let full = Picture::both(&mut renderer, &camera, &[pose(0.0)]);
+    let empty = both(&mut renderer, &camera, &[without_rope()]);
+    let full = both(&mut renderer, &camera, &[pose(0.0)]);
     let nodes = pose(0.0).nodes;
     for side in 0..2 {
         for link in nodes[2..20].windows(2) {
-            let (a, b) = (
-                project(&camera, side, &link[0]),
-                project(&camera, side, &link[1]),
-            );
+            let [a, b] = [0, 1].map(|end| project(&camera, side, &link[end]));
             let v = a[1].ceil();
-            let want = a[0] + (b[0] - a[0]) * (v - a[1]) / (b[1] - a[1]);
-            let (mut weight, mut moment) = (0.0, 0.0);
-            for u in want as usize - 9..want as usize + 10 {
-                let w = full[side].covered(&empty[side], u, v as usize);
-                weight += w;
-                moment += w * u as f64;
-            }
-            let error = moment / weight - want;
+            let [error, weight] = crossing(&full[side], &empty[side], [a, b], v as usize, 9);
             assert!(
                 error.abs() < 0.35,
                 "eye {side} row {v}: off by {error:.3} px"
@@ -124,15 +102,33 @@ fn rope_and_lead_lie_where_the_camera_model_puts_them() {
     }
 }
 
+/// By how much row `v` of what is new is off the line from `a` to `b`, and how wide it is
+/// (px), within `reach` pixels.
+fn crossing(
+    full: &EyeFrame,
+    empty: &EyeFrame,
+    [a, b]: [[f64; 2]; 2],
+    v: usize,
+    reach: usize,
+) -> [f64; 2] {
+    let want = a[0] + (b[0] - a[0]) * (v as f64 - a[1]) / (b[1] - a[1]);
+    let (mut weight, mut moment) = (0.0, 0.0);
+    for u in want as usize - reach..=want as usize + reach {
+        let w = covered(full, empty, u, v);
+        weight += w;
+        moment += w * u as f64;
+    }
+    [moment / weight - want, weight]
+}
+
 /// Centroid and area of what has turned blue within `reach` pixels: the lead,
 /// not the orange rope above it.
-fn blob(full: &Picture, empty: &Picture, near: [f64; 2], reach: usize) -> [f64; 3] {
+fn blob(full: &EyeFrame, empty: &EyeFrame, near: [f64; 2], reach: usize) -> [f64; 3] {
     let mut sums = [0.0; 3];
     let (u0, v0) = (near[0].round() as usize, near[1].round() as usize);
     for v in v0 - reach..=v0 + reach {
         for u in u0 - reach..=u0 + reach {
-            let i = v * full.width + u;
-            let w = ((full.pixels[i][1] - empty.pixels[i][1]) / 25.0).clamp(0.0, 1.0);
+            let w = ((ycc(full, u, v)[1] - ycc(empty, u, v)[1]) / 25.0).clamp(0.0, 1.0);
             sums[0] += w * u as f64;
             sums[1] += w * v as f64;
             sums[2] += w;
@@ -156,32 +152,20 @@ fn a_rolling_shutter_shows_each_row_at_its_own_time() {
     let poses: Vec<_> = (0..count)
         .map(|i| at(frame_s * (i as f64 + 0.5) / count as f64))
         .collect();
-    let empty = Picture::both(&mut renderer, &camera, &[without_rope()]);
-    let full = Picture::both(&mut renderer, &camera, &poses);
+    let empty = both(&mut renderer, &camera, &[without_rope()]);
+    let full = both(&mut renderer, &camera, &poses);
     for (v, t_s) in (130..300)
         .step_by(10)
         .map(|v| (v, camera.row_time_s(v as f64)))
     {
         for side in 0..2 {
-            let pixels = at(t_s)
-                .nodes
-                .iter()
-                .map(|p| project(&camera, side, p))
-                .collect::<Vec<_>>();
-            let crossed = pixels[2..21]
-                .windows(2)
-                .find(|w| w[0][1] <= v as f64 && v as f64 <= w[1][1]);
-            let Some([a, b]) = crossed.map(|w| [w[0], w[1]]) else {
+            let nodes = at(t_s).nodes;
+            let pixels: Vec<_> = nodes.iter().map(|p| project(&camera, side, p)).collect();
+            let mut links = pixels[2..21].windows(2).map(|w| [w[0], w[1]]);
+            let Some([a, b]) = links.find(|[a, b]| a[1] <= v as f64 && v as f64 <= b[1]) else {
                 continue;
             };
-            let want = a[0] + (b[0] - a[0]) * (v as f64 - a[1]) / (b[1] - a[1]);
-            let (mut weight, mut moment) = (0.0, 0.0);
-            for u in want as usize - 16..want as usize + 17 {
-                let w = full[side].covered(&empty[side], u, v);
-                weight += w;
-                moment += w * u as f64;
-            }
-            let error = moment / weight - want;
+            let [error, weight] = crossing(&full[side], &empty[side], [a, b], v, 16);
             assert!(
                 error.abs() < 0.5,
                 "eye {side} row {v}: off by {error:.2} px"
@@ -202,9 +186,9 @@ fn motion_blur_spreads_evenly_about_the_middle_of_the_exposure() {
     let poses: Vec<_> = (0..count)
         .map(|i| pose(-0.02 + 0.04 * (i as f64 + 0.5) / count as f64))
         .collect();
-    let empty = Picture::both(&mut renderer, &camera, &[without_rope()]);
-    let blurred = Picture::both(&mut renderer, &camera, &poses);
-    let sharp = Picture::both(&mut renderer, &camera, &[pose(0.0)]);
+    let empty = both(&mut renderer, &camera, &[without_rope()]);
+    let blurred = both(&mut renderer, &camera, &poses);
+    let sharp = both(&mut renderer, &camera, &[pose(0.0)]);
     let want = project(&camera, 0, pose(0.0).nodes.last().unwrap());
     let [u, _, area] = blob(&blurred[0], &empty[0], want, 14);
     let [_, _, sharp_area] = blob(&sharp[0], &empty[0], want, 14);
@@ -221,8 +205,8 @@ fn what_is_nearer_covers_what_is_behind() {
     let mut seen = |offset_m: f64| {
         let towards = (camera.p_w_cam_m - lead).normalize();
         renderer.place_target(Some(lead + towards * offset_m));
-        let [left, _] = Picture::both(&mut renderer, &camera, &[pose(0.0)]);
-        left.pixels[v.round() as usize * left.width + u.round() as usize]
+        let [left, _] = both(&mut renderer, &camera, &[pose(0.0)]);
+        ycc(&left, u.round() as usize, v.round() as usize)
     };
     let (ball, lead) = (seen(0.1), seen(-0.1));
     assert!(

@@ -176,36 +176,26 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     let rows = f64::from(camera.stereo_camera().height_px - 1);
     let spare_s = 1.0 / camera.frame_rate_hz - camera.exposure_s;
     let longest_line_s = (spare_s / rows * 1e9).floor().max(0.0) / 1e9;
+    let noise_levels = f64::from(camera.noise_levels);
     let bounds = [
-        ("camera.frame_rate_hz", camera.frame_rate_hz, 1.0, 200.0),
-        ("camera.exposure_s", camera.exposure_s, 1e-5, 0.1),
-        (
-            "camera.line_time_s",
-            camera.line_time_s,
-            0.0,
-            longest_line_s,
-        ),
-        ("camera.baseline_m", camera.baseline_m, 0.01, 1.0),
-        ("camera.tilt_up_rad", camera.tilt_up_rad, -1.5, 1.5),
-        ("camera.latency_s", camera.latency_s, 0.0, 0.5),
-        (
-            "camera.noise_levels",
-            f64::from(camera.noise_levels),
-            0.0,
-            40.0,
-        ),
+        ("frame_rate_hz", camera.frame_rate_hz, [1.0, 200.0]),
+        ("exposure_s", camera.exposure_s, [1e-5, 0.1]),
+        ("line_time_s", camera.line_time_s, [0.0, longest_line_s]),
+        ("baseline_m", camera.baseline_m, [0.01, 1.0]),
+        ("tilt_up_rad", camera.tilt_up_rad, [-1.5, 1.5]),
+        ("latency_s", camera.latency_s, [0.0, 0.5]),
+        ("noise_levels", noise_levels, [0.0, 40.0]),
     ];
-    for (key, value, min, max) in bounds {
-        if !(value >= min && value <= max) {
-            return Err(RigError::Config {
-                key,
-                value,
-                min,
-                max,
-            });
-        }
+    let mut bounds = bounds.into_iter();
+    match bounds.find(|(_, value, [min, max])| !(*min..=*max).contains(value)) {
+        None => Ok(()),
+        Some((key, value, [min, max])) => Err(RigError::Config {
+            key: format!("camera.{key}"),
+            value,
+            min,
+            max,
+        }),
     }
-    Ok(())
 }
 
 #[cfg(test)]

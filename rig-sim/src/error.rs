@@ -11,7 +11,7 @@ pub enum RigError {
     #[error("`{key}` is {value}, but must lie between {min} and {max}")]
     Config {
         /// Key.
-        key: &'static str,
+        key: String,
         /// Value found.
         value: f64,
         /// Smallest value.

@@ -11,11 +11,11 @@
 
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
-mod as_seen;
-pub mod body;
 mod camera;
 mod config;
+mod contact;
 mod error;
+mod exposure;
 mod filming;
 pub mod hidden;
 mod physics;

@@ -1,13 +1,13 @@
 //! The rope on the arm's true motion, a few milliseconds behind real time.
 
-use super::body::ArmBody;
+use super::contact::touches;
 use super::error::RigError;
 use super::record::{Moment, Record};
 use arm_model::{Cell, JointPiece, JointState};
 use rope_sim::LiveRope;
 use shared_types::{MonotonicNs, RopeParams};
 use std::sync::atomic::{AtomicBool, Ordering};
-use xarm_sim::{JointSample, MotionHistory, clock};
+use xarm_sim::{History, JointSample, clock};
 
 /// Step of the rope's integration (s).
 const STEP_S: f64 = 1e-4;
@@ -21,7 +21,7 @@ const GAP_S: f64 = 0.1;
 pub(super) fn run(
     rope: &RopeParams,
     cell: &Cell,
-    arm: &MotionHistory,
+    arm: &History<JointSample>,
     record: &Record,
     stop: &AtomicBool,
 ) -> Result<(), RigError> {
@@ -87,12 +87,11 @@ impl Physics {
         if !nodes.iter().all(|p| p.sum().is_finite()) {
             return Err(RigError::RopeDiverged);
         }
-        let body = ArmBody::at(&next.state.q, &self.cell);
-        let (radius_m, lead_m) = (self.rope.radius_m, self.rope.lead_radius_m);
+        let radii_m = [self.rope.radius_m, self.rope.lead_radius_m];
         Ok(Moment {
             at: next.at,
             q: next.state.q,
-            touched: body.is_touched_by(&nodes, radius_m, lead_m),
+            touched: touches(&nodes, radii_m, &next.state.q, &self.cell),
             nodes,
         })
     }

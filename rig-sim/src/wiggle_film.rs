@@ -2,7 +2,7 @@
 //! the same film whatever else the machine does.
 
 use crate::CameraConfig;
-use crate::as_seen::as_seen;
+use crate::exposure::{as_seen, draw, poses};
 use crate::hidden::hidden_rope;
 use crate::render::{Appearance, Renderer, RopeShape, ScenePose};
 use arm_model::joint::START_POSE;
@@ -17,8 +17,6 @@ const FREQUENCY_HZ: f64 = 1.3;
 const DURATION_S: f64 = 5.6;
 const RAMP_S: f64 = 2.8;
 const PHYSICS_STEP_S: f64 = 1e-4;
-/// Poses computed per exposure of a row; as many of them are drawn as the motion needs.
-const POSES: usize = 8;
 /// Where the target hangs (m).
 const TARGET_M: [f64; 3] = [1.10, 0.0, 0.45];
 
@@ -39,10 +37,16 @@ pub fn joints(t_s: f64) -> JointVector {
     q
 }
 
-/// The attach frame at a time (s), with velocities and accelerations by central
-/// differences.
+/// The attach frame of the shipped wiggle at a time (s).
 #[must_use]
 pub fn attach(t_s: f64) -> FrameMotion {
+    attach_of(joints, t_s)
+}
+
+/// The attach frame of a motion of the joints (rad) at a time (s), with velocities and
+/// accelerations by central differences.
+#[must_use]
+pub fn attach_of(joints: impl Fn(f64) -> JointVector, t_s: f64) -> FrameMotion {
     const H: f64 = 1e-3;
     let (before, now, after) = (joints(t_s - H), joints(t_s), joints(t_s + H));
     Pole::default().attach_motion(&JointState {
@@ -137,21 +141,13 @@ impl Iterator for WiggleFilm {
     /// The next frame; there is always one.
     fn next(&mut self) -> Option<Frame> {
         let start_s = self.late_s + self.next as f64 / self.frame_rate_hz;
-        let frame_s = self.camera.frame_time_s();
-        let poses = (POSES as f64 * frame_s / self.camera.exposure_s).ceil() as usize;
-        let part = |i: usize| start_s + frame_s * (i as f64 + 0.5) / poses as f64;
-        let all: Vec<_> = (0..poses).map(|i| self.pose(part(i))).collect();
-        let needed = self.renderer.sub_frames(&all[0], &all[poses - 1]);
-        let drawn = needed.min(poses);
-        // Even over the frame's time, within half of a pose's.
-        let middle = |i: usize| (2 * i + 1) * poses / (2 * drawn);
-        let drawn: Vec<_> = (0..drawn).map(|i| all[middle(i)].clone()).collect();
-        let mut yuyv = vec![0; self.renderer.frame_bytes()];
-        self.renderer.render(&drawn, self.next, &mut yuyv);
+        let camera = self.camera.clone();
+        let all = poses(&camera, start_s, |t_s| self.pose(t_s));
+        let yuyv = draw(&mut self.renderer, &all, self.next);
         self.next += 1;
         let nodes = (0..all[0].nodes.len()).map(|node| {
             let places_m: Vec<_> = all.iter().map(|pose| pose.nodes[node]).collect();
-            as_seen(&self.camera, &places_m)
+            as_seen(&camera, &places_m)
         });
         Some(Frame {
             start_s,

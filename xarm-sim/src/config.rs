@@ -95,12 +95,21 @@ impl ArmConfig {
     /// [`ArmStartError::Config`] with the key.
     pub fn check(&self) -> Result<(), ArmStartError> {
         let refuse = |key, why| Err(ArmStartError::Config { key, why });
-        self.lag.check()?;
-        self.joint_lags
-            .iter()
-            .flatten()
-            .try_for_each(JointLag::check)?;
-        if !(self.lag_spread >= 0.0 && self.lag_spread < 1.0) {
+        for lag in [self.lag].iter().chain(self.joint_lags.iter().flatten()) {
+            if !(0.0..=1.0).contains(&lag.dead_time_s) {
+                return refuse("lag.dead_time_s", "must lie between 0 and 1 s");
+            }
+            // The joint model integrates in steps of 1 ms.
+            let frequency_rad_s = lag.natural_frequency_rad_s;
+            if !(frequency_rad_s > 0.0 && frequency_rad_s <= 1000.0) {
+                let why = "must lie above 0 and up to 1000 rad/s";
+                return refuse("lag.natural_frequency_rad_s", why);
+            }
+            if !(0.1..=2.0).contains(&lag.damping_ratio) {
+                return refuse("lag.damping_ratio", "must lie between 0.1 and 2");
+            }
+        }
+        if !(0.0..1.0).contains(&self.lag_spread) {
             return refuse("lag_spread", "must be at least 0 and below 1");
         }
         if self.limits.position_violation(&self.initial_q).is_some() {
@@ -112,17 +121,15 @@ impl ArmConfig {
         if !(self.speed_limit_factor > 0.0 && self.speed_limit_factor.is_finite()) {
             return refuse("speed_limit_factor", "must be above 0");
         }
-        if !(self.uptime_s >= 0.0 && self.uptime_s < 1e9) {
+        if !(0.0..1e9).contains(&self.uptime_s) {
             return refuse("uptime_s", "must lie between 0 and 1e9 s");
         }
         if !(-1e5..=1e5).contains(&self.clock_ppm) {
             return refuse("clock_ppm", "must lie between -1e5 and 1e5");
         }
         if !self.obstacles.iter().all(Obstacle::is_well_formed) {
-            return refuse(
-                "obstacles",
-                "needs normals that are not zero, and boxes whose min_m lies below max_m",
-            );
+            let why = "needs normals that are not zero, and boxes whose min_m lies below max_m";
+            return refuse("obstacles", why);
         }
         Ok(())
     }

@@ -4,11 +4,6 @@ use super::fault::FaultKind;
 use arm_model::JointVector;
 use rt_controller::xarm::{ArmState, ErrorCode, Mode};
 use shared_types::MonotonicNs;
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// Events kept: some minutes of setpoints.
-const KEPT_EVENTS: usize = 100_000;
 
 /// Something that happened inside the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,32 +77,4 @@ pub struct ArmCounters {
     pub ignored: u64,
     /// Other requests.
     pub requests: u64,
-}
-
-/// The arm's own log: what it got, from whom, and what happened to it, oldest
-/// first, shared with whoever holds a clone. The oldest give way to new ones.
-#[derive(Debug, Clone, Default)]
-pub struct EventLog {
-    events: Arc<Mutex<VecDeque<TimedEvent>>>,
-}
-
-impl EventLog {
-    fn events(&self) -> MutexGuard<'_, VecDeque<TimedEvent>> {
-        // A panic elsewhere leaves whole events behind.
-        self.events.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn extend(&self, new: &[TimedEvent]) {
-        let mut events = self.events();
-        events.extend(new);
-        let surplus = events.len().saturating_sub(KEPT_EVENTS);
-        events.drain(..surplus);
-    }
-
-    /// Events later than `after`, oldest first.
-    #[must_use]
-    pub fn since(&self, after: MonotonicNs) -> Vec<TimedEvent> {
-        let events = self.events();
-        events.iter().filter(|e| e.at > after).copied().collect()
-    }
 }

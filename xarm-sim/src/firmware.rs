@@ -37,21 +37,19 @@ impl FromStr for Firmware {
     type Err = BadFirmware;
 
     fn from_str(text: &str) -> Result<Self, BadFirmware> {
-        let bad = || BadFirmware {
-            text: text.to_owned(),
+        let version = || {
+            let mut parts = text.trim_start_matches('v').split('.');
+            let (major, minor, revision) = (parts.next()?, parts.next()?, parts.next()?);
+            let version = Self(
+                major.parse().ok()?,
+                minor.parse().ok()?,
+                revision.parse().ok()?,
+            );
+            parts.next().is_none().then_some(version)
         };
-        let mut parts = text.trim_start_matches('v').split('.');
-        let mut next = || parts.next().ok_or_else(bad);
-        let (major, minor, revision) = (next()?, next()?, next()?);
-        let version = Self(
-            major.parse().map_err(|_wrong| bad())?,
-            minor.parse().map_err(|_wrong| bad())?,
-            revision.parse().map_err(|_wrong| bad())?,
-        );
-        match parts.next() {
-            None => Ok(version),
-            Some(_) => Err(bad()),
-        }
+        version().ok_or_else(|| BadFirmware {
+            text: text.to_owned(),
+        })
     }
 }
 

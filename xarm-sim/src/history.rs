@@ -1,12 +1,11 @@
-//! True motion of the simulated joints over the last seconds.
+//! What a running arm keeps of the past: true motion of its joints, and a log of what it
+//! got, from whom, and what happened to it.
 
+use super::event::TimedEvent;
 use arm_model::JointState;
 use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// Seconds of motion kept, at 1 kHz.
-const KEPT_SAMPLES: usize = 5000;
 
 /// True joint motion at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,40 +16,73 @@ pub struct JointSample {
     pub state: JointState,
 }
 
-/// The last 5 s of true joint motion, one sample per millisecond, shared with
-/// whoever holds a clone.
-#[derive(Debug, Clone, Default)]
-pub struct MotionHistory {
-    samples: Arc<Mutex<VecDeque<JointSample>>>,
+/// Something that a [`History`] keeps.
+pub trait Timed: Copy {
+    /// How many are kept.
+    const KEPT: usize;
+
+    /// When it was.
+    fn at(&self) -> MonotonicNs;
 }
 
-impl MotionHistory {
-    fn samples(&self) -> MutexGuard<'_, VecDeque<JointSample>> {
-        // A panic elsewhere leaves whole samples behind.
-        self.samples.lock().unwrap_or_else(PoisonError::into_inner)
+impl Timed for JointSample {
+    /// 5 s at 1 kHz.
+    const KEPT: usize = 5000;
+
+    fn at(&self) -> MonotonicNs {
+        self.at
+    }
+}
+
+impl Timed for TimedEvent {
+    /// Some minutes of setpoints.
+    const KEPT: usize = 100_000;
+
+    fn at(&self) -> MonotonicNs {
+        self.at
+    }
+}
+
+/// The newest of their kind, oldest first, shared with whoever holds a clone. The oldest
+/// give way to new ones.
+#[derive(Debug, Clone)]
+pub struct History<T> {
+    kept: Arc<Mutex<VecDeque<T>>>,
+}
+
+impl<T> Default for History<T> {
+    fn default() -> Self {
+        Self {
+            kept: Arc::default(),
+        }
+    }
+}
+
+impl<T: Timed> History<T> {
+    fn kept(&self) -> MutexGuard<'_, VecDeque<T>> {
+        // A panic elsewhere leaves whole values behind.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn extend(&self, new: impl IntoIterator<Item = JointSample>) {
-        let mut samples = self.samples();
-        samples.extend(new);
-        let surplus = samples.len().saturating_sub(KEPT_SAMPLES);
-        samples.drain(..surplus);
+    pub(super) fn extend(&self, new: impl IntoIterator<Item = T>) {
+        let mut kept = self.kept();
+        kept.extend(new);
+        let surplus = kept.len().saturating_sub(T::KEPT);
+        kept.drain(..surplus);
     }
 
-    /// The newest sample, `None` before the first.
+    /// The newest, `None` before the first.
     #[must_use]
-    pub fn latest(&self) -> Option<JointSample> {
-        self.samples().back().copied()
+    pub fn latest(&self) -> Option<T> {
+        self.kept().back().copied()
     }
 
-    /// Samples later than `after`, oldest first. Calling it again with the
-    /// stamp of the last one gives every sample once, as long as calls are
-    /// less than 5 s apart.
+    /// What was later than `after`. Calling it again with the time of the last one gives
+    /// every one once, as long as it is still kept.
     #[must_use]
-    pub fn since(&self, after: MonotonicNs) -> Vec<JointSample> {
-        let samples = self.samples();
-        let first = samples.partition_point(|s| s.at <= after);
-        samples.range(first..).copied().collect()
+    pub fn since(&self, after: MonotonicNs) -> Vec<T> {
+        let kept = self.kept();
+        kept.iter().filter(|it| it.at() > after).copied().collect()
     }
 }
 
@@ -67,8 +99,8 @@ mod tests {
     }
 
     #[test]
-    fn keeps_five_seconds() {
-        let history = MotionHistory::default();
+    fn keeps_five_seconds_of_motion() {
+        let history = History::default();
         assert!(history.latest().is_none());
         history.extend((0..6000).map(sample));
         assert_eq!(history.latest(), Some(sample(5999)));

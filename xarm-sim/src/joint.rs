@@ -1,7 +1,6 @@
 //! How one joint follows its setpoints: dead time, second-order lag, bounded
 //! speed.
 
-use super::start_error::ArmStartError;
 use serde::{Deserialize, Serialize};
 use shared_types::MonotonicNs;
 use std::collections::VecDeque;
@@ -27,30 +26,6 @@ impl Default for JointLag {
             natural_frequency_rad_s: core::f64::consts::TAU * 25.0,
             damping_ratio: 0.9,
         }
-    }
-}
-
-impl JointLag {
-    /// Refuses a lag that the model cannot integrate.
-    ///
-    /// # Errors
-    /// [`ArmStartError::Config`] with the key.
-    pub(super) fn check(&self) -> Result<(), ArmStartError> {
-        let refuse = |key, why| Err(ArmStartError::Config { key, why });
-        if !(self.dead_time_s >= 0.0 && self.dead_time_s <= 1.0) {
-            return refuse("lag.dead_time_s", "must lie between 0 and 1 s");
-        }
-        // The joint model integrates in steps of 1 ms.
-        if !(self.natural_frequency_rad_s > 0.0 && self.natural_frequency_rad_s <= 1000.0) {
-            return refuse(
-                "lag.natural_frequency_rad_s",
-                "must lie above 0 and up to 1000 rad/s",
-            );
-        }
-        if !(self.damping_ratio >= 0.1 && self.damping_ratio <= 2.0) {
-            return refuse("lag.damping_ratio", "must lie between 0.1 and 2");
-        }
-        Ok(())
     }
 }
 

@@ -23,17 +23,15 @@ use rt_controller::xarm::{
 use shared_types::MonotonicNs;
 use std::collections::VecDeque;
 
-mod answer;
 mod effort;
 mod inject;
 mod motion_requests;
-mod raw;
 mod requests;
 mod setting_requests;
 mod settings;
 mod step;
 
-pub use answer::{Answer, AnswerData};
+pub use requests::{Answer, AnswerData};
 pub(super) use settings::Settings;
 
 /// Step of the model (s, ns).

@@ -137,7 +137,6 @@ impl Reference {
         let before = self.qd;
         match &mut self.profile {
             Profile::Hold => return,
-            Profile::Line { .. } => self.advance_line(dt_s),
             Profile::Velocity(ramp) => {
                 let motion = [&mut self.q, &mut self.qd, &mut self.qdd];
                 if ramp.advance(now, dt_s, limits, motion) {
@@ -145,61 +144,45 @@ impl Reference {
                 }
                 return;
             }
-            Profile::Brake { .. } => self.advance_brake(dt_s, limits),
+            Profile::Line {
+                target,
+                direction,
+                left_rad,
+                speed_rad_s,
+                speed_max_rad_s,
+                acceleration_rad_s2,
+            } => {
+                let can_stop_from = (2.0 * *acceleration_rad_s2 * *left_rad).sqrt();
+                *speed_rad_s = (*speed_rad_s + *acceleration_rad_s2 * dt_s)
+                    .min(*speed_max_rad_s)
+                    .min(can_stop_from);
+                *left_rad -= *speed_rad_s * dt_s;
+                if *left_rad <= 1e-6 {
+                    return *self = Self::at_rest(*target);
+                }
+                self.q = *target - *direction * *left_rad;
+                self.qd = *direction * *speed_rad_s;
+            }
+            Profile::Brake {
+                rate_per_s,
+                start,
+                left,
+            } => {
+                let next = (*left - *rate_per_s * dt_s).max(0.0);
+                for j in 0..JOINTS {
+                    // A joint that meets the end of its range stops there.
+                    let (min, max) = (limits.position_min_rad[j], limits.position_max_rad[j]);
+                    let free = self.q[j] + start[j] * (0.5 * (*left + next) * dt_s);
+                    self.q[j] = free.clamp(min, max);
+                }
+                if next == 0.0 {
+                    return self.hold();
+                }
+                self.qd = *start * next;
+                *left = next;
+            }
         }
         self.qdd = (self.qd - before) * (1.0 / dt_s);
-        if !self.is_busy() {
-            self.hold();
-        }
-    }
-
-    fn advance_line(&mut self, dt_s: f64) {
-        let Profile::Line {
-            target,
-            direction,
-            left_rad,
-            speed_rad_s,
-            speed_max_rad_s,
-            acceleration_rad_s2,
-        } = &mut self.profile
-        else {
-            return;
-        };
-        let can_stop_from = (2.0 * *acceleration_rad_s2 * *left_rad).sqrt();
-        *speed_rad_s = (*speed_rad_s + *acceleration_rad_s2 * dt_s)
-            .min(*speed_max_rad_s)
-            .min(can_stop_from);
-        *left_rad -= *speed_rad_s * dt_s;
-        if *left_rad <= 1e-6 {
-            self.q = *target;
-            self.profile = Profile::Hold;
-        } else {
-            self.q = *target - *direction * *left_rad;
-            self.qd = *direction * *speed_rad_s;
-        }
-    }
-
-    /// A joint that meets the end of its range stops there.
-    fn advance_brake(&mut self, dt_s: f64, limits: &Limits) {
-        let Profile::Brake {
-            rate_per_s,
-            start,
-            left,
-        } = &mut self.profile
-        else {
-            return;
-        };
-        let next = (*left - *rate_per_s * dt_s).max(0.0);
-        for j in 0..JOINTS {
-            let (min, max) = (limits.position_min_rad[j], limits.position_max_rad[j]);
-            let free = self.q[j] + start[j] * (0.5 * (*left + next) * dt_s);
-            self.q[j] = free.clamp(min, max);
-        }
-        self.qd = *start * next;
-        *left = next;
-        if next == 0.0 {
-            self.profile = Profile::Hold;
-        }
     }
 }
 

@@ -26,16 +26,6 @@ impl ReportKind {
     /// In the order of the standard ports.
     pub const ALL: [Self; 4] = [Self::Realtime, Self::Normal, Self::Rich, Self::Real];
 
-    /// Place in [`ALL`](Self::ALL).
-    pub(super) const fn index(self) -> usize {
-        match self {
-            Self::Realtime => 0,
-            Self::Normal => 1,
-            Self::Rich => 2,
-            Self::Real => 3,
-        }
-    }
-
     /// Time between two reports (s).
     #[must_use]
     pub const fn period_s(self) -> f64 {

@@ -7,14 +7,13 @@
 
 use super::config::ArmConfig;
 use super::endpoint::Service;
-use super::event::{ArmCounters, EventLog};
+use super::event::TimedEvent;
 use super::fault::Fault;
-use super::history::MotionHistory;
+use super::history::{History, JointSample};
 use super::reports::ReportKind;
 use super::start_error::ArmStartError;
 use listener::{Listener, join, listen};
 use plant::Plant;
-use rt_controller::xarm::ErrorCode;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
@@ -89,27 +88,14 @@ impl SimulatedArm {
 
     /// True joint motion, 1 kHz, stamped CLOCK_MONOTONIC.
     #[must_use]
-    pub fn history(&self) -> MotionHistory {
+    pub fn history(&self) -> History<JointSample> {
         self.plant.history.clone()
     }
 
     /// What it got and what happened to it, stamped CLOCK_MONOTONIC.
     #[must_use]
-    pub fn events(&self) -> EventLog {
+    pub fn events(&self) -> History<TimedEvent> {
         self.plant.events.clone()
-    }
-
-    /// Counts of commands since the start.
-    #[must_use]
-    pub fn counters(&self) -> ArmCounters {
-        self.plant
-            .with_endpoint(|endpoint, _| endpoint.model().counters())
-    }
-
-    /// Raises an error as if the arm had found it, to try how clients react.
-    pub fn raise_error(&self, error: ErrorCode) {
-        self.plant
-            .with_endpoint(|endpoint, _| endpoint.model_mut().raise(error));
     }
 
     /// Adds a fault to the script it runs.

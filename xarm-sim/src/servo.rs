@@ -252,25 +252,15 @@ mod tests {
         let limits = Limits::default();
         let checks = checks(&limits);
         let mut servo = ServoStream::default();
-        let mut far = JointVector::ZERO;
-        far[6] = 1.0;
-        let refused = servo.offer(
-            MonotonicNs(MS),
-            MonotonicNs(MS),
-            far,
-            JointVector::ZERO,
-            &checks,
-        );
-        assert_eq!(refused, Err(ErrorCode::SPEED_LIMIT));
-        far[3] = -1.0;
-        let refused = servo.offer(
-            MonotonicNs(MS),
-            MonotonicNs(MS),
-            far,
-            JointVector::ZERO,
-            &checks,
-        );
-        assert_eq!(refused, Err(ErrorCode::JOINT_LIMIT));
+        let (at, mut far) = (MonotonicNs(MS), JointVector::ZERO);
+        for (joint, to_rad, code) in [
+            (6, 1.0, ErrorCode::SPEED_LIMIT),
+            (3, -1.0, ErrorCode::JOINT_LIMIT),
+        ] {
+            far[joint] = to_rad;
+            let refused = servo.offer(at, at, far, JointVector::ZERO, &checks);
+            assert_eq!(refused, Err(code));
+        }
     }
 
     #[test]

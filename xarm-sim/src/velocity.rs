@@ -84,6 +84,7 @@ mod tests {
 
     const DT_S: f64 = 1e-3;
 
+    #[derive(Default)]
     struct Bench {
         q: JointVector,
         qd: JointVector,
@@ -92,15 +93,6 @@ mod tests {
     }
 
     impl Bench {
-        fn new() -> Self {
-            Self {
-                q: JointVector::ZERO,
-                qd: JointVector::ZERO,
-                qdd: JointVector::ZERO,
-                time: MonotonicNs(0),
-            }
-        }
-
         fn ramp(&self, target: JointVector, until: Option<MonotonicNs>) -> VelocityRamp {
             VelocityRamp::new(target, true, until, self.qd, self.qdd)
         }
@@ -135,7 +127,7 @@ mod tests {
     #[test]
     fn ramps_take_the_time_of_a_jerk_limited_profile() {
         for (v, want_s) in [(0.5, 2.0 * (0.5_f64 / 500.0).sqrt()), (3.0, 0.15 + 0.04)] {
-            let mut bench = Bench::new();
+            let mut bench = Bench::default();
             let mut ramp = bench.ramp(JointVector::splat(v), None);
             let took_s = bench.run(&mut ramp, |b, _| b.qd[0] == v);
             assert!((took_s - want_s).abs() < 0.005, "{v}: {took_s} s");
@@ -144,7 +136,7 @@ mod tests {
 
     #[test]
     fn synchronised_joints_arrive_together() {
-        let mut bench = Bench::new();
+        let mut bench = Bench::default();
         let mut target = JointVector::ZERO;
         (target[0], target[3], target[6]) = (2.0, -0.7, 0.1);
         let mut ramp = bench.ramp(target, None);
@@ -158,7 +150,7 @@ mod tests {
     /// Without a new command the speed goes to zero by itself.
     #[test]
     fn the_speed_ends_with_its_time() {
-        let mut bench = Bench::new();
+        let mut bench = Bench::default();
         let mut ramp = bench.ramp(JointVector::splat(1.0), Some(MonotonicNs(500_000_000)));
         let took_s = bench.run(&mut ramp, |_, rests| rests);
         assert!((took_s - 0.59).abs() < 0.01, "{took_s}");

@@ -8,10 +8,7 @@ use xarm_sim::{ArmConfig, ConnectRefused, Obstacle, Service};
 
 #[test]
 fn errors_stops_and_drives_latch_as_on_the_real_arm() {
-    let mut b = Scenario::new(&entry(
-        "on = \"setpoint:20\"",
-        "kind = \"raise_error\"\ncode = 60",
-    ));
+    let mut b = Scenario::new(&entry("on = 'setpoint:20'", "raise_error, code = 60"));
     b.bring_up(Mode::Servo);
     b.stream(0.2, 0.2);
     assert_eq!(b.errors(), [60]);
@@ -24,7 +21,7 @@ fn errors_stops_and_drives_latch_as_on_the_real_arm() {
     // A pressed button cannot be cleared away.
     let mut b = Scenario::new(&entry(
         "at_s = 0.1",
-        "kind = \"emergency_stop\"\ncode = 2\nduration_s = 1",
+        "emergency_stop, code = 2, duration_s = 1",
     ));
     b.wait(0.5);
     b.bring_up(Mode::Servo);
@@ -34,8 +31,8 @@ fn errors_stops_and_drives_latch_as_on_the_real_arm() {
     assert_eq!(b.status(), Status(0));
 
     // Nor can a broken drive, until power was off.
-    let script = entry("at_s = 0.1", "kind = \"servo_error\"\njoint = 3\ncode = 23")
-        + &entry("at_s = 1", "kind = \"power_cycle\"\nduration_s = 0.5");
+    let script = entry("at_s = 0.1", "servo_error, joint = 3, code = 23")
+        + &entry("at_s = 1", "power_cycle, duration_s = 0.5");
     let mut b = Scenario::new(&script);
     b.wait(0.5);
     assert_eq!(b.errors(), [13]);
@@ -57,12 +54,12 @@ fn errors_stops_and_drives_latch_as_on_the_real_arm() {
 #[test]
 fn warnings_states_and_modes_change_by_themselves() {
     for (kind, want) in [
-        ("kind = \"state_changed\"\nstate = 4", Status::NOT_READY),
-        ("kind = \"mode_changed\"\nmode = 0", Status::NOT_READY),
-        ("kind = \"warning\"\ncode = 11", Status::WARNING),
-        ("kind = \"collision\"", Status::ERROR | Status::NOT_READY),
+        ("state_changed, state = 4", Status::NOT_READY),
+        ("mode_changed, mode = 0", Status::NOT_READY),
+        ("warning, code = 11", Status::WARNING),
+        ("collision", Status::ERROR | Status::NOT_READY),
     ] {
-        let mut b = Scenario::new(&entry("on = \"setpoint:10\"", kind));
+        let mut b = Scenario::new(&entry("on = 'setpoint:10'", kind));
         b.bring_up(Mode::Servo);
         b.stream(0.2, 0.1);
         assert_eq!(b.status(), Status(want), "{kind}");
@@ -73,10 +70,8 @@ fn warnings_states_and_modes_change_by_themselves() {
 fn a_second_commander_moves_stops_or_takes_the_arm_away() {
     let run = |wish: &str| {
         let script = entry(
-            "on = \"setpoint:10\"",
-            &format!(
-                "kind = \"second_commander\"\nwish = \"{wish}\"\nrate_hz = 50\nduration_s = 0.1"
-            ),
+            "on = 'setpoint:10'",
+            &format!("second_commander, wish = '{wish}', rate_hz = 50, duration_s = 0.1"),
         );
         let mut b = Scenario::new(&script);
         b.bring_up(Mode::Servo);
@@ -114,13 +109,13 @@ fn joints_lag_stick_and_lie() {
         )
     };
     // 0.5 rad/s behind by about 20 ms, or by 100 ms more.
-    let (healthy, _) = run("kind = \"collision\"\n");
+    let (healthy, _) = run("collision");
     assert!(healthy > 0.2, "a collision stops the arm: {healthy}");
-    let (late, _) = run("kind = \"tracking_lag\"\nlag_s = 0.1");
+    let (late, _) = run("tracking_lag, lag_s = 0.1");
     assert!((0.055..0.065).contains(&late), "{late}");
-    let (stuck, _) = run("kind = \"joint_stuck\"\njoint = 7");
+    let (stuck, _) = run("joint_stuck, joint = 7");
     assert!((0.24..0.28).contains(&stuck), "{stuck}");
-    let (truth, seen) = run("kind = \"encoder_jump\"\njoint = 7\nby_rad = 0.0873");
+    let (truth, seen) = run("encoder_jump, joint = 7, by_rad = 0.0873");
     assert!((truth - seen - 0.0873).abs() < 2e-5);
 }
 
@@ -133,7 +128,7 @@ fn a_clock_off_by_a_thousandth_is_counted() {
         ..ArmConfig::default()
     };
     let run = |ppm: f64| {
-        let script = entry("at_s = 0", &format!("kind = \"clock_rate\"\nppm = {ppm}"));
+        let script = entry("at_s = 0", &format!("clock_rate, ppm = {ppm}"));
         let mut b = Scenario::with(&script, config());
         let uptime_us = b.arm.model().time_us();
         b.wait(0.01);

@@ -8,10 +8,7 @@ use xarm_sim::{Closing, ConnectRefused, ReportKind, Service};
 
 #[test]
 fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {
-    let script = entry(
-        "on = \"setpoint:50\"",
-        "kind = \"stall\"\nduration_s = 0.19",
-    );
+    let script = entry("on = 'setpoint:50'", "stall, duration_s = 0.19");
     let mut b = Scenario::new(&script);
     b.bring_up(Mode::Servo);
     b.replies.clear();
@@ -35,10 +32,7 @@ fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {
 #[test]
 fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
     // A reset: the connection ends, a new one works.
-    let mut b = Scenario::new(&entry(
-        "on = \"setpoint:10\"",
-        "kind = \"connection_reset\"",
-    ));
+    let mut b = Scenario::new(&entry("on = 'setpoint:10'", "connection_reset"));
     b.bring_up(Mode::Servo);
     b.replies.clear();
     b.stream(0.1, 0.1);
@@ -49,7 +43,7 @@ fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
     assert_eq!(b.replies.len(), 10);
 
     // Half open: it stays, but nothing comes any more.
-    let mut b = Scenario::new(&entry("on = \"setpoint:10\"", "kind = \"half_open\""));
+    let mut b = Scenario::new(&entry("on = 'setpoint:10'", "half_open"));
     b.bring_up(Mode::Servo);
     b.replies.clear();
     b.stream(0.1, 0.1);
@@ -60,10 +54,7 @@ fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
     assert_eq!(b.replies.len(), 10);
 
     // A pulled cable: silence everywhere, no new connection, then a reset.
-    let script = entry(
-        "on = \"setpoint:10\"",
-        "kind = \"cable_pull\"\nduration_s = 0.5",
-    );
+    let script = entry("on = 'setpoint:10'", "cable_pull, duration_s = 0.5");
     let mut b = Scenario::new(&script);
     let reports = b
         .arm
@@ -99,22 +90,22 @@ fn replies_come_late_swapped_twice_or_not_at_all() {
         (ids, b.replies[0].ms)
     };
     let in_order: Vec<u16> = (1..=40).collect();
-    let (ids, first_ms) = run("kind = \"replies_delayed\"\ndelay_s = 0.02");
+    let (ids, first_ms) = run("replies_delayed, delay_s = 0.02");
     assert_eq!((ids, first_ms), (in_order.clone(), 220));
-    let (ids, _) = run("kind = \"replies_reordered\"");
+    let (ids, _) = run("replies_reordered");
     assert_eq!(ids[..4], [2, 1, 4, 3]);
-    let (ids, _) = run("kind = \"replies_duplicated\"");
+    let (ids, _) = run("replies_duplicated");
     assert_eq!(ids[..4], [1, 1, 2, 2]);
-    let (ids, _) = run("kind = \"replies_lost\"\nshare = 0.5");
+    let (ids, _) = run("replies_lost, share = 0.5");
     assert!((10..30).contains(&ids.len()), "{ids:?}");
-    let (ids, _) = run("kind = \"replies_foreign\"");
+    let (ids, _) = run("replies_foreign");
     assert_eq!(ids[..4], [0x4001, 1, 0x4002, 2]);
 }
 
 /// A reply that waits for another one to pass does not wait for ever.
 #[test]
 fn a_lonely_reply_is_only_delayed_by_reordering() {
-    let mut b = Scenario::new(&entry("at_s = 0", "kind = \"replies_reordered\""));
+    let mut b = Scenario::new(&entry("at_s = 0", "replies_reordered"));
     b.wait(0.01);
     b.send(&Command::GetState);
     b.wait(0.1);
@@ -129,10 +120,7 @@ fn status_bits_lie_without_anything_else_changing() {
         ("warning_bit", Status::WARNING),
         ("not_ready_bit", Status::NOT_READY),
     ] {
-        let script = entry(
-            "on = \"setpoint:5\"",
-            &format!("kind = \"{kind}\"\nduration_s = 0.02"),
-        );
+        let script = entry("on = 'setpoint:5'", &format!("{kind}, duration_s = 0.02"));
         let mut b = Scenario::new(&script);
         b.bring_up(Mode::Servo);
         b.replies.clear();

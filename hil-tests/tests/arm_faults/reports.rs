@@ -26,17 +26,17 @@ fn reports(kind: &str) -> Vec<(u64, Vec<u8>)> {
 
 #[test]
 fn report_streams_stop_freeze_and_show_wrong_times() {
-    let healthy = reports("kind = \"collision\"");
+    let healthy = reports("collision");
     assert!(healthy.len() >= 249 && healthy.iter().all(|(_, f)| f.len() == 784));
 
-    let stopped = reports("kind = \"report_stop\"\nduration_s = 0.3");
+    let stopped = reports("report_stop, duration_s = 0.3");
     assert!((173..=177).contains(&stopped.len()), "{}", stopped.len());
 
     let parse = |frames: &[(u64, Vec<u8>)]| -> Vec<RealtimeReport> {
         let parse = |(_, f): &(u64, Vec<u8>)| RealtimeReport::parse(f).unwrap();
         frames.iter().map(parse).collect()
     };
-    let frozen = parse(&reports("kind = \"report_freeze\"\nduration_s = 0.3"));
+    let frozen = parse(&reports("report_freeze, duration_s = 0.3"));
     let same = frozen
         .windows(2)
         .filter(|w| w[0].actual == w[1].actual && w[1].time_us > w[0].time_us)
@@ -49,13 +49,11 @@ fn report_streams_stop_freeze_and_show_wrong_times() {
             .map(|w| w[1].time_us.cast_signed() - w[0].time_us.cast_signed())
             .collect()
     };
-    let jump = steps("kind = \"report_time_jump\"\nby_s = -0.5");
+    let jump = steps("report_time_jump, by_s = -0.5");
     assert_eq!(jump.iter().filter(|s| **s == -496_000).count(), 1);
-    let wrap = steps("kind = \"report_time_wrap\"");
+    let wrap = steps("report_time_wrap");
     assert_eq!(wrap.iter().filter(|s| **s < -100_000_000).count(), 1);
-    let drift: i64 = steps("kind = \"report_time_drift\"\nppm = 10000")
-        .iter()
-        .sum();
+    let drift: i64 = steps("report_time_drift, ppm = 10000").iter().sum();
     assert!((drift - 1_005_000).abs() < 3_000, "{drift}");
 }
 
@@ -63,20 +61,20 @@ fn report_streams_stop_freeze_and_show_wrong_times() {
 fn spoiled_reports_are_torn_mislabelled_or_no_numbers() {
     let count =
         |kind: &str, is: fn(&[u8]) -> bool| reports(kind).iter().filter(|(_, f)| is(f)).count();
-    let torn = "kind = \"report_torn\"\nframes = 3\nkeep_bytes = 60";
+    let torn = "report_torn, frames = 3, keep_bytes = 60";
     assert_eq!(count(torn, |f| f.len() == 60), 3);
-    let length = "kind = \"report_length\"\nframes = 2\nclaim_bytes = 12";
+    let length = "report_length, frames = 2, claim_bytes = 12";
     assert_eq!(count(length, |f| f[..4] == [0, 0, 0, 12]), 2);
     fn second(f: &[u8]) -> f64 {
         RealtimeReport::parse(f).unwrap().actual.q[1]
     }
-    let nan = "kind = \"report_nan\"\nframes = 4\njoint = 2";
+    let nan = "report_nan, frames = 4, joint = 2";
     assert_eq!(count(nan, |f| second(f).is_nan()), 4);
-    let infinity = "kind = \"report_infinity\"\nframes = 4\njoint = 2";
+    let infinity = "report_infinity, frames = 4, joint = 2";
     assert_eq!(count(infinity, |f| second(f).is_infinite()), 4);
     // A proper stamp is far below a day.
     let day_us = |f: &[u8]| RealtimeReport::parse(f).unwrap().time_us > 86_400_000_000;
-    let garbage = "kind = \"report_garbage\"\nframes = 5";
+    let garbage = "report_garbage, frames = 5";
     assert_eq!(count(garbage, day_us), 5);
 }
 
@@ -106,10 +104,7 @@ fn firmware_decides_layouts_and_what_is_known() {
     assert!(factor(Firmware(2, 2, 0)) && !factor(Firmware(2, 3, 0)));
 
     // A change concerns new connections; the old ones keep their size.
-    let mut b = Scenario::new(&entry(
-        "at_s = 0.1",
-        "kind = \"firmware_changed\"\nversion = \"2.8.2\"",
-    ));
+    let mut b = Scenario::new(&entry("at_s = 0.1", "firmware_changed, version = '2.8.2'"));
     let rich = |b: &mut Scenario| {
         b.arm
             .connect(Service::Reports(ReportKind::Rich), b.now)

@@ -1,86 +1,74 @@
 //! What every stop, and every fault that is no stop, must look like.
 
-use super::limits;
-use super::stage::{INTERFACES, Stage, mid_throw};
-use arm_model::{JointTrajectory, JointVector};
+use super::limits::{self, EVER};
+use super::stage::{INTERFACES, Stage};
+use arm_model::JointVector;
 use rt_controller::control::reaction::StopCategory;
-use rt_controller::control::{ControlCommand, ControlEvent, Motion};
-use shared_types::ipc::{CauseRecord, ControllerMode};
+use rt_controller::control::{ControlCommand, ControlEvent};
+use shared_types::ipc::{CauseRecord, ControllerMode, RunCounts};
 use shared_types::{FaultCode, MonotonicNs};
+use xarm_sim::JointSample;
 
 /// Speed under which the arm stands (rad/s).
 const STANDING_RAD_S: f64 = 1e-3;
 /// Longest time from the cause to standstill (s).
 const STOP_WITHIN_S: f64 = 1.5;
 
-/// Back and forth with joint 7, possible wherever the arm stopped.
-pub(crate) fn nod(from: JointVector) -> Motion {
-    let mut out = from;
-    out[6] += if from[6] > 0.0 { -0.2 } else { 0.2 };
-    let times = [0.0, 0.4, 0.8];
-    Motion::Spline(JointTrajectory::new(&times, &[from, out, from]).unwrap())
-}
-
-/// What a stop is expected to be.
+/// What a stop is expected to be: for which fault, how, and whether the arm is asked to stop.
 #[derive(Clone, Copy)]
-pub(crate) struct Stop {
-    pub(crate) fault: FaultCode,
-    pub(crate) path: StopCategory,
-    /// The arm is asked to stop.
-    pub(crate) stop_arm: bool,
-}
-
-impl Stop {
-    const fn of(fault: FaultCode, path: StopCategory, stop_arm: bool) -> Self {
-        Self {
-            fault,
-            path,
-            stop_arm,
-        }
-    }
-}
+pub(crate) struct Stop(FaultCode, StopCategory, bool);
 
 /// Slowed along the path.
 pub(crate) const fn slowed(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::OnPath, false)
+    Stop(fault, StopCategory::OnPath, false)
 }
 
 /// Braked in joint space.
 pub(crate) const fn braked(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::JointSpace, false)
+    Stop(fault, StopCategory::JointSpace, false)
 }
 
 /// Braked, then the arm asked to stop.
 pub(crate) const fn braked_and_stopped(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::JointSpace, true)
+    Stop(fault, StopCategory::JointSpace, true)
 }
 
 /// No setpoints any more, the arm asked to stop.
 pub(crate) const fn stopped(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::CutOff, true)
+    Stop(fault, StopCategory::CutOff, true)
 }
 
 /// No setpoints any more; the arm has stopped by itself or cannot hear.
 pub(crate) const fn silenced(fault: FaultCode) -> Stop {
-    Stop::of(fault, StopCategory::CutOff, false)
+    Stop(fault, StopCategory::CutOff, false)
 }
 
-/// A fault in the middle of a throw, by each interface: it stops the throw as wanted, is noticed
+/// A throw by each interface with a fault of a script: it stops as wanted, is noticed
 /// within `noticed_s`, and after `lasts_s` more the arm works again.
 pub(crate) fn assert_stopped_by(
-    kind: &str,
+    script: &str,
     want: Stop,
     [noticed_s, lasts_s]: [f64; 2],
-    also: impl Fn(&Stage, &CauseRecord),
+    also: impl Fn(&mut Stage, &CauseRecord),
 ) {
     for via in INTERFACES {
-        let mut stage = Stage::thrown(via, &mid_throw(kind));
+        let mut stage = Stage::thrown(via, script);
         let cause = stage.assert_stop(want);
         let took_s = MonotonicNs(cause.stamp_ns).since_s(stage.fault_began(1));
-        assert!(took_s < noticed_s, "{via:?}, {kind}: {took_s} s");
-        also(&stage, &cause);
+        assert!(took_s < noticed_s, "{via:?}, {script}: {took_s} s");
+        also(&mut stage, &cause);
         stage.rig.run_for(lasts_s);
         stage.assert_works_again();
+    }
+}
+
+/// A throw by each interface with a fault of a script: nothing comes of it but counts.
+pub(crate) fn assert_borne(script: &str, counted: impl Fn(&RunCounts) -> bool) {
+    for via in INTERFACES {
+        let stage = Stage::thrown(via, script);
+        stage.assert_undisturbed();
+        let counts = stage.rig.counts();
+        assert!(counted(&counts), "{via:?}, {script}: {counts:?}");
     }
 }
 
@@ -90,11 +78,11 @@ impl Stage {
     pub(crate) fn assert_stop(&mut self, want: Stop) -> CauseRecord {
         let cause = self.assert_one_cause(want);
         // What a dead link delivers later is no setpoint any more.
-        let wire_until = match want.path {
+        let wire_until = match want.1 {
             StopCategory::CutOff => MonotonicNs(cause.stamp_ns),
-            _ => MonotonicNs(u64::MAX),
+            _ => EVER,
         };
-        limits::assert_kept(self, wire_until);
+        limits::assert_kept(self, wire_until, 0.0);
         self.assert_standstill(&cause);
         self.assert_nothing_moves_it();
         assert_eq!(
@@ -105,23 +93,18 @@ impl Stage {
         cause
     }
 
-    fn assert_one_cause(&self, want: Stop) -> CauseRecord {
+    fn assert_one_cause(&self, Stop(fault, path, stop_arm): Stop) -> CauseRecord {
         let causes = &self.rig.log.causes;
-        assert_eq!(
-            causes.len(),
-            1,
-            "{:?} {:?}: {causes:?}",
-            self.via,
-            want.fault
-        );
-        let cause = causes[0];
+        let [cause] = causes[..] else {
+            panic!("{:?} {fault:?}: {causes:?}", self.via);
+        };
         let said = (cause.fault(), cause.path, cause.stop_arm != 0);
-        let wanted = (want.fault, want.path as u8, want.stop_arm);
+        let wanted = (fault, path as u8, stop_arm);
         assert_eq!(said, wanted, "{:?}: {cause:?}", self.via);
         assert!(cause.cycle <= cause.rest_cycle && cause.motion_id > 0);
         let (value, limit) = (cause.limit.value, cause.limit.limit);
         // Codes that are no excess: an error shows how near the speed limit was.
-        let excess = !matches!(want.fault, FaultCode::ArmError | FaultCode::ArmModeChanged);
+        let excess = !matches!(fault, FaultCode::ArmError | FaultCode::ArmModeChanged);
         assert!(!excess || value >= limit, "{value} of {limit}: {cause:?}");
         cause
     }
@@ -147,7 +130,7 @@ impl Stage {
         for k in 0..20 {
             self.rig.dead_man_released = k % 3 == 1;
             self.arm();
-            self.rig.start(nod(self.rig.commanded()));
+            self.start_nod();
             self.rig.command(ControlCommand::Disarm);
             self.rig.command(ControlCommand::Stop);
             self.rig.run_for(0.1);
@@ -161,11 +144,9 @@ impl Stage {
             refused.iter().all(|(_, why)| *why == FaultCode::WrongMode),
             "{refused:?}"
         );
-        let moved = self.rig.log.truth[stood..]
-            .iter()
-            .map(|s| s.state.qd.max_abs());
+        let still = |s: &JointSample| s.state.qd.max_abs() < STANDING_RAD_S;
         assert!(
-            moved.fold(0.0, f64::max) < STANDING_RAD_S,
+            self.rig.log.truth[stood..].iter().all(still),
             "it moved after the stop"
         );
     }
@@ -176,32 +157,28 @@ impl Stage {
         let (finished, causes) = (self.finished(), self.rig.log.causes.len());
         self.rig.bring_up().unwrap();
         self.rig.run_for(0.5);
-        assert_eq!(
-            self.rig.mode(),
-            ControllerMode::Idle,
-            "{:?}",
-            self.rig.log.causes
-        );
-        self.rig.start(nod(self.rig.commanded()));
+        self.assert_mode(ControllerMode::Idle);
+        self.start_nod();
         self.rig.run_cycles(2);
         let (_, refused) = *self.refusals().last().unwrap();
         assert_eq!(refused, FaultCode::NotArmed, "nothing re-arms by itself");
         self.arm();
-        self.rig.start(nod(self.rig.commanded()));
+        self.start_nod();
         let stood = self.rig.log.truth.len();
         self.rig.run_for(1.2);
         assert_eq!(self.finished(), finished + 1, "{:?}", self.rig.log.causes);
         assert_eq!(self.rig.log.causes.len(), causes);
-        let moved = self.rig.log.truth[stood..]
-            .iter()
-            .map(|s| s.state.qd[6].abs());
-        assert!(moved.fold(0.0, f64::max) > 0.3, "it does not move");
+        let moves = |s: &JointSample| s.state.qd[6].abs() > 0.3;
+        assert!(
+            self.rig.log.truth[stood..].iter().any(moves),
+            "it does not move"
+        );
     }
 
     /// Asserts that the throw went on to its end, within all limits, as if
     /// nothing had happened.
     pub(crate) fn assert_undisturbed(&self) {
-        self.assert_finished();
+        self.assert_finished(0.0);
         self.assert_same_path();
     }
 
@@ -214,30 +191,22 @@ impl Stage {
         assert!(path(self) == path(&undisturbed), "another path");
     }
 
-    /// Asserts that the throw went on to its end, within all limits.
-    pub(crate) fn assert_finished(&self) {
-        self.assert_ended();
-        limits::assert_kept(self, MonotonicNs(u64::MAX));
-    }
-
-    /// The same where setpoints may arrive a little beside the instant they are
-    /// for.
-    pub(crate) fn assert_finished_with_jitter(&self, jitter_s: f64) {
-        self.assert_ended();
-        limits::assert_kept_with_jitter(self, jitter_s);
-    }
-
-    fn assert_ended(&self) {
-        let log = &self.rig.log;
-        assert!(log.causes.is_empty(), "{:?}: {:?}", self.via, log.causes);
-        assert_eq!(
-            (self.finished(), self.rig.mode()),
-            (1, ControllerMode::Idle)
-        );
+    /// Asserts that the throw went on to its end, within all limits; setpoints may arrive
+    /// `jitter_s` beside the instant they are for.
+    pub(crate) fn assert_finished(&self, jitter_s: f64) {
+        self.assert_one_motion(jitter_s);
         assert_eq!(self.arm_errors(), [0_u8; 0]);
         let off = self.rig.with_arm(|arm| arm.model().true_motion().q) - self.throw.end();
         assert!(off.max_abs() < 2e-3, "{:?}: ends {off:?} off", self.via);
         assert!(self.speed() < STANDING_RAD_S);
+    }
+
+    /// Asserts that one motion went on to its end, within all limits.
+    pub(crate) fn assert_one_motion(&self, jitter_s: f64) {
+        self.assert_mode(ControllerMode::Idle);
+        let found = (self.finished(), self.rig.log.causes.len());
+        assert_eq!(found, (1, 0), "{:?}", self.via);
+        limits::assert_kept(self, EVER, jitter_s);
     }
 
     /// Asserts that nothing moved and that the last motion was refused for

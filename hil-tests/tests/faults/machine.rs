@@ -6,9 +6,9 @@ use arm_model::{JointTrajectory, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::restore_input;
-use rt_controller::control::{ControlCommand, ControlSettings, ControlState, Motion, Thresholds};
+use rt_controller::control::{ControlSettings, ControlState, Motion, Thresholds};
 use shared_types::ipc::CauseRecord;
-use shared_types::{Arming, CommandInterface, FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 use xarm_sim::Intake;
 
 const MS: u64 = 1_000_000;
@@ -18,11 +18,8 @@ const MS: u64 = 1_000_000;
 fn fault_02_a_single_late_wake_up_costs_its_setpoints_and_no_more() {
     for via in INTERFACES {
         for late_us in [300, 900, 2000, 3900, 4300, 6000, 7900, 8000] {
-            let mut stage = Stage::throwing(via, "");
-            stage.run_part(0.5);
-            stage.rig.oversleep([late_us * 1000]);
-            stage.finish();
-            stage.assert_finished();
+            let stage = Stage::disturbed(via, 0.5, |rig| rig.oversleep([late_us * 1000]));
+            stage.assert_finished(0.0);
             let missed = stage.rig.counts().missed;
             assert_eq!(missed > 0, late_us > 800, "{late_us} us: {missed} missed");
             assert_on_time(&stage);
@@ -48,12 +45,8 @@ fn assert_on_time(stage: &Stage) {
 fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
     for via in INTERFACES {
         for first_us in [500, 1500, 2500, 3500, 3900] {
-            let mut stage = Stage::throwing(via, "");
-            stage.run_part(0.2);
             let pairs = (0..60).flat_map(|k| [first_us * MS / 1000, (k % 4) * 900_000, 0]);
-            stage.rig.oversleep(pairs);
-            stage.finish();
-            stage.assert_finished();
+            Stage::disturbed(via, 0.2, |rig| rig.oversleep(pairs)).assert_finished(0.0);
         }
     }
 }
@@ -65,14 +58,11 @@ fn fault_02_late_wake_ups_in_a_row_never_look_too_fast_to_the_arm() {
 fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
     for via in INTERFACES {
         for held_us in [100, 300, 500, 1500, 2500, 3500, 3900, 4500, 7000] {
-            let mut stage = Stage::throwing(via, "");
-            stage.run_part(0.2);
             // Two cycles lost again and again are another fault's matter.
             let times = if held_us < 4000 { 40 } else { 1 };
             let often = (0..times).flat_map(|k| [held_us * 1000, (k % 4) * held_us * 250, 0, 0, 0]);
-            stage.rig.hold_up(often);
-            stage.finish();
-            stage.assert_finished_with_jitter(0.2e-3);
+            let stage = Stage::disturbed(via, 0.2, |rig| rig.hold_up(often));
+            stage.assert_finished(0.2e-3);
             let missed = stage.rig.counts().missed;
             assert_eq!(missed > 0, held_us > 200, "{held_us} us: {missed} missed");
             assert_on_time(&stage);
@@ -85,10 +75,7 @@ fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
 #[test]
 fn fault_02_a_machine_that_is_always_too_slow_stops_the_motion() {
     for via in INTERFACES {
-        let mut stage = Stage::throwing(via, "");
-        stage.run_part(0.2);
-        stage.rig.hold_up([MS; 2000]);
-        stage.finish();
+        let stage = Stage::disturbed(via, 0.2, |rig| rig.hold_up([MS; 2000]));
         let causes = &stage.rig.log.causes;
         let faults: Vec<FaultCode> = causes.iter().map(CauseRecord::fault).collect();
         assert_eq!(faults, [FaultCode::LateCycles]);
@@ -99,16 +86,11 @@ fn fault_02_a_machine_that_is_always_too_slow_stops_the_motion() {
 #[test]
 fn fault_02_three_cycles_lost_at_once_slow_the_motion() {
     // By velocities the arm has begun to brake by itself after 12 ms.
-    let servo = |via: &CommandInterface| *via == CommandInterface::ServoPosition;
-    for via in INTERFACES.into_iter().filter(servo) {
-        let mut stage = Stage::throwing(via, "");
-        stage.run_part(0.5);
-        stage.rig.oversleep([12 * MS + 300_000]);
-        stage.finish();
-        let cause = stage.assert_stop(slowed(FaultCode::LateCycles));
-        assert_eq!((cause.limit.value, cause.limit.limit), (3.0, 2.0));
-        stage.assert_works_again();
-    }
+    let via = CommandInterface::ServoPosition;
+    let mut stage = Stage::disturbed(via, 0.5, |rig| rig.oversleep([12 * MS + 300_000]));
+    let cause = stage.assert_stop(slowed(FaultCode::LateCycles));
+    assert_eq!((cause.limit.value, cause.limit.limit), (3.0, 2.0));
+    stage.assert_works_again();
 }
 
 /// In the gap the arm has come to rest: a brake from where it was would begin
@@ -116,10 +98,7 @@ fn fault_02_three_cycles_lost_at_once_slow_the_motion() {
 #[test]
 fn fault_03_twenty_lost_cycles_end_the_motion() {
     for via in INTERFACES {
-        let mut stage = Stage::throwing(via, "");
-        stage.run_part(0.5);
-        stage.rig.oversleep([80 * MS]);
-        stage.finish();
+        let mut stage = Stage::disturbed(via, 0.5, |rig| rig.oversleep([80 * MS]));
         let cause = stage.assert_stop(stopped(FaultCode::DeadlineMissed));
         assert_eq!((cause.limit.value, cause.limit.limit), (20.0, 5.0));
         stage.assert_works_again();
@@ -175,7 +154,7 @@ fn fault_33_a_core_that_is_told_the_same_does_the_same_at_any_hour() {
             out.record.send_ns = did.send_ns;
             assert_eq!(out.record, *did);
         }
-        stage.assert_finished();
+        stage.assert_finished(0.0);
     }
 }
 
@@ -204,7 +183,7 @@ fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
                     _ => rng.random_range(4 * MS..6 * MS),
                 }));
             stage.finish();
-            stage.assert_finished_with_jitter(0.000_201);
+            stage.assert_finished(0.000_201);
             assert!(stage.rig.counts().missed > 10);
         }
     }
@@ -213,19 +192,16 @@ fn fault_34_a_machine_under_stress_is_borne_within_bounds() {
 #[test]
 fn fault_34_beyond_the_bounds_the_motion_is_slowed() {
     // By velocities the arm has begun to brake by itself after 12 ms.
-    let servo = |via: &CommandInterface| *via == CommandInterface::ServoPosition;
-    for via in INTERFACES.into_iter().filter(servo) {
-        for seed in 0..20 {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut stage = Stage::throwing(via, "");
-            let calm = rng.random_range(20..200);
-            let late = |_| rng.random_range(200_000..3_990_000);
-            let jitter: Vec<u64> = (0..calm).map(late).collect();
-            stage.rig.oversleep(jitter);
-            stage.rig.oversleep([rng.random_range(13 * MS..19 * MS)]);
-            stage.finish();
-            stage.assert_stop(slowed(FaultCode::LateCycles));
-        }
+    for seed in 0..20 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut stage = Stage::throwing(CommandInterface::ServoPosition, "");
+        let calm = rng.random_range(20..200);
+        let late = |_| rng.random_range(200_000..3_990_000);
+        let jitter: Vec<u64> = (0..calm).map(late).collect();
+        stage.rig.oversleep(jitter);
+        stage.rig.oversleep([rng.random_range(13 * MS..19 * MS)]);
+        stage.finish();
+        stage.assert_stop(slowed(FaultCode::LateCycles));
     }
 }
 
@@ -239,11 +215,7 @@ fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
             config.arm.clock_ppm = ppm;
             config.arm.intake = Intake::Clock;
             let mut stage = Stage::of(config);
-            stage.rig.command(ControlCommand::Arm(Arming {
-                operating_mode: OperatingMode::Wiggle,
-                expires_ns: u64::MAX,
-                area_clear: false,
-            }));
+            stage.arm_for(OperatingMode::Wiggle);
             let from = stage.rig.commanded();
             let poses: Vec<_> = (0..13)
                 .map(|k| {
@@ -256,13 +228,7 @@ fn fault_35_an_arm_whose_clock_is_off_by_a_thousandth_slips_evenly() {
             let minute = JointTrajectory::new(&times, &poses).unwrap();
             stage.rig.start(Motion::Spline(minute));
             stage.rig.run_for(61.0);
-            assert!(
-                stage.rig.log.causes.is_empty(),
-                "{:?}",
-                stage.rig.log.causes
-            );
-            assert_eq!(stage.finished(), 1);
-            super::limits::assert_kept(&stage, stage.rig.now());
+            stage.assert_one_motion(0.0);
             // 62 s are 15 500 cycles, of which a thousandth slips.
             let counters = stage.rig.with_arm(|arm| arm.model().counters());
             let slipped = counters.dropped + counters.repeated;

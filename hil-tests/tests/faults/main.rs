@@ -15,5 +15,6 @@ mod operator;
 mod plan;
 mod processes;
 mod reports;
+mod rig;
 mod stage;
 mod tracking;

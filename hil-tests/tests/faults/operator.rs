@@ -1,7 +1,7 @@
 //! The operator lets go or withdraws the arming: 36.
 
 use super::limits;
-use super::stage::{INTERFACES, Stage};
+use super::stage::{INTERFACES, Stage, fastest_through};
 use arm_model::limits::LimitsSpec;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rt_controller::control::reaction::StopCategory;
 use rt_controller::control::{ControlCommand, ControlEvent, Motion};
 use shared_types::ipc::ControllerMode;
-use shared_types::{CommandInterface, FaultCode, MonotonicNs};
+use shared_types::{CommandInterface, FaultCode};
 
 /// Limits that a throw of each interface uses fully. An arm that follows velocities
 /// makes its own jerk and cannot follow steps of the full acceleration closely.
@@ -31,13 +31,7 @@ fn random_throw(from: JointVector, limits: &Limits, rng: &mut ChaCha8Rng) -> Joi
     loop {
         let mut away = || from + JointVector([0.0; 7].map(|_| rng.random_range(-0.7..0.7)));
         let poses = [from, away(), away(), away()];
-        let found = (20..200).find_map(|k| {
-            let step_s = f64::from(k) * 0.01;
-            let times = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
-            let throw = JointTrajectory::new(&times, &poses).unwrap();
-            limits.worst_violation(&throw).is_none().then_some(throw)
-        });
-        if let Some(throw) = found {
+        if let Some(throw) = fastest_through(&poses, limits, 0.01, 20..200) {
             return throw;
         }
     }
@@ -74,12 +68,7 @@ impl Withdrawal {
 /// brakes and that everything to standstill is within limits.
 fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
     stage.run_part(part);
-    assert_eq!(
-        stage.rig.mode(),
-        ControllerMode::Streaming,
-        "{:?}",
-        stage.rig.log.causes
-    );
+    stage.assert_mode(ControllerMode::Streaming);
     let before = stage.rig.log.records.last().unwrap().cycle;
     let fault = how.happens(stage);
     stage.rig.run_cycles(1);
@@ -87,20 +76,16 @@ fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
     assert_eq!(first.cycle, before + 1);
     assert_eq!((first.sent, first.mode), (1, ControllerMode::Braking as u8));
     stage.rig.run_for(0.8);
-    let causes = &stage.rig.log.causes;
-    assert_eq!(causes.len(), 1, "{how:?} at {part}: {causes:?}");
-    let cause = causes[0];
-    assert_eq!(
-        (cause.fault(), cause.path),
-        (fault, StopCategory::JointSpace as u8)
-    );
-    assert_eq!(
-        (cause.cycle, cause.stop_arm, cause.second_code),
-        (before + 1, 0, 0),
-        "{cause:?}"
-    );
+    let [cause] = stage.rig.log.causes[..] else {
+        panic!("{how:?} at {part}: {:?}", stage.rig.log.causes);
+    };
+    let braked = (fault, StopCategory::JointSpace as u8);
+    assert_eq!((cause.fault(), cause.path), braked);
+    let at_once = (before + 1, 0, 0);
+    let found = (cause.cycle, cause.stop_arm, cause.second_code);
+    assert_eq!(found, at_once, "{cause:?}");
     assert_eq!(stage.rig.mode(), ControllerMode::Faulted);
-    limits::assert_kept(stage, MonotonicNs(u64::MAX));
+    limits::assert_kept(stage, limits::EVER, 0.0);
     assert!(stage.speed() < 1e-3, "{}", stage.speed());
 }
 

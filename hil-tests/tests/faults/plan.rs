@@ -2,13 +2,13 @@
 
 use super::judge::braked;
 use super::limits;
-use super::stage::{INTERFACES, Stage};
+use super::stage::{INTERFACES, Stage, config, fast_throw};
 use arm_model::limits::{LimitKind, LimitsSpec};
 use arm_model::{JointTrajectory, JointVector, Limits, Pole};
 use rt_controller::control::Motion;
 use rt_controller::point_to_point::verify;
 use shared_types::plan::trajectory_hash;
-use shared_types::{CommandInterface, FaultCode, MonotonicNs};
+use shared_types::{CommandInterface, FaultCode};
 use xarm_sim::{Fault, FaultKind, Trigger};
 
 /// Half a degree and a little (rad).
@@ -21,9 +21,7 @@ fn fault_22_a_plan_that_begins_half_a_degree_beside_the_arm_is_refused() {
         let mut beside = stage.rig.commanded();
         beside[2] += BESIDE_RAD;
         stage.arm();
-        stage
-            .rig
-            .start(Motion::Spline(super::stage::fast_throw(beside)));
+        stage.rig.start(Motion::Spline(fast_throw(beside)));
         stage.finish();
         stage.assert_refused(FaultCode::StartPoseMismatch);
     }
@@ -46,11 +44,8 @@ fn fault_22_an_arm_that_stands_beside_what_it_was_told_begins_nothing() {
             stage.rig.start(Motion::Spline(stage.throw));
             stage.rig.run_cycles(6);
             if begins {
-                assert!(
-                    stage.on_path().next().is_some(),
-                    "{:?}",
-                    stage.rig.log.events
-                );
+                let began = stage.on_path().next().is_some();
+                assert!(began, "{:?}", stage.rig.log.events);
             } else {
                 stage.assert_refused(FaultCode::StartPoseMismatch);
             }
@@ -132,7 +127,7 @@ fn fault_23_a_plan_outside_the_limits_is_refused_and_would_be_braked() {
 #[test]
 fn fault_24_a_plan_too_fast_for_the_configured_tool_is_refused_with_time_and_margin() {
     for via in INTERFACES {
-        let mut config = super::stage::config(via, "");
+        let mut config = config(via, "");
         let with_pole = Limits::try_from(LimitsSpec {
             tcp_offset_m: Pole::default().end_m().into(),
             ..config.limits.clone().into()
@@ -154,7 +149,7 @@ fn fault_24_a_plan_too_fast_for_the_configured_tool_is_refused_with_time_and_mar
         let cause = stage.rig.log.causes[0];
         assert_eq!(cause.fault(), FaultCode::SetpointTcpSpeed);
         assert!(cause.trajectory_s < margin.time_s);
-        limits::assert_kept(&stage, MonotonicNs(u64::MAX));
+        limits::assert_kept(&stage, limits::EVER, 0.0);
         stage.assert_stop(braked(FaultCode::SetpointTcpSpeed));
     }
 }

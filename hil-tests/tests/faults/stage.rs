@@ -4,8 +4,10 @@ use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::scenario::entry;
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, Motion, Thresholds};
+use rt_controller::xarm::ArmState;
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{Arming, CommandInterface, MonotonicNs, OperatingMode};
+use std::ops::Range;
 use xarm_sim::ArmEvent;
 
 /// Both ways setpoints travel.
@@ -13,12 +15,18 @@ pub(crate) const INTERFACES: [CommandInterface; 2] = [
     CommandInterface::ServoPosition,
     CommandInterface::JointVelocity,
 ];
-/// In the middle of the throw: a joint is asked for more than 1.2 rad/s.
-pub(crate) const MID_THROW: &str = "on = \"speed:1.2\"";
 
-/// A fault in the middle of the throw.
-pub(crate) fn mid_throw(rest: &str) -> String {
-    entry(MID_THROW, rest)
+/// A fault in the middle of the throw, when a joint is asked for more than 1.2 rad/s.
+pub(crate) fn mid_throw(fault: &str) -> String {
+    entry("on = 'speed:1.2'", fault)
+}
+
+/// Back and forth with joint 7, possible wherever the arm stopped.
+pub(crate) fn nod(from: JointVector) -> Motion {
+    let mut out = from;
+    out[6] += if from[6] > 0.0 { -0.2 } else { 0.2 };
+    let times = [0.0, 0.4, 0.8];
+    Motion::Spline(JointTrajectory::new(&times, &[from, out, from]).unwrap())
 }
 
 /// A wind-up and a throw with joints 2, 4 and 6, as fast as the limits allow to
@@ -35,15 +43,24 @@ pub(crate) fn fast_throw(from: JointVector) -> JointTrajectory {
         by(0.25, -0.35, 0.9),
         by(0.1, -0.1, 0.3),
     ];
-    let limits = Limits::default();
-    (20..400)
-        .find_map(|k| {
-            let step_s = f64::from(k) * 0.005;
-            let times = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
-            let throw = JointTrajectory::new(&times, &poses).unwrap();
-            limits.worst_violation(&throw).is_none().then_some(throw)
-        })
+    fastest_through(&poses, &Limits::default(), 0.005, 20..400)
         .expect("slow enough, it fits the limits")
+}
+
+/// The fastest of the throws through `poses`, evenly in time, that keeps `limits`: between
+/// two poses it takes one of `counts` times `tick_s`.
+pub(crate) fn fastest_through(
+    poses: &[JointVector; 4],
+    limits: &Limits,
+    tick_s: f64,
+    mut counts: Range<u32>,
+) -> Option<JointTrajectory> {
+    counts.find_map(|k| {
+        let step_s = f64::from(k) * tick_s;
+        let times = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
+        let throw = JointTrajectory::new(&times, poses).unwrap();
+        limits.worst_violation(&throw).is_none().then_some(throw)
+    })
 }
 
 /// A rig, the command interface it uses and what it is to throw.
@@ -87,6 +104,19 @@ impl Stage {
         stage
     }
 
+    /// A stage whose throw has ended; after a part of it something happened to the rig.
+    pub(crate) fn disturbed(
+        via: CommandInterface,
+        part: f64,
+        happens: impl FnOnce(&mut VirtualRig),
+    ) -> Self {
+        let mut stage = Self::throwing(via, "");
+        stage.run_part(part);
+        happens(&mut stage.rig);
+        stage.finish();
+        stage
+    }
+
     /// A stage whose throw has ended, one way or the other.
     pub(crate) fn thrown(via: CommandInterface, script: &str) -> Self {
         let mut stage = Self::throwing(via, script);
@@ -94,32 +124,37 @@ impl Stage {
         stage
     }
 
+    pub(crate) fn assert_mode(&self, mode: ControllerMode) {
+        let log = &self.rig.log;
+        assert_eq!(self.rig.mode(), mode, "{:?} {:?}", log.causes, log.events);
+    }
+
     /// Arms for a throw.
     pub(crate) fn arm(&mut self) {
+        self.arm_for(OperatingMode::Throw);
+    }
+
+    /// Arms, for a throw with the area declared clear.
+    pub(crate) fn arm_for(&mut self, operating_mode: OperatingMode) {
         self.rig.command(ControlCommand::Arm(Arming {
-            operating_mode: OperatingMode::Throw,
+            operating_mode,
             expires_ns: u64::MAX,
-            area_clear: true,
+            area_clear: operating_mode == OperatingMode::Throw,
         }));
+    }
+
+    /// Orders a nod from where the arm is commanded to be.
+    pub(crate) fn start_nod(&mut self) {
+        self.rig.start(nod(self.rig.commanded()));
     }
 
     /// Arms and begins the throw.
     pub(crate) fn begin(&mut self) {
-        assert_eq!(
-            self.rig.mode(),
-            ControllerMode::Idle,
-            "{:?}",
-            self.rig.log.causes
-        );
+        self.assert_mode(ControllerMode::Idle);
         self.arm();
         self.rig.start(Motion::Spline(self.throw));
         self.rig.run_cycles(2);
-        assert_eq!(
-            self.rig.mode(),
-            ControllerMode::Streaming,
-            "{:?}",
-            self.rig.log.events
-        );
+        self.assert_mode(ControllerMode::Streaming);
     }
 
     /// Runs until the throw is over by far.
@@ -140,12 +175,8 @@ impl Stage {
     /// When the controller's commands reached the arm, and what they said (rad or
     /// rad/s).
     pub(crate) fn arrivals(&self) -> Vec<(MonotonicNs, JointVector)> {
-        let own = self
-            .rig
-            .log
-            .arm_events
-            .iter()
-            .filter(|e| e.client != Some(u32::MAX));
+        let events = self.rig.log.arm_events.iter();
+        let own = events.filter(|e| e.client != Some(u32::MAX));
         own.filter_map(|e| match e.event {
             ArmEvent::Setpoint(q) => Some((e.at, q)),
             ArmEvent::Velocity { qd, .. } => Some((e.at, qd)),
@@ -203,6 +234,11 @@ impl Stage {
     pub(crate) fn on_path(&self) -> impl Iterator<Item = &CycleRecord> {
         let records = self.rig.log.records.iter();
         records.filter(|r| r.sent == 1 && r.trajectory_s >= 0.0)
+    }
+
+    /// State that the arm is in.
+    pub(crate) fn arm_state(&self) -> ArmState {
+        self.rig.with_arm(|arm| arm.model().state())
     }
 
     /// True speed of the fastest joint now (rad/s).

@@ -11,7 +11,9 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The child's configuration, as TOML; for a subscriber the domain.
+/// The child's role.
+const ROLE: &str = "WAG_TEST_CHILD_ROLE";
+/// Its configuration, as TOML; for a subscriber the domain.
 const CONFIG: &str = "WAG_TEST_CHILD_CONFIG";
 
 /// What a child is.
@@ -29,17 +31,8 @@ pub enum Role {
     Sleeper,
 }
 
-impl Role {
-    const fn test(self) -> &'static str {
-        match self {
-            Self::Controller => "child::is_a_controller",
-            Self::Guardian => "child::is_a_guardian",
-            Self::Operator => "child::is_an_operator",
-            Self::Viewer => "child::is_a_viewer",
-            Self::Sleeper => "child::is_a_sleeper",
-        }
-    }
-}
+/// The test that a child runs.
+const CHILD: &str = "child::is_what_it_is_told_to_be";
 
 /// A child; it is asked to end, then made to, when dropped.
 #[derive(Debug)]
@@ -70,16 +63,10 @@ impl Process {
         config: &str,
         change: impl FnOnce(&mut Command),
     ) -> std::io::Result<Self> {
-        let log = log_of(role, name);
         let mut command = Command::new(std::env::current_exe()?);
-        command
-            .args(["--exact", role.test(), "--nocapture"])
-            .env(CONFIG, config)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(File::create(&log)?);
+        command.args(["--exact", CHILD, "--nocapture"]);
         change(&mut command);
-        Self::of(command, log)
+        Self::of(command, role, name, config)
     }
 
     /// Starts the controller where shared memory has room for 16 MB only; `None`
@@ -96,22 +83,22 @@ impl Process {
         if !can.success() {
             return None;
         }
-        let role = Role::Controller;
-        let log = log_of(role, name);
-        let mut command = place(&format!(
-            "exec '{}' --exact {} --nocapture",
-            this.display(),
-            role.test()
+        let command = place(&format!(
+            "exec '{}' --exact {CHILD} --nocapture",
+            this.display()
         ));
+        Self::of(command, Role::Controller, name, config).ok()
+    }
+
+    fn of(mut command: Command, role: Role, name: &str, config: &str) -> std::io::Result<Self> {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+        let log = folder.join(format!("{name}-{role:?}.log"));
         command
+            .env(ROLE, format!("{role:?}"))
             .env(CONFIG, config)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
-            .stderr(File::create(&log).ok()?);
-        Self::of(command, log).ok()
-    }
-
-    fn of(mut command: Command, log: PathBuf) -> std::io::Result<Self> {
+            .stderr(File::create(&log)?);
         let mut child = command.spawn()?;
         Ok(Self {
             input: child.stdin.take(),
@@ -156,15 +143,14 @@ impl Drop for Process {
     }
 }
 
-fn log_of(role: Role, name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
-    folder.join(format!("{name}-{role:?}.log"))
-}
-
-/// The configuration, in a child; its end is watched for from here on.
-fn config() -> Option<(String, &'static AtomicBool)> {
+/// Not a test by itself, where no environment says what to be.
+#[test]
+fn is_what_it_is_told_to_be() {
+    let Ok(role) = std::env::var(ROLE) else {
+        return;
+    };
     static STOP: AtomicBool = AtomicBool::new(false);
-    let config = std::env::var(CONFIG).ok()?;
+    let config = std::env::var(CONFIG).unwrap();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .init();
@@ -172,7 +158,37 @@ fn config() -> Option<(String, &'static AtomicBool)> {
         let _ = std::io::stdin().read_to_end(&mut Vec::new());
         STOP.store(true, Ordering::SeqCst);
     });
-    Some((config, &STOP))
+    let bus = || Bus::join(&config).unwrap();
+    match role.as_str() {
+        "Controller" => tell(&rt_controller::run(toml::from_str(&config).unwrap(), &STOP)),
+        "Guardian" => {
+            let config: ControllerConfig = toml::from_str(&config).unwrap();
+            tell(&rt_controller::guardian::run(&config, &STOP));
+        }
+        "Operator" => {
+            let mut operator = OperatorEnd::take(&bus()).unwrap();
+            until(&STOP, Duration::from_millis(5), || operator.beat());
+        }
+        "Viewer" => {
+            let bus = bus();
+            let (cycles, joints) = (
+                bus.cycle_subscriber().unwrap(),
+                bus.joint_subscriber().unwrap(),
+            );
+            until(&STOP, Duration::from_millis(1), || {
+                while cycles.receive().unwrap().is_some() {}
+                while joints.receive().unwrap().is_some() {}
+            });
+        }
+        "Sleeper" => {
+            let bus = bus();
+            let _cycles = bus.cycle_subscriber().unwrap();
+            let _chunks = bus.chunk_subscriber().unwrap();
+            let _joints = bus.joint_subscriber().unwrap();
+            until(&STOP, Duration::from_millis(10), || ());
+        }
+        other => panic!("{other} is no role"),
+    }
 }
 
 /// Says why a process could not do its work, as its program would.
@@ -183,64 +199,10 @@ fn tell(end: &Result<(), rt_controller::ControllerError>) {
     }
 }
 
-/// Not a test by itself: the controller of a stand.
-#[test]
-fn is_a_controller() {
-    if let Some((config, stop)) = config() {
-        let config: ControllerConfig = toml::from_str(&config).unwrap();
-        tell(&rt_controller::run(config, stop));
-    }
-}
-
-/// Not a test by itself: the guardian of a stand.
-#[test]
-fn is_a_guardian() {
-    if let Some((config, stop)) = config() {
-        let config: ControllerConfig = toml::from_str(&config).unwrap();
-        tell(&rt_controller::guardian::run(&config, stop));
-    }
-}
-
-/// Not a test by itself: holds the operator's place and beats.
-#[test]
-fn is_an_operator() {
-    if let Some((domain, stop)) = config() {
-        let bus = Bus::join(&domain).unwrap();
-        let mut operator = OperatorEnd::take(&bus).unwrap();
-        while !stop.load(Ordering::SeqCst) {
-            operator.beat();
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-}
-
-/// Not a test by itself: attaches, takes everything in, and waits for its end.
-#[test]
-fn is_a_viewer() {
-    if let Some((domain, stop)) = config() {
-        let bus = Bus::join(&domain).unwrap();
-        let (cycles, joints) = (
-            bus.cycle_subscriber().unwrap(),
-            bus.joint_subscriber().unwrap(),
-        );
-        while !stop.load(Ordering::SeqCst) {
-            while cycles.receive().unwrap().is_some() {}
-            while joints.receive().unwrap().is_some() {}
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-}
-
-/// Not a test by itself: attaches to the records and sleeps.
-#[test]
-fn is_a_sleeper() {
-    if let Some((domain, stop)) = config() {
-        let bus = Bus::join(&domain).unwrap();
-        let _cycles = bus.cycle_subscriber().unwrap();
-        let _chunks = bus.chunk_subscriber().unwrap();
-        let _joints = bus.joint_subscriber().unwrap();
-        while !stop.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(10));
-        }
+/// Does something again and again, with a pause between.
+fn until(stop: &AtomicBool, pause: Duration, mut work: impl FnMut()) {
+    while !stop.load(Ordering::SeqCst) {
+        work();
+        std::thread::sleep(pause);
     }
 }

@@ -1,6 +1,6 @@
 //! Somebody else commands the arm.
 
-use super::stand::{PATIENCE, Stand, at_speed};
+use super::stand::{PATIENCE, Stand};
 use rt_controller::session::ArmSession;
 use rt_controller::xarm::Command;
 use shared_types::FaultCode;
@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 #[test]
 fn fault_13_replies_to_commands_never_sent_mean_a_second_commander() {
     let mut stand = Stand::ready("foreign");
-    let script = at_speed("kind = \"replies_foreign\"\nduration_s = 0.4");
-    stand.stopped_by(&script, &[FaultCode::SecondCommander]);
+    let fault = "replies_foreign, duration_s = 0.4";
+    stand.stopped_by(fault, &[FaultCode::SecondCommander]);
     stand.recovers();
 }
 

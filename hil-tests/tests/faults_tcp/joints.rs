@@ -1,13 +1,13 @@
 //! The joints themselves: lag, a stuck joint, a jumping encoder.
 
-use super::stand::{Stand, at_speed};
+use super::stand::Stand;
 use shared_types::FaultCode;
 use std::time::Duration;
 
 /// Brakes, and asks the arm to stop; works again once the fault is over.
-fn braked(name: &str, kind: &str, expected: &[FaultCode]) {
+fn braked(name: &str, fault: &str, expected: &[FaultCode]) {
     let mut stand = Stand::ready(name);
-    stand.stopped_by(&at_speed(kind), expected);
+    stand.stopped_by(fault, expected);
     stand.rest(Duration::from_secs(2));
     let flight = stand.recovers();
     let cause = flight.causes[0];
@@ -16,27 +16,26 @@ fn braked(name: &str, kind: &str, expected: &[FaultCode]) {
 
 #[test]
 fn fault_19_an_arm_that_lags_is_braked_and_stopped() {
+    let expected = [FaultCode::TrackingError, FaultCode::JointStuck];
     braked(
         "lag",
-        "kind = \"tracking_lag\"\nlag_s = 0.3\nduration_s = 1.0",
-        &[FaultCode::TrackingError, FaultCode::JointStuck],
+        "tracking_lag, lag_s = 0.3, duration_s = 1.0",
+        &expected,
     );
 }
 
 #[test]
 fn fault_20_a_stuck_joint_is_braked_and_stopped() {
+    let expected = [FaultCode::JointStuck, FaultCode::TrackingError];
     braked(
         "stuck",
-        "kind = \"joint_stuck\"\njoint = 6\nduration_s = 2.5",
-        &[FaultCode::JointStuck, FaultCode::TrackingError],
+        "joint_stuck, joint = 6, duration_s = 2.5",
+        &expected,
     );
 }
 
 #[test]
 fn fault_21_an_encoder_that_jumps_5_degrees_is_braked_and_stopped() {
-    braked(
-        "encoder",
-        "kind = \"encoder_jump\"\njoint = 4\nby_rad = 0.0873\nduration_s = 1.0",
-        &[FaultCode::EncoderJump],
-    );
+    let jump = "encoder_jump, joint = 4, by_rad = 0.0873, duration_s = 1.0";
+    braked("encoder", jump, &[FaultCode::EncoderJump]);
 }

@@ -1,7 +1,7 @@
 //! The joint reports: silent, frozen, out of time, torn, no numbers; and arms
 //! whose reports have another layout.
 
-use super::stand::{Stand, at_speed};
+use super::stand::Stand;
 use rt_controller::ControllerConfig;
 use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerRequest;
@@ -16,10 +16,11 @@ fn impatient(config: &mut ControllerConfig) {
 
 #[test]
 fn fault_14_reports_that_stop_slow_the_motion_along_its_path() {
-    let mut stand = Stand::with("report_stop", ArmConfig::default(), impatient);
-    stand.make_ready();
-    let script = at_speed("kind = \"report_stop\"\nport = \"all\"\nduration_s = 1.0");
-    stand.stopped_by(&script, &[FaultCode::ReportStale]);
+    let mut stand = Stand::ready_with("report_stop", impatient);
+    stand.stopped_by(
+        "report_stop, port = 'all', duration_s = 1.0",
+        &[FaultCode::ReportStale],
+    );
     let flight = stand.recovers();
     assert_eq!(flight.causes[0].path, 1, "{:?}", flight.causes[0]);
 }
@@ -27,9 +28,9 @@ fn fault_14_reports_that_stop_slow_the_motion_along_its_path() {
 #[test]
 fn fault_15_frozen_reports_slow_the_motion_along_its_path() {
     let mut stand = Stand::ready("report_freeze");
-    let script = at_speed("kind = \"report_freeze\"\nport = \"all\"\nduration_s = 1.0");
+    let fault = "report_freeze, port = 'all', duration_s = 1.0";
     let expected = [FaultCode::ReportFrozen, FaultCode::JointStuck];
-    stand.stopped_by(&script, &expected);
+    stand.stopped_by(fault, &expected);
     stand.recovers();
 }
 
@@ -37,13 +38,13 @@ fn fault_15_frozen_reports_slow_the_motion_along_its_path() {
 fn fault_16_a_clock_that_jumps_wraps_or_drifts_is_followed() {
     let mut stand = Stand::ready("report_clock");
     for kind in [
-        "kind = \"report_time_jump\"\nby_s = -0.8",
-        "kind = \"report_time_jump\"\nby_s = -0.2",
-        "kind = \"report_time_jump\"\nby_s = 3.0",
-        "kind = \"report_time_wrap\"",
-        "kind = \"report_time_drift\"\nppm = 200\nduration_s = 1.5",
+        "report_time_jump, by_s = -0.8",
+        "report_time_jump, by_s = -0.2",
+        "report_time_jump, by_s = 3.0",
+        "report_time_wrap",
+        "report_time_drift, ppm = 200, duration_s = 1.5",
     ] {
-        stand.inject(&at_speed(kind));
+        stand.inject(kind);
         stand.throws();
     }
     stand.finish();
@@ -53,20 +54,32 @@ fn fault_16_a_clock_that_jumps_wraps_or_drifts_is_followed() {
 fn fault_17_broken_reports_are_dropped_and_too_many_in_a_row_slow_the_motion() {
     let mut stand = Stand::ready("report_broken");
     for kind in [
-        "kind = \"report_nan\"\nframes = 2\njoint = 2",
-        "kind = \"report_infinity\"\nframes = 2\njoint = 5",
-        "kind = \"report_torn\"\nframes = 1\nkeep_bytes = 60",
-        "kind = \"report_length\"\nframes = 1\nclaim_bytes = 12",
+        "report_nan, frames = 2, joint = 2",
+        "report_infinity, frames = 2, joint = 5",
+        "report_torn, frames = 1, keep_bytes = 60",
+        "report_length, frames = 1, claim_bytes = 12",
     ] {
-        stand.inject(&at_speed(kind));
+        stand.inject(kind);
         stand.throws();
     }
-    let script = at_speed("kind = \"report_nan\"\nframes = 200\njoint = 2");
-    stand.stopped_by(&script, &[FaultCode::ReportBroken]);
+    stand.stopped_by(
+        "report_nan, frames = 200, joint = 2",
+        &[FaultCode::ReportBroken],
+    );
     let flight = stand.recovers();
     let broken = flight.total(|c| c.input.broken_reports);
     assert!(broken >= 10, "{broken}");
     assert_eq!(flight.causes[0].path, 1, "{:?}", flight.causes[0]);
+}
+
+/// The bring-up is refused with words that say why, and nothing is brought up.
+fn refuses_to_bring_up(mut stand: Stand, words: &[&str]) {
+    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
+    assert!(words.iter().all(|w| message.contains(w)), "{message}");
+    let refused = stand.refused(&ControllerRequest::Acknowledge);
+    assert_eq!(refused.0, FaultCode::WrongMode, "nothing was brought up");
+    stand.finish();
 }
 
 #[test]
@@ -75,11 +88,7 @@ fn fault_18_a_firmware_without_the_reports_needed_is_refused() {
         firmware: Firmware(1, 12, 0),
         ..ArmConfig::default()
     };
-    let mut stand = Stand::with("old", old, |_| ());
-    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
-    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
-    assert!(message.contains("v1.12.0"), "{message}");
-    stand.finish();
+    refuses_to_bring_up(Stand::with("old", old, |_| ()), &["v1.12.0"]);
 }
 
 /// A line between controller and arm that passes everything on but says that the
@@ -118,33 +127,16 @@ fn a_line_that_lies(arm_port: u16) -> u16 {
 
 #[test]
 fn fault_18_reports_of_another_layout_than_the_firmwares_are_refused() {
-    let mut stand = Stand::with("liar", ArmConfig::default(), |config| {
+    let stand = Stand::with("liar", ArmConfig::default(), |config| {
         config.command_port = a_line_that_lies(config.command_port);
     });
-    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
-    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
-    for word in ["v2.8.2", "574", "587"] {
-        assert!(message.contains(word), "{message}");
-    }
-    let refused = ControllerRequest::Acknowledge;
-    assert_eq!(
-        stand.refused(&refused).0,
-        FaultCode::WrongMode,
-        "nothing was brought up"
-    );
-    stand.finish();
+    refuses_to_bring_up(stand, &["v2.8.2", "574", "587"]);
 }
 
 #[test]
 fn fault_18_another_report_on_the_port_of_the_joint_reports_is_refused() {
-    let mut stand = Stand::with("ports", ArmConfig::default(), |config| {
+    let stand = Stand::with("ports", ArmConfig::default(), |config| {
         config.report_port = config.fallback_report_port;
     });
-    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
-    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
-    assert!(
-        message.contains("135") && message.contains("784"),
-        "{message}"
-    );
-    stand.finish();
+    refuses_to_bring_up(stand, &["135", "784"]);
 }

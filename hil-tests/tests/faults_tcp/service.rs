@@ -1,6 +1,6 @@
 //! What the controller's service answers, mode by mode.
 
-use super::stand::{Stand, execute, swing};
+use super::stand::{Stand, arm_for, execute, swing};
 use arm_model::joint::START_POSE;
 use arm_model::{Limits, LimitsSpec};
 use rt_controller::commander::CommanderLock;
@@ -8,13 +8,6 @@ use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::{FaultCode, OperatingMode};
 use xarm_sim::ArmConfig;
-
-fn arm_for(operating_mode: OperatingMode, area_clear: bool) -> ControllerRequest {
-    ControllerRequest::Arm {
-        operating_mode,
-        area_clear,
-    }
-}
 
 #[test]
 fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
@@ -41,23 +34,16 @@ fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
         other => panic!("{other:?}"),
     }
     for pose in [aside, START_POSE] {
-        let answer = stand.ask(&move_to(pose));
-        assert!(
-            matches!(answer, ControllerEvent::Finished { .. }),
-            "{answer:?}"
-        );
+        let pending = stand.call(&move_to(pose));
+        stand.finishes(&pending);
         assert!((stand.commanded() - pose).max_abs() < 1e-6);
     }
     assert_eq!(stand.ask(&ControllerRequest::Disarm), ControllerEvent::Done);
     assert_eq!(stand.refused(&throw).0, FaultCode::NotArmed);
 
-    match stand.throw() {
-        ControllerEvent::Finished { start_ns, end_ns } => {
-            let lasted_s = (end_ns - start_ns) as f64 * 1e-9;
-            assert!((2.4..4.0).contains(&lasted_s), "{lasted_s}");
-        }
-        other => panic!("{other:?}"),
-    }
+    let [start_ns, end_ns] = stand.throws();
+    let lasted_s = (end_ns - start_ns) as f64 * 1e-9;
+    assert!((2.4..4.0).contains(&lasted_s), "{lasted_s}");
     assert_eq!(stand.refused(&throw).0, FaultCode::NotArmed);
     match stand.ask(&ControllerRequest::Latency) {
         ControllerEvent::Latency(report) => {
@@ -74,26 +60,15 @@ fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
 /// Both hear of it: who asked for the stop and who asked for the motion.
 #[test]
 fn a_stop_is_served_while_a_trajectory_runs() {
-    let mut stand = Stand::start("served");
-    stand.make_ready();
+    let mut stand = Stand::ready("served");
     let pending = stand.begin();
     stand.wait_for_speed();
     assert_eq!(stand.ask(&ControllerRequest::Stop), ControllerEvent::Done);
-    let answer = stand.answer(&pending);
-    let fault = FaultCode::OperatorStop;
-    assert!(
-        matches!(answer, ControllerEvent::Stopped { fault: f, .. } if f == fault),
-        "{answer:?}"
-    );
-    stand.expect(&[fault]);
-    stand.is_latched();
-    assert_eq!(
-        stand.ask(&ControllerRequest::Acknowledge),
-        ControllerEvent::Done
-    );
-    assert_eq!(stand.mode().0, ControllerMode::Idle);
-    stand.works_again();
-    stand.finish();
+    stand.stops(&pending, &[FaultCode::OperatorStop]);
+    let answer = stand.ask(&ControllerRequest::Acknowledge);
+    assert_eq!(answer, ControllerEvent::Done);
+    assert_eq!(stand.mode(), ControllerMode::Idle);
+    stand.recovers();
 }
 
 #[test]

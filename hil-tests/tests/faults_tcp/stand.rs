@@ -4,6 +4,7 @@ use super::child::{Process, Role};
 use super::flight::Flight;
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector};
+use hil_tests::scenario::entry;
 use rt_controller::ControllerConfig;
 use rt_controller::config::{Profile, ThresholdSettings};
 use rt_controller::guardian::GuardianSettings;
@@ -13,7 +14,7 @@ use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerR
 use shared_types::ipc::rpc::{Pending, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
 use shared_types::plan::trajectory_hash;
-use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode};
 use std::cell::OnceCell;
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::{Duration, Instant};
@@ -56,6 +57,13 @@ fn swings(from: JointVector, count: usize) -> JointTrajectory {
     JointTrajectory::new(&times[..=2 * count], &poses[..=2 * count]).unwrap()
 }
 
+pub fn arm_for(operating_mode: OperatingMode, area_clear: bool) -> ControllerRequest {
+    ControllerRequest::Arm {
+        operating_mode,
+        area_clear,
+    }
+}
+
 pub fn execute(trajectory: &JointTrajectory) -> ControllerRequest {
     ControllerRequest::Execute {
         trajectory: Box::new(*trajectory),
@@ -63,9 +71,15 @@ pub fn execute(trajectory: &JointTrajectory) -> ControllerRequest {
     }
 }
 
-/// One entry of a fault script that strikes when the arm is at speed.
-pub fn at_speed(rest: &str) -> String {
-    format!("[[fault]]\non = \"speed:0.5\"\n{rest}\n")
+/// A simulated arm in its start pose.
+pub fn arm_on_free_ports(config: ArmConfig) -> SimulatedArm {
+    SimulatedArm::start(ArmConfig {
+        command_port: 0,
+        report_ports: [0; 4],
+        initial_q: START_POSE,
+        ..config
+    })
+    .unwrap()
 }
 
 /// The controller's configuration for the arm, patient where only a busy machine
@@ -127,7 +141,12 @@ impl Stand {
 
     /// The same with its arm brought up.
     pub fn ready(name: &str) -> Self {
-        let mut stand = Self::start(name);
+        Self::ready_with(name, |_| ())
+    }
+
+    /// The same with changes to the controller's configuration.
+    pub fn ready_with(name: &str, change: impl FnOnce(&mut ControllerConfig)) -> Self {
+        let mut stand = Self::with(name, ArmConfig::default(), change);
         stand.make_ready();
         stand
     }
@@ -138,13 +157,7 @@ impl Stand {
         if ALONE.with(|alone| alone.get().is_none()) {
             BESIDE_OTHERS.with(|_turn| ());
         }
-        let arm = SimulatedArm::start(ArmConfig {
-            command_port: 0,
-            report_ports: [0; 4],
-            initial_q: START_POSE,
-            ..arm
-        })
-        .unwrap();
+        let arm = arm_on_free_ports(arm);
         let mut config = patient(name, &arm);
         change(&mut config);
         let sweep = DomainSweep::new(&config.domain);
@@ -172,12 +185,7 @@ impl Stand {
             truth_ns,
             _sweep: sweep,
         };
-        stand.wait_until("the controller", |s| {
-            matches!(
-                s.ask(&ControllerRequest::Status),
-                ControllerEvent::Status { .. }
-            )
-        });
+        stand.mode();
         stand
     }
 
@@ -275,26 +283,28 @@ impl Stand {
         }
     }
 
-    pub fn mode(&mut self) -> (ControllerMode, FaultCode) {
+    /// Mode of the controller, and the pose that it commands (rad).
+    fn status(&mut self) -> (ControllerMode, JointVector) {
         match self.ask(&ControllerRequest::Status) {
-            ControllerEvent::Status { mode, fault, .. } => (mode, fault),
+            ControllerEvent::Status { mode, q_c, .. } => (mode, q_c),
             other => panic!("{other:?}"),
         }
     }
 
+    pub fn mode(&mut self) -> ControllerMode {
+        self.status().0
+    }
+
     /// Pose that the controller commands (rad).
     pub fn commanded(&mut self) -> JointVector {
-        match self.ask(&ControllerRequest::Status) {
-            ControllerEvent::Status { q_c, .. } => q_c,
-            other => panic!("{other:?}"),
-        }
+        self.status().1
     }
 
     /// Brings the arm up, or acknowledges a fault; both want an arm that can be
     /// recovered by then.
     pub fn make_ready(&mut self) {
         self.wait_until("a ready arm", |s| {
-            let request = match s.mode().0 {
+            let request = match s.mode() {
                 ControllerMode::Offline => ControllerRequest::Bringup,
                 ControllerMode::Idle => return true,
                 _ => ControllerRequest::Acknowledge,
@@ -307,17 +317,13 @@ impl Stand {
     }
 
     pub fn arm_for(&mut self, operating_mode: OperatingMode) -> ControllerEvent {
-        self.ask(&ControllerRequest::Arm {
-            operating_mode,
-            area_clear: true,
-        })
+        self.ask(&arm_for(operating_mode, true))
     }
 
-    /// Adds the faults of a script to the arm's.
-    pub fn inject(&self, script: &str) {
-        for fault in script.parse::<FaultScript>().unwrap().faults {
-            self.arm.inject(fault);
-        }
+    /// Adds a fault of the arm that strikes when it is at speed.
+    pub fn inject(&self, fault: &str) {
+        let script: FaultScript = entry("on = 'speed:0.5'", fault).parse().unwrap();
+        self.arm.inject(script.faults[0]);
     }
 
     /// Arms and begins to swing from where the arm stands.
@@ -325,12 +331,6 @@ impl Stand {
         let from = self.commanded();
         assert_eq!(self.arm_for(OperatingMode::Throw), ControllerEvent::Done);
         self.call(&execute(&swing(from)))
-    }
-
-    /// Arms, swings, and what came of it.
-    pub fn throw(&mut self) -> ControllerEvent {
-        let pending = self.begin();
-        self.answer(&pending)
     }
 
     /// Waits until the arm is asked to move faster than half a radian a second.
@@ -353,15 +353,25 @@ impl Stand {
             .is_some_and(|guardian| guardian.log().contains("the arm is asked to stop"))
     }
 
-    /// A throw that a fault stops: the answer names one of `expected`, and
-    /// nothing moves until it is acknowledged. Returns what was answered.
-    pub fn stopped_by(&mut self, script: &str, expected: &[FaultCode]) -> ControllerEvent {
-        self.inject(script);
-        let answer = self.throw();
+    /// A throw that a fault of the arm stops, as in [`stops`](Self::stops).
+    pub fn stopped_by(&mut self, fault: &str, expected: &[FaultCode]) -> ControllerEvent {
+        self.inject(fault);
+        let pending = self.begin();
+        self.stops(&pending, expected)
+    }
+
+    /// A motion is stopped: the answer names one of `expected`, and nothing moves until it
+    /// is acknowledged. Returns what was answered.
+    pub fn stops(
+        &mut self,
+        pending: &Pending<ControllerRpc>,
+        expected: &[FaultCode],
+    ) -> ControllerEvent {
+        let answer = self.answer(pending);
         let ControllerEvent::Stopped { fault, .. } = answer else {
             panic!("not stopped: {answer:?}");
         };
-        assert!(expected.contains(&fault), "{fault:?} by {script}");
+        assert!(expected.contains(&fault), "{answer:?}");
         self.flight.expect(expected);
         self.is_latched();
         answer
@@ -369,13 +379,10 @@ impl Stand {
 
     /// The stop that has just been answered holds, whatever is asked for.
     pub fn is_latched(&mut self) {
-        assert_eq!(self.mode().0, ControllerMode::Faulted);
+        assert_eq!(self.mode(), ControllerMode::Faulted);
         let from = self.commanded();
         for request in [
-            ControllerRequest::Arm {
-                operating_mode: OperatingMode::Throw,
-                area_clear: true,
-            },
+            arm_for(OperatingMode::Throw, true),
             ControllerRequest::MoveTo {
                 q: START_POSE,
                 speed_part: 0.1,
@@ -392,13 +399,18 @@ impl Stand {
         self.flight.at_rest_between(from_ns, clock::now());
     }
 
-    /// Arms and swings to the end.
-    pub fn throws(&mut self) {
-        let answer = self.throw();
-        assert!(
-            matches!(answer, ControllerEvent::Finished { .. }),
-            "{answer:?}"
-        );
+    /// Arms and swings to the end; when that was (ns).
+    pub fn throws(&mut self) -> [u64; 2] {
+        let pending = self.begin();
+        self.finishes(&pending)
+    }
+
+    /// A motion goes on to its end; when that was (ns).
+    pub fn finishes(&mut self, pending: &Pending<ControllerRpc>) -> [u64; 2] {
+        match self.answer(pending) {
+            ControllerEvent::Finished { start_ns, end_ns } => [start_ns, end_ns],
+            other => panic!("not finished: {other:?}"),
+        }
     }
 
     /// After an acknowledgement the arm works as before, as one swing shows.
@@ -406,11 +418,8 @@ impl Stand {
         self.make_ready();
         let once = swings(self.commanded(), 1);
         assert_eq!(self.arm_for(OperatingMode::Throw), ControllerEvent::Done);
-        let answer = self.ask(&execute(&once));
-        assert!(
-            matches!(answer, ControllerEvent::Finished { .. }),
-            "{answer:?}"
-        );
+        let pending = self.call(&execute(&once));
+        self.finishes(&pending);
     }
 
     /// Works again, and that was all.
@@ -426,7 +435,7 @@ impl Stand {
 
     /// Ends all processes in order and hands over what was recorded, checked.
     pub fn finish(mut self) -> Flight {
-        if self.mode().0 == ControllerMode::Idle {
+        if self.mode() == ControllerMode::Idle {
             // Its end is one more stop, of an arm that stands.
             self.flight.expect(&[FaultCode::OperatorStop]);
         }
@@ -444,14 +453,8 @@ impl Stand {
                 Read::Flaw(flaw) => panic!("{flaw}"),
             }
         }
-        let flight = std::mem::take(&mut self.flight);
-        flight.check();
-        flight
-    }
-
-    /// Setpoints travel as velocities.
-    pub fn velocity(config: &mut ControllerConfig) {
-        config.command_interface = CommandInterface::JointVelocity;
+        self.flight.check();
+        self.flight
     }
 }
 

@@ -28,22 +28,22 @@ const STILL_RAD_S: f64 = 1e-3;
 
 /// What goes wrong in turn; every one ends by itself or with the next bring-up.
 const FAULTS: [&str; 16] = [
-    "kind = \"stall\"\nduration_s = 0.19",
-    "kind = \"connection_reset\"",
-    "kind = \"replies_delayed\"\ndelay_s = 0.006\nduration_s = 1.0",
-    "kind = \"replies_duplicated\"\nduration_s = 1.0",
-    "kind = \"replies_reordered\"\nduration_s = 1.0",
-    "kind = \"replies_lost\"\nshare = 0.02\nduration_s = 1.0",
-    "kind = \"raise_error\"\ncode = 31",
-    "kind = \"mode_changed\"\nmode = 0",
-    "kind = \"report_stop\"\nduration_s = 0.5",
-    "kind = \"report_freeze\"\nduration_s = 0.5",
-    "kind = \"report_garbage\"\nframes = 3",
-    "kind = \"report_time_jump\"\nby_s = 5.0",
-    "kind = \"tracking_lag\"\nlag_s = 0.2\nduration_s = 1.0",
-    "kind = \"joint_stuck\"\njoint = 6\nduration_s = 1.0",
-    "kind = \"encoder_jump\"\njoint = 4\nby_rad = 0.0873\nduration_s = 1.0",
-    "kind = \"warning_bit\"\nduration_s = 1.0",
+    "stall, duration_s = 0.19",
+    "connection_reset",
+    "replies_delayed, delay_s = 0.006, duration_s = 1.0",
+    "replies_duplicated, duration_s = 1.0",
+    "replies_reordered, duration_s = 1.0",
+    "replies_lost, share = 0.02, duration_s = 1.0",
+    "raise_error, code = 31",
+    "mode_changed, mode = 0",
+    "report_stop, duration_s = 0.5",
+    "report_freeze, duration_s = 0.5",
+    "report_garbage, frames = 3",
+    "report_time_jump, by_s = 5.0",
+    "tracking_lag, lag_s = 0.2, duration_s = 1.0",
+    "joint_stuck, joint = 6, duration_s = 1.0",
+    "encoder_jump, joint = 4, by_rad = 0.0873, duration_s = 1.0",
+    "warning_bit, duration_s = 1.0",
 ];
 
 /// A recorded flight.

@@ -2,6 +2,7 @@
 //! cabinet and a whiteboard. Nothing in it moves, so it is cast once per eye.
 
 use super::texture::{fractal, noise};
+use crate::room::shapes::Shape;
 use arm_model::Cell;
 use nalgebra::Vector3;
 
@@ -13,8 +14,7 @@ type Rgb = Vector3<f64>;
 
 /// An upright box standing in the room.
 struct Cuboid {
-    low_m: Vector3<f64>,
-    high_m: Vector3<f64>,
+    shape: Shape,
     /// Its colour at a point, on a face with this normal, so high above the floor (m).
     paint: fn(&Vector3<f64>, &Vector3<f64>, f64) -> Rgb,
 }
@@ -22,27 +22,30 @@ struct Cuboid {
 /// What stands in the room.
 fn furniture(cell: &Cell) -> [Cuboid; 4] {
     let (half, floor_z_m) = (cell.column_half_width_m, cell.floor_z_m);
+    let cuboid = |low_m: [f64; 3], high_m: [f64; 3], paint| Cuboid {
+        shape: Shape::Box {
+            low_m: low_m.into(),
+            high_m: high_m.into(),
+        },
+        paint,
+    };
     [
-        Cuboid {
-            low_m: Vector3::new(-half, -half, floor_z_m),
-            high_m: Vector3::new(half, half, 0.0),
-            paint: column,
-        },
-        Cuboid {
-            low_m: Vector3::new(-0.17, -0.17, floor_z_m),
-            high_m: Vector3::new(0.17, 0.17, floor_z_m + 0.015),
-            paint: plate,
-        },
-        Cuboid {
-            low_m: Vector3::new(-1.32, 0.50, floor_z_m + 0.06),
-            high_m: Vector3::new(-0.42, WALL_Y_M, 0.02),
-            paint: cabinet,
-        },
-        Cuboid {
-            low_m: Vector3::new(1.52, WALL_Y_M - 0.018, 0.10),
-            high_m: Vector3::new(2.62, WALL_Y_M, 0.86),
-            paint: whiteboard,
-        },
+        cuboid([-half, -half, floor_z_m], [half, half, 0.0], column),
+        cuboid(
+            [-0.17, -0.17, floor_z_m],
+            [0.17, 0.17, floor_z_m + 0.015],
+            plate,
+        ),
+        cuboid(
+            [-1.32, 0.50, floor_z_m + 0.06],
+            [-0.42, WALL_Y_M, 0.02],
+            cabinet,
+        ),
+        cuboid(
+            [1.52, WALL_Y_M - 0.018, 0.10],
+            [2.62, WALL_Y_M, 0.86],
+            whiteboard,
+        ),
     ]
 }
 
@@ -140,11 +143,11 @@ impl PlainRoom {
         let nearest = self
             .furniture
             .iter()
-            .filter_map(|c| c.hit(origin, ray).map(|(t, normal)| (t, normal, c)))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((t, normal, cuboid)) = nearest {
-            let p = origin + ray * t;
-            return (cuboid.paint)(&p, &normal, p.z - self.floor_z_m);
+            .filter_map(|c| Some((c.shape.hit(origin, ray)?, c.paint)))
+            .min_by(|a, b| a.0.t.total_cmp(&b.0.t));
+        if let Some((hit, paint)) = nearest {
+            let p = origin + ray * hit.t;
+            return paint(&p, &hit.normal, p.z - self.floor_z_m);
         }
         let to_floor = (self.floor_z_m - origin.z) / ray.z;
         let to_wall = (WALL_Y_M - origin.y) / ray.y;
@@ -155,23 +158,5 @@ impl PlainRoom {
         } else {
             Rgb::repeat(90.0)
         }
-    }
-}
-
-impl Cuboid {
-    /// Distance along the ray and outward normal of the face it enters through.
-    fn hit(&self, origin: &Vector3<f64>, ray: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
-        let (mut enter, mut leave, mut axis) = (f64::NEG_INFINITY, f64::INFINITY, 0);
-        for i in 0..3 {
-            let a = (self.low_m[i] - origin[i]) / ray[i];
-            let b = (self.high_m[i] - origin[i]) / ray[i];
-            if a.min(b) > enter {
-                (enter, axis) = (a.min(b), i);
-            }
-            leave = leave.min(a.max(b));
-        }
-        let mut normal = Vector3::zeros();
-        normal[axis] = -ray[axis].signum();
-        (enter > 0.0 && enter < leave).then_some((enter, normal))
     }
 }

@@ -5,7 +5,7 @@ use super::eye::Eye;
 use super::lighting::Lighting;
 use super::solid::{Material, Solid};
 use super::stroke::Strokes;
-use crate::body::ArmBody;
+use arm_model::capsules::arm_at;
 use arm_model::{Cell, JointVector};
 use nalgebra::Vector3;
 use shared_types::RopeParams;
@@ -114,13 +114,12 @@ pub(super) fn arm_solids(cell: &Cell, q: &JointVector) -> Vec<Solid> {
     const PAINT: [[u8; 3]; 12] = [
         BASE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, GREY, DARK,
     ];
-    let body = ArmBody::at(q, cell);
-    let links = body.links.iter().zip(PAINT);
-    let pole = body.pole;
+    let (links, pole) = arm_at(q, &cell.pole);
+    let links = links.iter().zip(PAINT);
     let collar = pole.b_m + (pole.a_m - pole.b_m).normalize() * 0.012;
     let foot = |x: f64| Vector3::new(x, 0.0, 0.012);
     links
-        .map(|(c, rgb)| {
+        .map(|((_, c), rgb)| {
             // The base's capsule reaches into the column it stands on.
             let sunk = Vector3::z() * (c.radius_m - c.a_m.z).max(0.0);
             let a = if rgb == BASE { c.a_m + sunk } else { c.a_m };
@@ -147,11 +146,8 @@ pub(super) fn arm_solids(cell: &Cell, q: &JointVector) -> Vec<Solid> {
 /// Sizes and surfaces of the rope.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RopeLook {
-    /// Its sizes.
     pub(crate) shape: RopeShape,
-    /// Its surface.
     pub(crate) cord: Material,
-    /// The lead's surface.
     pub(crate) lead: Material,
 }
 
@@ -167,13 +163,7 @@ impl RopeLook {
 
     /// The rope along a smooth curve through its nodes, and the lead at its end.
     pub(super) fn solids(&self, nodes: &[Vector3<f64>]) -> Vec<Solid> {
-        let Some(lead_at) = nodes.last() else {
-            return Vec::new();
-        };
-        let lead = Solid::new(lead_at, lead_at, self.shape.lead_radius_m, self.lead);
-        Solid::chain(&centreline(nodes), self.shape.radius_m, self.cord)
-            .chain([lead])
-            .collect()
+        self.coarse_solids(&centreline(nodes))
     }
 
     /// As [`RopeLook::solids`], straight from node to node: enough for a shadow.

@@ -109,15 +109,8 @@ pub(super) struct Vignette {
 }
 
 impl Vignette {
-    /// Light lost in the corners of the picture.
-    const CORNER_LOSS: f32 = 0.24;
-
-    pub(super) fn of(eye: &Eye) -> Self {
-        Self::with_loss(eye, Self::CORNER_LOSS)
-    }
-
-    /// That loses this part of the light in the corners.
-    pub(super) fn with_loss(eye: &Eye, corner_loss: f32) -> Self {
+    /// A lens that loses this part of the light in the corners.
+    pub(super) fn of(eye: &Eye, corner_loss: f32) -> Self {
         let (w, h) = eye.size_px();
         let centre = [w as f32 / 2.0, h as f32 / 2.0];
         Self {

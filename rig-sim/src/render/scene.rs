@@ -65,22 +65,18 @@ impl Renderer {
         noise_levels: f32,
         seed: u64,
     ) -> Self {
-        let eyes = [Eye::left(camera), Eye::right(camera)]
-            .map(|eye| EyeCanvas::new(eye, View::plain(&eye, &appearance, cell)));
-        let size_px = eyes[0].eye.size_px();
-        Self {
-            eyes,
-            cell: *cell,
-            rope: RopeLook::plain(rope, &appearance),
+        let look = RopeLook::plain(rope, &appearance);
+        let view = |eye: &Eye| View::plain(eye, &appearance, cell);
+        let lamps = Vec::new();
+        Self::of(
+            camera,
+            cell,
+            look,
             appearance,
-            sensor: Sensor::new(noise_levels, size_px.0 * 4, seed),
-            rows: RowTimes::of(camera),
-            target_m: None,
-            size_px,
-            shadows: Shadows::of(Vec::new()),
-            life: Life::default(),
-            drawn_px: 0,
-        }
+            (noise_levels, seed),
+            lamps,
+            view,
+        )
     }
 
     /// Prepares both eyes in a drawn room, which has a surface for the rope and noise of
@@ -98,23 +94,44 @@ impl Renderer {
         let lamps: Vec<_> = lamps
             .map(|lamp| LampView::of(lamp, room.still.wall_y_m))
             .collect();
-        let eyes = [Eye::left(camera), Eye::right(camera)]
-            .map(|eye| EyeCanvas::new(eye, View::of(&eye, room, &lamps)));
+        let (look, appearance) = (rope_look(room, rope), room.appearance(target_rgb));
+        let views = lamps.clone();
+        let view = |eye: &Eye| View::of(eye, room, &views);
+        let noise = (room.picture.noise_levels, seed);
+        let life = Life {
+            bystanders: room.bystanders.clone(),
+            picture: Some((room.picture, frame_rate_hz)),
+        };
+        Self {
+            life,
+            ..Self::of(camera, cell, look, appearance, noise, lamps, view)
+        }
+    }
+
+    /// Prepares both eyes, each with its view of what stands still; nothing else lives.
+    fn of(
+        camera: &StereoCamera,
+        cell: &Cell,
+        rope: RopeLook,
+        appearance: Appearance,
+        (noise_levels, seed): (f32, u64),
+        lamps: Vec<LampView>,
+        view: impl Fn(&Eye) -> View,
+    ) -> Self {
+        let eyes =
+            [Eye::left(camera), Eye::right(camera)].map(|eye| EyeCanvas::new(eye, view(&eye)));
         let size_px = eyes[0].eye.size_px();
         Self {
             eyes,
             cell: *cell,
-            rope: rope_look(room, rope),
-            appearance: room.appearance(target_rgb),
-            sensor: Sensor::new(room.picture.noise_levels, size_px.0 * 4, seed),
+            rope,
+            appearance,
+            sensor: Sensor::new(noise_levels, size_px.0 * 4, seed),
             rows: RowTimes::of(camera),
             target_m: None,
             size_px,
             shadows: Shadows::of(lamps),
-            life: Life {
-                bystanders: room.bystanders.clone(),
-                picture: Some((room.picture, frame_rate_hz)),
-            },
+            life: Life::default(),
             drawn_px: 0,
         }
     }

@@ -11,7 +11,6 @@ pub(crate) struct Material {
     pub(crate) colour: Ycc,
     /// Luma of the highlight.
     pub(crate) gloss: f32,
-    /// Its pattern.
     pub(crate) weave: Weave,
 }
 
@@ -29,13 +28,10 @@ impl Material {
 /// A capsule: all points within a radius of a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Solid {
-    /// One end of the segment (world, m).
+    /// Both ends of the segment (world, m).
     pub(crate) a_m: Vector3<f64>,
-    /// The other end (world, m).
     pub(crate) b_m: Vector3<f64>,
-    /// Its radius (m).
     pub(crate) radius_m: f64,
-    /// Its surface.
     pub(crate) material: Material,
     /// Length of what continues from it at both ends (m), where its pattern goes on.
     pub(crate) arc_m: [f64; 2],

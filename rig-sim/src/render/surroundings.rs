@@ -18,6 +18,8 @@ use nalgebra::Vector3;
 
 /// Rays per pixel along u and v.
 const RAYS: u32 = 2;
+/// Light lost in the corners of the plain room's picture.
+const CORNER_LOSS: f32 = 0.24;
 /// Where the light on moving things is judged (m).
 const MIDDLE_M: Vector3<f64> = Vector3::new(0.6, 0.0, 0.1);
 
@@ -62,7 +64,7 @@ fn cast(
 impl View {
     /// The plain room of a cell.
     pub(super) fn plain(eye: &Eye, appearance: &Appearance, cell: &Cell) -> Self {
-        let vignette = Vignette::of(eye);
+        let vignette = Vignette::of(eye, CORNER_LOSS);
         let room = PlainRoom::new(appearance.wall_rgb, cell);
         Self {
             picture: cast(eye, &vignette, |origin, ray, _| room.look(origin, ray)),
@@ -76,7 +78,7 @@ impl View {
     /// A drawn room.
     pub(super) fn of(eye: &Eye, room: &Room, lamps: &[LampView]) -> Self {
         let (width, height) = eye.size_px();
-        let vignette = Vignette::with_loss(eye, room.picture.corner_loss);
+        let vignette = Vignette::of(eye, room.picture.corner_loss);
         // What each pixel shows: the last of its rays says where, all say how much light.
         let mut seen: Vec<(Vector3<f64>, [f32; 2])> = vec![Default::default(); width * height];
         let picture = cast(eye, &vignette, |origin, ray, [u, v, i]| {

@@ -14,47 +14,25 @@ pub(crate) const WALLS: [&str; 7] = [
 
 /// The wall's surface.
 pub(crate) fn wall(rng: &mut impl Rng, name: &str) -> Paint {
-    let seed = rng.random();
-    let mut paint = |kind, rgb: [u8; 3], other: [u8; 3], size_m| Paint {
+    let seed: u64 = rng.random();
+    let chance = |i: u64| ((seed >> (8 * i)) & 255) as usize;
+    let part = chance(1) as f64 / 255.0;
+    let (kind, colours, other, size_m) = match name {
+        "brick" => {
+            let mortar = [186, 182, 174];
+            (PaintKind::Brick, &BRICK[..], mortar, 0.06 + 0.04 * part)
+        }
+        "wood" => (PaintKind::Boards, &WOOD[..], [0; 3], 0.09 + 0.14 * part),
+        "shelf" => (PaintKind::Books, &WOOD[..], [0; 3], 0.28 + 0.10 * part),
+        "curtain" => (PaintKind::Curtain, &CLOTH[..], [0; 3], 0.07 + 0.10 * part),
+        _ => (PaintKind::Plaster, &PLASTER[..], [0; 3], 1.0),
+    };
+    Paint {
         kind,
-        rgb: about(rng, rgb, 12.0),
+        rgb: about(rng, colours[chance(0) % colours.len()], 12.0),
         other: about(rng, other, 12.0),
         size_m,
         seed,
-    };
-    let chance = |i: u64| ((seed >> (8 * i)) & 255) as usize;
-    let part = |i: u64| chance(i) as f64 / 255.0;
-    match name {
-        "brick" => paint(
-            PaintKind::Brick,
-            BRICK[chance(0) % BRICK.len()],
-            [186, 182, 174],
-            0.06 + 0.04 * part(1),
-        ),
-        "wood" => paint(
-            PaintKind::Boards,
-            WOOD[chance(0) % WOOD.len()],
-            [0; 3],
-            0.09 + 0.14 * part(1),
-        ),
-        "shelf" => paint(
-            PaintKind::Books,
-            WOOD[chance(0) % WOOD.len()],
-            [0; 3],
-            0.28 + 0.10 * part(1),
-        ),
-        "curtain" => paint(
-            PaintKind::Curtain,
-            CLOTH[chance(0) % CLOTH.len()],
-            [0; 3],
-            0.07 + 0.10 * part(1),
-        ),
-        _ => paint(
-            PaintKind::Plaster,
-            PLASTER[chance(0) % PLASTER.len()],
-            [0; 3],
-            1.0,
-        ),
     }
 }
 

@@ -9,11 +9,9 @@ pub(crate) type Rgb = Vector3<f64>;
 /// A surface; places on it are metres to the right and up.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Paint {
-    /// Its kind.
     pub(crate) kind: PaintKind,
-    /// Its main colour.
+    /// Its main colour, and its second one.
     pub(crate) rgb: Rgb,
-    /// Its second colour.
     pub(crate) other: Rgb,
     /// Size of what repeats (m).
     pub(crate) size_m: f64,

@@ -6,9 +6,7 @@ use nalgebra::Vector3;
 /// A still thing.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Thing {
-    /// Its shape.
     pub(crate) shape: Shape,
-    /// Its surface.
     pub(crate) paint: Paint,
 }
 

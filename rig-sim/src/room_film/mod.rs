@@ -7,7 +7,7 @@
 mod camera;
 mod swing;
 
-use crate::as_seen::as_seen;
+use crate::exposure::{as_seen, draw, poses};
 use crate::hidden::hidden_rope;
 use crate::render::{Appearance, Renderer, RopeShape, ScenePose, centreline};
 use crate::room::{Kind, Room};
@@ -31,8 +31,6 @@ pub const FRAME_RATE_HZ: f64 = 60.0;
 const REPORT_S: f64 = 0.004;
 /// Time by which the simulation goes on after the last frame begins (s).
 const AFTER_S: f64 = 0.05;
-/// Poses computed per exposure of a row; as many of them are drawn as the motion needs.
-const POSES: usize = 8;
 /// Time between the places for which the camera must see the rope (s).
 const LOOK_S: f64 = 0.05;
 
@@ -203,23 +201,14 @@ impl RoomFilm {
     pub fn frame(&mut self, i: usize) -> Frame {
         let camera = &self.setting.camera;
         let start_s = start_s(i) + self.setting.film_late_s;
-        let frame_s = camera.frame_time_s();
-        let poses = (POSES as f64 * frame_s / camera.exposure_s).ceil() as usize;
-        let part = |i: usize| start_s + frame_s * (i as f64 + 0.5) / poses as f64;
-        let all: Vec<_> = (0..poses).map(|i| self.pose(part(i))).collect();
+        let all = poses(camera, start_s, |t_s| self.pose(t_s));
         let lines: Vec<Vec<Vector3<f64>>> = all.iter().map(|p| centreline(&p.nodes)).collect();
         let truth = (0..lines[0].len()).filter_map(|point| {
             let places_m: Vec<_> = lines.iter().map(|line| line[point]).collect();
             camera.project_left(&as_seen(camera, &places_m))
         });
         let truth_px = truth.collect();
-        let needed = self.renderer.sub_frames(&all[0], &all[poses - 1]);
-        let drawn = needed.min(poses);
-        // Even over the frame's time, within half of a pose's.
-        let middle = |i: usize| (2 * i + 1) * poses / (2 * drawn);
-        let drawn: Vec<_> = (0..drawn).map(|i| all[middle(i)].clone()).collect();
-        let mut yuyv = vec![0; self.renderer.frame_bytes()];
-        self.renderer.render(&drawn, i as u64, &mut yuyv);
+        let yuyv = draw(&mut self.renderer, &all, i as u64);
         Frame { yuyv, truth_px }
     }
 }

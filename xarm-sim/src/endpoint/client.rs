@@ -1,5 +1,6 @@
 //! One connection, without its socket.
 
+use crate::fault::FaultKind;
 use crate::firmware::Firmware;
 use crate::reports::ReportKind;
 use rt_controller::xarm::{FrameReader, Protocol};
@@ -29,15 +30,6 @@ pub enum Closing {
     Reset,
 }
 
-/// What is done to the next reports of a client.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Damage {
-    Torn { keep_bytes: usize },
-    Length { claim_bytes: u32 },
-    Angle { joint: usize, value: f32 },
-    Garbage,
-}
-
 #[derive(Debug)]
 pub(super) struct Client {
     pub(super) service: Service,
@@ -64,7 +56,8 @@ pub(super) struct Client {
     pub(super) counter: u32,
     /// The last report, undamaged.
     pub(super) last_report: Vec<u8>,
-    pub(super) damage: VecDeque<(Damage, u32)>,
+    /// Faults that spoil its next reports, each so many of them.
+    pub(super) damage: VecDeque<(FaultKind, u32)>,
 }
 
 impl Client {
@@ -146,7 +139,7 @@ impl Client {
     }
 
     /// The damage for the next report, if any is left.
-    pub(super) fn next_damage(&mut self) -> Option<Damage> {
+    pub(super) fn next_damage(&mut self) -> Option<FaultKind> {
         let (damage, left) = self.damage.front_mut()?;
         let damage = *damage;
         *left = left.saturating_sub(1);

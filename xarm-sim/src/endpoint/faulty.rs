@@ -1,9 +1,9 @@
 //! What the faults of the script do when they begin and end.
 
-use super::client::{Client, Damage, Service};
+use super::client::{Client, Service};
 use super::{ArmEndpoint, ArmEvent};
-use crate::fault::{FaultKind, ForeignWish, Progress, ReportPort, Transition};
-use rt_controller::xarm::{ArmState, Command, ErrorCode, Mode, StateRequest};
+use crate::fault::{FaultKind, ForeignWish, Progress};
+use rt_controller::xarm::{Command, Mode, StateRequest};
 use shared_types::MonotonicNs;
 
 /// Number under which the second commander shows in events.
@@ -20,22 +20,15 @@ impl ArmEndpoint {
             setpoints,
             speed_rad_s: self.model.reference_motion().qd.max_abs(),
         };
-        for Transition {
-            entry,
-            kind,
-            begins,
-        } in self.faults.update(at, progress)
-        {
-            self.log(
-                at,
-                ArmEvent::Fault {
-                    entry,
-                    kind,
-                    begins,
-                },
-            );
+        for (entry, kind, begins) in self.faults.update(at, progress) {
+            let event = ArmEvent::Fault {
+                entry,
+                kind,
+                begins,
+            };
+            self.log(at, event);
             self.change_wire(at, &kind, begins);
-            self.change_arm(at, &kind, begins);
+            self.model.change(at, &kind, begins);
         }
     }
 
@@ -53,82 +46,20 @@ impl ArmEndpoint {
             FaultKind::PowerCycle if begins => every.for_each(Client::reset),
             FaultKind::Stall if !begins => self.release(at),
             FaultKind::SecondCommander { .. } if begins => self.foreign_due = at,
-            FaultKind::ReportTorn {
-                port,
-                frames,
-                keep_bytes,
-            } => {
-                let keep_bytes = usize::from(keep_bytes);
-                self.damage(port, frames, Damage::Torn { keep_bytes });
-            }
-            FaultKind::ReportLength {
-                port,
-                frames,
-                claim_bytes,
-            } => self.damage(port, frames, Damage::Length { claim_bytes }),
-            FaultKind::ReportNan {
-                port,
-                frames,
-                joint,
-            } => self.damage(port, frames, angle(joint, f32::NAN)),
-            FaultKind::ReportInfinity {
-                port,
-                frames,
-                joint,
-            } => self.damage(port, frames, angle(joint, f32::INFINITY)),
-            FaultKind::ReportGarbage { port, frames } => {
-                self.damage(port, frames, Damage::Garbage);
+            FaultKind::ReportTorn { port, frames, .. }
+            | FaultKind::ReportLength { port, frames, .. }
+            | FaultKind::ReportNan { port, frames, .. }
+            | FaultKind::ReportInfinity { port, frames, .. }
+            | FaultKind::ReportGarbage { port, frames } => {
+                for client in every {
+                    if let Service::Reports(report) = client.service
+                        && port.covers(report as usize)
+                    {
+                        client.damage.push_back((*kind, frames));
+                    }
+                }
             }
             _ => {}
-        }
-    }
-
-    fn change_arm(&mut self, at: MonotonicNs, kind: &FaultKind, begins: bool) {
-        let model = &mut self.model;
-        let sign = if begins { 1.0 } else { -1.0 };
-        match *kind {
-            FaultKind::Warning { code } => model.warn(code),
-            FaultKind::RaiseError { code } => model.raise(ErrorCode(code)),
-            FaultKind::ServoError { joint, code } if begins => model.break_drive(joint, code),
-            FaultKind::ServoError { .. } => model.mend_drives(),
-            FaultKind::EmergencyStop { code } if begins => model.press_stop(ErrorCode(code)),
-            FaultKind::EmergencyStop { .. } => model.release_stop(),
-            FaultKind::Collision => model.collide(),
-            FaultKind::StateChanged { state } => model.change_state(ArmState::from_code(state)),
-            FaultKind::ModeChanged { mode } => model.change_mode(Mode::from_code(mode)),
-            FaultKind::PowerCycle if begins => model.switch_off(),
-            FaultKind::PowerCycle => model.switch_on(at),
-            FaultKind::FirmwareChanged { version } => model.set_firmware(version),
-            FaultKind::ReportTimeJump { by_s } => model.clock_mut().jump(by_s),
-            FaultKind::ReportTimeWrap => model.clock_mut().restart(at),
-            FaultKind::ReportTimeDrift { ppm } => {
-                let ppm = if begins { ppm } else { 0.0 };
-                model.clock_mut().set_stamp_rate(at, ppm);
-            }
-            FaultKind::ClockRate { ppm } => {
-                let ppm = if begins {
-                    ppm
-                } else {
-                    model.config().clock_ppm
-                };
-                model.clock_mut().set_rate(at, ppm);
-            }
-            FaultKind::TrackingLag { lag_s } => {
-                model.delay_joints(if begins { lag_s } else { 0.0 });
-            }
-            FaultKind::JointStuck { joint } => model.hold_joint(joint, begins),
-            FaultKind::EncoderJump { joint, by_rad } => model.shift_encoder(joint, sign * by_rad),
-            _ => {}
-        }
-    }
-
-    fn damage(&mut self, port: ReportPort, frames: u32, damage: Damage) {
-        for client in self.clients.values_mut() {
-            if let Service::Reports(kind) = client.service
-                && port.covers(kind.index())
-            {
-                client.damage.push_back((damage, frames));
-            }
         }
     }
 
@@ -152,12 +83,5 @@ impl ArmEndpoint {
             ForeignWish::Mode => Command::SetMode(Mode::Position),
         };
         self.model.command_from(SECOND_COMMANDER, now, &command);
-    }
-}
-
-fn angle(joint: u8, value: f32) -> Damage {
-    Damage::Angle {
-        joint: usize::from(joint).saturating_sub(1),
-        value,
     }
 }

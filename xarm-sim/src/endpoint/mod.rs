@@ -75,11 +75,6 @@ impl ArmEndpoint {
         &self.model
     }
 
-    /// The same, to make it misbehave by hand.
-    pub fn model_mut(&mut self) -> &mut ArmModel {
-        &mut self.model
-    }
-
     /// Adds a fault to the script.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);

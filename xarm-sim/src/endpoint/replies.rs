@@ -80,12 +80,7 @@ impl ArmEndpoint {
         {
             state.feedback_mask = *mask;
         }
-        let mut answer = self.model.request_from(
-            Some((client, request.transaction)),
-            arrived,
-            request.register,
-            request.parameters,
-        );
+        let mut answer = self.model.request_from(client, arrived, &request);
         answer.status.0 |= self.false_bits();
         // Replies are far shorter than the longest frame.
         if let Ok(len) = answer.emit(&mut out, &request) {

@@ -2,8 +2,8 @@
 //! it.
 
 use super::ArmEndpoint;
-use super::client::{Client, Damage, Service};
-use crate::fault::FaultKind;
+use super::client::{Client, Service};
+use crate::fault::{FaultKind, ReportPort};
 use crate::reports::ReportKind;
 use rand::Rng;
 use shared_types::MonotonicNs;
@@ -31,11 +31,15 @@ impl ArmEndpoint {
         if client.due <= now {
             client.due = now.plus_s(period_s);
         }
-        let port = kind.index();
-        if self.is_dark() || self.faults.any(|f| stops(f, port)) {
+        let own = |port: &ReportPort| port.covers(kind as usize);
+        let stops =
+            |fault: &FaultKind| matches!(fault, FaultKind::ReportStop { port } if own(port));
+        let freezes =
+            |fault: &FaultKind| matches!(fault, FaultKind::ReportFreeze { port } if own(port));
+        if self.is_dark() || self.faults.any(stops) {
             return;
         }
-        let frozen = self.faults.any(|f| freezes(f, port)) && !client.last_report.is_empty();
+        let frozen = self.faults.any(freezes) && !client.last_report.is_empty();
         let mut frame = if frozen {
             client.last_report.clone()
         } else {
@@ -52,25 +56,19 @@ impl ArmEndpoint {
         client.push(now, frame);
     }
 
-    fn spoil(&mut self, frame: &mut Vec<u8>, damage: Damage, kind: ReportKind) {
+    fn spoil(&mut self, frame: &mut Vec<u8>, damage: FaultKind, kind: ReportKind) {
+        let mut put_angle = |joint: u8, value: f32| {
+            let at = kind.joint_offset(usize::from(joint).saturating_sub(1));
+            frame[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        };
         match damage {
-            Damage::Torn { keep_bytes } => frame.truncate(keep_bytes),
-            Damage::Length { claim_bytes } => {
+            FaultKind::ReportNan { joint, .. } => put_angle(joint, f32::NAN),
+            FaultKind::ReportInfinity { joint, .. } => put_angle(joint, f32::INFINITY),
+            FaultKind::ReportTorn { keep_bytes, .. } => frame.truncate(keep_bytes.into()),
+            FaultKind::ReportLength { claim_bytes, .. } => {
                 frame[..4].copy_from_slice(&claim_bytes.to_be_bytes());
             }
-            Damage::Angle { joint, value } => {
-                let at = kind.joint_offset(joint);
-                frame[at..at + 4].copy_from_slice(&value.to_le_bytes());
-            }
-            Damage::Garbage => self.rng.fill_bytes(&mut frame[4..]),
+            _ => self.rng.fill_bytes(&mut frame[4..]),
         }
     }
-}
-
-fn stops(fault: &FaultKind, index: usize) -> bool {
-    matches!(fault, FaultKind::ReportStop { port } if port.covers(index))
-}
-
-fn freezes(fault: &FaultKind, index: usize) -> bool {
-    matches!(fault, FaultKind::ReportFreeze { port } if port.covers(index))
 }

@@ -48,7 +48,7 @@ pub enum ForeignWish {
 
 /// A fault. Joints are numbered from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum FaultKind {
     /// The command port takes and gives nothing; then everything at once.
     Stall,
@@ -236,24 +236,91 @@ pub enum FaultKind {
     },
 }
 
+/// How long a fault lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lasts {
+    /// Something that happens; a duration makes no sense.
+    Moment,
+    /// For a duration that must be given.
+    Span,
+    /// For a duration, or for ever when none is given.
+    Open,
+}
+
+impl FaultKind {
+    /// How long it lasts.
+    pub(super) fn lasts(&self) -> Lasts {
+        match self {
+            Self::Stall | Self::CablePull | Self::PowerCycle => Lasts::Span,
+            Self::ConnectionReset { .. }
+            | Self::HalfOpen { .. }
+            | Self::Warning { .. }
+            | Self::RaiseError { .. }
+            | Self::Collision
+            | Self::StateChanged { .. }
+            | Self::ModeChanged { .. }
+            | Self::FirmwareChanged { .. }
+            | Self::ReportTimeJump { .. }
+            | Self::ReportTimeWrap
+            | Self::ReportTorn { .. }
+            | Self::ReportLength { .. }
+            | Self::ReportNan { .. }
+            | Self::ReportInfinity { .. }
+            | Self::ReportGarbage { .. } => Lasts::Moment,
+            _ => Lasts::Open,
+        }
+    }
+
+    /// Fields with bounds, both included: name, value, smallest and largest.
+    pub(super) fn bounded(&self) -> Vec<(&'static str, f64, [f64; 2])> {
+        let of_joint = |joint: u8| ("joint", f64::from(joint), [1.0, 7.0]);
+        let of_frames = |frames: u32| ("frames", f64::from(frames), [1.0, 1e6]);
+        let of_code = |code: u8, max: f64| ("code", f64::from(code), [1.0, max]);
+        match *self {
+            Self::RepliesDelayed { delay_s } => vec![("delay_s", delay_s, [0.0, 60.0])],
+            Self::RepliesLost { share } => vec![("share", share, [0.0, 1.0])],
+            Self::Warning { code } | Self::RaiseError { code } => vec![of_code(code, 255.0)],
+            Self::ServoError { joint, code } => vec![of_joint(joint), of_code(code, 255.0)],
+            Self::EmergencyStop { code } => vec![of_code(code, 3.0)],
+            Self::StateChanged { state } => vec![("state", state.into(), [3.0, 6.0])],
+            Self::ModeChanged { mode } => vec![("mode", mode.into(), [0.0, 11.0])],
+            Self::SecondCommander { rate_hz, .. } => vec![("rate_hz", rate_hz, [0.1, 1000.0])],
+            Self::ReportTimeJump { by_s } => vec![("by_s", by_s, [-1e6, 1e6])],
+            Self::ReportTimeDrift { ppm } | Self::ClockRate { ppm } => {
+                vec![("ppm", ppm, [-1e5, 1e5])]
+            }
+            Self::ReportTorn {
+                frames, keep_bytes, ..
+            } => vec![
+                of_frames(frames),
+                ("keep_bytes", keep_bytes.into(), [0.0, 86.0]),
+            ],
+            Self::ReportLength { frames, .. } | Self::ReportGarbage { frames, .. } => {
+                vec![of_frames(frames)]
+            }
+            Self::ReportNan { frames, joint, .. } | Self::ReportInfinity { frames, joint, .. } => {
+                vec![of_frames(frames), of_joint(joint)]
+            }
+            Self::TrackingLag { lag_s } => vec![("lag_s", lag_s, [0.0, 10.0])],
+            Self::JointStuck { joint } => vec![of_joint(joint)],
+            Self::EncoderJump { joint, by_rad } => {
+                vec![of_joint(joint), ("by_rad", by_rad, [-10.0, 10.0])]
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
 impl ReportPort {
     /// Whether it covers the port of index `port` in 30000, 30001, ...
-    #[must_use]
-    pub fn covers(self, port: usize) -> bool {
-        match self {
-            Self::Realtime => port == 0,
-            Self::Normal => port == 1,
-            Self::Rich => port == 2,
-            Self::Real => port == 3,
-            Self::All => true,
-        }
+    pub(crate) fn covers(self, port: usize) -> bool {
+        self == Self::All || self as usize == port
     }
 }
 
 impl PortSet {
     /// Whether it covers the command port, or the report ports.
-    #[must_use]
-    pub fn covers(self, commands: bool) -> bool {
+    pub(crate) fn covers(self, commands: bool) -> bool {
         match self {
             Self::Commands => commands,
             Self::Reports => !commands,

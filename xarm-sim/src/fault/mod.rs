@@ -4,15 +4,11 @@
 //! ([`Trigger`]), for how long, and what ([`FaultKind`]). The same script runs
 //! in real and in virtual time. `configs/rig/faults.toml` shows every kind.
 
-mod error;
 pub mod kind;
-mod parse;
 mod runner;
-mod schema;
 mod script;
 
-pub use error::FaultScriptError;
 pub use kind::{FaultKind, ForeignWish, PortSet, ReportPort};
+pub use script::{Fault, FaultScript, FaultScriptError, Trigger};
 
-pub(super) use runner::{FaultRunner, Progress, Transition};
-pub use script::{Fault, FaultScript, Trigger};
+pub(super) use runner::{FaultRunner, Progress};

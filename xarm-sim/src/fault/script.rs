@@ -1,9 +1,48 @@
-//! Scripts: which fault, when, and for how long.
+//! Scripts: which fault, when, and for how long; from TOML and back.
 
-use super::error::FaultScriptError;
-use super::kind::FaultKind;
+use super::kind::{FaultKind, Lasts};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Longest time in a script (s).
+const LONGEST_S: f64 = 1e6;
+const TRIGGERS: &str =
+    "\"first_setpoint\", \"setpoint:N\", \"motion:PERCENT\", \"speed:RAD_PER_S\"";
+
+/// Why a fault script is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum FaultScriptError {
+    /// The file cannot be read.
+    #[error("cannot read the fault script {path}", path = .path.display())]
+    Read {
+        /// File.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Something about one file.
+    #[error("fault script {path}: {error}", path = .path.display())]
+    InFile {
+        /// File.
+        path: PathBuf,
+        /// What is wrong.
+        error: Box<FaultScriptError>,
+    },
+    /// No list of `[[fault]]` in TOML.
+    #[error("not valid TOML, or more than a list of [[fault]]: {0}")]
+    Toml(String),
+    /// An entry makes no fault.
+    #[error("fault {entry}: {what}")]
+    Entry {
+        /// Entry, from 1.
+        entry: usize,
+        /// The field, and what is allowed there.
+        what: String,
+    },
+}
 
 /// When a fault begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +80,7 @@ pub struct Fault {
 
 /// The faults of a run; none by default.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(try_from = "Vec<toml::Table>", into = "Vec<toml::Table>")]
+#[serde(try_from = "Vec<Table>", into = "Vec<Table>")]
 pub struct FaultScript {
     /// In the order of the file.
     pub faults: Vec<Fault>,
@@ -53,29 +92,185 @@ impl FaultScript {
     /// # Errors
     /// [`FaultScriptError`], which names file, entry, field and allowed values.
     pub fn read(path: &Path) -> Result<Self, FaultScriptError> {
-        let in_file = |error: FaultScriptError| error.in_file(path);
         let text = std::fs::read_to_string(path).map_err(|source| FaultScriptError::Read {
             path: path.to_owned(),
             source,
         })?;
-        text.parse().map_err(in_file)
+        text.parse().map_err(|error| FaultScriptError::InFile {
+            path: path.to_owned(),
+            error: Box::new(error),
+        })
     }
+}
 
-    /// A script of one fault.
-    #[must_use]
-    pub fn one(trigger: Trigger, duration_s: Option<f64>, kind: FaultKind) -> Self {
-        Self {
-            faults: vec![Fault {
+impl core::str::FromStr for FaultScript {
+    type Err = FaultScriptError;
+
+    /// Parses the text of a script.
+    fn from_str(text: &str) -> Result<Self, FaultScriptError> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct File {
+            #[serde(default)]
+            fault: Vec<Table>,
+        }
+        let file: File =
+            toml::from_str(text).map_err(|error| FaultScriptError::Toml(error.to_string()))?;
+        file.fault.try_into()
+    }
+}
+
+impl TryFrom<Vec<Table>> for FaultScript {
+    type Error = FaultScriptError;
+
+    fn try_from(tables: Vec<Table>) -> Result<Self, FaultScriptError> {
+        let faults = (1..).zip(tables).map(|(entry, table)| {
+            Fault::from_table(table).map_err(|what| FaultScriptError::Entry { entry, what })
+        });
+        let faults = faults.collect::<Result<_, _>>()?;
+        Ok(Self { faults })
+    }
+}
+
+impl From<FaultScript> for Vec<Table> {
+    fn from(script: FaultScript) -> Self {
+        script.faults.into_iter().map(Fault::to_table).collect()
+    }
+}
+
+impl Fault {
+    /// The fault of an entry, or what is wrong with the entry.
+    fn from_table(mut table: Table) -> Result<Self, String> {
+        let name = take::<String>(&mut table, "kind")?.unwrap_or_default();
+        let trigger = Trigger::take(&mut table)?;
+        let duration_s = take_time(&mut table, "duration_s")?;
+        let kind = kind_of(name.clone(), table)?;
+        match (kind.lasts(), duration_s) {
+            (Lasts::Moment, Some(_)) => Err(format!("`duration_s` means nothing for `{name}`")),
+            (Lasts::Span, None) => Err(missing_time("duration_s")),
+            _ => Ok(Self {
                 trigger,
                 duration_s,
                 kind,
-            }],
+            }),
         }
     }
 
-    /// Whether there is nothing to inject.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.faults.is_empty()
+    /// An entry as it would be written in a file.
+    fn to_table(self) -> Table {
+        let (name, mut table) = match Value::try_from(self.kind) {
+            Ok(Value::Table(kind)) => kind
+                .into_iter()
+                .find_map(|(name, fields)| Some((name, fields.as_table()?.clone())))
+                .unwrap_or_default(),
+            Ok(name) => (name.as_str().unwrap_or_default().to_owned(), Table::new()),
+            // Words, numbers and a version can always be written.
+            Err(_) => Default::default(),
+        };
+        let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+        put("kind", name.into());
+        match self.trigger {
+            Trigger::At(at_s) => put("at_s", at_s.into()),
+            Trigger::Setpoint(count) => put("on", format!("setpoint:{count}").into()),
+            Trigger::Speed(speed) => put("on", format!("speed:{speed}").into()),
+            Trigger::Motion {
+                part,
+                length_s,
+                number,
+            } => {
+                put("motion_s", length_s.into());
+                put("motion", i64::from(number).into());
+                put("on", format!("motion:{}", part * 100.0).into())
+            }
+        };
+        if let Some(duration_s) = self.duration_s {
+            put("duration_s", duration_s.into());
+        }
+        table
     }
 }
+
+impl Trigger {
+    /// Takes the fields that say when a fault begins.
+    fn take(table: &mut Table) -> Result<Self, String> {
+        match (take_time(table, "at_s")?, take::<String>(table, "on")?) {
+            (Some(at_s), None) => Ok(Self::At(at_s)),
+            (None, Some(on)) => Self::of(&on, table),
+            (None, None) => Err(format!(
+                "`at_s` is missing; give it, or `on` with one of {TRIGGERS}"
+            )),
+            (Some(_), Some(_)) => Err("give either `at_s` or `on`, not both".to_owned()),
+        }
+    }
+
+    /// The trigger that `on` means.
+    fn of(on: &str, table: &mut Table) -> Result<Self, String> {
+        let bad = || format!("`on` is \"{on}\"; allowed is one of {TRIGGERS}");
+        if on == "first_setpoint" {
+            return Ok(Self::Setpoint(1));
+        }
+        let (word, value) = on.split_once(':').ok_or_else(bad)?;
+        let number: f64 = value.parse().map_err(|_wrong| bad())?;
+        match word {
+            "setpoint" => match value.parse() {
+                Ok(count) if count >= 1 => Ok(Self::Setpoint(count)),
+                _ => Err(bad()),
+            },
+            "motion" if (0.0..=100.0).contains(&number) => Ok(Self::Motion {
+                part: number / 100.0,
+                length_s: take_time(table, "motion_s")?.ok_or_else(|| missing_time("motion_s"))?,
+                number: take(table, "motion")?.map_or(1, NonZeroU32::get),
+            }),
+            "speed" if number > 0.0 && number.is_finite() => Ok(Self::Speed(number)),
+            _ => Err(bad()),
+        }
+    }
+}
+
+/// The kind of a name with its fields, each within its bounds.
+fn kind_of(name: String, fields: Table) -> Result<FaultKind, String> {
+    let alone = Value::from(name.as_str()).try_into();
+    let kind: FaultKind = match (alone, fields.keys().next()) {
+        (Ok(kind), None) => kind,
+        (Ok(_), Some(field)) => return Err(format!("`{field}` means nothing for `{name}`")),
+        (Err(_), _) => Value::Table(Table::from_iter([(name, Value::Table(fields))]))
+            .try_into()
+            .map_err(|error| format!("`kind` and its fields: {}", one_line(&error)))?,
+    };
+    let mut bounded = kind.bounded().into_iter();
+    match bounded.find(|(_, value, [min, max])| !(*min..=*max).contains(value)) {
+        Some((field, value, [min, max])) => Err(format!(
+            "`{field}` is {value}; allowed is a number from {min} to {max}"
+        )),
+        None => Ok(kind),
+    }
+}
+
+/// Takes a field, if it is there.
+fn take<T: DeserializeOwned>(table: &mut Table, field: &str) -> Result<Option<T>, String> {
+    let found = table.remove(field).map(Value::try_into);
+    found
+        .transpose()
+        .map_err(|error| format!("`{field}`: {}", one_line(&error)))
+}
+
+/// Takes a time (s), if it is there.
+fn take_time(table: &mut Table, field: &str) -> Result<Option<f64>, String> {
+    match take(table, field)? {
+        Some(time_s) if !(0.0..=LONGEST_S).contains(&time_s) => Err(format!(
+            "`{field}` is {time_s}; allowed is a number from 0 to {LONGEST_S}"
+        )),
+        time_s => Ok(time_s),
+    }
+}
+
+fn missing_time(field: &str) -> String {
+    format!("`{field}` is missing; give a number from 0 to {LONGEST_S}")
+}
+
+fn one_line(error: &toml::de::Error) -> String {
+    error.to_string().trim_end().replace('\n', " ")
+}
+
+#[cfg(test)]
+mod tests;

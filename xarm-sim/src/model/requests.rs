@@ -1,49 +1,93 @@
 //! What each request does to the controller.
 
 use super::*;
-use arm_model::kinematics;
-use rt_controller::xarm::JointQuery;
+use arm_model::kinematics::{self, JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use rt_controller::xarm::reply::Text;
+use rt_controller::xarm::{EmitError, JointQuery, Reply, Request};
 
 /// Version text of a real arm before its firmware: 7 axes, type 7, 1305 arm.
 const MODEL: &str = "7,7,XS1305,AC1304,v";
 /// Serial numbers of arm and control box, a NUL between them.
 const SERIAL_NUMBERS: &str = "XS130500000000\0AC130400000000";
-impl ArmModel {
-    /// Takes a request as it came from the wire at `at` and gives the reply.
-    pub fn request(&mut self, at: MonotonicNs, register: u8, parameters: &[u8]) -> Answer {
-        self.request_from(None, at, register, parameters)
-    }
 
-    /// The same for a request of a known client (its number, transaction id).
+/// Data of a reply.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnswerData {
+    /// Of a register with a typed reply.
+    Typed(ReplyData),
+    /// Of any other, as sent.
+    Raw(Vec<u8>),
+}
+
+/// Reply to a request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// Status byte.
+    pub status: Status,
+    /// Data.
+    pub data: AnswerData,
+}
+
+impl Answer {
+    /// Writes the reply to `request` to the front of `out`; returns its length.
+    ///
+    /// # Errors
+    /// [`EmitError::BufferTooSmall`].
+    pub fn emit(&self, out: &mut [u8], request: &Request<'_>) -> Result<usize, EmitError> {
+        match &self.data {
+            AnswerData::Typed(data) => data.emit(out, request, self.status),
+            AnswerData::Raw(data) => Reply {
+                transaction: request.transaction,
+                protocol: request.protocol,
+                register: request.register,
+                status: self.status,
+                data,
+            }
+            .emit(out),
+        }
+    }
+}
+
+impl ArmModel {
+    /// Takes a request as it came from the wire at `at` and gives the reply. It is of the
+    /// client of number `client`.
     pub(crate) fn request_from(
         &mut self,
-        origin: Option<(u32, u16)>,
+        client: u32,
         at: MonotonicNs,
-        register: u8,
-        parameters: &[u8],
+        request: &Request<'_>,
     ) -> Answer {
-        self.origin = origin;
-        self.arrived = self.arrived.max(at);
-        let answer = match Command::parse(register, parameters) {
-            Ok(command) if !self.knows(&command) => {
-                self.refuse(&CommandError::UnknownRegister(register), parameters)
+        let (register, parameters) = (request.register, request.parameters);
+        let origin = (client, request.transaction);
+        self.on_behalf_of(origin, at, |model| {
+            match Command::parse(register, parameters) {
+                Ok(command) if !model.knows(&command) => {
+                    model.refuse(&CommandError::UnknownRegister(register), parameters)
+                }
+                Ok(command) => model.command(at, &command),
+                Err(error) => model.refuse(&error, parameters),
             }
-            Ok(command) => self.command(at, &command),
-            Err(error) => self.refuse(&error, parameters),
-        };
-        self.tell_state();
-        self.origin = None;
-        answer
+        })
     }
 
     /// A command of the client of number `client` outside any connection.
     pub(crate) fn command_from(&mut self, client: u32, at: MonotonicNs, command: &Command) {
-        self.origin = Some((client, 0));
+        self.on_behalf_of((client, 0), at, |model| model.command(at, command));
+    }
+
+    /// Executes what a client (its number, transaction id) sent, arrived at `at`.
+    fn on_behalf_of(
+        &mut self,
+        origin: (u32, u16),
+        at: MonotonicNs,
+        execute: impl FnOnce(&mut Self) -> Answer,
+    ) -> Answer {
+        self.origin = Some(origin);
         self.arrived = self.arrived.max(at);
-        self.command(at, command);
+        let answer = execute(self);
         self.tell_state();
         self.origin = None;
+        answer
     }
 
     /// Whether a command to this register would be taken up as a setpoint or
@@ -94,6 +138,33 @@ impl ArmModel {
         let mut answer = self.answer(ReplyData::None);
         answer.status.0 |= Status::INVALID;
         answer
+    }
+
+    /// Data of the reply to a register without a typed command; `None` when
+    /// this controller does not know what to do with it.
+    fn raw(&mut self, register: Register, parameters: &[u8]) -> Option<Vec<u8>> {
+        Some(match register {
+            Register::ReportedEffort => vec![u8::from(self.settings.reports_current)],
+            Register::GetReducedMode => vec![u8::from(self.settings.reduced.on)],
+            Register::ReducedState => self.settings.reduced_state(),
+            Register::JointTorque => self.effort_nm().iter().flat_map(f32_le).collect(),
+            Register::DhTable => dh_table(),
+            Register::PowerBoardVersion => vec![0; 6],
+            Register::HardwareTypes => vec![0; 2],
+            Register::SaveConfiguration => {
+                self.saved = self.settings;
+                Vec::new()
+            }
+            Register::ClearConfiguration => {
+                self.saved = Settings::factory(&self.config);
+                self.settings = self.saved;
+                Vec::new()
+            }
+            register => {
+                self.settings.set_raw(register, parameters)?;
+                Vec::new()
+            }
+        })
     }
 
     /// Executes a command that arrived at `at`.
@@ -170,4 +241,22 @@ impl ArmModel {
         let offset = &self.settings.tcp_offset;
         TcpPose::from_frame(&(p + r * offset.position()), &(r * offset.attitude()))
     }
+}
+
+fn f32_le(value: &f64) -> [u8; 4] {
+    (*value as f32).to_le_bytes()
+}
+
+/// The vendor's table, modified convention: offset (rad), d (mm), alpha (rad), a (mm) of
+/// each joint.
+fn dh_table() -> Vec<u8> {
+    let rows = JOINT_ORIGIN_M.into_iter().zip(JOINT_QUARTER_TURNS_X);
+    rows.flat_map(|([x, y, z], turns)| {
+        let alpha_rad = core::f32::consts::FRAC_PI_2 * f32::from(turns);
+        // One of y and z is zero: a joint is moved along its own axis or along the turned one.
+        let [d_mm, a_mm] = [y.abs() + z, x].map(|m| (m * 1e3) as f32);
+        [0.0, d_mm, alpha_rad, a_mm]
+    })
+    .flat_map(f32::to_le_bytes)
+    .collect()
 }

@@ -285,22 +285,3 @@ fn commanded_and_measured_positions_are_told_apart() {
     let steps = position[6] / 1e-5;
     assert!((steps - steps.round()).abs() < 1e-6);
 }
-
-#[test]
-fn same_seed_same_arm_and_other_seed_another() {
-    let run = |seed| {
-        let config = ArmConfig {
-            seed,
-            ..ArmConfig::default()
-        };
-        let mut arm = Bench {
-            model: ArmModel::new(config, START),
-            now: START,
-        };
-        arm.bring_up(Mode::Servo);
-        arm.stream_joint7(1.0, 20);
-        arm.q7()
-    };
-    assert_eq!(run(1), run(1));
-    assert_ne!(run(1), run(2));
-}

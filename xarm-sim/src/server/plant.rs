@@ -4,8 +4,8 @@ use super::line::{Line, lock};
 use crate::clock;
 use crate::config::ArmConfig;
 use crate::endpoint::{ArmEndpoint, Closing, ConnectRefused, Service};
-use crate::event::{ArmEvent, EventLog, TimedEvent};
-use crate::history::MotionHistory;
+use crate::event::{ArmEvent, TimedEvent};
+use crate::history::{History, JointSample};
 use crate::model::STEP_S;
 use rt_controller::os::{RealTimeSettings, enter_real_time};
 use shared_types::MonotonicNs;
@@ -39,8 +39,8 @@ pub(super) fn stand_for_another_machine() {
 pub(super) struct Plant {
     endpoint: Mutex<ArmEndpoint>,
     lines: Mutex<BTreeMap<u32, Arc<Line>>>,
-    pub(super) history: MotionHistory,
-    pub(super) events: EventLog,
+    pub(super) history: History<JointSample>,
+    pub(super) events: History<TimedEvent>,
     stop: AtomicBool,
 }
 
@@ -49,8 +49,8 @@ impl Plant {
         Self {
             endpoint: Mutex::new(ArmEndpoint::new(config, clock::now())),
             lines: Mutex::default(),
-            history: MotionHistory::default(),
-            events: EventLog::default(),
+            history: History::default(),
+            events: History::default(),
             stop: AtomicBool::new(false),
         }
     }
@@ -68,7 +68,7 @@ impl Plant {
         let used = use_endpoint(&mut endpoint, now);
         let events = endpoint.take_events();
         // Kept before the lock is given up, so that they stay in order.
-        self.events.extend(&events);
+        self.events.extend(events.iter().copied());
         drop(endpoint);
         events.iter().for_each(report);
         used
