@@ -1,7 +1,8 @@
 //! Runs as a table for people and as CSV.
 
 use super::{Entry, RunResult};
-use crate::{Result, quoted};
+use crate::quoted;
+use anyhow::Result;
 use cli_output::table;
 use comfy_table::Table;
 use shared_types::rope::RANGES;
@@ -103,7 +104,5 @@ pub fn csv(entries: &[Entry]) -> Result<Vec<u8>> {
         row.extend((0..RANGES.len()).map(|i| number(rope.map(|r| r[i]))));
         writer.write_record(&row)?;
     }
-    writer
-        .into_inner()
-        .map_err(|e| csv::Error::from(e.into_error()).into())
+    Ok(writer.into_inner()?)
 }

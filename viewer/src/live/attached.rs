@@ -74,7 +74,7 @@ impl Controller {
             .or_else(|| folder_of_process(now.pid));
         Ok(Self {
             cycle: Pulse::new(now.cycle),
-            beat: Pulse::new(operator.newest().count),
+            beat: Pulse::new(operator.get().count),
             state,
             operator,
             opened: Instant::now(),
@@ -85,7 +85,7 @@ impl Controller {
     fn look(&mut self) -> Seen {
         let state = self.state.get();
         let alive = self.cycle.beats(state.cycle, SILENCE);
-        let beat = self.operator.newest().count;
+        let beat = self.operator.get().count;
         Seen {
             state,
             alive: alive || self.opened.elapsed() < SILENCE,
