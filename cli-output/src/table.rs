@@ -24,6 +24,16 @@ pub fn numbers<const N: usize>(
     table
 }
 
+/// [`numbers`] whose columns tell what they show of a row.
+pub fn columns<T, const N: usize>(
+    columns: [(&str, fn(&T) -> String); N],
+    text_columns: usize,
+    rows: &[T],
+) -> Table {
+    let cells = rows.iter().map(|row| columns.map(|(_, show)| show(row)));
+    numbers(columns.map(|(name, _)| name), text_columns, cells)
+}
+
 /// Significant digits of a deviation; a value is told as far down as its deviation.
 const DIGITS: i32 = 3;
 /// Significant digits of a value whose deviation is not known.

@@ -22,7 +22,7 @@ pub use facts::domain_of_run;
 pub use preview::{PreviewChild, PreviewProcess};
 
 use crate::report::{arm_points, tenths_mm};
-use ask::{Ask, Asked, Open, Present, hand_over};
+use ask::{Ask, Asked, Open, hand_over};
 use attached::{Attached, Seen, newest_domain};
 use http::Site;
 use jitter::Jitter;
@@ -73,7 +73,8 @@ pub struct Watcher {
     left: Snapshot,
     searched: Option<Instant>,
     histograms_at: Option<Instant>,
-    present: Present,
+    /// What was seen last, while there is a controller.
+    seen: Option<Seen>,
     /// The preview of the rope, where it is wished for.
     preview: Option<PreviewChild>,
     /// When the last turn was due.
@@ -110,7 +111,7 @@ impl Watcher {
             left: Snapshot::default(),
             searched: None,
             histograms_at: None,
-            present: Present::default(),
+            seen: None,
             preview,
             turned: Instant::now(),
         };
@@ -159,7 +160,7 @@ impl Watcher {
     fn pass_on(&mut self, asked: Asked) {
         tracing::info!(ask = asked.ask.name(), "requested by a page");
         let bus = self.attached.as_ref().map(Attached::bus);
-        self.open.extend(hand_over(asked, bus, &self.present));
+        self.open.extend(hand_over(asked, bus, self.seen.as_ref()));
     }
 
     /// Looks at everything once.
@@ -189,13 +190,7 @@ impl Watcher {
             (true, None) => self.end(),
             _ => {}
         }
-        self.present = Present {
-            mode: seen
-                .filter(|s| s.alive)
-                .map(|s| ControllerMode::from_raw(s.state.mode)),
-            operator: seen.is_some_and(|s| s.operator),
-            armed: seen.is_some_and(|s| s.state.operating_mode != 0),
-        };
+        self.seen = seen;
         if let Err(error) = self.listen(search) {
             tracing::warn!("reconnecting: {error:#}");
             self.end();
@@ -237,7 +232,7 @@ impl Watcher {
 
     /// The controller ended; the next may run elsewhere.
     fn end(&mut self) {
-        self.present = Present::default();
+        self.seen = None;
         if self.wanted == Wanted::Newest {
             self.attached = None;
         }
@@ -293,7 +288,7 @@ impl Watcher {
                 .and_then(|film| film.seen)
                 .is_some_and(|at| at.elapsed() < Duration::from_secs(1)),
             asks: Ask::ALL
-                .map(|ask| (ask, ask.objection(&self.present)))
+                .map(|ask| (ask, ask.objection(self.seen.as_ref())))
                 .to_vec(),
             ..Snapshot::default()
         };

@@ -8,7 +8,7 @@ mod guard;
 mod reply;
 mod request;
 
-use super::ask::{Answer, Ask, Asked};
+use super::ask::{Ask, Asked};
 use super::film::Picture;
 use super::newest::Newest;
 use super::page;
@@ -242,8 +242,8 @@ fn wish(site: &Site, ask: Ask) -> Reply {
         .ok()
         .and_then(|()| answers.recv_timeout(ANSWER_PATIENCE).ok())
     {
-        Some(Answer::Done(text)) => Reply::said(200, text),
-        Some(Answer::Refused(text)) => Reply::said(409, &text),
+        Some(Ok(())) => Reply::said(200, "done"),
+        Some(Err(why)) => Reply::said(409, &why),
         None => Reply::said(503, "the controller did not answer; use the emergency stop"),
     }
 }
