@@ -24,9 +24,12 @@ pub fn numbers<const N: usize>(
     table
 }
 
-/// [`numbers`] whose columns tell what they show of a row.
+/// A column: its name, and what it shows of a row.
+pub type Column<T> = (&'static str, fn(&T) -> String);
+
+/// [`numbers`] of rows and what each column shows of them.
 pub fn columns<T, const N: usize>(
-    columns: [(&str, fn(&T) -> String); N],
+    columns: [Column<T>; N],
     text_columns: usize,
     rows: &[T],
 ) -> Table {

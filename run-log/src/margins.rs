@@ -25,6 +25,13 @@ pub struct Margin {
 
 /// Joint, value and limit.
 type Used = (Option<usize>, f64, f64);
+/// What is measured, its unit, whether it counts only while the arm moves, and how.
+type Measure<'a> = (
+    &'static str,
+    &'static str,
+    bool,
+    &'a dyn Fn(&CycleSample, &Figures) -> Used,
+);
 
 /// The smallest margins of a run, in a fixed order. Speeds count always, what
 /// matters only to a moving arm only while it moves.
@@ -35,8 +42,7 @@ pub(crate) fn smallest_margins(log: &RunLog) -> Vec<Margin> {
     let missed_max = f64::from(t.missed_cycles_max);
     let joint = |w: WorstJoint| (Some(w.joint).filter(|j| *j > 0), w.value.abs(), w.limit);
     let report_ms = |f: &Figures| f.report_ms.unwrap_or(0.0);
-    // Whether it counts only while the arm moves.
-    let limits: [(&str, &str, bool, &dyn Fn(&CycleSample, &Figures) -> Used); 7] = [
+    let limits: [Measure<'_>; 7] = [
         ("joint speed", "rad/s", false, &|_, f| joint(f.speed)),
         ("joint acceleration", "rad/s²", false, &|_, f| {
             joint(f.acceleration)

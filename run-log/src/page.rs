@@ -3,7 +3,7 @@
 use super::cycle_sample::WorstJoint;
 use super::explanation::{Explanation, Late, Row, Stop};
 use super::margins::Margin;
-use cli_output::table;
+use cli_output::table::{self, Column};
 use comfy_table::Table;
 use std::fmt::Write;
 
@@ -180,7 +180,7 @@ fn or_dash(value: Option<f64>, decimals: usize) -> String {
 }
 
 fn around(rows: &[Row]) -> Table {
-    let columns: [(&str, fn(&Row) -> String); 12] = [
+    let columns: [Column<Row>; 12] = [
         ("until ms", |r| format!("{:.0}", r.until_ms)),
         ("motion s", |r| or_dash(r.figures.motion_s, 3)),
         ("path rate", |r| format!("{:.2}", r.figures.speed_override)),
@@ -198,7 +198,7 @@ fn around(rows: &[Row]) -> Table {
 }
 
 fn margins(margins: &[Margin]) -> Table {
-    let columns: [(&str, fn(&Margin) -> String); 7] = [
+    let columns: [Column<Margin>; 7] = [
         ("limit", |m| m.what.to_owned()),
         ("used", |m| format!("{:.1} %", 100.0 * m.part)),
         ("value", |m| short(m.value)),

@@ -3,7 +3,7 @@
 use super::{Entry, RunResult};
 use crate::quoted;
 use anyhow::Result;
-use cli_output::table;
+use cli_output::table::{self, Column};
 use comfy_table::Table;
 use shared_types::rope::RANGES;
 
@@ -28,7 +28,7 @@ pub fn table(entries: &[Entry]) -> Table {
     fn cm(m: Option<f64>) -> String {
         or_dash(m, |m| format!("{:.1}", 100.0 * m))
     }
-    let columns: [(&str, fn(&Entry) -> String); 8] = [
+    let columns: [Column<Entry>; 8] = [
         ("run", |e| {
             let name = e.run.file_name().unwrap_or(e.run.as_os_str());
             name.to_string_lossy().into_owned()
@@ -55,7 +55,7 @@ fn or_empty(value: Option<impl ToString>) -> String {
 }
 
 /// Columns of the table for a spreadsheet; the rope's parameters follow them.
-const COLUMNS: [(&str, fn(&Entry) -> String); 17] = [
+const COLUMNS: [Column<Entry>; 17] = [
     ("run", |e| e.run.display().to_string()),
     ("result", |e| format!("{:?}", e.result).to_lowercase()),
     ("problems", |e| e.problems.join("; ")),

@@ -1,6 +1,7 @@
 //! From the run's clock to the one that viewers show, and at which rate.
 
-use rustix::time::{ClockId, clock_gettime};
+use rt_controller::os::now_ns;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// How far the wall clock was ahead of CLOCK_MONOTONIC when the file was begun.
 /// Later steps of the wall clock do not matter.
@@ -9,18 +10,13 @@ pub(super) struct Clock {
     ahead_ns: u64,
 }
 
-fn read_ns(clock: ClockId) -> u64 {
-    let t = clock_gettime(clock);
-    let ns = i128::from(t.tv_sec) * 1_000_000_000 + i128::from(t.tv_nsec);
-    u64::try_from(ns).unwrap_or_default()
-}
-
 impl Clock {
     /// Compares both clocks.
     pub(super) fn compare() -> Self {
-        let wall_ns = read_ns(ClockId::Realtime);
+        let wall = SystemTime::now().duration_since(UNIX_EPOCH);
+        let wall_ns = u64::try_from(wall.unwrap_or_default().as_nanos()).unwrap_or_default();
         Self {
-            ahead_ns: wall_ns.saturating_sub(read_ns(ClockId::Monotonic)),
+            ahead_ns: wall_ns.saturating_sub(now_ns()),
         }
     }
 
@@ -36,7 +32,7 @@ impl Clock {
 
     /// Wall time now (ns).
     pub(super) fn now_ns(self) -> u64 {
-        self.wall_ns(read_ns(ClockId::Monotonic))
+        self.wall_ns(now_ns())
     }
 }
 
