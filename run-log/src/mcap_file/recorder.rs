@@ -204,8 +204,7 @@ impl Recording {
                 let message = messages::keypoints(at_ns, &frame);
                 self.file.json(Channel::Keypoints, at_ns, &message)
             },
-        )?;
-        Ok(())
+        )
     }
 
     /// Takes in frames that have arrived, and compresses `most` of them.

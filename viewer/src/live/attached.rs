@@ -159,12 +159,8 @@ pub(crate) fn newest_domain() -> Option<String> {
     running_controllers()
         .into_iter()
         .filter_map(|domain| {
-            let sweep = DomainSweep::new(&domain);
-            let pid = {
-                let bus = Bus::join(&domain).ok()?;
-                StateReader::open(&bus).ok()?.get().pid
-            };
-            drop(sweep);
+            let _sweep = DomainSweep::new(&domain);
+            let pid = StateReader::open(&Bus::join(&domain).ok()?).ok()?.get().pid;
             Some((started(pid)?, domain))
         })
         .max()
