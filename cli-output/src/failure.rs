@@ -2,19 +2,11 @@
 
 use std::{fmt, io};
 
-/// A failed command.
+/// A failed command: usage or input is wrong, or the command ran and did not succeed.
 #[derive(Debug)]
 pub struct Failure {
-    class: Class,
+    is_input: bool,
     error: anyhow::Error,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Class {
-    /// The command ran and did not succeed: exit code 1.
-    Failed,
-    /// Usage or input is wrong: exit code 2.
-    BadInput,
 }
 
 /// What every command returns.
@@ -23,50 +15,32 @@ pub type Outcome<T = ()> = Result<T, Failure>;
 impl Failure {
     /// Usage or input is wrong.
     pub fn input(error: impl Into<anyhow::Error>) -> Self {
-        Self {
-            class: Class::BadInput,
-            error: error.into(),
-        }
+        Self::of(true, error)
     }
 
     /// The command ran and did not succeed.
     pub fn failed(error: impl Into<anyhow::Error>) -> Self {
-        Self {
-            class: Class::Failed,
-            error: error.into(),
-        }
+        Self::of(false, error)
     }
 
     /// Bad input, or else a failure of the work.
     pub fn of(is_input: bool, error: impl Into<anyhow::Error>) -> Self {
-        if is_input {
-            Self::input(error)
-        } else {
-            Self::failed(error)
-        }
+        let error = error.into();
+        Self { is_input, error }
     }
 
     /// A server that could not be: an address that this machine does not have is bad input.
     pub fn of_server(error: impl Into<anyhow::Error>) -> Self {
         let error = error.into();
-        let of_system =
-            |e: &(dyn std::error::Error + 'static)| Some(e.downcast_ref::<io::Error>()?.kind());
-        let none_such = io::ErrorKind::AddrNotAvailable;
-        Self::of(
-            error
-                .chain()
-                .filter_map(of_system)
-                .any(|kind| kind == none_such),
-            error,
-        )
+        let of_system = error.chain().filter_map(|e| e.downcast_ref::<io::Error>());
+        let mut kinds = of_system.map(io::Error::kind);
+        let is_input = kinds.any(|kind| kind == io::ErrorKind::AddrNotAvailable);
+        Self::of(is_input, error)
     }
 
-    /// Process exit code.
+    /// Process exit code: 1 for work that failed, 2 for bad input.
     pub fn exit_code(&self) -> u8 {
-        match self.class {
-            Class::Failed => 1,
-            Class::BadInput => 2,
-        }
+        if self.is_input { 2 } else { 1 }
     }
 }
 

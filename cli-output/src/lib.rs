@@ -12,14 +12,12 @@
 pub mod output;
 
 mod failure;
-mod interrupt;
 mod machine;
 mod program;
 mod progress;
 pub mod table;
 
 pub use failure::{Failure, OrInput, Outcome};
-pub use interrupt::{interrupted, watch_interrupts};
 pub use machine::Machine;
-pub use program::{finish, refuse_usage, seed, start_logging};
+pub use program::{finish, interrupted, refuse_usage, seed, start_logging, watch_interrupts};
 pub use progress::Stage;

@@ -104,15 +104,9 @@ pub fn data(bytes: &[u8]) {
 /// Prints the one JSON object of a command, at once, unless one was printed.
 pub fn object(value: &serde_json::Value) {
     let mut state = state();
-    if !state.object {
-        state.object = true;
-        let bytes = format!("{value:#}\n");
-        if state.taken {
-            drop(state);
-            aside(format_args!("{bytes}"));
-        } else {
-            state.write(&mut io::stdout(), bytes.as_bytes());
-        }
+    if !std::mem::replace(&mut state.object, true) {
+        drop(state);
+        line(format_args!("{value:#}"));
     }
 }
 
@@ -120,52 +114,4 @@ pub fn object(value: &serde_json::Value) {
 /// early has what they wanted.
 pub fn failure() -> Option<String> {
     state().failed.clone()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A stream that fails in one way after some bytes.
-    struct Ends(usize, ErrorKind);
-
-    impl Write for Ends {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            if self.0 == 0 {
-                return Err(self.1.into());
-            }
-            let n = bytes.len().min(self.0);
-            self.0 -= n;
-            Ok(n)
-        }
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    fn fresh() -> State {
-        State {
-            taken: false,
-            closed: false,
-            failed: None,
-            object: false,
-        }
-    }
-
-    #[test]
-    fn a_reader_who_leaves_is_no_failure_and_a_full_disk_is() {
-        let mut state = fresh();
-        state.write(&mut Ends(3, ErrorKind::BrokenPipe), b"four");
-        assert!(state.closed && state.failed.is_none());
-        let mut kept = Vec::new();
-        state.write(&mut kept, b"more");
-        assert!(kept.is_empty(), "nobody reads");
-        let mut state = fresh();
-        state.write(&mut Ends(0, ErrorKind::StorageFull), b"four");
-        state.write(&mut Ends(0, ErrorKind::Other), b"four");
-        assert_eq!(
-            state.failed,
-            Some(io::Error::from(ErrorKind::StorageFull).to_string())
-        );
-    }
 }

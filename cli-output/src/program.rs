@@ -1,9 +1,11 @@
-//! How a program begins and ends: its log, a wrong command line, its exit code.
+//! How a program begins and ends: its log, a wrong command line, Ctrl-C, its exit code.
 
 use crate::{Outcome, output};
+use anyhow::Context;
 use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
@@ -81,4 +83,20 @@ pub fn start_logging(verbose: u8) {
                 .with_ansi(std::io::stderr().is_terminal()),
         )
         .init();
+}
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Lets Ctrl-C and SIGTERM end the command in order instead of at once.
+///
+/// # Errors
+/// When the signals are watched for already or the system refuses.
+pub fn watch_interrupts() -> anyhow::Result<()> {
+    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst))
+        .context("cannot watch for Ctrl-C")
+}
+
+/// The flag that Ctrl-C and SIGTERM set.
+pub fn interrupted() -> &'static AtomicBool {
+    &INTERRUPTED
 }

@@ -24,6 +24,19 @@ pub fn numbers<const N: usize>(
     table
 }
 
+/// A column: its name, and what it shows of a row.
+pub type Column<T> = (&'static str, fn(&T) -> String);
+
+/// [`numbers`] of rows and what each column shows of them.
+pub fn columns<T, const N: usize>(
+    columns: [Column<T>; N],
+    text_columns: usize,
+    rows: &[T],
+) -> Table {
+    let cells = rows.iter().map(|row| columns.map(|(_, show)| show(row)));
+    numbers(columns.map(|(name, _)| name), text_columns, cells)
+}
+
 /// Significant digits of a deviation; a value is told as far down as its deviation.
 const DIGITS: i32 = 3;
 /// Significant digits of a value whose deviation is not known.

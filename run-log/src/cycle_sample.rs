@@ -32,12 +32,16 @@ impl WorstJoint {
     }
 
     fn of(values: &JointVector, limits: &JointVector) -> Self {
-        (0..JOINTS)
-            .map(|j| Self {
-                joint: j + 1,
-                value: values[j],
-                limit: limits[j],
-            })
+        Self::worst((0..JOINTS).map(|j| Self {
+            joint: j + 1,
+            value: values[j],
+            limit: limits[j],
+        }))
+    }
+
+    /// The one of several that comes closest to its limit.
+    pub(crate) fn worst(several: impl Iterator<Item = Self>) -> Self {
+        several
             .max_by(|a, b| a.fraction().total_cmp(&b.fraction()))
             .unwrap_or_default()
     }

@@ -1,7 +1,8 @@
 //! What the control loop did and was told: tables of it, and what they show of the arm.
 
+use crate::files;
 use crate::mcap_file::mode_name;
-use crate::{Result, files};
+use anyhow::Result;
 use arm_model::JointVector;
 use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
 use shared_types::{FaultCode, MonotonicNs};

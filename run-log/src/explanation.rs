@@ -5,7 +5,7 @@ use super::margins::{Margin, smallest_margins};
 use rt_controller::xarm::ErrorCode;
 use serde::Serialize;
 use shared_types::ipc::{CauseRecord, ControllerMode, RunCounts};
-use shared_types::{FaultCode, OperatingMode};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode};
 
 /// Ends of the rows around a stop (ms); a row covers what lies between the end
 /// before and its own.
@@ -251,8 +251,12 @@ const fn unit(code: FaultCode, joint: u32) -> &'static str {
     }
 }
 
+fn between_ms(later_ns: u64, earlier_ns: u64) -> f64 {
+    MonotonicNs(later_ns).since_s(MonotonicNs(earlier_ns)) * 1e3
+}
+
 fn since_ms(sample: &CycleSample, stamp_ns: u64) -> f64 {
-    shared_types::MonotonicNs(sample.deadline_ns).since_s(shared_types::MonotonicNs(stamp_ns)) * 1e3
+    between_ms(sample.deadline_ns, stamp_ns)
 }
 
 fn around(log: &RunLog, stamp_ns: u64) -> Vec<Row> {
@@ -274,18 +278,12 @@ fn around(log: &RunLog, stamp_ns: u64) -> Vec<Row> {
 fn row(until_ms: f64, samples: &[&CycleSample]) -> Option<Row> {
     let last = samples.last()?.figures;
     let figures = || samples.iter().map(|m| &m.figures);
-    let worst = |of: fn(&Figures) -> WorstJoint| {
-        figures()
-            .map(of)
-            .max_by(|a, b| a.fraction().total_cmp(&b.fraction()))
-            .unwrap_or_default()
-    };
     let most = |of: fn(&Figures) -> Option<f64>| figures().filter_map(of).max_by(f64::total_cmp);
     Some(Row {
         until_ms,
         figures: Figures {
-            speed: worst(|f| f.speed),
-            acceleration: worst(|f| f.acceleration),
+            speed: WorstJoint::worst(figures().map(|f| f.speed)),
+            acceleration: WorstJoint::worst(figures().map(|f| f.acceleration)),
             tool_m_s: most(|f| Some(f.tool_m_s)).unwrap_or(0.0),
             link_ms: most(|f| Some(f.link_ms)).unwrap_or(0.0),
             report_ms: most(|f| f.report_ms),
@@ -294,11 +292,6 @@ fn row(until_ms: f64, samples: &[&CycleSample]) -> Option<Row> {
             ..last
         },
     })
-}
-
-fn planned_after_ms(after: &CycleSample, before: &CycleSample) -> f64 {
-    use shared_types::MonotonicNs as At;
-    At(after.planned_ns).since_s(At(before.planned_ns)) * 1e3
 }
 
 /// The setpoint of the second before the stop that was sent latest, and the one
@@ -326,7 +319,7 @@ fn latest(log: &RunLog, stamp_ns: u64) -> Option<Late> {
             }
         }),
         next_came_after_ms: next
-            .map(|(after, late)| planned_after_ms(after, sample) + late - late_ms),
+            .map(|(after, late)| between_ms(after.planned_ns, sample.planned_ns) + late - late_ms),
     })
 }
 

@@ -10,8 +10,8 @@
 //! use run_log::{Channel, McapFile, recover};
 //! use serde_json::json;
 //!
-//! # fn main() -> run_log::Result<()> {
-//! # let folder = tempfile::tempdir().map_err(mcap::McapError::from)?;
+//! # fn main() -> anyhow::Result<()> {
+//! # let folder = tempfile::tempdir()?;
 //! let path = folder.path().join(run_log::files::RUN);
 //! let mut file = McapFile::create(&path)?;
 //! file.json(Channel::Log, 1_000_000_000, &json!({ "message": "the arm stands" }))?;
@@ -27,7 +27,6 @@
 mod command_line;
 mod cycle_sample;
 mod cycles;
-mod error;
 mod explanation;
 pub mod files;
 pub mod ledger;
@@ -39,13 +38,11 @@ mod run;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::{CYCLES_TABLE, Cycles};
-pub use error::{Error, Result};
 pub use explanation::{Broken, Explanation, Late, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{
     Channel, McapFile, Recorded, RecorderConfig, RecordingCounts, Recovered, RopeMotion,
-    RunFileThread, RunFilm, RunPart, SimulateRope, Walked, is_mcap, left_jpeg, record, recover,
-    replay_bytes,
+    RunFileThread, RunFilm, RunPart, SimulateRope, left_jpeg, record, recover,
 };
 pub use page::show;
-pub use run::{CellHere, Recording, Run};
+pub use run::{CellHere, NoRecording, Recording, Run};

@@ -1,6 +1,6 @@
 //! How close a run came to its limits.
 
-use super::cycle_sample::{CycleSample, RunLog, WorstJoint};
+use super::cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 use arm_model::JOINTS;
 use serde::Serialize;
 
@@ -23,85 +23,70 @@ pub struct Margin {
     pub time_s: f64,
 }
 
+/// Joint, value and limit.
+type Used = (Option<usize>, f64, f64);
+/// What is measured, its unit, whether it counts only while the arm moves, and how.
+type Measure<'a> = (
+    &'static str,
+    &'static str,
+    bool,
+    &'a dyn Fn(&CycleSample, &Figures) -> Used,
+);
+
 /// The smallest margins of a run, in a fixed order. Speeds count always, what
 /// matters only to a moving arm only while it moves.
 pub(crate) fn smallest_margins(log: &RunLog) -> Vec<Margin> {
     let t = &log.settings.thresholds;
-    let ms = |ns: u64| ns as f64 / 1e6;
-    let moving = |m: &&CycleSample| m.figures.mode.is_moving();
-    let joint = |what, unit, of: fn(&CycleSample) -> WorstJoint| {
-        worst(log, what, unit, log.samples.iter(), move |m| {
-            let w = of(m);
-            (Some(w.joint).filter(|j| *j > 0), w.value.abs(), w.limit)
-        })
-    };
-    let (link_ms, report_ms) = (ms(t.reply_stall_ns), ms(t.report_stale_ns));
-    let missed = f64::from(t.missed_cycles_max);
-    [
-        joint("joint speed", "rad/s", |m| m.figures.speed),
-        joint("joint acceleration", "rad/s²", |m| m.figures.acceleration),
-        worst(log, "tool speed", "m/s", log.samples.iter(), |m| {
-            (None, m.figures.tool_m_s, m.figures.tool_max_m_s)
+    let [link_max_ms, report_max_ms] =
+        [t.reply_stall_ns, t.report_stale_ns].map(|ns| ns as f64 / 1e6);
+    let missed_max = f64::from(t.missed_cycles_max);
+    let joint = |w: WorstJoint| (Some(w.joint).filter(|j| *j > 0), w.value.abs(), w.limit);
+    let report_ms = |f: &Figures| f.report_ms.unwrap_or(0.0);
+    let limits: [Measure<'_>; 7] = [
+        ("joint speed", "rad/s", false, &|_, f| joint(f.speed)),
+        ("joint acceleration", "rad/s²", false, &|_, f| {
+            joint(f.acceleration)
         }),
-        worst(
-            log,
-            "joint range",
-            "rad from its middle",
-            log.samples.iter(),
-            |m| range(log, m),
-        ),
-        worst(
-            log,
-            "unanswered setpoint",
-            "ms",
-            log.samples.iter(),
-            move |m| (None, m.figures.link_ms, link_ms),
-        ),
-        worst(
-            log,
-            "age of joint reports, moving",
-            "ms",
-            log.samples.iter().filter(moving),
-            move |m| (None, m.figures.report_ms.unwrap_or(0.0), report_ms),
-        ),
-        worst(
-            log,
-            "cycles missed at once, moving",
-            "cycles",
-            log.samples.iter().filter(moving),
-            move |m| (None, f64::from(m.figures.missed), missed),
-        ),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
-}
-
-fn worst<'a>(
-    log: &RunLog,
-    what: &'static str,
-    unit: &'static str,
-    samples: impl Iterator<Item = &'a CycleSample>,
-    measure: impl Fn(&CycleSample) -> (Option<usize>, f64, f64),
-) -> Option<Margin> {
-    let part = |(_, value, limit): (Option<usize>, f64, f64)| {
-        if limit > 0.0 { value / limit } else { 0.0 }
-    };
-    let sample = samples.max_by(|a, b| part(measure(a)).total_cmp(&part(measure(b))))?;
-    let (joint, value, limit) = measure(sample);
-    Some(Margin {
-        what,
-        unit,
-        joint,
-        value,
-        limit,
-        part: part((joint, value, limit)),
-        time_s: log.time_s(sample.deadline_ns),
-    })
+        ("tool speed", "m/s", false, &|_, f| {
+            (None, f.tool_m_s, f.tool_max_m_s)
+        }),
+        ("joint range", "rad from its middle", false, &|m, _| {
+            range(log, m)
+        }),
+        ("unanswered setpoint", "ms", false, &|_, f| {
+            (None, f.link_ms, link_max_ms)
+        }),
+        ("age of joint reports, moving", "ms", true, &|_, f| {
+            (None, report_ms(f), report_max_ms)
+        }),
+        ("cycles missed at once, moving", "cycles", true, &|_, f| {
+            (None, f.missed.into(), missed_max)
+        }),
+    ];
+    let part = |(_, value, limit): Used| if limit > 0.0 { value / limit } else { 0.0 };
+    limits
+        .into_iter()
+        .filter_map(|(what, unit, only_moving, used)| {
+            let used = |m: &CycleSample| used(m, &m.figures);
+            let counts = |m: &&CycleSample| !only_moving || m.figures.mode.is_moving();
+            let counted = log.samples.iter().filter(counts);
+            let worst = counted.max_by(|a, b| part(used(a)).total_cmp(&part(used(b))))?;
+            let (joint, value, limit) = used(worst);
+            Some(Margin {
+                what,
+                unit,
+                joint,
+                value,
+                limit,
+                part: part((joint, value, limit)),
+                time_s: log.time_s(worst.deadline_ns),
+            })
+        })
+        .collect()
 }
 
 /// The joint nearest to an end of its range, as its distance from the middle.
-fn range(log: &RunLog, sample: &CycleSample) -> (Option<usize>, f64, f64) {
+fn range(log: &RunLog, sample: &CycleSample) -> Used {
     let limits = &log.limits;
     // A pose is known only when setpoints were ever sent.
     if sample.figures.speed.joint == 0 {

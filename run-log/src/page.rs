@@ -3,7 +3,7 @@
 use super::cycle_sample::WorstJoint;
 use super::explanation::{Explanation, Late, Row, Stop};
 use super::margins::Margin;
-use cli_output::table;
+use cli_output::table::{self, Column};
 use comfy_table::Table;
 use std::fmt::Write;
 
@@ -175,58 +175,39 @@ fn percent(worst: &WorstJoint) -> String {
     format!("{:.0} % J{}", 100.0 * worst.fraction(), worst.joint)
 }
 
+fn or_dash(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |v| format!("{v:.decimals$}"))
+}
+
 fn around(rows: &[Row]) -> Table {
-    let header = [
-        "until ms",
-        "motion s",
-        "path rate",
-        "joint speed",
-        "joint acc.",
-        "tool m/s",
-        "allowed",
-        "link ms",
-        "report ms",
-        "late ms",
-        "missed",
-        "mode",
+    let columns: [Column<Row>; 12] = [
+        ("until ms", |r| format!("{:.0}", r.until_ms)),
+        ("motion s", |r| or_dash(r.figures.motion_s, 3)),
+        ("path rate", |r| format!("{:.2}", r.figures.speed_override)),
+        ("joint speed", |r| percent(&r.figures.speed)),
+        ("joint acc.", |r| percent(&r.figures.acceleration)),
+        ("tool m/s", |r| format!("{:.3}", r.figures.tool_m_s)),
+        ("allowed", |r| format!("{:.2}", r.figures.tool_max_m_s)),
+        ("link ms", |r| format!("{:.1}", r.figures.link_ms)),
+        ("report ms", |r| or_dash(r.figures.report_ms, 1)),
+        ("late ms", |r| or_dash(r.figures.late_ms, 1)),
+        ("missed", |r| r.figures.missed.to_string()),
+        ("mode", |r| format!("{:?}", r.figures.mode).to_lowercase()),
     ];
-    table::numbers(
-        header,
-        1,
-        rows.iter().map(|r| {
-            let f = &r.figures;
-            [
-                format!("{:.0}", r.until_ms),
-                f.motion_s.map_or("-".to_owned(), |t| format!("{t:.3}")),
-                format!("{:.2}", f.speed_override),
-                percent(&f.speed),
-                percent(&f.acceleration),
-                format!("{:.3}", f.tool_m_s),
-                format!("{:.2}", f.tool_max_m_s),
-                format!("{:.1}", f.link_ms),
-                f.report_ms.map_or("-".to_owned(), |a| format!("{a:.1}")),
-                f.late_ms.map_or("-".to_owned(), |l| format!("{l:.1}")),
-                f.missed.to_string(),
-                format!("{:?}", f.mode).to_lowercase(),
-            ]
-        }),
-    )
+    table::columns(columns, 1, rows)
 }
 
 fn margins(margins: &[Margin]) -> Table {
-    table::numbers(
-        ["limit", "used", "value", "allowed", "at s", "joint", "unit"],
-        1,
-        margins.iter().map(|m| {
-            [
-                m.what.to_owned(),
-                format!("{:.1} %", 100.0 * m.part),
-                short(m.value),
-                short(m.limit),
-                format!("{:.3}", m.time_s),
-                m.joint.map_or("-".to_owned(), |j| j.to_string()),
-                m.unit.to_owned(),
-            ]
+    let columns: [Column<Margin>; 7] = [
+        ("limit", |m| m.what.to_owned()),
+        ("used", |m| format!("{:.1} %", 100.0 * m.part)),
+        ("value", |m| short(m.value)),
+        ("allowed", |m| short(m.limit)),
+        ("at s", |m| format!("{:.3}", m.time_s)),
+        ("joint", |m| {
+            m.joint.map_or("-".to_owned(), |j| j.to_string())
         }),
-    )
+        ("unit", |m| m.unit.to_owned()),
+    ];
+    table::columns(columns, 1, margins)
 }

@@ -1,8 +1,9 @@
 //! A recorded run, from its folder or its file.
 
-use crate::error::At;
+use crate::files::cannot_read;
 use crate::mcap_file::{RunFilm, is_mcap, replay_bytes};
-use crate::{CommandLine, Cycles, Error, Explanation, Result, RunLog, explain, files};
+use crate::{CommandLine, Cycles, Explanation, RunLog, explain, files};
+use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
@@ -35,6 +36,15 @@ impl CellHere {
     }
 }
 
+/// A folder or a file without a recording.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "`{}` is no run folder or file with recorded control cycles: {} (of older versions {}) \
+     is not there, or its recorder died before it wrote any",
+    .0.display(), files::RUN, files::CYCLES
+)]
+pub struct NoRecording(pub PathBuf);
+
 /// The exact recording of a run's control cycles.
 #[derive(Debug, Clone)]
 pub struct Recording {
@@ -47,11 +57,13 @@ impl Run {
     /// the cycles apart).
     ///
     /// # Errors
-    /// [`Error::NoRun`].
+    /// There is none.
     pub fn open(run: &Path) -> Result<Self> {
-        if !run.exists() {
-            return Err(Error::NoRun(run.to_owned()));
-        }
+        ensure!(
+            run.exists(),
+            "`{}` does not exist; name a run folder as made by wag demo, throw, wiggle or record",
+            run.display()
+        );
         if run.is_dir() {
             // Where there are both, the smaller one is read sooner.
             let files = [files::CYCLES, files::RUN].map(|name| run.join(name));
@@ -76,18 +88,18 @@ impl Run {
     /// The exact recording.
     ///
     /// # Errors
-    /// [`Error::NoRecording`], or the file cannot be read.
+    /// [`NoRecording`], or the file cannot be read.
     pub fn recording(&self) -> Result<Recording> {
         let path = self.recorded.clone();
-        let path = path.ok_or_else(|| Error::NoRecording(self.folder.clone()))?;
-        let mut bytes = std::fs::read(&path).map_err(Error::read(&path))?;
+        let path = path.ok_or_else(|| NoRecording(self.folder.clone()))?;
+        let mut bytes = std::fs::read(&path).with_context(cannot_read(&path))?;
         let of_mcap = is_mcap(&bytes);
         if of_mcap {
-            bytes = replay_bytes(&bytes).at(|| format!("`{}`", path.display()))?;
+            bytes = replay_bytes(&bytes).with_context(|| format!("`{}`", path.display()))?;
         }
         // On a full disk the recorder leaves its file without a byte.
         if bytes.is_empty() && (of_mcap || path.ends_with(files::RUN)) {
-            return Err(Error::NoRecording(path));
+            bail!(NoRecording(path));
         }
         Ok(Recording { path, bytes })
     }
@@ -107,57 +119,36 @@ impl Run {
     }
 
     /// How it was made.
-    ///
-    /// # Errors
-    /// The file is damaged.
     pub fn command(&self) -> Result<Option<CommandLine>> {
         self.file(files::COMMAND, files::read_json)
     }
 
     /// Every figure of it.
-    ///
-    /// # Errors
-    /// The file is damaged.
     pub fn summary(&self) -> Result<Option<Value>> {
         self.file(files::SUMMARY, files::read_json)
     }
 
     /// The tracked keypoints.
-    ///
-    /// # Errors
-    /// The file is damaged.
     pub fn keypoints(&self) -> Result<Option<KeypointTrack>> {
         self.file(files::KEYPOINTS, files::read_json)
     }
 
     /// The cell it ran in; runs of older versions do not tell it.
-    ///
-    /// # Errors
-    /// The file is damaged.
     pub fn cell(&self) -> Result<Option<Cell>> {
         self.file(files::CELL, files::read_cell)
     }
 
     /// The identified rope.
-    ///
-    /// # Errors
-    /// The file is damaged.
     pub fn rope(&self) -> Result<Option<RopeParams>> {
         self.file(files::ROPE, files::read_rope)
     }
 
-    /// The plan of the throw.
-    ///
-    /// # Errors
-    /// The file is damaged, or was changed after it was planned.
+    /// The plan of the throw; one that was changed after it was planned is damaged.
     pub fn plan(&self) -> Result<Option<Plan>> {
         self.file(files::PLAN, files::read_plan)
     }
 
     /// Why it was stopped, as it was kept.
-    ///
-    /// # Errors
-    /// The file is damaged.
     pub fn cause(&self) -> Result<Option<Value>> {
         self.file(files::CAUSE, files::read_json)
     }
@@ -187,7 +178,7 @@ impl Recording {
     /// # Errors
     /// It holds nothing this version can read.
     pub fn log(&self) -> Result<RunLog> {
-        RunLog::read(&self.bytes).at(|| format!("`{}`", self.path.display()))
+        RunLog::read(&self.bytes).with_context(|| format!("`{}`", self.path.display()))
     }
 
     /// Control cycles and joint reports, bit for bit.
@@ -195,7 +186,8 @@ impl Recording {
     /// # Errors
     /// It holds nothing this version can read.
     pub fn cycles(&self) -> Result<Cycles> {
-        let items = LogReader::open(&self.bytes).at(|| format!("`{}`", self.path.display()))?;
+        let items =
+            LogReader::open(&self.bytes).with_context(|| format!("`{}`", self.path.display()))?;
         let mut found = Cycles::default();
         for read in items {
             if let Read::Item(Item::Cycle(cycle)) = read {
@@ -251,21 +243,6 @@ mod tests {
         let found = Run::open(folder.path()).unwrap().recording().unwrap();
         assert_eq!(found.bytes(), bytes);
         assert_eq!(found.cycles().unwrap(), told);
-    }
-
-    #[test]
-    fn what_is_no_run_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let none = folder.path().join("none");
-        assert!(matches!(Run::open(&none), Err(Error::NoRun(path)) if path == none));
-        let empty = Run::open(folder.path()).unwrap();
-        assert!(matches!(empty.recording(), Err(Error::NoRecording(_))));
-        assert!(empty.summary().unwrap().is_none());
-        let words = folder.path().join("words");
-        std::fs::write(&words, "t,q1\n0,1\n").unwrap();
-        let recording = Run::open(&words).unwrap().recording().unwrap();
-        let error = recording.cycles().unwrap_err();
-        assert!(error.to_string().contains("words"), "{error}");
     }
 
     /// A recording with bytes changed is read as far as it is whole, or refused.

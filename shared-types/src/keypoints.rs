@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub const MAX_KEYPOINTS: usize = 32;
 
 /// Keypoints of one frame as published in shared memory. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
 #[repr(C)]
 pub struct KeypointFrame {
     /// Sequence number of the camera frame.
@@ -23,19 +23,6 @@ pub struct KeypointFrame {
     pub points_px: [[f32; 2]; MAX_KEYPOINTS],
     /// Confidence of each point, 0 to 1.
     pub confidence: [f32; MAX_KEYPOINTS],
-}
-
-impl Default for KeypointFrame {
-    fn default() -> Self {
-        Self {
-            sequence: 0,
-            stamp_ns: 0,
-            count: 0,
-            lost: 0,
-            points_px: [[0.0; 2]; MAX_KEYPOINTS],
-            confidence: [0.0; MAX_KEYPOINTS],
-        }
-    }
 }
 
 impl KeypointFrame {
@@ -118,40 +105,10 @@ pub struct KeypointTrack {
     pub doubts: Vec<String>,
 }
 
-/// Why a keypoint track is refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum KeypointError {
-    /// Fewer frames or keypoints than identification needs.
-    #[error("keypoints: {what} is {found}, but at least {min} are needed")]
-    TooFew {
-        /// `keypoints` or `frames`.
-        what: &'static str,
-        /// Number found.
-        found: usize,
-        /// Number needed.
-        min: usize,
-    },
-    /// A frame has another number of points or confidences than `keypoints` says.
-    #[error(
-        "keypoints: frame {frame} has {found} points or confidences, `keypoints` is {expected}"
-    )]
-    FrameSize {
-        /// Index of the frame.
-        frame: usize,
-        /// Number found.
-        found: usize,
-        /// Number announced.
-        expected: usize,
-    },
-    /// A number is not finite or times do not increase.
-    #[error(
-        "keypoints: frame {frame} has a number that is not finite, or its `t_s` does not increase"
-    )]
-    BadNumber {
-        /// Index of the frame.
-        frame: usize,
-    },
-}
+/// Why a keypoint track is refused: what is wrong, and in which frame.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("keypoints: {0}")]
+pub struct KeypointError(String);
 
 impl KeypointTrack {
     /// The track of published frames, time 0 at the first one; `None` without frames.
@@ -170,24 +127,20 @@ impl KeypointTrack {
     /// # Errors
     /// The first frame that breaks a rule.
     pub fn validate(&self) -> Result<(), KeypointError> {
-        let need = |what, found, min| {
-            if found < min {
-                Err(KeypointError::TooFew { what, found, min })
-            } else {
-                Ok(())
+        let refused = |what: String| Err(KeypointError(what));
+        let (expected, frames) = (self.keypoints, self.frames.len());
+        for (what, found) in [("keypoints", expected), ("frames", frames)] {
+            if found < 2 {
+                return refused(format!("{what} is {found}, but at least 2 are needed"));
             }
-        };
-        need("keypoints", self.keypoints, 2)?;
-        need("frames", self.frames.len(), 2)?;
+        }
         let mut before = f64::NEG_INFINITY;
         for (frame, f) in self.frames.iter().enumerate() {
             for found in [f.points.len(), f.confidence.len()] {
-                if found != self.keypoints {
-                    return Err(KeypointError::FrameSize {
-                        frame,
-                        found,
-                        expected: self.keypoints,
-                    });
+                if found != expected {
+                    return refused(format!(
+                        "frame {frame} has {found} points or confidences, `keypoints` is {expected}"
+                    ));
                 }
             }
             let finite = f
@@ -197,7 +150,9 @@ impl KeypointTrack {
                 .chain(&f.confidence)
                 .all(|v| v.is_finite());
             if !finite || !f.t_s.is_finite() || f.t_s <= before {
-                return Err(KeypointError::BadNumber { frame });
+                return refused(format!(
+                    "frame {frame} has a number that is not finite, or its `t_s` does not increase"
+                ));
             }
             before = f.t_s;
         }
@@ -233,18 +188,19 @@ mod tests {
     #[test]
     fn rules_are_checked() {
         assert_eq!(track().validate(), Ok(()));
-        let mut t = track();
-        t.frames[1].points.pop();
-        assert!(matches!(
-            t.validate(),
-            Err(KeypointError::FrameSize { frame: 1, .. })
-        ));
-        let mut t = track();
-        t.frames[1].t_s = 0.0;
-        assert_eq!(t.validate(), Err(KeypointError::BadNumber { frame: 1 }));
-        let mut t = track();
-        t.frames[0].points[0][1] = f64::NAN;
-        assert_eq!(t.validate(), Err(KeypointError::BadNumber { frame: 0 }));
+        let refused = |spoil: fn(&mut KeypointTrack)| {
+            let mut spoilt = track();
+            spoil(&mut spoilt);
+            spoilt.validate().unwrap_err().to_string()
+        };
+        let said = refused(|t| t.frames[1].points.truncate(2));
+        assert!(said.contains("frame 1 has 2 points"), "{said}");
+        let said = refused(|t| t.frames[1].t_s = 0.0);
+        assert!(said.contains("frame 1 has a number"), "{said}");
+        let said = refused(|t| t.frames[0].points[0][1] = f64::NAN);
+        assert!(said.contains("frame 0 has a number"), "{said}");
+        let said = refused(|t| t.frames.truncate(1));
+        assert!(said.contains("frames is 1"), "{said}");
     }
 
     #[test]

@@ -47,3 +47,25 @@ pub use time::MonotonicNs;
 
 /// Version of this build, written into every result file.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ipc::{CommandKind, ControllerMode, PreviewState};
+
+    /// Raw numbers are part of recorded runs and of shared memory.
+    #[test]
+    fn numbers_come_back_and_unknown_ones_are_safe() {
+        for raw in 0..=u8::MAX {
+            let command = CommandKind::from_raw(raw).map(|kind| kind as u8);
+            assert_eq!(command, (raw < 6).then_some(raw));
+            let interface = CommandInterface::from_raw(raw).map(|interface| interface as u8);
+            assert_eq!(interface, (raw < 2).then_some(raw));
+            let armed = OperatingMode::from_raw(raw).map(|mode| mode as u8);
+            assert_eq!(armed, (1..4).contains(&raw).then_some(raw));
+            assert_eq!(ControllerMode::from_raw(raw) as u8, raw.min(5));
+            let seen = if raw < 5 { raw } else { 0 };
+            assert_eq!(PreviewState::from_raw(raw) as u8, seen);
+        }
+    }
+}

@@ -4,7 +4,7 @@
 use arm_model::{JointVector, Pole};
 use rope_sim::MeasuredArm;
 use shared_types::StereoCamera;
-use shared_types::ipc::{PreviewFrame, PreviewState};
+use shared_types::ipc::{PAYLOAD_VERSION, PreviewFrame, PreviewState};
 use shared_types::keypoints::{KeypointFrame, TrackedFrame};
 
 use super::arm::Arm;
@@ -264,6 +264,7 @@ impl Preview {
             ..KeypointFrame::default()
         };
         PreviewFrame {
+            version: PAYLOAD_VERSION,
             state: state as u8,
             seen: self.seen,
             skipped: self.skipped,

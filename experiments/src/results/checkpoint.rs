@@ -44,7 +44,7 @@ impl<T: Serialize + DeserializeOwned> Checkpoint<T> {
     }
 
     pub(super) fn write(&self, path: Option<&Path>) -> anyhow::Result<()> {
-        path.map_or(Ok(()), |path| Ok(files::write_json(path, self)?))
+        path.map_or(Ok(()), |path| files::write_json(path, self))
     }
 }
 

@@ -1,21 +1,21 @@
 //! Files of people and runs: reading with errors that name file and field,
-//! writing so that nothing is ever half there.
+//! writing so that nothing is ever half there. Every reader fails when its file cannot be
+//! read or is not as it should be, every writer when its file cannot be written.
 
-mod arm_response;
 mod atomic;
-mod cell;
 mod motion;
-mod plan;
 mod rope;
 mod text;
 
-pub use arm_response::{read_arm_response, read_excitation, write_arm_response};
+pub(crate) use atomic::cannot_write;
 pub use atomic::{check_writable, write_atomic, write_json};
-pub use cell::read_cell;
 pub use motion::{JointsCsv, PoseSample, read_joints, read_pose, write_joints, write_trajectory};
-pub use plan::read_plan;
 pub use rope::{read_doubts, read_posterior, read_rope, write_rope_estimate};
-pub use text::{read_json, read_text};
+pub(crate) use text::cannot_read;
+pub use text::{
+    read_arm_response, read_cell, read_excitation, read_json, read_plan, read_text,
+    write_arm_response,
+};
 
 /// File of a run folder that holds the whole run.
 pub const RUN: &str = "run.mcap";

@@ -1,7 +1,7 @@
 //! Joint and pose motion as CSV files.
 
-use crate::error::At;
-use crate::{Error, Result};
+use super::text::cannot_read;
+use anyhow::{Context, Result, bail, ensure};
 use arm_model::{JOINTS, JointTrajectory, JointVector};
 use std::path::Path;
 
@@ -21,74 +21,58 @@ const JOINT_MAX_RAD: f64 = 7.5;
 /// and the first one increasing.
 fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
     let name = path.display();
-    let wrong = |problem: String| Error::Table {
-        path: path.to_owned(),
-        problem,
-    };
-    let file = std::fs::File::open(path).map_err(Error::read(path))?;
+    let file = std::fs::File::open(path).with_context(cannot_read(path))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(file);
     let found = reader
         .headers()
-        .at(|| format!("`{name}` is not a CSV file"))?
+        .with_context(|| format!("`{name}` is not a CSV file"))?
         .clone();
-    let matches = found.len() >= header.len() && header.iter().zip(&found).all(|(a, b)| *a == b);
-    if !matches {
-        return Err(wrong(format!(
-            ": the first line must name the columns {}, found {}",
-            header.join(","),
-            found.iter().collect::<Vec<_>>().join(",")
-        )));
-    }
+    ensure!(
+        found.len() >= header.len() && header.iter().zip(&found).all(|(a, b)| *a == b),
+        "`{name}`: the first line must name the columns {}, found {}",
+        header.join(","),
+        found.iter().collect::<Vec<_>>().join(",")
+    );
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let line = i + 2;
-        let record = record.at(|| format!("`{name}` line {line}"))?;
+        let record = record.with_context(|| format!("`{name}` line {line}"))?;
         let mut row = Vec::with_capacity(header.len());
         for (column, text) in header.iter().zip(&record) {
             match text.parse::<f64>() {
                 Ok(v) if v.is_finite() => row.push(v),
-                _ => {
-                    return Err(wrong(format!(
-                        " line {line}, column `{column}`: `{text}` is not a finite number"
-                    )));
-                }
+                _ => bail!(
+                    "`{name}` line {line}, column `{column}`: `{text}` is not a finite number"
+                ),
             }
         }
         if let Some(before) = rows.last().filter(|before| row[0] <= before[0]) {
-            return Err(wrong(format!(
-                " line {line}: time {} s does not come after {} s",
-                row[0], before[0]
-            )));
+            let (now, before) = (row[0], before[0]);
+            bail!("`{name}` line {line}: time {now} s does not come after {before} s");
         }
         rows.push(row);
     }
-    if rows.len() < 2 {
-        return Err(wrong(format!(
-            " needs at least two rows of numbers, found {}",
-            rows.len()
-        )));
-    }
+    let count = rows.len();
+    ensure!(
+        count >= 2,
+        "`{name}` needs at least two rows of numbers, found {count}"
+    );
     Ok(rows)
 }
 
 /// Reads `t,q1..q7` (s, rad).
-///
-/// # Errors
-/// The file cannot be read, or a line of it is wrong.
 pub fn read_joints(path: &Path) -> Result<JointsCsv> {
     let rows = read_table(path, &["t", "q1", "q2", "q3", "q4", "q5", "q6", "q7"])?;
     for (i, row) in rows.iter().enumerate() {
         if let Some(q) = row[1..].iter().find(|q| q.abs() > JOINT_MAX_RAD) {
-            return Err(Error::Table {
-                path: path.to_owned(),
-                problem: format!(
-                    " line {}: a joint at {q} rad, but none turns beyond {JOINT_MAX_RAD} rad; \
-                     is the file in degrees?",
-                    i + 2
-                ),
-            });
+            bail!(
+                "`{}` line {}: a joint at {q} rad, but none turns beyond {JOINT_MAX_RAD} rad; \
+                 is the file in degrees?",
+                path.display(),
+                i + 2
+            );
         }
     }
     Ok(JointsCsv {
@@ -101,9 +85,6 @@ pub fn read_joints(path: &Path) -> Result<JointsCsv> {
 }
 
 /// Writes `t,q1..q7` (s, rad).
-///
-/// # Errors
-/// The file cannot be written.
 pub fn write_joints(path: &Path, samples: impl Iterator<Item = (f64, JointVector)>) -> Result<()> {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
     for (t, q) in samples {
@@ -117,9 +98,6 @@ pub fn write_joints(path: &Path, samples: impl Iterator<Item = (f64, JointVector
 }
 
 /// Writes a trajectory as joints at a rate, its last row at rest.
-///
-/// # Errors
-/// The file cannot be written.
 pub fn write_trajectory(path: &Path, trajectory: &JointTrajectory, period_s: f64) -> Result<()> {
     #[allow(
         clippy::cast_possible_truncation,
@@ -146,23 +124,16 @@ pub struct PoseSample {
 }
 
 /// Reads `t,x,y,z,qw,qx,qy,qz` (s, m, unit quaternion of the attach frame).
-///
-/// # Errors
-/// The file cannot be read, or a line of it is wrong.
 pub fn read_pose(path: &Path) -> Result<Vec<PoseSample>> {
     let rows = read_table(path, &["t", "x", "y", "z", "qw", "qx", "qy", "qz"])?;
     for (i, r) in rows.iter().enumerate() {
         let norm = r[4..8].iter().map(|v| v * v).sum::<f64>().sqrt();
-        let is_unit = (norm - 1.0).abs() < 1e-3;
-        if !is_unit {
-            return Err(Error::Table {
-                path: path.to_owned(),
-                problem: format!(
-                    " line {}: quaternion qw,qx,qy,qz has length {norm:.4}, but must have length 1",
-                    i + 2
-                ),
-            });
-        }
+        ensure!(
+            (norm - 1.0).abs() < 1e-3,
+            "`{}` line {}: quaternion qw,qx,qy,qz has length {norm:.4}, but must have length 1",
+            path.display(),
+            i + 2
+        );
     }
     Ok(rows
         .iter()
@@ -180,13 +151,6 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn refused(text: &str) -> String {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("j.csv");
-        std::fs::write(&path, text).unwrap();
-        format!("{:#}", anyhow::Error::from(read_joints(&path).unwrap_err()))
-    }
-
     #[test]
     fn joints_come_back_as_written() {
         let dir = tempfile::tempdir().unwrap();
@@ -199,18 +163,19 @@ mod tests {
     }
 
     #[test]
-    fn bad_files_are_named_with_line_and_column() {
-        let head = "t,q1,q2,q3,q4,q5,q6,q7\n";
-        assert!(refused("t,q1\n0,1\n").contains("must name the columns"));
-        let nan = refused(&format!("{head}0,0,0,0,0,0,0,0\n1,0,NaN,0,0,0,0,0\n"));
-        assert!(nan.contains("line 3") && nan.contains("`q2`"), "{nan}");
-        let order = refused(&format!("{head}1,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n"));
-        assert!(order.contains("does not come after"), "{order}");
-        assert!(refused(head).contains("at least two rows"));
-        let degrees = refused(&format!("{head}0,0,0,0,0,0,0,0\n1,0,0,90,0,0,0,0\n"));
-        assert!(degrees.contains("line 3") && degrees.contains("in degrees"));
-        let short = refused(&format!("{head}0,0,0\n"));
-        assert!(short.contains("line 2"), "{short}");
+    fn degrees_and_short_lines_are_named_with_their_line() {
+        let rows = [
+            ("1,0,0,90,0,0,0,0", "line 3: a joint at 90 rad"),
+            ("1,0,0", "line 3"),
+        ];
+        for (row, words) in rows {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("j.csv");
+            let text = format!("t,q1,q2,q3,q4,q5,q6,q7\n0,0,0,0,0,0,0,0\n{row}\n");
+            std::fs::write(&path, text).unwrap();
+            let said = format!("{:#}", read_joints(&path).unwrap_err());
+            assert!(said.contains(words), "{said}");
+        }
     }
 
     /// `text` with up to three bytes changed, inserted or taken out.

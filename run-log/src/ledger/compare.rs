@@ -1,7 +1,7 @@
 //! Two runs, value by value.
 
 use super::Entry;
-use crate::Result;
+use anyhow::Result;
 use serde::Serialize;
 use serde_json::Value;
 

@@ -1,6 +1,7 @@
 //! One run, as far as its folder tells.
 
-use crate::{Result, Run, files};
+use crate::{Run, files};
+use anyhow::Result;
 use serde::Serialize;
 use shared_types::RopeParams;
 use std::path::{Path, PathBuf};
@@ -65,7 +66,7 @@ impl Entry {
 impl FromStr for RunResult {
     type Err = String;
 
-    fn from_str(name: &str) -> std::result::Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self, String> {
         match name {
             "ok" => Ok(Self::Ok),
             "failed" => Ok(Self::Failed),
@@ -78,9 +79,7 @@ impl FromStr for RunResult {
 /// A file of a run; one that is damaged is a problem of the run.
 fn part<T>(name: &str, damage: &mut Vec<String>, found: Result<Option<T>>) -> Option<T> {
     found.unwrap_or_else(|error| {
-        let reasons = std::iter::successors(Some(&error as &dyn std::error::Error), |e| e.source());
-        let reasons: Vec<String> = reasons.map(ToString::to_string).collect();
-        damage.push(format!("{name}: {}", reasons.join(": ")).replace('\n', " "));
+        damage.push(format!("{name}: {error:#}").replace('\n', " "));
         None
     })
 }
@@ -120,9 +119,7 @@ pub fn read(folder: &Path) -> Result<Entry> {
             .map(|l| l.arguments)
             .or(text("command").map(|c| vec![c])),
         seed: summary["seed"].as_u64().or(plan.as_ref().map(|p| p.seed)),
-        task: text("task").or(plan
-            .as_ref()
-            .map(|p| format!("{:?}", p.task).to_lowercase())),
+        task: text("task").or(plan.as_ref().map(|p| p.task.name().to_owned())),
         target_m: serde_json::from_value(summary["target_m"].clone())
             .ok()
             .or(plan.as_ref().map(|p| p.target_m)),

@@ -1,8 +1,9 @@
 //! Runs as a table for people and as CSV.
 
 use super::{Entry, RunResult};
-use crate::{Result, quoted};
-use cli_output::table;
+use crate::quoted;
+use anyhow::Result;
+use cli_output::table::{self, Column};
 use comfy_table::Table;
 use shared_types::rope::RANGES;
 
@@ -24,86 +25,67 @@ fn result(entry: &Entry) -> String {
 
 /// A line per run.
 pub fn table(entries: &[Entry]) -> Table {
-    let cm = |m: f64| format!("{:.1}", 100.0 * m);
-    let rows = entries.iter().map(|e| {
-        [
-            e.run.file_name().map_or_else(
-                || e.run.display().to_string(),
-                |name| name.to_string_lossy().into_owned(),
-            ),
-            e.command().unwrap_or("-").to_owned(),
-            result(e),
-            or_dash(e.seed, |s| s.to_string()),
-            or_dash(e.rope, |r| format!("{:.3}", r.length_m)),
+    fn cm(m: Option<f64>) -> String {
+        or_dash(m, |m| format!("{:.1}", 100.0 * m))
+    }
+    let columns: [Column<Entry>; 8] = [
+        ("run", |e| {
+            let name = e.run.file_name().unwrap_or(e.run.as_os_str());
+            name.to_string_lossy().into_owned()
+        }),
+        ("command", |e| e.command().unwrap_or("-").to_owned()),
+        ("result", result),
+        ("seed", |e| or_dash(e.seed, |s| s.to_string())),
+        ("rope (m)", |e| {
+            or_dash(e.rope, |r| format!("{:.3}", r.length_m))
+        }),
+        ("plan", |e| {
             or_dash(e.plan_sha256.as_ref(), |h| {
                 h.chars().take(HASH_LETTERS).collect()
-            }),
-            or_dash(e.predicted_m, cm),
-            or_dash(e.true_m.or(e.camera_m), cm),
-        ]
-    });
-    let header = [
-        "run",
-        "command",
-        "result",
-        "seed",
-        "rope (m)",
-        "plan",
-        "planned (cm)",
-        "achieved (cm)",
+            })
+        }),
+        ("planned (cm)", |e| cm(e.predicted_m)),
+        ("achieved (cm)", |e| cm(e.true_m.or(e.camera_m))),
     ];
-    table::numbers(header, 0, rows)
+    table::columns(columns, 0, entries)
 }
 
+fn or_empty(value: Option<impl ToString>) -> String {
+    value.map(|value| value.to_string()).unwrap_or_default()
+}
+
+/// Columns of the table for a spreadsheet; the rope's parameters follow them.
+const COLUMNS: [Column<Entry>; 17] = [
+    ("run", |e| e.run.display().to_string()),
+    ("result", |e| format!("{:?}", e.result).to_lowercase()),
+    ("problems", |e| e.problems.join("; ")),
+    ("started", |e| or_empty(e.started.as_ref())),
+    ("arguments", |e| {
+        or_empty(e.arguments.as_ref().map(|a| quoted(a)))
+    }),
+    ("version", |e| or_empty(e.version.as_ref())),
+    ("seed", |e| or_empty(e.seed)),
+    ("task", |e| or_empty(e.task.as_ref())),
+    ("target_x_m", |e| or_empty(e.target_m.map(|t| t[0]))),
+    ("target_y_m", |e| or_empty(e.target_m.map(|t| t[1]))),
+    ("target_z_m", |e| or_empty(e.target_m.map(|t| t[2]))),
+    ("wiggle_frames", |e| or_empty(e.wiggle_frames)),
+    ("plan_sha256", |e| or_empty(e.plan_sha256.as_ref())),
+    ("predicted_m", |e| or_empty(e.predicted_m)),
+    ("true_m", |e| or_empty(e.true_m)),
+    ("camera_m", |e| or_empty(e.camera_m)),
+    ("stopped_by", |e| or_empty(e.stopped_by.as_ref())),
+];
+
 /// A line per run with every value, for a spreadsheet.
-///
-/// # Errors
-/// The table cannot be put together.
 pub fn csv(entries: &[Entry]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut header = vec![
-        "run",
-        "result",
-        "problems",
-        "started",
-        "arguments",
-        "version",
-        "seed",
-        "task",
-        "target_x_m",
-        "target_y_m",
-        "target_z_m",
-        "wiggle_frames",
-        "plan_sha256",
-        "predicted_m",
-        "true_m",
-        "camera_m",
-        "stopped_by",
-    ];
-    header.extend(RANGES.iter().map(|range| range.key));
-    writer.write_record(&header)?;
-    let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+    let names = COLUMNS.iter().map(|(name, _)| *name);
+    writer.write_record(names.chain(RANGES.iter().map(|range| range.key)))?;
     for e in entries {
-        let mut row = vec![
-            e.run.display().to_string(),
-            format!("{:?}", e.result).to_lowercase(),
-            e.problems.join("; "),
-            e.started.clone().unwrap_or_default(),
-            e.arguments.as_ref().map(|a| quoted(a)).unwrap_or_default(),
-            e.version.clone().unwrap_or_default(),
-            e.seed.map(|s| s.to_string()).unwrap_or_default(),
-            e.task.clone().unwrap_or_default(),
-        ];
-        row.extend((0..3).map(|axis| number(e.target_m.map(|t| t[axis]))));
-        row.push(e.wiggle_frames.map(|n| n.to_string()).unwrap_or_default());
-        row.push(e.plan_sha256.clone().unwrap_or_default());
-        row.extend([e.predicted_m, e.true_m, e.camera_m].map(number));
-        row.push(e.stopped_by.clone().unwrap_or_default());
         let rope = e.rope.map(|r| r.to_array());
-        row.extend((0..RANGES.len()).map(|i| number(rope.map(|r| r[i]))));
-        writer.write_record(&row)?;
+        let rope = (0..RANGES.len()).map(|i| or_empty(rope.map(|r| r[i])));
+        writer.write_record(COLUMNS.iter().map(|(_, show)| show(e)).chain(rope))?;
     }
-    writer
-        .into_inner()
-        .map_err(|e| csv::Error::from(e.into_error()).into())
+    Ok(writer.into_inner()?)
 }

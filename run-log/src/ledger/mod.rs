@@ -8,7 +8,8 @@ pub use compare::{Difference, compare};
 pub use entry::{Entry, RunResult, read};
 pub use export::{csv, table};
 
-use crate::{Error, Result, files};
+use crate::files::{self, cannot_read};
+use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 
 /// Where runs lie by default.
@@ -26,7 +27,7 @@ pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {
             found.push(place.clone());
             continue;
         }
-        let inside = place.read_dir().map_err(Error::read(place))?;
+        let inside = place.read_dir().with_context(cannot_read(place))?;
         let mut runs: Vec<PathBuf> = inside
             .flatten()
             .map(|entry| entry.path())

@@ -1,4 +1,4 @@
-//! The channels of a file: topic, encoding, schema.
+//! The channels of a file: topic and schema.
 
 /// One channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,67 +34,47 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 14] = [
-        Self::Replay,
-        Self::Measured,
-        Self::Commanded,
-        Self::Cycles,
-        Self::Frames,
-        Self::Scene,
-        Self::Rope,
-        Self::Image,
-        Self::Calibration,
-        Self::Keypoints,
-        Self::Log,
-        Self::Plan,
-        Self::Parameters,
-        Self::Summary,
+    /// All of them in the order of their numbers, each with its topic and the schema of its
+    /// messages; none for bytes that only this program reads.
+    pub(super) const ALL: [(Self, &'static str, Option<&'static str>); 14] = [
+        (Self::Replay, "/wag/replay", None),
+        (
+            Self::Measured,
+            "/arm/measured",
+            Some("foxglove.JointStates"),
+        ),
+        (
+            Self::Commanded,
+            "/arm/commanded",
+            Some("foxglove.JointStates"),
+        ),
+        (Self::Cycles, "/controller/cycles", Some("wag.Cycle")),
+        (Self::Frames, "/tf", Some("foxglove.FrameTransforms")),
+        (Self::Scene, "/scene", Some("foxglove.SceneUpdate")),
+        (Self::Rope, "/rope/simulated", Some("foxglove.SceneUpdate")),
+        (
+            Self::Image,
+            "/camera/left/image",
+            Some("foxglove.CompressedImage"),
+        ),
+        (
+            Self::Calibration,
+            "/camera/left/calibration",
+            Some("foxglove.CameraCalibration"),
+        ),
+        (
+            Self::Keypoints,
+            "/camera/left/keypoints",
+            Some("foxglove.ImageAnnotations"),
+        ),
+        (Self::Log, "/log", Some("foxglove.Log")),
+        (Self::Plan, "/wag/plan", Some("wag.Plan")),
+        (Self::Parameters, "/wag/parameters", Some("wag.Parameters")),
+        (Self::Summary, "/wag/summary", Some("wag.Summary")),
     ];
 
     /// Topic.
     pub const fn topic(self) -> &'static str {
-        match self {
-            Self::Replay => "/wag/replay",
-            Self::Measured => "/arm/measured",
-            Self::Commanded => "/arm/commanded",
-            Self::Cycles => "/controller/cycles",
-            Self::Frames => "/tf",
-            Self::Scene => "/scene",
-            Self::Rope => "/rope/simulated",
-            Self::Image => "/camera/left/image",
-            Self::Calibration => "/camera/left/calibration",
-            Self::Keypoints => "/camera/left/keypoints",
-            Self::Log => "/log",
-            Self::Plan => "/wag/plan",
-            Self::Parameters => "/wag/parameters",
-            Self::Summary => "/wag/summary",
-        }
-    }
-
-    /// Name of the schema; none for bytes that only this program reads.
-    pub const fn schema(self) -> Option<&'static str> {
-        Some(match self {
-            Self::Replay => return None,
-            Self::Measured | Self::Commanded => "foxglove.JointStates",
-            Self::Cycles => "wag.Cycle",
-            Self::Frames => "foxglove.FrameTransforms",
-            Self::Scene | Self::Rope => "foxglove.SceneUpdate",
-            Self::Image => "foxglove.CompressedImage",
-            Self::Calibration => "foxglove.CameraCalibration",
-            Self::Keypoints => "foxglove.ImageAnnotations",
-            Self::Log => "foxglove.Log",
-            Self::Plan => "wag.Plan",
-            Self::Parameters => "wag.Parameters",
-            Self::Summary => "wag.Summary",
-        })
-    }
-
-    /// Encoding of its messages.
-    pub const fn encoding(self) -> &'static str {
-        match self.schema() {
-            Some(_) => "json",
-            None => "wag-replay-chunk",
-        }
+        Self::ALL[self as usize].1
     }
 }

@@ -1,6 +1,7 @@
-//! From the run's clock to the one that viewers show.
+//! From the run's clock to the one that viewers show, and at which rate.
 
-use rustix::time::{ClockId, clock_gettime};
+use rt_controller::os::now_ns;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// How far the wall clock was ahead of CLOCK_MONOTONIC when the file was begun.
 /// Later steps of the wall clock do not matter.
@@ -9,18 +10,13 @@ pub(super) struct Clock {
     ahead_ns: u64,
 }
 
-fn read_ns(clock: ClockId) -> u64 {
-    let t = clock_gettime(clock);
-    let ns = i128::from(t.tv_sec) * 1_000_000_000 + i128::from(t.tv_nsec);
-    u64::try_from(ns).unwrap_or_default()
-}
-
 impl Clock {
     /// Compares both clocks.
     pub(super) fn compare() -> Self {
-        let wall_ns = read_ns(ClockId::Realtime);
+        let wall = SystemTime::now().duration_since(UNIX_EPOCH);
+        let wall_ns = u64::try_from(wall.unwrap_or_default().as_nanos()).unwrap_or_default();
         Self {
-            ahead_ns: wall_ns.saturating_sub(read_ns(ClockId::Monotonic)),
+            ahead_ns: wall_ns.saturating_sub(now_ns()),
         }
     }
 
@@ -36,6 +32,57 @@ impl Clock {
 
     /// Wall time now (ns).
     pub(super) fn now_ns(self) -> u64 {
-        self.wall_ns(read_ns(ClockId::Monotonic))
+        self.wall_ns(now_ns())
+    }
+}
+
+/// Lets one through per period of its own time.
+#[derive(Debug)]
+pub(super) struct Thinned {
+    period_ns: u64,
+    next_ns: u64,
+}
+
+impl Thinned {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "saturating"
+    )]
+    /// So many a second.
+    pub(super) fn at(rate_hz: f64) -> Self {
+        Self {
+            period_ns: (1e9 / rate_hz) as u64,
+            next_ns: 0,
+        }
+    }
+
+    /// Whether the one of this instant goes through.
+    pub(super) fn takes(&mut self, stamp_ns: u64) -> bool {
+        if stamp_ns < self.next_ns {
+            return false;
+        }
+        // Keeps the rhythm, and finds it again after a pause.
+        let slack_ns = self.period_ns / 4;
+        let due_ns = self.next_ns + self.period_ns;
+        self.next_ns = due_ns.max((stamp_ns + self.period_ns).saturating_sub(slack_ns));
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_the_frames_of_a_jittering_camera_are_taken() {
+        let mut thinned = Thinned::at(30.0);
+        let taken = (0..600u64)
+            .map(|n| 5_000_000_000 + n * 16_666_667 + (n * 7_919 % 3_000_000))
+            .filter(|stamp| thinned.takes(*stamp))
+            .count();
+        assert!((295..=305).contains(&taken), "{taken}");
+        assert!(thinned.takes(60_000_000_000));
+        assert!(!thinned.takes(60_010_000_000));
     }
 }

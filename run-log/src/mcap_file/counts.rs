@@ -1,7 +1,24 @@
-//! What became of the exact recording.
+//! What is lost on the way, and what became of the exact recording.
 
 use rt_controller::recording::chunk::{self, Front};
 use serde::Serialize;
+
+/// Numbers that should follow each other.
+#[derive(Debug, Default)]
+pub(super) struct Gaps {
+    /// The one that comes next, after the first.
+    pub next: Option<u64>,
+    /// How many never came.
+    pub lost: u64,
+}
+
+impl Gaps {
+    /// Takes in a number.
+    pub(super) fn count(&mut self, number: u64) {
+        self.lost += number.saturating_sub(self.next.unwrap_or(number));
+        self.next = Some(number + 1);
+    }
+}
 
 /// What became of the exact recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

@@ -5,9 +5,9 @@ use super::channel::Channel;
 use super::messages::mode_name;
 use super::read::{Walked, walk};
 use super::urdf::joint_name;
-use crate::error::At;
 use crate::files::JointsCsv;
-use crate::{Error, Result};
+use crate::files::cannot_read;
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use arm_model::{JOINTS, JointVector};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -39,13 +39,13 @@ struct Picture {
 }
 
 /// What a run's file shows of the rope.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct RunFilm {
     path: PathBuf,
     pictures: Vec<Picture>,
     picture_bytes: usize,
     /// The camera, or why what the file tells is none.
-    camera: Option<std::result::Result<StereoCamera, String>>,
+    camera: Option<Result<StereoCamera, String>>,
     joints: Vec<(u64, JointVector)>,
     /// The motions that were streamed.
     streamed: Vec<Streamed>,
@@ -71,7 +71,7 @@ pub struct RunPart {
     path: PathBuf,
     pictures: Vec<Picture>,
     /// The camera, where the file tells it, or why what it tells is none.
-    pub camera: Option<std::result::Result<StereoCamera, String>>,
+    pub camera: Option<Result<StereoCamera, String>>,
     /// Measured joints; t = 0 is the first picture.
     pub joints: JointsCsv,
     /// What is missing or damaged.
@@ -101,7 +101,7 @@ struct CycleMessage {
 }
 
 /// What can be seen with; a reason, if nothing can.
-fn camera_of(text: Option<&String>) -> std::result::Result<StereoCamera, String> {
+fn camera_of(text: Option<&String>) -> Result<StereoCamera, String> {
     let text = text.ok_or("the table is empty")?;
     let camera: StereoCamera = serde_json::from_str(text).map_err(|error| error.to_string())?;
     check_camera(&camera)?;
@@ -128,18 +128,13 @@ impl RunFilm {
     /// writes it.
     pub fn read(path: &Path) -> Result<Self> {
         let fail = || format!("run file `{}`", path.display());
-        let bytes = std::fs::read(path).map_err(Error::read(path)).at(fail)?;
+        let bytes = std::fs::read(path).with_context(cannot_read(path));
+        let bytes = bytes.with_context(fail)?;
         let mut film = Self {
             path: path.to_owned(),
-            pictures: Vec::new(),
-            picture_bytes: 0,
-            camera: None,
-            joints: Vec::new(),
-            streamed: Vec::new(),
-            last_cycle: None,
-            walked: Walked::default(),
+            ..Self::default()
         };
-        film.take_in(&bytes).at(fail)?;
+        film.take_in(&bytes).with_context(fail)?;
         Ok(film)
     }
 
@@ -159,7 +154,7 @@ impl RunFilm {
                     };
                     let at_ns = header.log_time;
                     self.message(topic, at_ns, data)
-                        .at(|| format!("channel `{topic}`, time {at_ns} ns"))?;
+                        .with_context(|| format!("channel `{topic}`, time {at_ns} ns"))?;
                 }
                 _ => {}
             }
@@ -174,22 +169,17 @@ impl RunFilm {
     fn message(&mut self, topic: &str, at_ns: u64, data: &[u8]) -> Result<()> {
         if topic == Channel::Image.topic() {
             let image: ImageMessage = serde_json::from_slice(data)?;
-            if image.format != "jpeg" {
-                return Err(Error::Picture(format!(
-                    "a picture is `{}`, not jpeg",
-                    image.format
-                )));
-            }
+            let format = image.format;
+            ensure!(format == "jpeg", "a picture is `{format}`, not jpeg");
             let jpeg = STANDARD
                 .decode(image.data)
-                .map_err(|error| Error::Picture(format!("a picture is no base64: {error}")))?;
+                .map_err(|error| anyhow!("a picture is no base64: {error}"))?;
             self.picture_bytes += jpeg.len();
-            if self.picture_bytes > MAX_BYTES {
-                return Err(Error::Picture(format!(
-                    "the pictures take more than {} MB",
-                    MAX_BYTES >> 20
-                )));
-            }
+            ensure!(
+                self.picture_bytes <= MAX_BYTES,
+                "the pictures take more than {} MB",
+                MAX_BYTES >> 20
+            );
             self.pictures.push(Picture {
                 stamp_ns: at_ns,
                 jpeg,
@@ -227,39 +217,26 @@ impl RunFilm {
 
     /// What is missing of a motion's pictures, first to last, and of the whole file.
     fn warnings(&self, number: usize, motion: Streamed, pictures: &[Picture]) -> Vec<String> {
-        let name = self.path.display();
-        let mut warnings = Vec::new();
-        let Walked {
-            damaged_chunks,
-            whole,
-            ..
-        } = self.walked;
-        if damaged_chunks > 0 {
-            warnings.push(format!(
-                "run file `{name}`: {damaged_chunks} damaged chunks are left out, and motions \
-                 may be counted wrongly"
-            ));
-        }
-        if !whole {
-            warnings.push(format!("run file `{name}` breaks off before its end"));
-        }
-        if !motion.to_its_end {
-            warnings.push(format!(
-                "run file `{name}`: the end of motion {number} is missing"
-            ));
-        }
+        let damaged = self.walked.damaged_chunks;
         let missing_ns: u64 = pictures
             .windows(2)
             .map(|pair| pair[1].stamp_ns - pair[0].stamp_ns)
             .filter(|step_ns| *step_ns > GAP_NS)
             .sum();
-        if missing_ns > 0 {
-            warnings.push(format!(
-                "run file `{name}`: pictures of {:.1} s of motion {number} are missing",
-                MonotonicNs(missing_ns).since_s(MonotonicNs(0))
-            ));
-        }
-        warnings
+        let missing_s = MonotonicNs(missing_ns).since_s(MonotonicNs(0));
+        let damage =
+            format!(": {damaged} damaged chunks are left out, and motions may be counted wrongly");
+        let end = format!(": the end of motion {number} is missing");
+        let gaps = format!(": pictures of {missing_s:.1} s of motion {number} are missing");
+        let warnings = [
+            (damaged > 0, &*damage),
+            (!self.walked.whole, " breaks off before its end"),
+            (!motion.to_its_end, &end),
+            (missing_ns > 0, &gaps),
+        ];
+        let said = warnings.into_iter().filter(|(holds, _)| *holds);
+        said.map(|(_, what)| format!("run file `{}`{what}", self.path.display()))
+            .collect()
     }
 
     /// Pictures of the `number`-th streamed motion, from 1.
@@ -269,10 +246,7 @@ impl RunFilm {
     pub fn part(mut self, number: usize) -> Result<RunPart> {
         let count = self.streamed.len();
         let path = self.path.clone();
-        let missing = |problem: String| Error::Film {
-            path: path.clone(),
-            problem,
-        };
+        let name = format!("run file `{}`", path.display());
         let broken = match self.walked {
             Walked {
                 damaged_chunks: 1..,
@@ -281,62 +255,55 @@ impl RunFilm {
             Walked { whole: false, .. } => "; the file breaks off before its end",
             _ => "",
         };
-        if count == 0 {
-            return Err(missing(format!(
-                "no motion was streamed to the arm while it was recorded, so no wiggle is in \
-                 it{broken}"
-            )));
-        }
-        let Some(motion) = number.checked_sub(1).and_then(|i| self.streamed.get(i)) else {
-            return Err(missing(format!(
-                "--part is {number}, but {count} motions were streamed to the arm{broken}"
-            )));
-        };
-        let motion = *motion;
-        if !motion.from_its_begin {
-            return Err(missing(format!(
-                "the beginning of motion {number} is missing, in which the rope hangs still"
-            )));
-        }
+        ensure!(
+            count > 0,
+            "{name}: no motion was streamed to the arm while it was recorded, so no wiggle is \
+             in it{broken}"
+        );
+        let motion = number.checked_sub(1).and_then(|i| self.streamed.get(i));
+        let motion = *motion.with_context(|| {
+            format!(
+                "{name}: --part is {number}, but {count} motions were streamed to the arm{broken}"
+            )
+        })?;
+        ensure!(
+            motion.from_its_begin,
+            "{name}: the beginning of motion {number} is missing, in which the rope hangs still"
+        );
         let first = self
             .pictures
             .iter()
             .rposition(|picture| picture.stamp_ns <= motion.begin_ns)
             .filter(|first| motion.begin_ns - self.pictures[*first].stamp_ns < GAP_NS)
-            .ok_or_else(|| {
-                missing(format!(
-                    "no picture is there from just before motion {number} began, when the rope \
-                     hung still"
-                ))
+            .with_context(|| {
+                format!(
+                    "{name}: no picture is there from just before motion {number} began, when \
+                     the rope hung still"
+                )
             })?;
         let count = self.pictures[first..]
             .iter()
             .take_while(|picture| picture.stamp_ns <= motion.end_ns)
             .count();
         let pictures: Vec<Picture> = self.pictures.drain(first..first + count).collect();
-        let (zero_ns, last_ns) = match &pictures[..] {
-            [first, .., last] => (first.stamp_ns, last.stamp_ns),
-            _ => {
-                return Err(missing(format!(
-                    "no pictures were recorded during motion {number}"
-                )));
-            }
+        let [first, .., last] = &pictures[..] else {
+            bail!("{name}: no pictures were recorded during motion {number}");
         };
+        let (zero_ns, last_ns) = (first.stamp_ns, last.stamp_ns);
         let span = zero_ns.saturating_sub(MARGIN_NS)..=last_ns.saturating_add(MARGIN_NS);
         let around = self.joints.iter().filter(|(t, _)| span.contains(t));
         let (times_s, q): (Vec<f64>, Vec<JointVector>) = around
             .map(|(t, q)| (MonotonicNs(*t).since_s(MonotonicNs(zero_ns)), *q))
             .unzip();
-        if times_s.len() < MIN_JOINTS {
-            return Err(missing(format!(
-                "the arm reported its joints {} times during motion {number}, but {MIN_JOINTS} \
-                 are needed at least",
-                times_s.len()
-            )));
-        }
+        ensure!(
+            times_s.len() >= MIN_JOINTS,
+            "{name}: the arm reported its joints {} times during motion {number}, but \
+             {MIN_JOINTS} are needed at least",
+            times_s.len()
+        );
         Ok(RunPart {
             warnings: self.warnings(number, motion, &pictures),
-            path: self.path,
+            path,
             pictures,
             camera: self.camera,
             joints: JointsCsv { times_s, q },
@@ -349,7 +316,7 @@ impl FrameSource for RunPart {
         self.pictures.len()
     }
 
-    fn read_left(&mut self, index: usize) -> std::result::Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
         let path = || self.path.clone();
         let picture = self
             .pictures

@@ -157,10 +157,7 @@ fn what_a_file_does_not_hold_is_said() {
         refused(1)
     );
     std::fs::write(&path, b"words").unwrap();
-    let error = format!(
-        "{:#}",
-        anyhow::Error::from(RunFilm::read(&path).unwrap_err())
-    );
+    let error = format!("{:#}", RunFilm::read(&path).unwrap_err());
     assert!(
         error.contains("run.mcap") && error.contains("MCAP"),
         "{error}"

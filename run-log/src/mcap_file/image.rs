@@ -1,6 +1,6 @@
 //! The camera's left eye as JPEG.
 
-use crate::{Error, Result};
+use anyhow::{Context, Result, ensure};
 use jpeg_encoder::{Encoder, ImageBuffer, JpegColorType, SamplingFactor};
 use shared_types::ipc::{FrameHeader, PIXEL_FORMAT_YUYV};
 
@@ -39,23 +39,19 @@ impl ImageBuffer for LeftEye<'_> {
 /// The left eye of a side-by-side frame, made `scale` times smaller each way.
 ///
 /// # Errors
-/// [`Error::Picture`].
+/// Header and bytes do not fit, or the picture is too large for a JPEG.
 pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -> Result<Vec<u8>> {
     let (width, height) = (header.width_px as usize, header.height_px as usize);
-    let is_yuyv = header.pixel_format == PIXEL_FORMAT_YUYV
-        && width > 0
-        && height > 0
-        && width.is_multiple_of(4)
-        && yuyv.len() == 2 * width * height;
-    if !is_yuyv {
-        return Err(Error::Picture(format!(
-            "the frame is no YUYV of {width} x {height} px"
-        )));
-    }
-    let side = |px: usize| {
-        let side = u16::try_from(px.div_ceil(scale));
-        side.map_err(|_e| Error::Picture("the frame is too large for a JPEG".to_owned()))
-    };
+    ensure!(
+        header.pixel_format == PIXEL_FORMAT_YUYV
+            && width > 0
+            && height > 0
+            && width.is_multiple_of(4)
+            && yuyv.len() == 2 * width * height,
+        "the frame is no YUYV of {width} x {height} px"
+    );
+    let side =
+        |px: usize| u16::try_from(px.div_ceil(scale)).context("the frame is too large for a JPEG");
     let eye = LeftEye {
         yuyv,
         columns: width / 2,
@@ -66,9 +62,7 @@ pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -
     let mut jpeg = Vec::new();
     let mut encoder = Encoder::new(&mut jpeg, quality);
     encoder.set_sampling_factor(SamplingFactor::F_2_1);
-    encoder
-        .encode_image(eye)
-        .map_err(|reason| Error::Picture(reason.to_string()))?;
+    encoder.encode_image(eye)?;
     Ok(jpeg)
 }
 

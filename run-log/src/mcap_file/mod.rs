@@ -5,11 +5,9 @@
 //! controller nor the camera up. The file grows by whole chunks, so that of a killed recorder's file
 //! everything but the last second is there and [`recover()`] makes it whole.
 
-mod calibration;
 mod channel;
 mod clock;
 mod counts;
-mod fields;
 mod film;
 mod image;
 mod messages;
@@ -19,7 +17,6 @@ mod recover;
 mod results;
 mod scene;
 mod schema;
-mod thinned;
 mod thread;
 mod urdf;
 mod writer;
@@ -29,7 +26,7 @@ pub use counts::RecordingCounts;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;
 pub(crate) use messages::mode_name;
-pub use read::{Walked, is_mcap, replay_bytes};
+pub(crate) use read::{is_mcap, replay_bytes};
 pub use recorder::{Recorded, RecorderConfig, run as record};
 pub use recover::{Recovered, recover};
 pub use results::{RopeMotion, SimulateRope};

@@ -1,7 +1,7 @@
 //! Reading a file, whole or not.
 
 use super::channel::Channel;
-use crate::{Error, Result};
+use anyhow::{Result, ensure};
 use mcap::MAGIC;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -15,7 +15,7 @@ const LONGEST: usize = 1 << 28;
 
 /// What was met on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Walked {
+pub(crate) struct Walked {
     /// Chunks whose checksum or inside is wrong; nothing of them is told.
     pub damaged_chunks: u32,
     /// The data ended where they should.
@@ -25,7 +25,7 @@ pub struct Walked {
 }
 
 /// Whether bytes begin like an MCAP file.
-pub fn is_mcap(bytes: &[u8]) -> bool {
+pub(crate) fn is_mcap(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
@@ -64,9 +64,10 @@ pub(super) fn walk(
     bytes: &[u8],
     mut each: impl FnMut(&Record<'_>) -> Result<()>,
 ) -> Result<Walked> {
-    if !is_mcap(bytes) {
-        return Err(Error::NotMcap);
-    }
+    ensure!(
+        is_mcap(bytes),
+        "this is no MCAP file: it does not begin like one"
+    );
     let mut rest = &bytes[MAGIC.len()..];
     let mut walked = Walked::default();
     while let Some((opcode, body, len)) = front(rest) {
@@ -145,8 +146,8 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
 /// the file was cut or damaged before it began.
 ///
 /// # Errors
-/// [`Error::NotMcap`], [`Error::NoChannel`].
-pub fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
+/// The bytes are no MCAP file, or one of another program.
+pub(crate) fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut id = None;
     let mut out = Vec::new();
     let walked = walk(bytes, |record| {
@@ -165,9 +166,11 @@ pub fn replay_bytes(bytes: &[u8]) -> Result<Vec<u8>> {
         }
         Ok(())
     })?;
-    if id.is_none() && walked.whole && walked.damaged_chunks == 0 {
-        return Err(Error::NoChannel(Channel::Replay.topic()));
-    }
+    ensure!(
+        id.is_some() || !walked.whole || walked.damaged_chunks > 0,
+        "the MCAP file holds no channel `{}`: it was not recorded by this program",
+        Channel::Replay.topic()
+    );
     Ok(out)
 }
 
@@ -191,13 +194,14 @@ mod tests {
         let run = crate::Run::open(folder.path()).unwrap();
         for len in [whole.len(), MAGIC.len() + 40, MAGIC.len(), 0] {
             std::fs::write(&path, &whole[..len]).unwrap();
-            let found = run.recording();
-            assert!(matches!(found, Err(Error::NoRecording(_))), "{len}");
+            let error = run.recording().unwrap_err();
+            assert!(error.is::<crate::NoRecording>(), "{len}: {error}");
         }
         let mut foreign = options().create(Cursor::new(Vec::new())).unwrap();
         foreign.finish().unwrap();
         let foreign = foreign.into_inner().into_inner();
-        assert!(matches!(replay_bytes(&foreign), Err(Error::NoChannel(_))));
+        let error = replay_bytes(&foreign).unwrap_err().to_string();
+        assert!(error.contains("no channel `/wag/replay`"), "{error}");
     }
 
     #[test]

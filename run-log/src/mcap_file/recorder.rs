@@ -1,26 +1,25 @@
 //! The process that writes the file: it subscribes, writes what comes, and finishes
 //! the file when it is told to end or its parent is gone.
 
-use super::calibration::{calibration, place};
 use super::channel::Channel;
-use super::clock::Clock;
-use super::counts::RecordingCounts;
+use super::clock::{Clock, Thinned};
+use super::counts::{Gaps, RecordingCounts};
 use super::film::CAMERA;
 use super::image::left_jpeg;
 use super::messages::{self, Level};
 use super::results::{Results, SimulateRope};
-use super::scene::{arm_frames, room};
-use super::thinned::Thinned;
+use super::scene::{arm_frames, calibration, camera_place, room};
 use super::urdf::urdf;
 use super::writer::McapFile;
-use crate::{Error, Result, files};
+use crate::files;
+use anyhow::{Context, Result, ensure};
 use arm_model::{Cell, Limits, Pole};
 use rt_controller::recording::{Item, LogReader, Read};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use shared_types::ipc::{
     Bus, ChunkSubscriber, ControllerMode, CycleRecord, CycleSubscriber, FrameHeader,
-    FrameSubscriber, IpcError, JointReport, JointSubscriber, KeypointSubscriber,
+    FrameSubscriber, JointReport, JointSubscriber, KeypointSubscriber,
 };
 use shared_types::{FaultCode, StereoCamera};
 use std::path::{Path, PathBuf};
@@ -102,7 +101,7 @@ struct Ports {
 }
 
 impl Ports {
-    fn open(bus: &Bus) -> std::result::Result<Self, IpcError> {
+    fn open(bus: &Bus) -> Result<Self> {
         Ok(Self {
             chunks: bus.chunk_subscriber()?,
             cycles: bus.cycle_subscriber()?,
@@ -113,19 +112,16 @@ impl Ports {
     }
 }
 
-fn cannot_receive(reason: impl std::error::Error) -> Error {
-    Error::Recorder(format!("cannot receive from shared memory: {reason}"))
-}
+const CANNOT_RECEIVE: &str = "cannot receive from shared memory";
 
 /// Hands what has arrived to `take`, a whole buffer at most: on a machine that is too
 /// slow there is always more.
-fn each<T, E: std::error::Error>(
-    receive: impl Fn() -> std::result::Result<Option<T>, E>,
+fn each<T>(
+    receive: impl Fn() -> Result<Option<T>>,
     mut take: impl FnMut(T) -> Result<()>,
 ) -> Result<()> {
     for _ in 0..BUFFER {
-        let sample = receive().map_err(cannot_receive)?;
-        let Some(sample) = sample else {
+        let Some(sample) = receive().context(CANNOT_RECEIVE)? else {
             break;
         };
         take(sample)?;
@@ -143,11 +139,9 @@ struct Recording {
     pole: Pole,
     arm: Thinned,
     pictures: Thinned,
-    next_frame: Option<u64>,
-    frames_lost: u64,
+    frames: Gaps,
     pictures_late: u64,
-    next_cycle: Option<u64>,
-    cycles_lost: u64,
+    cycles: Gaps,
 }
 
 impl Recording {
@@ -176,7 +170,7 @@ impl Recording {
             file.metadata(CAMERA[0], &[(CAMERA[1], text)])?;
             let sees = calibration(at_ns, camera);
             file.json(Channel::Calibration, at_ns, &sees)?;
-            let stands = json!({ "transforms": [place(at_ns, camera)] });
+            let stands = json!({ "transforms": [camera_place(at_ns, camera)] });
             file.json(Channel::Frames, at_ns, &stands)?;
         }
         Ok(Self {
@@ -188,37 +182,36 @@ impl Recording {
             pole: config.cell.pole,
             arm: Thinned::at(FRAMES_HZ),
             pictures: Thinned::at(config.pictures_hz),
-            next_frame: None,
-            frames_lost: 0,
+            frames: Gaps::default(),
             pictures_late: 0,
-            next_cycle: None,
-            cycles_lost: 0,
+            cycles: Gaps::default(),
         })
     }
 
     /// Takes in what has arrived.
     fn drain(&mut self, ports: &Ports) -> Result<()> {
         // The exact recording first: the rest can be made from it.
-        each(|| ports.chunks.receive(), |chunk| self.chunk(&chunk))?;
-        each(|| ports.cycles.receive(), |cycle| self.cycle(&cycle))?;
-        each(|| ports.joints.receive(), |report| self.report(&report))?;
+        each(|| Ok(ports.chunks.receive()?), |chunk| self.chunk(&chunk))?;
+        each(|| Ok(ports.cycles.receive()?), |cycle| self.cycle(&cycle))?;
         each(
-            || ports.keypoints.receive(),
+            || Ok(ports.joints.receive()?),
+            |report| self.report(&report),
+        )?;
+        each(
+            || Ok(ports.keypoints.receive()?),
             |frame| {
                 let at_ns = self.clock.wall_ns(frame.stamp_ns);
                 let message = messages::keypoints(at_ns, &frame);
                 self.file.json(Channel::Keypoints, at_ns, &message)
             },
-        )?;
-        Ok(())
+        )
     }
 
     /// Takes in frames that have arrived, and compresses `most` of them.
     fn pictures(&mut self, ports: &Ports, most: usize) -> Result<()> {
         let mut compressed = 0;
         for _ in 0..FRAMES_AT_ONCE {
-            let frame = ports.frames.receive();
-            let Some(frame) = frame.map_err(cannot_receive)? else {
+            let Some(frame) = ports.frames.receive().context(CANNOT_RECEIVE)? else {
                 break;
             };
             compressed += usize::from(self.frame(frame.user_header(), &frame)?);
@@ -249,10 +242,7 @@ impl Recording {
 
     fn cycle(&mut self, cycle: &CycleRecord) -> Result<()> {
         let at_ns = self.clock.wall_ns(cycle.deadline_ns);
-        if let Some(expected) = self.next_cycle {
-            self.cycles_lost += cycle.cycle.saturating_sub(expected);
-        }
-        self.next_cycle = Some(cycle.cycle + 1);
+        self.cycles.count(cycle.cycle);
         self.file
             .json(Channel::Cycles, at_ns, &messages::cycle(at_ns, cycle))?;
         if cycle.sent != 0 {
@@ -266,16 +256,12 @@ impl Recording {
         }
         if self.fault != cycle.fault {
             let fault = FaultCode::from_raw(cycle.fault).unwrap_or_default();
-            let level = if fault == FaultCode::None {
-                Level::Info
-            } else {
-                Level::Error
+            let level = match fault {
+                FaultCode::None => Level::Info,
+                _ => Level::Error,
             };
-            self.log(
-                at_ns,
-                level,
-                &format!("fault {fault:?}: {}", fault.explain()),
-            )?;
+            let text = format!("fault {fault:?}: {}", fault.explain());
+            self.log(at_ns, level, &text)?;
             self.fault = cycle.fault;
         }
         Ok(())
@@ -295,10 +281,7 @@ impl Recording {
 
     /// Records a frame; whether it was compressed.
     fn frame(&mut self, header: &FrameHeader, pixels: &[u8]) -> Result<bool> {
-        if let Some(expected) = self.next_frame {
-            self.frames_lost += header.sequence.saturating_sub(expected);
-        }
-        self.next_frame = Some(header.sequence + 1);
+        self.frames.count(header.sequence);
         if !self.pictures.takes(header.stamp_ns) {
             return Ok(false);
         }
@@ -360,8 +343,8 @@ impl Recorded {
             &[
                 ("chunks", chunks.to_string()),
                 ("chunks_lost", lost_chunks.to_string()),
-                ("cycles_lost", recording.cycles_lost.to_string()),
-                ("frames_lost", recording.frames_lost.to_string()),
+                ("cycles_lost", recording.cycles.lost.to_string()),
+                ("frames_lost", recording.frames.lost.to_string()),
                 ("pictures_left_out", recording.pictures_late.to_string()),
             ],
         )?;
@@ -387,12 +370,11 @@ pub(super) fn listen(config: &RecorderConfig, stop: &AtomicBool) -> Result<Recor
     if let Err(reason) = rustix::process::nice(NICE) {
         tracing::warn!(%reason, "the recorder runs with ordinary priority");
     }
-    if !(config.pictures_hz.is_finite() && config.pictures_hz > 0.0) {
-        return Err(Error::Recorder(format!(
-            "pictures_hz must be a number above zero, found {}",
-            config.pictures_hz
-        )));
-    }
+    let rate_hz = config.pictures_hz;
+    ensure!(
+        rate_hz.is_finite() && rate_hz > 0.0,
+        "pictures_hz must be a number above zero, found {rate_hz}"
+    );
     let bus = Bus::join(&config.domain)?;
     let ports = Ports::open(&bus)?;
     // Its appearance tells the parent that nothing is missed from here on.
@@ -459,8 +441,8 @@ mod tests {
             send();
         }
         recording.pictures(&ports, 1).unwrap();
-        assert_eq!(recording.next_frame, Some(1), "one, then the rest");
+        assert_eq!(recording.frames.next, Some(1), "one, then the rest");
         recording.pictures(&ports, FRAMES_AT_ONCE).unwrap();
-        assert_eq!(recording.next_frame, Some(8));
+        assert_eq!(recording.frames.next, Some(8));
     }
 }

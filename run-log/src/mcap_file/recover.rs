@@ -3,8 +3,8 @@
 
 use super::read::walk;
 use super::writer::options;
-use crate::error::At;
-use crate::{Error, Result, files};
+use crate::files::{cannot_read, write_atomic};
+use anyhow::{Context, Result};
 use mcap::records::{MessageHeader, Record};
 use mcap::{Attachment, Summary, Writer};
 use serde::Serialize;
@@ -33,7 +33,7 @@ pub struct Recovered {
 /// It cannot be read or written, or is no MCAP file.
 pub fn recover(path: &Path) -> Result<Recovered> {
     let fail = || format!("`{}`", path.display());
-    let bytes = std::fs::read(path).map_err(Error::read(path))?;
+    let bytes = std::fs::read(path).with_context(cannot_read(path))?;
     let mut writer = options().create(Cursor::new(Vec::new()))?;
     let mut found = Recovered::default();
     let mut span_ns: Option<(u64, u64)> = None;
@@ -45,14 +45,14 @@ pub fn recover(path: &Path) -> Result<Recovered> {
         }
         copy(&mut writer, record)
     })
-    .at(fail)?;
+    .with_context(fail)?;
     found.span_s = span_ns.map_or(0, |(first, last)| (last - first) / 1_000_000_000);
     (found.damaged, found.cut_bytes) = (walked.damaged_chunks, walked.cut_bytes);
     found.was_whole =
         walked.whole && found.damaged == 0 && matches!(Summary::read(&bytes), Ok(Some(_)));
     if !found.was_whole {
-        writer.finish().at(fail)?;
-        files::write_atomic(path, writer.into_inner().get_ref())?;
+        writer.finish().with_context(fail)?;
+        write_atomic(path, writer.into_inner().get_ref())?;
     }
     Ok(found)
 }
@@ -158,7 +158,7 @@ mod tests {
         let found = recover(&path).unwrap();
         assert_eq!((found.damaged, found.messages), (1, 20), "{found:?}");
         std::fs::write(&path, b"no such file").unwrap();
-        let said = format!("{:#}", anyhow::Error::from(recover(&path).unwrap_err()));
+        let said = format!("{:#}", recover(&path).unwrap_err());
         assert!(
             said.contains("no MCAP file") && said.contains("run.mcap"),
             "{said}"

@@ -3,10 +3,11 @@
 
 use super::channel::Channel;
 use super::clock::Clock;
-use super::fields::time;
+use super::messages::time;
 use super::scene::rope;
 use super::writer::McapFile;
-use crate::{Result, files};
+use crate::files;
+use anyhow::Result;
 use serde_json::{Value, json};
 use shared_types::MonotonicNs;
 use std::path::{Path, PathBuf};
@@ -34,8 +35,7 @@ pub struct RopeMotion {
 }
 
 /// Simulates the rope of a finished run folder; this crate must not depend on a simulator.
-pub type SimulateRope =
-    fn(&Path) -> std::result::Result<Vec<RopeMotion>, Box<dyn std::error::Error + Send + Sync>>;
+pub type SimulateRope = fn(&Path) -> Result<Vec<RopeMotion>>;
 
 /// Results of a run folder, each taken in once.
 #[derive(Debug)]

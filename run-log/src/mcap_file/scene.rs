@@ -1,14 +1,15 @@
-//! Arm, pole, rope and target in space.
+//! Arm, pole, rope, target and camera in space.
 //!
 //! The arm is drawn once, each piece bound to the frame of its link; only the frames
 //! move.
 
-use super::fields::{colour, round, time};
+use super::messages::{CAMERA_FRAME, colour, round, time};
 use super::urdf::{BASE, POLE_END, link_name};
 use arm_model::kinematics::{JOINT_ORIGIN_M, link_poses};
 use arm_model::{JOINTS, JointVector, Pole};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
+use shared_types::StereoCamera;
 
 const ARM_DIAMETER_M: f64 = 0.08;
 /// Diameter of the simulated rig's target ball.
@@ -32,7 +33,7 @@ fn pose(at: &Isometry3<f64>) -> Value {
 }
 
 /// A place from an origin (m) and an attitude.
-pub(super) fn placed(p_m: &Vector3<f64>, r: &Matrix3<f64>) -> Isometry3<f64> {
+fn placed(p_m: &Vector3<f64>, r: &Matrix3<f64>) -> Isometry3<f64> {
     let rotation = Rotation3::from_matrix_unchecked(*r);
     Isometry3::from_parts(
         Translation3::from(*p_m),
@@ -41,7 +42,7 @@ pub(super) fn placed(p_m: &Vector3<f64>, r: &Matrix3<f64>) -> Isometry3<f64> {
 }
 
 /// One `foxglove.FrameTransform`.
-pub(super) fn transform(at_ns: u64, parent: &str, child: &str, place: Isometry3<f64>) -> Value {
+fn transform(at_ns: u64, parent: &str, child: &str, place: Isometry3<f64>) -> Value {
     json!({
         "timestamp": time(at_ns), "parent_frame_id": parent, "child_frame_id": child,
         "translation": vector(&place.translation.vector), "rotation": quaternion(&place.rotation),
@@ -151,6 +152,30 @@ pub(super) fn rope(at_ns: u64, nodes: &[i32], [radius_m, lead_radius_m]: [f64; 2
         parts.push(("spheres", ball(tip, 2.0 * lead_radius_m, LEAD)));
     }
     json!({ "deletions": [], "entities": [entity(at_ns, "rope", BASE, &parts)] })
+}
+
+/// `foxglove.CameraCalibration` of the left eye.
+pub(super) fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {
+    let eye = &camera.left;
+    let (cx, cy) = (eye.cx, eye.cy);
+    json!({
+        "timestamp": time(at_ns), "frame_id": CAMERA_FRAME,
+        "width": camera.width_px, "height": camera.height_px,
+        "distortion_model": "plumb_bob", "D": eye.distortion,
+        "K": [eye.fx, 0.0, cx, 0.0, eye.fy, cy, 0.0, 0.0, 1.0],
+        "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        "P": [eye.fx, 0.0, cx, 0.0, 0.0, eye.fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    })
+}
+
+/// Place of the camera in the world.
+pub(super) fn camera_place(at_ns: u64, camera: &StereoCamera) -> Value {
+    transform(
+        at_ns,
+        BASE,
+        CAMERA_FRAME,
+        placed(&camera.p_w_cam_m, &camera.r_w_cam),
+    )
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! JSON schemas of the messages: Foxglove's well-known ones by their published
 //! names, fields and numbers, and our own.
 
-use crate::Result;
+use anyhow::Result;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -67,6 +67,7 @@ impl Schemas {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mcap_file::channel::Channel;
 
     const KINDS: [&str; 8] = [
         "time", "duration", "text", "bytes", "number", "count", "flag", "object",
@@ -91,10 +92,12 @@ mod tests {
                 );
             }
         }
-        for channel in super::super::channel::Channel::ALL {
-            if let Some(name) = channel.schema() {
-                assert!(messages.contains_key(name), "{name}");
-            }
+        for (number, (channel, topic, schema)) in Channel::ALL.into_iter().enumerate() {
+            assert_eq!(channel as usize, number, "{topic}");
+            assert!(
+                schema.is_none_or(|name| messages.contains_key(name)),
+                "{topic}"
+            );
         }
     }
 

@@ -1,7 +1,7 @@
 //! The recorder as a thread, for a command that does nothing but record.
 
 use super::recorder::{Recorded, RecorderConfig, listen};
-use crate::{Error, Result};
+use anyhow::{Context, Result, bail};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -29,9 +29,7 @@ impl RunFileThread {
         let thread = std::thread::Builder::new()
             .name("run-file".to_owned())
             .spawn(move || listen(&config, &stopped))
-            .map_err(|reason| {
-                Error::Recorder(format!("cannot start the recording thread: {reason}"))
-            })?;
+            .context("cannot start the recording thread")?;
         while !file.exists() && !thread.is_finished() {
             std::thread::sleep(LOOK);
         }
@@ -44,10 +42,7 @@ impl RunFileThread {
             Ok(started)
         } else {
             started.stop()?;
-            Err(Error::Recorder(format!(
-                "the recording of `{}` ended at once",
-                file.display()
-            )))
+            bail!("the recording of `{}` ended at once", file.display());
         }
     }
 
@@ -63,10 +58,9 @@ impl RunFileThread {
     pub fn stop(mut self) -> Result<Recorded> {
         self.stop.store(true, Ordering::SeqCst);
         let ended = self.thread.take().map(JoinHandle::join);
-        let broke_down = || Error::Recorder("the recording thread broke down".to_owned());
         ended
-            .ok_or_else(broke_down)?
-            .map_err(|_panic| broke_down())?
+            .and_then(std::thread::Result::ok)
+            .context("the recording thread broke down")?
     }
 }
 

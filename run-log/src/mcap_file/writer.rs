@@ -2,8 +2,8 @@
 
 use super::channel::Channel;
 use super::schema::Schemas;
-use crate::error::At;
-use crate::{Error, Result};
+use crate::files::cannot_write;
+use anyhow::{Context, Result};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use serde_json::Value;
@@ -49,26 +49,20 @@ impl McapFile {
             .write(true)
             .create_new(true)
             .open(path)
-            .map_err(Error::write(path))?;
-        let cannot = || format!("cannot write `{}`", path.display());
-        let mut writer = options().create(file).at(cannot)?;
+            .with_context(cannot_write(path))?;
+        let mut writer = options().create(file).with_context(cannot_write(path))?;
         let schemas = Schemas::read()?;
         let mut ids = Vec::new();
-        for channel in Channel::ALL {
-            let schema_id = match channel.schema() {
-                Some(name) => writer.add_schema(
-                    name,
-                    "jsonschema",
-                    schemas.schema(name).to_string().as_bytes(),
-                )?,
-                None => 0,
+        for (_, topic, schema) in Channel::ALL {
+            let (schema_id, encoding) = match schema {
+                Some(name) => {
+                    let text = schemas.schema(name).to_string();
+                    let id = writer.add_schema(name, "jsonschema", text.as_bytes())?;
+                    (id, "json")
+                }
+                None => (0, "wag-replay-chunk"),
             };
-            ids.push(writer.add_channel(
-                schema_id,
-                channel.topic(),
-                channel.encoding(),
-                &BTreeMap::new(),
-            )?);
+            ids.push(writer.add_channel(schema_id, topic, encoding, &BTreeMap::new())?);
         }
         Ok(Self {
             writer,
@@ -140,7 +134,6 @@ impl McapFile {
     /// Writes indexes and footer.
     pub fn finish(mut self) -> Result<()> {
         self.writer.finish()?;
-        let synced = self.writer.into_inner().sync_all();
-        Ok(synced.map_err(mcap::McapError::from)?)
+        Ok(self.writer.into_inner().sync_all()?)
     }
 }

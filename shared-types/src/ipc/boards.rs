@@ -1,33 +1,23 @@
-//! Blackboards between the real-time thread and the rest: the newest value,
-//! without allocation or system calls on either side once opened.
+//! The ends of the blackboards between the real-time thread and the rest.
 
-use super::bus::{Transport, open_error};
 use super::payload::{ControllerState, GuardianBeat, OperatorBeat, PAYLOAD_VERSION};
-use super::slots::{Key, Place, Slots, create_slots, reader_of};
+use super::slots::{BoardReader, Place, create};
 use super::{Bus, IpcError};
-use iceoryx2::port::reader::{EntryHandle, Reader};
-use iceoryx2::port::writer::{EntryHandleMut, Writer};
 
-const STATE: &str = "wag/v1/controller/state";
-const OPERATOR: &str = "wag/v1/controller/operator";
-const GUARDIAN: &str = "wag/v1/controller/guardian";
-
-const KEY: Key = Key(0);
+/// Reads the controller's state.
+pub type StateReader = BoardReader<ControllerState>;
+/// Sees whether somebody has the operator's place, without taking it: the count of the
+/// heartbeat stands still when there is no operator.
+pub type OperatorReader = BoardReader<OperatorBeat>;
 
 /// The controller's end: writes its state, reads the heartbeats of operator and
 /// guardian. Open it in the real-time thread before the loop; then all calls
 /// are RT-safe.
+#[derive(Debug)]
 pub struct ControllerBoards {
-    state: EntryHandleMut<Transport, Key, ControllerState>,
-    operator: Slots<OperatorBeat>,
-    guardian: Slots<GuardianBeat>,
-    _keep: Writer<Transport, Key>,
-}
-
-impl core::fmt::Debug for ControllerBoards {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("ControllerBoards").finish_non_exhaustive()
-    }
+    state: Place<ControllerState>,
+    operator: BoardReader<OperatorBeat>,
+    guardian: BoardReader<GuardianBeat>,
 }
 
 impl ControllerBoards {
@@ -36,105 +26,32 @@ impl ControllerBoards {
     /// # Errors
     /// [`IpcError::Open`], for instance when another controller runs.
     pub fn create(bus: &Bus) -> Result<Self, IpcError> {
-        let state = bus
-            .service(STATE)?
-            .blackboard_creator::<Key>()
-            .max_readers(8)
-            .max_nodes(8)
-            .add::<ControllerState>(
-                KEY,
-                ControllerState {
-                    version: PAYLOAD_VERSION,
-                    ..ControllerState::default()
-                },
-            )
-            .create()
-            .map_err(open_error(STATE))?;
-        let writer = state.writer_builder().create().map_err(open_error(STATE))?;
+        let state = ControllerState {
+            version: PAYLOAD_VERSION,
+            ..ControllerState::default()
+        };
         Ok(Self {
-            state: writer.entry(&KEY).map_err(open_error(STATE))?,
-            operator: create_slots(bus, OPERATOR)?,
-            guardian: create_slots(bus, GUARDIAN)?,
-            _keep: writer,
+            state: Place::of(&create(bus, state)?)?,
+            operator: BoardReader::of(&create(bus, OperatorBeat::default())?)?,
+            guardian: BoardReader::of(&create(bus, GuardianBeat::default())?)?,
         })
     }
 
     /// Writes the newest state. RT-safe.
     pub fn publish(&mut self, state: ControllerState) {
-        self.state.update_with_copy(state);
+        self.state.write(state);
     }
 
     /// Reads the newest heartbeat. RT-safe.
     #[must_use]
     pub fn operator(&self) -> OperatorBeat {
-        self.operator.newest()
+        self.operator.get()
     }
 
     /// Reads the guardian's newest beat. RT-safe.
     #[must_use]
     pub fn guardian(&self) -> GuardianBeat {
-        self.guardian.newest()
-    }
-}
-
-/// Reads the controller's state.
-pub struct StateReader {
-    state: EntryHandle<Transport, Key, ControllerState>,
-    _keep: Reader<Transport, Key>,
-}
-
-impl core::fmt::Debug for StateReader {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("StateReader").finish_non_exhaustive()
-    }
-}
-
-impl StateReader {
-    /// Opens the state of a running controller.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`] when there is no controller in this domain.
-    pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        let reader = reader_of(bus, STATE)?;
-        Ok(Self {
-            state: reader.entry(&KEY).map_err(open_error(STATE))?,
-            _keep: reader,
-        })
-    }
-
-    /// The newest state. RT-safe.
-    #[must_use]
-    pub fn get(&self) -> ControllerState {
-        *self.state.get()
-    }
-}
-
-/// Sees whether somebody has the operator's place, without taking it.
-pub struct OperatorReader {
-    beats: Slots<OperatorBeat>,
-}
-
-impl core::fmt::Debug for OperatorReader {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("OperatorReader").finish_non_exhaustive()
-    }
-}
-
-impl OperatorReader {
-    /// Opens the heartbeat of a running controller's operator.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`] when there is no controller in this domain.
-    pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        Ok(Self {
-            beats: Slots::read(reader_of(bus, OPERATOR)?, OPERATOR)?,
-        })
-    }
-
-    /// The newest heartbeat. Its count stands still when there is no operator.
-    #[must_use]
-    pub fn newest(&self) -> OperatorBeat {
-        self.beats.newest()
+        self.guardian.get()
     }
 }
 
@@ -152,7 +69,7 @@ impl OperatorEnd {
     /// # Errors
     /// [`IpcError::Open`] when there is no controller or the place is taken.
     pub fn take(bus: &Bus) -> Result<Self, IpcError> {
-        let (place, before): (_, OperatorBeat) = Place::take(bus, OPERATOR)?;
+        let (place, before) = Place::<OperatorBeat>::take(bus)?;
         let last = OperatorBeat {
             version: PAYLOAD_VERSION,
             stop: 0,
@@ -207,7 +124,7 @@ impl GuardianEnd {
     /// # Errors
     /// [`IpcError::Open`] when there is no controller or the place is taken.
     pub fn take(bus: &Bus) -> Result<Self, IpcError> {
-        let (place, before): (_, GuardianBeat) = Place::take(bus, GUARDIAN)?;
+        let (place, before) = Place::<GuardianBeat>::take(bus)?;
         Ok(Self {
             place,
             count: before.count,
@@ -253,7 +170,7 @@ mod tests {
         let watcher = OperatorReader::open(&bus).unwrap();
         operator.beat();
         operator.stop();
-        assert_eq!(watcher.newest(), controller.operator());
+        assert_eq!(watcher.get(), controller.operator());
         assert_eq!(
             (controller.operator().count, controller.operator().stop),
             (2, 1)

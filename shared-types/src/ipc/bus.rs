@@ -5,10 +5,11 @@ use super::domain::{config_of, root_folder};
 use super::payload::{CycleRecord, FrameHeader, JointReport};
 use super::preview::PreviewFrame;
 use crate::keypoints::KeypointFrame;
+use core::fmt::Debug;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::*;
-use iceoryx2::service::port_factory::publish_subscribe;
+use iceoryx2::service::builder::publish_subscribe::Builder;
 
 pub(super) type Transport = ipc::Service;
 
@@ -46,29 +47,28 @@ pub const KEYPOINT_SERVICE: &str = "wag/v1/camera/keypoints";
 pub const PREVIEW_SERVICE: &str = "wag/v2/camera/preview";
 /// Service of [`Bus::joint_publisher`].
 pub const JOINT_SERVICE: &str = "wag/v1/controller/joints";
-const RECORDING: &str = "wag/v1/controller/recording";
 
-/// A service of records: its name, and how many are kept for a subscriber.
-type Topic = (&'static str, usize);
+/// A service: its name, and how many samples are kept for a subscriber, and borrowed by it.
+type Topic = (&'static str, usize, usize);
 
+/// What a slow subscriber may lag behind before it loses the oldest.
+const FRAMES: Topic = (FRAME_SERVICE, 16, 2);
 /// A whole wiggle and more.
-const KEYPOINTS: Topic = (KEYPOINT_SERVICE, 1024);
+const KEYPOINTS: Topic = (KEYPOINT_SERVICE, 1024, 2);
 /// A second of them. Who comes late wants the newest.
-const PREVIEW: Topic = (PREVIEW_SERVICE, 64);
+const PREVIEW: Topic = (PREVIEW_SERVICE, 64, 2);
 /// Four seconds.
-const CYCLES: Topic = ("wag/v1/controller/cycles", 1024);
+const CYCLES: Topic = ("wag/v1/controller/cycles", 1024, 2);
 /// Four seconds.
-const JOINTS: Topic = (JOINT_SERVICE, 1024);
+const JOINTS: Topic = (JOINT_SERVICE, 1024, 2);
+/// Ten to the second: twelve seconds.
+const CHUNKS: Topic = ("wag/v1/controller/recording", 128, 1);
 
 /// The run that a record belongs to, its recorder, a page that looks on, the one that works
 /// on frames or previews them, and a recorder that joined late, with its exact recording.
 const SUBSCRIBERS: usize = 6;
 /// Processes that have opened a service.
 const NODES: usize = 10;
-/// Frames a slow subscriber may lag behind before it loses the oldest.
-const FRAME_BUFFER: usize = 16;
-/// Chunks of a recording kept for a subscriber, ten to the second: twelve seconds.
-const CHUNK_BUFFER: usize = 128;
 
 /// One process's connection to a shared-memory domain.
 ///
@@ -78,7 +78,7 @@ pub struct Bus {
     node: Node<Transport>,
 }
 
-pub(super) fn open_error<E: core::fmt::Debug>(service: &'static str) -> impl Fn(E) -> IpcError {
+pub(super) fn open_error<E: Debug>(service: &'static str) -> impl Fn(E) -> IpcError {
     move |e| IpcError::Open {
         service,
         reason: format!("{e:?}"),
@@ -90,21 +90,15 @@ impl Bus {
     /// removed on the way.
     ///
     /// # Errors
-    /// [`IpcError::Domain`] for a bad name, [`IpcError::Folder`] without a folder
-    /// of this user's own, [`IpcError::Join`] otherwise.
+    /// [`IpcError::Domain`] for a bad name, [`IpcError::Join`] otherwise.
     pub fn join(domain: &str) -> Result<Self, IpcError> {
         let config = config_of(domain)?;
         let root = root_folder()?;
-        let fail = |reason: String| IpcError::Join {
-            domain: domain.to_owned(),
-            folder: root,
-            reason,
-        };
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Transport>()
-            .map_err(|e| fail(format!("{e:?}")))?;
+            .map_err(|e| IpcError::join(domain, &root, e))?;
         Ok(Self { node })
     }
 
@@ -113,196 +107,134 @@ impl Bus {
         let _ = self.node.try_cleanup_dead_nodes();
     }
 
-    fn name(service: &'static str) -> Result<ServiceName, IpcError> {
-        service.try_into().map_err(open_error(service))
-    }
-
     pub(super) fn service(
         &self,
         name: &'static str,
     ) -> Result<iceoryx2::service::builder::Builder<Transport>, IpcError> {
-        Ok(self.node.service_builder(&Self::name(name)?))
+        let name: ServiceName = name.try_into().map_err(open_error(name))?;
+        Ok(self.node.service_builder(&name))
     }
+}
 
-    fn frames(
+/// Publishers and subscribers. There is one publisher of a kind per domain; a slow
+/// subscriber loses the oldest and never slows the publisher. Each fails with
+/// [`IpcError::Open`], for instance where another publishes already.
+impl Bus {
+    fn topic<P: Debug + IceoryxSend + ?Sized, H: Debug + ZeroCopySend>(
         &self,
-    ) -> Result<publish_subscribe::PortFactory<Transport, [u8], FrameHeader>, IpcError> {
-        self.service(FRAME_SERVICE)?
-            .publish_subscribe::<[u8]>()
-            .user_header::<FrameHeader>()
+        (name, kept, borrowed): Topic,
+    ) -> Result<Builder<P, H, Transport>, IpcError> {
+        let service = self.service(name)?.publish_subscribe::<P>();
+        Ok(service
+            .user_header::<H>()
             .max_publishers(1)
             .max_subscribers(SUBSCRIBERS)
             .max_nodes(NODES)
-            .subscriber_max_buffer_size(FRAME_BUFFER)
-            .subscriber_max_borrowed_samples(2)
+            .subscriber_max_buffer_size(kept)
+            .subscriber_max_borrowed_samples(borrowed)
             .history_size(0)
-            .enable_safe_overflow(true)
-            .open_or_create()
-            .map_err(open_error(FRAME_SERVICE))
+            .enable_safe_overflow(true))
     }
 
-    /// Publishes frames of at most `frame_bytes` bytes. One per domain.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
-    pub fn frame_publisher(&self, frame_bytes: usize) -> Result<FramePublisher, IpcError> {
-        self.frames()?
-            .publisher_builder()
-            .initial_max_slice_len(frame_bytes)
-            .max_loaned_samples(1)
-            .create()
-            .map_err(open_error(FRAME_SERVICE))
-    }
-
-    /// Receives frames; a slow reader loses the oldest, never slows the camera.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
-    pub fn frame_subscriber(&self) -> Result<FrameSubscriber, IpcError> {
-        self.frames()?
-            .subscriber_builder()
-            .buffer_size(FRAME_BUFFER)
-            .create()
-            .map_err(open_error(FRAME_SERVICE))
-    }
-
-    fn records<T: core::fmt::Debug + ZeroCopySend + 'static>(
-        &self,
-        (name, buffer): Topic,
-    ) -> Result<publish_subscribe::PortFactory<Transport, T, ()>, IpcError> {
-        self.service(name)?
-            .publish_subscribe::<T>()
-            .max_publishers(1)
-            .max_subscribers(SUBSCRIBERS)
-            .max_nodes(NODES)
-            .subscriber_max_buffer_size(buffer)
-            .subscriber_max_borrowed_samples(2)
-            .history_size(0)
-            .enable_safe_overflow(true)
-            .open_or_create()
-            .map_err(open_error(name))
-    }
-
-    fn publisher<T: core::fmt::Debug + ZeroCopySend + 'static>(
+    fn publisher<T: Debug + ZeroCopySend + 'static>(
         &self,
         topic: Topic,
     ) -> Result<Publisher<Transport, T, ()>, IpcError> {
-        let service = self.records(topic)?;
+        let service = self.topic::<T, ()>(topic)?.open_or_create();
+        let service = service.map_err(open_error(topic.0))?;
         let port = service.publisher_builder().create();
         port.map_err(open_error(topic.0))
     }
 
-    fn subscriber<T: core::fmt::Debug + ZeroCopySend + 'static>(
+    fn subscriber<T: Debug + ZeroCopySend + 'static>(
         &self,
         topic: Topic,
     ) -> Result<Subscriber<Transport, T, ()>, IpcError> {
-        let service = self.records(topic)?;
+        let service = self.topic::<T, ()>(topic)?.open_or_create();
+        let service = service.map_err(open_error(topic.0))?;
         let port = service.subscriber_builder().buffer_size(topic.1).create();
         port.map_err(open_error(topic.0))
     }
 
-    /// Publishes keypoints. One per domain.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
+    fn bytes_publisher<H: Debug + ZeroCopySend + Default + 'static>(
+        &self,
+        topic: Topic,
+        most_bytes: usize,
+    ) -> Result<Publisher<Transport, [u8], H>, IpcError> {
+        let service = self.topic::<[u8], H>(topic)?.open_or_create();
+        let service = service.map_err(open_error(topic.0))?;
+        let port = service.publisher_builder().max_loaned_samples(1);
+        let port = port.initial_max_slice_len(most_bytes).create();
+        port.map_err(open_error(topic.0))
+    }
+
+    fn bytes_subscriber<H: Debug + ZeroCopySend + 'static>(
+        &self,
+        topic: Topic,
+    ) -> Result<Subscriber<Transport, [u8], H>, IpcError> {
+        let service = self.topic::<[u8], H>(topic)?.open_or_create();
+        let service = service.map_err(open_error(topic.0))?;
+        let port = service.subscriber_builder().buffer_size(topic.1).create();
+        port.map_err(open_error(topic.0))
+    }
+
+    /// Publishes frames of at most `frame_bytes` bytes.
+    pub fn frame_publisher(&self, frame_bytes: usize) -> Result<FramePublisher, IpcError> {
+        self.bytes_publisher(FRAMES, frame_bytes)
+    }
+
+    /// Receives frames.
+    pub fn frame_subscriber(&self) -> Result<FrameSubscriber, IpcError> {
+        self.bytes_subscriber(FRAMES)
+    }
+
+    /// Publishes chunks of a recording, of at most `chunk_bytes` bytes; the bridge thread's.
+    pub fn chunk_publisher(&self, chunk_bytes: usize) -> Result<ChunkPublisher, IpcError> {
+        self.bytes_publisher(CHUNKS, chunk_bytes)
+    }
+
+    /// Receives chunks of a recording.
+    pub fn chunk_subscriber(&self) -> Result<ChunkSubscriber, IpcError> {
+        self.bytes_subscriber(CHUNKS)
+    }
+
+    /// Publishes keypoints.
     pub fn keypoint_publisher(&self) -> Result<KeypointPublisher, IpcError> {
         self.publisher(KEYPOINTS)
     }
 
     /// Receives keypoints.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
     pub fn keypoint_subscriber(&self) -> Result<KeypointSubscriber, IpcError> {
         self.subscriber(KEYPOINTS)
     }
 
-    /// Publishes what the live preview sees. One per domain.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`], for instance when another preview runs.
+    /// Publishes what the live preview sees.
     pub fn preview_publisher(&self) -> Result<PreviewPublisher, IpcError> {
         self.publisher(PREVIEW)
     }
 
-    /// Receives what the live preview sees; a slow reader loses the oldest.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
+    /// Receives what the live preview sees.
     pub fn preview_subscriber(&self) -> Result<PreviewSubscriber, IpcError> {
         self.subscriber(PREVIEW)
     }
 
-    /// Publishes cycle records. One per domain; the bridge thread's.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
+    /// Publishes cycle records; the bridge thread's.
     pub fn cycle_publisher(&self) -> Result<CyclePublisher, IpcError> {
         self.publisher(CYCLES)
     }
 
     /// Receives cycle records.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
     pub fn cycle_subscriber(&self) -> Result<CycleSubscriber, IpcError> {
         self.subscriber(CYCLES)
     }
 
-    /// Publishes joint reports. One per domain; the bridge thread's.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
+    /// Publishes joint reports; the bridge thread's.
     pub fn joint_publisher(&self) -> Result<JointPublisher, IpcError> {
         self.publisher(JOINTS)
     }
 
     /// Receives joint reports.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
     pub fn joint_subscriber(&self) -> Result<JointSubscriber, IpcError> {
         self.subscriber(JOINTS)
-    }
-
-    fn chunks(&self) -> Result<publish_subscribe::PortFactory<Transport, [u8], ()>, IpcError> {
-        self.service(RECORDING)?
-            .publish_subscribe::<[u8]>()
-            .max_publishers(1)
-            .max_subscribers(SUBSCRIBERS)
-            .max_nodes(NODES)
-            .subscriber_max_buffer_size(CHUNK_BUFFER)
-            .subscriber_max_borrowed_samples(1)
-            .history_size(0)
-            .enable_safe_overflow(true)
-            .open_or_create()
-            .map_err(open_error(RECORDING))
-    }
-
-    /// Publishes chunks of a recording, of at most `chunk_bytes` bytes. One per
-    /// domain; the bridge thread's.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
-    pub fn chunk_publisher(&self, chunk_bytes: usize) -> Result<ChunkPublisher, IpcError> {
-        self.chunks()?
-            .publisher_builder()
-            .initial_max_slice_len(chunk_bytes)
-            .max_loaned_samples(1)
-            .create()
-            .map_err(open_error(RECORDING))
-    }
-
-    /// Receives chunks of a recording; a slow reader loses the oldest, never
-    /// slows the controller.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
-    pub fn chunk_subscriber(&self) -> Result<ChunkSubscriber, IpcError> {
-        self.chunks()?
-            .subscriber_builder()
-            .buffer_size(CHUNK_BUFFER)
-            .create()
-            .map_err(open_error(RECORDING))
     }
 }

@@ -102,7 +102,7 @@ impl CauseRecord {
 
     /// Mode when it was noticed.
     #[must_use]
-    pub const fn mode_then(&self) -> ControllerMode {
+    pub fn mode_then(&self) -> ControllerMode {
         ControllerMode::from_raw(self.mode)
     }
 }

@@ -19,7 +19,7 @@ fn folder_of(user: u32) -> PathBuf {
 /// This user's folder, made when it is missing.
 ///
 /// # Errors
-/// [`IpcError::Folder`] when it cannot be made or belongs to somebody else.
+/// [`IpcError::Join`] when it cannot be made or belongs to somebody else.
 pub(super) fn root_folder() -> Result<PathBuf, IpcError> {
     let user = rustix::process::getuid().as_raw();
     let folder = folder_of(user);
@@ -28,21 +28,19 @@ pub(super) fn root_folder() -> Result<PathBuf, IpcError> {
 }
 
 fn own_folder(folder: &Path, user: u32) -> Result<(), IpcError> {
-    let fail = |reason: String| IpcError::Folder {
-        folder: folder.to_owned(),
-        reason,
-    };
     match DirBuilder::new().mode(0o700).create(folder) {
         Ok(()) => return Ok(()),
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-        Err(e) => return Err(fail(e.to_string())),
+        Err(e) => return Err(IpcError::folder(folder, e)),
     }
-    let found = folder.symlink_metadata().map_err(|e| fail(e.to_string()))?;
+    let found = folder.symlink_metadata();
+    let found = found.map_err(|e| IpcError::folder(folder, e))?;
     if !found.is_dir() {
-        return Err(fail("it is no folder".to_owned()));
+        return Err(IpcError::folder(folder, "it is no folder"));
     }
     if found.uid() != user {
-        return Err(fail(format!("it belongs to user {}", found.uid())));
+        let of = format!("it belongs to user {}", found.uid());
+        return Err(IpcError::folder(folder, of));
     }
     Ok(())
 }
@@ -57,11 +55,7 @@ pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
         });
     }
     let root = root_folder()?;
-    let fail = |e: SemanticStringError| IpcError::Join {
-        domain: domain.to_owned(),
-        folder: root.clone(),
-        reason: format!("{e:?}"),
-    };
+    let fail = |e: SemanticStringError| IpcError::join(domain, &root, e);
     let mut config = Config::default();
     config.global.prefix = FileName::new(prefix_of(domain).as_bytes()).map_err(fail)?;
     let path = IpcPath::new(root.as_os_str().as_encoded_bytes()).map_err(fail)?;
@@ -72,6 +66,11 @@ pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
 /// What the name of every file of a domain begins with.
 pub(super) fn prefix_of(domain: &str) -> String {
     format!("wag_{domain}_")
+}
+
+/// Whether this is the hash of a service in the name of a file.
+pub(super) fn is_hash(text: &str) -> bool {
+    text.len() == 40 && text.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
 #[cfg(test)]

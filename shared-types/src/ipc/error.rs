@@ -1,5 +1,8 @@
 //! What can go wrong where processes meet.
 
+use std::fmt::{Debug, Display};
+use std::path::Path;
+
 /// Why shared memory could not be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum IpcError {
@@ -9,29 +12,9 @@ pub enum IpcError {
         /// Name given.
         domain: String,
     },
-    /// The folder in which this user's processes meet cannot be used.
-    #[error(
-        "cannot use `{}`, where the processes of one user meet: {reason}; remove it or have it removed", .folder.display()
-    )]
-    Folder {
-        /// The folder.
-        folder: std::path::PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The process could not join shared memory at all.
-    #[error(
-        "cannot join shared memory (domain `{domain}`): {reason}; all processes must run as the same user, \
-         `{}` and /dev/shm must be writable with some 100 MB free", .folder.display()
-    )]
-    Join {
-        /// Domain name.
-        domain: String,
-        /// This user's folder.
-        folder: std::path::PathBuf,
-        /// What the library said.
-        reason: String,
-    },
+    /// The process cannot join shared memory at all.
+    #[error("{0}")]
+    Join(String),
     /// A service could not be opened.
     #[error(
         "cannot open shared-memory service `{service}`: {reason}; all processes must run as the same user and be of the same version"
@@ -75,8 +58,26 @@ pub enum IpcError {
 }
 
 impl IpcError {
+    /// Makes [`Self::Join`] of why the folder in which this user's processes meet cannot be
+    /// used.
+    pub(super) fn folder(folder: &Path, reason: impl Display) -> Self {
+        Self::Join(format!(
+            "cannot use `{}`, where the processes of one user meet: {reason}; remove it or have it removed",
+            folder.display()
+        ))
+    }
+
+    /// Makes [`Self::Join`] of what the library said about a domain.
+    pub(super) fn join(domain: &str, folder: &Path, reason: impl Debug) -> Self {
+        Self::Join(format!(
+            "cannot join shared memory (domain `{domain}`): {reason:?}; all processes must run as the same \
+             user, `{}` and /dev/shm must be writable with some 100 MB free",
+            folder.display()
+        ))
+    }
+
     /// Makes [`Self::Transfer`] of what the library said about a service.
-    pub fn transfer<E: std::fmt::Debug>(service: &'static str) -> impl Fn(E) -> Self {
+    pub fn transfer<E: Debug>(service: &'static str) -> impl Fn(E) -> Self {
         move |error| Self::Transfer {
             service,
             reason: format!("{error:?}"),

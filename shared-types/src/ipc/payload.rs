@@ -55,15 +55,10 @@ impl ControllerMode {
     /// The mode of a raw number from shared memory; unknown ones read as
     /// [`ControllerMode::Faulted`]. RT-safe.
     #[must_use]
-    pub const fn from_raw(raw: u8) -> Self {
-        match raw {
-            0 => Self::Offline,
-            1 => Self::Idle,
-            2 => Self::Moving,
-            3 => Self::Streaming,
-            4 => Self::Braking,
-            _ => Self::Faulted,
-        }
+    pub fn from_raw(raw: u8) -> Self {
+        use ControllerMode::{Braking, Faulted, Idle, Moving, Offline, Streaming};
+        let mut all = [Offline, Idle, Moving, Streaming, Braking].into_iter();
+        all.find(|mode| *mode as u8 == raw).unwrap_or(Faulted)
     }
 
     /// Whether setpoints change in this mode.

@@ -1,17 +1,12 @@
 //! Which domains of this machine have a controller.
 
-use super::domain::{prefix_of, root_folder};
-use super::{Bus, DomainSweep, IpcError, StateReader};
-
-/// Letters of the hash at the end of a service's name.
-const HASH: usize = 40;
-const SERVICE_SUFFIX: &str = ".service";
+use super::domain::{is_hash, prefix_of, root_folder};
+use super::{Bus, DomainSweep, StateReader};
 
 /// Domain of a service's file, `wag_DOMAIN_HASH.service`.
 fn domain_in(file: &str) -> Option<&str> {
-    let (head, hash) = file.strip_suffix(SERVICE_SUFFIX)?.rsplit_once('_')?;
-    let whole = hash.len() == HASH && hash.bytes().all(|b| b.is_ascii_hexdigit());
-    let domain = head.strip_prefix("wag_").filter(|_| whole)?;
+    let (head, hash) = file.strip_suffix(".service")?.rsplit_once('_')?;
+    let domain = head.strip_prefix("wag_").filter(|_| is_hash(hash))?;
     // The one place that builds the prefix must agree.
     (prefix_of(domain) == format!("{head}_")).then_some(domain)
 }
@@ -20,16 +15,10 @@ fn domain_in(file: &str) -> Option<&str> {
 /// RT-safe.
 #[must_use]
 pub fn running_controllers() -> Vec<String> {
-    let Ok(files) = root_folder().and_then(|root| {
-        root.join("services")
-            .read_dir()
-            .map_err(|e| IpcError::Folder {
-                folder: root,
-                reason: e.to_string(),
-            })
-    }) else {
+    let Ok(root) = root_folder() else {
         return Vec::new();
     };
+    let files = root.join("services").read_dir().into_iter().flatten();
     let mut domains: Vec<String> = files
         .flatten()
         .filter_map(|file| domain_in(file.file_name().to_str()?).map(str::to_owned))

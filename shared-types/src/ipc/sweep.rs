@@ -4,7 +4,7 @@
 //! machine that throws a thousand times would keep a thousand of them.
 
 use super::bus::Transport;
-use super::domain::{config_of, prefix_of};
+use super::domain::{config_of, is_hash, prefix_of};
 use iceoryx2::prelude::{CallbackProgression, Node, NodeState};
 use std::path::Path;
 
@@ -50,9 +50,7 @@ impl DomainSweep {
         name.strip_prefix(&prefix_of(&self.domain))
             .and_then(|rest| rest.strip_suffix(COUNTER_SUFFIX))
             .and_then(|rest| rest.split_once('_'))
-            .is_some_and(|(hash, _)| {
-                hash.len() == 40 && hash.bytes().all(|b| b.is_ascii_hexdigit())
-            })
+            .is_some_and(|(hash, _)| is_hash(hash))
     }
 }
 

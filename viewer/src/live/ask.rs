@@ -1,5 +1,6 @@
 //! What a page may ask of the controller, and when.
 
+use super::attached::Seen;
 use anyhow::Context;
 use serde::Serialize;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
@@ -50,29 +51,19 @@ impl Ask {
     }
 
     /// Why it may not be asked for now; `None` when it may.
-    pub(crate) fn objection(self, now: &Present) -> Option<&'static str> {
-        let Some(mode) = now.mode else {
+    pub(crate) fn objection(self, now: Option<&Seen>) -> Option<&'static str> {
+        let Some(now) = now.filter(|now| now.alive) else {
             return Some("no controller runs");
         };
-        let operated = || (!now.operator).then_some("there is no operator");
+        let is_armed = now.state.operating_mode != 0;
+        let is_faulted = ControllerMode::from_raw(now.state.mode) == ControllerMode::Faulted;
         match self {
             Self::Stop => None,
-            Self::Disarm => operated().or((!now.armed).then_some("nothing is armed")),
-            Self::Acknowledge => operated()
-                .or((mode != ControllerMode::Faulted).then_some("there is no fault to accept")),
+            _ if !now.operator => Some("there is no operator"),
+            Self::Disarm => (!is_armed).then_some("nothing is armed"),
+            Self::Acknowledge => (!is_faulted).then_some("there is no fault to accept"),
         }
     }
-}
-
-/// What decides about wishes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Present {
-    /// The controller's mode, if there is a controller.
-    pub mode: Option<ControllerMode>,
-    /// Whether an operator's program gives signs of life.
-    pub operator: bool,
-    /// Whether motions are armed.
-    pub armed: bool,
 }
 
 /// A wish on its way, with the place for its answer.
@@ -84,14 +75,8 @@ pub(crate) struct Asked {
     pub reply: mpsc::Sender<Answer>,
 }
 
-/// What became of a wish.
-#[derive(Debug)]
-pub(crate) enum Answer {
-    /// It was done.
-    Done(&'static str),
-    /// It was not: one sentence.
-    Refused(String),
-}
+/// Whether a wish was done; why not, in one sentence.
+pub(crate) type Answer = Result<(), String>;
 
 /// A wish that the controller has got.
 #[derive(Debug)]
@@ -105,7 +90,7 @@ pub(crate) struct Open {
 
 /// Hands a wish to the controller; one that may not be asked for, or cannot be, is
 /// answered at once.
-pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: &Present) -> Option<Open> {
+pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: Option<&Seen>) -> Option<Open> {
     let sent = match (asked.ask.objection(now), bus) {
         (Some(objection), _) => Err(anyhow::anyhow!(objection)),
         (None, None) => Err(anyhow::anyhow!("no controller runs")),
@@ -121,7 +106,7 @@ pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: &Present) -> Optio
             reply: asked.reply,
         }),
         Err(error) => {
-            let _ = asked.reply.send(Answer::Refused(format!("{error:#}")));
+            let _ = asked.reply.send(Err(format!("{error:#}")));
             None
         }
     }
@@ -131,17 +116,15 @@ impl Open {
     /// Passes the answer on if it is there; whether the wish is still open.
     pub(crate) fn is_open(&self) -> bool {
         let answer = match self.pending.try_next() {
-            Ok(Some(ControllerEvent::Done)) => Answer::Done("done"),
-            Ok(Some(ControllerEvent::Refused { message, .. })) => Answer::Refused(message),
+            Ok(Some(ControllerEvent::Done)) => Ok(()),
+            Ok(Some(ControllerEvent::Refused { message, .. })) => Err(message),
             Ok(Some(ControllerEvent::Step { .. } | ControllerEvent::Started { .. })) => {
                 return true;
             }
-            Ok(Some(other)) => Answer::Refused(format!("the controller answered {other:?}")),
+            Ok(Some(other)) => Err(format!("the controller answered {other:?}")),
             Ok(None) if self.since.elapsed() < PATIENCE => return true,
-            Ok(None) => {
-                Answer::Refused("the controller did not answer; use the emergency stop".to_owned())
-            }
-            Err(error) => Answer::Refused(error.to_string()),
+            Ok(None) => Err("the controller did not answer; use the emergency stop".to_owned()),
+            Err(error) => Err(error.to_string()),
         };
         // The page may be gone by now.
         let _ = self.reply.send(answer);
@@ -152,31 +135,35 @@ impl Open {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_types::ipc::ControllerState;
 
     #[test]
     fn a_stop_needs_a_controller_only_and_everything_else_an_operator() {
-        let alone = Present {
-            mode: Some(ControllerMode::Faulted),
-            operator: false,
-            armed: true,
+        let seen = |mode: ControllerMode, operating_mode: u8, operator: bool| Seen {
+            state: ControllerState {
+                mode: mode as u8,
+                operating_mode,
+                ..ControllerState::default()
+            },
+            alive: true,
+            operator,
         };
-        let operated = Present {
-            operator: true,
-            ..alone
+        let alone = seen(ControllerMode::Faulted, 1, false);
+        let operated = seen(ControllerMode::Faulted, 1, true);
+        let silent = Seen {
+            alive: false,
+            ..operated
         };
         for ask in Ask::ALL {
-            assert!(ask.objection(&Present::default()).is_some());
+            assert!(ask.objection(None).is_some() && ask.objection(Some(&silent)).is_some());
             assert_eq!(Ask::named(ask.name()), Some(ask));
-            assert_eq!(ask.objection(&alone).is_none(), ask == Ask::Stop, "{ask:?}");
-            assert_eq!(ask.objection(&operated), None, "{ask:?}");
+            let objection = ask.objection(Some(&alone));
+            assert_eq!(objection.is_none(), ask == Ask::Stop, "{ask:?}");
+            assert_eq!(ask.objection(Some(&operated)), None, "{ask:?}");
         }
-        let still = Present {
-            mode: Some(ControllerMode::Idle),
-            operator: true,
-            armed: false,
-        };
-        assert!(Ask::Disarm.objection(&still).is_some());
-        assert!(Ask::Acknowledge.objection(&still).is_some());
+        let still = seen(ControllerMode::Idle, 0, true);
+        assert!(Ask::Disarm.objection(Some(&still)).is_some());
+        assert!(Ask::Acknowledge.objection(Some(&still)).is_some());
         assert_eq!(Ask::named("move"), None);
     }
 }

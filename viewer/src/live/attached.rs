@@ -74,7 +74,7 @@ impl Controller {
             .or_else(|| folder_of_process(now.pid));
         Ok(Self {
             cycle: Pulse::new(now.cycle),
-            beat: Pulse::new(operator.newest().count),
+            beat: Pulse::new(operator.get().count),
             state,
             operator,
             opened: Instant::now(),
@@ -85,7 +85,7 @@ impl Controller {
     fn look(&mut self) -> Seen {
         let state = self.state.get();
         let alive = self.cycle.beats(state.cycle, SILENCE);
-        let beat = self.operator.newest().count;
+        let beat = self.operator.get().count;
         Seen {
             state,
             alive: alive || self.opened.elapsed() < SILENCE,
@@ -159,12 +159,8 @@ pub(crate) fn newest_domain() -> Option<String> {
     running_controllers()
         .into_iter()
         .filter_map(|domain| {
-            let sweep = DomainSweep::new(&domain);
-            let pid = {
-                let bus = Bus::join(&domain).ok()?;
-                StateReader::open(&bus).ok()?.get().pid
-            };
-            drop(sweep);
+            let _sweep = DomainSweep::new(&domain);
+            let pid = StateReader::open(&Bus::join(&domain).ok()?).ok()?.get().pid;
             Some((started(pid)?, domain))
         })
         .max()

@@ -71,10 +71,7 @@ impl Facts {
             *stamp = now;
             match *file {
                 "params.toml" => self.identified = files::read_rope(&path).ok(),
-                "plan.json" => {
-                    let text = files::read_text(&path).ok();
-                    self.plan = text.and_then(|text| serde_json::from_str(&text).ok());
-                }
+                "plan.json" => self.plan = files::read_json(&path).ok(),
                 files::CELL => self.cell = files::read_cell(&path).ok(),
                 _ => self.camera = load_camera(&path).ok(),
             }

@@ -28,7 +28,7 @@ const SAME_FRAME_NS: u64 = 1_000_000;
 const OLD_NS: u64 = 500_000_000;
 
 /// A picture for the page.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Picture {
     /// The left eye.
     pub jpeg: Arc<[u8]>,
@@ -213,128 +213,109 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::ipc::{DomainSweep, FrameHeader, PreviewFrame, PreviewState};
+    use shared_types::ipc::{DomainSweep, FrameHeader, FramePublisher, PreviewFrame, PreviewState};
 
-    const SIZE: [u32; 2] = [64, 16];
+    /// A camera, and the film of it. Fields are dropped in order.
+    struct Stage {
+        film: Film,
+        camera: FramePublisher,
+        bus: Bus,
+        _sweep: DomainSweep,
+    }
 
-    fn frame(number: u64) -> (FrameHeader, Vec<u8>) {
-        let header = FrameHeader {
-            pixel_format: PIXEL_FORMAT_YUYV,
-            sequence: number,
-            stamp_ns: number * 20_000_000,
-            width_px: SIZE[0],
-            height_px: SIZE[1],
-            ..FrameHeader::default()
-        };
-        (header, vec![128; (SIZE[0] * SIZE[1] * 2) as usize])
+    impl Stage {
+        fn new(name: &str) -> Self {
+            let domain = format!("test_{name}_{}", std::process::id());
+            let sweep = DomainSweep::new(&domain);
+            let bus = Bus::join(&domain).unwrap();
+            Self {
+                film: Film::open(&bus).unwrap(),
+                camera: bus.frame_publisher(1 << 16).unwrap(),
+                bus,
+                _sweep: sweep,
+            }
+        }
+
+        /// What is made of one more frame, 20 ms times its number after the first.
+        fn turn(&mut self, number: u64, wanted: bool) -> Option<Picture> {
+            let mut sample = self.camera.loan_slice_uninit(64 * 16 * 2).unwrap();
+            *sample.user_header_mut() = FrameHeader {
+                pixel_format: PIXEL_FORMAT_YUYV,
+                sequence: number,
+                stamp_ns: number * 20_000_000,
+                width_px: 64,
+                height_px: 16,
+                ..FrameHeader::default()
+            };
+            let sample = sample.write_from_slice(&[128; 64 * 16 * 2]);
+            sample.send().unwrap();
+            self.film.turn(wanted, None, &[]).unwrap()
+        }
+
+        /// The same, when it is time for a picture.
+        fn due(&mut self, number: u64) -> Option<Picture> {
+            std::thread::sleep(PERIOD);
+            self.turn(number, true)
+        }
     }
 
     #[test]
     fn pictures_are_live_until_keypoints_of_a_kept_frame_come() {
-        let domain = format!("test_film_{}", std::process::id());
-        let _sweep = DomainSweep::new(&domain);
-        let bus = Bus::join(&domain).unwrap();
-        let camera = bus.frame_publisher(1 << 16).unwrap();
-        let tracker = bus.keypoint_publisher().unwrap();
-        let mut film = Film::open(&bus).unwrap();
-        let publish = |number: u64| {
-            let (header, bytes) = frame(number);
-            let mut sample = camera.loan_slice_uninit(bytes.len()).unwrap();
-            *sample.user_header_mut() = header;
-            sample.write_from_slice(&bytes).send().unwrap();
-        };
-        publish(1);
-        assert!(
-            film.turn(false, None, &[]).unwrap().is_none(),
-            "nobody looks"
-        );
-        publish(2);
-        let live = film.turn(true, None, &[]).unwrap().unwrap();
+        let mut stage = Stage::new("film");
+        let tracker = stage.bus.keypoint_publisher().unwrap();
+        assert!(stage.turn(1, false).is_none(), "nobody looks");
+        let live = stage.turn(2, true).unwrap();
         assert!(live.over.contains("live") && live.jpeg.starts_with(&[0xff, 0xd8]));
-        publish(3);
-        assert!(film.turn(true, None, &[]).unwrap().is_none(), "too soon");
-        let mut found = KeypointFrame {
-            sequence: 2,
-            stamp_ns: 40_000_000,
-            count: 2,
-            ..KeypointFrame::default()
-        };
-        found.points_px[1] = [7.0, 9.0];
-        tracker.send_copy(found).unwrap();
-        // One of a frame that was never shown.
-        tracker
-            .send_copy(KeypointFrame {
-                stamp_ns: 1,
-                ..found
-            })
-            .unwrap();
-        std::thread::sleep(PERIOD);
-        publish(4);
-        let tracked = film.turn(true, None, &[]).unwrap().unwrap();
-        assert!(
-            tracked.over.contains("[[0.0,0.0],[7.0,9.0]]"),
-            "{}",
-            tracked.over
-        );
+        assert!(stage.turn(3, true).is_none(), "too soon");
+        // Of a frame that was shown, and of one that was not.
+        for stamp_ns in [40_000_000, 1] {
+            let mut found = KeypointFrame {
+                stamp_ns,
+                count: 2,
+                ..KeypointFrame::default()
+            };
+            found.points_px[1] = [7.0, 9.0];
+            tracker.send_copy(found).unwrap();
+        }
+        let tracked = stage.due(4).unwrap();
+        let over = tracked.over;
+        assert!(over.contains("[[0.0,0.0],[7.0,9.0]]"), "{over}");
         assert_eq!(tracked.jpeg, live.jpeg);
-        std::thread::sleep(PERIOD);
-        publish(5);
-        assert!(
-            film.turn(true, None, &[])
-                .unwrap()
-                .unwrap()
-                .over
-                .contains("live")
-        );
+        assert!(stage.due(5).unwrap().over.contains("live"));
     }
 
     #[test]
     fn with_a_preview_each_picture_waits_for_its_own_keypoints() {
-        let domain = format!("test_film_preview_{}", std::process::id());
-        let _sweep = DomainSweep::new(&domain);
-        let bus = Bus::join(&domain).unwrap();
-        let camera = bus.frame_publisher(1 << 16).unwrap();
-        let preview = bus.preview_publisher().unwrap();
-        let mut film = Film::open(&bus).unwrap();
+        let mut stage = Stage::new("film_preview");
+        let preview = stage.bus.preview_publisher().unwrap();
         let mut turn = |number: u64, found: Option<f32>| {
-            std::thread::sleep(PERIOD);
-            let (header, bytes) = frame(number);
-            let mut sample = camera.loan_slice_uninit(bytes.len()).unwrap();
-            *sample.user_header_mut() = header;
-            sample.write_from_slice(&bytes).send().unwrap();
-            let picture = film.turn(true, None, &[]).unwrap();
+            let picture = stage.due(number);
             if let Some(u) = found {
                 let mut told = PreviewFrame {
                     state: PreviewState::Following as u8,
                     ..PreviewFrame::default()
                 };
                 told.rope.count = 1;
-                told.rope.stamp_ns = header.stamp_ns;
+                told.rope.stamp_ns = number * 20_000_000;
                 told.rope.points_px[0][0] = u;
                 preview.send_copy(told).unwrap();
             }
             picture.map_or_else(String::new, |picture| picture.over)
         };
-        assert!(
-            turn(1, Some(11.0)).contains("\"keypoints\":[]"),
-            "no preview"
-        );
-        // Frames are 20 ms apart by their stamps, so that every other one is far.
+        let none = "\"keypoints\":[]";
+        assert!(turn(1, Some(11.0)).contains(none), "no preview");
+        // Every tenth frame, so that those beside it are far.
         let first_with = turn(11, Some(12.0));
         assert!(first_with.contains("[[11.0,0.0]]"), "{first_with}");
         assert!(first_with.contains("the preview's keypoints"));
         assert!(turn(21, None).contains("[[12.0,0.0]]"));
-        assert!(
-            turn(31, None).contains("\"keypoints\":[]"),
-            "it skipped one"
-        );
+        assert!(turn(31, None).contains(none), "it skipped one");
     }
 
     #[test]
     fn what_is_kept_is_bounded() {
-        let domain = format!("test_kept_{}", std::process::id());
-        let _sweep = DomainSweep::new(&domain);
-        let mut film = Film::open(&Bus::join(&domain).unwrap()).unwrap();
+        let mut stage = Stage::new("kept");
+        let film = &mut stage.film;
         for stamp_ns in 0..40 {
             film.keep(Jpeg {
                 stamp_ns,

@@ -22,7 +22,7 @@ pub use facts::domain_of_run;
 pub use preview::{PreviewChild, PreviewProcess};
 
 use crate::report::{arm_points, tenths_mm};
-use ask::{Ask, Asked, Open, Present, hand_over};
+use ask::{Ask, Asked, Open, hand_over};
 use attached::{Attached, Seen, newest_domain};
 use http::Site;
 use jitter::Jitter;
@@ -56,6 +56,17 @@ pub enum Wanted {
     Domain(String, Option<PathBuf>),
 }
 
+/// What is known of one controller.
+#[derive(Debug, Default)]
+struct Shown {
+    jitter: Jitter,
+    histograms_at: Option<Instant>,
+    rope: Option<(FollowingRope, &'static str)>,
+    stop: Option<StopView>,
+    /// What it left in view.
+    left: Snapshot,
+}
+
 /// The watcher: call [`Watcher::turn`] until it is enough.
 #[derive(Debug)]
 pub struct Watcher {
@@ -66,14 +77,10 @@ pub struct Watcher {
     asks: mpsc::Receiver<Asked>,
     open: Vec<Open>,
     attached: Option<Attached>,
-    jitter: Jitter,
-    rope: Option<(FollowingRope, &'static str)>,
-    stop: Option<StopView>,
-    /// What the last run left in view.
-    left: Snapshot,
     searched: Option<Instant>,
-    histograms_at: Option<Instant>,
-    present: Present,
+    shown: Shown,
+    /// What was seen last, while there is a controller.
+    seen: Option<Seen>,
     /// The preview of the rope, where it is wished for.
     preview: Option<PreviewChild>,
     /// When the last turn was due.
@@ -104,13 +111,9 @@ impl Watcher {
             asks,
             open: Vec::new(),
             attached,
-            jitter: Jitter::default(),
-            rope: None,
-            stop: None,
-            left: Snapshot::default(),
             searched: None,
-            histograms_at: None,
-            present: Present::default(),
+            shown: Shown::default(),
+            seen: None,
             preview,
             turned: Instant::now(),
         };
@@ -152,14 +155,14 @@ impl Watcher {
         if self.site.is_followed() {
             self.site.state.put(serde_json::to_string(&snapshot)?);
         }
-        self.left = snapshot;
+        self.shown.left = snapshot;
         Ok(())
     }
 
     fn pass_on(&mut self, asked: Asked) {
         tracing::info!(ask = asked.ask.name(), "requested by a page");
         let bus = self.attached.as_ref().map(Attached::bus);
-        self.open.extend(hand_over(asked, bus, &self.present));
+        self.open.extend(hand_over(asked, bus, self.seen.as_ref()));
     }
 
     /// Looks at everything once.
@@ -185,17 +188,12 @@ impl Watcher {
             .as_mut()
             .and_then(|attached| attached.look(search, run.as_deref()));
         match (had, seen) {
-            (false, Some(_)) => self.begin(),
+            // Nothing of the one before counts for it.
+            (false, Some(_)) => self.shown = Shown::default(),
             (true, None) => self.end(),
             _ => {}
         }
-        self.present = Present {
-            mode: seen
-                .filter(|s| s.alive)
-                .map(|s| ControllerMode::from_raw(s.state.mode)),
-            operator: seen.is_some_and(|s| s.operator),
-            armed: seen.is_some_and(|s| s.state.operating_mode != 0),
-        };
+        self.seen = seen;
         if let Err(error) = self.listen(search) {
             tracing::warn!("reconnecting: {error:#}");
             self.end();
@@ -226,18 +224,9 @@ impl Watcher {
         }
     }
 
-    /// A controller came: nothing of the one before counts for it.
-    fn begin(&mut self) {
-        self.jitter = Jitter::default();
-        self.rope = None;
-        self.stop = None;
-        self.left = Snapshot::default();
-        self.histograms_at = None;
-    }
-
     /// The controller ended; the next may run elsewhere.
     fn end(&mut self) {
-        self.present = Present::default();
+        self.seen = None;
         if self.wanted == Wanted::Newest {
             self.attached = None;
         }
@@ -255,27 +244,36 @@ impl Watcher {
         let pole = self.here.of_run(facts.and_then(|f| f.cell)).pole;
         match facts.and_then(|facts| facts.rope()) {
             Some((rope, name)) => {
-                if self.rope.as_ref().is_none_or(|(r, _)| *r.params() != rope) {
-                    self.rope = Some((FollowingRope::new(rope, pole), name));
+                if self
+                    .shown
+                    .rope
+                    .as_ref()
+                    .is_none_or(|(r, _)| *r.params() != rope)
+                {
+                    self.shown.rope = Some((FollowingRope::new(rope, pole), name));
                 }
             }
-            None => self.rope = None,
+            None => self.shown.rope = None,
         }
         if let Some(cycles) = &attached.cycles {
             while let Some(cycle) = cycles.receive()? {
-                self.jitter.add(&cycle);
-                note_stop(&mut self.stop, cycle.fault, cycle.cycle);
+                self.shown.jitter.add(&cycle);
+                note_stop(&mut self.shown.stop, cycle.fault, cycle.cycle);
             }
         }
         if let Some(joints) = &attached.joints {
             while let Some(report) = joints.receive()? {
-                if let Some((rope, _)) = &mut self.rope {
+                if let Some((rope, _)) = &mut self.shown.rope {
                     rope.report(report.stamp_ns, report.q);
                 }
             }
         }
         let camera = facts.and_then(|facts| facts.camera.as_ref());
-        let nodes = self.rope.as_ref().map_or(&[][..], |(rope, _)| rope.nodes());
+        let nodes = self
+            .shown
+            .rope
+            .as_ref()
+            .map_or(&[][..], |(rope, _)| rope.nodes());
         if let Some(film) = &mut attached.film
             && let Some(picture) = film.turn(self.site.wants_pictures(), camera, nodes)?
         {
@@ -288,18 +286,18 @@ impl Watcher {
         let attached = self.attached.as_ref();
         let film = attached.and_then(|a| a.film.as_ref());
         let mut snapshot = Snapshot {
-            missed: self.jitter.missed,
+            missed: self.shown.jitter.missed,
             camera: film
                 .and_then(|film| film.seen)
                 .is_some_and(|at| at.elapsed() < Duration::from_secs(1)),
             asks: Ask::ALL
-                .map(|ask| (ask, ask.objection(&self.present)))
+                .map(|ask| (ask, ask.objection(self.seen.as_ref())))
                 .to_vec(),
             ..Snapshot::default()
         };
         let (Some(seen), Some(attached)) = (seen, attached) else {
             // The last one stays in view, said to be over.
-            let left = std::mem::take(&mut self.left);
+            let left = std::mem::take(&mut self.shown.left);
             snapshot.title = match &self.wanted {
                 Wanted::Domain(domain, _) => format!("domain {domain}"),
                 Wanted::Newest => "no run".to_owned(),
@@ -330,7 +328,7 @@ impl Watcher {
             "the controller is silent: use the emergency stop".clone_into(&mut snapshot.note);
         }
         let state = &seen.state;
-        note_stop(&mut self.stop, state.fault, state.cycle);
+        note_stop(&mut self.shown.stop, state.fault, state.cycle);
         let mode = ControllerMode::from_raw(state.mode);
         snapshot.controller = Some(ControllerView {
             mode,
@@ -339,13 +337,13 @@ impl Watcher {
             cycle: state.cycle,
             alive: seen.alive,
             operator: seen.operator,
-            stop: self.stop.clone(),
+            stop: self.shown.stop.clone(),
         });
         if mode != ControllerMode::Offline && state.q.is_finite() {
             snapshot.arm = arm_points(&state.q, &snapshot.cell.pole);
         }
         snapshot.target_m = facts.and_then(|facts| facts.target_m());
-        match &self.rope {
+        match &self.shown.rope {
             Some((rope, name)) => {
                 snapshot.rope = rope.nodes().iter().flat_map(tenths_mm).collect();
                 snapshot.rope_is = name;
@@ -354,11 +352,12 @@ impl Watcher {
             None => snapshot.rope_is = "no rope is identified yet",
         }
         if self
+            .shown
             .histograms_at
             .is_none_or(|at| at.elapsed() >= HISTOGRAMS)
         {
-            self.histograms_at = Some(Instant::now());
-            snapshot.jitter = Some(self.jitter.histograms());
+            self.shown.histograms_at = Some(Instant::now());
+            snapshot.jitter = Some(self.shown.jitter.histograms());
         }
         snapshot
     }

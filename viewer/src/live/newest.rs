@@ -1,66 +1,32 @@
 //! A place for one value: whoever comes late gets the newest and never a queue.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
-
-#[derive(Debug)]
-struct Slot<T> {
-    /// Values put in so far.
-    count: u64,
-    value: Option<Arc<T>>,
-}
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 /// The newest value and its number, counted from 1.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Newest<T> {
-    slot: Mutex<Slot<T>>,
+    slot: Mutex<(u64, Option<Arc<T>>)>,
     changed: Condvar,
 }
 
-impl<T> Default for Newest<T> {
-    fn default() -> Self {
-        let slot = Slot {
-            count: 0,
-            value: None,
-        };
-        Self {
-            slot: Mutex::new(slot),
-            changed: Condvar::new(),
-        }
-    }
-}
-
 impl<T> Newest<T> {
-    fn slot(&self) -> MutexGuard<'_, Slot<T>> {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Puts in a value; the one before is forgotten.
     pub(crate) fn put(&self, value: T) {
-        let mut slot = self.slot();
-        slot.count += 1;
-        slot.value = Some(Arc::new(value));
+        let mut slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
+        *slot = (slot.0 + 1, Some(Arc::new(value)));
         drop(slot);
         self.changed.notify_all();
     }
 
     /// A value with another number than `seen`, waited for at most `patience`.
     pub(crate) fn other_than(&self, seen: u64, patience: Duration) -> Option<(u64, Arc<T>)> {
-        let until = Instant::now() + patience;
-        let mut slot = self.slot();
-        loop {
-            if slot.count != seen
-                && let Some(value) = &slot.value
-            {
-                return Some((slot.count, Arc::clone(value)));
-            }
-            let left = until.checked_duration_since(Instant::now())?;
-            slot = self
-                .changed
-                .wait_timeout(slot, left)
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
-        }
+        let slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = |slot: &mut (u64, Option<Arc<T>>)| slot.0 == seen;
+        let waited = self.changed.wait_timeout_while(slot, patience, known);
+        let (slot, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let other = slot.1.as_ref().filter(|_| slot.0 != seen)?;
+        Some((slot.0, Arc::clone(other)))
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Jpeg {
 ///
 /// # Errors
 /// Size and bytes do not fit, or the picture is too large for a JPEG.
-pub(crate) fn encode(pixels: &[u8], head: FrameHeader) -> run_log::Result<Jpeg> {
+pub(crate) fn encode(pixels: &[u8], head: FrameHeader) -> anyhow::Result<Jpeg> {
     let scale = (head.width_px as usize / 2).div_ceil(WIDTH_MAX_PX).max(1);
     Ok(Jpeg {
         stamp_ns: head.stamp_ns,

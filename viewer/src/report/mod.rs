@@ -7,12 +7,10 @@
 
 mod data;
 mod latency;
-mod motion;
 mod page;
 mod pictures;
 mod read;
 mod replay;
-mod rope;
 
 pub use data::Histogram;
 pub use latency::histogram;

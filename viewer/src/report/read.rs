@@ -1,12 +1,14 @@
 //! A run folder as what a report holds.
 
-use super::data::{Errors, ReportData, Scene};
-use super::motion::motions;
-use super::replay::{Known, scene};
-use super::{latency, pictures, rope};
+use super::data::{Errors, ReportData, RopeRow, Scene};
+use super::replay::{Known, motions, scene};
+use super::{latency, pictures};
 use anyhow::{Context, ensure};
-use run_log::{CellHere, RopeMotion, Run, explain, files, show};
+use run_log::{CellHere, NoRecording, RopeMotion, Run, explain, files, show};
+use serde::de::DeserializeOwned;
 use serde_json::Value;
+use shared_types::RopeParams;
+use shared_types::rope::RANGES;
 use std::path::Path;
 
 /// Parts of `summary.json` that are told elsewhere, and better.
@@ -27,9 +29,7 @@ fn scenes(known: &Known<'_>) -> anyhow::Result<Vec<Scene>> {
 ///
 /// # Errors
 /// A file of the run is damaged.
-pub fn simulated_rope(
-    run: &Path,
-) -> Result<Vec<RopeMotion>, Box<dyn std::error::Error + Send + Sync>> {
+pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
     let run = Run::open(run)?;
     let plan = run.plan()?;
     let Some(rope) = run.rope()?.or(plan.as_ref().map(|p| p.rope)) else {
@@ -69,8 +69,8 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
     note(summary.is_some(), files::SUMMARY, "no figures of the run");
     let recorded = match of_run.recording() {
         Ok(recording) => Some((recording.cycles()?, explain(&recording.log()?))),
-        Err(run_log::Error::NoRecording(_)) => None,
-        Err(damaged) => return Err(damaged.into()),
+        Err(none) if none.is::<NoRecording>() => None,
+        Err(damaged) => return Err(damaged),
     };
     ensure!(
         summary.is_some() || recorded.is_some(),
@@ -88,8 +88,8 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
     note(plan.is_some(), files::PLAN, "no plan to compare with");
     let params = of_run.rope()?;
     note(params.is_some(), files::ROPE, "no identified rope");
-    let rope_rows = match &params {
-        Some(rope) => rope::rows(rope, &run.join(files::ROPE), &summary["truth"]["rope"])?,
+    let rope = match &params {
+        Some(rope) => rope_rows(rope, &run.join(files::ROPE), &summary["truth"]["rope"])?,
         None => Vec::new(),
     };
     let known = Known {
@@ -98,7 +98,7 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
         // A throw alone has the rope it was planned for.
         rope: params.as_ref().or(plan.as_ref().map(|p| &p.rope)),
         plan: plan.as_ref(),
-        target_m: target(&summary).or(plan.as_ref().map(|p| p.target_m)),
+        target_m: value(&summary["target_m"]).or(plan.as_ref().map(|p| p.target_m)),
     };
     let scenes = scenes(&known).with_context(|| format!("run `{}`", run.display()))?;
     let moving: Vec<_> = motions(&cycles.cycles).into_iter().flatten().collect();
@@ -108,7 +108,7 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
         forecast_90_m: plan.as_ref().and_then(|p| Some(p.forecast?.interval_90_m)),
         true_m: summary["true_tip_target_distance_m"].as_f64(),
         camera_m: summary["score"]["closest_m"].as_f64(),
-        camera_interval_m: pair(&summary["score"]["interval_m"]),
+        camera_interval_m: value(&summary["score"]["interval_m"]),
     };
     if let Some(table) = summary.as_object_mut() {
         for key in TOLD_ELSEWHERE {
@@ -120,7 +120,7 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
         run: folder_name(run),
         summary,
         error,
-        rope: rope_rows,
+        rope,
         plan_margins: plan.as_ref().map(|p| p.margins.clone()).unwrap_or_default(),
         cause: explanation.as_ref().filter(|e| e.stopped).map(show),
         explanation,
@@ -138,15 +138,33 @@ fn folder_name(run: &Path) -> String {
         .unwrap_or_default()
 }
 
-fn pair(value: &Value) -> Option<[f64; 2]> {
-    Some([value[0].as_f64()?, value[1].as_f64()?])
+/// A value of the summary, where it is there and as it should be.
+fn value<T: DeserializeOwned>(found: &Value) -> Option<T> {
+    T::deserialize(found).ok()
 }
 
-fn target(summary: &Value) -> Option<[f64; 3]> {
-    let target = &summary["target_m"];
-    Some([
-        target[0].as_f64()?,
-        target[1].as_f64()?,
-        target[2].as_f64()?,
-    ])
+/// Rows of a rope with the intervals in its file; `truth` is what a simulated rig said
+/// about it.
+fn rope_rows(params: &RopeParams, path: &Path, truth: &Value) -> anyhow::Result<Vec<RopeRow>> {
+    let table: toml::Table = toml::from_str(&files::read_text(path)?)
+        .with_context(|| format!("rope file `{}`", path.display()))?;
+    let interval = |key: &str| {
+        let ends = table.get("interval_90")?.get(key)?.as_array()?;
+        match ends.iter().map(toml::Value::as_float).collect::<Vec<_>>()[..] {
+            [Some(low), Some(high)] => Some([low, high]),
+            _ => None,
+        }
+    };
+    Ok(RANGES
+        .iter()
+        .zip(params.to_array())
+        .map(|(range, value)| RopeRow {
+            label: range.label,
+            unit: range.unit,
+            value,
+            interval_90: interval(range.key),
+            range: [range.min, range.max],
+            truth: truth[range.key].as_f64(),
+        })
+        .collect())
 }

@@ -1,7 +1,6 @@
 //! Motions to look at: the arm as measured, the identified rope simulated on it.
 
 use super::data::{Joints, Scene};
-use super::motion::begin;
 use anyhow::Context;
 use arm_model::{Cell, JOINTS, JointVector, Pole, kinematics};
 use nalgebra::Vector3;
@@ -10,7 +9,7 @@ use rope_sim::{
     Start, Watch, roll_out,
 };
 use run_log::Cycles;
-use shared_types::ipc::CycleRecord;
+use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{MonotonicNs, Plan, RopeParams};
 
 /// Frames per second.
@@ -25,8 +24,25 @@ const LONGEST_S: f64 = 15.0;
 const STEP_S: (f64, f64) = (5e-4, 1e-3);
 /// Points of a joint's curve.
 const CURVE_POINTS: usize = 400;
+/// Fewer cycles than this are nothing to look at.
+const CYCLES_MIN: usize = 25;
 /// Samples the measured motion needs.
 const SAMPLES_MIN: usize = 8;
+
+/// The cycles of each motion that was asked for, in order; moves to a start pose are the
+/// controller's own.
+pub(crate) fn motions(cycles: &[CycleRecord]) -> Vec<&[CycleRecord]> {
+    let streams = |c: &CycleRecord| c.mode == ControllerMode::Streaming as u8;
+    cycles
+        .chunk_by(|a, b| a.mode == b.mode && b.trajectory_s >= a.trajectory_s)
+        .filter(|run| streams(&run[0]) && run.len() >= CYCLES_MIN)
+        .collect()
+}
+
+/// When a motion began.
+fn begin(motion: &[CycleRecord]) -> MonotonicNs {
+    MonotonicNs(motion[0].deadline_ns).plus_s(-motion[0].trajectory_s)
+}
 
 /// What is known of a run beside the motion itself.
 #[derive(Debug)]
@@ -223,4 +239,30 @@ fn curves(
         }
     }
     joints
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_is_a_row_of_streaming_cycles() {
+        let run = |mode: ControllerMode, count: u32| {
+            (0..count).map(move |i| CycleRecord {
+                mode: mode as u8,
+                trajectory_s: f64::from(i),
+                ..CycleRecord::default()
+            })
+        };
+        // The third and the fourth follow each other without a pause.
+        let cycles: Vec<CycleRecord> = run(ControllerMode::Moving, 60)
+            .chain(run(ControllerMode::Streaming, 40))
+            .chain(run(ControllerMode::Idle, 30))
+            .chain(run(ControllerMode::Streaming, 50))
+            .chain(run(ControllerMode::Streaming, 30))
+            .chain(run(ControllerMode::Streaming, 3))
+            .collect();
+        let lengths: Vec<usize> = motions(&cycles).iter().map(|m| m.len()).collect();
+        assert_eq!(lengths, [40, 50, 30]);
+    }
 }

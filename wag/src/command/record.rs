@@ -74,7 +74,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     while !interrupted().load(Ordering::SeqCst) && !over() && !recorder.has_died() {
         std::thread::sleep(Duration::from_millis(20));
     }
-    let recorded = recorder.stop().map_err(anyhow::Error::from);
+    let recorded = recorder.stop();
     let counts = recorded.as_ref().ok().map(Recorded::counts);
     if counts.is_some_and(|counts| counts.chunks == 0) {
         // An empty folder goes by itself.
@@ -96,7 +96,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     let summary_kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     // What became of the recording says more than what could not be written next to it.
     recorded
-        .and_then(|recorded| Ok(recorded.finish(simulated_rope)?))
+        .and_then(|recorded| recorded.finish(simulated_rope))
         .with_context(|| remedy(&folder.file(files::RUN)))
         .or_failed()?;
     cell_kept.or_failed()?;

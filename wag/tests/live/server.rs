@@ -32,13 +32,21 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
         "/state",
         "/watch.js",
         "/picture",
+        "//state",
+        "state",
+        &format!("/x{home}state"),
         &wrong,
         &format!("/state?{}", &home[1..]),
     ] {
         assert_eq!(get(path, &own).status, 403, "{path}");
     }
     // The token, from another page or under another name.
-    for foreign in ["http://evil.example", "null", "https://127.0.0.1"] {
+    for foreign in [
+        "http://evil.example",
+        "null",
+        "https://127.0.0.1",
+        "http://127.0.0.1:1",
+    ] {
         let lines = format!("{own}Origin: {foreign}\r\n");
         assert_eq!(get(home, &lines).status, 403, "Origin {foreign}");
         let stop = watch.raw(&format!("POST {home}ask/stop HTTP/1.1\r\n{lines}\r\n"));

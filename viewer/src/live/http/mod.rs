@@ -8,15 +8,15 @@ mod guard;
 mod reply;
 mod request;
 
-use super::ask::{Answer, Ask, Asked};
+use super::ask::{Ask, Asked};
 use super::film::Picture;
 use super::newest::Newest;
 use super::page;
 use super::token::Token;
 use anyhow::Context;
-use guard::{SentAway, admit};
+use guard::admit;
 use reply::{Reply, begin_events, end_unread};
-use request::{Request, Unread};
+use request::Unread;
 use std::io::Write;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -145,68 +145,51 @@ fn accept(listener: &TcpListener, site: &Arc<Site>) {
 fn converse(stream: &TcpStream, site: &Site) {
     let mut rest = Vec::new();
     loop {
-        let request = match request::read(stream, &mut rest) {
-            Ok(request) => request,
-            Err(Unread::Gone) => return,
+        let request = request::read(stream, &mut rest);
+        let done = request.and_then(|request| {
+            let path = admit(&request, &site.token, site.bound)?;
+            let done = match (request.method.as_str(), path) {
+                ("GET", Some("state")) => follow(stream, site),
+                (method, path) => {
+                    answer(site, method, path, &request.query).write(stream, request.keep)
+                }
+            };
+            Ok(done.is_ok() && request.keep)
+        });
+        match done {
+            Ok(true) => {}
+            Ok(false) | Err(Unread::Gone) => return,
             Err(Unread::Refused(status, why)) => {
                 let _ = Reply::said(status, why).write(stream, false);
                 return end_unread(stream);
             }
-        };
-        let done = match admit(&request, &site.token, site.bound) {
-            Ok(path) => answer(stream, site, &request, path),
-            Err(SentAway(status, why)) => {
-                let _ = Reply::said(status, why).write(stream, false);
-                return end_unread(stream);
-            }
-        };
-        if done.is_err() || !request.keep {
-            return;
         }
     }
 }
 
-/// Answers a request that has the token; `path` is what stands behind it.
-fn answer(
-    stream: &TcpStream,
-    site: &Site,
-    request: &Request,
-    path: Option<&str>,
-) -> std::io::Result<()> {
-    let keep = request.keep;
-    match (request.method.as_str(), path) {
+/// The answer to a request that has the token; `path` is what stands behind it.
+fn answer(site: &Site, method: &str, path: Option<&str>, query: &str) -> Reply {
+    let ask = path.and_then(|path| path.strip_prefix("ask/"));
+    match (method, path) {
         ("GET", None) => Reply {
             more: format!("Location: /{}/\r\n", site.token.as_str()),
             ..Reply::said(308, "")
-        }
-        .write(stream, keep),
-        ("GET", Some("")) => {
-            Reply::of("text/html; charset=utf-8", page::HTML.as_bytes()).write(stream, keep)
-        }
-        ("GET", Some("watch.js")) => {
-            Reply::of("text/javascript; charset=utf-8", page::script().as_bytes())
-                .write(stream, keep)
-        }
-        ("GET", Some("watch.css")) => {
-            Reply::of("text/css; charset=utf-8", page::style().as_bytes()).write(stream, keep)
-        }
-        ("GET", Some("state")) => follow(stream, site),
-        ("GET", Some("picture")) => picture(stream, site, request),
-        ("POST", Some(path)) if path.starts_with("ask/") => match Ask::named(&path[4..]) {
-            Some(ask) => wish(stream, site, ask, keep),
-            None => Reply::said(404, "unknown request").write(stream, keep),
         },
-        ("GET" | "POST", Some(path)) => {
-            let known = matches!(path, "" | "watch.js" | "watch.css" | "state" | "picture")
-                || path.strip_prefix("ask/").and_then(Ask::named).is_some();
-            let (status, why) = if known {
-                (405, "method not allowed")
-            } else {
-                (404, "there is nothing here")
-            };
-            Reply::said(status, why).write(stream, keep)
+        ("GET", Some("")) => Reply::of("text/html; charset=utf-8", page::HTML),
+        ("GET", Some("watch.js")) => Reply::of("text/javascript; charset=utf-8", page::script()),
+        ("GET", Some("watch.css")) => Reply::of("text/css; charset=utf-8", page::style()),
+        ("GET", Some("picture")) => picture(site, query),
+        ("POST", Some(_)) if ask.is_some() => match ask.and_then(Ask::named) {
+            Some(ask) => wish(site, ask),
+            None => Reply::said(404, "unknown request"),
+        },
+        ("GET" | "POST", Some(path))
+            if !matches!(path, "" | "watch.js" | "watch.css" | "state" | "picture")
+                && ask.and_then(Ask::named).is_none() =>
+        {
+            Reply::said(404, "there is nothing here")
         }
-        _ => Reply::said(405, "method not allowed").write(stream, keep),
+        _ => Reply::said(405, "method not allowed"),
     }
 }
 
@@ -232,44 +215,35 @@ fn follow(mut stream: &TcpStream, site: &Site) -> std::io::Result<()> {
 
 /// The newest picture, if it is another than the page has; what is drawn over it stands
 /// in a header line.
-fn picture(stream: &TcpStream, site: &Site, request: &Request) -> std::io::Result<()> {
-    *site
-        .picture_asked
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
-    let seen = request.query.strip_prefix("after=");
+fn picture(site: &Site, query: &str) -> Reply {
+    let asked = site.picture_asked.lock();
+    *asked.unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
+    let seen = query.strip_prefix("after=");
     let seen = seen.and_then(|n| n.parse().ok()).unwrap_or(0);
     match site.pictures.other_than(seen, PICTURE_PATIENCE) {
         None => Reply {
             status: 204,
-            ..Reply::of("image/jpeg", &[])
-        }
-        .write(stream, request.keep),
+            ..Reply::of("image/jpeg", [])
+        },
         Some((number, picture)) => Reply {
             more: format!("X-Number: {number}\r\nX-Over: {}\r\n", picture.over),
-            ..Reply::of("image/jpeg", &picture.jpeg)
-        }
-        .write(stream, request.keep),
+            ..Reply::of("image/jpeg", &*picture.jpeg)
+        },
     }
 }
 
 /// Passes a wish on and waits for the controller's answer.
-fn wish(stream: &TcpStream, site: &Site, ask: Ask, keep: bool) -> std::io::Result<()> {
+fn wish(site: &Site, ask: Ask) -> Reply {
     let (reply, answers) = mpsc::channel();
-    let asked = Asked { ask, reply };
-    let sent = site
-        .asks
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .send(asked);
-    let answer = match sent {
-        Ok(()) => answers.recv_timeout(ANSWER_PATIENCE).ok(),
-        Err(_gone) => None,
-    };
-    match answer {
-        Some(Answer::Done(text)) => Reply::said(200, text).write(stream, keep),
-        Some(Answer::Refused(text)) => Reply::said(409, &text).write(stream, keep),
-        None => Reply::said(503, "the controller did not answer; use the emergency stop")
-            .write(stream, keep),
+    let asks = site.asks.lock().unwrap_or_else(PoisonError::into_inner);
+    let sent = asks.send(Asked { ask, reply });
+    drop(asks);
+    match sent
+        .ok()
+        .and_then(|()| answers.recv_timeout(ANSWER_PATIENCE).ok())
+    {
+        Some(Ok(())) => Reply::said(200, "done"),
+        Some(Err(why)) => Reply::said(409, &why),
+        None => Reply::said(503, "the controller did not answer; use the emergency stop"),
     }
 }

@@ -14,7 +14,7 @@ const COMMON: &str = "Cache-Control: no-store\r\n\
 
 /// An answer of known length.
 #[derive(Debug)]
-pub(crate) struct Reply<'a> {
+pub(crate) struct Reply {
     /// Status.
     pub status: u16,
     /// Type of the body.
@@ -22,25 +22,25 @@ pub(crate) struct Reply<'a> {
     /// Further header lines, each with its end.
     pub more: String,
     /// Body.
-    pub body: &'a [u8],
+    pub body: Vec<u8>,
 }
 
-impl<'a> Reply<'a> {
+impl Reply {
     /// A whole answer of a type.
-    pub(crate) fn of(kind: &'static str, body: &'a [u8]) -> Self {
+    pub(crate) fn of(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
         Self {
             status: 200,
             kind,
             more: String::new(),
-            body,
+            body: body.into(),
         }
     }
 
     /// A sentence with a status.
-    pub(crate) fn said(status: u16, text: &'a str) -> Self {
+    pub(crate) fn said(status: u16, text: &str) -> Self {
         Self {
             status,
-            ..Self::of("text/plain; charset=utf-8", text.as_bytes())
+            ..Self::of("text/plain; charset=utf-8", text)
         }
     }
 
@@ -55,7 +55,7 @@ impl<'a> Reply<'a> {
             if keep { "keep-alive" } else { "close" },
             self.more,
         );
-        to.write_all(&[head.as_bytes(), self.body].concat())
+        to.write_all(&[head.as_bytes(), &self.body].concat())
     }
 }
 
