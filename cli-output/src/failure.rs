@@ -2,6 +2,17 @@
 
 use std::{fmt, io};
 
+/// A [`Failure`] for wrong usage or input: exit code 2.
+#[macro_export]
+macro_rules! bad_input {
+    ($($arg:tt)*) => { $crate::Failure::input($crate::anyhow!($($arg)*)) };
+}
+/// A [`Failure`] of the work itself: exit code 1.
+#[macro_export]
+macro_rules! failed {
+    ($($arg:tt)*) => { $crate::Failure::failed($crate::anyhow!($($arg)*)) };
+}
+
 /// A failed command.
 #[derive(Debug)]
 pub struct Failure {

@@ -11,6 +11,7 @@
 #[macro_use]
 pub mod output;
 
+#[macro_use]
 mod failure;
 mod interrupt;
 mod machine;
@@ -18,8 +19,10 @@ mod program;
 mod progress;
 pub mod table;
 
+#[doc(hidden)]
+pub use anyhow::anyhow;
 pub use failure::{Failure, OrInput, Outcome};
 pub use interrupt::{interrupted, watch_interrupts};
 pub use machine::Machine;
-pub use program::{finish, refuse_usage, seed, start_logging};
+pub use program::{finish, refuse_usage, seed, start};
 pub use progress::Stage;

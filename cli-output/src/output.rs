@@ -34,6 +34,8 @@ macro_rules! eprintln {
 /// What became of standard output.
 #[derive(Debug)]
 struct State {
+    /// Only the JSON object is for standard output, nothing for people.
+    json: bool,
     /// What is printed goes to standard error, because a file the user asked for
     /// is written to standard output.
     taken: bool,
@@ -46,6 +48,7 @@ struct State {
 }
 
 static STATE: Mutex<State> = Mutex::new(State {
+    json: false,
     taken: false,
     closed: false,
     failed: None,
@@ -72,9 +75,22 @@ impl State {
     }
 }
 
-/// Prints text for people.
+/// With `--json`: from here on the one object is printed, and nothing for people.
+pub fn set_json(json: bool) {
+    state().json = json;
+}
+
+/// Whether `--json` was asked for.
+pub fn is_json() -> bool {
+    state().json
+}
+
+/// Prints text for people; with `--json` nothing.
 pub fn text(text: fmt::Arguments<'_>) {
     let mut state = state();
+    if state.json {
+        return;
+    }
     if state.taken {
         drop(state);
         aside(text);
@@ -93,6 +109,13 @@ pub fn aside(text: fmt::Arguments<'_>) {
     let _ = io::stderr().write_all(text.to_string().as_bytes());
 }
 
+/// Prints a line to standard error for people; with `--json` the object tells it.
+pub fn remark(line: fmt::Arguments<'_>) {
+    if !is_json() {
+        aside(format_args!("{line}\n"));
+    }
+}
+
 /// Writes a file the user asked for to standard output; from here on what is for
 /// people goes to standard error.
 pub fn data(bytes: &[u8]) {
@@ -101,10 +124,11 @@ pub fn data(bytes: &[u8]) {
     state.write(&mut io::stdout(), bytes);
 }
 
-/// Prints the one JSON object of a command, at once, unless one was printed.
+/// Prints the one JSON object of a command, at once, unless one was printed or none was
+/// asked for.
 pub fn object(value: &serde_json::Value) {
     let mut state = state();
-    if !state.object {
+    if state.json && !state.object {
         state.object = true;
         let bytes = format!("{value:#}\n");
         if state.taken {
@@ -145,6 +169,7 @@ mod tests {
 
     fn fresh() -> State {
         State {
+            json: false,
             taken: false,
             closed: false,
             failed: None,

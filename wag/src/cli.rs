@@ -18,10 +18,13 @@ pub use results::*;
 pub use runs::*;
 pub use values::Point;
 
-use values::{host, mass_kg, offset_ms, rate_hz};
+use values::{host, mass_kg, offset_ms, one_of, rate_hz};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
+use planner::identify::Method;
+use rope_sim::Precision;
+use shared_types::Task;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
@@ -125,8 +128,12 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// What the throw is for; the rig has a scene for strikes only so far.
-    #[arg(long, value_enum, default_value_t = TaskName::Strike)]
-    pub task: TaskName,
+    #[arg(long, default_value = "strike", value_parser = one_of([
+        ("strike", "The tip passes through the target", Task::Strike),
+        ("lob", "", Task::Lob),
+        ("drape", "", Task::Drape),
+    ]))]
+    pub task: Task,
     /// Seed of the hidden rope, the target, the noise and every search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
@@ -145,19 +152,6 @@ pub struct DemoArgs {
     pub accept_unconfirmed: bool,
 }
 
-/// Tasks known by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TaskName {
-    /// The tip passes through the target.
-    Strike,
-    /// The tip lands on a board and stays.
-    #[value(hide = true)]
-    Lob,
-    /// The rope comes to hang over a wall.
-    #[value(hide = true)]
-    Drape,
-}
-
 /// `wag sim ...`
 #[derive(Debug, Subcommand)]
 pub enum SimCommand {
@@ -165,15 +159,6 @@ pub enum SimCommand {
     Rope(SimRopeArgs),
     /// Arm, pole and rope driven by a joint trajectory.
     Throw(SimThrowArgs),
-}
-
-/// Arithmetic of the simulation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PrecisionName {
-    /// Single precision, vector lanes.
-    F32,
-    /// Double precision.
-    F64,
 }
 
 /// Arguments of `wag sim rope`.
@@ -192,8 +177,11 @@ pub struct SimRopeArgs {
     #[arg(long, default_value_t = 5e-4)]
     pub dt: f64,
     /// Arithmetic.
-    #[arg(long, value_enum, default_value_t = PrecisionName::F64)]
-    pub precision: PrecisionName,
+    #[arg(long, default_value = "f64", value_parser = one_of([
+        ("f32", "Single precision, vector lanes", Precision::F32),
+        ("f64", "Double precision", Precision::F64),
+    ]))]
+    pub precision: Precision,
     /// Rotation vector of joint 0 at the start (rad), x,y,z.
     #[arg(long, allow_hyphen_values = true, default_value = "0,0,0")]
     pub initial_joint0: Point,
@@ -269,20 +257,6 @@ pub struct ObservationArgs {
     pub keypoints: Option<PathBuf>,
 }
 
-/// How to identify.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
-    /// The network alone: at once, for the built-in wiggle only.
-    Nn,
-    /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
-    Cmaes,
-    /// A quick proposal of the network, or of a search where the film is
-    /// out of its distribution, then refined.
-    Hybrid,
-    /// A quick proposal of a search, then refined.
-    HybridSearch,
-}
-
 /// Arguments of `wag identify`.
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
@@ -296,8 +270,18 @@ pub struct IdentifyArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Method.
-    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
-    pub method: MethodName,
+    #[arg(long, default_value = "hybrid", value_parser = one_of([
+        ("nn", "The network alone: at once, for the built-in wiggle only", Method::Network),
+        ("cmaes", "The paper's Φ-CMA-ES: a wide search of the simulator, then refined", Method::Cmaes),
+        (
+            "hybrid",
+            "A quick proposal of the network, or of a search where the film is out of its \
+             distribution, then refined",
+            Method::Hybrid,
+        ),
+        ("hybrid-search", "A quick proposal of a search, then refined", Method::HybridSearch),
+    ]))]
+    pub method: Method,
     /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
     /// phi-train).
     #[arg(long, value_name = "FILE")]

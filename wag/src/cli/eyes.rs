@@ -1,8 +1,9 @@
 //! Arguments of what looks: film, track, score, calib.
 
 use super::SceneArgs;
-use super::values::{Colour, rate_hz};
-use clap::{Args, Subcommand, ValueEnum};
+use super::values::{Colour, one_of, rate_hz};
+use camera_ingest::calib::VideoMode;
+use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
 /// Arguments of `wag film`.
@@ -12,8 +13,13 @@ pub struct FilmArgs {
     #[arg(long)]
     pub device: PathBuf,
     /// Size of one image: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
-    #[arg(long, value_enum, default_value_t = ModeName::Vga)]
-    pub mode: ModeName,
+    #[arg(long, default_value = "VGA", value_parser = one_of([
+        ("VGA", "672x376", VideoMode::Vga),
+        ("HD", "1280x720", VideoMode::Hd),
+        ("FHD", "1920x1080", VideoMode::FullHd),
+        ("2K", "2208x1242", VideoMode::TwoK),
+    ]))]
+    pub mode: VideoMode,
     /// Frames per second.
     #[arg(long, default_value_t = 60)]
     pub fps: u32,
@@ -32,23 +38,6 @@ pub struct FilmArgs {
     /// Prefix of the file names: NAME_WIDTHxHEIGHT.yuyv and .csv.
     #[arg(long, value_name = "NAME")]
     pub out: PathBuf,
-}
-
-/// Picture sizes of a stereo camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ModeName {
-    /// 672x376.
-    #[value(name = "VGA")]
-    Vga,
-    /// 1280x720.
-    #[value(name = "HD")]
-    Hd,
-    /// 1920x1080.
-    #[value(name = "FHD")]
-    FullHd,
-    /// 2208x1242.
-    #[value(name = "2K")]
-    TwoK,
 }
 
 /// Arguments of `wag track`.

@@ -2,8 +2,7 @@
 //! clear.
 
 use crate::cli::ArmArgs;
-use anyhow::anyhow;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome, output};
 use std::io::{BufRead, IsTerminal, Write, stdin, stdout};
 use std::net::IpAddr;
 
@@ -34,13 +33,13 @@ fn declaration(address: Option<IpAddr>, dry_run: bool, yes: bool, terminal: bool
 /// Makes sure that the area around the arm is clear for a motion called `word`:
 /// by `--yes`, or by the operator who types the word. A simulated arm is in
 /// nobody's way.
-pub fn require_clear_area(arm: &ArmArgs, word: &str, quiet: bool) -> Outcome {
-    let terminal = stdin().is_terminal() && !quiet;
+pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome {
+    let terminal = stdin().is_terminal() && !output::is_json();
     let refuse = |why: &str| {
         let address = arm.address.map(|a| a.to_string()).unwrap_or_default();
-        Err(Failure::input(anyhow!(
+        Err(bad_input!(
             "{address} is a real arm: clear the area, keep the emergency stop in reach, and {why}"
-        )))
+        ))
     };
     match declaration(arm.address, arm.dry_run, arm.yes, terminal) {
         Declaration::NotNeeded | Declaration::Given => Ok(()),

@@ -1,8 +1,7 @@
 //! The network that reads rope parameters: the one inside this program, or a file.
 
-use anyhow::anyhow;
 use arm_model::Pole;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use planner::identify::Method;
 use planner::phi::PhiNet;
 use std::path::Path;
@@ -22,10 +21,10 @@ pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
 /// What to do instead.
 pub fn no_model_without_network(method: Method, model: Option<&Path>) -> Outcome {
     match model {
-        Some(path) if !method.asks_network() => Err(Failure::input(anyhow!(
+        Some(path) if !method.asks_network() => Err(bad_input!(
             "--model {} is for --method nn and hybrid only",
             path.display()
-        ))),
+        )),
         _ => Ok(()),
     }
 }

@@ -3,12 +3,11 @@
 use super::filmed::Filmed;
 use super::learned::{Learned, classify};
 use crate::cli::TrackArgs;
-use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
 use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::KeypointTrack;
@@ -87,19 +86,19 @@ fn said(clamp: &ClampFit) -> String {
     )
 }
 
-pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
     if !(2..=shared_types::keypoints::MAX_KEYPOINTS).contains(&args.keypoints) {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "--keypoints is {}, but must be from 2 to {}",
             args.keypoints,
             shared_types::keypoints::MAX_KEYPOINTS
-        )));
+        ));
     }
     let mut filmed = Filmed::open(&args.video, args.fps, &args.scene)?;
     filmed.warn();
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(Some(&args.models), file)?;
-    let stage = Stage::begin("track", quiet);
+    let stage = Stage::begin("track");
     let tracked = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
     let (frames, result) = (&tracked.frames, &tracked.result);
     files::write_json(&args.out, &result.track).or_failed()?;
@@ -119,16 +118,14 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     for doubt in &result.track.doubts {
         eprintln!("warning: in doubt: {doubt}");
     }
-    if !quiet {
-        if let Some(clamp) = result.clamp {
-            println!("{}", said(&clamp));
-            if clamp.time_offset_s.abs() > FAR_STDS * clamp.time_std_s {
-                let late_ms = args.scene.film_late_ms + clamp.time_offset_s * 1e3;
-                println!("--film-late-ms {late_ms:.1} takes that out of the times");
-            }
+    if let Some(clamp) = result.clamp {
+        println!("{}", said(&clamp));
+        if clamp.time_offset_s.abs() > FAR_STDS * clamp.time_std_s {
+            let late_ms = args.scene.film_late_ms + clamp.time_offset_s * 1e3;
+            println!("--film-late-ms {late_ms:.1} takes that out of the times");
         }
-        println!("keypoints written to `{}`", args.out.display());
     }
+    println!("keypoints written to `{}`", args.out.display());
     Ok(Some(json!({
         "ok": true, "command": "track", "out": args.out, "frames": count,
         "lost": lost, "doubted": doubted, "doubts": result.track.doubts, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),

@@ -1,7 +1,7 @@
 //! The folder of one run: results, configurations as used, logs.
 
-use anyhow::{Context, anyhow};
-use cli_output::{Failure, OrInput, Outcome};
+use anyhow::Context;
+use cli_output::{OrInput, Outcome};
 use run_log::{CommandLine, files};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -49,10 +49,10 @@ impl RunFolder {
     /// Refuses a folder that is there already; results are never mixed.
     pub fn refuse_existing(path: &Path) -> Outcome {
         if path.exists() {
-            return Err(Failure::input(anyhow!(
+            return Err(bad_input!(
                 "run folder `{}` exists already; name another one with --out",
                 path.display()
-            )));
+            ));
         }
         Ok(())
     }

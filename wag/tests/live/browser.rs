@@ -4,7 +4,7 @@
 use super::chromium::Chromium;
 use super::client::Watch;
 use super::fake::{Fake, run_folder};
-use super::support::{record, wag};
+use super::support::{alone, record, wag};
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
 use rt_controller::recording::RecordedCycle;
@@ -14,11 +14,7 @@ use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::rope::RANGES;
 use std::path::Path;
 use std::sync::atomic::Ordering;
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-
-/// One browser at a time: each draws with the processor.
-static SCREEN: Mutex<()> = Mutex::new(());
 
 /// Largest report (bytes), so that it can be sent by mail.
 const REPORT_MAX_BYTES: u64 = 6_000_000;
@@ -82,7 +78,7 @@ fn throw_folder(run: &Path) {
 
 #[test]
 fn a_report_is_drawn_its_slider_moves_the_rope_and_two_fingers_come_nearer() {
-    let _screen = SCREEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let Some(mut page) = Chromium::start() else {
         return;
     };
@@ -138,7 +134,7 @@ fn pinch(page: &mut Chromium) {
 
 #[test]
 fn the_live_page_follows_a_run_and_stops_it() {
-    let _screen = SCREEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let Some(mut page) = Chromium::start() else {
         return;
     };

@@ -3,7 +3,6 @@
 //! A benchmark measures and compares with limits; it does not judge: the exit code
 //! is 0 whatever the figures are.
 
-mod percentiles;
 mod record;
 mod rt;
 
@@ -12,9 +11,9 @@ use cli_output::Outcome;
 use serde_json::Value;
 
 /// Runs a benchmark. The value is what `--json` prints.
-pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     match args.name {
-        BenchName::Rt => rt::run(args, quiet),
-        BenchName::Record => record::run(args, quiet),
+        BenchName::Rt => rt::run(args),
+        BenchName::Record => record::run(args),
     }
 }

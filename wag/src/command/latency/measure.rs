@@ -6,10 +6,9 @@ use crate::command::area::require_clear_area;
 use crate::command::on_arm::on_arm;
 use crate::config;
 use crate::pipeline;
-use anyhow::anyhow;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
@@ -42,15 +41,13 @@ fn intent(args: &LatencyArgs) -> Outcome<Intent> {
 }
 
 /// Checks the motions and connects to nothing.
-pub(super) fn dry_run(args: &LatencyArgs, quiet: bool) -> Outcome<Value> {
+pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
     let sweeps = intent(args)?.sweeps;
     let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
-    if !quiet {
-        println!(
-            "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
-            sweeps.len()
-        );
-    }
+    println!(
+        "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
+        sweeps.len()
+    );
     Ok(json!({
         "ok": true, "command": "latency", "dry_run": true, "sweeps": sweeps.len(), "duration_s": moving_s,
     }))
@@ -59,20 +56,19 @@ pub(super) fn dry_run(args: &LatencyArgs, quiet: bool) -> Outcome<Value> {
 /// Moves the arm; what `conclude` finds in what it did is the run's summary.
 pub(super) fn measure(
     args: &LatencyArgs,
-    quiet: bool,
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
     let Some(address) = args.arm.address else {
-        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
+        return Err(bad_input!("name the arm with --arm ADDR"));
     };
     let Intent {
         limits,
         excitation,
         sweeps,
     } = intent(args)?;
-    require_clear_area(&args.arm, "MEASURE", quiet)?;
+    require_clear_area(&args.arm, "MEASURE")?;
     let Some((_, first)) = sweeps.first() else {
-        return Err(Failure::input(anyhow!("name a joint with --joints")));
+        return Err(bad_input!("name a joint with --joints"));
     };
     let place = (args.out.as_deref(), "latency");
     let (_, found) = on_arm(
@@ -80,13 +76,12 @@ pub(super) fn measure(
         &limits,
         first.start(),
         place,
-        quiet,
         |session, link| {
-            let stage = Stage::begin("sweep", quiet);
+            let stage = Stage::begin("sweep");
             for (place, (joint, sweep)) in sweeps.iter().enumerate() {
                 stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
                 session.idle(REST)?;
-                pipeline::execute(link, sweep)?.finish(session)?;
+                pipeline::execute(session, link, sweep)?;
             }
             session.idle(REST)?;
             stage.done(&format!("{} joints swept", sweeps.len()));

@@ -11,9 +11,9 @@ mod show;
 pub use show::loop_table;
 
 use crate::cli::LatencyArgs;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use arm_model::{ArmResponse, JOINTS};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use evidence::{Evidence, Findings, RESPONSE_FILE, recorded};
 use planner::arm_response::delay::command_to_target;
 use planner::arm_response::{Recording, Sample, Setpoint, identify};
@@ -23,37 +23,35 @@ use serde_json::{Value, json};
 use shared_types::MonotonicNs;
 use std::path::PathBuf;
 
-pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let conclude = |evidence: &Evidence| conclude(args, evidence, quiet);
+pub fn run(args: &LatencyArgs) -> Outcome<Option<Value>> {
+    let conclude = |evidence: &Evidence| conclude(args, evidence);
     let value = match (&args.arm.address, &args.run) {
-        (_, None) if args.arm.dry_run => return measure::dry_run(args, quiet).map(Some),
-        (Some(_), None) => measure::measure(args, quiet, conclude)?,
+        (_, None) if args.arm.dry_run => return measure::dry_run(args).map(Some),
+        (Some(_), None) => measure::measure(args, conclude)?,
         (None, Some(run)) => conclude(&recorded(run).or_input()?).or_failed()?,
         _ => {
-            return Err(Failure::input(anyhow!(
+            return Err(bad_input!(
                 "say what to measure: --arm ADDR moves an arm (start `wag rig` for a simulated one), --run RUN reads a recorded run"
-            )));
+            ));
         }
     };
     if value["joints_measured"] == json!([]) {
-        return Err(Failure::failed(anyhow!(
+        return Err(failed!(
             "no joint moved in a way that shows how it follows, so nothing is written; measure with `wag latency --arm ADDR`"
-        )));
+        ));
     }
     Ok(Some(value))
 }
 
 /// Examines what was recorded, writes the response and shows it; returns what was found.
-fn conclude(args: &LatencyArgs, evidence: &Evidence, quiet: bool) -> anyhow::Result<Value> {
-    let findings = examine(evidence, quiet)?;
+fn conclude(args: &LatencyArgs, evidence: &Evidence) -> anyhow::Result<Value> {
+    let findings = examine(evidence)?;
     let known = findings.response.joints.iter().any(|j| j.lag().is_some());
     let path = response_path(args, evidence).filter(|_| known);
     if let Some(path) = &path {
         files::write_arm_response(path, &findings.response)?;
     }
-    if !quiet {
-        show::print(&findings, evidence, path.as_deref());
-    }
+    show::print(&findings, evidence, path.as_deref());
     Ok(show::json(&findings, evidence, path.as_deref()))
 }
 
@@ -64,8 +62,8 @@ fn response_path(args: &LatencyArgs, evidence: &Evidence) -> Option<PathBuf> {
     args.response.clone().or_else(own)
 }
 
-fn examine(evidence: &Evidence, quiet: bool) -> anyhow::Result<Findings> {
-    let stage = Stage::begin("identify", quiet);
+fn examine(evidence: &Evidence) -> anyhow::Result<Findings> {
+    let stage = Stage::begin("identify");
     let mut latencies = Latencies::new()?;
     for cycle in &evidence.run.cycles {
         latencies.record(cycle);
