@@ -16,36 +16,24 @@ macro_rules! failed {
 /// A failed command.
 #[derive(Debug)]
 pub struct Failure {
-    class: Class,
+    exit_code: u8,
     error: anyhow::Error,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Class {
-    /// The command ran and did not succeed: exit code 1.
-    Failed,
-    /// Usage or input is wrong: exit code 2.
-    BadInput,
 }
 
 /// What every command returns.
 pub type Outcome<T = ()> = Result<T, Failure>;
 
 impl Failure {
-    /// Usage or input is wrong.
+    /// Usage or input is wrong: exit code 2.
     pub fn input(error: impl Into<anyhow::Error>) -> Self {
-        Self {
-            class: Class::BadInput,
-            error: error.into(),
-        }
+        let (exit_code, error) = (2, error.into());
+        Self { exit_code, error }
     }
 
-    /// The command ran and did not succeed.
+    /// The command ran and did not succeed: exit code 1.
     pub fn failed(error: impl Into<anyhow::Error>) -> Self {
-        Self {
-            class: Class::Failed,
-            error: error.into(),
-        }
+        let (exit_code, error) = (1, error.into());
+        Self { exit_code, error }
     }
 
     /// Bad input, or else a failure of the work.
@@ -60,24 +48,14 @@ impl Failure {
     /// A server that could not be: an address that this machine does not have is bad input.
     pub fn of_server(error: impl Into<anyhow::Error>) -> Self {
         let error = error.into();
-        let of_system =
-            |e: &(dyn std::error::Error + 'static)| Some(e.downcast_ref::<io::Error>()?.kind());
-        let none_such = io::ErrorKind::AddrNotAvailable;
-        Self::of(
-            error
-                .chain()
-                .filter_map(of_system)
-                .any(|kind| kind == none_such),
-            error,
-        )
+        let mut system = error.chain().filter_map(|e| e.downcast_ref::<io::Error>());
+        let none_such = system.any(|e| e.kind() == io::ErrorKind::AddrNotAvailable);
+        Self::of(none_such, error)
     }
 
     /// Process exit code.
     pub fn exit_code(&self) -> u8 {
-        match self.class {
-            Class::Failed => 1,
-            Class::BadInput => 2,
-        }
+        self.exit_code
     }
 }
 

@@ -56,7 +56,6 @@ pub struct Cli {
     /// Log more to standard error (-v info, -vv debug).
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// What to do.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -124,7 +123,6 @@ pub enum Command {
     Process(ProcessArgs),
 }
 
-/// Arguments of `wag demo`.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// What the throw is for; the rig has a scene for strikes only so far.
@@ -152,7 +150,6 @@ pub struct DemoArgs {
     pub accept_unconfirmed: bool,
 }
 
-/// `wag sim ...`
 #[derive(Debug, Subcommand)]
 pub enum SimCommand {
     /// Free simulation of a rope under a prescribed motion of its attach frame.
@@ -161,7 +158,6 @@ pub enum SimCommand {
     Throw(SimThrowArgs),
 }
 
-/// Arguments of `wag sim rope`.
 #[derive(Debug, Args)]
 pub struct SimRopeArgs {
     /// Rope parameters.
@@ -190,7 +186,6 @@ pub struct SimRopeArgs {
     pub out: PathBuf,
 }
 
-/// Arguments of `wag sim throw`.
 #[derive(Debug, Args)]
 pub struct SimThrowArgs {
     /// Rope parameters.
@@ -213,7 +208,6 @@ pub struct SceneArgs {
     /// Camera calibration and extrinsics (camera.toml); default for a run: the one in its file.
     #[arg(long)]
     pub camera: Option<PathBuf>,
-    /// Motion of the clamp.
     #[command(flatten)]
     pub motion: MotionArgs,
     /// Which of a run's motions that were streamed to the arm; default: 1, the wiggle. A
@@ -257,16 +251,13 @@ pub struct ObservationArgs {
     pub keypoints: Option<PathBuf>,
 }
 
-/// Arguments of `wag identify`.
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    /// Observation.
     #[command(flatten)]
     pub observation: ObservationArgs,
     /// Frames per second, for a recording without frame times.
     #[arg(long, value_parser = rate_hz, requires = "video")]
     pub fps: Option<f64>,
-    /// Camera and motion.
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Method.
@@ -300,7 +291,6 @@ pub struct IdentifyArgs {
     pub out: PathBuf,
 }
 
-/// `wag plan ...`
 #[derive(Debug, Subcommand)]
 pub enum PlanCommand {
     /// The tip passes through the target.
@@ -311,7 +301,6 @@ pub enum PlanCommand {
     Drape(PlanArgs),
 }
 
-/// Arguments of `wag doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
     /// Address or name of an arm's controller to check too; nothing on it is changed.
@@ -321,7 +310,6 @@ pub struct DoctorArgs {
     pub ports: ArmPorts,
 }
 
-/// Arguments of `wag man`.
 #[derive(Debug, Args)]
 pub struct ManArgs {
     /// Folder for the pages; made if it does not exist.
@@ -329,7 +317,6 @@ pub struct ManArgs {
     pub folder: PathBuf,
 }
 
-/// Arguments of `wag completions`.
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
     /// Shell.
@@ -337,7 +324,6 @@ pub struct CompletionsArgs {
     pub shell: clap_complete::Shell,
 }
 
-/// Arguments of `wag process`.
 #[derive(Debug, Args)]
 pub struct ProcessArgs {
     /// Which process.

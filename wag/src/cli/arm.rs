@@ -45,7 +45,6 @@ pub struct ArmArgs {
     pub dead_man: bool,
 }
 
-/// Arguments of `wag wiggle`.
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
     /// Report how well it identifies ropes of the ranges, compared with the paper's wiggle.
@@ -60,7 +59,6 @@ pub struct WiggleArgs {
     /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
-    /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder for the run; it must not exist. Default: runs/TIME-wiggle.
@@ -68,7 +66,6 @@ pub struct WiggleArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `wag throw`.
 #[derive(Debug, Args)]
 pub struct ThrowArgs {
     /// The plan.
@@ -76,7 +73,6 @@ pub struct ThrowArgs {
     /// Go on although the track of the rope is in doubt.
     #[arg(long)]
     pub accept_unconfirmed: bool,
-    /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder for the run; it must not exist. Default: runs/TIME-throw.
@@ -84,7 +80,6 @@ pub struct ThrowArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `wag latency`.
 #[derive(Debug, Args)]
 pub struct LatencyArgs {
     /// Arm to move: one joint after the other, a small sweep of rising frequency.
@@ -113,7 +108,6 @@ pub struct LatencyArgs {
     pub response: Option<PathBuf>,
 }
 
-/// Arguments of `wag rig`.
 #[derive(Debug, Args)]
 pub struct RigArgs {
     /// Address to listen on. Anything but loopback lets others drive the simulated arm.

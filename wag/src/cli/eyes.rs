@@ -6,7 +6,6 @@ use camera_ingest::calib::VideoMode;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// Arguments of `wag film`.
 #[derive(Debug, Args)]
 pub struct FilmArgs {
     /// The camera, /dev/videoN.
@@ -40,7 +39,6 @@ pub struct FilmArgs {
     pub out: PathBuf,
 }
 
-/// Arguments of `wag track`.
 #[derive(Debug, Args)]
 pub struct TrackArgs {
     /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, folder with video.avi or with PNG or JPEG
@@ -50,13 +48,11 @@ pub struct TrackArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera and motion.
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Keypoints per frame.
     #[arg(long, default_value_t = 20)]
     pub keypoints: usize,
-    /// Learned model.
     #[command(flatten)]
     pub models: ModelArgs,
     /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
@@ -91,7 +87,6 @@ pub struct StereoArgs {
     pub camera: PathBuf,
 }
 
-/// Arguments of `wag score`.
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
     #[command(flatten)]
@@ -129,10 +124,8 @@ pub struct ShownArgs {
     pub lead_rgb: Option<Colour>,
 }
 
-/// Arguments of `wag calib extrinsics`.
 #[derive(Debug, Args)]
 pub struct ExtrinsicsArgs {
-    /// What the camera is shown.
     #[command(flatten)]
     pub shown: ShownArgs,
     /// The camera's settings with the estimated extrinsics (TOML).
@@ -140,10 +133,8 @@ pub struct ExtrinsicsArgs {
     pub out: PathBuf,
 }
 
-/// Arguments of `wag calib check`.
 #[derive(Debug, Args)]
 pub struct CalibCheckArgs {
-    /// What the camera is shown.
     #[command(flatten)]
     pub shown: ShownArgs,
     /// Largest residual that passes (px, RMS over both images).

@@ -7,7 +7,6 @@ use cli_output::seed;
 use shared_types::CommandInterface;
 use std::path::PathBuf;
 
-/// Arguments of `wag plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
     /// Rope parameters.
@@ -56,7 +55,6 @@ pub struct PlanArgs {
     pub reach: Option<PathBuf>,
 }
 
-/// Arguments of `wag check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
     /// The plan.

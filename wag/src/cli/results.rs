@@ -3,7 +3,6 @@
 use clap::{Args, ValueEnum};
 use cli_output::seed;
 
-/// Arguments of `wag bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
     /// What to measure.

@@ -11,9 +11,7 @@ fn failure(error: LiveError) -> Failure {
         LiveError::Unplugged { .. } | LiveError::Silent { .. } | LiveError::System { .. } => {
             Failure::failed(error)
         }
-        LiveError::Unfit { .. } | LiveError::Granted { .. } | LiveError::Setting { .. } => {
-            Failure::input(error)
-        }
+        other => Failure::input(other),
     }
 }
 

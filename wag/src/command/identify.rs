@@ -4,7 +4,7 @@ use super::filmed::{ClampMotion, Filmed};
 use super::learned::Learned;
 use super::network::{network, no_model_without_network, warning_of_pole};
 use super::plan::LOOK;
-use super::track::{TrackedVideo, overlay, track_video};
+use super::track::{overlay, track_video};
 use super::unconfirmed::confirm;
 use crate::cli::IdentifyArgs;
 use crate::config;
@@ -73,8 +73,7 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     let stage = Stage::begin("track");
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(None, file)?;
-    let TrackedVideo { frames, result } =
-        track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
+    let (frames, result) = track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
     stage.done(&format!("{} frames", frames.len()));
     if !result.track.doubts.is_empty() {
         let sheet = args.out.with_extension("track.png");

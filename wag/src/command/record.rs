@@ -110,39 +110,34 @@ pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
 
 /// The domain to record: named, of a run folder, or of the only controller there is.
 fn chosen_domain(args: &RecordArgs) -> Outcome<String> {
-    if let Some(run) = &args.run {
-        let domain = domain_of_run(run).or_input()?;
-        let runs = running_controllers();
-        return if runs.contains(&domain) {
-            Ok(domain)
-        } else {
-            Err(failed!(
-                "the controller of run `{}` does not run any more; {}",
-                run.display(),
-                those_that_run(&runs)
-            ))
-        };
-    }
     if let Some(domain) = &args.domain {
         return Ok(domain.clone());
     }
-    let mut runs = running_controllers();
-    match (runs.pop(), runs.as_slice()) {
-        (Some(only), []) => Ok(only),
-        (last, others) => {
-            let all: Vec<String> = others.iter().cloned().chain(last).collect();
-            Err(failed!("{}", those_that_run(&all)))
-        }
+    let Some(run) = &args.run else {
+        let running = running_controllers();
+        return match running.as_slice() {
+            [only] => Ok(only.clone()),
+            _ => Err(failed!("{}", those_that_run(&running))),
+        };
+    };
+    let domain = domain_of_run(run).or_input()?;
+    let running = running_controllers();
+    if !running.contains(&domain) {
+        return Err(failed!(
+            "the controller of run `{}` does not run any more; {}",
+            run.display(),
+            those_that_run(&running)
+        ));
     }
+    Ok(domain)
 }
 
 fn those_that_run(domains: &[String]) -> String {
     if domains.is_empty() {
-        "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned()
-    } else {
-        format!(
-            "controllers of these domains run: {}; name one with --domain",
-            domains.join(", ")
-        )
+        return "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned();
     }
+    format!(
+        "controllers of these domains run: {}; name one with --domain",
+        domains.join(", ")
+    )
 }

@@ -48,19 +48,29 @@ fn check_step(dt: f64) -> anyhow::Result<()> {
     clippy::cast_sign_loss,
     reason = "positive and bounded by the caller's check"
 )]
-fn frame_count(duration_s: f64, rate_hz: f64) -> usize {
-    (duration_s * rate_hz + 1e-6).floor() as usize + 1
+fn options(step_s: f64, start: Start, duration_s: f64, rate_hz: f64) -> SimOptions {
+    SimOptions {
+        step_s,
+        precision: Precision::F64,
+        start,
+        frames: FrameTimes {
+            first_s: 0.0,
+            period_s: 1.0 / rate_hz,
+            count: (duration_s * rate_hz + 1e-6).floor() as usize + 1,
+        },
+        watch: Watch::NOTHING,
+        horizon_s: duration_s,
+        threads: 1,
+    }
 }
 
 pub fn rope(args: &SimRopeArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let rows = read_pose(&args.pose).or_input()?;
-    let (first_s, last_s) = match (rows.first(), rows.last()) {
-        (Some(a), Some(b)) => (a.t_s, b.t_s),
-        _ => {
-            return Err(bad_input!("`{}` is empty", args.pose.display()));
-        }
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
+        return Err(bad_input!("`{}` is empty", args.pose.display()));
     };
+    let (first_s, last_s) = (first.t_s, last.t_s);
     if !(args.fps.is_finite() && args.fps > 0.0 && args.fps <= 1e5) {
         return Err(bad_input!(
             "--fps is {}, but must be above 0 and at most 100000",
@@ -77,22 +87,14 @@ pub fn rope(args: &SimRopeArgs) -> Outcome<Option<Value>> {
     let motion = PoseTrack::new(&rows)
         .with_context(|| format!("`{}`", args.pose.display()))
         .or_input()?;
-    let count = frame_count(last_s, args.fps);
-    let options = SimOptions {
-        step_s: args.dt,
-        precision: args.precision,
-        start: Start::Straight {
-            joint0_rotvec: args.initial_joint0.0,
-        },
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / args.fps,
-            count,
-        },
-        watch: Watch::NOTHING,
-        horizon_s: last_s,
-        threads: 1,
+    let start = Start::Straight {
+        joint0_rotvec: args.initial_joint0.0,
     };
+    let options = SimOptions {
+        precision: args.precision,
+        ..options(args.dt, start, last_s, args.fps)
+    };
+    let count = options.frames.count;
     let rollout = simulate(&rope, &motion, &options).or_failed()?;
     let nodes = rollout.nodes.nodes();
     let mut bytes = Vec::new();
@@ -127,20 +129,8 @@ pub fn throw(args: &SimThrowArgs) -> Outcome<Option<Value>> {
         .with_context(|| format!("`{}`", args.joints.display()))
         .or_input()?;
     let duration_s = times.last().copied().unwrap_or_default();
-    let count = frame_count(duration_s, TIP_RATE_HZ);
-    let options = SimOptions {
-        step_s: args.dt,
-        precision: Precision::F64,
-        start: Start::Equilibrium,
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / TIP_RATE_HZ,
-            count,
-        },
-        watch: Watch::NOTHING,
-        horizon_s: duration_s,
-        threads: 1,
-    };
+    let options = options(args.dt, Start::Equilibrium, duration_s, TIP_RATE_HZ);
+    let count = options.frames.count;
     let rollout = simulate(&rope, &motion, &options).or_failed()?;
     let mut text = String::from("t,x,y,z\n");
     for frame in 0..count {

@@ -17,21 +17,14 @@ use std::path::Path;
 /// Pictures in a contact sheet, and how many stand in a row.
 const SHEET: (usize, usize) = (12, 3);
 
-/// A tracked video with its frames.
-pub struct TrackedVideo {
-    /// Left-eye frames.
-    pub frames: Vec<EyeFrame>,
-    /// Keypoints and what else was seen.
-    pub result: TrackResult,
-}
-
-/// Tracks the rope through a film; a learned tracker reads it where there is one.
+/// Tracks the rope through a film; a learned tracker reads it where there is one. The
+/// left-eye frames, and what was found in them.
 pub fn track_video(
     filmed: &mut Filmed,
     learned: &mut Learned,
     keypoints: usize,
     stage: &Stage,
-) -> Outcome<TrackedVideo> {
+) -> Outcome<(Vec<EyeFrame>, TrackResult)> {
     let motion = filmed.motion.attach().or_input()?;
     stage.say("reading frames");
     let eyes = filmed.frames()?;
@@ -47,10 +40,7 @@ pub fn track_video(
             None => Ok(result),
         })
         .map_err(|error| classify(error, &filmed.path))?;
-    Ok(TrackedVideo {
-        frames: eyes.left,
-        result,
-    })
+    Ok((eyes.left, result))
 }
 
 /// A film for a name that ends in `.avi`, else a contact sheet.
@@ -99,11 +89,10 @@ pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(Some(&args.models), file)?;
     let stage = Stage::begin("track");
-    let tracked = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
-    let (frames, result) = (&tracked.frames, &tracked.result);
+    let (frames, result) = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
     files::write_json(&args.out, &result.track).or_failed()?;
     if let Some(path) = &args.overlay {
-        files::write_atomic(path, &overlay(path, frames, &result.track).or_failed()?)
+        files::write_atomic(path, &overlay(path, &frames, &result.track).or_failed()?)
             .or_failed()?;
     }
     let count = result.track.frames.len();

@@ -232,38 +232,39 @@ fn listed(names: &[String], none: &str) -> String {
 mod tests {
     use super::*;
 
-    const LIMITS: &str = "Max locked memory  8388608  8388608  bytes\n\
-                          Max realtime priority     95       95\n";
-    const GOVERNOR: &str = "sys/devices/system/cpu/cpu1/cpufreq/scaling_governor";
-    const CLOCK: &str = "sys/devices/system/clocksource/clocksource0/current_clocksource";
-    /// The other files of a machine that is set up, each with its text.
-    const GOOD: &str = "\
+    /// The files of a machine that is set up, each with its text.
+    const GOOD: &str = "
         proc/sys/kernel/osrelease = 6.1.0-rt
         proc/version = Linux version 6.1 #1 SMP PREEMPT_RT
-        proc/self/status = CapEff:\t0000000000004000
+        proc/self/status = CapEff: 0000000000004000
+        proc/self/limits = Max realtime priority     95       95
         sys/devices/system/cpu/cpu0/cpufreq/scaling_governor = performance
+        sys/devices/system/cpu/cpu1/cpufreq/scaling_governor = performance
         sys/devices/system/cpu/isolated = 1
+        sys/devices/system/clocksource/clocksource0/current_clocksource = tsc
         dev/video0 =
         dev/null =
         proc/77/stat =
         dev/shm/wag_run-77_abc.dynamic =
         dev/shm/wag_run-x_def.data =";
+    /// What is changed of it, and what alone is not a pass then.
+    const WORSE: &str = "
+        proc/version = Linux => kernel: 6.1.0-rt, not PREEMPT_RT
+        proc/self/limits = Max realtime priority 79 => real-time priority: up to 79
+        proc/self/status = CapEff: 0 => memory lock: 0 MB
+        sys/devices/system/cpu/cpu1/cpufreq/scaling_governor = powersave => frequency governor: performance, powersave
+        sys/devices/system/cpu/isolated = => isolated core: none
+        sys/devices/system/clocksource/clocksource0/current_clocksource = hpet => clock source: hpet
+        dev/shm/wag_run-78_a.data = => leftovers of dead runs: run-78";
 
-    /// What is found on that machine with some files changed and something else `worse`.
-    fn findings(changed: &[(&str, &str)], worsen: impl Fn(&mut Machine<'_>)) -> Vec<Finding> {
+    /// What is found on the good machine with a file changed and something else worse.
+    fn findings(changed: &str, worsen: impl Fn(&mut Machine<'_>)) -> Vec<Finding> {
         let root = tempfile::tempdir().unwrap();
-        let files = GOOD
-            .lines()
-            .map(|line| line.trim().split_once(" =").unwrap());
-        let set_up = [
-            ("proc/self/limits", LIMITS),
-            (GOVERNOR, "performance"),
-            (CLOCK, "tsc\n"),
-        ];
-        for (path, text) in files.chain(set_up).chain(changed.iter().copied()) {
-            let path = root.path().join(path);
+        for line in GOOD.lines().chain([changed]).skip(1) {
+            let (path, text) = line.split_once('=').unwrap();
+            let path = root.path().join(path.trim());
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(path, text).unwrap();
+            std::fs::write(path, format!("{}\n", text.trim())).unwrap();
         }
         let mut machine = Machine {
             root: root.path(),
@@ -281,7 +282,7 @@ mod tests {
     }
 
     /// The only finding that is not a pass.
-    fn wrong(changed: &[(&str, &str)], worsen: impl Fn(&mut Machine<'_>)) -> Finding {
+    fn wrong(changed: &str, worsen: impl Fn(&mut Machine<'_>)) -> Finding {
         let mut wrong = findings(changed, worsen);
         wrong.retain(|f| f.verdict != Verdict::Pass);
         assert_eq!(wrong.len(), 1, "{wrong:?}");
@@ -289,92 +290,43 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_that_is_set_up_passes() {
-        let all = findings(&[], |_| ());
-        let found: Vec<_> = all.iter().map(|f| (f.verdict, f.found.as_str())).collect();
-        let expected = [
-            "6.1.0-rt, PREEMPT_RT",
-            "up to 95",
-            "unlimited",
-            "performance",
-            "1",
-            "tsc",
-            "1000 MB free",
-            "none",
-            "50000 MB free",
-            "8 rope(s) at a time",
-            "video0",
-        ];
-        assert_eq!(found, expected.map(|text| (Verdict::Pass, text)));
-    }
-
-    #[test]
     fn each_file_is_judged_by_itself() {
-        let low = LIMITS.replace("95", "79");
-        for (path, text, name, found) in [
-            (
-                "proc/version",
-                "Linux",
-                "kernel",
-                "6.1.0-rt, not PREEMPT_RT",
-            ),
-            ("proc/self/limits", &low, "real-time priority", "up to 79"),
-            ("proc/self/status", "CapEff:\t0\n", "memory lock", "8 MB"),
-            (
-                GOVERNOR,
-                "powersave",
-                "frequency governor",
-                "performance, powersave",
-            ),
-            (
-                "sys/devices/system/cpu/isolated",
-                "\n",
-                "isolated core",
-                "none",
-            ),
-            (CLOCK, "hpet\n", "clock source", "hpet"),
-            (
-                "dev/shm/wag_run-78_a.data",
-                "",
-                "leftovers of dead runs",
-                "run-78",
-            ),
-        ] {
-            let wrong = wrong(&[(path, text)], |_| ());
-            assert_eq!((wrong.name, wrong.found.as_str()), (name, found));
-            assert_eq!(wrong.verdict, Verdict::Warn, "{name}");
+        let all = findings("dev/zero =", |_| ());
+        let found: Vec<_> = all.iter().map(|f| f.found.as_str()).collect();
+        let expected = "6.1.0-rt, PREEMPT_RT; up to 95; unlimited; performance; 1; tsc; \
+                        1000 MB free; none; 50000 MB free; 8 rope(s) at a time; video0";
+        assert_eq!(found.join("; "), expected);
+        assert!(all.iter().all(|f| f.verdict == Verdict::Pass), "{all:?}");
+        for line in WORSE.lines().skip(1) {
+            let (changed, expected) = line.split_once(" => ").unwrap();
+            let wrong = wrong(changed, |_| ());
+            assert_eq!(format!("{}: {}", wrong.name, wrong.found), expected);
+            assert_eq!(wrong.verdict, Verdict::Warn, "{expected}");
         }
     }
 
     #[test]
     fn room_vectors_and_silence_are_judged() {
         type Case = (fn(&mut Machine<'_>), &'static str, Verdict);
+        let scalar = |m: &mut Machine<'_>| m.rope_kernel = Some(Kernel::ScalarF64);
+        let full = |m: &mut Machine<'_>| m.shared_memory_mb = Some(64);
         let cases: [Case; 4] = [
-            (
-                |m| m.rope_kernel = Some(Kernel::ScalarF64),
-                "vector instructions",
-                Verdict::Warn,
-            ),
-            (
-                |m| m.shared_memory_mb = Some(64),
-                "shared memory",
-                Verdict::Fail,
-            ),
+            (scalar, "vector instructions", Verdict::Warn),
+            (full, "shared memory", Verdict::Fail),
             (|m| m.disk_mb = Some(500), "disk", Verdict::Warn),
             (|m| m.disk_mb = Some(50), "disk", Verdict::Fail),
         ];
         for (worsen, name, verdict) in cases {
-            let wrong = wrong(&[], worsen);
+            let wrong = wrong("dev/zero =", worsen);
             assert_eq!((wrong.name, wrong.verdict), (name, verdict));
         }
         // A machine that says nothing has neither passed nor failed, but has no leftovers.
-        let silent = findings(&[], |m| {
+        let mut silent = findings("dev/zero =", |m| {
             m.root = Path::new("/nowhere");
             (m.rope_kernel, m.shared_memory_mb, m.disk_mb) = (None, None, None);
         });
-        let clean = |f: &&Finding| f.name == "leftovers of dead runs";
-        assert_eq!(silent.iter().find(clean).unwrap().verdict, Verdict::Pass);
-        let others = silent.iter().filter(|f| !clean(f));
-        assert!(others.into_iter().all(|f| f.verdict == Verdict::Warn));
+        silent.retain(|f| f.verdict != Verdict::Warn);
+        let silent: Vec<_> = silent.iter().map(|f| (f.name, f.verdict)).collect();
+        assert_eq!(silent, [("leftovers of dead runs", Verdict::Pass)]);
     }
 }

@@ -28,13 +28,12 @@ impl RunFolder {
         Self::refuse_existing(&path)?;
         crate::config::check_here().or_input()?;
         for folder in ["config", "log"] {
+            let refused = || {
+                let path = path.display();
+                format!("cannot create run folder `{path}`; name a writable one with --out")
+            };
             std::fs::create_dir_all(path.join(folder))
-                .with_context(|| {
-                    format!(
-                        "cannot create run folder `{}`; name a writable one with --out",
-                        path.display()
-                    )
-                })
+                .with_context(refused)
                 .or_input()?;
         }
         let folder = Self {
@@ -111,14 +110,7 @@ mod tests {
         drop(folder);
         assert!(!out.exists());
         let folder = RunFolder::create(Some(&out), "test").unwrap();
-        folder
-            .config(
-                "rig",
-                &[("a", 1)]
-                    .into_iter()
-                    .collect::<std::collections::BTreeMap<_, _>>(),
-            )
-            .unwrap();
+        folder.config("rig", &toml::toml! { a = 1 }).unwrap();
         drop(folder);
         assert!(out.join("config/rig.toml").is_file());
     }

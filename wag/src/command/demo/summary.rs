@@ -243,14 +243,10 @@ pub fn show(record: &DemoRecord) {
         |v: Option<f64>| v.map_or_else(|| "unknown".to_owned(), |m| format!("{:.1} cm", 100.0 * m));
     let [x, y, z] = record.target_m;
     println!("target ({x:.3}, {y:.3}, {z:.3}) m, closest approach of the tip:");
-    println!(
-        "  planned      {}",
-        cm(record.planned_tip_target_distance_m)
-    );
-    println!(
-        "  achieved     {}   (the simulator's truth)",
-        cm(record.true_tip_target_distance_m)
-    );
+    let planned = cm(record.planned_tip_target_distance_m);
+    let achieved = cm(record.true_tip_target_distance_m);
+    println!("  planned      {planned}");
+    println!("  achieved     {achieved}   (the simulator's truth)");
     match (&record.score, &record.score_failed) {
         (Some(score), _) => println!(
             "  by camera    {}   ({:.1} to {:.1} cm)",

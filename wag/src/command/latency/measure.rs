@@ -12,18 +12,14 @@ use cli_output::{OrInput, Outcome, Stage};
 use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
+use std::net::IpAddr;
 use std::time::Duration;
 
 /// Rest before and after each sweep, so that every joint starts and ends at rest.
 const REST: Duration = Duration::from_millis(600);
 
-/// What a measurement would do.
-struct Intent {
-    limits: Limits,
-    excitation: Excitation,
-    /// Joints (1-based) and their motions.
-    sweeps: Vec<(usize, JointTrajectory)>,
-}
+/// Limits, the shape of the motion, and the sweeps asked for with their joints (1-based).
+type Intent = (Limits, Excitation, Vec<(usize, JointTrajectory)>);
 
 fn intent(args: &LatencyArgs) -> Outcome<Intent> {
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
@@ -32,17 +28,22 @@ fn intent(args: &LatencyArgs) -> Outcome<Intent> {
         None => Excitation::default(),
     };
     excitation.seed = args.seed.unwrap_or(excitation.seed);
-    let sweeps = sweeps(args, &excitation, &limits)?;
-    Ok(Intent {
-        limits,
-        excitation,
-        sweeps,
-    })
+    let joints: Vec<usize> = match args.joints.as_slice() {
+        [] => (1..=JOINTS).collect(),
+        named => named.iter().map(|j| usize::from(*j)).collect(),
+    };
+    let pole = config::cell().or_input()?.pole;
+    let swept = |joint: usize| {
+        let swept = sweep(&excitation, &limits, &pole, joint - 1).or_input()?;
+        Ok((joint, swept))
+    };
+    let sweeps = joints.into_iter().map(swept).collect::<Outcome<_>>()?;
+    Ok((limits, excitation, sweeps))
 }
 
 /// Checks the motions and connects to nothing.
 pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
-    let sweeps = intent(args)?.sweeps;
+    let (_, _, sweeps) = intent(args)?;
     let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
     println!(
         "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
@@ -56,16 +57,10 @@ pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
 /// Moves the arm; what `conclude` finds in what it did is the run's summary.
 pub(super) fn measure(
     args: &LatencyArgs,
+    address: IpAddr,
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
-    let Some(address) = args.arm.address else {
-        return Err(bad_input!("name the arm with --arm ADDR"));
-    };
-    let Intent {
-        limits,
-        excitation,
-        sweeps,
-    } = intent(args)?;
+    let (limits, excitation, sweeps) = intent(args)?;
     require_clear_area(&args.arm, "MEASURE")?;
     let Some((_, first)) = sweeps.first() else {
         return Err(bad_input!("name a joint with --joints"));
@@ -98,24 +93,4 @@ pub(super) fn measure(
         },
     )?;
     Ok(found)
-}
-
-/// The sweeps asked for, with their joints (1-based).
-fn sweeps(
-    args: &LatencyArgs,
-    excitation: &Excitation,
-    limits: &Limits,
-) -> Outcome<Vec<(usize, JointTrajectory)>> {
-    let joints: Vec<usize> = match args.joints.as_slice() {
-        [] => (1..=JOINTS).collect(),
-        named => named.iter().map(|j| usize::from(*j)).collect(),
-    };
-    let pole = config::cell().or_input()?.pole;
-    joints
-        .into_iter()
-        .map(|joint| {
-            let swept = sweep(excitation, limits, &pole, joint - 1).or_input()?;
-            Ok((joint, swept))
-        })
-        .collect()
 }
