@@ -10,20 +10,8 @@ use onnx::Axis::{Is, Open};
 use onnx::{FLOAT, Graph};
 use planner::phi::graph_sha256;
 use shared_types::KeypointTrack;
-use std::path::{Path, PathBuf};
-use support::{are_refused_in, json_in};
-
-/// Folder of a recorded wiggle; `None`, said aloud, where it is not there.
-fn wiggle() -> Option<PathBuf> {
-    let path = Path::new(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/data/wiggle/a1"
-    ));
-    if !path.exists() {
-        println!("skipped: {} not found", path.display());
-    }
-    path.exists().then(|| path.to_owned())
-}
+use std::path::Path;
+use support::{are_refused_in, json_in, shared};
 
 /// A folder with two trackers, another model, no model, and the wiggle's camera, which names
 /// a tracker.
@@ -61,7 +49,9 @@ fn track(wiggle: &Path, more: &str) -> String {
 
 #[test]
 fn the_report_tells_who_did_what() {
-    let Some(wiggle) = wiggle() else { return };
+    let Some(wiggle) = shared("data/wiggle/a1") else {
+        return;
+    };
     let dir = folder(&wiggle);
     // How far the models say that the rope goes to the right in eight frames (px).
     let cases = [
@@ -101,7 +91,9 @@ fn the_report_tells_who_did_what() {
 
 #[test]
 fn what_does_not_fit_is_refused() {
-    let Some(wiggle) = wiggle() else { return };
+    let Some(wiggle) = shared("data/wiggle/a1") else {
+        return;
+    };
     let dir = folder(&wiggle);
     for (more, words) in [
         ("--tracker nowhere.onnx", "nowhere.onnx | path"),

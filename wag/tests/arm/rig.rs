@@ -1,7 +1,7 @@
 //! `wag rig`: one in each domain, which leaves nothing; the vendor's own Python client
 //! against it, by the conformance check that lies beside the checkout.
 
-use super::support::{Rig, alone, refused_in, said, shared_memory_of};
+use super::support::{Rig, alone, refused_in, said, shared, shared_memory_of};
 use rustix::process::Signal;
 use std::path::Path;
 use std::process::Command;
@@ -74,11 +74,9 @@ fn two_clients_of_the_vendor_sdk_share_the_simulated_arm() {
 
 #[test]
 fn the_vendor_sdk_accepts_the_simulated_arm() {
-    let check = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/checks/xarm_sdk_check.py");
-    if !check.is_file() {
-        println!("skipped: {} not found", check.display());
+    let Some(check) = shared("checks/xarm_sdk_check.py") else {
         return;
-    }
+    };
     let Some(mut python) = python() else { return };
     let _alone = alone();
     let rig = Rig::start("");

@@ -115,6 +115,7 @@ pub(crate) const ROPES: &str = "
     identify --keypoints k.json --camera camera.toml --pose pose.csv --method cmaes --model m.onnx --out r.toml => m.onnx | --method nn
     identify --keypoints k.json --camera camera.toml --pose pose.csv --method nn --model LINKS --out r.toml => link | only simulated films show
     plan strike --rope rope.toml --target 2.5,0,0.3 --out p.json => reach | nearest
+    plan strike --rope doubted.toml --accept-unconfirmed --target 2.5,0,0.3 --out p.json => warning: the track is in doubt | reach
     plan strike --rope rope.toml --target 0,0,0.1 --reach r.svg --out p.json => arm's base
     plan strike --rope rope.toml --target 1,0,0.3 --limits limits.toml --out p.json => limits.toml | rate_hz
     plan drape --rope rope.toml --target 1,0,0.3 --robust 8 --out p.json => rope.toml | posterior | --robust

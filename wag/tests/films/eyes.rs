@@ -1,7 +1,7 @@
 //! What the eyes' commands read and write, from files to files.
 
-use super::support::{are_refused_in, json_in};
-use super::{printed_board, shared};
+use super::printed_board;
+use super::support::{are_refused_in, json_in, shared};
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};

@@ -1,8 +1,7 @@
 //! From a rendered video of another simulator's rope (MuJoCo) to a fling: the identified
 //! rope moves like the true one in a motion it was not identified from.
 
-use super::shared;
-use super::support::json_in;
+use super::support::{json_in, shared};
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, FrameTimes, PoseRow, PoseTrack, Precision, SimOptions, Start, Watch, roll_out,

@@ -3,6 +3,7 @@
 use super::client::{Watch, read_answer};
 use super::fake::{Fake, run_folder};
 use super::support::{alone, shared_memory_of};
+use serde_json::json;
 use std::io::{BufReader, Write};
 use std::net::TcpStream;
 use std::sync::atomic::Ordering;
@@ -80,17 +81,11 @@ fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
     assert!(took < Duration::from_secs(3), "{took:?}");
     let state = states.until("the stop", |s| s["controller"]["stop"]["latched"] == true);
     assert_eq!(state["controller"]["stop"]["code"], "operator_stop");
-    assert!(
-        state["controller"]["stop"]["words"]
-            .as_str()
-            .unwrap()
-            .contains("asked for a stop")
-    );
-    assert_eq!(state["asks"][0], serde_json::json!(["stop", null]));
-    assert_eq!(
-        state["asks"][2],
-        serde_json::json!(["acknowledge", "there is no operator"])
-    );
+    let words = state["controller"]["stop"]["words"].as_str().unwrap();
+    assert!(words.contains("asked for a stop"), "{words}");
+    assert_eq!(state["asks"][0], json!(["stop", null]));
+    let refused = json!(["acknowledge", "there is no operator"]);
+    assert_eq!(state["asks"][2], refused);
     for path in ["ask/acknowledge", "ask/disarm"] {
         let refused = watch.ask("POST", path);
         assert_eq!(refused.status, 409);
@@ -118,30 +113,21 @@ fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
     let mut states = watch.states();
     let before = states.next();
     assert!(before["controller"].is_null());
-    assert!(
-        before["note"]
-            .as_str()
-            .unwrap()
-            .contains("no controller runs yet")
-    );
+    let note = before["note"].as_str().unwrap();
+    assert!(note.contains("no controller runs yet"), "{note}");
     assert_eq!(watch.ask("POST", "ask/stop").body, b"no controller runs");
     for run in 0..2 {
         let fake = Fake::start(&name);
         let state = states.until("the run", |s| {
             s["arm"].as_array().unwrap().len() == 27 && s["rope"].as_array().unwrap().len() > 30
         });
-        assert_eq!(
-            state["rope_is"], "the identified rope, simulated",
-            "run {run}"
-        );
+        let rope = "the identified rope, simulated";
+        assert_eq!(state["rope_is"], rope, "run {run}");
         drop(fake);
         let over = states.until("its end", |s| s["controller"].is_null());
         assert!(over["note"].as_str().unwrap().contains("has ended"));
-        assert_eq!(
-            over["arm"].as_array().unwrap().len(),
-            27,
-            "it stays in view"
-        );
+        let shown = over["arm"].as_array().unwrap().len();
+        assert_eq!(shown, 27, "it stays in view");
     }
     assert_eq!(watch.end(), Some(0));
     assert_eq!(shared_memory_of(&name), Vec::<String>::new());
@@ -170,11 +156,8 @@ fn readers_that_never_read_hold_nobody_up() {
     }
     let rate_hz = f64::from(count) / began.elapsed().as_secs_f64();
     // A busy machine tells less often, never in bursts of what is old.
-    let wanted_hz = if std::env::var_os("WAG_LONG_TESTS").is_some() {
-        10.0
-    } else {
-        2.0
-    };
+    let long = std::env::var_os("WAG_LONG_TESTS").is_some();
+    let wanted_hz = if long { 10.0 } else { 2.0 };
     eprintln!("told {rate_hz:.1} times a second");
     assert!(rate_hz >= wanted_hz, "{rate_hz} Hz");
     assert!(cycles.is_sorted(), "{cycles:?}");

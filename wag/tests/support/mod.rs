@@ -110,6 +110,17 @@ pub(crate) fn plan_json(motion: &JointTrajectory, rope: &RopeParams) -> Value {
     })
 }
 
+/// A file or folder of the data beside the checkout; `None`, said aloud, where it is not
+/// there.
+pub(crate) fn shared(path: &str) -> Option<PathBuf> {
+    let shared = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared"));
+    let path = shared.join(path);
+    if !path.exists() {
+        println!("skipped: {} not found", path.display());
+    }
+    path.exists().then_some(path)
+}
+
 /// Files of a domain in shared memory.
 pub(crate) fn shared_memory_of(domain: &str) -> Vec<String> {
     let files = fs::read_dir("/dev/shm").unwrap().flatten();

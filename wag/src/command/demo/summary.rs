@@ -14,23 +14,14 @@ use shared_types::{Plan, RopeEstimate, RopeParams};
 /// Wall time of each stage (s).
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct StageTimes {
-    /// Starting the processes.
     pub start_s: f64,
-    /// Enabling the arm, moving to the start pose, waiting for the rope.
     pub bringup_s: f64,
-    /// Wiggling and filming.
     pub wiggle_s: f64,
-    /// Tracking the rope.
     pub track_s: f64,
-    /// Identifying it.
     pub identify_s: f64,
-    /// Planning the throw.
     pub plan_s: f64,
-    /// Damping the rope's swing.
     pub settle_s: f64,
-    /// Throwing and filming.
     pub throw_s: f64,
-    /// Scoring.
     pub score_s: f64,
 }
 
