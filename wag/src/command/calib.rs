@@ -3,7 +3,7 @@
 
 use super::score::not_scored;
 use crate::cli::{CalibCheckArgs, CalibCommand, ExtrinsicsArgs, ShownArgs};
-use anyhow::{Context, anyhow};
+use anyhow::{Context, bail};
 use camera_ingest::calib::board::{Board, BoardError};
 use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
 use camera_ingest::calib::placed_camera_toml;
@@ -36,15 +36,11 @@ fn read_shown(path: &Path, frames: usize) -> anyhow::Result<Vec<(usize, Vector3<
         let (frame, x, y, z) =
             row.with_context(|| format!("`{name}`: expected rows frame,x,y,z"))?;
         if frame >= frames {
-            return Err(anyhow!(
-                "`{name}`: frame {frame}, but the video has {frames}"
-            ));
+            bail!("`{name}`: frame {frame}, but the video has {frames}");
         }
         let p_w_m = Vector3::new(x, y, z);
         if !p_w_m.iter().all(|v| v.is_finite()) {
-            return Err(anyhow!(
-                "`{name}`: frame {frame} has a number that is not finite"
-            ));
+            bail!("`{name}`: frame {frame} has a number that is not finite");
         }
         shown.push((frame, p_w_m));
     }

@@ -2,7 +2,7 @@
 
 use crate::cli::SceneArgs;
 use crate::config;
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::{Cell, Pole};
 use camera_ingest::source::{AnySource, BothEyes, run_file};
 use camera_ingest::{load_camera, open_video};
@@ -152,16 +152,16 @@ impl Filmed {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),
             (None, Some(Err(reason))) => {
-                return Err(anyhow!(
+                bail!(
                     "the camera in the run's file `{}` is none: {reason}; name another with --camera",
                     path.display()
-                ));
+                );
             }
             (None, None) => {
-                return Err(anyhow!(
+                bail!(
                     "the run's file `{}` does not tell its camera: name it with --camera",
                     path.display()
-                ));
+                );
             }
         };
         let motion = if scene.motion.is_given() {

@@ -19,6 +19,7 @@ use run_log::files;
 use serde_json::{Value, json};
 use shared_types::rope::{Ambiguity, RANGES};
 use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
+use std::path::Path;
 
 /// Keypoints per frame when a video is given.
 const KEYPOINTS: usize = 24;
@@ -37,16 +38,19 @@ fn other_pole(motion: &ClampMotion, method: Method) -> Option<String> {
     warning_of_pole(method, motion.pole()?).map(str::to_owned)
 }
 
+fn read_keypoints(path: &Path) -> anyhow::Result<KeypointTrack> {
+    let fail = || format!("keypoints `{}`", path.display());
+    let track: KeypointTrack = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
+    track.validate().with_context(fail)?;
+    Ok(track)
+}
+
 fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
         let camera = args.scene.camera().or_input()?;
         let clamp = ClampMotion::read(&args.scene).or_input()?;
         let motion = clamp.attach().or_input()?;
-        let fail = || format!("keypoints `{}`", path.display());
-        let track: KeypointTrack = serde_json::from_str(&files::read_text(path).or_input()?)
-            .with_context(fail)
-            .or_input()?;
-        track.validate().with_context(fail).or_input()?;
+        let track = read_keypoints(path).or_input()?;
         confirm(&track.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
         let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
         for warning in &warnings {

@@ -26,7 +26,7 @@ const MOVE_SPEED: f64 = 0.1;
 /// Where the rig's target stands; nothing is thrown at it.
 const TARGET_M: [f64; 3] = [0.9, 0.0, 0.3];
 
-pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
+pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     watch_interrupts().or_failed()?;
     let room = tempfile::tempdir().or_failed()?;
     let folder = RunFolder::create(Some(&room.path().join("run")), "bench")?;
