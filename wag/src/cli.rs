@@ -5,7 +5,6 @@ mod config;
 mod eyes;
 mod ledger;
 mod plans;
-mod results;
 mod runs;
 mod values;
 
@@ -14,7 +13,6 @@ pub use config::*;
 pub use eyes::*;
 pub use ledger::*;
 pub use plans::*;
-pub use results::*;
 pub use runs::*;
 pub use values::Point;
 

@@ -25,9 +25,6 @@ fn refused(error: ModelError) -> Failure {
 
 impl Learned {
     /// The model that the command line names, or else `camera.toml`.
-    ///
-    /// # Errors
-    /// Why a file is refused.
     pub fn load(args: Option<&ModelArgs>, file: Option<&Path>) -> Outcome<Self> {
         let files = file.map(load_model_files).transpose().or_input()?;
         let tracker = args.and_then(|a| a.tracker.clone());

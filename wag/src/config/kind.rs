@@ -23,7 +23,6 @@ pub enum Kind {
 
 /// A type that a kind's file is read into.
 pub trait Configured: DeserializeOwned {
-    /// Its kind.
     const KIND: Kind;
 
     /// The same in a cell, where it has one.
@@ -70,7 +69,6 @@ pub struct BuiltIn {
     pub file: &'static str,
     /// Where the built-in text is in the sources.
     pub path: &'static str,
-    /// That text.
     pub text: &'static str,
 }
 
@@ -81,7 +79,6 @@ impl Kind {
         matches!(self, Self::Planner | Self::Rig)
     }
 
-    /// What is built in of it.
     pub fn built_in(self) -> BuiltIn {
         macro_rules! shipped {
             ($name:literal, $file:literal, $path:literal) => {

@@ -17,9 +17,7 @@ pub const RIG_FOLDER: &str = "WAG_CONFIG";
 /// Where files of a site and of a rig are looked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Folders {
-    /// The site's.
     pub site: Option<PathBuf>,
-    /// The rig's.
     pub rig: Option<PathBuf>,
 }
 
@@ -52,12 +50,10 @@ impl Folders {
     }
 }
 
-/// One layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// `built in`, `site`, `rig` or `run`.
     pub name: &'static str,
-    /// Its file.
     pub path: PathBuf,
     table: Table,
 }
@@ -65,9 +61,7 @@ pub struct Layer {
 /// The layers of one kind, the strongest last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers {
-    /// What they configure.
     kind: Kind,
-    /// All of them.
     pub layers: Vec<Layer>,
     /// Tables `cell` of files of another kind: they set nothing.
     cells: Vec<(PathBuf, Table)>,
@@ -78,9 +72,7 @@ pub struct Layers {
 pub struct Told<'a> {
     /// Tables and key, with dots.
     pub key: String,
-    /// The value.
     pub value: Value,
-    /// The layer that says so.
     pub layer: &'a Layer,
 }
 

@@ -31,7 +31,6 @@ pub struct Machine<'a> {
 }
 
 impl Machine<'static> {
-    /// This machine.
     pub fn here() -> Self {
         let disk = rustix::fs::statvfs(".").ok();
         Self {

@@ -13,16 +13,13 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// As it should be.
     Pass,
     /// It works, but less well than it could.
     Warn,
-    /// It does not work.
     Fail,
 }
 
 impl Verdict {
-    /// One word.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -43,11 +40,8 @@ impl Verdict {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What.
     pub name: &'static str,
-    /// What it means.
     pub verdict: Verdict,
-    /// What was found.
     pub found: String,
     /// What to do; empty when nothing is to be done.
     pub remedy: String,

@@ -94,9 +94,7 @@ pub fn start_rig(
 /// Where an arm listens.
 #[derive(Debug, Clone, Copy)]
 pub struct ArmAddress {
-    /// Its address.
     pub ip: IpAddr,
-    /// Command port.
     pub command: u16,
     /// Port with joint states (250 Hz).
     pub joints: u16,

@@ -20,7 +20,6 @@ pub struct Session {
     dead_man: Option<DeadMan>,
     /// A motion runs that nobody but the controller is needed for.
     committed: bool,
-    /// Child processes.
     supervisor: Supervisor,
     /// What stages work with.
     pub received: Received,
@@ -77,7 +76,6 @@ impl Session {
         Ok(())
     }
 
-    /// Starts a process.
     pub fn start(&mut self, spec: &ProcessSpec) -> anyhow::Result<()> {
         self.supervisor.start(spec, &self.log_folder)
     }

@@ -3,15 +3,13 @@
 
 use super::chromium::Chromium;
 use super::client::Watch;
-use super::fake::{Fake, run_folder};
+use super::fake::{Fake, put_rope, run_folder};
 use super::support::{alone, record, wag};
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
 use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
-use shared_types::RopeParams;
 use shared_types::ipc::{ControllerMode, CycleRecord};
-use shared_types::rope::RANGES;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -70,8 +68,7 @@ fn throw_folder(run: &Path) {
         }
     });
     record(run, cycles);
-    let rope = RopeParams::from_array(RANGES.map(|r| 0.5 * (r.min + r.max)));
-    std::fs::write(run.join("params.toml"), toml::to_string(&rope).unwrap()).unwrap();
+    put_rope(run);
     let summary = json!({ "ok": true, "command": "throw", "target_m": [0.9, 0.1, 0.2] });
     std::fs::write(run.join("summary.json"), summary.to_string()).unwrap();
 }
