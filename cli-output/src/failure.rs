@@ -2,6 +2,17 @@
 
 use std::{fmt, io};
 
+/// A [`Failure`] for wrong usage or input: exit code 2.
+#[macro_export]
+macro_rules! bad_input {
+    ($($arg:tt)*) => { $crate::Failure::input($crate::anyhow!($($arg)*)) };
+}
+/// A [`Failure`] of the work itself: exit code 1.
+#[macro_export]
+macro_rules! failed {
+    ($($arg:tt)*) => { $crate::Failure::failed($crate::anyhow!($($arg)*)) };
+}
+
 /// A failed command: usage or input is wrong, or the command ran and did not succeed.
 #[derive(Debug)]
 pub struct Failure {
@@ -13,12 +24,12 @@ pub struct Failure {
 pub type Outcome<T = ()> = Result<T, Failure>;
 
 impl Failure {
-    /// Usage or input is wrong.
+    /// Usage or input is wrong: exit code 2.
     pub fn input(error: impl Into<anyhow::Error>) -> Self {
         Self::of(true, error)
     }
 
-    /// The command ran and did not succeed.
+    /// The command ran and did not succeed: exit code 1.
     pub fn failed(error: impl Into<anyhow::Error>) -> Self {
         Self::of(false, error)
     }

@@ -11,13 +11,16 @@
 #[macro_use]
 pub mod output;
 
+#[macro_use]
 mod failure;
 mod machine;
 mod program;
 mod progress;
 pub mod table;
 
+#[doc(hidden)]
+pub use anyhow::anyhow;
 pub use failure::{Failure, OrInput, Outcome};
 pub use machine::Machine;
-pub use program::{finish, interrupted, refuse_usage, seed, start_logging, watch_interrupts};
+pub use program::{finish, interrupted, refuse_usage, seed, start, watch_interrupts};
 pub use progress::Stage;

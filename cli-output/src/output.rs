@@ -34,6 +34,8 @@ macro_rules! eprintln {
 /// What became of standard output.
 #[derive(Debug)]
 struct State {
+    /// Only the JSON object is for standard output, nothing for people.
+    json: bool,
     /// What is printed goes to standard error, because a file the user asked for
     /// is written to standard output.
     taken: bool,
@@ -46,6 +48,7 @@ struct State {
 }
 
 static STATE: Mutex<State> = Mutex::new(State {
+    json: false,
     taken: false,
     closed: false,
     failed: None,
@@ -72,9 +75,22 @@ impl State {
     }
 }
 
-/// Prints text for people.
+/// With `--json`: from here on the one object is printed, and nothing for people.
+pub fn set_json(json: bool) {
+    state().json = json;
+}
+
+/// Whether `--json` was asked for.
+pub fn is_json() -> bool {
+    state().json
+}
+
+/// Prints text for people; with `--json` nothing.
 pub fn text(text: fmt::Arguments<'_>) {
     let mut state = state();
+    if state.json {
+        return;
+    }
     if state.taken {
         drop(state);
         aside(text);
@@ -93,6 +109,13 @@ pub fn aside(text: fmt::Arguments<'_>) {
     let _ = io::stderr().write_all(text.to_string().as_bytes());
 }
 
+/// Prints a line to standard error for people; with `--json` the object tells it.
+pub fn remark(line: fmt::Arguments<'_>) {
+    if !is_json() {
+        aside(format_args!("{line}\n"));
+    }
+}
+
 /// Writes a file the user asked for to standard output; from here on what is for
 /// people goes to standard error.
 pub fn data(bytes: &[u8]) {
@@ -101,12 +124,19 @@ pub fn data(bytes: &[u8]) {
     state.write(&mut io::stdout(), bytes);
 }
 
-/// Prints the one JSON object of a command, at once, unless one was printed.
+/// Prints the one JSON object of a command, at once, unless one was printed or none was
+/// asked for.
 pub fn object(value: &serde_json::Value) {
     let mut state = state();
-    if !std::mem::replace(&mut state.object, true) {
-        drop(state);
-        line(format_args!("{value:#}"));
+    if state.json && !state.object {
+        state.object = true;
+        let bytes = format!("{value:#}\n");
+        if state.taken {
+            drop(state);
+            aside(format_args!("{bytes}"));
+        } else {
+            state.write(&mut io::stdout(), bytes.as_bytes());
+        }
     }
 }
 
@@ -114,4 +144,53 @@ pub fn object(value: &serde_json::Value) {
 /// early has what they wanted.
 pub fn failure() -> Option<String> {
     state().failed.clone()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A stream that fails in one way after some bytes.
+    struct Ends(usize, ErrorKind);
+
+    impl Write for Ends {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.0 == 0 {
+                return Err(self.1.into());
+            }
+            let n = bytes.len().min(self.0);
+            self.0 -= n;
+            Ok(n)
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn fresh() -> State {
+        State {
+            json: false,
+            taken: false,
+            closed: false,
+            failed: None,
+            object: false,
+        }
+    }
+
+    #[test]
+    fn a_reader_who_leaves_is_no_failure_and_a_full_disk_is() {
+        let mut state = fresh();
+        state.write(&mut Ends(3, ErrorKind::BrokenPipe), b"four");
+        assert!(state.closed && state.failed.is_none());
+        let mut kept = Vec::new();
+        state.write(&mut kept, b"more");
+        assert!(kept.is_empty(), "nobody reads");
+        let mut state = fresh();
+        state.write(&mut Ends(0, ErrorKind::StorageFull), b"four");
+        state.write(&mut Ends(0, ErrorKind::Other), b"four");
+        assert_eq!(
+            state.failed,
+            Some(io::Error::from(ErrorKind::StorageFull).to_string())
+        );
+    }
 }

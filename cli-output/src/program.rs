@@ -19,18 +19,16 @@ pub fn seed(text: &str) -> Result<u64, String> {
 }
 
 /// Prints what `--json` asks for, and why the command failed; returns the exit code.
-pub fn finish(outcome: Outcome<Option<Value>>, json: bool) -> ExitCode {
+pub fn finish(outcome: Outcome<Option<Value>>) -> ExitCode {
     let code = match outcome {
         Ok(result) => {
-            if let Some(value) = result.filter(|_| json) {
+            if let Some(value) = result {
                 output::object(&value);
             }
             0
         }
         Err(failure) => {
-            if json {
-                output::object(&json!({ "ok": false, "error": failure.to_string() }));
-            }
+            output::object(&json!({ "ok": false, "error": failure.to_string() }));
             eprintln!("error: {failure}");
             failure.exit_code()
         }
@@ -51,11 +49,10 @@ pub fn refuse_usage(error: &clap::Error) -> ExitCode {
         print!("{text}");
         return ExitCode::SUCCESS;
     }
-    if std::env::args_os().any(|arg| arg == "--json") {
-        let text = text.to_string();
-        let said = text.trim().strip_prefix("error: ").unwrap_or(&text);
-        output::object(&json!({ "ok": false, "error": said }));
-    }
+    output::set_json(std::env::args_os().any(|arg| arg == "--json"));
+    let plain = text.to_string();
+    let said = plain.trim().strip_prefix("error: ").unwrap_or(&plain);
+    output::object(&json!({ "ok": false, "error": said }));
     if std::io::stderr().is_terminal() {
         eprint!("{}", text.ansi());
     } else {
@@ -64,8 +61,10 @@ pub fn refuse_usage(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Logs to standard error; `WAG_LOG` sets the filter (`debug`, `planner=trace`).
-pub fn start_logging(verbose: u8) {
+/// Begins a command: what it prints is for programs or for people, and it logs to standard
+/// error; `WAG_LOG` sets the filter (`debug`, `planner=trace`).
+pub fn start(json: bool, verbose: u8) {
+    output::set_json(json);
     let default = match verbose {
         0 => "warn,iceoryx2=error,tract_onnx=error",
         1 => "info,iceoryx2=error,tract_onnx=error",

@@ -1,7 +1,7 @@
 //! What people see while they wait: one line per stage, on standard error, and
 //! only on a terminal does it move.
 
-use crate::interrupted;
+use crate::{interrupted, output};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -18,8 +18,9 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Begins a stage. `quiet` hides it altogether.
-    pub fn begin(name: &'static str, quiet: bool) -> Self {
+    /// Begins a stage; `--json` hides it altogether.
+    pub fn begin(name: &'static str) -> Self {
+        let quiet = output::is_json();
         let terminal = std::io::stderr().is_terminal();
         let bar = ProgressBar::new(0);
         bar.set_draw_target(if quiet || !terminal {

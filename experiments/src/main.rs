@@ -26,12 +26,12 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return cli_output::refuse_usage(&e),
     };
-    cli_output::start_logging(cli.verbose);
+    cli_output::start(cli.json, cli.verbose);
     let outcome = match &cli.command {
         args::Command::Bench(bench) => bench::run(bench, cli.json),
-        args::Command::Rooms(args) => rooms::run(args, cli.json),
+        args::Command::Rooms(args) => rooms::run(args),
         args::Command::TrackRooms(args) => rooms::track::run(args, cli.json),
         args::Command::Result(result) => results::run(result, cli.json),
     };
-    cli_output::finish(outcome, cli.json)
+    cli_output::finish(outcome)
 }

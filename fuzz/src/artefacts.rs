@@ -1,8 +1,8 @@
 //! Files of a run: plans, ropes, keypoint tracks.
 
+use arm_model::JointTrajectory;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use arm_model::{JointTrajectory};
 use shared_types::{KeypointTrack, Plan, RopeEstimate, RopeParams};
 
 /// What can be read can be written and read again.

@@ -1,17 +1,11 @@
 //! Camera settings and the factory's calibration beside them.
 
+use crate::folder;
 use camera_ingest::calib::load_camera;
 use std::fs::write;
-use std::sync::OnceLock;
-use tempfile::TempDir;
 
 /// Between settings and calibration.
 const BREAK: &[u8] = b"\n=====\n";
-
-fn folder() -> &'static TempDir {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    FOLDER.get_or_init(|| TempDir::new().expect("a temporary folder"))
-}
 
 /// Reads the two parts of `data` as `camera.toml` and `camera.conf`.
 ///
@@ -24,10 +18,10 @@ pub fn run(data: &[u8]) {
         Some(at) => (&data[..at], &data[at + BREAK.len()..]),
         None => (SETTINGS.as_bytes(), data),
     };
-    let path = folder().path().join("camera.toml");
+    let path = folder().join("camera.toml");
     // The settings name the file; whatever else they name is not there.
     write(&path, settings).expect("settings");
-    write(folder().path().join("camera.conf"), factory).expect("calibration");
+    write(folder().join("camera.conf"), factory).expect("calibration");
     let _ = load_camera(&path);
 }
 

@@ -2,6 +2,17 @@
 
 use arm_model::{ArmResponse, Cell, Limits};
 use rt_controller::ControllerConfig;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+
+/// What was read, which can be written and read again.
+fn again<T: Serialize + DeserializeOwned + PartialEq + Debug>(text: &str) -> Option<T> {
+    let value: T = toml::from_str(text).ok()?;
+    let written = toml::to_string(&value).unwrap();
+    assert_eq!(toml::from_str::<T>(&written).unwrap(), value);
+    Some(value)
+}
 
 /// Reads `data` as each kind; what passes its checks resolves, and what was read
 /// can be written and read again.
@@ -12,27 +23,15 @@ pub fn run(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;
     };
-    if let Ok(config) = toml::from_str::<ControllerConfig>(text) {
+    if let Some(config) = again::<ControllerConfig>(text) {
         if config.check().is_ok() {
             let _ = config.control_settings();
         }
         if config.limits_file.is_none() {
             let _ = config.resolve_limits();
         }
-        let written = toml::to_string(&config).unwrap();
-        assert_eq!(
-            toml::from_str::<ControllerConfig>(&written).unwrap(),
-            config
-        );
     }
-    if let Ok(limits) = toml::from_str::<Limits>(text) {
-        let written = toml::to_string(&limits).unwrap();
-        assert_eq!(toml::from_str::<Limits>(&written).unwrap(), limits);
-    }
-    if let Ok(cell) = toml::from_str::<Cell>(text) {
-        let written = toml::to_string(&cell).unwrap();
-        assert_eq!(toml::from_str::<Cell>(&written).unwrap(), cell);
-    }
+    let _ = (again::<Limits>(text), again::<Cell>(text));
     if let Ok(response) = toml::from_str::<ArmResponse>(text) {
         let _ = toml::to_string(&response).unwrap();
     }

@@ -1,9 +1,9 @@
 //! Recorded control cycles: chunks, items, and the core stepped over them.
 
+use arm_model::Limits;
 use rt_controller::control::record::record_input;
 use rt_controller::control::{ControlState, CycleInput, Thresholds};
 use rt_controller::recording::{ChunkWriter, LogReader, Read, RecordedCycle, Snapshot, replay};
-use arm_model::Limits;
 
 /// Bytes of a chunk's header; its checksum is over the first of them and the items.
 const HEADER_LEN: usize = 24;

@@ -1,23 +1,17 @@
 //! Films: the container and the pictures inside.
 
+use crate::folder;
 use camera_ingest::source::{AviSource, FrameSource, StereoSource};
-use std::sync::OnceLock;
-use tempfile::TempDir;
 
 /// Pictures looked at in one film.
 const PICTURES: usize = 3;
-
-fn folder() -> &'static TempDir {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    FOLDER.get_or_init(|| TempDir::new().expect("a temporary folder"))
-}
 
 /// Opens `data` as a film and decodes its first pictures.
 ///
 /// # Panics
 /// When the temporary folder cannot be written.
 pub fn run(data: &[u8]) {
-    let path = folder().path().join("video.avi");
+    let path = folder().join("video.avi");
     std::fs::write(&path, data).expect("a film");
     if let Ok(mut film) = AviSource::open(&path, None) {
         for index in 0..film.len().min(PICTURES) {

@@ -1,6 +1,7 @@
 //! The arm's wire: frames, requests, replies, every report layout, streams cut
 //! anywhere.
 
+use arm_model::JointVector;
 use rt_controller::report_feed::arm_codes;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::report::{
@@ -10,7 +11,6 @@ use rt_controller::xarm::{
     ArmVersion, Command, Firmware, FrameReader, JointQuery, Protocol, ReplyData, ReportReader,
     StateRequest, Status,
 };
-use arm_model::JointVector;
 
 /// Commands whose replies carry something.
 fn asked() -> Vec<Command> {

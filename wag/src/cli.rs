@@ -5,7 +5,6 @@ mod config;
 mod eyes;
 mod ledger;
 mod plans;
-mod results;
 mod runs;
 mod values;
 
@@ -14,14 +13,16 @@ pub use config::*;
 pub use eyes::*;
 pub use ledger::*;
 pub use plans::*;
-pub use results::*;
 pub use runs::*;
 pub use values::Point;
 
-use values::{host, mass_kg, offset_ms, rate_hz};
+use values::{host, mass_kg, offset_ms, one_of, rate_hz};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
+use planner::identify::Method;
+use rope_sim::Precision;
+use shared_types::Task;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
@@ -53,7 +54,6 @@ pub struct Cli {
     /// Log more to standard error (-v info, -vv debug).
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// What to do.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -121,12 +121,15 @@ pub enum Command {
     Process(ProcessArgs),
 }
 
-/// Arguments of `wag demo`.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// What the throw is for; the rig has a scene for strikes only so far.
-    #[arg(long, value_enum, default_value_t = TaskName::Strike)]
-    pub task: TaskName,
+    #[arg(long, default_value = "strike", value_parser = one_of([
+        ("strike", "The tip passes through the target", Task::Strike),
+        ("lob", "", Task::Lob),
+        ("drape", "", Task::Drape),
+    ]))]
+    pub task: Task,
     /// Seed of the hidden rope, the target, the noise and every search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
@@ -145,20 +148,6 @@ pub struct DemoArgs {
     pub accept_unconfirmed: bool,
 }
 
-/// Tasks known by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TaskName {
-    /// The tip passes through the target.
-    Strike,
-    /// The tip lands on a board and stays.
-    #[value(hide = true)]
-    Lob,
-    /// The rope comes to hang over a wall.
-    #[value(hide = true)]
-    Drape,
-}
-
-/// `wag sim ...`
 #[derive(Debug, Subcommand)]
 pub enum SimCommand {
     /// Free simulation of a rope under a prescribed motion of its attach frame.
@@ -167,16 +156,6 @@ pub enum SimCommand {
     Throw(SimThrowArgs),
 }
 
-/// Arithmetic of the simulation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PrecisionName {
-    /// Single precision, vector lanes.
-    F32,
-    /// Double precision.
-    F64,
-}
-
-/// Arguments of `wag sim rope`.
 #[derive(Debug, Args)]
 pub struct SimRopeArgs {
     /// Rope parameters.
@@ -192,8 +171,11 @@ pub struct SimRopeArgs {
     #[arg(long, default_value_t = 5e-4)]
     pub dt: f64,
     /// Arithmetic.
-    #[arg(long, value_enum, default_value_t = PrecisionName::F64)]
-    pub precision: PrecisionName,
+    #[arg(long, default_value = "f64", value_parser = one_of([
+        ("f32", "Single precision, vector lanes", Precision::F32),
+        ("f64", "Double precision", Precision::F64),
+    ]))]
+    pub precision: Precision,
     /// Rotation vector of joint 0 at the start (rad), x,y,z.
     #[arg(long, allow_hyphen_values = true, default_value = "0,0,0")]
     pub initial_joint0: Point,
@@ -202,7 +184,6 @@ pub struct SimRopeArgs {
     pub out: PathBuf,
 }
 
-/// Arguments of `wag sim throw`.
 #[derive(Debug, Args)]
 pub struct SimThrowArgs {
     /// Rope parameters.
@@ -225,7 +206,6 @@ pub struct SceneArgs {
     /// Camera calibration and extrinsics (camera.toml); default for a run: the one in its file.
     #[arg(long)]
     pub camera: Option<PathBuf>,
-    /// Motion of the clamp.
     #[command(flatten)]
     pub motion: MotionArgs,
     /// Which of a run's motions that were streamed to the arm; default: 1, the wiggle. A
@@ -269,35 +249,28 @@ pub struct ObservationArgs {
     pub keypoints: Option<PathBuf>,
 }
 
-/// How to identify.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
-    /// The network alone: at once, for the built-in wiggle only.
-    Nn,
-    /// The paper's Φ-CMA-ES: a wide search of the simulator, then refined.
-    Cmaes,
-    /// A quick proposal of the network, or of a search where the film is
-    /// out of its distribution, then refined.
-    Hybrid,
-    /// A quick proposal of a search, then refined.
-    HybridSearch,
-}
-
-/// Arguments of `wag identify`.
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    /// Observation.
     #[command(flatten)]
     pub observation: ObservationArgs,
     /// Frames per second, for a recording without frame times.
     #[arg(long, value_parser = rate_hz, requires = "video")]
     pub fps: Option<f64>,
-    /// Camera and motion.
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Method.
-    #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
-    pub method: MethodName,
+    #[arg(long, default_value = "hybrid", value_parser = one_of([
+        ("nn", "The network alone: at once, for the built-in wiggle only", Method::Network),
+        ("cmaes", "The paper's Φ-CMA-ES: a wide search of the simulator, then refined", Method::Cmaes),
+        (
+            "hybrid",
+            "A quick proposal of the network, or of a search where the film is out of its \
+             distribution, then refined",
+            Method::Hybrid,
+        ),
+        ("hybrid-search", "A quick proposal of a search, then refined", Method::HybridSearch),
+    ]))]
+    pub method: Method,
     /// Network for --method nn and hybrid instead of the built-in one (ONNX, written by
     /// phi-train).
     #[arg(long, value_name = "FILE")]
@@ -316,7 +289,6 @@ pub struct IdentifyArgs {
     pub out: PathBuf,
 }
 
-/// `wag plan ...`
 #[derive(Debug, Subcommand)]
 pub enum PlanCommand {
     /// The tip passes through the target.
@@ -327,7 +299,6 @@ pub enum PlanCommand {
     Drape(PlanArgs),
 }
 
-/// Arguments of `wag doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
     /// Address or name of an arm's controller to check too; nothing on it is changed.
@@ -337,7 +308,6 @@ pub struct DoctorArgs {
     pub ports: ArmPorts,
 }
 
-/// Arguments of `wag man`.
 #[derive(Debug, Args)]
 pub struct ManArgs {
     /// Folder for the pages; made if it does not exist.
@@ -345,7 +315,6 @@ pub struct ManArgs {
     pub folder: PathBuf,
 }
 
-/// Arguments of `wag completions`.
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
     /// Shell.
@@ -353,7 +322,6 @@ pub struct CompletionsArgs {
     pub shell: clap_complete::Shell,
 }
 
-/// Arguments of `wag process`.
 #[derive(Debug, Args)]
 pub struct ProcessArgs {
     /// Which process.

@@ -27,9 +27,9 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return cli_output::refuse_usage(&error),
     };
-    cli_output::start_logging(cli.verbose);
+    cli_output::start(cli.json, cli.verbose);
     if let Some(file) = &cli.cell {
         config::name_cell(file);
     }
-    cli_output::finish(command::run(&cli), cli.json)
+    cli_output::finish(command::run(&cli))
 }

@@ -9,23 +9,9 @@ mod support;
 use onnx::Axis::{Is, Open};
 use onnx::{FLOAT, Graph};
 use planner::phi::graph_sha256;
-use serde_json::Value;
 use shared_types::KeypointTrack;
-use std::path::{Path, PathBuf};
-use std::process::Output;
-use support::{said, wag_in};
-
-/// Folder of a recorded wiggle; `None`, said aloud, where it is not there.
-fn wiggle() -> Option<PathBuf> {
-    let path = Path::new(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/data/wiggle/a1"
-    ));
-    if !path.exists() {
-        println!("skipped: {} not found", path.display());
-    }
-    path.exists().then(|| path.to_owned())
-}
+use std::path::Path;
+use support::{are_refused_in, json_in, shared};
 
 /// A folder with two trackers, another model, no model, and the wiggle's camera, which names
 /// a tracker.
@@ -50,7 +36,7 @@ fn folder(wiggle: &Path) -> tempfile::TempDir {
     dir
 }
 
-fn track(folder: &Path, wiggle: &Path, more: &str) -> Output {
+fn track(wiggle: &Path, more: &str) -> String {
     let wiggle = wiggle.display();
     let camera = if more.contains("--camera") {
         String::new()
@@ -58,15 +44,14 @@ fn track(folder: &Path, wiggle: &Path, more: &str) -> Output {
         format!("--camera {wiggle}/camera.toml")
     };
     let files = format!("--video {wiggle} --pose {wiggle}/pose.csv {camera}");
-    wag_in(
-        folder,
-        &format!("track --json {files} --out keypoints.json {more}"),
-    )
+    format!("track {files} --out keypoints.json {more}")
 }
 
 #[test]
 fn the_report_tells_who_did_what() {
-    let Some(wiggle) = wiggle() else { return };
+    let Some(wiggle) = shared("data/wiggle/a1") else {
+        return;
+    };
     let dir = folder(&wiggle);
     // How far the models say that the rope goes to the right in eight frames (px).
     let cases = [
@@ -78,9 +63,7 @@ fn the_report_tells_who_did_what() {
         ),
     ];
     for (more, model) in cases {
-        let output = track(dir.path(), &wiggle, more);
-        assert!(output.status.success(), "{}", said(&output));
-        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let report = json_in(dir.path(), &track(&wiggle, more));
         assert_eq!(report["lost"], 0, "{report}");
         let reading = &report["models"]["reading"];
         let Some((model, moved_px)) = model else {
@@ -108,24 +91,20 @@ fn the_report_tells_who_did_what() {
 
 #[test]
 fn what_does_not_fit_is_refused() {
-    let Some(wiggle) = wiggle() else { return };
+    let Some(wiggle) = shared("data/wiggle/a1") else {
+        return;
+    };
     let dir = folder(&wiggle);
-    let cases: [(&str, &[&str]); 4] = [
-        ("--tracker nowhere.onnx", &["nowhere.onnx", "path"]),
-        ("--tracker none.onnx", &["none.onnx", "ONNX file?"]),
+    for (more, words) in [
+        ("--tracker nowhere.onnx", "nowhere.onnx | path"),
+        ("--tracker none.onnx", "none.onnx | ONNX file?"),
         (
             "--tracker other.onnx",
-            &["other.onnx", "`image`", "`frames`, `queries`"],
+            "other.onnx | `image` | `frames`, `queries`",
         ),
-        ("--camera misspelt.toml", &["misspelt.toml", "trakcer"]),
-    ];
-    for (more, words) in cases {
-        let output = track(dir.path(), &wiggle, more);
-        let error = said(&output);
-        assert_eq!(output.status.code(), Some(2), "{more}: {error}");
-        for word in words {
-            assert!(error.contains(word), "{more}: {error}");
-        }
-        assert!(!dir.path().join("keypoints.json").exists());
+        ("--camera misspelt.toml", "misspelt.toml | trakcer"),
+    ] {
+        let case = format!("{} => {words}", track(&wiggle, more));
+        are_refused_in(dir.path(), 2, &case);
     }
 }

@@ -77,7 +77,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         threads: Machine::here().cores,
         ..config.identify
     };
-    let stage = Stage::begin("identify", quiet);
+    let stage = Stage::begin("identify");
     let net = network(None)?;
     let nn = measure(&rig, args, ("nn", 0.010), |filmed, _| {
         // From keypoints to parameters; nothing is simulated.

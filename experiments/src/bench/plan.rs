@@ -110,7 +110,7 @@ fn measure(
 
 pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let config = crate::results::experiment::built_in().or_failed()?;
-    let stage = Stage::begin("bench", quiet);
+    let stage = Stage::begin("bench");
     let rows = TASKS
         .into_iter()
         .map(|task| measure(&config, args, task))

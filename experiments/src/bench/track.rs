@@ -111,7 +111,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         ))
     })?;
     let (mut video, camera, motion) = recording(folder)?;
-    let stage = Stage::begin("bench", quiet);
+    let stage = Stage::begin("bench");
     let mut least = Pass::over(&mut video, &camera, &*motion)?;
     let peak_mb = peak_mb();
     for _ in 1..if args.quick { 1 } else { 3 } {

@@ -68,7 +68,7 @@ impl<'a> Experiment<'a> {
         Ok(Self {
             name,
             quiet,
-            stage: Stage::begin(name, quiet),
+            stage: Stage::begin(name),
             args,
             rig,
             options: IdentifyOptions {

@@ -30,9 +30,9 @@ fn folder_of(out: &Path, kind: Kind, seed: u64) -> PathBuf {
 }
 
 /// Renders films. The value is what `--json` prints.
-pub fn run(args: &RoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &RoomsArgs) -> Outcome<Option<Value>> {
     let kind = Kind::from(args.kind);
-    let stage = Stage::begin("rooms", quiet);
+    let stage = Stage::begin("rooms");
     let seeds: Vec<u64> = args.seeds.clone().collect();
     each(&seeds, args.threads, |seed| {
         folder::write(&folder_of(&args.out, kind, seed), seed, kind)

@@ -130,7 +130,7 @@ fn result(args: &TrackRoomsArgs, seed: u64, kind: Kind) -> anyhow::Result<Tracke
 /// Tracks films. The value is what `--json` prints.
 pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
     let kind = Kind::from(args.kind);
-    let stage = Stage::begin("track-rooms", quiet);
+    let stage = Stage::begin("track-rooms");
     let seeds: Vec<u64> = args.seeds.clone().collect();
     let all = each(&seeds, args.threads, |seed| {
         let tracked = result(args, seed, kind)?;

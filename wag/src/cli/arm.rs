@@ -1,7 +1,8 @@
-//! The commands that move an arm, and the one that simulates it.
+//! The commands that move an arm, the one that simulates it, and those that measure its
+//! control loop.
 
 use super::values::host;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use cli_output::seed;
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -45,7 +46,6 @@ pub struct ArmArgs {
     pub dead_man: bool,
 }
 
-/// Arguments of `wag wiggle`.
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
     /// Report how well it identifies ropes of the ranges, compared with the paper's wiggle.
@@ -60,7 +60,6 @@ pub struct WiggleArgs {
     /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
-    /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder for the run; it must not exist. Default: runs/TIME-wiggle.
@@ -68,7 +67,6 @@ pub struct WiggleArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `wag throw`.
 #[derive(Debug, Args)]
 pub struct ThrowArgs {
     /// The plan.
@@ -76,7 +74,6 @@ pub struct ThrowArgs {
     /// Go on although the track of the rope is in doubt.
     #[arg(long)]
     pub accept_unconfirmed: bool,
-    /// Arm to execute it on.
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder for the run; it must not exist. Default: runs/TIME-throw.
@@ -84,7 +81,6 @@ pub struct ThrowArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `wag latency`.
 #[derive(Debug, Args)]
 pub struct LatencyArgs {
     /// Arm to move: one joint after the other, a small sweep of rising frequency.
@@ -113,7 +109,6 @@ pub struct LatencyArgs {
     pub response: Option<PathBuf>,
 }
 
-/// Arguments of `wag rig`.
 #[derive(Debug, Args)]
 pub struct RigArgs {
     /// Address to listen on. Anything but loopback lets others drive the simulated arm.
@@ -142,4 +137,32 @@ pub struct RigArgs {
     /// Seed of the hidden rope and the noise.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// What to measure.
+    #[arg(value_enum)]
+    pub name: BenchName,
+    /// Seconds instead of a minute, rough figures.
+    #[arg(long)]
+    pub quick: bool,
+    /// Seed of the simulated rig of `record`.
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// `rt`, `record`: time of each contender (s).
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    pub seconds: u32,
+    /// `rt`: core of the control loop; default: the last one.
+    #[arg(long)]
+    pub cpu: Option<usize>,
+}
+
+/// Benchmarks known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BenchName {
+    /// The control loop: wake-up latency compared with `cyclictest`, times within a cycle.
+    Rt,
+    /// Recording: times within a control cycle without and with the recorder.
+    Record,
 }

@@ -4,7 +4,6 @@ use crate::config::Kind;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// `wag config ...`
 #[derive(Debug, Subcommand)]
 pub enum ConfigCommand {
     /// Print the effective configuration: the built-in values, overridden by those of the
@@ -14,7 +13,6 @@ pub enum ConfigCommand {
     Check(ConfigCheckArgs),
 }
 
-/// Arguments of `wag config show`.
 #[derive(Debug, Args)]
 #[command(after_help = "LAYERS, the later over the earlier:\n  \
     built in   the files in configs/ that this program was built with\n  \
@@ -35,7 +33,6 @@ pub struct ConfigShowArgs {
     pub origin: bool,
 }
 
-/// Arguments of `wag config check`.
 #[derive(Debug, Args)]
 pub struct ConfigCheckArgs {
     /// What is configured; default: everything.

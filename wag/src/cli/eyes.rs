@@ -1,19 +1,24 @@
 //! Arguments of what looks: film, track, score, calib.
 
 use super::SceneArgs;
-use super::values::{Colour, rate_hz};
-use clap::{Args, Subcommand, ValueEnum};
+use super::values::{Colour, one_of, rate_hz};
+use camera_ingest::calib::VideoMode;
+use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// Arguments of `wag film`.
 #[derive(Debug, Args)]
 pub struct FilmArgs {
     /// The camera, /dev/videoN.
     #[arg(long)]
     pub device: PathBuf,
     /// Size of one image: VGA 672x376, HD 1280x720, FHD 1920x1080, 2K 2208x1242.
-    #[arg(long, value_enum, default_value_t = ModeName::Vga)]
-    pub mode: ModeName,
+    #[arg(long, default_value = "VGA", value_parser = one_of([
+        ("VGA", "672x376", VideoMode::Vga),
+        ("HD", "1280x720", VideoMode::Hd),
+        ("FHD", "1920x1080", VideoMode::FullHd),
+        ("2K", "2208x1242", VideoMode::TwoK),
+    ]))]
+    pub mode: VideoMode,
     /// Frames per second.
     #[arg(long, default_value_t = 60)]
     pub fps: u32,
@@ -34,24 +39,6 @@ pub struct FilmArgs {
     pub out: PathBuf,
 }
 
-/// Picture sizes of a stereo camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ModeName {
-    /// 672x376.
-    #[value(name = "VGA")]
-    Vga,
-    /// 1280x720.
-    #[value(name = "HD")]
-    Hd,
-    /// 1920x1080.
-    #[value(name = "FHD")]
-    FullHd,
-    /// 2208x1242.
-    #[value(name = "2K")]
-    TwoK,
-}
-
-/// Arguments of `wag track`.
 #[derive(Debug, Args)]
 pub struct TrackArgs {
     /// AVI file, raw NAME_WIDTHxHEIGHT.yuyv, folder with video.avi or with PNG or JPEG
@@ -61,13 +48,11 @@ pub struct TrackArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera and motion.
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Keypoints per frame.
     #[arg(long, default_value_t = 20)]
     pub keypoints: usize,
-    /// Learned model.
     #[command(flatten)]
     pub models: ModelArgs,
     /// Keypoints drawn in: a film if the name ends in .avi, else a contact sheet (PNG).
@@ -102,7 +87,6 @@ pub struct StereoArgs {
     pub camera: PathBuf,
 }
 
-/// Arguments of `wag score`.
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
     #[command(flatten)]
@@ -140,10 +124,8 @@ pub struct ShownArgs {
     pub lead_rgb: Option<Colour>,
 }
 
-/// Arguments of `wag calib extrinsics`.
 #[derive(Debug, Args)]
 pub struct ExtrinsicsArgs {
-    /// What the camera is shown.
     #[command(flatten)]
     pub shown: ShownArgs,
     /// The camera's settings with the estimated extrinsics (TOML).
@@ -151,10 +133,8 @@ pub struct ExtrinsicsArgs {
     pub out: PathBuf,
 }
 
-/// Arguments of `wag calib check`.
 #[derive(Debug, Args)]
 pub struct CalibCheckArgs {
-    /// What the camera is shown.
     #[command(flatten)]
     pub shown: ShownArgs,
     /// Largest residual that passes (px, RMS over both images).

@@ -6,11 +6,9 @@ use cli_output::seed;
 use run_log::ledger::RunResult;
 use std::path::PathBuf;
 
-/// Arguments of `wag ledger`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct LedgerArgs {
-    /// What to do instead of listing.
     #[command(subcommand)]
     pub instead: Option<LedgerCommand>,
     /// Run folders, or folders of them; default: runs.
@@ -37,7 +35,6 @@ fn results() -> impl TypedValueParser<Value = RunResult> {
     PossibleValuesParser::new(["ok", "failed", "broken"]).try_map(|name| name.parse())
 }
 
-/// `wag ledger ...`
 #[derive(Debug, Subcommand)]
 pub enum LedgerCommand {
     /// Show the values in which two runs differ.
@@ -46,7 +43,6 @@ pub enum LedgerCommand {
     Rerun(LedgerRerunArgs),
 }
 
-/// Arguments of `wag ledger compare`.
 #[derive(Debug, Args)]
 pub struct LedgerCompareArgs {
     /// Run folder.
@@ -55,7 +51,6 @@ pub struct LedgerCompareArgs {
     pub second: PathBuf,
 }
 
-/// Arguments of `wag ledger rerun`.
 #[derive(Debug, Args)]
 pub struct LedgerRerunArgs {
     /// Run folder.

@@ -1,11 +1,12 @@
 //! Arguments of `wag plan` and `wag check`.
 
 use super::Point;
-use clap::{Args, ValueEnum};
+use super::values::one_of;
+use clap::Args;
 use cli_output::seed;
+use shared_types::CommandInterface;
 use std::path::PathBuf;
 
-/// Arguments of `wag plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
     /// Rope parameters.
@@ -54,16 +55,6 @@ pub struct PlanArgs {
     pub reach: Option<PathBuf>,
 }
 
-/// How setpoints reach the arm, by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum InterfaceName {
-    /// Joint positions, the arm's mode 1.
-    Servo,
-    /// Joint velocities, the arm's mode 4.
-    Velocity,
-}
-
-/// Arguments of `wag check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
     /// The plan.
@@ -72,8 +63,11 @@ pub struct CheckArgs {
     #[arg(long)]
     pub limits: Option<PathBuf>,
     /// Command interface: how setpoints reach the arm.
-    #[arg(long, alias = "wire", value_enum, default_value_t = InterfaceName::Servo)]
-    pub interface: InterfaceName,
+    #[arg(long, alias = "wire", default_value = "servo", value_parser = one_of([
+        ("servo", "Joint positions, the arm's mode 1", CommandInterface::ServoPosition),
+        ("velocity", "Joint velocities, the arm's mode 4", CommandInterface::JointVelocity),
+    ]))]
+    pub interface: CommandInterface,
     /// Linear speed limit set in the arm, as a factor of 1 m/s (servo only).
     #[arg(long, default_value_t = 1.2, value_name = "FACTOR")]
     pub speed_factor: f64,

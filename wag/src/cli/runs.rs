@@ -5,11 +5,9 @@ use clap::{Args, Subcommand};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-/// Arguments of `wag record`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct RecordArgs {
-    /// What to do instead.
     #[command(subcommand)]
     pub instead: Option<RecordCommand>,
     /// Run folder of a running command; its controller is recorded.
@@ -30,7 +28,6 @@ pub struct RecordArgs {
     pub out: Option<PathBuf>,
 }
 
-/// `wag record ...`
 #[derive(Debug, Subcommand)]
 pub enum RecordCommand {
     /// Repair a run.mcap whose recorder was killed: at most its last second is
@@ -38,7 +35,6 @@ pub enum RecordCommand {
     Recover(RecoverArgs),
 }
 
-/// Arguments of `wag record recover`.
 #[derive(Debug, Args)]
 pub struct RecoverArgs {
     /// The file.
@@ -46,7 +42,6 @@ pub struct RecoverArgs {
     pub file: PathBuf,
 }
 
-/// Arguments of `wag watch`.
 #[derive(Debug, Args)]
 #[command(after_help = "EXAMPLES:\n  \
     wag watch                       whichever run began last, then the next\n  \
@@ -79,7 +74,6 @@ pub struct WatchArgs {
     pub seconds: Option<f64>,
 }
 
-/// Arguments of `wag replay`.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
     /// Run folder, or its file run.mcap (cycles.bin of an older version).
@@ -89,21 +83,18 @@ pub struct ReplayArgs {
     pub from_cycle: u64,
 }
 
-/// Arguments of `wag explain`.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
     /// Run folder, or its file run.mcap (cycles.bin of an older version).
     pub run: PathBuf,
 }
 
-/// `wag export ...`
 #[derive(Debug, Subcommand)]
 pub enum ExportCommand {
     /// Control cycles and measured joints as cycles.csv and joints.csv.
     Csv(ExportCsvArgs),
 }
 
-/// Arguments of `wag export csv`.
 #[derive(Debug, Args)]
 pub struct ExportCsvArgs {
     /// Run folder, or its file run.mcap (cycles.bin of an older version).
@@ -113,7 +104,6 @@ pub struct ExportCsvArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `wag report`.
 #[derive(Debug, Args)]
 pub struct ReportArgs {
     /// Run folder.

@@ -1,7 +1,27 @@
 //! Values on the command line, with what they may be.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::net::{IpAddr, ToSocketAddrs};
 use std::str::FromStr;
+
+/// One of these by its name, each with what `--help` says of it; one of which it says
+/// nothing is not listed there.
+pub(super) fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    known: [(&'static str, &'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let names = known.map(|(name, help, _)| {
+        let value = PossibleValue::new(name).hide(help.is_empty());
+        if help.is_empty() {
+            value
+        } else {
+            value.help(help)
+        }
+    });
+    PossibleValuesParser::new(names).try_map(move |name| {
+        let found = known.iter().find(|(known, ..)| *known == name);
+        found.map(|(.., value)| *value).ok_or("it is not known")
+    })
+}
 
 /// A frame rate (Hz).
 pub(super) fn rate_hz(text: &str) -> Result<f64, String> {

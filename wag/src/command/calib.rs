@@ -3,14 +3,14 @@
 
 use super::score::not_scored;
 use crate::cli::{CalibCheckArgs, CalibCommand, ExtrinsicsArgs, ShownArgs};
-use anyhow::{Context, anyhow};
+use anyhow::{Context, bail};
 use camera_ingest::calib::board::{Board, BoardError};
 use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
 use camera_ingest::calib::placed_camera_toml;
 use camera_ingest::score::sight_lead;
 use camera_ingest::source::FrameSource;
 use camera_ingest::{ScoreOptions, load_camera, open_video};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use nalgebra::Vector3;
 use run_log::files;
 use serde_json::{Value, json};
@@ -20,10 +20,10 @@ use std::path::Path;
 /// Frames of a video in which the board is looked for.
 const FRAMES: usize = 12;
 
-pub fn run(command: &CalibCommand, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(command: &CalibCommand) -> Outcome<Option<Value>> {
     match command {
-        CalibCommand::Extrinsics(args) => extrinsics(args, quiet),
-        CalibCommand::Check(args) => check(args, quiet),
+        CalibCommand::Extrinsics(args) => extrinsics(args),
+        CalibCommand::Check(args) => check(args),
     }
 }
 
@@ -36,15 +36,11 @@ fn read_shown(path: &Path, frames: usize) -> anyhow::Result<Vec<(usize, Vector3<
         let (frame, x, y, z) =
             row.with_context(|| format!("`{name}`: expected rows frame,x,y,z"))?;
         if frame >= frames {
-            return Err(anyhow!(
-                "`{name}`: frame {frame}, but the video has {frames}"
-            ));
+            bail!("`{name}`: frame {frame}, but the video has {frames}");
         }
         let p_w_m = Vector3::new(x, y, z);
         if !p_w_m.iter().all(|v| v.is_finite()) {
-            return Err(anyhow!(
-                "`{name}`: frame {frame} has a number that is not finite"
-            ));
+            bail!("`{name}`: frame {frame} has a number that is not finite");
         }
         shown.push((frame, p_w_m));
     }
@@ -69,9 +65,9 @@ fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<S
             sight_lead(&mut video, camera, rgb.0, &shown, &options)
                 .map_err(|error| not_scored(error, &args.film.video))
         }
-        _ => Err(Failure::input(anyhow!(
+        _ => Err(bad_input!(
             "name what the camera is shown: --board, or --lead with --lead-rgb"
-        ))),
+        )),
     }
 }
 
@@ -82,26 +78,24 @@ fn told(residual: &Residual) -> String {
     )
 }
 
-fn extrinsics(args: &ExtrinsicsArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn extrinsics(args: &ExtrinsicsArgs) -> Outcome<Option<Value>> {
     let camera = load_camera(&args.shown.film.camera).or_input()?;
-    let stage = Stage::begin("calib extrinsics", quiet);
+    let stage = Stage::begin("calib extrinsics");
     let points = look(&args.shown, &camera, &stage)?;
     let found = solve(&camera, &points).or_failed()?;
     let (r, p) = (&found.r_w_cam, &found.p_w_cam_m);
     let text = placed_camera_toml(&args.out, &args.shown.film.camera, r, p).or_failed()?;
     files::write_atomic(&args.out, text.as_bytes()).or_failed()?;
     stage.done(&told(&found.residual));
-    if !quiet {
-        println!(
-            "left camera at ({:.4}, {:.4}, {:.4}) m, standard error {:.1} mm and {:.2} degrees",
-            p.x,
-            p.y,
-            p.z,
-            1e3 * found.position_error_m,
-            found.attitude_error_rad.to_degrees()
-        );
-        println!("written to `{}`", args.out.display());
-    }
+    println!(
+        "left camera at ({:.4}, {:.4}, {:.4}) m, standard error {:.1} mm and {:.2} degrees",
+        p.x,
+        p.y,
+        p.z,
+        1e3 * found.position_error_m,
+        found.attitude_error_rad.to_degrees()
+    );
+    println!("written to `{}`", args.out.display());
     let rotation: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|k| r[(i, k)]));
     Ok(Some(json!({
         "ok": true, "command": "calib extrinsics", "out": args.out,
@@ -112,9 +106,9 @@ fn extrinsics(args: &ExtrinsicsArgs, quiet: bool) -> Outcome<Option<Value>> {
     })))
 }
 
-fn check(args: &CalibCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn check(args: &CalibCheckArgs) -> Outcome<Option<Value>> {
     let camera = load_camera(&args.shown.film.camera).or_input()?;
-    let stage = Stage::begin("calib check", quiet);
+    let stage = Stage::begin("calib check");
     let points = look(&args.shown, &camera, &stage)?;
     let here = residual(&camera, &points);
     // The sign of the turn between the eyes is easily mistaken in a calibration.
@@ -125,19 +119,19 @@ fn check(args: &CalibCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
     let turned_px = residual(&turned, &points).epipolar_px;
     stage.done(&told(&here));
     if turned_px < here.epipolar_px {
-        return Err(Failure::failed(anyhow!(
+        return Err(failed!(
             "both images show the points {:.2} px apart, and {turned_px:.2} px with the turn \
              between them reversed: its sign is wrong in the calibration",
             here.epipolar_px
-        )));
+        ));
     }
     if here.rms_px > args.limit_px {
-        return Err(Failure::failed(anyhow!(
+        return Err(failed!(
             "what is seen is {:.2} px (RMS) from where it should be, more than {} px; \
              estimate the extrinsics again with `wag calib extrinsics`",
             here.rms_px,
             args.limit_px
-        )));
+        ));
     }
     Ok(Some(json!({
         "ok": true, "command": "calib check", "residual": here, "limit_px": args.limit_px,

@@ -1,16 +1,15 @@
 //! `wag check`: preflight of a plan.
 
-use crate::cli::{CheckArgs, InterfaceName};
+use crate::cli::CheckArgs;
 use crate::config;
-use anyhow::{anyhow, ensure};
+use anyhow::ensure;
 use arm_model::Limits;
 use arm_model::limits::{LimitKind, Margin, TOOL_SPEED_RATED_M_S};
-use cli_output::{Failure, OrInput, Outcome, output, table};
+use cli_output::{OrInput, Outcome, output, table};
 use comfy_table::Table;
 use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop, tool_contact_s};
 use run_log::files::read_plan;
 use serde_json::{Value, json};
-use shared_types::CommandInterface;
 
 fn kind_name(kind: LimitKind) -> &'static str {
     match kind {
@@ -57,6 +56,17 @@ fn rule_table(margins: &[RuleMargin]) -> Table {
     table::numbers(header, 0, rows)
 }
 
+/// Prints which of the limits, which are all kept, is nearest; returns it.
+pub fn print_tightest(margins: &[Margin]) -> Option<&Margin> {
+    let tightest = margins.iter().min_by(|a, b| a.left.total_cmp(&b.left));
+    println!(
+        "All {} limits are kept, and the arm would not stop. Tightest: {}.",
+        margins.len(),
+        tightest.map_or_else(String::new, Margin::describe)
+    );
+    tightest
+}
+
 /// What the arm is set up to judge by.
 fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
     ensure!(
@@ -71,16 +81,13 @@ fn judged_arm(args: &CheckArgs) -> anyhow::Result<JudgedArm> {
         Some(sides) => anyhow::bail!("--fence takes 6 numbers, found {}", sides.len()),
     };
     Ok(JudgedArm {
-        interface: match args.interface {
-            InterfaceName::Servo => CommandInterface::ServoPosition,
-            InterfaceName::Velocity => CommandInterface::JointVelocity,
-        },
+        interface: args.interface,
         speed_factor: args.speed_factor,
         fence,
     })
 }
 
-pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &CheckArgs) -> Outcome<Option<Value>> {
     let arm = judged_arm(args).or_input()?;
     let plan = read_plan(&args.plan).or_input()?;
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
@@ -91,18 +98,14 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
         .filter(|m| m.left.is_nan() || m.left < 0.0)
         .collect();
     let judged = arm_margins(&plan.trajectory, &limits, &arm);
-    if !quiet {
-        println!("{}\n\n{}", margin_table(&margins), rule_table(&judged));
-    }
+    println!("{}\n\n{}", margin_table(&margins), rule_table(&judged));
     let refuse = |what: String| {
         let error = format!("plan `{}` {what}", args.plan.display());
-        if quiet {
-            output::object(&json!({
-                "ok": false, "error": error, "command": "check", "interface": arm.interface,
-                "margins": margins, "arm": judged,
-            }));
-        }
-        Err(Failure::failed(anyhow!(error)))
+        output::object(&json!({
+            "ok": false, "error": error, "command": "check", "interface": arm.interface,
+            "margins": margins, "arm": judged,
+        }));
+        Err(failed!(error))
     };
     let stop = first_stop(&judged);
     let arm_says = stop.map_or_else(
@@ -124,19 +127,12 @@ pub fn run(args: &CheckArgs, quiet: bool) -> Outcome<Option<Value>> {
         return refuse(format!("keeps the limits, but {arm_says}"));
     }
     let contact_s = tool_contact_s(&plan.trajectory, &cell, limits.period_s());
-    if !quiet {
-        if let Some(contact_s) = contact_s {
-            eprintln!(
-                "warning: pole or wrist come within 5 mm of arm, column or floor at {contact_s:.3} s"
-            );
-        }
-        let tightest = margins.iter().min_by(|a, b| a.left.total_cmp(&b.left));
-        println!(
-            "All {} limits are kept, and the arm would not stop. Tightest: {}.",
-            margins.len(),
-            tightest.map_or_else(String::new, Margin::describe)
-        );
+    if let Some(contact_s) = contact_s {
+        output::remark(format_args!(
+            "warning: pole or wrist come within 5 mm of arm, column or floor at {contact_s:.3} s"
+        ));
     }
+    print_tightest(&margins);
     Ok(Some(json!({
         "ok": true, "command": "check", "interface": arm.interface, "margins": margins, "arm": judged,
         "tool_contact_s": contact_s,

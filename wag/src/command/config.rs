@@ -2,86 +2,67 @@
 
 use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
 use crate::config::{self, Kind, Layers};
-use anyhow::anyhow;
 use clap::ValueEnum;
-use cli_output::{Failure, OrInput, Outcome, table};
+use cli_output::{OrInput, Outcome, table};
 use serde_json::{Value, json};
 
-pub fn run(command: &ConfigCommand, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(command: &ConfigCommand) -> Outcome<Option<Value>> {
     match command {
-        ConfigCommand::Show(args) => show(args, quiet),
-        ConfigCommand::Check(args) => check(args, quiet),
+        ConfigCommand::Show(args) => show(args),
+        ConfigCommand::Check(args) => check(args),
     }
 }
 
 fn files_of(layers: &Layers) -> Vec<Value> {
+    let layers = layers.layers.iter();
     layers
-        .layers()
-        .iter()
         .map(|layer| json!({ "layer": layer.name, "file": layer.path }))
         .collect()
 }
 
-fn show(args: &ConfigShowArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn show(args: &ConfigShowArgs) -> Outcome<Option<Value>> {
     let layers = config::layers(args.kind, args.run.as_deref()).or_input()?;
     let told = layers.told();
-    if !quiet && args.origin {
+    if args.origin {
         let rows = told.iter().map(|t| {
-            [
-                t.key.clone(),
-                t.value.to_string(),
-                t.layer.name.to_owned(),
-                t.layer.path.display().to_string(),
-            ]
+            let file = t.layer.path.display().to_string();
+            let (value, layer) = (t.value.to_string(), t.layer.name.to_owned());
+            [t.key.clone(), value, layer, file]
         });
-        println!(
-            "{}",
-            table::numbers(["key", "value", "layer", "file"], 3, rows)
-        );
-    } else if !quiet {
+        let header = ["key", "value", "layer", "file"];
+        println!("{}", table::numbers(header, 3, rows));
+    } else {
         print!("{}", toml::to_string(&layers.merged()).or_failed()?);
     }
-    let values: Vec<Value> = told
-        .iter()
-        .map(|t| {
-            json!({
-                "key": t.key,
-                "value": t.value,
-                "layer": t.layer.name,
-                "file": t.layer.path,
-            })
-        })
-        .collect();
+    let values = told.iter().map(
+        |t| json!({ "key": t.key, "value": t.value, "layer": t.layer.name, "file": t.layer.path }),
+    );
+    let values: Vec<Value> = values.collect();
     Ok(Some(json!({
-        "kind": args.kind.name(),
-        "layers": files_of(&layers),
-        "values": values,
+        "kind": args.kind.name(), "layers": files_of(&layers), "values": values,
     })))
 }
 
-fn check(args: &ConfigCheckArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let kinds = args
-        .kind
-        .map_or(Kind::value_variants().to_vec(), |kind| vec![kind]);
+fn check(args: &ConfigCheckArgs) -> Outcome<Option<Value>> {
+    let all = Kind::value_variants();
+    let kinds = args.kind.as_ref().map_or(all, std::slice::from_ref);
     let (mut checked, mut wrong) = (Vec::new(), Vec::new());
     for kind in kinds {
-        match config::layers(kind, args.run.as_deref()) {
-            Ok(layers) => {
-                let files: Vec<String> = layers
-                    .layers()
-                    .iter()
-                    .map(|layer| format!("{} ({})", layer.name, layer.path.display()))
-                    .collect();
-                if !quiet {
-                    println!("✔ {:10} {}", kind.name(), files.join(", "));
-                }
-                checked.push(json!({ "kind": kind.name(), "layers": files_of(&layers) }));
+        let layers = match config::layers(*kind, args.run.as_deref()) {
+            Ok(layers) => layers,
+            Err(error) => {
+                wrong.push(format!("{error:#}"));
+                continue;
             }
-            Err(error) => wrong.push(format!("{error:#}")),
-        }
+        };
+        let files = layers.layers.iter();
+        let files = files.map(|layer| format!("{} ({})", layer.name, layer.path.display()));
+        let files: Vec<String> = files.collect();
+        println!("✔ {:10} {}", kind.name(), files.join(", "));
+        checked.push(json!({ "kind": kind.name(), "layers": files_of(&layers) }));
     }
     if wrong.is_empty() {
         return Ok(Some(json!({ "ok": true, "checked": checked })));
     }
-    Err(Failure::input(anyhow!("{}", wrong.join("; "))))
+    Err(bad_input!("{}", wrong.join("; ")))
 }

@@ -1,34 +1,35 @@
 //! `wag demo`: one throw from start to end on the simulated rig. Reads top to
 //! bottom as the data flows.
 
-use super::demo_summary::{DemoRecord, show};
-use super::explain::explain_stop;
-use super::network::warning_of_pole;
-use super::plan::describe;
-use super::unconfirmed::confirm;
-use crate::cli::{DemoArgs, TaskName};
+mod rope;
+mod summary;
+
+use super::runs::explain_stop;
+use crate::cli::DemoArgs;
 use crate::config;
-use crate::pipeline::{self, ArmLink, Film, RunFolder, SettleInput, Shot};
+use crate::pipeline::{self, ArmLink, RunFolder, execute};
 use crate::session::Session;
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
+use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
+use camera_ingest::process::CameraConfig;
+use cli_output::{Failure, OrInput, Outcome, Stage, output, watch_interrupts};
 use planner::PlannerConfig;
-use planner::plan::{PlanOptions, PlanRequest, check_reach, clear_of_arm, warnings};
-use planner::service::PlannerRpc;
+use planner::plan::{check_reach, clear_of_arm};
+use planner::service::{PlannerRequest, PlannerRpc};
 use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::RigConfig;
-use rig_sim::render::Appearance;
 use run_log::files;
 use serde_json::Value;
-use shared_types::ipc::message::{CameraRpc, RigEvent, RigRequest, RigRpc, ScoreResult};
+use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
-use shared_types::{OperatingMode, Plan, RopeEstimate, StereoCamera, Task};
+use shared_types::{OperatingMode, Plan, StereoCamera, Task};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
+use summary::{DemoRecord, Film, show};
 use viewer::report;
 
 /// Speed of moves between poses, as a part of the fastest move.
@@ -36,8 +37,6 @@ use viewer::report;
 /// Slow enough that the move lasts several periods of the rope's pendulum and
 /// leaves it with millimetres of swing.
 const MOVE_SPEED: f64 = 0.04;
-/// The joint that wiggles (0-based).
-const WIGGLE_JOINT: usize = 5;
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a throw: two and a half seconds.
@@ -61,17 +60,18 @@ fn random_target(seed: u64) -> [f64; 3] {
     [rho * bearing.cos(), rho * bearing.sin(), height]
 }
 
-pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
-    match args.task {
-        TaskName::Strike => {}
-        TaskName::Lob => return Err(super::plan::not_there("lob")),
-        TaskName::Drape => return Err(super::plan::not_there("drape")),
+pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
+    if args.task != Task::Strike {
+        let task = args.task.name();
+        return Err(failed!(
+            "a demo of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
+        ));
     }
     let target_m = args
         .target
         .map_or_else(|| random_target(args.seed), |p| p.0);
     // Refused before anything starts, whatever rope turns out to be there.
-    let rig = pipeline::shipped_rig(args.rig_config.as_deref()).or_input()?;
+    let rig: RigConfig = config::here(args.rig_config.as_deref()).or_input()?;
     check_reach(target_m, RANGES[1].max, &rig.cell).or_input()?;
     clear_of_arm(target_m, &rig.cell).or_input()?;
     watch_interrupts().or_failed()?;
@@ -79,32 +79,30 @@ pub fn run(args: &DemoArgs, quiet: bool) -> Outcome<Option<Value>> {
     let began = Instant::now();
     let mut record = DemoRecord::new(args.seed, target_m, &folder);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    let result = throw_once(&folder, &mut session, &mut record, &rig, (args, quiet));
+    let accept = args.accept_unconfirmed;
+    let result = throw_once(&folder, &mut session, &mut record, &rig, accept);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let keypoints_kept = session.received.keep_keypoints(folder.path());
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
     let summary_kept = files::write_json(&folder.file(files::SUMMARY), &record);
     let recorded = session.finish_run_file();
-    explain_stop(folder.path(), quiet);
+    explain_stop(folder.path());
     result
         .with_context(|| format!("run `{}`", folder.path().display()))
         .map_err(Failure::failed)?;
     keypoints_kept.or_failed()?;
-    if !quiet {
-        show(&record);
-    }
-    keep_report(folder.path(), quiet);
+    show(&record);
+    keep_report(folder.path());
     recorded.or_failed()?;
     summary_kept.or_failed()?;
     Ok(Some(serde_json::to_value(&record).or_failed()?))
 }
 
 /// The run as a page to look at. Without it the run is as good as before.
-fn keep_report(run: &Path, quiet: bool) {
+fn keep_report(run: &Path) {
     match config::cell_here().and_then(|here| report::write(run, None, &here)) {
-        Ok(written) if !quiet => println!("report: {}", written.path.display()),
-        Ok(_) => {}
+        Ok(written) => println!("report: {}", written.path.display()),
         Err(reason) => tracing::warn!("no report was written: {reason:#}"),
     }
 }
@@ -115,7 +113,7 @@ fn throw_once(
     session: &mut Session,
     record: &mut DemoRecord,
     rig: &RigConfig,
-    (args, quiet): (&DemoArgs, bool),
+    accept_unconfirmed: bool,
 ) -> anyhow::Result<()> {
     let mut settings = config::here::<PlannerConfig>(None)?;
     settings.identify.seed = record.seed;
@@ -123,16 +121,17 @@ fn throw_once(
     settings.identify.camera_look_at_std_m = CAMERA_STD;
     settings.identify.camera_roll_std_rad = CAMERA_STD;
     let rig_config = pipeline::rig_config(folder, rig, record.seed, record.target_m);
-    let mut demo = Demo::start(folder, session, record, quiet, settings, &rig_config)?;
+    let mut demo = Demo::start(folder, session, record, settings, &rig_config)?;
     let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
     demo.bring_up(&motion)?;
     let film = demo.wiggle(&motion)?;
-    let rope = demo.identify(&film, args.accept_unconfirmed)?;
+    let tracked = demo.track(&film, accept_unconfirmed)?;
+    let rope = demo.identify(&film, tracked)?;
     let plan = demo.plan(&rope)?;
     demo.settle(&rope, &film, &motion, &plan)?;
     let throw = demo.throw(&plan)?;
-    let score = demo.score(&rig_config.appearance());
-    demo.compare_with_truth(&throw, score)
+    demo.score(&rig_config);
+    demo.compare_with_truth(&throw)
 }
 
 /// The running processes and what all stages need.
@@ -140,7 +139,6 @@ struct Demo<'a> {
     folder: &'a RunFolder,
     session: &'a mut Session,
     record: &'a mut DemoRecord,
-    quiet: bool,
     limits: Limits,
     settings: PlannerConfig,
     calibration: StereoCamera,
@@ -157,27 +155,37 @@ impl<'a> Demo<'a> {
         folder: &'a RunFolder,
         session: &'a mut Session,
         record: &'a mut DemoRecord,
-        quiet: bool,
         settings: PlannerConfig,
         rig_config: &RigConfig,
     ) -> anyhow::Result<Self> {
-        let stage = Stage::begin("start", quiet);
+        let stage = Stage::begin("start");
         let limits = config::here::<Limits>(None)?;
+        // The calibration lies in the run folder as a lab's would.
         let calibration = rig_config.stereo_camera();
-        pipeline::write_calibration(folder, &calibration)?;
+        let (conf, mode) = (Path::new("camera.conf"), VideoMode::Vga);
+        write_factory_conf(&folder.path().join(conf), &calibration, mode)?;
+        write_camera_toml(&folder.file("camera.toml"), &calibration, mode, conf)?;
         let target_m = Some(record.target_m);
         pipeline::start_recorder(session, folder, &limits, Some(&calibration), target_m)?;
-        let rig = pipeline::start_rig(session, folder, rig_config)?;
-        let address = pipeline::arm_ports(session, &rig)?;
-        let camera = pipeline::start_camera(session, folder)?;
-        let planner = pipeline::start_planner(session, folder, &settings)?;
+        let (rig, address) = pipeline::start_rig(session, folder, rig_config)?;
+        let domain = folder.domain.clone();
+        let config = CameraConfig {
+            domain: domain.clone(),
+        };
+        let ping = &CameraRequest::Ping;
+        let camera = pipeline::start(session, folder, "camera-ingest", &config, ping)?;
+        let config = PlannerConfig {
+            domain,
+            ..settings.clone()
+        };
+        let ping = &PlannerRequest::Ping;
+        let planner = pipeline::start(session, folder, "planner", &config, ping)?;
         let arm = pipeline::start_controller(session, folder, &limits, address)?;
         record.stages.start_s = stage.done("rig, controller, camera and planner are up");
         Ok(Self {
             folder,
             session,
             record,
-            quiet,
             limits,
             settings,
             calibration,
@@ -188,15 +196,45 @@ impl<'a> Demo<'a> {
         })
     }
 
+    /// Tells a person, and keeps it in the summary.
+    fn warn(&mut self, warning: &str) {
+        output::remark(format_args!("warning: {warning}"));
+        self.record.warnings.push(warning.to_owned());
+    }
+
+    /// Asks the camera; its last event, unless that is a failure.
+    fn ask_camera(
+        &mut self,
+        request: &CameraRequest,
+        within_s: f64,
+        stage: &Stage,
+    ) -> anyhow::Result<CameraEvent> {
+        let event = self.session.ask(&self.camera, request, within_s, |event| {
+            if let CameraEvent::Progress(p) = event {
+                stage.progress(p);
+            }
+        })?;
+        answered(event)
+    }
+
+    /// Waits until nothing moves in the picture; whether that came about.
+    fn wait_still(&mut self, stage: &Stage) -> anyhow::Result<bool> {
+        stage.say("waiting for the rope to hang still");
+        let request = CameraRequest::WaitStill { timeout_s: STILL_S };
+        match self.ask_camera(&request, STILL_S + 5.0, stage)? {
+            CameraEvent::Still { still } => Ok(still),
+            other => bail!("the camera process answered with {other:?}"),
+        }
+    }
+
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<()> {
-        let stage = Stage::begin("bring-up", self.quiet);
+        let stage = Stage::begin("bring-up");
         self.record.warnings = pipeline::acquire(self.session, &self.arm)?;
         // The arm is simulated: nobody needs to be asked.
         pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp)?;
         pipeline::move_to(self.session, &self.arm, wiggle.start(), MOVE_SPEED)?;
-        stage.say("waiting for the rope to hang still");
-        let still = pipeline::wait_still(self.session, &self.camera, STILL_S)?;
+        let still = self.wait_still(&stage)?;
         self.record.stages.bringup_s = stage.done(if still {
             "arm enabled and armed (simulated: no confirmation needed), rope hangs still"
         } else {
@@ -205,205 +243,112 @@ impl<'a> Demo<'a> {
         Ok(())
     }
 
+    /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
+    /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
+    /// sake, which needs the left eye only, and is braked when it is lost.
+    fn film(
+        &mut self,
+        frames: u32,
+        trajectory: &JointTrajectory,
+        throw: bool,
+        stage: &Stage,
+    ) -> anyhow::Result<Film> {
+        let request = CameraRequest::Record {
+            frames,
+            both_eyes: throw,
+        };
+        let recording = self.camera.call(&request)?;
+        let first_stamp_ns = match answered(self.session.next(&recording, 5.0)?)? {
+            CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
+            other => bail!("the camera process answered a recording with {other:?}"),
+        };
+        let stream = |session: &mut Session| execute(session, &self.arm, trajectory);
+        let motion = if throw {
+            self.session.committed(stream)?
+        } else {
+            stream(self.session)?
+        };
+        let within_s = f64::from(frames) / 15.0 + 5.0;
+        let event = self.session.finish(&recording, within_s, |event| {
+            if let CameraEvent::Progress(p) = event {
+                stage.progress(p);
+            }
+        })?;
+        match answered(event)? {
+            CameraEvent::Recorded {
+                frames, dropped, ..
+            } => Ok(Film {
+                first_stamp_ns,
+                frames,
+                dropped,
+                motion,
+            }),
+            other => bail!("the camera process answered a recording with {other:?}"),
+        }
+    }
+
     /// Streams the wiggle and films it.
     fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
-        let stage = Stage::begin("wiggle", self.quiet);
+        let stage = Stage::begin("wiggle");
         pipeline::arm_for(self.session, &self.arm, OperatingMode::Wiggle)?;
-        let film = pipeline::film_during(
-            self.session,
-            &self.camera,
-            &self.arm,
-            wiggle,
-            Shot {
-                frames: WIGGLE_FRAMES,
-                both_eyes: false,
-                throw: false,
-            },
-            &stage,
-        )?;
+        let film = self.film(WIGGLE_FRAMES, wiggle, false, &stage)?;
         self.record.set_wiggle(film);
         self.record.stages.wiggle_s =
             stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
         Ok(film)
     }
 
-    /// Tracks the rope through the film and fits its parameters.
-    fn identify(&mut self, film: &Film, accept_unconfirmed: bool) -> anyhow::Result<RopeEstimate> {
-        let stage = Stage::begin("track", self.quiet);
-        let overlay = self.folder.file("wiggle.png");
-        let tracked = pipeline::track(
-            self.session,
-            &self.camera,
-            &self.calibration,
-            film,
-            self.settings.cell.pole,
-            &overlay,
-            &stage,
-        )?;
-        self.record.track = Some(tracked.clone());
-        self.record.stages.track_s = stage.done(&format!(
-            "{:.1} ms a frame, rope lost in {:.1} %",
-            tracked.ms_per_frame,
-            100.0 * tracked.lost_fraction
-        ));
-        let look = format!("look at `{}`", overlay.display());
-        confirm(&tracked.doubts, accept_unconfirmed, &look)?;
-        let method = self.settings.identify.method;
-        if let Some(warning) = warning_of_pole(method, &self.settings.cell.pole) {
-            self.warn(warning);
-        }
-        let stage = Stage::begin("identify", self.quiet);
-        let rope = pipeline::identify(
-            self.session,
-            &self.planner,
-            &self.calibration,
-            film,
-            tracked.appearance,
-            &self.settings,
-            &stage,
-        )?;
-        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope, &tracked.doubts)?;
-        self.record.stages.identify_s = stage.done(&format!(
-            "length {:.3} m, residual {:.2} px, {} simulations",
-            rope.params.length_m, rope.residual_px, rope.simulations
-        ));
-        self.record.identified = Some(rope.clone());
-        Ok(rope)
-    }
-
-    /// Tells a person, and keeps it in the summary.
-    fn warn(&mut self, warning: &str) {
-        if !self.quiet {
-            eprintln!("warning: {warning}");
-        }
-        self.record.warnings.push(warning.to_owned());
-    }
-
-    /// Plans the throw with what was identified.
-    fn plan(&mut self, rope: &RopeEstimate) -> anyhow::Result<Plan> {
-        let stage = Stage::begin("plan", self.quiet);
-        let options = PlanOptions {
-            seed: self.record.seed,
-            ..self.settings.search
-        };
-        let goal = self.settings.goal(Task::Strike, self.record.target_m);
-        let request = PlanRequest {
-            limits: self.limits.clone(),
-            cell: self.settings.cell,
-            ..PlanRequest::new(goal, &rope.params, options)
-        };
-        let plan = pipeline::plan(self.session, &self.planner, request, &stage)?;
-        files::write_json(&self.folder.file(files::PLAN), &plan)?;
-        files::write_trajectory(
-            &self.folder.file("plan.csv"),
-            &plan.trajectory,
-            self.limits.period_s(),
-        )?;
-        self.record.stages.plan_s = stage.done(&describe(&plan));
-        for warning in warnings(&plan) {
-            self.warn(&warning);
-        }
-        self.record.set_plan(&plan);
-        Ok(plan)
-    }
-
-    /// Turns towards the target so that the rope comes to rest.
-    fn settle(
-        &mut self,
-        rope: &RopeEstimate,
-        film: &Film,
-        wiggle: &JointTrajectory,
-        plan: &Plan,
-    ) -> anyhow::Result<()> {
-        let stage = Stage::begin("settle", self.quiet);
-        let arm_lag_s = {
-            let span = [film.motion.start_ns, film.motion.end_ns];
-            self.session.received.cycles.joint_lag_s(WIGGLE_JOINT, span)
-        };
-        let input = SettleInput {
-            rope: rope.params,
-            film,
-            start_q: wiggle.end(),
-            end_q: plan.trajectory.start(),
-            limits: &self.limits,
-            cell: self.settings.cell,
-            config: &self.settings.settle,
-            arm_lag_s: arm_lag_s.unwrap_or_default(),
-        };
-        let settled = pipeline::settle(self.session, &self.planner, &self.arm, &input, &stage)?;
-        stage.say("waiting for the rope to hang still");
-        pipeline::wait_still(self.session, &self.camera, STILL_S)?;
-        self.record.settle = Some(settled);
-        self.record.arm_lag_s = arm_lag_s;
-        self.record.stages.settle_s = stage.done(&format!(
-            "swing {:.1} cm -> {:.1} cm",
-            100.0 * settled.plain_residual_m,
-            100.0 * settled.residual_m
-        ));
-        Ok(())
-    }
-
     /// Throws once, open loop, filmed.
     fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
-        let stage = Stage::begin("throw", self.quiet);
+        let stage = Stage::begin("throw");
         pipeline::arm_for(self.session, &self.arm, OperatingMode::Throw)?;
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
-        let film = pipeline::film_during(
-            self.session,
-            &self.camera,
-            &self.arm,
-            &plan.trajectory,
-            Shot {
-                frames: THROW_FRAMES,
-                both_eyes: true,
-                throw: true,
-            },
-            &stage,
-        )?;
+        let film = self.film(THROW_FRAMES, &plan.trajectory, true, &stage)?;
         self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
         self.record.stages.throw_s =
             stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));
         Ok(film)
     }
 
-    /// Scores the throw by the camera.
-    fn score(&mut self, colours: &Appearance) -> anyhow::Result<ScoreResult> {
-        let stage = Stage::begin("score", self.quiet);
-        let strobe = self.folder.file("throw.png");
-        let score = pipeline::score(
-            self.session,
-            &self.camera,
-            &self.calibration,
-            colours.lead_rgb,
-            colours.target_rgb,
-            &strobe,
-        );
+    /// Measures the closest approach of tip and target by the camera. That it could not
+    /// see the throw does not undo the throw; it is reported.
+    fn score(&mut self, rig: &RigConfig) {
+        let stage = Stage::begin("score");
+        let colours = rig.appearance();
+        let request = CameraRequest::Score {
+            camera: Box::new(self.calibration.clone()),
+            tip_rgb: colours.lead_rgb,
+            target_rgb: colours.target_rgb,
+            strobe: Some(self.folder.file("throw.png").display().to_string()),
+        };
+        let score = match self.ask_camera(&request, 60.0, &stage) {
+            Ok(CameraEvent::Scored(score)) => Ok(score),
+            Ok(other) => Err(anyhow!("the camera process answered with {other:?}")),
+            Err(reason) => Err(reason),
+        };
         self.record.stages.score_s = stage.done(&match &score {
             Ok(s) => format!("by camera {:.1} cm", 100.0 * s.closest_m),
             Err(_) => "the camera could not measure the throw".to_owned(),
         });
-        score
+        self.record.set_score(score);
     }
 
-    /// Only now the rig is asked what really happened. That the camera could
-    /// not see the throw does not undo the throw; it is reported.
-    fn compare_with_truth(
-        &mut self,
-        throw: &Film,
-        score: anyhow::Result<ScoreResult>,
-    ) -> anyhow::Result<()> {
-        self.record.set_score(score);
+    /// Only now the rig is asked what really happened.
+    fn compare_with_truth(&mut self, throw: &Film) -> anyhow::Result<()> {
         let request = RigRequest::Truth {
             from_ns: throw.motion.start_ns,
             to_ns: throw.motion.end_ns + AFTER_THROW_NS,
         };
-        match self
-            .session
-            .ask(&self.rig, &request, Duration::from_secs(10), |_| ())?
-        {
-            RigEvent::Failed { message } => Err(anyhow!(message)),
-            truth => self.record.set_truth(&truth),
-        }
+        let truth = self.session.ask(&self.rig, &request, 10.0, |_| ())?;
+        self.record.set_truth(truth)
+    }
+}
+
+/// An event of the camera that is no failure.
+fn answered(event: CameraEvent) -> anyhow::Result<CameraEvent> {
+    match event {
+        CameraEvent::Failed { message } => bail!(message),
+        event => Ok(event),
     }
 }

@@ -2,69 +2,45 @@
 
 use super::network::network;
 use crate::cli::DoctorArgs;
-use crate::doctor::{ArmLine, Facts, Finding, Verdict, judge, judge_line};
-use anyhow::anyhow;
-use cli_output::{Failure, Outcome, output, table};
+use crate::doctor::{Finding, Machine, Verdict, judge_line};
+use cli_output::{Outcome, output, table};
 use serde_json::{Value, json};
-use std::path::Path;
 
-pub fn run(args: &DoctorArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let facts = Facts::read(Path::new("/")).with_processor_and_room(Path::new("."));
-    let mut findings = judge(&facts);
+pub fn run(args: &DoctorArgs) -> Outcome<Option<Value>> {
+    let mut findings = Machine::here().judge();
     findings.push(network_finding());
     if let Some(ip) = args.address {
         let ports = [args.ports.report_port, args.ports.status_port];
-        findings.extend(judge_line(&ArmLine::measure(
-            ip,
-            args.ports.command_port,
-            &ports,
-        )));
+        findings.extend(judge_line(ip, args.ports.command_port, &ports));
     }
-    let failed = findings
-        .iter()
-        .filter(|f| f.verdict == Verdict::Fail)
-        .count();
-    if !quiet {
-        show(&findings);
-    }
+    let is_failed = |f: &&Finding| f.verdict == Verdict::Fail;
+    let failed = findings.iter().filter(is_failed).count();
+    show(&findings);
     let value = json!({ "ok": failed == 0, "command": "doctor", "findings": findings });
     if failed == 0 {
         return Ok(Some(value));
     }
-    if quiet {
-        output::object(&value);
-    }
-    Err(Failure::failed(anyhow!(
+    output::object(&value);
+    Err(failed!(
         "{failed} of {} checks failed; remedies are listed above",
         findings.len()
-    )))
+    ))
 }
 
 /// Whether the network that reads a film can be loaded.
 fn network_finding() -> Finding {
-    let (verdict, found, remedy) = match network(None) {
-        Ok(_) => (Verdict::Pass, "built in, loads".to_owned(), ""),
-        Err(reason) => (
-            Verdict::Fail,
-            reason.to_string(),
-            "this build is damaged: install it again",
-        ),
+    let (verdict, found) = match network(None) {
+        Ok(_) => (Verdict::Pass, "built in, loads".to_owned()),
+        Err(reason) => (Verdict::Fail, reason.to_string()),
     };
-    Finding {
-        name: "network",
-        verdict,
-        found,
-        remedy: remedy.to_owned(),
-    }
+    let remedy = "this build is damaged: install it again";
+    Finding::new("network", verdict, found, remedy)
 }
 
 fn show(findings: &[Finding]) {
     let rows = findings.iter().map(|f| {
-        [
-            f.name.to_owned(),
-            f.verdict.word().to_owned(),
-            f.found.clone(),
-        ]
+        let (name, word) = (f.name.to_owned(), f.verdict.word().to_owned());
+        [name, word, f.found.clone()]
     });
     println!("{}", table::numbers(["check", "", "found"], 2, rows));
     let wrong: Vec<&Finding> = findings.iter().filter(|f| !f.remedy.is_empty()).collect();

@@ -1,11 +1,10 @@
 //! What a motion on an arm would do, told without one.
 
+use super::check::print_tightest;
 use crate::cli::ArmArgs;
 use crate::config;
-use anyhow::anyhow;
-use arm_model::limits::Margin;
 use arm_model::{JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use planner::preflight::{JudgedArm, arm_margins, first_stop};
 use rt_controller::ControllerConfig;
 use serde_json::{Value, json};
@@ -19,7 +18,6 @@ pub fn tell(
     limits: &Limits,
     trajectory: &JointTrajectory,
     name: &str,
-    quiet: bool,
 ) -> Outcome<Value> {
     let interface = config::here::<ControllerConfig>(None)
         .or_input()?
@@ -34,42 +32,35 @@ pub fn tell(
             || "the controller".to_owned(),
             |code| format!("the arm, with C{code}"),
         );
-        return Err(Failure::failed(anyhow!(
+        return Err(failed!(
             "dry run: the {name} keeps the limits but would be stopped by {by}: {}",
             stop.describe()
-        )));
+        ));
     }
     let margins = limits.margins(trajectory);
-    let tightest = margins.iter().min_by(|a, b| a.left.total_cmp(&b.left));
     let duration_s = trajectory.duration_s();
-    if !quiet {
-        let address = arm
-            .address
-            .map_or_else(|| "the arm named with --arm".to_owned(), |a| a.to_string());
-        let start: Vec<String> = trajectory
-            .start()
-            .iter()
-            .map(|q| format!("{q:.3}"))
-            .collect();
-        println!(
-            "dry run: nothing is connected, nothing moves. Without --dry-run wag would\n  \
+    let address = arm
+        .address
+        .map_or_else(|| "the arm named with --arm".to_owned(), |a| a.to_string());
+    let start: Vec<String> = trajectory
+        .start()
+        .iter()
+        .map(|q| format!("{q:.3}"))
+        .collect();
+    println!(
+        "dry run: nothing is connected, nothing moves. Without --dry-run wag would\n  \
              1. ask whether the area is clear, unless --yes says so or the arm is simulated\n  \
              2. connect to {address} (ports {}, {}, {}), read its settings and compare them with the limits\n  \
              3. move it at set-up speed to the start pose {} rad\n  \
              4. arm it for one {name} and send it for {duration_s:.2} s, {:.0} setpoints a second\n  \
              5. disarm it, and keep the record of every cycle in the run's folder",
-            arm.ports.command_port,
-            arm.ports.report_port,
-            arm.ports.status_port,
-            start.join(", "),
-            1.0 / limits.period_s(),
-        );
-        println!(
-            "All {} limits are kept, and the arm would not stop. Tightest: {}.",
-            margins.len(),
-            tightest.map_or_else(String::new, Margin::describe)
-        );
-    }
+        arm.ports.command_port,
+        arm.ports.report_port,
+        arm.ports.status_port,
+        start.join(", "),
+        1.0 / limits.period_s(),
+    );
+    let tightest = print_tightest(&margins);
     Ok(json!({
         "dry_run": true, "duration_s": duration_s, "start_rad": trajectory.start(), "interface": interface,
         "tightest": tightest,

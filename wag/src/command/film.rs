@@ -1,21 +1,9 @@
 //! `wag film`: a stretch of a stereo camera's frames as a raw film.
 
-use crate::cli::{FilmArgs, ModeName};
-use camera_ingest::calib::VideoMode;
+use crate::cli::FilmArgs;
 use camera_ingest::live::{LiveCamera, LiveError, LiveSettings, record};
 use cli_output::{Failure, OrInput, Outcome, Stage, interrupted, watch_interrupts};
 use serde_json::{Value, json};
-
-impl From<ModeName> for VideoMode {
-    fn from(name: ModeName) -> Self {
-        match name {
-            ModeName::Vga => Self::Vga,
-            ModeName::Hd => Self::Hd,
-            ModeName::FullHd => Self::FullHd,
-            ModeName::TwoK => Self::TwoK,
-        }
-    }
-}
 
 /// A camera that cannot be had as asked is a wrong input; one that ends is a failure.
 fn failure(error: LiveError) -> Failure {
@@ -23,24 +11,22 @@ fn failure(error: LiveError) -> Failure {
         LiveError::Unplugged { .. } | LiveError::Silent { .. } | LiveError::System { .. } => {
             Failure::failed(error)
         }
-        LiveError::Unfit { .. } | LiveError::Granted { .. } | LiveError::Setting { .. } => {
-            Failure::input(error)
-        }
+        other => Failure::input(other),
     }
 }
 
-pub fn run(args: &FilmArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &FilmArgs) -> Outcome<Option<Value>> {
     watch_interrupts().or_failed()?;
     let settings = LiveSettings {
         device: args.device.clone(),
-        mode: args.mode.into(),
+        mode: args.mode,
         rate_hz: args.fps,
         gain: args.gain,
         exposure_raw: args.exposure_raw,
         sensor_gain_raw: args.sensor_gain_raw,
     };
     let mut camera = LiveCamera::open(settings).map_err(failure)?;
-    let stage = Stage::begin("film", quiet);
+    let stage = Stage::begin("film");
     let told = |frames: u64| {
         if frames.is_multiple_of(30) {
             stage.say(format!("{frames} of {} frames", args.frames));
@@ -49,17 +35,15 @@ pub fn run(args: &FilmArgs, quiet: bool) -> Outcome<Option<Value>> {
     let made = record(&mut camera, args.frames, &args.out, interrupted(), told).or_failed()?;
     let lost = made.losses;
     let seconds = stage.done(&format!("{} frames, {} lost", made.frames, lost.total()));
-    if !quiet {
-        println!(
-            "`{}`, times in `{}`; {} missed, {} damaged, {} short, {} out of order",
-            made.film.display(),
-            made.times.display(),
-            lost.missed,
-            lost.damaged,
-            lost.short,
-            lost.unordered
-        );
-    }
+    println!(
+        "`{}`, times in `{}`; {} missed, {} damaged, {} short, {} out of order",
+        made.film.display(),
+        made.times.display(),
+        lost.missed,
+        lost.damaged,
+        lost.short,
+        lost.unordered
+    );
     Ok(Some(json!({
         "ok": true, "command": "film", "film": made.film, "times": made.times,
         "frames": made.frames, "losses": lost, "seconds": seconds,

@@ -2,7 +2,7 @@
 
 use crate::cli::SceneArgs;
 use crate::config;
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::{Cell, Pole};
 use camera_ingest::source::{AnySource, BothEyes, run_file};
 use camera_ingest::{load_camera, open_video};
@@ -18,64 +18,53 @@ const NO_MOTION: &str = "name the clamp's motion with --joints or --pose";
 /// How the clamp moved, on the film's clock: t = 0 is the first frame.
 #[derive(Debug)]
 pub struct ClampMotion {
-    told: Told,
+    /// The file that tells it.
+    path: PathBuf,
+    /// Measured joints in it; else it has the attach frame's poses.
+    joints: Option<JointsCsv>,
     pole: Pole,
     /// How late the film's times are on the motion's (s).
     late_s: f64,
 }
 
-/// Who tells the motion.
-#[derive(Debug)]
-enum Told {
-    /// Measured joints, and the file they are from.
-    Joints(PathBuf, JointsCsv),
-    /// The file of the attach frame's poses.
-    Pose(PathBuf),
-}
-
 impl ClampMotion {
-    /// What the command line names.
-    pub fn read(scene: &SceneArgs) -> anyhow::Result<Self> {
-        let told = match (&scene.motion.joints, &scene.motion.pose) {
-            (Some(path), _) => Told::Joints(path.clone(), files::read_joints(path)?),
-            (None, Some(path)) => Told::Pose(path.clone()),
-            (None, None) => return Err(anyhow!(NO_MOTION)),
-        };
-        Ok(Self::late(told, config::cell()?, scene))
-    }
-
-    fn late(told: Told, cell: Cell, scene: &SceneArgs) -> Self {
+    fn new(path: &Path, joints: Option<JointsCsv>, cell: Cell, scene: &SceneArgs) -> Self {
         Self {
-            told,
+            path: path.to_owned(),
+            joints,
             pole: cell.pole,
             late_s: scene.film_late_ms * 1e-3,
         }
     }
 
+    /// What the command line names.
+    pub fn read(scene: &SceneArgs) -> anyhow::Result<Self> {
+        let (path, joints) = match (&scene.motion.joints, &scene.motion.pose) {
+            (Some(path), _) => (path, Some(files::read_joints(path)?)),
+            (None, Some(path)) => (path, None),
+            (None, None) => return Err(anyhow!(NO_MOTION)),
+        };
+        Ok(Self::new(path, joints, config::cell()?, scene))
+    }
+
     /// The pole that carries the clamp, where its motion is that of joints.
     pub fn pole(&self) -> Option<&Pole> {
-        matches!(self.told, Told::Joints(..)).then_some(&self.pole)
+        self.joints.as_ref().map(|_| &self.pole)
     }
 
     /// For tracker and simulator.
     pub fn attach(&self) -> anyhow::Result<Box<dyn AttachMotion>> {
-        match &self.told {
-            Told::Joints(path, csv) => {
-                let times_s: Vec<f64> = csv.times_s.iter().map(|t| t + self.late_s).collect();
-                let arm = MeasuredArm::new(&times_s, &csv.q, self.pole)
-                    .with_context(|| format!("`{}`", path.display()))?;
-                Ok(Box::new(arm))
-            }
-            Told::Pose(path) => {
-                let mut rows = read_pose(path)?;
-                for row in &mut rows {
-                    row.t_s += self.late_s;
-                }
-                let track =
-                    PoseTrack::new(&rows).with_context(|| format!("`{}`", path.display()))?;
-                Ok(Box::new(track))
-            }
+        let file = || format!("`{}`", self.path.display());
+        if let Some(csv) = &self.joints {
+            let times_s: Vec<f64> = csv.times_s.iter().map(|t| t + self.late_s).collect();
+            let arm = MeasuredArm::new(&times_s, &csv.q, self.pole).with_context(file)?;
+            return Ok(Box::new(arm));
         }
+        let mut rows = read_pose(&self.path)?;
+        for row in &mut rows {
+            row.t_s += self.late_s;
+        }
+        Ok(Box::new(PoseTrack::new(&rows).with_context(file)?))
     }
 }
 
@@ -163,23 +152,27 @@ impl Filmed {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),
             (None, Some(Err(reason))) => {
-                return Err(anyhow!(
+                bail!(
                     "the camera in the run's file `{}` is none: {reason}; name another with --camera",
                     path.display()
-                ));
+                );
             }
             (None, None) => {
-                return Err(anyhow!(
+                bail!(
                     "the run's file `{}` does not tell its camera: name it with --camera",
                     path.display()
-                ));
+                );
             }
         };
         let motion = if scene.motion.is_given() {
             ClampMotion::read(scene)?
         } else {
-            let told = Told::Joints(path.to_owned(), part.joints.clone());
-            ClampMotion::late(told, config::cell_of(&run)?, scene)
+            ClampMotion::new(
+                path,
+                Some(part.joints.clone()),
+                config::cell_of(&run)?,
+                scene,
+            )
         };
         Ok(Self {
             warnings: part.warnings.clone(),

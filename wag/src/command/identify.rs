@@ -4,11 +4,11 @@ use super::filmed::{ClampMotion, Filmed};
 use super::learned::Learned;
 use super::network::{network, no_model_without_network, warning_of_pole};
 use super::plan::LOOK;
-use super::track::{TrackedVideo, overlay, track_video};
+use super::track::{overlay, track_video};
 use super::unconfirmed::confirm;
-use crate::cli::{IdentifyArgs, MethodName};
+use crate::cli::IdentifyArgs;
 use crate::config;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use cli_output::{Failure, OrInput, Outcome, Stage, table};
 use comfy_table::Table;
 use planner::PlannerConfig;
@@ -19,6 +19,7 @@ use run_log::files;
 use serde_json::{Value, json};
 use shared_types::rope::{Ambiguity, RANGES};
 use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
+use std::path::Path;
 
 /// Keypoints per frame when a video is given.
 const KEYPOINTS: usize = 24;
@@ -37,16 +38,19 @@ fn other_pole(motion: &ClampMotion, method: Method) -> Option<String> {
     warning_of_pole(method, motion.pole()?).map(str::to_owned)
 }
 
-fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed> {
+fn read_keypoints(path: &Path) -> anyhow::Result<KeypointTrack> {
+    let fail = || format!("keypoints `{}`", path.display());
+    let track: KeypointTrack = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
+    track.validate().with_context(fail)?;
+    Ok(track)
+}
+
+fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
         let camera = args.scene.camera().or_input()?;
         let clamp = ClampMotion::read(&args.scene).or_input()?;
         let motion = clamp.attach().or_input()?;
-        let fail = || format!("keypoints `{}`", path.display());
-        let track: KeypointTrack = serde_json::from_str(&files::read_text(path).or_input()?)
-            .with_context(fail)
-            .or_input()?;
-        track.validate().with_context(fail).or_input()?;
+        let track = read_keypoints(path).or_input()?;
         confirm(&track.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
         let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
         for warning in &warnings {
@@ -61,20 +65,19 @@ fn observe(args: &IdentifyArgs, method: Method, quiet: bool) -> Outcome<Observed
         });
     }
     let Some(video) = &args.observation.video else {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "name the observation with --video or --keypoints"
-        )));
+        ));
     };
     let mut filmed = Filmed::open(video, args.fps, &args.scene)?;
     filmed.warnings.extend(other_pole(&filmed.motion, method));
     filmed.warn();
     // Before the long work: what the simulator needs of the motion.
     let motion = filmed.motion.attach().or_input()?;
-    let stage = Stage::begin("track", quiet);
+    let stage = Stage::begin("track");
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(None, file)?;
-    let TrackedVideo { frames, result } =
-        track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
+    let (frames, result) = track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
     stage.done(&format!("{} frames", frames.len()));
     if !result.track.doubts.is_empty() {
         let sheet = args.out.with_extension("track.png");
@@ -155,25 +158,15 @@ fn print_remarks(estimate: &RopeEstimate) {
     }
 }
 
-/// The planner's name of a method.
-pub fn method_of(name: MethodName) -> Method {
-    match name {
-        MethodName::Cmaes => Method::Cmaes,
-        MethodName::Hybrid => Method::Hybrid,
-        MethodName::HybridSearch => Method::HybridSearch,
-        MethodName::Nn => Method::Network,
-    }
-}
-
-pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let method = method_of(args.method);
+pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
+    let method = args.method;
     let model = args.model.as_deref();
     no_model_without_network(method, model)?;
     let net = method.asks_network().then(|| network(model)).transpose()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
     cli_output::watch_interrupts().or_failed()?;
-    let observed = observe(args, method, quiet)?;
-    let stage = Stage::begin("identify", quiet);
+    let observed = observe(args, method)?;
+    let stage = Stage::begin("identify");
     let observation = Observation {
         track: &observed.track,
         points: ObservedPoints::ArcLength,
@@ -196,15 +189,13 @@ pub fn run(args: &IdentifyArgs, quiet: bool) -> Outcome<Option<Value>> {
         estimate.residual_px, estimate.simulations
     ));
     files::write_rope_estimate(&args.out, &estimate, &observed.track.doubts).or_failed()?;
-    if !quiet {
-        println!(
-            "{}\nresidual {:.2} px -> `{}`",
-            parameter_table(&estimate),
-            estimate.residual_px,
-            args.out.display()
-        );
-        print_remarks(&estimate);
-    }
+    println!(
+        "{}\nresidual {:.2} px -> `{}`",
+        parameter_table(&estimate),
+        estimate.residual_px,
+        args.out.display()
+    );
+    print_remarks(&estimate);
     Ok(Some(json!({
         "ok": true, "command": "identify", "out": args.out, "seconds": seconds,
         "rope": estimate.params, "std_dev": estimate.std_dev, "residual_px": estimate.residual_px,

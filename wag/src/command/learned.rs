@@ -19,20 +19,12 @@ pub struct Learned {
 fn refused(error: ModelError) -> Failure {
     match error {
         ModelError::Runtime { .. } => Failure::failed(error),
-        ModelError::Unreadable { .. }
-        | ModelError::Refused { .. }
-        | ModelError::Names { .. }
-        | ModelError::Form { .. }
-        | ModelError::Count { .. }
-        | ModelError::NotFinite { .. } => Failure::input(error),
+        other => Failure::input(other),
     }
 }
 
 impl Learned {
     /// The model that the command line names, or else `camera.toml`.
-    ///
-    /// # Errors
-    /// Why a file is refused.
     pub fn load(args: Option<&ModelArgs>, file: Option<&Path>) -> Outcome<Self> {
         let files = file.map(load_model_files).transpose().or_input()?;
         let tracker = args.and_then(|a| a.tracker.clone());

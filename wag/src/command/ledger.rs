@@ -2,7 +2,7 @@
 
 use crate::cli::{LedgerArgs, LedgerCommand, LedgerCompareArgs, LedgerRerunArgs};
 use anyhow::{Context, anyhow};
-use cli_output::{Failure, OrInput, Outcome, table};
+use cli_output::{Failure, OrInput, Outcome, output, table};
 use run_log::files;
 use run_log::ledger::{self, Entry, RUNS};
 use run_log::{Run, quoted};
@@ -11,15 +11,15 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-pub fn run(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &LedgerArgs) -> Outcome<Option<Value>> {
     match &args.instead {
-        Some(LedgerCommand::Compare(args)) => compare(args, quiet),
-        Some(LedgerCommand::Rerun(args)) => rerun(args, quiet),
-        None => list(args, quiet),
+        Some(LedgerCommand::Compare(args)) => compare(args),
+        Some(LedgerCommand::Rerun(args)) => rerun(args),
+        None => list(args),
     }
 }
 
-fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn list(args: &LedgerArgs) -> Outcome<Option<Value>> {
     let mut places = args.places.clone();
     // Before the first run the default folder is not there, which is no mistake.
     if places.is_empty() && Path::new(RUNS).exists() {
@@ -44,9 +44,9 @@ fn list(args: &LedgerArgs, quiet: bool) -> Outcome<Option<Value>> {
         let text = ledger::csv(&entries).or_failed()?;
         files::write_atomic(path, &text).or_failed()?;
     }
-    if !quiet && entries.is_empty() {
+    if entries.is_empty() {
         println!("no runs: name run folders or folders of them, or make one with `wag demo`");
-    } else if !quiet {
+    } else {
         println!("{}", ledger::table(&entries));
         for entry in &entries {
             for problem in &entry.problems {
@@ -64,50 +64,48 @@ fn known(run: &Path) -> Outcome<Entry> {
     if ledger::is_run(run) {
         return ledger::read(run).or_input();
     }
-    Err(Failure::input(anyhow!(
+    Err(bad_input!(
         "`{}` is no run folder; `wag ledger` lists those of `{RUNS}`",
         run.display()
-    )))
+    ))
 }
 
-fn compare(args: &LedgerCompareArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn compare(args: &LedgerCompareArgs) -> Outcome<Option<Value>> {
     let (first, second) = (known(&args.first)?, known(&args.second)?);
     let found = ledger::compare(&first, &second).or_failed()?;
-    if !quiet {
-        let rows = found.iter().map(|d| {
-            let by =
-                d.by.map_or_else(|| "-".to_owned(), |by| format!("{by:+.4e}"));
-            [
-                d.what.clone(),
-                d.first.to_string(),
-                d.second.to_string(),
-                by,
-            ]
-        });
-        println!(
-            "{}",
-            table::numbers(["value", "first", "second", "by"], 0, rows)
-        );
-        println!("{} differences", found.len());
-    }
+    let rows = found.iter().map(|d| {
+        let by =
+            d.by.map_or_else(|| "-".to_owned(), |by| format!("{by:+.4e}"));
+        [
+            d.what.clone(),
+            d.first.to_string(),
+            d.second.to_string(),
+            by,
+        ]
+    });
+    println!(
+        "{}",
+        table::numbers(["value", "first", "second", "by"], 0, rows)
+    );
+    println!("{} differences", found.len());
     Ok(Some(json!({
         "ok": true, "command": "ledger compare", "first": first, "second": second, "differences": found,
     })))
 }
 
-fn rerun(args: &LedgerRerunArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn rerun(args: &LedgerRerunArgs) -> Outcome<Option<Value>> {
     known(&args.run)?;
     let command = Run::open(&args.run).and_then(|run| run.command());
     let line = command.or_input()?.ok_or_else(|| {
-        Failure::input(anyhow!(
+        bad_input!(
             "`{}` does not say how it was made: it holds no {}",
             args.run.display(),
             files::COMMAND
-        ))
+        )
     })?;
     let mut again = line.again();
     if args.go {
-        if quiet && !again.iter().any(|word| word == "--json") {
+        if output::is_json() && !again.iter().any(|word| word == "--json") {
             again.push("--json".to_owned());
         }
         let program = std::env::current_exe()
@@ -125,10 +123,8 @@ fn rerun(args: &LedgerRerunArgs, quiet: bool) -> Outcome<Option<Value>> {
             line.working_directory.display()
         ))));
     }
-    if !quiet {
-        let folder = line.working_directory.display().to_string();
-        println!("cd {} && wag {}", quoted(&[folder]), quoted(&again));
-    }
+    let folder = line.working_directory.display().to_string();
+    println!("cd {} && wag {}", quoted(&[folder]), quoted(&again));
     Ok(Some(json!({
         "ok": true, "command": "ledger rerun", "run": args.run, "arguments": again,
         "working_directory": line.working_directory, "version": line.version,

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// One page for `wag` and one for each of its commands, as `wag-sim-rope.1`.
-pub fn man(args: &ManArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn man(args: &ManArgs) -> Outcome<Option<Value>> {
     let mut wag = Cli::command().disable_help_subcommand(true);
     wag.build();
     std::fs::create_dir_all(&args.folder)
@@ -18,14 +18,12 @@ pub fn man(args: &ManArgs, quiet: bool) -> Outcome<Option<Value>> {
         .or_input()?;
     let mut pages = Vec::new();
     write_pages(&wag, &args.folder, &mut pages).or_input()?;
-    if !quiet {
-        println!(
-            "{} pages in `{}`; read one with `man -l {}`",
-            pages.len(),
-            args.folder.display(),
-            args.folder.join("wag.1").display()
-        );
-    }
+    println!(
+        "{} pages in `{}`; read one with `man -l {}`",
+        pages.len(),
+        args.folder.display(),
+        args.folder.join("wag.1").display()
+    );
     Ok(Some(
         json!({ "ok": true, "command": "man", "pages": pages }),
     ))
@@ -67,7 +65,7 @@ mod tests {
         let args = ManArgs {
             folder: folder.clone(),
         };
-        let said = man(&args, true).unwrap().unwrap();
+        let said = man(&args).unwrap().unwrap();
         let pages = said["pages"].as_array().unwrap().len();
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), pages);
         let page = std::fs::read_to_string(folder.join("wag-sim-rope.1")).unwrap();

@@ -1,16 +1,14 @@
 //! One file per command.
 
 mod area;
-mod bench;
+mod bench_record;
+mod bench_rt;
 mod calib;
 mod check;
 mod config;
 mod demo;
-mod demo_summary;
 mod doctor;
 mod dry_run;
-mod explain;
-mod export;
 mod film;
 mod filmed;
 mod identify;
@@ -23,9 +21,8 @@ mod on_arm;
 mod plan;
 mod process;
 mod record;
-mod replay;
-mod report;
 mod rig;
+mod runs;
 mod score;
 mod sim;
 mod throw;
@@ -35,7 +32,7 @@ mod watch;
 mod wiggle;
 mod wiggle_design;
 
-use crate::cli::{CalibCommand, Cli, Command, PlanCommand, SimCommand};
+use crate::cli::{BenchName, CalibCommand, Cli, Command, PlanCommand, SimCommand};
 use cli_output::{OrInput, Outcome};
 use serde_json::Value;
 use shared_types::Task;
@@ -68,35 +65,38 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
     for path in results(&cli.command) {
         run_log::files::check_writable(path).or_input()?;
     }
-    let quiet = cli.json;
     match &cli.command {
-        Command::Demo(args) => demo::run(args, quiet),
-        Command::Rig(args) => rig::run(args, quiet),
-        Command::Sim(SimCommand::Rope(args)) => sim::rope(args, quiet),
-        Command::Sim(SimCommand::Throw(args)) => sim::throw(args, quiet),
-        Command::Wiggle(args) => wiggle::run(args, quiet),
-        Command::Film(args) => film::run(args, quiet),
-        Command::Track(args) => track::run(args, quiet),
-        Command::Identify(args) => identify::run(args, quiet),
-        Command::Plan(PlanCommand::Strike(args)) => plan::run(Task::Strike, args, quiet),
-        Command::Plan(PlanCommand::Lob(args)) => plan::run(Task::Lob, args, quiet),
-        Command::Plan(PlanCommand::Drape(args)) => plan::run(Task::Drape, args, quiet),
-        Command::Check(args) => check::run(args, quiet),
-        Command::Throw(args) => throw::run(args, quiet),
-        Command::Latency(args) => latency::run(args, quiet),
-        Command::Watch(args) => watch::run(args, quiet),
-        Command::Record(args) => record::run(args, quiet),
-        Command::Replay(args) => replay::run(args, quiet),
-        Command::Explain(args) => explain::run(args, quiet),
-        Command::Export(command) => export::run(command, quiet),
-        Command::Report(args) => report::run(args, quiet),
-        Command::Ledger(args) => ledger::run(args, quiet),
-        Command::Score(args) => score::run(args, quiet),
-        Command::Calib(command) => calib::run(command, quiet),
-        Command::Bench(args) => bench::run(args, quiet),
-        Command::Config(command) => config::run(command, quiet),
-        Command::Doctor(args) => doctor::run(args, quiet),
-        Command::Man(args) => manual::man(args, quiet),
+        Command::Demo(args) => demo::run(args),
+        Command::Rig(args) => rig::run(args),
+        Command::Sim(SimCommand::Rope(args)) => sim::rope(args),
+        Command::Sim(SimCommand::Throw(args)) => sim::throw(args),
+        Command::Wiggle(args) => wiggle::run(args),
+        Command::Film(args) => film::run(args),
+        Command::Track(args) => track::run(args),
+        Command::Identify(args) => identify::run(args),
+        Command::Plan(PlanCommand::Strike(args)) => plan::run(Task::Strike, args),
+        Command::Plan(PlanCommand::Lob(args)) => plan::run(Task::Lob, args),
+        Command::Plan(PlanCommand::Drape(args)) => plan::run(Task::Drape, args),
+        Command::Check(args) => check::run(args),
+        Command::Throw(args) => throw::run(args),
+        Command::Latency(args) => latency::run(args),
+        Command::Watch(args) => watch::run(args),
+        Command::Record(args) => record::run(args),
+        Command::Replay(args) => runs::replay(args),
+        Command::Explain(args) => runs::explain(args),
+        Command::Export(command) => runs::export(command),
+        Command::Report(args) => runs::report(args),
+        Command::Ledger(args) => ledger::run(args),
+        Command::Score(args) => score::run(args),
+        Command::Calib(command) => calib::run(command),
+        // Benchmarks compare with limits and do not judge: the exit code is 0 whatever they find.
+        Command::Bench(args) => match args.name {
+            BenchName::Rt => bench_rt::run(args),
+            BenchName::Record => bench_record::run(args),
+        },
+        Command::Config(command) => config::run(command),
+        Command::Doctor(args) => doctor::run(args),
+        Command::Man(args) => manual::man(args),
         Command::Completions(args) => Ok(manual::completions(args)),
         Command::Process(args) => process::run(args).map(|()| None),
     }

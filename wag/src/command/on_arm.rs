@@ -1,13 +1,12 @@
 //! Work on an arm from its bring-up to the end of its record: what throw, wiggle and
 //! latency have in common.
 
-use super::explain::explain_stop;
+use super::runs::explain_stop;
 use crate::cli::ArmArgs;
 use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
 use crate::session::Session;
-use anyhow::anyhow;
 use arm_model::{JointVector, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
+use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
@@ -28,21 +27,20 @@ pub fn on_arm(
     limits: &Limits,
     start: JointVector,
     (out, name): (Option<&Path>, &str),
-    quiet: bool,
     work: impl FnOnce(&mut Session, &ArmLink) -> anyhow::Result<Value>,
     conclude: impl FnOnce(&Path, Cycles, Value) -> anyhow::Result<Value>,
 ) -> Outcome<(PathBuf, Value)> {
     let Some(ip) = arm.address else {
-        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
+        return Err(bad_input!("name the arm with --arm ADDR"));
     };
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
     if arm.dead_man {
-        session.hold_dead_man(quiet).or_failed()?;
+        session.hold_dead_man().or_failed()?;
     }
     let worked = |session: &mut Session| -> anyhow::Result<Value> {
-        let (link, warnings) = bring_up(session, &folder, arm, ip, limits, start, quiet)?;
+        let (link, warnings) = bring_up(session, &folder, arm, ip, limits, start)?;
         let mut value = work(session, &link)?;
         value["ok"] = true.into();
         value["run"] = json!(folder.path());
@@ -61,7 +59,7 @@ pub fn on_arm(
     summary["epoch_ns"] = epoch_ns.into();
     let kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     let recorded = session.finish_run_file();
-    explain_stop(folder.path(), quiet);
+    explain_stop(folder.path());
     let value = result.or_failed()?;
     recorded.or_failed()?;
     kept.or_failed()?;
@@ -77,9 +75,8 @@ fn bring_up(
     ip: IpAddr,
     limits: &Limits,
     start: JointVector,
-    quiet: bool,
 ) -> anyhow::Result<(ArmLink, Vec<String>)> {
-    let stage = Stage::begin("bring-up", quiet);
+    let stage = Stage::begin("bring-up");
     let address = ArmAddress {
         ip,
         command: arm.ports.command_port,

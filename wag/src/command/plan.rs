@@ -3,9 +3,9 @@
 use super::unconfirmed::confirm;
 use crate::cli::PlanArgs;
 use crate::config;
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use arm_model::Limits;
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{Failure, OrInput, Outcome, Stage, output};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::plan::{
@@ -16,13 +16,6 @@ use run_log::files;
 use serde_json::{Value, json};
 use shared_types::{Plan, Task};
 use std::path::Path;
-
-/// A task that the demo's rig has no scene for.
-pub fn not_there(task: &str) -> Failure {
-    Failure::failed(anyhow!(
-        "a demo of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
-    ))
-}
 
 /// Bad requests are the caller's; everything else is a failure of the work.
 fn classify(error: PlanError) -> Failure {
@@ -69,17 +62,11 @@ fn ensemble(args: &PlanArgs) -> anyhow::Result<PosteriorEnsemble> {
 }
 
 /// Draws which targets the rope reaches; refuses one that it does not.
-fn reach(
-    path: &Path,
-    args: &PlanArgs,
-    limits: &Limits,
-    config: &PlannerConfig,
-    quiet: bool,
-) -> Outcome<()> {
+fn reach(path: &Path, args: &PlanArgs, limits: &Limits, config: &PlannerConfig) -> Outcome<()> {
     /// The reach is explored before anything else is done.
     const THREADS: usize = 2;
     let rope = files::read_rope(&args.rope).or_input()?;
-    let stage = Stage::begin("reach", quiet);
+    let stage = Stage::begin("reach");
     let map = ReachMap::explore(
         &rope,
         limits,
@@ -110,7 +97,7 @@ pub fn describe(plan: &Plan) -> String {
 }
 
 /// Plans a throw of a task.
-pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let doubts = files::read_doubts(&args.rope).or_input()?;
     confirm(&doubts, args.accept_unconfirmed, LOOK).or_failed()?;
@@ -121,10 +108,10 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     let response = response.transpose().or_input()?;
     if let Some(path) = &args.reach {
         clear_of_arm(args.target.0, &config.cell).map_err(classify)?;
-        reach(path, args, &limits, &config, quiet)?;
+        reach(path, args, &limits, &config)?;
     }
     cli_output::watch_interrupts().or_failed()?;
-    let stage = Stage::begin("plan", quiet);
+    let stage = Stage::begin("plan");
     let request = PlanRequest {
         goal: config.goal(kind, args.target.0),
         rope,
@@ -149,21 +136,19 @@ pub fn run(kind: Task, args: &PlanArgs, quiet: bool) -> Outcome<Option<Value>> {
     if let Some(path) = &args.csv {
         files::write_trajectory(path, &plan.trajectory, limits.period_s()).or_failed()?;
     }
-    if !quiet {
-        for warning in &warnings {
-            eprintln!("warning: {warning}");
-        }
-        if let Some(f) = plan.forecast {
-            println!(
-                "over {} ropes it might be: error {:.2} cm in the median, {:.2} to {:.2} cm in nine of ten",
-                f.ropes,
-                100.0 * f.median_m,
-                100.0 * f.interval_90_m[0],
-                100.0 * f.interval_90_m[1]
-            );
-        }
-        println!("plan written to `{}`", args.out.display());
+    for warning in &warnings {
+        output::remark(format_args!("warning: {warning}"));
     }
+    if let Some(f) = plan.forecast {
+        println!(
+            "over {} ropes it might be: error {:.2} cm in the median, {:.2} to {:.2} cm in nine of ten",
+            f.ropes,
+            100.0 * f.median_m,
+            100.0 * f.interval_90_m[0],
+            100.0 * f.interval_90_m[1]
+        );
+    }
+    println!("plan written to `{}`", args.out.display());
     Ok(Some(json!({
         "ok": true, "command": format!("plan {}", kind.name()), "out": args.out, "seed": args.seed,
         "warnings": warnings, "target_m": args.target.0, "predicted_error_m": plan.predicted_error_m,

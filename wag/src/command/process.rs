@@ -7,6 +7,7 @@ use crate::cli::{ProcessArgs, ProcessName};
 use anyhow::Context;
 use cli_output::{OrInput, Outcome, interrupted, watch_interrupts};
 use run_log::files;
+use serde::de::DeserializeOwned;
 use shared_types::ipc::DomainSweep;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -46,9 +47,19 @@ fn watch_parent(parent: Option<u32>, end_within: Duration) -> anyhow::Result<()>
     Ok(())
 }
 
-fn read<T: serde::de::DeserializeOwned>(args: &ProcessArgs) -> anyhow::Result<T> {
-    toml::from_str(&files::read_text(&args.config)?)
+fn read<T: DeserializeOwned>(args: &ProcessArgs) -> Outcome<T> {
+    let text = files::read_text(&args.config).or_input()?;
+    toml::from_str(&text)
         .with_context(|| format!("configuration `{}`", args.config.display()))
+        .or_input()
+}
+
+/// Does a process's work with its configuration.
+fn work<T: DeserializeOwned, E: Into<anyhow::Error>>(
+    args: &ProcessArgs,
+    work: impl FnOnce(T) -> Result<(), E>,
+) -> Outcome {
+    work(read(args)?).or_failed()
 }
 
 /// Everything else goes first: what this process makes is only looked at.
@@ -72,28 +83,20 @@ pub fn run(args: &ProcessArgs) -> Outcome {
     watch_parent(args.parent, end_within).or_failed()?;
     let stop = interrupted();
     // Dropped after everything of the process that uses the domain.
-    let domain = read::<toml::Table>(args).or_input()?;
-    let _sweep = domain
-        .get("domain")
-        .and_then(toml::Value::as_str)
-        .map(DomainSweep::new);
+    let domain = read::<toml::Table>(args)?;
+    let domain = domain.get("domain").and_then(toml::Value::as_str);
+    let _sweep = domain.map(DomainSweep::new);
     match args.name {
-        ProcessName::Rig => rig_sim::run(&read(args).or_input()?, stop).or_failed(),
-        ProcessName::RtController => rt_controller::run(read(args).or_input()?, stop).or_failed(),
-        ProcessName::Guardian => {
-            rt_controller::guardian::run(&read(args).or_input()?, stop).or_failed()
-        }
-        ProcessName::Camera => camera_ingest::live::run(&read(args).or_input()?, stop).or_failed(),
-        ProcessName::CameraIngest => {
-            camera_ingest::process::run(&read(args).or_input()?, stop).or_failed()
-        }
+        ProcessName::Rig => work(args, |c| rig_sim::run(&c, stop)),
+        ProcessName::RtController => work(args, |c| rt_controller::run(c, stop)),
+        ProcessName::Guardian => work(args, |c| rt_controller::guardian::run(&c, stop)),
+        ProcessName::Camera => work(args, |c| camera_ingest::live::run(&c, stop)),
+        ProcessName::CameraIngest => work(args, |c| camera_ingest::process::run(&c, stop)),
         ProcessName::Preview => {
             give_way();
-            camera_ingest::preview::run(&read(args).or_input()?, stop).or_failed()
+            work(args, |c| camera_ingest::preview::run(&c, stop))
         }
-        ProcessName::Planner => planner::service::run(&read(args).or_input()?, stop).or_failed(),
-        ProcessName::Recorder => {
-            run_log::record(&read(args).or_input()?, simulated_rope, stop).or_failed()
-        }
+        ProcessName::Planner => work(args, |c| planner::service::run(&c, stop)),
+        ProcessName::Recorder => work(args, |c| run_log::record(&c, simulated_rope, stop)),
     }
 }

@@ -4,9 +4,9 @@ use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
 use crate::config;
 use crate::pipeline::RunFolder;
 use crate::session::remedy;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use arm_model::Limits;
-use cli_output::{Failure, OrInput, Outcome, interrupted, watch_interrupts};
+use cli_output::{OrInput, Outcome, interrupted, watch_interrupts};
 use run_log::files;
 use run_log::{Recorded, RecorderConfig, Run, RunFileThread};
 use serde_json::{Value, json};
@@ -17,30 +17,28 @@ use viewer::live::domain_of_run;
 use viewer::report::simulated_rope;
 
 /// `wag record recover`: a file without its end becomes a whole one.
-fn recover(args: &RecoverArgs, quiet: bool) -> Outcome<Option<Value>> {
+fn recover(args: &RecoverArgs) -> Outcome<Option<Value>> {
     let found = run_log::recover(&args.file).or_input()?;
-    if !quiet {
-        let file = args.file.display();
-        if found.was_whole {
-            println!(
-                "`{file}` is whole: {} messages, {} s",
-                found.messages, found.span_s
-            );
-        } else {
-            println!(
-                "`{file}` is whole again: {} messages, {} s; left out: {} damaged chunks, {} bytes at the end",
-                found.messages, found.span_s, found.damaged, found.cut_bytes
-            );
-        }
+    let file = args.file.display();
+    if found.was_whole {
+        println!(
+            "`{file}` is whole: {} messages, {} s",
+            found.messages, found.span_s
+        );
+    } else {
+        println!(
+            "`{file}` is whole again: {} messages, {} s; left out: {} damaged chunks, {} bytes at the end",
+            found.messages, found.span_s, found.damaged, found.cut_bytes
+        );
     }
     Ok(Some(json!({
         "ok": true, "command": "record recover", "file": args.file, "recovered": found,
     })))
 }
 
-pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
     if let Some(RecordCommand::Recover(args)) = &args.instead {
-        return recover(args, quiet);
+        return recover(args);
     }
     if let Some(out) = &args.out {
         RunFolder::refuse_existing(out)?;
@@ -60,12 +58,10 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
     let config = RecorderConfig::of_run(&domain, folder.path(), &limits, cell);
     let recorder = RunFileThread::start(config).or_failed()?;
-    if !quiet {
-        println!(
-            "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",
-            folder.path().display()
-        );
-    }
+    println!(
+        "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",
+        folder.path().display()
+    );
     let began = Instant::now();
     let over = || {
         args.seconds
@@ -79,10 +75,10 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
     if counts.is_some_and(|counts| counts.chunks == 0) {
         // An empty folder goes by itself.
         let _ = std::fs::remove_file(folder.file(files::RUN));
-        return Err(Failure::failed(anyhow!(
+        return Err(failed!(
             "nothing was recorded: no controller runs in domain `{domain}`; {}",
             those_that_run(&running_controllers())
-        )));
+        ));
     }
     let cell_kept = folder.config("cell", &cell);
     let explanation = Run::open(folder.path()).or_failed()?.keep_cause();
@@ -101,9 +97,7 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
         .or_failed()?;
     cell_kept.or_failed()?;
     summary_kept.or_failed()?;
-    if let Some(counts) = counts
-        && !quiet
-    {
+    if let Some(counts) = counts {
         println!(
             "{:.1} MB; read it with `wag explain {}`, or open its {}",
             counts.bytes as f64 / 1e6,
@@ -116,39 +110,34 @@ pub fn run(args: &RecordArgs, quiet: bool) -> Outcome<Option<Value>> {
 
 /// The domain to record: named, of a run folder, or of the only controller there is.
 fn chosen_domain(args: &RecordArgs) -> Outcome<String> {
-    if let Some(run) = &args.run {
-        let domain = domain_of_run(run).or_input()?;
-        let runs = running_controllers();
-        return if runs.contains(&domain) {
-            Ok(domain)
-        } else {
-            Err(Failure::failed(anyhow!(
-                "the controller of run `{}` does not run any more; {}",
-                run.display(),
-                those_that_run(&runs)
-            )))
-        };
-    }
     if let Some(domain) = &args.domain {
         return Ok(domain.clone());
     }
-    let mut runs = running_controllers();
-    match (runs.pop(), runs.as_slice()) {
-        (Some(only), []) => Ok(only),
-        (last, others) => {
-            let all: Vec<String> = others.iter().cloned().chain(last).collect();
-            Err(Failure::failed(anyhow!("{}", those_that_run(&all))))
-        }
+    let Some(run) = &args.run else {
+        let running = running_controllers();
+        return match running.as_slice() {
+            [only] => Ok(only.clone()),
+            _ => Err(failed!("{}", those_that_run(&running))),
+        };
+    };
+    let domain = domain_of_run(run).or_input()?;
+    let running = running_controllers();
+    if !running.contains(&domain) {
+        return Err(failed!(
+            "the controller of run `{}` does not run any more; {}",
+            run.display(),
+            those_that_run(&running)
+        ));
     }
+    Ok(domain)
 }
 
 fn those_that_run(domains: &[String]) -> String {
     if domains.is_empty() {
-        "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned()
-    } else {
-        format!(
-            "controllers of these domains run: {}; name one with --domain",
-            domains.join(", ")
-        )
+        return "no controller of yours runs on this machine; start one, or name the domain of one that is still to come with --domain".to_owned();
     }
+    format!(
+        "controllers of these domains run: {}; name one with --domain",
+        domains.join(", ")
+    )
 }

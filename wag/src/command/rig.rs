@@ -2,7 +2,6 @@
 
 use crate::cli::RigArgs;
 use crate::config;
-use anyhow::anyhow;
 use arm_model::Cell;
 use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
 use rig_sim::{RigConfig, run_announced};
@@ -14,28 +13,28 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 use xarm_sim::{ArmConfig, ArmPorts, FaultScript, SimulatedArm};
 
-pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
     let faults = match &args.faults {
         Some(path) => FaultScript::read(path).or_input()?,
         None => FaultScript::default(),
     };
     let report_ports: [u16; 4] = args.report_ports.clone().try_into().map_err(
         |found: Vec<u16>| {
-            Failure::input(anyhow!(
+            bad_input!(
                 "--report-ports needs four ports in the place of 30000,30001,30002,30003, found {}",
                 found.len()
-            ))
+            )
         },
     )?;
     if args.camera.is_some() && args.rope.is_none() {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "--camera films a rope: add --rope FILE or --rope random"
-        )));
+        ));
     }
     let cell = config::cell().or_input()?;
     watch_interrupts().or_failed()?;
     match &args.rope {
-        None => arm_alone(args, report_ports, faults, cell, quiet).map_err(Failure::of_server)?,
+        None => arm_alone(args, report_ports, faults, cell).map_err(Failure::of_server)?,
         Some(rope) => {
             let mut config = RigConfig {
                 domain: args
@@ -56,7 +55,7 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
             }
             // Goes last: nothing of the domain stays once the rig is gone.
             let _sweep = DomainSweep::new(&config.domain);
-            let announce = |ports| announce(config.bind, ports, quiet);
+            let announce = |ports| announce(config.bind, ports);
             run_announced(&config, interrupted(), announce).map_err(Failure::of_server)?;
         }
     }
@@ -65,18 +64,15 @@ pub fn run(args: &RigArgs, quiet: bool) -> Outcome<Option<Value>> {
 
 /// Says where the arm listens as soon as it does: whoever starts a rig waits for
 /// its ports, not for its end.
-fn announce(bind: IpAddr, ports: ArmPorts, quiet: bool) {
-    if quiet {
-        output::object(&json!({
-            "ok": true, "command": "rig", "bind": bind,
-            "command_port": ports.command, "report_ports": ports.reports,
-        }));
-    } else {
-        println!(
-            "simulated xArm 7 at {bind}: commands on {}, reports on {:?}; Ctrl-C ends it",
-            ports.command, ports.reports
-        );
-    }
+fn announce(bind: IpAddr, ports: ArmPorts) {
+    output::object(&json!({
+        "ok": true, "command": "rig", "bind": bind,
+        "command_port": ports.command, "report_ports": ports.reports,
+    }));
+    println!(
+        "simulated xArm 7 at {bind}: commands on {}, reports on {:?}; Ctrl-C ends it",
+        ports.command, ports.reports
+    );
 }
 
 fn arm_alone(
@@ -84,7 +80,6 @@ fn arm_alone(
     report_ports: [u16; 4],
     faults: FaultScript,
     cell: Cell,
-    quiet: bool,
 ) -> anyhow::Result<()> {
     let arm = SimulatedArm::start(ArmConfig {
         bind: args.bind,
@@ -95,7 +90,7 @@ fn arm_alone(
         cell: Some(cell),
         ..ArmConfig::default()
     })?;
-    announce(args.bind, arm.ports(), quiet);
+    announce(args.bind, arm.ports());
     while !interrupted().load(Ordering::SeqCst) {
         std::thread::sleep(Duration::from_millis(50));
     }

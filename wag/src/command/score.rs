@@ -12,10 +12,10 @@ pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
     Failure::of(error.is_input(), anyhow::Error::new(error).context(video))
 }
 
-pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let camera = load_camera(&args.film.camera).or_input()?;
     let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
-    let stage = Stage::begin("score", quiet);
+    let stage = Stage::begin("score");
     let found = score(
         &mut video,
         &camera,
@@ -32,9 +32,7 @@ pub fn run(args: &ScoreArgs, quiet: bool) -> Outcome<Option<Value>> {
         found.time_s
     );
     stage.done("tip and target measured");
-    if !quiet {
-        println!("{line}");
-    }
+    println!("{line}");
     Ok(Some(json!({
         "ok": true, "command": "score", "closest_m": found.closest_m, "interval_m": found.interval_m,
         "time_s": found.time_s, "target_m": found.target_m,

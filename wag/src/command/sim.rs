@@ -1,11 +1,11 @@
 //! `wag sim`: rope simulation from files to files.
 
 use super::filmed::read_pose;
-use crate::cli::{PrecisionName, SimRopeArgs, SimThrowArgs};
+use crate::cli::{SimRopeArgs, SimThrowArgs};
 use crate::config;
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, ensure};
 use arm_model::unit_hint;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome as SimOutcome, PoseTrack, Precision,
     Rollout, SimOptions, Start, Watch, roll_out,
@@ -48,57 +48,53 @@ fn check_step(dt: f64) -> anyhow::Result<()> {
     clippy::cast_sign_loss,
     reason = "positive and bounded by the caller's check"
 )]
-fn frame_count(duration_s: f64, rate_hz: f64) -> usize {
-    (duration_s * rate_hz + 1e-6).floor() as usize + 1
+fn options(step_s: f64, start: Start, duration_s: f64, rate_hz: f64) -> SimOptions {
+    SimOptions {
+        step_s,
+        precision: Precision::F64,
+        start,
+        frames: FrameTimes {
+            first_s: 0.0,
+            period_s: 1.0 / rate_hz,
+            count: (duration_s * rate_hz + 1e-6).floor() as usize + 1,
+        },
+        watch: Watch::NOTHING,
+        horizon_s: duration_s,
+        threads: 1,
+    }
 }
 
-pub fn rope(args: &SimRopeArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn rope(args: &SimRopeArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let rows = read_pose(&args.pose).or_input()?;
-    let (first_s, last_s) = match (rows.first(), rows.last()) {
-        (Some(a), Some(b)) => (a.t_s, b.t_s),
-        _ => {
-            return Err(Failure::input(anyhow!(
-                "`{}` is empty",
-                args.pose.display()
-            )));
-        }
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
+        return Err(bad_input!("`{}` is empty", args.pose.display()));
     };
+    let (first_s, last_s) = (first.t_s, last.t_s);
     if !(args.fps.is_finite() && args.fps > 0.0 && args.fps <= 1e5) {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "--fps is {}, but must be above 0 and at most 100000",
             args.fps
-        )));
+        ));
     }
     check_step(args.dt).or_input()?;
     if first_s.abs() > 1e-9 {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "`{}`: column `t` starts at {first_s} s, but must start at 0",
             args.pose.display()
-        )));
+        ));
     }
     let motion = PoseTrack::new(&rows)
         .with_context(|| format!("`{}`", args.pose.display()))
         .or_input()?;
-    let count = frame_count(last_s, args.fps);
-    let options = SimOptions {
-        step_s: args.dt,
-        precision: match args.precision {
-            PrecisionName::F32 => Precision::F32,
-            PrecisionName::F64 => Precision::F64,
-        },
-        start: Start::Straight {
-            joint0_rotvec: args.initial_joint0.0,
-        },
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / args.fps,
-            count,
-        },
-        watch: Watch::NOTHING,
-        horizon_s: last_s,
-        threads: 1,
+    let start = Start::Straight {
+        joint0_rotvec: args.initial_joint0.0,
     };
+    let options = SimOptions {
+        precision: args.precision,
+        ..options(args.dt, start, last_s, args.fps)
+    };
+    let count = options.frames.count;
     let rollout = simulate(&rope, &motion, &options).or_failed()?;
     let nodes = rollout.nodes.nodes();
     let mut bytes = Vec::new();
@@ -106,25 +102,23 @@ pub fn rope(args: &SimRopeArgs, quiet: bool) -> Outcome<Option<Value>> {
         .or_failed()?;
     files::write_atomic(&args.out, &bytes).or_failed()?;
     let rerun = rollout.outcome == SimOutcome::RerunAtQuarterStep;
-    if !quiet {
-        println!(
-            "{count} frames of {nodes} nodes in `{}`; fastest tip {:.2} m/s{}",
-            args.out.display(),
-            rollout.peak_tip_speed_m_s,
-            if rerun {
-                "; diverged at the step asked for and was run again at a quarter of it"
-            } else {
-                ""
-            }
-        );
-    }
+    println!(
+        "{count} frames of {nodes} nodes in `{}`; fastest tip {:.2} m/s{}",
+        args.out.display(),
+        rollout.peak_tip_speed_m_s,
+        if rerun {
+            "; diverged at the step asked for and was run again at a quarter of it"
+        } else {
+            ""
+        }
+    );
     Ok(Some(json!({
         "ok": true, "command": "sim rope", "frames": count, "nodes": nodes, "out": args.out,
         "peak_tip_speed_m_s": rollout.peak_tip_speed_m_s, "rerun_at_quarter_step": rerun,
     })))
 }
 
-pub fn throw(args: &SimThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn throw(args: &SimThrowArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let joints = files::read_joints(&args.joints).or_input()?;
     check_step(args.dt).or_input()?;
@@ -135,20 +129,8 @@ pub fn throw(args: &SimThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
         .with_context(|| format!("`{}`", args.joints.display()))
         .or_input()?;
     let duration_s = times.last().copied().unwrap_or_default();
-    let count = frame_count(duration_s, TIP_RATE_HZ);
-    let options = SimOptions {
-        step_s: args.dt,
-        precision: Precision::F64,
-        start: Start::Equilibrium,
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: 1.0 / TIP_RATE_HZ,
-            count,
-        },
-        watch: Watch::NOTHING,
-        horizon_s: duration_s,
-        threads: 1,
-    };
+    let options = options(args.dt, Start::Equilibrium, duration_s, TIP_RATE_HZ);
+    let count = options.frames.count;
     let rollout = simulate(&rope, &motion, &options).or_failed()?;
     let mut text = String::from("t,x,y,z\n");
     for frame in 0..count {
@@ -157,13 +139,11 @@ pub fn throw(args: &SimThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
         text.push_str(&format!("{t:.6},{:.9},{:.9},{:.9}\n", tip.x, tip.y, tip.z));
     }
     files::write_atomic(&args.out, text.as_bytes()).or_failed()?;
-    if !quiet {
-        println!(
-            "{count} tip positions in `{}`; fastest {:.2} m/s",
-            args.out.display(),
-            rollout.peak_tip_speed_m_s
-        );
-    }
+    println!(
+        "{count} tip positions in `{}`; fastest {:.2} m/s",
+        args.out.display(),
+        rollout.peak_tip_speed_m_s
+    );
     Ok(Some(json!({
         "ok": true, "command": "sim throw", "samples": count, "out": args.out,
         "peak_tip_speed_m_s": rollout.peak_tip_speed_m_s,

@@ -9,9 +9,8 @@ use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmLink};
 use crate::session::Session;
-use anyhow::anyhow;
 use arm_model::{JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use run_log::files::read_plan;
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
@@ -25,27 +24,26 @@ pub fn drive(
     trajectory: &JointTrajectory,
     out: Option<&Path>,
     operating_mode: OperatingMode,
-    quiet: bool,
 ) -> Outcome<Option<Value>> {
     let name = match operating_mode {
         OperatingMode::Throw => "throw",
         OperatingMode::Wiggle | OperatingMode::SetUp => "wiggle",
     };
     if let Some(worst) = limits.worst_violation(trajectory) {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "the {name} breaks a limit: {}",
             worst.describe()
-        )));
+        ));
     }
     if arm.dry_run {
-        return dry_run::tell(arm, limits, trajectory, name, quiet).map(Some);
+        return dry_run::tell(arm, limits, trajectory, name).map(Some);
     }
     let start = trajectory.start();
     let work = |session: &mut Session, link: &ArmLink| {
-        let stage = Stage::begin("stream", quiet);
+        let stage = Stage::begin("stream");
         pipeline::latency(session, link)?;
         pipeline::arm_for(session, link, operating_mode)?;
-        let span = pipeline::execute(link, trajectory)?.finish(session)?;
+        let span = pipeline::execute(session, link, trajectory)?;
         let latency = pipeline::latency(session, link)?;
         stage.done(&format!(
             "{} cycles, {} missed, reply p99 {:.0} µs",
@@ -54,20 +52,16 @@ pub fn drive(
         Ok(json!({ "start_ns": span.start_ns, "end_ns": span.end_ns, "latency": latency }))
     };
     let place = (out, name);
-    let (folder, value) = on_arm(arm, limits, start, place, quiet, work, |_, _, value| {
-        Ok(value)
-    })?;
-    if !quiet {
-        println!("done; run folder: {}", folder.display());
-    }
+    let (folder, value) = on_arm(arm, limits, start, place, work, |_, _, value| Ok(value))?;
+    println!("done; run folder: {}", folder.display());
     Ok(Some(value))
 }
 
-pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
     confirm(&plan.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(&plan).or_input()?;
-    require_clear_area(&args.arm, "THROW", quiet)?;
+    require_clear_area(&args.arm, "THROW")?;
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let run = drive(
         &args.arm,
@@ -75,7 +69,6 @@ pub fn run(args: &ThrowArgs, quiet: bool) -> Outcome<Option<Value>> {
         &plan.trajectory,
         args.out.as_deref(),
         OperatingMode::Throw,
-        quiet,
     )?;
     Ok(Some(
         json!({ "ok": true, "command": "throw", "plan": args.plan, "run": run }),

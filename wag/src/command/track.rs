@@ -3,12 +3,11 @@
 use super::filmed::Filmed;
 use super::learned::{Learned, classify};
 use crate::cli::TrackArgs;
-use anyhow::anyhow;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
 use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::KeypointTrack;
@@ -18,21 +17,14 @@ use std::path::Path;
 /// Pictures in a contact sheet, and how many stand in a row.
 const SHEET: (usize, usize) = (12, 3);
 
-/// A tracked video with its frames.
-pub struct TrackedVideo {
-    /// Left-eye frames.
-    pub frames: Vec<EyeFrame>,
-    /// Keypoints and what else was seen.
-    pub result: TrackResult,
-}
-
-/// Tracks the rope through a film; a learned tracker reads it where there is one.
+/// Tracks the rope through a film; a learned tracker reads it where there is one. The
+/// left-eye frames, and what was found in them.
 pub fn track_video(
     filmed: &mut Filmed,
     learned: &mut Learned,
     keypoints: usize,
     stage: &Stage,
-) -> Outcome<TrackedVideo> {
+) -> Outcome<(Vec<EyeFrame>, TrackResult)> {
     let motion = filmed.motion.attach().or_input()?;
     stage.say("reading frames");
     let eyes = filmed.frames()?;
@@ -48,10 +40,7 @@ pub fn track_video(
             None => Ok(result),
         })
         .map_err(|error| classify(error, &filmed.path))?;
-    Ok(TrackedVideo {
-        frames: eyes.left,
-        result,
-    })
+    Ok((eyes.left, result))
 }
 
 /// A film for a name that ends in `.avi`, else a contact sheet.
@@ -87,24 +76,23 @@ fn said(clamp: &ClampFit) -> String {
     )
 }
 
-pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
     if !(2..=shared_types::keypoints::MAX_KEYPOINTS).contains(&args.keypoints) {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "--keypoints is {}, but must be from 2 to {}",
             args.keypoints,
             shared_types::keypoints::MAX_KEYPOINTS
-        )));
+        ));
     }
     let mut filmed = Filmed::open(&args.video, args.fps, &args.scene)?;
     filmed.warn();
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(Some(&args.models), file)?;
-    let stage = Stage::begin("track", quiet);
-    let tracked = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
-    let (frames, result) = (&tracked.frames, &tracked.result);
+    let stage = Stage::begin("track");
+    let (frames, result) = track_video(&mut filmed, &mut learned, args.keypoints, &stage)?;
     files::write_json(&args.out, &result.track).or_failed()?;
     if let Some(path) = &args.overlay {
-        files::write_atomic(path, &overlay(path, frames, &result.track).or_failed()?)
+        files::write_atomic(path, &overlay(path, &frames, &result.track).or_failed()?)
             .or_failed()?;
     }
     let count = result.track.frames.len();
@@ -119,16 +107,14 @@ pub fn run(args: &TrackArgs, quiet: bool) -> Outcome<Option<Value>> {
     for doubt in &result.track.doubts {
         eprintln!("warning: in doubt: {doubt}");
     }
-    if !quiet {
-        if let Some(clamp) = result.clamp {
-            println!("{}", said(&clamp));
-            if clamp.time_offset_s.abs() > FAR_STDS * clamp.time_std_s {
-                let late_ms = args.scene.film_late_ms + clamp.time_offset_s * 1e3;
-                println!("--film-late-ms {late_ms:.1} takes that out of the times");
-            }
+    if let Some(clamp) = result.clamp {
+        println!("{}", said(&clamp));
+        if clamp.time_offset_s.abs() > FAR_STDS * clamp.time_std_s {
+            let late_ms = args.scene.film_late_ms + clamp.time_offset_s * 1e3;
+            println!("--film-late-ms {late_ms:.1} takes that out of the times");
         }
-        println!("keypoints written to `{}`", args.out.display());
     }
+    println!("keypoints written to `{}`", args.out.display());
     Ok(Some(json!({
         "ok": true, "command": "track", "out": args.out, "frames": count,
         "lost": lost, "doubted": doubted, "doubts": result.track.doubts, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),

@@ -2,12 +2,13 @@
 
 use crate::cli::WatchArgs;
 use crate::config;
-use crate::pipeline::preview_spec;
-use crate::session::Supervisor;
+use crate::session::{ProcessSpec, Supervisor};
 use anyhow::Context;
 use arm_model::Cell;
 use camera_ingest::load_camera;
+use camera_ingest::preview::PreviewConfig;
 use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
+use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::IpcError;
 use std::path::Path;
@@ -38,7 +39,15 @@ impl Preview {
 
 impl PreviewProcess for Preview {
     fn start(&mut self, domain: &str, camera: &Path, cell: &Cell) -> anyhow::Result<()> {
-        let spec = preview_spec(self.folder.path(), domain, camera, *cell)?;
+        let config = PreviewConfig::new(domain, camera.to_owned(), *cell);
+        let path = self.folder.path().join("preview.toml");
+        let text = toml::to_string(&config).context("configuration of preview")?;
+        files::write_atomic(&path, text.as_bytes())?;
+        let spec = ProcessSpec {
+            name: "preview",
+            config: path,
+            holds_arm: false,
+        };
         self.process.start(&spec, self.folder.path())
     }
 
@@ -51,7 +60,7 @@ impl PreviewProcess for Preview {
     }
 }
 
-pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &WatchArgs) -> Outcome<Option<Value>> {
     let wanted = match (&args.run, &args.domain) {
         (Some(run), _) => Wanted::Domain(domain_of_run(run).or_input()?, Some(run.clone())),
         (None, Some(domain)) => Wanted::Domain(domain.clone(), None),
@@ -73,11 +82,8 @@ pub fn run(args: &WatchArgs, quiet: bool) -> Outcome<Option<Value>> {
     // Whatever happens here may wait; what is watched may not.
     let _ = rustix::process::nice(NICE);
     let began = Instant::now();
-    if quiet {
-        output::object(&json!({ "ok": true, "command": "watch", "url": url }));
-    } else {
-        println!("{url}\nOpen it in a browser; Ctrl-C ends it.");
-    }
+    output::object(&json!({ "ok": true, "command": "watch", "url": url }));
+    println!("{url}\nOpen it in a browser; Ctrl-C ends it.");
     if !args.bind.ip().is_loopback() {
         eprintln!(
             "warning: whoever reaches {} and knows this address can look on and stop the arm; \

@@ -5,37 +5,34 @@ use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
 use crate::config;
-use anyhow::anyhow;
 use arm_model::Limits;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use planner::PlannerConfig;
 use planner::wiggle::wiggle;
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
 
-pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     if args.evaluate || args.optimise {
-        return wiggle_design::run(args, quiet);
+        return wiggle_design::run(args);
     }
     if args.csv.is_none() && args.arm.address.is_none() && !args.arm.dry_run {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate reports its information"
-        )));
+        ));
     }
-    require_clear_area(&args.arm, "WIGGLE", quiet)?;
+    require_clear_area(&args.arm, "WIGGLE")?;
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;
     if let Some(path) = &args.csv {
         files::write_trajectory(path, &trajectory, limits.period_s()).or_failed()?;
-        if !quiet {
-            println!(
-                "{:.2} s of joint positions in `{}`",
-                trajectory.duration_s(),
-                path.display()
-            );
-        }
+        println!(
+            "{:.2} s of joint positions in `{}`",
+            trajectory.duration_s(),
+            path.display()
+        );
     }
     let run = if args.arm.address.is_some() || args.arm.dry_run {
         drive(
@@ -44,7 +41,6 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             &trajectory,
             args.out.as_deref(),
             OperatingMode::Wiggle,
-            quiet,
         )?
     } else {
         None

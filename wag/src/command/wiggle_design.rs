@@ -2,7 +2,6 @@
 
 use crate::cli::WiggleArgs;
 use crate::config;
-use anyhow::anyhow;
 use arm_model::Limits;
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
@@ -33,11 +32,11 @@ fn classify(error: DesignError) -> Failure {
     }
 }
 
-pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     if args.arm.address.is_some() {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "--evaluate and --optimise move nothing: leave --arm out, or execute the wiggle without them"
-        )));
+        ));
     }
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
@@ -61,7 +60,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
         ("paper", judged(&papers(&config.wiggle))?),
     ];
     if args.optimise {
-        let stage = Stage::begin("optimise", quiet);
+        let stage = Stage::begin("optimise");
         let best = optimise(
             &config.wiggle,
             &limits,
@@ -86,9 +85,7 @@ pub fn run(args: &WiggleArgs, quiet: bool) -> Outcome<Option<Value>> {
             files::write_trajectory(path, &trajectory, limits.period_s()).or_failed()?;
         }
     }
-    if !quiet {
-        print(&rows);
-    }
+    print(&rows);
     let wiggles: serde_json::Map<String, Value> = rows
         .iter()
         .map(|(name, judged)| ((*name).to_owned(), json!(judged)))

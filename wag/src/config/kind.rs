@@ -2,10 +2,9 @@
 
 use arm_model::{Cell, Limits};
 use planner::PlannerConfig;
-use rig_sim::{RigConfig, check};
+use rig_sim::RigConfig;
 use rt_controller::config::ControllerConfig;
-use serde::de::DeserializeOwned;
-use serde::de::Error as _;
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error as _};
 
 /// What a file configures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -24,7 +23,6 @@ pub enum Kind {
 
 /// A type that a kind's file is read into.
 pub trait Configured: DeserializeOwned {
-    /// Its kind.
     const KIND: Kind;
 
     /// The same in a cell, where it has one.
@@ -62,6 +60,18 @@ impl Configured for RigConfig {
     }
 }
 
+/// What this program holds of a kind.
+#[derive(Debug, Clone, Copy)]
+pub struct BuiltIn {
+    /// The kind's name in messages.
+    pub name: &'static str,
+    /// Its file in a site's or a rig's folder.
+    pub file: &'static str,
+    /// Where the built-in text is in the sources.
+    pub path: &'static str,
+    pub text: &'static str,
+}
+
 impl Kind {
     /// Whether its configuration has a table `cell`: the cell that holds, written there for
     /// the process that reads it.
@@ -69,77 +79,47 @@ impl Kind {
         matches!(self, Self::Planner | Self::Rig)
     }
 
-    /// Its name in messages, its file in a site's or a rig's folder, and where its built-in
-    /// text is in the sources, with that text.
-    fn about(self) -> [&'static str; 4] {
-        macro_rules! built_in {
+    pub fn built_in(self) -> BuiltIn {
+        macro_rules! shipped {
             ($name:literal, $file:literal, $path:literal) => {
-                [
-                    $name,
-                    $file,
-                    $path,
-                    include_str!(concat!("../../../", $path)),
-                ]
+                BuiltIn {
+                    name: $name,
+                    file: $file,
+                    path: $path,
+                    text: include_str!(concat!("../../../", $path)),
+                }
             };
         }
         match self {
-            Self::Planner => built_in!("planner", "planner.toml", "configs/planner/planner.toml"),
-            Self::Limits => built_in!("limits", "limits.toml", "configs/robot/xarm7.toml"),
-            Self::Cell => built_in!("cell", "cell.toml", "configs/cell/lab.toml"),
+            Self::Planner => shipped!("planner", "planner.toml", "configs/planner/planner.toml"),
+            Self::Limits => shipped!("limits", "limits.toml", "configs/robot/xarm7.toml"),
+            Self::Cell => shipped!("cell", "cell.toml", "configs/cell/lab.toml"),
             Self::Controller => {
-                built_in!(
+                shipped!(
                     "controller",
                     "rt-controller.toml",
                     "configs/rt/controller.toml"
                 )
             }
-            Self::Rig => built_in!("rig", "rig.toml", "configs/rig/demo.toml"),
+            Self::Rig => shipped!("rig", "rig.toml", "configs/rig/demo.toml"),
         }
     }
 
     /// Its name in messages.
     pub fn name(self) -> &'static str {
-        self.about()[0]
+        self.built_in().name
     }
 
-    /// Its file in a site's or a rig's folder.
-    pub fn file(self) -> &'static str {
-        self.about()[1]
-    }
-
-    /// Where its built-in text is in the sources.
-    pub fn built_in_path(self) -> &'static str {
-        self.about()[2]
-    }
-
-    /// Its built-in text.
-    pub fn built_in(self) -> &'static str {
-        self.about()[3]
-    }
-
-    /// Whether a table can be read as this kind.
-    pub fn accepts(self, table: toml::Table) -> Result<(), toml::de::Error> {
+    /// Whether something can be read as this kind. The error of a text knows its line.
+    pub fn check<'de, D: Deserializer<'de>>(self, from: D) -> Result<(), D::Error> {
         match self {
-            Self::Planner => table.try_into::<PlannerConfig>().map(drop),
-            Self::Limits => table
-                .try_into::<Limits>()
-                .and_then(|limits| limits.check_rating().map_err(toml::de::Error::custom)),
-            Self::Cell => table.try_into::<Cell>().map(drop),
-            Self::Controller => table.try_into::<ControllerConfig>().map(drop),
-            Self::Rig => table
-                .try_into::<RigConfig>()
-                .and_then(|rig| check(&rig).map_err(toml::de::Error::custom)),
-        }
-    }
-
-    /// What is wrong with a text of this kind by itself: such an error knows its line.
-    pub fn refusal_of(self, text: &str) -> Option<toml::de::Error> {
-        match self {
-            Self::Planner => toml::from_str::<PlannerConfig>(text).err(),
-            Self::Limits => toml::from_str::<Limits>(text).err(),
-            Self::Cell => toml::from_str::<Cell>(text).err(),
-            Self::Controller => toml::from_str::<ControllerConfig>(text).err(),
-            Self::Rig => toml::from_str::<RigConfig>(text).err(),
+            Self::Planner => PlannerConfig::deserialize(from).map(drop),
+            Self::Limits => Limits::deserialize(from)
+                .and_then(|limits| limits.check_rating().map_err(D::Error::custom)),
+            Self::Cell => Cell::deserialize(from).map(drop),
+            Self::Controller => ControllerConfig::deserialize(from).map(drop),
+            Self::Rig => RigConfig::deserialize(from)
+                .and_then(|rig| rig_sim::check(&rig).map_err(D::Error::custom)),
         }
     }
 }

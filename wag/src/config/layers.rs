@@ -5,6 +5,7 @@ use super::nearest::suggestion;
 use anyhow::{Context, anyhow, bail};
 use arm_model::Cell;
 use run_log::files::read_text;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -16,9 +17,7 @@ pub const RIG_FOLDER: &str = "WAG_CONFIG";
 /// Where files of a site and of a rig are looked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Folders {
-    /// The site's.
     pub site: Option<PathBuf>,
-    /// The rig's.
     pub rig: Option<PathBuf>,
 }
 
@@ -51,12 +50,10 @@ impl Folders {
     }
 }
 
-/// One layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// `built in`, `site`, `rig` or `run`.
     pub name: &'static str,
-    /// Its file.
     pub path: PathBuf,
     table: Table,
 }
@@ -64,9 +61,8 @@ pub struct Layer {
 /// The layers of one kind, the strongest last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers {
-    /// What they configure.
-    pub kind: Kind,
-    layers: Vec<Layer>,
+    kind: Kind,
+    pub layers: Vec<Layer>,
     /// Tables `cell` of files of another kind: they set nothing.
     cells: Vec<(PathBuf, Table)>,
 }
@@ -76,9 +72,7 @@ pub struct Layers {
 pub struct Told<'a> {
     /// Tables and key, with dots.
     pub key: String,
-    /// The value.
     pub value: Value,
-    /// The layer that says so.
     pub layer: &'a Layer,
 }
 
@@ -89,11 +83,12 @@ impl Layers {
     /// # Errors
     /// A file that cannot be read or says what its kind does not know: with its name.
     pub fn read(kind: Kind, folders: &Folders, run: Option<&Path>) -> anyhow::Result<Self> {
+        let shipped = kind.built_in();
         let built_in = Layer {
             name: "built in",
-            path: PathBuf::from(kind.built_in_path()),
-            table: toml::from_str(kind.built_in())
-                .with_context(|| format!("the built-in `{}` is damaged", kind.built_in_path()))?,
+            path: PathBuf::from(shipped.path),
+            table: toml::from_str(shipped.text)
+                .with_context(|| format!("the built-in `{}` is damaged", shipped.path))?,
         };
         let mut out = Self {
             kind,
@@ -101,7 +96,7 @@ impl Layers {
             cells: Vec::new(),
         };
         for (name, folder) in [("site", &folders.site), ("rig", &folders.rig)] {
-            let file = folder.as_ref().map(|folder| folder.join(kind.file()));
+            let file = folder.as_ref().map(|folder| folder.join(shipped.file));
             if let Some(path) = file.filter(|path| path.exists()) {
                 out.add(name, &path)?;
             }
@@ -130,17 +125,17 @@ impl Layers {
         };
         let mut merged = self.merged();
         lay_over(&mut merged, &layer.table);
-        if let Err(refusal) = self.kind.accepts(merged) {
+        if let Err(refusal) = self.kind.check(merged) {
             // Alone it may lack what lower layers say; where it is refused for the same
             // reason, that refusal knows the line.
-            let alone = self.kind.refusal_of(&text);
-            let located = alone.filter(|alone| alone.message() == refusal.message());
+            let alone = toml::Deserializer::parse(&text).and_then(|text| self.kind.check(text));
+            let located = alone
+                .err()
+                .filter(|alone| alone.message() == refusal.message());
             let refusal = located.unwrap_or(refusal).to_string();
-            let refusal = match suggestion(&refusal) {
-                Some(suggestion) => anyhow!("{}; {suggestion}", refusal.trim_end()),
-                None => anyhow!("{}", refusal.trim_end()),
-            };
-            return Err(refusal.context(file()));
+            let suggestion = suggestion(&refusal).map(|name| format!("; {name}"));
+            let refusal = refusal.trim_end();
+            return Err(anyhow!("{refusal}{}", suggestion.unwrap_or_default()).context(file()));
         }
         self.layers.push(layer);
         Ok(())
@@ -166,11 +161,6 @@ impl Layers {
         Ok(())
     }
 
-    /// All layers, the strongest last.
-    pub fn layers(&self) -> &[Layer] {
-        &self.layers
-    }
-
     /// What holds.
     pub fn merged(&self) -> Table {
         let mut out = Table::new();
@@ -189,31 +179,22 @@ impl Layers {
 
     /// Every value that holds, with the layer it comes from.
     pub fn told(&self) -> Vec<Told<'_>> {
-        let mut leaves = Vec::new();
-        collect(&self.merged(), &mut Vec::new(), &mut leaves);
-        leaves
-            .into_iter()
-            .filter_map(|(keys, value)| {
-                let says = |layer: &&Layer| at(&layer.table, &keys).is_some();
-                let layer = self.layers.iter().rev().find(says)?;
-                let key = keys.join(".");
-                Some(Told { key, value, layer })
-            })
-            .collect()
+        let mut told: BTreeMap<String, Told<'_>> = BTreeMap::new();
+        for layer in &self.layers {
+            for (key, value) in leaves(&layer.table) {
+                told.insert(key.clone(), Told { key, value, layer });
+            }
+        }
+        told.into_values().collect()
     }
 }
 
 /// The first value in which a cell differs from the one that holds, in words.
 pub fn difference(told: &Cell, here: &Cell) -> anyhow::Result<Option<String>> {
-    let leaves = |cell: &Cell| -> anyhow::Result<_> {
-        let mut leaves = Vec::new();
-        collect(&Table::try_from(cell)?, &mut Vec::new(), &mut leaves);
-        Ok(leaves)
-    };
-    let pairs = leaves(told)?.into_iter().zip(leaves(here)?);
+    let [told, here] = [told, here].map(Table::try_from);
+    let pairs = leaves(&told?).into_iter().zip(leaves(&here?));
     let mut differing = pairs.filter(|((_, told), (_, here))| told != here);
-    Ok(differing.next().map(|((keys, told), (_, here))| {
-        let key = keys.join(".");
+    Ok(differing.next().map(|((key, told), (_, here))| {
         format!("its {key} = {told} is not the {here} of the cell that holds here")
     }))
 }
@@ -230,23 +211,16 @@ fn lay_over(lower: &mut Table, upper: &Table) {
     }
 }
 
-fn collect(table: &Table, keys: &mut Vec<String>, leaves: &mut Vec<(Vec<String>, Value)>) {
-    for (key, value) in table {
-        keys.push(key.clone());
-        match value {
-            Value::Table(inner) => collect(inner, keys, leaves),
-            leaf => leaves.push((keys.clone(), leaf.clone())),
+/// Values with their keys, before which stand the names of their tables and dots.
+fn leaves(table: &Table) -> Vec<(String, Value)> {
+    let of = |(key, value): (&String, &Value)| match value {
+        Value::Table(inner) => {
+            let inner = leaves(inner).into_iter();
+            inner.map(|(k, v)| (format!("{key}.{k}"), v)).collect()
         }
-        keys.pop();
-    }
-}
-
-fn at<'a>(table: &'a Table, keys: &[String]) -> Option<&'a Value> {
-    let (last, tables) = keys.split_last()?;
-    let within = tables
-        .iter()
-        .try_fold(table, |t, key| t.get(key)?.as_table());
-    within?.get(last)
+        leaf => vec![(key.clone(), leaf.clone())],
+    };
+    table.iter().flat_map(of).collect()
 }
 
 #[cfg(test)]

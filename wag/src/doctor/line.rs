@@ -1,5 +1,6 @@
-//! The line to an arm: who answers, and how fast.
+//! The line to an arm: who answers, how fast, and what that means.
 
+use super::{Finding, Verdict};
 use rt_controller::session::ArmSession;
 use rt_controller::xarm::{ArmVersion, Command, ReplyData};
 use std::io::Read;
@@ -10,39 +11,33 @@ use std::time::{Duration, Instant};
 const QUESTIONS: usize = 200;
 /// Longest wait for anything.
 const WAIT: Duration = Duration::from_secs(2);
+/// Round trips that leave a cycle of 4 ms room: median and p99 (µs).
+const ROUND_TRIP_US: (f64, f64) = (500.0, 2000.0);
 
-/// What was found on the line to an arm.
-#[derive(Debug)]
-pub struct ArmLine {
-    /// Command port.
-    pub address: SocketAddr,
-    /// Version of the arm, or why there is none.
-    pub version: Result<ArmVersion, String>,
-    /// Round trips (µs), in increasing order.
-    pub round_trips_us: Vec<f64>,
-    /// Report ports, and whether one said something.
-    pub reports: Vec<(u16, bool)>,
-}
-
-impl ArmLine {
-    /// Asks an arm for its version, again and again, and listens to its report
-    /// ports. Nothing is set and nothing moves.
-    pub fn measure(ip: IpAddr, command_port: u16, report_ports: &[u16]) -> Self {
-        let address = SocketAddr::new(ip, command_port);
-        let mut round_trips_us = Vec::with_capacity(QUESTIONS);
-        let version = ask(address, &mut round_trips_us);
-        round_trips_us.sort_by(f64::total_cmp);
-        let reports = if version.is_ok() { report_ports } else { &[] };
-        Self {
-            address,
-            version,
-            round_trips_us,
-            reports: reports
-                .iter()
-                .map(|port| (*port, reports_at(SocketAddr::new(ip, *port))))
-                .collect(),
-        }
+/// Asks an arm for its version, again and again, and listens to its report ports.
+/// Nothing is set and nothing moves.
+pub fn judge_line(ip: IpAddr, command_port: u16, report_ports: &[u16]) -> Vec<Finding> {
+    let address = SocketAddr::new(ip, command_port);
+    let mut round_trips_us = Vec::with_capacity(QUESTIONS);
+    let version = ask(address, &mut round_trips_us);
+    round_trips_us.sort_by(f64::total_cmp);
+    let mut findings = vec![Finding::new(
+        "arm",
+        Verdict::fail_unless(version.is_ok()),
+        match &version {
+            Ok(ArmVersion { axes, firmware, .. }) => {
+                format!("{address}: {axes} axes, firmware {firmware}")
+            }
+            Err(reason) => format!("{address}: {reason}"),
+        },
+        "check power, cable and address (the arm's own page shows it in a browser), and that this machine has an address in its network",
+    )];
+    if version.is_ok() {
+        let ports = report_ports.iter();
+        findings.extend(ports.map(|port| report_port(SocketAddr::new(ip, *port))));
     }
+    findings.extend(round_trips(&round_trips_us));
+    findings
 }
 
 fn ask(address: SocketAddr, round_trips_us: &mut Vec<f64>) -> Result<ArmVersion, String> {
@@ -62,11 +57,62 @@ fn ask(address: SocketAddr, round_trips_us: &mut Vec<f64>) -> Result<ArmVersion,
 }
 
 /// Whether anything comes from a report port.
-fn reports_at(address: SocketAddr) -> bool {
+fn report_port(address: SocketAddr) -> Finding {
     let listen = || {
         let mut stream = TcpStream::connect_timeout(&address, WAIT)?;
         stream.set_read_timeout(Some(WAIT))?;
         stream.read(&mut [0; 4])
     };
-    listen().is_ok_and(|bytes: usize| bytes > 0)
+    let speaks = listen().is_ok_and(|bytes: usize| bytes > 0);
+    let found = if speaks { "reports" } else { "is silent" };
+    Finding::new(
+        "report port",
+        Verdict::fail_unless(speaks),
+        format!("{} {found}", address.port()),
+        "end other clients (the arm takes a few only); port 30000 needs firmware 2.1.101 or newer",
+    )
+}
+
+/// Judges sorted round trips.
+fn round_trips(sorted_us: &[f64]) -> Option<Finding> {
+    let max = sorted_us.last()?;
+    let at = |percent: usize| sorted_us[(sorted_us.len() - 1) * percent / 100];
+    let (median, p99) = (at(50), at(99));
+    Some(Finding::new(
+        "round trip",
+        Verdict::warn_unless(median <= ROUND_TRIP_US.0 && p99 <= ROUND_TRIP_US.1),
+        format!(
+            "{} requests: median {median:.0} µs, p99 {p99:.0} µs, max {max:.0} µs",
+            sorted_us.len()
+        ),
+        "a direct cable to a network port of its own, no switch, no wireless, interrupt coalescing off",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_line_is_warned_of_and_a_silent_port_fails() {
+        let quick: Vec<f64> = (0..200).map(|i| 100.0 + f64::from(i)).collect();
+        assert_eq!(round_trips(&quick).unwrap().verdict, Verdict::Pass);
+        let mut stalls = quick;
+        stalls.truncate(190);
+        stalls.extend([190_000.0; 10]);
+        let slow = round_trips(&stalls).unwrap();
+        assert_eq!(slow.verdict, Verdict::Warn);
+        assert!(slow.found.contains("max 190000 µs"), "{}", slow.found);
+        // Port 9 of this machine: nobody is there.
+        let here = [127, 0, 0, 1].into();
+        let found = [
+            judge_line(here, 9, &[9]),
+            vec![report_port((here, 9).into())],
+        ]
+        .concat();
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found.iter().all(|f| f.verdict == Verdict::Fail));
+        assert!(found[0].found.starts_with("127.0.0.1:9: "), "{found:?}");
+        assert_eq!(found[1].found, "9 is silent");
+    }
 }

@@ -1,14 +1,11 @@
 //! Whether a machine is fit to drive an arm: what is found, what it means, and what
-//! to do about it. Reading is one thing ([`mod@facts`], [`mod@line`]), judging another
-//! ([`mod@judge`]).
+//! to do about it.
 
-mod facts;
-mod judge;
 mod line;
+mod machine;
 
-pub use facts::Facts;
-pub use judge::{judge, judge_line};
-pub use line::ArmLine;
+pub use line::judge_line;
+pub use machine::Machine;
 
 use serde::Serialize;
 
@@ -16,16 +13,13 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// As it should be.
     Pass,
     /// It works, but less well than it could.
     Warn,
-    /// It does not work.
     Fail,
 }
 
 impl Verdict {
-    /// One word.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -33,17 +27,38 @@ impl Verdict {
             Self::Fail => "FAIL",
         }
     }
+
+    const fn warn_unless(good: bool) -> Self {
+        if good { Self::Pass } else { Self::Warn }
+    }
+
+    const fn fail_unless(good: bool) -> Self {
+        if good { Self::Pass } else { Self::Fail }
+    }
 }
 
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What.
     pub name: &'static str,
-    /// What it means.
     pub verdict: Verdict,
-    /// What was found.
     pub found: String,
     /// What to do; empty when nothing is to be done.
     pub remedy: String,
+}
+
+impl Finding {
+    /// What was found, with the remedy for what is not as it should be.
+    pub fn new(name: &'static str, verdict: Verdict, found: String, remedy: &str) -> Self {
+        let remedy = match verdict {
+            Verdict::Pass => String::new(),
+            Verdict::Warn | Verdict::Fail => remedy.to_owned(),
+        };
+        Self {
+            name,
+            verdict,
+            found,
+            remedy,
+        }
+    }
 }

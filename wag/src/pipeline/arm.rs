@@ -1,21 +1,20 @@
 //! Asking the controller: bring-up, moves, trajectories, latencies.
 
 use crate::session::Session;
-use anyhow::{anyhow, bail, ensure};
+use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::OperatingMode;
 use shared_types::ipc::message::{
     ControllerEvent, ControllerRequest, ControllerRpc, LatencyReport,
 };
-use shared_types::ipc::rpc::{Pending, RpcClient};
+use shared_types::ipc::rpc::RpcClient;
 use shared_types::plan::trajectory_hash;
-use std::time::Duration;
 
 /// A connection to the controller.
 pub type ArmLink = RpcClient<ControllerRpc>;
 
 /// When a motion ran (CLOCK_MONOTONIC, ns).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct MotionSpan {
     /// Deadline of the first setpoint.
     pub start_ns: u64,
@@ -42,12 +41,34 @@ fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
             };
             anyhow!("the controller stopped {what} in cycle {cycle} ({fault:?}{arm}): {message}")
         }
-        ControllerEvent::Status { .. }
-        | ControllerEvent::Step { .. }
-        | ControllerEvent::Started { .. }
-        | ControllerEvent::Finished { .. }
-        | ControllerEvent::Done
-        | ControllerEvent::Latency(_) => anyhow!("the controller answered {what} with {event:?}"),
+        other => anyhow!("the controller answered {what} with {other:?}"),
+    }
+}
+
+/// Asks for what is simply done.
+fn command(
+    session: &mut Session,
+    arm: &ArmLink,
+    what: &str,
+    request: &ControllerRequest,
+    within_s: f64,
+) -> anyhow::Result<()> {
+    let event = session.ask(arm, request, within_s, |_| ())?;
+    ensure!(event == ControllerEvent::Done, refusal(what, &event));
+    Ok(())
+}
+
+/// Asks for a motion and waits for its end.
+fn motion(
+    session: &mut Session,
+    arm: &ArmLink,
+    what: &str,
+    request: &ControllerRequest,
+    within_s: f64,
+) -> anyhow::Result<MotionSpan> {
+    match session.ask(arm, request, within_s, |_| ())? {
+        ControllerEvent::Finished { start_ns, end_ns } => Ok(MotionSpan { start_ns, end_ns }),
+        other => Err(refusal(what, &other)),
     }
 }
 
@@ -55,23 +76,9 @@ fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
 /// the controller's real-time set-up could not get.
 pub fn acquire(session: &mut Session, arm: &ArmLink) -> anyhow::Result<Vec<String>> {
     session.take_operator()?;
-    let done = session.ask(
-        arm,
-        &ControllerRequest::Bringup,
-        Duration::from_secs(20),
-        |_| (),
-    )?;
-    ensure!(
-        done == ControllerEvent::Done,
-        refusal("to bring up the arm", &done)
-    );
-    let status = session.ask(
-        arm,
-        &ControllerRequest::Status,
-        Duration::from_secs(5),
-        |_| (),
-    )?;
-    match status {
+    let bring_up = ControllerRequest::Bringup;
+    command(session, arm, "to bring up the arm", &bring_up, 20.0)?;
+    match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
         ControllerEvent::Status { warnings, .. } => Ok(warnings),
         other => Err(refusal("to report its state", &other)),
     }
@@ -88,19 +95,7 @@ pub fn arm_for(
         operating_mode,
         area_clear: true,
     };
-    let done = session.ask(arm, &request, Duration::from_secs(5), |_| ())?;
-    ensure!(done == ControllerEvent::Done, refusal("to arm", &done));
-    Ok(())
-}
-
-fn span(what: &str, event: &ControllerEvent) -> anyhow::Result<MotionSpan> {
-    match event {
-        ControllerEvent::Finished { start_ns, end_ns } => Ok(MotionSpan {
-            start_ns: *start_ns,
-            end_ns: *end_ns,
-        }),
-        other => Err(refusal(what, other)),
-    }
+    command(session, arm, "to arm", &request, 5.0)
 }
 
 /// Moves jerk-limited to a pose.
@@ -111,54 +106,27 @@ pub fn move_to(
     speed_part: f64,
 ) -> anyhow::Result<MotionSpan> {
     let request = ControllerRequest::MoveTo { q, speed_part };
-    let event = session.ask(arm, &request, Duration::from_secs(60), |_| ())?;
-    span("the move to the start pose", &event)
+    motion(session, arm, "the move to the start pose", &request, 60.0)
 }
 
-/// A trajectory being streamed.
-pub struct Streaming {
-    pending: Pending<ControllerRpc>,
-    duration_s: f64,
-}
-
-/// Hands a trajectory over and returns as soon as the controller has it.
-pub fn execute(arm: &ArmLink, trajectory: &JointTrajectory) -> anyhow::Result<Streaming> {
+/// Streams a trajectory to its end.
+pub fn execute(
+    session: &mut Session,
+    arm: &ArmLink,
+    trajectory: &JointTrajectory,
+) -> anyhow::Result<MotionSpan> {
     let request = ControllerRequest::Execute {
         trajectory: Box::new(*trajectory),
         sha256: trajectory_hash(trajectory),
     };
-    Ok(Streaming {
-        pending: arm.call(&request)?,
-        duration_s: trajectory.duration_s(),
-    })
-}
-
-impl Streaming {
-    /// Waits for the end of the motion.
-    pub fn finish(self, session: &mut Session) -> anyhow::Result<MotionSpan> {
-        let timeout = Duration::from_secs_f64(self.duration_s + 10.0);
-        let event = session.finish(&self.pending, timeout, |_| ())?;
-        span("the trajectory", &event)
-    }
-
-    /// The same for a throw: the plan lies in the controller whole, so planner and
-    /// camera may die meanwhile. Their death is an error afterwards.
-    pub fn finish_committed(self, session: &mut Session) -> anyhow::Result<MotionSpan> {
-        let timeout = Duration::from_secs_f64(self.duration_s + 10.0);
-        let event = session.finish_committed(&self.pending, timeout)?;
-        span("the trajectory", &event)
-    }
+    let within_s = trajectory.duration_s() + 10.0;
+    motion(session, arm, "the trajectory", &request, within_s)
 }
 
 /// Latency histograms of the control loop since the last call.
 pub fn latency(session: &mut Session, arm: &ArmLink) -> anyhow::Result<LatencyReport> {
-    match session.ask(
-        arm,
-        &ControllerRequest::Latency,
-        Duration::from_secs(5),
-        |_| (),
-    )? {
+    match session.ask(arm, &ControllerRequest::Latency, 5.0, |_| ())? {
         ControllerEvent::Latency(report) => Ok(*report),
-        other => bail!(refusal("to report latencies", &other)),
+        other => Err(refusal("to report latencies", &other)),
     }
 }

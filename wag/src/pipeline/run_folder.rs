@@ -1,7 +1,7 @@
 //! The folder of one run: results, configurations as used, logs.
 
-use anyhow::{Context, anyhow};
-use cli_output::{Failure, OrInput, Outcome};
+use anyhow::Context;
+use cli_output::{OrInput, Outcome};
 use run_log::{CommandLine, files};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -28,13 +28,12 @@ impl RunFolder {
         Self::refuse_existing(&path)?;
         crate::config::check_here().or_input()?;
         for folder in ["config", "log"] {
+            let refused = || {
+                let path = path.display();
+                format!("cannot create run folder `{path}`; name a writable one with --out")
+            };
             std::fs::create_dir_all(path.join(folder))
-                .with_context(|| {
-                    format!(
-                        "cannot create run folder `{}`; name a writable one with --out",
-                        path.display()
-                    )
-                })
+                .with_context(refused)
                 .or_input()?;
         }
         let folder = Self {
@@ -49,20 +48,18 @@ impl RunFolder {
     /// Refuses a folder that is there already; results are never mixed.
     pub fn refuse_existing(path: &Path) -> Outcome {
         if path.exists() {
-            return Err(Failure::input(anyhow!(
+            return Err(bad_input!(
                 "run folder `{}` exists already; name another one with --out",
                 path.display()
-            )));
+            ));
         }
         Ok(())
     }
 
-    /// The folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A file in it.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
@@ -111,14 +108,7 @@ mod tests {
         drop(folder);
         assert!(!out.exists());
         let folder = RunFolder::create(Some(&out), "test").unwrap();
-        folder
-            .config(
-                "rig",
-                &[("a", 1)]
-                    .into_iter()
-                    .collect::<std::collections::BTreeMap<_, _>>(),
-            )
-            .unwrap();
+        folder.config("rig", &toml::toml! { a = 1 }).unwrap();
         drop(folder);
         assert!(out.join("config/rig.toml").is_file());
     }

@@ -14,23 +14,16 @@ pub struct DeadMan {
 }
 
 impl DeadMan {
-    /// Held from now on.
+    /// Held from now on. Its thread may outlive the switch: nothing can wake a read of
+    /// standard input.
     pub fn hold() -> anyhow::Result<Self> {
-        Self::watch(|| {
-            // Whatever ends the wait lets go.
-            let _ = stdin().lock().read_line(&mut String::new());
-        })
-    }
-
-    /// Held until `wait` returns. Its thread may outlive the switch: nothing can
-    /// wake a read of standard input.
-    fn watch(wait: impl FnOnce() + Send + 'static) -> anyhow::Result<Self> {
         let let_go = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&let_go);
         std::thread::Builder::new()
             .name("dead-man".to_owned())
             .spawn(move || {
-                wait();
+                // Whatever ends the wait lets go.
+                let _ = stdin().lock().read_line(&mut String::new());
                 flag.store(true, Ordering::SeqCst);
             })
             .context("cannot watch the dead-man switch")?;
@@ -40,26 +33,5 @@ impl DeadMan {
     /// Whether it was let go.
     pub fn is_let_go(&self) -> bool {
         self.let_go.load(Ordering::SeqCst)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::sync::mpsc;
-
-    #[test]
-    fn it_is_held_until_the_wait_ends_and_then_let_go_for_good() {
-        let (end, ended) = mpsc::channel::<()>();
-        let switch = DeadMan::watch(move || {
-            let _ = ended.recv();
-        })
-        .unwrap();
-        assert!(!switch.is_let_go());
-        drop(end);
-        while !switch.is_let_go() {
-            std::thread::yield_now();
-        }
-        assert!(switch.is_let_go());
     }
 }

@@ -2,23 +2,13 @@
 //! operator's heartbeat, what is received, and the file of the run.
 
 use super::{DeadMan, ProcessSpec, Received, RunFile, Supervisor};
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 use cli_output::interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-
-/// Errors of a wait: either the transport's or what the session noticed.
-#[derive(Debug)]
-pub struct SessionError(pub anyhow::Error);
-
-impl From<IpcError> for SessionError {
-    fn from(error: IpcError) -> Self {
-        Self(error.into())
-    }
-}
 
 /// Processes, shared memory and records of one command.
 #[derive(Debug)]
@@ -30,7 +20,6 @@ pub struct Session {
     dead_man: Option<DeadMan>,
     /// A motion runs that nobody but the controller is needed for.
     committed: bool,
-    /// Child processes.
     supervisor: Supervisor,
     /// What stages work with.
     pub received: Received,
@@ -41,6 +30,8 @@ pub struct Session {
     last_beat: Instant,
 }
 
+/// How long a process may take to come up (s).
+const STARTUP_S: f64 = 15.0;
 /// How often the operator's heartbeat is written.
 const BEAT_EVERY: Duration = Duration::from_millis(20);
 /// Two and a half periods of the reports that have the arm's codes (5 Hz).
@@ -79,15 +70,12 @@ impl Session {
     }
 
     /// Makes standard input the operator's dead-man switch, held from now on.
-    pub fn hold_dead_man(&mut self, quiet: bool) -> anyhow::Result<()> {
+    pub fn hold_dead_man(&mut self) -> anyhow::Result<()> {
         self.dead_man = Some(DeadMan::hold()?);
-        if !quiet {
-            println!("Enter lets go of the dead-man switch; Ctrl-C stops as well");
-        }
+        println!("Enter lets go of the dead-man switch; Ctrl-C stops as well");
         Ok(())
     }
 
-    /// Starts a process.
     pub fn start(&mut self, spec: &ProcessSpec) -> anyhow::Result<()> {
         self.supervisor.start(spec, &self.log_folder)
     }
@@ -129,27 +117,20 @@ impl Session {
     }
 
     /// Connects to a service and waits until its process answers `ping`.
-    pub fn connect<R: Rpc>(
-        &mut self,
-        ping: &R::Request,
-        timeout: Duration,
-    ) -> anyhow::Result<RpcClient<R>> {
+    pub fn connect<R: Rpc>(&mut self, ping: &R::Request) -> anyhow::Result<RpcClient<R>> {
         let client = RpcClient::<R>::open(&self.bus)?;
         let began = Instant::now();
         loop {
             match client.call(ping) {
                 Ok(pending) => {
-                    self.finish(&pending, timeout, |_| ())?;
+                    self.finish(&pending, STARTUP_S, |_| ())?;
                     return Ok(client);
                 }
-                Err(IpcError::Gone { .. }) if began.elapsed() < timeout => {
+                Err(IpcError::Gone { .. }) if began.elapsed().as_secs_f64() < STARTUP_S => {
                     self.idle(Duration::from_millis(10))?;
                 }
                 Err(IpcError::Gone { service }) => {
-                    bail!(
-                        "no process serves `{service}` after {} s",
-                        timeout.as_secs()
-                    );
+                    bail!("no process serves `{service}` after {STARTUP_S} s");
                 }
                 Err(e) => return Err(e.into()),
             }
@@ -168,79 +149,71 @@ impl Session {
         &mut self,
         client: &RpcClient<R>,
         request: &R::Request,
-        timeout: Duration,
+        within_s: f64,
         each: impl FnMut(&R::Event),
     ) -> anyhow::Result<R::Event> {
         let pending = client.call(request)?;
-        self.finish(&pending, timeout, each)
+        self.finish(&pending, within_s, each)
     }
 
     /// Waits for the last event of a request under way.
     pub fn finish<R: Rpc>(
         &mut self,
         pending: &Pending<R>,
-        timeout: Duration,
+        within_s: f64,
         each: impl FnMut(&R::Event),
     ) -> anyhow::Result<R::Event> {
-        let result = pending.finish(timeout, || self.tick().map_err(SessionError), each);
-        self.explain(result)
+        let timeout = Duration::from_secs_f64(within_s);
+        let result = pending.finish(timeout, || self.tick(), each);
+        result.map_err(|error| self.explain(error))
     }
 
-    /// The same while a motion runs that lies in the controller whole: the death
-    /// of a process that does not hold the arm stops nothing. It is reported after
-    /// the motion, by the error that this returns then.
-    pub fn finish_committed<R: Rpc>(
+    /// Does `work` whose motion lies in the controller whole: the death of a process that
+    /// does not hold the arm stops nothing. It is reported after the motion, by the error
+    /// that this returns then.
+    pub fn committed<T>(
         &mut self,
-        pending: &Pending<R>,
-        timeout: Duration,
-    ) -> anyhow::Result<R::Event> {
+        work: impl FnOnce(&mut Self) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
         self.committed = true;
-        let event = self.finish(pending, timeout, |_| ());
+        let result = work(self);
         self.committed = false;
         self.supervisor.check()?;
-        event
+        result
     }
 
     /// Waits for the next event of a request under way.
     pub fn next<R: Rpc>(
         &mut self,
         pending: &Pending<R>,
-        timeout: Duration,
+        within_s: f64,
     ) -> anyhow::Result<R::Event> {
         let began = Instant::now();
         loop {
             self.tick()?;
             match pending.try_next() {
                 Ok(Some(event)) => return Ok(event),
-                Ok(None) if began.elapsed() < timeout => {
+                Ok(None) if began.elapsed().as_secs_f64() < within_s => {
                     std::thread::sleep(Duration::from_millis(1));
                 }
-                Ok(None) => {
-                    return Err(anyhow!(
-                        "`{}` did not answer within {} s",
-                        R::NAME,
-                        timeout.as_secs()
-                    ));
-                }
-                Err(e) => return self.explain(Err(e.into())),
+                Ok(None) => bail!("`{}` did not answer within {within_s} s", R::NAME),
+                Err(e) => return Err(self.explain(e.into())),
             }
         }
     }
 
     /// A vanished server is explained by the process that died, if one did.
-    fn explain<T>(&mut self, result: Result<T, SessionError>) -> anyhow::Result<T> {
-        result.map_err(|SessionError(error)| {
-            for _ in 0..40 {
-                if let Err(death) = self.supervisor.check() {
-                    return death;
-                }
-                if !matches!(error.downcast_ref(), Some(IpcError::Gone { .. })) {
-                    break;
-                }
-                std::thread::sleep(Duration::from_millis(5));
+    fn explain(&mut self, error: anyhow::Error) -> anyhow::Error {
+        for _ in 0..40 {
+            if let Err(death) = self.supervisor.check() {
+                return death;
             }
-            error
-        })
+            if !matches!(error.downcast_ref(), Some(IpcError::Gone { .. })) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        error
     }
 
     /// Ends the session. When its work is done the arm rests and the operator

@@ -2,7 +2,7 @@
 //! the exact record of the cycles ends there; the command says so at once, and fails.
 
 use super::{ProcessSpec, Supervisor};
-use anyhow::{Context, anyhow};
+use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -48,11 +48,11 @@ impl RunFile {
         while !self.path.exists() {
             self.process.check()?;
             if began.elapsed() > BEGIN {
-                return Err(anyhow!(
+                bail!(
                     "the {} process did not begin within {} s",
                     spec.name,
                     BEGIN.as_secs()
-                ));
+                );
             }
             std::thread::sleep(Duration::from_millis(5));
         }

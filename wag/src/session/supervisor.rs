@@ -23,7 +23,6 @@ const BRAKE_GRACE: Duration = Duration::from_millis(5000);
 pub struct ProcessSpec {
     /// Name, as `wag process NAME` knows it.
     pub name: &'static str,
-    /// Its configuration file.
     pub config: PathBuf,
     /// Whether it holds an arm: it ends before everything the arm may need.
     pub holds_arm: bool,

@@ -3,22 +3,16 @@
 
 use super::chromium::Chromium;
 use super::client::Watch;
-use super::fake::{Fake, run_folder};
-use super::support::{record, wag};
+use super::fake::{Fake, put_rope, run_folder};
+use super::support::{alone, record, wag};
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
 use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
-use shared_types::RopeParams;
 use shared_types::ipc::{ControllerMode, CycleRecord};
-use shared_types::rope::RANGES;
 use std::path::Path;
 use std::sync::atomic::Ordering;
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-
-/// One browser at a time: each draws with the processor.
-static SCREEN: Mutex<()> = Mutex::new(());
 
 /// Largest report (bytes), so that it can be sent by mail.
 const REPORT_MAX_BYTES: u64 = 6_000_000;
@@ -74,15 +68,14 @@ fn throw_folder(run: &Path) {
         }
     });
     record(run, cycles);
-    let rope = RopeParams::from_array(RANGES.map(|r| 0.5 * (r.min + r.max)));
-    std::fs::write(run.join("params.toml"), toml::to_string(&rope).unwrap()).unwrap();
+    put_rope(run);
     let summary = json!({ "ok": true, "command": "throw", "target_m": [0.9, 0.1, 0.2] });
     std::fs::write(run.join("summary.json"), summary.to_string()).unwrap();
 }
 
 #[test]
 fn a_report_is_drawn_its_slider_moves_the_rope_and_two_fingers_come_nearer() {
-    let _screen = SCREEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let Some(mut page) = Chromium::start() else {
         return;
     };
@@ -138,7 +131,7 @@ fn pinch(page: &mut Chromium) {
 
 #[test]
 fn the_live_page_follows_a_run_and_stops_it() {
-    let _screen = SCREEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let Some(mut page) = Chromium::start() else {
         return;
     };

@@ -13,6 +13,11 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Names of the program, in the order in which they are tried.
 const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
+/// It draws without a graphics card and asks nobody for anything.
+const OPTIONS: &str = "--headless=new --no-sandbox --remote-debugging-pipe \
+    --use-angle=swiftshader --enable-unsafe-swiftshader --disable-dev-shm-usage \
+    --disable-background-networking --no-first-run --window-size=700,900";
+
 /// The browser's program: `WAG_CHROMIUM`, or one on the path.
 fn program() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("WAG_CHROMIUM") {
@@ -51,31 +56,16 @@ impl Chromium {
         let folder = tempfile::tempdir().unwrap();
         let pipe = |name: &str| {
             let path = folder.path().join(name);
-            assert!(
-                Command::new("mkfifo")
-                    .arg(&path)
-                    .status()
-                    .unwrap()
-                    .success()
-            );
+            let made = Command::new("mkfifo").arg(&path).status().unwrap();
+            assert!(made.success());
             path
         };
         let (orders, answers) = (pipe("orders"), pipe("answers"));
         let process = Command::new("sh")
             .args(["-c", "exec \"$@\" 3<\"$ORDERS\" 4>\"$ANSWERS\"", "sh"])
             .arg(program)
-            .args([
-                "--headless=new",
-                "--no-sandbox",
-                "--remote-debugging-pipe",
-                "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader",
-                "--disable-dev-shm-usage",
-                "--disable-background-networking",
-                "--no-first-run",
-                "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
-                "--window-size=700,900",
-            ])
+            .args(OPTIONS.split_whitespace())
+            .arg("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1")
             .arg(format!(
                 "--user-data-dir={}",
                 folder.path().join("profile").display()

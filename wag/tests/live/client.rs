@@ -1,15 +1,15 @@
 //! A `wag watch` as a process, and requests to it byte by byte.
 
-use super::support::{command, send};
+use super::support::Running;
+use rustix::process::Signal;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// A watcher that ends when dropped.
 pub(crate) struct Watch {
-    process: Child,
+    process: Running,
     /// The page's address.
     pub(crate) url: String,
 }
@@ -24,21 +24,15 @@ pub(crate) struct Answer {
 
 impl Watch {
     pub(crate) fn start(args: &str) -> Self {
-        let mut process = command(&format!("watch --json {args}"))
-            .stderr(Stdio::inherit())
-            .spawn()
-            .unwrap();
-        let mut text = String::new();
-        let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
-        while !text.ends_with("}\n") {
-            text.push_str(&lines.next().unwrap().unwrap());
-            text.push('\n');
-        }
-        let told: Value = serde_json::from_str(&text).unwrap();
+        let (process, told) = Running::start(&format!("watch {args}"));
         Self {
             process,
             url: told["url"].as_str().unwrap().to_owned(),
         }
+    }
+
+    pub(crate) fn pid(&self) -> u32 {
+        self.process.0.id()
     }
 
     /// `127.0.0.1:PORT`.
@@ -59,6 +53,12 @@ impl Watch {
         stream
     }
 
+    /// Asks for something of this page.
+    pub(crate) fn get(&self, mut stream: &TcpStream, path: &str) {
+        let (home, host) = (self.home(), self.host());
+        write!(stream, "GET {home}{path} HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+    }
+
     /// Sends these bytes; reads one answer.
     pub(crate) fn raw(&self, text: &str) -> Answer {
         let mut stream = self.connect();
@@ -77,9 +77,8 @@ impl Watch {
 
     /// Follows the state.
     pub(crate) fn states(&self) -> States {
-        let mut stream = self.connect();
-        let (home, host) = (self.home(), self.host());
-        write!(stream, "GET {home}state HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        let stream = self.connect();
+        self.get(&stream, "state");
         let mut reader = BufReader::new(stream);
         assert!(head(&mut reader).contains("text/event-stream"));
         States(reader)
@@ -87,28 +86,25 @@ impl Watch {
 
     /// Resident memory of the process (MB).
     pub(crate) fn resident_mb(&self) -> f64 {
-        let status =
-            std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap();
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
         let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap();
-        line.split_whitespace()
-            .nth(1)
-            .unwrap()
-            .parse::<f64>()
-            .unwrap()
-            / 1e3
+        let kilobytes = line.split_whitespace().nth(1).unwrap();
+        kilobytes.parse::<f64>().unwrap() / 1e3
     }
 
     /// Ends it as Ctrl-C does; its exit code.
     pub(crate) fn end(mut self) -> Option<i32> {
-        send(self.process.id(), rustix::process::Signal::INT);
-        self.process.wait().unwrap().code()
+        self.process.end(Signal::INT).0
     }
 }
 
-impl Drop for Watch {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+impl Answer {
+    /// What stands behind a name in its head.
+    pub(crate) fn line(&self, name: &str) -> Option<&str> {
+        let lines = self.head.lines().filter_map(|l| l.split_once(": "));
+        lines
+            .into_iter()
+            .find_map(|(n, v)| (n == name).then_some(v))
     }
 }
 
@@ -152,14 +148,13 @@ fn head(reader: &mut BufReader<TcpStream>) -> String {
 
 pub(crate) fn read_answer(reader: &mut BufReader<TcpStream>) -> Answer {
     let head = head(reader);
-    let length = head
-        .lines()
-        .find_map(|l| l.strip_prefix("Content-Length: "));
-    let mut body = vec![0; length.unwrap().parse().unwrap()];
-    reader.read_exact(&mut body).unwrap();
-    Answer {
+    let mut answer = Answer {
         status: head.split(' ').nth(1).unwrap().parse().unwrap(),
         head,
-        body,
-    }
+        body: Vec::new(),
+    };
+    let length = answer.line("Content-Length").unwrap().parse().unwrap();
+    answer.body.resize(length, 0);
+    reader.read_exact(&mut answer.body).unwrap();
+    answer
 }

@@ -2,6 +2,7 @@
 
 use arm_model::JointVector;
 use arm_model::joint::START_POSE;
+use rt_controller::os::now_ns;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcServer;
 use shared_types::ipc::{
@@ -9,7 +10,7 @@ use shared_types::ipc::{
     JointReport, OperatorEnd, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
 use shared_types::rope::RANGES;
-use shared_types::{FaultCode, MonotonicNs, OperatingMode, RopeParams};
+use shared_types::{FaultCode, OperatingMode, RopeParams};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -92,7 +93,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
     ready.send(()).unwrap();
     while !wires.end.load(Ordering::SeqCst) {
         cycle += 1;
-        let now_ns = now_ns();
+        let stamp_ns = now_ns();
         let q = joints(began.elapsed().as_secs_f64());
         let mode = match fault {
             FaultCode::None => ControllerMode::Streaming,
@@ -103,7 +104,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
             mode,
             fault: fault as u16,
             cycle,
-            stamp_ns: now_ns,
+            stamp_ns,
             q_c: q,
             q,
             operating_mode: OperatingMode::Wiggle as u8,
@@ -120,7 +121,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
         };
         cycles.send_copy(record).unwrap();
         let report = JointReport {
-            stamp_ns: now_ns,
+            stamp_ns,
             q,
             ..JointReport::default()
         };
@@ -129,7 +130,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
             version: PAYLOAD_VERSION,
             pixel_format: PIXEL_FORMAT_YUYV,
             sequence: cycle,
-            stamp_ns: now_ns,
+            stamp_ns,
             width_px: SIZE[0],
             height_px: SIZE[1],
         };
@@ -165,11 +166,6 @@ fn serve(server: &RpcServer<ControllerRpc>, wires: &Wires, fault: &mut FaultCode
     }
 }
 
-fn now_ns() -> u64 {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
-    MonotonicNs(now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64).0
-}
-
 /// A run folder whose controller is `domain`, with an identified rope.
 pub(crate) fn run_folder(folder: &Path, domain: &str) {
     std::fs::create_dir(folder.join("config")).unwrap();
@@ -179,6 +175,11 @@ pub(crate) fn run_folder(folder: &Path, domain: &str) {
     };
     let text = toml::to_string(&config).unwrap();
     std::fs::write(folder.join("config/rt-controller.toml"), text).unwrap();
+    put_rope(folder);
+}
+
+/// An identified rope, in the middle of all ranges.
+pub(crate) fn put_rope(folder: &Path) {
     let rope = RopeParams::from_array(RANGES.map(|r| 0.5 * (r.min + r.max)));
     std::fs::write(folder.join("params.toml"), toml::to_string(&rope).unwrap()).unwrap();
 }

@@ -6,6 +6,7 @@ mod browser;
 mod chromium;
 mod client;
 mod fake;
+mod preview;
 mod server;
 #[path = "../support/mod.rs"]
 mod support;

@@ -2,6 +2,8 @@
 
 use super::client::{Watch, read_answer};
 use super::fake::{Fake, run_folder};
+use super::support::{alone, shared_memory_of};
+use serde_json::json;
 use std::io::{BufReader, Write};
 use std::net::TcpStream;
 use std::sync::atomic::Ordering;
@@ -13,6 +15,7 @@ fn domain(tag: &str) -> String {
 
 #[test]
 fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
+    let _alone = alone();
     let watch = Watch::start(&format!("--domain {}", domain("strange")));
     let (home, host) = (watch.home(), watch.host());
     let port = host.rsplit_once(':').unwrap().1;
@@ -52,17 +55,15 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
         let stop = watch.raw(&format!("POST {home}ask/stop HTTP/1.1\r\n{lines}\r\n"));
         assert_eq!(stop.status, 403, "Origin {foreign}");
     }
-    for foreign in ["evil.example", &format!("evil.example:{port}"), "10.1.2.3"] {
-        assert_eq!(
-            get(home, &format!("Host: {foreign}\r\n")).status,
-            403,
-            "Host {foreign}"
-        );
+    for (name, status) in [
+        ("evil.example", 403),
+        (&format!("evil.example:{port}"), 403),
+        ("10.1.2.3", 403),
+        (&format!("localhost:{port}"), 200),
+    ] {
+        let answer = get(home, &format!("Host: {name}\r\n"));
+        assert_eq!(answer.status, status, "Host {name}");
     }
-    assert_eq!(
-        get(home, &format!("Host: localhost:{port}\r\n")).status,
-        200
-    );
     assert_eq!(watch.ask("GET", "nothing").status, 404);
     assert_eq!(watch.ask("POST", "ask/move").status, 404);
     assert_eq!(watch.ask("GET", "ask/stop").status, 405);
@@ -79,6 +80,7 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
 
 #[test]
 fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
+    let _alone = alone();
     let fake = Fake::start(&domain("ask"));
     let watch = Watch::start(&format!("--domain {}", fake.domain));
     let mut states = watch.states();
@@ -93,17 +95,11 @@ fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
     assert!(took < Duration::from_secs(3), "{took:?}");
     let state = states.until("the stop", |s| s["controller"]["stop"]["latched"] == true);
     assert_eq!(state["controller"]["stop"]["code"], "operator_stop");
-    assert!(
-        state["controller"]["stop"]["words"]
-            .as_str()
-            .unwrap()
-            .contains("asked for a stop")
-    );
-    assert_eq!(state["asks"][0], serde_json::json!(["stop", null]));
-    assert_eq!(
-        state["asks"][2],
-        serde_json::json!(["acknowledge", "there is no operator"])
-    );
+    let words = state["controller"]["stop"]["words"].as_str().unwrap();
+    assert!(words.contains("asked for a stop"), "{words}");
+    assert_eq!(state["asks"][0], json!(["stop", null]));
+    let refused = json!(["acknowledge", "there is no operator"]);
+    assert_eq!(state["asks"][2], refused);
     for path in ["ask/acknowledge", "ask/disarm"] {
         let refused = watch.ask("POST", path);
         assert_eq!(refused.status, 409);
@@ -123,6 +119,7 @@ fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
 
 #[test]
 fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
+    let _alone = alone();
     let name = domain("next");
     let dir = tempfile::tempdir().unwrap();
     run_folder(dir.path(), &name);
@@ -130,45 +127,29 @@ fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
     let mut states = watch.states();
     let before = states.next();
     assert!(before["controller"].is_null());
-    assert!(
-        before["note"]
-            .as_str()
-            .unwrap()
-            .contains("no controller runs yet")
-    );
+    let note = before["note"].as_str().unwrap();
+    assert!(note.contains("no controller runs yet"), "{note}");
     assert_eq!(watch.ask("POST", "ask/stop").body, b"no controller runs");
     for run in 0..2 {
         let fake = Fake::start(&name);
         let state = states.until("the run", |s| {
             s["arm"].as_array().unwrap().len() == 27 && s["rope"].as_array().unwrap().len() > 30
         });
-        assert_eq!(
-            state["rope_is"], "the identified rope, simulated",
-            "run {run}"
-        );
+        let rope = "the identified rope, simulated";
+        assert_eq!(state["rope_is"], rope, "run {run}");
         drop(fake);
         let over = states.until("its end", |s| s["controller"].is_null());
         assert!(over["note"].as_str().unwrap().contains("has ended"));
-        assert_eq!(
-            over["arm"].as_array().unwrap().len(),
-            27,
-            "it stays in view"
-        );
+        let shown = over["arm"].as_array().unwrap().len();
+        assert_eq!(shown, 27, "it stays in view");
     }
     assert_eq!(watch.end(), Some(0));
-    let left: Vec<_> = std::fs::read_dir("/dev/shm")
-        .unwrap()
-        .flatten()
-        .map(|f| f.file_name())
-        .collect();
-    assert!(
-        left.iter().all(|f| !f.to_string_lossy().contains(&name)),
-        "{left:?}"
-    );
+    assert_eq!(shared_memory_of(&name), Vec::<String>::new());
 }
 
 #[test]
 fn readers_that_never_read_hold_nobody_up() {
+    let _alone = alone();
     let fake = Fake::start(&domain("slow"));
     let watch = Watch::start(&format!("--domain {}", fake.domain));
     let (home, host) = (watch.home(), watch.host());
@@ -189,11 +170,8 @@ fn readers_that_never_read_hold_nobody_up() {
     }
     let rate_hz = f64::from(count) / began.elapsed().as_secs_f64();
     // A busy machine tells less often, never in bursts of what is old.
-    let wanted_hz = if std::env::var_os("WAG_LONG_TESTS").is_some() {
-        10.0
-    } else {
-        2.0
-    };
+    let long = std::env::var_os("WAG_LONG_TESTS").is_some();
+    let wanted_hz = if long { 10.0 } else { 2.0 };
     eprintln!("told {rate_hz:.1} times a second");
     assert!(rate_hz >= wanted_hz, "{rate_hz} Hz");
     assert!(cycles.is_sorted(), "{cycles:?}");
@@ -206,26 +184,15 @@ fn readers_that_never_read_hold_nobody_up() {
     let mut reader = BufReader::new(stream.try_clone().unwrap());
     let (mut seen, began, mut pictures) = (0_u64, Instant::now(), 0);
     while began.elapsed() < Duration::from_secs(2) {
-        write!(
-            &stream,
-            "GET {home}picture?after={seen} HTTP/1.1\r\nHost: {host}\r\n\r\n"
-        )
-        .unwrap();
+        watch.get(&stream, &format!("picture?after={seen}"));
         let answer = read_answer(&mut reader);
         if answer.status == 204 {
             continue;
         }
         assert_eq!((answer.status, &answer.body[..2]), (200, &[0xff, 0xd8][..]));
-        let number = answer
-            .head
-            .lines()
-            .find_map(|l| l.strip_prefix("X-Number: "))
-            .unwrap();
-        assert!(
-            number.parse::<u64>().unwrap() > seen,
-            "{number} after {seen}"
-        );
-        seen = number.parse().unwrap();
+        let number: u64 = answer.line("X-Number").unwrap().parse().unwrap();
+        assert!(number > seen, "{number} after {seen}");
+        seen = number;
         pictures += 1;
     }
     assert!((4..=32).contains(&pictures), "{pictures} pictures in 2 s");

@@ -1,25 +1,34 @@
 //! Processes of a whole demo killed while the arm moves.
 
 use super::shell::{recorded, said};
-use crate::support::{command, process_of, send, until};
+use crate::support::{alone, command, process_of, send, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
 use shared_types::{FaultCode, OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 use std::process::Child;
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Longest wait for a stage of a demo.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// One demo at a time: each wants the whole machine, in real time.
-static MACHINE: Mutex<()> = Mutex::new(());
 /// What a demo says that gave up because other programs kept the machine busy.
 const TOO_BUSY: [&str; 2] = [
     "on this machine; stop other programs",
     "no camera frame arrived",
 ];
+
+/// Kills a process of the demo in `run` after some time of its motion; the demo ends with
+/// an error that says so.
+fn killed(child: Child, run: &Path, victim: &str, after_ms: u64) {
+    std::thread::sleep(Duration::from_millis(after_ms));
+    let victim_pid = process_of(&run.display().to_string(), victim).unwrap();
+    send(victim_pid, Signal::KILL);
+    let (code, said) = said(child);
+    assert_eq!(code, Some(1), "{said}");
+    let death = format!("{victim} process was killed by signal 9");
+    assert!(said.contains(&death), "{said}");
+}
 
 /// A demo that streams a trajectory of `operating_mode` right now, and its folder in `into`.
 ///
@@ -74,19 +83,9 @@ fn domain(config: &Path) -> Option<String> {
 #[test]
 fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report() {
     let folder = tempfile::tempdir().unwrap();
-    let _alone = MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let (child, run) = demo_in(folder.path(), OperatingMode::Throw);
-    std::thread::sleep(Duration::from_millis(300));
-    send(
-        process_of(&run.display().to_string(), "planner").unwrap(),
-        Signal::KILL,
-    );
-    let (code, said) = said(child);
-    assert_eq!(code, Some(1), "{said}");
-    assert!(
-        said.contains("planner process was killed by signal 9"),
-        "{said}"
-    );
+    killed(child, &run, "planner", 300);
 
     // The throw is whole, and to the bit what was planned.
     let plan = std::fs::read_to_string(run.join("plan.json")).unwrap();
@@ -111,19 +110,9 @@ fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report(
 #[test]
 fn fault_27_a_camera_killed_during_the_wiggle_ends_it_gently_and_nothing_is_identified() {
     let folder = tempfile::tempdir().unwrap();
-    let _alone = MACHINE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = alone();
     let (child, run) = demo_in(folder.path(), OperatingMode::Wiggle);
-    std::thread::sleep(Duration::from_millis(700));
-    send(
-        process_of(&run.display().to_string(), "camera-ingest").unwrap(),
-        Signal::KILL,
-    );
-    let (code, said) = said(child);
-    assert_eq!(code, Some(1), "{said}");
-    assert!(
-        said.contains("camera-ingest process was killed by signal 9"),
-        "{said}"
-    );
+    killed(child, &run, "camera-ingest", 700);
     assert!(!run.join("params.toml").exists(), "nothing was identified");
     let (_, causes) = recorded(&run);
     let met: Vec<_> = causes.iter().map(|c| (c.fault(), c.path)).collect();

@@ -1,29 +1,21 @@
 //! A plan is executed identically, byte for byte in the record, with planner and
 //! camera killed half-way.
 
-use super::shell::{arm, read};
-use crate::support::{command, send, until};
+use super::shell::{arm, on_arm, recorded, said};
+use crate::support::{Running, alone, command, plan_json, until};
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector};
 use camera_ingest::process::CameraConfig;
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest};
+use planner::ropes::random_rope;
 use planner::service::{PlannerRequest, PlannerRpc};
-use rt_controller::ControllerConfig;
-use rustix::process::Signal;
-use shared_types::ipc::message::{
-    CameraRequest, CameraRpc, ControllerEvent, ControllerRequest, ControllerRpc,
-};
-use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
-use shared_types::ipc::{
-    Bus, CauseRecord, ChunkSubscriber, ControllerMode, CycleRecord, DomainSweep, OperatorEnd,
-    StateReader,
-};
-use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MonotonicNs, OperatingMode, RopeParams, Task};
+use shared_types::ipc::message::{CameraRequest, CameraRpc};
+use shared_types::ipc::rpc::{Rpc, RpcClient};
+use shared_types::ipc::{Bus, ControllerMode, CycleRecord, DomainSweep, StateReader};
+use shared_types::{MonotonicNs, OperatingMode, Task};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::Child;
 use std::time::Duration;
 use xarm_sim::{ArmEvent, SimulatedArm};
 
@@ -39,41 +31,34 @@ fn plan() -> JointTrajectory {
     JointTrajectory::new(&[0.0, 1.0, 2.0], &[held, out, held]).unwrap()
 }
 
-/// A process of `wag`; it is killed when dropped.
-struct Part(Child);
-
-impl Part {
-    fn start<T: serde::Serialize>(folder: &Path, name: &str, config: &T) -> Self {
-        let path = folder.join(format!("{name}.toml"));
-        std::fs::write(&path, toml::to_string(config).unwrap()).unwrap();
-        let log = std::fs::File::create(folder.join(format!("{name}.log"))).unwrap();
-        let mut command = command(&format!("process {name} --config"));
-        command.arg(&path).env("WAG_LOG", "info").stderr(log);
-        Self(command.spawn().unwrap())
-    }
-
-    fn kill(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-
-    /// Asks it to end in order.
-    fn end(&mut self) {
-        send(self.0.id(), Signal::TERM);
-        self.0.wait().unwrap();
-    }
+/// A process of the run in `domain`, as a daemon beside those that `wag` starts.
+fn daemon<R: Rpc>(
+    bus: &Bus,
+    folder: &Path,
+    (name, config): (&str, &impl serde::Serialize),
+    ping: &R::Request,
+) -> (Running, RpcClient<R>) {
+    let path = folder.join(format!("{name}.toml"));
+    std::fs::write(&path, toml::to_string(config).unwrap()).unwrap();
+    let log = std::fs::File::create(folder.join(format!("{name}.log"))).unwrap();
+    let mut command = command(&format!("process {name} --config"));
+    let process = Running(command.arg(&path).stderr(log).spawn().unwrap());
+    let client = RpcClient::<R>::open(bus).unwrap();
+    let pending = until("a service", PATIENCE, || client.call(ping).ok());
+    until("its answer", PATIENCE, || pending.try_next().unwrap());
+    (process, client)
 }
 
-impl Drop for Part {
-    fn drop(&mut self) {
-        self.kill();
-    }
-}
-
-/// Cycles of the throw that sent a setpoint.
-fn of_the_throw(records: &[CycleRecord]) -> Vec<CycleRecord> {
-    let flown = |r: &&CycleRecord| r.trajectory_s >= 0.0 && r.sent != 0;
-    records.iter().filter(flown).copied().collect()
+/// A plan that is searched for meanwhile.
+fn strike() -> PlannerRequest {
+    let config = PlannerConfig::default();
+    let goal = config.goal(Task::Strike, [0.95, 0.0, 0.2]);
+    let options = PlanOptions {
+        seed: 1,
+        ..config.search
+    };
+    let request = PlanRequest::new(goal, &random_rope(1), options);
+    PlannerRequest::Plan(Box::new(request))
 }
 
 fn bits(q: &JointVector) -> [u64; 7] {
@@ -113,179 +98,66 @@ fn arrived(arm: &SimulatedArm, from: MonotonicNs) -> BTreeSet<[u32; 7]> {
     setpoints.collect()
 }
 
-/// The processes of a throw, and who watches them.
-struct Play {
-    // In the order in which a failed test takes them down.
-    operator: OperatorEnd,
-    client: RpcClient<ControllerRpc>,
-    chunks: ChunkSubscriber,
-    state: StateReader,
-    controller: Part,
-    guardian: Part,
-    planner: Part,
-    camera: Part,
-    arm: SimulatedArm,
-    bus: Bus,
-    recording: Vec<u8>,
-    _sweep: DomainSweep,
-}
-
-impl Play {
-    fn start(folder: &Path, name: &str) -> Self {
-        let arm = arm();
-        let domain = format!("identical_{name}_{}", std::process::id());
-        let sweep = DomainSweep::new(&domain);
-        let bus = Bus::join(&domain).unwrap();
-        let chunks = bus.chunk_subscriber().unwrap();
-        let config = patient(&domain, &arm);
-        let planner = PlannerConfig {
-            domain: domain.clone(),
-            ..PlannerConfig::default()
-        };
-        let controller = Part::start(folder, "rt-controller", &config);
-        let guardian = Part::start(folder, "guardian", &config);
-        let planner = Part::start(folder, "planner", &planner);
-        let camera = Part::start(folder, "camera-ingest", &CameraConfig { domain });
-        let client = open::<ControllerRpc>(&bus, &ControllerRequest::Status);
-        let operator = until("the operator's place", PATIENCE, || {
-            OperatorEnd::take(&bus).ok()
-        });
-        Self {
-            operator,
-            client,
-            chunks,
-            state: StateReader::open(&bus).unwrap(),
-            controller,
-            guardian,
-            planner,
-            camera,
-            arm,
-            bus,
-            recording: Vec::new(),
-            _sweep: sweep,
-        }
-    }
-
-    fn drain(&mut self) {
-        while let Some(chunk) = self.chunks.receive().unwrap() {
-            self.recording.extend_from_slice(&chunk);
-        }
-    }
-
-    /// Waits for the last answer to a call; `meanwhile` is done every turn.
-    fn answer(
-        &mut self,
-        pending: &Pending<ControllerRpc>,
-        mut meanwhile: impl FnMut(&mut Self),
-    ) -> ControllerEvent {
-        until("an answer", PATIENCE, || {
-            self.operator.beat();
-            self.drain();
-            meanwhile(self);
-            pending.try_next().unwrap().filter(ControllerRpc::is_last)
-        })
-    }
-
-    fn ask(&mut self, request: &ControllerRequest) -> ControllerEvent {
-        let pending = self.client.call(request).unwrap();
-        self.answer(&pending, |_| ())
-    }
-
-    /// Brings the arm up and arms it for the throw.
-    fn arm_for_a_throw(&mut self, guardian_log: &Path) {
-        assert_eq!(self.ask(&ControllerRequest::Bringup), ControllerEvent::Done);
-        // The guardian may come a moment later than the controller.
-        until("the guardian", PATIENCE, || {
-            self.ask(&ControllerRequest::Status);
-            let log = std::fs::read_to_string(guardian_log).ok()?;
-            log.contains("guarding the controller").then_some(())
-        });
-        let armed = ControllerRequest::Arm {
-            operating_mode: OperatingMode::Throw,
-            area_clear: true,
-        };
-        assert_eq!(self.ask(&armed), ControllerEvent::Done);
-    }
-
-    /// Runs the plan to its end; with `murder`, planner and camera are killed when
-    /// half of it is done.
-    fn throw(&mut self, murder: bool) {
-        let trajectory = Box::new(plan());
-        let sha256 = trajectory_hash(&trajectory);
-        let execute = ControllerRequest::Execute { trajectory, sha256 };
-        let pending = self.client.call(&execute).unwrap();
-        let mut begin = None;
-        let end = self.answer(&pending, |play| {
-            let now = play.state.get();
-            if now.mode == ControllerMode::Streaming as u8 {
-                let first = *begin.get_or_insert(now.cycle);
-                if murder && now.cycle > first + HALF_WAY {
-                    play.planner.kill();
-                    play.camera.kill();
-                }
-            }
-        });
-        assert!(matches!(end, ControllerEvent::Finished { .. }), "{end:?}");
-        let dead = self.planner.0.try_wait().unwrap().is_some();
-        assert_eq!(dead, murder, "killed while the arm moved, or never");
-    }
-
-    /// Ends controller and guardian in order; cycles and causes.
-    fn end(mut self) -> (Vec<CycleRecord>, Vec<CauseRecord>, SimulatedArm) {
-        self.controller.end();
-        self.guardian.end();
-        self.drain();
-        let (cycles, causes) = read(&self.recording);
-        (cycles, causes, self.arm)
-    }
-}
-
-/// Patient where only a busy machine would be noticed.
-fn patient(domain: &str, arm: &SimulatedArm) -> ControllerConfig {
-    let [joints, normal, rich, real] = arm.ports().reports;
-    let mut config = ControllerConfig {
-        domain: domain.to_owned(),
-        command_port: arm.ports().command,
-        report_port: joints,
-        fallback_report_port: real,
-        status_ports: [rich, normal],
-        ..ControllerConfig::default()
-    };
-    let thresholds = &mut config.thresholds;
-    thresholds.operator_timeout_ms = Some(5000.0);
-    thresholds.reply_stall_ms = Some(500.0);
-    thresholds.unanswered_max = Some(125);
-    thresholds.report_stale_ms = Some(500.0);
-    thresholds.late_cycles_max = Some(50);
-    thresholds.missed_cycles_max = Some(50);
-    config.guardian.silence_ms = 500.0;
-    config
-}
-
-/// One throw of the plan; with `murder`, planner and camera are killed half-way,
-/// both at work. Its cycles.
+/// One throw of the plan while planner and camera are at work; with `murder`, both are
+/// killed half-way. Its cycles that sent a setpoint.
 fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     let folder = folder.join(name);
     std::fs::create_dir(&folder).unwrap();
-    let mut play = Play::start(&folder, name);
-    // Both are at work: a throw is being planned, a film is being kept.
-    let planner = open::<PlannerRpc>(&play.bus, &PlannerRequest::Ping);
-    let planned = planner.call(&strike()).unwrap();
-    play.arm_for_a_throw(&folder.join("guardian.log"));
-    let camera = open::<CameraRpc>(&play.bus, &CameraRequest::Ping);
+    let file = folder.join("plan.json");
+    std::fs::write(&file, plan_json(&plan(), &random_rope(1)).to_string()).unwrap();
+    let (arm, run) = (arm(), folder.join("run"));
+    let line = format!("throw {}", file.display());
+    let mut child = on_arm(&arm, &line, &run).spawn().unwrap();
+    let domain = format!("run-{}", child.id());
+    let _sweep = DomainSweep::new(&domain);
+    let bus = Bus::join(&domain).unwrap();
+    let camera = CameraConfig {
+        domain: domain.clone(),
+    };
+    let config = PlannerConfig {
+        domain,
+        ..PlannerConfig::default()
+    };
+    let ping = CameraRequest::Ping;
+    let (mut camera, films) = daemon::<CameraRpc>(&bus, &folder, ("camera-ingest", &camera), &ping);
+    let ping = PlannerRequest::Ping;
+    let (mut planner, plans) = daemon::<PlannerRpc>(&bus, &folder, ("planner", &config), &ping);
+    let planned = plans.call(&strike()).unwrap();
+    let began = xarm_sim::clock::now();
+    let state = until("the controller", PATIENCE, || StateReader::open(&bus).ok());
+    let streams = until("the throw", PATIENCE, || {
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "ended before its throw"
+        );
+        let now = state.get();
+        let is_throw = now.operating_mode == OperatingMode::Throw as u8;
+        (is_throw && now.mode == ControllerMode::Streaming as u8).then_some(now.cycle)
+    });
     let film = CameraRequest::Record {
         frames: 10_000,
         both_eyes: true,
     };
-    let filmed = camera.call(&film).unwrap();
-    let began = xarm_sim::clock::now();
-    play.throw(murder);
+    let filmed = films.call(&film).unwrap();
+    if murder {
+        until("half of the throw", PATIENCE, || {
+            (state.get().cycle > streams + HALF_WAY).then_some(())
+        });
+        assert_eq!(state.get().mode, ControllerMode::Streaming as u8);
+        camera.kill();
+        planner.kill();
+    }
+    let (code, said) = said(child);
+    assert_eq!(code, Some(0), "{said}");
     drop((planned, filmed));
-    let (cycles, causes, arm) = play.end();
-    // Its end at rest is a stop, too.
-    let met: Vec<_> = causes.iter().map(|c| (c.fault(), c.motion_id)).collect();
-    assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
-    let flown = of_the_throw(&cycles);
+    let (cycles, causes) = recorded(&run);
+    let during = causes.iter().filter(|c| c.motion_id != 0).count();
+    assert_eq!(during, 0, "{causes:?}");
+    let is_thrown = |r: &&CycleRecord| r.trajectory_s >= 0.0 && r.sent != 0;
+    let throw = cycles.iter().rev().skip_while(|r| r.trajectory_s < 0.0);
+    let throw = throw.take_while(|r| r.trajectory_s >= 0.0);
+    let mut flown: Vec<_> = throw.filter(is_thrown).copied().collect();
+    flown.reverse();
     // One that the loop was held up with is held back, by design.
     let went = flown.iter().filter(|r| r.send_ns > 0);
     let sent: BTreeSet<_> = went.map(|r| wire_bits(&r.q_c)).collect();
@@ -294,49 +166,15 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     flown
 }
 
-fn strike() -> PlannerRequest {
-    let rope = RopeParams {
-        links: 23,
-        length_m: 0.55,
-        joint_damping_nms_per_rad: 0.02,
-        joint_stiffness_nm_per_rad: 0.3,
-        radius_m: 0.006,
-        mass_per_length_kg_per_m: 0.06,
-        lead_mass_kg: 0.06,
-        lead_radius_m: 0.025,
-        link_extra_scale: 1.0,
-    };
-    let config = PlannerConfig::default();
-    let goal = config.goal(Task::Strike, [0.95, 0.0, 0.2]);
-    let options = PlanOptions {
-        seed: 1,
-        ..config.search
-    };
-    PlannerRequest::Plan(Box::new(PlanRequest::new(goal, &rope, options)))
-}
-
-/// A client of a service, once its process answers.
-fn open<R: Rpc>(bus: &Bus, ping: &R::Request) -> RpcClient<R> {
-    let client = RpcClient::<R>::open(bus).unwrap();
-    let pending = until("a service", PATIENCE, || client.call(ping).ok());
-    until("its answer", PATIENCE, || pending.try_next().unwrap());
-    client
-}
-
 /// Each setpoint is the plan at its instant, to the bit. A machine that is late
 /// sends some for other instants than the planned ones, none for another plan.
 fn is_the_plan(flown: &[CycleRecord]) {
     let plan = plan();
     for record in flown {
-        let planned = plan.state_at(record.trajectory_s).q;
-        assert_eq!(
-            bits(&record.q_c),
-            bits(&planned),
-            "at {} s",
-            record.trajectory_s
-        );
+        let (t_s, planned) = (record.trajectory_s, plan.state_at(record.trajectory_s).q);
+        assert_eq!(bits(&record.q_c), bits(&planned), "at {t_s} s");
         // Behind its end it is followed no more.
-        let rate = f64::from(record.trajectory_s < plan.duration_s());
+        let rate = f64::from(t_s < plan.duration_s());
         assert_eq!(record.speed_override.to_bits(), rate.to_bits());
     }
     let end_s = flown.last().unwrap().trajectory_s;
@@ -345,27 +183,24 @@ fn is_the_plan(flown: &[CycleRecord]) {
 
 #[test]
 fn a_plan_runs_byte_for_byte_the_same_with_planner_and_camera_killed_half_way() {
+    let _alone = alone();
     let folder = tempfile::tempdir().unwrap();
     let quiet = throw(folder.path(), "quiet", false);
     let killed = throw(folder.path(), "killed", true);
     is_the_plan(&quiet);
     is_the_plan(&killed);
     // Cycles for one instant of the plan have the same record, byte for byte.
-    let by_instant: BTreeMap<u64, Vec<u8>> = quiet
-        .iter()
-        .map(|r| (r.trajectory_s.to_bits(), commanded(r)))
-        .collect();
+    let of = |r: &CycleRecord| (r.trajectory_s.to_bits(), commanded(r));
+    let by_instant: BTreeMap<u64, Vec<u8>> = quiet.iter().map(of).collect();
     let mut same = 0;
     for record in &killed {
         if let Some(bytes) = by_instant.get(&record.trajectory_s.to_bits()) {
-            assert_eq!(bytes, &commanded(record), "at {} s", record.trajectory_s);
+            let t_s = record.trajectory_s;
+            assert_eq!(bytes, &commanded(record), "at {t_s} s");
             same += 1;
         }
     }
-    println!(
-        "{same} cycles at the same instants of {} and {}",
-        quiet.len(),
-        killed.len()
-    );
+    let [quiet, killed] = [quiet.len(), killed.len()];
+    println!("{same} cycles at the same instants of {quiet} and {killed}");
     assert!(same > 20, "{same}: this machine is late in every cycle");
 }

@@ -1,10 +1,10 @@
 //! The processes of `wag` while one of them dies: what a running plan needs, it
 //! has; what an operator withdraws, stops.
 #![cfg(test)]
-#![allow(unreachable_pub, reason = "a test")]
 
 mod demo;
 mod identical;
+mod kill;
 mod operator;
 mod shell;
 #[path = "../support/mod.rs"]

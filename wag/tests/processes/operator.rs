@@ -1,6 +1,6 @@
 //! What the operator at the terminal can do: Ctrl-C, and the dead-man switch.
 
-use super::shell::{arm, recorded, said, wiggle};
+use super::shell::{arm, on_arm, recorded, said};
 use crate::support::{send, until};
 use rustix::process::Signal;
 use shared_types::FaultCode;
@@ -43,7 +43,7 @@ fn was_braked(arm: &SimulatedArm, child: Child, run: &Path, fault: FaultCode) {
 fn one_ctrl_c_brakes_the_arm_and_ends_everything() {
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
-    let child = wiggle(&arm, &run, "").spawn().unwrap();
+    let child = on_arm(&arm, "wiggle", &run).spawn().unwrap();
     wait_for_speed(&arm);
     send(child.id(), Signal::INT);
     was_braked(&arm, child, &run, FaultCode::OperatorStop);
@@ -53,7 +53,7 @@ fn one_ctrl_c_brakes_the_arm_and_ends_everything() {
 fn closing_standard_input_lets_go_of_the_dead_man_switch() {
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
-    let mut child = wiggle(&arm, &run, "--dead-man")
+    let mut child = on_arm(&arm, "wiggle --dead-man", &run)
         .stdin(Stdio::piped())
         .spawn()
         .unwrap();
@@ -67,7 +67,7 @@ fn a_dead_man_switch_that_is_not_held_moves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
     // Standard input is at its end from the beginning.
-    let child = wiggle(&arm, &run, "--dead-man").spawn().unwrap();
+    let child = on_arm(&arm, "wiggle --dead-man", &run).spawn().unwrap();
     let (code, said) = said(child);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("DeadManReleased"), "{said}");

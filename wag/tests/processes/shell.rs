@@ -9,7 +9,7 @@ use std::process::{Child, Command};
 use xarm_sim::{ArmConfig, SimulatedArm};
 
 /// An arm in this process, at the start pose.
-pub fn arm() -> SimulatedArm {
+pub(crate) fn arm() -> SimulatedArm {
     SimulatedArm::start(ArmConfig {
         command_port: 0,
         report_ports: [0; 4],
@@ -19,19 +19,17 @@ pub fn arm() -> SimulatedArm {
     .unwrap()
 }
 
-/// `wag wiggle` on that arm, into `run`.
-pub fn wiggle(arm: &SimulatedArm, run: &Path, more: &str) -> Command {
+/// A command such as `wiggle` on that arm, into `run`.
+pub(crate) fn on_arm(arm: &SimulatedArm, line: &str, run: &Path) -> Command {
     let [joints, _, rich, _] = arm.ports().reports;
     let ports = format!("--report-port {joints} --status-port {rich}");
     let address = format!("--arm 127.0.0.1 --command-port {}", arm.ports().command);
     let out = run.display();
-    command(&format!(
-        "wiggle --json {address} {ports} {more} --out {out}"
-    ))
+    command(&format!("{line} --json {address} {ports} --out {out}"))
 }
 
 /// What a child said, once it has ended; its exit code.
-pub fn said(child: Child) -> (Option<i32>, String) {
+pub(crate) fn said(child: Child) -> (Option<i32>, String) {
     let output = child.wait_with_output().unwrap();
     let text = format!(
         "{}{}",
@@ -42,15 +40,10 @@ pub fn said(child: Child) -> (Option<i32>, String) {
 }
 
 /// Cycles and causes of a run's recording.
-pub fn recorded(run: &Path) -> (Vec<CycleRecord>, Vec<CauseRecord>) {
+pub(crate) fn recorded(run: &Path) -> (Vec<CycleRecord>, Vec<CauseRecord>) {
     let recording = run_log::Run::open(run).unwrap().recording().unwrap();
-    read(recording.bytes())
-}
-
-/// Cycles and causes of a recording.
-pub fn read(bytes: &[u8]) -> (Vec<CycleRecord>, Vec<CauseRecord>) {
     let (mut cycles, mut causes) = (Vec::new(), Vec::new());
-    for read in LogReader::open(bytes).unwrap() {
+    for read in LogReader::open(recording.bytes()).unwrap() {
         match read {
             Read::Item(Item::Cycle(cycle)) => cycles.push(cycle.record),
             Read::Item(Item::Cause(cause)) => causes.push(*cause),

@@ -1,17 +1,27 @@
 //! `wag` as its users start it, a simulated arm to start it against, and what it recorded.
 #![allow(dead_code, reason = "each test uses a part")]
 
-use arm_model::Limits;
+use arm_model::{JointTrajectory, Limits};
+use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use rt_controller::control::{ControlState, Thresholds};
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use run_log::{Channel, McapFile, files};
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
+use serde_json::{Value, json};
+use shared_types::plan::trajectory_hash_hex;
+use shared_types::{RopeParams, StereoCamera};
 use std::fs;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+/// For tests that want the whole machine, in real time: one at a time.
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    static MACHINE: Mutex<()> = Mutex::new(());
+    MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A command that hears nothing and whose words are kept; its line is split at spaces.
 pub(crate) fn command(line: &str) -> Command {
@@ -57,6 +67,67 @@ pub(crate) fn refused_in(folder: &Path, code: i32, line: &str) -> String {
     let said = said(&output);
     assert_eq!(output.status.code(), Some(code), "wag {line}: {said}");
     said
+}
+
+/// Runs commands that must fail with an exit code, one a line, and leave nothing behind;
+/// behind `=>` are the words that must be in the one clear line of the error.
+pub(crate) fn are_refused_in(folder: &Path, code: i32, cases: &str) {
+    let count = || fs::read_dir(folder).unwrap().count();
+    let before = count();
+    for case in cases.lines().filter(|case| !case.trim().is_empty()) {
+        let (line, words) = case.split_once("=>").unwrap();
+        let said = refused_in(folder, code, line);
+        for word in words.split('|').map(str::trim) {
+            assert!(
+                said.contains(word),
+                "wag {line}: `{word}` is not in: {said}"
+            );
+        }
+        for word in ["panicked", ".tmp"] {
+            assert!(!said.contains(word), "wag {line}: {said}");
+        }
+        let errors = said.lines().filter(|l| l.starts_with("error: ")).count();
+        assert_eq!(errors.max(1), 1, "wag {line}: {said}");
+        assert_eq!(count(), before, "wag {line} left something");
+    }
+}
+
+/// The calibration of a camera, as `camera.toml` of a folder.
+pub(crate) fn calibrate(folder: &Path, camera: &StereoCamera, mode: VideoMode) -> PathBuf {
+    let (path, conf) = (folder.join("camera.toml"), Path::new("camera.conf"));
+    write_factory_conf(&folder.join(conf), camera, mode).unwrap();
+    write_camera_toml(&path, camera, mode, conf).unwrap();
+    path
+}
+
+/// A plan of a motion as `plan.json` contains it.
+pub(crate) fn plan_json(motion: &JointTrajectory, rope: &RopeParams) -> Value {
+    json!({
+        "version": "0", "seed": 5, "task": "strike", "target_m": [0.9, 0.1, 0.0],
+        "rope": rope, "trajectory": motion, "predicted_error_m": 0.0125,
+        "predicted_time_s": 0.9, "fitness": -1.0, "simulations": 1, "resampled": 0,
+        "margins": [], "trajectory_sha256": trajectory_hash_hex(motion),
+    })
+}
+
+/// A file or folder of the data beside the checkout; `None`, said aloud, where it is not
+/// there.
+pub(crate) fn shared(path: &str) -> Option<PathBuf> {
+    let shared = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared"));
+    let path = shared.join(path);
+    if !path.exists() {
+        println!("skipped: {} not found", path.display());
+    }
+    path.exists().then_some(path)
+}
+
+/// Files of a domain in shared memory.
+pub(crate) fn shared_memory_of(domain: &str) -> Vec<String> {
+    let files = fs::read_dir("/dev/shm").unwrap().flatten();
+    files
+        .map(|f| f.file_name().to_string_lossy().into_owned())
+        .filter(|name| name.starts_with(&format!("wag_{domain}_")))
+        .collect()
 }
 
 /// Waits for something that comes within a time.
@@ -127,17 +198,15 @@ pub(crate) fn record(run: &Path, cycles: impl IntoIterator<Item = RecordedCycle>
     file.finish().unwrap();
 }
 
-/// `wag rig` on free ports; it ends with the test.
-pub(crate) struct Rig {
-    process: Child,
-    /// What it printed as JSON, which is all it ever prints there.
-    pub(crate) told: Value,
-}
+/// A process that is killed when dropped.
+#[derive(Debug)]
+pub(crate) struct Running(pub(crate) Child);
 
-impl Rig {
-    pub(crate) fn start(more: &str) -> Self {
-        let line = format!("rig --json --command-port 0 --report-ports 0,0,0,0 {more}");
-        let mut process = command(&line).stderr(Stdio::inherit()).spawn().unwrap();
+impl Running {
+    /// Starts a command that prints its JSON object and goes on; that object.
+    pub(crate) fn start(line: &str) -> (Self, Value) {
+        let mut started = command(&format!("{line} --json"));
+        let mut process = started.stderr(Stdio::inherit()).spawn().unwrap();
         // The object ends with a brace at the begin of a line.
         let (mut text, mut byte) = (Vec::new(), [0]);
         let stdout = process.stdout.as_mut().unwrap();
@@ -145,10 +214,43 @@ impl Rig {
             stdout.read_exact(&mut byte).unwrap();
             text.push(byte[0]);
         }
-        Self {
-            process,
-            told: serde_json::from_slice(&text).unwrap(),
+        (Self(process), serde_json::from_slice(&text).unwrap())
+    }
+
+    /// Ends it in order; returns its exit code and what else it printed.
+    pub(crate) fn end(&mut self, signal: Signal) -> (Option<i32>, String) {
+        send(self.0.id(), signal);
+        let mut rest = String::new();
+        if let Some(stdout) = &mut self.0.stdout {
+            stdout.read_to_string(&mut rest).unwrap();
         }
+        (self.0.wait().unwrap().code(), rest)
+    }
+
+    pub(crate) fn kill(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// `wag rig` on free ports; it ends with the test.
+pub(crate) struct Rig {
+    pub(crate) process: Running,
+    /// What it printed as JSON, which is all it ever prints there.
+    pub(crate) told: Value,
+}
+
+impl Rig {
+    pub(crate) fn start(more: &str) -> Self {
+        let line = format!("rig --command-port 0 --report-ports 0,0,0,0 {more}");
+        let (process, told) = Running::start(&line);
+        Self { process, told }
     }
 
     /// Command port, then those of the four reports.
@@ -167,21 +269,5 @@ impl Rig {
             .current_dir(run.parent().unwrap())
             .spawn()
             .unwrap()
-    }
-
-    /// Ends it as Ctrl-C does; returns its exit code and what else it printed.
-    pub(crate) fn end(mut self) -> (Option<i32>, String) {
-        send(self.process.id(), Signal::INT);
-        let mut rest = String::new();
-        let stdout = self.process.stdout.as_mut().unwrap();
-        stdout.read_to_string(&mut rest).unwrap();
-        (self.process.wait().unwrap().code(), rest)
-    }
-}
-
-impl Drop for Rig {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }

@@ -47,13 +47,13 @@ struct Report {
 pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     let extent = Extent::of(args.quick);
     let workload = Workload::new(args.seed).or_failed()?;
-    let stage = Stage::begin("kernels", quiet);
+    let stage = Stage::begin("kernels");
     let kernels = kernels::measure(&workload, extent, |row| stage.say(row)).or_failed()?;
     stage.done(&format!("{} measured", kernels.len()));
-    let stage = Stage::begin("jobs", quiet);
+    let stage = Stage::begin("jobs");
     let jobs = jobs::measure(&workload, extent, |row| stage.say(row)).or_failed()?;
     stage.done(&format!("{} measured", jobs.len()));
-    let stage = Stage::begin("scaling", quiet);
+    let stage = Stage::begin("scaling");
     let links = scaling::over_links(&workload, extent).or_failed()?;
     let candidates = scaling::over_candidates(&workload, extent).or_failed()?;
     stage.done(&format!(

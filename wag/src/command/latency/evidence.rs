@@ -1,11 +1,11 @@
-//! What latencies are found from, and what is found.
+//! What latencies are found from.
 
 use anyhow::Context;
-use arm_model::ArmResponse;
 use arm_model::response::Excitation;
-use planner::arm_response::delay::TargetDelay;
+use planner::arm_response::{Recording, Sample, Setpoint};
 use rt_controller::bridge::Latencies;
 use run_log::{Cycles, Run, files};
+use shared_types::MonotonicNs;
 use std::path::{Path, PathBuf};
 
 /// File written into the run folder.
@@ -39,26 +39,46 @@ impl Evidence {
             camera_offset_s: None,
         }
     }
-}
 
-/// Everything that was found.
-pub(super) struct Findings {
-    pub latencies: Latencies,
-    pub target_delay: Option<TargetDelay>,
-    pub response: ArmResponse,
-    pub camera_offset_s: Option<f64>,
-}
+    /// A recorded run as evidence.
+    ///
+    /// # Errors
+    /// The run holds no recording, or a file of it is damaged.
+    pub(super) fn recorded(run: &Path) -> anyhow::Result<Self> {
+        let cycles = Run::open(run)?.recording()?.cycles()?;
+        Ok(Self {
+            camera_offset_s: camera_offset_s(&run.join(files::ROPE))?,
+            ..Self::of(format!("run {}", run.display()), run, cycles)
+        })
+    }
 
-/// A recorded run as evidence.
-///
-/// # Errors
-/// The run holds no recording, or a file of it is damaged.
-pub(super) fn recorded(run: &Path) -> anyhow::Result<Evidence> {
-    let cycles = Run::open(run)?.recording()?.cycles()?;
-    Ok(Evidence {
-        camera_offset_s: camera_offset_s(&run.join(files::ROPE))?,
-        ..Evidence::of(format!("run {}", run.display()), run, cycles)
-    })
+    /// Setpoints when they were sent and joints when they were measured, both in
+    /// seconds since the first cycle.
+    pub(super) fn recording(&self, latencies: &Latencies) -> Recording {
+        let cycles = &self.run.cycles;
+        let epoch = MonotonicNs(cycles.first().map_or(0, |c| c.deadline_ns));
+        let sent = cycles.iter().filter(|c| c.sent != 0);
+        let mut setpoints: Vec<Setpoint> = sent
+            .map(|c| Setpoint {
+                sent_s: MonotonicNs(c.deadline_ns).since_s(epoch)
+                    + 1e-9 * (f64::from(c.wake_late_ns) + f64::from(c.send_ns)),
+                q: c.q_c,
+            })
+            .collect();
+        setpoints.sort_by(|a, b| a.sent_s.total_cmp(&b.sent_s));
+        setpoints.dedup_by(|next, kept| next.sent_s <= kept.sent_s);
+        let first_s = setpoints.first().map_or(0.0, |s| s.sent_s);
+        let samples = self.run.reports().into_iter().map(|r| Sample {
+            at_s: MonotonicNs(r.stamp_ns).since_s(epoch),
+            q: r.q,
+            q_target: self.has_targets.then_some(r.q_target),
+        });
+        Recording {
+            setpoints,
+            samples: samples.filter(|s| s.at_s >= first_s).collect(),
+            round_trip_s: 1e-6 * latencies.report().reply.p50_us,
+        }
+    }
 }
 
 /// The offset that `wag identify` and `wag demo` leave in their result (s).
@@ -68,8 +88,6 @@ fn camera_offset_s(path: &Path) -> anyhow::Result<Option<f64>> {
     }
     let table: toml::Table = toml::from_str(&files::read_text(path)?)
         .with_context(|| format!("`{}`", path.display()))?;
-    Ok(table
-        .get("fit")
-        .and_then(|fit| fit.get("time_offset_s"))
-        .and_then(toml::Value::as_float))
+    let offset = table.get("fit").and_then(|fit| fit.get("time_offset_s"));
+    Ok(offset.and_then(toml::Value::as_float))
 }

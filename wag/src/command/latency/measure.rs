@@ -6,25 +6,20 @@ use crate::command::area::require_clear_area;
 use crate::command::on_arm::on_arm;
 use crate::config;
 use crate::pipeline;
-use anyhow::anyhow;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage};
+use cli_output::{OrInput, Outcome, Stage};
 use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
+use std::net::IpAddr;
 use std::time::Duration;
 
 /// Rest before and after each sweep, so that every joint starts and ends at rest.
 const REST: Duration = Duration::from_millis(600);
 
-/// What a measurement would do.
-struct Intent {
-    limits: Limits,
-    excitation: Excitation,
-    /// Joints (1-based) and their motions.
-    sweeps: Vec<(usize, JointTrajectory)>,
-}
+/// Limits, the shape of the motion, and the sweeps asked for with their joints (1-based).
+type Intent = (Limits, Excitation, Vec<(usize, JointTrajectory)>);
 
 fn intent(args: &LatencyArgs) -> Outcome<Intent> {
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
@@ -33,24 +28,27 @@ fn intent(args: &LatencyArgs) -> Outcome<Intent> {
         None => Excitation::default(),
     };
     excitation.seed = args.seed.unwrap_or(excitation.seed);
-    let sweeps = sweeps(args, &excitation, &limits)?;
-    Ok(Intent {
-        limits,
-        excitation,
-        sweeps,
-    })
+    let joints: Vec<usize> = match args.joints.as_slice() {
+        [] => (1..=JOINTS).collect(),
+        named => named.iter().map(|j| usize::from(*j)).collect(),
+    };
+    let pole = config::cell().or_input()?.pole;
+    let swept = |joint: usize| {
+        let swept = sweep(&excitation, &limits, &pole, joint - 1).or_input()?;
+        Ok((joint, swept))
+    };
+    let sweeps = joints.into_iter().map(swept).collect::<Outcome<_>>()?;
+    Ok((limits, excitation, sweeps))
 }
 
 /// Checks the motions and connects to nothing.
-pub(super) fn dry_run(args: &LatencyArgs, quiet: bool) -> Outcome<Value> {
-    let sweeps = intent(args)?.sweeps;
+pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
+    let (_, _, sweeps) = intent(args)?;
     let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
-    if !quiet {
-        println!(
-            "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
-            sweeps.len()
-        );
-    }
+    println!(
+        "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
+        sweeps.len()
+    );
     Ok(json!({
         "ok": true, "command": "latency", "dry_run": true, "sweeps": sweeps.len(), "duration_s": moving_s,
     }))
@@ -59,20 +57,13 @@ pub(super) fn dry_run(args: &LatencyArgs, quiet: bool) -> Outcome<Value> {
 /// Moves the arm; what `conclude` finds in what it did is the run's summary.
 pub(super) fn measure(
     args: &LatencyArgs,
-    quiet: bool,
+    address: IpAddr,
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
-    let Some(address) = args.arm.address else {
-        return Err(Failure::input(anyhow!("name the arm with --arm ADDR")));
-    };
-    let Intent {
-        limits,
-        excitation,
-        sweeps,
-    } = intent(args)?;
-    require_clear_area(&args.arm, "MEASURE", quiet)?;
+    let (limits, excitation, sweeps) = intent(args)?;
+    require_clear_area(&args.arm, "MEASURE")?;
     let Some((_, first)) = sweeps.first() else {
-        return Err(Failure::input(anyhow!("name a joint with --joints")));
+        return Err(bad_input!("name a joint with --joints"));
     };
     let place = (args.out.as_deref(), "latency");
     let (_, found) = on_arm(
@@ -80,13 +71,12 @@ pub(super) fn measure(
         &limits,
         first.start(),
         place,
-        quiet,
         |session, link| {
-            let stage = Stage::begin("sweep", quiet);
+            let stage = Stage::begin("sweep");
             for (place, (joint, sweep)) in sweeps.iter().enumerate() {
                 stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
                 session.idle(REST)?;
-                pipeline::execute(link, sweep)?.finish(session)?;
+                pipeline::execute(session, link, sweep)?;
             }
             session.idle(REST)?;
             stage.done(&format!("{} joints swept", sweeps.len()));
@@ -103,24 +93,4 @@ pub(super) fn measure(
         },
     )?;
     Ok(found)
-}
-
-/// The sweeps asked for, with their joints (1-based).
-fn sweeps(
-    args: &LatencyArgs,
-    excitation: &Excitation,
-    limits: &Limits,
-) -> Outcome<Vec<(usize, JointTrajectory)>> {
-    let joints: Vec<usize> = match args.joints.as_slice() {
-        [] => (1..=JOINTS).collect(),
-        named => named.iter().map(|j| usize::from(*j)).collect(),
-    };
-    let pole = config::cell().or_input()?.pole;
-    joints
-        .into_iter()
-        .map(|joint| {
-            let swept = sweep(excitation, limits, &pole, joint - 1).or_input()?;
-            Ok((joint, swept))
-        })
-        .collect()
 }

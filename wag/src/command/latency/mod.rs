@@ -11,66 +11,59 @@ mod show;
 pub use show::loop_table;
 
 use crate::cli::LatencyArgs;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use arm_model::{ArmResponse, JOINTS};
-use cli_output::{Failure, OrInput, Outcome, Stage};
-use evidence::{Evidence, Findings, RESPONSE_FILE, recorded};
+use cli_output::{OrInput, Outcome, Stage};
+use evidence::{Evidence, RESPONSE_FILE};
 use planner::arm_response::delay::command_to_target;
-use planner::arm_response::{Recording, Sample, Setpoint, identify};
+use planner::arm_response::identify;
 use rt_controller::bridge::Latencies;
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::MonotonicNs;
-use std::path::PathBuf;
+use show::Findings;
 
-pub fn run(args: &LatencyArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let conclude = |evidence: &Evidence| conclude(args, evidence, quiet);
+pub fn run(args: &LatencyArgs) -> Outcome<Option<Value>> {
+    let conclude = |evidence: &Evidence| conclude(args, evidence);
     let value = match (&args.arm.address, &args.run) {
-        (_, None) if args.arm.dry_run => return measure::dry_run(args, quiet).map(Some),
-        (Some(_), None) => measure::measure(args, quiet, conclude)?,
-        (None, Some(run)) => conclude(&recorded(run).or_input()?).or_failed()?,
+        (_, None) if args.arm.dry_run => return measure::dry_run(args).map(Some),
+        (Some(address), None) => measure::measure(args, *address, conclude)?,
+        (None, Some(run)) => conclude(&Evidence::recorded(run).or_input()?).or_failed()?,
         _ => {
-            return Err(Failure::input(anyhow!(
+            return Err(bad_input!(
                 "say what to measure: --arm ADDR moves an arm (start `wag rig` for a simulated one), --run RUN reads a recorded run"
-            )));
+            ));
         }
     };
     if value["joints_measured"] == json!([]) {
-        return Err(Failure::failed(anyhow!(
+        return Err(failed!(
             "no joint moved in a way that shows how it follows, so nothing is written; measure with `wag latency --arm ADDR`"
-        )));
+        ));
     }
     Ok(Some(value))
 }
 
 /// Examines what was recorded, writes the response and shows it; returns what was found.
-fn conclude(args: &LatencyArgs, evidence: &Evidence, quiet: bool) -> anyhow::Result<Value> {
-    let findings = examine(evidence, quiet)?;
-    let known = findings.response.joints.iter().any(|j| j.lag().is_some());
-    let path = response_path(args, evidence).filter(|_| known);
-    if let Some(path) = &path {
+fn conclude(args: &LatencyArgs, evidence: &Evidence) -> anyhow::Result<Value> {
+    let mut findings = examine(evidence)?;
+    if findings.joints().next().is_some() {
+        // A file that was named, or the run folder's own, which is never replaced.
+        let own = || Some(evidence.folder.join(RESPONSE_FILE)).filter(|path| !path.exists());
+        findings.path = args.response.clone().or_else(own);
+    }
+    if let Some(path) = &findings.path {
         files::write_arm_response(path, &findings.response)?;
     }
-    if !quiet {
-        show::print(&findings, evidence, path.as_deref());
-    }
-    Ok(show::json(&findings, evidence, path.as_deref()))
+    findings.print();
+    Ok(findings.json())
 }
 
-/// Where the response goes: a file that was named, or the run folder's own, which is
-/// never replaced.
-fn response_path(args: &LatencyArgs, evidence: &Evidence) -> Option<PathBuf> {
-    let own = || Some(evidence.folder.join(RESPONSE_FILE)).filter(|path| !path.exists());
-    args.response.clone().or_else(own)
-}
-
-fn examine(evidence: &Evidence, quiet: bool) -> anyhow::Result<Findings> {
-    let stage = Stage::begin("identify", quiet);
+fn examine(evidence: &Evidence) -> anyhow::Result<Findings<'_>> {
+    let stage = Stage::begin("identify");
     let mut latencies = Latencies::new()?;
     for cycle in &evidence.run.cycles {
         latencies.record(cycle);
     }
-    let recording = recording(evidence, &latencies);
+    let recording = evidence.recording(&latencies);
     let joints = identify(&recording, |joint| {
         stage.say(format!("joint {} of {JOINTS}", joint + 1));
     })
@@ -79,9 +72,8 @@ fn examine(evidence: &Evidence, quiet: bool) -> anyhow::Result<Findings> {
         .has_targets
         .then(|| command_to_target(&recording))
         .flatten();
-    let known = joints.iter().filter(|j| j.lag().is_some()).count();
-    stage.done(&format!("{known} of {JOINTS} joints measured"));
-    Ok(Findings {
+    let findings = Findings {
+        evidence,
         latencies,
         target_delay,
         response: ArmResponse {
@@ -91,34 +83,9 @@ fn examine(evidence: &Evidence, quiet: bool) -> anyhow::Result<Findings> {
             excitation: evidence.excitation,
             joints,
         },
-        camera_offset_s: evidence.camera_offset_s,
-    })
-}
-
-/// Setpoints when they were sent and joints when they were measured, both in
-/// seconds since the first cycle.
-fn recording(evidence: &Evidence, latencies: &Latencies) -> Recording {
-    let cycles = &evidence.run.cycles;
-    let epoch = MonotonicNs(cycles.first().map_or(0, |c| c.deadline_ns));
-    let sent = cycles.iter().filter(|c| c.sent != 0);
-    let mut setpoints: Vec<Setpoint> = sent
-        .map(|c| Setpoint {
-            sent_s: MonotonicNs(c.deadline_ns).since_s(epoch)
-                + 1e-9 * (f64::from(c.wake_late_ns) + f64::from(c.send_ns)),
-            q: c.q_c,
-        })
-        .collect();
-    setpoints.sort_by(|a, b| a.sent_s.total_cmp(&b.sent_s));
-    setpoints.dedup_by(|next, kept| next.sent_s <= kept.sent_s);
-    let first_s = setpoints.first().map_or(0.0, |s| s.sent_s);
-    let samples = evidence.run.reports().into_iter().map(|r| Sample {
-        at_s: MonotonicNs(r.stamp_ns).since_s(epoch),
-        q: r.q,
-        q_target: evidence.has_targets.then_some(r.q_target),
-    });
-    Recording {
-        setpoints,
-        samples: samples.filter(|s| s.at_s >= first_s).collect(),
-        round_trip_s: 1e-6 * latencies.report().reply.p50_us,
-    }
+        path: None,
+    };
+    let known = findings.joints().count();
+    stage.done(&format!("{known} of {JOINTS} joints measured"));
+    Ok(findings)
 }

@@ -1,0 +1,270 @@
+//! What the demo makes of the film of the wiggle: the rope, a plan for it, and a move
+//! that brings it to rest.
+
+use super::Demo;
+use super::summary::{Film, Settled, Tracked};
+use crate::command::network::warning_of_pole;
+use crate::command::plan::describe;
+use crate::command::unconfirmed::confirm;
+use crate::pipeline::execute;
+use anyhow::{anyhow, bail, ensure};
+use arm_model::{JointTrajectory, JointVector};
+use cli_output::Stage;
+use planner::plan::{PlanOptions, PlanRequest, warnings};
+use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
+use planner::settle::SettleRequest;
+use rt_controller::os::now_ns;
+use run_log::files;
+use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
+use shared_types::{MonotonicNs, Plan, RopeEstimate, Task};
+use std::time::Duration;
+
+/// The joint that wiggles (0-based).
+const WIGGLE_JOINT: usize = 5;
+/// Joint reports this much before and after a film are given along (ns).
+const JOINT_MARGIN_NS: u64 = 300_000_000;
+/// Time allowed for an identification or a plan (s).
+const PLANNING_S: f64 = 300.0;
+/// Keypoints per frame.
+const KEYPOINTS: u32 = 24;
+/// Time allowed for planning before the settling move begins (s); longer after a plan
+/// that came too late. The swing decays meanwhile: to wait spoils nothing.
+const SETTLING_S: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// Time after which the answer about a settling move is not waited for any longer (s).
+const SETTLED_S: f64 = 60.0;
+/// From the call to the first setpoint, on average (s): half a turn of the
+/// controller's bridge and half a cycle.
+const HANDOVER_S: f64 = 0.005;
+
+impl Demo<'_> {
+    /// Asks the planner; its last event, unless that is a failure.
+    fn ask_planner(
+        &mut self,
+        request: &PlannerRequest,
+        within_s: f64,
+        stage: &Stage,
+    ) -> anyhow::Result<PlannerEvent> {
+        let event = self
+            .session
+            .ask(&self.planner, request, within_s, |event| {
+                if let PlannerEvent::Progress(p) = event {
+                    stage.progress(p);
+                }
+            })?;
+        match event {
+            PlannerEvent::Failed { message } => bail!(message),
+            event => Ok(event),
+        }
+    }
+
+    /// Measured joints around a film.
+    fn film_joints(&mut self, film: &Film) -> anyhow::Result<Vec<(u64, JointVector)>> {
+        self.session.received.drain()?;
+        let end_ns = film.first_stamp_ns + u64::from(film.frames + film.dropped) * 16_800_000;
+        let joints = self.session.received.cycles.joints_between(
+            film.first_stamp_ns.saturating_sub(JOINT_MARGIN_NS),
+            end_ns + JOINT_MARGIN_NS,
+        );
+        ensure!(
+            joints.len() >= 50,
+            "only {} joint reports came during the film; check the arm's report port",
+            joints.len()
+        );
+        Ok(joints)
+    }
+
+    /// Tracks the rope through the film; keypoints go out over shared memory.
+    pub fn track(
+        &mut self,
+        film: &Film,
+        accept_unconfirmed: bool,
+    ) -> anyhow::Result<RopeAppearance> {
+        let stage = Stage::begin("track");
+        let overlay = self.folder.file("wiggle.png").display().to_string();
+        let joints = self.film_joints(film)?;
+        self.session.received.keypoints.clear();
+        let request = CameraRequest::Track {
+            camera: Box::new(self.calibration.clone()),
+            joints,
+            pole: self.settings.cell.pole,
+            keypoints: KEYPOINTS,
+            overlay: Some(overlay.clone()),
+        };
+        let tracked = match self.ask_camera(&request, 60.0, &stage)? {
+            CameraEvent::Tracked {
+                lost_fraction,
+                appearance,
+                ms_per_frame,
+                doubts,
+                ..
+            } => Tracked {
+                lost_fraction,
+                appearance,
+                ms_per_frame,
+                doubts,
+            },
+            other => bail!("the camera process answered with {other:?}"),
+        };
+        self.record.stages.track_s = stage.done(&format!(
+            "{:.1} ms a frame, rope lost in {:.1} %",
+            tracked.ms_per_frame,
+            100.0 * tracked.lost_fraction
+        ));
+        let doubts = tracked.doubts.clone();
+        let appearance = tracked.appearance;
+        self.record.track = Some(tracked);
+        let look = format!("look at `{overlay}`");
+        confirm(&doubts, accept_unconfirmed, &look)?;
+        Ok(appearance)
+    }
+
+    /// Fits the rope's parameters to the published keypoints.
+    pub fn identify(
+        &mut self,
+        film: &Film,
+        appearance: RopeAppearance,
+    ) -> anyhow::Result<RopeEstimate> {
+        let (options, pole) = (self.settings.identify, self.settings.cell.pole);
+        if let Some(warning) = warning_of_pole(options.method, &pole) {
+            self.warn(warning);
+        }
+        let stage = Stage::begin("identify");
+        let request = PlannerRequest::Identify(Box::new(IdentifyRequest {
+            first_stamp_ns: film.first_stamp_ns,
+            frames: film.frames,
+            camera: self.calibration.clone(),
+            joints: self.film_joints(film)?,
+            pole,
+            appearance: appearance.into(),
+            options,
+        }));
+        let rope = match self.ask_planner(&request, PLANNING_S, &stage)? {
+            PlannerEvent::Identified(estimate) => *estimate,
+            other => bail!("the planner process answered with {other:?}"),
+        };
+        let tracked = self.record.track.as_ref();
+        let doubts = tracked.map_or(&[][..], |tracked| &tracked.doubts);
+        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope, doubts)?;
+        self.record.stages.identify_s = stage.done(&format!(
+            "length {:.3} m, residual {:.2} px, {} simulations",
+            rope.params.length_m, rope.residual_px, rope.simulations
+        ));
+        self.record.identified = Some(rope.clone());
+        Ok(rope)
+    }
+
+    /// Plans the throw with what was identified.
+    pub fn plan(&mut self, rope: &RopeEstimate) -> anyhow::Result<Plan> {
+        let stage = Stage::begin("plan");
+        let options = PlanOptions {
+            seed: self.record.seed,
+            ..self.settings.search
+        };
+        let goal = self.settings.goal(Task::Strike, self.record.target_m);
+        let request = PlannerRequest::Plan(Box::new(PlanRequest {
+            limits: self.limits.clone(),
+            cell: self.settings.cell,
+            ..PlanRequest::new(goal, &rope.params, options)
+        }));
+        let plan = match self.ask_planner(&request, PLANNING_S, &stage)? {
+            PlannerEvent::Planned(plan) => *plan,
+            other => bail!("the planner process answered with {other:?}"),
+        };
+        files::write_json(&self.folder.file(files::PLAN), &plan)?;
+        let csv = self.folder.file("plan.csv");
+        files::write_trajectory(&csv, &plan.trajectory, self.limits.period_s())?;
+        self.record.stages.plan_s = stage.done(&describe(&plan));
+        for warning in warnings(&plan) {
+            self.warn(&warning);
+        }
+        self.record.set_plan(&plan);
+        Ok(plan)
+    }
+
+    /// Turns towards the target so that the rope comes to rest: by a move planned with the
+    /// identified rope and begun at the instant it was planned for.
+    pub fn settle(
+        &mut self,
+        rope: &RopeEstimate,
+        film: &Film,
+        wiggle: &JointTrajectory,
+        plan: &Plan,
+    ) -> anyhow::Result<()> {
+        let stage = Stage::begin("settle");
+        let span = [film.motion.start_ns, film.motion.end_ns];
+        let cycles = &self.session.received.cycles;
+        self.record.arm_lag_s = cycles.joint_lag_s(WIGGLE_JOINT, span);
+        let mut settled = None;
+        for planning_s in SETTLING_S {
+            let begin = MonotonicNs(now_ns()).plus_s(planning_s);
+            settled = self.settle_at(begin, (rope, film, wiggle, plan), &stage)?;
+            if settled.is_some() {
+                break;
+            }
+        }
+        let settled = settled.ok_or_else(|| {
+            anyhow!(
+                "planning a swing-damping move takes too long on this machine; stop other programs"
+            )
+        })?;
+        self.wait_still(&stage)?;
+        self.record.settle = Some(settled);
+        self.record.stages.settle_s = stage.done(&format!(
+            "swing {:.1} cm -> {:.1} cm",
+            100.0 * settled.plain_residual_m,
+            100.0 * settled.residual_m
+        ));
+        Ok(())
+    }
+
+    /// Plans a settling move for the instant `begin` and makes it; `None` when the plan
+    /// came too late.
+    fn settle_at(
+        &mut self,
+        begin: MonotonicNs,
+        (rope, film, wiggle, plan): (&RopeEstimate, &Film, &JointTrajectory, &Plan),
+        stage: &Stage,
+    ) -> anyhow::Result<Option<Settled>> {
+        self.session.received.drain()?;
+        let cycles = &self.session.received.cycles;
+        let joints = cycles.joints_between(film.first_stamp_ns, u64::MAX);
+        let start = begin.plus_s(self.record.arm_lag_s.unwrap_or_default());
+        // The rope hangs still at the first joint sample.
+        let epoch = joints.first().map_or(start, |(ns, _)| MonotonicNs(*ns));
+        let (times_s, q) = joints
+            .iter()
+            .map(|(stamp_ns, q)| (MonotonicNs(*stamp_ns).since_s(epoch), *q))
+            .unzip();
+        let request = PlannerRequest::Settle(Box::new(SettleRequest {
+            rope: rope.params,
+            times_s,
+            q,
+            start_s: start.since_s(epoch),
+            start_q: wiggle.end(),
+            end_q: plan.trajectory.start(),
+            limits: self.limits.clone(),
+            cell: self.settings.cell,
+            config: self.settings.settle.clone(),
+        }));
+        stage.say("planning");
+        let found = match self.ask_planner(&request, SETTLED_S, stage)? {
+            PlannerEvent::Settled(found) => found,
+            other => bail!("the planner process answered with {other:?}"),
+        };
+        let swing_cm = 100.0 * found.plain_residual_m;
+        stage.say(format!("damping {swing_cm:.1} cm of swing"));
+        let left_s = || begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S;
+        if left_s() < 0.0 {
+            return Ok(None);
+        }
+        let early = Duration::from_secs_f64((left_s() - 0.03).max(0.0));
+        self.session.idle(early)?;
+        std::thread::sleep(Duration::from_secs_f64(left_s().max(0.0)));
+        let span = execute(self.session, &self.arm, &found.trajectory)?;
+        Ok(Some(Settled {
+            plain_residual_m: found.plain_residual_m,
+            residual_m: found.residual_m,
+            late_s: MonotonicNs(span.start_ns).since_s(begin),
+        }))
+    }
+}

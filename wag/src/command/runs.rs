@@ -1,0 +1,145 @@
+//! What reads a recorded run: `wag replay`, `wag explain`, `wag export`, `wag report`.
+
+use crate::cli::{ExplainArgs, ExportCommand, ReplayArgs, ReportArgs};
+use crate::config;
+use anyhow::Context;
+use cli_output::{OrInput, Outcome, output};
+use rt_controller::recording::{CORE_VERSION, Gap, Replay};
+use run_log::{CYCLES_TABLE, Run, files};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Steps the controller's core over a run again and compares every record, bit by bit.
+pub fn replay(args: &ReplayArgs) -> Outcome<Option<Value>> {
+    let recording = Run::open(&args.run).and_then(|run| run.recording());
+    let recording = recording.or_input()?;
+    let found = rt_controller::recording::replay(recording.bytes(), args.from_cycle)
+        .with_context(|| format!("`{}`", args.run.display()))
+        .or_input()?;
+    // The end of a controller at rest is recorded as a stop, but is none.
+    let stops = recording.log().map_or(found.causes, |log| {
+        let stops = run_log::explain(&log).stops;
+        let compared = stops.iter().filter(|s| s.cycle >= found.first_cycle);
+        compared.count() as u64
+    });
+    print_replay(&found, stops);
+    if !found.is_exact() {
+        return Err(failed!(verdict(&found)));
+    }
+    Ok(Some(
+        json!({ "ok": true, "command": "replay", "run": args.run, "stops": stops, "replay": found }),
+    ))
+}
+
+/// What is wrong, in one line.
+fn verdict(found: &Replay) -> String {
+    let difference = found.first_difference.as_ref().map(|first| {
+        format!(
+            "{} bytes differ, first in cycle {}, field `{}`: recorded {}, replayed {}",
+            found.differing_bytes,
+            first.cycle,
+            first.unequal.field,
+            first.unequal.recorded,
+            first.unequal.replayed
+        )
+    });
+    let damaged = found.gaps.iter().find(|g| g.damaged);
+    let damage = damaged.map(|g| format!("the recording is damaged: {}", g.reason));
+    let both: Vec<String> = [difference, damage].into_iter().flatten().collect();
+    both.join("; ")
+}
+
+fn print_replay(found: &Replay, stops: u64) {
+    let verdict = match found.differing_bytes {
+        0 => "identical".to_owned(),
+        bytes => format!("{bytes} bytes differ"),
+    };
+    println!(
+        "{verdict:<16} {} cycles ({} to {}), with {} whole states and {stops} stops",
+        found.cycles, found.first_cycle, found.last_cycle, found.states,
+    );
+    for gap in &found.gaps {
+        println!("gap              {}", describe(gap));
+    }
+    if found.skipped > 0 {
+        println!(
+            "not compared     {} cycles that follow a gap, up to the next keyframe",
+            found.skipped
+        );
+    }
+    if found.core != CORE_VERSION {
+        println!(
+            "recorded by      version {}; this is {CORE_VERSION}",
+            found.core
+        );
+    }
+}
+
+fn describe(gap: &Gap) -> String {
+    let after = gap.after_cycle.map(|c| format!("after cycle {c}"));
+    let after = after.unwrap_or_else(|| "at the begin".to_owned());
+    let until = gap.until_cycle.map(|c| format!("until cycle {c}"));
+    let until = until.unwrap_or_else(|| "to the end".to_owned());
+    format!("{after} {until}: {}", gap.reason)
+}
+
+/// Why a run was stopped, or how close it came to its limits.
+pub fn explain(args: &ExplainArgs) -> Outcome<Option<Value>> {
+    let recording = Run::open(&args.run).and_then(|run| run.recording());
+    let log = recording.and_then(|recording| recording.log()).or_input()?;
+    let found = run_log::explain(&log);
+    print!("{}", run_log::show(&found));
+    Ok(Some(
+        json!({ "ok": true, "command": "explain", "run": args.run, "explanation": found }),
+    ))
+}
+
+/// Keeps the explanation of a run that was stopped and shows it to people.
+pub fn explain_stop(run: &Path) {
+    let cause = Run::open(run).ok().and_then(|run| run.keep_cause());
+    if let Some(found) = cause.filter(|found| found.stopped) {
+        output::remark(format_args!("{}", run_log::show(&found).trim_end()));
+    }
+}
+
+/// A recorded run in other formats.
+pub fn export(ExportCommand::Csv(args): &ExportCommand) -> Outcome<Option<Value>> {
+    let run = Run::open(&args.run).or_input()?;
+    let recording = run.recording().or_input()?;
+    let recorded = recording.cycles().or_input()?;
+    let Some(first) = recorded.cycles.first() else {
+        return Err(bad_input!(
+            "`{}` holds no control cycle",
+            args.run.display()
+        ));
+    };
+    // Zero of the run's other files, if its summary has one.
+    let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
+    let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
+    let out = args.out.as_deref().unwrap_or(run.folder());
+    files::check_writable(&out.join(CYCLES_TABLE)).or_input()?;
+    let [cycles, joints] = recorded.write_tables(out, epoch_ns).or_failed()?;
+    println!(
+        "{cycles} cycles and {joints} joint reports in `{}`",
+        out.display()
+    );
+    Ok(Some(json!({
+        "ok": true, "command": "export csv", "run": args.run, "epoch_ns": epoch_ns,
+        "cycles": cycles, "joints": joints, "folder": out,
+    })))
+}
+
+/// A run as one HTML file.
+pub fn report(args: &ReportArgs) -> Outcome<Option<Value>> {
+    let here = config::cell_here().or_input()?;
+    let written = viewer::report::write(&args.run, args.out.as_deref(), &here).or_input()?;
+    let megabytes = written.bytes as f64 / 1e6;
+    println!("{} ({megabytes:.1} MB)", written.path.display());
+    for missing in &written.missing {
+        output::remark(format_args!("not in this run: {missing}"));
+    }
+    Ok(Some(json!({
+        "ok": true, "command": "report", "run": args.run, "out": written.path,
+        "bytes": written.bytes, "missing": written.missing,
+    })))
+}

@@ -1,0 +1,8 @@
+//! `wag rig`, and `wag wiggle` on it with what records a run, guards it and reads it.
+#![cfg(test)]
+
+mod guardian;
+mod recorded;
+mod rig;
+#[path = "../support/mod.rs"]
+mod support;

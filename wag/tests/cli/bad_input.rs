@@ -1,0 +1,42 @@
+//! Wrong input to every command: exit code 2 (or 1), one clear line that names
+//! the file and the field, nothing half-written.
+
+use super::cases::{FAILED, MACHINES, RECORDS, ROPES, SIM_ROPE};
+use super::files::{LINKS, prepare};
+use super::support::{are_refused_in, refused_in, wag_in};
+
+#[test]
+fn wrong_input_gets_one_clear_line_and_leaves_nothing_behind() {
+    let dir = prepare();
+    let ropes = ROPES.replace("LINKS", LINKS);
+    let sim_rope = SIM_ROPE.replace("--rope", "sim rope --fps 60 --out o.npy --rope");
+    for cases in [MACHINES, RECORDS, &ropes, &sim_rope] {
+        are_refused_in(dir.path(), 2, cases);
+    }
+    are_refused_in(dir.path(), 1, FAILED);
+}
+
+#[test]
+fn a_port_in_use_is_named_with_a_remedy() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let dir = tempfile::tempdir().unwrap();
+    let line = format!("rig --command-port {port} --report-ports 0,0,0,0");
+    let said = refused_in(dir.path(), 1, &line);
+    assert!(said.contains(&port), "{said}");
+}
+
+#[test]
+fn json_errors_are_json_and_no_runs_are_no_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let ledger = wag_in(dir.path(), "ledger");
+    let said = String::from_utf8_lossy(&ledger.stdout);
+    assert!(
+        ledger.status.success() && said.contains("no runs"),
+        "{said}"
+    );
+    let output = wag_in(dir.path(), "check none.json --json");
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["ok"], false);
+    assert!(told["error"].as_str().unwrap().contains("none.json"));
+}

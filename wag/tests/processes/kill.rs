@@ -1,0 +1,87 @@
+//! Killing any process of a demo at a random moment: it is reported within
+//! three seconds, nothing is left running, and the next demo succeeds.
+
+use crate::support::{alone, command, process_of, processes_of, said, send, until};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rustix::process::Signal;
+use std::path::Path;
+use std::process::Child;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+const PROCESSES: &str = "rig rt-controller guardian camera-ingest planner";
+
+fn demo(run: &Path, seed: u64) -> Child {
+    let line = format!("demo --json --seed {seed} --out {}", run.display());
+    command(&line).spawn().unwrap()
+}
+
+/// Waits until the named process runs and some more.
+fn wait_for(run: &Path, name: &str, more: Duration) -> u32 {
+    let run = run.display().to_string();
+    let pid = until(name, Duration::from_secs(20), || process_of(&run, name));
+    sleep(more);
+    pid
+}
+
+fn nothing_left(run: &Path, within: Duration) {
+    let run = run.display().to_string();
+    until("the end of all processes", within, || {
+        processes_of(&run).is_empty().then_some(())
+    });
+}
+
+#[test]
+fn a_killed_process_is_reported_and_nothing_is_left() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    for (i, victim) in PROCESSES.split(' ').enumerate() {
+        let run = folder.path().join(format!("kill-{victim}"));
+        let child = demo(&run, 100 + i as u64);
+        let moment = Duration::from_millis(rng.random_range(300..16_000));
+        let pid = wait_for(&run, victim, moment);
+        send(pid, Signal::KILL);
+        let killed = Instant::now();
+        let output = child.wait_with_output().unwrap();
+        let took = killed.elapsed();
+        let said = format!("{victim} killed after {moment:?}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.matches(victim).count() > 1, "{said}");
+        assert!(
+            took < Duration::from_secs(3),
+            "reported after {took:?}: {said}"
+        );
+        nothing_left(&run, Duration::from_millis(100));
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["ok"], false);
+    }
+
+    // The supervisor itself: its processes end themselves.
+    let run = folder.path().join("kill-wag");
+    let mut child = demo(&run, 200);
+    let moment = Duration::from_millis(rng.random_range(300..8_000));
+    wait_for(&run, "planner", moment);
+    send(child.id(), Signal::KILL);
+    child.wait().unwrap();
+    nothing_left(&run, Duration::from_secs(3));
+
+    // The next demo succeeds.
+    let run = folder.path().join("after");
+    let output = demo(&run, 1).wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["ok"], true);
+    let distance_m = told["true_tip_target_distance_m"].as_f64().unwrap();
+    assert!(distance_m < 0.15, "{told:#}");
+    for stage in "start bringup wiggle track identify plan throw score".split(' ') {
+        let time_s = told["stages"][format!("{stage}_s")].as_f64().unwrap();
+        assert!(time_s > 0.0, "{stage}");
+    }
+    let files = "summary.json plan.json plan.csv params.toml keypoints.json run.mcap wiggle.png";
+    for file in files.split(' ') {
+        assert!(run.join(file).is_file(), "{file} is missing");
+    }
+    nothing_left(&run, Duration::from_millis(100));
+}
