@@ -80,31 +80,19 @@ pub enum WiggleError {
 
 impl WiggleConfig {
     fn check(&self) -> Result<(), WiggleError> {
+        const AMPLITUDE: &str = "above 0 and below 1.5 rad";
+        const FREQUENCY: &str = "above 0 and at most 3 Hz";
+        const RAMP: &str = "above 0 and at most half of `duration_s`";
+        const FILMED: &str = "at least `duration_s` and at most 10 s";
+        let (a, f, whole_s) = (self.amplitude_rad, self.frequency_hz, self.duration_s);
+        let (ramp_s, filmed_s) = (self.ramp_s, self.filmed_s);
+        let ramp_fits = ramp_s > 0.0 && 2.0 * ramp_s <= whole_s;
+        let film_fits = filmed_s >= whole_s && filmed_s <= 10.0;
         let rules = [
-            (
-                "amplitude_rad",
-                self.amplitude_rad,
-                self.amplitude_rad > 0.0 && self.amplitude_rad < 1.5,
-                "above 0 and below 1.5 rad",
-            ),
-            (
-                "frequency_hz",
-                self.frequency_hz,
-                self.frequency_hz > 0.0 && self.frequency_hz <= 3.0,
-                "above 0 and at most 3 Hz",
-            ),
-            (
-                "ramp_s",
-                self.ramp_s,
-                self.ramp_s > 0.0 && 2.0 * self.ramp_s <= self.duration_s,
-                "above 0 and at most half of `duration_s`",
-            ),
-            (
-                "filmed_s",
-                self.filmed_s,
-                self.filmed_s >= self.duration_s && self.filmed_s <= 10.0,
-                "at least `duration_s` and at most 10 s",
-            ),
+            ("amplitude_rad", a, a > 0.0 && a < 1.5, AMPLITUDE),
+            ("frequency_hz", f, f > 0.0 && f <= 3.0, FREQUENCY),
+            ("ramp_s", ramp_s, ramp_fits, RAMP),
+            ("filmed_s", filmed_s, film_fits, FILMED),
         ];
         Ok(OutOfRange::check(rules)?)
     }

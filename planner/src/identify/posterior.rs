@@ -11,7 +11,7 @@ use super::coordinates::{
     DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, STIFFNESS, link_range, parameter,
 };
 use super::refine::Refined;
-use super::scale::MassScale;
+use super::scale;
 use crate::observation::Appearance;
 use nalgebra::{SMatrix, SVector};
 use rand::{RngExt, SeedableRng};
@@ -50,8 +50,7 @@ pub(super) fn posterior(
     lead_mass_kg: Option<f64>,
     seed: u64,
 ) -> (RopeParams, RopePosterior) {
-    let scale = MassScale::new(lead_mass_kg);
-    let mut draws = draw(fit, appearance, pixel_m, scale, seed);
+    let mut draws = draw(fit, appearance, pixel_m, lead_mass_kg, seed);
     let total: f64 = draws.iter().map(|d| d.weight).sum();
     let squares: f64 = draws.iter().map(|d| d.weight * d.weight).sum();
     let within_ranges = total > 0.0 && total * total / squares >= EFFECTIVE_MIN;
@@ -87,7 +86,7 @@ fn draw(
     fit: &Refined,
     appearance: Appearance,
     pixel_m: f64,
-    scale: MassScale,
+    lead_mass_kg: Option<f64>,
     seed: u64,
 ) -> Vec<Draw> {
     use parameter as p;
@@ -121,7 +120,7 @@ fn draw(
                 + root * normal;
             let s = x[0].max(1e-3) / links;
             let ratios = [x[1].exp() / s, x[2].exp() / s, x[3].exp()];
-            let drawn = scale.draw(ratios, rng.random_range(0.0..1.0));
+            let drawn = scale::draw(lead_mass_kg, ratios, rng.random_range(0.0..1.0));
             let mu = drawn.mass_per_length;
             let radius_m = match appearance.rope_radius_m {
                 Some(seen) => {

@@ -9,10 +9,17 @@
 use super::coordinates::parameter::{DAMPING, LEAD_MASS, MASS_PER_LENGTH, STIFFNESS};
 use shared_types::rope::RANGES;
 
-/// Rule that turns ratios into masses.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MassScale {
-    lead_mass_kg: Option<f64>,
+/// Median of the mass per length (kg/m) for the ratios `[k/µ, c/µ, m_L/µ]`. For ratios
+/// that no rope of the ranges has, it breaks the ranges least, by equal factors at both
+/// ends.
+#[must_use]
+pub fn median_mass_per_length(ratios: [f64; 3]) -> f64 {
+    let (low, high) = bounds(ratios);
+    if low < high {
+        ((low.powi(4) + high.powi(4)) / 2.0).powf(0.25)
+    } else {
+        (low * high).sqrt()
+    }
 }
 
 /// A mass per length drawn for given ratios.
@@ -25,49 +32,33 @@ pub(super) struct DrawnMass {
     pub(super) density: f64,
 }
 
-impl MassScale {
-    /// Scale from the ranges, or from the lead's mass if it was weighed.
-    #[must_use]
-    pub fn new(lead_mass_kg: Option<f64>) -> Self {
-        Self { lead_mass_kg }
+/// The mass per length at the quantile `part` (0 to 1) of its density for the
+/// ratios `[k/µ, c/µ, m_L/µ]`, or that of a lead that was weighed.
+pub(super) fn draw(lead_mass_kg: Option<f64>, ratios: [f64; 3], part: f64) -> DrawnMass {
+    if let Some(lead_mass_kg) = lead_mass_kg {
+        let mass_per_length = lead_mass_kg / ratios[2];
+        let inside = |i: usize, value: f64| value >= RANGES[i].min && value <= RANGES[i].max;
+        let possible = inside(MASS_PER_LENGTH, mass_per_length)
+            && inside(STIFFNESS, ratios[0] * mass_per_length)
+            && inside(DAMPING, ratios[1] * mass_per_length);
+        let density = ratios[0] * ratios[1] * mass_per_length.powi(3);
+        return DrawnMass {
+            mass_per_length,
+            density: if possible { density } else { 0.0 },
+        };
     }
-
-    /// Median of the mass per length (kg/m) for the ratios `[k/µ, c/µ, m_L/µ]`. For
-    /// ratios that no rope of the ranges has, it breaks the ranges least, by equal
-    /// factors at both ends.
-    #[must_use]
-    pub fn median(&self, ratios: [f64; 3]) -> f64 {
-        self.draw(ratios, 0.5).mass_per_length
-    }
-
-    /// The mass per length at the quantile `part` (0 to 1) of its density for the
-    /// ratios `[k/µ, c/µ, m_L/µ]`.
-    pub(super) fn draw(&self, ratios: [f64; 3], part: f64) -> DrawnMass {
-        if let Some(lead_mass_kg) = self.lead_mass_kg {
-            let mass_per_length = lead_mass_kg / ratios[2];
-            let inside = |i: usize, value: f64| value >= RANGES[i].min && value <= RANGES[i].max;
-            let possible = inside(MASS_PER_LENGTH, mass_per_length)
-                && inside(STIFFNESS, ratios[0] * mass_per_length)
-                && inside(DAMPING, ratios[1] * mass_per_length);
-            let density = ratios[0] * ratios[1] * mass_per_length.powi(3);
-            return DrawnMass {
-                mass_per_length,
-                density: if possible { density } else { 0.0 },
-            };
+    let (low, high) = bounds(ratios);
+    if low < high {
+        let (a, b) = (low.powi(4), high.powi(4));
+        DrawnMass {
+            mass_per_length: (a + part * (b - a)).powf(0.25),
+            density: ratios.iter().product::<f64>() * (b - a),
         }
-        let (low, high) = bounds(ratios);
-        if low < high {
-            let (a, b) = (low.powi(4), high.powi(4));
-            DrawnMass {
-                mass_per_length: (a + part * (b - a)).powf(0.25),
-                density: ratios.iter().product::<f64>() * (b - a),
-            }
-        } else {
-            // As wide as the ranges are apart from each other.
-            DrawnMass {
-                mass_per_length: low * (high / low).powf(part),
-                density: 0.0,
-            }
+    } else {
+        // As wide as the ranges are apart from each other.
+        DrawnMass {
+            mass_per_length: low * (high / low).powf(part),
+            density: 0.0,
         }
     }
 }
@@ -110,7 +101,7 @@ mod tests {
                 mu,
             ];
             let ratios = core::array::from_fn(|i| absolute[i] / mu);
-            let found = MassScale::new(None).median(ratios);
+            let found = median_mass_per_length(ratios);
             for (sum, value) in sum.iter_mut().zip(absolute) {
                 *sum += (value / mu * found - value).abs();
             }
@@ -123,18 +114,19 @@ mod tests {
 
     #[test]
     fn a_weighed_lead_fixes_the_scale() {
-        let found = MassScale::new(Some(0.03));
         for part in [0.0, 0.5, 1.0] {
-            let mass = found.draw([5.0, 0.1, 0.5], part).mass_per_length;
+            let mass = draw(Some(0.03), [5.0, 0.1, 0.5], part).mass_per_length;
             assert!((mass - 0.06).abs() < 1e-12);
         }
     }
 
     #[test]
     fn ratios_of_no_rope_still_give_a_positive_mass() {
-        let scale = MassScale::new(None);
-        let [low, high] = [0.0, 1.0].map(|part| scale.draw([1e3, 1e-4, 10.0], part));
+        let ratios = [1e3, 1e-4, 10.0];
+        let [low, high] = [0.0, 1.0].map(|part| draw(None, ratios, part));
         assert_eq!(low.density, 0.0);
-        assert!(low.mass_per_length > high.mass_per_length && high.mass_per_length > 0.0);
+        let (low, high) = (low.mass_per_length, high.mass_per_length);
+        let median = median_mass_per_length(ratios);
+        assert!(low > median && median > high && high > 0.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Predictions against the truth on held-out ropes, beside the paper's figures.
 
-use planner::identify::scale::MassScale;
+use planner::identify::scale::median_mass_per_length;
 use serde::Serialize;
 use shared_types::RopeParams;
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
@@ -113,7 +113,7 @@ fn ratios(v: &[f64; ROPE_PARAMETERS]) -> [f64; 3] {
 /// The best guess of one who knows the ratios of stiffness, damping and masses.
 fn best_possible(rope: &RopeParams) -> [Option<f64>; ROPE_PARAMETERS] {
     let ratios = ratios(&rope.to_array());
-    let mass = MassScale::new(None).median(ratios);
+    let mass = median_mass_per_length(ratios);
     let mut best = [None; ROPE_PARAMETERS];
     best[3] = Some(ratios[0] * mass);
     best[2] = Some(ratios[1] * mass);
