@@ -27,6 +27,7 @@
 
 mod batches;
 mod checkpoint;
+mod cli;
 mod config;
 mod draws;
 mod error;
@@ -49,113 +50,9 @@ mod steps;
 mod tests;
 mod trainer;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::path::PathBuf;
+use clap::Parser;
+use cli::{Arguments, Step};
 use std::process::ExitCode;
-
-/// Trains the network that reads rope parameters from a filmed wiggle.
-#[derive(Debug, Parser)]
-#[command(version, about)]
-struct Arguments {
-    #[command(subcommand)]
-    step: Step,
-}
-
-#[derive(Debug, Subcommand)]
-enum Step {
-    /// Simulate the ropes; shards that exist already are kept.
-    Dataset(DatasetArguments),
-    /// Train the network, from its last checkpoint if there is one.
-    Train(TrainArguments),
-    /// Compare predictions with the truth on held-out ropes.
-    Evaluate(EvaluateArguments),
-    /// Write the network as ONNX and check the file against it.
-    Export(ExportArguments),
-}
-
-/// Where ropes come from.
-#[derive(Debug, Args)]
-struct DataArguments {
-    /// Configuration of data and training.
-    #[arg(long, default_value = "configs/planner/training.toml")]
-    config: PathBuf,
-    /// Folder of the simulated ropes.
-    #[arg(long, default_value = "runs/phi/data")]
-    data: PathBuf,
-    /// Threads that simulate ropes and film them.
-    #[arg(long, default_value_t = 1)]
-    threads: usize,
-}
-
-#[derive(Debug, Args)]
-struct DatasetArguments {
-    #[command(flatten)]
-    data: DataArguments,
-    /// First shard of the training ropes to make here.
-    #[arg(long, default_value_t = 0)]
-    first: usize,
-    /// Shards of the training ropes to make here; all if not given.
-    #[arg(long)]
-    shards: Option<usize>,
-}
-
-#[derive(Debug, Args)]
-struct TrainArguments {
-    #[command(flatten)]
-    data: DataArguments,
-    /// Folder of checkpoint, metrics and plots.
-    #[arg(long, default_value = "runs/phi/training")]
-    out: PathBuf,
-    /// What computes.
-    #[arg(long, value_enum, default_value = "cpu")]
-    device: DeviceName,
-    /// End after this many steps of this run, with a checkpoint.
-    #[arg(long)]
-    pause_after: Option<usize>,
-}
-
-#[derive(Debug, Args)]
-struct EvaluateArguments {
-    #[command(flatten)]
-    data: DataArguments,
-    /// Folder of the training.
-    #[arg(long, default_value = "runs/phi/training")]
-    run: PathBuf,
-    /// Judge this model file instead of the checkpoint.
-    #[arg(long)]
-    model: Option<PathBuf>,
-    /// Held-out ropes to judge; all if not given.
-    #[arg(long)]
-    ropes: Option<usize>,
-    /// Print one JSON object instead of the table.
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Debug, Args)]
-struct ExportArguments {
-    #[command(flatten)]
-    data: DataArguments,
-    /// Folder of the training.
-    #[arg(long, default_value = "runs/phi/training")]
-    run: PathBuf,
-    /// File to write.
-    #[arg(long, default_value = "runs/phi/phi-nn.onnx")]
-    out: PathBuf,
-}
-
-/// What computes.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DeviceName {
-    /// This processor.
-    Cpu,
-    /// The first NVIDIA card.
-    #[cfg(feature = "cuda")]
-    Cuda,
-    /// The best card there is.
-    #[cfg(feature = "wgpu")]
-    Wgpu,
-}
 
 /// Exits with 2 for input that cannot be used, 1 for work that failed.
 fn main() -> ExitCode {

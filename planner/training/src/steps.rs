@@ -2,6 +2,9 @@
 
 use crate::batches::{Studio, fractions};
 use crate::checkpoint::{State, path_in};
+use crate::cli::{
+    DataArguments, DatasetArguments, DeviceName, EvaluateArguments, ExportArguments, TrainArguments,
+};
 use crate::config::TrainingConfig;
 use crate::error::{Result, TrainingError};
 use crate::evaluation::{Judged, evaluate as judge};
@@ -12,9 +15,6 @@ use crate::hypercube::Share;
 use crate::plots::plot_predictions;
 use crate::pool::{Pool, Recipe};
 use crate::trainer::{Predicted, Trainer, predict};
-use crate::{
-    DataArguments, DatasetArguments, DeviceName, EvaluateArguments, ExportArguments, TrainArguments,
-};
 use burn::module::Module;
 use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
