@@ -47,6 +47,6 @@ pub mod workers;
 
 pub use config::PlannerConfig;
 pub use identify::identify;
-pub use out_of_range::OutOfRange;
+pub use out_of_range::{OutOfRange, Rule};
 pub use plan::plan;
 pub use settle::settle;

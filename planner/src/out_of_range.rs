@@ -12,12 +12,15 @@ pub struct OutOfRange {
     pub expected: &'static str,
 }
 
+/// A key, its value, whether that is what it must be, and what it must be.
+pub type Rule = (&'static str, f64, bool, &'static str);
+
 impl OutOfRange {
-    /// Refuses the first of some rules that does not hold; a rule is a key, its value,
-    /// whether it holds, and what the value must be.
-    pub(crate) fn check(
-        rules: impl IntoIterator<Item = (&'static str, f64, bool, &'static str)>,
-    ) -> Result<(), Self> {
+    /// Checks some rules.
+    ///
+    /// # Errors
+    /// The first that does not hold.
+    pub fn check(rules: impl IntoIterator<Item = Rule>) -> Result<(), Self> {
         match rules.into_iter().find(|(_, _, holds, _)| !holds) {
             Some((key, value, _, expected)) => Err(Self {
                 key,

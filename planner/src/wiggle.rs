@@ -7,10 +7,10 @@
 use crate::OutOfRange;
 use crate::collide::{ArmShape, RopeShape, rope_clearance_m};
 use arm_model::joint::START_POSE;
-use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits, Pole, TrajectoryError};
 use nalgebra::Vector3;
 use rope_sim::{
-    Candidate, FrameTimes, Outcome, PlannedArm, Precision, SimOptions, SimulateError, Start, Watch,
+    Candidate, FrameTimes, Outcome, PlannedArm, Precision, Rollout, SimOptions, SimulateError,
     roll_out,
 };
 use serde::{Deserialize, Serialize};
@@ -80,31 +80,19 @@ pub enum WiggleError {
 
 impl WiggleConfig {
     fn check(&self) -> Result<(), WiggleError> {
+        const AMPLITUDE: &str = "above 0 and below 1.5 rad";
+        const FREQUENCY: &str = "above 0 and at most 3 Hz";
+        const RAMP: &str = "above 0 and at most half of `duration_s`";
+        const FILMED: &str = "at least `duration_s` and at most 10 s";
+        let (a, f, whole_s) = (self.amplitude_rad, self.frequency_hz, self.duration_s);
+        let (ramp_s, filmed_s) = (self.ramp_s, self.filmed_s);
+        let ramp_fits = ramp_s > 0.0 && 2.0 * ramp_s <= whole_s;
+        let film_fits = filmed_s >= whole_s && filmed_s <= 10.0;
         let rules = [
-            (
-                "amplitude_rad",
-                self.amplitude_rad,
-                self.amplitude_rad > 0.0 && self.amplitude_rad < 1.5,
-                "above 0 and below 1.5 rad",
-            ),
-            (
-                "frequency_hz",
-                self.frequency_hz,
-                self.frequency_hz > 0.0 && self.frequency_hz <= 3.0,
-                "above 0 and at most 3 Hz",
-            ),
-            (
-                "ramp_s",
-                self.ramp_s,
-                self.ramp_s > 0.0 && 2.0 * self.ramp_s <= self.duration_s,
-                "above 0 and at most half of `duration_s`",
-            ),
-            (
-                "filmed_s",
-                self.filmed_s,
-                self.filmed_s >= self.duration_s && self.filmed_s <= 10.0,
-                "at least `duration_s` and at most 10 s",
-            ),
+            ("amplitude_rad", a, a > 0.0 && a < 1.5, AMPLITUDE),
+            ("frequency_hz", f, f > 0.0 && f <= 3.0, FREQUENCY),
+            ("ramp_s", ramp_s, ramp_fits, RAMP),
+            ("filmed_s", filmed_s, film_fits, FILMED),
         ];
         Ok(OutOfRange::check(rules)?)
     }
@@ -139,6 +127,15 @@ pub fn wiggle(config: &WiggleConfig, limits: &Limits) -> Result<JointTrajectory,
     }
 }
 
+/// The planned motion of an arm with the usual limits and pole that makes this wiggle.
+///
+/// # Errors
+/// As [`wiggle`].
+pub fn wiggling_arm(config: &WiggleConfig) -> Result<PlannedArm, WiggleError> {
+    let trajectory = wiggle(config, &Limits::default())?;
+    Ok(PlannedArm::new(trajectory, Pole::default()))
+}
+
 /// [`wiggle`] of an arm without limits: for simulations only.
 pub fn unlimited(config: &WiggleConfig) -> Result<JointTrajectory, WiggleError> {
     config.check()?;
@@ -159,27 +156,17 @@ pub fn unlimited(config: &WiggleConfig) -> Result<JointTrajectory, WiggleError> 
     Ok(JointTrajectory::new(&times, &poses)?)
 }
 
-/// Nearest approach of one rope to arm or column during a wiggle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WiggleClearance {
-    /// Smallest gap between the rope's surface and column or arm (m).
-    pub gap_m: f64,
-    /// Largest distance of the tip from the vertical through the clamp (m).
-    pub swing_m: f64,
-    /// Whether the simulation stayed finite.
-    pub finite: bool,
-}
-
-/// Clearance of each of `ropes` during the wiggle and one second after it.
+/// Smallest gap between the surface of each of `ropes` and column or arm during the wiggle
+/// and one second after it (m); minus infinity where the simulation does not stay finite.
 ///
 /// # Errors
 /// What the rope simulator refuses.
-pub fn clearance(
+pub fn clearance_m(
     trajectory: &JointTrajectory,
     ropes: &[RopeParams],
     cell: &Cell,
     threads: usize,
-) -> Result<Vec<WiggleClearance>, WiggleError> {
+) -> Result<Vec<f64>, WiggleError> {
     const PERIOD_S: f64 = 0.02;
     let arm = PlannedArm::new(*trajectory, cell.pole);
     let candidates: Vec<Candidate<'_>> = ropes
@@ -193,47 +180,34 @@ pub fn clearance(
         reason = "a positive count of a few hundred"
     )]
     let count = (horizon_s / PERIOD_S).floor() as usize;
-    let rollouts = roll_out(
-        &candidates,
-        &SimOptions {
-            step_s: 1e-3,
-            precision: Precision::F32,
-            start: Start::Equilibrium,
-            frames: FrameTimes {
-                first_s: 0.0,
-                period_s: PERIOD_S,
-                count,
-            },
-            watch: Watch::NOTHING,
-            horizon_s,
-            threads,
+    let options = SimOptions {
+        frames: FrameTimes {
+            first_s: 0.0,
+            period_s: PERIOD_S,
+            count,
         },
-    )?;
-    Ok(ropes
-        .iter()
-        .zip(&rollouts)
-        .map(|(rope, rollout)| {
-            let shape = RopeShape::from(rope);
-            let mut out = WiggleClearance {
-                gap_m: f64::INFINITY,
-                swing_m: 0.0,
-                finite: !matches!(rollout.outcome, Outcome::Diverged),
-            };
-            let mut time_s = 0.0;
-            for frame in 0..rollout.nodes.frames() {
-                let pose = ArmShape::at(&trajectory.state_at(time_s).q, &cell.pole);
-                let nodes: Vec<Vector3<f64>> = (0..rollout.nodes.nodes())
-                    .map(|node| rollout.nodes.position(frame, node))
-                    .collect();
-                out.gap_m = out.gap_m.min(rope_clearance_m(&pose, cell, &shape, &nodes));
-                if let (Some(clamp), Some(tip)) = (nodes.first(), nodes.last()) {
-                    out.swing_m = out.swing_m.max((tip - clamp).xy().norm());
-                }
-                time_s += PERIOD_S;
-            }
-            out
-        })
-        .collect())
+        threads,
+        ..SimOptions::new(1e-3, Precision::F32, horizon_s)
+    };
+    let rollouts = roll_out(&candidates, &options)?;
+    let gap_m = |(rope, rollout): (&RopeParams, &Rollout)| {
+        if rollout.outcome == Outcome::Diverged {
+            return f64::NEG_INFINITY;
+        }
+        let shape = RopeShape::from(rope);
+        let mut gap_m = f64::INFINITY;
+        let mut time_s = 0.0;
+        for frame in 0..rollout.nodes.frames() {
+            let pose = ArmShape::at(&trajectory.state_at(time_s).q, &cell.pole);
+            let nodes: Vec<Vector3<f64>> = (0..rollout.nodes.nodes())
+                .map(|node| rollout.nodes.position(frame, node))
+                .collect();
+            gap_m = gap_m.min(rope_clearance_m(&pose, cell, &shape, &nodes));
+            time_s += PERIOD_S;
+        }
+        gap_m
+    };
+    Ok(ropes.iter().zip(&rollouts).map(gap_m).collect())
 }
 
 #[cfg(test)]
@@ -290,8 +264,8 @@ mod tests {
     fn ropes_of_the_ranges_stay_clear_of_column_and_arm() {
         let t = wiggle(&WiggleConfig::default(), &Limits::default()).unwrap();
         let ropes: Vec<_> = (0..64).map(random_rope).collect();
-        let all = clearance(&t, &ropes, &Cell::default(), 2).unwrap();
-        let worst = all.iter().map(|c| c.gap_m).fold(f64::INFINITY, f64::min);
-        assert!(all.iter().all(|c| c.finite) && worst > 0.15, "{worst}");
+        let gaps = clearance_m(&t, &ropes, &Cell::default(), 2).unwrap();
+        let worst = gaps.into_iter().fold(f64::INFINITY, f64::min);
+        assert!(worst > 0.15, "{worst}");
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::identify::{IdentifyError, WiggleInformation, information};
 use crate::ropes::random_rope;
-use crate::wiggle::{WiggleConfig, WiggleError, clearance, wiggle};
+use crate::wiggle::{WiggleConfig, WiggleError, clearance_m, wiggle};
 use arm_model::{Cell, Limits};
 use cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
 use rope_sim::PlannedArm;
@@ -86,7 +86,7 @@ pub fn judge(
         all.extend(information(rope, &arm, camera, exact, threads)?);
     }
     let over = |of: fn(&WiggleInformation) -> f64| median(all.iter().map(of));
-    let gaps = clearance(&trajectory, &ropes, cell, threads)?;
+    let gaps = clearance_m(&trajectory, &ropes, cell, threads)?;
     Ok(JudgedWiggle {
         amplitude_rad: config.amplitude_rad,
         frequency_hz: config.frequency_hz,
@@ -100,7 +100,7 @@ pub fn judge(
             links: over(|i| i.links),
             log_volume: over(|i| i.log_volume),
         },
-        gap_m: gaps.iter().map(|g| g.gap_m).fold(f64::INFINITY, f64::min),
+        gap_m: gaps.into_iter().fold(f64::INFINITY, f64::min),
     })
 }
 
@@ -177,21 +177,13 @@ mod tests {
     #[test]
     fn a_wider_wiggle_tells_more() {
         let limits = Limits::default();
+        let (cell, camera) = (Cell::default(), side_camera());
         let of = |amplitude_rad: f64| {
             let config = WiggleConfig {
                 amplitude_rad,
                 ..WiggleConfig::default()
             };
-            judge(
-                &config,
-                &limits,
-                &Cell::default(),
-                &side_camera(),
-                1,
-                false,
-                2,
-            )
-            .unwrap()
+            judge(&config, &limits, &cell, &camera, 1, false, 2).unwrap()
         };
         let (narrow, wide) = (of(0.1), of(0.25));
         assert!(wide.information.log_volume < narrow.information.log_volume - 0.3);

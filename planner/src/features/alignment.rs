@@ -41,7 +41,7 @@ impl Sway {
 /// frame (s) and forward places (m) of the clamp.
 ///
 /// # Errors
-/// [`ObserveError::OtherWiggle`] if the clamp does not move as in the known wiggle.
+/// A clamp that does not move as in the known wiggle.
 pub(super) fn delay_s(seen: &[[f64; 2]], sway: &Sway) -> Result<f64, ObserveError> {
     let fit = |delay_s: f64| fit(seen, sway, delay_s);
     let mut best = (f64::NEG_INFINITY, 0.0, 0.0);
@@ -67,11 +67,10 @@ pub(super) fn delay_s(seen: &[[f64; 2]], sway: &Sway) -> Result<f64, ObserveErro
     if correlation >= CORRELATION_MIN && (PART[0]..=PART[1]).contains(&part) {
         return Ok(delay_s);
     }
-    Err(ObserveError::OtherWiggle {
-        correlation,
-        correlation_min: CORRELATION_MIN,
-        part,
-    })
+    Err(ObserveError::new(format!(
+        "the clamp does not move as in the wiggle the network was trained on: correlation {correlation:.2} (at least {CORRELATION_MIN} is needed), its sideways motion {:.0} % of the trained one's: film that wiggle, or use --method hybrid",
+        part * 100.0
+    )))
 }
 
 /// Correlation of the two sways at a delay, and the seen one as a part of the known.

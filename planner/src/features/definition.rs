@@ -78,71 +78,19 @@ impl WiggleFeatures {
     }
 }
 
-/// Why keypoints give no features.
+/// Why keypoints give no features: what is wrong with the film, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ObserveError {
-    /// The keypoints contradict themselves.
-    #[error(transparent)]
-    Keypoints(#[from] KeypointError),
-    /// The camera looks along the plane of the wiggle.
-    #[error(
-        "the camera looks at the plane of the wiggle from {degrees:.0} degrees, at least {min} are needed: film it from the side"
-    )]
-    EdgeOn {
-        /// Angle between the view and the plane (degrees).
-        degrees: f64,
-        /// Smallest angle allowed (degrees).
-        min: f64,
-    },
-    /// The clamp hardly moves sideways, so that there is no plane of the wiggle.
-    #[error("the clamp moves {moved_mm:.1} mm sideways, at least {min_mm} mm make a wiggle")]
-    NoWiggle {
-        /// Way of the clamp (mm).
-        moved_mm: f64,
-        /// Way needed (mm).
-        min_mm: f64,
-    },
-    /// The clamp does not move as in the wiggle that the features are for.
-    #[error(
-        "the clamp does not move as in the wiggle the network was trained on: correlation {correlation:.2} (at least {correlation_min} is needed), its sideways motion {:.0} % of the trained one's: film that wiggle, or use --method hybrid",
-        part * 100.0
-    )]
-    OtherWiggle {
-        /// Of the clamp's sway with the known one.
-        correlation: f64,
-        /// Least correlation.
-        correlation_min: f64,
-        /// Size of the sway as a part of the known one's.
-        part: f64,
-    },
-    /// More link centres than the features have room for, or no two.
-    #[error("{found} link centres, but 2 to {max} are expected")]
-    LinkCentres {
-        /// Points of the track.
-        found: usize,
-        /// Most there may be.
-        max: usize,
-    },
-    /// The network reads link centres, which a camera does not show.
-    #[error(
-        "the network reads the centres of the rope's links, which only simulated films show (experiments sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
-    )]
-    NeedsLinkCentres,
-    /// The film shows link centres, the network reads keypoints uniform in arc length.
-    #[error(
-        "the film shows link centres, but the network reads keypoints uniform in arc length: name one trained with `points = \"link-centres\"`"
-    )]
-    NeedsArcLength,
-    /// The rope was seen in too few frames.
-    #[error(
-        "the rope was seen in {seen} of {frames} frames at 60 Hz, the network needs {min}: film again with the whole rope in view"
-    )]
-    TooFewSeen {
-        /// Frames seen.
-        seen: usize,
-        /// Frames of the network's input.
-        frames: usize,
-        /// Frames needed.
-        min: usize,
-    },
+#[error("{0}")]
+pub struct ObserveError(String);
+
+impl ObserveError {
+    pub(crate) fn new(reason: impl Into<String>) -> Self {
+        Self(reason.into())
+    }
+}
+
+impl From<KeypointError> for ObserveError {
+    fn from(error: KeypointError) -> Self {
+        Self(error.to_string())
+    }
 }

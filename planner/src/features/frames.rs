@@ -15,117 +15,99 @@ const GAP_KEYPOINTS_MAX: usize = 2;
 /// of the grid.
 const GAP_FRAMES_MAX: f64 = 2.5;
 
-/// A frame's keypoints in the plane, each with the time it was exposed.
-struct Seen {
-    /// Forward, up (m) and exposure (s) of each keypoint of the grid; of link centres
-    /// those there are.
-    points: Vec<[f64; 3]>,
+/// Forward, up (m) and exposure (s) of a point in the plane.
+type Exposed = [f64; 3];
+/// Forward and up (m) of a frame's keypoints, of link centres those there are; `None`
+/// where it was not seen.
+pub(super) type Frame = Option<Vec<[f64; 2]>>;
+
+/// Keypoints at the grid's times, those of the wiggle.
+pub(super) fn on_grid(
+    definition: &FeatureDefinition,
+    track: &KeypointTrack,
+    camera: &StereoCamera,
+    view: &PlaneView,
+    sway: &Sway,
+) -> Result<Vec<Frame>, ObserveError> {
+    let seen: Vec<Vec<Exposed>> = track
+        .frames
+        .iter()
+        .filter(|frame| !frame.lost)
+        .filter_map(|frame| see(frame, definition, camera, view))
+        .collect();
+    enough(seen.len(), definition)?;
+    let start_s = track.frames.first().map_or(0.0, |f| f.t_s);
+    let clamp: Vec<[f64; 2]> = seen.iter().map(|s| [s[0][2] - start_s, s[0][0]]).collect();
+    let first_s = start_s + delay_s(&clamp, sway)?;
+    let frame_s = 1.0 / definition.rate_hz;
+    let mut next = 0;
+    let at = |i| {
+        let t_s = first_s + i as f64 / definition.rate_hz;
+        while next < seen.len() && seen[next][0][2] <= t_s {
+            next += 1;
+        }
+        let keypoints = 0..seen[0].len();
+        keypoints
+            .map(|k| at_time(&seen, next, k, t_s, frame_s))
+            .collect()
+    };
+    let frames: Vec<Frame> = (0..definition.frames).map(at).collect();
+    enough(frames.iter().flatten().count(), definition)?;
+    Ok(frames)
 }
 
-/// Keypoints on the grid; `None` where the frame was not seen.
-pub(super) struct FrameTable {
-    definition: FeatureDefinition,
-    frames: Vec<Option<Vec<[f64; 2]>>>,
+/// Refuses a rope seen in less than a quarter of the frames.
+fn enough(seen: usize, definition: &FeatureDefinition) -> Result<(), ObserveError> {
+    let (frames, min) = (definition.frames, definition.frames / 4);
+    if seen >= min {
+        return Ok(());
+    }
+    Err(ObserveError::new(format!(
+        "the rope was seen in {seen} of {frames} frames at 60 Hz, the network needs {min}: film again with the whole rope in view"
+    )))
 }
 
-impl FrameTable {
-    pub(super) fn new(
-        definition: &FeatureDefinition,
-        track: &KeypointTrack,
-        camera: &StereoCamera,
-        view: &PlaneView,
-        sway: &Sway,
-    ) -> Result<Self, ObserveError> {
-        let seen: Vec<Seen> = track
-            .frames
-            .iter()
-            .filter(|frame| !frame.lost)
-            .filter_map(|frame| see(frame, definition, camera, view))
-            .collect();
-        let start_s = track.frames.first().map_or(0.0, |f| f.t_s);
-        let min = definition.frames / 4;
-        if seen.len() < min {
-            return Err(ObserveError::TooFewSeen {
-                seen: seen.len(),
-                frames: definition.frames,
-                min,
-            });
+/// All channels, as the table in the module's documentation says.
+pub(super) fn channels(definition: &FeatureDefinition, frames: &[Frame]) -> Vec<f32> {
+    let mut mean = [0.0; 2];
+    let seen = frames.iter().flatten().count().max(1) as f64;
+    for points in frames.iter().flatten() {
+        for axis in 0..2 {
+            mean[axis] += points[0][axis] / seen;
         }
-        let clamp: Vec<[f64; 2]> = seen
-            .iter()
-            .map(|s| [s.points[0][2] - start_s, s.points[0][0]])
-            .collect();
-        // The grid's times are those of the wiggle.
-        let first_s = start_s + delay_s(&clamp, sway)?;
-        let keypoints = seen[0].points.len();
-        let mut next = 0;
-        let frames = (0..definition.frames)
-            .map(|i| {
-                let t_s = first_s + i as f64 / definition.rate_hz;
-                while next < seen.len() && seen[next].points[0][2] <= t_s {
-                    next += 1;
-                }
-                let frame_s = 1.0 / definition.rate_hz;
-                (0..keypoints)
-                    .map(|k| at_time(&seen, next, k, t_s, frame_s))
-                    .collect()
-            })
-            .collect();
-        Ok(Self {
-            definition: *definition,
-            frames,
-        })
     }
-
-    /// Number of frames seen.
-    pub(super) fn seen(&self) -> usize {
-        self.frames.iter().flatten().count()
-    }
-
-    /// All channels, as the table in the module's documentation says.
-    pub(super) fn features(&self) -> Vec<f32> {
-        let mut mean = [0.0; 2];
-        let seen = self.seen().max(1) as f64;
-        for points in self.frames.iter().flatten() {
-            for axis in 0..2 {
-                mean[axis] += points[0][axis] / seen;
-            }
-        }
-        let channels = self.definition.channels();
-        let angles_end = channels - 1;
-        let angles_begin = 2 * self.definition.keypoints;
-        let mut out = Vec::with_capacity(self.frames.len() * channels);
-        for frame in &self.frames {
-            let begin = out.len();
-            let Some(points) = frame else {
-                out.resize(out.len() + channels, 0.0);
-                continue;
+    let channels = definition.channels();
+    let mut out = Vec::with_capacity(frames.len() * channels);
+    for frame in frames {
+        let begin = out.len();
+        let Some(points) = frame else {
+            out.resize(begin + channels, 0.0);
+            continue;
+        };
+        let first = points[0];
+        let relative = points.iter().enumerate().flat_map(|(k, p)| {
+            let reference = if k == 0 { mean } else { first };
+            [p[0] - reference[0], p[1] - reference[1]]
+        });
+        out.extend(relative.map(|x| x as f32));
+        // Links that the rope does not have.
+        out.resize(begin + 2 * definition.keypoints, 0.0);
+        let mut before: f64 = 0.0;
+        for pair in points.windows(2) {
+            let angle = (pair[1][0] - pair[0][0]).atan2(pair[0][1] - pair[1][1]);
+            let turn = (angle - before).rem_euclid(core::f64::consts::TAU);
+            let turn = if turn > core::f64::consts::PI {
+                turn - core::f64::consts::TAU
+            } else {
+                turn
             };
-            let first = points[0];
-            let relative = points.iter().enumerate().flat_map(|(k, p)| {
-                let reference = if k == 0 { mean } else { first };
-                [p[0] - reference[0], p[1] - reference[1]]
-            });
-            out.extend(relative.map(|x| x as f32));
-            // Links that the rope does not have.
-            out.resize(begin + angles_begin, 0.0);
-            let mut before: f64 = 0.0;
-            for pair in points.windows(2) {
-                let angle = (pair[1][0] - pair[0][0]).atan2(pair[0][1] - pair[1][1]);
-                let turn = (angle - before).rem_euclid(core::f64::consts::TAU);
-                let turn = if turn > core::f64::consts::PI {
-                    turn - core::f64::consts::TAU
-                } else {
-                    turn
-                };
-                before += turn;
-                out.push(before as f32);
-            }
-            out.resize(begin + angles_end, 0.0);
-            out.push(1.0);
+            before += turn;
+            out.push(before as f32);
         }
-        out
+        out.resize(begin + channels - 1, 0.0);
+        out.push(1.0);
     }
+    out
 }
 
 /// One frame's keypoints in the plane, at the grid's places along the rope.
@@ -134,8 +116,8 @@ fn see(
     definition: &FeatureDefinition,
     camera: &StereoCamera,
     view: &PlaneView,
-) -> Option<Seen> {
-    let found: Vec<Option<[f64; 3]>> = frame
+) -> Option<Vec<Exposed>> {
+    let found: Vec<Option<Exposed>> = frame
         .points
         .iter()
         .zip(&frame.confidence)
@@ -147,26 +129,21 @@ fn see(
         .collect();
     let whole = bridge(&found)?;
     if definition.points == ObservedPoints::LinkCentres {
-        return Some(Seen { points: whole });
+        return Some(whole);
     }
     let keypoints = definition.keypoints;
-    let points = (0..keypoints)
-        .map(|k| {
-            let (before, part) = {
-                let place = k as f64 / (keypoints - 1) as f64 * (whole.len() - 1) as f64;
-                let before = (place as usize).min(whole.len() - 2);
-                (before, place - before as f64)
-            };
-            mix(whole[before], whole[before + 1], part)
-        })
-        .collect();
-    Some(Seen { points })
+    let at_keypoint = |k| {
+        let place = k as f64 / (keypoints - 1) as f64 * (whole.len() - 1) as f64;
+        let before = (place as usize).min(whole.len() - 2);
+        mix(whole[before], whole[before + 1], place - before as f64)
+    };
+    Some((0..keypoints).map(at_keypoint).collect())
 }
 
 /// Fills short gaps between seen keypoints; `None` if an end or a longer row is
 /// missing.
-fn bridge(found: &[Option<[f64; 3]>]) -> Option<Vec<[f64; 3]>> {
-    let mut out: Vec<[f64; 3]> = Vec::with_capacity(found.len());
+fn bridge(found: &[Option<Exposed>]) -> Option<Vec<Exposed>> {
+    let mut out: Vec<Exposed> = Vec::with_capacity(found.len());
     for (index, point) in found.iter().enumerate() {
         let Some(point) = point else { continue };
         let gap = index - out.len();
@@ -183,15 +160,21 @@ fn bridge(found: &[Option<[f64; 3]>]) -> Option<Vec<[f64; 3]>> {
     (out.len() == found.len()).then_some(out)
 }
 
-fn mix(a: [f64; 3], b: [f64; 3], part: f64) -> [f64; 3] {
+fn mix(a: Exposed, b: Exposed, part: f64) -> Exposed {
     core::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
 }
 
 /// Keypoint `k` at a time, from the frames around it; `hint` is a frame near it.
 /// A frame stands in for times within a frame of it where the recording begins or
 /// ends or has a longer gap.
-fn at_time(seen: &[Seen], hint: usize, k: usize, t_s: f64, frame_s: f64) -> Option<[f64; 2]> {
-    let time_s = |i: usize| seen[i].points[k][2];
+fn at_time(
+    seen: &[Vec<Exposed>],
+    hint: usize,
+    k: usize,
+    t_s: f64,
+    frame_s: f64,
+) -> Option<[f64; 2]> {
+    let time_s = |i: usize| seen[i][k][2];
     let mut after = hint.min(seen.len());
     while after > 0 && time_s(after - 1) > t_s {
         after -= 1;
@@ -199,10 +182,10 @@ fn at_time(seen: &[Seen], hint: usize, k: usize, t_s: f64, frame_s: f64) -> Opti
     while after < seen.len() && time_s(after) <= t_s {
         after += 1;
     }
-    let before = after.checked_sub(1).map(|i| seen[i].points[k]);
-    let after = seen.get(after).map(|s| s.points[k]);
-    let place = |p: [f64; 3]| [p[0], p[1]];
-    let near = |p: &[f64; 3]| (p[2] - t_s).abs() < frame_s;
+    let before = after.checked_sub(1).map(|i| seen[i][k]);
+    let after = seen.get(after).map(|s| s[k]);
+    let place = |p: Exposed| [p[0], p[1]];
+    let near = |p: &Exposed| (p[2] - t_s).abs() < frame_s;
     match (before, after) {
         (Some(a), Some(b)) if b[2] - a[2] <= GAP_FRAMES_MAX * frame_s => {
             Some(place(mix(a, b, (t_s - a[2]) / (b[2] - a[2]))))

@@ -31,7 +31,7 @@ pub use definition::{FeatureDefinition, ObserveError, WIDTHS, WiggleFeatures};
 pub use plane::ViewPlane;
 
 use crate::observation::{Appearance, ObservedPoints};
-use frames::FrameTable;
+use frames::{channels, on_grid};
 use shared_types::{KeypointTrack, StereoCamera};
 
 /// Features of a recording of the wiggle of `plane`.
@@ -47,28 +47,19 @@ pub fn observe(
     plane: &ViewPlane,
 ) -> Result<WiggleFeatures, ObserveError> {
     track.validate()?;
-    let links = definition.points == ObservedPoints::LinkCentres;
-    if links && !(2..=definition.keypoints).contains(&track.keypoints) {
-        return Err(ObserveError::LinkCentres {
-            found: track.keypoints,
-            max: definition.keypoints,
-        });
+    let (found, most) = (track.keypoints, definition.keypoints);
+    if definition.points == ObservedPoints::LinkCentres && !(2..=most).contains(&found) {
+        return Err(ObserveError::new(format!(
+            "{found} link centres, but 2 to {most} are expected"
+        )));
     }
     let view = plane.seen_from(camera)?;
-    let table = FrameTable::new(&definition, track, camera, &view, &plane.sway)?;
-    let min = definition.frames / 4;
-    if table.seen() < min {
-        return Err(ObserveError::TooFewSeen {
-            seen: table.seen(),
-            frames: definition.frames,
-            min,
-        });
-    }
+    let frames = on_grid(&definition, track, camera, &view, &plane.sway)?;
     Ok(WiggleFeatures {
         definition,
-        motion: table.features(),
+        motion: channels(&definition, &frames),
         widths: widths(appearance),
-        seen: table.seen(),
+        seen: frames.iter().flatten().count(),
     })
 }
 

@@ -26,7 +26,7 @@ impl ViewPlane {
     /// The plane in which the clamp sways most during the first `duration_s`.
     ///
     /// # Errors
-    /// [`ObserveError::NoWiggle`] if it hardly moves sideways.
+    /// A clamp that hardly moves sideways.
     pub fn of_motion(motion: &dyn AttachMotion, duration_s: f64) -> Result<Self, ObserveError> {
         const SAMPLES: u32 = 1500;
         let period_s = duration_s / f64::from(SAMPLES);
@@ -51,10 +51,11 @@ impl ViewPlane {
         let ways = places.iter().map(|p| (p - mean).dot(&forward));
         let (low, high) = ways.fold((0.0_f64, 0.0_f64), |(l, h), w| (l.min(w), h.max(w)));
         if high - low < WAY_MIN_M {
-            return Err(ObserveError::NoWiggle {
-                moved_mm: (high - low) * 1e3,
-                min_mm: WAY_MIN_M * 1e3,
-            });
+            return Err(ObserveError::new(format!(
+                "the clamp moves {:.1} mm sideways, at least {} mm make a wiggle",
+                (high - low) * 1e3,
+                WAY_MIN_M * 1e3
+            )));
         }
         let forward_m = places.iter().map(|p| (p - mean).dot(&forward)).collect();
         Ok(Self {
@@ -73,23 +74,19 @@ impl ViewPlane {
         let normal = self.forward.cross(&up);
         let axis = camera.r_w_cam.column(2).into_owned();
         let degrees = axis.dot(&normal).abs().min(1.0).asin().to_degrees();
+        let edge_on = || {
+            ObserveError::new(format!(
+                "the camera looks at the plane of the wiggle from {degrees:.0} degrees, at least {ANGLE_MIN_DEGREES} are needed: film it from the side"
+            ))
+        };
         if degrees < ANGLE_MIN_DEGREES {
-            return Err(ObserveError::EdgeOn {
-                degrees,
-                min: ANGLE_MIN_DEGREES,
-            });
+            return Err(edge_on());
         }
         // A point a forward + b up of the plane is at R^T (origin + ... - camera);
         // the inverse of these columns casts a ray back onto (a, b, 1).
         let columns = Matrix3::from_columns(&[self.forward, up, self.origin_m - camera.p_w_cam_m]);
-        let cast =
-            (camera.r_w_cam.transpose() * columns)
-                .try_inverse()
-                .ok_or(ObserveError::EdgeOn {
-                    degrees: 0.0,
-                    min: ANGLE_MIN_DEGREES,
-                })?;
-        Ok(PlaneView { cast })
+        let cast = (camera.r_w_cam.transpose() * columns).try_inverse();
+        cast.map(|cast| PlaneView { cast }).ok_or_else(edge_on)
     }
 }
 

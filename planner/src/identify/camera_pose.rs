@@ -5,35 +5,11 @@
 //! of the point looked at as a shift of the picture: as people mount cameras, these
 //! are independent, and position and rotation are not.
 
-use super::options::IdentifyOptions;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use shared_types::StereoCamera;
 
 /// Corrections: position x, y, z (m), point looked at x, y (m), roll (rad).
 pub(super) const CORRECTIONS: usize = 6;
-
-/// Deviations of the corrections; their means are 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CorrectionPrior {
-    pub(super) std_dev: [f64; CORRECTIONS],
-}
-
-impl CorrectionPrior {
-    /// The deviations asked for.
-    pub(super) fn new(o: &IdentifyOptions) -> Self {
-        let (position, look_at) = (o.camera_position_std_m, o.camera_look_at_std_m);
-        Self {
-            std_dev: [
-                position,
-                position,
-                position,
-                look_at,
-                look_at,
-                o.camera_roll_std_rad,
-            ],
-        }
-    }
-}
 
 /// A camera whose place may be corrected.
 #[derive(Debug, Clone, Copy)]

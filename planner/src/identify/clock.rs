@@ -5,7 +5,6 @@
 //! distance between the two (a clamp that hides the first millimetres of rope)
 //! does not matter.
 
-use super::film::Sighting;
 use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
 
@@ -24,9 +23,10 @@ const MOTION_MIN_PX: f64 = 3.0;
 /// Half width left to the fit where the clamp was seen moving (s).
 const HALF_WIDTH_S: f64 = 0.03;
 
-/// Finds the offset within `max_s` from the sightings of the clamp.
+/// Finds the offset within `max_s` from where the clamp was seen: camera times (s) and
+/// raw left-image pixels.
 pub(super) fn clock_window(
-    clamp: &[Sighting],
+    clamp: &[(f64, [f64; 2])],
     camera: &StereoCamera,
     motion: &dyn AttachMotion,
     max_s: f64,
@@ -35,14 +35,19 @@ pub(super) fn clock_window(
         offset_s: 0.0,
         half_width_s: max_s,
     };
-    let spread = |offset_s: f64| spread_px2(clamp, camera, motion, offset_s);
-    let still = clamp.len() < 20 || {
-        let seen: Vec<[f64; 2]> = clamp.iter().map(|s| s.pixel).collect();
-        variance(&seen) < MOTION_MIN_PX * MOTION_MIN_PX
-    };
-    if still {
+    let seen: Vec<[f64; 2]> = clamp.iter().map(|(_, pixel)| *pixel).collect();
+    if clamp.len() < 20 || variance(&seen) < MOTION_MIN_PX * MOTION_MIN_PX {
         return unknown;
     }
+    // Variance of the distance between seen and projected clamp (px²).
+    let spread = |offset_s: f64| {
+        let apart = |(time_s, pixel): &(f64, [f64; 2])| {
+            let [u, v] = camera.project_left(&motion.at(time_s - offset_s).p_m)?;
+            Some([u - pixel[0], v - pixel[1]])
+        };
+        let apart: Option<Vec<[f64; 2]>> = clamp.iter().map(apart).collect();
+        apart.map_or(f64::INFINITY, |a| variance(&a))
+    };
     let mut best = (f64::INFINITY, 0.0);
     let mut step_s = max_s / 16.0;
     for k in -16..=16 {
@@ -68,24 +73,6 @@ pub(super) fn clock_window(
         offset_s: best.1,
         half_width_s: HALF_WIDTH_S.min(max_s),
     }
-}
-
-/// Variance of the distance between seen and projected clamp (px²).
-fn spread_px2(
-    clamp: &[Sighting],
-    camera: &StereoCamera,
-    motion: &dyn AttachMotion,
-    offset_s: f64,
-) -> f64 {
-    let apart: Option<Vec<[f64; 2]>> = clamp
-        .iter()
-        .map(|s| {
-            let p = motion.at(s.time_s - offset_s).p_m;
-            let [u, v] = camera.project_left(&p)?;
-            Some([u - s.pixel[0], v - s.pixel[1]])
-        })
-        .collect();
-    apart.map_or(f64::INFINITY, |a| variance(&a))
 }
 
 fn variance(points: &[[f64; 2]]) -> f64 {

@@ -94,12 +94,16 @@ impl<'a> Comparer<'a> {
         let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links(x))).collect();
         let rollouts = self.film.simulate(&ropes, Fidelity::Coarse)?;
         let jobs: Vec<_> = points.iter().zip(&rollouts).collect();
-        Ok(map_in_order(&jobs, self.film.threads, |(x, rollout)| {
-            self.one(x, rollout).unwrap_or(Compared {
-                distance_px: INVISIBLE_PX,
-                camera: [0.0; CORRECTIONS],
-            })
-        }))
+        Ok(map_in_order(
+            &jobs,
+            self.film.options.threads,
+            |(x, rollout)| {
+                self.one(x, rollout).unwrap_or(Compared {
+                    distance_px: INVISIBLE_PX,
+                    camera: [0.0; CORRECTIONS],
+                })
+            },
+        ))
     }
 
     fn one(&self, x: &Point, rollout: &Rollout) -> Option<Compared> {

@@ -6,7 +6,7 @@
 //! nearly alone, so that the count can be fitted like a number and rounded. The
 //! common factor is left to [`super::scale`].
 
-use super::camera_pose::CorrectionPrior;
+use super::camera_pose::CORRECTIONS;
 use super::clock::ClockWindow;
 use crate::observation::Appearance;
 use nalgebra::{SMatrix, SVector};
@@ -131,7 +131,7 @@ impl Coordinates {
         appearance: Appearance,
         pixel_m: f64,
         clock: ClockWindow,
-        camera: &CorrectionPrior,
+        camera_std: &[f64; CORRECTIONS],
         reach: Reach,
     ) -> Self {
         use parameter as p;
@@ -184,7 +184,7 @@ impl Coordinates {
             out.prior_mean[LEAD_RADIUS] = radius_m;
             out.prior_std[LEAD_RADIUS] = Appearance::std_dev_m(radius_m, pixel_m);
         }
-        for (i, std_dev) in camera.std_dev.iter().enumerate() {
+        for (i, std_dev) in camera_std.iter().enumerate() {
             out.lower[CAMERA + i] = -5.0 * std_dev;
             out.upper[CAMERA + i] = 5.0 * std_dev;
             out.prior_std[CAMERA + i] = *std_dev;
@@ -226,8 +226,8 @@ mod tests {
             offset_s: 0.0,
             half_width_s: 0.01,
         };
-        let camera = CorrectionPrior { std_dev: [0.02; 6] };
-        let c = Coordinates::new(Appearance::default(), 0.003, clock, &camera, Reach::Ranges);
+        let appearance = Appearance::default();
+        let c = Coordinates::new(appearance, 0.003, clock, &[0.02; 6], Reach::Ranges);
         for seed in 0..300 {
             let rope = random_rope(seed);
             let x = point_of(&rope);
@@ -235,18 +235,12 @@ mod tests {
             let back = simulated_rope(&x, rope.links);
             assert!(back.validate().is_ok());
             let factor = back.mass_per_length_kg_per_m / rope.mass_per_length_kg_per_m;
-            for (a, b) in [
-                (back.lead_mass_kg, rope.lead_mass_kg),
-                (
-                    back.joint_stiffness_nm_per_rad,
-                    rope.joint_stiffness_nm_per_rad,
-                ),
-                (
-                    back.joint_damping_nms_per_rad,
-                    rope.joint_damping_nms_per_rad,
-                ),
-                (back.link_inertia_kg_m2(), rope.link_inertia_kg_m2()),
-            ] {
+            let scaled = |r: &RopeParams| {
+                let (stiffness, damping) =
+                    (r.joint_stiffness_nm_per_rad, r.joint_damping_nms_per_rad);
+                [r.lead_mass_kg, stiffness, damping, r.link_inertia_kg_m2()]
+            };
+            for (a, b) in scaled(&back).into_iter().zip(scaled(&rope)) {
                 assert!((a / b / factor - 1.0).abs() < 1e-9);
             }
         }

@@ -13,35 +13,9 @@ pub enum IdentifyError {
     /// The keypoints contradict themselves.
     #[error(transparent)]
     Keypoints(#[from] KeypointError),
-    /// The rope was lost in too many frames.
-    #[error(
-        "the rope was lost in {:.0} % of the frames, at most {:.0} % are allowed: film again with the whole rope in view",
-        lost_fraction * 100.0, max * 100.0
-    )]
-    TooManyLost {
-        /// Fraction of the frames in which it was lost.
-        lost_fraction: f64,
-        /// Fraction allowed.
-        max: f64,
-    },
-    /// Too few frames.
-    #[error("{found} frames, but identification needs {min} or more")]
-    TooFewFrames {
-        /// Frames found.
-        found: usize,
-        /// Frames needed.
-        min: usize,
-    },
-    /// The motion of the attach frame ends before the film.
-    #[error(
-        "the attach frame's motion lasts {motion_s:.3} s, the film {film_s:.3} s: record the joints longer or film shorter"
-    )]
-    MotionTooShort {
-        /// Duration of the motion (s).
-        motion_s: f64,
-        /// Time of the last frame (s).
-        film_s: f64,
-    },
+    /// The film cannot be judged: what is wrong with it, and what to do.
+    #[error("{0}")]
+    Film(String),
     /// No simulated rope is in front of the camera, or every simulation failed.
     #[error(
         "no simulated rope projects into the picture: check the camera's extrinsics and the attach frame's motion"
@@ -80,9 +54,7 @@ impl IdentifyError {
         matches!(
             self,
             Self::Keypoints(_)
-                | Self::TooManyLost { .. }
-                | Self::TooFewFrames { .. }
-                | Self::MotionTooShort { .. }
+                | Self::Film(_)
                 | Self::NothingVisible
                 | Self::Option(_)
                 | Self::Network(PredictError::Observe(_))

@@ -1,11 +1,16 @@
 //! The observation as a grid of sightings, and the rope simulated under its motion.
 
 use super::camera_pose::Viewer;
+use super::clock::{ClockWindow, clock_window};
+use super::coordinates::{Coordinates, Reach};
 use super::error::IdentifyError;
 use super::options::IdentifyOptions;
 use crate::observation::{Observation, ObservedPoints};
 use nalgebra::Vector3;
-use rope_sim::{FrameTimes, NodeTrack, Outcome, Precision, Rollout, SimOptions, Start, Watch};
+use rope_sim::{
+    Candidate, FrameTimes, NodeTrack, Outcome, Precision, Rollout, SimOptions, roll_out,
+};
+use shared_types::RopeParams;
 use shared_types::keypoints::TrackedFrame;
 
 /// Periods at which simulated nodes are kept (s). Between, they are interpolated by
@@ -88,12 +93,8 @@ impl Grid {
 /// The observation in the form the fit compares.
 pub(super) struct Film<'a> {
     pub(super) observation: &'a Observation<'a>,
+    pub(super) options: IdentifyOptions,
     pub(super) viewer: Viewer<'a>,
-    pub(super) threads: usize,
-    /// Least noise of the tracker, in each axis (px).
-    pub(super) noise_min_px: f64,
-    search_step_s: f64,
-    step_s: f64,
     horizon_s: f64,
     fine: Grid,
     coarse: Grid,
@@ -121,22 +122,14 @@ impl<'a> Film<'a> {
         let stride = every(keypoints, COARSE_KEYPOINTS);
         // From the lead backwards: its place tells most.
         let chosen: Vec<usize> = (0..keypoints).rev().step_by(stride).collect();
+        let confidence_min = options.confidence_min;
         let grid = |frames: &[&TrackedFrame], chosen: &[usize]| {
-            Grid::new(
-                frames,
-                chosen,
-                period_s,
-                observation,
-                options.confidence_min,
-            )
+            Grid::new(frames, chosen, period_s, observation, confidence_min)
         };
         let film_s = usable.last().map_or(0.0, |f| f.t_s);
         Self {
             viewer: Viewer::new(observation.camera, &observation.motion.at(0.0).p_m),
-            threads: options.threads.max(1),
-            noise_min_px: options.noise_min_px,
-            search_step_s: options.search_step_s,
-            step_s: options.step_s,
+            options: *options,
             horizon_s: (film_s + options.clock_offset_max_s + 0.03)
                 .min(observation.motion.duration_s()),
             fine: grid(&usable, &all),
@@ -153,49 +146,55 @@ impl<'a> Film<'a> {
         }
     }
 
-    /// The sightings of the clamp.
-    pub(super) fn clamp(&self) -> Vec<Sighting> {
+    /// What the sightings of the clamp tell about the clocks.
+    pub(super) fn clock_window(&self) -> ClockWindow {
         let first_of_frames = self.fine.cells.iter().step_by(self.fine.keypoints);
-        first_of_frames.flatten().copied().collect()
+        let seen = first_of_frames.flatten().map(|s| (s.time_s, s.pixel));
+        let clamp: Vec<(f64, [f64; 2])> = seen.collect();
+        let (camera, motion) = (self.observation.camera, self.observation.motion);
+        clock_window(&clamp, camera, motion, self.options.clock_offset_max_s)
+    }
+
+    /// The coordinates in which the film is fitted.
+    pub(super) fn coordinates(&self, clock: ClockWindow, reach: Reach) -> Coordinates {
+        let pixel_m = self.viewer.pixel_m();
+        let camera_std = self.options.camera_std();
+        Coordinates::new(
+            self.observation.appearance,
+            pixel_m,
+            clock,
+            &camera_std,
+            reach,
+        )
     }
 
     /// How the filmed motion is simulated.
     pub(super) fn sim_options(&self, fidelity: Fidelity) -> SimOptions {
         let (precision, step_s) = match fidelity {
-            Fidelity::Coarse => (Precision::F32, self.search_step_s),
-            Fidelity::Fine => (Precision::F64, self.step_s),
+            Fidelity::Coarse => (Precision::F32, self.options.search_step_s),
+            Fidelity::Fine => (Precision::F64, self.options.step_s),
         };
         let period_s = sample_s(fidelity);
-        let count = (self.horizon_s / period_s).floor() as usize + 1;
         SimOptions {
-            step_s,
-            precision,
-            start: Start::Equilibrium,
             frames: FrameTimes {
                 first_s: 0.0,
                 period_s,
-                count,
+                count: (self.horizon_s / period_s).floor() as usize + 1,
             },
-            watch: Watch::NOTHING,
-            horizon_s: self.horizon_s,
-            threads: self.threads,
+            threads: self.options.threads.max(1),
+            ..SimOptions::new(step_s, precision, self.horizon_s)
         }
     }
 
     /// Simulates the filmed motion with each rope.
     pub(super) fn simulate(
         &self,
-        ropes: &[shared_types::RopeParams],
+        ropes: &[RopeParams],
         fidelity: Fidelity,
     ) -> Result<Vec<Rollout>, IdentifyError> {
-        let candidates: Vec<rope_sim::Candidate<'_>> = ropes
-            .iter()
-            .map(|rope| rope_sim::Candidate::new(rope, self.observation.motion))
-            .collect();
-        Ok(rope_sim::roll_out(
-            &candidates,
-            &self.sim_options(fidelity),
-        )?)
+        let candidate = |rope| Candidate::new(rope, self.observation.motion);
+        let candidates: Vec<Candidate<'_>> = ropes.iter().map(candidate).collect();
+        Ok(roll_out(&candidates, &self.sim_options(fidelity))?)
     }
 }
 

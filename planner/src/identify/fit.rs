@@ -1,8 +1,7 @@
 //! One identification by fitting: where it starts, how it is refined, and what comes of it.
 
 use super::budget::{Budget, FitProgress};
-use super::camera_pose::CorrectionPrior;
-use super::clock::{ClockWindow, clock_window};
+use super::clock::ClockWindow;
 use super::coordinates::{CLOCK, Coordinates, Reach};
 use super::descent::Iterate;
 use super::error::IdentifyError;
@@ -10,12 +9,12 @@ use super::film::Film;
 use super::linear;
 use super::options::IdentifyOptions;
 use super::out_of_distribution::out_of_distribution;
-use super::posterior::posterior;
+use super::posterior::{posterior, std_dev};
 use super::propose::{fast_search, from_proposal};
 use super::refine::{Refined, refine};
 use super::search::search;
 use crate::observation::Observation;
-use shared_types::rope::{FitCircumstances, KeypointNoise, OutOfDistribution};
+use shared_types::rope::{FitCircumstances, OutOfDistribution};
 use shared_types::{RopeEstimate, RopeParams};
 use std::ops::ControlFlow;
 
@@ -48,116 +47,99 @@ pub(super) fn fit(
     progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
     let film = Film::new(observation, options);
-    let fit = Fit {
-        clock: clock_window(
-            &film.clamp(),
-            observation.camera,
-            observation.motion,
-            options.clock_offset_max_s,
-        ),
-        film: &film,
-        options,
-        camera: CorrectionPrior::new(options),
-    };
-    let mut budget = Budget {
-        simulations: 0,
-        steps: 0,
-        steps_max: match start {
-            Start::Proposal(_) | Start::FastSearch => HYBRID_STEPS,
-            Start::Cmaes => options.generations + REFINE_STEPS,
+    let mut fit = Fit {
+        clock: film.clock_window(),
+        film,
+        budget: Budget {
+            simulations: 0,
+            steps: 0,
+            steps_max: match start {
+                Start::Proposal(_) | Start::FastSearch => HYBRID_STEPS,
+                Start::Cmaes => options.generations + REFINE_STEPS,
+            },
+            progress,
         },
-        progress,
     };
     let (near, label) = match start {
-        Start::Proposal(rope) => fit.proposed(rope, &mut budget)?,
-        Start::FastSearch => (fit.searched(&mut budget)?, SEARCHED),
-        Start::Cmaes => (fit.cmaes(Reach::Ranges, &mut budget)?, "cmaes"),
+        Start::Proposal(rope) => fit.proposed(rope)?,
+        Start::FastSearch => (fit.searched()?, SEARCHED),
+        Start::Cmaes => (fit.cmaes(Reach::Ranges)?, "cmaes"),
     };
     let found = out_of_distribution(&near);
     if !found.is_outside() || matches!(start, Start::Cmaes) {
-        return Ok(fit.estimate(&near, found, label, budget.simulations));
+        return Ok(fit.estimate(&near, found, label));
     }
     tracing::info!(
         score = found.score,
         "the rope is outside the ranges: wide search"
     );
-    let wide = fit.cmaes(Reach::Wide, &mut budget)?;
-    let better = if wide.residual_px < near.residual_px {
-        wide
-    } else {
-        near
-    };
-    let found = out_of_distribution(&better);
-    Ok(fit.estimate(&better, found, WIDE, budget.simulations))
+    let better = nearer(fit.cmaes(Reach::Wide)?, near);
+    Ok(fit.estimate(&better, out_of_distribution(&better), WIDE))
+}
+
+/// The fit that is nearer to the film, the second if neither is.
+fn nearer(a: Refined, b: Refined) -> Refined {
+    if a.residual_px < b.residual_px { a } else { b }
 }
 
 struct Fit<'a> {
-    film: &'a Film<'a>,
-    options: &'a IdentifyOptions,
+    film: Film<'a>,
     clock: ClockWindow,
-    camera: CorrectionPrior,
+    budget: Budget<'a>,
 }
 
 impl Fit<'_> {
-    fn coordinates(&self, reach: Reach) -> Coordinates {
-        let appearance = self.film.observation.appearance;
-        let pixel_m = self.film.viewer.pixel_m();
-        Coordinates::new(appearance, pixel_m, self.clock, &self.camera, reach)
-    }
-
     /// A fast search, refined.
-    fn searched(&self, budget: &mut Budget<'_>) -> Result<Refined, IdentifyError> {
-        let coordinates = self.coordinates(Reach::Ranges);
-        let iterates = fast_search(self.film, &coordinates, self.options.seed, budget)?;
-        self.refine(&coordinates, &iterates, budget)
+    fn searched(&mut self) -> Result<Refined, IdentifyError> {
+        let coordinates = self.film.coordinates(self.clock, Reach::Ranges);
+        let seed = self.film.options.seed;
+        let iterates = fast_search(&self.film, &coordinates, seed, &mut self.budget)?;
+        self.refine(&coordinates, &iterates)
     }
 
     /// A proposed rope, refined; a fast search if it ends where no rope of the ranges is.
-    fn proposed(
-        &self,
-        rope: &RopeParams,
-        budget: &mut Budget<'_>,
-    ) -> Result<(Refined, &'static str), IdentifyError> {
-        let coordinates = self.coordinates(Reach::Ranges);
-        let iterates = from_proposal(self.film, &coordinates, rope, budget)?;
-        let near = self.refine(&coordinates, &iterates, budget)?;
+    fn proposed(&mut self, rope: &RopeParams) -> Result<(Refined, &'static str), IdentifyError> {
+        let coordinates = self.film.coordinates(self.clock, Reach::Ranges);
+        let iterates = from_proposal(&self.film, &coordinates, rope, &mut self.budget)?;
+        let near = self.refine(&coordinates, &iterates)?;
         if !out_of_distribution(&near).is_outside() {
             return Ok((near, PROPOSED));
         }
-        let searched = self.searched(budget)?;
-        if searched.residual_px < near.residual_px {
-            Ok((searched, SEARCHED))
+        let searched = self.searched()?;
+        Ok(if searched.residual_px < near.residual_px {
+            (searched, SEARCHED)
         } else {
-            Ok((near, PROPOSED))
-        }
+            (near, PROPOSED)
+        })
     }
 
     fn refine(
-        &self,
+        &mut self,
         coordinates: &Coordinates,
         iterates: &[Iterate],
-        budget: &mut Budget<'_>,
     ) -> Result<Refined, IdentifyError> {
         let best = iterates.first().ok_or(IdentifyError::NothingVisible)?;
         let noise_px = best.at.distance_px / 2.0_f64.sqrt();
-        refine(self.film, coordinates, &best.x, noise_px, budget)
+        refine(&self.film, coordinates, &best.x, noise_px, &mut self.budget)
     }
 
     /// The global search, refined.
-    fn cmaes(&self, reach: Reach, budget: &mut Budget<'_>) -> Result<Refined, IdentifyError> {
-        let coordinates = self.coordinates(reach);
+    fn cmaes(&mut self, reach: Reach) -> Result<Refined, IdentifyError> {
+        let coordinates = self.film.coordinates(self.clock, reach);
         // A rope that no candidate resembles would have every repeat for nothing.
         let repeats_max = match reach {
-            Reach::Ranges => self.options.repeats_max,
+            Reach::Ranges => self.film.options.repeats_max,
             Reach::Wide => 0,
         };
-        let options = IdentifyOptions {
-            repeats_max,
-            ..*self.options
-        };
-        let found = search(self.film, &coordinates, &options, budget)?;
+        let found = search(&self.film, &coordinates, repeats_max, &mut self.budget)?;
         let noise_px = found.distance_px / 2.0_f64.sqrt();
-        refine(self.film, &coordinates, &found.x, noise_px, budget)
+        refine(
+            &self.film,
+            &coordinates,
+            &found.x,
+            noise_px,
+            &mut self.budget,
+        )
     }
 
     fn estimate(
@@ -165,28 +147,24 @@ impl Fit<'_> {
         fit: &Refined,
         out_of_distribution: OutOfDistribution,
         label: &str,
-        simulations: usize,
     ) -> RopeEstimate {
-        let options = self.options;
+        let options = &self.film.options;
         let appearance = self.film.observation.appearance;
         let pixel_m = self.film.viewer.pixel_m();
-        let found = posterior(fit, appearance, pixel_m, options.lead_mass_kg, options.seed);
+        let (params, posterior) =
+            posterior(fit, appearance, pixel_m, options.lead_mass_kg, options.seed);
         let (camera_position_m, camera_rotation_rad) =
             self.film.viewer.moved(&linear::corrections(&fit.x));
-        let [noise_along, noise_across] = fit.noise.axes.map(|a| KeypointNoise {
-            sigma_px: a.sigma_px,
-            in_time: a.in_time,
-            along_rope: a.along_rope,
-        });
+        let [noise_along, noise_across] = fit.noise.axes;
         RopeEstimate {
-            params: found.params,
-            std_dev: found.std_dev(),
+            params,
+            std_dev: std_dev(&posterior),
             residual_px: fit.residual_px,
             method: label.try_into().unwrap_or_default(),
-            simulations: u32::try_from(simulations).unwrap_or(u32::MAX),
+            simulations: u32::try_from(self.budget.simulations).unwrap_or(u32::MAX),
             seed: options.seed,
             time_offset_s: fit.x[CLOCK],
-            posterior: found.posterior,
+            posterior,
             circumstances: FitCircumstances {
                 noise_along,
                 noise_across,

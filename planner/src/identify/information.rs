@@ -5,21 +5,21 @@
 //! camera's place unknown as in any identification. Their inverse bounds what any
 //! method can learn from this motion.
 
-use super::camera_pose::CorrectionPrior;
 use super::clock::ClockWindow;
 use super::coordinates::{
-    Coordinates, DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Reach, STIFFNESS, point_of,
+    DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Reach, STIFFNESS, point_of,
 };
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::linear::linearise;
-use super::noise::{AxisNoise, Noise};
+use super::noise::Noise;
 use super::options::IdentifyOptions;
 use crate::observation::{Appearance, Observation, ObservedPoints};
 use crate::synthetic::{FilmNoise, FilmTiming, film};
 use nalgebra::SMatrix;
 use rope_sim::AttachMotion;
 use serde::{Deserialize, Serialize};
+use shared_types::rope::KeypointNoise;
 use shared_types::{RopeParams, StereoCamera};
 
 /// Keypoints per frame.
@@ -61,15 +61,8 @@ pub fn information(
     exact: bool,
     threads: usize,
 ) -> Result<Option<WiggleInformation>, IdentifyError> {
-    let timing = FilmTiming::default();
-    let filmed = film(
-        rope,
-        motion,
-        camera,
-        KEYPOINTS,
-        &timing,
-        &FilmNoise::default(),
-    )?;
+    let (timing, noise) = (FilmTiming::default(), FilmNoise::default());
+    let filmed = film(rope, motion, camera, KEYPOINTS, &timing, &noise)?;
     let observation = Observation {
         track: &filmed.track,
         points: ObservedPoints::ArcLength,
@@ -82,38 +75,26 @@ pub fn information(
         ..IdentifyOptions::default()
     };
     let seen = Film::new(&observation, &options);
-    let (fidelity, every) = if exact {
-        (Fidelity::Fine, 1)
+    let fidelity = if exact {
+        Fidelity::Fine
     } else {
-        let every = filmed
-            .track
-            .frames
-            .len()
-            .div_ceil(options.search_frames_max);
-        (Fidelity::Coarse, every)
+        Fidelity::Coarse
     };
     let clock = ClockWindow {
         offset_s: 0.0,
         half_width_s: options.clock_offset_max_s,
     };
-    let coordinates = Coordinates::new(
-        Appearance::default(),
-        seen.viewer.pixel_m(),
-        clock,
-        &CorrectionPrior::new(&options),
-        Reach::Ranges,
-    );
+    let coordinates = seen.coordinates(clock, Reach::Ranges);
     let x = point_of(rope);
     let (mut at, _) = linearise(&seen, &[x], &[], rope.links, fidelity)?;
     let Some(Some(at)) = at.pop() else {
         return Ok(None);
     };
-    // Frames left out between two that are compared take their correlation along.
-    let in_time = CORRELATION.powi(i32::try_from(every).unwrap_or(1));
     let noise = Noise {
-        axes: NOISE_PX.map(|sigma_px| AxisNoise {
+        axes: NOISE_PX.map(|sigma_px| KeypointNoise {
             sigma_px,
-            in_time: if exact { in_time } else { 0.0 },
+            // Frames left out between two that are compared take it along.
+            in_time: if exact { CORRELATION } else { 0.0 },
             along_rope: 0.0,
         }),
     };

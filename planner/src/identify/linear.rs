@@ -10,7 +10,7 @@ use super::error::IdentifyError;
 use super::film::{Fidelity, Film, Grid, Instant, Sighting, is_finite, sample_s};
 use super::noise::{Noise, RESIDUAL, Row, Rows};
 use crate::workers::map_in_order;
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::SMatrix;
 use rope_sim::sensitivity::{Family, Perturbation, Sensitivity, SensitivityError, sensitivities};
 use rope_sim::{Candidate, NodeTrack, Rollout};
 use shared_types::RopeParams;
@@ -73,33 +73,19 @@ pub(super) fn linearise(
     fidelity: Fidelity,
 ) -> Result<(Vec<Option<Linearised>>, usize), IdentifyError> {
     let fine = fidelity == Fidelity::Fine;
-    let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links)).collect();
-    let perturbations: Vec<Vec<Perturbation<'_>>> = points
-        .iter()
-        .map(|x| perturbations(x, links, fine))
-        .collect();
-    let motion = film.observation.motion;
-    let mut families: Vec<Family<'_>> = ropes
-        .iter()
-        .zip(&perturbations)
-        .map(|(rope, perturbations)| Family {
-            base: Candidate::new(rope, motion),
-            perturbations,
-        })
-        .collect();
+    let family = |x: &Point| (simulated_rope(x, links), perturbations(x, links, fine));
+    let mut ropes: Vec<(RopeParams, Vec<Perturbation<'_>>)> = points.iter().map(family).collect();
     let counts = neighbour_counts(links);
-    let other: Vec<RopeParams> = if fine && near.is_empty() {
-        let of = |x| counts.map(|n| simulated_rope(x, n));
-        points.iter().flat_map(of).collect()
-    } else {
-        Vec::new()
-    };
-    families.extend(other.iter().map(|rope| Family {
-        base: Candidate::new(rope, motion),
-        perturbations: &[],
-    }));
-    let options = film.sim_options(fidelity);
-    let all = sensitivities(&families, &options).map_err(unwrap_sensitivity)?;
+    if fine && near.is_empty() {
+        let of = |x| counts.map(|n| (simulated_rope(x, n), Vec::new()));
+        ropes.extend(points.iter().flat_map(of));
+    }
+    let families = ropes.iter().map(|(rope, perturbations)| Family {
+        base: Candidate::new(rope, film.observation.motion),
+        perturbations,
+    });
+    let families: Vec<Family<'_>> = families.collect();
+    let all = sensitivities(&families, &film.sim_options(fidelity)).map_err(unwrap_sensitivity)?;
     let simulations = all.iter().map(|s| 1 + s.neighbours.len()).sum();
     let (bases, others) = all.split_at(points.len());
     let out = points.iter().zip(bases).enumerate().map(|(i, (x, at))| {
@@ -208,7 +194,7 @@ fn compare(
         more_links: x[LINKS] - f64::from(links),
     };
     let cells = &film.grid(fidelity).cells;
-    let rows: Vec<Option<Option<[Row; 2]>>> = map_in_order(cells, film.threads, |cell| {
+    let rows: Vec<Option<Option<[Row; 2]>>> = map_in_order(cells, film.options.threads, |cell| {
         // The outer `None`: seen by the camera, but not by the simulated one.
         match cell {
             Some(sighting) => comparison.rows(sighting).map(Some),
@@ -258,12 +244,8 @@ impl Comparison<'_> {
         }
         let later = Instant::new(time_s + CLOCK_STEP_S, self.period_s, samples);
         let before = Instant::new(time_s - CLOCK_STEP_S, self.period_s, samples);
-        let (b, a) = (
-            self.view
-                .project(&later.position(self.nodes, sighting.along))?,
-            self.view
-                .project(&before.position(self.nodes, sighting.along))?,
-        );
+        let at = |now: &Instant| self.view.project(&now.position(self.nodes, sighting.along));
+        let (b, a) = (at(&later)?, at(&before)?);
         for axis in 0..2 {
             // A camera clock that is ahead sees an earlier rope.
             out[axis][CLOCK] = (a[axis] - b[axis]) / (2.0 * CLOCK_STEP_S);
@@ -288,10 +270,7 @@ impl Comparison<'_> {
 
     /// Unit vector along the rope in the picture.
     fn tangent(&self, now: &Instant, along: f64) -> Option<[f64; 2]> {
-        let place = |along: f64| -> Option<[f64; 2]> {
-            let p: Vector3<f64> = now.position(self.nodes, along);
-            self.view.project(&p)
-        };
+        let place = |along: f64| self.view.project(&now.position(self.nodes, along));
         let a = place((along - TANGENT_SPAN).max(0.0))?;
         let b = place((along + TANGENT_SPAN).min(1.0))?;
         let (du, dv) = (b[0] - a[0], b[1] - a[1]);
@@ -312,7 +291,7 @@ impl Linearised {
         noise.whiten(grid, &mut rows);
         let parts: Vec<&[Option<[Row; 2]>]> =
             rows.chunks(FRAMES_OF_PART * grid.keypoints).collect();
-        let sums = map_in_order(&parts, film.threads, |part| accumulate(part));
+        let sums = map_in_order(&parts, film.options.threads, |part| accumulate(part));
         let mut out = Normal {
             information: Square::zeros(),
             gradient: Point::zeros(),

@@ -1,9 +1,8 @@
 //! The network's answer: as an estimate of its own, and as the start of a fit.
 
-use super::camera_pose::CorrectionPrior;
-use super::clock::clock_window;
+use super::clock::ClockWindow;
 use super::coarse::{Comparer, INVISIBLE_PX};
-use super::coordinates::{CLOCK, Coordinates, Reach, parameter, point_of};
+use super::coordinates::{CLOCK, Reach, parameter, point_of};
 use super::error::IdentifyError;
 use super::film::Film;
 use super::options::IdentifyOptions;
@@ -21,6 +20,20 @@ const NINETY: f64 = 1.645;
 /// Distance to the film of the simulated rope above which the network is not believed
 /// (px): twice the largest tracking error.
 const DISTANCE_MAX_PX: f64 = 6.0;
+/// What the network fits beside the rope: neither noise nor camera.
+const NOTHING_FITTED: FitCircumstances = {
+    let noise = KeypointNoise {
+        sigma_px: 0.0,
+        in_time: 0.0,
+        along_rope: 0.0,
+    };
+    FitCircumstances {
+        noise_along: noise,
+        noise_across: noise,
+        camera_position_m: [0.0; 3],
+        camera_rotation_rad: [0.0; 3],
+    }
+};
 
 /// The rope that the network proposes for a film; none if it cannot judge such a film or
 /// finds it out of its distribution.
@@ -61,37 +74,54 @@ pub(super) fn estimate(
         std_dev[parameter::LEAD_MASS] = 0.0;
     }
     let params = RopeParams::from_array(mean);
-    let fit = compare(observation, options, &params)?;
+    let film = Film::new(observation, options);
+    let clock = film.clock_window();
+    let distance_px = distance_px(&film, clock, &params)?;
     let mut covariance = [[0.0; ROPE_PARAMETERS]; ROPE_PARAMETERS];
     for i in 0..ROPE_PARAMETERS {
         covariance[i][i] = std_dev[i] * std_dev[i];
     }
     let seen = |i: usize| std_dev[i] < UNSEEN_FRACTION * prior_std(i);
+    let ambiguity = |i: usize| Ambiguity {
+        direction: core::array::from_fn(|k| f64::from(u8::from(k == i))),
+        kept: std_dev[i] / prior_std(i),
+    };
+    let unseen = (0..ROPE_PARAMETERS).filter(|i| !seen(*i));
     Ok(RopeEstimate {
         params,
         std_dev: core::array::from_fn(|i| seen(i).then_some(std_dev[i])),
-        residual_px: fit.distance_px,
+        residual_px: distance_px,
         method: "network".try_into().unwrap_or_default(),
         simulations: 1,
         seed: options.seed,
-        time_offset_s: fit.time_offset_s,
+        time_offset_s: clock.offset_s,
         posterior: RopePosterior {
             mean,
             covariance,
             interval_90: core::array::from_fn(|i| interval(i, mean[i], std_dev[i])),
             links_probability: links_probability(mean[0], std_dev[0]),
-            ambiguities: (0..ROPE_PARAMETERS)
-                .filter(|i| !seen(*i))
-                .map(|i| Ambiguity {
-                    direction: core::array::from_fn(|k| f64::from(u8::from(k == i))),
-                    kept: std_dev[i] / prior_std(i),
-                })
-                .collect(),
+            ambiguities: unseen.map(ambiguity).collect(),
             inflation: 1.0,
         },
-        circumstances: nothing_fitted(),
-        out_of_distribution: out_of_distribution(score, &fit),
+        circumstances: NOTHING_FITTED,
+        out_of_distribution: out_of_distribution(score, distance_px),
     })
+}
+
+/// Root mean square (Huber) distance between seen keypoints and those of a simulated rope,
+/// the camera's small misplacement taken out (px).
+fn distance_px(
+    film: &Film<'_>,
+    clock: ClockWindow,
+    rope: &RopeParams,
+) -> Result<f64, IdentifyError> {
+    let coordinates = film.coordinates(clock, Reach::Wide);
+    let mut x = point_of(rope);
+    x[CLOCK] = clock.offset_s;
+    let found = Comparer::new(film, &coordinates).compare(&[x])?;
+    let seen = found.first().filter(|c| c.distance_px < INVISIBLE_PX);
+    seen.map(|c| c.distance_px)
+        .ok_or(IdentifyError::NothingVisible)
 }
 
 /// Parameters and deviations, scaled to a weighed lead: the film tells ratios of
@@ -135,16 +165,15 @@ fn links_probability(mean: f64, std_dev: f64) -> [f64; LINK_COUNTS] {
 }
 
 /// The network's score as a fraction of its limit, and a rope that misses the film.
-fn out_of_distribution(score: f64, fit: &Compared) -> OutOfDistribution {
-    let distance = fit.distance_px / DISTANCE_MAX_PX;
+fn out_of_distribution(score: f64, distance_px: f64) -> OutOfDistribution {
+    let distance = distance_px / DISTANCE_MAX_PX;
     let mut reasons = Vec::new();
     if score >= 1.0 {
         reasons.push("the film is unlike those of the known ropes".to_owned());
     }
     if distance >= 1.0 {
         reasons.push(format!(
-            "the simulated rope misses the keypoints by {:.1} px",
-            fit.distance_px
+            "the simulated rope misses the keypoints by {distance_px:.1} px"
         ));
     }
     OutOfDistribution {
@@ -152,61 +181,6 @@ fn out_of_distribution(score: f64, fit: &Compared) -> OutOfDistribution {
         limit: 1.0,
         reasons,
     }
-}
-
-/// The network fits neither noise nor camera.
-fn nothing_fitted() -> FitCircumstances {
-    let noise = KeypointNoise {
-        sigma_px: 0.0,
-        in_time: 0.0,
-        along_rope: 0.0,
-    };
-    FitCircumstances {
-        noise_along: noise,
-        noise_across: noise,
-        camera_position_m: [0.0; 3],
-        camera_rotation_rad: [0.0; 3],
-    }
-}
-
-/// How well a rope fits a film.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Compared {
-    /// Root mean square (Huber) distance between seen and simulated keypoints, the
-    /// camera's small misplacement taken out (px).
-    distance_px: f64,
-    /// Camera time minus motion time (s).
-    time_offset_s: f64,
-}
-
-/// Simulates one rope and compares it with a film.
-fn compare(
-    observation: &Observation<'_>,
-    options: &IdentifyOptions,
-    rope: &RopeParams,
-) -> Result<Compared, IdentifyError> {
-    let film = Film::new(observation, options);
-    let clock = clock_window(
-        &film.clamp(),
-        observation.camera,
-        observation.motion,
-        options.clock_offset_max_s,
-    );
-    let camera = CorrectionPrior::new(options);
-    let pixel_m = film.viewer.pixel_m();
-    let coordinates =
-        Coordinates::new(observation.appearance, pixel_m, clock, &camera, Reach::Wide);
-    let mut x = point_of(rope);
-    x[CLOCK] = clock.offset_s;
-    let found = Comparer::new(&film, &coordinates).compare(&[x])?;
-    let distance_px = found.first().map_or(INVISIBLE_PX, |c| c.distance_px);
-    if distance_px >= INVISIBLE_PX {
-        return Err(IdentifyError::NothingVisible);
-    }
-    Ok(Compared {
-        distance_px,
-        time_offset_s: clock.offset_s,
-    })
 }
 
 #[cfg(test)]
@@ -227,14 +201,8 @@ mod tests {
         let plain = prediction();
         for i in 0..ROPE_PARAMETERS {
             let factor = if [2, 3, 5, 6].contains(&i) { 2.0 } else { 1.0 };
-            assert!(
-                (mean[i] / plain.parameters[i] - factor).abs() < 1e-12,
-                "{i}"
-            );
-            assert!(
-                (std_dev[i] / plain.std_dev[i] - factor).abs() < 1e-12,
-                "{i}"
-            );
+            let factors = [mean[i] / plain.parameters[i], std_dev[i] / plain.std_dev[i]];
+            assert!(factors.iter().all(|f| (f - factor).abs() < 1e-12), "{i}");
         }
     }
 
@@ -252,12 +220,8 @@ mod tests {
 
     #[test]
     fn an_unusual_film_or_a_rope_that_misses_it_is_outside() {
-        let fit = |distance_px| Compared {
-            distance_px,
-            time_offset_s: 0.0,
-        };
-        assert!(!out_of_distribution(0.8, &fit(2.0)).is_outside());
-        assert!(out_of_distribution(1.1, &fit(2.0)).is_outside());
-        assert!(out_of_distribution(0.8, &fit(9.0)).reasons[0].contains("9.0 px"));
+        assert!(!out_of_distribution(0.8, 2.0).is_outside());
+        assert!(out_of_distribution(1.1, 2.0).is_outside());
+        assert!(out_of_distribution(0.8, 9.0).reasons[0].contains("9.0 px"));
     }
 }

@@ -7,6 +7,7 @@
 
 use super::coordinates::FREE;
 use super::film::Grid;
+use shared_types::rope::KeypointNoise;
 
 /// Slopes of a pixel over the coordinates, then its residual, in one axis.
 pub(super) type Row = [f64; FREE + 1];
@@ -23,27 +24,16 @@ const SIGMA_MIN_PX: f64 = 0.05;
 /// Residuals beyond so many deviations do not count for the estimate.
 const CLIP: f64 = 3.0;
 
-/// Noise in one axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct AxisNoise {
-    /// Standard deviation (px).
-    pub(super) sigma_px: f64,
-    /// Correlation from frame to frame.
-    pub(super) in_time: f64,
-    /// Correlation from keypoint to keypoint.
-    pub(super) along_rope: f64,
-}
-
 /// Noise along and across the rope.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Noise {
-    pub(super) axes: [AxisNoise; 2],
+    pub(super) axes: [KeypointNoise; 2],
 }
 
 impl Noise {
     /// Independent noise of one size.
     pub(super) fn white(sigma_px: f64) -> Self {
-        let axis = AxisNoise {
+        let axis = KeypointNoise {
             sigma_px: sigma_px.max(SIGMA_MIN_PX),
             in_time: 0.0,
             along_rope: 0.0,
@@ -54,7 +44,7 @@ impl Noise {
     /// The noise that residuals show.
     pub(super) fn estimate(grid: &Grid, rows: &Rows) -> Self {
         Self {
-            axes: [0, 1].map(|axis| AxisNoise::estimate(grid, rows, axis)),
+            axes: [0, 1].map(|axis| estimate_axis(grid, rows, axis)),
         }
     }
 
@@ -103,42 +93,41 @@ fn subtract(rows: &mut Rows, index: usize, before: usize, axis: usize, correlati
     }
 }
 
-impl AxisNoise {
-    fn estimate(grid: &Grid, rows: &Rows, axis: usize) -> Self {
-        let residual = |i: usize| rows[i].as_ref().map(|r| r[axis][RESIDUAL]);
-        let mut sizes: Vec<f64> = (0..rows.len()).filter_map(residual).map(f64::abs).collect();
-        if sizes.is_empty() {
-            return Noise::white(1.0).axes[axis];
-        }
-        let middle = sizes.len() / 2;
-        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-        // The median of a normal variable's size is 0.6745 deviations.
-        let limit = CLIP * (*median / 0.6745).max(SIGMA_MIN_PX);
-        let clipped = |i: usize| residual(i).map(|r| r.clamp(-limit, limit));
-        let squares: f64 = (0..rows.len()).filter_map(clipped).map(|r| r * r).sum();
-        let sigma = (squares / sizes.len() as f64).sqrt();
-        let k = grid.keypoints;
-        let lag = |step: usize, linked: &dyn Fn(usize) -> bool| {
-            let (mut products, mut squares) = (0.0, 0.0);
-            for i in step..rows.len() {
-                if linked(i)
-                    && let (Some(a), Some(b)) = (clipped(i), clipped(i - step))
-                {
-                    products += a * b;
-                    squares += f64::midpoint(a * a, b * b);
-                }
+/// The noise that residuals show in one axis.
+fn estimate_axis(grid: &Grid, rows: &Rows, axis: usize) -> KeypointNoise {
+    let residual = |i: usize| rows[i].as_ref().map(|r| r[axis][RESIDUAL]);
+    let mut sizes: Vec<f64> = (0..rows.len()).filter_map(residual).map(f64::abs).collect();
+    if sizes.is_empty() {
+        return Noise::white(1.0).axes[axis];
+    }
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    // The median of a normal variable's size is 0.6745 deviations.
+    let limit = CLIP * (*median / 0.6745).max(SIGMA_MIN_PX);
+    let clipped = |i: usize| residual(i).map(|r| r.clamp(-limit, limit));
+    let squares: f64 = (0..rows.len()).filter_map(clipped).map(|r| r * r).sum();
+    let sigma = (squares / sizes.len() as f64).sqrt();
+    let k = grid.keypoints;
+    let lag = |step: usize, linked: &dyn Fn(usize) -> bool| {
+        let (mut products, mut squares) = (0.0, 0.0);
+        for i in step..rows.len() {
+            if linked(i)
+                && let (Some(a), Some(b)) = (clipped(i), clipped(i - step))
+            {
+                products += a * b;
+                squares += f64::midpoint(a * a, b * b);
             }
-            if squares > 0.0 {
-                (products / squares).clamp(0.0, CORRELATION_MAX)
-            } else {
-                0.0
-            }
-        };
-        Self {
-            sigma_px: sigma.max(SIGMA_MIN_PX),
-            in_time: lag(k, &|i| grid.follows[i / k]),
-            along_rope: lag(1, &|i| !i.is_multiple_of(k)),
         }
+        if squares > 0.0 {
+            (products / squares).clamp(0.0, CORRELATION_MAX)
+        } else {
+            0.0
+        }
+    };
+    KeypointNoise {
+        sigma_px: sigma.max(SIGMA_MIN_PX),
+        in_time: lag(k, &|i| grid.follows[i / k]),
+        along_rope: lag(1, &|i| !i.is_multiple_of(k)),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Method, size and rules of an identification.
 
+use super::camera_pose::CORRECTIONS;
 use super::error::IdentifyError;
 use crate::OutOfRange;
 use crate::observation::Observation;
@@ -105,46 +106,58 @@ impl Default for IdentifyOptions {
     }
 }
 
+impl IdentifyOptions {
+    /// Deviations of the camera's corrections, whose means are 0.
+    pub(super) fn camera_std(&self) -> [f64; CORRECTIONS] {
+        let (position, look_at) = (self.camera_position_std_m, self.camera_look_at_std_m);
+        let roll = self.camera_roll_std_rad;
+        [position, position, position, look_at, look_at, roll]
+    }
+}
+
 /// Whether a film can be fitted with these options.
 pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<(), IdentifyError> {
     check_options(options)?;
     o.track.validate()?;
-    let lost_fraction = o.track.lost_fraction();
-    if lost_fraction > options.lost_fraction_max {
-        return Err(IdentifyError::TooManyLost {
-            lost_fraction,
-            max: options.lost_fraction_max,
-        });
-    }
-    let found = o.track.frames.len();
-    if found < options.frames_min {
-        return Err(IdentifyError::TooFewFrames {
-            found,
-            min: options.frames_min,
-        });
-    }
+    let (lost, most) = (o.track.lost_fraction(), options.lost_fraction_max);
+    let (found, min) = (o.track.frames.len(), options.frames_min);
     let film_s = o.track.frames.last().map_or(0.0, |f| f.t_s);
     let motion_s = o.motion.duration_s();
-    if motion_s < film_s {
-        return Err(IdentifyError::MotionTooShort { motion_s, film_s });
-    }
-    Ok(())
+    Err(IdentifyError::Film(if lost > most {
+        format!(
+            "the rope was lost in {:.0} % of the frames, at most {:.0} % are allowed: film again with the whole rope in view",
+            lost * 100.0,
+            most * 100.0
+        )
+    } else if found < min {
+        format!("{found} frames, but identification needs {min} or more")
+    } else if motion_s < film_s {
+        format!(
+            "the attach frame's motion lasts {motion_s:.3} s, the film {film_s:.3} s: record the joints longer or film shorter"
+        )
+    } else {
+        return Ok(());
+    }))
 }
 
 /// Refuses what cannot be searched with, never ends, or would pass any film.
 fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
     const STEP: &str = "above 0 and at most 0.005 s";
     const DEVIATION: &str = "above 0 and at most 1 (m, rad)";
+    const CLOCK: &str = "0.001 to 1 s";
+    const LEAD: &str = "above 0 and below 10 kg";
     let within = |option, value: f64, range: RangeInclusive<f64>, expected| {
         (option, value, range.contains(&value), expected)
     };
-    let count = |option, value: usize, range: RangeInclusive<usize>, expected| {
-        (option, value as f64, range.contains(&value), expected)
+    let count = |option, value: usize, max: usize, expected| {
+        (option, value as f64, (1..=max).contains(&value), expected)
     };
     let step = |option, value| within(option, value, f64::MIN_POSITIVE..=5e-3, STEP);
     let deviation = |option, value| within(option, value, f64::MIN_POSITIVE..=1.0, DEVIATION);
     let finite = |option, value| within(option, value, f64::MIN..=f64::MAX, "finite");
+    let positive = |option, value| count(option, value, usize::MAX, "1 or more");
     let lead_kg = o.lead_mass_kg.unwrap_or(1.0);
+    let (population, repeats) = (o.population as f64, o.repeats_max as f64);
     let rules = [
         step("search_step_s", o.search_step_s),
         step("step_s", o.step_s),
@@ -152,33 +165,23 @@ fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
             "clock_offset_max_s",
             o.clock_offset_max_s,
             1e-3..=1.0,
-            "0.001 to 1 s",
+            CLOCK,
         ),
         (
             "lead_mass_kg",
             lead_kg,
             lead_kg > 0.0 && lead_kg < 10.0,
-            "above 0 and below 10 kg",
+            LEAD,
         ),
         deviation("camera_position_std_m", o.camera_position_std_m),
         deviation("camera_look_at_std_m", o.camera_look_at_std_m),
         deviation("camera_roll_std_rad", o.camera_roll_std_rad),
         within("noise_min_px", o.noise_min_px, 0.0..=10.0, "0 to 10 px"),
-        count("population", o.population, 4..=10_000, "4 to 10000"),
-        count(
-            "generations",
-            o.generations,
-            1..=10_000_000,
-            "1 to 10000000",
-        ),
-        count(
-            "search_frames_max",
-            o.search_frames_max,
-            1..=usize::MAX,
-            "1 or more",
-        ),
-        count("repeats_max", o.repeats_max, 0..=100, "at most 100"),
-        count("frames_min", o.frames_min, 1..=usize::MAX, "1 or more"),
+        within("population", population, 4.0..=1e4, "4 to 10000"),
+        count("generations", o.generations, 10_000_000, "1 to 10000000"),
+        positive("search_frames_max", o.search_frames_max),
+        within("repeats_max", repeats, 0.0..=100.0, "at most 100"),
+        positive("frames_min", o.frames_min),
         within(
             "lost_fraction_max",
             o.lost_fraction_max,
@@ -197,7 +200,6 @@ mod tests {
 
     #[test]
     fn options_out_of_range_are_refused_by_name() {
-        assert!(check_options(&IdentifyOptions::default()).is_ok());
         type Change = fn(&mut IdentifyOptions);
         let cases: [(&str, Change); 14] = [
             ("population", |o| o.population = 3),
@@ -215,6 +217,7 @@ mod tests {
             ("noise_min_px", |o| o.noise_min_px = -1.0),
             ("lead_mass_kg", |o| o.lead_mass_kg = Some(f64::NAN)),
         ];
+        assert!(check_options(&IdentifyOptions::default()).is_ok());
         for (name, change) in cases {
             let mut options = IdentifyOptions::default();
             change(&mut options);

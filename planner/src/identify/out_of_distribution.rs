@@ -34,10 +34,7 @@ struct Edge {
 pub(super) fn out_of_distribution(fit: &Refined) -> OutOfDistribution {
     let mut worst = f64::NEG_INFINITY;
     let mut reasons = Vec::new();
-    for edge in edges_in_m(&fit.x)
-        .into_iter()
-        .chain(edges_of_ratios(&fit.x))
-    {
+    for edge in edges(&fit.x) {
         let variance = (fit.covariance * edge.slope).dot(&edge.slope).max(0.0) * fit.inflation;
         let score = edge.value / variance.sqrt().hypot(edge.tolerance);
         worst = worst.max(score);
@@ -58,6 +55,10 @@ pub(super) fn out_of_distribution(fit: &Refined) -> OutOfDistribution {
         limit: LIMIT,
         reasons,
     }
+}
+
+fn edges(x: &Point) -> impl Iterator<Item = Edge> {
+    edges_in_m(x).into_iter().chain(edges_of_ratios(x))
 }
 
 /// Edges of lengths.
@@ -136,8 +137,7 @@ mod tests {
     use crate::ropes::{outside_rope, random_rope};
 
     fn worst(x: &Point) -> f64 {
-        let edges = edges_in_m(x).into_iter().chain(edges_of_ratios(x));
-        edges.map(|e| e.value).fold(f64::NEG_INFINITY, f64::max)
+        edges(x).map(|e| e.value).fold(f64::NEG_INFINITY, f64::max)
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::coordinates::{
     DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, STIFFNESS, link_range, parameter,
 };
 use super::refine::Refined;
-use super::scale::MassScale;
+use super::scale;
 use crate::observation::Appearance;
 use nalgebra::{SMatrix, SVector};
 use rand::{RngExt, SeedableRng};
@@ -35,13 +35,6 @@ pub(super) const UNSEEN_FRACTION: f64 = 0.7;
 const DRAWN: [usize; 5] = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS];
 type Vector = SVector<f64, 5>;
 
-/// The parameters' posterior with its likeliest rope.
-#[derive(Debug, Clone)]
-pub(super) struct Inferred {
-    pub(super) params: RopeParams,
-    pub(super) posterior: RopePosterior,
-}
-
 /// One drawn rope.
 struct Draw {
     values: [f64; ROPE_PARAMETERS],
@@ -49,17 +42,15 @@ struct Draw {
     weight: f64,
 }
 
-/// Draws ropes from a fit.
+/// The parameters' posterior with its likeliest rope, from ropes drawn from a fit.
 pub(super) fn posterior(
     fit: &Refined,
     appearance: Appearance,
     pixel_m: f64,
     lead_mass_kg: Option<f64>,
     seed: u64,
-) -> Inferred {
-    let counts = count_probabilities(fit);
-    let scale = MassScale::new(lead_mass_kg);
-    let mut draws = draw(fit, &counts, appearance, pixel_m, scale, seed);
+) -> (RopeParams, RopePosterior) {
+    let mut draws = draw(fit, appearance, pixel_m, lead_mass_kg, seed);
     let total: f64 = draws.iter().map(|d| d.weight).sum();
     let squares: f64 = draws.iter().map(|d| d.weight * d.weight).sum();
     let within_ranges = total > 0.0 && total * total / squares >= EFFECTIVE_MIN;
@@ -69,30 +60,21 @@ pub(super) fn posterior(
             d.weight = 1.0;
         }
     }
-    normalise(&mut draws);
-    let links_probability = links_of(&draws);
-    let posterior = summarise(&draws, links_probability, fit);
-    Inferred {
-        params: likeliest(&draws, &posterior, lead_mass_kg),
-        posterior,
-    }
-}
-
-fn normalise(draws: &mut [Draw]) {
     let total: f64 = draws.iter().map(|d| d.weight).sum();
-    for d in draws {
+    for d in &mut draws {
         d.weight /= total;
     }
+    let posterior = summarise(&draws, fit);
+    (likeliest(&draws, &posterior, lead_mass_kg), posterior)
 }
 
-/// Probability of each link count of the ranges from the fit alone.
-fn count_probabilities(fit: &Refined) -> [f64; LINK_COUNTS] {
-    let variance = fit.covariance[(LINKS, LINKS)] * fit.inflation + LINKS_STD.powi(2);
+/// Probability of each link count of the ranges where they are normally distributed.
+fn count_probabilities(mean: f64, variance: f64) -> [f64; LINK_COUNTS] {
     let (low, _) = link_range();
     let mut count = f64::from(low) - 1.0;
     let logs: [f64; LINK_COUNTS] = core::array::from_fn(|_| {
         count += 1.0;
-        -(count - fit.x[LINKS]).powi(2) / (2.0 * variance)
+        -(count - mean).powi(2) / (2.0 * variance)
     });
     let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights = logs.map(|l| (l - top).exp());
@@ -102,10 +84,9 @@ fn count_probabilities(fit: &Refined) -> [f64; LINK_COUNTS] {
 
 fn draw(
     fit: &Refined,
-    counts: &[f64; LINK_COUNTS],
     appearance: Appearance,
     pixel_m: f64,
-    scale: MassScale,
+    lead_mass_kg: Option<f64>,
     seed: u64,
 ) -> Vec<Draw> {
     use parameter as p;
@@ -118,6 +99,9 @@ fn draw(
         .cholesky()
         .map_or_else(SMatrix::zeros, |c| c.l());
     let (low, _) = link_range();
+    // The variance of the count from the fit alone.
+    let counts_variance = fit.covariance[(LINKS, LINKS)] * fit.inflation + LINKS_STD.powi(2);
+    let counts = count_probabilities(fit.x[LINKS], counts_variance);
     let uniform = |rng: &mut ChaCha12Rng, i: usize| rng.random_range(RANGES[i].min..=RANGES[i].max);
     (0..DRAWS)
         .map(|_| {
@@ -136,7 +120,7 @@ fn draw(
                 + root * normal;
             let s = x[0].max(1e-3) / links;
             let ratios = [x[1].exp() / s, x[2].exp() / s, x[3].exp()];
-            let drawn = scale.draw(ratios, rng.random_range(0.0..1.0));
+            let drawn = scale::draw(lead_mass_kg, ratios, rng.random_range(0.0..1.0));
             let mu = drawn.mass_per_length;
             let radius_m = match appearance.rope_radius_m {
                 Some(seen) => {
@@ -203,11 +187,7 @@ fn quantiles<const N: usize>(
     })
 }
 
-fn summarise(
-    draws: &[Draw],
-    links_probability: [f64; LINK_COUNTS],
-    fit: &Refined,
-) -> RopePosterior {
+fn summarise(draws: &[Draw], fit: &Refined) -> RopePosterior {
     let mut mean = [0.0; ROPE_PARAMETERS];
     for d in draws {
         for (m, v) in mean.iter_mut().zip(d.values) {
@@ -223,6 +203,7 @@ fn summarise(
         }
     }
     let mut interval_90 = core::array::from_fn(|i| quantiles(draws, |d| d.values[i], [0.05, 0.95]));
+    let links_probability = links_of(draws);
     interval_90[parameter::LINKS] = count_interval(&links_probability);
     RopePosterior {
         mean,
@@ -310,14 +291,12 @@ fn likeliest(draws: &[Draw], posterior: &RopePosterior, lead_mass_kg: Option<f64
     ])
 }
 
-impl Inferred {
-    /// One standard deviation per parameter, `None` where the film says next to nothing.
-    pub(super) fn std_dev(&self) -> [Option<f64>; ROPE_PARAMETERS] {
-        core::array::from_fn(|i| {
-            let deviation = self.posterior.covariance[i][i].max(0.0).sqrt();
-            (deviation < UNSEEN_FRACTION * prior_std(i)).then_some(deviation)
-        })
-    }
+/// One standard deviation per parameter, `None` where the film says next to nothing.
+pub(super) fn std_dev(posterior: &RopePosterior) -> [Option<f64>; ROPE_PARAMETERS] {
+    core::array::from_fn(|i| {
+        let deviation = posterior.covariance[i][i].max(0.0).sqrt();
+        (deviation < UNSEEN_FRACTION * prior_std(i)).then_some(deviation)
+    })
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ pub(super) fn refine(
         settled_below: SETTLED,
     };
     let estimate = |w: &Iterate| {
-        Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows).at_least(film.noise_min_px)
+        Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows).at_least(film.options.noise_min_px)
     };
     let best = |iterates: Vec<Iterate>| {
         iterates

@@ -6,51 +6,19 @@
 //! all four stay in their ranges (`k = α µ`, `c = β µ`, `m_L = γ µ`: the change of
 //! variables contributes µ³). Its median minimises the mean absolute error.
 
+use super::coordinates::parameter::{DAMPING, LEAD_MASS, MASS_PER_LENGTH, STIFFNESS};
 use shared_types::rope::RANGES;
 
-/// Rule that turns ratios into masses.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MassScale {
-    lead_mass_kg: Option<f64>,
-}
-
-/// What is known about the mass per length once all ratios are.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MassPerLength {
-    /// Median (kg/m).
-    pub middle: f64,
-    /// Standard deviation (kg/m); 0 for a weighed lead.
-    pub std_dev: f64,
-}
-
-impl MassScale {
-    /// Scale from the ranges, or from the lead's mass if it was weighed.
-    #[must_use]
-    pub fn new(lead_mass_kg: Option<f64>) -> Self {
-        Self { lead_mass_kg }
-    }
-
-    /// Mass per length for the ratios `[k/µ, c/µ, m_L/µ]`.
-    #[must_use]
-    pub fn mass_per_length(&self, ratios: [f64; 3]) -> MassPerLength {
-        if let Some(lead_mass_kg) = self.lead_mass_kg {
-            return MassPerLength {
-                middle: lead_mass_kg / ratios[2],
-                std_dev: 0.0,
-            };
-        }
-        let (low, high) = bounds(ratios);
-        if low < high {
-            cubic_density(low, high)
-        } else {
-            // No rope of the ranges has these ratios: the mass per length that
-            // breaks the ranges least, by equal factors at both ends.
-            let middle = (low * high).sqrt();
-            MassPerLength {
-                middle,
-                std_dev: low - middle,
-            }
-        }
+/// Median of the mass per length (kg/m) for the ratios `[k/µ, c/µ, m_L/µ]`. For ratios
+/// that no rope of the ranges has, it breaks the ranges least, by equal factors at both
+/// ends.
+#[must_use]
+pub fn median_mass_per_length(ratios: [f64; 3]) -> f64 {
+    let (low, high) = bounds(ratios);
+    if low < high {
+        ((low.powi(4) + high.powi(4)) / 2.0).powf(0.25)
+    } else {
+        (low * high).sqrt()
     }
 }
 
@@ -64,39 +32,33 @@ pub(super) struct DrawnMass {
     pub(super) density: f64,
 }
 
-impl MassScale {
-    /// The mass per length at the quantile `part` (0 to 1) of its density for the
-    /// ratios `[k/µ, c/µ, m_L/µ]`.
-    pub(super) fn draw(&self, ratios: [f64; 3], part: f64) -> DrawnMass {
-        let product: f64 = ratios.iter().product();
-        if let Some(lead_mass_kg) = self.lead_mass_kg {
-            let mass_per_length = lead_mass_kg / ratios[2];
-            let inside = |i: usize, value: f64| value >= RANGES[i].min && value <= RANGES[i].max;
-            let possible = inside(5, mass_per_length)
-                && inside(3, ratios[0] * mass_per_length)
-                && inside(2, ratios[1] * mass_per_length);
-            return DrawnMass {
-                mass_per_length,
-                density: if possible {
-                    ratios[0] * ratios[1] * mass_per_length.powi(3)
-                } else {
-                    0.0
-                },
-            };
+/// The mass per length at the quantile `part` (0 to 1) of its density for the
+/// ratios `[k/µ, c/µ, m_L/µ]`, or that of a lead that was weighed.
+pub(super) fn draw(lead_mass_kg: Option<f64>, ratios: [f64; 3], part: f64) -> DrawnMass {
+    if let Some(lead_mass_kg) = lead_mass_kg {
+        let mass_per_length = lead_mass_kg / ratios[2];
+        let inside = |i: usize, value: f64| value >= RANGES[i].min && value <= RANGES[i].max;
+        let possible = inside(MASS_PER_LENGTH, mass_per_length)
+            && inside(STIFFNESS, ratios[0] * mass_per_length)
+            && inside(DAMPING, ratios[1] * mass_per_length);
+        let density = ratios[0] * ratios[1] * mass_per_length.powi(3);
+        return DrawnMass {
+            mass_per_length,
+            density: if possible { density } else { 0.0 },
+        };
+    }
+    let (low, high) = bounds(ratios);
+    if low < high {
+        let (a, b) = (low.powi(4), high.powi(4));
+        DrawnMass {
+            mass_per_length: (a + part * (b - a)).powf(0.25),
+            density: ratios.iter().product::<f64>() * (b - a),
         }
-        let (low, high) = bounds(ratios);
-        if low < high {
-            let (a, b) = (low.powi(4), high.powi(4));
-            DrawnMass {
-                mass_per_length: (a + part * (b - a)).powf(0.25),
-                density: product * (b - a),
-            }
-        } else {
-            // As wide as the ranges are apart from each other.
-            DrawnMass {
-                mass_per_length: low * (high / low).powf(part),
-                density: 0.0,
-            }
+    } else {
+        // As wide as the ranges are apart from each other.
+        DrawnMass {
+            mass_per_length: low * (high / low).powf(part),
+            density: 0.0,
         }
     }
 }
@@ -104,7 +66,8 @@ impl MassScale {
 /// Interval of the mass per length in which all four parameters stay in their ranges;
 /// empty, the lower end above the upper one, if there is none.
 fn bounds(ratios: [f64; 3]) -> (f64, f64) {
-    let [stiffness, damping, mass, lead] = [RANGES[3], RANGES[2], RANGES[5], RANGES[6]];
+    let [stiffness, damping, mass, lead] =
+        [STIFFNESS, DAMPING, MASS_PER_LENGTH, LEAD_MASS].map(|i| RANGES[i]);
     let bounds = [
         (mass.min, mass.max),
         (stiffness.min / ratios[0], stiffness.max / ratios[0]),
@@ -115,17 +78,6 @@ fn bounds(ratios: [f64; 3]) -> (f64, f64) {
         bounds.iter().map(|b| b.0).fold(0.0, f64::max),
         bounds.iter().map(|b| b.1).fold(f64::INFINITY, f64::min),
     )
-}
-
-/// Median and deviation of the density proportional to `x³` on an interval.
-fn cubic_density(a: f64, b: f64) -> MassPerLength {
-    let moment = |n: i32| (b.powi(n) - a.powi(n)) / f64::from(n);
-    let total = moment(4);
-    let mean = moment(5) / total;
-    MassPerLength {
-        middle: ((a.powi(4) + b.powi(4)) / 2.0).powf(0.25),
-        std_dev: (moment(6) / total - mean * mean).max(0.0).sqrt(),
-    }
 }
 
 #[cfg(test)]
@@ -149,7 +101,7 @@ mod tests {
                 mu,
             ];
             let ratios = core::array::from_fn(|i| absolute[i] / mu);
-            let found = MassScale::new(None).mass_per_length(ratios).middle;
+            let found = median_mass_per_length(ratios);
             for (sum, value) in sum.iter_mut().zip(absolute) {
                 *sum += (value / mu * found - value).abs();
             }
@@ -162,13 +114,19 @@ mod tests {
 
     #[test]
     fn a_weighed_lead_fixes_the_scale() {
-        let found = MassScale::new(Some(0.03)).mass_per_length([5.0, 0.1, 0.5]);
-        assert!((found.middle - 0.06).abs() < 1e-12 && found.std_dev == 0.0);
+        for part in [0.0, 0.5, 1.0] {
+            let mass = draw(Some(0.03), [5.0, 0.1, 0.5], part).mass_per_length;
+            assert!((mass - 0.06).abs() < 1e-12);
+        }
     }
 
     #[test]
     fn ratios_of_no_rope_still_give_a_positive_mass() {
-        let found = MassScale::new(None).mass_per_length([1e3, 1e-4, 10.0]);
-        assert!(found.middle > 0.0 && found.middle.is_finite() && found.std_dev > 0.0);
+        let ratios = [1e3, 1e-4, 10.0];
+        let [low, high] = [0.0, 1.0].map(|part| draw(None, ratios, part));
+        assert_eq!(low.density, 0.0);
+        let (low, high) = (low.mass_per_length, high.mass_per_length);
+        let median = median_mass_per_length(ratios);
+        assert!(low > median && median > high && high > 0.0);
     }
 }

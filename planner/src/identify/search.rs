@@ -6,7 +6,7 @@
 //! makes the link inertia. The link count is searched as a real number and rounded.
 
 use super::budget::Budget;
-use super::coarse::{Compared, Comparer, INVISIBLE_PX};
+use super::coarse::{Comparer, INVISIBLE_PX};
 use super::coordinates::{CAMERA, Coordinates, Point};
 use super::error::IdentifyError;
 use super::film::Film;
@@ -21,17 +21,18 @@ pub(super) struct Found {
     pub(super) distance_px: f64,
 }
 
-/// The global search; repeated from other random numbers where it was caught in a side
-/// minimum.
+/// The global search; repeated from other random numbers, `repeats_max` times at most,
+/// where it was caught in a side minimum.
 pub(super) fn search(
     film: &Film<'_>,
     coordinates: &Coordinates,
-    options: &IdentifyOptions,
+    repeats_max: usize,
     budget: &mut Budget<'_>,
 ) -> Result<Found, IdentifyError> {
+    let options = &film.options;
     let comparer = Comparer::new(film, coordinates);
     let mut found = once(&comparer, coordinates, options, options.seed, budget)?;
-    for repeat in 1..=options.repeats_max as u64 {
+    for repeat in 1..=repeats_max as u64 {
         if found.distance_px <= options.repeat_above_px {
             break;
         }
@@ -78,7 +79,12 @@ fn once(
         let fitness: Vec<f64> = compared.iter().map(|c| c.distance_px).collect();
         strategy.tell(&fitness)?;
         for (x, c) in points.iter().zip(&compared) {
-            keep_best(&mut found, x, c);
+            if c.distance_px < found.map_or(INVISIBLE_PX, |f| f.distance_px) {
+                found = Some(Found {
+                    x: c.with_camera(x),
+                    distance_px: c.distance_px,
+                });
+            }
         }
         let best = found.ok_or(IdentifyError::NothingVisible)?;
         budget.step(points.len(), best.distance_px)?;
@@ -86,16 +92,6 @@ fn once(
         if strategy.stop().is_some() || (options.early_stop && stalled(&history)) {
             return Ok(best);
         }
-    }
-}
-
-fn keep_best(found: &mut Option<Found>, x: &Point, compared: &Compared) {
-    let better = found.is_none_or(|f| compared.distance_px < f.distance_px);
-    if better && compared.distance_px < INVISIBLE_PX {
-        *found = Some(Found {
-            x: compared.with_camera(x),
-            distance_px: compared.distance_px,
-        });
     }
 }
 

@@ -6,7 +6,7 @@ use crate::synthetic::Randomisation;
 use crate::wiggle::WiggleConfig;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use shared_types::rope::{RANGES, ROPE_PARAMETERS};
+use shared_types::rope::{ParameterRange, RANGES, ROPE_PARAMETERS};
 use std::collections::BTreeMap;
 
 /// Key of the metadata in the model file; the value is JSON.
@@ -88,47 +88,13 @@ pub enum ModelError {
         /// Why.
         source: std::io::Error,
     },
-    /// The bytes are no ONNX model.
-    #[error("model {name}: not an ONNX file: {reason}")]
-    NotOnnx {
-        /// File or `embedded`.
-        name: String,
-        /// What was wrong.
-        reason: String,
-    },
-    /// An ONNX model without this program's metadata.
-    #[error(
-        "model {name}: has no `{METADATA_KEY}` metadata, so it was not written by phi-train: export it again"
-    )]
-    NoMetadata {
-        /// File or `embedded`.
-        name: String,
-    },
-    /// Metadata that cannot be understood or does not fit this program.
+    /// No model of this program, not for this version of it, or damaged.
     #[error("model {name}: {reason}")]
-    Unfit {
+    Refused {
         /// File or `embedded`.
         name: String,
-        /// What does not fit.
+        /// What is wrong, and what to do.
         reason: String,
-    },
-    /// The weights are not those that were written.
-    #[error("model {name}: damaged, its weights do not have the hash they were written with")]
-    Damaged {
-        /// File or `embedded`.
-        name: String,
-    },
-    /// The weights do not give the outputs that the trained network gave.
-    #[error(
-        "model {name}: its answer to the test input is off by {difference:.1e}, at most {limit:.0e} is allowed: export it again"
-    )]
-    OtherAnswer {
-        /// File or `embedded`.
-        name: String,
-        /// Largest difference.
-        difference: f32,
-        /// Largest difference allowed.
-        limit: f32,
     },
 }
 
@@ -146,34 +112,21 @@ pub fn hex(bytes: &[u8]) -> String {
 
 impl PhiMetadata {
     /// Reads and checks the metadata of a model file's bytes, and reads its weights by
-    /// name; `name` is for messages.
-    pub(super) fn read<'a>(
-        name: &str,
-        bytes: &'a [u8],
-    ) -> Result<(Self, BTreeMap<&'a str, Vec<f32>>), ModelError> {
-        let name = || name.to_owned();
-        let not_onnx = |reason: &str| ModelError::NotOnnx {
-            name: name(),
-            reason: reason.to_owned(),
-        };
-        let Ok(found) = parts(bytes) else {
-            return Err(not_onnx("cut short, or something else"));
-        };
+    /// name; in words what is wrong with them.
+    pub(super) fn read(bytes: &[u8]) -> Result<(Self, BTreeMap<&str, Vec<f32>>), String> {
+        let not_onnx = |reason: &str| format!("not an ONNX file: {reason}");
+        let found = parts(bytes).map_err(|NotFields| not_onnx("cut short, or something else"))?;
         let graph = found.graph.ok_or_else(|| not_onnx("it has no graph"))?;
-        let (_, text) = found
-            .metadata
-            .iter()
-            .find(|(key, _)| *key == METADATA_KEY)
-            .ok_or_else(|| ModelError::NoMetadata { name: name() })?;
-        let unfit = |reason: String| ModelError::Unfit {
-            name: name(),
-            reason,
-        };
+        let mut entries = found.metadata.into_iter();
+        let (_, text) = entries.find(|(key, _)| *key == METADATA_KEY).ok_or_else(|| {
+            format!("has no `{METADATA_KEY}` metadata, so it was not written by phi-train: export it again")
+        })?;
         let metadata: Self = serde_json::from_str(text)
-            .map_err(|error| unfit(format!("metadata not understood: {error}")))?;
-        metadata.check().map_err(unfit)?;
+            .map_err(|error| format!("metadata not understood: {error}"))?;
+        metadata.check()?;
         if graph_sha256(graph) != metadata.graph_sha256 {
-            return Err(ModelError::Damaged { name: name() });
+            let damaged = "damaged, its weights do not have the hash they were written with";
+            return Err(damaged.to_owned());
         }
         let weights = weights(graph).map_err(|NotFields| not_onnx("its weights are cut short"))?;
         Ok((metadata, weights))
@@ -208,13 +161,40 @@ impl PhiMetadata {
         }
         Ok(())
     }
+}
 
-    /// Physical values of nine normalised outputs, order of [`RANGES`].
+impl ParameterScale {
+    /// Outputs as fractions of the parameter ranges.
     #[must_use]
-    pub fn physical(&self, normalised: [f64; ROPE_PARAMETERS]) -> [f64; ROPE_PARAMETERS] {
-        core::array::from_fn(|i| {
-            let p = &self.parameters[i];
-            p.min + normalised[i] * (p.max - p.min)
-        })
+    pub fn of_ranges() -> Vec<Self> {
+        let scale = |range: &ParameterRange| Self {
+            key: range.key.to_owned(),
+            min: range.min,
+            max: range.max,
+        };
+        RANGES.iter().map(scale).collect()
     }
+}
+
+/// Physical values of nine normalised outputs, and their standard deviations, order of
+/// [`RANGES`].
+///
+/// # Panics
+/// With fewer than nine numbers or scales, as indexing does.
+#[must_use]
+pub fn in_units(
+    scales: &[ParameterScale],
+    mean: &[f32],
+    log_variance: &[f32],
+) -> ([f64; ROPE_PARAMETERS], [f64; ROPE_PARAMETERS]) {
+    let span = |i: usize| scales[i].max - scales[i].min;
+    (
+        core::array::from_fn(|i| scales[i].min + f64::from(mean[i]) * span(i)),
+        core::array::from_fn(|i| {
+            // A deviation beyond the range or far below a thousandth of it is the
+            // estimate's own error.
+            let deviation = (f64::from(log_variance[i]) / 2.0).exp();
+            deviation.clamp(1e-4, 1.0) * span(i)
+        }),
+    )
 }

@@ -15,7 +15,7 @@ mod probe;
 pub use encoder::RawOutputs;
 pub use metadata::{
     FORMAT, METADATA_KEY, ModelError, ParameterScale, PhiMetadata, ProbeOutputs, TrainingRecord,
-    graph_sha256, hex,
+    graph_sha256, hex, in_units,
 };
 pub use net::{PhiNet, PredictError, Prediction};
 pub use probe::{PARITY, difference, probe};

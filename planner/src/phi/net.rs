@@ -1,14 +1,11 @@
 //! The network of a model file.
 
 use super::encoder::{Encoder, RawOutputs};
-use super::metadata::{ModelError, PhiMetadata};
+use super::metadata::{ModelError, PhiMetadata, in_units};
 use super::probe::{PARITY, difference, probe};
 use crate::features::{FeatureDefinition, ObserveError, ViewPlane, WiggleFeatures, observe};
 use crate::observation::{Observation, ObservedPoints};
-use crate::wiggle::wiggle;
-use arm_model::Limits;
-use arm_model::Pole;
-use rope_sim::PlannedArm;
+use crate::wiggle::wiggling_arm;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
 
@@ -46,7 +43,6 @@ pub enum PredictError {
 
 /// A loaded network.
 pub struct PhiNet {
-    name: String,
     metadata: PhiMetadata,
     plane: ViewPlane,
     encoder: Encoder,
@@ -58,7 +54,6 @@ const EMBEDDED: &[u8] = include_bytes!("../../../configs/models/phi-nn.onnx");
 impl core::fmt::Debug for PhiNet {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("PhiNet")
-            .field("name", &self.name)
             .field("metadata", &self.metadata)
             .finish_non_exhaustive()
     }
@@ -66,8 +61,7 @@ impl core::fmt::Debug for PhiNet {
 
 /// The wiggle that the network was trained on, as the camera sees it.
 fn plane_of(metadata: &PhiMetadata) -> Result<ViewPlane, String> {
-    let wiggle = wiggle(&metadata.wiggle, &Limits::default());
-    let arm = PlannedArm::new(wiggle.map_err(|error| error.to_string())?, Pole::default());
+    let arm = wiggling_arm(&metadata.wiggle).map_err(|error| error.to_string())?;
     ViewPlane::of_motion(&arm, metadata.wiggle.filmed_s).map_err(|error| error.to_string())
 }
 
@@ -98,36 +92,34 @@ impl PhiNet {
     /// # Errors
     /// The reason why these bytes are not used.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
-        let (metadata, weights) = PhiMetadata::read(name, bytes)?;
-        let unfit = |reason: String| ModelError::Unfit {
+        Self::read(bytes).map_err(|reason| ModelError::Refused {
             name: name.to_owned(),
             reason,
-        };
-        let encoder = Encoder::read(&weights, &metadata.features).map_err(unfit)?;
-        let plane = plane_of(&metadata).map_err(unfit)?;
+        })
+    }
+
+    fn read(bytes: &[u8]) -> Result<Self, String> {
+        let (metadata, weights) = PhiMetadata::read(bytes)?;
         let net = Self {
-            name: name.to_owned(),
+            encoder: Encoder::read(&weights, &metadata.features)?,
+            plane: plane_of(&metadata)?,
             metadata,
-            plane,
-            encoder,
         };
         net.try_out()?;
         Ok(net)
     }
 
     /// Asks it for the answer it must know, so that weights in another order show now.
-    fn try_out(&self) -> Result<(), ModelError> {
+    fn try_out(&self) -> Result<(), String> {
         let asked = probe(self.metadata.features);
         let answer = self.encoder.outputs(&asked.motion, &asked.widths);
         let expected = &self.metadata.probe;
         let off = difference(&expected.mean, &answer.mean)
             .max(difference(&expected.log_variance, &answer.log_variance));
         if off > PARITY {
-            return Err(ModelError::OtherAnswer {
-                name: self.name.clone(),
-                difference: off,
-                limit: PARITY,
-            });
+            return Err(format!(
+                "its answer to the test input is off by {off:.1e}, at most {PARITY:.0e} is allowed: export it again"
+            ));
         }
         Ok(())
     }
@@ -141,12 +133,24 @@ impl PhiNet {
     /// Itself, if it reads what a camera shows.
     ///
     /// # Errors
-    /// [`ObserveError::NeedsLinkCentres`].
+    /// A network of link centres.
     pub fn for_camera(self) -> Result<Self, ObserveError> {
-        match self.metadata.features.points {
-            ObservedPoints::ArcLength => Ok(self),
-            ObservedPoints::LinkCentres => Err(ObserveError::NeedsLinkCentres),
-        }
+        self.reads(ObservedPoints::ArcLength).map(|()| self)
+    }
+
+    fn reads(&self, shown: ObservedPoints) -> Result<(), ObserveError> {
+        use ObservedPoints::{ArcLength, LinkCentres};
+        Err(ObserveError::new(
+            match (self.metadata.features.points, shown) {
+                (ArcLength, ArcLength) | (LinkCentres, LinkCentres) => return Ok(()),
+                (LinkCentres, ArcLength) => {
+                    "the network reads the centres of the rope's links, which only simulated films show (experiments sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
+                }
+                (ArcLength, LinkCentres) => {
+                    "the film shows link centres, but the network reads keypoints uniform in arc length: name one trained with `points = \"link-centres\"`"
+                }
+            },
+        ))
     }
 
     /// What the network sees of an observation of its wiggle.
@@ -154,15 +158,7 @@ impl PhiNet {
     /// # Errors
     /// See [`ObserveError`].
     pub fn see(&self, observation: &Observation<'_>) -> Result<WiggleFeatures, ObserveError> {
-        match (self.metadata.features.points, observation.points) {
-            (ObservedPoints::LinkCentres, ObservedPoints::ArcLength) => {
-                return Err(ObserveError::NeedsLinkCentres);
-            }
-            (ObservedPoints::ArcLength, ObservedPoints::LinkCentres) => {
-                return Err(ObserveError::NeedsArcLength);
-            }
-            _ => {}
-        }
+        self.reads(observation.points)?;
         observe(
             self.metadata.features,
             observation.track,
@@ -186,16 +182,10 @@ impl PhiNet {
     /// Other features than it was trained on, or outputs that are not finite.
     pub fn predict(&self, features: &WiggleFeatures) -> Result<Prediction, PredictError> {
         let out = self.run(features)?;
-        let normalised = core::array::from_fn(|i| f64::from(out.mean[i]));
-        let std_dev = core::array::from_fn(|i| {
-            let p = &self.metadata.parameters[i];
-            // A deviation beyond the range or far below a thousandth of it is the
-            // estimate's own error.
-            let deviation = (f64::from(out.log_variance[i]) / 2.0).exp();
-            deviation.clamp(1e-4, 1.0) * (p.max - p.min)
-        });
+        let scales = &self.metadata.parameters;
+        let (parameters, std_dev) = in_units(scales, &out.mean, &out.log_variance);
         Ok(Prediction {
-            parameters: self.metadata.physical(normalised),
+            parameters,
             std_dev,
             out_of_distribution: f64::from(out.out_of_distribution),
         })

@@ -13,7 +13,7 @@ mod project;
 mod record;
 
 pub use camera::side_camera;
-pub use noise::{FilmNoise, NoiseError, Randomisation};
+pub use noise::{FilmNoise, Randomisation};
 pub use project::{FilmTiming, Filmed, project};
 pub use record::{KeypointLayout, RecordOptions, RopeFilm, record};
 

@@ -1,6 +1,7 @@
 //! Errors of a recording, and their random draws (the paper's domain
 //! randomisation).
 
+use crate::OutOfRange;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -8,7 +9,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 /// Errors of one recording. [`FilmNoise::default`] has none.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FilmNoise {
     /// Where the camera really stands, minus where it is said to (world, m).
     pub camera_shift_m: Vector3<f64>,
@@ -20,8 +21,6 @@ pub struct FilmNoise {
     pub lateral_px: f64,
     /// Correlation of a keypoint's error with that of the frame before (0 to 1).
     pub correlation: f64,
-    /// Part of the error that all keypoints of a frame share (0 to 1).
-    pub shared_part: f64,
     /// Frames at the start in which the motion has not begun yet.
     pub padding_frames: u32,
     /// Offset of the camera's clock: camera time = motion time + offset (s).
@@ -32,24 +31,6 @@ pub struct FilmNoise {
     pub lead_width_px: f64,
     /// Seed of the frame-by-frame noise.
     pub seed: u64,
-}
-
-impl Default for FilmNoise {
-    fn default() -> Self {
-        Self {
-            camera_shift_m: Vector3::zeros(),
-            lookat_shift_m: Vector3::zeros(),
-            longitudinal_px: 0.0,
-            lateral_px: 0.0,
-            correlation: 0.0,
-            shared_part: 0.0,
-            padding_frames: 0,
-            clock_offset_s: 0.0,
-            rope_width_px: 0.0,
-            lead_width_px: 0.0,
-            seed: 0,
-        }
-    }
 }
 
 impl FilmNoise {
@@ -104,28 +85,16 @@ impl Default for Randomisation {
     }
 }
 
-/// A randomisation with a value out of range.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("randomisation: `{key}` is {value}, but must be {expected}")]
-pub struct NoiseError {
-    /// Key in the configuration.
-    pub key: &'static str,
-    /// Value found.
-    pub value: f64,
-    /// What it must be.
-    pub expected: &'static str,
-}
-
 impl Randomisation {
     /// Checks that every value can be drawn from.
     ///
     /// # Errors
     /// The first value out of range.
-    pub fn check(&self) -> Result<(), NoiseError> {
+    pub fn check(&self) -> Result<(), OutOfRange> {
         const SMALL: &str = "0 to 0.5";
+        const COUNT_ORDER: &str = "the smaller count first";
         let [px_min, px_max] = self.tracking_px;
         let [pad_min, pad_max] = self.padding_frames.map(f64::from);
-        let within = |value: f64, min: f64, max: f64| value >= min && value <= max;
         let rules = [
             ("camera_position_m", self.camera_position_m, 0.5, SMALL),
             ("camera_lookat_m", self.camera_lookat_m, 0.5, SMALL),
@@ -134,25 +103,13 @@ impl Randomisation {
             ("lateral_part", self.lateral_part, 10.0, "0 to 10"),
             ("correlation", self.correlation, 0.999, "0 to 0.999"),
             ("padding_frames", pad_max, 200.0, "two counts up to 200"),
-            (
-                "padding_frames",
-                pad_min,
-                pad_max,
-                "the smaller count first",
-            ),
+            ("padding_frames", pad_min, pad_max, COUNT_ORDER),
             ("clock_offset_s", self.clock_offset_s, 0.5, SMALL),
             ("width_px", self.width_px, 20.0, "0 to 20"),
         ];
-        rules
-            .into_iter()
-            .find(|(_, value, max, _)| !within(*value, 0.0, *max))
-            .map_or(Ok(()), |(key, value, _, expected)| {
-                Err(NoiseError {
-                    key,
-                    value,
-                    expected,
-                })
-            })
+        OutOfRange::check(rules.map(|(key, value, max, expected)| {
+            (key, value, value >= 0.0 && value <= max, expected)
+        }))
     }
 
     /// The errors of recording `index` under `seed`: the same whenever and
@@ -170,7 +127,6 @@ impl Randomisation {
             longitudinal_px,
             lateral_px: longitudinal_px * self.lateral_part,
             correlation: self.correlation,
-            shared_part: 0.0,
             padding_frames: rng.random_range(pad_min..=pad_max.max(pad_min)),
             clock_offset_s: uniform(rng, [-self.clock_offset_s, self.clock_offset_s]),
             rope_width_px: self.width_px * rng.sample::<f64, _>(StandardNormal),
@@ -195,10 +151,8 @@ pub(super) struct TrackingNoise {
     /// Weights of the error before and of the fresh one.
     carried: f64,
     fresh: f64,
-    /// Weights of the error all keypoints share and of each one's own.
-    shared: f64,
-    own: f64,
-    /// Error of each keypoint in units of the deviation; the shared one last.
+    /// Error of each keypoint in units of the deviation, and of one more: which random
+    /// numbers a film gets of a seed must not change.
     states: Vec<[f64; 2]>,
 }
 
@@ -207,13 +161,12 @@ impl TrackingNoise {
         let mut rng = ChaCha12Rng::seed_from_u64(noise.seed);
         let mut draw = || [rng.sample(StandardNormal), rng.sample(StandardNormal)];
         let states = (0..=keypoints).map(|_| draw()).collect();
-        let rest = |part: f64| (1.0 - part * part).max(0.0).sqrt();
         Self {
             deviation_px: [noise.longitudinal_px, noise.lateral_px],
             carried: noise.correlation,
-            fresh: rest(noise.correlation),
-            shared: noise.shared_part,
-            own: rest(noise.shared_part),
+            fresh: (1.0 - noise.correlation * noise.correlation)
+                .max(0.0)
+                .sqrt(),
             states,
             rng,
         }
@@ -221,11 +174,7 @@ impl TrackingNoise {
 
     /// Error of a keypoint in the present frame: along and across the rope (px).
     pub(super) fn error_px(&self, keypoint: usize) -> [f64; 2] {
-        let shared = self.states[self.states.len() - 1];
-        core::array::from_fn(|axis| {
-            let unit = self.own * self.states[keypoint][axis] + self.shared * shared[axis];
-            unit * self.deviation_px[axis]
-        })
+        core::array::from_fn(|axis| self.states[keypoint][axis] * self.deviation_px[axis])
     }
 
     /// Goes on to the next frame.

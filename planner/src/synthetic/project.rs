@@ -55,7 +55,7 @@ pub fn project(
     timing: &FilmTiming,
     noise: &FilmNoise,
 ) -> Filmed {
-    let keypoints = film.keypoints();
+    let keypoints = film.keypoints;
     let middle = film.position(0.0, keypoints / 2);
     let depth_m = camera.to_left(&middle).z.max(0.1);
     let real = misplaced(camera, depth_m, noise.camera_shift_m, noise.lookat_shift_m);
@@ -126,14 +126,14 @@ fn appearance(
     noise: &FilmNoise,
 ) -> Appearance {
     let focal_px = (camera.left.fx * camera.left.fy).sqrt();
-    let last = film.keypoints() - 1;
+    let last = film.keypoints - 1;
     let seen = |radius_m: f64, keypoint: usize, width_error_px: f64| {
         let true_depth_m = real.to_left(&film.position(0.0, keypoint)).z.max(0.1);
         let half_width_px = radius_m * focal_px / true_depth_m + width_error_px / 2.0;
         let seen_m = half_width_px * depth_m / focal_px;
         (seen_m > 0.0).then_some(seen_m)
     };
-    let rope = film.rope();
+    let rope = &film.rope;
     Appearance {
         rope_radius_m: seen(rope.radius_m, last / 2, noise.rope_width_px),
         lead_radius_m: seen(rope.lead_radius_m, last, noise.lead_width_px),

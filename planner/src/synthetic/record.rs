@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, NodeTrack, Outcome, Precision, SimOptions, SimulateError,
-    Start, Watch, roll_out,
+    roll_out,
 };
 use shared_types::RopeParams;
 
@@ -72,15 +72,19 @@ impl RecordOptions {
     }
 }
 
-/// Keypoint paths of one rope in one motion (world frame, m).
+/// Keypoint paths of one rope in one motion (world frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RopeFilm {
-    rope: RopeParams,
-    period_s: f64,
-    keypoints: usize,
-    finite: bool,
-    /// Sample by sample, keypoint by keypoint, x y z.
-    positions_m: Vec<f32>,
+    /// The rope.
+    pub rope: RopeParams,
+    /// Time between kept positions (s).
+    pub period_s: f64,
+    /// Keypoints per sample.
+    pub keypoints: usize,
+    /// Whether the simulation stayed finite; positions mean nothing if not.
+    pub is_finite: bool,
+    /// Sample by sample, one at least, keypoint by keypoint, x y z (m).
+    pub positions_m: Vec<f32>,
 }
 
 impl RopeFilm {
@@ -94,44 +98,13 @@ impl RopeFilm {
         positions_m: Vec<f32>,
     ) -> Option<Self> {
         let whole = keypoints > 0 && positions_m.len().is_multiple_of(3 * keypoints);
-        let finite = positions_m.iter().all(|x| x.is_finite());
-        (whole && !positions_m.is_empty() && period_s > 0.0).then_some(Self {
+        (whole && !positions_m.is_empty() && period_s > 0.0).then(|| Self {
             rope,
             period_s,
             keypoints,
-            finite,
+            is_finite: positions_m.iter().all(|x| x.is_finite()),
             positions_m,
         })
-    }
-
-    /// The rope.
-    #[must_use]
-    pub fn rope(&self) -> &RopeParams {
-        &self.rope
-    }
-
-    /// Keypoints per sample.
-    #[must_use]
-    pub fn keypoints(&self) -> usize {
-        self.keypoints
-    }
-
-    /// Whether the simulation stayed finite; positions mean nothing if not.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        self.finite
-    }
-
-    /// Time between kept positions (s).
-    #[must_use]
-    pub fn period_s(&self) -> f64 {
-        self.period_s
-    }
-
-    /// All kept positions: sample by sample, keypoint by keypoint, x y z (m).
-    #[must_use]
-    pub fn positions_m(&self) -> &[f32] {
-        &self.positions_m
     }
 
     /// Position of a keypoint at a motion time (world, m): cubic (Catmull-Rom)
@@ -174,22 +147,16 @@ pub fn record(
         .map(|rope| Candidate::new(rope, motion))
         .collect();
     let count = (options.duration_s / options.period_s).floor() as usize + 1;
-    let rollouts = roll_out(
-        &candidates,
-        &SimOptions {
-            step_s: options.step_s,
-            precision: options.precision,
-            start: Start::Equilibrium,
-            frames: FrameTimes {
-                first_s: 0.0,
-                period_s: options.period_s,
-                count,
-            },
-            watch: Watch::NOTHING,
-            horizon_s: options.duration_s,
-            threads: options.threads,
+    let sim_options = SimOptions {
+        frames: FrameTimes {
+            first_s: 0.0,
+            period_s: options.period_s,
+            count,
         },
-    )?;
+        threads: options.threads,
+        ..SimOptions::new(options.step_s, options.precision, options.duration_s)
+    };
+    let rollouts = roll_out(&candidates, &sim_options)?;
     Ok(ropes
         .iter()
         .zip(&rollouts)
@@ -199,7 +166,7 @@ pub fn record(
                 rope: *rope,
                 period_s: options.period_s,
                 keypoints: places.len(),
-                finite: rollout.outcome != Outcome::Diverged,
+                is_finite: rollout.outcome != Outcome::Diverged,
                 positions_m: positions_at(&rollout.nodes, &places),
             }
         })

@@ -1,38 +1,38 @@
 use super::noise::TrackingNoise;
 use super::*;
 use crate::ropes::random_rope;
-use crate::wiggle::{WiggleConfig, wiggle};
-use arm_model::{JointTrajectory, Limits, Pole};
+use crate::wiggle::{WiggleConfig, wiggling_arm};
+use arm_model::{JointTrajectory, Pole};
 use nalgebra::Vector3;
 use rope_sim::PlannedArm;
 use shared_types::Shutter;
 
 fn arm() -> PlannedArm {
-    PlannedArm::new(
-        wiggle(&WiggleConfig::default(), &Limits::default()).unwrap(),
-        Pole::default(),
-    )
+    wiggling_arm(&WiggleConfig::default()).unwrap()
 }
 
-fn short() -> FilmTiming {
-    FilmTiming {
+/// Two seconds of a wiggled rope.
+fn look(rope: u64, camera: &StereoCamera, keypoints: usize, noise: &FilmNoise) -> Filmed {
+    let timing = FilmTiming {
         frames: 120,
         rate_hz: 60.0,
-    }
+    };
+    film(
+        &random_rope(rope),
+        &arm(),
+        camera,
+        keypoints,
+        &timing,
+        noise,
+    )
+    .unwrap()
 }
 
 /// Largest distance between the keypoints of two films (px).
 fn apart_px(a: &Filmed, b: &Filmed) -> f64 {
-    let points = |f: &Filmed| -> Vec<[f64; 2]> {
-        f.track
-            .frames
-            .iter()
-            .flat_map(|f| f.points.clone())
-            .collect()
-    };
-    points(a)
-        .into_iter()
-        .zip(points(b))
+    let frames = a.track.frames.iter().zip(&b.track.frames);
+    frames
+        .flat_map(|(a, b)| a.points.iter().zip(&b.points))
         .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
         .fold(0.0, f64::max)
 }
@@ -41,7 +41,6 @@ fn apart_px(a: &Filmed, b: &Filmed) -> f64 {
 fn ends_of_a_film_are_the_clamp_and_the_lead() {
     let (arm, rope, camera) = (arm(), random_rope(3), side_camera());
     let films = record(&[rope], &arm, &RecordOptions::default()).unwrap();
-    use rope_sim::AttachMotion;
     for t_s in [0.0, 1.234, 3.3] {
         assert!((films[0].position(t_s, 0) - arm.at(t_s).p_m).norm() < 2e-5);
     }
@@ -53,7 +52,7 @@ fn ends_of_a_film_are_the_clamp_and_the_lead() {
         ..RecordOptions::default()
     };
     let film = &record(&[rope], &arm, &centres).unwrap()[0];
-    assert_eq!(film.keypoints(), rope.links as usize);
+    assert_eq!(film.keypoints, rope.links as usize);
     let apart = (film.position(0.0, 1) - film.position(0.0, 0)).norm();
     assert!((apart - rope.link_length_m()).abs() < 1e-4);
     assert!(camera.project_left(&film.position(0.0, 0)).is_some());
@@ -69,14 +68,10 @@ fn sparse_positions_in_single_precision_film_alike() {
         ..RecordOptions::default()
     };
     let coarse = RecordOptions::for_training(layout, 2);
-    let timing = FilmTiming::default();
-    let pairs = record(&ropes, &arm, &fine)
-        .unwrap()
-        .into_iter()
-        .zip(record(&ropes, &arm, &coarse).unwrap());
-    for (fine, coarse) in pairs {
-        let [a, b] =
-            [&fine, &coarse].map(|film| project(film, &camera, &timing, &FilmNoise::default()));
+    let [fine, coarse] = [fine, coarse].map(|o| record(&ropes, &arm, &o).unwrap());
+    let (timing, noise) = (FilmTiming::default(), FilmNoise::default());
+    for (fine, coarse) in fine.iter().zip(&coarse) {
+        let [a, b] = [fine, coarse].map(|film| project(film, &camera, &timing, &noise));
         let apart = apart_px(&a, &b);
         assert!(apart < 0.3, "{apart} px");
     }
@@ -84,27 +79,20 @@ fn sparse_positions_in_single_precision_film_alike() {
 
 #[test]
 fn a_rolling_shutter_sees_lower_rows_later() {
-    let (arm, rope, mut camera) = (arm(), random_rope(4), side_camera());
-    let look = |camera: &StereoCamera| {
-        film(&rope, &arm, camera, 9, &short(), &FilmNoise::default()).unwrap()
-    };
-    let rolling = look(&camera);
+    let mut camera = side_camera();
+    let rolling = look(4, &camera, 9, &FilmNoise::default());
     camera.shutter = Shutter::Global;
     camera.line_time_s = 0.0;
-    let global = look(&camera);
+    let global = look(4, &camera, 9, &FilmNoise::default());
     let apart = apart_px(&rolling, &global);
     // 300 rows of 26 µs at about a metre a second are some pixels.
     assert!((0.5..10.0).contains(&apart), "{apart}");
     // The film is that of a global shutter at each point's own time.
-    let recorded = record(
-        &[rope],
-        &arm,
-        &RecordOptions {
-            layout: KeypointLayout::Uniform(9),
-            ..RecordOptions::default()
-        },
-    )
-    .unwrap();
+    let options = RecordOptions {
+        layout: KeypointLayout::Uniform(9),
+        ..RecordOptions::default()
+    };
+    let recorded = record(&[random_rope(4)], &arm(), &options).unwrap();
     let seen = rolling.track.frames[80].points[8];
     let t_s = 80.0 / 60.0 + 0.002 + 26e-6 * seen[1];
     let [u, v] = camera.project_left(&recorded[0].position(t_s, 8)).unwrap();
@@ -113,24 +101,22 @@ fn a_rolling_shutter_sees_lower_rows_later() {
 
 #[test]
 fn padding_and_clock_offset_delay_the_motion() {
-    let (arm, rope, camera) = (arm(), random_rope(5), side_camera());
-    let look = |noise: FilmNoise| film(&rope, &arm, &camera, 5, &short(), &noise).unwrap();
-    let plain = look(FilmNoise::default());
-    let padded = look(FilmNoise {
+    let camera = side_camera();
+    let plain = look(5, &camera, 5, &FilmNoise::default());
+    let padded = FilmNoise {
         padding_frames: 7,
         ..FilmNoise::default()
-    });
-    let late = look(FilmNoise {
+    };
+    let late = FilmNoise {
         clock_offset_s: 7.0 / 60.0,
         ..FilmNoise::default()
-    });
-    for i in 0..100 {
-        let want = &plain.track.frames[i].points;
-        for other in [&padded, &late] {
-            for (a, b) in other.track.frames[i + 7].points.iter().zip(want) {
-                assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.02, "frame {i}");
-            }
-        }
+    };
+    for (name, noise) in [("padded", padded), ("late", late)] {
+        let mut delayed = look(5, &camera, 5, &noise);
+        delayed.track.frames.drain(..7);
+        delayed.track.frames.truncate(100);
+        let apart = apart_px(&delayed, &plain);
+        assert!(apart < 0.02, "{name}: {apart}");
     }
 }
 
@@ -166,16 +152,19 @@ fn tracking_errors_have_the_size_and_correlation_asked_for() {
 
 #[test]
 fn errors_lie_along_and_across_the_rope() {
-    let (rope, camera) = (random_rope(6), side_camera());
     let hold = JointTrajectory::hold(arm_model::joint::START_POSE, 3.0).unwrap();
     let arm = PlannedArm::new(hold, Pole::default());
-    let look = |noise: &FilmNoise| film(&rope, &arm, &camera, 9, &short(), noise).unwrap();
-    let plain = look(&FilmNoise::default());
+    let timing = FilmTiming {
+        frames: 120,
+        rate_hz: 60.0,
+    };
     // A hanging rope is upright in the picture: along it is along v.
-    let noisy = look(&FilmNoise {
+    let noisy = FilmNoise {
         longitudinal_px: 2.0,
         ..FilmNoise::default()
-    });
+    };
+    let [plain, noisy] = [FilmNoise::default(), noisy]
+        .map(|noise| film(&random_rope(6), &arm, &side_camera(), 9, &timing, &noise).unwrap());
     let (mut sideways, mut upright) = (0.0_f64, 0.0_f64);
     for (a, b) in noisy.track.frames.iter().zip(&plain.track.frames) {
         for (a, b) in a.points.iter().zip(&b.points) {
@@ -188,14 +177,18 @@ fn errors_lie_along_and_across_the_rope() {
 
 #[test]
 fn a_misplaced_camera_moves_the_picture_but_keeps_what_it_looks_at() {
-    let (arm, rope, camera) = (arm(), random_rope(7), side_camera());
-    let look = |noise: &FilmNoise| film(&rope, &arm, &camera, 5, &short(), noise).unwrap();
-    let plain = look(&FilmNoise::default());
     // 2 cm nearer: everything 2 % larger.
-    let nearer = look(&FilmNoise {
+    let nearer = FilmNoise {
         camera_shift_m: Vector3::new(0.0, 0.02, 0.0),
         ..FilmNoise::default()
-    });
+    };
+    // Looking 2 cm further right moves the picture by 7 px.
+    let turned = FilmNoise {
+        lookat_shift_m: Vector3::new(0.02, 0.0, 0.0),
+        ..FilmNoise::default()
+    };
+    let [plain, nearer, turned] =
+        [FilmNoise::default(), nearer, turned].map(|noise| look(7, &side_camera(), 5, &noise));
     let length = |f: &Filmed| {
         let points = &f.track.frames[0].points;
         (points[4][0] - points[0][0]).hypot(points[4][1] - points[0][1])
@@ -204,12 +197,7 @@ fn a_misplaced_camera_moves_the_picture_but_keeps_what_it_looks_at() {
     assert!((ratio - 1.0 / 0.98).abs() < 3e-3, "{ratio}");
     let wide = |f: &Filmed| f.appearance.lead_radius_m.unwrap();
     assert!((wide(&nearer) / wide(&plain) - 1.0 / 0.98).abs() < 1e-3);
-    assert!((wide(&plain) / rope.lead_radius_m - 1.0).abs() < 1e-6);
-    // Looking 2 cm further right moves the picture by 7 px.
-    let turned = look(&FilmNoise {
-        lookat_shift_m: Vector3::new(0.02, 0.0, 0.0),
-        ..FilmNoise::default()
-    });
+    assert!((wide(&plain) / random_rope(7).lead_radius_m - 1.0).abs() < 1e-6);
     let moved = plain.track.frames[0].points[2][0] - turned.track.frames[0].points[2][0];
     assert!((moved - 7.0).abs() < 0.5, "{moved}");
 }
@@ -234,19 +222,15 @@ fn draws_follow_seed_and_index_alone() {
 
 #[test]
 fn ranges_that_cannot_be_drawn_from_are_named() {
-    let wrong = Randomisation {
-        correlation: 1.5,
-        ..Randomisation::default()
-    };
-    assert_eq!(wrong.check().unwrap_err().key, "correlation");
-    let wrong = Randomisation {
-        tracking_px: [2.0, 1.0],
-        ..Randomisation::default()
-    };
-    assert_eq!(wrong.check().unwrap_err().key, "tracking_px");
-    let wrong = Randomisation {
-        width_px: f64::NAN,
-        ..Randomisation::default()
-    };
-    assert_eq!(wrong.check().unwrap_err().key, "width_px");
+    type Change = fn(&mut Randomisation);
+    let cases: [(&str, Change); 3] = [
+        ("correlation", |r| r.correlation = 1.5),
+        ("tracking_px", |r| r.tracking_px = [2.0, 1.0]),
+        ("width_px", |r| r.width_px = f64::NAN),
+    ];
+    for (key, change) in cases {
+        let mut wrong = Randomisation::default();
+        change(&mut wrong);
+        assert_eq!(wrong.check().unwrap_err().key, key);
+    }
 }

@@ -1,43 +1,26 @@
 //! Why a step of the training failed.
 
 use planner::features::ObserveError;
-use planner::synthetic::NoiseError;
+use planner::phi::ModelError;
 use planner::wiggle::WiggleError;
 use rope_sim::SimulateError;
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::Path;
 
-/// Why a step of the training failed.
+pub(crate) type Result<T> = core::result::Result<T, TrainingError>;
+
+/// Why a step of the training failed: what happened, to what, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum TrainingError {
-    /// A file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file does not hold what it should.
-    #[error("{}: {reason}", path.display())]
-    BadFile {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it, and what to do.
-        reason: String,
-    },
-    /// A value of the configuration is out of range.
-    #[error("training configuration: `{key}` is {value}, but must be {expected}")]
-    Value {
-        /// Key in the configuration.
-        key: &'static str,
-        /// Value found.
-        value: String,
-        /// What it must be.
-        expected: &'static str,
-    },
-    /// The noise cannot be drawn.
+pub(crate) enum TrainingError {
+    /// A file or a value of the configuration cannot be used.
+    #[error("{0}")]
+    Input(String),
+    /// A model file was refused by the program that uses it.
     #[error(transparent)]
-    Noise(#[from] NoiseError),
+    Model(#[from] ModelError),
+    /// The work itself failed.
+    #[error("{0}")]
+    Failed(String),
     /// The wiggle cannot be made.
     #[error(transparent)]
     Wiggle(#[from] WiggleError),
@@ -47,57 +30,21 @@ pub enum TrainingError {
     /// A film gave no features.
     #[error(transparent)]
     Observe(#[from] ObserveError),
-    /// The network gave numbers that are not finite.
-    #[error("step {step}: the loss is {loss}; use a smaller `learning_rate`")]
-    Diverged {
-        /// The step.
-        step: usize,
-        /// The loss.
-        loss: f32,
-    },
-    /// The tensor library failed.
-    #[error("tensor library: {reason}")]
-    Tensors {
-        /// Its words.
-        reason: String,
-    },
-    /// The written file does not do what the network does.
-    #[error(
-        "the written network differs from the trained one by {difference:.1e} in `{output}`, at most {limit:.0e} is allowed"
-    )]
-    NotTheSame {
-        /// Name of the output.
-        output: &'static str,
-        /// Largest difference.
-        difference: f32,
-        /// Largest difference allowed.
-        limit: f32,
-    },
-    /// The written file was refused by the program that uses it.
-    #[error(transparent)]
-    Model(#[from] planner::phi::ModelError),
-    /// A plot cannot be drawn.
-    #[error("plot {}: {reason}", path.display())]
-    Plot {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
 }
 
 impl TrainingError {
-    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            source,
-        }
+    /// A file that cannot be read or written, or does not hold what it should.
+    pub(crate) fn file(path: &Path, reason: impl Display) -> Self {
+        Self::Input(format!("{}: {reason}", path.display()))
     }
 
-    pub(crate) fn bad_file(path: &Path, reason: impl Into<String>) -> Self {
-        Self::BadFile {
-            path: path.to_owned(),
-            reason: reason.into(),
-        }
+    /// The tensor library failed.
+    pub(crate) fn tensors(reason: impl Display) -> Self {
+        Self::Failed(format!("tensor library: {reason}"))
+    }
+
+    /// Whether other input would help.
+    pub(crate) fn is_input(&self) -> bool {
+        matches!(self, Self::Input(_) | Self::Model(_))
     }
 }

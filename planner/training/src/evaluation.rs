@@ -1,14 +1,14 @@
 //! Predictions against the truth on held-out ropes, beside the paper's figures.
 
-use planner::identify::scale::MassScale;
-use serde::{Deserialize, Serialize};
+use planner::identify::scale::median_mass_per_length;
+use serde::Serialize;
 use shared_types::RopeParams;
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use std::fmt::Write as _;
 
 /// Mean absolute errors printed in the paper (table of in-domain results), order
 /// of [`RANGES`].
-pub const PAPER: [f64; ROPE_PARAMETERS] = [
+pub(crate) const PAPER: [f64; ROPE_PARAMETERS] = [
     0.098, 0.006, 0.010, 0.111, 0.002, 0.007, 0.005, 0.008, 0.152,
 ];
 
@@ -16,53 +16,48 @@ pub const PAPER: [f64; ROPE_PARAMETERS] = [
 const NINETY: f64 = 1.645;
 
 /// A held-out rope and what the network made of its film.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Judged {
-    /// The rope.
-    pub truth: RopeParams,
+#[derive(Debug)]
+pub(crate) struct Judged {
+    pub(crate) truth: RopeParams,
     /// Parameters found, order of [`RANGES`].
-    pub found: [f64; ROPE_PARAMETERS],
+    pub(crate) found: [f64; ROPE_PARAMETERS],
     /// Their deviations as the network says.
-    pub std_dev: [f64; ROPE_PARAMETERS],
+    pub(crate) std_dev: [f64; ROPE_PARAMETERS],
 }
 
 /// One parameter's line.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// Name of the parameter.
-    pub parameter: String,
-    /// Its unit.
-    pub unit: String,
+#[derive(Debug, Serialize)]
+pub(crate) struct Line {
+    pub(crate) parameter: &'static str,
+    pub(crate) unit: &'static str,
     /// Mean absolute error of the network.
-    pub error: f64,
+    pub(crate) error: f64,
     /// The paper's.
-    pub paper: f64,
+    pub(crate) paper: f64,
     /// Of always guessing the middle of the range.
-    pub middle: f64,
+    pub(crate) middle: f64,
     /// Of knowing every ratio of stiffness, damping and masses, and nothing of
     /// their common scale, which no camera sees; none for other parameters.
-    pub best_possible: Option<f64>,
+    pub(crate) best_possible: Option<f64>,
     /// Part of the truths in the 90 % intervals that the network gives.
-    pub covered_90: f64,
+    pub(crate) covered_90: f64,
 }
 
 /// Errors of all parameters on held-out ropes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Evaluation {
+#[derive(Debug, Serialize)]
+pub(crate) struct Evaluation {
     /// Ropes judged.
-    pub ropes: usize,
-    /// One line per parameter.
-    pub lines: Vec<Line>,
+    pub(crate) ropes: usize,
+    pub(crate) lines: Vec<Line>,
     /// Mean of the errors as parts of the ranges.
-    pub overall: f64,
+    pub(crate) overall: f64,
     /// Median relative errors of stiffness, damping and lead mass over mass per
     /// length: what a throw depends on.
-    pub ratio_errors: [f64; 3],
+    pub(crate) ratio_errors: [f64; 3],
 }
 
 /// Judges predictions.
-#[must_use]
-pub fn evaluate(judged: &[Judged]) -> Evaluation {
+pub(crate) fn evaluate(judged: &[Judged]) -> Evaluation {
     let count = judged.len().max(1) as f64;
     let mean = |f: &dyn Fn(&Judged) -> f64| judged.iter().map(f).sum::<f64>() / count;
     let lines: Vec<Line> = (0..ROPE_PARAMETERS)
@@ -72,8 +67,8 @@ pub fn evaluate(judged: &[Judged]) -> Evaluation {
             let truth = |j: &Judged| j.truth.to_array()[i];
             let best = |j: &Judged| best_possible(&j.truth)[i].map(|b| (b - truth(j)).abs());
             Line {
-                parameter: range.label.to_owned(),
-                unit: range.unit.to_owned(),
+                parameter: range.label,
+                unit: range.unit,
                 error: mean(&|j| (j.found[i] - truth(j)).abs()),
                 paper: PAPER[i],
                 middle: mean(&|j| (middle - truth(j)).abs()),
@@ -81,7 +76,7 @@ pub fn evaluate(judged: &[Judged]) -> Evaluation {
                     .iter()
                     .map(best)
                     .sum::<Option<f64>>()
-                    .map(|sum| sum / count),
+                    .map(|s| s / count),
                 covered_90: mean(&|j| {
                     let inside = (j.found[i] - truth(j)).abs() <= NINETY * j.std_dev[i];
                     f64::from(u8::from(inside))
@@ -118,7 +113,7 @@ fn ratios(v: &[f64; ROPE_PARAMETERS]) -> [f64; 3] {
 /// The best guess of one who knows the ratios of stiffness, damping and masses.
 fn best_possible(rope: &RopeParams) -> [Option<f64>; ROPE_PARAMETERS] {
     let ratios = ratios(&rope.to_array());
-    let mass = MassScale::new(None).mass_per_length(ratios).middle;
+    let mass = median_mass_per_length(ratios);
     let mut best = [None; ROPE_PARAMETERS];
     best[3] = Some(ratios[0] * mass);
     best[2] = Some(ratios[1] * mass);
@@ -129,8 +124,7 @@ fn best_possible(rope: &RopeParams) -> [Option<f64>; ROPE_PARAMETERS] {
 
 impl Evaluation {
     /// The table, as Markdown.
-    #[must_use]
-    pub fn table(&self) -> String {
+    pub(crate) fn table(&self) -> String {
         let mut out = String::from(
             "| parameter | unit | this network | paper | middle of range | best possible | inside 90 % |\n\
              |---|---|---:|---:|---:|---:|---:|\n",

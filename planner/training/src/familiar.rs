@@ -1,36 +1,31 @@
 //! How far an embedding is from those of known ropes.
 
-use crate::TrainingError;
+use crate::error::{Result, TrainingError};
 use crate::network::EMBEDDING;
 use crate::trainer::Predicted;
 use nalgebra::{DMatrix, DVector};
 
 /// How embeddings of known ropes are distributed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Familiar {
-    /// Their mean.
+pub(crate) struct Familiar {
     pub(crate) mean: Vec<f32>,
     /// Takes a deviation from the mean to numbers of mean square 1, row-major.
     pub(crate) whiten: Vec<f32>,
     /// Out-of-distribution score that one in a hundred exceeds.
-    pub limit: f64,
+    pub(crate) limit: f64,
 }
 
 impl Familiar {
     /// Measures the embeddings of known ropes, and the scores of `others` of the
     /// same kind beside them.
-    ///
-    /// # Errors
-    /// Too few of them, or embeddings that are not finite.
-    pub fn measure(known: &[Predicted], others: &[Predicted]) -> Result<Self, TrainingError> {
-        let wrong = |value: String| TrainingError::Value {
-            key: "ropes for the out-of-distribution score",
-            value,
-            expected: "2 or more with finite embeddings",
+    pub(crate) fn measure(known: &[Predicted], others: &[Predicted]) -> Result<Self> {
+        let wrong = |found: &str| {
+            TrainingError::Input(format!(
+                "ropes for the out-of-distribution score: {found}, but 2 or more with finite embeddings are needed"
+            ))
         };
         let count = known.len();
         if count < 2 || others.is_empty() {
-            return Err(wrong(count.to_string()));
+            return Err(wrong(&format!("{count} known, {} others", others.len())));
         }
         let row = |p: &Predicted| {
             DVector::from_iterator(EMBEDDING, p.embedding.iter().map(|x| f64::from(*x)))
@@ -46,13 +41,8 @@ impl Familiar {
         // by a hundredth of the others: a score, not a sentence.
         let floor = 1e-4 * covariance.trace() / EMBEDDING as f64 + 1e-12;
         covariance += DMatrix::identity(EMBEDDING, EMBEDDING) * floor;
-        let lower = covariance
-            .cholesky()
-            .ok_or_else(|| wrong("embeddings without spread".to_owned()))?
-            .l();
-        let inverse = lower
-            .try_inverse()
-            .ok_or_else(|| wrong("embeddings without spread".to_owned()))?;
+        let inverse = covariance.cholesky().and_then(|c| c.l().try_inverse());
+        let inverse = inverse.ok_or_else(|| wrong("embeddings without spread"))?;
         let score = |p: &Predicted| (&inverse * (row(p) - &mean)).norm_squared() / EMBEDDING as f64;
         let mut scores: Vec<f64> = others.iter().map(score).collect();
         scores.sort_by(f64::total_cmp);

@@ -1,47 +1,40 @@
 //! The network as an ONNX graph, layer by layer.
 
-use crate::TrainingError;
+use crate::error::Result;
 use crate::familiar::Familiar;
-use crate::network::{EMBEDDING, KERNEL, NORM_EPSILON, PADDING, PhiModel};
-use crate::onnx::{
-    ATTRIBUTE_FLOAT, ATTRIBUTE_INT, ATTRIBUTE_INTS, Attribute, Dimension, DimensionValue, FLOAT,
-    Graph, INT64, Node, Tensor, TensorShape, TensorType, ValueInfo, ValueType,
-};
+use crate::network::{EMBEDDING, KERNEL, NORM_EPSILON, PADDING, PhiModel, numbers};
+use crate::onnx::{FLOAT, Graph, INT64, float, int, ints};
 use crate::principal::{POOL, PRINCIPAL};
 use crate::standard::Standard;
+use burn::module::Param;
 use burn::nn::Linear;
-use burn::tensor::Tensor as BurnTensor;
+use burn::tensor::Tensor;
 use planner::features::{FeatureDefinition, WIDTHS};
 use planner::phi::{INPUTS, OUTPUTS};
 use shared_types::rope::ROPE_PARAMETERS;
 
-/// Writes a graph node by node; nodes without a name of their own are numbered.
+/// Writes a graph node by node; outputs without a name of their own are numbered.
 #[derive(Default)]
 pub(crate) struct GraphWriter {
     graph: Graph,
 }
 
 impl GraphWriter {
-    /// The whole network with its weights.
+    /// The bytes of the whole network with its weights.
     pub(crate) fn network(
         mut self,
         model: &PhiModel,
         standard: &Standard,
         features: &FeatureDefinition,
         familiar: &Familiar,
-    ) -> Result<Graph, TrainingError> {
+    ) -> Result<Vec<u8>> {
         let channels = features.channels();
-        self.graph.name = "phi-nn".to_owned();
-        self.graph.input = vec![
-            value(INPUTS[0], &[features.frames, channels]),
-            value(INPUTS[1], &[WIDTHS]),
-        ];
-        self.graph.output = vec![
-            value(OUTPUTS[0], &[ROPE_PARAMETERS]),
-            value(OUTPUTS[1], &[ROPE_PARAMETERS]),
-            value(OUTPUTS[2], &[EMBEDDING]),
-            value(OUTPUTS[3], &[1]),
-        ];
+        self.graph.input(INPUTS[0], &[features.frames, channels]);
+        self.graph.input(INPUTS[1], &[WIDTHS]);
+        let sizes = [ROPE_PARAMETERS, ROPE_PARAMETERS, EMBEDDING, 1];
+        for (name, size) in OUTPUTS.into_iter().zip(sizes) {
+            self.graph.output(name, &[size]);
+        }
         let x = self.standardised_motion(standard, features);
         let mut x = self.transpose(&x);
         let principal = self.principal(&x, standard);
@@ -54,7 +47,7 @@ impl GraphWriter {
                 &[out, rows / KERNEL, KERNEL],
                 &as_kernel(&weight, rows / KERNEL, out),
             );
-            let bias = self.bias(&name, &block.convolution)?;
+            let bias = self.bias(&name, block.convolution.bias.as_ref(), out)?;
             let pads = [PADDING[0] as i64, PADDING[1] as i64];
             x = self.node(
                 "Conv",
@@ -63,10 +56,8 @@ impl GraphWriter {
             );
             x = self.transpose(&x);
             let gamma = numbers(block.norm.gamma.val())?;
-            let beta = block.norm.beta.as_ref().map(|b| numbers(b.val()));
-            let beta = beta.unwrap_or_else(|| Ok(vec![0.0; out]))?;
             let gamma = self.floats(&format!("{name}.norm.scale"), &[out], &gamma);
-            let beta = self.floats(&format!("{name}.norm.bias"), &[out], &beta);
+            let beta = self.bias(&format!("{name}.norm"), block.norm.beta.as_ref(), out)?;
             let epsilon = NORM_EPSILON as f32;
             x = self.node(
                 "LayerNormalization",
@@ -95,7 +86,7 @@ impl GraphWriter {
         x = self.linear("spread1", &x, &model.spread[1])?;
         self.named("Identity", &[&x], &[], OUTPUTS[1]);
         self.out_of_distribution(&embedding, familiar);
-        Ok(self.graph)
+        Ok(self.graph.encode("phi-nn"))
     }
 
     /// (x - mean) * scale * mask, the mask being the last channel.
@@ -104,9 +95,9 @@ impl GraphWriter {
         let mean = self.floats("motion.mean", &[features.frames, channels], &standard.mean);
         let scale = self.floats("motion.scale", &[channels], &standard.scale);
         let last = channels as i64 - 1;
-        let start = self.integers("mask.start", &[last]);
-        let end = self.integers("mask.end", &[last + 1]);
-        let axis = self.integers("mask.axis", &[2]);
+        let start = self.integer("mask.start", last);
+        let end = self.integer("mask.end", last + 1);
+        let axis = self.integer("mask.axis", 2);
         let mask = self.node("Slice", &[INPUTS[0], &start, &end, &axis], &[]);
         let x = self.node("Sub", &[INPUTS[0], &mean], &[]);
         let x = self.node("Mul", &[&x, &scale], &[]);
@@ -149,18 +140,17 @@ impl GraphWriter {
         self.named("MatMul", &[&x, &share], &[], OUTPUTS[3]);
     }
 
-    fn linear(&mut self, name: &str, x: &str, layer: &Linear) -> Result<String, TrainingError> {
+    fn linear(&mut self, name: &str, x: &str, layer: &Linear) -> Result<String> {
         let dims = layer.weight.dims();
         let weight = numbers(layer.weight.val())?;
         let weight = self.floats(&format!("{name}.weight"), &dims, &weight);
-        let bias = self.bias(name, layer)?;
+        let bias = self.bias(name, layer.bias.as_ref(), dims[1])?;
         Ok(self.node("Gemm", &[x, &weight, &bias], &[]))
     }
 
-    fn bias(&mut self, name: &str, layer: &Linear) -> Result<String, TrainingError> {
-        let [_, out] = layer.weight.dims();
-        let bias = layer.bias.as_ref().map(|b| numbers(b.val()));
-        let bias = bias.unwrap_or_else(|| Ok(vec![0.0; out]))?;
+    /// A layer's bias, zeros if it has none.
+    fn bias(&mut self, name: &str, bias: Option<&Param<Tensor<1>>>, out: usize) -> Result<String> {
+        let bias = bias.map_or_else(|| Ok(vec![0.0; out]), |b| numbers(b.val()))?;
         Ok(self.floats(&format!("{name}.bias"), &[out], &bias))
     }
 
@@ -177,62 +167,27 @@ impl GraphWriter {
         )
     }
 
-    fn node(&mut self, op: &str, inputs: &[&str], attributes: &[Attribute]) -> String {
-        let output = format!("x{}", self.graph.node.len());
+    fn node(&mut self, op: &str, inputs: &[&str], attributes: &[Vec<u8>]) -> String {
+        let output = format!("x{}", self.graph.nodes());
         self.named(op, inputs, attributes, &output)
     }
 
-    fn named(
-        &mut self,
-        op: &str,
-        inputs: &[&str],
-        attributes: &[Attribute],
-        output: &str,
-    ) -> String {
-        self.graph.node.push(Node {
-            input: inputs.iter().map(|i| (*i).to_owned()).collect(),
-            output: vec![output.to_owned()],
-            name: format!("{op}_{}", self.graph.node.len()),
-            op_type: op.to_owned(),
-            attribute: attributes.to_vec(),
-        });
+    fn named(&mut self, op: &str, inputs: &[&str], attributes: &[Vec<u8>], output: &str) -> String {
+        self.graph.node(op, inputs, output, attributes);
         output.to_owned()
     }
 
     fn floats(&mut self, name: &str, dims: &[usize], numbers: &[f32]) -> String {
-        let bytes = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-        self.constant(name, FLOAT, dims, bytes)
-    }
-
-    fn integers(&mut self, name: &str, numbers: &[i64]) -> String {
-        let bytes = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-        self.constant(name, INT64, &[numbers.len()], bytes)
-    }
-
-    fn constant(
-        &mut self,
-        name: &str,
-        data_type: i32,
-        dims: &[usize],
-        raw_data: Vec<u8>,
-    ) -> String {
-        self.graph.initializer.push(Tensor {
-            dims: dims.iter().map(|d| *d as i64).collect(),
-            data_type,
-            name: name.to_owned(),
-            raw_data,
-        });
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        self.graph.constant(name, FLOAT, dims, &bytes);
         name.to_owned()
     }
-}
 
-fn numbers<const D: usize>(tensor: BurnTensor<D>) -> Result<Vec<f32>, TrainingError> {
-    tensor
-        .into_data()
-        .try_into_vec::<f32>()
-        .map_err(|error| TrainingError::Tensors {
-            reason: format!("{error:?}"),
-        })
+    fn integer(&mut self, name: &str, number: i64) -> String {
+        self.graph
+            .constant(name, INT64, &[1], &number.to_le_bytes());
+        name.to_owned()
+    }
 }
 
 /// Weight `[(tap, in), out]` as ONNX has it: `[out, in, tap]`.
@@ -246,52 +201,4 @@ fn as_kernel(weight: &[f32], channels_in: usize, channels_out: usize) -> Vec<f32
         }
     }
     kernel
-}
-
-/// A float tensor with any number of films.
-fn value(name: &str, sizes: &[usize]) -> ValueInfo {
-    let films = Dimension {
-        value: Some(DimensionValue::Name("n".to_owned())),
-    };
-    let fixed = sizes.iter().map(|size| Dimension {
-        value: Some(DimensionValue::Size(*size as i64)),
-    });
-    ValueInfo {
-        name: name.to_owned(),
-        value_type: Some(ValueType {
-            tensor_type: Some(TensorType {
-                elem_type: FLOAT,
-                shape: Some(TensorShape {
-                    dim: core::iter::once(films).chain(fixed).collect(),
-                }),
-            }),
-        }),
-    }
-}
-
-fn int(name: &str, i: i64) -> Attribute {
-    Attribute {
-        name: name.to_owned(),
-        i,
-        kind: ATTRIBUTE_INT,
-        ..Attribute::default()
-    }
-}
-
-fn ints(name: &str, ints: &[i64]) -> Attribute {
-    Attribute {
-        name: name.to_owned(),
-        ints: ints.to_vec(),
-        kind: ATTRIBUTE_INTS,
-        ..Attribute::default()
-    }
-}
-
-fn float(name: &str, f: f32) -> Attribute {
-    Attribute {
-        name: name.to_owned(),
-        f,
-        kind: ATTRIBUTE_FLOAT,
-        ..Attribute::default()
-    }
 }

@@ -10,7 +10,7 @@ use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 
 /// Which ropes of a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Share {
+pub(crate) enum Share {
     /// Those trained on.
     Training,
     /// Those that only judge.
@@ -19,7 +19,7 @@ pub enum Share {
 
 /// A Latin hypercube of ropes.
 #[derive(Debug, Clone)]
-pub struct Hypercube {
+pub(crate) struct Hypercube {
     seed: u64,
     purpose: Purpose,
     /// Part of each parameter's range, rope by rope.
@@ -28,18 +28,15 @@ pub struct Hypercube {
 
 impl Hypercube {
     /// The hypercube of `count` ropes.
-    #[must_use]
-    pub fn new(seed: u64, share: Share, count: usize) -> Self {
+    pub(crate) fn new(seed: u64, share: Share, count: usize) -> Self {
         let purpose = match share {
             Share::Training => Purpose::Hypercube,
             Share::HeldOut => Purpose::HeldOutHypercube,
         };
         let parts = core::array::from_fn(|parameter| {
             // Streams beyond all ropes' own.
-            order(
-                &mut generator(seed, purpose, u64::MAX - parameter as u64),
-                count,
-            )
+            let stream = u64::MAX - parameter as u64;
+            order(&mut generator(seed, purpose, stream), count)
         });
         Self {
             seed,
@@ -49,11 +46,7 @@ impl Hypercube {
     }
 
     /// Rope `index`, below the count.
-    ///
-    /// # Panics
-    /// If there is no such rope, as indexing does.
-    #[must_use]
-    pub fn rope(&self, index: usize) -> RopeParams {
+    pub(crate) fn rope(&self, index: usize) -> RopeParams {
         let mut rng = generator(self.seed, self.purpose, index as u64);
         RopeParams::from_array(core::array::from_fn(|parameter| {
             let parts = &self.parts[parameter];

@@ -1,7 +1,7 @@
 //! Curriculum masking: blocks of frames hidden from the network, more of them as
 //! the training goes on (paper, "Curriculum Masking Schedule").
 
-use crate::TrainingError;
+use planner::Rule;
 use planner::features::WiggleFeatures;
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
@@ -10,44 +10,36 @@ use serde::{Deserialize, Serialize};
 /// Masking during a part of the training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MaskPhase {
+pub(crate) struct MaskPhase {
     /// Part of all steps after which it begins (0 to 1).
-    pub from: f64,
+    pub(crate) from: f64,
     /// Fewest and most blocks hidden in a film.
-    pub blocks: [usize; 2],
+    pub(crate) blocks: [usize; 2],
     /// Frames of a block.
-    pub block_frames: usize,
+    pub(crate) block_frames: usize,
     /// Whether blocks near the start are preferred.
-    pub at_the_beginning: bool,
+    pub(crate) at_the_beginning: bool,
 }
 
 impl MaskPhase {
-    pub(crate) fn check_all(phases: &[Self]) -> Result<(), TrainingError> {
-        let bad = |value: String, expected| {
-            Err(TrainingError::Value {
-                key: "training.masking",
-                value,
-                expected,
-            })
-        };
-        for phase in phases {
-            if !(0.0..=1.0).contains(&phase.from) {
-                return bad(format!("from = {}", phase.from), "0 to 1 in `from`");
-            }
-            if phase.blocks[0] > phase.blocks[1] || phase.blocks[1] > 100 {
-                let found = format!("blocks = {:?}", phase.blocks);
-                return bad(found, "`blocks` up to 100, the smaller first");
-            }
-        }
-        if phases.windows(2).any(|pair| pair[0].from > pair[1].from) {
-            return bad("out of order".to_owned(), "in the order of `from`");
-        }
-        Ok(())
+    /// What must hold of the phases of a training.
+    pub(crate) fn rules(phases: &[Self]) -> impl Iterator<Item = Rule> {
+        const FROM: &str = "0 to 1, and at least that of the phase before";
+        const BLOCKS: &str = "two numbers up to 100, the smaller first";
+        let before = core::iter::once(0.0).chain(phases.iter().map(|p| p.from));
+        phases.iter().zip(before).flat_map(|(phase, before)| {
+            let [fewest, most] = phase.blocks;
+            let in_order = (before..=1.0).contains(&phase.from);
+            let few = fewest <= most && most <= 100;
+            [
+                ("training.masking.from", phase.from, in_order, FROM),
+                ("training.masking.blocks", most as f64, few, BLOCKS),
+            ]
+        })
     }
 
     /// The phase at a part of the training, if one has begun.
-    #[must_use]
-    pub fn at(phases: &[Self], part: f64) -> Option<&Self> {
+    pub(crate) fn at(phases: &[Self], part: f64) -> Option<&Self> {
         phases.iter().take_while(|p| p.from <= part).last()
     }
 
@@ -55,8 +47,7 @@ impl MaskPhase {
     pub(crate) fn apply(&self, features: &mut WiggleFeatures, rng: &mut ChaCha12Rng) {
         let frames = features.definition.frames;
         let places = frames.saturating_sub(self.block_frames);
-        let blocks = rng.random_range(self.blocks[0]..=self.blocks[1]);
-        for _ in 0..blocks {
+        for _ in 0..rng.random_range(self.blocks[0]..=self.blocks[1]) {
             let mut along: f64 = rng.random();
             if self.at_the_beginning {
                 // Half of the blocks begin in the first quarter.
@@ -83,43 +74,42 @@ mod tests {
         }
     }
 
-    fn film() -> WiggleFeatures {
-        let definition = FeatureDefinition::default();
-        WiggleFeatures {
-            definition,
-            motion: vec![1.0; definition.frames * definition.channels()],
-            widths: [0.0; 4],
-            seen: definition.frames,
-        }
-    }
-
     #[test]
     fn phases_follow_each_other() {
         let phases = [phase(0.1, 1, false), phase(0.4, 2, true)];
         assert!(MaskPhase::at(&phases, 0.05).is_none());
         assert_eq!(MaskPhase::at(&phases, 0.2), Some(&phases[0]));
         assert_eq!(MaskPhase::at(&phases, 0.9), Some(&phases[1]));
-        assert!(MaskPhase::check_all(&phases).is_ok());
+        let holds = |phases: &[MaskPhase]| MaskPhase::rules(phases).all(|rule| rule.2);
+        assert!(holds(&phases));
         let [a, b] = phases;
-        assert!(MaskPhase::check_all(&[b, a]).is_err());
+        assert!(!holds(&[b, a.clone()]));
+        assert!(!holds(&[phase(1.5, 1, false)]) && !holds(&[phase(0.0, 101, false)]));
     }
 
     #[test]
     fn blocks_hide_whole_frames_and_prefer_the_beginning_when_asked() {
-        let (mut early, mut early_biased) = (0, 0);
-        for place in 0..300 {
+        let definition = FeatureDefinition::default();
+        let starts_early = |biased, place| {
+            let mut film = WiggleFeatures {
+                definition,
+                motion: vec![1.0; definition.frames * definition.channels()],
+                widths: [0.0; 4],
+                seen: definition.frames,
+            };
             let mut rng = generator(1, Purpose::Masks, place);
-            let mut one = film();
-            phase(0.0, 1, false).apply(&mut one, &mut rng);
-            assert_eq!(one.seen, 350);
-            let mut biased = film();
-            phase(0.0, 1, true).apply(&mut biased, &mut rng);
-            assert_eq!(biased.seen, 350);
-            let start = |f: &WiggleFeatures| f.motion.iter().position(|x| *x == 0.0).unwrap() / 48;
-            early += usize::from(start(&one) < 88);
-            early_biased += usize::from(start(&biased) < 88);
-        }
-        assert!((50..100).contains(&early), "{early}");
-        assert!((125..175).contains(&early_biased), "{early_biased}");
+            phase(0.0, 1, biased).apply(&mut film, &mut rng);
+            assert_eq!(film.seen, 350);
+            let start = film.motion.iter().position(|x| *x == 0.0).unwrap() / 48;
+            start < 88
+        };
+        let early = |biased| {
+            (0..300)
+                .filter(|place| starts_early(biased, *place))
+                .count()
+        };
+        let (anywhere, biased) = (early(false), early(true));
+        assert!((50..100).contains(&anywhere), "{anywhere}");
+        assert!((125..175).contains(&biased), "{biased}");
     }
 }

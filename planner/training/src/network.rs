@@ -3,8 +3,8 @@
 //!
 //! Three blocks of convolution (kernel 8), layer norm, GELU, average pooling by 2
 //! and dropout; adaptive pooling; a linear layer to 256 numbers, the embedding,
-//! that also sees the widths and the motion's principal components; a head of 128 and 64 to the nine normalised
-//! parameters. A second, smaller head says how far off each is. It reads the
+//! that also sees the widths and the motion's principal components; a head of 128 and 64
+//! to the nine normalised parameters. A second, smaller head says how far off each is. It reads the
 //! first one's last layer but does not change it. A third one, of use in training only,
 //! is asked for the ratios that a film can tell.
 //!
@@ -12,9 +12,10 @@
 //! shifted copies of its input side by side, which on a CPU is faster than the
 //! tensor library's own.
 
+use crate::batches::RATIOS;
 use crate::config::NetworkConfig;
+use crate::error::{Result, TrainingError};
 use crate::principal::PRINCIPAL;
-use crate::ratios::RATIOS;
 use burn::module::Module;
 use burn::nn::{Dropout, DropoutConfig, LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::activation::{gelu, sigmoid};
@@ -23,60 +24,61 @@ use planner::features::{FeatureDefinition, WIDTHS};
 use shared_types::rope::ROPE_PARAMETERS;
 
 /// Kernel of every convolution.
-pub const KERNEL: usize = 8;
+pub(crate) const KERNEL: usize = 8;
 /// Zero frames before and after the input of a convolution.
-pub const PADDING: [usize; 2] = [3, 4];
+pub(crate) const PADDING: [usize; 2] = [3, 4];
 /// Numbers of the embedding.
-pub const EMBEDDING: usize = 256;
+pub(crate) const EMBEDDING: usize = 256;
 const HEAD: [usize; 2] = [128, 64];
 const SPREAD: usize = 32;
 /// Added to the variance by layer norm.
-pub const NORM_EPSILON: f64 = 1e-5;
+pub(crate) const NORM_EPSILON: f64 = 1e-5;
 
 /// Convolution, layer norm, GELU, average pooling by 2, dropout.
 #[derive(Module, Debug)]
-pub struct Block {
+pub(crate) struct Block {
     /// Weight `[(tap, channel in), channel out]`.
-    pub convolution: Linear,
+    pub(crate) convolution: Linear,
     /// Over the channels.
-    pub norm: LayerNorm,
+    pub(crate) norm: LayerNorm,
     dropout: Dropout,
 }
 
 /// The network.
 #[derive(Module, Debug)]
-pub struct PhiModel {
-    /// The encoder's blocks.
-    pub blocks: Vec<Block>,
+pub(crate) struct PhiModel {
+    pub(crate) blocks: Vec<Block>,
     /// To the embedding.
-    pub embed: Linear,
+    pub(crate) embed: Linear,
     /// Head: embedding to 128, 64 and the parameters.
-    pub head: Vec<Linear>,
+    pub(crate) head: Vec<Linear>,
     /// Head of the deviations: 64 to 32 and the logarithms of the variances.
-    pub spread: Vec<Linear>,
+    pub(crate) spread: Vec<Linear>,
     /// Head of the ratios.
-    pub ratios: Linear,
+    pub(crate) ratios: Linear,
     /// Length after adaptive pooling.
-    pub pooled: usize,
+    pub(crate) pooled: usize,
 }
 
 /// What the network gives.
-#[derive(Debug, Clone)]
-pub struct Outputs {
+pub(crate) struct Outputs {
     /// Normalised parameters `[n, 9]`.
-    pub mean: Tensor<2>,
+    pub(crate) mean: Tensor<2>,
     /// Logarithm of their variances `[n, 9]`.
-    pub log_variance: Tensor<2>,
+    pub(crate) log_variance: Tensor<2>,
     /// Embedding `[n, 256]`.
-    pub embedding: Tensor<2>,
+    pub(crate) embedding: Tensor<2>,
     /// Logarithms of ratios `[n, 3]`.
-    pub ratios: Tensor<2>,
+    pub(crate) ratios: Tensor<2>,
 }
 
 impl PhiModel {
     /// A network with random weights of the device's generator.
-    #[must_use]
-    pub fn new(config: &NetworkConfig, features: &FeatureDefinition, device: &Device) -> Self {
+    pub(crate) fn new(
+        config: &NetworkConfig,
+        features: &FeatureDefinition,
+        device: &Device,
+    ) -> Self {
         let mut channels_in = features.channels();
         let blocks = config
             .channels
@@ -110,8 +112,12 @@ impl PhiModel {
 
     /// Standardised motion `[n, frames, channels]`, widths `[n, 4]` and principal
     /// components `[n, 64]` to outputs.
-    #[must_use]
-    pub fn forward(&self, motion: Tensor<3>, widths: Tensor<2>, principal: Tensor<2>) -> Outputs {
+    pub(crate) fn forward(
+        &self,
+        motion: Tensor<3>,
+        widths: Tensor<2>,
+        principal: Tensor<2>,
+    ) -> Outputs {
         let mut x = motion;
         for block in &self.blocks {
             x = block.forward(x);
@@ -157,4 +163,10 @@ fn pool(x: Tensor<3>, width: usize) -> Tensor<3> {
     x.reshape([films, length / width, width, channels])
         .mean_dim(2)
         .reshape([films, length / width, channels])
+}
+
+/// A tensor's numbers, its last axis first to change.
+pub(crate) fn numbers<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>> {
+    let numbers = tensor.into_data().try_into_vec::<f32>();
+    numbers.map_err(|error| TrainingError::tensors(format!("{error:?}")))
 }

@@ -1,148 +1,125 @@
-//! The part of the ONNX file format that Φ-NN needs, as Protocol Buffers messages.
-//!
-//! Field numbers are those of the published `onnx.proto`. Fields that are not
-//! listed are skipped when a file is read.
+//! The part of the ONNX file format that Φ-NN needs, written field by field as the
+//! published `onnx.proto` numbers them; `planner::phi` reads it.
 
-#![allow(
-    missing_docs,
-    reason = "names and meaning are those of the ONNX format"
-)]
+/// `TensorProto.DataType`.
+pub(crate) const FLOAT: u64 = 1;
+pub(crate) const INT64: u64 = 7;
 
-/// `TensorProto.DataType.FLOAT`.
-pub(crate) const FLOAT: i32 = 1;
-/// `TensorProto.DataType.INT64`.
-pub(crate) const INT64: i32 = 7;
-/// `AttributeProto.AttributeType.FLOAT`.
-pub(crate) const ATTRIBUTE_FLOAT: i32 = 1;
-/// `AttributeProto.AttributeType.INT`.
-pub(crate) const ATTRIBUTE_INT: i32 = 2;
-/// `AttributeProto.AttributeType.INTS`.
-pub(crate) const ATTRIBUTE_INTS: i32 = 7;
-
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Model {
-    #[prost(int64, tag = "1")]
-    pub(crate) ir_version: i64,
-    #[prost(string, tag = "2")]
-    pub(crate) producer_name: String,
-    #[prost(string, tag = "3")]
-    pub(crate) producer_version: String,
-    #[prost(message, optional, tag = "7")]
-    pub(crate) graph: Option<Graph>,
-    #[prost(message, repeated, tag = "8")]
-    pub(crate) opset_import: Vec<OperatorSet>,
-    #[prost(message, repeated, tag = "14")]
-    pub(crate) metadata_props: Vec<StringEntry>,
+fn varint(mut number: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    while number > 0x7f {
+        bytes.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    bytes.push(number as u8);
+    bytes
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct OperatorSet {
-    #[prost(string, tag = "1")]
-    pub(crate) domain: String,
-    #[prost(int64, tag = "2")]
-    pub(crate) version: i64,
+/// A field of a plain number.
+fn number(field: u64, value: u64) -> Vec<u8> {
+    [varint(field << 3), varint(value)].concat()
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct StringEntry {
-    #[prost(string, tag = "1")]
-    pub(crate) key: String,
-    #[prost(string, tag = "2")]
-    pub(crate) value: String,
+/// A field of bytes: text, another message, or numbers one after the other.
+fn bytes(field: u64, content: impl AsRef<[u8]>) -> Vec<u8> {
+    let content = content.as_ref();
+    let head = [varint(field << 3 | 2), varint(content.len() as u64)].concat();
+    [&head, content].concat()
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
+fn texts(field: u64, texts: &[&str]) -> Vec<u8> {
+    texts.iter().flat_map(|text| bytes(field, text)).collect()
+}
+
+fn numbers(field: u64, numbers: &[i64]) -> Vec<u8> {
+    let all: Vec<u8> = numbers.iter().flat_map(|n| varint(*n as u64)).collect();
+    bytes(field, all)
+}
+
+/// An attribute of a node: `float`, `int` or `ints`.
+pub(crate) fn float(name: &str, value: f32) -> Vec<u8> {
+    let value = [&varint(2 << 3 | 5)[..], &value.to_le_bytes()].concat();
+    [bytes(1, name), value, number(20, 1)].concat()
+}
+
+pub(crate) fn int(name: &str, value: i64) -> Vec<u8> {
+    [bytes(1, name), number(3, value as u64), number(20, 2)].concat()
+}
+
+pub(crate) fn ints(name: &str, values: &[i64]) -> Vec<u8> {
+    [bytes(1, name), numbers(8, values), number(20, 7)].concat()
+}
+
+/// A graph, part by part; each part is a list of fields.
+#[derive(Default)]
 pub(crate) struct Graph {
-    #[prost(message, repeated, tag = "1")]
-    pub(crate) node: Vec<Node>,
-    #[prost(string, tag = "2")]
-    pub(crate) name: String,
-    #[prost(message, repeated, tag = "5")]
-    pub(crate) initializer: Vec<Tensor>,
-    #[prost(message, repeated, tag = "11")]
-    pub(crate) input: Vec<ValueInfo>,
-    #[prost(message, repeated, tag = "12")]
-    pub(crate) output: Vec<ValueInfo>,
+    nodes: Vec<Vec<u8>>,
+    constants: Vec<u8>,
+    inputs: Vec<u8>,
+    outputs: Vec<u8>,
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Node {
-    #[prost(string, repeated, tag = "1")]
-    pub(crate) input: Vec<String>,
-    #[prost(string, repeated, tag = "2")]
-    pub(crate) output: Vec<String>,
-    #[prost(string, tag = "3")]
-    pub(crate) name: String,
-    #[prost(string, tag = "4")]
-    pub(crate) op_type: String,
-    #[prost(message, repeated, tag = "5")]
-    pub(crate) attribute: Vec<Attribute>,
+impl Graph {
+    /// Number of nodes so far.
+    pub(crate) fn nodes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub(crate) fn node(&mut self, op: &str, inputs: &[&str], output: &str, attributes: &[Vec<u8>]) {
+        let name = format!("{op}_{}", self.nodes.len());
+        let attributes: Vec<u8> = attributes.iter().flat_map(|a| bytes(5, a)).collect();
+        let (inputs, outputs) = (texts(1, inputs), texts(2, &[output]));
+        let node = [inputs, outputs, bytes(3, name), bytes(4, op), attributes];
+        self.nodes.push(node.concat());
+    }
+
+    pub(crate) fn constant(&mut self, name: &str, kind: u64, dims: &[usize], raw: &[u8]) {
+        let dims: Vec<i64> = dims.iter().map(|d| *d as i64).collect();
+        let name = bytes(8, name);
+        let tensor = [numbers(1, &dims), number(2, kind), name, bytes(9, raw)].concat();
+        self.constants.extend(bytes(5, tensor));
+    }
+
+    pub(crate) fn input(&mut self, name: &str, sizes: &[usize]) {
+        self.inputs.extend(bytes(11, value(name, sizes)));
+    }
+
+    pub(crate) fn output(&mut self, name: &str, sizes: &[usize]) {
+        self.outputs.extend(bytes(12, value(name, sizes)));
+    }
+
+    /// The graph's own bytes.
+    pub(crate) fn encode(&self, name: &str) -> Vec<u8> {
+        let mut all: Vec<u8> = self.nodes.iter().flat_map(|n| bytes(1, n)).collect();
+        all.extend(bytes(2, name));
+        [&all[..], &self.constants, &self.inputs, &self.outputs].concat()
+    }
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Attribute {
-    #[prost(string, tag = "1")]
-    pub(crate) name: String,
-    #[prost(float, tag = "2")]
-    pub(crate) f: f32,
-    #[prost(int64, tag = "3")]
-    pub(crate) i: i64,
-    #[prost(int64, repeated, tag = "8")]
-    pub(crate) ints: Vec<i64>,
-    #[prost(int32, tag = "20")]
-    pub(crate) kind: i32,
+/// A float tensor with any number of films.
+fn value(name: &str, sizes: &[usize]) -> Vec<u8> {
+    let mut shape = bytes(1, bytes(2, "n"));
+    for size in sizes {
+        shape.extend(bytes(1, number(1, *size as u64)));
+    }
+    let tensor = bytes(1, [number(1, FLOAT), bytes(2, shape)].concat());
+    [bytes(1, name), bytes(2, tensor)].concat()
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Tensor {
-    #[prost(int64, repeated, tag = "1")]
-    pub(crate) dims: Vec<i64>,
-    #[prost(int32, tag = "2")]
-    pub(crate) data_type: i32,
-    #[prost(string, tag = "8")]
-    pub(crate) name: String,
-    #[prost(bytes = "vec", tag = "9")]
-    pub(crate) raw_data: Vec<u8>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct ValueInfo {
-    #[prost(string, tag = "1")]
-    pub(crate) name: String,
-    #[prost(message, optional, tag = "2")]
-    pub(crate) value_type: Option<ValueType>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct ValueType {
-    #[prost(message, optional, tag = "1")]
-    pub(crate) tensor_type: Option<TensorType>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct TensorType {
-    #[prost(int32, tag = "1")]
-    pub(crate) elem_type: i32,
-    #[prost(message, optional, tag = "2")]
-    pub(crate) shape: Option<TensorShape>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct TensorShape {
-    #[prost(message, repeated, tag = "1")]
-    pub(crate) dim: Vec<Dimension>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Dimension {
-    #[prost(oneof = "DimensionValue", tags = "1, 2")]
-    pub(crate) value: Option<DimensionValue>,
-}
-
-#[derive(Clone, PartialEq, prost::Oneof)]
-pub(crate) enum DimensionValue {
-    #[prost(int64, tag = "1")]
-    Size(i64),
-    #[prost(string, tag = "2")]
-    Name(String),
+/// A model file of a graph, with one entry of metadata.
+pub(crate) fn file(graph: &[u8], [key, value]: [&str; 2]) -> Vec<u8> {
+    /// Version of the file format that goes with the operators.
+    const IR_VERSION: u64 = 9;
+    /// ONNX operator set: the first with GELU.
+    const OPSET: u64 = 20;
+    let entry = [bytes(1, key), bytes(2, value)].concat();
+    [
+        number(1, IR_VERSION),
+        bytes(2, "phi-train"),
+        bytes(3, env!("CARGO_PKG_VERSION")),
+        bytes(7, graph),
+        bytes(8, number(2, OPSET)),
+        bytes(14, entry),
+    ]
+    .concat()
 }

@@ -1,17 +1,17 @@
 //! Plots: losses over the steps, predicted against true parameters.
 
-use crate::TrainingError;
+use crate::error::{Result, TrainingError};
 use crate::files::write_whole;
 use crate::metrics::Metric;
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use std::path::Path;
 
+type Drawn = core::result::Result<(), Box<dyn core::error::Error>>;
+
 /// Draws the losses of training and held-out films over the steps.
-///
-/// # Errors
-/// A plot that cannot be drawn or written.
-pub fn plot_losses(path: &Path, metrics: &[Metric]) -> Result<(), TrainingError> {
+pub(crate) fn plot_losses(path: &Path, metrics: &[Metric]) -> Result<()> {
     let trained: Vec<(f64, f64)> = metrics.iter().map(|m| (m.step as f64, m.loss)).collect();
     let held_out: Vec<(f64, f64)> = metrics
         .iter()
@@ -21,11 +21,8 @@ pub fn plot_losses(path: &Path, metrics: &[Metric]) -> Result<(), TrainingError>
     let low = all().fold(f64::INFINITY, f64::min).clamp(1e-6, 1.0) * 0.9;
     let high = all().fold(0.0, f64::max).max(low * 1.5) * 1.1;
     let last = trained.last().map_or(1.0, |p| p.0).max(1.0);
-    let mut svg = String::new();
-    let drawn = || -> Result<(), Box<dyn core::error::Error>> {
-        let area = SVGBackend::with_string(&mut svg, (900, 500)).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
+    plot(path, (900, 500), |area| {
+        let mut chart = ChartBuilder::on(area)
             .margin(16)
             .caption(
                 "mean squared error of normalised parameters",
@@ -50,26 +47,17 @@ pub fn plot_losses(path: &Path, metrics: &[Metric]) -> Result<(), TrainingError>
             .background_style(WHITE)
             .border_style(BLACK)
             .draw()?;
-        area.present()?;
         Ok(())
-    };
-    named(path, drawn)?;
-    write_whole(path, svg.as_bytes())
+    })
 }
 
 /// Draws predicted over true values, one panel per parameter; the values are parts
 /// of their ranges.
-///
-/// # Errors
-/// A plot that cannot be drawn or written.
-pub fn plot_predictions(
+pub(crate) fn plot_predictions(
     path: &Path,
     pairs: &[([f64; ROPE_PARAMETERS], [f64; ROPE_PARAMETERS])],
-) -> Result<(), TrainingError> {
-    let mut svg = String::new();
-    let drawn = || -> Result<(), Box<dyn core::error::Error>> {
-        let area = SVGBackend::with_string(&mut svg, (960, 960)).into_drawing_area();
-        area.fill(&WHITE)?;
+) -> Result<()> {
+    plot(path, (960, 960), |area| {
         for (i, panel) in area.split_evenly((3, 3)).iter().enumerate() {
             let mut chart = ChartBuilder::on(panel)
                 .margin(10)
@@ -84,20 +72,23 @@ pub fn plot_predictions(
                 .map(|(truth, found)| Circle::new((truth[i], found[i]), 1, BLUE.mix(0.5).filled()));
             chart.draw_series(dots)?;
         }
-        area.present()?;
         Ok(())
-    };
-    named(path, drawn)?;
-    write_whole(path, svg.as_bytes())
+    })
 }
 
-/// Runs a drawing and names the file in its error.
-fn named(
+/// Draws into an SVG file of this size.
+fn plot(
     path: &Path,
-    drawn: impl FnOnce() -> Result<(), Box<dyn core::error::Error>>,
-) -> Result<(), TrainingError> {
-    drawn().map_err(|error| TrainingError::Plot {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    })
+    size: (u32, u32),
+    draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> Drawn,
+) -> Result<()> {
+    let mut svg = String::new();
+    let drawn = || -> Drawn {
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        area.fill(&WHITE)?;
+        draw(&area)?;
+        Ok(area.present()?)
+    };
+    drawn().map_err(|e| TrainingError::Failed(format!("plot {}: {e}", path.display())))?;
+    write_whole(path, svg.as_bytes())
 }

@@ -11,29 +11,23 @@ use planner::features::FeatureDefinition;
 use serde::{Deserialize, Serialize};
 
 /// Numbers kept.
-pub const PRINCIPAL: usize = 64;
+pub(crate) const PRINCIPAL: usize = 64;
 /// Frames averaged before: an eighth of a second at 60 Hz.
-pub const POOL: usize = 8;
+pub(crate) const POOL: usize = 8;
 
-/// A matrix from pooled standardised motion to principal components.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A matrix from pooled standardised motion to principal components; without numbers,
+/// every component is 0.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Principal {
+pub(crate) struct Principal {
     /// Row-major: frame group by frame group, channel by channel, then component.
-    pub matrix: Vec<f32>,
+    pub(crate) matrix: Vec<f32>,
 }
 
 impl Principal {
-    /// No component at all: every number is 0.
-    #[must_use]
-    pub fn none() -> Self {
-        Self { matrix: Vec::new() }
-    }
-
     /// Measures standardised films with errors and without; `scale` is that of the
     /// channels.
-    #[must_use]
-    pub fn measure(
+    pub(crate) fn measure(
         films: &[Vec<f32>],
         clean: &[Vec<f32>],
         scale: &[f32],
@@ -88,8 +82,7 @@ impl Principal {
     }
 
     /// Components of standardised motion.
-    #[must_use]
-    pub fn of(&self, motion: &[f32], channels: usize) -> [f32; PRINCIPAL] {
+    pub(crate) fn of(&self, motion: &[f32], channels: usize) -> [f32; PRINCIPAL] {
         let mut out = [0.0; PRINCIPAL];
         let rows = self.matrix.chunks(PRINCIPAL);
         for (x, row) in pooled(motion, channels).iter().zip(rows) {

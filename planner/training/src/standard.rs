@@ -13,23 +13,22 @@ use serde::{Deserialize, Serialize};
 /// Mean and scale of every channel and width.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Standard {
+pub(crate) struct Standard {
     /// Mean of each frame's channels over the films in which it was seen.
-    pub mean: Vec<f32>,
+    pub(crate) mean: Vec<f32>,
     /// One over the deviation of each channel from these means.
-    pub scale: Vec<f32>,
+    pub(crate) scale: Vec<f32>,
     /// Mean of rope and lead half width (m).
-    pub width_mean: [f32; 2],
+    pub(crate) width_mean: [f32; 2],
     /// One over their deviation (1/m).
-    pub width_scale: [f32; 2],
+    pub(crate) width_scale: [f32; 2],
     /// What tells most of the motion.
-    pub principal: Principal,
+    pub(crate) principal: Principal,
 }
 
 impl Standard {
     /// Measures films with all their errors, and without any.
-    #[must_use]
-    pub fn measure(films: &[WiggleFeatures], clean: &[WiggleFeatures]) -> Self {
+    pub(crate) fn measure(films: &[WiggleFeatures], clean: &[WiggleFeatures]) -> Self {
         let definition = films
             .first()
             .map_or_else(Default::default, |f| f.definition);
@@ -55,7 +54,7 @@ impl Standard {
             scale,
             width_mean: [rope.0, lead.0],
             width_scale: [rope.1, lead.1],
-            principal: Principal::none(),
+            principal: Principal::default(),
         };
         let standardised = |films: &[WiggleFeatures]| -> Vec<Vec<f32>> {
             let one = |f: &WiggleFeatures| {
@@ -71,7 +70,7 @@ impl Standard {
     }
 
     /// Standardises the motion; frames not seen stay 0.
-    pub fn motion(&self, motion: &mut [f32]) {
+    pub(crate) fn motion(&self, motion: &mut [f32]) {
         let channels = self.scale.len();
         let frames = motion.chunks_mut(channels).zip(self.mean.chunks(channels));
         for (frame, mean) in frames {
@@ -83,14 +82,12 @@ impl Standard {
     }
 
     /// Principal components of standardised motion.
-    #[must_use]
-    pub fn principal(&self, motion: &[f32]) -> [f32; PRINCIPAL] {
+    pub(crate) fn principal(&self, motion: &[f32]) -> [f32; PRINCIPAL] {
         self.principal.of(motion, self.scale.len())
     }
 
     /// Standardises the widths; those not seen stay 0.
-    #[must_use]
-    pub fn widths(&self, widths: [f32; WIDTHS]) -> [f32; WIDTHS] {
+    pub(crate) fn widths(&self, widths: [f32; WIDTHS]) -> [f32; WIDTHS] {
         let value = |i: usize| {
             let (width, seen) = (widths[2 * i], widths[2 * i + 1]);
             width * self.width_scale[i] - self.width_mean[i] * self.width_scale[i] * seen

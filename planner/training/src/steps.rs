@@ -1,47 +1,40 @@
 //! The four steps as commands.
 
-use crate::{
+use crate::batches::{Studio, fractions};
+use crate::checkpoint::{State, path_in};
+use crate::cli::{
     DataArguments, DatasetArguments, DeviceName, EvaluateArguments, ExportArguments, TrainArguments,
 };
+use crate::config::TrainingConfig;
+use crate::error::{Result, TrainingError};
+use crate::evaluation::{Judged, evaluate as judge};
+use crate::export::{compare, to_onnx};
+use crate::familiar::Familiar;
+use crate::files::write_whole;
+use crate::hypercube::Share;
+use crate::plots::plot_predictions;
+use crate::pool::{Pool, Recipe};
+use crate::trainer::{Predicted, Trainer, predict};
 use burn::module::Module;
 use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
-use phi_training::TrainingError;
-use phi_training::batches::{Batch, Studio};
-use phi_training::checkpoint::{State, path_in};
-use phi_training::config::TrainingConfig;
-use phi_training::evaluation::{Judged, evaluate as judge};
-use phi_training::export::{Familiar, to_onnx};
-use phi_training::hypercube::Share;
-use phi_training::plots::plot_predictions;
-use phi_training::pool::{Pool, Recipe};
-use phi_training::trainer::{Predicted, Trainer, predict};
-use shared_types::rope::{RANGES, ROPE_PARAMETERS};
-use std::path::Path;
+use planner::features::WiggleFeatures;
+use planner::phi::{ParameterScale, PhiNet, PredictError, in_units};
 
 /// Films of training ropes whose embeddings the out-of-distribution score is measured against.
 const FAMILIAR_FILMS: usize = 2000;
+/// Films with which a written file is checked.
+const CHECKED: usize = 20;
 
-pub(crate) fn dataset(arguments: &DatasetArguments) -> Result<(), TrainingError> {
-    let config = TrainingConfig::load(&arguments.data.config)?;
-    config.check()?;
-    let recipe = Recipe::new(&config.data, Share::Training, arguments.data.threads);
-    let last = arguments.shards.map_or(recipe.shards(), |n| {
-        (arguments.first + n).min(recipe.shards())
-    });
-    make(
-        &recipe,
-        arguments.first..last,
-        &arguments.data,
-        "training ropes",
-    )?;
-    let held_out = Recipe::new(&config.data, Share::HeldOut, arguments.data.threads);
-    make(
-        &held_out,
-        0..held_out.shards(),
-        &arguments.data,
-        "held-out ropes",
-    )
+pub(crate) fn dataset(arguments: &DatasetArguments) -> Result<()> {
+    let data = &arguments.data;
+    let config = TrainingConfig::load(&data.config)?;
+    let [training, held_out] = [Share::Training, Share::HeldOut]
+        .map(|share| Recipe::new(&config.data, share, data.threads));
+    let (first, all) = (arguments.first, training.shards());
+    let last = arguments.shards.map_or(all, |n| (first + n).min(all));
+    make(&training, first..last, data, "training ropes")?;
+    make(&held_out, 0..held_out.shards(), data, "held-out ropes")
 }
 
 fn make(
@@ -49,11 +42,9 @@ fn make(
     shards: core::ops::Range<usize>,
     data: &DataArguments,
     what: &'static str,
-) -> Result<(), TrainingError> {
-    let bar = bar(
-        shards.len(),
-        "{msg} {bar:30} {pos}/{len} thousand, {eta} left",
-    );
+) -> Result<()> {
+    let template = "{msg} {bar:30} {pos}/{len} thousand, {eta} left";
+    let bar = bar(shards.len(), template);
     bar.set_message(what);
     recipe.make(&data.data, shards, &mut |_| bar.inc(1))?;
     bar.finish();
@@ -61,20 +52,13 @@ fn make(
 }
 
 /// The ropes of a share, simulated now if they are not there yet.
-fn ropes(
-    config: &TrainingConfig,
-    data: &DataArguments,
-    share: Share,
-) -> Result<Pool, TrainingError> {
+fn ropes(config: &TrainingConfig, data: &DataArguments, share: Share) -> Result<Pool> {
     let recipe = Recipe::new(&config.data, share, data.threads);
     make(&recipe, 0..recipe.shards(), data, "ropes")?;
     let pool = recipe.load(&data.data)?;
-    if pool.failed() > 0 {
-        eprintln!(
-            "{} of {} ropes blew up in the simulator",
-            pool.failed(),
-            pool.len()
-        );
+    let (failed, all) = (pool.failed(), pool.len());
+    if failed > 0 {
+        eprintln!("{failed} of {all} ropes blew up in the simulator");
     }
     Ok(pool)
 }
@@ -89,14 +73,12 @@ fn device(name: DeviceName) -> Device {
     }
 }
 
-pub(crate) fn train(arguments: &TrainArguments) -> Result<(), TrainingError> {
+pub(crate) fn train(arguments: &TrainArguments) -> Result<()> {
     let config = TrainingConfig::load(&arguments.data.config)?;
     let pool = ropes(&config, &arguments.data, Share::Training)?;
     let held_out = ropes(&config, &arguments.data, Share::HeldOut)?;
-    let bar = bar(
-        config.training.steps,
-        "{bar:30} {pos}/{len} steps, {per_sec}, {eta} left, {msg}",
-    );
+    let template = "{bar:30} {pos}/{len} steps, {per_sec}, {eta} left, {msg}";
+    let bar = bar(config.training.steps, template);
     let mut first = None;
     let trainer = Trainer {
         config: &config,
@@ -106,196 +88,119 @@ pub(crate) fn train(arguments: &TrainArguments) -> Result<(), TrainingError> {
         device: device(arguments.device),
         threads: arguments.data.threads,
     };
-    trainer.run(&mut |done, _, loss, metric| {
+    trainer.run(&mut |done, loss, metric| {
         bar.set_position(done as u64);
         bar.set_message(format!("loss {loss:.4}"));
-        if let Some((held_out, errors)) = metric.and_then(|m| m.held_out) {
-            let errors: Vec<String> = errors.iter().map(|e| format!("{e:.3}")).collect();
-            let trained = metric.map_or(f64::NAN, |m| m.loss);
+        if let Some(metric) = metric
+            && let Some((held_out, errors)) = metric.held_out
+        {
+            let errors = errors.map(|e| format!("{e:.3}")).join(" ");
             eprintln!(
-                "step {done}: loss {trained:.5}, held out {held_out:.5}, errors {}",
-                errors.join(" ")
+                "step {done}: loss {:.5}, held out {held_out:.5}, errors {errors}",
+                metric.loss
             );
         }
         let began = *first.get_or_insert(done);
-        arguments
-            .pause_after
-            .is_none_or(|steps| done + 1 < began + steps)
+        let pause = arguments.pause_after;
+        pause.is_none_or(|steps| done + 1 < began + steps)
     })?;
     bar.finish();
     Ok(())
 }
 
-/// Predictions for films of the first ropes of a share.
-fn look(
-    state: &State,
-    studio: &Studio<'_>,
-    pool: &Pool,
-    count: usize,
-) -> Result<Vec<Predicted>, TrainingError> {
+/// Predictions for the first films of a studio, which show `count` ropes.
+fn look(state: &State, studio: &Studio<'_>, count: usize) -> Result<Vec<Predicted>> {
+    let progress = &state.progress;
     let bar = bar(count, "films {bar:30} {pos}/{len}, {eta} left");
-    let mut films = Batch::with_capacity(count);
-    for i in 0..count {
-        films.push(studio.held_out(i)?, pool.rope(i), &state.progress.standard);
-        bar.inc(1);
-    }
+    let films = studio.held_out_batch(count, &progress.standard, || bar.inc(1))?;
     bar.finish_and_clear();
-    let device = Device::flex();
     predict(
         &state.model.valid(),
-        &state.progress.config,
+        &progress.config,
         &films,
-        &device,
+        &Device::flex(),
     )
 }
 
-pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<(), TrainingError> {
+pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
     let config = TrainingConfig::load(&arguments.data.config)?;
     let pool = ropes(&config, &arguments.data, Share::HeldOut)?;
     let count = arguments.ropes.unwrap_or(pool.len()).min(pool.len());
     let studio = Studio::new(&config, &pool)?;
-    let judged = if let Some(model) = &arguments.model {
-        from_file::judge(model, &studio, &pool, count)?
+    let found: Vec<_> = if let Some(model) = &arguments.model {
+        let net = PhiNet::load(model)?;
+        let in_units = |i| {
+            let found = net.predict(&studio.held_out(i)?).map_err(refused)?;
+            Ok((found.parameters, found.std_dev))
+        };
+        (0..count).map(in_units).collect::<Result<_>>()?
     } else {
         let state = State::load(&path_in(&arguments.run), &Device::flex().autodiff())?;
-        let looked = look(&state, &studio, &pool, count)?;
-        let in_units = |p: &Predicted| Judged {
-            truth: *pool.rope(p.film),
-            found: from_parts(&p.mean),
-            std_dev: core::array::from_fn(|i| {
-                let deviation = (f64::from(p.log_variance[i]) / 2.0).exp();
-                deviation.clamp(1e-4, 1.0) * (RANGES[i].max - RANGES[i].min)
-            }),
-        };
+        let looked = look(&state, &studio, count)?;
+        let scales = ParameterScale::of_ranges();
+        let in_units = |p: &Predicted| in_units(&scales, &p.mean, &p.log_variance);
         looked.iter().map(in_units).collect()
     };
+    let with_truth = |(i, (found, std_dev))| Judged {
+        truth: *pool.rope(i),
+        found,
+        std_dev,
+    };
+    let judged: Vec<Judged> = found.into_iter().enumerate().map(with_truth).collect();
     let evaluation = judge(&judged);
     if arguments.json {
-        let text = serde_json::to_string(&evaluation).map_err(|error| TrainingError::BadFile {
-            path: "standard output".into(),
-            reason: error.to_string(),
-        })?;
+        let text = serde_json::to_string(&evaluation)
+            .map_err(|error| TrainingError::Failed(format!("standard output: {error}")))?;
         println!("{text}");
     } else {
         println!("{}", evaluation.table());
     }
-    let part = |i: usize, x: f64| (x - RANGES[i].min) / (RANGES[i].max - RANGES[i].min);
-    let pairs: Vec<_> = judged
-        .iter()
-        .map(|j| {
-            let truth = j.truth.to_array();
-            let parts = |v: [f64; ROPE_PARAMETERS]| core::array::from_fn(|i| part(i, v[i]));
-            (parts(truth), parts(j.found))
-        })
-        .collect();
+    let pairs = |j: &Judged| (fractions(j.truth.to_array()), fractions(j.found));
+    let pairs: Vec<_> = judged.iter().map(pairs).collect();
     plot_predictions(&arguments.run.join("predictions.svg"), &pairs)
 }
 
-fn from_parts(parts: &[f32]) -> [f64; ROPE_PARAMETERS] {
-    core::array::from_fn(|i| {
-        let range = RANGES[i];
-        range.min + f64::from(parts[i]) * (range.max - range.min)
-    })
-}
-
-pub(crate) fn export(arguments: &ExportArguments) -> Result<(), TrainingError> {
+pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
     let state = State::load(&path_in(&arguments.run), &Device::flex().autodiff())?;
-    let config = state.progress.config.clone();
-    let training = ropes(&config, &arguments.data, Share::Training)?;
-    let held_out = ropes(&config, &arguments.data, Share::HeldOut)?;
-    let known = look(
-        &state,
-        &Studio::new(&config, &training)?,
-        &training,
-        training.len().min(FAMILIAR_FILMS),
-    )?;
-    let studio = Studio::new(&config, &held_out)?;
-    let others = look(&state, &studio, &held_out, held_out.len())?;
-    let familiar = Familiar::measure(&known, &others)?;
-    let bytes = to_onnx(&state, &familiar)?;
-    from_file::check(&bytes, &studio, &others)?;
-    write(&arguments.out, &bytes)?;
+    let config = &state.progress.config;
+    let training = ropes(config, &arguments.data, Share::Training)?;
+    let held_out = ropes(config, &arguments.data, Share::HeldOut)?;
+    let count = training.len().min(FAMILIAR_FILMS);
+    let known = look(&state, &Studio::new(config, &training)?, count)?;
+    let studio = Studio::new(config, &held_out)?;
+    let others = look(&state, &studio, held_out.len())?;
+    let bytes = to_onnx(&state, &Familiar::measure(&known, &others)?)?;
+    let checked = others.len().min(CHECKED);
+    let net = PhiNet::from_bytes("just written", &bytes)?;
+    let file = |i| run(&net, &studio.held_out(i)?);
+    let file: Vec<Predicted> = (0..checked).map(file).collect::<Result<_>>()?;
+    compare(&others, &file)?;
+    write_whole(&arguments.out, &bytes)?;
     println!(
-        "{}: {} bytes after {} steps, checked against the trained network on {} films",
+        "{}: {} bytes after {} steps, checked against the trained network on {checked} films",
         arguments.out.display(),
         bytes.len(),
         state.progress.step,
-        others.len().min(from_file::CHECKED)
     );
     Ok(())
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), TrainingError> {
-    let failed = |source| TrainingError::File {
-        path: path.to_owned(),
-        source,
-    };
-    let beside = path.with_extension("part");
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(failed)?;
-    }
-    std::fs::write(&beside, bytes).map_err(failed)?;
-    std::fs::rename(&beside, path).map_err(failed)
+/// What a model file makes of a film.
+pub(crate) fn run(net: &PhiNet, film: &WiggleFeatures) -> Result<Predicted> {
+    let out = net.run(film).map_err(refused)?;
+    Ok(Predicted {
+        mean: out.mean,
+        log_variance: out.log_variance,
+        embedding: out.embedding,
+    })
+}
+
+fn refused(error: PredictError) -> TrainingError {
+    TrainingError::Failed(error.to_string())
 }
 
 fn bar(length: usize, template: &str) -> ProgressBar {
     let style =
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length as u64).with_style(style)
-}
-
-/// Model files as the planner reads them.
-mod from_file {
-    use super::{Judged, Pool, Predicted, Studio, TrainingError};
-    use phi_training::export::compare;
-    use planner::phi::PhiNet;
-    use std::path::Path;
-
-    /// Films with which a written file is checked.
-    pub(super) const CHECKED: usize = 20;
-
-    pub(super) fn judge(
-        model: &Path,
-        studio: &Studio<'_>,
-        pool: &Pool,
-        count: usize,
-    ) -> Result<Vec<Judged>, TrainingError> {
-        let net = PhiNet::load(model)?;
-        (0..count)
-            .map(|i| {
-                let found = net.predict(&studio.held_out(i)?).map_err(refused)?;
-                Ok(Judged {
-                    truth: *pool.rope(i),
-                    found: found.parameters,
-                    std_dev: found.std_dev,
-                })
-            })
-            .collect()
-    }
-
-    pub(super) fn check(
-        bytes: &[u8],
-        studio: &Studio<'_>,
-        network: &[Predicted],
-    ) -> Result<(), TrainingError> {
-        let net = PhiNet::from_bytes("just written", bytes)?;
-        let file = (0..network.len().min(CHECKED))
-            .map(|film| {
-                let out = net.run(&studio.held_out(film)?).map_err(refused)?;
-                Ok(Predicted {
-                    film,
-                    mean: out.mean,
-                    log_variance: out.log_variance,
-                    embedding: out.embedding,
-                })
-            })
-            .collect::<Result<Vec<_>, TrainingError>>()?;
-        compare(network, &file).map(drop)
-    }
-
-    fn refused(error: planner::phi::PredictError) -> TrainingError {
-        TrainingError::Tensors {
-            reason: error.to_string(),
-        }
-    }
 }
