@@ -180,21 +180,12 @@ impl JointTrajectory {
     fn solve_second_derivatives(&mut self) {
         let n = self.waypoint_count();
         let mut upper = [0.0; MAX_WAYPOINTS];
-        let slope = |a: usize, j: usize| {
-            (self.q[a + 1][j] - self.q[a][j]) / (self.t_s[a + 1] - self.t_s[a])
-        };
+        let span = |i: usize| self.t_s[i + 1] - self.t_s[i];
+        let slope = |i: usize, j: usize| (self.q[i + 1][j] - self.q[i][j]) / span(i);
         let mut rhs = [JointVector::ZERO; MAX_WAYPOINTS];
         for i in 0..n {
-            let left = if i > 0 {
-                self.t_s[i] - self.t_s[i - 1]
-            } else {
-                0.0
-            };
-            let right = if i + 1 < n {
-                self.t_s[i + 1] - self.t_s[i]
-            } else {
-                0.0
-            };
+            let left = if i > 0 { span(i - 1) } else { 0.0 };
+            let right = if i + 1 < n { span(i) } else { 0.0 };
             let pivot = 2.0 * (left + right) - if i > 0 { left * upper[i - 1] } else { 0.0 };
             upper[i] = right / pivot;
             for j in 0..JOINTS {
@@ -278,24 +269,17 @@ impl JointTrajectory {
     /// Exact extrema of joint `joint` (0-based).
     #[must_use]
     pub fn extrema(&self, joint: usize) -> JointExtrema {
-        let zero = Extremum {
-            value: 0.0,
-            time_s: 0.0,
-        };
-        let at_start = Extremum {
-            value: self.q[0][joint],
-            time_s: 0.0,
-        };
+        let at = |value, time_s| Extremum { value, time_s };
         let mut e = JointExtrema {
-            q_min: at_start,
-            q_max: at_start,
-            qd: zero,
-            qdd: zero,
-            qddd: zero,
+            q_min: at(self.q[0][joint], 0.0),
+            q_max: at(self.q[0][joint], 0.0),
+            qd: at(0.0, 0.0),
+            qdd: at(0.0, 0.0),
+            qddd: at(0.0, 0.0),
         };
         let grow = |slot: &mut Extremum, value: f64, time_s: f64| {
             if value.abs() > slot.value.abs() {
-                *slot = Extremum { value, time_s };
+                *slot = at(value, time_s);
             }
         };
         for i in 0..self.waypoint_count() - 1 {
@@ -313,11 +297,8 @@ impl JointTrajectory {
             let curve = (m1 - m0) / (2.0 * h);
             let vertex = -m0 / (2.0 * curve);
             if vertex > 0.0 && vertex < h {
-                grow(
-                    &mut e.qd,
-                    v0 + m0 * vertex + curve * vertex * vertex,
-                    t0 + vertex,
-                );
+                let v = v0 + m0 * vertex + curve * vertex * vertex;
+                grow(&mut e.qd, v, t0 + vertex);
             }
             let disc = crate::exact::sqrt((m0 * m0 - 4.0 * curve * v0).max(0.0));
             let qq = -0.5 * (m0 + disc.copysign(m0));
@@ -326,16 +307,10 @@ impl JointTrajectory {
                     let q =
                         self.q[i][joint] + u * (v0 + u * (m0 / 2.0 + u * (m1 - m0) / (6.0 * h)));
                     if q < e.q_min.value {
-                        e.q_min = Extremum {
-                            value: q,
-                            time_s: t0 + u,
-                        };
+                        e.q_min = at(q, t0 + u);
                     }
                     if q > e.q_max.value {
-                        e.q_max = Extremum {
-                            value: q,
-                            time_s: t0 + u,
-                        };
+                        e.q_max = at(q, t0 + u);
                     }
                 }
             }
@@ -420,22 +395,15 @@ mod tests {
 
     #[test]
     fn bad_input_is_named() {
-        let q = [JointVector::ZERO; 3];
-        assert!(matches!(
-            JointTrajectory::new(&[0.0, 0.5, 0.5], &q),
-            Err(TrajectoryError::TimeOrder { index: 2, .. })
-        ));
-        assert!(matches!(
-            JointTrajectory::new(&[0.0, f64::NAN, 0.5], &q),
-            Err(TrajectoryError::NotFinite { index: 1 })
-        ));
-        assert!(matches!(
-            JointTrajectory::new(&[0.0, 1.0], &q),
-            Err(TrajectoryError::LengthMismatch { .. })
-        ));
-        assert!(matches!(
-            JointTrajectory::new(&[0.0], &q[..1]),
-            Err(TrajectoryError::WaypointCount { found: 1 })
-        ));
+        for (times_s, waypoints, said) in [
+            (&[0.0, 0.5, 0.5][..], 3, "time 0.5 s of waypoint 2"),
+            (&[0.0, f64::NAN, 0.5], 3, "waypoint 1 holds"),
+            (&[0.0, 1.0], 3, "`times_s` has 2 entries"),
+            (&[0.0], 1, "found 1"),
+        ] {
+            let q = vec![JointVector::ZERO; waypoints];
+            let error = JointTrajectory::new(times_s, &q).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
     }
 }

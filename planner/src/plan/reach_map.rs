@@ -14,14 +14,12 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
-use rope_sim::{
-    Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start, Watch, roll_out,
-};
+use rope_sim::{Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, roll_out};
 use shared_types::RopeParams;
 use std::collections::BTreeMap;
 
 /// Edge of a cell (m).
-const CELL_M: f64 = 0.05;
+pub(super) const CELL_M: f64 = 0.05;
 /// Throws of one round, and rounds.
 const THROWS: usize = 192;
 const ROUNDS: usize = 14;
@@ -34,13 +32,13 @@ const STEP_S: f64 = 1e-3;
 const NEAR_M: f64 = 0.10;
 
 /// A cell: columns outwards from the base axis, rows upwards from the base.
-pub type GridCell = (i32, i32);
+pub(super) type GridCell = (i32, i32);
 
 /// What the throws reached.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReachMap {
-    /// Throws that passed each cell.
-    cells: BTreeMap<GridCell, u32>,
+    /// Throws that passed each cell that was reached.
+    pub(super) cells: BTreeMap<GridCell, u32>,
     /// Throws simulated.
     pub throws: u32,
 }
@@ -101,21 +99,9 @@ impl ReachMap {
         })
     }
 
-    /// Cells that were reached, with the number of throws that passed them.
-    pub fn cells(&self) -> impl Iterator<Item = (GridCell, u32)> + '_ {
-        self.cells.iter().map(|(cell, passed)| (*cell, *passed))
-    }
-
     /// Middle of a cell: distance from the base axis and height (m).
-    #[must_use]
-    pub fn middle_m((column, row): GridCell) -> [f64; 2] {
+    pub(super) fn middle_m((column, row): GridCell) -> [f64; 2] {
         [column, row].map(|i| (f64::from(i) + 0.5) * CELL_M)
-    }
-
-    /// Edge of a cell (m).
-    #[must_use]
-    pub fn cell_m() -> f64 {
-        CELL_M
     }
 
     /// Refuses a target far from everything that was reached.
@@ -192,23 +178,18 @@ fn tip_paths(
     let horizon_s = space.times_s[WAYPOINTS - 1] + config.tail_s;
     let count = (horizon_s / PERIOD_S).floor() as usize + 1;
     let options = SimOptions {
-        step_s: STEP_S,
-        precision: Precision::F32,
-        start: Start::Equilibrium,
         frames: FrameTimes {
             first_s: 0.0,
             period_s: PERIOD_S,
             count,
         },
-        watch: Watch::NOTHING,
-        horizon_s,
         threads,
+        ..SimOptions::new(STEP_S, Precision::F32, horizon_s)
     };
     let rollouts = roll_out(&candidates, &options)?;
-    let paths = motions.iter().zip(&rollouts);
-    Ok(paths
-        .map(|(motion, rollout)| passed(rope, motion.trajectory(), rollout, cell))
-        .collect())
+    let path =
+        |(motion, rollout): (&PlannedArm, _)| passed(rope, motion.trajectory(), rollout, cell);
+    Ok(motions.iter().zip(&rollouts).map(path).collect())
 }
 
 fn passed(

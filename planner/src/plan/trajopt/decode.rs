@@ -133,23 +133,27 @@ mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
 
+    /// Spaces of three and of seven joints, with times that stretch by as much.
+    fn spaces(stretch_max: f64) -> [WaypointSpace; 2] {
+        [Dimensions::Planar, Dimensions::Full].map(|dimensions| WaypointSpace {
+            start: START_POSE,
+            dimensions,
+            times_s: [0.4, 0.8, 1.1],
+            stretch_max,
+        })
+    }
+
     #[test]
     fn coordinates_land_on_their_joints_and_waypoints() {
-        for dimensions in [Dimensions::Planar, Dimensions::Full] {
-            let space = WaypointSpace {
-                start: START_POSE,
-                dimensions,
-                times_s: [0.4, 0.8, 1.1],
-                stretch_max: 1.0,
-            };
+        for space in spaces(1.0) {
             let mut x = space.resting();
-            assert_eq!(x.len(), dimensions.count());
+            assert_eq!(x.len(), space.dimensions.count());
             let rest = space.decode(&x).unwrap();
             assert_eq!(rest.start(), rest.end());
-            let per_waypoint = dimensions.joints().len();
-            x[per_waypoint] += 0.25;
+            let joints = space.dimensions.joints();
+            x[joints.len()] += 0.25;
             let moved = space.decode(&x).unwrap();
-            let joint = dimensions.joints()[0];
+            let joint = joints[0];
             assert!((moved.waypoints()[2][joint] - START_POSE[joint] - 0.25).abs() < 1e-12);
             assert_eq!(moved.waypoints()[1], START_POSE);
             assert_eq!(moved.times_s(), &[0.0, 0.4, 0.8, 1.1]);
@@ -158,23 +162,17 @@ mod tests {
 
     #[test]
     fn free_times_stretch_each_segment_and_leave_the_waypoints() {
-        for dimensions in [Dimensions::Planar, Dimensions::Full] {
-            let space = WaypointSpace {
-                start: START_POSE,
-                dimensions,
-                times_s: [0.4, 0.8, 1.1],
-                stretch_max: 1.5,
-            };
-            let mut x = space.resting();
-            assert_eq!(x.len(), dimensions.count() + WAYPOINTS);
+        for space in spaces(1.5) {
+            let (mut x, waypoints) = (space.resting(), space.dimensions.count());
+            assert_eq!(x.len(), waypoints + WAYPOINTS);
             assert_eq!(space.decode(&x).unwrap().times_s(), &[0.0, 0.4, 0.8, 1.1]);
-            x[dimensions.count() - 1] += 0.25;
-            x[dimensions.count() + 1] = 1.5_f64.ln();
+            x[waypoints - 1] += 0.25;
+            x[waypoints + 1] = 1.5_f64.ln();
             let moved = space.decode(&x).unwrap();
             for (is, wanted) in moved.times_s().iter().zip([0.0, 0.4, 1.0, 1.3]) {
                 assert!((is - wanted).abs() < 1e-12, "{is} s, not {wanted} s");
             }
-            let last = *dimensions.joints().last().unwrap();
+            let last = *space.dimensions.joints().last().unwrap();
             assert!((moved.end()[last] - START_POSE[last] - 0.25).abs() < 1e-12);
             let (low, high) = space.bounds(&Limits::default());
             assert_eq!((low.len(), high.len()), (x.len(), x.len()));

@@ -1,4 +1,4 @@
-//! CMA-ES-traj: the search for joint waypoints of a throw.
+//! CMA-ES-traj: the space that is searched for the joint waypoints of a throw.
 //!
 //! Paper, section "CMA-ES Trajectory Optimization" and appendix "Trajectory
 //! Parameterization and Velocity Filtering": three joint-space waypoints at fixed
@@ -7,15 +7,11 @@
 
 mod decode;
 mod pole;
-mod polish;
 mod screen;
-mod search;
 
 pub use decode::Dimensions;
 pub(crate) use decode::{WAYPOINTS, WaypointSpace};
 pub use pole::PolePose;
 pub(crate) use pole::reach_pose;
-pub(crate) use polish::{Polish, polish};
 pub use screen::Clearance;
 pub(crate) use screen::Screen;
-pub(crate) use search::{Found, SearchOptions, Valued, search};
