@@ -1,6 +1,7 @@
 //! What is tuned about throws of every task, and the size of their search.
 
-use super::trajopt::{Clearance, Dimensions, WAYPOINTS};
+use super::screen::Clearance;
+use super::waypoints::{Dimensions, WAYPOINTS};
 use crate::OutOfRange;
 use crate::collide::ContactCounts;
 use arm_model::JOINTS;
@@ -91,15 +92,12 @@ impl Robustness {
     pub fn variants(&self, rope: &RopeParams) -> Vec<RopeParams> {
         let mut out = vec![*rope];
         for sign in [-1.0, 1.0] {
-            let mut change = |edit: &dyn Fn(&mut RopeParams)| {
-                let mut r = *rope;
-                edit(&mut r);
-                out.push(r);
-            };
-            change(&|r| r.length_m *= 1.0 + sign * self.length);
-            change(&|r| r.joint_stiffness_nm_per_rad *= 1.0 + sign * self.stiffness);
-            change(&|r| r.joint_damping_nms_per_rad *= 1.0 + sign * self.damping);
-            change(&|r| r.lead_mass_kg *= 1.0 + sign * self.lead_mass);
+            let mut varied = [*rope; 4];
+            varied[0].length_m *= 1.0 + sign * self.length;
+            varied[1].joint_stiffness_nm_per_rad *= 1.0 + sign * self.stiffness;
+            varied[2].joint_damping_nms_per_rad *= 1.0 + sign * self.damping;
+            varied[3].lead_mass_kg *= 1.0 + sign * self.lead_mass;
+            out.extend(varied);
         }
         out
     }

@@ -4,8 +4,8 @@
 //! near a point half a rope below it, without a high arc. Ours adds where the rope is at
 //! the end: its middle on the edge, its tip below it on the far side, at rest.
 
+use super::pole_pose::PolePose;
 use super::scene::PlanarScene;
-use super::trajopt::PolePose;
 use super::{ThrowConfig, ThrowOutcome, ThrowTask, verdict};
 use crate::OutOfRange;
 use crate::collide::Block;

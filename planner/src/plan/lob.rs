@@ -5,8 +5,8 @@
 //! how far the domino tilts, how long the tip has lain on the board at the end, and how
 //! near the target it lies then, which is what leaves room for an error of the rope.
 
+use super::pole_pose::PolePose;
 use super::scene::PlanarScene;
-use super::trajopt::PolePose;
 use super::{Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward, verdict};
 use crate::OutOfRange;
 use crate::collide::Block;

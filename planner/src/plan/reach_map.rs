@@ -5,7 +5,8 @@
 //! changing those that came to rarely visited cells, so the edge moves outwards (the
 //! archive of J.-B. Mouret and J. Clune, "Illuminating search spaces by mapping elites").
 
-use super::trajopt::{Dimensions, Screen, WAYPOINTS, WaypointSpace};
+use super::screen::Screen;
+use super::waypoints::{Dimensions, WAYPOINTS, WaypointSpace};
 use super::{PlanError, ThrowConfig, start_pose_for};
 use crate::collide::{ArmShape, RopeShape, rope_contacts};
 use arm_model::{Cell, JointTrajectory, JointVector, Limits};
@@ -43,11 +44,8 @@ pub struct ReachMap {
     pub throws: u32,
 }
 
-/// A cell's throw, and how many passed the cell.
-struct Elite {
-    x: Vec<f64>,
-    passed: u32,
-}
+/// Each cell's throw, and how many passed the cell.
+type Archive = BTreeMap<GridCell, (Vec<f64>, u32)>;
 
 impl ReachMap {
     /// Explores the reach of a rope; about a second. Deterministic for a seed, whatever
@@ -74,7 +72,7 @@ impl ReachMap {
         let screen = Screen::new(space.clone(), limits.clone(), *cell, config.clearance)?;
         let std_dev = space.std_dev(&JointVector(config.std_dev_rad));
         let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x4ea_c400);
-        let mut archive: BTreeMap<GridCell, Elite> = BTreeMap::new();
+        let mut archive = Archive::new();
         let mut throws = 0;
         for _ in 0..ROUNDS {
             let points: Vec<Vec<f64>> = (0..THROWS)
@@ -84,15 +82,13 @@ impl ReachMap {
             throws += u32::try_from(points.len()).unwrap_or(u32::MAX);
             for (x, path) in points.into_iter().zip(paths) {
                 for passed in path {
-                    let kept = archive.entry(passed).or_insert_with(|| Elite {
-                        x: x.clone(),
-                        passed: 0,
-                    });
-                    kept.passed += 1;
+                    archive.entry(passed).or_insert_with(|| (x.clone(), 0)).1 += 1;
                 }
             }
         }
-        let cells = archive.into_iter().map(|(cell, kept)| (cell, kept.passed));
+        let cells = archive
+            .into_iter()
+            .map(|(cell, (_, passed))| (cell, passed));
         Ok(Self {
             cells: cells.collect(),
             throws,
@@ -140,16 +136,16 @@ fn draw(
     space: &WaypointSpace,
     screen: &Screen,
     std_dev: &[f64],
-    archive: &BTreeMap<GridCell, Elite>,
+    archive: &Archive,
     rng: &mut ChaCha12Rng,
 ) -> Option<Vec<f64>> {
-    let kept: Vec<&Elite> = archive.values().collect();
+    let kept: Vec<&(Vec<f64>, u32)> = archive.values().collect();
     let parent = kept
-        .choose_weighted(rng, |k| 1.0 / f64::from(k.passed.max(1)))
+        .choose_weighted(rng, |(_, passed)| 1.0 / f64::from((*passed).max(1)))
         .ok()
         .filter(|_| rng.random_bool(0.9));
     let (middle, spread) = match parent {
-        Some(kept) => (kept.x.clone(), rng.random_range(0.1..0.6)),
+        Some((x, _)) => (x.clone(), rng.random_range(0.1..0.6)),
         None => (space.resting(), 1.0),
     };
     (0..DRAWS_MAX)

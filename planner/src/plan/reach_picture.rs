@@ -75,21 +75,17 @@ fn axes(out: &mut String) {
         bottom + 44.0,
         (bottom + top) / 2.0
     );
+    let mut tick = |x: f64, y: f64, anchor, v: f64| {
+        let _ = writeln!(
+            out,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{v:.1}</text>"
+        );
+    };
     for k in -3..=8 {
         let v = 0.2 * f64::from(k);
         if (RHO_M[0] - 1e-9..=RHO_M[1] + 1e-9).contains(&v) {
-            let _ = writeln!(
-                out,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{v:.1}</text>",
-                x(v),
-                bottom + 20.0
-            );
+            tick(x(v), bottom + 20.0, "middle", v);
         }
-        let _ = writeln!(
-            out,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{v:.1}</text>",
-            left - 8.0,
-            y(v) + 5.0
-        );
+        tick(left - 8.0, y(v) + 5.0, "end", v);
     }
 }

@@ -1,6 +1,8 @@
 //! What one request needs again and again.
 
-use super::trajopt::{Screen, WAYPOINTS, WaypointSpace, reach_pose};
+use super::pole_pose::reach_pose;
+use super::screen::Screen;
+use super::waypoints::{WAYPOINTS, WaypointSpace};
 use super::{
     PlanError, PlanRequest, ThrowOutcome, ThrowSimulator, ThrowTask, simulator_for, start_pose_for,
 };

@@ -1,7 +1,7 @@
 //! What a task is.
 
-use super::trajopt::{PolePose, WAYPOINTS};
-use super::{PlanOptions, ThrowConfig, ThrowOutcome, ThrowSimulator};
+use super::waypoints::WAYPOINTS;
+use super::{PlanOptions, PolePose, ThrowConfig, ThrowOutcome, ThrowSimulator};
 use crate::collide::Block;
 use arm_model::Cell;
 use rope_sim::{Precision, Scene, Watch};

@@ -9,10 +9,7 @@ use std::ops::ControlFlow;
 
 /// A small search for a strike.
 fn request(target_m: [f64; 3]) -> PlanRequest {
-    let goal = ThrowGoal::Strike(Strike {
-        target_m,
-        config: ThrowConfig::default(),
-    });
+    let goal = PlannerConfig::default().goal(Task::Strike, target_m);
     let options = PlanOptions {
         population: 24,
         generations: Some(12),

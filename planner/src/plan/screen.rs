@@ -4,7 +4,7 @@
 //! Where the knot times are fixed, a candidate's second derivatives are one
 //! small matrix times its knots; a rejected draw costs well under a microsecond.
 
-use super::decode::{WAYPOINTS, WaypointSpace};
+use super::waypoints::{WAYPOINTS, WaypointSpace};
 use arm_model::kinematics;
 use arm_model::{Cell, JOINTS, JointState, JointTrajectory, Limits};
 use nalgebra::{Matrix4, Vector3, Vector4};
@@ -32,7 +32,7 @@ const TOOL_STEPS_S: [f64; 2] = [0.06, 0.012];
 
 /// Checks candidates of one [`WaypointSpace`] against limits and cell.
 #[derive(Debug, Clone)]
-pub(crate) struct Screen {
+pub(super) struct Screen {
     space: WaypointSpace,
     limits: Limits,
     cell: Cell,
@@ -53,7 +53,7 @@ impl Screen {
     ///
     /// # Errors
     /// Waypoint times that do not increase.
-    pub(crate) fn new(
+    pub(super) fn new(
         space: WaypointSpace,
         limits: Limits,
         cell: Cell,
@@ -73,7 +73,7 @@ impl Screen {
     }
 
     /// Whether the arm may execute the candidate.
-    pub(crate) fn accepts(&self, x: &[f64]) -> bool {
+    pub(super) fn accepts(&self, x: &[f64]) -> bool {
         let knots = self.space.knots(x);
         let times = self.space.knot_times_s(x);
         let curvature = self.curvature.unwrap_or_else(|| curvature_matrix(&times));
@@ -154,7 +154,7 @@ impl Screen {
 
     /// Sum over joints of the speed above its limit (rad/s), the paper's
     /// `P_vel`; 0 for every candidate this screen accepts.
-    pub(crate) fn speed_excess_rad_s(&self, trajectory: &JointTrajectory) -> f64 {
+    pub(super) fn speed_excess_rad_s(&self, trajectory: &JointTrajectory) -> f64 {
         (0..JOINTS)
             .map(|j| {
                 let peak = trajectory.extrema(j).qd.value.abs();

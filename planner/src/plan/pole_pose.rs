@@ -57,7 +57,7 @@ impl PolePose {
 
 /// Joints 2, 4 and 6 changed from `start` so that the pole takes the pose, or comes as
 /// near to it as the arm gets (rad).
-pub(crate) fn reach_pose(start: &JointVector, wanted: PolePose, pole: &Pole) -> JointVector {
+pub(super) fn reach_pose(start: &JointVector, wanted: PolePose, pole: &Pole) -> JointVector {
     const STEP: f64 = 1e-6;
     let mut q = *start;
     for _ in 0..ITERATIONS {

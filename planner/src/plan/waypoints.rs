@@ -1,10 +1,15 @@
-//! From search coordinates to joint trajectories.
+//! The space in which a throw is searched for (CMA-ES-traj), and its trajectories.
+//!
+//! Paper, section "CMA-ES Trajectory Optimization" and appendix "Trajectory
+//! Parameterization and Velocity Filtering": three joint-space waypoints at fixed
+//! times, a cubic spline from the start pose, candidates that break a limit
+//! rejected when they are drawn.
 
 use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use serde::{Deserialize, Serialize};
 
 /// Free waypoints of a throw (paper: three).
-pub(crate) const WAYPOINTS: usize = 3;
+pub(super) const WAYPOINTS: usize = 3;
 
 /// Which joints a search moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,7 +44,7 @@ impl Dimensions {
 /// the third; where the times are free too, then the logarithm of how much each
 /// of the three segments is stretched.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct WaypointSpace {
+pub(super) struct WaypointSpace {
     /// Pose at rest from which the throw starts (rad).
     pub start: JointVector,
     /// Which joints move.
@@ -53,12 +58,12 @@ pub(crate) struct WaypointSpace {
 
 impl WaypointSpace {
     /// Whether the times of the waypoints are free.
-    pub(crate) fn is_timed(&self) -> bool {
+    pub(super) fn is_timed(&self) -> bool {
         self.stretch_max > 1.0
     }
 
     /// Number of search coordinates.
-    pub(crate) fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.dimensions.count() + if self.is_timed() { WAYPOINTS } else { 0 }
     }
 
@@ -74,26 +79,26 @@ impl WaypointSpace {
     }
 
     /// The point that stays in the start pose.
-    pub(crate) fn resting(&self) -> Vec<f64> {
+    pub(super) fn resting(&self) -> Vec<f64> {
         self.filled(|j| self.start[j], 0.0)
     }
 
     /// Ranges of the coordinates as (lower, upper): those of the joints (rad), and of
     /// the stretches' logarithms.
-    pub(crate) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
         let most = self.stretch_max.ln();
         let of_joint = |j: usize| (limits.position_min_rad[j], limits.position_max_rad[j]);
         self.filled(of_joint, (-most, most)).into_iter().unzip()
     }
 
     /// Deviations of a first generation from those of the joints (rad).
-    pub(crate) fn std_dev(&self, of_joints_rad: &JointVector) -> Vec<f64> {
+    pub(super) fn std_dev(&self, of_joints_rad: &JointVector) -> Vec<f64> {
         // The bounds are three deviations away.
         self.filled(|j| of_joints_rad[j], self.stretch_max.ln() / 3.0)
     }
 
     /// Times of all knots of the spline of a point, start included (s).
-    pub(crate) fn knot_times_s(&self, x: &[f64]) -> [f64; WAYPOINTS + 1] {
+    pub(super) fn knot_times_s(&self, x: &[f64]) -> [f64; WAYPOINTS + 1] {
         let mut out = [0.0; WAYPOINTS + 1];
         out[1..].copy_from_slice(&self.times_s);
         if self.is_timed() {
@@ -108,7 +113,7 @@ impl WaypointSpace {
 
     /// Poses at all knots of the spline, start included (rad). Missing
     /// coordinates stay at the start pose.
-    pub(crate) fn knots(&self, x: &[f64]) -> [JointVector; WAYPOINTS + 1] {
+    pub(super) fn knots(&self, x: &[f64]) -> [JointVector; WAYPOINTS + 1] {
         let joints = self.dimensions.joints();
         let mut out = [self.start; WAYPOINTS + 1];
         for (knot, part) in out[1..].iter_mut().zip(x.chunks(joints.len())) {
@@ -123,7 +128,7 @@ impl WaypointSpace {
     ///
     /// # Errors
     /// Numbers that are not finite, waypoint times out of order.
-    pub(crate) fn decode(&self, x: &[f64]) -> Result<JointTrajectory, TrajectoryError> {
+    pub(super) fn decode(&self, x: &[f64]) -> Result<JointTrajectory, TrajectoryError> {
         JointTrajectory::new(&self.knot_times_s(x), &self.knots(x))
     }
 }
