@@ -79,19 +79,21 @@ impl TryFrom<LimitsSpec> for Limits {
         if spec.tcp_offset_m.iter().any(|v| !v.is_finite()) {
             return Err(LimitsError("limit `tcp_offset_m` must be finite".into()));
         }
-        for j in 0..JOINTS {
-            let (lo, hi) = (spec.position_min_rad[j], spec.position_max_rad[j]);
+        let ranges = spec
+            .position_min_rad
+            .iter()
+            .zip(spec.position_max_rad.iter());
+        for (joint, (lo, hi)) in (1..).zip(ranges) {
             if !(lo.is_finite() && hi.is_finite() && lo < hi) {
                 return Err(LimitsError(format!(
-                    "`position_min_rad` is not below `position_max_rad` for joint {}",
-                    j + 1
+                    "`position_min_rad` is not below `position_max_rad` for joint {joint}"
                 )));
             }
         }
-        if !(30.0..=250.0).contains(&spec.rate_hz) {
+        let rate_hz = spec.rate_hz;
+        if !(30.0..=250.0).contains(&rate_hz) {
             return Err(LimitsError(format!(
-                "`rate_hz` is {}, but the arm takes 30 to 250 setpoints a second",
-                spec.rate_hz
+                "`rate_hz` is {rate_hz}, but the arm takes 30 to 250 setpoints a second"
             )));
         }
         Ok(Self(spec))
@@ -151,7 +153,7 @@ impl Limits {
     /// # Errors
     /// A limit beyond what the arm is rated for.
     pub fn check_rating(&self) -> Result<(), LimitsError> {
-        let [range, speed, acceleration, jerk] = RATED;
+        let [range, speed, accel, jerk] = RATED;
         let spec = &self.0;
         let of_joints = [
             ("position_min_rad", spec.position_min_rad, range),
@@ -160,7 +162,7 @@ impl Limits {
             (
                 "acceleration_max_rad_s2",
                 spec.acceleration_max_rad_s2,
-                acceleration,
+                accel,
             ),
             ("jerk_max_rad_s3", spec.jerk_max_rad_s3, jerk),
         ];

@@ -23,11 +23,8 @@ pub const MAX_DURATION_S: f64 = 600.0;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TrajectoryError {
     /// Too few or too many waypoints.
-    #[error("a trajectory needs 2 to {MAX_WAYPOINTS} waypoints, found {found}")]
-    WaypointCount {
-        /// Number found.
-        found: usize,
-    },
+    #[error("a trajectory needs 2 to {MAX_WAYPOINTS} waypoints, found {0}")]
+    WaypointCount(usize),
     /// As many times as waypoints are needed.
     #[error("`times_s` has {times} entries but `waypoints_rad` has {waypoints}")]
     LengthMismatch {
@@ -36,17 +33,13 @@ pub enum TrajectoryError {
         /// Entries in `waypoints_rad`.
         waypoints: usize,
     },
-    /// A number is NaN or infinite.
-    #[error("waypoint {index} holds a number that is not finite")]
-    NotFinite {
-        /// Index of the waypoint.
-        index: usize,
-    },
+    /// A number of a waypoint is NaN or infinite.
+    #[error("waypoint {0} holds a number that is not finite")]
+    NotFinite(usize),
     /// Times must start at zero and increase by at least [`MIN_SEGMENT_S`].
     #[error(
-        "time {time_s} s of waypoint {index} must be {} s or more after the one before \
-         (the first is 0), at most {MAX_DURATION_S} s",
-        MIN_SEGMENT_S
+        "time {time_s} s of waypoint {index} must be {MIN_SEGMENT_S} s or more after the one before \
+         (the first is 0), at most {MAX_DURATION_S} s"
     )]
     TimeOrder {
         /// Index of the waypoint.
@@ -141,11 +134,11 @@ impl JointTrajectory {
             });
         }
         if !(2..=MAX_WAYPOINTS).contains(&n) {
-            return Err(TrajectoryError::WaypointCount { found: n });
+            return Err(TrajectoryError::WaypointCount(n));
         }
         for (index, (t, q)) in times_s.iter().zip(waypoints_rad).enumerate() {
             if !t.is_finite() || !q.is_finite() {
-                return Err(TrajectoryError::NotFinite { index });
+                return Err(TrajectoryError::NotFinite(index));
             }
             let ordered = if index == 0 {
                 *t == 0.0

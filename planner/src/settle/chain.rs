@@ -1,8 +1,7 @@
 //! The arm from the moment the rope hung still to the end of a move: measured
 //! joints, a hold, then the move.
 
-use super::error::SettleError;
-use super::request::SettleRequest;
+use super::request::{SettleError, SettleRequest};
 use crate::OutOfRange;
 use arm_model::kinematics::FrameMotion;
 use arm_model::{Cell, JointState, JointTrajectory, JointVector};

@@ -1,8 +1,7 @@
 //! Offsets of least residual vibration: damped Gauss-Newton, all finite differences in one
 //! batch of simulations.
 
-use super::error::SettleError;
-use super::request::SettleConfig;
+use super::request::{SettleConfig, SettleError};
 use super::residual::{Residual, ResidualSimulator};
 use super::shape::MoveShape;
 use nalgebra::{DMatrix, DVector};

@@ -10,15 +10,13 @@
 
 mod chain;
 mod descent;
-mod error;
 mod request;
 mod residual;
 mod shape;
 #[cfg(test)]
 mod tests;
 
-pub use error::SettleError;
-pub use request::{SettleConfig, SettleMove, SettleRequest};
+pub use request::{SettleConfig, SettleError, SettleMove, SettleRequest};
 
 use arm_model::JointTrajectory;
 use chain::Prelude;

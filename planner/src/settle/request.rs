@@ -1,10 +1,12 @@
-//! What a settling move is planned from, and what comes of it.
+//! What a settling move is planned from, what comes of it, and why there is none.
 
-use super::error::SettleError;
 use crate::OutOfRange;
-use arm_model::{Cell, JointTrajectory, JointVector, Limits};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
+use rope_sim::sensitivity::SensitivityError;
+use rope_sim::{MotionError, SimulateError};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
+use shared_types::rope::RopeError;
 
 /// What a settling move starts from and ends in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -109,4 +111,47 @@ impl SettleConfig {
         let expected = "from 0.1 s to a third of the shortest duration";
         Ok(within(0.1..=shortest_s / 3.0, expected, &knot_s)?)
     }
+}
+
+/// Why there is no settling move.
+#[derive(Debug, thiserror::Error)]
+pub enum SettleError {
+    /// A value of the configuration is out of range.
+    #[error("settle: {0}")]
+    Value(#[from] OutOfRange),
+    /// The configuration names no duration.
+    #[error("settle: `durations_s` is empty; name at least one duration")]
+    NoDuration,
+    /// The rope's parameters are not physical.
+    #[error(transparent)]
+    Rope(#[from] RopeError),
+    /// The measured joints make no motion.
+    #[error("measured joints: {0}")]
+    Joints(#[from] MotionError),
+    /// The arm is not known to stand where and when the move begins.
+    #[error("{0}")]
+    Start(String),
+    /// The knots make no trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// Even the plain move breaks a limit of the arm.
+    #[error("a plain move to the end pose breaks a limit: {0}; use longer `durations_s`")]
+    BreaksLimit(String),
+    /// Even the plain move brings rope or tool too near to something: gap of the rope (m).
+    #[error(
+        "every settling move brings the rope within {0:.3} m of arm or column or lets the tool collide; let the rope settle or choose another end pose"
+    )]
+    TooClose(f64),
+    /// The rope simulator refused.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// Slopes of the residual vibration could not be taken.
+    #[error(transparent)]
+    Sensitivity(#[from] SensitivityError),
+    /// The caller broke off after so many Gauss-Newton steps.
+    #[error("the settling move was cancelled after step {0}")]
+    Cancelled(usize),
+    /// The simulated rope blew up.
+    #[error("the simulation of the rope diverged; identify the rope again")]
+    Diverged,
 }

@@ -1,7 +1,7 @@
 //! How much the rope still swings after a move, and how near it comes to the arm.
 
 use super::chain::Prelude;
-use super::error::SettleError;
+use super::request::SettleError;
 use crate::collide::{ArmShape, RopeShape, rope_clearance_m, tool_contacts};
 use arm_model::JointTrajectory;
 use nalgebra::Vector3;

@@ -45,12 +45,17 @@ fn turned(turn_deg: f64) -> JointVector {
     q
 }
 
-/// A move 1.5 s after the wiggle.
-fn request(rope: RopeParams, turn_deg: f64) -> SettleRequest {
+/// A move 1.5 s after the wiggle, with one of the ropes.
+fn request(index: usize) -> SettleRequest {
+    let (c, k, turn_deg) = ROPES[index];
     let before = wiggled();
     let (times_s, q) = samples(before.duration_s(), |t| before.state_at(t).q);
     SettleRequest {
-        rope,
+        rope: RopeParams {
+            joint_damping_nms_per_rad: c,
+            joint_stiffness_nm_per_rad: k,
+            ..random_rope(index as u64)
+        },
         times_s,
         q,
         start_s: before.duration_s() + 1.5,
@@ -60,16 +65,6 @@ fn request(rope: RopeParams, turn_deg: f64) -> SettleRequest {
         cell: Cell::default(),
         config: SettleConfig::default(),
     }
-}
-
-fn rope(seed: usize) -> (RopeParams, f64) {
-    let (c, k, turn_deg) = ROPES[seed];
-    let rope = RopeParams {
-        joint_damping_nms_per_rad: c,
-        joint_stiffness_nm_per_rad: k,
-        ..random_rope(seed as u64)
-    };
-    (rope, turn_deg)
 }
 
 /// Largest distance of the tip from the point a rope length below the pole's
@@ -110,8 +105,7 @@ fn settled(request: &SettleRequest) -> Result<SettleMove, SettleError> {
 #[test]
 fn ropes_from_soft_to_stiff_hang_still_after_the_move() {
     for seed in 0..ROPES.len() {
-        let (rope, turn_deg) = rope(seed);
-        let request = request(rope, turn_deg);
+        let request = request(seed);
         let found = settled(&request).unwrap();
         let true_m = settled_residual_m(&request, &found.trajectory);
         assert!(found.residual_m < 5e-3 && true_m < 6e-3, "{seed}: {true_m}");
@@ -133,8 +127,7 @@ fn ropes_from_soft_to_stiff_hang_still_after_the_move() {
 #[test]
 fn a_rope_identified_half_a_percent_wrong_still_loses_most_of_its_swing() {
     for seed in [1, 2] {
-        let (rope, turn_deg) = rope(seed);
-        let request = request(rope, turn_deg);
+        let request = request(seed);
         let found = settled(&request).unwrap();
         assert!(found.plain_residual_m > 0.05, "{seed}: nothing to take out");
         for part in [0.995, 1.005] {
@@ -149,9 +142,8 @@ fn a_rope_identified_half_a_percent_wrong_still_loses_most_of_its_swing() {
 
 #[test]
 fn threads_do_not_change_the_move() {
-    let (rope, turn_deg) = rope(3);
     let with = |threads| {
-        let mut request = request(rope, turn_deg);
+        let mut request = request(3);
         request.config.threads = threads;
         settled(&request).unwrap()
     };
@@ -160,8 +152,7 @@ fn threads_do_not_change_the_move() {
 
 #[test]
 fn tight_limits_are_kept_by_taking_out_less() {
-    let (rope, _) = rope(2);
-    let mut request = request(rope, 0.0);
+    let mut request = request(2);
     request.config.durations_s = vec![3.5];
     let free = settled(&request).unwrap();
     let used = free.trajectory.extrema(5).qdd.value.abs();
@@ -185,8 +176,8 @@ fn tight_limits_are_kept_by_taking_out_less() {
 
 #[test]
 fn a_rope_that_would_come_too_near_is_refused() {
-    let (rope, _) = rope(1);
-    let mut request = request(rope, 0.0);
+    let mut request = request(1);
+    request.end_q = START_POSE;
     request.config.clearance_m = 0.9;
     match settled(&request) {
         Err(SettleError::TooClose(gap_m)) => assert!(gap_m > 0.1 && gap_m < 0.9, "{gap_m}"),
@@ -196,8 +187,7 @@ fn a_rope_that_would_come_too_near_is_refused() {
 
 #[test]
 fn a_wrong_start_is_refused_by_name() {
-    let (rope, _) = rope(4);
-    let good = request(rope, 0.0);
+    let good = request(4);
     type Change = fn(&mut SettleRequest);
     let cases: [(Change, &str); 8] = [
         (|r| r.start_s = 5.0, "would begin 5.000 s"),
@@ -219,9 +209,8 @@ fn a_wrong_start_is_refused_by_name() {
 
 #[test]
 fn a_caller_that_leaves_ends_the_search() {
-    let (rope, turn_deg) = rope(2);
     let mut steps = Vec::new();
-    let ended = settle(&request(rope, turn_deg), &mut |p| {
+    let ended = settle(&request(2), &mut |p| {
         steps.push(p.done);
         ControlFlow::Break(())
     });
@@ -231,8 +220,7 @@ fn a_caller_that_leaves_ends_the_search() {
 
 #[test]
 fn the_arm_keeps_its_standing_error_through_the_move() {
-    let (rope, turn_deg) = rope(0);
-    let mut request = request(rope, turn_deg);
+    let mut request = request(0);
     request.start_q[5] -= 0.004;
     let prelude = Prelude::new(&request).unwrap();
     let shape = MoveShape::new(request.start_q, request.end_q, 3.5, 0.44);
