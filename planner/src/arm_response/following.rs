@@ -145,7 +145,7 @@ mod tests {
     use arm_model::joint::START_POSE;
     use arm_model::response::{Estimate, JointResponse, NotExcited, TrackingLag};
 
-    fn response(joints: &[(usize, f64, f64)]) -> ArmResponse {
+    fn response(joint: usize, dead_time_s: f64, hz: f64) -> ArmResponse {
         let known = |value: f64| Estimate {
             value,
             interval: [value, value],
@@ -157,15 +157,13 @@ mod tests {
             excitation: None,
             joints: [JointResponse::NotExcited(NotExcited::Still); JOINTS],
         };
-        for (joint, dead_time_s, hz) in joints {
-            out.joints[*joint] = JointResponse::Excited(TrackingLag {
-                dead_time_s: known(*dead_time_s),
-                natural_frequency_hz: known(*hz),
-                damping_ratio: known(0.9),
-                residual_rad: 0.0,
-                samples: 1,
-            });
-        }
+        out.joints[joint] = JointResponse::Excited(TrackingLag {
+            dead_time_s: known(dead_time_s),
+            natural_frequency_hz: known(hz),
+            damping_ratio: known(0.9),
+            residual_rad: 0.0,
+            samples: 1,
+        });
         out
     }
 
@@ -178,7 +176,7 @@ mod tests {
     /// A slow motion is late by dead time, lag and half a cycle of the staircase.
     #[test]
     fn a_swing_comes_late_by_its_slow_delay_and_ends_where_it_should() {
-        let arm = response(&[(3, 0.020, 12.0)]);
+        let arm = response(3, 0.020, 12.0);
         let late_s = arm.joints[3].lag().unwrap().slow_delay_s() + 0.002;
         let command = swing(3);
         let motion = Following::new(&arm, &Limits::default())
@@ -200,7 +198,7 @@ mod tests {
         fn lag(f: &mut Following) -> &mut Lag {
             f.joints[3].as_mut().unwrap()
         }
-        let good = Following::new(&response(&[(3, 0.02, 12.0)]), &Limits::default());
+        let good = Following::new(&response(3, 0.02, 12.0), &Limits::default());
         assert_eq!(good.check(), Ok(()));
         type Change = fn(&mut Following);
         let cases: [(&str, Change); 6] = [
@@ -222,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_joint_that_was_not_measured_may_not_move() {
-        let following = Following::new(&response(&[(3, 0.02, 12.0)]), &Limits::default());
+        let following = Following::new(&response(3, 0.02, 12.0), &Limits::default());
         assert!(following.motion(&swing(3)).is_ok());
         assert_eq!(
             following.motion(&swing(5)).unwrap_err(),

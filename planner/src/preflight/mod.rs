@@ -30,32 +30,23 @@ pub fn arm_margins(
     limits: &Limits,
     arm: &JudgedArm,
 ) -> Vec<RuleMargin> {
-    let mut margins = arm.rules(limits);
-    let mut before = None;
-    let mut judge = |time_s: f64, step: &mut Step| {
-        step.before = before.replace(step.setpoint).unwrap_or(step.setpoint);
-        for margin in &mut margins {
-            let found = margin.rule.value(step, limits, arm);
-            margin.meet(found, time_s);
-        }
-    };
-    match arm.interface {
-        CommandInterface::ServoPosition => {
-            for time_s in cycles_s(trajectory, limits.period_s()) {
+    let steps = match arm.interface {
+        CommandInterface::ServoPosition => cycles_s(trajectory, limits.period_s())
+            .map(|time_s| {
                 // The wire holds single precision.
                 let setpoint = trajectory.state_at(time_s).q.map(|v| f64::from(v as f32));
-                judge(time_s, &mut Step::at(setpoint));
-            }
-        }
-        CommandInterface::JointVelocity => {
-            for cycle in velocity::cycles(trajectory, limits) {
-                let mut step = Step {
-                    q: cycle.q,
-                    astray_rad: cycle.astray_rad,
-                    ..Step::at(cycle.planned)
-                };
-                judge(cycle.time_s, &mut step);
-            }
+                (time_s, Step::at(setpoint))
+            })
+            .collect(),
+        CommandInterface::JointVelocity => velocity::steps(trajectory, limits),
+    };
+    let mut margins = arm.rules(limits);
+    let mut before = None;
+    for (time_s, mut step) in steps {
+        step.before = before.replace(step.setpoint).unwrap_or(step.setpoint);
+        for margin in &mut margins {
+            let found = margin.rule.value(&step, limits, arm);
+            margin.meet(found, time_s);
         }
     }
     margins

@@ -32,7 +32,7 @@ pub(super) struct Step {
     pub(super) setpoint: JointVector,
     /// Where the arm has its joints (rad).
     pub(super) q: JointVector,
-    /// How far they are from what was asked of them (rad).
+    /// How far they are from what was asked of them, which the controller stops for (rad).
     pub(super) astray_rad: f64,
 }
 
