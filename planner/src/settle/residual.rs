@@ -32,6 +32,9 @@ pub(super) struct Residual {
     pub(super) finite: bool,
 }
 
+/// How [`Residual::displacements_m`] change towards each neighbouring move (m per unit).
+type Slopes = Vec<Vec<f64>>;
+
 /// Simulates one rope through moves of one duration and end pose.
 #[derive(Debug)]
 pub(super) struct ResidualSimulator<'a> {
@@ -85,14 +88,14 @@ impl<'a> ResidualSimulator<'a> {
             .collect())
     }
 
-    /// Residual after `plan` and how [`Residual::displacements_m`] change towards each plan of
-    /// `beside` (m per unit of `distance`); `None` where the rope diverges.
+    /// Residual after `plan` and its slopes per unit of `distance` towards each plan of `beside`;
+    /// `None` where the rope diverges.
     pub(super) fn slopes(
         &self,
         plan: &JointTrajectory,
         beside: &[JointTrajectory],
         distance: f64,
-    ) -> Result<Option<(Residual, Vec<Vec<f64>>)>, SettleError> {
+    ) -> Result<Option<(Residual, Slopes)>, SettleError> {
         let here = self.prelude.then(plan);
         let arms: Vec<_> = beside.iter().map(|t| self.prelude.then(t)).collect();
         let perturbations: Vec<Perturbation<'_>> = arms
