@@ -50,38 +50,10 @@ pub struct LimitsSpec {
     pub rate_hz: f64,
 }
 
-/// Why limits are refused.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum LimitsError {
-    /// A value is NaN, infinite, zero or negative where it must be positive.
-    #[error("limit `{key}` must be finite and above zero for every joint")]
-    NotPositive {
-        /// Key in the file.
-        key: &'static str,
-    },
-    /// Minimum above maximum.
-    #[error("`position_min_rad` is not below `position_max_rad` for joint {joint}")]
-    EmptyRange {
-        /// Joint, 1-based.
-        joint: usize,
-    },
-    /// More than the arm is rated for.
-    #[error("`{key}` is {value}, but the arm reaches at most {most}{}", unit_hint(key, *value, *most))]
-    BeyondRating {
-        /// Key in the file.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// Largest value that makes sense.
-        most: f64,
-    },
-    /// Rate outside what the wire takes.
-    #[error("`rate_hz` is {rate_hz}, but the arm takes 30 to 250 setpoints a second")]
-    Rate {
-        /// Value found (Hz).
-        rate_hz: f64,
-    },
-}
+/// Why limits are refused: which key, and what it must be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct LimitsError(String);
 
 /// Checked limits. RT-safe to use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,35 +63,38 @@ pub struct Limits(LimitsSpec);
 impl TryFrom<LimitsSpec> for Limits {
     type Error = LimitsError;
     fn try_from(spec: LimitsSpec) -> Result<Self, LimitsError> {
-        let positive = |key, v: &JointVector| {
-            if v.iter().all(|x| x.is_finite() && *x > 0.0) {
-                Ok(())
-            } else {
-                Err(LimitsError::NotPositive { key })
+        let tcp_speed = JointVector::splat(spec.tcp_speed_max_m_s);
+        for (key, values) in [
+            ("velocity_max_rad_s", &spec.velocity_max_rad_s),
+            ("acceleration_max_rad_s2", &spec.acceleration_max_rad_s2),
+            ("jerk_max_rad_s3", &spec.jerk_max_rad_s3),
+            ("tcp_speed_max_m_s", &tcp_speed),
+        ] {
+            if !values.iter().all(|x| x.is_finite() && *x > 0.0) {
+                return Err(LimitsError(format!(
+                    "limit `{key}` must be finite and above zero for every joint"
+                )));
             }
-        };
-        positive("velocity_max_rad_s", &spec.velocity_max_rad_s)?;
-        positive("acceleration_max_rad_s2", &spec.acceleration_max_rad_s2)?;
-        positive("jerk_max_rad_s3", &spec.jerk_max_rad_s3)?;
-        positive(
-            "tcp_speed_max_m_s",
-            &JointVector::splat(spec.tcp_speed_max_m_s),
-        )?;
+        }
         if spec.tcp_offset_m.iter().any(|v| !v.is_finite()) {
-            return Err(LimitsError::NotPositive {
-                key: "tcp_offset_m",
-            });
+            return Err(LimitsError("limit `tcp_offset_m` must be finite".into()));
         }
-        for j in 0..JOINTS {
-            let (lo, hi) = (spec.position_min_rad[j], spec.position_max_rad[j]);
+        let ranges = spec
+            .position_min_rad
+            .iter()
+            .zip(spec.position_max_rad.iter());
+        for (joint, (lo, hi)) in (1..).zip(ranges) {
             if !(lo.is_finite() && hi.is_finite() && lo < hi) {
-                return Err(LimitsError::EmptyRange { joint: j + 1 });
+                return Err(LimitsError(format!(
+                    "`position_min_rad` is not below `position_max_rad` for joint {joint}"
+                )));
             }
         }
-        if !(30.0..=250.0).contains(&spec.rate_hz) {
-            return Err(LimitsError::Rate {
-                rate_hz: spec.rate_hz,
-            });
+        let rate_hz = spec.rate_hz;
+        if !(30.0..=250.0).contains(&rate_hz) {
+            return Err(LimitsError(format!(
+                "`rate_hz` is {rate_hz}, but the arm takes 30 to 250 setpoints a second"
+            )));
         }
         Ok(Self(spec))
     }
@@ -176,32 +151,33 @@ impl Limits {
     /// Refuses what this arm cannot be limited to: a slip of the unit, mostly.
     ///
     /// # Errors
-    /// [`LimitsError::BeyondRating`].
+    /// A limit beyond what the arm is rated for.
     pub fn check_rating(&self) -> Result<(), LimitsError> {
-        let [range, speed, acceleration, jerk] = RATED;
-        let rules = [
-            ("position_min_rad", self.position_min_rad.max_abs(), range),
-            ("position_max_rad", self.position_max_rad.max_abs(), range),
-            (
-                "velocity_max_rad_s",
-                self.velocity_max_rad_s.max_abs(),
-                speed,
-            ),
+        let [range, speed, accel, jerk] = RATED;
+        let spec = &self.0;
+        let of_joints = [
+            ("position_min_rad", spec.position_min_rad, range),
+            ("position_max_rad", spec.position_max_rad, range),
+            ("velocity_max_rad_s", spec.velocity_max_rad_s, speed),
             (
                 "acceleration_max_rad_s2",
-                self.acceleration_max_rad_s2.max_abs(),
-                acceleration,
+                spec.acceleration_max_rad_s2,
+                accel,
             ),
-            ("jerk_max_rad_s3", self.jerk_max_rad_s3.max_abs(), jerk),
-            (
-                "tcp_speed_max_m_s",
-                self.tcp_speed_max_m_s,
-                TOOL_SPEED_RATED_M_S,
-            ),
+            ("jerk_max_rad_s3", spec.jerk_max_rad_s3, jerk),
+        ];
+        let tcp_speed = spec.tcp_speed_max_m_s;
+        let of_tool = [
+            ("tcp_speed_max_m_s", tcp_speed, TOOL_SPEED_RATED_M_S),
             ("tcp_offset_m", self.tcp_offset().amax(), TOOL_MAX_M),
         ];
-        match rules.into_iter().find(|(_, value, most)| value > most) {
-            Some((key, value, most)) => Err(LimitsError::BeyondRating { key, value, most }),
+        let of_joints = of_joints.map(|(key, values, most)| (key, values.max_abs(), most));
+        let mut rules = of_joints.into_iter().chain(of_tool);
+        match rules.find(|(_, value, most)| value > most) {
+            Some((key, value, most)) => Err(LimitsError(format!(
+                "`{key}` is {value}, but the arm reaches at most {most}{}",
+                unit_hint(key, value, most)
+            ))),
             None => Ok(()),
         }
     }
@@ -229,35 +205,19 @@ impl Limits {
     /// spline, then that of the tool's speed.
     #[must_use]
     pub fn margins(&self, trajectory: &JointTrajectory) -> Vec<Margin> {
+        use LimitKind::{Acceleration, PositionMax, PositionMin, Velocity};
         let mut out = Vec::with_capacity(4 * JOINTS + 1);
         for j in 0..JOINTS {
             let e = trajectory.extrema(j);
             let (lo, hi) = (self.0.position_min_rad[j], self.0.position_max_rad[j]);
-            let (v, a) = (
-                self.0.velocity_max_rad_s[j],
-                self.0.acceleration_max_rad_s2[j],
-            );
+            let v = self.0.velocity_max_rad_s[j];
+            let a = self.0.acceleration_max_rad_s2[j];
             let (span, joint) = (hi - lo, u8::try_from(j + 1).unwrap_or(u8::MAX));
             let found = [
-                (
-                    LimitKind::PositionMin,
-                    e.q_min,
-                    lo,
-                    (e.q_min.value - lo) / span,
-                ),
-                (
-                    LimitKind::PositionMax,
-                    e.q_max,
-                    hi,
-                    (hi - e.q_max.value) / span,
-                ),
-                (LimitKind::Velocity, e.qd, v, 1.0 - e.qd.value.abs() / v),
-                (
-                    LimitKind::Acceleration,
-                    e.qdd,
-                    a,
-                    1.0 - e.qdd.value.abs() / a,
-                ),
+                (PositionMin, e.q_min, lo, (e.q_min.value - lo) / span),
+                (PositionMax, e.q_max, hi, (hi - e.q_max.value) / span),
+                (Velocity, e.qd, v, 1.0 - e.qd.value.abs() / v),
+                (Acceleration, e.qdd, a, 1.0 - e.qdd.value.abs() / a),
             ];
             out.extend(found.map(|(kind, extreme, limit, left)| Margin {
                 kind,
@@ -391,30 +351,20 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused_by_name() {
-        let mut spec = LimitsSpec::from(Limits::default());
-        spec.velocity_max_rad_s[3] = f64::NAN;
-        assert_eq!(
-            Limits::try_from(spec.clone()),
-            Err(LimitsError::NotPositive {
-                key: "velocity_max_rad_s"
-            })
-        );
-        spec = LimitsSpec::from(Limits::default());
-        spec.rate_hz = 1000.0;
-        assert!(matches!(
-            Limits::try_from(spec),
-            Err(LimitsError::Rate { .. })
-        ));
-        let beyond = |change: fn(&mut LimitsSpec)| {
+        let refused = |change: fn(&mut LimitsSpec)| {
             let mut spec = LimitsSpec::from(Limits::default());
             change(&mut spec);
-            let limits = Limits::try_from(spec).unwrap();
-            limits.check_rating().unwrap_err().to_string()
+            let checked = Limits::try_from(spec).and_then(|limits| limits.check_rating());
+            checked.unwrap_err().to_string()
         };
         assert_eq!(Limits::default().check_rating(), Ok(()));
-        let said = beyond(|spec| spec.tcp_speed_max_m_s = 900.0);
+        let said = refused(|spec| spec.velocity_max_rad_s[3] = f64::NAN);
+        assert!(said.contains("`velocity_max_rad_s`"), "{said}");
+        let said = refused(|spec| spec.rate_hz = 1000.0);
+        assert!(said.contains("`rate_hz`"), "{said}");
+        let said = refused(|spec| spec.tcp_speed_max_m_s = 900.0);
         assert!(said.contains("2.2") && said.contains("in mm?"), "{said}");
-        let said = beyond(|spec| spec.velocity_max_rad_s[6] = 180.0);
+        let said = refused(|spec| spec.velocity_max_rad_s[6] = 180.0);
         assert!(said.contains("in degrees?"), "{said}");
     }
 }

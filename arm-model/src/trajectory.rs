@@ -23,11 +23,8 @@ pub const MAX_DURATION_S: f64 = 600.0;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TrajectoryError {
     /// Too few or too many waypoints.
-    #[error("a trajectory needs 2 to {MAX_WAYPOINTS} waypoints, found {found}")]
-    WaypointCount {
-        /// Number found.
-        found: usize,
-    },
+    #[error("a trajectory needs 2 to {MAX_WAYPOINTS} waypoints, found {0}")]
+    WaypointCount(usize),
     /// As many times as waypoints are needed.
     #[error("`times_s` has {times} entries but `waypoints_rad` has {waypoints}")]
     LengthMismatch {
@@ -36,17 +33,13 @@ pub enum TrajectoryError {
         /// Entries in `waypoints_rad`.
         waypoints: usize,
     },
-    /// A number is NaN or infinite.
-    #[error("waypoint {index} holds a number that is not finite")]
-    NotFinite {
-        /// Index of the waypoint.
-        index: usize,
-    },
+    /// A number of a waypoint is NaN or infinite.
+    #[error("waypoint {0} holds a number that is not finite")]
+    NotFinite(usize),
     /// Times must start at zero and increase by at least [`MIN_SEGMENT_S`].
     #[error(
-        "time {time_s} s of waypoint {index} must be {} s or more after the one before \
-         (the first is 0), at most {MAX_DURATION_S} s",
-        MIN_SEGMENT_S
+        "time {time_s} s of waypoint {index} must be {MIN_SEGMENT_S} s or more after the one before \
+         (the first is 0), at most {MAX_DURATION_S} s"
     )]
     TimeOrder {
         /// Index of the waypoint.
@@ -141,11 +134,11 @@ impl JointTrajectory {
             });
         }
         if !(2..=MAX_WAYPOINTS).contains(&n) {
-            return Err(TrajectoryError::WaypointCount { found: n });
+            return Err(TrajectoryError::WaypointCount(n));
         }
         for (index, (t, q)) in times_s.iter().zip(waypoints_rad).enumerate() {
             if !t.is_finite() || !q.is_finite() {
-                return Err(TrajectoryError::NotFinite { index });
+                return Err(TrajectoryError::NotFinite(index));
             }
             let ordered = if index == 0 {
                 *t == 0.0
@@ -180,21 +173,12 @@ impl JointTrajectory {
     fn solve_second_derivatives(&mut self) {
         let n = self.waypoint_count();
         let mut upper = [0.0; MAX_WAYPOINTS];
-        let slope = |a: usize, j: usize| {
-            (self.q[a + 1][j] - self.q[a][j]) / (self.t_s[a + 1] - self.t_s[a])
-        };
+        let span = |i: usize| self.t_s[i + 1] - self.t_s[i];
+        let slope = |i: usize, j: usize| (self.q[i + 1][j] - self.q[i][j]) / span(i);
         let mut rhs = [JointVector::ZERO; MAX_WAYPOINTS];
         for i in 0..n {
-            let left = if i > 0 {
-                self.t_s[i] - self.t_s[i - 1]
-            } else {
-                0.0
-            };
-            let right = if i + 1 < n {
-                self.t_s[i + 1] - self.t_s[i]
-            } else {
-                0.0
-            };
+            let left = if i > 0 { span(i - 1) } else { 0.0 };
+            let right = if i + 1 < n { span(i) } else { 0.0 };
             let pivot = 2.0 * (left + right) - if i > 0 { left * upper[i - 1] } else { 0.0 };
             upper[i] = right / pivot;
             for j in 0..JOINTS {
@@ -278,24 +262,17 @@ impl JointTrajectory {
     /// Exact extrema of joint `joint` (0-based).
     #[must_use]
     pub fn extrema(&self, joint: usize) -> JointExtrema {
-        let zero = Extremum {
-            value: 0.0,
-            time_s: 0.0,
-        };
-        let at_start = Extremum {
-            value: self.q[0][joint],
-            time_s: 0.0,
-        };
+        let at = |value, time_s| Extremum { value, time_s };
         let mut e = JointExtrema {
-            q_min: at_start,
-            q_max: at_start,
-            qd: zero,
-            qdd: zero,
-            qddd: zero,
+            q_min: at(self.q[0][joint], 0.0),
+            q_max: at(self.q[0][joint], 0.0),
+            qd: at(0.0, 0.0),
+            qdd: at(0.0, 0.0),
+            qddd: at(0.0, 0.0),
         };
         let grow = |slot: &mut Extremum, value: f64, time_s: f64| {
             if value.abs() > slot.value.abs() {
-                *slot = Extremum { value, time_s };
+                *slot = at(value, time_s);
             }
         };
         for i in 0..self.waypoint_count() - 1 {
@@ -313,11 +290,8 @@ impl JointTrajectory {
             let curve = (m1 - m0) / (2.0 * h);
             let vertex = -m0 / (2.0 * curve);
             if vertex > 0.0 && vertex < h {
-                grow(
-                    &mut e.qd,
-                    v0 + m0 * vertex + curve * vertex * vertex,
-                    t0 + vertex,
-                );
+                let v = v0 + m0 * vertex + curve * vertex * vertex;
+                grow(&mut e.qd, v, t0 + vertex);
             }
             let disc = crate::exact::sqrt((m0 * m0 - 4.0 * curve * v0).max(0.0));
             let qq = -0.5 * (m0 + disc.copysign(m0));
@@ -326,16 +300,10 @@ impl JointTrajectory {
                     let q =
                         self.q[i][joint] + u * (v0 + u * (m0 / 2.0 + u * (m1 - m0) / (6.0 * h)));
                     if q < e.q_min.value {
-                        e.q_min = Extremum {
-                            value: q,
-                            time_s: t0 + u,
-                        };
+                        e.q_min = at(q, t0 + u);
                     }
                     if q > e.q_max.value {
-                        e.q_max = Extremum {
-                            value: q,
-                            time_s: t0 + u,
-                        };
+                        e.q_max = at(q, t0 + u);
                     }
                 }
             }
@@ -420,22 +388,15 @@ mod tests {
 
     #[test]
     fn bad_input_is_named() {
-        let q = [JointVector::ZERO; 3];
-        assert!(matches!(
-            JointTrajectory::new(&[0.0, 0.5, 0.5], &q),
-            Err(TrajectoryError::TimeOrder { index: 2, .. })
-        ));
-        assert!(matches!(
-            JointTrajectory::new(&[0.0, f64::NAN, 0.5], &q),
-            Err(TrajectoryError::NotFinite { index: 1 })
-        ));
-        assert!(matches!(
-            JointTrajectory::new(&[0.0, 1.0], &q),
-            Err(TrajectoryError::LengthMismatch { .. })
-        ));
-        assert!(matches!(
-            JointTrajectory::new(&[0.0], &q[..1]),
-            Err(TrajectoryError::WaypointCount { found: 1 })
-        ));
+        for (times_s, waypoints, said) in [
+            (&[0.0, 0.5, 0.5][..], 3, "time 0.5 s of waypoint 2"),
+            (&[0.0, f64::NAN, 0.5], 3, "waypoint 1 holds"),
+            (&[0.0, 1.0], 3, "`times_s` has 2 entries"),
+            (&[0.0], 1, "found 1"),
+        ] {
+            let q = vec![JointVector::ZERO; waypoints];
+            let error = JointTrajectory::new(times_s, &q).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
     }
 }

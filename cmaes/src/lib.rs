@@ -64,49 +64,8 @@ impl CmaOptions {
 
 /// Why a search cannot start or go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CmaError {
-    /// Vectors of the options differ in length, or are empty.
-    #[error("search options: `{field}` has {found} entries, `mean` has {expected} (at least 1)")]
-    Dimension {
-        /// Field of the options.
-        field: &'static str,
-        /// Entries found.
-        found: usize,
-        /// Entries of `mean`.
-        expected: usize,
-    },
-    /// A start value is not finite, a deviation not positive, a bound above its
-    /// partner, or the mean outside the bounds.
-    #[error(
-        "search options: coordinate {coordinate} needs a finite mean inside its bounds and a positive deviation"
-    )]
-    Coordinate {
-        /// Index of the coordinate.
-        coordinate: usize,
-    },
-    /// Too few candidates per generation.
-    #[error("search options: a population of {population} is too small, use 4 or more")]
-    Population {
-        /// Population asked for.
-        population: usize,
-    },
-    /// No feasible point was found near the mean or the best candidate.
-    #[error(
-        "no feasible candidate after {draws} draws: start from a feasible mean or with a smaller deviation"
-    )]
-    NoFeasibleCandidate {
-        /// Draws of this generation.
-        draws: usize,
-    },
-    /// `tell` got another number of values than candidates were asked for.
-    #[error("{found} fitness values for {expected} candidates: tell each generation once")]
-    FitnessCount {
-        /// Values given.
-        found: usize,
-        /// Candidates asked.
-        expected: usize,
-    },
-}
+#[error("{0}")]
+pub struct CmaError(String);
 
 /// Best candidate seen so far.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,8 +74,6 @@ pub struct Best {
     pub x: Vec<f64>,
     /// Its fitness.
     pub fitness: f64,
-    /// Generation in which it was drawn, 0-based.
-    pub generation: usize,
 }
 
 /// State of a search. Deterministic for a seed and a sequence of `tell`s.
@@ -160,11 +117,9 @@ impl CmaEs {
             ("upper", options.upper.len()),
         ] {
             if found != n || n == 0 {
-                return Err(CmaError::Dimension {
-                    field,
-                    found,
-                    expected: n,
-                });
+                return Err(CmaError(format!(
+                    "search options: `{field}` has {found} entries, `mean` has {n} (at least 1)"
+                )));
             }
         }
         for i in 0..n {
@@ -173,22 +128,23 @@ impl CmaEs {
             if !(m.is_finite() && inside && s.is_finite() && s > 0.0)
                 || options.lower[i] >= options.upper[i]
             {
-                return Err(CmaError::Coordinate { coordinate: i });
+                return Err(CmaError(format!(
+                    "search options: coordinate {i} needs a finite mean inside its bounds and a positive deviation"
+                )));
             }
         }
         if options.population < 4 {
-            return Err(CmaError::Population {
-                population: options.population,
-            });
+            return Err(CmaError(format!(
+                "search options: a population of {} is too small, use 4 or more",
+                options.population
+            )));
         }
-        let mean = DVector::from_iterator(
-            n,
-            options
-                .mean
-                .iter()
-                .zip(&options.std_dev)
-                .map(|(m, s)| m / s),
-        );
+        let scaled = options
+            .mean
+            .iter()
+            .zip(&options.std_dev)
+            .map(|(m, s)| m / s);
+        let mean = DVector::from_iterator(n, scaled);
         Ok(Self {
             constants: StrategyConstants::new(n, options.population),
             rng: ChaCha12Rng::seed_from_u64(options.seed),
@@ -252,8 +208,8 @@ impl CmaEs {
         // Pull back: first towards the mean, then towards the best candidate.
         let mut anchors = vec![DVector::zeros(n)];
         if let Some(best) = &self.best {
-            let at = self.normalised(&best.x);
-            anchors.push((at - &self.mean) / self.sigma);
+            let scaled = best.x.iter().zip(&self.options.std_dev).map(|(x, s)| x / s);
+            anchors.push((DVector::from_iterator(n, scaled) - &self.mean) / self.sigma);
         }
         for anchor in anchors {
             let mut part = 0.5;
@@ -266,7 +222,10 @@ impl CmaEs {
                 part *= 0.5;
             }
         }
-        Err(CmaError::NoFeasibleCandidate { draws: self.draws })
+        Err(CmaError(format!(
+            "no feasible candidate after {} draws: start from a feasible mean or with a smaller deviation",
+            self.draws
+        )))
     }
 
     /// Fitness of the candidates of the last [`CmaEs::ask`], in their order;
@@ -276,18 +235,14 @@ impl CmaEs {
     /// Another number of values than candidates.
     pub fn tell(&mut self, fitness: &[f64]) -> Result<(), CmaError> {
         if fitness.len() != self.asked.len() || fitness.is_empty() {
-            return Err(CmaError::FitnessCount {
-                found: fitness.len(),
-                expected: self.asked.len(),
-            });
+            return Err(CmaError(format!(
+                "{} fitness values for {} candidates: tell each generation once",
+                fitness.len(),
+                self.asked.len()
+            )));
         }
-        let value = |i: usize| {
-            if fitness[i].is_finite() {
-                fitness[i]
-            } else {
-                f64::MAX
-            }
-        };
+        let finite = |f: &f64| if f.is_finite() { *f } else { f64::MAX };
+        let value = |i: usize| finite(&fitness[i]);
         let mut order: Vec<usize> = (0..fitness.len()).collect();
         order.sort_by(|&a, &b| value(a).total_cmp(&value(b)));
         let first = value(order[0]);
@@ -297,7 +252,6 @@ impl CmaEs {
             self.best = Some(Best {
                 x: self.asked[order[0]].clone(),
                 fitness: first,
-                generation: self.generation,
             });
         }
         self.update(&order);
@@ -338,13 +292,6 @@ impl CmaEs {
                 reflect(x, self.options.lower[i], self.options.upper[i])
             })
             .collect()
-    }
-
-    fn normalised(&self, x: &[f64]) -> DVector<f64> {
-        DVector::from_iterator(
-            x.len(),
-            x.iter().zip(&self.options.std_dev).map(|(x, s)| x / s),
-        )
     }
 }
 

@@ -130,7 +130,7 @@ fn every_candidate_is_feasible_and_redraws_are_counted() {
     assert!(x.iter().all(|x| inside(x)));
     assert!(search.resampled() > 0);
     let error = search.ask(&mut |_| false).unwrap_err();
-    assert!(matches!(error, CmaError::NoFeasibleCandidate { .. }));
+    assert!(error.to_string().contains("no feasible"), "{error}");
 }
 
 #[test]
@@ -143,27 +143,19 @@ fn values_that_are_not_finite_rank_last() {
 
 #[test]
 fn bad_options_are_named() {
-    let mut o = options(3, 0.0, 1.0, 0);
-    o.std_dev.pop();
-    assert!(matches!(
-        CmaEs::new(o),
-        Err(CmaError::Dimension {
-            field: "std_dev",
-            ..
-        })
-    ));
-    let mut o = options(3, 0.0, 1.0, 0);
-    o.lower[1] = 0.5;
-    assert_eq!(
-        CmaEs::new(o).err(),
-        Some(CmaError::Coordinate { coordinate: 1 })
-    );
+    type Change = fn(&mut CmaOptions);
+    let cases: [(Change, &str); 3] = [
+        (|o| o.std_dev.truncate(2), "`std_dev` has 2 entries"),
+        (|o| o.lower[1] = 0.5, "coordinate 1 needs"),
+        (|o| o.population = 3, "a population of 3"),
+    ];
+    for (change, said) in cases {
+        let mut o = options(3, 0.0, 1.0, 0);
+        change(&mut o);
+        let error = CmaEs::new(o).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
     let mut search = CmaEs::new(options(3, 0.0, 1.0, 0)).unwrap();
-    assert!(matches!(
-        search.tell(&[1.0]),
-        Err(CmaError::FitnessCount {
-            found: 1,
-            expected: 0
-        })
-    ));
+    let error = search.tell(&[1.0]).unwrap_err().to_string();
+    assert!(error.contains("1 fitness values for 0"), "{error}");
 }

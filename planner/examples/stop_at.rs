@@ -28,10 +28,6 @@ fn speed_m_s(outcome: &ThrowOutcome) -> f64 {
 }
 
 impl ThrowTask for StopAt {
-    fn name(&self) -> &'static str {
-        "stop at"
-    }
-
     fn target_m(&self) -> [f64; 3] {
         self.target_m
     }

@@ -14,34 +14,25 @@ use shared_types::Task;
 /// table may be left out. Whoever asks makes requests from it; of the planner process
 /// it sets the domain alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct PlannerConfig {
     /// Shared-memory domain.
-    #[serde(default = "default_domain")]
     pub domain: String,
     /// The pole, and what stands around the arm; of a process, its caller's.
-    #[serde(default)]
     pub cell: Cell,
     /// Size and rules of identifications.
-    #[serde(default)]
     pub identify: IdentifyOptions,
     /// Size of the search for a throw.
-    #[serde(default)]
     pub search: PlanOptions,
     /// Tuned values of strikes.
-    #[serde(default)]
     pub strike: ThrowConfig,
     /// Tuned values of lobs.
-    #[serde(default)]
     pub lob: LobConfig,
     /// Tuned values of drapes.
-    #[serde(default)]
     pub drape: DrapeConfig,
     /// The wiggle.
-    #[serde(default)]
     pub wiggle: WiggleConfig,
     /// Moves that damp the rope's swing.
-    #[serde(default)]
     pub settle: SettleConfig,
 }
 
@@ -66,14 +57,10 @@ impl PlannerConfig {
     }
 }
 
-fn default_domain() -> String {
-    "lab".to_owned()
-}
-
 impl Default for PlannerConfig {
     fn default() -> Self {
         Self {
-            domain: default_domain(),
+            domain: "lab".to_owned(),
             cell: Cell::default(),
             identify: IdentifyOptions::default(),
             search: PlanOptions::default(),

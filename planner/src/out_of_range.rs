@@ -1,5 +1,7 @@
 //! A value out of range, named by its key: one form for options and configurations.
 
+use std::ops::RangeInclusive;
+
 /// A value that is not what it must be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("`{key}` is {value}, but must be {expected}")]
@@ -29,5 +31,20 @@ impl OutOfRange {
             }),
             None => Ok(()),
         }
+    }
+
+    /// Refuses the first of some keys and their values that is not in the range.
+    pub(crate) fn unless_within(
+        range: RangeInclusive<f64>,
+        expected: &'static str,
+        values: &[(&'static str, f64)],
+    ) -> Result<(), Self> {
+        let rule = |(key, value): &(_, f64)| (*key, *value, range.contains(value), expected);
+        Self::check(values.iter().map(rule))
+    }
+
+    /// Refuses numbers that are not finite.
+    pub(crate) fn unless_finite(values: &[(&'static str, f64)]) -> Result<(), Self> {
+        Self::unless_within(f64::MIN..=f64::MAX, "finite", values)
     }
 }

@@ -7,51 +7,13 @@ use serde::{Deserialize, Serialize};
 /// Version of the file's layout.
 pub const RESPONSE_FORMAT: u32 = 1;
 
-/// Why a file is no arm response.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ArmResponseError {
-    /// Written by another version.
-    #[error("`format` is {found}, this version reads {RESPONSE_FORMAT}: measure the arm again")]
-    Format {
-        /// Number found.
-        found: u32,
-    },
-    /// Not seven joints.
-    #[error("`joints` has {found} entries, it needs one for each of the {JOINTS} joints")]
-    JointCount {
-        /// Entries found.
-        found: usize,
-    },
-    /// Entries out of order.
-    #[error("entry {place} of `joints` is for joint {found}: list them from 1 to {JOINTS}")]
-    JointOrder {
-        /// Place in the list, 1-based.
-        place: usize,
-        /// Joint named there.
-        found: u8,
-    },
-    /// An excited joint lacks a value, or one at rest has some.
-    #[error("joint {joint}: `{key}` must be given exactly when `excited` is {expected}")]
-    Presence {
-        /// Joint, 1-based.
-        joint: u8,
-        /// Key in the file.
-        key: &'static str,
-        /// Value of `excited` that it belongs to.
-        expected: bool,
-    },
-    /// A value makes no sense.
-    #[error("joint {joint}: `{key}` is {value}, but must be {expected}")]
-    Value {
-        /// Joint, 1-based; 0 for the whole arm.
-        joint: u8,
-        /// Key in the file.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+/// Why a file is no arm response: which joint and key, and what it must be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct ArmResponseError(String);
+
+fn refused<T>(why: String) -> Result<T, ArmResponseError> {
+    Err(ArmResponseError(why))
 }
 
 /// A measured arm.
@@ -78,9 +40,7 @@ struct ArmResponseForm {
     format: u32,
     version: String,
     source: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     command_to_target_s: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     excitation: Option<Excitation>,
     joints: Vec<JointForm>,
 }
@@ -91,23 +51,14 @@ struct ArmResponseForm {
 struct JointForm {
     joint: u8,
     excited: bool,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     why: Option<NotExcited>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     dead_time_s: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     dead_time_interval_s: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     natural_frequency_hz: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     natural_frequency_interval_hz: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     damping_ratio: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     damping_ratio_interval: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     residual_rad: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     samples: Option<u32>,
 }
 
@@ -122,7 +73,6 @@ impl JointForm {
             JointResponse::Excited(lag) => Self {
                 joint,
                 excited: true,
-                why: None,
                 dead_time_s: Some(lag.dead_time_s.value),
                 dead_time_interval_s: Some(lag.dead_time_s.interval),
                 natural_frequency_hz: Some(lag.natural_frequency_hz.value),
@@ -131,6 +81,7 @@ impl JointForm {
                 damping_ratio_interval: Some(lag.damping_ratio.interval),
                 residual_rad: Some(lag.residual_rad),
                 samples: Some(lag.samples),
+                ..Self::default()
             },
         }
     }
@@ -139,96 +90,85 @@ impl JointForm {
         if self.excited {
             self.lag().map(JointResponse::Excited)
         } else if self.dead_time_s.is_some() || self.natural_frequency_hz.is_some() {
-            Err(self.presence("dead_time_s", true))
+            self.exactly_when("dead_time_s", true)
         } else {
-            self.why
-                .map(JointResponse::NotExcited)
-                .ok_or(self.presence("why", false))
+            let why = self.why.map(JointResponse::NotExcited);
+            why.map_or_else(|| self.exactly_when("why", false), Ok)
         }
     }
 
     fn lag(&self) -> Result<TrackingLag, ArmResponseError> {
-        let finite_range = |key, given: Option<f64>, low: f64, high: f64, expected| {
-            let value = given.ok_or(self.presence(key, true))?;
-            if (low..=high).contains(&value) {
-                Ok(value)
-            } else {
-                Err(self.value(key, value, expected))
-            }
-        };
-        let with = |key, value: f64, interval: Option<[f64; 2]>| {
-            let [low, high] = interval.ok_or(self.presence(key, true))?;
-            if (low..=high).contains(&value) && low.is_finite() && high.is_finite() {
-                Ok(Estimate {
-                    value,
-                    interval: [low, high],
-                })
-            } else {
-                Err(self.value(key, low, "an interval, lower end first, around the value"))
-            }
-        };
-        let dead_time_s = finite_range("dead_time_s", self.dead_time_s, 0.0, 1.0, "from 0 to 1 s")?;
-        let natural_frequency_hz = finite_range(
-            "natural_frequency_hz",
+        let (hz, hz_interval) = (
             self.natural_frequency_hz,
-            0.1,
-            500.0,
-            "from 0.1 to 500 Hz",
-        )?;
-        let damping_ratio = finite_range(
-            "damping_ratio",
-            self.damping_ratio,
-            0.01,
-            10.0,
-            "from 0.01 to 10",
-        )?;
+            self.natural_frequency_interval_hz,
+        );
+        let (damping, damping_interval) = (self.damping_ratio, self.damping_ratio_interval);
+        let dead_time_s = self.within("dead_time_s", self.dead_time_s, [0.0, 1.0], " s")?;
+        let hz = self.within("natural_frequency_hz", hz, [0.1, 500.0], " Hz")?;
+        let damping = self.within("damping_ratio", damping, [0.01, 10.0], "")?;
+        let Some(samples) = self.samples else {
+            return self.exactly_when("samples", true);
+        };
         Ok(TrackingLag {
-            dead_time_s: with(
+            dead_time_s: self.around(
                 "dead_time_interval_s",
                 dead_time_s,
                 self.dead_time_interval_s,
             )?,
-            natural_frequency_hz: with(
-                "natural_frequency_interval_hz",
-                natural_frequency_hz,
-                self.natural_frequency_interval_hz,
-            )?,
-            damping_ratio: with(
-                "damping_ratio_interval",
-                damping_ratio,
-                self.damping_ratio_interval,
-            )?,
-            residual_rad: finite_range(
-                "residual_rad",
-                self.residual_rad,
-                0.0,
-                1.0,
-                "from 0 to 1 rad",
-            )?,
-            samples: self.samples.ok_or(self.presence("samples", true))?,
+            natural_frequency_hz: self.around("natural_frequency_interval_hz", hz, hz_interval)?,
+            damping_ratio: self.around("damping_ratio_interval", damping, damping_interval)?,
+            residual_rad: self.within("residual_rad", self.residual_rad, [0.0, 1.0], " rad")?,
+            samples,
         })
     }
 
-    const fn presence(&self, key: &'static str, expected: bool) -> ArmResponseError {
-        ArmResponseError::Presence {
-            joint: self.joint,
-            key,
-            expected,
+    /// A number that an excited joint has, in its range.
+    fn within(
+        &self,
+        key: &str,
+        given: Option<f64>,
+        [low, high]: [f64; 2],
+        unit: &str,
+    ) -> Result<f64, ArmResponseError> {
+        let Some(value) = given else {
+            return self.exactly_when(key, true);
+        };
+        if (low..=high).contains(&value) {
+            Ok(value)
+        } else {
+            self.wrong(key, value, &format!("from {low} to {high}{unit}"))
         }
     }
 
-    const fn value(
+    /// A value with the interval that an excited joint has.
+    fn around(
         &self,
-        key: &'static str,
+        key: &str,
         value: f64,
-        expected: &'static str,
-    ) -> ArmResponseError {
-        ArmResponseError::Value {
-            joint: self.joint,
-            key,
-            value,
-            expected,
+        given: Option<[f64; 2]>,
+    ) -> Result<Estimate, ArmResponseError> {
+        let Some(interval @ [low, high]) = given else {
+            return self.exactly_when(key, true);
+        };
+        if (low..=high).contains(&value) && low.is_finite() && high.is_finite() {
+            Ok(Estimate { value, interval })
+        } else {
+            self.wrong(key, low, "an interval, lower end first, around the value")
         }
+    }
+
+    fn exactly_when<T>(&self, key: &str, excited: bool) -> Result<T, ArmResponseError> {
+        let joint = self.joint;
+        refused(format!(
+            "joint {joint}: `{key}` must be given exactly when `excited` is {excited}"
+        ))
+    }
+
+    fn wrong<T>(&self, key: &str, value: f64, expected: &str) -> Result<T, ArmResponseError> {
+        let joint = self.joint;
+        refused(format!(
+            "joint {joint}: `{key}` is {value}, but must be {expected}"
+        ))
     }
 }
 
@@ -236,30 +176,31 @@ impl TryFrom<ArmResponseForm> for ArmResponse {
     type Error = ArmResponseError;
     fn try_from(form: ArmResponseForm) -> Result<Self, ArmResponseError> {
         if form.format != RESPONSE_FORMAT {
-            return Err(ArmResponseError::Format { found: form.format });
+            return refused(format!(
+                "`format` is {}, this version reads {RESPONSE_FORMAT}: measure the arm again",
+                form.format
+            ));
         }
         if let Some([low, high]) = form.command_to_target_s
             && !(low.is_finite() && high.is_finite() && low <= high)
         {
-            return Err(ArmResponseError::Value {
-                joint: 0,
-                key: "command_to_target_s",
-                value: low,
-                expected: "a finite interval, lower end first",
-            });
+            return refused(format!(
+                "`command_to_target_s` is {low} to {high}, but must be a finite interval, lower end first"
+            ));
+        }
+        let found = form.joints.len();
+        if found != JOINTS {
+            return refused(format!(
+                "`joints` has {found} entries, it needs one for each of the {JOINTS} joints"
+            ));
         }
         let mut joints = [JointResponse::NotExcited(NotExcited::Still); JOINTS];
-        if form.joints.len() != JOINTS {
-            return Err(ArmResponseError::JointCount {
-                found: form.joints.len(),
-            });
-        }
         for ((place, slot), given) in (1..).zip(&mut joints).zip(&form.joints) {
             if usize::from(given.joint) != place {
-                return Err(ArmResponseError::JointOrder {
-                    place,
-                    found: given.joint,
-                });
+                return refused(format!(
+                    "entry {place} of `joints` is for joint {}: list them from 1 to {JOINTS}",
+                    given.joint
+                ));
             }
             *slot = given.response()?;
         }

@@ -9,7 +9,7 @@ use crate::wiggle::smooth_step;
 use arm_model::kinematics::tool_speed_m_s;
 use arm_model::response::Excitation;
 use arm_model::trajectory::MAX_WAYPOINTS;
-use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole, TrajectoryError, unit_hint};
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole, unit_hint};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -22,67 +22,37 @@ const PEAK_RESERVE: f64 = 0.8;
 
 /// Why there is no sweep.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ExcitationError {
-    /// A value is out of range.
-    #[error("excitation: `{key}` is {value}, but must be {expected}")]
-    Value {
-        /// Key in the configuration.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// What it must be.
-        expected: String,
-    },
-    /// The pose is outside the joint ranges.
-    #[error("excitation: joint {joint} of `pose_rad` is outside its range")]
-    Pose {
-        /// Joint, 1-based.
-        joint: usize,
-    },
-    /// The spline cannot be made.
-    #[error(transparent)]
-    Trajectory(#[from] TrajectoryError),
-    /// The motion breaks a limit of the arm.
-    #[error("the sweep of joint {joint} breaks a limit: {what}; use a smaller `limits_fraction`")]
-    BreaksLimit {
-        /// Joint, 1-based.
-        joint: usize,
-        /// The limit, with value and time.
-        what: String,
-    },
-}
+#[error("{0}")]
+pub struct ExcitationError(String);
 
 fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
     let highest_max_hz = (MAX_WAYPOINTS - 1) as f64 / e.duration_s / KNOTS_PER_SWING;
+    let tool_speeds_m_s = [0.01, limits.tcp_speed_max_m_s];
     let rules = [
-        ("duration_s", e.duration_s, 1.0, 20.0),
-        ("lowest_hz", e.lowest_hz, 0.2, 5.0),
+        ("duration_s", e.duration_s, [1.0, 20.0]),
+        ("lowest_hz", e.lowest_hz, [0.2, 5.0]),
         (
             "highest_hz",
             e.highest_hz,
-            2.0 * e.lowest_hz,
-            highest_max_hz,
+            [2.0 * e.lowest_hz, highest_max_hz],
         ),
-        ("amplitude_max_rad", e.amplitude_max_rad, 1e-3, 0.2),
-        ("limits_fraction", e.limits_fraction, 0.01, 0.9),
-        (
-            "tool_speed_max_m_s",
-            e.tool_speed_max_m_s,
-            0.01,
-            limits.tcp_speed_max_m_s,
-        ),
+        ("amplitude_max_rad", e.amplitude_max_rad, [1e-3, 0.2]),
+        ("limits_fraction", e.limits_fraction, [0.01, 0.9]),
+        ("tool_speed_max_m_s", e.tool_speed_max_m_s, tool_speeds_m_s),
     ];
-    for (key, value, low, high) in rules {
+    for (key, value, [low, high]) in rules {
         if !(low..=high).contains(&value) {
-            return Err(ExcitationError::Value {
-                key,
-                value,
-                expected: format!("from {low:.3} to {high:.3}{}", unit_hint(key, value, high)),
-            });
+            let hint = unit_hint(key, value, high);
+            return Err(ExcitationError(format!(
+                "excitation: `{key}` is {value}, but must be from {low:.3} to {high:.3}{hint}"
+            )));
         }
     }
     match limits.position_violation(&e.pose_rad) {
-        Some(joint) => Err(ExcitationError::Pose { joint: joint + 1 }),
+        Some(joint) => Err(ExcitationError(format!(
+            "excitation: joint {} of `pose_rad` is outside its range",
+            joint + 1
+        ))),
         None => Ok(()),
     }
 }
@@ -114,7 +84,7 @@ fn phases_rad(seed: u64) -> [f64; JOINTS] {
 /// against the limits with the reduced tool speed.
 ///
 /// # Errors
-/// [`ExcitationError`].
+/// A value out of range, a pose outside the joints' ranges, a motion that breaks a limit.
 pub fn sweep(
     e: &Excitation,
     limits: &Limits,
@@ -151,41 +121,36 @@ pub fn sweep(
             (t_s, q)
         })
         .unzip();
-    let trajectory = JointTrajectory::new(&times_s, &poses)?;
-    within_limits(&trajectory, e, limits, joint)?;
-    Ok(trajectory)
+    let trajectory = JointTrajectory::new(&times_s, &poses);
+    let trajectory = trajectory.map_err(|e| ExcitationError(e.to_string()))?;
+    match broken_limit(&trajectory, e, limits, joint) {
+        None => Ok(trajectory),
+        Some(what) => Err(ExcitationError(format!(
+            "the sweep of joint {} breaks a limit: {what}; use a smaller `limits_fraction`",
+            joint + 1
+        ))),
+    }
 }
 
-fn within_limits(
+/// A limit that the sweep breaks, with value and time.
+fn broken_limit(
     trajectory: &JointTrajectory,
     e: &Excitation,
     limits: &Limits,
     joint: usize,
-) -> Result<(), ExcitationError> {
-    let broken = |what| {
-        Err(ExcitationError::BreaksLimit {
-            joint: joint + 1,
-            what,
-        })
-    };
+) -> Option<String> {
     if let Some(margin) = limits.worst_violation(trajectory) {
-        return broken(margin.describe());
+        return Some(margin.describe());
     }
-    let tool = limits.tcp_margin(trajectory);
-    if tool.value > e.tool_speed_max_m_s {
-        return broken(format!(
-            "tool speed {:.3} m/s against {:.3} m/s",
-            tool.value, e.tool_speed_max_m_s
+    let (tool, tool_max) = (limits.tcp_margin(trajectory).value, e.tool_speed_max_m_s);
+    if tool > tool_max {
+        return Some(format!(
+            "tool speed {tool:.3} m/s against {tool_max:.3} m/s"
         ));
     }
     let jerk = trajectory.extrema(joint).qddd.value.abs();
-    if jerk > limits.jerk_max_rad_s3[joint] {
-        return broken(format!(
-            "jerk {jerk:.0} rad/s³ against {:.0} rad/s³",
-            limits.jerk_max_rad_s3[joint]
-        ));
-    }
-    Ok(())
+    let jerk_max = limits.jerk_max_rad_s3[joint];
+    (jerk > jerk_max).then(|| format!("jerk {jerk:.0} rad/s³ against {jerk_max:.0} rad/s³"))
 }
 
 #[cfg(test)]
@@ -217,59 +182,18 @@ mod tests {
 
     #[test]
     fn values_out_of_range_are_refused_by_key() {
-        let limits = Limits::default();
-        let refused = |e: Excitation| {
-            sweep(&e, &limits, &Pole::default(), 0)
-                .unwrap_err()
-                .to_string()
-        };
-        let good = Excitation::default();
-        for (key, bad) in [
-            (
-                "highest_hz",
-                Excitation {
-                    highest_hz: 60.0,
-                    ..good
-                },
-            ),
-            (
-                "lowest_hz",
-                Excitation {
-                    lowest_hz: f64::NAN,
-                    ..good
-                },
-            ),
-            (
-                "duration_s",
-                Excitation {
-                    duration_s: 0.0,
-                    ..good
-                },
-            ),
-            (
-                "limits_fraction",
-                Excitation {
-                    limits_fraction: 2.0,
-                    ..good
-                },
-            ),
-            (
-                "tool_speed_max_m_s",
-                Excitation {
-                    tool_speed_max_m_s: 9.0,
-                    ..good
-                },
-            ),
-            (
-                "pose_rad",
-                Excitation {
-                    pose_rad: JointVector::splat(6.2),
-                    ..good
-                },
-            ),
+        for wrong in [
+            "highest_hz = 60.0",
+            "lowest_hz = nan",
+            "duration_s = 0.0",
+            "limits_fraction = 2.0",
+            "tool_speed_max_m_s = 9.0",
+            "pose_rad = [6.2, 6.2, 6.2, 6.2, 6.2, 6.2, 6.2]",
         ] {
-            let said = refused(bad);
-            assert!(said.contains(key), "{said}");
+            let e: Excitation = toml::from_str(wrong).unwrap();
+            let refusal = sweep(&e, &Limits::default(), &Pole::default(), 0).unwrap_err();
+            let (said, key) = (refusal.to_string(), wrong.split(' ').next().unwrap());
+            assert!(said.contains(&format!("`{key}`")), "{said}");
         }
     }
 }

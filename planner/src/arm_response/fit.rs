@@ -43,18 +43,6 @@ const CLOCK_MAP_S: f64 = 2e-4;
 const HALF_95: f64 = 1.96;
 const HALF_95_FEW: f64 = 2.4;
 
-/// The most likely parameters of one joint.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Fit {
-    parameters: Parameters,
-    half_95: Parameters,
-    /// Root mean square of the residuals, wild ones cut (rad).
-    pub(super) residual_rad: f64,
-    /// Whether a parameter sits at the end of its range.
-    pub(super) at_bound: bool,
-    samples: u32,
-}
-
 fn lag(p: &Parameters) -> Lag {
     Lag {
         dead_time_s: p[0],
@@ -181,80 +169,69 @@ fn starts(windows: &[Window]) -> Vec<Parameters> {
     tried.into_iter().map(|(_, p)| p).collect()
 }
 
-impl Fit {
-    /// The most likely lag for what one joint did; `None` without samples.
-    pub(super) fn of(windows: &[Window]) -> Option<Self> {
-        let starts = starts(windows);
-        let even = Noise::even(&residuals(windows, starts.first()?).0);
-        let (mut p, _) = starts
-            .into_iter()
-            .map(|start| descend(windows, start, &even))
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        for _ in 0..ROUNDS {
-            let (off, speeds) = residuals(windows, &p);
-            let noise = Noise::from_residuals(&off, &speeds);
-            (p, _) = descend(windows, p, &noise);
-        }
-        Self::with_intervals(windows, p)
-    }
-
-    fn with_intervals(windows: &[Window], parameters: Parameters) -> Option<Self> {
-        let (off, speeds) = residuals(windows, &parameters);
+/// The most likely lag for what one joint did, and whether a parameter of it sits at the end
+/// of its range; `None` without samples. The lower end of the dead time leaves room for what
+/// two clocks cannot tell from a lag: `round_trip_s` on the wire, and the error of their map.
+pub(super) fn most_likely(windows: &[Window], round_trip_s: f64) -> Option<(TrackingLag, bool)> {
+    let starts = starts(windows);
+    let even = Noise::even(&residuals(windows, starts.first()?).0);
+    let (mut p, _) = starts
+        .into_iter()
+        .map(|start| descend(windows, start, &even))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    for _ in 0..ROUNDS {
+        let (off, speeds) = residuals(windows, &p);
         let noise = Noise::from_residuals(&off, &speeds);
-        let slopes = slopes(windows, &parameters);
-        let (curvature, _) = normal(&slopes, &off, &speeds, &noise);
-        let inverse = curvature.try_inverse()?;
-        let mut scatter = Matrix4::zeros();
-        let rows: Vec<Parameters> = slopes
-            .iter()
-            .zip(off.iter().zip(&speeds))
-            .map(|(slope, (r, v))| slope * (noise.weight(*r, *v) * r))
-            .collect();
-        for block in rows.chunks(BLOCK) {
-            let score: Parameters = block.iter().sum();
-            scatter += score * score.transpose();
-        }
-        // Few blocks scatter less than many would, by the parameters fitted.
-        let blocks = rows.len().div_ceil(BLOCK).max(6) as f64;
-        let freedom = blocks - 5.0;
-        let robust = inverse * scatter * inverse * (blocks / freedom);
-        // Whichever is wider: what the noise allows, or what was seen.
-        let std_dev =
-            Parameters::from_fn(|i, _| robust[(i, i)].max(inverse[(i, i)]).max(0.0).sqrt());
-        let cut = |r: &f64, v: &f64| (r * r).min(9.0 * noise.variance(*v));
-        let squares: f64 = off.iter().zip(&speeds).map(|(r, v)| cut(r, v)).sum();
-        Some(Self {
-            parameters,
-            half_95: std_dev * (HALF_95 + HALF_95_FEW / freedom),
-            residual_rad: (squares / off.len().max(1) as f64).sqrt(),
-            at_bound: (1..3).any(|i| parameters[i] <= LOW[i] || parameters[i] >= HIGH[i])
-                || parameters[0] >= HIGH[0],
-            samples: u32::try_from(off.len()).unwrap_or(u32::MAX),
-        })
+        (p, _) = descend(windows, p, &noise);
     }
+    let (off, speeds) = residuals(windows, &p);
+    let noise = Noise::from_residuals(&off, &speeds);
+    let half = half_95(&slopes(windows, &p), &off, &speeds, &noise)?;
+    let exponential = |i: usize, unit: f64| Estimate {
+        value: p[i].exp() * unit,
+        interval: [(p[i] - half[i]).exp() * unit, (p[i] + half[i]).exp() * unit],
+    };
+    let earliest_s = p[0] - half[0] - round_trip_s - CLOCK_MAP_S;
+    let cut = |r: &f64, v: &f64| (r * r).min(9.0 * noise.variance(*v));
+    let squares: f64 = off.iter().zip(&speeds).map(|(r, v)| cut(r, v)).sum();
+    let lag = TrackingLag {
+        dead_time_s: Estimate {
+            value: p[0],
+            interval: [earliest_s.max(0.0), p[0] + half[0]],
+        },
+        natural_frequency_hz: exponential(1, 1.0 / core::f64::consts::TAU),
+        damping_ratio: exponential(2, 1.0),
+        residual_rad: (squares / off.len().max(1) as f64).sqrt(),
+        samples: u32::try_from(off.len()).unwrap_or(u32::MAX),
+    };
+    let at_bound = (1..3).any(|i| p[i] <= LOW[i] || p[i] >= HIGH[i]) || p[0] >= HIGH[0];
+    Some((lag, at_bound))
+}
 
-    /// The result in the units of the file. The lower end of the dead time
-    /// leaves room for what two clocks cannot tell from a lag: `round_trip_s` on
-    /// the wire, and the error of their map.
-    pub(super) fn tracking_lag(&self, round_trip_s: f64) -> TrackingLag {
-        let half = self.half_95;
-        let p = self.parameters;
-        let exponential = |i: usize, unit: f64| Estimate {
-            value: p[i].exp() * unit,
-            interval: [(p[i] - half[i]).exp() * unit, (p[i] + half[i]).exp() * unit],
-        };
-        TrackingLag {
-            dead_time_s: Estimate {
-                value: p[0],
-                interval: [
-                    (p[0] - half[0] - round_trip_s - CLOCK_MAP_S).max(0.0),
-                    p[0] + half[0],
-                ],
-            },
-            natural_frequency_hz: exponential(1, 1.0 / core::f64::consts::TAU),
-            damping_ratio: exponential(2, 1.0),
-            residual_rad: self.residual_rad,
-            samples: self.samples,
-        }
+/// Half of each parameter's 95 % interval.
+fn half_95(
+    slopes: &[Parameters],
+    off: &[f64],
+    speeds: &[f64],
+    noise: &Noise,
+) -> Option<Parameters> {
+    let (curvature, _) = normal(slopes, off, speeds, noise);
+    let inverse = curvature.try_inverse()?;
+    let mut scatter = Matrix4::zeros();
+    let rows: Vec<Parameters> = slopes
+        .iter()
+        .zip(off.iter().zip(speeds))
+        .map(|(slope, (r, v))| slope * (noise.weight(*r, *v) * r))
+        .collect();
+    for block in rows.chunks(BLOCK) {
+        let score: Parameters = block.iter().sum();
+        scatter += score * score.transpose();
     }
+    // Few blocks scatter less than many would, by the parameters fitted.
+    let blocks = rows.len().div_ceil(BLOCK).max(6) as f64;
+    let freedom = blocks - 5.0;
+    let robust = inverse * scatter * inverse * (blocks / freedom);
+    // Whichever is wider: what the noise allows, or what was seen.
+    let std_dev = Parameters::from_fn(|i, _| robust[(i, i)].max(inverse[(i, i)]).max(0.0).sqrt());
+    Some(std_dev * (HALF_95 + HALF_95_FEW / freedom))
 }

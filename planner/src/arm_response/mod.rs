@@ -26,7 +26,6 @@ pub use recording::{Recording, ResponseError, Sample, Setpoint};
 
 use arm_model::JOINTS;
 use arm_model::response::{Estimate, JointResponse, NotExcited, TrackingLag};
-use fit::Fit;
 use recording::SAMPLES_MIN;
 use window::Window;
 
@@ -65,12 +64,12 @@ fn identify_joint(recording: &Recording, joint: usize) -> Result<TrackingLag, No
     if travel_rad < TRAVEL_MIN_RAD || samples < SAMPLES_MIN {
         return Err(NotExcited::Still);
     }
-    let fit = Fit::of(&windows).ok_or(NotExcited::Unexplained)?;
-    if fit.residual_rad > UNEXPLAINED_MAX * window::spread_rad(&windows) {
+    let found = fit::most_likely(&windows, recording.round_trip_s);
+    let (lag, at_bound) = found.ok_or(NotExcited::Unexplained)?;
+    if lag.residual_rad > UNEXPLAINED_MAX * window::spread_rad(&windows) {
         return Err(NotExcited::Unexplained);
     }
-    let lag = fit.tracking_lag(recording.round_trip_s);
-    if fit.at_bound || !is_distinct(&lag) {
+    if at_bound || !is_distinct(&lag) {
         return Err(NotExcited::Indistinct);
     }
     Ok(lag)

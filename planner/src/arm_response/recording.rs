@@ -38,44 +38,9 @@ pub struct Recording {
 }
 
 /// Why a recording is refused.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ResponseError {
-    /// Too little of something.
-    #[error(
-        "the recording holds {found} {what}, at least {needed} are needed: record a whole motion"
-    )]
-    TooFew {
-        /// Of what.
-        what: &'static str,
-        /// Number found.
-        found: usize,
-        /// Number needed.
-        needed: usize,
-    },
-    /// Times do not increase.
-    #[error("{what} {index} of the recording does not come after the one before, at {time_s} s")]
-    Order {
-        /// Of what.
-        what: &'static str,
-        /// Place in the list, 0-based.
-        index: usize,
-        /// Time found (s).
-        time_s: f64,
-    },
-    /// A number is NaN or infinite.
-    #[error("{what} {index} of the recording holds a number that is not finite")]
-    NotFinite {
-        /// Of what.
-        what: &'static str,
-        /// Place in the list, 0-based.
-        index: usize,
-    },
-    /// Setpoints and reports are of different times.
-    #[error(
-        "the joint reports begin or end when no setpoint was sent: they are of another run or another clock"
-    )]
-    Apart,
-}
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct ResponseError(String);
 
 impl Recording {
     /// Refuses recordings that nothing can be learnt from.
@@ -87,45 +52,41 @@ impl Recording {
         let samples = self.samples.iter().map(|s| (s.at_s, s.q));
         check_rows("setpoint", "setpoints", setpoints)?;
         check_rows("joint report", "joint reports", samples)?;
-        let (Some(first), Some(last)) = (self.setpoints.first(), self.setpoints.last()) else {
-            return Err(ResponseError::Apart);
-        };
-        let shared = self
-            .samples
-            .iter()
-            .filter(|s| (first.sent_s..=last.sent_s).contains(&s.at_s))
-            .count();
-        if shared < SAMPLES_MIN {
-            return Err(ResponseError::Apart);
+        let setpoints = &self.setpoints;
+        let sent_s = setpoints[0].sent_s..=setpoints[setpoints.len() - 1].sent_s;
+        let shared = self.samples.iter().filter(|s| sent_s.contains(&s.at_s));
+        if shared.count() < SAMPLES_MIN {
+            return Err(ResponseError(
+                "the joint reports begin or end when no setpoint was sent: they are of another run or another clock".to_owned(),
+            ));
         }
         Ok(())
     }
 }
 
 fn check_rows(
-    one: &'static str,
-    many: &'static str,
+    one: &str,
+    many: &str,
     rows: impl ExactSizeIterator<Item = (f64, JointVector)>,
 ) -> Result<(), ResponseError> {
     let found = rows.len();
     if found < SAMPLES_MIN {
-        return Err(ResponseError::TooFew {
-            what: many,
-            found,
-            needed: SAMPLES_MIN,
-        });
+        return Err(ResponseError(format!(
+            "the recording holds {found} {many}, at least {SAMPLES_MIN} are needed: record a whole motion"
+        )));
     }
     let mut before_s = f64::NEG_INFINITY;
     for (index, (time_s, q)) in rows.enumerate() {
+        let wrong = |what| {
+            Err(ResponseError(format!(
+                "{one} {index} of the recording {what}"
+            )))
+        };
         if !time_s.is_finite() || !q.is_finite() {
-            return Err(ResponseError::NotFinite { what: one, index });
+            return wrong("holds a number that is not finite".to_owned());
         }
         if time_s <= before_s {
-            return Err(ResponseError::Order {
-                what: one,
-                index,
-                time_s,
-            });
+            return wrong(format!("does not come after the one before, at {time_s} s"));
         }
         before_s = time_s;
     }

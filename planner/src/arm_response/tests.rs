@@ -81,6 +81,22 @@ fn lags(dead_time_s: f64, hz: f64, damping_ratio: f64) -> [Lag; JOINTS] {
     })
 }
 
+/// Within a dead time (s), and fractions of natural frequency and damping.
+fn assert_found(found: &JointResponse, truth: &Lag, [dead_time_s, part, damping]: [f64; 3]) {
+    let lag = found.lag().unwrap();
+    let hz = truth.natural_frequency_rad_s / core::f64::consts::TAU;
+    let off = |e: &Estimate, truth: f64| (e.value / truth - 1.0).abs();
+    assert!(
+        (lag.dead_time_s.value - truth.dead_time_s).abs() < dead_time_s,
+        "{lag:?}"
+    );
+    assert!(off(&lag.natural_frequency_hz, hz) < part, "{lag:?}");
+    assert!(
+        off(&lag.damping_ratio, truth.damping_ratio) < damping,
+        "{lag:?}"
+    );
+}
+
 #[test]
 fn known_lags_are_found_within_their_intervals_and_resting_joints_are_not_guessed() {
     let truth = lags(0.012, 9.0, 0.8);
@@ -90,20 +106,9 @@ fn known_lags_are_found_within_their_intervals_and_resting_joints_are_not_guesse
             assert_eq!(*response, JointResponse::NotExcited(NotExcited::Still));
             continue;
         }
-        let lag = response.lag().unwrap();
-        let off_s = lag.dead_time_s.value - truth[j].dead_time_s;
-        let hz = truth[j].natural_frequency_rad_s / core::f64::consts::TAU;
-        assert!(off_s.abs() < 5e-4, "joint {}: {lag:?}", j + 1);
-        assert!(
-            (lag.natural_frequency_hz.value / hz - 1.0).abs() < 0.02,
-            "{lag:?}"
-        );
-        assert!(
-            (lag.damping_ratio.value / 0.8 - 1.0).abs() < 0.04,
-            "{lag:?}"
-        );
-        let [low, high] = lag.dead_time_s.interval;
-        assert!(low < high && high - low < 2e-3, "{lag:?}");
+        assert_found(response, &truth[j], [5e-4, 0.02, 0.04]);
+        let [low, high] = response.lag().unwrap().dead_time_s.interval;
+        assert!(low < high && high - low < 2e-3, "{response:?}");
     }
 }
 
@@ -119,16 +124,7 @@ fn wild_and_missing_reports_do_little_harm() {
         }
     }
     let found = identify(&bad, |_| ()).unwrap();
-    let lag = found[5].lag().unwrap();
-    assert!(
-        (lag.dead_time_s.value - truth[5].dead_time_s).abs() < 1e-3,
-        "{lag:?}"
-    );
-    let hz = truth[5].natural_frequency_rad_s / core::f64::consts::TAU;
-    assert!(
-        (lag.natural_frequency_hz.value / hz - 1.0).abs() < 0.04,
-        "{lag:?}"
-    );
+    assert_found(&found[5], &truth[5], [1e-3, 0.04, f64::INFINITY]);
 }
 
 /// A joint that is stuck, and one that follows at half the amplitude.
@@ -175,17 +171,20 @@ fn slow_motion_under_coarse_reports_is_indistinct() {
 #[test]
 fn damaged_recordings_are_refused_with_place() {
     let good = recording(&[0], &lags(0.02, 10.0, 0.9), 1);
-    let refused = |change: &dyn Fn(&mut Recording)| {
+    type Change = fn(&mut Recording);
+    let cases: [(Change, &str); 4] = [
+        (|r| r.samples.truncate(20), "20 joint reports"),
+        (|r| r.setpoints[40].sent_s = 0.0, "setpoint 40"),
+        (|r| r.samples[9].q[3] = f64::NAN, "joint report 9"),
+        (
+            |r| r.samples.iter_mut().for_each(|s| s.at_s += 1e6),
+            "another clock",
+        ),
+    ];
+    for (change, said) in cases {
         let mut bad = good.clone();
         change(&mut bad);
-        identify(&bad, |_| ()).unwrap_err().to_string()
-    };
-    let said = refused(&|r| r.samples.truncate(20));
-    assert!(said.contains("20 joint reports"), "{said}");
-    let said = refused(&|r| r.setpoints[40].sent_s = 0.0);
-    assert!(said.contains("setpoint 40"), "{said}");
-    let said = refused(&|r| r.samples[9].q[3] = f64::NAN);
-    assert!(said.contains("joint report 9"), "{said}");
-    let said = refused(&|r| r.samples.iter_mut().for_each(|s| s.at_s += 1e6));
-    assert!(said.contains("another clock"), "{said}");
+        let error = identify(&bad, |_| ()).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
 }

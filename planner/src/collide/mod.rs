@@ -10,7 +10,6 @@ mod block;
 mod rope;
 
 pub use arm::{ArmShape, Part, tool_contacts};
-pub use arm_model::geometry::Capsule;
 pub use block::{Block, block_contacts};
 pub use rope::{RopeShape, rope_clearance_m, rope_contacts};
 

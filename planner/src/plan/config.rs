@@ -1,7 +1,8 @@
 //! What is tuned about throws of every task, and the size of their search.
 
-use super::error::PlanError;
-use super::trajopt::{Clearance, Dimensions, WAYPOINTS};
+use super::screen::Clearance;
+use super::waypoints::{Dimensions, WAYPOINTS};
+use crate::OutOfRange;
 use crate::collide::ContactCounts;
 use arm_model::JOINTS;
 use serde::{Deserialize, Serialize};
@@ -91,15 +92,12 @@ impl Robustness {
     pub fn variants(&self, rope: &RopeParams) -> Vec<RopeParams> {
         let mut out = vec![*rope];
         for sign in [-1.0, 1.0] {
-            let mut change = |edit: &dyn Fn(&mut RopeParams)| {
-                let mut r = *rope;
-                edit(&mut r);
-                out.push(r);
-            };
-            change(&|r| r.length_m *= 1.0 + sign * self.length);
-            change(&|r| r.joint_stiffness_nm_per_rad *= 1.0 + sign * self.stiffness);
-            change(&|r| r.joint_damping_nms_per_rad *= 1.0 + sign * self.damping);
-            change(&|r| r.lead_mass_kg *= 1.0 + sign * self.lead_mass);
+            let mut varied = [*rope; 4];
+            varied[0].length_m *= 1.0 + sign * self.length;
+            varied[1].joint_stiffness_nm_per_rad *= 1.0 + sign * self.stiffness;
+            varied[2].joint_damping_nms_per_rad *= 1.0 + sign * self.damping;
+            varied[3].lead_mass_kg *= 1.0 + sign * self.lead_mass;
+            out.extend(varied);
         }
         out
     }
@@ -165,62 +163,42 @@ const COUNT_MAX: f64 = 1e4;
 
 impl ThrowConfig {
     /// Refuses what would hide collisions, or take a search without end.
-    pub(super) fn check(&self) -> Result<(), PlanError> {
-        let within = PlanError::unless_within;
-        for time_s in self.waypoint_times_s {
-            within("waypoint_times_s", time_s, 0.0..=30.0, "from 0 to 30 s")?;
-        }
-        for (option, tail_s) in [
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let within = OutOfRange::unless_within;
+        let (weights, compared) = (&self.weights, &self.robustness);
+        let times_s = self.waypoint_times_s.map(|t| ("waypoint_times_s", t));
+        within(0.0..=30.0, "from 0 to 30 s", &times_s)?;
+        let tails_s = [
             ("tail_s", self.tail_s),
             ("observed_s", self.observed_s),
             ("contact_tail_s", self.contact_tail_s),
-        ] {
-            within(option, tail_s, 0.0..=30.0, "from 0 to 30 s")?;
-        }
-        let period_s = self.contact_period_s;
-        within(
-            "contact_period_s",
-            period_s,
-            1e-3..=1.0,
-            "from 0.001 to 1 s",
-        )?;
-        for (option, number) in [
-            ("weights.rope_contact", self.weights.rope_contact),
-            ("weights.pole_contact", self.weights.pole_contact),
-            ("weights.base_contact", self.weights.base_contact),
+        ];
+        within(0.0..=30.0, "from 0 to 30 s", &tails_s)?;
+        let period_s = [("contact_period_s", self.contact_period_s)];
+        within(1e-3..=1.0, "from 0.001 to 1 s", &period_s)?;
+        let unsigned = [
+            ("weights.rope_contact", weights.rope_contact),
+            ("weights.pole_contact", weights.pole_contact),
+            ("weights.base_contact", weights.base_contact),
             ("clearance.tool_m", self.clearance.tool_m),
-        ] {
-            within(option, number, 0.0..=f64::MAX, "finite and 0 or more")?;
-        }
-        PlanError::unless_finite([
-            ("weights.distance_per_m", self.weights.distance_per_m),
-            ("weights.proximity", self.weights.proximity),
-            ("weights.motion_per_rad", self.weights.motion_per_rad),
-            (
-                "weights.speed_excess_per_rad_s",
-                self.weights.speed_excess_per_rad_s,
-            ),
+        ];
+        within(0.0..=f64::MAX, "finite and 0 or more", &unsigned)?;
+        let speed_excess = weights.speed_excess_per_rad_s;
+        OutOfRange::unless_finite(&[
+            ("weights.distance_per_m", weights.distance_per_m),
+            ("weights.proximity", weights.proximity),
+            ("weights.motion_per_rad", weights.motion_per_rad),
+            ("weights.speed_excess_per_rad_s", speed_excess),
         ])?;
-        let (generations, draws) = (self.generations as f64, self.draws_max as f64);
-        within(
-            "generations",
-            generations,
-            0.0..=GENERATIONS_MAX,
-            "at most 10000000",
-        )?;
-        within("draws_max", draws, 0.0..=COUNT_MAX, "at most 10000")?;
-        let Robustness {
-            finalists,
-            polished,
-            ..
-        } = self.robustness;
-        for (option, count) in [
-            ("robustness.finalists", finalists),
-            ("robustness.polished", polished),
-        ] {
-            within(option, count as f64, 0.0..=1e3, "at most 1000")?;
-        }
-        Ok(())
+        let generations = [("generations", self.generations as f64)];
+        within(0.0..=GENERATIONS_MAX, "at most 10000000", &generations)?;
+        let draws = [("draws_max", self.draws_max as f64)];
+        within(0.0..=COUNT_MAX, "at most 10000", &draws)?;
+        let finalists = [
+            ("robustness.finalists", compared.finalists as f64),
+            ("robustness.polished", compared.polished as f64),
+        ];
+        within(0.0..=1e3, "at most 1000", &finalists)
     }
 }
 
@@ -275,26 +253,22 @@ impl Default for PlanOptions {
 
 impl PlanOptions {
     /// Refuses what cannot be searched with, or never ends.
-    pub(super) fn check(&self) -> Result<(), PlanError> {
-        let within = PlanError::unless_within;
-        for (option, step_s) in [
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let within = OutOfRange::unless_within;
+        let steps_s = [
             ("step_s", self.step_s),
             ("search_step_s", self.search_step_s),
-        ] {
-            let range = f64::MIN_POSITIVE..=5e-3;
-            within(option, step_s, range, "above 0 and at most 0.005 s")?;
-        }
-        let stretch = self.segment_stretch_max;
-        within("segment_stretch_max", stretch, 1.0..=2.0, "from 1 to 2")?;
-        let population = self.population as f64;
-        within("population", population, 4.0..=COUNT_MAX, "from 4 to 10000")?;
+        ];
+        let range = f64::MIN_POSITIVE..=5e-3;
+        within(range, "above 0 and at most 0.005 s", &steps_s)?;
+        let stretch = [("segment_stretch_max", self.segment_stretch_max)];
+        within(1.0..=2.0, "from 1 to 2", &stretch)?;
+        let population = [("population", self.population as f64)];
+        within(4.0..=COUNT_MAX, "from 4 to 10000", &population)?;
         let generations = self.generations.map_or(1.0, |count| count as f64);
-        within(
-            "generations",
-            generations,
-            1.0..=GENERATIONS_MAX,
-            "from 1 to 10000000",
-        )?;
-        within("searches", self.searches as f64, 0.0..=1e3, "at most 1000")
+        let generations = [("generations", generations)];
+        within(1.0..=GENERATIONS_MAX, "from 1 to 10000000", &generations)?;
+        let searches = [("searches", self.searches as f64)];
+        within(0.0..=1e3, "at most 1000", &searches)
     }
 }

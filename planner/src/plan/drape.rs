@@ -4,8 +4,10 @@
 //! near a point half a rope below it, without a high arc. Ours adds where the rope is at
 //! the end: its middle on the edge, its tip below it on the far side, at rest.
 
-use super::trajopt::PolePose;
-use super::{PlanError, PlanarScene, ThrowConfig, ThrowOutcome, ThrowTask, verdict};
+use super::pole_pose::PolePose;
+use super::scene::PlanarScene;
+use super::{ThrowConfig, ThrowOutcome, ThrowTask, verdict};
+use crate::OutOfRange;
 use crate::collide::Block;
 use arm_model::Cell;
 use nalgebra::Vector3;
@@ -72,8 +74,8 @@ impl Default for DrapeConfig {
 
 impl DrapeConfig {
     /// Refuses numbers of its own that are not finite.
-    pub(super) fn check(&self) -> Result<(), PlanError> {
-        PlanError::unless_finite([
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        OutOfRange::unless_finite(&[
             ("arc_height_m", self.arc_height_m),
             ("arc_per_m", self.arc_per_m),
             ("tip_per_m", self.tip_per_m),
@@ -137,10 +139,6 @@ impl Drape {
 }
 
 impl ThrowTask for Drape {
-    fn name(&self) -> &'static str {
-        "drape"
-    }
-
     fn target_m(&self) -> [f64; 3] {
         self.target_m
     }
@@ -179,14 +177,12 @@ impl ThrowTask for Drape {
     /// Up and back, forth over the wall, then down before it.
     fn warm_start(&self, rope: &RopeParams) -> Vec<PolePose> {
         let l = rope.length_m;
-        let pose = |outside_m, above_m, tilt_rad| {
-            PolePose::beside(self.target_m, outside_m, above_m, tilt_rad)
-        };
-        vec![
-            pose(-0.25, 0.7 * l, 0.5),
-            pose(0.08, 0.95 * l, 1.3),
-            pose(-0.10, 0.40 * l, 1.0),
-        ]
+        let poses = [
+            [-0.25, 0.7 * l, 0.5],
+            [0.08, 0.95 * l, 1.3],
+            [-0.10, 0.40 * l, 1.0],
+        ];
+        PolePose::beside(self.target_m, poses).into()
     }
 
     fn fitness(&self, rope: &RopeParams, outcome: &ThrowOutcome) -> f64 {

@@ -19,6 +19,10 @@ pub struct PosteriorEnsemble {
 
 impl PosteriorEnsemble {
     /// `optimised` and `forecast` ropes of a posterior around the rope planned for.
+    ///
+    /// Parameters are taken for lognormal with the posterior's means and covariance, because
+    /// what a film leaves open is a common factor of stiffness, damping and masses: ratios
+    /// stay as sharp as they were identified. The link count follows its probabilities.
     #[must_use]
     pub fn drawn(
         rope: &RopeParams,
@@ -27,54 +31,41 @@ impl PosteriorEnsemble {
         forecast: usize,
         seed: u64,
     ) -> Self {
-        let mut ropes = ropes_of(rope, posterior, optimised + forecast, seed);
+        const N: usize = ROPE_PARAMETERS - 1;
+        let mean = |i: usize| posterior.mean[i + 1].max(1e-9);
+        let logs = SMatrix::<f64, N, N>::from_fn(|i, k| {
+            let relative = posterior.covariance[i + 1][k + 1] / (mean(i) * mean(k));
+            relative.max(-0.9).ln_1p()
+        });
+        // Rounding and moments of no lognormal may leave it slightly indefinite.
+        let eigen = logs.symmetric_eigen();
+        let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0xbe11_ef00);
+        let mut ropes: Vec<RopeParams> = (0..optimised + forecast)
+            .map(|_| {
+                let z = SVector::<f64, N>::from_fn(|i, _| {
+                    lengths[i] * rng.sample::<f64, _>(StandardNormal)
+                });
+                let shift = eigen.eigenvectors * z;
+                let mut values = rope.to_array();
+                values[0] = links(posterior, rope, rng.random());
+                for i in 0..N {
+                    values[i + 1] = (mean(i).ln() - logs[(i, i)] / 2.0 + shift[i]).exp();
+                }
+                let drawn = RopeParams::from_array(values);
+                if drawn.validate().is_ok() {
+                    drawn
+                } else {
+                    *rope
+                }
+            })
+            .collect();
         let forecast = ropes.split_off(optimised);
         Self {
             optimised: ropes,
             forecast,
         }
     }
-}
-
-/// Ropes drawn from a posterior. Parameters are taken for lognormal with the posterior's
-/// means and covariance, because what a film leaves open is a common factor of
-/// stiffness, damping and masses: ratios stay as sharp as they were identified. The link
-/// count follows its probabilities.
-fn ropes_of(
-    rope: &RopeParams,
-    posterior: &RopePosterior,
-    count: usize,
-    seed: u64,
-) -> Vec<RopeParams> {
-    const N: usize = ROPE_PARAMETERS - 1;
-    let mean = |i: usize| posterior.mean[i + 1].max(1e-9);
-    let logs = SMatrix::<f64, N, N>::from_fn(|i, k| {
-        let relative = posterior.covariance[i + 1][k + 1] / (mean(i) * mean(k));
-        relative.max(-0.9).ln_1p()
-    });
-    // Rounding and moments of no lognormal may leave it slightly indefinite.
-    let eigen = logs.symmetric_eigen();
-    let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-    let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0xbe11_ef00);
-    (0..count)
-        .map(|_| {
-            let z = SVector::<f64, N>::from_fn(|i, _| {
-                lengths[i] * rng.sample::<f64, _>(StandardNormal)
-            });
-            let shift = eigen.eigenvectors * z;
-            let mut values = rope.to_array();
-            values[0] = links(posterior, rope, rng.random());
-            for i in 0..N {
-                values[i + 1] = (mean(i).ln() - logs[(i, i)] / 2.0 + shift[i]).exp();
-            }
-            let drawn = RopeParams::from_array(values);
-            if drawn.validate().is_ok() {
-                drawn
-            } else {
-                *rope
-            }
-        })
-        .collect()
 }
 
 /// The link count at a part of the cumulated probability.
@@ -114,7 +105,8 @@ mod tests {
             ambiguities: Vec::new(),
             inflation: 1.0,
         };
-        let drawn = ropes_of(&rope, &posterior, 4000, 1);
+        let drawn = PosteriorEnsemble::drawn(&rope, &posterior, 3995, 5, 1);
+        let drawn = [drawn.optimised, drawn.forecast].concat();
         let moments = |of: &dyn Fn(&RopeParams) -> f64| {
             let m = drawn.iter().map(of).sum::<f64>() / 4000.0;
             let v = drawn.iter().map(|r| (of(r) - m).powi(2)).sum::<f64>() / 4000.0;
@@ -129,6 +121,7 @@ mod tests {
         assert!((m - 1.0).abs() < 0.02 && s < 0.02, "{m} {s}");
         let (m, _) = moments(&|r| f64::from(r.links));
         assert!((m - 22.5).abs() < 0.05, "{m}");
-        assert_eq!(drawn[..5], ropes_of(&rope, &posterior, 5, 1));
+        let few = PosteriorEnsemble::drawn(&rope, &posterior, 5, 0, 1);
+        assert_eq!(drawn[..5], few.optimised);
     }
 }

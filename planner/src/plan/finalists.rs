@@ -1,10 +1,8 @@
 //! The throws that are compared at the end: polished, and observed with all ropes.
 
 use super::setup::{Count, Point, Setup};
-use super::trajopt::{Found, Polish, polish};
 use super::{PlanError, ThrowOutcome};
 use arm_model::JointTrajectory;
-use rope_sim::FrameTimes;
 
 /// A throw that is compared at the end.
 #[derive(Debug, Clone)]
@@ -27,41 +25,29 @@ const LOOKED_AT_AGAIN: usize = 8;
 /// Of these, how many at most are judged exactly with all ropes.
 const JUDGED_EXACTLY: usize = 3;
 
+pub(super) fn best_first(finalists: &mut [Finalist]) {
+    finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+}
+
 impl Setup<'_> {
     /// The best of a search with all ropes; the best of those polished.
     pub(super) fn compare(
         &self,
-        found: Vec<Found>,
+        found: Vec<Point>,
         count: &mut Count,
     ) -> Result<Vec<Finalist>, PlanError> {
-        let points = found.into_iter().map(|f| (f.x, f.trajectory)).collect();
-        let mut finalists = self.finalists(points, count)?;
+        let mut finalists = self.finalists(found, count)?;
         if self.task.polishes() {
-            let best = finalists
-                .iter()
-                .take(self.task.config().robustness.polished);
-            let points: Vec<Vec<f64>> = best.map(|f| f.x.clone()).collect();
-            let frames = FrameTimes::NONE;
-            let motion = self.simulator.motion(&self.space.decode(&self.start)?)?;
-            let motion_s = motion.duration_s().max(self.simulator.motion_s_min);
-            let work = Polish {
-                space: &self.space,
-                screen: &self.screen,
-                rope: &self.request.rope,
-                pole: self.request.cell.pole,
-                following: self.request.following.as_ref(),
-                slopes: &self.simulator.options(motion_s, frames),
-                exact: &self.simulator.exact().options(motion_s, frames),
-                seed: self.request.options.seed,
-            };
-            let (polished, simulations) = polish(&work, &points)?;
-            count.add(simulations);
-            let points = polished
-                .into_iter()
-                .map(|p| Ok((p.x.clone(), self.space.decode(&p.x)?)))
-                .collect::<Result<Vec<_>, PlanError>>()?;
+            let polished = self.task.config().robustness.polished;
+            let best = finalists.iter().take(polished).map(|f| f.x.clone());
+            let polished = self.polish(best.collect(), count)?;
+            let points = polished.into_iter().map(|x| {
+                let trajectory = self.space.decode(&x)?;
+                Ok((x, trajectory))
+            });
+            let points = points.collect::<Result<Vec<_>, PlanError>>()?;
             finalists.extend(self.finalists(points, count)?);
-            finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+            best_first(&mut finalists);
         }
         Ok(finalists)
     }
@@ -74,7 +60,7 @@ impl Setup<'_> {
         count: &mut Count,
     ) -> Result<Vec<Finalist>, PlanError> {
         let mut out = self.judged(points, false, count)?;
-        out.sort_by(|a, b| a.score.total_cmp(&b.score));
+        best_first(&mut out);
         Ok(out)
     }
 
@@ -97,7 +83,7 @@ impl Setup<'_> {
             }
             let best = finalists.remove(0);
             finalists.extend(self.judged(vec![(best.x, best.trajectory)], true, count)?);
-            finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+            best_first(finalists);
         }
         Ok(())
     }
@@ -111,10 +97,8 @@ impl Setup<'_> {
     ) -> Result<(), PlanError> {
         let (rope, others) = (&self.request.rope, &self.ropes[1..]);
         let seen = finalists.len().min(LOOKED_AT_AGAIN);
-        let mut throws: Vec<_> = finalists[..seen]
-            .iter()
-            .map(|f| (rope, &f.trajectory))
-            .collect();
+        let again = finalists[..seen].iter();
+        let mut throws: Vec<_> = again.map(|f| (rope, &f.trajectory)).collect();
         throws.extend(others.iter().map(|rope| (rope, &finalists[0].trajectory)));
         let mut outcomes = self.judging.exact().run(&throws)?;
         count.add(throws.len());
@@ -127,7 +111,7 @@ impl Setup<'_> {
         let best = finalists.remove(0);
         let own = outcomes.into_iter().take(1).chain(of_others).collect();
         finalists.extend(self.finalist((best.x, best.trajectory), own, true));
-        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        best_first(finalists);
         Ok(())
     }
 
@@ -142,11 +126,8 @@ impl Setup<'_> {
             .iter()
             .flat_map(|(_, t)| self.ropes.iter().map(move |rope| (rope, t)))
             .collect();
-        let mut outcomes = if is_exact {
-            self.judging.exact().run(&throws)?
-        } else {
-            self.judging.run(&throws)?
-        };
+        let exact = is_exact.then(|| self.judging.exact());
+        let mut outcomes = exact.as_ref().unwrap_or(&self.judging).run(&throws)?;
         count.add(throws.len());
         let mut of_one = || outcomes.drain(..self.ropes.len()).collect();
         Ok(points
@@ -182,12 +163,17 @@ impl Setup<'_> {
         })
     }
 
+    /// Whether a throw comes close enough, where that is what counts.
+    pub(super) fn is_close(&self, outcome: &ThrowOutcome) -> bool {
+        let good_enough_m = self.request.options.good_enough_m;
+        !self.task.polishes() || self.task.error_m(outcome) <= good_enough_m
+    }
+
     /// Whether no further search is needed.
     pub(super) fn is_good(&self, finalist: &Finalist) -> bool {
         // All but one of the ropes compared.
         const SUCCESSES: f64 = 0.85;
-        let error_m = self.task.error_m(&finalist.outcome);
-        let close = !self.task.polishes() || error_m <= self.request.options.good_enough_m;
-        close && finalist.successes >= SUCCESSES && finalist.outcome.contacts.none()
+        let outcome = &finalist.outcome;
+        self.is_close(outcome) && finalist.successes >= SUCCESSES && outcome.contacts.none()
     }
 }

@@ -5,11 +5,10 @@
 //! how far the domino tilts, how long the tip has lain on the board at the end, and how
 //! near the target it lies then, which is what leaves room for an error of the rope.
 
-use super::trajopt::PolePose;
-use super::{
-    PlanError, PlanarScene, Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward,
-    verdict,
-};
+use super::pole_pose::PolePose;
+use super::scene::PlanarScene;
+use super::{Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward, verdict};
+use crate::OutOfRange;
 use crate::collide::Block;
 use arm_model::Cell;
 use nalgebra::Vector3;
@@ -81,8 +80,8 @@ impl Default for LobConfig {
 
 impl LobConfig {
     /// Refuses numbers of its own that are not finite.
-    pub(super) fn check(&self) -> Result<(), PlanError> {
-        PlanError::unless_finite([
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        OutOfRange::unless_finite(&[
             ("dwell_per_s", self.dwell_per_s),
             ("domino", self.domino),
             ("stay", self.stay),
@@ -105,6 +104,11 @@ impl Lob {
         PlanarScene::at(self.target_m)
     }
 
+    /// Height of the column below the board (m).
+    fn column_m(&self, cell: &Cell) -> f64 {
+        (self.target_m[2] - BOARD_M[2] - cell.floor_z_m).max(0.01)
+    }
+
     /// How long the tip has lain on the board when the simulation ends (s).
     fn stay_s(outcome: &ThrowOutcome) -> f64 {
         outcome
@@ -120,10 +124,6 @@ impl Lob {
 }
 
 impl ThrowTask for Lob {
-    fn name(&self) -> &'static str {
-        "lob"
-    }
-
     fn target_m(&self) -> [f64; 3] {
         self.target_m
     }
@@ -134,14 +134,13 @@ impl ThrowTask for Lob {
 
     fn scene(&self, cell: &Cell) -> Scene {
         let place = self.place();
-        let column_m = self.target_m[2] - BOARD_M[2] - cell.floor_z_m;
         Scene {
             obstacles: vec![
                 place.box_below([0.0, 0.0, 0.0], BOARD_M, BOARD_FRICTION),
                 Obstacle::column_below(
                     place.point([0.0, 0.0, -BOARD_M[2]]),
                     COLUMN_RADIUS_M,
-                    column_m.max(0.01),
+                    self.column_m(cell),
                     BOARD_FRICTION,
                 ),
                 Obstacle::floor(cell.floor_z_m, BOARD_FRICTION),
@@ -160,12 +159,8 @@ impl ThrowTask for Lob {
 
     fn keep_clear(&self, cell: &Cell) -> Vec<Block> {
         let place = self.place();
-        let column_m = self.target_m[2] - BOARD_M[2] - cell.floor_z_m;
-        let column = [
-            2.0 * COLUMN_RADIUS_M,
-            2.0 * COLUMN_RADIUS_M,
-            column_m.max(0.01),
-        ];
+        let width_m = 2.0 * COLUMN_RADIUS_M;
+        let column = [width_m, width_m, self.column_m(cell)];
         vec![
             place.block_below([0.0, 0.0, 0.0], BOARD_M),
             place.block_below([0.0, 0.0, -BOARD_M[2]], column),
@@ -195,14 +190,12 @@ impl ThrowTask for Lob {
     /// Up and back, over the board at arm's length, then down onto it.
     fn warm_start(&self, rope: &RopeParams) -> Vec<PolePose> {
         let l = rope.length_m;
-        let pose = |outside_m, above_m, tilt_rad| {
-            PolePose::beside(self.target_m, outside_m, above_m, tilt_rad)
-        };
-        vec![
-            pose(-0.35, 0.8 * l, 0.6),
-            pose(-0.05, l + 0.10, 1.2),
-            pose(-0.05, 0.7 * l, 0.9),
-        ]
+        let poses = [
+            [-0.35, 0.8 * l, 0.6],
+            [-0.05, l + 0.10, 1.2],
+            [-0.05, 0.7 * l, 0.9],
+        ];
+        PolePose::beside(self.target_m, poses).into()
     }
 
     fn fitness(&self, _: &RopeParams, outcome: &ThrowOutcome) -> f64 {

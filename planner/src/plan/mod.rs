@@ -1,5 +1,5 @@
 //! Throws: the tasks, one file each behind one trait, and what they share: the search,
-//! progress, errors, start pose and reach.
+//! errors, start pose and reach.
 
 mod assess;
 mod config;
@@ -7,37 +7,41 @@ mod drape;
 mod ensemble;
 mod error;
 mod finalists;
-mod goal;
 mod lob;
 mod planning;
+mod pole_pose;
+mod polish;
 mod reach;
 mod reach_map;
 mod reach_picture;
 mod request;
 mod robust;
 mod scene;
+mod screen;
+mod search;
 mod setup;
 mod strike;
 mod task;
 #[cfg(test)]
 mod tests;
 mod throw;
-mod trajopt;
+mod waypoints;
 
 pub use assess::{Shortcoming, shortcoming, warnings};
 pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
 pub use drape::{Drape, DrapeConfig};
 pub use ensemble::PosteriorEnsemble;
-pub use error::{PlanError, PlanProgress};
-pub use goal::ThrowGoal;
+pub use error::PlanError;
 pub use lob::{Lob, LobConfig};
 pub use planning::{plan, plan_task};
-pub use reach::{check_reach, clear_of_arm, start_pose_for};
-pub use reach_map::{GridCell, ReachMap};
+pub use pole_pose::PolePose;
+use reach::start_pose_for;
+pub use reach::{check_reach, clear_of_arm};
+pub use reach_map::ReachMap;
 pub use reach_picture::reach_svg;
-pub use request::PlanRequest;
-pub use scene::PlanarScene;
+pub use request::{PlanRequest, ThrowGoal};
+pub use screen::Clearance;
 pub use strike::Strike;
 pub use task::{ThrowTask, proximity_reward, simulator_for, verdict};
 pub use throw::{ThrowOutcome, ThrowSimulator};
-pub use trajopt::{Clearance, Dimensions, PolePose};
+pub use waypoints::Dimensions;

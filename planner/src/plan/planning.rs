@@ -1,25 +1,24 @@
 //! From a rope and a task to a throw: searches, polish, choice among the finalists.
 
-use super::finalists::Finalist;
-use super::robust::{forecast, least_risk, search_around};
+use super::finalists::{Finalist, best_first};
 use super::setup::{Count, Setup};
-use super::{
-    PlanError, PlanProgress, PlanRequest, ThrowOutcome, ThrowTask, check_reach, clear_of_arm,
-};
+use super::{PlanError, PlanRequest, ThrowOutcome, ThrowTask, check_reach, clear_of_arm};
+use crate::arm_response::FollowError;
 use arm_model::JointTrajectory;
 use arm_model::limits::LimitKind;
+use shared_types::ipc::message::Progress;
 use shared_types::plan::trajectory_hash_hex;
 use shared_types::{LimitedBy, Plan, VERSION, Verdict};
 use std::ops::ControlFlow;
 
-/// Plans a throw. Deterministic for a seed, whatever the threads. Interrupted by
-/// `progress`, it plans with what has been found up to then.
+/// Plans a throw. Deterministic for a seed, whatever the threads. `progress` is told
+/// of every generation; interrupted by it, the throw is planned with what has been found.
 ///
 /// # Errors
 /// See [`PlanError`]; an unreachable target is refused before any simulation.
 pub fn plan(
     request: &PlanRequest,
-    progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Plan, PlanError> {
     plan_task(request.goal.task(), request, progress)
 }
@@ -31,13 +30,16 @@ pub fn plan(
 pub fn plan_task(
     task: &dyn ThrowTask,
     request: &PlanRequest,
-    progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Plan, PlanError> {
     let target_m = task.target_m();
     request.rope.validate()?;
     request.options.check()?;
     task.config().check()?;
     request.goal.check()?;
+    if let Some(following) = &request.following {
+        following.check().map_err(FollowError::from)?;
+    }
     check_reach(target_m, request.rope.length_m, &request.cell)?;
     clear_of_arm(target_m, &request.cell)?;
     let setup = Setup::new(task, request)?;
@@ -46,7 +48,7 @@ pub fn plan_task(
     for round in 0..request.options.searches.max(1) {
         let found = setup.search(round, &mut count, progress)?;
         finalists.extend(setup.compare(found, &mut count)?);
-        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        best_first(&mut finalists);
         if !setup.task.polishes() {
             setup.confirm(&mut finalists, &mut count)?;
         }
@@ -55,52 +57,29 @@ pub fn plan_task(
             break;
         }
     }
-    let is_robust = !request.ensemble.optimised.is_empty() && !count.interrupted;
-    let chosen = if is_robust {
-        let (around, simulations) = least_risk(&setup, &request.ensemble, finalists)?;
-        count.add(simulations);
-        match around {
-            Some(around) => Some(setup.robust(around, &mut count, progress)?),
-            None => None,
-        }
-    } else {
+    let chosen = if request.ensemble.optimised.is_empty() || count.interrupted {
         finalists.into_iter().next()
+    } else {
+        setup.robust(finalists, &mut count, progress)?
     };
-    let chosen = chosen.ok_or(PlanError::OnlyCollisions {
-        simulations: count.simulations,
-    })?;
+    let chosen = chosen.ok_or(PlanError::OnlyCollisions(count.simulations))?;
     setup.finish(chosen, count)
 }
 
 impl Setup<'_> {
-    /// The throw near a finalist that has the least risk over the ropes of the ensemble.
-    fn robust(
-        &self,
-        around: Finalist,
-        count: &mut Count,
-        progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
-    ) -> Result<Finalist, PlanError> {
-        let (found, simulations) = search_around(self, &self.request.ensemble, &around, progress)?;
-        count.simulations += simulations;
-        let best = self.finalists(found, count)?.into_iter().next();
-        Ok(best.unwrap_or(around))
-    }
-
     /// The plan as it is written down. The prediction comes from double precision at half
     /// the step.
     fn finish(&self, chosen: Finalist, mut count: Count) -> Result<Plan, PlanError> {
         let (request, trajectory) = (self.request, chosen.trajectory);
         if let Some(margin) = request.limits.worst_violation(&trajectory) {
-            return Err(PlanError::BreaksLimit {
-                what: margin.describe(),
-            });
+            return Err(PlanError::BreaksLimit(margin.describe()));
         }
         let rope = &request.rope;
         let exact = self.judging.exact().run(&[(rope, &trajectory)])?;
         count.add(1);
         let exact = exact.into_iter().find(|o| o.finite);
         let outcome = exact.unwrap_or(chosen.outcome);
-        let forecast = forecast(self, &request.ensemble, &trajectory)?;
+        let forecast = self.forecast(&trajectory)?;
         count.add(request.ensemble.forecast.len());
         let verdict = self.task.judge(rope, &outcome);
         Ok(Plan {
@@ -135,25 +114,25 @@ impl Setup<'_> {
     ) -> LimitedBy {
         // Plans use 98.5 % of each limit; this much more is hardly room.
         const LEFT_FRACTION: f64 = 0.03;
-        let error_m = self.task.error_m(outcome);
-        let close = !self.task.polishes() || error_m <= self.request.options.good_enough_m;
         if !outcome.contacts.none() {
             return LimitedBy::Contact;
         }
-        if verdict.success && close {
+        if verdict.success && self.is_close(outcome) {
             return LimitedBy::Nothing;
         }
         let margins = self.request.limits.margins(trajectory);
         let is_range = |k: LimitKind| matches!(k, LimitKind::PositionMin | LimitKind::PositionMax);
-        let used = |range: bool| {
-            margins.iter().any(|m| {
-                is_range(m.kind) == range && m.left < LEFT_FRACTION * m.limit.abs().max(1e-3)
-            })
-        };
-        match () {
-            () if used(true) => LimitedBy::JointRange,
-            () if used(false) => LimitedBy::ArmSpeed,
-            () => LimitedBy::Budget,
+        let used: Vec<bool> = margins
+            .iter()
+            .filter(|m| m.left < LEFT_FRACTION * m.limit.abs().max(1e-3))
+            .map(|m| is_range(m.kind))
+            .collect();
+        if used.contains(&true) {
+            LimitedBy::JointRange
+        } else if used.is_empty() {
+            LimitedBy::Budget
+        } else {
+            LimitedBy::ArmSpeed
         }
     }
 }

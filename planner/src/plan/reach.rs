@@ -33,7 +33,7 @@ fn pole_end_reach_m(pole: &Pole) -> f64 {
 /// [`START_POSE`] with joint 1 turned to the target's bearing, so that joints 2,
 /// 4 and 6 move in the vertical plane through base axis and target.
 #[must_use]
-pub fn start_pose_for(target_m: [f64; 3]) -> JointVector {
+pub(super) fn start_pose_for(target_m: [f64; 3]) -> JointVector {
     let mut pose = START_POSE;
     pose[0] = target_m[1].atan2(target_m[0]);
     pose
@@ -42,7 +42,7 @@ pub fn start_pose_for(target_m: [f64; 3]) -> JointVector {
 /// Refuses targets in the column, in the base, or where the arm stands before the throw.
 ///
 /// # Errors
-/// [`PlanError::InArm`] with the part that the target lies in.
+/// [`PlanError::Target`] with the part that the target lies in.
 pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> Result<(), PlanError> {
     let target = Vector3::from(target_m);
     let (links, pole) = arm_at(&start_pose_for(target_m), &cell.pole);
@@ -57,11 +57,11 @@ pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> Result<(), PlanError> {
     } else {
         return Ok(());
     };
-    Err(PlanError::InArm {
-        target_m,
-        part,
-        room_m: TARGET_ROOM_M,
-    })
+    let [x, y, z] = target_m;
+    let room_cm = 100.0 * TARGET_ROOM_M;
+    Err(PlanError::Target(format!(
+        "target ({x:.3}, {y:.3}, {z:.3}) m lies in the arm's {part}; name one at least {room_cm:.0} cm away from it"
+    )))
 }
 
 /// Refuses targets that no throw reaches.
@@ -71,7 +71,9 @@ pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> Result<(), PlanError> {
 /// a nearby point that can be reached.
 pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Result<(), PlanError> {
     if target_m.iter().any(|v| !v.is_finite()) {
-        return Err(PlanError::TargetNotFinite { target_m });
+        return Err(PlanError::Target(format!(
+            "target {target_m:?} has a coordinate that is not a finite number of metres"
+        )));
     }
     let [x, y, z] = target_m;
     let rho = x.hypot(y);
@@ -165,17 +167,17 @@ mod tests {
     #[test]
     fn targets_in_the_arm_are_refused() {
         let cell = Cell::default();
-        let refused = |t| match clear_of_arm(t, &cell) {
-            Err(PlanError::InArm { part, .. }) => part,
-            other => panic!("{other:?}"),
-        };
-        assert_eq!(refused([0.0, 0.0, 0.1]), "base");
-        assert_eq!(refused([0.05, -0.05, -0.3]), "base");
-        let links = "links in the start pose";
         let flange = arm_model::kinematics::flange_pose(&start_pose_for([1.0, 0.0, 0.0])).0;
-        assert_eq!(refused(flange.into()), links);
         let end = cell.pole.attach_pose(&start_pose_for([0.6, 0.6, 0.0])).0;
-        assert_eq!(refused(end.into()), links);
+        for (target_m, part) in [
+            ([0.0, 0.0, 0.1], "base"),
+            ([0.05, -0.05, -0.3], "base"),
+            (flange.into(), "links in the start pose"),
+            (end.into(), "links in the start pose"),
+        ] {
+            let refusal = clear_of_arm(target_m, &cell).unwrap_err().to_string();
+            assert!(refusal.contains(&format!("arm's {part};")), "{refusal}");
+        }
         for free in [[1.0, 0.0, 0.4], [0.85, 0.3, -0.1], [1.05, -0.3, 0.6]] {
             assert!(clear_of_arm(free, &cell).is_ok(), "{free:?}");
         }
@@ -200,9 +202,7 @@ mod tests {
             );
         }
         assert!(check_reach([1.1, 0.0, 0.45], 0.45, &cell).is_ok());
-        assert!(matches!(
-            check_reach([f64::NAN, 0.0, 0.0], 0.5, &cell),
-            Err(PlanError::TargetNotFinite { .. })
-        ));
+        let refusal = check_reach([f64::NAN, 0.0, 0.0], 0.5, &cell).unwrap_err();
+        assert!(refusal.to_string().contains("not a finite"), "{refusal}");
     }
 }

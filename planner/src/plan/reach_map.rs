@@ -5,7 +5,8 @@
 //! changing those that came to rarely visited cells, so the edge moves outwards (the
 //! archive of J.-B. Mouret and J. Clune, "Illuminating search spaces by mapping elites").
 
-use super::trajopt::{Dimensions, Screen, WAYPOINTS, WaypointSpace};
+use super::screen::Screen;
+use super::waypoints::{Dimensions, WAYPOINTS, WaypointSpace};
 use super::{PlanError, ThrowConfig, start_pose_for};
 use crate::collide::{ArmShape, RopeShape, rope_contacts};
 use arm_model::{Cell, JointTrajectory, JointVector, Limits};
@@ -14,14 +15,12 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
-use rope_sim::{
-    Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, Start, Watch, roll_out,
-};
+use rope_sim::{Candidate, FrameTimes, PlannedArm, Precision, Rollout, SimOptions, roll_out};
 use shared_types::RopeParams;
 use std::collections::BTreeMap;
 
 /// Edge of a cell (m).
-const CELL_M: f64 = 0.05;
+pub(super) const CELL_M: f64 = 0.05;
 /// Throws of one round, and rounds.
 const THROWS: usize = 192;
 const ROUNDS: usize = 14;
@@ -34,22 +33,19 @@ const STEP_S: f64 = 1e-3;
 const NEAR_M: f64 = 0.10;
 
 /// A cell: columns outwards from the base axis, rows upwards from the base.
-pub type GridCell = (i32, i32);
+pub(super) type GridCell = (i32, i32);
 
 /// What the throws reached.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReachMap {
-    /// Throws that passed each cell.
-    cells: BTreeMap<GridCell, u32>,
+    /// Throws that passed each cell that was reached.
+    pub(super) cells: BTreeMap<GridCell, u32>,
     /// Throws simulated.
     pub throws: u32,
 }
 
-/// A cell's throw, and how many passed the cell.
-struct Elite {
-    x: Vec<f64>,
-    passed: u32,
-}
+/// Each cell's throw, and how many passed the cell.
+type Archive = BTreeMap<GridCell, (Vec<f64>, u32)>;
 
 impl ReachMap {
     /// Explores the reach of a rope; about a second. Deterministic for a seed, whatever
@@ -76,7 +72,7 @@ impl ReachMap {
         let screen = Screen::new(space.clone(), limits.clone(), *cell, config.clearance)?;
         let std_dev = space.std_dev(&JointVector(config.std_dev_rad));
         let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x4ea_c400);
-        let mut archive: BTreeMap<GridCell, Elite> = BTreeMap::new();
+        let mut archive = Archive::new();
         let mut throws = 0;
         for _ in 0..ROUNDS {
             let points: Vec<Vec<f64>> = (0..THROWS)
@@ -86,36 +82,22 @@ impl ReachMap {
             throws += u32::try_from(points.len()).unwrap_or(u32::MAX);
             for (x, path) in points.into_iter().zip(paths) {
                 for passed in path {
-                    let kept = archive.entry(passed).or_insert_with(|| Elite {
-                        x: x.clone(),
-                        passed: 0,
-                    });
-                    kept.passed += 1;
+                    archive.entry(passed).or_insert_with(|| (x.clone(), 0)).1 += 1;
                 }
             }
         }
-        let cells = archive.into_iter().map(|(cell, kept)| (cell, kept.passed));
+        let cells = archive
+            .into_iter()
+            .map(|(cell, (_, passed))| (cell, passed));
         Ok(Self {
             cells: cells.collect(),
             throws,
         })
     }
 
-    /// Cells that were reached, with the number of throws that passed them.
-    pub fn cells(&self) -> impl Iterator<Item = (GridCell, u32)> + '_ {
-        self.cells.iter().map(|(cell, passed)| (*cell, *passed))
-    }
-
     /// Middle of a cell: distance from the base axis and height (m).
-    #[must_use]
-    pub fn middle_m((column, row): GridCell) -> [f64; 2] {
+    pub(super) fn middle_m((column, row): GridCell) -> [f64; 2] {
         [column, row].map(|i| (f64::from(i) + 0.5) * CELL_M)
-    }
-
-    /// Edge of a cell (m).
-    #[must_use]
-    pub fn cell_m() -> f64 {
-        CELL_M
     }
 
     /// Refuses a target far from everything that was reached.
@@ -154,16 +136,16 @@ fn draw(
     space: &WaypointSpace,
     screen: &Screen,
     std_dev: &[f64],
-    archive: &BTreeMap<GridCell, Elite>,
+    archive: &Archive,
     rng: &mut ChaCha12Rng,
 ) -> Option<Vec<f64>> {
-    let kept: Vec<&Elite> = archive.values().collect();
+    let kept: Vec<&(Vec<f64>, u32)> = archive.values().collect();
     let parent = kept
-        .choose_weighted(rng, |k| 1.0 / f64::from(k.passed.max(1)))
+        .choose_weighted(rng, |(_, passed)| 1.0 / f64::from((*passed).max(1)))
         .ok()
         .filter(|_| rng.random_bool(0.9));
     let (middle, spread) = match parent {
-        Some(kept) => (kept.x.clone(), rng.random_range(0.1..0.6)),
+        Some((x, _)) => (x.clone(), rng.random_range(0.1..0.6)),
         None => (space.resting(), 1.0),
     };
     (0..DRAWS_MAX)
@@ -192,23 +174,18 @@ fn tip_paths(
     let horizon_s = space.times_s[WAYPOINTS - 1] + config.tail_s;
     let count = (horizon_s / PERIOD_S).floor() as usize + 1;
     let options = SimOptions {
-        step_s: STEP_S,
-        precision: Precision::F32,
-        start: Start::Equilibrium,
         frames: FrameTimes {
             first_s: 0.0,
             period_s: PERIOD_S,
             count,
         },
-        watch: Watch::NOTHING,
-        horizon_s,
         threads,
+        ..SimOptions::new(STEP_S, Precision::F32, horizon_s)
     };
     let rollouts = roll_out(&candidates, &options)?;
-    let paths = motions.iter().zip(&rollouts);
-    Ok(paths
-        .map(|(motion, rollout)| passed(rope, motion.trajectory(), rollout, cell))
-        .collect())
+    let path =
+        |(motion, rollout): (&PlannedArm, _)| passed(rope, motion.trajectory(), rollout, cell);
+    Ok(motions.iter().zip(&rollouts).map(path).collect())
 }
 
 fn passed(

@@ -1,6 +1,6 @@
 //! The reach of a rope as a picture.
 
-use super::ReachMap;
+use super::reach_map::{CELL_M, ReachMap};
 use shared_types::RopeParams;
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ fn y(z_m: f64) -> f64 {
 #[must_use]
 pub fn reach_svg(map: &ReachMap, rope: &RopeParams, target_m: [f64; 3], seed: u64) -> String {
     let (width, height) = (x(RHO_M[1]) + 30.0, y(Z_M[0]) + 60.0);
-    let edge = SCALE * ReachMap::cell_m();
+    let edge = SCALE * CELL_M;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
          font-family=\"sans-serif\" font-size=\"14\">\n\
@@ -40,9 +40,9 @@ pub fn reach_svg(map: &ReachMap, rope: &RopeParams, target_m: [f64; 3], seed: u6
         map.throws
     );
     // Writing to a string cannot fail.
-    for (cell, passed) in map.cells() {
-        let [rho, z] = ReachMap::middle_m(cell);
-        let colour = COLOURS[usize::from(passed >= OFTEN)];
+    for (cell, passed) in &map.cells {
+        let [rho, z] = ReachMap::middle_m(*cell);
+        let colour = COLOURS[usize::from(*passed >= OFTEN)];
         let _ = writeln!(
             out,
             "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{edge:.1}\" height=\"{edge:.1}\" fill=\"{colour}\"/>",
@@ -75,21 +75,17 @@ fn axes(out: &mut String) {
         bottom + 44.0,
         (bottom + top) / 2.0
     );
+    let mut tick = |x: f64, y: f64, anchor, v: f64| {
+        let _ = writeln!(
+            out,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{v:.1}</text>"
+        );
+    };
     for k in -3..=8 {
         let v = 0.2 * f64::from(k);
         if (RHO_M[0] - 1e-9..=RHO_M[1] + 1e-9).contains(&v) {
-            let _ = writeln!(
-                out,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{v:.1}</text>",
-                x(v),
-                bottom + 20.0
-            );
+            tick(x(v), bottom + 20.0, "middle", v);
         }
-        let _ = writeln!(
-            out,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{v:.1}</text>",
-            left - 8.0,
-            y(v) + 5.0
-        );
+        tick(left - 8.0, y(v) + 5.0, "end", v);
     }
 }

@@ -1,10 +1,53 @@
 //! What is asked for when a throw is planned.
 
-use super::{PlanOptions, PosteriorEnsemble, ThrowGoal};
+use super::{Drape, Lob, PlanOptions, PosteriorEnsemble, Strike, ThrowTask};
+use crate::OutOfRange;
 use crate::arm_response::Following;
 use arm_model::{Cell, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::RopeParams;
+use shared_types::{RopeParams, Task};
+
+/// A task at a target, with its tuned values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ThrowGoal {
+    /// Strike a point.
+    Strike(Strike),
+    /// Lob onto a board.
+    Lob(Lob),
+    /// Drape over a wall.
+    Drape(Drape),
+}
+
+impl ThrowGoal {
+    /// The task behind its trait.
+    #[must_use]
+    pub fn task(&self) -> &dyn ThrowTask {
+        match self {
+            Self::Strike(task) => task,
+            Self::Lob(task) => task,
+            Self::Drape(task) => task,
+        }
+    }
+
+    /// Refuses numbers of the task's own that are not finite.
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        match self {
+            Self::Strike(_) => Ok(()),
+            Self::Lob(task) => task.config.check(),
+            Self::Drape(task) => task.config.check(),
+        }
+    }
+
+    /// Which task it is.
+    #[must_use]
+    pub fn kind(&self) -> Task {
+        match self {
+            Self::Strike(_) => Task::Strike,
+            Self::Lob(_) => Task::Lob,
+            Self::Drape(_) => Task::Drape,
+        }
+    }
+}
 
 /// A throw to plan, in this process or by the planner's service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,17 +6,15 @@ use rope_sim::{Obstacle, Shape};
 
 /// A frame at the target whose x points away from the base axis and whose z is up: the
 /// scene of a task beside the x axis is that on it, turned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlanarScene {
+pub(super) struct PlanarScene {
     /// Turn about the vertical (rad).
-    pub bearing_rad: f64,
+    pub(super) bearing_rad: f64,
     pose: Isometry3<f64>,
 }
 
 impl PlanarScene {
     /// The frame at a target (m).
-    #[must_use]
-    pub fn at(target_m: [f64; 3]) -> Self {
+    pub(super) fn at(target_m: [f64; 3]) -> Self {
         let bearing_rad = target_m[1].atan2(target_m[0]);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), bearing_rad);
         Self {
@@ -26,8 +24,7 @@ impl PlanarScene {
     }
 
     /// A point of the frame in the world (m).
-    #[must_use]
-    pub fn point(&self, local_m: [f64; 3]) -> [f64; 3] {
+    pub(super) fn point(&self, local_m: [f64; 3]) -> [f64; 3] {
         self.pose
             .transform_point(&Point3::from(local_m))
             .coords
@@ -41,8 +38,7 @@ impl PlanarScene {
     }
 
     /// A box by the middle of its upper face and its whole edges (m).
-    #[must_use]
-    pub fn box_below(&self, top_m: [f64; 3], size_m: [f64; 3], friction: f64) -> Obstacle {
+    pub(super) fn box_below(&self, top_m: [f64; 3], size_m: [f64; 3], friction: f64) -> Obstacle {
         let (pose, half_m) = self.middle_of(top_m, size_m);
         Obstacle {
             shape: Shape::Box { half_m },
@@ -52,8 +48,7 @@ impl PlanarScene {
     }
 
     /// The same box, for the arm to keep clear of.
-    #[must_use]
-    pub fn block_below(&self, top_m: [f64; 3], size_m: [f64; 3]) -> Block {
+    pub(super) fn block_below(&self, top_m: [f64; 3], size_m: [f64; 3]) -> Block {
         let (pose, half_m) = self.middle_of(top_m, size_m);
         Block { pose, half_m }
     }

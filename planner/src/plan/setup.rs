@@ -1,15 +1,13 @@
-//! What one request needs again and again, and one search with it.
+//! What one request needs again and again.
 
-use super::trajopt::{
-    Found, Screen, SearchOptions, Valued, WAYPOINTS, WaypointSpace, reach_pose, search,
-};
+use super::pole_pose::reach_pose;
+use super::screen::Screen;
+use super::waypoints::{WAYPOINTS, WaypointSpace};
 use super::{
-    PlanError, PlanProgress, PlanRequest, ThrowOutcome, ThrowSimulator, ThrowTask, simulator_for,
-    start_pose_for,
+    PlanError, PlanRequest, ThrowOutcome, ThrowSimulator, ThrowTask, simulator_for, start_pose_for,
 };
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::RopeParams;
-use std::ops::ControlFlow;
 
 /// A point of the search's space with its trajectory.
 pub(super) type Point = (Vec<f64>, JointTrajectory);
@@ -20,11 +18,10 @@ pub(super) struct Setup<'a> {
     pub(super) request: &'a PlanRequest,
     pub(super) space: WaypointSpace,
     pub(super) screen: Screen,
-    pub(super) bounds: (Vec<f64>, Vec<f64>),
     pub(super) std_dev: Vec<f64>,
     pub(super) simulator: ThrowSimulator,
     /// The same with the step of the generations.
-    searching: ThrowSimulator,
+    pub(super) searching: ThrowSimulator,
     /// The same with the whole time of observation.
     pub(super) judging: ThrowSimulator,
     pub(super) start: Vec<f64>,
@@ -86,7 +83,6 @@ impl<'a> Setup<'a> {
             ..simulator.clone()
         };
         Ok(Self {
-            bounds: space.bounds(&request.limits),
             std_dev: space.std_dev(&JointVector(config.std_dev_rad)),
             start: start_point(task, request, &space, &screen),
             ropes: config.robustness.variants(&request.rope),
@@ -117,51 +113,6 @@ impl<'a> Setup<'a> {
             + weights.motion_per_rad * joint_motion_rad(trajectory)
             + weights.speed_excess_per_rad_s * self.screen.speed_excess_rad_s(trajectory)
             + weights.contacts(&outcome.contacts)
-    }
-
-    /// One search from its own random numbers.
-    pub(super) fn search(
-        &self,
-        round: usize,
-        count: &mut Count,
-        progress: &mut dyn FnMut(PlanProgress) -> ControlFlow<()>,
-    ) -> Result<Vec<Found>, PlanError> {
-        let (options, config) = (&self.request.options, self.task.config());
-        let size = SearchOptions {
-            start: self.start.clone(),
-            population: options.population,
-            generations: options.generations.unwrap_or(config.generations),
-            seed: options.seed.wrapping_add((round as u64) << 40),
-            std_dev: self.std_dev.clone(),
-            draws_max: config.draws_max,
-            stop_below_m: options.stop_below_m,
-            stop_success_fraction: config.stop_success_fraction,
-            keep: config.robustness.finalists,
-        };
-        let rope = &self.request.rope;
-        let mut value = |trajectories: &[JointTrajectory]| {
-            let throws: Vec<_> = trajectories.iter().map(|t| (rope, t)).collect();
-            let outcomes = self.searching.run(&throws)?;
-            let valued = |(t, o): (_, &ThrowOutcome)| Valued {
-                fitness: self.fitness(rope, t, o),
-                error_m: self.task.error_m(o),
-                success: o.finite && o.contacts.none() && self.task.judge(rope, o).success,
-            };
-            Ok(trajectories.iter().zip(&outcomes).map(valued).collect())
-        };
-        let bounds = self.bounds.clone();
-        let found = search(
-            &self.space,
-            &self.screen,
-            bounds,
-            &size,
-            &mut value,
-            progress,
-        )?;
-        count.simulations += found.simulations;
-        count.resampled += found.resampled;
-        count.interrupted |= found.interrupted;
-        Ok(found.best)
     }
 }
 

@@ -20,10 +20,6 @@ pub struct Strike {
 }
 
 impl ThrowTask for Strike {
-    fn name(&self) -> &'static str {
-        "strike"
-    }
-
     fn target_m(&self) -> [f64; 3] {
         self.target_m
     }

@@ -1,7 +1,7 @@
 //! What a task is.
 
-use super::trajopt::{PolePose, WAYPOINTS};
-use super::{PlanOptions, ThrowConfig, ThrowOutcome, ThrowSimulator};
+use super::waypoints::WAYPOINTS;
+use super::{PlanOptions, PolePose, ThrowConfig, ThrowOutcome, ThrowSimulator};
 use crate::collide::Block;
 use arm_model::Cell;
 use rope_sim::{Precision, Scene, Watch};
@@ -11,9 +11,6 @@ use shared_types::{Condition, RopeParams, Verdict};
 /// when it succeeded; drawing, screening, simulating, contacts with the arm and the
 /// search are the same for all.
 pub trait ThrowTask: Sync {
-    /// Name for messages.
-    fn name(&self) -> &'static str;
-
     /// The target in the world (m). Its bearing is the plane of the throw.
     fn target_m(&self) -> [f64; 3];
 
@@ -69,15 +66,13 @@ pub fn proximity_reward(closest_m: f64) -> f64 {
 /// Success is all conditions met.
 #[must_use]
 pub fn verdict<const N: usize>(conditions: [(&str, bool); N]) -> Verdict {
+    let condition = |(name, met): (&str, bool)| Condition {
+        name: name.to_owned(),
+        met,
+    };
     Verdict {
         success: conditions.iter().all(|(_, met)| *met),
-        conditions: conditions
-            .iter()
-            .map(|(name, met)| Condition {
-                name: (*name).to_owned(),
-                met: *met,
-            })
-            .collect(),
+        conditions: conditions.map(condition).into(),
     }
 }
 

@@ -10,7 +10,7 @@ use arm_model::{Cell, JointTrajectory};
 use nalgebra::Vector3;
 use rope_sim::{
     Candidate, ContactSummary, DominoOutcome, FrameTimes, Outcome, PlannedArm, Precision, Rollout,
-    Scene, SimOptions, Start, Watch, Watched, roll_out_in,
+    Scene, SimOptions, Watch, Watched, roll_out_in,
 };
 use shared_types::RopeParams;
 
@@ -81,13 +81,10 @@ impl ThrowSimulator {
     /// Options of the rope simulation for motions that end at `motion_s`.
     pub(crate) fn options(&self, motion_s: f64, frames: FrameTimes) -> SimOptions {
         SimOptions {
-            step_s: self.step_s,
-            precision: self.precision,
-            start: Start::Equilibrium,
             frames,
             watch: self.watch,
-            horizon_s: motion_s + self.tail_s,
             threads: self.threads,
+            ..SimOptions::new(self.step_s, self.precision, motion_s + self.tail_s)
         }
     }
 

@@ -7,18 +7,21 @@
 //! boundary (C35). They are judged here on the setpoints as they will stand on the wire,
 //! or, by velocities, on the motion that follows from them.
 
-mod contact;
 mod rules;
-mod setpoints;
 mod velocity;
 
-pub use contact::tool_contact_s;
 pub use rules::{Fence, FenceError, JudgedArm, Rule, RuleMargin};
 
-use arm_model::{JointTrajectory, Limits};
+use crate::collide::{ArmShape, tool_contacts};
+use arm_model::{Cell, JointTrajectory, Limits};
 use rules::Step;
-use setpoints::setpoints;
 use shared_types::CommandInterface;
+
+/// One instant per cycle (s): the first is the start of a trajectory, the last its end.
+fn cycles_s(trajectory: &JointTrajectory, period_s: f64) -> impl Iterator<Item = f64> {
+    let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
+    (0..=cycles).map(move |k| f64::from(k) * period_s)
+}
 
 /// Everything the arm judges, in the order in which it does.
 #[must_use]
@@ -27,30 +30,23 @@ pub fn arm_margins(
     limits: &Limits,
     arm: &JudgedArm,
 ) -> Vec<RuleMargin> {
+    let steps = match arm.interface {
+        CommandInterface::ServoPosition => cycles_s(trajectory, limits.period_s())
+            .map(|time_s| {
+                // The wire holds single precision.
+                let setpoint = trajectory.state_at(time_s).q.map(|v| f64::from(v as f32));
+                (time_s, Step::at(setpoint))
+            })
+            .collect(),
+        CommandInterface::JointVelocity => velocity::steps(trajectory, limits),
+    };
     let mut margins = arm.rules(limits);
     let mut before = None;
-    let mut judge = |time_s: f64, step: &mut Step| {
+    for (time_s, mut step) in steps {
         step.before = before.replace(step.setpoint).unwrap_or(step.setpoint);
         for margin in &mut margins {
-            let found = margin.rule.value(step, limits, arm);
+            let found = margin.rule.value(&step, limits, arm);
             margin.meet(found, time_s);
-        }
-    };
-    match arm.interface {
-        CommandInterface::ServoPosition => {
-            for (time_s, setpoint) in setpoints(trajectory, limits.period_s()) {
-                judge(time_s, &mut Step::at(setpoint));
-            }
-        }
-        CommandInterface::JointVelocity => {
-            for cycle in velocity::cycles(trajectory, limits) {
-                let mut step = Step {
-                    q: cycle.q,
-                    astray_rad: cycle.astray_rad,
-                    ..Step::at(cycle.planned)
-                };
-                judge(cycle.time_s, &mut step);
-            }
         }
     }
     margins
@@ -64,6 +60,16 @@ pub fn first_stop(margins: &[RuleMargin]) -> Option<&RuleMargin> {
     broken.min_by(|a, b| {
         let at = |m: &RuleMargin| m.broken_s.unwrap_or(f64::INFINITY);
         at(a).total_cmp(&at(b))
+    })
+}
+
+/// When pole or wrist first come to arm, column or floor (s), which the arm's own rules do not
+/// know of; looked at once per `period_s`.
+#[must_use]
+pub fn tool_contact_s(trajectory: &JointTrajectory, cell: &Cell, period_s: f64) -> Option<f64> {
+    cycles_s(trajectory, period_s).find(|t| {
+        let arm = ArmShape::at(&trajectory.state_at(*t).q, &cell.pole);
+        !tool_contacts(&arm, cell).none()
     })
 }
 

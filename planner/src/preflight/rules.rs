@@ -32,7 +32,7 @@ pub(super) struct Step {
     pub(super) setpoint: JointVector,
     /// Where the arm has its joints (rad).
     pub(super) q: JointVector,
-    /// How far they are from what was asked of them (rad).
+    /// How far they are from what was asked of them, which the controller stops for (rad).
     pub(super) astray_rad: f64,
 }
 
@@ -58,18 +58,9 @@ pub struct Fence {
 }
 
 /// A box without an inside.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error(
-    "the safety boundary needs its lower side below its upper one in {axis}, found {low} and {high} m"
-)]
-pub struct FenceError {
-    /// Axis.
-    pub axis: char,
-    /// Lower side (m).
-    pub low: f64,
-    /// Upper side (m).
-    pub high: f64,
-}
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("the safety boundary needs its lower side below its upper one in {0}")]
+pub struct FenceError(String);
 
 impl Fence {
     /// From x-, x+, y-, y+, z-, z+ (m).
@@ -80,7 +71,7 @@ impl Fence {
         let [x0, x1, y0, y1, z0, z1] = sides_m;
         for (axis, low, high) in [('x', x0, x1), ('y', y0, y1), ('z', z0, z1)] {
             if !(low.is_finite() && high.is_finite() && low < high) {
-                return Err(FenceError { axis, low, high });
+                return Err(FenceError(format!("{axis}, found {low} and {high} m")));
             }
         }
         Ok(Self {
@@ -140,42 +131,34 @@ pub enum Rule {
 }
 
 impl Rule {
+    const fn facts(self) -> (Option<u8>, &'static str, &'static str) {
+        match self {
+            Self::JointRange => (Some(23), "joint outside its range", "rad"),
+            Self::JointSpeed => (Some(24), "joint speed of setpoints", "rad/s"),
+            Self::ToolSpeed => (Some(60), "tool speed of setpoints", "m/s"),
+            Self::SelfCollision => (Some(22), "gap between links", "m"),
+            Self::SafetyBoundary => (Some(35), "tool inside the boundary", "m"),
+            Self::StepLength => (None, "tool step per cycle", "m"),
+            Self::Tracking => (None, "joints off the plan", "rad"),
+        }
+    }
+
     /// The arm's error code; none where the controller is the one to stop.
     #[must_use]
-    pub fn code(self) -> Option<u8> {
-        match self {
-            Self::SelfCollision => Some(22),
-            Self::JointRange => Some(23),
-            Self::JointSpeed => Some(24),
-            Self::SafetyBoundary => Some(35),
-            Self::ToolSpeed => Some(60),
-            Self::StepLength | Self::Tracking => None,
-        }
+    pub const fn code(self) -> Option<u8> {
+        self.facts().0
     }
 
     /// In words.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::JointRange => "joint outside its range",
-            Self::JointSpeed => "joint speed of setpoints",
-            Self::ToolSpeed => "tool speed of setpoints",
-            Self::SelfCollision => "gap between links",
-            Self::SafetyBoundary => "tool inside the boundary",
-            Self::StepLength => "tool step per cycle",
-            Self::Tracking => "joints off the plan",
-        }
+    pub const fn name(self) -> &'static str {
+        self.facts().1
     }
 
     /// Unit of its value.
     #[must_use]
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::JointRange | Self::Tracking => "rad",
-            Self::JointSpeed => "rad/s",
-            Self::ToolSpeed => "m/s",
-            Self::SelfCollision | Self::SafetyBoundary | Self::StepLength => "m",
-        }
+    pub const fn unit(self) -> &'static str {
+        self.facts().2
     }
 
     /// Whether small values break it.
@@ -254,15 +237,11 @@ impl RuleMargin {
 
     pub(super) fn meet(&mut self, value: f64, time_s: f64) {
         let least = self.rule.is_least();
-        let (worse, broken) = if least {
-            (value < self.value, value < self.limit)
-        } else {
-            (value > self.value, value > self.limit)
-        };
-        if worse {
+        let worse_than = |other: f64| if least { value < other } else { value > other };
+        if worse_than(self.value) {
             (self.value, self.time_s) = (value, time_s);
         }
-        if broken || value.is_nan() {
+        if worse_than(self.limit) || value.is_nan() {
             self.broken_s.get_or_insert(time_s);
         }
     }
@@ -294,35 +273,35 @@ impl RuleMargin {
 impl JudgedArm {
     /// The rules of its mode, in the order in which it looks at them.
     pub(super) fn rules(&self, limits: &Limits) -> Vec<RuleMargin> {
+        let margin = RuleMargin::new;
         let speed = 1.0 + SPEED_SLACK;
+        let joint_speed = limits.velocity_max_rad_s[0] * speed;
+        let astray_rad = ASTRAY_PART * Thresholds::strict().tracking_error_max_rad;
         // The controller looks before the arm does.
-        let step = RuleMargin::new(Rule::StepLength, STEP_MAX_M);
-        let mut out = match self.interface {
-            CommandInterface::ServoPosition => vec![
-                step,
-                RuleMargin::new(Rule::JointRange, RANGE_TOLERANCE_RAD),
-                RuleMargin::new(Rule::JointSpeed, limits.velocity_max_rad_s[0] * speed),
-                RuleMargin::new(Rule::ToolSpeed, self.speed_factor * speed),
-                RuleMargin::new(Rule::SelfCollision, 0.0),
-            ],
+        let mut out = vec![margin(Rule::StepLength, STEP_MAX_M)];
+        let stray_m = match self.interface {
+            CommandInterface::ServoPosition => {
+                out.extend([
+                    margin(Rule::JointRange, RANGE_TOLERANCE_RAD),
+                    margin(Rule::JointSpeed, joint_speed),
+                    margin(Rule::ToolSpeed, self.speed_factor * speed),
+                    margin(Rule::SelfCollision, 0.0),
+                ]);
+                0.0
+            }
             // Speeds are limited before they are sent; where the joints go is not quite
             // where the plan goes.
-            CommandInterface::JointVelocity => vec![
-                step,
-                RuleMargin::new(Rule::JointRange, -VELOCITY_STRAY_RAD),
-                RuleMargin::new(Rule::SelfCollision, VELOCITY_GAP_M),
-                RuleMargin::new(
-                    Rule::Tracking,
-                    ASTRAY_PART * Thresholds::strict().tracking_error_max_rad,
-                ),
-            ],
+            CommandInterface::JointVelocity => {
+                out.extend([
+                    margin(Rule::JointRange, -VELOCITY_STRAY_RAD),
+                    margin(Rule::SelfCollision, VELOCITY_GAP_M),
+                    margin(Rule::Tracking, astray_rad),
+                ]);
+                VELOCITY_STRAY_M
+            }
         };
         if self.fence.is_some() {
-            let stray_m = match self.interface {
-                CommandInterface::ServoPosition => 0.0,
-                CommandInterface::JointVelocity => VELOCITY_STRAY_M,
-            };
-            out.push(RuleMargin::new(Rule::SafetyBoundary, stray_m));
+            out.push(margin(Rule::SafetyBoundary, stray_m));
         }
         out
     }

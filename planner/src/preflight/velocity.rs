@@ -5,6 +5,7 @@
 //! where the plan turns hard, and the controller's position loop brings it back. The plan
 //! is run here against that, cycle by cycle, with the controller's own position loop.
 
+use super::rules::Step;
 use arm_model::{JOINTS, JointState, JointTrajectory, JointVector, Limits};
 use control_core::control::brake::brake_with_jerk;
 use control_core::control::velocity_interface::VelocityInterface;
@@ -23,52 +24,31 @@ const REPORTED_LATE: usize = 2;
 /// How long the motion is watched after the end of the plan (s).
 const SETTLE_S: f64 = 0.3;
 
-/// One cycle of the plan.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cycle {
-    /// Since the beginning of the plan (s).
-    pub(super) time_s: f64,
-    /// Where the plan is (rad).
-    pub(super) planned: JointVector,
-    /// Where the firmware has brought the joints (rad).
-    pub(super) q: JointVector,
-    /// How far the joints, as they are reported, are outside all that was planned within
-    /// the controller's window: what it stops for (rad).
-    pub(super) astray_rad: f64,
-}
-
-/// The arm's way from velocity to velocity.
-#[derive(Debug, Clone, Copy)]
-struct Ramp {
-    state: JointState,
-}
-
-impl Ramp {
-    /// One cycle towards `qd` (rad/s). Seen from there it is a brake to rest.
-    fn advance(&mut self, qd: &JointVector, limits: &Limits) {
-        let period_s = limits.period_s();
-        let seen = JointState {
-            qd: self.state.qd - *qd,
-            ..self.state
-        };
-        let after = brake_with_jerk(&seen, limits, |_| JERK_RAD_S3).state_at(period_s);
-        self.state = JointState {
-            q: after.q + *qd * period_s,
-            qd: after.qd + *qd,
-            qdd: after.qdd,
-        };
+/// One cycle of the arm's way from velocity to velocity, towards `qd` (rad/s). Seen from
+/// there it is a brake to rest.
+fn ramp(state: &JointState, qd: &JointVector, limits: &Limits) -> JointState {
+    let period_s = limits.period_s();
+    let seen = JointState {
+        qd: state.qd - *qd,
+        ..*state
+    };
+    let after = brake_with_jerk(&seen, limits, |_| JERK_RAD_S3).state_at(period_s);
+    JointState {
+        q: after.q + *qd * period_s,
+        qd: after.qd + *qd,
+        qdd: after.qdd,
     }
 }
 
-/// The motion of a plan that is sent as velocities.
-pub(super) fn cycles(trajectory: &JointTrajectory, limits: &Limits) -> Vec<Cycle> {
+/// The motion of a plan that is sent as velocities, by time since its beginning (s): where the
+/// plan is, where the firmware has brought the joints, and how far these, as they are
+/// reported, are outside all that was planned within the controller's window.
+pub(super) fn steps(trajectory: &JointTrajectory, limits: &Limits) -> Vec<(f64, Step)> {
     let period_s = limits.period_s();
     let window = window_cycles(period_s);
     let count = ((trajectory.duration_s() + SETTLE_S) / period_s).ceil() as u32;
     let start = trajectory.start();
-    let mut ramp = Ramp {
-        state: JointState::at_rest(start),
-    };
+    let mut arm = JointState::at_rest(start);
     let mut interface = VelocityInterface::default();
     // Newest last: what was planned, and what the firmware asked for.
     let mut planned = VecDeque::from(vec![start; window]);
@@ -80,25 +60,20 @@ pub(super) fn cycles(trajectory: &JointTrajectory, limits: &Limits) -> Vec<Cycle
         let target = trajectory.state_at(time_s);
         let shown = asked.pop_front().unwrap_or(start);
         planned.push_back(target.q);
-        out.push(Cycle {
-            time_s,
-            planned: target.q,
-            q: ramp.state.q,
+        let step = Step {
+            q: arm.q,
             astray_rad: outside_rad(&shown, &planned),
-        });
+            ..Step::at(target.q)
+        };
+        out.push((time_s, step));
         planned.pop_front();
-        asked.push_back(ramp.state.q);
+        asked.push_back(arm.q);
         off.push_back(target.q - shown);
         let reported = off.pop_front().unwrap_or_default();
-        let command = interface.command(
-            &target,
-            &reported,
-            period_s,
-            limits,
-            limits.tcp_speed_max_m_s,
-        );
+        let speed_max = limits.tcp_speed_max_m_s;
+        let command = interface.command(&target, &reported, period_s, limits, speed_max);
         if let ArmCommand::Velocity { qd, .. } = command {
-            ramp.advance(&qd, limits);
+            arm = ramp(&arm, &qd, limits);
         }
     }
     out
@@ -137,13 +112,13 @@ mod tests {
     #[test]
     fn a_gentle_plan_is_followed_and_a_hard_one_less_well() {
         let limits = Limits::default();
-        let gentle = cycles(&swing(0.5, 2.0), &limits);
-        let off = |c: &Cycle| (c.planned - c.q).max_abs();
-        let worst = |cycles: &[Cycle]| cycles.iter().map(off).fold(0.0, f64::max);
+        let gentle = steps(&swing(0.5, 2.0), &limits);
+        let off = |(_, step): &(f64, Step)| (step.setpoint - step.q).max_abs();
+        let worst = |steps: &[(f64, Step)]| steps.iter().map(off).fold(0.0, f64::max);
         assert!(worst(&gentle) < 0.02, "{}", worst(&gentle));
-        assert!(gentle.iter().all(|c| c.astray_rad < 0.005));
+        assert!(gentle.iter().all(|(_, step)| step.astray_rad < 0.005));
         assert!(off(gentle.last().unwrap()) < 0.005);
-        let hard = cycles(&swing(0.8, 0.5), &limits);
+        let hard = steps(&swing(0.8, 0.5), &limits);
         assert!(worst(&hard) > 2.0 * worst(&gentle), "{}", worst(&hard));
     }
 
@@ -151,21 +126,18 @@ mod tests {
     #[test]
     fn ramps_keep_acceleration_and_jerk() {
         let limits = Limits::default();
-        let mut ramp = Ramp {
-            state: JointState::at_rest(START_POSE),
-        };
+        let mut arm = JointState::at_rest(START_POSE);
         let mut way_rad = 0.0;
         for k in 0..400_u32 {
-            let before = ramp.state;
+            let before = arm;
             let wanted = if k < 200 { 3.0 } else { -1.0 };
-            ramp.advance(&JointVector::splat(wanted), &limits);
-            let jerk = (ramp.state.qdd - before.qdd).max_abs() / limits.period_s();
-            assert!(ramp.state.qdd.max_abs() <= 20.0 + 1e-9);
+            arm = ramp(&arm, &JointVector::splat(wanted), &limits);
+            let jerk = (arm.qdd - before.qdd).max_abs() / limits.period_s();
+            assert!(arm.qdd.max_abs() <= 20.0 + 1e-9);
             assert!(jerk <= JERK_RAD_S3 * (1.0 + 1e-9), "{jerk}");
-            let mean = 0.5 * (ramp.state.qd[0] + before.qd[0]);
-            way_rad += mean * limits.period_s();
+            way_rad += 0.5 * (arm.qd[0] + before.qd[0]) * limits.period_s();
         }
-        assert!((ramp.state.qd[0] + 1.0).abs() < 1e-9);
-        assert!((ramp.state.q[0] - START_POSE[0] - way_rad).abs() < 1e-3);
+        assert!((arm.qd[0] + 1.0).abs() < 1e-9);
+        assert!((arm.q[0] - START_POSE[0] - way_rad).abs() < 1e-3);
     }
 }

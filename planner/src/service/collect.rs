@@ -1,6 +1,5 @@
 //! Keypoint frames as they are published, kept until asked for.
 
-use super::error::ServiceError;
 use shared_types::ipc::{Bus, IpcError, KEYPOINT_SERVICE, KeypointSubscriber};
 use shared_types::keypoints::{KeypointFrame, KeypointTrack};
 use std::collections::VecDeque;
@@ -36,11 +35,7 @@ impl Collector {
 
     /// The `wanted` frames from the last one stamped `first_stamp_ns` on, time 0
     /// at that one.
-    pub(super) fn track(
-        &self,
-        first_stamp_ns: u64,
-        wanted: u32,
-    ) -> Result<KeypointTrack, ServiceError> {
+    pub(super) fn track(&self, first_stamp_ns: u64, wanted: u32) -> Result<KeypointTrack, String> {
         let wanted = wanted as usize;
         let start = self
             .frames
@@ -48,14 +43,14 @@ impl Collector {
             .rposition(|f| f.stamp_ns == first_stamp_ns)
             .unwrap_or(self.frames.len());
         let found = (self.frames.len() - start).min(wanted);
-        let missing = ServiceError::MissingKeypoints {
-            found,
-            wanted,
-            first_stamp_ns,
-        };
-        if found < wanted {
-            return Err(missing);
-        }
-        KeypointTrack::from_published(self.frames.range(start..start + wanted)).ok_or(missing)
+        let frames = self.frames.range(start..start + found);
+        (found == wanted)
+            .then(|| KeypointTrack::from_published(frames))
+            .flatten()
+            .ok_or_else(|| {
+                format!(
+                    "{found} of {wanted} keypoint frames are here, the first stamped {first_stamp_ns} ns; track the recording first"
+                )
+            })
     }
 }

@@ -7,15 +7,13 @@
 //! ends the work.
 
 mod collect;
-mod error;
 mod message;
 
-pub use error::ServiceError;
 pub use message::{IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc};
 
 use crate::config::PlannerConfig;
 use crate::observation::{Observation, ObservedPoints};
-use crate::plan::{PlanError, PlanRequest};
+use crate::plan::PlanRequest;
 use arm_model::JointVector;
 use collect::Collector;
 use rope_sim::MeasuredArm;
@@ -23,6 +21,7 @@ use shared_types::MonotonicNs;
 use shared_types::ipc::message::Progress;
 use shared_types::ipc::rpc::{Call, RpcServer};
 use shared_types::ipc::{Bus, IpcError};
+use std::error::Error;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -31,7 +30,7 @@ use std::time::Duration;
 ///
 /// # Errors
 /// When shared memory cannot be used.
-pub fn run(config: &PlannerConfig, stop: &AtomicBool) -> Result<(), ServiceError> {
+pub fn run(config: &PlannerConfig, stop: &AtomicBool) -> Result<(), IpcError> {
     let bus = Bus::join(&config.domain)?;
     let mut collector = Collector::open(&bus)?;
     let server = RpcServer::<PlannerRpc>::open(&bus)?;
@@ -42,11 +41,14 @@ pub fn run(config: &PlannerConfig, stop: &AtomicBool) -> Result<(), ServiceError
             Ok(Some(call)) => serve(&mut collector, &Client { call, stop }),
             Ok(None) => std::thread::sleep(Duration::from_millis(5)),
             Err(e @ IpcError::Message { .. }) => tracing::warn!("{e}"),
-            Err(e) => return Err(e.into()),
+            Err(e) => return Err(e),
         }
     }
     Ok(())
 }
+
+/// An answer, or in one sentence why there is none.
+type Answer = Result<PlannerEvent, Box<dyn Error>>;
 
 /// Who asked, and whether to go on for them.
 struct Client<'a> {
@@ -74,7 +76,7 @@ fn serve(collector: &mut Collector, client: &Client<'_>) {
         PlannerRequest::Plan(request) => plan(request, client),
         PlannerRequest::Settle(request) => crate::settle(request, &mut |p| client.report(p))
             .map(|found| PlannerEvent::Settled(Box::new(found)))
-            .map_err(ServiceError::from),
+            .map_err(Box::from),
     };
     let event = result.unwrap_or_else(|e| PlannerEvent::Failed {
         message: e.to_string(),
@@ -84,11 +86,7 @@ fn serve(collector: &mut Collector, client: &Client<'_>) {
     }
 }
 
-fn identify(
-    collector: &mut Collector,
-    request: &IdentifyRequest,
-    client: &Client<'_>,
-) -> Result<PlannerEvent, ServiceError> {
+fn identify(collector: &mut Collector, request: &IdentifyRequest, client: &Client<'_>) -> Answer {
     collector.drain()?;
     let track = collector.track(request.first_stamp_ns, request.frames)?;
     let epoch = MonotonicNs(request.first_stamp_ns);
@@ -97,7 +95,8 @@ fn identify(
         .iter()
         .map(|(t, q)| (MonotonicNs(*t).since_s(epoch), *q))
         .unzip();
-    let motion = MeasuredArm::new(&times_s, &q, request.pole)?;
+    let motion = MeasuredArm::new(&times_s, &q, request.pole)
+        .map_err(|e| format!("measured joints: {e}"))?;
     let observation = Observation {
         track: &track,
         points: ObservedPoints::ArcLength,
@@ -111,15 +110,15 @@ fn identify(
     Ok(PlannerEvent::Identified(Box::new(estimate)))
 }
 
-fn plan(request: &PlanRequest, client: &Client<'_>) -> Result<PlannerEvent, ServiceError> {
+fn plan(request: &PlanRequest, client: &Client<'_>) -> Answer {
     let mut generation = 0;
     let plan = crate::plan(request, &mut |p| {
-        generation = p.generation;
+        generation = p.done;
         client.report(p)
     })?;
     // Nobody waits for a throw that was interrupted, and nobody may throw it by mistake.
     if plan.interrupted {
-        return Err(PlanError::Cancelled { generation }.into());
+        return Err(format!("planning was cancelled after generation {generation}").into());
     }
     Ok(PlannerEvent::Planned(Box::new(plan)))
 }

@@ -1,11 +1,10 @@
 //! The arm from the moment the rope hung still to the end of a move: measured
 //! joints, a hold, then the move.
 
-use super::error::SettleError;
-use super::request::SettleRequest;
+use super::request::{SettleError, SettleRequest};
 use crate::OutOfRange;
 use arm_model::kinematics::FrameMotion;
-use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector};
+use arm_model::{Cell, JointState, JointTrajectory, JointVector};
 use rope_sim::{AttachMotion, MeasuredArm};
 
 /// Largest distance of a joint from the commanded start pose (rad): above what
@@ -33,24 +32,26 @@ impl Prelude {
         let last_s = measured.duration_s();
         let start_s = request.start_s;
         if !(start_s >= last_s && start_s > 0.0 && start_s.is_finite()) {
-            return Err(SettleError::StartsTooEarly { start_s, last_s });
+            return Err(SettleError::Start(format!(
+                "the settling move would begin {start_s:.3} s after the rope hung still, but the joints were measured until {last_s:.3} s; begin it later"
+            )));
         }
         let expected = "at most half an hour (1800 s)";
         OutOfRange::check([("start_s", start_s, start_s <= START_MAX_S, expected)])?;
         let standing_error = measured.joints_at(start_s).q - request.start_q;
-        let off = |j: usize| standing_error[j];
-        match (0..JOINTS).find(|&j| off(j).is_nan() || off(j).abs() > START_TOLERANCE_RAD) {
-            Some(j) => Err(SettleError::NotAtStart {
-                joint: j + 1,
-                off_rad: off(j),
-            }),
-            None => Ok(Self {
-                measured,
-                cell: request.cell,
-                start_s,
-                standing_error,
-            }),
+        for (joint, off_rad) in (1..).zip(standing_error.iter()) {
+            if off_rad.is_nan() || off_rad.abs() > START_TOLERANCE_RAD {
+                return Err(SettleError::Start(format!(
+                    "joint {joint} stands {off_rad:.4} rad away from the start of the settling move; hold the start pose first"
+                )));
+            }
         }
+        Ok(Self {
+            measured,
+            cell: request.cell,
+            start_s,
+            standing_error,
+        })
     }
 
     /// The arm that makes this move after all that was.

@@ -1,11 +1,11 @@
 //! Offsets of least residual vibration: damped Gauss-Newton, all finite differences in one
 //! batch of simulations.
 
-use super::error::SettleError;
-use super::request::{SettleConfig, SettleProgress};
+use super::request::{SettleConfig, SettleError};
 use super::residual::{Residual, ResidualSimulator};
 use super::shape::MoveShape;
 use nalgebra::{DMatrix, DVector};
+use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
 
 /// Step of the finite differences (rad): moves the rope by millimetres, far
@@ -49,7 +49,7 @@ pub(super) fn least_residual(
     shape: &MoveShape,
     simulator: &ResidualSimulator<'_>,
     config: &SettleConfig,
-    progress: &mut dyn FnMut(SettleProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<LeastResidual, SettleError> {
     let mut x = DVector::from_vec(shape.no_offsets());
     let mut at = linearise(shape, simulator, config, &x)?.ok_or(SettleError::Diverged)?;
@@ -59,13 +59,14 @@ pub(super) fn least_residual(
         if at.residual_m2.sqrt() < config.stop_below_rms_m || damping > DAMPING_MAX_M_PER_RAD {
             break;
         }
-        let report = SettleProgress {
-            step,
-            steps: config.iterations,
-            residual_m: at.residual.largest_m,
+        let report = Progress {
+            done: u32::try_from(step).unwrap_or(u32::MAX),
+            total: u32::try_from(config.iterations).unwrap_or(u32::MAX),
+            value: 100.0 * at.residual.largest_m,
+            label: "residual cm".to_owned(),
         };
         if progress(report).is_break() {
-            return Err(SettleError::Cancelled { step });
+            return Err(SettleError::Cancelled(step));
         }
         let ridge = DMatrix::from_diagonal_element(x.len(), x.len(), damping.powi(2));
         let Some(factor) = (&at.normal + ridge).cholesky() else {
@@ -106,14 +107,11 @@ fn linearise(
             shape.trajectory(beside.as_slice())
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let Some(found) = simulator.slopes(&here, &beside, STEP_RAD)? else {
+    let Some((here, slopes)) = simulator.slopes(&here, &beside, STEP_RAD)? else {
         return Ok(None);
     };
-    let here = found.residual;
     let residuals = DVector::from_column_slice(&here.displacements_m);
-    let slopes = DMatrix::from_fn(residuals.len(), x.len(), |row, column| {
-        found.slopes[column][row]
-    });
+    let slopes = DMatrix::from_fn(residuals.len(), x.len(), |row, column| slopes[column][row]);
     // Six numbers per frame: tip and middle in three axes.
     let per_frame = 6.0 / residuals.len().max(1) as f64;
     let price = config.offset_cost_m_per_rad.powi(2);

@@ -9,23 +9,21 @@
 //! nonlinear model in the place of a list of frequencies.
 
 mod chain;
-mod clear;
 mod descent;
-mod error;
 mod request;
 mod residual;
 mod shape;
 #[cfg(test)]
 mod tests;
 
-pub use error::SettleError;
-pub use request::{SettleConfig, SettleMove, SettleProgress, SettleRequest};
+pub use request::{SettleConfig, SettleError, SettleMove, SettleRequest};
 
 use arm_model::JointTrajectory;
 use chain::Prelude;
 use descent::LeastResidual;
 use residual::{Residual, ResidualSimulator};
 use shape::MoveShape;
+use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
 
 /// Fractions of the offsets found that are tried, largest first: where limits or
@@ -40,35 +38,34 @@ const FRACTIONS: [f64; 5] = [0.8, 0.6, 0.4, 0.2, 0.0];
 /// See [`SettleError`].
 pub fn settle(
     request: &SettleRequest,
-    progress: &mut dyn FnMut(SettleProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<SettleMove, SettleError> {
     let config = &request.config;
     config.check()?;
     request.rope.validate()?;
     let prelude = Prelude::new(request)?;
-    let mut best: Option<SettleMove> = None;
-    let mut refused = SettleError::NoDuration;
+    let mut best = Err(SettleError::NoDuration);
     for duration_s in &config.durations_s {
         match settle_within(request, &prelude, *duration_s, progress) {
             Ok(found) => {
-                let least = best.as_ref().map_or(f64::INFINITY, |b| b.residual_m);
-                if found.residual_m < least {
-                    best = Some(found);
+                let least_m = best
+                    .as_ref()
+                    .map_or(f64::INFINITY, |b: &SettleMove| b.residual_m);
+                if found.residual_m < least_m {
+                    best = Ok(found);
                 }
             }
-            Err(error @ (SettleError::BreaksLimit { .. } | SettleError::TooClose { .. })) => {
-                refused = error;
+            Err(error @ (SettleError::BreaksLimit(_) | SettleError::TooClose(_))) => {
+                best = best.or(Err(error));
             }
             Err(error) => return Err(error),
         }
-        if best
-            .as_ref()
-            .is_some_and(|b| b.residual_m <= config.residual_max_m)
-        {
+        let small_m = config.residual_max_m;
+        if best.as_ref().is_ok_and(|b| b.residual_m <= small_m) {
             break;
         }
     }
-    best.ok_or(refused)
+    best
 }
 
 /// The move of one duration that leaves the least residual vibration.
@@ -76,15 +73,13 @@ fn settle_within(
     request: &SettleRequest,
     prelude: &Prelude,
     duration_s: f64,
-    progress: &mut dyn FnMut(SettleProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<SettleMove, SettleError> {
     let config = &request.config;
     let shape = MoveShape::new(request.start_q, request.end_q, duration_s, config.knot_s);
     let plain = shape.trajectory(&shape.no_offsets())?;
     if let Some(margin) = request.limits.worst_violation(&plain) {
-        return Err(SettleError::BreaksLimit {
-            what: margin.describe(),
-        });
+        return Err(SettleError::BreaksLimit(margin.describe()));
     }
     let simulator = ResidualSimulator::new(&request.rope, prelude, &plain, config.threads)?;
     let found = descent::least_residual(&shape, &simulator, config, progress)?;
@@ -105,9 +100,9 @@ fn choose(
         if !residual.finite || request.limits.worst_violation(trajectory).is_some() {
             return false;
         }
-        let room = clear::room(&request.rope, simulator, trajectory, residual);
-        gap_m = room.rope_gap_m;
-        gap_m >= request.config.clearance_m && !room.tool_touches
+        let touches;
+        (gap_m, touches) = simulator.room(trajectory, residual);
+        gap_m >= request.config.clearance_m && !touches
     };
     let whole = shape.trajectory(&found.offsets_rad)?;
     if allowed(&whole, &found.residual) {
@@ -136,5 +131,5 @@ fn choose(
             plain_residual_m,
             residual_m: residual.largest_m,
         })
-        .ok_or(SettleError::TooClose { gap_m })
+        .ok_or(SettleError::TooClose(gap_m))
 }

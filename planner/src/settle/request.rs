@@ -1,11 +1,12 @@
-//! What a settling move is planned from, and what comes of it.
+//! What a settling move is planned from, what comes of it, and why there is none.
 
-use super::error::SettleError;
 use crate::OutOfRange;
-use arm_model::{Cell, JointTrajectory, JointVector, Limits};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
+use rope_sim::sensitivity::SensitivityError;
+use rope_sim::{MotionError, SimulateError};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
-use shared_types::ipc::message::Progress;
+use shared_types::rope::RopeError;
 
 /// What a settling move starts from and ends in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,86 +81,77 @@ pub struct SettleMove {
     pub residual_m: f64,
 }
 
-/// How far the search for a settling move has come, reported before every Gauss-Newton
-/// step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SettleProgress {
-    /// Steps done for the duration that is tried.
-    pub step: usize,
-    /// Most steps.
-    pub steps: usize,
-    /// Largest distance of the tip from its place at rest after the best move so far (m).
-    pub residual_m: f64,
-}
-
-impl From<SettleProgress> for Progress {
-    fn from(p: SettleProgress) -> Self {
-        Self {
-            done: u32::try_from(p.step).unwrap_or(u32::MAX),
-            total: u32::try_from(p.steps).unwrap_or(u32::MAX),
-            value: 100.0 * p.residual_m,
-            label: "residual cm".to_owned(),
-        }
-    }
-}
-
 impl SettleConfig {
     pub(super) fn check(&self) -> Result<(), SettleError> {
         if self.durations_s.is_empty() {
             return Err(SettleError::NoDuration);
         }
-        let (shortest_s, longest_s) = self
+        let within = OutOfRange::unless_within;
+        let durations = [("durations_s", self.durations_s.len() as f64)];
+        within(0.0..=10.0, "at most 10 durations", &durations)?;
+        let iterations = [("iterations", self.iterations as f64)];
+        within(0.0..=1000.0, "at most 1000", &iterations)?;
+        let durations_s: Vec<_> = self
             .durations_s
             .iter()
-            .fold((f64::INFINITY, 0.0_f64), |(lo, hi), d| {
-                (lo.min(*d), hi.max(*d))
-            });
-        let outside_s = if shortest_s < 1.0 {
-            shortest_s
-        } else {
-            longest_s
-        };
-        let (durations, iterations) = (self.durations_s.len(), self.iterations);
-        let rules = [
-            (
-                "durations_s",
-                durations as f64,
-                durations <= 10,
-                "at most 10 durations",
-            ),
-            (
-                "iterations",
-                iterations as f64,
-                iterations <= 1000,
-                "at most 1000",
-            ),
-            (
-                "durations_s",
-                outside_s,
-                shortest_s >= 1.0
-                    && longest_s <= 30.0
-                    && self.durations_s.iter().all(|d| d.is_finite()),
-                "from 1 to 30 s",
-            ),
-            (
-                "knot_s",
-                self.knot_s,
-                self.knot_s >= 0.1 && 3.0 * self.knot_s <= shortest_s,
-                "from 0.1 s to a third of the shortest duration",
-            ),
-            (
-                "offset_cost_m_per_rad",
-                self.offset_cost_m_per_rad,
-                self.offset_cost_m_per_rad > 0.0 && self.offset_cost_m_per_rad < 10.0,
-                "above 0 and below 10 m/rad",
-            ),
-            (
-                "clearance_m",
-                self.clearance_m,
-                self.clearance_m >= 0.0 && self.clearance_m < 1.0,
-                "from 0 to 1 m",
-            ),
-        ];
-        Ok(OutOfRange::check(rules)?)
+            .map(|d| ("durations_s", *d))
+            .collect();
+        within(1.0..=30.0, "from 1 to 30 s", &durations_s)?;
+        let clearance = [("clearance_m", self.clearance_m)];
+        within(0.0..=1.0, "from 0 to 1 m", &clearance)?;
+        let cost = [("offset_cost_m_per_rad", self.offset_cost_m_per_rad)];
+        let range = f64::MIN_POSITIVE..=10.0;
+        within(range, "above 0 and at most 10 m/rad", &cost)?;
+        let shortest_s = self
+            .durations_s
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let knot_s = [("knot_s", self.knot_s)];
+        let expected = "from 0.1 s to a third of the shortest duration";
+        Ok(within(0.1..=shortest_s / 3.0, expected, &knot_s)?)
     }
+}
+
+/// Why there is no settling move.
+#[derive(Debug, thiserror::Error)]
+pub enum SettleError {
+    /// A value of the configuration is out of range.
+    #[error("settle: {0}")]
+    Value(#[from] OutOfRange),
+    /// The configuration names no duration.
+    #[error("settle: `durations_s` is empty; name at least one duration")]
+    NoDuration,
+    /// The rope's parameters are not physical.
+    #[error(transparent)]
+    Rope(#[from] RopeError),
+    /// The measured joints make no motion.
+    #[error("measured joints: {0}")]
+    Joints(#[from] MotionError),
+    /// The arm is not known to stand where and when the move begins.
+    #[error("{0}")]
+    Start(String),
+    /// The knots make no trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// Even the plain move breaks a limit of the arm.
+    #[error("a plain move to the end pose breaks a limit: {0}; use longer `durations_s`")]
+    BreaksLimit(String),
+    /// Even the plain move brings rope or tool too near to something: gap of the rope (m).
+    #[error(
+        "every settling move brings the rope within {0:.3} m of arm or column or lets the tool collide; let the rope settle or choose another end pose"
+    )]
+    TooClose(f64),
+    /// The rope simulator refused.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// Slopes of the residual vibration could not be taken.
+    #[error(transparent)]
+    Sensitivity(#[from] SensitivityError),
+    /// The caller broke off after so many Gauss-Newton steps.
+    #[error("the settling move was cancelled after step {0}")]
+    Cancelled(usize),
+    /// The simulated rope blew up.
+    #[error("the simulation of the rope diverged; identify the rope again")]
+    Diverged,
 }

@@ -1,13 +1,13 @@
-//! How much the rope still swings after a move.
+//! How much the rope still swings after a move, and how near it comes to the arm.
 
 use super::chain::Prelude;
-use super::error::SettleError;
+use super::request::SettleError;
+use crate::collide::{ArmShape, RopeShape, rope_clearance_m, tool_contacts};
 use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use rope_sim::sensitivity::{Family, Perturbation, sensitivity};
 use rope_sim::{
-    Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, Start, Watch,
-    roll_out,
+    Candidate, FrameTimes, NodeTrack, Outcome, PlannedArm, Precision, SimOptions, roll_out,
 };
 use shared_types::RopeParams;
 
@@ -26,34 +26,21 @@ pub(super) struct Residual {
     pub(super) displacements_m: Vec<f64>,
     /// Largest distance of the tip from its place at rest after the move (m).
     pub(super) largest_m: f64,
-    /// Nodes from the start of the move on, [`Self::time_s`] apart.
-    pub(super) nodes: NodeTrack,
+    /// Nodes from the start of the move on, [`PERIOD_S`] apart.
+    nodes: NodeTrack,
     /// Whether the simulation stayed finite; nothing else means anything if not.
     pub(super) finite: bool,
 }
 
-/// Residual after one move and how neighbouring moves change it.
-#[derive(Debug)]
-pub(super) struct ResidualSlopes {
-    /// Residual after the move.
-    pub(super) residual: Residual,
-    /// Slopes of [`Residual::displacements_m`] towards each neighbour (m per unit).
-    pub(super) slopes: Vec<Vec<f64>>,
-}
-
-impl Residual {
-    /// Time of a frame of `nodes` after the start of the move (s).
-    pub(super) fn time_s(frame: usize) -> f64 {
-        frame as f64 * PERIOD_S
-    }
-}
+/// How [`Residual::displacements_m`] change towards each neighbouring move (m per unit).
+type Slopes = Vec<Vec<f64>>;
 
 /// Simulates one rope through moves of one duration and end pose.
 #[derive(Debug)]
 pub(super) struct ResidualSimulator<'a> {
     rope: &'a RopeParams,
     /// What the arm did before.
-    pub(super) prelude: &'a Prelude,
+    prelude: &'a Prelude,
     /// Tip and middle of the rope at rest in the end pose: node and place (m).
     rest: [(usize, Vector3<f64>); 2],
     options: SimOptions,
@@ -75,17 +62,13 @@ impl<'a> ResidualSimulator<'a> {
             prelude,
             rest: rest(rope, prelude, plain)?,
             options: SimOptions {
-                step_s: STEP_S,
-                precision: Precision::F32,
-                start: Start::Equilibrium,
                 frames: FrameTimes {
                     first_s: prelude.start_s,
                     period_s: PERIOD_S,
                     count: (shown_s / PERIOD_S).floor() as usize + 1,
                 },
-                watch: Watch::NOTHING,
-                horizon_s: prelude.start_s + shown_s,
                 threads,
+                ..SimOptions::new(STEP_S, Precision::F32, prelude.start_s + shown_s)
             },
             settled_frame: (plain.duration_s() / PERIOD_S).ceil() as usize,
         })
@@ -105,14 +88,14 @@ impl<'a> ResidualSimulator<'a> {
             .collect())
     }
 
-    /// Residual after `plan` and, per unit of `distance`, how its displacements change
-    /// towards each plan of `beside`; `None` where the rope diverges.
+    /// Residual after `plan` and its slopes per unit of `distance` towards each plan of `beside`;
+    /// `None` where the rope diverges.
     pub(super) fn slopes(
         &self,
         plan: &JointTrajectory,
         beside: &[JointTrajectory],
         distance: f64,
-    ) -> Result<Option<ResidualSlopes>, SettleError> {
+    ) -> Result<Option<(Residual, Slopes)>, SettleError> {
         let here = self.prelude.then(plan);
         let arms: Vec<_> = beside.iter().map(|t| self.prelude.then(t)).collect();
         let perturbations: Vec<Perturbation<'_>> = arms
@@ -127,10 +110,27 @@ impl<'a> ResidualSimulator<'a> {
         let slopes = found.slopes(|rollout| self.displacements_m(&rollout.nodes));
         let slopes: Option<Vec<_>> = slopes.into_iter().collect();
         let finite = found.base.outcome != Outcome::Diverged;
-        Ok(slopes.filter(|_| finite).map(|slopes| ResidualSlopes {
-            residual: self.residual(found.base.nodes, finite),
-            slopes,
-        }))
+        Ok(slopes
+            .filter(|_| finite)
+            .map(|slopes| (self.residual(found.base.nodes, finite), slopes)))
+    }
+
+    /// Smallest gap between rope and arm or column during a move and the swing after it (m),
+    /// and whether the tool side of the arm touches anything; looks at every frame.
+    pub(super) fn room(&self, trajectory: &JointTrajectory, residual: &Residual) -> (f64, bool) {
+        let cell = &self.prelude.cell;
+        let shape = RopeShape::from(self.rope);
+        let (mut gap_m, mut touches) = (f64::INFINITY, false);
+        for frame in 0..residual.nodes.frames() {
+            let commanded = trajectory.state_at(frame as f64 * PERIOD_S).q;
+            let arm = ArmShape::at(&(commanded + self.prelude.standing_error), &cell.pole);
+            let nodes: Vec<Vector3<f64>> = (0..residual.nodes.nodes())
+                .map(|n| residual.nodes.position(frame, n))
+                .collect();
+            gap_m = gap_m.min(rope_clearance_m(&arm, cell, &shape, &nodes));
+            touches |= !tool_contacts(&arm, cell).none();
+        }
+        (gap_m, touches)
     }
 
     fn residual(&self, nodes: NodeTrack, finite: bool) -> Residual {
@@ -168,22 +168,15 @@ fn rest(
         JointTrajectory::hold(plain.end() + prelude.standing_error, 1.0)?,
         prelude.cell.pole,
     );
-    let rollouts = roll_out(
-        &[Candidate::new(rope, &held)],
-        &SimOptions {
-            step_s: STEP_S,
-            precision: Precision::F64,
-            start: Start::Equilibrium,
-            frames: FrameTimes {
-                first_s: 0.0,
-                period_s: PERIOD_S,
-                count: 1,
-            },
-            watch: Watch::NOTHING,
-            horizon_s: PERIOD_S,
-            threads: 1,
+    let options = SimOptions {
+        frames: FrameTimes {
+            first_s: 0.0,
+            period_s: PERIOD_S,
+            count: 1,
         },
-    )?;
+        ..SimOptions::new(STEP_S, Precision::F64, PERIOD_S)
+    };
+    let rollouts = roll_out(&[Candidate::new(rope, &held)], &options)?;
     let nodes = &rollouts.first().ok_or(SettleError::Diverged)?.nodes;
     let tip = nodes.nodes() - 1;
     Ok([tip, tip.div_ceil(2)].map(|n| (n, nodes.position(0, n))))

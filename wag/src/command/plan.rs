@@ -127,7 +127,7 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
         ensemble,
         following: response.map(|r| Following::new(&r, &limits)),
     };
-    let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p.into())).map_err(classify)?;
+    let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p)).map_err(classify)?;
     plan.doubts = doubts;
     let warnings = warnings(&plan);
     check_fault(&plan, args).or_failed()?;

@@ -4,9 +4,9 @@
 //! Where the knot times are fixed, a candidate's second derivatives are one
 //! small matrix times its knots; a rejected draw costs well under a microsecond.
 
-use super::decode::{WAYPOINTS, WaypointSpace};
+use super::waypoints::{WAYPOINTS, WaypointSpace};
 use arm_model::kinematics;
-use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector, Limits};
+use arm_model::{Cell, JOINTS, JointState, JointTrajectory, Limits};
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 /// Distances the tool keeps from the cell (m).
@@ -32,7 +32,7 @@ const TOOL_STEPS_S: [f64; 2] = [0.06, 0.012];
 
 /// Checks candidates of one [`WaypointSpace`] against limits and cell.
 #[derive(Debug, Clone)]
-pub(crate) struct Screen {
+pub(super) struct Screen {
     space: WaypointSpace,
     limits: Limits,
     cell: Cell,
@@ -53,7 +53,7 @@ impl Screen {
     ///
     /// # Errors
     /// Waypoint times that do not increase.
-    pub(crate) fn new(
+    pub(super) fn new(
         space: WaypointSpace,
         limits: Limits,
         cell: Cell,
@@ -73,7 +73,7 @@ impl Screen {
     }
 
     /// Whether the arm may execute the candidate.
-    pub(crate) fn accepts(&self, x: &[f64]) -> bool {
+    pub(super) fn accepts(&self, x: &[f64]) -> bool {
         let knots = self.space.knots(x);
         let times = self.space.knot_times_s(x);
         let curvature = self.curvature.unwrap_or_else(|| curvature_matrix(&times));
@@ -84,23 +84,16 @@ impl Screen {
                 q,
             }
         });
-        let moved = self.space.dimensions.joints();
-        if !moved
-            .iter()
-            .all(|&j| self.joint_within_limits(j, &splines[j], &times))
-        {
-            return false;
-        }
-        TOOL_STEPS_S
-            .iter()
-            .all(|step| self.tool_within_limits(&splines, &times, *step))
+        let mut moved = self.space.dimensions.joints().iter();
+        moved.all(|&j| self.joint_within_limits(j, &splines[j], &times))
+            && TOOL_STEPS_S
+                .iter()
+                .all(|step| self.tool_within_limits(&splines, &times, *step))
     }
 
     fn joint_within_limits(&self, j: usize, s: &JointSpline, times: &[f64; 4]) -> bool {
-        let (lo, hi) = (
-            self.limits.position_min_rad[j],
-            self.limits.position_max_rad[j],
-        );
+        let lo = self.limits.position_min_rad[j];
+        let hi = self.limits.position_max_rad[j];
         let v_max = LIMIT_FRACTION * self.limits.velocity_max_rad_s[j];
         let a_max = LIMIT_FRACTION * self.limits.acceleration_max_rad_s2[j];
         if s.m.amax() > a_max || s.q.iter().any(|q| !(*q >= lo && *q <= hi)) {
@@ -161,7 +154,7 @@ impl Screen {
 
     /// Sum over joints of the speed above its limit (rad/s), the paper's
     /// `P_vel`; 0 for every candidate this screen accepts.
-    pub(crate) fn speed_excess_rad_s(&self, trajectory: &JointTrajectory) -> f64 {
+    pub(super) fn speed_excess_rad_s(&self, trajectory: &JointTrajectory) -> f64 {
         (0..JOINTS)
             .map(|j| {
                 let peak = trajectory.extrema(j).qd.value.abs();
@@ -175,11 +168,7 @@ fn state_at(splines: &[JointSpline; JOINTS], times: &[f64; 4], t: f64) -> JointS
     let i = (1..WAYPOINTS).filter(|&i| t >= times[i]).count();
     let h = times[i + 1] - times[i];
     let (a, b) = (times[i + 1] - t, t - times[i]);
-    let mut out = JointState {
-        q: JointVector::ZERO,
-        qd: JointVector::ZERO,
-        qdd: JointVector::ZERO,
-    };
+    let mut out = JointState::default();
     for (j, s) in splines.iter().enumerate() {
         let (m0, m1) = (s.m[i], s.m[i + 1]);
         let (c0, c1) = (s.q[i] / h - m0 * h / 6.0, s.q[i + 1] / h - m1 * h / 6.0);
@@ -214,7 +203,7 @@ mod tests {
     use super::*;
     use crate::plan::Dimensions;
     use arm_model::joint::START_POSE;
-    use arm_model::limits::{LimitKind, LimitsSpec};
+    use arm_model::limits::{LimitKind, LimitsSpec, Margin};
     use rand::{RngExt, SeedableRng};
 
     fn screen(tcp_speed: f64, stretch_max: f64) -> Screen {
@@ -234,6 +223,8 @@ mod tests {
     /// shared-types computes from the finished trajectory.
     #[test]
     fn agrees_with_the_margins_of_the_limits() {
+        let is_range = |k| matches!(k, LimitKind::PositionMin | LimitKind::PositionMax);
+        let is_roomy = |m: &Margin| m.left > 0.03 || is_range(m.kind);
         let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(4);
         let mut seen = [0; 2];
         for round in 0..3000 {
@@ -243,11 +234,8 @@ mod tests {
             let spread = rng.random_range(0.05..0.8);
             let waypoints = s.space.dimensions.count();
             for (i, v) in x.iter_mut().enumerate() {
-                let most = if i < waypoints {
-                    spread
-                } else {
-                    stretch_max.ln()
-                };
+                let stretch = stretch_max.ln();
+                let most = if i < waypoints { spread } else { stretch };
                 *v += most * rng.random_range(-1.0..1.0);
             }
             let trajectory = s.space.decode(&x).unwrap();
@@ -256,18 +244,12 @@ mod tests {
                 seen[0] += 1;
                 assert!(worst.is_none(), "accepted {worst:?}");
                 assert_eq!(s.speed_excess_rad_s(&trajectory), 0.0);
-            } else if s.limits.margins(&trajectory).iter().all(|m| {
-                m.left > 0.03 || matches!(m.kind, LimitKind::PositionMin | LimitKind::PositionMax)
-            }) && worst.is_none()
-            {
+            } else if worst.is_none() && s.limits.margins(&trajectory).iter().all(is_roomy) {
                 // Only the scene can be the reason.
                 let low = (0..=200).any(|k| {
-                    let q = trajectory
-                        .state_at(f64::from(k) * trajectory.duration_s() / 200.0)
-                        .q;
-                    let (p, r) = kinematics::flange_pose(&q);
-                    let end = p + r * s.cell.pole.end_m();
-                    !s.clear(&p) || !s.clear(&end)
+                    let t = f64::from(k) * trajectory.duration_s() / 200.0;
+                    let (p, r) = kinematics::flange_pose(&trajectory.state_at(t).q);
+                    !s.clear(&p) || !s.clear(&(p + r * s.cell.pole.end_m()))
                 });
                 assert!(low, "refused without a reason");
             } else {

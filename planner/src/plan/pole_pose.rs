@@ -39,16 +39,14 @@ impl PolePose {
         }
     }
 
-    /// A pose by how far the pole's end is outside and above a point (m), and its tilt
-    /// (rad).
+    /// Poses by how far the pole's end is outside and above a point (m), and its tilt (rad).
     #[must_use]
-    pub fn beside(point_m: [f64; 3], outside_m: f64, above_m: f64, tilt_rad: f64) -> Self {
-        let [x, y, z] = point_m;
-        Self {
+    pub fn beside<const N: usize>([x, y, z]: [f64; 3], places: [[f64; 3]; N]) -> [Self; N] {
+        places.map(|[outside_m, above_m, tilt_rad]| Self {
             rho_m: x.hypot(y) + outside_m,
             z_m: z + above_m,
             tilt_rad,
-        }
+        })
     }
 
     fn minus(self, other: Self) -> Vector3<f64> {
@@ -59,7 +57,7 @@ impl PolePose {
 
 /// Joints 2, 4 and 6 changed from `start` so that the pole takes the pose, or comes as
 /// near to it as the arm gets (rad).
-pub(crate) fn reach_pose(start: &JointVector, wanted: PolePose, pole: &Pole) -> JointVector {
+pub(super) fn reach_pose(start: &JointVector, wanted: PolePose, pole: &Pole) -> JointVector {
     const STEP: f64 = 1e-6;
     let mut q = *start;
     for _ in 0..ITERATIONS {
@@ -94,26 +92,12 @@ mod tests {
         assert!(down.tilt_rad.abs() < 1e-3 && (down.rho_m - 0.663).abs() < 2e-3);
         let mut start = START_POSE;
         start[0] = -0.6;
-        for wanted in [
-            PolePose {
-                rho_m: 0.55,
-                z_m: 0.7,
-                tilt_rad: 0.8,
-            },
-            PolePose {
-                rho_m: 0.80,
-                z_m: 0.45,
-                tilt_rad: 1.0,
-            },
-        ] {
+        let poses = [[0.55, 0.7, 0.8], [0.80, 0.45, 1.0], [2.0, 0.3, 1.5]];
+        let [high, far, beyond] = PolePose::beside([0.0; 3], poses);
+        for wanted in [high, far] {
             let found = PolePose::of(&reach_pose(&start, wanted, &pole), &pole);
             assert!(wanted.minus(found).norm() < 2e-3, "{wanted:?} {found:?}");
         }
-        let far = PolePose {
-            rho_m: 2.0,
-            z_m: 0.3,
-            tilt_rad: 1.5,
-        };
-        assert!(PolePose::of(&reach_pose(&start, far, &pole), &pole).rho_m > 0.85);
+        assert!(PolePose::of(&reach_pose(&start, beyond, &pole), &pole).rho_m > 0.85);
     }
 }

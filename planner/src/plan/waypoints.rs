@@ -1,10 +1,15 @@
-//! From search coordinates to joint trajectories.
+//! The space in which a throw is searched for (CMA-ES-traj), and its trajectories.
+//!
+//! Paper, section "CMA-ES Trajectory Optimization" and appendix "Trajectory
+//! Parameterization and Velocity Filtering": three joint-space waypoints at fixed
+//! times, a cubic spline from the start pose, candidates that break a limit
+//! rejected when they are drawn.
 
 use arm_model::{JointTrajectory, JointVector, Limits, TrajectoryError};
 use serde::{Deserialize, Serialize};
 
 /// Free waypoints of a throw (paper: three).
-pub(crate) const WAYPOINTS: usize = 3;
+pub(super) const WAYPOINTS: usize = 3;
 
 /// Which joints a search moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,7 +44,7 @@ impl Dimensions {
 /// the third; where the times are free too, then the logarithm of how much each
 /// of the three segments is stretched.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct WaypointSpace {
+pub(super) struct WaypointSpace {
     /// Pose at rest from which the throw starts (rad).
     pub start: JointVector,
     /// Which joints move.
@@ -53,12 +58,12 @@ pub(crate) struct WaypointSpace {
 
 impl WaypointSpace {
     /// Whether the times of the waypoints are free.
-    pub(crate) fn is_timed(&self) -> bool {
+    pub(super) fn is_timed(&self) -> bool {
         self.stretch_max > 1.0
     }
 
     /// Number of search coordinates.
-    pub(crate) fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.dimensions.count() + if self.is_timed() { WAYPOINTS } else { 0 }
     }
 
@@ -74,26 +79,26 @@ impl WaypointSpace {
     }
 
     /// The point that stays in the start pose.
-    pub(crate) fn resting(&self) -> Vec<f64> {
+    pub(super) fn resting(&self) -> Vec<f64> {
         self.filled(|j| self.start[j], 0.0)
     }
 
     /// Ranges of the coordinates as (lower, upper): those of the joints (rad), and of
     /// the stretches' logarithms.
-    pub(crate) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
         let most = self.stretch_max.ln();
         let of_joint = |j: usize| (limits.position_min_rad[j], limits.position_max_rad[j]);
         self.filled(of_joint, (-most, most)).into_iter().unzip()
     }
 
     /// Deviations of a first generation from those of the joints (rad).
-    pub(crate) fn std_dev(&self, of_joints_rad: &JointVector) -> Vec<f64> {
+    pub(super) fn std_dev(&self, of_joints_rad: &JointVector) -> Vec<f64> {
         // The bounds are three deviations away.
         self.filled(|j| of_joints_rad[j], self.stretch_max.ln() / 3.0)
     }
 
     /// Times of all knots of the spline of a point, start included (s).
-    pub(crate) fn knot_times_s(&self, x: &[f64]) -> [f64; WAYPOINTS + 1] {
+    pub(super) fn knot_times_s(&self, x: &[f64]) -> [f64; WAYPOINTS + 1] {
         let mut out = [0.0; WAYPOINTS + 1];
         out[1..].copy_from_slice(&self.times_s);
         if self.is_timed() {
@@ -108,7 +113,7 @@ impl WaypointSpace {
 
     /// Poses at all knots of the spline, start included (rad). Missing
     /// coordinates stay at the start pose.
-    pub(crate) fn knots(&self, x: &[f64]) -> [JointVector; WAYPOINTS + 1] {
+    pub(super) fn knots(&self, x: &[f64]) -> [JointVector; WAYPOINTS + 1] {
         let joints = self.dimensions.joints();
         let mut out = [self.start; WAYPOINTS + 1];
         for (knot, part) in out[1..].iter_mut().zip(x.chunks(joints.len())) {
@@ -123,7 +128,7 @@ impl WaypointSpace {
     ///
     /// # Errors
     /// Numbers that are not finite, waypoint times out of order.
-    pub(crate) fn decode(&self, x: &[f64]) -> Result<JointTrajectory, TrajectoryError> {
+    pub(super) fn decode(&self, x: &[f64]) -> Result<JointTrajectory, TrajectoryError> {
         JointTrajectory::new(&self.knot_times_s(x), &self.knots(x))
     }
 }
@@ -133,23 +138,27 @@ mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
 
+    /// Spaces of three and of seven joints, with times that stretch by as much.
+    fn spaces(stretch_max: f64) -> [WaypointSpace; 2] {
+        [Dimensions::Planar, Dimensions::Full].map(|dimensions| WaypointSpace {
+            start: START_POSE,
+            dimensions,
+            times_s: [0.4, 0.8, 1.1],
+            stretch_max,
+        })
+    }
+
     #[test]
     fn coordinates_land_on_their_joints_and_waypoints() {
-        for dimensions in [Dimensions::Planar, Dimensions::Full] {
-            let space = WaypointSpace {
-                start: START_POSE,
-                dimensions,
-                times_s: [0.4, 0.8, 1.1],
-                stretch_max: 1.0,
-            };
+        for space in spaces(1.0) {
             let mut x = space.resting();
-            assert_eq!(x.len(), dimensions.count());
+            assert_eq!(x.len(), space.dimensions.count());
             let rest = space.decode(&x).unwrap();
             assert_eq!(rest.start(), rest.end());
-            let per_waypoint = dimensions.joints().len();
-            x[per_waypoint] += 0.25;
+            let joints = space.dimensions.joints();
+            x[joints.len()] += 0.25;
             let moved = space.decode(&x).unwrap();
-            let joint = dimensions.joints()[0];
+            let joint = joints[0];
             assert!((moved.waypoints()[2][joint] - START_POSE[joint] - 0.25).abs() < 1e-12);
             assert_eq!(moved.waypoints()[1], START_POSE);
             assert_eq!(moved.times_s(), &[0.0, 0.4, 0.8, 1.1]);
@@ -158,23 +167,17 @@ mod tests {
 
     #[test]
     fn free_times_stretch_each_segment_and_leave_the_waypoints() {
-        for dimensions in [Dimensions::Planar, Dimensions::Full] {
-            let space = WaypointSpace {
-                start: START_POSE,
-                dimensions,
-                times_s: [0.4, 0.8, 1.1],
-                stretch_max: 1.5,
-            };
-            let mut x = space.resting();
-            assert_eq!(x.len(), dimensions.count() + WAYPOINTS);
+        for space in spaces(1.5) {
+            let (mut x, waypoints) = (space.resting(), space.dimensions.count());
+            assert_eq!(x.len(), waypoints + WAYPOINTS);
             assert_eq!(space.decode(&x).unwrap().times_s(), &[0.0, 0.4, 0.8, 1.1]);
-            x[dimensions.count() - 1] += 0.25;
-            x[dimensions.count() + 1] = 1.5_f64.ln();
+            x[waypoints - 1] += 0.25;
+            x[waypoints + 1] = 1.5_f64.ln();
             let moved = space.decode(&x).unwrap();
             for (is, wanted) in moved.times_s().iter().zip([0.0, 0.4, 1.0, 1.3]) {
                 assert!((is - wanted).abs() < 1e-12, "{is} s, not {wanted} s");
             }
-            let last = *dimensions.joints().last().unwrap();
+            let last = *space.dimensions.joints().last().unwrap();
             assert!((moved.end()[last] - START_POSE[last] - 0.25).abs() < 1e-12);
             let (low, high) = space.bounds(&Limits::default());
             assert_eq!((low.len(), high.len()), (x.len(), x.len()));
