@@ -8,48 +8,9 @@ use shared_types::keypoints::TrackedFrame;
 /// Why a learned model gives no answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ModelError {
-    /// The file cannot be read.
-    #[error("model {path}: {reason} (check the path and its permissions)")]
-    Unreadable {
-        /// The file.
-        path: String,
-        /// The system's reason.
-        reason: String,
-    },
-    /// The runtime does not take the file.
-    #[error("model {path}: the network runtime does not take it: {reason}; is it an ONNX file?")]
-    Refused {
-        /// The file.
-        path: String,
-        /// The runtime's words.
-        reason: String,
-    },
-    /// An input or output is missing, or there is one too many.
-    #[error("model {path}: its {kind}s are {found}, they must be {wanted}")]
-    Names {
-        /// The file.
-        path: String,
-        /// `input` or `output`.
-        kind: &'static str,
-        /// What it has.
-        found: String,
-        /// What it must have.
-        wanted: String,
-    },
-    /// An input or output of another type or shape.
-    #[error("model {path}: {kind} `{name}` is {found}, it must be {wanted}")]
-    Form {
-        /// The file.
-        path: String,
-        /// `input` or `output`.
-        kind: &'static str,
-        /// Name of the input or output.
-        name: &'static str,
-        /// Type and shape found.
-        found: String,
-        /// Type and shape wanted.
-        wanted: String,
-    },
+    /// The file cannot be used, or gives what it must not.
+    #[error("{0}")]
+    Unfit(String),
     /// The runtime failed, or there is none.
     #[error("model {path}: the network runtime failed: {reason}")]
     Runtime {
@@ -57,24 +18,6 @@ pub enum ModelError {
         path: String,
         /// The runtime's words.
         reason: String,
-    },
-    /// Too few or too many values.
-    #[error("a learned model gave {found} {what}, it must give {wanted}")]
-    Count {
-        /// What it gave.
-        what: &'static str,
-        /// So many of them.
-        found: usize,
-        /// So many it must give.
-        wanted: usize,
-    },
-    /// An answer that is none.
-    #[error("model {path}: its answer `{name}` has numbers that are not finite")]
-    NotFinite {
-        /// The file.
-        path: String,
-        /// Name of the output.
-        name: &'static str,
     },
 }
 
@@ -155,15 +98,13 @@ impl TrackResult {
 }
 
 /// That a model gave as many values as it must.
-fn check_count(what: &'static str, found: usize, wanted: usize) -> Result<(), ModelError> {
+fn check_count(what: &str, found: usize, wanted: usize) -> Result<(), ModelError> {
     if found == wanted {
         return Ok(());
     }
-    Err(ModelError::Count {
-        what,
-        found,
-        wanted,
-    })
+    Err(ModelError::Unfit(format!(
+        "a learned model gave {found} {what}, it must give {wanted}"
+    )))
 }
 
 /// `count` points at equal distances along some.

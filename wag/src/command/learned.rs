@@ -19,12 +19,7 @@ pub struct Learned {
 fn refused(error: ModelError) -> Failure {
     match error {
         ModelError::Runtime { .. } => Failure::failed(error),
-        ModelError::Unreadable { .. }
-        | ModelError::Refused { .. }
-        | ModelError::Names { .. }
-        | ModelError::Form { .. }
-        | ModelError::Count { .. }
-        | ModelError::NotFinite { .. } => Failure::input(error),
+        other => Failure::input(other),
     }
 }
 

@@ -146,7 +146,7 @@ impl Searcher<'_> {
 
     /// `None` where a part is behind the camera.
     fn score(&self, x: &Point, seen: &Seen) -> Option<f64> {
-        let mut along = vec![0.0; POINTS];
+        let mut along = [0.0; POINTS];
         let (mut sum, mut images) = (0.0, 0.0);
         for moment in self.moments {
             for (side, map) in &moment.maps {
