@@ -113,34 +113,27 @@ fn open_places(scene: &EyeFrame, frames: &[Lit<'_>]) -> Vec<bool> {
 
 /// Small parts that places of two colours enclose are islands.
 fn survey(open: &[bool], width: usize) -> Vec<Place> {
-    let mut places: Vec<Place> = open
-        .iter()
-        .map(|open| if *open { Place::Open } else { Place::Island })
-        .collect();
+    let place = |open: &bool| if *open { Place::Open } else { Place::Island };
+    let mut places: Vec<Place> = open.iter().map(place).collect();
     let largest_island = ISLAND * open.len() as f64;
     let mut visited = open.to_vec();
-    let mut part = Vec::new();
     for start in 0..open.len() {
         if visited[start] {
             continue;
         }
-        part.clear();
-        part.push(start);
         visited[start] = true;
+        let mut part = vec![start];
         let mut next = 0;
         while let Some(&from) = part.get(next) {
             next += 1;
             for at in beside(from, width, open.len()) {
-                if !visited[at] {
-                    visited[at] = true;
+                if !std::mem::replace(&mut visited[at], true) {
                     part.push(at);
                 }
             }
         }
         if part.len() as f64 > largest_island {
-            for at in &part {
-                places[*at] = Place::Known;
-            }
+            part.into_iter().for_each(|at| places[at] = Place::Known);
         }
     }
     places
