@@ -3,7 +3,7 @@
 use shared_types::KeypointTrack;
 
 use crate::frame::EyeFrame;
-use crate::overlay::{OverlayError, Picture, drawn};
+use crate::overlay::{OverlayError, drawn};
 
 /// JPEG quality: the lines stay sharp.
 const QUALITY: u8 = 85;
@@ -27,16 +27,13 @@ pub fn keypoint_film(frames: &[EyeFrame], track: &KeypointTrack) -> Result<Vec<u
     ) else {
         return Err(large);
     };
-    let jpegs = frames
-        .iter()
-        .zip(&track.frames)
-        .map(|(frame, tracked)| jpeg(&drawn(frame, tracked), [width, height]))
-        .collect::<Result<Vec<_>, _>>()?;
-    avi(&jpegs, [width, height], frame_us).ok_or(large)
-}
-
-fn jpeg(picture: &Picture, size_px: [u16; 2]) -> Result<Vec<u8>, OverlayError> {
-    encoded(&picture.rgb, size_px, QUALITY, jpeg_encoder::ColorType::Rgb)
+    let size_px = [width, height];
+    let jpeg = |(frame, tracked)| {
+        let rgb = drawn(frame, tracked).rgb;
+        encoded(&rgb, size_px, QUALITY, jpeg_encoder::ColorType::Rgb)
+    };
+    let jpegs = frames.iter().zip(&track.frames).map(jpeg);
+    avi(&jpegs.collect::<Result<Vec<_>, _>>()?, size_px, frame_us).ok_or(large)
 }
 
 fn encoded(
@@ -100,19 +97,8 @@ fn avi(jpegs: &[Vec<u8>], [width, height]: [u16; 2], frame_us: u32) -> Option<Ve
     let stream = [
         &b"vidsMJPG"[..],
         // Flags, priority, start-up delay; then the rate as a fraction.
-        &words(&[
-            0,
-            0,
-            0,
-            frame_us,
-            1_000_000,
-            0,
-            count,
-            largest,
-            u32::MAX,
-            0,
-            0,
-        ]),
+        &words(&[0, 0, 0, frame_us, 1_000_000]),
+        &words(&[0, count, largest, u32::MAX, 0, 0]),
         // The picture's rectangle, 16 bits a side; cut below the limits of JPEG.
         &words(&[width | height << 16]),
     ]

@@ -30,4 +30,4 @@ pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
 pub use score::{Score, ScoreError, ScoreOptions, score};
 pub use source::{FrameSource, SourceError, StereoSource, open_video};
-pub use track::{Film, RopeAppearance, TrackError, TrackOptions, TrackResult, track};
+pub use track::{Film, RopeAppearance, TrackError, TrackResult, USUAL_KEYPOINTS, track};

@@ -8,32 +8,14 @@ use std::collections::VecDeque;
 
 use crate::frame::EyeFrame;
 
-/// What changed between two frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
-    /// Pixels that changed by more than the noise explains.
-    pub moved_px: usize,
-    /// Mean square change above the noise (grey levels squared).
-    pub energy: f64,
-}
-
-/// Compares two frames of one size.
-#[must_use]
-pub fn motion(a: &EyeFrame, b: &EyeFrame) -> Motion {
+/// Pixels that changed between two frames of one size by more than noise explains.
+fn moved_px(a: &EyeFrame, b: &EyeFrame) -> usize {
     // Pairs of pixels: half the noise, and the chroma's own raster.
-    let pairs = |frame: &EyeFrame| {
-        let pairs = frame.luma.chunks_exact(2);
-        pairs
-            .map(|p| f32::from(p[0]) + f32::from(p[1]))
-            .collect::<Vec<f32>>()
-    };
-    let both = pairs(a).into_iter().zip(pairs(b));
-    let changes: Vec<f32> = both.map(|(a, b)| (a - b) / 2.0).collect();
+    let pairs = a.luma.chunks_exact(2).zip(b.luma.chunks_exact(2));
+    let mean = |pair: &[u8]| (f32::from(pair[0]) + f32::from(pair[1])) / 2.0;
+    let changes: Vec<f32> = pairs.map(|(a, b)| mean(a) - mean(b)).collect();
     if changes.is_empty() {
-        return Motion {
-            moved_px: 0,
-            energy: 0.0,
-        };
+        return 0;
     }
     // The median is a drift of the light, the median deviation is noise.
     let middle = changes.len() / 2;
@@ -42,20 +24,17 @@ pub fn motion(a: &EyeFrame, b: &EyeFrame) -> Motion {
     let mut away: Vec<f32> = changes.iter().map(|c| (c - drift).abs()).collect();
     let noise = 1.4826 * *away.select_nth_unstable_by(middle, f32::total_cmp).1;
     let threshold = (6.0 * noise).max(8.0);
-    let moved: Vec<f32> = away.into_iter().filter(|a| *a > threshold).collect();
-    let energy: f64 = moved.iter().map(|m| f64::from(*m).powi(2)).sum();
-    Motion {
-        moved_px: 2 * moved.len(),
-        energy: energy / changes.len() as f64,
-    }
+    2 * away.iter().filter(|a| **a > threshold).count()
 }
+
+/// The rope hangs still while no more pixels than this change.
+const STILL_PX: usize = 12;
 
 /// Says when a rope has hung still for a while.
 #[derive(Debug)]
 pub struct StillDetector {
     lag: usize,
     needed: usize,
-    moved_limit_px: usize,
     recent: VecDeque<EyeFrame>,
     still_frames: usize,
 }
@@ -68,7 +47,6 @@ impl StillDetector {
         Self {
             lag: lag.max(1),
             needed: needed.max(1),
-            moved_limit_px: 12,
             recent: VecDeque::new(),
             still_frames: 0,
         }
@@ -79,12 +57,8 @@ impl StillDetector {
         if self.recent.len() >= self.lag
             && let Some(before) = self.recent.pop_front()
         {
-            let moved = motion(&before, &frame).moved_px;
-            self.still_frames = if moved <= self.moved_limit_px {
-                self.still_frames + 1
-            } else {
-                0
-            };
+            let is_still = moved_px(&before, &frame) <= STILL_PX;
+            self.still_frames = if is_still { self.still_frames + 1 } else { 0 };
         }
         self.recent.push_back(frame);
         self.still_frames >= self.needed
@@ -96,15 +70,13 @@ mod tests {
     use super::*;
 
     /// Grey frame with deterministic noise and a bright bar at column `bar`.
-    fn frame(seed: usize, bar: Option<usize>) -> EyeFrame {
+    fn frame(seed: usize, bar: usize) -> EyeFrame {
         let (width_px, height_px) = (64, 48);
         let mut luma: Vec<u8> = (0..width_px * height_px)
             .map(|i| 100 + u8::try_from((i * 7919 + seed * 104_729) % 5).unwrap())
             .collect();
-        for v in 10..40 {
-            if let Some(u) = bar {
-                luma[v * width_px + u..v * width_px + u + 3].fill(200);
-            }
+        for row in luma.chunks_exact_mut(width_px).take(40).skip(10) {
+            row[bar..bar + 3].fill(200);
         }
         EyeFrame {
             luma,
@@ -114,11 +86,11 @@ mod tests {
 
     #[test]
     fn noise_and_drift_are_not_motion() {
-        let mut brighter = frame(2, Some(20));
+        let mut brighter = frame(2, 20);
         brighter.luma.iter_mut().for_each(|y| *y += 4);
-        assert_eq!(motion(&frame(1, Some(20)), &brighter).moved_px, 0);
-        let moved = motion(&frame(1, Some(20)), &frame(2, Some(24)));
-        assert!(moved.moved_px > 100 && moved.energy > 10.0, "{moved:?}");
+        assert_eq!(moved_px(&frame(1, 20), &brighter), 0);
+        let moved = moved_px(&frame(1, 20), &frame(2, 24));
+        assert!(moved > 100, "{moved}");
     }
 
     #[test]
@@ -127,10 +99,10 @@ mod tests {
         let mut said = Vec::new();
         for i in 0..10 {
             let bar = if i < 4 { 10 + 5 * i } else { 40 };
-            said.push(detector.push(frame(i, Some(bar))));
+            said.push(detector.push(frame(i, bar)));
         }
         // Frame 6 is the first like the one two before it; 8 the third.
         assert_eq!(said.iter().position(|s| *s), Some(8));
-        assert!(!detector.push(frame(11, Some(10))));
+        assert!(!detector.push(frame(11, 10)));
     }
 }

@@ -1,80 +1,19 @@
-//! The tracker and the scorer against rendered recordings with exact truth.
+//! The scorer, calibrations and raw files against rendered recordings with exact truth.
 #![cfg(test)]
 #![allow(missing_docs, reason = "a test")]
 
 mod recording;
 
-use std::path::Path;
-
 use camera_ingest::source::FrameSource;
 use camera_ingest::{ScoreOptions, load_camera, open_video, score};
-use recording::{Wiggle, folder, quantile, read_npy};
-
-fn truth_json(folder: &Path) -> serde_json::Value {
-    serde_json::from_str(&std::fs::read_to_string(folder.join("truth.json")).unwrap()).unwrap()
-}
-
-/// The bars of a good tracker on these recordings: median 1.2 px, 95th
-/// percentile 2.5 px, no node off by more than 8 px, tip 95th percentile 4 px.
-fn assert_tracks(name: &str) {
-    let Some(folder) = folder(name) else { return };
-    let Some(wiggle) = Wiggle::read_both(name) else {
-        return;
-    };
-    let nodes = wiggle.nodes();
-    let result = wiggle.track().unwrap();
-    result.track.validate().unwrap();
-    let errors = wiggle.errors(&result).concat();
-    let [median, p95, max] = [0.5, 0.95, 1.0].map(|q| quantile(&errors, q));
-    println!("{name}: median {median:.2}, p95 {p95:.2}, max {max:.2} px");
-    assert!(
-        median <= 1.2 && p95 <= 2.5 && max <= 8.0,
-        "{median} {p95} {max}"
-    );
-    let tip: Vec<f64> = errors
-        .iter()
-        .skip(nodes - 1)
-        .step_by(nodes)
-        .copied()
-        .collect();
-    assert!(quantile(&tip, 0.95) <= 4.0, "tip {}", quantile(&tip, 0.95));
-    assert!(result.track.lost_fraction() < 1e-9);
-
-    let rope = &truth_json(&folder)["rope"];
-    let number = |key: &str| rope[key].as_f64().unwrap();
-    let seen = &result.appearance;
-    println!("{seen:?}");
-    // A third of a pixel is 0.9 mm at this distance.
-    assert!(
-        (seen.rope_radius_m - number("radius_m")).abs() < 1e-3,
-        "{seen:?}"
-    );
-    assert!(
-        (seen.lead_radius_m - number("lead_radius_m")).abs() < 1.5e-3,
-        "{seen:?}"
-    );
-    assert!(
-        (seen.length_m / number("length_m") - 1.0).abs() < 0.01,
-        "{seen:?}"
-    );
-}
-
-#[test]
-fn tracks_the_orange_rope_with_blur_and_shadow() {
-    assert_tracks("a1");
-}
-
-#[test]
-fn tracks_the_brown_rope_on_brown_planks() {
-    assert_tracks("a2");
-}
+use recording::{folder, read_npy, truth_json};
 
 #[test]
 fn scores_the_throw_within_six_millimetres() {
     let Some(folder) = folder("athrow") else {
         return;
     };
-    let truth = truth_json(&folder);
+    let truth = truth_json("athrow");
     let camera = load_camera(&folder.join("camera.toml")).unwrap();
     let colour =
         |key: &str| -> [u8; 3] { serde_json::from_value(truth["colours"][key].clone()).unwrap() };

@@ -59,16 +59,19 @@ impl Graph {
         outputs: &[Wanted],
     ) -> Result<Self, ModelError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| ModelError::Unreadable {
-            path: name.clone(),
-            reason: source.to_string(),
+        let bytes = std::fs::read(path).map_err(|reason| {
+            ModelError::Unfit(format!(
+                "model {name}: {reason} (check the path and its permissions)"
+            ))
         })?;
-        let session = onnx_session::open(&bytes).map_err(|error| {
-            let path = name.clone();
-            match error {
-                OpenError::NoRuntime(reason) => ModelError::Runtime { path, reason },
-                OpenError::Refused(reason) => ModelError::Refused { path, reason },
-            }
+        let session = onnx_session::open(&bytes).map_err(|error| match error {
+            OpenError::NoRuntime(reason) => ModelError::Runtime {
+                path: name.clone(),
+                reason,
+            },
+            OpenError::Refused(reason) => ModelError::Unfit(format!(
+                "model {name}: the network runtime does not take it: {reason}; is it an ONNX file?"
+            )),
         })?;
         let mut fixed = Fixed::new();
         compare(&name, "input", session.inputs(), inputs, &mut fixed)?;
@@ -102,20 +105,8 @@ impl Graph {
     }
 
     /// That an input or output is not as it must be.
-    pub(super) fn unfit(
-        &self,
-        kind: &'static str,
-        name: &'static str,
-        found: String,
-        wanted: String,
-    ) -> ModelError {
-        ModelError::Form {
-            path: self.path.clone(),
-            kind,
-            name,
-            found,
-            wanted,
-        }
+    pub(super) fn unfit(&self, kind: &str, name: &str, found: &str, wanted: &str) -> ModelError {
+        unfit(&self.path, kind, name, found, wanted)
     }
 
     /// Runs the graph; the values of each output, which must have the given shape.
@@ -148,16 +139,13 @@ impl Graph {
                     .zip(&wanted)
                     .all(|(a, b)| usize::try_from(*a) == Ok(*b));
             if !same {
-                return Err(ModelError::Form {
-                    path,
-                    kind: "output",
-                    name,
-                    found: format!("float32 {shape:?}"),
-                    wanted: format!("float32 {wanted:?}"),
-                });
+                let [found, wanted] = [format!("float32 {shape:?}"), format!("float32 {wanted:?}")];
+                return Err(unfit(&path, "output", name, &found, &wanted));
             }
             if numbers.iter().any(|x| !x.is_finite()) {
-                return Err(ModelError::NotFinite { path, name });
+                return Err(ModelError::Unfit(format!(
+                    "model {path}: its answer `{name}` has numbers that are not finite"
+                )));
             }
             *values = numbers.to_vec();
         }
@@ -165,10 +153,17 @@ impl Graph {
     }
 }
 
+/// That an input or output of a file is not as it must be.
+fn unfit(path: &str, kind: &str, name: &str, found: &str, wanted: &str) -> ModelError {
+    ModelError::Unfit(format!(
+        "model {path}: {kind} `{name}` is {found}, it must be {wanted}"
+    ))
+}
+
 /// Compares names, types and shapes; takes note of the lengths that are fixed.
 fn compare(
     path: &str,
-    kind: &'static str,
+    kind: &str,
     found: &[Outlet],
     wanted: &[Wanted],
     fixed: &mut Fixed,
@@ -179,24 +174,18 @@ fn compare(
     };
     let known = |outlet: &Outlet| wanted.iter().any(|w| w.name == outlet.name());
     if found.len() != wanted.len() || !found.iter().all(known) {
-        return Err(ModelError::Names {
-            path: path.to_owned(),
-            kind,
-            found: quoted(found.iter().map(Outlet::name).collect()),
-            wanted: quoted(wanted.iter().map(|w| w.name).collect()),
-        });
+        let found = quoted(found.iter().map(Outlet::name).collect());
+        let wanted = quoted(wanted.iter().map(|w| w.name).collect());
+        return Err(ModelError::Unfit(format!(
+            "model {path}: its {kind}s are {found}, they must be {wanted}"
+        )));
     }
     for wanted in wanted {
         let outlets = found.iter().filter(|outlet| outlet.name() == wanted.name);
         for outlet in outlets {
             if !fits(outlet, wanted, fixed) {
-                return Err(ModelError::Form {
-                    path: path.to_owned(),
-                    kind,
-                    name: wanted.name,
-                    found: form(outlet),
-                    wanted: wanted.form(fixed),
-                });
+                let (found, form) = (form(outlet), wanted.form(fixed));
+                return Err(unfit(path, kind, wanted.name, &found, &form));
             }
         }
     }

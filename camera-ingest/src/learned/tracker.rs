@@ -57,7 +57,7 @@ impl OnnxTracker {
             let found = graph.fixed(axis).filter(|found| *found < least)?;
             let form = |length: &dyn core::fmt::Display| format!("of {axis} = {length}");
             let least = format!("{least} or more");
-            Some(graph.unfit("input", wanted.name, form(&found), form(&least)))
+            Some(graph.unfit("input", wanted.name, &form(&found), &form(&least)))
         };
         let refused =
             too_few(&FRAMES, "T", MIN_FRAMES).or_else(|| too_few(&QUERIES, "N", MIN_POINTS));

@@ -8,7 +8,6 @@
 //! only: identification uses the film.
 
 mod arm;
-mod follower;
 mod step;
 
 use std::path::PathBuf;
@@ -25,7 +24,7 @@ use shared_types::ipc::{
 
 use crate::calib::{CalibError, load_camera};
 use crate::frame::EyeFrame;
-use crate::track::{TrackError, TrackOptions};
+use crate::track::{TrackError, USUAL_KEYPOINTS};
 pub use step::{Answer, Preview, Search};
 
 /// Pause between two looks for a frame.
@@ -51,7 +50,7 @@ pub struct PreviewConfig {
 }
 
 fn usual_keypoints() -> usize {
-    TrackOptions::default().keypoints
+    USUAL_KEYPOINTS
 }
 
 impl PreviewConfig {
@@ -61,7 +60,7 @@ impl PreviewConfig {
         Self {
             domain: domain.to_owned(),
             camera,
-            keypoints: usual_keypoints(),
+            keypoints: USUAL_KEYPOINTS,
             cell,
         }
     }
@@ -101,12 +100,12 @@ pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError
     while !stop.load(Ordering::Relaxed) {
         searcher.look_after(&mut preview)?;
         let found = match ports.newest()? {
-            Some(Arrived::Left(frame)) => {
+            Some(Ok(frame)) => {
                 heard = Instant::now();
                 ports.take_joints(&mut preview)?;
                 preview.see(frame)
             }
-            Some(Arrived::Unfit(head)) => {
+            Some(Err(head)) => {
                 heard = Instant::now();
                 preview.unfit(head.sequence, head.stamp_ns)
             }
@@ -175,12 +174,6 @@ impl Searcher {
     }
 }
 
-/// What a newest frame is.
-enum Arrived {
-    Left(EyeFrame),
-    Unfit(FrameHeader),
-}
-
 /// The connections.
 struct Ports {
     frames: FrameSubscriber,
@@ -197,8 +190,9 @@ impl Ports {
         })
     }
 
-    /// The left image of the newest frame; all frames have gone back to the camera then.
-    fn newest(&self) -> Result<Option<Arrived>, IpcError> {
+    /// The left image of the newest frame, or the header of one that does not fit; all
+    /// frames have gone back to the camera then.
+    fn newest(&self) -> Result<Option<Result<EyeFrame, FrameHeader>>, IpcError> {
         let failed = IpcError::transfer(FRAME_SERVICE);
         let mut newest = None;
         while let Some(sample) = self.frames.receive().map_err(&failed)? {
@@ -207,13 +201,11 @@ impl Ports {
         Ok(newest.map(|sample| {
             let head = *sample.user_header();
             let size = [head.width_px as usize, head.height_px as usize];
-            let left = (head.pixel_format == PIXEL_FORMAT_YUYV).then(|| {
-                EyeFrame::left_from_yuyv(sample.payload(), size, head.stamp_ns, head.sequence)
-            });
-            match left {
-                Some(Ok(frame)) => Arrived::Left(frame),
-                Some(Err(_)) | None => Arrived::Unfit(head),
+            if head.pixel_format != PIXEL_FORMAT_YUYV {
+                return Err(head);
             }
+            let yuyv = sample.payload();
+            EyeFrame::left_from_yuyv(yuyv, size, head.stamp_ns, head.sequence).map_err(|_e| head)
         }))
     }
 

@@ -3,12 +3,11 @@
 
 use arm_model::{JointVector, Pole};
 use rope_sim::MeasuredArm;
-use shared_types::StereoCamera;
 use shared_types::ipc::{PAYLOAD_VERSION, PreviewFrame, PreviewState};
 use shared_types::keypoints::{KeypointFrame, TrackedFrame};
+use shared_types::{MonotonicNs, StereoCamera};
 
 use super::arm::Arm;
-use super::follower::Follower;
 use crate::frame::EyeFrame;
 use crate::track::{Known, TrackError, check_keypoints};
 
@@ -26,6 +25,9 @@ const PERIOD_NS: u64 = 60_000_000;
 const ENOUGH_RAD: f64 = 0.05;
 /// Joint reports kept from before the first of them (ns).
 const BEFORE_NS: u64 = 200_000_000;
+/// And from before the instant until which a known rope is simulated, because its motion
+/// still depends on them (ns).
+const PAST_NS: u64 = 250_000_000;
 
 /// A frame that was looked at.
 #[derive(Debug, Clone, Copy)]
@@ -39,10 +41,13 @@ enum Stage {
     /// Takes frames: the newest one while the arm stands, then all of a motion.
     Collecting(Vec<EyeFrame>),
     /// Somebody looks for the rope in them, the first of which began at `zero_ns`.
-    Searching {
+    Searching { zero_ns: u64 },
+    /// There is one; `lost_ns` is the frame since which nothing of it is seen.
+    Following {
+        known: Box<Known>,
         zero_ns: u64,
+        lost_ns: Option<u64>,
     },
-    Following(Box<Follower>),
 }
 
 /// A search for the rope, which takes seconds.
@@ -167,18 +172,17 @@ impl Preview {
         if answer.attempt != self.restarts {
             return;
         }
-        let known = match answer.found {
-            Ok(known) => known,
+        match answer.found {
+            Ok(known) => {
+                self.stage = Stage::Following {
+                    known: Box::new(known),
+                    zero_ns,
+                    lost_ns: None,
+                }
+            }
             Err(reason) => {
                 tracing::info!(%reason, "no rope found");
-                return self.begin_anew("no simulated rope explains the frames");
-            }
-        };
-        match Follower::new(known, zero_ns, &self.arm) {
-            Ok(follower) => self.stage = Stage::Following(Box::new(follower)),
-            Err(reason) => {
-                tracing::debug!(%reason, "the rope that was found");
-                self.begin_anew("the rope that was found cannot be simulated");
+                self.begin_anew("no simulated rope explains the frames");
             }
         }
     }
@@ -232,20 +236,24 @@ impl Preview {
                 (PreviewState::Looking, None)
             }
             Stage::Searching { .. } => (PreviewState::Looking, None),
-            Stage::Following(follower) => {
-                let seen = follower.see(&frame, &mut self.arm, self.keypoints);
-                let lost = |since_ns| stamp_ns - since_ns > LOST_NS;
-                let is_lost = follower.lost_ns().is_some_and(lost);
-                match seen {
-                    Ok(tracked) if !is_lost => {
-                        return (PreviewState::Following, Some(tracked));
-                    }
-                    Ok(_) => self.begin_anew("the rope is lost"),
-                    Err(reason) => {
-                        tracing::debug!(%reason, "the rope");
-                        self.begin_anew("the rope cannot be simulated further");
-                    }
+            Stage::Following {
+                known,
+                zero_ns,
+                lost_ns,
+            } => {
+                let seen = follow(known, *zero_ns, &frame, &mut self.arm, self.keypoints);
+                if let Some(tracked) = &seen {
+                    *lost_ns = tracked.lost.then_some(lost_ns.unwrap_or(stamp_ns));
                 }
+                let is_lost = lost_ns.is_some_and(|since_ns| stamp_ns - since_ns > LOST_NS);
+                if seen.is_some() && !is_lost {
+                    return (PreviewState::Following, seen);
+                }
+                self.begin_anew(if is_lost {
+                    "the rope is lost"
+                } else {
+                    "the rope cannot be simulated further"
+                });
                 (PreviewState::Looking, None)
             }
         }
@@ -273,6 +281,25 @@ impl Preview {
             ..PreviewFrame::default()
         }
     }
+}
+
+/// Keypoints of a frame. Where the arm's reports end before its exposure, the arm comes to
+/// rest. `None` where they are no motion, or the simulated rope is not before the camera.
+fn follow(
+    known: &mut Known,
+    zero_ns: u64,
+    frame: &EyeFrame,
+    arm: &mut Arm,
+    keypoints: usize,
+) -> Option<TrackedFrame> {
+    let motion = arm.motion(zero_ns);
+    let motion = motion.inspect_err(|reason| tracing::debug!(%reason, "joint reports"));
+    let since_s = |stamp_ns| MonotonicNs(stamp_ns).since_s(MonotonicNs(zero_ns));
+    let times_s = [frame.stamp_ns, arm.newest_ns()].map(since_s);
+    let seen = known.see(frame, times_s, &motion.ok()?, keypoints);
+    let reached_ns = zero_ns + (known.reached_s() * 1e9) as u64;
+    arm.forget_before(reached_ns.saturating_sub(PAST_NS));
+    seen
 }
 
 /// Takes in a frame while the rope is unknown: the newest one of a rest, then those of the

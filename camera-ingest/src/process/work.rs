@@ -6,7 +6,7 @@ use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
-use crate::track::{TrackOptions, TrackResult};
+use crate::track::TrackResult;
 use arm_model::{JointVector, Pole};
 use rope_sim::MeasuredArm;
 use shared_types::ipc::KeypointPublisher;
@@ -63,11 +63,7 @@ fn try_track(
     answer(call, &CameraEvent::Progress(progress));
     let began = Instant::now();
     let motion = attach_motion(joints, recording.first_stamp_ns(), pole)?;
-    let options = TrackOptions {
-        keypoints: *keypoints as usize,
-        ..TrackOptions::default()
-    };
-    let result = crate::track::track(film, camera, &motion, &options)?;
+    let result = crate::track::track(film, camera, &motion, *keypoints as usize)?;
     let ms_per_frame = began.elapsed().as_secs_f64() * 1e3 / frames.len() as f64;
     publish(frames, &result, publisher)?;
     if let Some(path) = overlay {

@@ -113,34 +113,27 @@ fn open_places(scene: &EyeFrame, frames: &[Lit<'_>]) -> Vec<bool> {
 
 /// Small parts that places of two colours enclose are islands.
 fn survey(open: &[bool], width: usize) -> Vec<Place> {
-    let mut places: Vec<Place> = open
-        .iter()
-        .map(|open| if *open { Place::Open } else { Place::Island })
-        .collect();
+    let place = |open: &bool| if *open { Place::Open } else { Place::Island };
+    let mut places: Vec<Place> = open.iter().map(place).collect();
     let largest_island = ISLAND * open.len() as f64;
     let mut visited = open.to_vec();
-    let mut part = Vec::new();
     for start in 0..open.len() {
         if visited[start] {
             continue;
         }
-        part.clear();
-        part.push(start);
         visited[start] = true;
+        let mut part = vec![start];
         let mut next = 0;
         while let Some(&from) = part.get(next) {
             next += 1;
             for at in beside(from, width, open.len()) {
-                if !visited[at] {
-                    visited[at] = true;
+                if !std::mem::replace(&mut visited[at], true) {
                     part.push(at);
                 }
             }
         }
         if part.len() as f64 > largest_island {
-            for at in &part {
-                places[*at] = Place::Known;
-            }
+            part.into_iter().for_each(|at| places[at] = Place::Known);
         }
     }
     places
@@ -204,40 +197,28 @@ fn continued(scene: &EyeFrame, there: Place, from: usize, at: usize) -> Option<(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::background::Background;
+    use crate::track::scene::median_frame;
 
     const WIDTH: usize = 192;
     const HEIGHT: usize = 128;
 
     /// A textured wall, a still post, and a shaded disc about a column.
     fn frame(centre_u: f64) -> EyeFrame {
-        let (mut luma, mut cb) = (Vec::new(), Vec::new());
+        let mut frame = EyeFrame::grey([WIDTH, HEIGHT], 40);
         for i in 0..WIDTH * HEIGHT {
             let (u, v) = ((i % WIDTH) as f64, (i / WIDTH) as f64);
             let wall = 120 + ((u * 0.7).sin() * 6.0 + (v * 0.4).cos() * 6.0) as i16;
-            let post = (70.0..73.0).contains(&u);
             let away = (u - centre_u).hypot(v - 32.0);
-            let (y, blue) = if away < 10.0 {
-                (200 - (away * 2.0) as i16, 60)
-            } else if post {
-                (40, 128)
-            } else {
-                (wall, 128)
-            };
-            luma.push(u8::try_from(y).unwrap());
-            if i % 2 == 0 {
-                cb.push(blue);
+            if away < 10.0 {
+                frame.luma[i] = 200 - (away * 2.0) as u8;
+                if i % 2 == 0 {
+                    frame.cb[i / 2] = 60;
+                }
+            } else if !(70.0..73.0).contains(&u) {
+                frame.luma[i] = u8::try_from(wall).unwrap();
             }
         }
-        EyeFrame {
-            stamp_ns: 0,
-            sequence: 0,
-            width_px: WIDTH,
-            height_px: HEIGHT,
-            luma,
-            cr: vec![128; cb.len()],
-            cb,
-        }
+        frame
     }
 
     fn lit(frames: &[EyeFrame]) -> Vec<Lit<'_>> {
@@ -247,8 +228,7 @@ mod tests {
     fn scene_of(amplitude_px: f64) -> EyeFrame {
         let swing = |i: usize| 40.0 + amplitude_px * (i as f64 * 0.37).sin();
         let frames: Vec<EyeFrame> = (0..31).map(|i| frame(swing(i))).collect();
-        let all: Vec<usize> = (0..frames.len()).collect();
-        let mut scene = Background::median(&frames, &all).image;
+        let mut scene = median_frame(&frames);
         uncover(&mut scene, &lit(&frames));
         scene
     }

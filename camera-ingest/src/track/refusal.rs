@@ -1,61 +1,25 @@
 //! What is refused, and why.
 
+use std::fmt::Display;
+
 use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
 use shared_types::keypoints::MAX_KEYPOINTS;
 
-use super::TrackOptions;
-use super::models::ModelError;
+use super::ModelError;
 use crate::frame::EyeFrame;
 
+/// Fewer frames show no motion.
+const MIN_FRAMES: usize = 8;
 /// The clamp may be this far outside the image: the search turns the camera so far (px).
 const BESIDE_PX: f64 = 20.0;
 
 /// Why a recording cannot be tracked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrackError {
-    /// Too few frames, or too many or few keypoints.
-    #[error("tracking: {what} is {found}, it must be {}", allowed(*least, *most))]
-    Range {
-        /// `frames` or an option's name.
-        what: &'static str,
-        /// Number given.
-        found: usize,
-        /// Least allowed.
-        least: usize,
-        /// Most allowed.
-        most: usize,
-    },
-    /// Frames differ from the camera's size.
-    #[error(
-        "tracking: frame {frame} is {found:?} px, the camera's mode gives {expected:?} px per image; \
-         is the `mode` in camera.toml the one recorded?"
-    )]
-    Size {
-        /// Index of the frame.
-        frame: usize,
-        /// Its size.
-        found: [usize; 2],
-        /// The camera's.
-        expected: [usize; 2],
-    },
-    /// Times of the frames do not increase.
-    #[error("tracking: the time stamp of frame {frame} is not later than the one before")]
-    Times {
-        /// Index of the frame.
-        frame: usize,
-    },
-    /// The clamp cannot be seen.
-    #[error(
-        "tracking: in the first frame (frame 0) the clamp should be at pixel ({u:.0}, {v:.0}), outside the \
-         image; check the camera's place in camera.toml, and joints or poses"
-    )]
-    ClampOutside {
-        /// Pixel column.
-        u: f64,
-        /// Pixel row.
-        v: f64,
-    },
+    /// Film, camera or motion are not such that a rope could be looked for.
+    #[error("tracking: {0}")]
+    Input(String),
     /// No rope is explanation enough.
     #[error(
         "tracking: no rope hanging on the clamp explains what is seen: the best one is evident in \
@@ -72,20 +36,6 @@ pub enum TrackError {
         evident: [f64; 3],
         /// How evident it must be in each respect.
         least: [f64; 3],
-    },
-    /// A part of the rope would be behind the camera.
-    #[error(
-        "tracking: the rope found would swing behind the camera; check the camera's place in \
-         camera.toml and the motion"
-    )]
-    BehindCamera,
-    /// The motion cannot be simulated.
-    #[error(
-        "tracking: no rope can be simulated under this motion: {reason}; check the joints or poses"
-    )]
-    Motion {
-        /// What the simulation says.
-        reason: String,
     },
     /// A learned tracker does not see the rope.
     #[error(
@@ -112,27 +62,55 @@ impl TrackError {
     pub fn is_input(&self) -> bool {
         !matches!(self, Self::NoRope { .. } | Self::MostlyLost { .. })
     }
+
+    /// The motion cannot be simulated.
+    pub(super) fn motion(reason: impl Display) -> Self {
+        Self::Input(format!(
+            "no rope can be simulated under this motion: {reason}; check the joints or poses"
+        ))
+    }
+
+    /// A part of the rope would be behind the camera.
+    pub(super) fn behind_camera() -> Self {
+        Self::Input(
+            "the rope found would swing behind the camera; check the camera's place in \
+             camera.toml and the motion"
+                .to_owned(),
+        )
+    }
 }
 
-fn allowed(least: usize, most: usize) -> String {
-    if most == usize::MAX {
-        return format!("at least {least}");
+fn unless(fine: bool, problem: impl FnOnce() -> String) -> Result<(), TrackError> {
+    if fine {
+        return Ok(());
     }
-    format!("{least} to {most}")
+    Err(TrackError::Input(problem()))
 }
 
 pub(super) fn check(
     frames: &[EyeFrame],
     camera: &StereoCamera,
     motion: &dyn AttachMotion,
-    options: &TrackOptions,
+    keypoints: usize,
 ) -> Result<(), TrackError> {
-    range("frames", frames.len(), 8, usize::MAX)?;
-    check_keypoints(options.keypoints)?;
-    range("background_frames", options.background_frames, 3, 255)?;
+    let count = frames.len();
+    unless(count >= MIN_FRAMES, || {
+        format!("frames is {count}, it must be at least {MIN_FRAMES}")
+    })?;
+    check_keypoints(keypoints)?;
+    let expected = [camera.width_px as usize, camera.height_px as usize];
     for (index, frame) in frames.iter().enumerate() {
-        let before = index.checked_sub(1).map(|before| &frames[before]);
-        check_frame(index, before, frame, camera)?;
+        let found = [frame.width_px, frame.height_px];
+        unless(found == expected, || {
+            format!(
+                "frame {index} is {found:?} px, the camera's mode gives {expected:?} px per \
+                 image; is the `mode` in camera.toml the one recorded?"
+            )
+        })?;
+        let is_later = index == 0 || frame.stamp_ns > frames[index - 1].stamp_ns;
+        unless(is_later, || {
+            format!("the time stamp of frame {index} is not later than the one before")
+        })?;
     }
     check_clamp(camera, motion)
 }
@@ -144,46 +122,19 @@ fn check_clamp(camera: &StereoCamera, motion: &dyn AttachMotion) -> Result<(), T
         .project_left(&motion.at(0.0).p_m)
         .unwrap_or([f64::NAN; 2]);
     let near = |x: f64, size: u32| (-BESIDE_PX..=f64::from(size - 1) + BESIDE_PX).contains(&x);
-    if near(u, camera.width_px) && near(v, camera.height_px) {
-        return Ok(());
-    }
-    Err(TrackError::ClampOutside { u, v })
-}
-
-fn range(what: &'static str, found: usize, least: usize, most: usize) -> Result<(), TrackError> {
-    if (least..=most).contains(&found) {
-        return Ok(());
-    }
-    Err(TrackError::Range {
-        what,
-        found,
-        least,
-        most,
-    })
+    unless(
+        near(u, camera.width_px) && near(v, camera.height_px),
+        || {
+            format!(
+                "in the first frame (frame 0) the clamp should be at pixel ({u:.0}, {v:.0}), outside \
+             the image; check the camera's place in camera.toml, and joints or poses"
+            )
+        },
+    )
 }
 
 pub(crate) fn check_keypoints(count: usize) -> Result<(), TrackError> {
-    range("keypoints", count, 2, MAX_KEYPOINTS)
-}
-
-/// The `index`-th frame has the camera's size and is later than the one before.
-fn check_frame(
-    index: usize,
-    before: Option<&EyeFrame>,
-    frame: &EyeFrame,
-    camera: &StereoCamera,
-) -> Result<(), TrackError> {
-    let expected = [camera.width_px as usize, camera.height_px as usize];
-    let found = [frame.width_px, frame.height_px];
-    if found != expected {
-        return Err(TrackError::Size {
-            frame: index,
-            found,
-            expected,
-        });
-    }
-    if before.is_some_and(|before| frame.stamp_ns <= before.stamp_ns) {
-        return Err(TrackError::Times { frame: index });
-    }
-    Ok(())
+    unless((2..=MAX_KEYPOINTS).contains(&count), || {
+        format!("keypoints is {count}, it must be 2 to {MAX_KEYPOINTS}")
+    })
 }

@@ -50,14 +50,6 @@ pub struct ClampFit {
     pub frames: usize,
 }
 
-/// A place of the rope as it is seen in one frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SeenNode {
-    pub(super) point: Point,
-    /// How evident the rope is there, 0 to 1.
-    pub(super) confidence: f64,
-}
-
 /// The clamp in one frame, where the rope shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SeenClamp {
@@ -68,8 +60,9 @@ pub(super) struct SeenClamp {
 }
 
 /// Continues the rope's first part, without its hidden nodes before `first`, up to the
-/// clamp. `None` where too little of it is seen.
-pub(super) fn seen_clamp(nodes: &[SeenNode], first: usize) -> Option<SeenClamp> {
+/// clamp. Nodes have a place and how evident the rope is there (0 to 1). `None` where too
+/// little of it is seen.
+pub(super) fn seen_clamp(nodes: &[(Point, f64)], first: usize) -> Option<SeenClamp> {
     let (short, along) = continued(nodes, first, PARTS[0])?;
     let (long, _) = continued(nodes, first, PARTS[1])?;
     let length = along[0].hypot(along[1]);
@@ -84,30 +77,32 @@ pub(super) fn seen_clamp(nodes: &[SeenNode], first: usize) -> Option<SeenClamp> 
 }
 
 /// Place and direction of a parabola through a part of the nodes at the first one.
-fn continued(nodes: &[SeenNode], first: usize, part: f64) -> Option<(Point, Point)> {
+fn continued(nodes: &[(Point, f64)], first: usize, part: f64) -> Option<(Point, Point)> {
     let end = first + (part * nodes.len() as f64).round() as usize;
-    let clear: Vec<(f64, Point)> = nodes
-        .iter()
-        .enumerate()
+    let clear: Vec<(Vector3<f64>, Point)> = (0..)
+        .map(f64::from)
+        .zip(nodes)
         .take(end)
         .skip(first)
-        .filter(|(_, node)| node.confidence > CLEAR)
-        .map(|(i, node)| (i as f64, node.point))
+        .filter(|(_, (_, confidence))| *confidence > CLEAR)
+        .map(|(i, (point, _))| (Vector3::new(1.0, i, i * i), *point))
         .collect();
     if clear.len() < LEAST_NODES {
         return None;
     }
-    let powers = |i: f64| Vector3::new(1.0, i, i * i);
-    let normal: Matrix3<f64> = clear
-        .iter()
-        .map(|(i, _)| powers(*i) * powers(*i).transpose())
-        .sum();
-    let inverse = normal.try_inverse()?;
+    let inverse = inverse_normal(clear.iter().map(|(powers, _)| powers))?;
     let fit = [0, 1].map(|k| {
-        let right: Vector3<f64> = clear.iter().map(|(i, p)| powers(*i) * p[k]).sum();
+        let right: Vector3<f64> = clear.iter().map(|(powers, p)| powers * p[k]).sum();
         inverse * right
     });
     Some((fit.map(|c| c[0]), fit.map(|c| c[1])))
+}
+
+/// Inverse of the normal matrix of a least-squares fit.
+fn inverse_normal<'a>(rows: impl Iterator<Item = &'a Vector3<f64>>) -> Option<Matrix3<f64>> {
+    rows.map(|row| row * row.transpose())
+        .sum::<Matrix3<f64>>()
+        .try_inverse()
 }
 
 /// Fits offset and place to the clamps seen at their times (s). `told` is the clamp's
@@ -151,8 +146,7 @@ fn fit_part(
             .iter()
             .map(|(t, s)| row(*t, s, part, &x, told))
             .collect();
-        let normal: Matrix3<f64> = rows.iter().map(|(j, _)| j * j.transpose()).sum();
-        let inverse = normal.try_inverse()?;
+        let inverse = inverse_normal(rows.iter().map(|(j, _)| j))?;
         let step: Vector3<f64> = inverse * rows.iter().map(|(j, r)| j * *r).sum::<Vector3<f64>>();
         let left: Vec<f64> = rows.iter().map(|(j, r)| r - j.dot(&step)).collect();
         x += step;
@@ -275,21 +269,16 @@ mod tests {
 
     #[test]
     fn the_rope_is_continued_to_the_clamp() {
-        let node = |i: usize, confidence: f64| {
-            let s = i as f64;
-            SeenNode {
-                point: [0.3 + 0.002 * s + 1e-5 * s * s, 0.1 + 0.008 * s],
-                confidence,
-            }
-        };
-        let nodes: Vec<SeenNode> = (0..64).map(|i| node(i, f64::from(i > 1))).collect();
+        let point = |s: f64| [0.3 + 0.002 * s + 1e-5 * s * s, 0.1 + 0.008 * s];
+        let node = |i: usize| (point(i as f64), f64::from(i > 1));
+        let nodes: Vec<(Point, f64)> = (0..64).map(node).collect();
         let seen = seen_clamp(&nodes, 2).unwrap();
         for at in seen.at {
             assert!((at[0] - 0.3).abs() < 1e-9 && (at[1] - 0.1).abs() < 1e-9);
         }
         assert!((seen.across[0] * 0.002 + seen.across[1] * 0.008).abs() < 1e-9);
         assert!(seen.across[0] > 0.0);
-        let hidden: Vec<SeenNode> = (0..64).map(|i| node(i, 0.2)).collect();
+        let hidden: Vec<(Point, f64)> = (0..64).map(|i| (node(i).0, 0.2)).collect();
         assert_eq!(seen_clamp(&hidden, 2), None);
     }
 }

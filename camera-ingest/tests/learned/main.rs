@@ -136,7 +136,6 @@ fn followed_points_become_keypoints_and_lost_frames() {
         assert_eq!(frame.lost, lost, "frame {index}");
         let wanted = if lost { 0.0 } else { 0.9 };
         assert!(frame.confidence.iter().all(|c| (c - wanted).abs() < 1e-9));
-        assert!((result.residual[index] - (1.0 - wanted)).abs() < 1e-9);
     }
     let errors = wiggle.errors(&result).concat();
     let [median, p95] = [0.5, 0.95].map(|q| quantile(&errors, q));
@@ -167,7 +166,8 @@ fn refusal(bytes: &[u8]) -> String {
 #[test]
 fn files_that_do_not_fit_are_refused_with_what_is_wanted() {
     let missing = OnnxTracker::load(std::path::Path::new("none.onnx")).unwrap_err();
-    assert!(matches!(missing, ModelError::Unreadable { .. }));
+    let missing = missing.to_string();
+    assert!(missing.contains("check the path"), "{missing}");
     for bytes in [&b""[..], b"no model", &[0xff; 64]] {
         let said = refusal(bytes);
         assert!(said.contains("is it an ONNX file?"), "{said}");
@@ -251,9 +251,10 @@ fn an_answer_of_no_numbers_is_refused() {
     let error = OnnxTracker::load(&file.path)
         .unwrap()
         .follow(&frames, &[[3.0, 3.0]; 4])
-        .unwrap_err();
-    assert!(matches!(
-        error,
-        ModelError::NotFinite { name: "tracks", .. }
-    ));
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("`tracks`") && error.contains("not finite"),
+        "{error}"
+    );
 }

@@ -4,6 +4,7 @@
 use super::Wiggle;
 use camera_ingest::EyeFrame;
 use camera_ingest::frame::ycc_from_rgb;
+use camera_ingest::overlay::still_scene;
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,6 +13,11 @@ use std::ops::Range;
 
 fn byte(x: f64) -> u8 {
     x.round().clamp(0.0, 255.0) as u8
+}
+
+/// Luma and chroma planes, and how many pixels of a row a value stands for.
+fn planes(frame: &mut EyeFrame) -> [(&mut Vec<u8>, usize); 3] {
+    [(&mut frame.luma, 1), (&mut frame.cb, 2), (&mut frame.cr, 2)]
 }
 
 /// How another rope swings.
@@ -35,11 +41,8 @@ impl Wiggle {
     /// A part of the frames is missing, here and there.
     pub(crate) fn dropped(mut self, part: f64, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let lost: Vec<bool> = self
-            .frames
-            .iter()
-            .map(|_| rng.random::<f64>() < part)
-            .collect();
+        let frames = self.frames.iter();
+        let lost: Vec<bool> = frames.map(|_| rng.random::<f64>() < part).collect();
         self.keep(|i| i == 0 || !lost[i]);
         self
     }
@@ -68,16 +71,10 @@ impl Wiggle {
     /// Adds noise of a standard deviation (levels of 255; half of it in chroma).
     pub(crate) fn noisy(mut self, sigma: f64, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let (luma, chroma) = (
-            Normal::new(0.0, sigma).unwrap(),
-            Normal::new(0.0, sigma / 2.0).unwrap(),
-        );
-        for frame in &mut self.frames {
-            for y in &mut frame.luma {
-                *y = byte(f64::from(*y) + luma.sample(&mut rng));
-            }
-            for c in frame.cb.iter_mut().chain(&mut frame.cr) {
-                *c = byte(f64::from(*c) + chroma.sample(&mut rng));
+        for (plane, step) in self.frames.iter_mut().flat_map(planes) {
+            let noise = Normal::new(0.0, sigma / step as f64).unwrap();
+            for value in plane {
+                *value = byte(f64::from(*value) + noise.sample(&mut rng));
             }
         }
         self
@@ -92,9 +89,7 @@ impl Wiggle {
             // 9 cm by 16 cm at this distance.
             let inside = |x: f64, w: f64| ((x - u) / 17.0).powi(2) + ((w - v) / 30.0).powi(2) < 1.0;
             let around = [u - 18.0, v - 31.0, u + 18.0, v + 31.0];
-            paint(&mut self.frames[i], around, |x, w| {
-                inside(x, w).then_some([y, cb, cr])
-            });
+            paint(&mut self.frames[i], around, [y, cb, cr], inside);
         }
         self
     }
@@ -123,9 +118,8 @@ impl Wiggle {
             let stroke = |frame: &mut EyeFrame, a: [f64; 2], b: [f64; 2], radius: f64, colour| {
                 let low = [0, 1].map(|k| a[k].min(b[k]) - radius - 1.0);
                 let high = [0, 1].map(|k| a[k].max(b[k]) + radius + 1.0);
-                paint(frame, [low[0], low[1], high[0], high[1]], |x, y| {
-                    (distance([x, y], a, b) < radius).then_some(colour)
-                });
+                let inside = |x, y| distance([x, y], a, b) < radius;
+                paint(frame, [low[0], low[1], high[0], high[1]], colour, inside);
             };
             for pair in points.windows(2) {
                 stroke(frame, pair[0], pair[1], 2.3, rope);
@@ -139,77 +133,54 @@ impl Wiggle {
     /// its own motion. Boxes of lengths 1 and sqrt(3) have together twice the
     /// spread of the first.
     pub(crate) fn smeared(mut self) -> Self {
-        let scene = median(&self.frames);
-        let count = self.frames.len();
-        let last_node = self.nodes() - 1;
-        for i in 0..count {
-            let (a, b) = (i.saturating_sub(1), (i + 1).min(count - 1));
+        const SAMPLES: usize = 9;
+        let mut scene = still_scene(&self.frames).unwrap();
+        let last = self.frames.len() - 1;
+        for i in 0..=last {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
             let dt = (self.frames[b].stamp_ns - self.frames[a].stamp_ns) as f64 * 1e-9;
             let exposure = 3.0_f64.sqrt() * self.camera.exposure_s / dt;
-            let truth = &self.truth;
-            let motion: Vec<[f64; 2]> = (0..=last_node)
-                .map(|n| [0, 1].map(|k| (truth[b][n][k] - truth[a][n][k]) * exposure))
-                .collect();
-            let here = self.truth[i].clone();
-            let original = self.frames[i].clone();
-            let width = original.width_px;
-            let mut smear = |plane: fn(&mut EyeFrame) -> &mut Vec<u8>, step: usize| {
-                let mut from = original.clone();
-                let from = plane(&mut from).clone();
-                let mut still = scene.clone();
-                let still = plane(&mut still).clone();
-                let to = plane(&mut self.frames[i]);
+            let nodes = self.truth[a].iter().zip(&self.truth[b]).zip(&self.truth[i]);
+            let nodes = nodes.map(|((a, b), here)| {
+                let way = [0, 1].map(|k| (b[k] - a[k]) * exposure);
+                (*here, way, (14.0 + way[0].hypot(way[1])).powi(2))
+            });
+            let nodes: Vec<_> = nodes.collect();
+            let off2 = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2);
+            let width = self.frames[i].width_px;
+            let planes = planes(&mut self.frames[i]).into_iter();
+            for ((plane, step), (still, _)) in planes.zip(self::planes(&mut scene)) {
                 let row = width / step;
-                let (low, high) = (0..2).fold(([0.0; 2], [0.0; 2]), |(mut low, mut high), k| {
-                    let along = || here.iter().map(|q| q[k]);
-                    low[k] = along().fold(f64::INFINITY, f64::min) - 50.0;
-                    high[k] = along().fold(0.0, f64::max) + 50.0;
-                    (low, high)
-                });
-                for (at, value) in to.iter_mut().enumerate() {
+                let from = plane.clone();
+                let smeared = |at: usize| {
                     let p = [(at % row * step) as f64, (at / row) as f64];
-                    if (0..2).any(|k| p[k] < low[k] || p[k] > high[k]) {
-                        continue;
-                    }
-                    let (node, away) = here
-                        .iter()
-                        .map(|q| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2))
-                        .enumerate()
-                        .min_by(|x, y| x.1.total_cmp(&y.1))
-                        .unwrap();
-                    let [du, dv] = motion[node];
-                    if away.sqrt() > 14.0 + du.hypot(dv) {
-                        continue;
-                    }
-                    let samples = 9;
-                    let sum: f64 = (0..samples)
-                        .map(|k| {
-                            let part = (k as f64 + 0.5) / samples as f64 - 0.5;
-                            let x = (p[0] - part * du) / step as f64;
-                            let y = (p[1] - part * dv).round();
-                            let y = y.clamp(0.0, (from.len() / row - 1) as f64) as usize;
-                            let x = x.round().clamp(0.0, (row - 1) as f64) as usize;
-                            f64::from(from[y * row + x]) - f64::from(still[y * row + x])
-                        })
-                        .sum();
-                    *value = byte(f64::from(still[at]) + sum / samples as f64);
+                    let off2 = |node: &&([f64; 2], _, _)| off2(p, node.0);
+                    let nearest = nodes.iter().min_by(|x, y| off2(x).total_cmp(&off2(y)));
+                    let (_, [du, dv], _) = nearest.filter(|node| off2(node) <= node.2)?;
+                    let change = |k: usize| {
+                        let part = (k as f64 + 0.5) / SAMPLES as f64 - 0.5;
+                        let x = ((p[0] - part * du) / step as f64).round();
+                        let y = (p[1] - part * dv).round();
+                        let x = x.clamp(0.0, (row - 1) as f64) as usize;
+                        let y = y.clamp(0.0, (from.len() / row - 1) as f64) as usize;
+                        f64::from(from[y * row + x]) - f64::from(still[y * row + x])
+                    };
+                    let sum: f64 = (0..SAMPLES).map(change).sum();
+                    Some(byte(f64::from(still[at]) + sum / SAMPLES as f64))
+                };
+                for (at, value) in plane.iter_mut().enumerate() {
+                    *value = smeared(at).unwrap_or(*value);
                 }
-            };
-            smear(|f| &mut f.luma, 1);
-            smear(|f| &mut f.cb, 2);
-            smear(|f| &mut f.cr, 2);
+            }
         }
         self
     }
 
     /// Out of focus: a Gaussian of the given spread (px).
     pub(crate) fn defocused(mut self, sigma_px: f64) -> Self {
-        for frame in &mut self.frames {
-            let (w, h) = (frame.width_px, frame.height_px);
-            frame.luma = gaussian(&frame.luma, w, h, [sigma_px; 2]);
-            let chroma = [sigma_px / 2.0, sigma_px];
-            frame.cb = gaussian(&frame.cb, w / 2, h, chroma);
-            frame.cr = gaussian(&frame.cr, w / 2, h, chroma);
+        let width = self.frames[0].width_px;
+        for (plane, step) in self.frames.iter_mut().flat_map(planes) {
+            *plane = gaussian(plane, width / step, [sigma_px / step as f64, sigma_px]);
         }
         self
     }
@@ -217,14 +188,11 @@ impl Wiggle {
     /// Everything seen in a mirror: the same as a mirrored world filmed by a
     /// mirrored camera.
     pub(crate) fn mirrored(mut self) -> Self {
-        let flip = |plane: &mut Vec<u8>, width: usize| {
-            plane.chunks_exact_mut(width).for_each(<[u8]>::reverse);
-        };
         let width = self.frames[0].width_px;
-        for frame in &mut self.frames {
-            flip(&mut frame.luma, width);
-            flip(&mut frame.cb, width / 2);
-            flip(&mut frame.cr, width / 2);
+        for (plane, step) in self.frames.iter_mut().flat_map(planes) {
+            plane
+                .chunks_exact_mut(width / step)
+                .for_each(<[u8]>::reverse);
         }
         let last = width as f64 - 1.0;
         self.truth
@@ -291,13 +259,14 @@ impl Wiggle {
 fn paint(
     frame: &mut EyeFrame,
     [u0, v0, u1, v1]: [f64; 4],
-    colour: impl Fn(f64, f64) -> Option<[f32; 3]>,
+    [y, cb, cr]: [f32; 3],
+    inside: impl Fn(f64, f64) -> bool,
 ) {
     let width = frame.width_px;
     let bound = |x: f64, most: usize| x.clamp(0.0, most as f64) as usize;
     for v in bound(v0, frame.height_px)..bound(v1, frame.height_px) {
         for u in bound(u0, width)..bound(u1, width) {
-            if let Some([y, cb, cr]) = colour(u as f64, v as f64) {
+            if inside(u as f64, v as f64) {
                 frame.luma[v * width + u] = y as u8;
                 frame.cb[v * (width / 2) + u / 2] = cb as u8;
                 frame.cr[v * (width / 2) + u / 2] = cr as u8;
@@ -313,56 +282,28 @@ fn distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (e[0] - part * d[0]).hypot(e[1] - part * d[1])
 }
 
-/// Median over every seventh frame.
-fn median(frames: &[EyeFrame]) -> EyeFrame {
-    let chosen: Vec<&EyeFrame> = frames.iter().step_by(7).collect();
-    let plane = |pick: fn(&EyeFrame) -> &Vec<u8>| -> Vec<u8> {
-        (0..pick(chosen[0]).len())
-            .map(|at| {
-                let mut values: Vec<u8> = chosen.iter().map(|f| pick(f)[at]).collect();
-                values.sort_unstable();
-                values[values.len() / 2]
-            })
-            .collect()
-    };
-    EyeFrame {
-        luma: plane(|f| &f.luma),
-        cb: plane(|f| &f.cb),
-        cr: plane(|f| &f.cr),
-        ..frames[0].clone()
-    }
-}
-
-fn gaussian(plane: &[u8], width: usize, height: usize, sigma: [f64; 2]) -> Vec<u8> {
+/// A plane blurred along rows and columns (px).
+fn gaussian(plane: &[u8], width: usize, sigma: [f64; 2]) -> Vec<u8> {
+    let height = plane.len() / width;
     let kernel = |s: f64| -> Vec<f64> {
         let reach = (3.0 * s).ceil() as i32;
-        let raw: Vec<f64> = (-reach..=reach)
-            .map(|i| (-0.5 * (f64::from(i) / s).powi(2)).exp())
-            .collect();
-        let sum: f64 = raw.iter().sum();
-        raw.iter().map(|k| k / sum).collect()
+        let raw = (-reach..=reach).map(|i| (-0.5 * (f64::from(i) / s).powi(2)).exp());
+        let sum: f64 = raw.clone().sum();
+        raw.map(|k| k / sum).collect()
     };
-    let pass = |from: &[f64], k: &[f64], along_row: bool| -> Vec<f64> {
+    let pass = |from: &[f64], k: &[f64], [du, dv]: [isize; 2]| -> Vec<f64> {
         let reach = (k.len() / 2) as isize;
-        (0..from.len())
-            .map(|at| {
-                let (u, v) = ((at % width) as isize, (at / width) as isize);
-                k.iter()
-                    .zip(-reach..)
-                    .map(|(k, d)| {
-                        let (x, y) = if along_row { (u + d, v) } else { (u, v + d) };
-                        let x = x.clamp(0, width as isize - 1) as usize;
-                        let y = y.clamp(0, height as isize - 1) as usize;
-                        k * from[y * width + x]
-                    })
-                    .sum()
-            })
-            .collect()
+        let at = |at: usize, d: isize| {
+            let (u, v) = ((at % width) as isize, (at / width) as isize);
+            let u = (u + d * du).clamp(0, width as isize - 1) as usize;
+            let v = (v + d * dv).clamp(0, height as isize - 1) as usize;
+            from[v * width + u]
+        };
+        let sum = |i: usize| k.iter().zip(-reach..).map(|(k, d)| k * at(i, d)).sum();
+        (0..from.len()).map(sum).collect()
     };
     let start: Vec<f64> = plane.iter().map(|&b| f64::from(b)).collect();
-    let rows = pass(&start, &kernel(sigma[0]), true);
-    pass(&rows, &kernel(sigma[1]), false)
-        .into_iter()
-        .map(byte)
-        .collect()
+    let rows = pass(&start, &kernel(sigma[0]), [1, 0]);
+    let both = pass(&rows, &kernel(sigma[1]), [0, 1]);
+    both.into_iter().map(byte).collect()
 }

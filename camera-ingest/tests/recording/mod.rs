@@ -5,25 +5,30 @@ use std::path::{Path, PathBuf};
 
 use arm_model::{JointVector, Pole};
 use camera_ingest::source::{FrameSource, read_film};
-use camera_ingest::{
-    EyeFrame, Film, TrackError, TrackOptions, TrackResult, load_camera, open_video, track,
-};
+use camera_ingest::{EyeFrame, Film, TrackError, TrackResult, load_camera, open_video, track};
 use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
 use shared_types::StereoCamera;
 
-/// Folder of a recording; `None`, with a message, where the data are missing.
-pub(crate) fn folder(name: &str) -> Option<PathBuf> {
-    let path = Path::new(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/data/wiggle"
-    ))
-    .join(name);
-    if path.exists() {
-        Some(path)
-    } else {
+/// A file of the shared data; `None`, with a message, where it is missing.
+pub(crate) fn shared(name: &str) -> Option<PathBuf> {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+    let path = Path::new(data).join(name);
+    if !path.exists() {
         println!("skipped: {} not found", path.display());
-        None
+        return None;
     }
+    Some(path)
+}
+
+/// Folder of a wiggle or a throw.
+pub(crate) fn folder(name: &str) -> Option<PathBuf> {
+    shared(&format!("wiggle/{name}"))
+}
+
+/// What a recording shows.
+pub(crate) fn truth_json(name: &str) -> serde_json::Value {
+    let path = folder(name).unwrap().join("truth.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// float32 .npy of shape (frames, nodes, width).
@@ -42,6 +47,16 @@ pub(crate) fn read_npy(path: &Path) -> (Vec<usize>, Vec<f32>) {
         .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         .collect();
     (shape, values)
+}
+
+/// Pixels of the nodes per frame.
+pub(crate) fn read_nodes(path: &Path) -> Vec<Vec<[f64; 2]>> {
+    let (shape, values) = read_npy(path);
+    let pixel = |p: &[f32]| [f64::from(p[0]), f64::from(p[1])];
+    let frames = values.chunks_exact(2 * shape[1]);
+    frames
+        .map(|frame| frame.chunks_exact(2).map(pixel).collect())
+        .collect()
 }
 
 /// The numbers of a table without its head.
@@ -106,20 +121,16 @@ impl Wiggle {
     /// Reads the first frames of a recording, `most` of them.
     pub(crate) fn read_first(name: &str, most: usize) -> Option<Self> {
         let folder = folder(name)?;
-        let (shape, truth) = read_npy(&folder.join("nodes_left_px.npy"));
-        let pixel = |p: &[f32]| [f64::from(p[0]), f64::from(p[1])];
+        let mut truth = read_nodes(&folder.join("nodes_left_px.npy"));
         let mut video = open_video(&folder, None).unwrap();
         let count = most.min(video.len());
+        truth.truncate(count);
         Some(Self {
             frames: (0..count).map(|i| video.read(i).unwrap().left()).collect(),
             right: Vec::new(),
             camera: load_camera(&folder.join("camera.toml")).unwrap(),
             poses: read_poses(&folder.join("pose.csv")),
-            truth: truth
-                .chunks_exact(2 * shape[1])
-                .take(count)
-                .map(|frame| frame.chunks_exact(2).map(pixel).collect())
-                .collect(),
+            truth,
         })
     }
 
@@ -129,16 +140,12 @@ impl Wiggle {
 
     /// Tracked with a keypoint for every node.
     pub(crate) fn track(&self) -> Result<TrackResult, TrackError> {
-        let options = TrackOptions {
-            keypoints: self.nodes(),
-            ..TrackOptions::default()
-        };
         let motion = PoseTrack::new(&self.poses).unwrap();
         let film = Film {
             left: &self.frames,
             right: &self.right,
         };
-        track(film, &self.camera, &motion, &options)
+        track(film, &self.camera, &motion, self.nodes())
     }
 
     /// Distance of every keypoint from its node, frame by frame (px).

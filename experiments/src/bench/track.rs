@@ -7,7 +7,7 @@ use crate::args::BenchArgs;
 use anyhow::{Context, anyhow};
 use arm_model::Pole;
 use camera_ingest::source::{FrameSource, StereoSource, read_film};
-use camera_ingest::{TrackOptions, load_camera, open_video, track};
+use camera_ingest::{USUAL_KEYPOINTS, load_camera, open_video, track};
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome, Stage};
 use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
@@ -47,9 +47,8 @@ impl Pass {
         motion: &dyn AttachMotion,
     ) -> Outcome<Self> {
         let (decoding, eyes) = least(1, || read_film(video)).or_input()?;
-        let options = TrackOptions::default();
-        let (tracking, result) =
-            least(1, || track(eyes.film(), camera, motion, &options)).or_failed()?;
+        let follow = || track(eyes.film(), camera, motion, USUAL_KEYPOINTS);
+        let (tracking, result) = least(1, follow).or_failed()?;
         let times = result.times;
         Ok(Self {
             decoding,

@@ -11,7 +11,7 @@ use crate::report::{Column, print_table};
 use anyhow::{Context, ensure};
 use arm_model::Pole;
 use camera_ingest::source::read_film;
-use camera_ingest::{TrackError, TrackOptions, load_camera, open_video, track};
+use camera_ingest::{TrackError, USUAL_KEYPOINTS, load_camera, open_video, track};
 use cli_output::{OrInput, Outcome, Stage};
 use rig_sim::room::Kind;
 use rope_sim::{MeasuredArm, npy};
@@ -45,7 +45,7 @@ fn follow(folder: &Path) -> anyhow::Result<Result<KeypointTrack, TrackError>> {
     let joints = files::read_joints(&folder.join("joints_measured.csv"))?;
     let arm = MeasuredArm::new(&joints.times_s, &joints.q, Pole::default())?;
     let eyes = read_film(&mut video)?;
-    let tracked = track(eyes.film(), &camera, &arm, &TrackOptions::default());
+    let tracked = track(eyes.film(), &camera, &arm, USUAL_KEYPOINTS);
     Ok(tracked.map(|result| result.track))
 }
 

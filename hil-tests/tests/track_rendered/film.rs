@@ -1,7 +1,7 @@
 //! Films of the rig's wiggle in memory, with the arm's report and the truth.
 
 use arm_model::Pole;
-use camera_ingest::{EyeFrame, Film, StereoFrame, TrackError, TrackOptions, TrackResult, track};
+use camera_ingest::{EyeFrame, Film, StereoFrame, TrackError, TrackResult, track};
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{WiggleFilm, joints};
 use rope_sim::MeasuredArm;
@@ -88,15 +88,11 @@ impl Filmed {
 
     /// Tracks it with a keypoint for every node.
     pub(crate) fn track(&self, arm: &MeasuredArm) -> Result<TrackResult, TrackError> {
-        let options = TrackOptions {
-            keypoints: self.truth[0].len(),
-            ..TrackOptions::default()
-        };
         let film = Film {
             left: &self.frames,
             right: &self.right,
         };
-        track(film, &self.camera, arm, &options)
+        track(film, &self.camera, arm, self.truth[0].len())
     }
 
     /// What is behind the rope, but for where it hardly moves: the median over the motion.

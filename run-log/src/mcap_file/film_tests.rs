@@ -6,7 +6,7 @@ use crate::mcap_file::image::left_jpeg;
 use crate::mcap_file::messages;
 use crate::mcap_file::writer::McapFile;
 use arm_model::Pole;
-use camera_ingest::{Film, TrackOptions, track};
+use camera_ingest::{Film, track};
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{Frame, WiggleFilm, joints};
 use rope_sim::MeasuredArm;
@@ -112,15 +112,11 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
     let frames: Vec<EyeFrame> = (0..part.len())
         .map(|i| part.read_left(i).unwrap())
         .collect();
-    let options = TrackOptions {
-        keypoints: shown[0].nodes.len(),
-        ..TrackOptions::default()
-    };
     let film = Film {
         left: &frames,
         right: &[],
     };
-    let found = track(film, &camera, &arm, &options).unwrap();
+    let found = track(film, &camera, &arm, shown[0].nodes.len()).unwrap();
     assert_eq!(found.track.lost_fraction(), 0.0);
     let mut errors_px: Vec<f64> = Vec::new();
     for (frame, truth) in found.track.frames.iter().zip(&shown) {

@@ -6,7 +6,7 @@ use crate::cli::TrackArgs;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
-use camera_ingest::{EyeFrame, TrackOptions, TrackResult, track};
+use camera_ingest::{EyeFrame, TrackResult, track};
 use cli_output::{OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
@@ -29,11 +29,7 @@ pub fn track_video(
     stage.say("reading frames");
     let eyes = filmed.frames()?;
     stage.say(format!("tracking through {} frames", eyes.left.len()));
-    let options = TrackOptions {
-        keypoints,
-        ..TrackOptions::default()
-    };
-    let explained = track(eyes.film(), &filmed.camera, &*motion, &options);
+    let explained = track(eyes.film(), &filmed.camera, &*motion, keypoints);
     let result = explained
         .and_then(|result| match learned.tracker() {
             Some(tracker) => result.by_points(&eyes.left, tracker),

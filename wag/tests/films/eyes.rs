@@ -7,7 +7,7 @@ use arm_model::joint::START_POSE;
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::frame::StereoFrame;
 use camera_ingest::source::read_film;
-use camera_ingest::{TrackOptions, load_camera, open_video, track};
+use camera_ingest::{load_camera, open_video, track};
 use nalgebra::{Rotation3, Vector3};
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
@@ -77,13 +77,7 @@ fn keypoints(from: &Path) -> KeypointTrack {
     let mut video = open_video(from, None).unwrap();
     let all: Vec<StereoFrame> = (0..FRAMES).map(|i| video.read(i).unwrap()).collect();
     let eyes = read_film(&mut { all }).unwrap();
-    let options = TrackOptions {
-        keypoints: 20,
-        ..TrackOptions::default()
-    };
-    track(eyes.film(), &camera, &motion, &options)
-        .unwrap()
-        .track
+    track(eyes.film(), &camera, &motion, 20).unwrap().track
 }
 
 #[test]

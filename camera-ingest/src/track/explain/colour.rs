@@ -1,6 +1,8 @@
 //! Colours of rope and tip weight, learnt where they were found, and how much of a pixel
 //! they cover.
 
+use super::curve::Pixel;
+use super::statistics::median;
 use crate::frame::EyeFrame;
 
 /// Luma and both chromas about grey, in the scene's light; chroma weighs more than luma,
@@ -19,10 +21,18 @@ pub(super) const SHADES: [f32; 5] = [0.7, 0.85, 1.0, 1.15, 1.3];
 /// thing: its sides must count alike however they are lit.
 const EDGE: [f32; 2] = [0.1, 0.3];
 
+/// A pixel's own colour, in the light of a scene that is darker by `gain`.
+pub(super) fn pixel_colour(frame: &EyeFrame, gain: f32, [u, v]: [usize; 2]) -> Colour {
+    let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
+    let chroma = |c: f32| CHROMA_WEIGHT * (c - 128.0) / gain;
+    [y / gain, chroma(cb), chroma(cr)]
+}
+
 /// Colour of a frame at a place (px), divided by the frame's gain; luma interpolated
 /// between pixels, chroma between pairs. `None` outside.
 #[inline]
-pub(super) fn colour_at(frame: &EyeFrame, gain: f32, [u, v]: [f64; 2]) -> Option<Colour> {
+pub(super) fn colour_at(frame: &EyeFrame, gain: f32, p: Pixel) -> Option<Colour> {
+    let (u, v) = (p.x, p.y);
     let inside =
         u >= 0.0 && v >= 0.0 && u < frame.width_px as f64 - 1.0 && v < frame.height_px as f64 - 1.0;
     if !inside {
@@ -30,25 +40,35 @@ pub(super) fn colour_at(frame: &EyeFrame, gain: f32, [u, v]: [f64; 2]) -> Option
     }
     let (column, row) = (u as usize, v as usize);
     let (a, b) = ((u - column as f64) as f32, (v - row as f64) as f32);
-    let mix = |plane: &[u8], width: usize, column: usize, a: f32| {
-        let across = |row: usize| {
-            let at = row * width + column;
-            let [left, right] = [f32::from(plane[at]), f32::from(plane[at + 1])];
-            left + (right - left) * a
-        };
-        let (top, bottom) = (across(row), across(row + 1));
-        top + (bottom - top) * b
-    };
     let half = frame.width_px / 2;
     // A chroma sample stands between the two pixels of its pair.
     let pair = ((u - 0.5) * 0.5).clamp(0.0, half as f64 - 1.001);
     let (left, part) = (pair as usize, pair.fract() as f32);
-    let chroma = |plane: &[u8]| CHROMA_WEIGHT * (mix(plane, half, left, part) - 128.0) / gain;
+    let chroma = |plane: &[u8]| {
+        CHROMA_WEIGHT * (interpolated(plane, half, [left, row], [part, b]) - 128.0) / gain
+    };
     Some([
-        mix(&frame.luma, frame.width_px, column, a) / gain,
+        interpolated(&frame.luma, frame.width_px, [column, row], [a, b]) / gain,
         chroma(&frame.cb),
         chroma(&frame.cr),
     ])
+}
+
+/// Value of a plane at parts of a step beyond a column and a row (bilinear).
+#[inline]
+pub(super) fn interpolated(
+    plane: &[u8],
+    width: usize,
+    [column, row]: [usize; 2],
+    [a, b]: [f32; 2],
+) -> f32 {
+    let across = |at: usize| {
+        let [left, right] = [f32::from(plane[at]), f32::from(plane[at + 1])];
+        left + (right - left) * a
+    };
+    let at = row * width + column;
+    let (top, bottom) = (across(at), across(at + width));
+    top + (bottom - top) * b
 }
 
 fn square_distance(a: &Colour, b: &Colour) -> f32 {
@@ -60,12 +80,8 @@ pub(super) fn are_apart(a: &Colour, b: &Colour) -> bool {
     square_distance(a, b) > (1.5 * APART).powi(2)
 }
 
-fn median(of: &[&Colour]) -> Colour {
-    core::array::from_fn(|k| {
-        let mut values: Vec<f32> = of.iter().map(|c| c[k]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    })
+fn middle(of: &[&Colour]) -> Colour {
+    core::array::from_fn(|k| median(of.iter().map(|c| f64::from(c[k]))) as f32)
 }
 
 /// Which centre is nearest.
@@ -82,7 +98,7 @@ pub(super) fn groups(samples: &[Colour], count: usize) -> Vec<Colour> {
     if samples.is_empty() {
         return Vec::new();
     }
-    let mut centres = vec![median(&samples.iter().collect::<Vec<_>>())];
+    let mut centres = vec![middle(&samples.iter().collect::<Vec<_>>())];
     let members = |centres: &[Colour]| {
         let mut groups: Vec<Vec<&Colour>> = vec![Vec::new(); centres.len()];
         for sample in samples {
@@ -107,7 +123,7 @@ pub(super) fn groups(samples: &[Colour], count: usize) -> Vec<Colour> {
             let groups = members(&centres);
             for (centre, group) in centres.iter_mut().zip(groups) {
                 if !group.is_empty() {
-                    *centre = median(&group);
+                    *centre = middle(&group);
                 }
             }
         }
@@ -187,9 +203,10 @@ mod tests {
     fn a_place_between_pixels_is_interpolated() {
         let mut frame = EyeFrame::grey([8, 4], 100);
         frame.luma[8 + 3] = 200;
-        let seen = colour_at(&frame, 1.0, [2.5, 1.0]).unwrap();
+        let seen = colour_at(&frame, 1.0, Pixel::new(2.5, 1.0)).unwrap();
         assert_eq!(seen, [150.0, 0.0, 0.0]);
-        assert!(colour_at(&frame, 1.0, [7.0, 1.0]).is_none());
-        assert!(colour_at(&frame, 1.0, [-0.1, 1.0]).is_none());
+        for u in [7.0, -0.1] {
+            assert!(colour_at(&frame, 1.0, Pixel::new(u, 1.0)).is_none());
+        }
     }
 }

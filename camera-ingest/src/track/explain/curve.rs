@@ -1,69 +1,77 @@
 //! Curves in the picture.
 
+use nalgebra::Vector2;
+
+/// A place or a direction in the picture (px).
+pub(super) type Pixel = Vector2<f64>;
+
+/// Unit vector from one place to another, and their distance (px).
+fn towards(a: Pixel, b: Pixel) -> (Pixel, f64) {
+    let length = distance_px(a, b).max(1e-9);
+    ((b - a) / length, length)
+}
+
+pub(super) fn distance_px(a: Pixel, b: Pixel) -> f64 {
+    (b.x - a.x).hypot(b.y - a.y)
+}
+
+/// Place at a part of the way from one to another.
+fn between(a: Pixel, b: Pixel, part: f64) -> Pixel {
+    a + (b - a) * part
+}
+
 /// Unit tangent at a point, over `reach` points to either side, and their distance (px).
 #[inline]
-pub(super) fn tangent(points: &[[f64; 2]], at: usize, reach: usize) -> ([f64; 2], f64) {
-    let (a, b) = (
-        points[at.saturating_sub(reach)],
-        points[(at + reach).min(points.len() - 1)],
-    );
-    let (x, y) = (b[0] - a[0], b[1] - a[1]);
-    let length = x.hypot(y).max(1e-9);
-    ([x / length, y / length], length)
+pub(super) fn tangent(points: &[Pixel], at: usize, reach: usize) -> (Pixel, f64) {
+    let after = (at + reach).min(points.len() - 1);
+    towards(points[at.saturating_sub(reach)], points[after])
+}
+
+/// Across a direction.
+pub(super) fn across(direction: Pixel) -> Pixel {
+    Pixel::new(-direction.y, direction.x)
 }
 
 /// Unit normals.
-pub(super) fn normals(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let normal = |at| {
-        let ([x, y], _) = tangent(points, at, 2);
-        [-y, x]
-    };
-    (0..points.len()).map(normal).collect()
+pub(super) fn normals(points: &[Pixel]) -> impl Iterator<Item = Pixel> {
+    (0..points.len()).map(|at| across(tangent(points, at, 2).0))
 }
 
-/// Length (px).
-pub(super) fn length_px(points: &[[f64; 2]]) -> f64 {
-    let step = |w: &[[f64; 2]]| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
-    points.windows(2).map(step).sum()
+/// How far along the curve each of its points lies (px).
+fn along_px(points: &[Pixel]) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    for w in points.windows(2) {
+        sums.push(sums[sums.len() - 1] + distance_px(w[0], w[1]));
+    }
+    sums
+}
+
+/// In the points' unit.
+pub(super) fn length(points: &[Pixel]) -> f64 {
+    points.windows(2).map(|w| distance_px(w[0], w[1])).sum()
 }
 
 /// Place and tangent so far beyond the last point (px); before it where negative.
-pub(super) fn from_end(points: &[[f64; 2]], s_px: f64) -> ([f64; 2], [f64; 2]) {
+pub(super) fn from_end(points: &[Pixel], s_px: f64) -> (Pixel, Pixel) {
     let last = points.len() - 1;
     if s_px >= 0.0 {
         let (t, _) = tangent(points, last, 3);
-        let p = points[last];
-        return ([p[0] + t[0] * s_px, p[1] + t[1] * s_px], t);
+        return (points[last] + t * s_px, t);
     }
     let mut left_px = -s_px;
     for i in (1..=last).rev() {
-        let (t, step_px) = {
-            let (a, b) = (points[i - 1], points[i]);
-            let (x, y) = (b[0] - a[0], b[1] - a[1]);
-            let length = x.hypot(y).max(1e-9);
-            ([x / length, y / length], length)
-        };
+        let (t, step_px) = towards(points[i - 1], points[i]);
         if left_px <= step_px || i == 1 {
-            let p = points[i];
-            let (smooth, _) = tangent(points, i, 2);
-            return ([p[0] - t[0] * left_px, p[1] - t[1] * left_px], smooth);
+            return (points[i] - t * left_px, tangent(points, i, 2).0);
         }
         left_px -= step_px;
     }
-    (points[0], [0.0, 1.0])
+    (points[0], Pixel::y())
 }
 
 /// A curve whose points lie where they do along another one: at the same parts of its length.
-pub(super) fn respaced(points: &[[f64; 2]], like: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let along = |points: &[[f64; 2]]| -> Vec<f64> {
-        let mut sums = vec![0.0];
-        for w in points.windows(2) {
-            let step = (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
-            sums.push(sums[sums.len() - 1] + step);
-        }
-        sums
-    };
-    let (here, there) = (along(points), along(like));
+pub(super) fn respaced(points: &[Pixel], like: &[Pixel]) -> Vec<Pixel> {
+    let (here, there) = (along_px(points), along_px(like));
     let last = here.len() - 1;
     let scale = here[last] / there[last].max(1e-9);
     let mut i = 0;
@@ -72,24 +80,21 @@ pub(super) fn respaced(points: &[[f64; 2]], like: &[[f64; 2]]) -> Vec<[f64; 2]> 
         while i + 2 < here.len() && here[i + 1] < s {
             i += 1;
         }
-        let w = (s - here[i]) / (here[i + 1] - here[i]).max(1e-9);
-        let (a, b) = (points[i], points[i + 1]);
-        [a[0] + (b[0] - a[0]) * w, a[1] + (b[1] - a[1]) * w]
+        let part = (s - here[i]) / (here[i + 1] - here[i]).max(1e-9);
+        between(points[i], points[i + 1], part)
     };
     there.iter().map(place).collect()
 }
 
 /// Place at a part of the points' count, drawn on beyond the last one: 0 first, 1 last.
-pub(super) fn at_part(points: &[[f64; 2]], part: f64) -> [f64; 2] {
+pub(super) fn at_part(points: &[Pixel], part: f64) -> Pixel {
     let last = points.len() - 1;
     let place = part * last as f64;
     if place >= last as f64 {
-        return from_end(points, (part - 1.0) * length_px(points)).0;
+        return from_end(points, (part - 1.0) * length(points)).0;
     }
     let before = place.max(0.0) as usize;
-    let w = place - before as f64;
-    let (a, b) = (points[before], points[before + 1]);
-    [a[0] + (b[0] - a[0]) * w, a[1] + (b[1] - a[1]) * w]
+    between(points[before], points[before + 1], place - before as f64)
 }
 
 #[cfg(test)]
@@ -98,16 +103,18 @@ mod tests {
 
     #[test]
     fn places_lie_where_a_straight_line_has_them() {
-        let line: Vec<[f64; 2]> = (0..11).map(|i| [3.0, 2.0 * f64::from(i)]).collect();
-        assert_eq!(length_px(&line), 20.0);
-        assert_eq!(from_end(&line, 5.0), ([3.0, 25.0], [0.0, 1.0]));
-        assert_eq!(from_end(&line, -5.0), ([3.0, 15.0], [0.0, 1.0]));
-        assert_eq!(at_part(&line, 0.25), [3.0, 5.0]);
-        assert_eq!(at_part(&line, 1.1), [3.0, 22.0]);
-        assert_eq!(at_part(&line, -0.1), [3.0, -2.0]);
-        assert_eq!(normals(&line)[4], [-1.0, 0.0]);
+        let place = |y: f64| Pixel::new(3.0, y);
+        let line: Vec<Pixel> = (0..11).map(|i| place(2.0 * f64::from(i))).collect();
+        assert_eq!(length(&line), 20.0);
+        assert_eq!(from_end(&line, 5.0), (place(25.0), Pixel::y()));
+        assert_eq!(from_end(&line, -5.0), (place(15.0), Pixel::y()));
+        for (part, y) in [(0.25, 5.0), (1.1, 22.0), (-0.1, -2.0)] {
+            assert_eq!(at_part(&line, part), place(y));
+        }
+        assert_eq!(normals(&line).nth(4), Some(-Pixel::x()));
         // Unevenly spaced, and twice as long.
-        let uneven: Vec<[f64; 2]> = (0..11).map(|i| [0.0, 0.4 * f64::from(i * i)]).collect();
-        assert_eq!(respaced(&uneven, &line)[5], [0.0, 20.0]);
+        let uneven = |i: i32| Pixel::new(0.0, 0.4 * f64::from(i * i));
+        let uneven: Vec<Pixel> = (0..11).map(uneven).collect();
+        assert_eq!(respaced(&uneven, &line)[5], Pixel::new(0.0, 20.0));
     }
 }

@@ -1,13 +1,15 @@
 //! The tip weight in one frame: a disc.
 
+use super::curve::Pixel;
+
 /// Where a disc is looked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Disc {
     /// Where it should be (px).
-    pub(super) centre: [f64; 2],
+    pub(super) centre: Pixel,
     pub(super) radius_px: f64,
     /// Unit vector along the curve, away from the rope.
-    pub(super) outwards: [f64; 2],
+    pub(super) outwards: Pixel,
     /// How far off it may be (px).
     pub(super) reach_px: f64,
 }
@@ -22,23 +24,23 @@ const PULL: f64 = 0.004;
 impl Disc {
     /// Offset of the disc that stands out most from the ring around it, but for the
     /// rope's side (px), and how much it does. `at` gives evidence at a place.
-    pub(super) fn find(&self, at: impl Fn([f64; 2]) -> f32) -> ([f64; 2], f64) {
+    pub(super) fn find(&self, at: impl Fn(Pixel) -> f32) -> (Pixel, f64) {
         let reach = self.reach_px.floor() as i32;
         let kernel = (self.radius_px + RING_PX[1]).ceil() as i32;
         let size = kernel + reach + 1;
         let side = (2 * size + 1) as usize;
-        let place = |i: i32| f64::from(i);
+        let place = |i: i32, j: i32| Pixel::new(f64::from(i), f64::from(j));
         let mut patch = Vec::with_capacity(side * side);
         for j in -size..=size {
             for i in -size..=size {
-                patch.push(at([self.centre[0] + place(i), self.centre[1] + place(j)]));
+                patch.push(at(self.centre + place(i, j)));
             }
         }
         let (mut disc, mut ring) = (Vec::new(), Vec::new());
         for j in -kernel..=kernel {
             for i in -kernel..=kernel {
-                let r = place(i).hypot(place(j));
-                let out = place(i) * self.outwards[0] + place(j) * self.outwards[1];
+                let r = f64::from(i).hypot(f64::from(j));
+                let out = place(i, j).dot(&self.outwards);
                 let offset = j as isize * side as isize + i as isize;
                 if r <= self.radius_px - 0.5 {
                     disc.push(offset);
@@ -61,7 +63,7 @@ impl Disc {
         let mut best = (f64::MIN, 0, 0);
         for j in -reach..=reach {
             for i in -reach..=reach {
-                let far2 = place(i * i + j * j);
+                let far2 = f64::from(i * i + j * j);
                 let worth = value(i, j) - PULL * far2;
                 if far2 <= self.reach_px * self.reach_px && worth > best.0 {
                     best = (worth, i, j);
@@ -78,11 +80,11 @@ impl Disc {
                 0.0
             }
         };
-        let offset = [
-            place(i) + top(value(i - 1, j), value(i + 1, j)),
-            place(j) + top(value(i, j - 1), value(i, j + 1)),
-        ];
-        (offset, here.max(0.0))
+        let beside = Pixel::new(
+            top(value(i - 1, j), value(i + 1, j)),
+            top(value(i, j - 1), value(i, j + 1)),
+        );
+        (place(i, j) + beside, here.max(0.0))
     }
 }
 
@@ -94,19 +96,20 @@ mod tests {
     fn a_disc_on_a_rope_is_found_where_it_is() {
         for (x, y) in [(0.0, 0.0), (2.4, -1.3), (-3.2, 2.0)] {
             // The rope comes from above.
-            let picture = |[u, v]: [f64; 2]| {
-                let disc = (6.5 - (u - 40.0 - x).hypot(v - 30.0 - y)).clamp(0.0, 1.0);
-                let rope = (3.5 - (u - 40.0 - x).abs()).clamp(0.0, 1.0);
-                (if v < 30.0 + y { disc.max(rope) } else { disc }) as f32
+            let picture = |p: Pixel| {
+                let off = p - Pixel::new(40.0 + x, 30.0 + y);
+                let disc = (6.5 - off.norm()).clamp(0.0, 1.0);
+                let rope = (3.5 - off.x.abs()).clamp(0.0, 1.0);
+                (if off.y < 0.0 { disc.max(rope) } else { disc }) as f32
             };
             let disc = Disc {
-                centre: [40.0, 30.0],
+                centre: Pixel::new(40.0, 30.0),
                 radius_px: 6.0,
-                outwards: [0.0, 1.0],
+                outwards: Pixel::y(),
                 reach_px: 5.0,
             };
             let (found, weight) = disc.find(picture);
-            let off = (found[0] - x).hypot(found[1] - y);
+            let off = (found - Pixel::new(x, y)).norm();
             assert!(
                 off < 0.35 && weight > 0.8,
                 "{found:?} for {x}, {y}: {weight}"

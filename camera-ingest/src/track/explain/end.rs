@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
+use super::curve::{Pixel, distance_px};
 use super::ends::EndPicture;
 
 /// Where the tip weight is, from the hypothesis's end on (px).
@@ -15,14 +16,13 @@ pub(super) struct End {
 
 impl End {
     /// How many of a curve's points the tip weight does not hide.
-    pub(super) fn nodes_shown(&self, curve: &[[f64; 2]]) -> usize {
+    pub(super) fn nodes_shown(&self, curve: &[Pixel]) -> usize {
         let mut from_end_px = -self.centre_px;
         for node in (1..curve.len()).rev() {
             if from_end_px >= self.radius_px {
                 return node + 1;
             }
-            let (a, b) = (curve[node - 1], curve[node]);
-            from_end_px += (b[0] - a[0]).hypot(b[1] - a[1]);
+            from_end_px += distance_px(curve[node - 1], curve[node]);
         }
         1
     }
@@ -98,19 +98,20 @@ fn misfit(picture: &EndPicture, end: &End, least: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ends::{EndFrames, Window};
+    use super::super::ends::Window;
     use super::*;
 
-    /// A curve that ends at the origin, drawn straight down, and its mean picture.
-    fn picture(evidence: impl Fn([f64; 2]) -> f32) -> EndPicture {
-        let mut frames = EndFrames::new(Window {
+    /// A curve that ends at the origin, drawn straight down, and its picture.
+    fn picture(evidence: impl Fn(Pixel) -> f32) -> EndPicture {
+        let window = Window {
             before: 45,
             beyond: 45,
             reach: 24,
-        });
-        let curve: Vec<[f64; 2]> = (0..20).map(|i| [0.0, 5.0 * f64::from(i - 19)]).collect();
-        frames.add(&curve, |p| Some((evidence(p), [0.0; 3])));
-        frames.picture()
+        };
+        let place = |i| Pixel::new(0.0, 5.0 * f64::from(i - 19));
+        let curve: Vec<Pixel> = (0..20).map(place).collect();
+        let sample = |p| Some((evidence(p), [0.0; 3]));
+        EndPicture::of(window, std::iter::once((curve, sample)))
     }
 
     #[test]
@@ -122,7 +123,8 @@ mod tests {
             (2.0, 8.0, 3.0, 0.25),
             (6.0, 3.5, 3.0, 1.0),
         ] {
-            let picture = picture(|[u, v]| {
+            let picture = picture(|p| {
+                let (u, v) = (p.x, p.y);
                 let disc = (radius - u.hypot(v - centre) + 0.5).clamp(0.0, 1.0);
                 let band = (rope - u.abs() + 0.5).clamp(0.0, 1.0);
                 let band = if v < centre { band } else { 0.0 };

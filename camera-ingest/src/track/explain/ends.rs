@@ -4,7 +4,11 @@
 //! stand still and sharp.
 
 use super::colour::Colour;
-use super::curve::from_end;
+use super::curve::{Pixel, across, from_end};
+use super::statistics::median;
+
+/// Contrast (levels) from which a colour is another one.
+const OTHER_COLOUR: f64 = 18.0;
 
 /// What is around one end of a curve: rows along it, columns across.
 #[derive(Debug, Clone, Copy)]
@@ -26,14 +30,6 @@ impl Window {
     }
 }
 
-/// Frames around one end, of which a picture is made.
-#[derive(Debug)]
-pub(super) struct EndFrames {
-    window: Window,
-    /// Evidence and colour in every frame, place by place.
-    seen: Vec<Vec<[f32; 4]>>,
-}
-
 /// Median over frames around one end of a curve.
 #[derive(Debug, Clone)]
 pub(super) struct EndPicture {
@@ -42,91 +38,54 @@ pub(super) struct EndPicture {
     colour: Vec<[f64; 3]>,
 }
 
-/// Contrast (levels) from which a colour is another one.
-const OTHER_COLOUR: f64 = 18.0;
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-impl EndFrames {
-    pub(super) fn new(window: Window) -> Self {
-        Self {
-            window,
-            seen: vec![Vec::new(); window.rows() * window.columns()],
-        }
-    }
-
-    /// Adds a frame: the curve's end is its last point; `sample` gives evidence and
-    /// colour at a place.
-    pub(super) fn add(
-        &mut self,
-        points: &[[f64; 2]],
-        sample: impl Fn([f64; 2]) -> Option<(f32, Colour)>,
-    ) {
-        let columns = self.window.columns();
-        for row in 0..self.window.rows() {
-            let (p, t) = from_end(points, row as f64 - self.window.before as f64);
-            for column in 0..columns {
-                let aside = column as f64 - self.window.reach as f64;
-                let place = [p[0] - t[1] * aside, p[1] + t[0] * aside];
-                if let Some((evidence, [a, b, c])) = sample(place) {
-                    self.seen[row * columns + column].push([evidence, a, b, c]);
+impl EndPicture {
+    /// From curves whose last points are the end, each with what gives evidence and colour
+    /// at a place of its frame. Medians leave out what passes by in some frames.
+    pub(super) fn of<F: Fn(Pixel) -> Option<(f32, Colour)>>(
+        window: Window,
+        frames: impl Iterator<Item = (Vec<Pixel>, F)>,
+    ) -> Self {
+        let columns = window.columns();
+        let mut seen = vec![Vec::new(); window.rows() * columns];
+        for (curve, sample) in frames {
+            for row in 0..window.rows() {
+                let (p, t) = from_end(&curve, row as f64 - window.before as f64);
+                for column in 0..columns {
+                    let aside = column as f64 - window.reach as f64;
+                    seen[row * columns + column].extend(sample(p + across(t) * aside));
                 }
             }
         }
-    }
-
-    /// Medians: what passes by in some frames is left out.
-    pub(super) fn picture(&self) -> EndPicture {
-        let mut values = Vec::new();
-        let mut middle = |seen: &Vec<[f32; 4]>, k: usize| {
-            values.clear();
-            values.extend(seen.iter().map(|s| s[k]));
-            let at = values.len() / 2;
-            let middle = |v: &mut Vec<f32>| *v.select_nth_unstable_by(at, f32::total_cmp).1;
-            (!values.is_empty()).then(|| f64::from(middle(&mut values)))
+        let middle = |of: &Vec<(f32, Colour)>, value: &dyn Fn(&(f32, Colour)) -> f32| {
+            median(of.iter().map(|s| f64::from(value(s))))
         };
-        let mut median = |k: usize| -> Vec<f64> {
-            let of = |seen| middle(seen, k).unwrap_or(0.0);
-            self.seen.iter().map(of).collect()
-        };
-        let [evidence, y, cb, cr] = [0, 1, 2, 3].map(&mut median);
-        let colour = y.into_iter().zip(cb).zip(cr);
-        EndPicture {
-            window: self.window,
-            evidence,
-            colour: colour.map(|((y, cb), cr)| [y, cb, cr]).collect(),
+        let colour = |of| core::array::from_fn(|k| middle(of, &|(_, colour)| colour[k]));
+        Self {
+            window,
+            evidence: seen.iter().map(|of| middle(of, &|(e, _)| *e)).collect(),
+            colour: seen.iter().map(colour).collect(),
         }
     }
-}
 
-impl EndPicture {
     fn at(&self, row: usize, column: usize) -> f64 {
         self.evidence[row * self.window.columns() + column]
     }
 
-    /// Evidence on the curve.
-    fn line(&self, row: usize) -> f64 {
+    /// Mean of three columns on the curve.
+    fn on_curve(&self, value: impl Fn(usize) -> f64) -> f64 {
         let middle = self.window.reach - 1..=self.window.reach + 1;
-        middle.map(|c| self.at(row, c)).sum::<f64>() / 3.0
+        middle.map(value).sum::<f64>() / 3.0
     }
 
     /// Colour on the curve.
     fn colour(&self, row: usize) -> [f64; 3] {
-        let columns = self.window.columns();
-        core::array::from_fn(|k| {
-            let middle = self.window.reach - 1..=self.window.reach + 1;
-            middle
-                .map(|c| self.colour[row * columns + c][k])
-                .sum::<f64>()
-                / 3.0
-        })
+        let first = row * self.window.columns();
+        core::array::from_fn(|k| self.on_curve(|c| self.colour[first + c][k]))
     }
 
     /// Half of what is evident in a row, its edges at half of the middle's.
     fn half_width_px(&self, row: usize) -> f64 {
-        let peak = self.line(row);
+        let peak = self.on_curve(|c| self.at(row, c));
         let ground = 0.5 * (self.at(row, 1) + self.at(row, self.window.columns() - 2));
         let part =
             |c: usize| ((self.at(row, c) - ground) / (peak - ground).max(0.05)).clamp(0.0, 1.0);
@@ -135,26 +94,17 @@ impl EndPicture {
 
     /// Half the rope's width, well before the end.
     pub(super) fn rope_half_px(&self) -> f64 {
-        median(
-            (0..self.window.before * 2 / 3)
-                .map(|r| self.half_width_px(r))
-                .collect(),
-        )
+        median((0..self.window.before * 2 / 3).map(|row| self.half_width_px(row)))
     }
 
     /// Places along the curve from its end on and across it (px), and the evidence there.
     pub(super) fn places(&self) -> impl Iterator<Item = (f64, f64, f64)> {
         let px = |index: usize, middle: usize| index as f64 - middle as f64;
-        (0..self.window.rows()).flat_map(move |row| {
-            let at = move |c| {
-                (
-                    px(row, self.window.before),
-                    px(c, self.window.reach),
-                    self.at(row, c),
-                )
-            };
-            (0..self.window.columns()).map(at)
-        })
+        let Window { before, reach, .. } = self.window;
+        let columns = self.window.columns();
+        let place =
+            move |(i, e): (usize, &f64)| (px(i / columns, before), px(i % columns, reach), *e);
+        self.evidence.iter().enumerate().map(place)
     }
 
     /// Where the rope begins, from the clamp of the hypothesis on (px): the colour of the

@@ -3,11 +3,16 @@
 //! A cast shadow darkens the scene along its own colour; a rope does not only that. So a
 //! pixel's difference from the scene is split along and across the scene's colour: a
 //! change of hue counts fully, brightening half, darkening hardly.
+//!
+//! A rope fills little of its surroundings. Where evidence fills a large part of them,
+//! something else is there (a person, a door, the arm), and what is seen there tells nothing
+//! about the rope.
 
-use super::super::background::{Background, frames_by_motion};
-use super::bulk::Bulk;
-use super::colour::{CHROMA_WEIGHT, Colour, SHADES, colour_at, coverage, presence};
-use super::read::Lit;
+use super::super::scene::Scene;
+use super::colour::{
+    CHROMA_WEIGHT, Colour, SHADES, colour_at, coverage, interpolated, pixel_colour, presence,
+};
+use super::curve::Pixel;
 use crate::frame::EyeFrame;
 use crate::vectors::widest;
 
@@ -16,75 +21,41 @@ const BRIGHTER: f32 = 0.5;
 const DARKER: f32 = 0.02;
 /// Evidence begins and is full at so many times the noise.
 const LEVELS: [f32; 2] = [1.5, 6.0];
-/// A still scene differs by less than what compression leaves around things that move
-/// (levels).
-const QUIETEST: f32 = 3.5;
 /// Keeps black from having a colour (squared levels).
 const BLACK: f32 = 100.0;
 
-/// One eye's scene without the rope.
-#[derive(Debug)]
-pub(super) struct Scene {
-    background: Background,
-}
+/// Cells along the picture's height.
+const CELLS_HIGH: usize = 47;
+/// Surroundings: this many cells to every side.
+const AROUND: usize = 4;
+/// Every which pixel of a cell is looked at, in both directions.
+const EVERY: usize = 4;
+/// Part of the surroundings from which evidence begins to count less, and from which it
+/// counts nothing.
+const FILLED: [f32; 2] = [0.45, 0.7];
 
 impl Scene {
-    /// The median over frames in which much has moved.
-    pub(super) fn of(frames: &[EyeFrame], count: usize) -> Self {
-        let mut background = Background::uncovered(frames, &frames_by_motion(frames, count));
-        background.noise = background.noise.max(QUIETEST);
-        Self { background }
+    /// Colour of a frame at a place, in the scene's light, and the scene's there; `None`
+    /// outside.
+    #[inline]
+    pub(super) fn colours(
+        &self,
+        frame: &EyeFrame,
+        gain: f32,
+        p: Pixel,
+    ) -> Option<(Colour, Colour)> {
+        Some((colour_at(frame, gain, p)?, colour_at(&self.image, 1.0, p)?))
     }
 
-    pub(super) fn noise(&self) -> f32 {
-        self.background.noise
-    }
-
-    /// Brightness of a frame relative to the scene.
-    pub(super) fn gain(&self, frame: &EyeFrame) -> f32 {
-        self.background.gain(frame)
-    }
-
-    /// Colour of the scene at a place.
-    pub(super) fn colour_at(&self, p: [f64; 2]) -> Option<Colour> {
-        colour_at(&self.background.image, 1.0, p)
+    /// Distances from the scene (levels) at which evidence begins and is full.
+    fn levels(&self) -> [f32; 2] {
+        LEVELS.map(|l| l * self.noise)
     }
 
     /// Evidence (0 to 1) that a colour seen at a place is not the scene.
     pub(super) fn unexplained(&self, seen: Colour, behind: Colour) -> f32 {
-        let [zero, full] = LEVELS.map(|l| l * self.background.noise);
+        let [zero, full] = self.levels();
         ((distance(seen, behind) - zero) / (full - zero)).clamp(0.0, 1.0)
-    }
-
-    /// Evidence (0 to 1) at a place of a frame that something of these colours is there.
-    pub(super) fn present(
-        &self,
-        frame: &EyeFrame,
-        gain: f32,
-        colours: &[Colour],
-        p: [f64; 2],
-    ) -> f32 {
-        let seen = colour_at(frame, gain, p).zip(self.colour_at(p));
-        seen.map_or(0.0, |(seen, behind)| {
-            presence(coverage(seen, behind, colours, &SHADES, self.noise()))
-        })
-    }
-
-    /// Evidence that what is seen at a pixel is not the scene.
-    pub(super) fn unexplained_at(&self, frame: &EyeFrame, gain: f32, [u, v]: [usize; 2]) -> f32 {
-        let colour = |frame: &EyeFrame, gain: f32| -> Colour {
-            let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
-            let chroma = |c: f32| CHROMA_WEIGHT * (c - 128.0) / gain;
-            [y / gain, chroma(cb), chroma(cr)]
-        };
-        self.unexplained(colour(frame, gain), colour(&self.background.image, 1.0))
-    }
-
-    /// Evidence in all of a frame, but for what is too large to be a rope.
-    pub(super) fn map(&self, lit: &Lit<'_>) -> EvidenceMap {
-        let mut map = EvidenceMap::of(lit.frame, &self.background, lit.gain);
-        map.leave_out(&lit.bulk);
-        map
     }
 }
 
@@ -103,146 +74,201 @@ fn distance(seen: Colour, behind: Colour) -> f32 {
     ((square - along2).max(0.0) + weight * along2).sqrt()
 }
 
+/// A frame in its scene's light.
+pub(super) struct Lit<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) frame: &'a EyeFrame,
+    /// Brightness relative to the scene.
+    gain: f32,
+    /// How far evidence counts, in cells of so many pixels a side.
+    counts: Vec<f32>,
+    cell_px: usize,
+    columns: usize,
+}
+
+impl<'a> Lit<'a> {
+    pub(super) fn of(frame: &'a EyeFrame, scene: &'a Scene) -> Self {
+        let gain = scene.gain(frame);
+        let cell_px = (frame.height_px / CELLS_HIGH).max(EVERY);
+        let columns = frame.width_px.div_ceil(cell_px);
+        let rows = frame.height_px.div_ceil(cell_px);
+        let mut filled = vec![[0.0_f32; 2]; columns * rows];
+        for v in (0..frame.height_px).step_by(EVERY) {
+            for u in (0..frame.width_px).step_by(EVERY) {
+                let [sum, count] = &mut filled[v / cell_px * columns + u / cell_px];
+                let seen = pixel_colour(frame, gain, [u, v]);
+                let behind = pixel_colour(&scene.image, 1.0, [u, v]);
+                *sum += scene.unexplained(seen, behind);
+                *count += 1.0;
+            }
+        }
+        Self {
+            scene,
+            frame,
+            gain,
+            counts: counts(&filled, columns, rows),
+            cell_px,
+            columns,
+        }
+    }
+
+    /// How far evidence at a pixel counts: from 0, in something large, to 1.
+    fn count_at(&self, [u, v]: [usize; 2]) -> f32 {
+        let column = (u / self.cell_px).min(self.columns - 1);
+        let at = v / self.cell_px * self.columns + column;
+        self.counts.get(at).copied().unwrap_or(1.0)
+    }
+
+    /// Colour at a place, and the scene's there; `None` outside.
+    pub(super) fn colours(&self, p: Pixel) -> Option<(Colour, Colour)> {
+        self.scene.colours(self.frame, self.gain, p)
+    }
+
+    /// Evidence (0 to 1) that something other than the scene is at a place, which may be
+    /// the rope, and its colour; `None` outside.
+    pub(super) fn unexplained(&self, p: Pixel) -> Option<(f32, Colour)> {
+        let (seen, behind) = self.colours(p)?;
+        let count = self.count_at([p.x as usize, p.y as usize]);
+        Some((self.scene.unexplained(seen, behind) * count, seen))
+    }
+
+    /// Evidence (0 to 1) that something of these colours is at a place.
+    pub(super) fn present(&self, colours: &[Colour], p: Pixel) -> f32 {
+        self.colours(p).map_or(0.0, |(seen, behind)| {
+            let noise = self.scene.noise;
+            presence(coverage(seen, behind, colours, &SHADES, noise))
+        })
+    }
+
+    /// Evidence of something other than the scene in all of the frame.
+    pub(super) fn map(&self) -> EvidenceMap {
+        let (frame, scene) = (self.frame, &self.scene.image);
+        let [zero, full] = self.scene.levels();
+        let (inverse, slope) = (1.0 / self.gain, 255.0 / (full - zero));
+        let mut values = vec![0; frame.luma.len()];
+        widest(
+            #[inline(always)]
+            || {
+                for (i, out) in values.iter_mut().enumerate() {
+                    let colour = |frame: &EyeFrame, scale: f32| -> Colour {
+                        let chroma = |c: u8| (f32::from(c) - 128.0) * (CHROMA_WEIGHT * scale);
+                        let luma = f32::from(frame.luma[i]) * scale;
+                        [luma, chroma(frame.cb[i / 2]), chroma(frame.cr[i / 2])]
+                    };
+                    let off = distance(colour(frame, inverse), colour(scene, 1.0));
+                    *out = ((off - zero) * slope).clamp(0.0, 255.0) as u8;
+                }
+            },
+        );
+        for (v, row) in values.chunks_exact_mut(frame.width_px).enumerate() {
+            for (u, value) in row.iter_mut().enumerate() {
+                *value = (f32::from(*value) * self.count_at([u, v])) as u8;
+            }
+        }
+        EvidenceMap {
+            width: frame.width_px,
+            values,
+        }
+    }
+}
+
+/// From evidence and number of looks per cell: means over the surroundings, from sums over
+/// all cells above and to the left.
+fn counts(filled: &[[f32; 2]], columns: usize, rows: usize) -> Vec<f32> {
+    let [low, high] = FILLED;
+    let wide = columns + 1;
+    let mut sums = vec![[0.0_f32; 2]; wide * (rows + 1)];
+    for row in 0..rows {
+        let mut line = [0.0; 2];
+        for column in 0..columns {
+            for k in 0..2 {
+                line[k] += filled[row * columns + column][k];
+                sums[(row + 1) * wide + column + 1][k] = sums[row * wide + column + 1][k] + line[k];
+            }
+        }
+    }
+    let near = |at: usize, count: usize| (at.saturating_sub(AROUND), (at + AROUND + 1).min(count));
+    let count = |at: usize| {
+        let ((top, bottom), (left, right)) =
+            (near(at / columns, rows), near(at % columns, columns));
+        let [evidence, looks] = [0, 1].map(|k| {
+            let sum = |row: usize, column: usize| sums[row * wide + column][k];
+            sum(bottom, right) - sum(top, right) - sum(bottom, left) + sum(top, left)
+        });
+        ((high - evidence / looks.max(1.0)) / (high - low)).clamp(0.0, 1.0)
+    };
+    (0..columns * rows).map(count).collect()
+}
+
 /// Evidence of one frame, row by row, 255 for certain.
 #[derive(Debug, Clone)]
 pub(super) struct EvidenceMap {
     width: usize,
-    height: usize,
     values: Vec<u8>,
 }
 
 impl EvidenceMap {
-    fn of(frame: &EyeFrame, scene: &Background, gain: f32) -> Self {
-        let (width, height) = (frame.width_px, frame.height_px);
-        let mut values = vec![0; width * height];
-        let [zero, full] = LEVELS.map(|l| l * scene.noise);
-        let (inverse, slope) = (1.0 / gain, 255.0 / (full - zero));
-        let mut chroma = [const { Vec::new() }; 4];
-        for row in &mut chroma {
-            *row = vec![0.0_f32; width];
-        }
-        widest(
-            #[inline(always)]
-            || {
-                for (v, out) in values.chunks_exact_mut(width).enumerate() {
-                    let half = v * width / 2..(v + 1) * width / 2;
-                    let planes = [
-                        (&frame.cb, inverse),
-                        (&frame.cr, inverse),
-                        (&scene.image.cb, 1.0),
-                        (&scene.image.cr, 1.0),
-                    ];
-                    for (row, (plane, scale)) in chroma.iter_mut().zip(planes) {
-                        let scale = CHROMA_WEIGHT * scale;
-                        for (pair, c) in row.chunks_exact_mut(2).zip(&plane[half.clone()]) {
-                            pair.fill((f32::from(*c) - 128.0) * scale);
-                        }
-                    }
-                    let [cb, cr, scene_cb, scene_cr] = &chroma;
-                    let row = v * width..(v + 1) * width;
-                    let (luma, scene_luma) = (&frame.luma[row.clone()], &scene.image.luma[row]);
-                    for u in 0..width {
-                        let seen = [f32::from(luma[u]) * inverse, cb[u], cr[u]];
-                        let behind = [f32::from(scene_luma[u]), scene_cb[u], scene_cr[u]];
-                        out[u] = ((distance(seen, behind) - zero) * slope).clamp(0.0, 255.0) as u8;
-                    }
-                }
-            },
-        );
-        Self {
-            width,
-            height,
-            values,
-        }
-    }
-
-    fn leave_out(&mut self, bulk: &Bulk) {
-        let cell_px = bulk.cell_px();
-        for (v, row) in self.values.chunks_exact_mut(self.width).enumerate() {
-            for (cell, values) in row.chunks_mut(cell_px).enumerate() {
-                let count = bulk.at([(cell * cell_px) as f64, v as f64]);
-                if count < 1.0 {
-                    for value in values {
-                        *value = (f32::from(*value) * count) as u8;
-                    }
-                }
-            }
-        }
-    }
-
     /// Evidence at a place (px), 0 to 1, between pixels; 0 outside.
     #[inline]
-    pub(super) fn at(&self, [u, v]: [f64; 2]) -> f32 {
-        let (u, v) = (u as f32, v as f32);
-        let inside =
-            u >= 0.0 && v >= 0.0 && u < (self.width - 1) as f32 && v < (self.height - 1) as f32;
-        if !inside {
+    pub(super) fn at(&self, p: Pixel) -> f32 {
+        let (u, v) = (p.x as f32, p.y as f32);
+        let [last_u, last_v] = [self.width, self.values.len() / self.width].map(|n| n - 1);
+        if !(u >= 0.0 && v >= 0.0 && u < last_u as f32 && v < last_v as f32) {
             return 0.0;
         }
         let (column, row) = (u as usize, v as usize);
-        let (a, b) = (u - column as f32, v - row as f32);
-        let at = row * self.width + column;
-        let value = |at: usize| f32::from(self.values[at]);
-        let top = value(at) + (value(at + 1) - value(at)) * a;
-        let at = at + self.width;
-        let bottom = value(at) + (value(at + 1) - value(at)) * a;
-        (top + (bottom - top) * b) / 255.0
+        let beyond = [u - column as f32, v - row as f32];
+        interpolated(&self.values, self.width, [column, row], beyond) / 255.0
     }
 
     /// Mean over a square of `2 reach + 1` pixels a side, so that a hypothesis is drawn
     /// to what it misses by that much.
     pub(super) fn blurred(&self, reach: usize) -> Self {
-        let along = |values: &[u8], width: usize, height: usize| -> Vec<u8> {
-            // Running sums along columns; the result is transposed.
-            let mut out = vec![0; width * height];
-            let side = 2 * reach as u32 + 1;
-            let mut sums = vec![0_u32; width];
-            let row = |v: usize| &values[v * width..(v + 1) * width];
-            let add = |sums: &mut [u32], v: usize, sign: i64| {
-                for (sum, x) in sums.iter_mut().zip(row(v)) {
-                    *sum = (i64::from(*sum) + sign * i64::from(*x)) as u32;
-                }
-            };
-            (0..reach.min(height)).for_each(|v| add(&mut sums, v, 1));
-            for v in 0..height {
-                if v + reach < height {
-                    add(&mut sums, v + reach, 1);
-                }
-                for (u, sum) in sums.iter().enumerate() {
-                    out[u * height + v] = (sum / side) as u8;
-                }
-                if v >= reach {
-                    add(&mut sums, v - reach, -1);
-                }
-            }
-            out
-        };
-        let turned = along(&self.values, self.width, self.height);
+        let turned = blurred_and_turned(&self.values, self.width, reach);
+        let height = self.values.len() / self.width;
         Self {
-            values: along(&turned, self.height, self.width),
+            values: blurred_and_turned(&turned, height, reach),
             ..*self
         }
     }
+}
+
+/// Means over `2 reach + 1` rows, their columns as rows; beyond the picture is nothing.
+fn blurred_and_turned(values: &[u8], width: usize, reach: usize) -> Vec<u8> {
+    let height = values.len() / width;
+    let mut out = vec![0; values.len()];
+    for v in 0..height {
+        let mut sums = vec![0_u32; width];
+        let rows = values.chunks_exact(width).take(v + reach + 1);
+        for row in rows.skip(v.saturating_sub(reach)) {
+            for (sum, value) in sums.iter_mut().zip(row) {
+                *sum += u32::from(*value);
+            }
+        }
+        for (u, sum) in sums.into_iter().enumerate() {
+            out[u * height + v] = (sum / (2 * reach as u32 + 1)) as u8;
+        }
+    }
+    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn scene() -> Scene {
-        let frame = |stamp_ns| EyeFrame {
+    fn wall(stamp_ns: u64) -> EyeFrame {
+        EyeFrame {
             cb: vec![120; 32],
             cr: vec![150; 32],
             stamp_ns,
             ..EyeFrame::grey([8, 8], 160)
-        };
-        Scene::of(&[frame(1), frame(2), frame(3)], 3)
+        }
     }
 
     #[test]
     fn a_shadow_is_hardly_evidence_and_another_hue_is() {
-        let scene = scene();
-        let behind = scene.colour_at([3.0, 3.0]).unwrap();
+        let scene = Scene::of(&[1, 2, 3].map(wall));
+        let behind = colour_at(&scene.image, 1.0, Pixel::new(3.0, 3.0)).unwrap();
         let seen = |scale: f32| behind.map(|c| c * scale);
         assert!(scene.unexplained(seen(0.85), behind) < 0.6);
         assert!(scene.unexplained(seen(0.95), behind) < 0.01);
@@ -252,24 +278,45 @@ mod tests {
     }
 
     #[test]
-    fn the_map_says_what_its_places_say() {
-        let scene = scene();
-        let mut frame = EyeFrame {
-            cb: vec![120; 32],
-            cr: vec![150; 32],
-            ..EyeFrame::grey([8, 8], 160)
+    fn a_walker_counts_nothing_and_a_rope_in_full() {
+        let wall = |stamp_ns| EyeFrame {
+            stamp_ns,
+            ..EyeFrame::grey([400, 376], 160)
         };
+        let scene = Scene::of(&[wall(1), wall(2), wall(3)]);
+        let mut frame = wall(4);
+        for row in frame.luma.chunks_exact_mut(400) {
+            row[60..180].fill(250);
+            row[300..310].fill(250);
+        }
+        let lit = Lit::of(&frame, &scene);
+        assert_eq!(lit.count_at([120, 200]), 0.0);
+        assert!(lit.count_at([62, 200]) < 0.9, "the edge counts less");
+        assert_eq!(lit.count_at([305, 200]), 1.0);
+        assert_eq!(lit.count_at([399, 375]), 1.0);
+    }
+
+    #[test]
+    fn the_map_says_what_its_places_say() {
+        let scene = Scene::of(&[1, 2, 3].map(wall));
+        let mut frame = wall(4);
         frame.luma[8 * 4 + 4] = 184;
-        let map = scene.map(&Lit::of(&frame, &scene));
-        let seen = colour_at(&frame, 1.0, [4.0, 4.0]).unwrap();
-        let one = scene.unexplained(seen, scene.colour_at([4.0, 4.0]).unwrap());
-        assert!(one > 0.3 && (map.at([4.0, 4.0]) - one).abs() < 0.005);
-        assert!((map.at([4.5, 4.0]) - one / 2.0).abs() < 0.005);
-        assert_eq!(map.at([1.0, 1.0]), 0.0);
-        assert_eq!(map.at([7.5, 1.0]), 0.0);
+        let lit = Lit::of(&frame, &scene);
+        let (one, _) = lit.unexplained(Pixel::new(4.0, 4.0)).unwrap();
+        let assert_near = |map: &EvidenceMap, u, v, wanted: f32| {
+            let found = map.at(Pixel::new(u, v));
+            assert!((found - wanted).abs() < 0.005, "{found} at {u}, {v}");
+        };
+        assert!(one > 0.3);
+        let map = lit.map();
+        assert_near(&map, 4.0, 4.0, one);
+        assert_near(&map, 4.5, 4.0, one / 2.0);
         // A square of nine pixels holds it, spread evenly.
         let blurred = map.blurred(1);
-        assert!((blurred.at([3.0, 5.0]) - one / 9.0).abs() < 0.01);
-        assert_eq!(blurred.at([2.0, 4.0]), 0.0);
+        assert_near(&blurred, 3.0, 5.0, one / 9.0);
+        assert_eq!(blurred.at(Pixel::new(2.0, 4.0)), 0.0);
+        for u in [1.0, 7.5] {
+            assert_eq!(map.at(Pixel::new(u, 1.0)), 0.0);
+        }
     }
 }

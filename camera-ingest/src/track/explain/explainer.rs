@@ -3,23 +3,22 @@
 use rope_sim::AttachMotion;
 use shared_types::StereoCamera;
 
-use super::evidence::Scene;
-use super::hypothesis::{Curve, Fidelity, Point, SPREAD, Seen, Side, simulate};
-use super::read::{Lit, NODES, Reader};
+use super::super::scene::Scene;
+use super::Film;
+use super::curve::{self, Pixel};
+use super::evidence::Lit;
+use super::hypothesis::{Fidelity, MIDDLE, Point, SPREAD, Seen, Setup, Side};
+use super::read::{NODES, Reader};
 use super::reading::Reading;
 use super::refine::{Fit, Sighting};
-use super::search::{Comparison, Found, Moment, SearchError, Searcher};
-use super::{TrackError, curve, quantile};
+use super::search::{Moment, Searcher, side_by_side};
+use super::statistics::quantile;
+use crate::track::TrackError;
 
-/// Every which moment is searched, in blurred evidence.
-const BLURRED_EVERY: usize = 3;
+/// Of the frames with two images, every which one is searched, in evidence blurred by so
+/// much.
+const SEARCHED_EVERY: usize = 3;
 const BLUR_PX: usize = 4;
-const COARSE: Comparison = Comparison {
-    points: 24,
-    side_px: 22.0,
-    price: 0.2,
-    fidelity: Fidelity::COARSE,
-};
 /// Frames that what was found by searching is fitted to, and how often it is.
 const ROUGH: (usize, usize) = (50, 2);
 /// Frames that the best of it is fitted to, how often at most, and the change of its numbers
@@ -27,58 +26,84 @@ const ROUGH: (usize, usize) = (50, 2);
 const LAST: (usize, usize) = (100, 4);
 const SETTLED: f64 = 0.02;
 
-/// The film of one eye, and what moves the rope in it.
+/// A film, and what moves the rope in it.
 pub(super) struct Explainer<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) frames: &'a [Lit<'a>],
+    setup: Setup<'a>,
+    frames: Vec<Lit<'a>>,
     /// Starts of the frames' exposures.
-    pub(super) times_s: &'a [f64],
-    pub(super) camera: &'a StereoCamera,
-    pub(super) motion: &'a dyn AttachMotion,
-    pub(super) threads: usize,
+    times_s: &'a [f64],
+    moments: Vec<Moment>,
 }
 
-impl Explainer<'_> {
-    /// The hypothesis that explains most, fitted to what is read along it.
-    pub(super) fn hypothesis(&self, moments: &[Moment]) -> Result<Point, TrackError> {
-        let blurred: Vec<Moment> = moments
-            .iter()
-            .step_by(BLURRED_EVERY)
-            .map(|m| m.blurred(BLUR_PX))
-            .collect();
-        let searcher = Searcher {
-            moments: &blurred,
-            camera: self.camera,
-            motion: self.motion,
-            comparison: COARSE,
-            threads: self.threads,
+/// A hypothesis, and what was read off the film along it.
+pub(super) struct Explained {
+    pub(super) seen: Seen,
+    /// The hypothesis's curves in all frames.
+    pub(super) curves: Vec<Vec<Pixel>>,
+    pub(super) reading: Reading,
+}
+
+impl<'a> Explainer<'a> {
+    /// `scenes` are those of the left and the right images.
+    pub(super) fn new(
+        film: Film<'a>,
+        times_s: &'a [f64],
+        (left, right): (&'a Scene, Option<&'a Scene>),
+        (camera, motion): (&'a StereoCamera, &'a dyn AttachMotion),
+        threads: usize,
+    ) -> Self {
+        let frames: Vec<Lit<'_>> = film.left.iter().map(|f| Lit::of(f, left)).collect();
+        let moment = |i: usize| {
+            let blurred = |side, lit: &Lit<'_>| (side, lit.map().blurred(BLUR_PX));
+            let mut maps = vec![blurred(Side::Left, &frames[i])];
+            let right = right.zip(film.right_at(film.left[i].stamp_ns));
+            maps.extend(right.map(|(scene, frame)| blurred(Side::Right, &Lit::of(frame, scene))));
+            Moment {
+                t_s: times_s[i],
+                maps,
+            }
         };
-        let mut starts = searcher.search()?;
-        let part = starts.len().div_ceil(self.threads).max(1);
+        let searched = (0..times_s.len()).filter(|i| Film::needs_right(*i, times_s.len()));
+        Self {
+            moments: searched.step_by(SEARCHED_EVERY).map(moment).collect(),
+            setup: Setup {
+                camera,
+                motion,
+                film_s: times_s[times_s.len() - 1],
+                threads,
+            },
+            frames,
+            times_s,
+        }
+    }
+
+    /// The hypothesis that explains most, fitted to what is read along it.
+    pub(super) fn hypothesis(&self) -> Result<Point, TrackError> {
+        let searcher = Searcher {
+            moments: &self.moments,
+            setup: self.setup,
+        };
+        let starts = searcher.search()?.into_iter();
+        let mut fitted: Vec<_> = starts.map(|start| Ok(start.x)).collect();
         let (frames, rounds) = ROUGH;
-        std::thread::scope(|scope| {
-            let fit = |starts: &mut [Found]| -> Result<(), TrackError> {
-                for start in starts {
-                    for _ in 0..rounds {
-                        start.x = self.refined(start.x, frames, Fidelity::COARSE, 1)?;
-                    }
-                }
-                Ok(())
-            };
-            let parts = starts.chunks_mut(part);
-            let all: Vec<_> = parts.map(|s| scope.spawn(move || fit(s))).collect();
-            all.into_iter()
-                .try_for_each(|s| s.join().unwrap_or_else(|e| std::panic::resume_unwind(e)))
-        })?;
-        let fitted = searcher.scored(starts.iter().map(|s| s.x).collect())?;
-        let best = fitted
-            .into_iter()
-            .max_by(|a, b| a.score.total_cmp(&b.score));
-        let mut x = best.map_or(starts[0].x, |found| found.x);
+        let alone = Setup {
+            threads: 1,
+            ..self.setup
+        };
+        side_by_side(&mut fitted, self.setup.threads, |x| {
+            for _ in 0..rounds {
+                let fit = |x| self.refined(x, frames, Fidelity::COARSE, alone);
+                *x = x.clone().and_then(fit);
+            }
+        });
+        let fitted = fitted.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let scored = searcher.scored(fitted)?.into_iter();
+        let best = scored.max_by(|a, b| a.score.total_cmp(&b.score));
+        let mut x = best.map_or(MIDDLE, |found| found.x);
         let (frames, rounds) = LAST;
         for _ in 0..rounds {
             let before = x;
-            x = self.refined(x, frames, Fidelity::FINAL, self.threads)?;
+            x = self.refined(x, frames, Fidelity::FINAL, self.setup)?;
             let moved = (0..x.len()).map(|i| ((x[i] - before[i]) / SPREAD[i]).abs());
             if moved.fold(0.0, f64::max) < SETTLED {
                 break;
@@ -93,73 +118,56 @@ impl Explainer<'_> {
         x: Point,
         frames: usize,
         fidelity: Fidelity,
-        threads: usize,
+        setup: Setup<'_>,
     ) -> Result<Point, TrackError> {
         let every = (self.frames.len() / frames).max(1);
-        let Ok(told) = self.told(&x, fidelity, every) else {
+        let Ok(Explained { reading, .. }) = self.read(&x, fidelity, every) else {
             return Ok(x);
         };
-        let reading = self.read(told, every);
-        let times_s = self.times_s.iter().step_by(every);
+        let times_s = self.times_s.iter().step_by(every).enumerate();
         let sightings: Vec<Sighting> = times_s
-            .enumerate()
             .map(|(frame, t_s)| Sighting::of(&reading, frame, *t_s))
             .collect();
         let fit = Fit {
             sightings: &sightings,
-            camera: self.camera,
-            motion: self.motion,
+            setup,
             fidelity,
-            film_s: self.film_s(),
-            threads,
         };
-        Ok(fit.refined(x)?)
+        fit.refined(x)
     }
 
-    pub(super) fn film_s(&self) -> f64 {
-        self.times_s[self.times_s.len() - 1]
-    }
-
-    /// Curves of a hypothesis in each `every`-th frame.
-    pub(super) fn told(
+    /// Reads each `every`-th frame off along a hypothesis.
+    pub(super) fn read(
         &self,
         x: &Point,
         fidelity: Fidelity,
         every: usize,
-    ) -> Result<Vec<Vec<[f64; 2]>>, TrackError> {
-        let rollouts =
-            simulate(&[*x], fidelity, self.motion, self.film_s(), 1).map_err(SearchError::from)?;
-        let seen = Seen::new(x, &rollouts[0], self.camera).ok_or(TrackError::BehindCamera)?;
+    ) -> Result<Explained, TrackError> {
+        let seen = self.setup.simulate_one(x, fidelity)?;
         let times_s = self.times_s.iter().step_by(every);
-        times_s
-            .map(|t_s| curve_at(&seen, *t_s, Side::Left))
-            .collect::<Option<_>>()
-            .ok_or(TrackError::BehindCamera)
-    }
-
-    /// Reads each `every`-th frame off along curves.
-    pub(super) fn read(&self, curves: Vec<Vec<[f64; 2]>>, every: usize) -> Reading {
-        let told_px = self.clamp_px(&curves, every);
+        let curves: Option<Vec<_>> = times_s
+            .map(|t_s| seen.curve(*t_s, Side::Left, NODES))
+            .collect();
+        let curves = curves.ok_or_else(TrackError::behind_camera)?;
         let frames = self.frames.iter().step_by(every).collect();
-        Reader::new(self.scene, frames, every, curves).read(told_px)
+        let reader = Reader::new(frames, every, curves.clone());
+        Ok(Explained {
+            reading: reader.read(self.clamp_px(&curves, every)),
+            seen,
+            curves,
+        })
     }
 
     /// Where the arm and the camera's file put the clamp, along the hypothesis from its
-    /// beginning on (px, median of the frames).
-    fn clamp_px(&self, curves: &[Vec<[f64; 2]>], every: usize) -> f64 {
-        let along = |(curve, t_s): (&Vec<[f64; 2]>, &f64)| {
-            let told = self.camera.project_left(&self.motion.at(*t_s).p_m)?;
+    /// beginning on (px, middle of the frames).
+    fn clamp_px(&self, curves: &[Vec<Pixel>], every: usize) -> f64 {
+        let Setup { camera, motion, .. } = self.setup;
+        let along = |(curve, t_s): (&Vec<Pixel>, &f64)| {
+            let told = camera.project_left(&motion.at(*t_s).p_m)?;
             let (t, _) = curve::tangent(curve, 0, 2);
-            Some((told[0] - curve[0][0]) * t[0] + (told[1] - curve[0][1]) * t[1])
+            Some((Pixel::from(told) - curve[0]).dot(&t))
         };
         let times_s = self.times_s.iter().step_by(every);
-        quantile(curves.iter().zip(times_s).filter_map(along).collect(), 0.5)
+        quantile(curves.iter().zip(times_s).filter_map(along), 0.5)
     }
-}
-
-/// The hypothesis in one frame.
-pub(super) fn curve_at(seen: &Seen<'_>, t_s: f64, side: Side) -> Option<Vec<[f64; 2]>> {
-    let mut curve = Curve::default();
-    seen.curve(t_s, side, NODES, &mut curve)
-        .then_some(curve.points)
 }

@@ -5,6 +5,8 @@
 //! Offsets change slowly along the rope and from frame to frame, so they are smoothed in
 //! both, each node with the weight of its contrast.
 
+use super::curve::{Pixel, normals};
+
 /// An offset (px) and its weight, 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Offset {
@@ -38,20 +40,14 @@ pub(super) struct Look {
     pub(super) jump: f32,
 }
 
-/// Offsets of all nodes of one frame. `at` gives evidence (0 to 1) at a place.
-pub(super) fn offsets(
-    points: &[[f64; 2]],
-    normals: &[[f64; 2]],
-    look: Look,
-    at: impl Fn([f64; 2]) -> f32,
-) -> Vec<Offset> {
+/// Offsets of all nodes of one frame, along the curve's normals. `at` gives evidence (0 to
+/// 1) at a place.
+pub(super) fn offsets(points: &[Pixel], look: Look, at: impl Fn(Pixel) -> f32) -> Vec<Offset> {
     let width = 2 * look.reach + 1;
     let mut profiles = Vec::with_capacity(points.len() * width);
-    for (p, n) in points.iter().zip(normals) {
-        for d in 0..width {
-            let d = d as f64 - look.reach as f64;
-            profiles.push(at([p[0] + n[0] * d, p[1] + n[1] * d]));
-        }
+    for (p, n) in points.iter().zip(normals(points)) {
+        let places = (0..width).map(|d| p + n * (d as f64 - look.reach as f64));
+        profiles.extend(places.map(&at));
     }
     let half = look.half_width_px.round().max(1.0) as usize;
     let gains: Vec<f32> = profiles
@@ -178,16 +174,10 @@ pub(super) fn smooth_field(field: &mut [Vec<Offset>], over_time: f64, along: f64
     }
 }
 
-/// A curve moved along its normals.
-pub(super) fn moved(
-    points: &[[f64; 2]],
-    normals: &[[f64; 2]],
-    offsets: &[Offset],
-) -> Vec<[f64; 2]> {
-    let places = points.iter().zip(normals).zip(offsets);
-    places
-        .map(|((p, n), o)| [p[0] + n[0] * o.px, p[1] + n[1] * o.px])
-        .collect()
+/// A curve whose points are moved along its normals (px).
+pub(super) fn moved(points: &[Pixel], px: impl Iterator<Item = f64>) -> Vec<Pixel> {
+    let places = points.iter().zip(normals(points)).zip(px);
+    places.map(|((p, n), px)| p + n * px).collect()
 }
 
 #[cfg(test)]
@@ -196,12 +186,13 @@ mod tests {
 
     #[test]
     fn a_band_beside_the_curve_is_found_to_a_tenth_of_a_pixel() {
-        let points: Vec<[f64; 2]> = (0..40).map(|i| [50.0, 3.0 * f64::from(i)]).collect();
-        let normals = vec![[1.0, 0.0]; 40];
-        // A band 6 px wide, 4.3 px to the right, with soft edges; a spot elsewhere.
-        let band = |[u, v]: [f64; 2]| {
-            let stray = (u - 42.0).abs() < 2.0 && (v - 60.0).abs() < 5.0;
-            let edge = (3.5 - (u - 54.3).abs()).clamp(0.0, 1.0) as f32;
+        let points: Vec<Pixel> = (0..40)
+            .map(|i| Pixel::new(50.0, 3.0 * f64::from(i)))
+            .collect();
+        // A band 6 px wide, 4.3 px aside, with soft edges; a spot elsewhere.
+        let band = |p: Pixel| {
+            let stray = (p.x - 42.0).abs() < 2.0 && (p.y - 60.0).abs() < 5.0;
+            let edge = (3.5 - (p.x - 54.3).abs()).clamp(0.0, 1.0) as f32;
             if stray { 1.0 } else { edge }
         };
         let look = Look {
@@ -209,9 +200,10 @@ mod tests {
             half_width_px: 3.0,
             jump: 0.05,
         };
-        for offset in offsets(&points, &normals, look, band) {
+        // The normals of a curve that runs down point to the left.
+        for offset in offsets(&points, look, band) {
             assert!(
-                (offset.px - 4.3).abs() < 0.1 && offset.weight > 0.8,
+                (offset.px + 4.3).abs() < 0.1 && offset.weight > 0.8,
                 "{offset:?}"
             );
         }
@@ -220,18 +212,16 @@ mod tests {
     #[test]
     fn what_is_not_seen_is_filled_from_its_neighbours() {
         let value = |i: usize| 0.5 * i as f64;
-        let mut values: Vec<Offset> = (0..30)
-            .map(|i| Offset {
-                px: value(i),
-                weight: 1.0,
-            })
-            .collect();
-        for v in &mut values[10..14] {
-            *v = Offset {
-                px: -20.0,
-                weight: 0.0,
+        let offset = |i: usize| {
+            let is_seen = !(10..14).contains(&i);
+            let (px, weight) = if is_seen {
+                (value(i), 1.0)
+            } else {
+                (-20.0, 0.0)
             };
-        }
+            Offset { px, weight }
+        };
+        let values: Vec<Offset> = (0..30).map(offset).collect();
         // A straight line has no second differences.
         for (i, v) in smoothed(&values, 2.0, 1e-9).iter().enumerate() {
             assert!((v.px - value(i)).abs() < 1e-5, "{i}: {v:?}");

@@ -5,9 +5,12 @@
 
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, Outcome, Precision, Rollout, SimOptions, SimulateError,
+    AttachMotion, Candidate, FrameTimes, NodeTrack, Outcome, Precision, Rollout, SimOptions,
 };
 use shared_types::{RopeParams, StereoCamera};
+
+use super::curve::Pixel;
+use crate::track::TrackError;
 
 /// Numbers of a hypothesis.
 pub(super) const FREE: usize = 8;
@@ -77,27 +80,60 @@ pub(super) fn rope(x: &Point, links: u32) -> RopeParams {
     }
 }
 
-/// Simulates hypotheses until the film's end (s), on the arm's clock.
-pub(super) fn simulate(
-    points: &[Point],
-    fidelity: Fidelity,
-    motion: &dyn AttachMotion,
-    film_s: f64,
-    threads: usize,
-) -> Result<Vec<Rollout>, SimulateError> {
-    let horizon_s = (film_s + UPPER[CLOCK] + 0.04).min(motion.duration_s());
-    let ropes: Vec<RopeParams> = points.iter().map(|x| rope(x, fidelity.links)).collect();
-    let candidates: Vec<_> = ropes.iter().map(|r| Candidate::new(r, motion)).collect();
-    let options = SimOptions {
-        frames: FrameTimes {
-            first_s: 0.0,
-            period_s: SAMPLE_S,
-            count: (horizon_s / SAMPLE_S) as usize + 1,
-        },
-        threads,
-        ..SimOptions::new(fidelity.step_s, fidelity.precision, horizon_s)
-    };
-    rope_sim::roll_out(&candidates, &options)
+/// What moves the rope, and the camera that sees it.
+#[derive(Clone, Copy)]
+pub(super) struct Setup<'a> {
+    pub(super) camera: &'a StereoCamera,
+    /// The attach frame's, t = 0 at the first frame.
+    pub(super) motion: &'a dyn AttachMotion,
+    /// End of the film (s).
+    pub(super) film_s: f64,
+    pub(super) threads: usize,
+}
+
+impl Setup<'_> {
+    /// Simulates hypotheses until the film's end, on the arm's clock; `None` where the
+    /// simulation blew up.
+    pub(super) fn simulate(
+        &self,
+        points: &[Point],
+        fidelity: Fidelity,
+    ) -> Result<Vec<Option<Seen>>, TrackError> {
+        let horizon_s = (self.film_s + UPPER[CLOCK] + 0.04).min(self.motion.duration_s());
+        let ropes: Vec<RopeParams> = points.iter().map(|x| rope(x, fidelity.links)).collect();
+        let candidates: Vec<_> = ropes
+            .iter()
+            .map(|r| Candidate::new(r, self.motion))
+            .collect();
+        let options = SimOptions {
+            frames: FrameTimes {
+                first_s: 0.0,
+                period_s: SAMPLE_S,
+                count: (horizon_s / SAMPLE_S) as usize + 1,
+            },
+            threads: self.threads,
+            ..SimOptions::new(fidelity.step_s, fidelity.precision, horizon_s)
+        };
+        let rollouts = rope_sim::roll_out(&candidates, &options).map_err(TrackError::motion)?;
+        let seen = |(x, rollout): (&Point, Rollout)| {
+            (!matches!(rollout.outcome, Outcome::Diverged)).then(|| Seen {
+                nodes: rollout.nodes,
+                camera: turned(x, self.camera),
+                clock_s: x[CLOCK],
+            })
+        };
+        Ok(points.iter().zip(rollouts).map(seen).collect())
+    }
+
+    /// Simulates one hypothesis finely, on one thread.
+    pub(super) fn simulate_one(&self, x: &Point, fidelity: Fidelity) -> Result<Seen, TrackError> {
+        let alone = Setup {
+            threads: 1,
+            ..*self
+        };
+        let seen = alone.simulate(&[*x], fidelity)?.pop().flatten();
+        seen.ok_or_else(TrackError::behind_camera)
+    }
 }
 
 /// The camera as the hypothesis has it.
@@ -118,112 +154,71 @@ pub(super) enum Side {
 
 /// A simulated hypothesis, ready to be looked at.
 #[derive(Debug)]
-pub(super) struct Seen<'a> {
-    rollout: &'a Rollout,
+pub(super) struct Seen {
+    nodes: NodeTrack,
     camera: StereoCamera,
     clock_s: f64,
 }
 
-impl<'a> Seen<'a> {
-    /// `None` where the simulation blew up.
-    pub(super) fn new(x: &Point, rollout: &'a Rollout, camera: &StereoCamera) -> Option<Self> {
-        if matches!(rollout.outcome, Outcome::Diverged) {
-            return None;
-        }
-        Some(Self {
-            rollout,
-            camera: turned(x, camera),
-            clock_s: x[CLOCK],
-        })
-    }
-
-    fn project(&self, p_w_m: &Vector3<f64>, side: Side) -> Option<[f64; 2]> {
-        match side {
-            Side::Left => self.camera.project_left(p_w_m),
-            Side::Right => self.camera.project_right(p_w_m),
-        }
-    }
-
+impl Seen {
     /// A node when a row of the frame that begins at `t_s` is in the middle of its exposure.
     fn node(&self, t_s: f64, row: f64, node: usize) -> Vector3<f64> {
-        let nodes = &self.rollout.nodes;
-        let last = nodes.frames() - 1;
+        let last = self.nodes.frames() - 1;
         let at_s = t_s + self.camera.row_time_s(row) - self.clock_s;
         let place = (at_s / SAMPLE_S).clamp(0.0, last as f64);
         let before = (place as usize).min(last.saturating_sub(1));
         let part = place - before as f64;
         let (a, b) = (
-            nodes.position(before, node),
-            nodes.position((before + 1).min(last), node),
+            self.nodes.position(before, node),
+            self.nodes.position((before + 1).min(last), node),
         );
         a + (b - a) * part
     }
 
-    /// Pixels of `count` points at equal distances along the rope, clamp first, in the
-    /// frame that begins at `t_s`; false where a part is behind the camera.
-    pub(super) fn curve(&self, t_s: f64, side: Side, count: usize, out: &mut Curve) -> bool {
-        let pixel = |node, row| self.project(&self.node(t_s, row, node), side);
-        out.fill(&self.camera, self.rollout.nodes.nodes(), count, pixel)
-    }
-}
-
-/// Pixels of nodes, and of points between them.
-#[derive(Debug, Default)]
-pub(super) struct Curve {
-    nodes: Vec<[f64; 2]>,
-    pub(super) points: Vec<[f64; 2]>,
-}
-
-impl Curve {
-    /// `count` points between the pixels of `nodes` nodes; `pixel` gives that of a node as
-    /// it is when a row is exposed. False where a part is behind the camera.
-    pub(super) fn fill(
-        &mut self,
-        camera: &StereoCamera,
-        nodes: usize,
-        count: usize,
-        pixel: impl Fn(usize, f64) -> Option<[f64; 2]>,
-    ) -> bool {
-        self.nodes.clear();
-        let middle = f64::from(camera.height_px) / 2.0;
-        // A node moves far less than a row in a row's time.
-        let looks = if camera.line_time_s > 0.0 { 3 } else { 1 };
-        for node in 0..nodes {
-            let look = |seen: [f64; 2], _| pixel(node, seen[1]);
-            let Some(seen) = (0..looks).try_fold([0.0, middle], look) else {
-                return false;
-            };
-            self.nodes.push(seen);
-        }
-        self.spread(count);
-        true
-    }
-
-    /// Points at equal distances: cubic (Catmull-Rom) through the nodes.
-    fn spread(&mut self, count: usize) {
-        let last = self.nodes.len() - 1;
-        let nodes = &self.nodes;
-        let beyond = |a: [f64; 2], b: [f64; 2]| [2.0 * a[0] - b[0], 2.0 * a[1] - b[1]];
-        let (first, end) = (
-            beyond(nodes[0], nodes[1]),
-            beyond(nodes[last], nodes[last - 1]),
-        );
-        let node = |i: usize| match i {
-            0 => first,
-            i if i > last + 1 => end,
-            i => nodes[i - 1],
+    /// `count` points at equal distances along the rope, clamp first, in the frame that
+    /// begins at `t_s`; `None` where a part is behind the camera.
+    pub(super) fn curve(&self, t_s: f64, side: Side, count: usize) -> Option<Vec<Pixel>> {
+        let project = match side {
+            Side::Left => StereoCamera::project_left,
+            Side::Right => StereoCamera::project_right,
         };
-        self.points.clear();
-        for k in 0..count {
-            let place = k as f64 * last as f64 / (count - 1) as f64;
-            let i = (place as usize).min(last - 1);
-            let w = place - i as f64;
-            let [a, b, c, d] = [i, i + 1, i + 2, i + 3].map(node);
-            self.points.push(core::array::from_fn(|m| {
-                let cubic = 3.0 * (b[m] - c[m]) + d[m] - a[m];
-                let square = 2.0 * a[m] - 5.0 * b[m] + 4.0 * c[m] - d[m];
-                b[m] + 0.5 * w * (c[m] - a[m] + w * (square + w * cubic))
-            }));
-        }
+        let pixel = |node, row| project(&self.camera, &self.node(t_s, row, node));
+        seen_curve(&self.camera, self.nodes.nodes(), count, pixel)
     }
+}
+
+/// `count` points between the pixels of `nodes` nodes; `pixel` gives that of a node as it is
+/// when a row is exposed. `None` where a part is behind the camera.
+pub(super) fn seen_curve(
+    camera: &StereoCamera,
+    nodes: usize,
+    count: usize,
+    pixel: impl Fn(usize, f64) -> Option<[f64; 2]>,
+) -> Option<Vec<Pixel>> {
+    let middle = f64::from(camera.height_px) / 2.0;
+    // A node moves far less than a row in a row's time.
+    let looks = if camera.line_time_s > 0.0 { 3 } else { 1 };
+    let seen = |node| (0..looks).try_fold([0.0, middle], |[_, row], _| pixel(node, row));
+    let nodes: Option<Vec<Pixel>> = (0..nodes).map(|n| seen(n).map(Pixel::from)).collect();
+    nodes.map(|nodes| spread(&nodes, count))
+}
+
+/// Points at equal distances: cubic (Catmull-Rom) through the nodes.
+fn spread(nodes: &[Pixel], count: usize) -> Vec<Pixel> {
+    let last = nodes.len() - 1;
+    let node = |i: usize| match i {
+        0 => nodes[0] * 2.0 - nodes[1],
+        i if i > last + 1 => nodes[last] * 2.0 - nodes[last - 1],
+        i => nodes[i - 1],
+    };
+    let point = |k: usize| {
+        let place = k as f64 * last as f64 / (count - 1) as f64;
+        let i = (place as usize).min(last - 1);
+        let w = place - i as f64;
+        let [a, b, c, d] = [i, i + 1, i + 2, i + 3].map(node);
+        let cubic = (b - c) * 3.0 + d - a;
+        let square = a * 2.0 - b * 5.0 + c * 4.0 - d;
+        b + (c - a + (square + cubic * w) * w) * (0.5 * w)
+    };
+    (0..count).map(point).collect()
 }

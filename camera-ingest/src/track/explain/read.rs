@@ -1,16 +1,15 @@
 //! Reads the film off along the hypothesis: curve, ends and tip weight in every frame.
 
-use super::bulk::Bulk;
-use super::colour::{Colour, SHADES, are_apart, colour_at, coverage, groups};
-use super::curve::{from_end, normals, respaced};
+use super::colour::{Colour, SHADES, are_apart, coverage, groups};
+use super::curve::{Pixel, across, distance_px, from_end, normals, respaced};
 use super::disc::Disc;
 use super::end::{self, End};
-use super::ends::{EndFrames, EndPicture, Window};
-use super::evidence::Scene;
+use super::ends::{EndPicture, Window};
+use super::evidence::Lit;
 use super::field::{Look, Offset, moved, offsets, smooth_field, smoothed};
 use super::reading::Reading;
 use super::round::{self, Profile, Round};
-use crate::frame::EyeFrame;
+use super::statistics::median;
 
 /// Places along the rope.
 pub(super) const NODES: usize = 64;
@@ -68,67 +67,29 @@ const SIZED_SHADES: [f32; 3] = [0.85, 1.0, 1.15];
 const TIP_STIFFNESS: f64 = 0.3;
 const TIP_PULL: f64 = 0.02;
 
-/// One frame, how bright it is, and what in it is too large to be a rope.
-pub(super) struct Lit<'a> {
-    pub(super) frame: &'a EyeFrame,
-    pub(super) gain: f32,
-    pub(super) bulk: Bulk,
-}
-
-impl<'a> Lit<'a> {
-    pub(super) fn of(frame: &'a EyeFrame, scene: &Scene) -> Self {
-        let gain = scene.gain(frame);
-        Self {
-            frame,
-            gain,
-            bulk: Bulk::of(frame, gain, scene),
-        }
-    }
-}
-
-/// Frames of one eye, and the hypothesis's curves in them.
+/// A film's frames, and the hypothesis's curves in them.
 pub(super) struct Reader<'a> {
-    scene: &'a Scene,
     frames: Vec<&'a Lit<'a>>,
-    curves: Vec<Vec<[f64; 2]>>,
+    curves: Vec<Vec<Pixel>>,
     /// Offsets in frames further apart in time have less to do with each other.
     apart: f64,
 }
 
 impl<'a> Reader<'a> {
     /// Of each `every`-th frame of a film.
-    pub(super) fn new(
-        scene: &'a Scene,
-        frames: Vec<&'a Lit<'a>>,
-        every: usize,
-        curves: Vec<Vec<[f64; 2]>>,
-    ) -> Self {
+    pub(super) fn new(frames: Vec<&'a Lit<'a>>, every: usize, curves: Vec<Vec<Pixel>>) -> Self {
         Self {
-            scene,
             frames,
             curves,
             apart: (every as f64).powi(3),
         }
     }
 
-    fn learn_every(&self) -> usize {
-        (self.frames.len() / LEARNT).max(1)
-    }
-
-    /// Colour in the scene's light, and the scene's there.
-    fn colours(&self, lit: &Lit<'_>, p: [f64; 2]) -> Option<(Colour, Colour)> {
-        Some((colour_at(lit.frame, lit.gain, p)?, self.scene.colour_at(p)?))
-    }
-
-    fn unexplained(&self, lit: &Lit<'_>, p: [f64; 2]) -> f32 {
-        self.colours(lit, p).map_or(0.0, |(seen, behind)| {
-            self.scene.unexplained(seen, behind) * lit.bulk.at(p)
-        })
-    }
-
-    /// Evidence of things of some colours.
-    fn present(&self, lit: &Lit<'_>, colours: &[Colour], p: [f64; 2]) -> f32 {
-        self.scene.present(lit.frame, lit.gain, colours, p)
+    /// The frames that colours and ends are learnt from, and the curves in them.
+    fn learnt(&self) -> impl Iterator<Item = (&'a Lit<'a>, &[Pixel])> {
+        let every = (self.frames.len() / LEARNT).max(1);
+        let frames = self.frames.iter().zip(&self.curves).step_by(every);
+        frames.map(|(lit, curve)| (*lit, curve.as_slice()))
     }
 
     /// Reads all frames. `told_px` is where the arm says that the rope begins, from the
@@ -141,18 +102,18 @@ impl<'a> Reader<'a> {
             jump: 0.02,
         };
         let hypothesis = self.curves.clone();
-        let field = self.look(look, |reader, lit, p| reader.unexplained(lit, p));
+        let field = self.look(look, |lit, p| lit.unexplained(p).map_or(0.0, |(e, _)| e));
         self.follow(field.clone(), FIRST_STIFFNESS, None);
         let rope = groups(&self.rope_samples(), ROPE_COLOURS);
-        let picture = self.picture(&FREE_END, |curve| curve.to_vec());
+        let picture = self.picture(FREE_END, <[Pixel]>::to_vec);
         let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
         // A weight thicker than the look is wide draws it to one of its sides.
         self.curves = hypothesis;
         self.follow(field, FIRST_STIFFNESS, Some(&end));
         // The arm says where the clamp is, but for the camera's place; the picture shows where
         // the rope comes out of it, but for caps and knots, and counts less.
-        let clamp_last = |curve: &[[f64; 2]]| curve.iter().rev().copied().collect();
-        let seen_px = self.picture(&CLAMP_END, clamp_last).start_px();
+        let clamp_last = |curve: &[Pixel]| curve.iter().rev().copied().collect();
+        let seen_px = self.picture(CLAMP_END, clamp_last).start_px();
         let seen_px = seen_px.filter(|seen| (seen - told_px).abs() <= START_PX);
         let start_px = seen_px.map_or(told_px, |seen| told_px + SEEN_PART * (seen - told_px));
         // Then what has the rope's colours.
@@ -161,7 +122,7 @@ impl<'a> Reader<'a> {
             half_width_px: end.rope_half_px,
             jump: 0.05,
         };
-        let field = self.look(look, |reader, lit, p| reader.present(lit, &rope, p));
+        let field = self.look(look, |lit, p| lit.present(&rope, p));
         let evident = field
             .iter()
             .map(|f| f.iter().map(|o| o.weight).collect())
@@ -170,7 +131,9 @@ impl<'a> Reader<'a> {
         let still = self.still_frames();
         let round = self.round(&still);
         if round.left < CYLINDER {
-            self.shift(round.middle_px);
+            for curve in &mut self.curves {
+                *curve = moved(curve, std::iter::repeat(round.middle_px));
+            }
         }
         let rope_px = if round.left < CYLINDER_WIDTH {
             round.radius_px
@@ -178,17 +141,18 @@ impl<'a> Reader<'a> {
             end.rope_half_px
         };
         // First roughly, then with the size that the median picture of all weights has.
-        let none = vec![(Offset::NONE, Offset::NONE); self.frames.len()];
+        let none = vec![[Offset::NONE; 2]; self.frames.len()];
         let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
         let both = [&rope[..], &tip].concat();
         let disc = self.tip_disc(&still, &end, (&both, &SHADES), &tips);
         let sized = self.tip_disc(&still, &end, (&both, &SIZED_SHADES), &tips);
-        end.centre_px += median_px(&tips) + disc.centre_px;
+        let along_px = |tips: &[[Offset; 2]]| median(tips.iter().map(|[along, _]| along.px));
+        end.centre_px += along_px(&tips) + disc.centre_px;
         end.radius_px = disc.radius_px;
         let (tip, mut tips) = self.tips(&end, &tips, (&rope, TIP_REACH_PX[1]));
         // Where they are on average, the median picture has told.
-        let usual_px = median_px(&tips);
-        tips.iter_mut().for_each(|(along, _)| along.px -= usual_px);
+        let usual_px = along_px(&tips);
+        tips.iter_mut().for_each(|[along, _]| along.px -= usual_px);
         Reading {
             curves: self.curves,
             evident,
@@ -202,10 +166,10 @@ impl<'a> Reader<'a> {
     }
 
     /// Where evidence lies across the curves.
-    fn look(&self, look: Look, at: impl Fn(&Self, &Lit<'_>, [f64; 2]) -> f32) -> Vec<Vec<Offset>> {
+    fn look(&self, look: Look, at: impl Fn(&Lit<'_>, Pixel) -> f32) -> Vec<Vec<Offset>> {
         let frames = self.frames.iter().zip(&self.curves);
         frames
-            .map(|(lit, curve)| offsets(curve, &normals(curve), look, |p| at(self, lit, p)))
+            .map(|(lit, curve)| offsets(curve, look, |p| at(lit, p)))
             .collect()
     }
 
@@ -225,25 +189,21 @@ impl<'a> Reader<'a> {
         }
         smooth_field(&mut field, over_time / self.apart, along);
         for (curve, offsets) in self.curves.iter_mut().zip(&field) {
-            *curve = respaced(&moved(curve, &normals(curve), offsets), curve);
+            *curve = respaced(&moved(curve, offsets.iter().map(|o| o.px)), curve);
         }
     }
 
     /// The quarter of the frames in which the rope moves least.
     fn still_frames(&self) -> Vec<usize> {
-        let moved = |i: usize| {
-            let [before, now] = [&self.curves[i.saturating_sub(1)], &self.curves[i]];
-            let ways = before.iter().zip(now);
-            ways.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-                .sum::<f64>()
+        let moved_px = |i: usize| -> f64 {
+            let ways = self.curves[i - 1].iter().zip(&self.curves[i]);
+            ways.map(|(a, b)| distance_px(*a, *b)).sum()
         };
-        let mut order: Vec<(f64, usize)> = (1..self.curves.len()).map(|i| (moved(i), i)).collect();
+        let mut order: Vec<(f64, usize)> =
+            (1..self.curves.len()).map(|i| (moved_px(i), i)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        order
-            .into_iter()
-            .map(|(_, i)| i)
-            .take(self.curves.len().div_ceil(4))
-            .collect()
+        order.truncate(self.curves.len().div_ceil(4));
+        order.into_iter().map(|(_, i)| i).collect()
     }
 
     /// The rope's cross section in some frames, but for its ends.
@@ -254,17 +214,11 @@ impl<'a> Reader<'a> {
         };
         let mut counts = profile.seen;
         for &i in still {
-            let (lit, curve) = (&self.frames[i], &self.curves[i]);
-            for (p, n) in curve
-                .iter()
-                .zip(normals(curve))
-                .take(NODES * 3 / 4)
-                .skip(NODES / 6)
-            {
+            let nodes = self.curves[i].iter().zip(normals(&self.curves[i]));
+            for (p, n) in nodes.take(NODES * 3 / 4).skip(NODES / 6) {
                 for (k, count) in counts.iter_mut().enumerate() {
                     let aside = (k as f64 - round::REACH as f64) * round::STEP_PX;
-                    let place = [p[0] + n[0] * aside, p[1] + n[1] * aside];
-                    if let Some((seen, behind)) = self.colours(lit, place) {
+                    if let Some((seen, behind)) = self.frames[i].colours(p + n * aside) {
                         profile.seen[k] += f64::from(seen[0]);
                         profile.behind[k] += f64::from(behind[0]);
                         *count += 1.0;
@@ -279,14 +233,11 @@ impl<'a> Reader<'a> {
         round::fit(&profile)
     }
 
-    /// Moves all curves along their normals.
-    fn shift(&mut self, px: f64) {
-        for curve in &mut self.curves {
-            let normals = normals(curve);
-            for (p, n) in curve.iter_mut().zip(normals) {
-                *p = [p[0] + n[0] * px, p[1] + n[1] * px];
-            }
-        }
+    /// Median picture around one end, which `turned` puts last.
+    fn picture(&self, window: Window, turned: impl Fn(&[Pixel]) -> Vec<Pixel>) -> EndPicture {
+        let frames = self.learnt();
+        let frames = frames.map(|(lit, curve)| (turned(curve), move |p| lit.unexplained(p)));
+        EndPicture::of(window, frames)
     }
 
     /// Centre and radius of the tip weight in the median picture of some frames around where
@@ -296,27 +247,19 @@ impl<'a> Reader<'a> {
         still: &[usize],
         end: &End,
         (colours, shades): (&[Colour], &[f32]),
-        places: &[(Offset, Offset)],
+        places: &[[Offset; 2]],
     ) -> End {
-        let mut frames = EndFrames::new(TIP);
-        let noise = self.scene.noise();
-        for &i in still {
-            let (lit, curve, (along, across)) = (&self.frames[i], &self.curves[i], places[i]);
-            let (c, t) = from_end(curve, end.centre_px + along.px);
-            let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
+        let frames = still.iter().map(|&i| {
+            let (lit, (c, t)) = (self.frames[i], tip(&self.curves[i], end, places[i]));
             // Straight on both sides: the weight hides how the rope bends there.
-            let axis: Vec<[f64; 2]> = (0..5)
-                .map(|i| {
-                    let back = 10.0 * f64::from(4 - i);
-                    [c[0] - t[0] * back, c[1] - t[1] * back]
-                })
-                .collect();
-            frames.add(&axis, |p| {
-                let (seen, behind) = self.colours(lit, p)?;
-                Some((coverage(seen, behind, colours, shades, noise), seen))
-            });
-        }
-        let picture = frames.picture();
+            let axis = (0..5).map(|i| c - t * (10.0 * f64::from(4 - i))).collect();
+            (axis, move |p| {
+                let (seen, behind) = lit.colours(p)?;
+                let covered = coverage(seen, behind, colours, shades, lit.scene.noise);
+                Some((covered, seen))
+            })
+        });
+        let picture = EndPicture::of(TIP, frames);
         let rope_half_px = picture.rope_half_px().min(end.rope_half_px);
         end::find(&picture, rope_half_px, TIP_REACH_PX[0], COVERED)
     }
@@ -324,57 +267,27 @@ impl<'a> Reader<'a> {
     /// Colours where the rope is evident, but for its ends, across half its width.
     fn rope_samples(&self) -> Vec<Colour> {
         let mut samples = Vec::new();
-        for (lit, curve) in self
-            .frames
-            .iter()
-            .zip(&self.curves)
-            .step_by(self.learn_every())
-        {
-            for (p, n) in curve
-                .iter()
-                .zip(normals(curve))
-                .take(NODES * 7 / 8)
-                .skip(NODES / 8)
-            {
-                for aside in [-2.0, 0.0, 2.0] {
-                    self.sample(
-                        lit,
-                        [p[0] + n[0] * aside, p[1] + n[1] * aside],
-                        &mut samples,
-                    );
-                }
+        for (lit, curve) in self.learnt() {
+            let nodes = curve.iter().zip(normals(curve));
+            for (p, n) in nodes.take(NODES * 7 / 8).skip(NODES / 8) {
+                let places = [-2.0, 0.0, 2.0].map(|aside| p + n * aside);
+                samples.extend(places.into_iter().filter_map(|p| evident(lit, p)));
             }
         }
         samples
     }
 
-    fn sample(&self, lit: &Lit<'_>, p: [f64; 2], samples: &mut Vec<Colour>) {
-        if let Some((seen, behind)) = self.colours(lit, p)
-            && self.scene.unexplained(seen, behind) * lit.bulk.at(p) > 0.6
-        {
-            samples.push(seen);
+    /// Colours around the tip weight's centre where it was found.
+    fn tip_samples(&self, end: &End, places: &[[Offset; 2]]) -> Vec<Colour> {
+        let every = (self.frames.len() / LEARNT).max(1);
+        let mut samples = Vec::new();
+        for ((lit, curve), place) in self.learnt().zip(places.iter().step_by(every)) {
+            let (c, _) = tip(curve, end, *place);
+            let [u, v] = [Pixel::x(), Pixel::y()].map(|d| d * (0.4 * end.radius_px));
+            let around = [c, c + u, c - u, c + v, c - v];
+            samples.extend(around.into_iter().filter_map(|p| evident(lit, p)));
         }
-    }
-
-    /// Median picture around one end, which `turned` puts last.
-    fn picture(
-        &self,
-        window: &Window,
-        turned: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
-    ) -> EndPicture {
-        let mut frames = EndFrames::new(*window);
-        for (lit, curve) in self
-            .frames
-            .iter()
-            .zip(&self.curves)
-            .step_by(self.learn_every())
-        {
-            frames.add(&turned(curve), |p| {
-                let (seen, behind) = self.colours(lit, p)?;
-                Some((self.scene.unexplained(seen, behind) * lit.bulk.at(p), seen))
-            });
-        }
-        frames.picture()
+        samples
     }
 
     /// The tip weight's colours, learnt where it was found before, and its place along and
@@ -382,9 +295,9 @@ impl<'a> Reader<'a> {
     fn tips(
         &self,
         end: &End,
-        before: &[(Offset, Offset)],
+        before: &[[Offset; 2]],
         (rope, reach_px): (&[Colour], f64),
-    ) -> (Vec<Colour>, Vec<(Offset, Offset)>) {
+    ) -> (Vec<Colour>, Vec<[Offset; 2]>) {
         let colours = groups(&self.tip_samples(end, before), TIP_COLOURS);
         // Where it has colours of its own, the rope's would only blur where it begins.
         let is_own = |c: &&Colour| rope.iter().all(|r| are_apart(c, r));
@@ -395,7 +308,7 @@ impl<'a> Reader<'a> {
             own
         };
         let frames = self.frames.iter().zip(&self.curves);
-        let (along, across): (Vec<Offset>, Vec<Offset>) = frames
+        let (along, aside): (Vec<Offset>, Vec<Offset>) = frames
             .map(|(lit, curve)| {
                 let (centre, t) = from_end(curve, end.centre_px);
                 let disc = Disc {
@@ -404,38 +317,28 @@ impl<'a> Reader<'a> {
                     outwards: t,
                     reach_px,
                 };
-                let (o, weight) = disc.find(|p| self.present(lit, &looked_for, p));
+                let (o, weight) = disc.find(|p| lit.present(&looked_for, p));
                 let offset = |px| Offset { px, weight };
-                (
-                    offset(o[0] * t[0] + o[1] * t[1]),
-                    offset(o[1] * t[0] - o[0] * t[1]),
-                )
+                (offset(o.dot(&t)), offset(o.dot(&across(t))))
             })
             .unzip();
         let smooth = |offsets: &[Offset]| smoothed(offsets, TIP_STIFFNESS, TIP_PULL);
-        let places = smooth(&along).into_iter().zip(smooth(&across));
-        (colours, places.collect())
-    }
-
-    /// Colours around the tip weight's centre where it was found.
-    fn tip_samples(&self, end: &End, places: &[(Offset, Offset)]) -> Vec<Colour> {
-        let mut samples = Vec::new();
-        let found = self.frames.iter().zip(&self.curves).zip(places);
-        for ((lit, curve), (along, across)) in found.step_by(self.learn_every()) {
-            let (c, t) = from_end(curve, end.centre_px + along.px);
-            let c = [c[0] - t[1] * across.px, c[1] + t[0] * across.px];
-            let r = 0.4 * end.radius_px;
-            for (x, y) in [(0.0, 0.0), (r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r)] {
-                self.sample(lit, [c[0] + x, c[1] + y], &mut samples);
-            }
-        }
-        samples
+        let places = smooth(&along).into_iter().zip(smooth(&aside));
+        (
+            colours,
+            places.map(|(along, aside)| [along, aside]).collect(),
+        )
     }
 }
 
-/// How far along the curve the tip weight is usually found.
-fn median_px(tips: &[(Offset, Offset)]) -> f64 {
-    let mut along: Vec<f64> = tips.iter().map(|(along, _)| along.px).collect();
-    along.sort_by(f64::total_cmp);
-    along.get(along.len() / 2).copied().unwrap_or(0.0)
+/// The tip weight's centre where it was found, and the curve's direction there.
+fn tip(curve: &[Pixel], end: &End, [along, aside]: [Offset; 2]) -> (Pixel, Pixel) {
+    let (c, t) = from_end(curve, end.centre_px + along.px);
+    (c + across(t) * aside.px, t)
+}
+
+/// Colour of a place where something other than the scene is evident.
+fn evident(lit: &Lit<'_>, p: Pixel) -> Option<Colour> {
+    let (evidence, seen) = lit.unexplained(p)?;
+    (evidence > 0.6).then_some(seen)
 }

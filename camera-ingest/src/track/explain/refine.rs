@@ -6,17 +6,13 @@
 //! stretch that was read off something else) counts little.
 
 use nalgebra::{SMatrix, SVector};
-use rope_sim::AttachMotion;
-use shared_types::StereoCamera;
 
-use super::curve::normals;
-use super::hypothesis::{
-    Curve, FREE, Fidelity, LOWER, Point, SPREAD, Seen, Side, TURN, UPPER, simulate,
-};
-use super::quantile;
+use super::curve::{Pixel, normals};
+use super::hypothesis::{FREE, Fidelity, LOWER, Point, SPREAD, Seen, Setup, Side, TURN, UPPER};
 use super::read::NODES;
 use super::reading::Reading;
-use super::search::SearchError;
+use super::statistics::quantile;
+use crate::track::TrackError;
 
 /// Steps at most, and the part of the misfit that one must gain.
 const STEPS: usize = 5;
@@ -43,59 +39,57 @@ type Vector = SVector<f64, FREE>;
 pub(super) struct Sighting {
     t_s: f64,
     /// Index, place, unit normal and weight of nodes.
-    nodes: Vec<(usize, [f64; 2], [f64; 2], f64)>,
-    tip_px: [f64; 2],
+    nodes: Vec<(usize, Pixel, Pixel, f64)>,
+    tip: Pixel,
     tip_weight: f64,
 }
 
 impl Sighting {
     pub(super) fn of(reading: &Reading, frame: usize, t_s: f64) -> Self {
         let curve = &reading.curves[frame];
-        let normals = normals(curve);
         let shown = reading.end.nodes_shown(curve);
-        let node = |k: usize| (k, curve[k], normals[k], reading.evident[frame][k]);
+        let nodes = curve
+            .iter()
+            .zip(normals(curve))
+            .zip(&reading.evident[frame]);
+        let nodes = (0..)
+            .zip(nodes)
+            .map(|(k, ((p, n), weight))| (k, *p, n, *weight));
         Self {
             t_s,
-            nodes: (EVERY / 2..shown).step_by(EVERY).map(node).collect(),
-            tip_px: reading.tip_px(frame),
-            tip_weight: TIP * reading.tips[frame].1.weight,
+            nodes: nodes.take(shown).skip(EVERY / 2).step_by(EVERY).collect(),
+            tip: reading.tip(frame),
+            tip_weight: TIP * reading.tips[frame][1].weight,
         }
     }
 
-    /// Distance (px) and weight of all that is compared.
-    fn misses(&self, seen: &Seen<'_>, curve: &mut Curve, out: &mut Vec<[f64; 2]>) -> bool {
-        if !seen.curve(self.t_s, Side::Left, NODES, curve) {
-            return false;
-        }
-        let points = &curve.points;
-        out.extend(self.nodes.iter().map(|(k, p, n, weight)| {
-            let off = [points[*k][0] - p[0], points[*k][1] - p[1]];
-            [off[0] * n[0] + off[1] * n[1], *weight]
-        }));
-        let end = points[NODES - 1];
-        out.extend([0, 1].map(|i| [end[i] - self.tip_px[i], self.tip_weight]));
-        true
+    /// Adds distance (px) and weight of all that is compared; `None` where a part is behind
+    /// the camera.
+    fn add_misses(&self, seen: &Seen, out: &mut Vec<[f64; 2]>) -> Option<()> {
+        let points = seen.curve(self.t_s, Side::Left, NODES)?;
+        let nodes = self.nodes.iter();
+        out.extend(nodes.map(|(k, p, n, weight)| [(points[*k] - p).dot(n), *weight]));
+        let off = points[NODES - 1] - self.tip;
+        out.extend([off.x, off.y].map(|px| [px, self.tip_weight]));
+        Some(())
     }
 }
 
 /// What a hypothesis is fitted to.
 pub(super) struct Fit<'a> {
     pub(super) sightings: &'a [Sighting],
-    pub(super) camera: &'a StereoCamera,
-    pub(super) motion: &'a dyn AttachMotion,
+    pub(super) setup: Setup<'a>,
     pub(super) fidelity: Fidelity,
-    pub(super) film_s: f64,
-    pub(super) threads: usize,
 }
 
 impl Fit<'_> {
     /// The hypothesis near another one that fits best.
-    pub(super) fn refined(&self, mut x: Point) -> Result<Point, SearchError> {
+    pub(super) fn refined(&self, mut x: Point) -> Result<Point, TrackError> {
         let Some(mut misses) = self.misses(&[x])?.pop().flatten() else {
             return Ok(x);
         };
         for _ in 0..STEPS {
-            let sizes = misses.iter().map(|[px, _]| px.abs()).collect();
+            let sizes = misses.iter().map(|[px, _]| px.abs());
             let scale_px = (SCALE * quantile(sizes, 0.5)).max(LEAST_SCALE_PX);
             let Some((normal, slope)) = self.linearised(&x, &misses, scale_px)? else {
                 break;
@@ -131,24 +125,16 @@ impl Fit<'_> {
     }
 
     /// Distances of some hypotheses; `None` for those that cannot be looked at.
-    fn misses(&self, points: &[Point]) -> Result<Vec<Option<Vec<[f64; 2]>>>, SearchError> {
-        let rollouts = simulate(
-            points,
-            self.fidelity,
-            self.motion,
-            self.film_s,
-            self.threads,
-        )?;
-        let mut curve = Curve::default();
-        let mut misses = |(x, rollout)| {
-            let seen = Seen::new(x, rollout, self.camera)?;
+    fn misses(&self, points: &[Point]) -> Result<Vec<Option<Vec<[f64; 2]>>>, TrackError> {
+        let seen = self.setup.simulate(points, self.fidelity)?;
+        let misses = |seen: Option<Seen>| {
             let mut out = Vec::new();
-            let mut frames = self.sightings.iter();
-            frames
-                .all(|s| s.misses(&seen, &mut curve, &mut out))
-                .then_some(out)
+            for sighting in self.sightings {
+                sighting.add_misses(seen.as_ref()?, &mut out)?;
+            }
+            Some(out)
         };
-        Ok(points.iter().zip(&rollouts).map(&mut misses).collect())
+        Ok(seen.into_iter().map(misses).collect())
     }
 
     fn prior(&self) -> f64 {
@@ -170,31 +156,25 @@ impl Fit<'_> {
         x: &Point,
         misses: &[[f64; 2]],
         scale_px: f64,
-    ) -> Result<Option<(Normal, Vector)>, SearchError> {
+    ) -> Result<Option<(Normal, Vector)>, TrackError> {
+        // Towards the middle of the box.
+        let slopes: [f64; FREE] = core::array::from_fn(|i| {
+            let is_above = x[i] > 0.5 * (LOWER[i] + UPPER[i]);
+            if is_above { -SLOPE } else { SLOPE }
+        });
         let moved = |i: usize| {
             let mut moved = *x;
-            // Towards the middle of the box.
-            let sign = if x[i] > 0.5 * (LOWER[i] + UPPER[i]) {
-                -1.0
-            } else {
-                1.0
-            };
-            moved[i] += sign * SLOPE * SPREAD[i];
-            (moved, sign * SLOPE)
+            moved[i] += slopes[i] * SPREAD[i];
+            moved
         };
-        let moved: Vec<(Point, f64)> = (0..FREE).map(moved).collect();
-        let points: Vec<Point> = moved.iter().map(|(x, _)| *x).collect();
-        let Some(beside) = self
-            .misses(&points)?
-            .into_iter()
-            .collect::<Option<Vec<_>>>()
-        else {
+        let beside = self.misses(&(0..FREE).map(moved).collect::<Vec<_>>())?;
+        let Some(beside) = beside.into_iter().collect::<Option<Vec<_>>>() else {
             return Ok(None);
         };
         let (mut normal, mut slope) = (Normal::zeros(), Vector::zeros());
         for (row, [px, weight]) in misses.iter().enumerate() {
             let weight = weight / (1.0 + (px / scale_px).powi(2));
-            let slopes = Vector::from_fn(|i, _| (beside[i][row][0] - px) / moved[i].1);
+            let slopes = Vector::from_fn(|i, _| (beside[i][row][0] - px) / slopes[i]);
             normal += slopes * slopes.transpose() * weight;
             slope += slopes * (weight * px);
         }
@@ -211,12 +191,11 @@ impl Fit<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::explainer::curve_at;
     use super::super::hypothesis::{LENGTH, MIDDLE, STIFFNESS};
     use super::*;
     use nalgebra::{Matrix3, Vector3};
     use rope_sim::{PoseRow, PoseTrack};
-    use shared_types::{Intrinsics, Shutter};
+    use shared_types::{Intrinsics, Shutter, StereoCamera};
 
     /// Looks along y at the clamp, from two metres off.
     fn camera() -> StereoCamera {
@@ -253,45 +232,44 @@ mod tests {
             }
         };
         let motion = PoseTrack::new(&(0..=160).map(row).collect::<Vec<_>>()).unwrap();
-        let camera = camera();
         let mut truth = MIDDLE;
         truth[TURN + 1] = 0.004;
-        let film_s = 3.0;
-        let curves = |x: &Point| -> Vec<(f64, Vec<[f64; 2]>)> {
-            let rollouts = simulate(&[*x], Fidelity::COARSE, &motion, film_s, 1).unwrap();
-            let seen = Seen::new(x, &rollouts[0], &camera).unwrap();
+        let setup = Setup {
+            camera: &camera(),
+            motion: &motion,
+            film_s: 3.0,
+            threads: 1,
+        };
+        let curves = |x: &Point| -> Vec<(f64, Vec<Pixel>)> {
+            let seen = setup.simulate_one(x, Fidelity::COARSE).unwrap();
             let times_s = (0..30).map(|i| 0.1 * f64::from(i));
             times_s
-                .map(|t_s| (t_s, curve_at(&seen, t_s, Side::Left).unwrap()))
+                .map(|t_s| (t_s, seen.curve(t_s, Side::Left, NODES).unwrap()))
                 .collect()
         };
-        let sighting = |(t_s, curve): &(f64, Vec<[f64; 2]>)| {
-            let normals = normals(curve);
-            let node = |k: usize| {
+        let sighting = |(t_s, curve): &(f64, Vec<Pixel>)| {
+            let node = |(k, n): (usize, Pixel)| {
                 // Every sixth place shows something twelve pixels to the side.
                 let aside = if (k + (t_s * 10.0) as usize).is_multiple_of(6) {
                     12.0
                 } else {
                     0.0
                 };
-                let (p, n) = (curve[k], normals[k]);
-                (k, [p[0] + n[0] * aside, p[1] + n[1] * aside], n, 1.0)
+                (k, curve[k] + n * aside, n, 1.0)
             };
+            let nodes = normals(curve).enumerate().map(node);
             Sighting {
                 t_s: *t_s,
-                nodes: (EVERY / 2..NODES).step_by(EVERY).map(node).collect(),
-                tip_px: curve[NODES - 1],
+                nodes: nodes.skip(EVERY / 2).step_by(EVERY).collect(),
+                tip: curve[NODES - 1],
                 tip_weight: TIP,
             }
         };
         let there = curves(&truth);
         let fit = Fit {
             sightings: &there.iter().map(sighting).collect::<Vec<_>>(),
-            camera: &camera,
-            motion: &motion,
+            setup,
             fidelity: Fidelity::COARSE,
-            film_s,
-            threads: 1,
         };
         let mut x = truth;
         x[LENGTH] += 0.02;
@@ -300,8 +278,7 @@ mod tests {
         let worst_px = |x: &Point| {
             let pairs = there.iter().zip(curves(x));
             let off = pairs.flat_map(|((_, a), (_, b))| a.clone().into_iter().zip(b));
-            off.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-                .fold(0.0, f64::max)
+            off.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
         };
         assert!(worst_px(&x) > 4.0, "{}", worst_px(&x));
         for _ in 0..2 {

@@ -4,16 +4,13 @@
 //! the rope, with a price per pixel, so that a curve is neither cut short nor drawn on.
 //! First in blurred evidence from a bank of ropes, then by CMA-ES from the best ones.
 
-use super::curve::tangent;
+use super::curve::{across, tangent};
 use super::evidence::EvidenceMap;
-use super::hypothesis::{
-    Curve, Fidelity, LOWER, MIDDLE, Point, SPREAD, Seen, Side, TURN, UPPER, simulate,
-};
-use cmaes::{CmaError, CmaEs, CmaOptions, StopRules};
+use super::hypothesis::{Fidelity, LOWER, MIDDLE, Point, SPREAD, Seen, Setup, Side, TURN, UPPER};
+use crate::track::TrackError;
+use cmaes::{CmaEs, CmaOptions, StopRules};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
-use rope_sim::{AttachMotion, SimulateError};
-use shared_types::StereoCamera;
 
 /// Hypotheses drawn at first, and how many of them are improved.
 const BANK: usize = 128;
@@ -32,36 +29,22 @@ const GENERATIONS: usize = 8;
 const POPULATION: usize = 16;
 const CLIMB_SEED: u64 = 2;
 
-/// Evidence of one moment.
+/// Points compared along the rope.
+const POINTS: usize = 24;
+/// How far beside it evidence counts against it (px).
+const SIDE_PX: f64 = 22.0;
+/// What a pixel of the curve costs.
+const PRICE: f64 = 0.2;
+/// Score of what cannot be looked at.
+const NOTHING: f64 = -10.0;
+
+/// Blurred evidence of one moment.
 #[derive(Debug)]
 pub(super) struct Moment {
     /// Start of the frame's exposure (s).
     pub(super) t_s: f64,
     /// Left image's, and the right one's where there is one.
     pub(super) maps: Vec<(Side, EvidenceMap)>,
-}
-
-impl Moment {
-    /// With evidence spread over so many pixels to every side.
-    pub(super) fn blurred(&self, reach_px: usize) -> Self {
-        let blurred = |(side, map): &(Side, EvidenceMap)| (*side, map.blurred(reach_px));
-        Self {
-            t_s: self.t_s,
-            maps: self.maps.iter().map(blurred).collect(),
-        }
-    }
-}
-
-/// How a curve is compared with evidence.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Comparison {
-    /// Points along the rope.
-    pub(super) points: usize,
-    /// How far beside it evidence counts against it (px).
-    pub(super) side_px: f64,
-    /// What a pixel of the curve costs.
-    pub(super) price: f64,
-    pub(super) fidelity: Fidelity,
 }
 
 /// A hypothesis and how much it explains: about the part of the picture's height that
@@ -72,27 +55,15 @@ pub(super) struct Found {
     pub(super) score: f64,
 }
 
-/// Why a search cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub(in super::super) enum SearchError {
-    #[error(transparent)]
-    Simulate(#[from] SimulateError),
-    #[error(transparent)]
-    Cma(#[from] CmaError),
-}
-
-/// A film's evidence and how it is searched.
+/// A film's evidence, and what moves the rope in it.
 pub(super) struct Searcher<'a> {
     pub(super) moments: &'a [Moment],
-    pub(super) camera: &'a StereoCamera,
-    pub(super) motion: &'a dyn AttachMotion,
-    pub(super) comparison: Comparison,
-    pub(super) threads: usize,
+    pub(super) setup: Setup<'a>,
 }
 
 impl Searcher<'_> {
     /// From a bank of ropes to some good ones.
-    pub(super) fn search(&self) -> Result<Vec<Found>, SearchError> {
+    pub(super) fn search(&self) -> Result<Vec<Found>, TrackError> {
         let mut starts: Vec<Found> = Vec::new();
         for found in self.bank()? {
             let apart =
@@ -111,7 +82,7 @@ impl Searcher<'_> {
     }
 
     /// Ropes drawn about the middle, the best first.
-    fn bank(&self) -> Result<Vec<Found>, SearchError> {
+    fn bank(&self) -> Result<Vec<Found>, TrackError> {
         let mut rng = ChaCha12Rng::seed_from_u64(1);
         let mut draw = |i: usize| {
             let spreads = BANK_SPREADS[usize::from(i >= TURN)];
@@ -125,7 +96,7 @@ impl Searcher<'_> {
     }
 
     /// The best hypothesis near a start.
-    fn climb(&self, start: Found, seed: u64) -> Result<Found, SearchError> {
+    fn climb(&self, start: Found, seed: u64) -> Result<Found, TrackError> {
         let mut strategy = CmaEs::new(CmaOptions {
             mean: start.x.to_vec(),
             std_dev: SPREAD.iter().map(|s| s * CLIMB_SPREADS).collect(),
@@ -138,13 +109,15 @@ impl Searcher<'_> {
                 generations_max: GENERATIONS,
                 ..StopRules::default()
             },
-        })?;
+        })
+        .map_err(TrackError::motion)?;
         let mut best = start;
         while strategy.stop().is_none() {
-            let asked = strategy.ask(&mut |_| true)?;
+            let asked = strategy.ask(&mut |_| true).map_err(TrackError::motion)?;
             let point = |x: &Vec<f64>| core::array::from_fn(|i| x[i]);
             let all = self.scored(asked.iter().map(point).collect())?;
-            strategy.tell(&all.iter().map(|f| -f.score).collect::<Vec<_>>())?;
+            let costs: Vec<f64> = all.iter().map(|f| -f.score).collect();
+            strategy.tell(&costs).map_err(TrackError::motion)?;
             for found in all {
                 if found.score > best.score {
                     best = found;
@@ -155,63 +128,59 @@ impl Searcher<'_> {
     }
 
     /// How much each of some hypotheses explains; the same for any number of threads.
-    pub(super) fn scored(&self, points: Vec<Point>) -> Result<Vec<Found>, SearchError> {
-        let film_s = self.moments.last().map_or(0.0, |m| m.t_s);
-        let fidelity = self.comparison.fidelity;
-        let rollouts = simulate(&points, fidelity, self.motion, film_s, self.threads)?;
-        let mut out: Vec<Found> = points
-            .into_iter()
-            .map(|x| Found { x, score: NOTHING })
-            .collect();
-        let part = out.len().div_ceil(self.threads).max(1);
-        std::thread::scope(|scope| {
-            for (found, rollouts) in out.chunks_mut(part).zip(rollouts.chunks(part)) {
-                scope.spawn(move || {
-                    let mut curve = Curve::default();
-                    for (found, rollout) in found.iter_mut().zip(rollouts) {
-                        if let Some(seen) = Seen::new(&found.x, rollout, self.camera) {
-                            found.score = self.score(&found.x, &seen, &mut curve);
-                        }
-                    }
-                });
-            }
+    pub(super) fn scored(&self, points: Vec<Point>) -> Result<Vec<Found>, TrackError> {
+        let setup = Setup {
+            film_s: self.moments.last().map_or(0.0, |m| m.t_s),
+            ..self.setup
+        };
+        let seen = setup.simulate(&points, Fidelity::COARSE)?;
+        let score = NOTHING;
+        let found = points.into_iter().map(|x| Found { x, score });
+        let mut found: Vec<(Found, Option<Seen>)> = found.zip(seen).collect();
+        side_by_side(&mut found, setup.threads, |(found, seen)| {
+            let score = seen.as_ref().and_then(|seen| self.score(&found.x, seen));
+            found.score = score.unwrap_or(NOTHING);
         });
-        Ok(out)
+        Ok(found.into_iter().map(|(found, _)| found).collect())
     }
 
-    fn score(&self, x: &Point, seen: &Seen<'_>, curve: &mut Curve) -> f64 {
-        let Comparison {
-            points,
-            side_px,
-            price,
-            ..
-        } = self.comparison;
-        let mut along = vec![0.0; points];
+    /// `None` where a part is behind the camera.
+    fn score(&self, x: &Point, seen: &Seen) -> Option<f64> {
+        let mut along = [0.0; POINTS];
         let (mut sum, mut images) = (0.0, 0.0);
         for moment in self.moments {
             for (side, map) in &moment.maps {
-                if !seen.curve(moment.t_s, *side, points, curve) {
-                    return NOTHING;
-                }
-                let curve = &curve.points;
+                let curve = seen.curve(moment.t_s, *side, POINTS)?;
                 for (k, p) in curve.iter().enumerate() {
-                    let (t, span_px) = tangent(curve, k, 1);
-                    let step_px = if k == 0 || k == points - 1 { 1.0 } else { 0.5 } * span_px;
-                    let aside = |d: f64| map.at([p[0] - t[1] * d, p[1] + t[0] * d]);
-                    let beside = 0.5 * f64::from(aside(side_px) + aside(-side_px));
+                    let (t, span_px) = tangent(&curve, k, 1);
+                    let step_px = if k == 0 || k == POINTS - 1 { 1.0 } else { 0.5 } * span_px;
+                    let aside = |px: f64| map.at(p + across(t) * px);
+                    let beside = 0.5 * f64::from(aside(SIDE_PX) + aside(-SIDE_PX));
                     let evident = f64::from(map.at(*p)) - 0.5 * beside;
                     along[k] += evident;
-                    sum += (evident - price) * step_px;
+                    sum += (evident - PRICE) * step_px;
                 }
                 images += 1.0;
             }
         }
         along.sort_by(f64::total_cmp);
         let prior: f64 = (TURN..x.len()).map(|i| (x[i] / SPREAD[i]).powi(2)).sum();
-        let half_height_px = f64::from(self.camera.height_px) / 2.0;
-        sum / (images * half_height_px) + WEAKEST * along[points / 10] / images - PRIOR * prior
+        let half_height_px = f64::from(self.setup.camera.height_px) / 2.0;
+        let weakest = WEAKEST * along[POINTS / 10] / images;
+        Some(sum / (images * half_height_px) + weakest - PRIOR * prior)
     }
 }
 
-/// Score of what cannot be looked at.
-const NOTHING: f64 = -10.0;
+/// Does the same work on all of some things, on so many threads.
+pub(super) fn side_by_side<T: Send>(
+    things: &mut [T],
+    threads: usize,
+    work: impl Fn(&mut T) + Sync,
+) {
+    let part = things.len().div_ceil(threads).max(1);
+    std::thread::scope(|scope| {
+        for part in things.chunks_mut(part) {
+            scope.spawn(|| part.iter_mut().for_each(&work));
+        }
+    });
+}

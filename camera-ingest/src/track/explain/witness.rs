@@ -3,11 +3,16 @@
 //! What was read off one image lies at the hypothesis's depth: that says where it is in the
 //! other one. A shadow on the wall, a cable further back or a person is elsewhere there.
 
+use super::super::scene::Scene;
+use super::Film;
 use super::colour::Colour;
-use super::curve::normals;
-use super::evidence::Scene;
-use super::field::{Look, offsets};
+use super::curve::Pixel;
+use super::evidence::Lit;
+use super::explainer::Explained;
+use super::field::{Look, Offset, offsets};
+use super::hypothesis::Side;
 use super::read::NODES;
+use super::statistics::{mean, median};
 use crate::frame::EyeFrame;
 
 /// The rope is looked for this far to either side of where it should be (px).
@@ -20,13 +25,12 @@ const COMMON_PX: f64 = 4.0;
 const LEAST: f64 = 0.3;
 
 /// One frame of the second image.
-#[derive(Debug)]
-pub(super) struct Sight<'a> {
+struct Sight<'a> {
     /// Index of the first image's frame of the same time.
-    pub(super) index: usize,
-    pub(super) frame: &'a EyeFrame,
+    index: usize,
+    frame: &'a EyeFrame,
     /// Where the rope should be.
-    pub(super) curve: Vec<[f64; 2]>,
+    curve: Vec<Pixel>,
 }
 
 /// What the second image shows.
@@ -39,71 +43,86 @@ pub(super) struct Testimony {
 }
 
 impl Testimony {
-    /// Looks for the rope's colours where it should be.
+    /// Looks in the right images where they should show what was read off the left ones: as
+    /// far from the hypothesis as there. `scene` is the right images'.
     pub(super) fn of(
+        film: Film<'_>,
+        scene: &Scene,
+        times_s: &[f64],
+        found: &Explained,
+    ) -> Option<Self> {
+        let sight = |frame| {
+            let stamp_ns = |f: &EyeFrame| f.stamp_ns;
+            let index = film.left.binary_search_by_key(&stamp_ns(frame), stamp_ns);
+            let index = index.ok()?;
+            let mut curve = found.seen.curve(times_s[index], Side::Right, NODES)?;
+            let left = found.curves[index].iter().zip(&found.reading.curves[index]);
+            for (p, (told, read)) in curve.iter_mut().zip(left) {
+                *p = *p + read - told;
+            }
+            Some(Sight {
+                index,
+                frame,
+                curve,
+            })
+        };
+        let sights: Vec<Sight<'_>> = film.right.iter().filter_map(sight).collect();
+        let rope = &found.reading.rope;
+        Self::from_sights(scene, &sights, rope, found.reading.end.rope_half_px)
+    }
+
+    /// Looks for the rope's colours where it should be.
+    fn from_sights(
         scene: &Scene,
         sights: &[Sight<'_>],
         rope: &[Colour],
         half_width_px: f64,
     ) -> Option<Self> {
+        if sights.is_empty() {
+            return None;
+        }
         let look = Look {
             reach: REACH_PX,
             half_width_px,
             jump: 0.05,
         };
-        let found: Vec<_> = sights
-            .iter()
-            .map(|sight| {
-                let gain = scene.gain(sight.frame);
-                let at = |p| scene.present(sight.frame, gain, rope, p);
-                offsets(&sight.curve, &normals(&sight.curve), look, at)
-            })
-            .collect();
-        let mut clear: Vec<f64> = found
-            .iter()
-            .flatten()
-            .filter(|o| o.weight > LEAST)
-            .map(|o| o.px)
-            .collect();
-        clear.sort_by(f64::total_cmp);
-        let common_px = clear.get(clear.len() / 2).copied().unwrap_or(0.0);
-        let is_common = common_px.abs() <= COMMON_PX;
-        let confirmed: Vec<Vec<bool>> = found
-            .iter()
-            .map(|offsets| {
-                let near = |px: f64| is_common && (px - common_px).abs() <= NEAR_PX;
-                let confirms = offsets.iter().map(|o| o.weight > LEAST && near(o.px));
-                confirms.collect()
-            })
-            .collect();
-        let part = |of: &mut dyn Iterator<Item = bool>| {
-            let (yes, all) = of.fold((0.0, 0.0), |(yes, all), c| {
-                (yes + f64::from(u8::from(c)), all + 1.0)
-            });
-            yes / f64::max(all, 1.0)
+        let offsets = |sight: &Sight<'_>| {
+            let lit = Lit::of(sight.frame, scene);
+            offsets(&sight.curve, look, |p| lit.present(rope, p))
         };
-        (!sights.is_empty()).then(|| Self {
-            frames: sights
-                .iter()
-                .zip(&confirmed)
-                .map(|(s, c)| (s.index, part(&mut c.iter().copied())))
-                .collect(),
-            nodes: (0..NODES)
-                .map(|k| part(&mut confirmed.iter().map(|c| c[k])))
-                .collect(),
+        let found: Vec<Vec<Offset>> = sights.iter().map(offsets).collect();
+        let clear = found.iter().flatten().filter(|o| o.weight > LEAST);
+        let common_px = median(clear.map(|o| o.px));
+        let confirms = |o: &Offset| {
+            let is_near = (o.px - common_px).abs() <= NEAR_PX;
+            f64::from(o.weight > LEAST && is_near && common_px.abs() <= COMMON_PX)
+        };
+        let confirmed: Vec<Vec<f64>> = found
+            .iter()
+            .map(|offsets| offsets.iter().map(confirms).collect())
+            .collect();
+        let node = |k: usize| mean(&confirmed.iter().map(|c| c[k]).collect::<Vec<_>>());
+        let frames = sights.iter().zip(&confirmed);
+        Some(Self {
+            frames: frames.map(|(s, c)| (s.index, mean(c))).collect(),
+            nodes: (0..NODES).map(node).collect(),
         })
     }
 
     /// Part of all places in all frames that is confirmed.
     pub(super) fn confirmed(&self) -> f64 {
-        self.frames.iter().map(|(_, part)| part).sum::<f64>() / self.frames.len() as f64
+        Self::mean_part(&self.frames)
+    }
+
+    fn mean_part(frames: &[(usize, f64)]) -> f64 {
+        mean(&frames.iter().map(|(_, part)| *part).collect::<Vec<_>>())
     }
 
     /// Part of the rope confirmed in the frame nearest to one of the first image's.
     pub(super) fn around(&self, index: usize) -> f64 {
         let after = self.frames.partition_point(|(i, _)| *i < index);
-        let near = &self.frames[after.saturating_sub(1)..(after + 1).min(self.frames.len())];
-        near.iter().map(|(_, part)| part).sum::<f64>() / near.len().max(1) as f64
+        let near = after.saturating_sub(1)..(after + 1).min(self.frames.len());
+        Self::mean_part(&self.frames[near])
     }
 
     /// Part of the frames that confirm a part of the rope (0 at the clamp to 1).
@@ -132,21 +151,17 @@ mod tests {
 
     #[test]
     fn a_rope_at_another_depth_is_not_confirmed() {
-        let scene = Scene::of(&[drawn(1, None), drawn(2, None), drawn(3, None)], 3);
-        let confirmed = |rope_at: usize, frames: usize| {
-            let frames: Vec<EyeFrame> = (0..frames)
-                .map(|i| drawn(i as u64, Some(rope_at)))
-                .collect();
-            let curve: Vec<[f64; 2]> = (0..NODES).map(|k| [47.5, 10.0 + k as f64 * 1.5]).collect();
-            let sights: Vec<Sight<'_>> = (0..)
-                .zip(&frames)
-                .map(|(index, frame)| Sight {
-                    index,
-                    frame,
-                    curve: curve.clone(),
-                })
-                .collect();
-            Testimony::of(&scene, &sights, &[[40.0, 0.0, 0.0]], 3.0).map(|t| t.confirmed())
+        let scene = Scene::of(&[drawn(1, None), drawn(2, None), drawn(3, None)]);
+        let confirmed = |rope_at: usize, frames: u64| {
+            let frames: Vec<EyeFrame> = (0..frames).map(|i| drawn(i, Some(rope_at))).collect();
+            let place = |k| Pixel::new(47.5, 10.0 + k as f64 * 1.5);
+            let sight = |(index, frame)| Sight {
+                index,
+                frame,
+                curve: (0..NODES).map(place).collect(),
+            };
+            let sights: Vec<Sight<'_>> = frames.iter().enumerate().map(sight).collect();
+            Testimony::from_sights(&scene, &sights, &[[40.0, 0.0, 0.0]], 3.0).map(|t| t.confirmed())
         };
         assert!(confirmed(48, 4).unwrap() > 0.95);
         assert!(

@@ -1,15 +1,55 @@
-//! The rope from points that somebody else followed.
+//! Where something learned may stand in for the built-in tracker: a [`PointTracker`]
+//! follows points of the rope through the film.
 
-use super::confirmation::doubted;
-use super::models::{PointTracker, SeenPoint, check_count};
 use super::{TrackError, TrackResult};
 use crate::frame::EyeFrame;
 use shared_types::keypoints::TrackedFrame;
 
+/// Why a learned model gives no answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ModelError {
+    /// The file cannot be used, or gives what it must not.
+    #[error("{0}")]
+    Unfit(String),
+    /// The runtime failed, or there is none.
+    #[error("model {path}: the network runtime failed: {reason}")]
+    Runtime {
+        /// The file.
+        path: String,
+        /// The runtime's words.
+        reason: String,
+    },
+}
+
+/// A followed point in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenPoint {
+    /// Raw pixel.
+    pub pixel: [f64; 2],
+    /// From 0 (hidden) to 1 (seen).
+    pub visible: f64,
+}
+
+/// Follows points of the first frame through a film.
+pub trait PointTracker {
+    /// How many points it follows, where it cannot be asked for any number.
+    fn points(&self) -> Option<usize>;
+
+    /// Every point (raw pixel of frame 0) in every frame.
+    ///
+    /// # Errors
+    /// No answer.
+    fn follow(
+        &mut self,
+        frames: &[EyeFrame],
+        points: &[[f64; 2]],
+    ) -> Result<Vec<Vec<SeenPoint>>, ModelError>;
+}
+
 /// Points asked for where the tracker follows any number.
 const POINTS: usize = 32;
 /// A frame in which less than this part of the points is visible is lost.
-const LEAST_VISIBLE: f64 = 0.25;
+const MIN_VISIBLE: f64 = 0.25;
 
 impl TrackResult {
     /// The same rope as a point tracker sees it: asked for points spread evenly over the
@@ -33,7 +73,7 @@ impl TrackResult {
         let asked: Vec<[f64; 2]> = evenly(&first, count).iter().map(|s| s.pixel).collect();
         let seen = tracker.follow(frames, &asked)?;
         check_count("frames", seen.len(), tracked.len())?;
-        for (index, (frame, seen)) in tracked.iter_mut().zip(&seen).enumerate() {
+        for (frame, seen) in tracked.iter_mut().zip(&seen) {
             check_count("points of a frame", seen.len(), count)?;
             let visible = seen.iter().map(|s| s.visible).sum::<f64>() / count as f64;
             let points = evenly(seen, self.track.keypoints);
@@ -41,9 +81,8 @@ impl TrackResult {
                 t_s: frame.t_s,
                 points: points.iter().map(|s| s.pixel).collect(),
                 confidence: points.iter().map(|s| s.visible.clamp(0.0, 1.0)).collect(),
-                lost: visible < LEAST_VISIBLE,
+                lost: visible < MIN_VISIBLE,
             };
-            self.residual[index] = 1.0 - visible;
         }
         let lost = tracked.iter().filter(|f| f.lost).count();
         if lost * 2 > tracked.len() {
@@ -53,10 +92,19 @@ impl TrackResult {
                 first: tracked.iter().position(|f| f.lost).unwrap_or(0),
             });
         }
-        self.confirmation.doubted = doubted(tracked);
-        self.track.doubts = self.confirmation.doubts();
+        self.track.doubts = self.confirmation.doubts(tracked);
         Ok(self)
     }
+}
+
+/// That a model gave as many values as it must.
+fn check_count(what: &str, found: usize, wanted: usize) -> Result<(), ModelError> {
+    if found == wanted {
+        return Ok(());
+    }
+    Err(ModelError::Unfit(format!(
+        "a learned model gave {found} {what}, it must give {wanted}"
+    )))
 }
 
 /// `count` points at equal distances along some.
