@@ -12,7 +12,7 @@ use planner::PlannerConfig;
 use planner::service::{PlannerRequest, PlannerRpc};
 use rig_sim::RigConfig;
 use rt_controller::ControllerConfig;
-use rt_controller::set_up::OnDifference;
+use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
 use run_log::files;
 use shared_types::StereoCamera;
