@@ -4,7 +4,6 @@ use crate::control::settings::TRACKING_WINDOW_MAX_MS;
 use crate::control::{ControlSettings, Thresholds};
 use crate::guardian::GuardianSettings;
 use crate::os::RealTimeSettings;
-use crate::set_up::OnDifference;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::Limits;
 use serde::{Deserialize, Serialize};
@@ -22,6 +21,18 @@ const WINDOW_KEY: &str = "tracking_window_ms";
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct ConfigError(String);
+
+/// What is done about an arm that is configured otherwise than the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnDifference {
+    /// Refuse and name both values. For a real arm: somebody configured it, and
+    /// somebody should look.
+    #[default]
+    Refuse,
+    /// Set the arm to what the controller is configured for.
+    Set,
+}
 
 /// Configuration of the controller; TOML keys as the fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

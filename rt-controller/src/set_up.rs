@@ -7,7 +7,7 @@
 //! the arm shall be set. Order of the recovery as in the vendor's manual: clear
 //! error, enable, mode, state.
 
-use crate::config::ControllerConfig;
+use crate::config::{ControllerConfig, OnDifference};
 use crate::session::{ArmSession, SessionError};
 use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport};
 use crate::xarm::{
@@ -16,7 +16,6 @@ use crate::xarm::{
 };
 use arm_model::{JointVector, Limits};
 use core::ops::RangeInclusive;
-use serde::{Deserialize, Serialize};
 use shared_types::FaultCode;
 use std::io::Read;
 use std::net::{SocketAddr, TcpStream};
@@ -39,18 +38,6 @@ const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// What to do about a difference that is refused.
 const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
-
-/// What is done about an arm that is configured otherwise than the controller.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OnDifference {
-    /// Refuse and name both values. For a real arm: somebody configured it, and
-    /// somebody should look.
-    #[default]
-    Refuse,
-    /// Set the arm to what the controller is configured for.
-    Set,
-}
 
 /// Why the arm could not be set up: what was found, and what to do.
 #[derive(Debug, thiserror::Error)]

@@ -108,6 +108,9 @@ fn fault_18_firmware_without_a_known_report_is_refused() {
         ArmVersion::parse(&text).unwrap().check()
     };
     assert!(matches!(check("1.12.0"), Err(VersionError::TooOld(_))));
-    assert!(matches!(check("3.0.0"), Err(VersionError::UnknownLayout(_))));
+    assert!(matches!(
+        check("3.0.0"),
+        Err(VersionError::UnknownLayout(_))
+    ));
     assert_eq!(check("2.8.2"), Ok(()));
 }

@@ -16,14 +16,16 @@
 
 pub mod decision;
 pub mod line;
+mod settings;
 mod watched;
+
+pub use settings::GuardianSettings;
 
 use crate::config::ControllerConfig;
 use crate::error::ControllerError;
 use crate::os::{Clock, MonotonicClock, RealTimeSettings, enter_real_time};
 use decision::{Emergency, Guardian, GuardianInput, GuardianPhase};
 use line::ArmLine;
-use serde::{Deserialize, Serialize};
 use shared_types::ipc::{Bus, DomainSweep, GuardianBeat};
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,38 +41,6 @@ const LEAVE_WITHIN_NS: u64 = 4_000_000_000;
 /// The same where no connection to the arm can be had (ns): its host is down or
 /// gone, and whoever ends the guardian is told to look at the arm.
 const LEAVE_UNCONFIRMED_WITHIN_NS: u64 = 1_500_000_000;
-
-/// How the guardian watches; table `[guardian]` of the controller's file.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GuardianSettings {
-    /// Silence of a moving controller after which the arm is stopped (ms); three
-    /// cycles at 250 Hz. A controller whose process ends is met at once.
-    pub silence_ms: f64,
-    /// `SCHED_FIFO` priority of the guardian, 1 to 99, above the control thread.
-    /// Absent: ordinary scheduling.
-    pub priority: Option<u8>,
-    /// Whether the controller moves only while a guardian watches.
-    pub required: bool,
-}
-
-impl Default for GuardianSettings {
-    fn default() -> Self {
-        Self {
-            silence_ms: 12.0,
-            priority: Some(85),
-            required: true,
-        }
-    }
-}
-
-impl GuardianSettings {
-    /// The silence (ns).
-    #[must_use]
-    pub const fn silence_ns(&self) -> u64 {
-        (self.silence_ms * 1e6) as u64
-    }
-}
 
 /// Guards the arm and the controller of `config` until `stop` is set; when the
 /// arm moves then, until it stands. Blocks the calling thread.

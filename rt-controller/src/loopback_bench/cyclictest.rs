@@ -1,7 +1,7 @@
 //! `cyclictest` of the `rt-tests` package, the kernel developers' own measure of
 //! how late a thread wakes.
 
-use super::{SideBySide, WARM_UP};
+use super::{PERIOD, PRIORITY, WARM_UP};
 use crate::os::schedule::run_on;
 use std::io::ErrorKind;
 use std::process::Command;
@@ -15,12 +15,12 @@ pub(super) fn lateness_ns(
     others: &[usize],
     span: Duration,
 ) -> Result<Vec<u64>, String> {
-    let interval_us = SideBySide::PERIOD.as_micros();
+    let interval_us = PERIOD.as_micros();
     let loops = span.as_micros() / interval_us.max(1) + WARM_UP as u128;
     let mut command = Command::new("cyclictest");
     command
         .args(["--verbose", "--nsecs", "--mlockall", "--distance=0"])
-        .arg(format!("--priority={}", SideBySide::PRIORITY))
+        .arg(format!("--priority={}", PRIORITY))
         .arg(format!("--interval={interval_us}"))
         .arg(format!("--affinity={cpu}"))
         .arg(format!("--loops={loops}"));

@@ -36,6 +36,10 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// The loop's period.
+const PERIOD: Duration = Duration::from_millis(4);
+/// Priority of the loop and of all that it is compared with.
+const PRIORITY: u8 = 80;
 /// Pause between two turns of the part that the bridge would do.
 const TURN: Duration = Duration::from_millis(2);
 /// Longest wait for the loop to begin to move.

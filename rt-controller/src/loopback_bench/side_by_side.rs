@@ -32,9 +32,9 @@ impl SideBySide {
     /// Time until the next has its turn.
     pub const SLICE: Duration = Duration::from_secs(1);
     /// The loop's period.
-    pub const PERIOD: Duration = Duration::from_millis(4);
+    pub const PERIOD: Duration = super::PERIOD;
     /// Priority of all.
-    pub const PRIORITY: u8 = 80;
+    pub const PRIORITY: u8 = super::PRIORITY;
 
     /// Measures on one of `cores` until each has had its seconds; tells `say` how many it had.
     ///

@@ -7,7 +7,7 @@ use anyhow::bail;
 use arm_model::Limits;
 use rig_sim::RigConfig;
 use rt_controller::ControllerConfig;
-use rt_controller::set_up::OnDifference;
+use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{ControllerRequest, RigEvent, RigRequest, RigRpc};
