@@ -8,6 +8,7 @@ use crate::geometry::box_distance_m;
 use crate::joint::{JointState, JointVector};
 use crate::kinematics::{FrameMotion, flange_motion, flange_pose};
 use crate::unit::unit_hint;
+use core::ops::RangeInclusive;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -48,28 +49,27 @@ pub struct Cell {
 
 fn checked<'de, D: Deserializer<'de>>(
     from: D,
-    holds: impl Fn(f64) -> bool,
+    range: RangeInclusive<f64>,
     expected: &str,
 ) -> Result<f64, D::Error> {
     let value = f64::deserialize(from)?;
-    if holds(value) {
-        Ok(value)
-    } else {
-        Err(serde::de::Error::custom(format_args!(
-            "{value} m is {expected}{}",
-            unit_hint("_m", value, LENGTH_MAX_M)
-        )))
+    if range.contains(&value) {
+        return Ok(value);
     }
+    let hint = unit_hint("_m", value, LENGTH_MAX_M);
+    Err(serde::de::Error::custom(format_args!(
+        "{value} m is {expected}{hint}"
+    )))
 }
 
 fn length<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let holds = |v: f64| v > 0.0 && v <= LENGTH_MAX_M;
-    checked(from, holds, "not above 0 and at most 10 m")
+    let range = f64::MIN_POSITIVE..=LENGTH_MAX_M;
+    checked(from, range, "not above 0 and at most 10 m")
 }
 
 fn below_zero<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let holds = |v: f64| (-LENGTH_MAX_M..0.0).contains(&v);
-    checked(from, holds, "not below 0 and at least -10 m")
+    let range = -LENGTH_MAX_M..=-f64::MIN_POSITIVE;
+    checked(from, range, "not below 0 and at least -10 m")
 }
 
 fn place<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {

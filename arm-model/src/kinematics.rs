@@ -7,7 +7,7 @@
 
 use crate::exact;
 use crate::joint::{JOINTS, JointState, JointVector};
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// Origin of each joint in its parent's frame (m).
 pub const JOINT_ORIGIN_M: [[f64; 3]; JOINTS] = [
@@ -81,16 +81,6 @@ impl FrameMotion {
                 + self.w_rad_s.cross(&self.w_rad_s.cross(&arm)),
             ..*self
         }
-    }
-
-    /// Pose as an isometry (frame to world).
-    #[must_use]
-    pub fn pose(&self) -> Isometry3<f64> {
-        let rotation = Rotation3::from_matrix_unchecked(self.r);
-        Isometry3::from_parts(
-            Translation3::from(self.p_m),
-            UnitQuaternion::from_rotation_matrix(&rotation),
-        )
     }
 }
 

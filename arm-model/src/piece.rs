@@ -17,25 +17,23 @@ pub struct JointPiece {
 }
 
 fn sum<const N: usize>(terms: [(JointVector, f64); N]) -> JointVector {
-    terms
-        .into_iter()
-        .fold(JointVector::ZERO, |s, (v, k)| s + v.map(|v| v * k))
+    let scaled = terms.into_iter().map(|(v, k)| v * k);
+    scaled.fold(JointVector::ZERO, |sum, v| sum + v)
 }
 
 impl JointPiece {
     /// The quintics that meet position, speed and acceleration at both ends.
     #[must_use]
     pub fn quintic(from: &JointState, to: &JointState, span_s: f64) -> Self {
-        let scaled = |v: JointVector, s: f64| v.map(|v| v * s);
-        let (v0, v1) = (scaled(from.qd, span_s), scaled(to.qd, span_s));
+        let (v0, v1) = (from.qd * span_s, to.qd * span_s);
         let square = span_s * span_s;
-        let (a0, a1) = (scaled(from.qdd, square), scaled(to.qdd, square));
+        let (a0, a1) = (from.qdd * square, to.qdd * square);
         let d = to.q - from.q;
         Self {
             c: [
                 from.q,
                 v0,
-                scaled(a0, 0.5),
+                a0 * 0.5,
                 sum([(d, 10.0), (v0, -6.0), (v1, -4.0), (a0, -1.5), (a1, 0.5)]),
                 sum([(d, -15.0), (v0, 8.0), (v1, 7.0), (a0, 1.5), (a1, -1.0)]),
                 sum([(d, 6.0), (v0, -3.0), (v1, -3.0), (a0, -0.5), (a1, 0.5)]),
@@ -69,9 +67,9 @@ impl JointPiece {
         let mut q = self.c[5];
         let (mut qd, mut half_qdd) = (JointVector::ZERO, JointVector::ZERO);
         for c in self.c[..5].iter().rev() {
-            half_qdd = half_qdd.map(|v| v * u) + qd;
-            qd = qd.map(|v| v * u) + q;
-            q = q.map(|v| v * u) + *c;
+            half_qdd = half_qdd * u + qd;
+            qd = qd * u + q;
+            q = q * u + *c;
         }
         JointState {
             q,

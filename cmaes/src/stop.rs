@@ -62,12 +62,9 @@ impl StopRules {
         let window = 10 + 30 * search.mean.len() / search.options.population;
         let history = &search.best_of_generations;
         if history.len() >= window {
-            let last = &history[history.len() - window..];
-            let (low, high) = last
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
+            let last = history[history.len() - window..].iter().copied();
+            let low = last.clone().fold(f64::INFINITY, f64::min);
+            let high = last.fold(f64::NEG_INFINITY, f64::max);
             if (high - low).max(search.last_spread) < self.fitness_tolerance {
                 return Some(StopReason::FitnessTolerance);
             }

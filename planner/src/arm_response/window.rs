@@ -24,23 +24,18 @@ impl Window {
     pub(super) fn all(recording: &Recording, joint: usize) -> Vec<Self> {
         let mut out = Vec::new();
         for (from_s, to_s) in motions(recording, joint) {
-            let setpoints = &recording.setpoints;
+            let (setpoints, samples) = (&recording.setpoints, &recording.samples);
             // The setpoint that holds when the window opens.
-            let first = setpoints
-                .partition_point(|s| s.sent_s <= from_s)
-                .saturating_sub(1);
+            let first = setpoints.partition_point(|s| s.sent_s <= from_s);
+            let first = first.saturating_sub(1);
             let end = setpoints.partition_point(|s| s.sent_s <= to_s);
-            let samples = &recording.samples;
+            let seen = samples.partition_point(|s| s.at_s < from_s)
+                ..samples.partition_point(|s| s.at_s <= to_s);
+            let sent = setpoints[first..end].iter();
+            let measured = samples[seen].iter();
             let window = Self {
-                setpoints: setpoints[first..end]
-                    .iter()
-                    .map(|s| (s.sent_s, s.q[joint]))
-                    .collect(),
-                samples: samples[samples.partition_point(|s| s.at_s < from_s)
-                    ..samples.partition_point(|s| s.at_s <= to_s)]
-                    .iter()
-                    .map(|s| (s.at_s, s.q[joint]))
-                    .collect(),
+                setpoints: sent.map(|s| (s.sent_s, s.q[joint])).collect(),
+                samples: measured.map(|s| (s.at_s, s.q[joint])).collect(),
             };
             if !window.samples.is_empty() {
                 out.push(window);
@@ -51,12 +46,9 @@ impl Window {
 
     /// How far the joint was told to go (rad).
     pub(super) fn travel_rad(&self) -> f64 {
-        let (low, high) = self
-            .setpoints
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(lo, hi), (_, q)| {
-                (lo.min(*q), hi.max(*q))
-            });
+        let sent = self.setpoints.iter().map(|(_, q)| *q);
+        let low = sent.clone().fold(f64::MAX, f64::min);
+        let high = sent.fold(f64::MIN, f64::max);
         (high - low).max(0.0)
     }
 }

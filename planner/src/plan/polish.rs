@@ -38,8 +38,9 @@ impl Setup<'_> {
         mut points: Vec<Vec<f64>>,
         count: &mut Count,
     ) -> Result<Vec<Vec<f64>>, PlanError> {
-        let motion = self.simulator.motion(&self.space.decode(&self.start)?)?;
-        let motion_s = motion.duration_s().max(self.simulator.motion_s_min);
+        let start = self.simulator.arm(&self.space.decode(&self.start)?)?;
+        let motion_s = start.trajectory().duration_s();
+        let motion_s = motion_s.max(self.simulator.motion_s_min);
         let rough = self.simulator.options(motion_s, FrameTimes::NONE);
         let exact = self.simulator.exact();
         let exact = exact.options(motion_s, FrameTimes::NONE);
@@ -80,10 +81,8 @@ impl Setup<'_> {
     }
 
     fn motions(&self, points: &[impl AsRef<[f64]>]) -> Result<Vec<PlannedArm>, PlanError> {
-        let motion = |x: &[f64]| self.simulator.motion(&self.space.decode(x)?);
-        let pole = self.request.cell.pole;
-        let motions = points.iter().map(|x| motion(x.as_ref()));
-        motions.map(|m| Ok(PlannedArm::new(m?, pole))).collect()
+        let motion = |x: &[f64]| self.simulator.arm(&self.space.decode(x)?);
+        points.iter().map(|x| motion(x.as_ref())).collect()
     }
 
     /// Closest approach of each point in a simulation; `None` if it diverged.

@@ -88,15 +88,16 @@ impl ThrowSimulator {
         }
     }
 
-    /// What the arm does when it is told a trajectory.
+    /// The arm when it is told a trajectory.
     ///
     /// # Errors
     /// A joint moves whose response is not known.
-    pub fn motion(&self, command: &JointTrajectory) -> Result<JointTrajectory, PlanError> {
-        match &self.following {
-            None => Ok(*command),
-            Some(following) => Ok(following.motion(command)?),
-        }
+    pub(super) fn arm(&self, command: &JointTrajectory) -> Result<PlannedArm, PlanError> {
+        let motion = match &self.following {
+            None => *command,
+            Some(following) => following.motion(command)?,
+        };
+        Ok(PlannedArm::new(motion, self.cell.pole))
     }
 
     /// Commands each trajectory with its rope. Results are in the order of the
@@ -108,16 +109,12 @@ impl ThrowSimulator {
         &self,
         throws: &[(&RopeParams, &JointTrajectory)],
     ) -> Result<Vec<ThrowOutcome>, PlanError> {
-        let motions = throws
+        let arms = throws
             .iter()
-            .map(|(_, command)| self.motion(command))
+            .map(|(_, command)| self.arm(command))
             .collect::<Result<Vec<_>, _>>()?;
-        let motion_s = motions.iter().map(JointTrajectory::duration_s);
+        let motion_s = arms.iter().map(|arm| arm.trajectory().duration_s());
         let motion_s = motion_s.fold(self.motion_s_min, f64::max);
-        let arms: Vec<PlannedArm> = motions
-            .iter()
-            .map(|m| PlannedArm::new(*m, self.cell.pole))
-            .collect();
         let candidates: Vec<Candidate<'_>> = throws
             .iter()
             .zip(&arms)
@@ -132,11 +129,13 @@ impl ThrowSimulator {
         };
         let options = self.options(motion_s, frames);
         let rollouts = roll_out_in(&self.scene, &candidates, &options)?;
-        let jobs: Vec<_> = throws.iter().zip(&motions).zip(&rollouts).collect();
+        let jobs: Vec<_> = throws.iter().zip(&arms).zip(&rollouts).collect();
         Ok(map_in_order(
             &jobs,
             self.threads,
-            |(((rope, _), motion), rollout)| self.outcome(rope, motion, rollout, options.horizon_s),
+            |(((rope, _), arm), rollout)| {
+                self.outcome(rope, arm.trajectory(), rollout, options.horizon_s)
+            },
         ))
     }
 

@@ -71,21 +71,19 @@ pub(super) struct ChainedArm<'a> {
     trajectory: &'a JointTrajectory,
 }
 
-impl ChainedArm<'_> {
-    fn joints_at(&self, t_s: f64) -> JointState {
-        let since_start_s = t_s - self.prelude.start_s;
-        if since_start_s <= 0.0 {
-            return self.prelude.measured.joints_at(t_s);
-        }
-        let mut state = self.trajectory.state_at(since_start_s);
-        state.q = state.q + self.prelude.standing_error;
-        state
-    }
-}
-
 impl AttachMotion for ChainedArm<'_> {
     fn at(&self, t_s: f64) -> FrameMotion {
-        self.prelude.cell.pole.attach_motion(&self.joints_at(t_s))
+        let since_start_s = t_s - self.prelude.start_s;
+        let state = if since_start_s <= 0.0 {
+            self.prelude.measured.joints_at(t_s)
+        } else {
+            let commanded = self.trajectory.state_at(since_start_s);
+            JointState {
+                q: commanded.q + self.prelude.standing_error,
+                ..commanded
+            }
+        };
+        self.prelude.cell.pole.attach_motion(&state)
     }
 
     fn duration_s(&self) -> f64 {
