@@ -9,6 +9,18 @@ pub mod virtual_rig;
 use std::num::NonZeroUsize;
 use std::thread;
 
+/// The value that `part` of all values do not exceed, the largest at most.
+///
+/// # Panics
+/// Without any value.
+#[must_use]
+pub fn quantile(values: &[f64], part: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let index = (sorted.len() as f64 * part) as usize;
+    sorted[index.min(sorted.len() - 1)]
+}
+
 /// Work for each seed, on all processors; in the order of the seeds.
 ///
 /// # Panics

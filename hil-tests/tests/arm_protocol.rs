@@ -200,6 +200,15 @@ fn two_clients_share_one_arm() {
     assert!((b.q() - target).max_abs() < 1e-4);
     b.ask(&Command::SetState(StateRequest::Stop));
     assert!(a.ask(&Command::ServoJoint(target)).0.is_not_ready());
+    // What one does wrong, the other is told, too: C23, outside a joint's range.
+    a.bring_up(Mode::Servo);
+    target[3] = -1.0;
+    assert!(a.ask(&Command::ServoJoint(target)).0.has_error());
+    let fault = b.ask(&Command::GetFault).1;
+    assert!(
+        matches!(fault, ReplyData::Fault { error: 23, .. }),
+        "{fault:?}"
+    );
 }
 
 /// Four clients of the real-time report at once, a fifth is turned away; five

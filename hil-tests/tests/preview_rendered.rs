@@ -11,6 +11,7 @@ use arm_model::kinematics::FrameMotion;
 use arm_model::{Cell, JointVector, Pole};
 use camera_ingest::StereoFrame;
 use camera_ingest::preview::Preview;
+use hil_tests::quantile;
 use nalgebra::Vector3;
 use rig_sim::CameraConfig;
 use rig_sim::hidden::hidden_rope;
@@ -133,12 +134,6 @@ fn off_px(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
         (p - a - (b - a) * along.clamp(0.0, 1.0)).norm()
     };
     line.windows(2).map(from).fold(f64::INFINITY, f64::min)
-}
-
-fn quantile(values: &[f64], part: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[((sorted.len() - 1) as f64 * part) as usize]
 }
 
 /// Films until a search is due and runs it; frames go on while it would.

@@ -48,6 +48,23 @@ fn ask(client: &RpcClient<RigRpc>, request: &RigRequest) -> RigEvent {
     }
 }
 
+/// A test with a running rig: its domain, its service and the port for commands.
+fn on_rig(config: &RigConfig, test: impl FnOnce(&Bus, &RpcClient<RigRpc>, u16)) {
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let rig = scope.spawn(|| rig_sim::run(config, &stop));
+        let bus = Bus::join(&config.domain).unwrap();
+        let client = RpcClient::open(&bus).unwrap();
+        let RigEvent::Ports { command, reports } = ask(&client, &RigRequest::Ports) else {
+            panic!("no ports");
+        };
+        assert!(command > 0 && reports.iter().all(|p| *p > 0));
+        test(&bus, &client, command);
+        stop.store(true, Ordering::Release);
+        rig.join().unwrap().unwrap();
+    });
+}
+
 fn film(bus: &Bus) -> Vec<(FrameHeader, Vec<u8>)> {
     let subscriber = bus.frame_subscriber().unwrap();
     let began = Instant::now();
@@ -92,17 +109,8 @@ fn lead_in(frame: &(FrameHeader, Vec<u8>), config: &RigConfig) -> Vector3<f64> {
 #[test]
 fn frames_and_truth_of_a_rope_at_rest_agree() {
     let config = config();
-    let stop = AtomicBool::new(false);
-    std::thread::scope(|scope| {
-        let rig = scope.spawn(|| rig_sim::run(&config, &stop));
-        let bus = Bus::join(&config.domain).unwrap();
-        let client = RpcClient::<RigRpc>::open(&bus).unwrap();
-        let RigEvent::Ports { command, reports } = ask(&client, &RigRequest::Ports) else {
-            panic!("no ports");
-        };
-        assert!(command > 0 && reports.iter().all(|p| *p > 0));
-
-        let frames = film(&bus);
+    on_rig(&config, |bus, client, _| {
+        let frames = film(bus);
         let period_ns = 1e9 / config.camera.frame_rate_hz;
         for pair in frames.windows(2) {
             let (a, b) = (pair[0].0, pair[1].0);
@@ -117,18 +125,16 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
         let target_m = [0.75, 0.0, -0.2];
         let (from_ns, to_ns) = (frames[0].0.stamp_ns, frames[FRAMES - 1].0.stamp_ns);
         let request = RigRequest::Truth { from_ns, to_ns };
-        assert!(matches!(ask(&client, &request), RigEvent::Failed { .. }));
-        assert_eq!(
-            ask(&client, &RigRequest::PlaceTarget { target_m }),
-            RigEvent::Done
-        );
+        assert!(matches!(ask(client, &request), RigEvent::Failed { .. }));
+        let placed = ask(client, &RigRequest::PlaceTarget { target_m });
+        assert_eq!(placed, RigEvent::Done);
         let RigEvent::Truth {
             rope,
             closest_m,
             peak_tip_speed_m_s,
             touched,
             ..
-        } = ask(&client, &request)
+        } = ask(client, &request)
         else {
             panic!("no truth");
         };
@@ -140,9 +146,6 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
             (seen_m - closest_m).abs() < 0.02,
             "{seen_m} and {closest_m}"
         );
-
-        stop.store(true, Ordering::Release);
-        rig.join().unwrap().unwrap();
     });
 }
 
@@ -154,13 +157,7 @@ fn the_rope_swings_when_the_arm_moves() {
         ..config()
     };
     config.camera.enabled = false;
-    let stop = AtomicBool::new(false);
-    std::thread::scope(|scope| {
-        let rig = scope.spawn(|| rig_sim::run(&config, &stop));
-        let client = RpcClient::<RigRpc>::open(&Bus::join(&config.domain).unwrap()).unwrap();
-        let RigEvent::Ports { command: port, .. } = ask(&client, &RigRequest::Ports) else {
-            panic!("no ports");
-        };
+    on_rig(&config, |_, client, port| {
         let address = SocketAddr::new(config.bind, port);
         let mut arm = ArmSession::connect(address, PATIENCE).unwrap();
         let from_ns = clock::now().0;
@@ -179,7 +176,7 @@ fn the_rope_swings_when_the_arm_moves() {
             peak_tip_speed_m_s,
             touched,
             ..
-        } = ask(&client, &RigRequest::Truth { from_ns, to_ns })
+        } = ask(client, &RigRequest::Truth { from_ns, to_ns })
         else {
             panic!("no truth");
         };
@@ -189,20 +186,5 @@ fn the_rope_swings_when_the_arm_moves() {
             "{peak_tip_speed_m_s} m/s"
         );
         assert!(!touched);
-        stop.store(true, Ordering::Release);
-        rig.join().unwrap().unwrap();
     });
-}
-
-#[test]
-fn a_taken_port_is_named() {
-    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = taken.local_addr().unwrap().port();
-    let config = RigConfig {
-        domain: format!("test_rig_port_{}", std::process::id()),
-        command_port: port,
-        ..config()
-    };
-    let error = rig_sim::run(&config, &AtomicBool::new(false)).unwrap_err();
-    assert!(error.to_string().contains(&port.to_string()), "{error}");
 }

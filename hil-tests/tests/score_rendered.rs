@@ -5,7 +5,7 @@
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
 use camera_ingest::{ScoreOptions, StereoFrame, score};
-use hil_tests::for_each_seed;
+use hil_tests::{for_each_seed, quantile};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -108,17 +108,15 @@ impl Throw {
     }
 }
 
-/// Scores of the throws of one set of colours.
-#[derive(Default)]
-struct Scores {
-    held: usize,
-    refused: usize,
-    errors_m: Vec<f64>,
-    widths_m: Vec<f64>,
+/// The score of a throw that was not refused.
+struct Scored {
+    holds: bool,
+    error_m: f64,
+    width_m: f64,
 }
 
 /// Renders and scores the throws of one seed.
-fn scores_of(seed: u64, config: &CameraConfig) -> Scores {
+fn scores_of(seed: u64, config: &CameraConfig) -> Vec<Option<Scored>> {
     let camera = config.stereo_camera();
     let appearance = Appearance::from_seed(seed);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -134,21 +132,15 @@ fn scores_of(seed: u64, config: &CameraConfig) -> Scores {
         config.noise_levels,
         seed,
     );
-    let mut scores = Scores::default();
-    for index in 0..THROWS {
+    let mut scored = |index: u32| {
         let throw = Throw::random(&mut rng, 1.0 / config.frame_rate_hz);
         let mut film = throw.film(&mut renderer, config, &camera);
         let truth_m = throw.closest_m(f64::from(FRAMES) / config.frame_rate_hz);
         let options = ScoreOptions::default();
         let colours = (appearance.lead_rgb, appearance.target_rgb);
-        let found = match score(&mut film, &camera, colours.0, colours.1, &options) {
-            Ok(found) => found,
-            Err(error) => {
-                println!("seed {seed} throw {index}: {error}");
-                scores.refused += 1;
-                continue;
-            }
-        };
+        let found = score(&mut film, &camera, colours.0, colours.1, &options)
+            .inspect_err(|error| println!("seed {seed} throw {index}: {error}"))
+            .ok()?;
         let holds = (found.interval_m[0]..=found.interval_m[1]).contains(&truth_m);
         println!(
             "seed {seed} throw {index}: {:.1} mm, truth {:.1} mm, interval {:.1} to {:.1} mm{}",
@@ -158,13 +150,13 @@ fn scores_of(seed: u64, config: &CameraConfig) -> Scores {
             1e3 * found.interval_m[1],
             if holds { "" } else { ": missed" }
         );
-        scores.held += usize::from(holds);
-        scores.errors_m.push((found.closest_m - truth_m).abs());
-        scores
-            .widths_m
-            .push(found.interval_m[1] - found.interval_m[0]);
-    }
-    scores
+        Some(Scored {
+            holds,
+            error_m: (found.closest_m - truth_m).abs(),
+            width_m: found.interval_m[1] - found.interval_m[0],
+        })
+    };
+    (0..THROWS).map(&mut scored).collect()
 }
 
 /// Renders and scores throws of many colours.
@@ -172,21 +164,21 @@ fn assert_intervals_hold(config: &CameraConfig) {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
     // The first were looked at while the intervals were made, the others were not.
     let seeds: Vec<u64> = if long { 3000..3020 } else { 100..102 }.collect();
-    let scores = for_each_seed(&seeds, |seed| scores_of(seed, config));
-    let held: usize = scores.iter().map(|s| s.held).sum();
-    let refused: usize = scores.iter().map(|s| s.refused).sum();
-    let mut errors_m: Vec<f64> = scores.iter().flat_map(|s| s.errors_m.clone()).collect();
-    let mut widths_m: Vec<f64> = scores.iter().flat_map(|s| s.widths_m.clone()).collect();
-    let count = errors_m.len();
-    for values in [&mut errors_m, &mut widths_m] {
-        values.sort_by(f64::total_cmp);
-    }
-    let (error_m, width_m) = (errors_m[count / 2], widths_m[count / 2]);
+    let throws = for_each_seed(&seeds, |seed| scores_of(seed, config))
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>();
+    let scores: Vec<&Scored> = throws.iter().flatten().collect();
+    let (count, refused) = (scores.len(), throws.len() - scores.len());
+    let held = scores.iter().filter(|s| s.holds).count();
+    let errors_m: Vec<f64> = scores.iter().map(|s| s.error_m).collect();
+    let widths_m: Vec<f64> = scores.iter().map(|s| s.width_m).collect();
+    let (error_m, width_m) = (quantile(&errors_m, 0.5), quantile(&widths_m, 0.5));
     println!(
         "{held} of {count} hold the truth; median error {:.1} mm, largest {:.1} mm, median \
          width {:.1} mm",
         1e3 * error_m,
-        1e3 * errors_m[count - 1],
+        1e3 * quantile(&errors_m, 1.0),
         1e3 * width_m
     );
     // Two standard errors hold nineteen of twenty, so that one of these few may be

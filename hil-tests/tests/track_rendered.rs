@@ -9,7 +9,7 @@ mod film;
 
 use camera_ingest::EyeFrame;
 use film::{Filmed, Take};
-use hil_tests::for_each_seed;
+use hil_tests::{for_each_seed, quantile};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::CameraConfig;
@@ -49,19 +49,8 @@ enum Filming {
     Rolling,
 }
 
-/// What came of one film.
-struct Outcome {
-    seed: u64,
-    filming: Filming,
-    lost: f64,
-    doubted: f64,
-    /// Median and 95th percentile over the frames not lost (px).
-    errors_px: [f64; 2],
-    /// Largest error of a node held for more likely than not (px).
-    confident_px: f64,
-}
-
-fn outcome(seed: u64, filming: Filming) -> Outcome {
+/// Films and tracks a wiggle and prints what came of it; that is an error if it is not good.
+fn outcome(seed: u64, filming: Filming) -> Result<(), String> {
     let mut arrives = busy_machine(seed);
     let config = CameraConfig {
         line_time_s: if filming == Filming::Rolling {
@@ -81,24 +70,13 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
     let filmed = Filmed::of(&config, take, |index| {
         filming != Filming::Busy || arrives(index)
     });
-    let found = match filmed.track(&filmed.arm(0.0)) {
-        Ok(found) => found,
-        Err(error) => {
-            println!("seed {seed}, {filming:?}: {error}");
-            return Outcome {
-                seed,
-                filming,
-                lost: 1.0,
-                doubted: 1.0,
-                errors_px: [f64::INFINITY; 2],
-                confident_px: 0.0,
-            };
-        }
-    };
+    let found = filmed
+        .track(&filmed.arm(0.0))
+        .map_err(|error| format!("seed {seed}, {filming:?}: {error}"))?;
     let (mut errors_px, mut confident_px) = (Vec::new(), 0.0_f64);
-    let mut doubted = 0;
+    let mut doubted = 0_u32;
     for (index, frame) in found.track.frames.iter().enumerate() {
-        doubted += usize::from(frame.lost || frame.confidence.iter().all(|c| *c <= 0.5));
+        doubted += u32::from(frame.lost || frame.confidence.iter().all(|c| *c <= 0.5));
         if frame.lost {
             continue;
         }
@@ -108,21 +86,25 @@ fn outcome(seed: u64, filming: Filming) -> Outcome {
             .zip(&frame.confidence)
         {
             errors_px.push(*off);
+            // Where it is right more likely than not.
             if *confidence > 0.5 {
                 confident_px = confident_px.max(*off);
             }
         }
     }
-    errors_px.sort_by(f64::total_cmp);
-    let part = |percent: usize| errors_px[(errors_px.len() - 1) * percent / 100];
-    Outcome {
-        seed,
-        filming,
-        lost: found.track.lost_fraction(),
-        doubted: doubted as f64 / found.track.frames.len() as f64,
-        errors_px: [part(50), part(95)],
-        confident_px,
-    }
+    // Over the frames not lost.
+    let [median, p95] = [0.5, 0.95].map(|part| quantile(&errors_px, part));
+    let lost = found.track.lost_fraction();
+    let told = format!(
+        "seed {seed} ({:.1} mm), {filming:?}: lost {:.1} %, in doubt {:.1} %, \
+         median {median:.2}, p95 {p95:.2}, most where sure {confident_px:.1} px",
+        hidden_rope(seed).radius_m * 1e3,
+        100.0 * lost,
+        100.0 * f64::from(doubted) / found.track.frames.len() as f64,
+    );
+    println!("{told}");
+    let good = lost <= 0.03 && median < 1.0 && p95 < 3.0 && confident_px < 20.0;
+    if good { Ok(()) } else { Err(told) }
 }
 
 /// Some thin ropes and one of usual thickness; many with `WAG_LONG_TESTS`.
@@ -139,26 +121,13 @@ fn seeds() -> Vec<u64> {
 #[test]
 fn a_rope_is_not_lost_where_nothing_hides_it() {
     let seeds = seeds();
-    let all = [Filming::Quiet, Filming::Busy, Filming::Rolling]
-        .map(|how| for_each_seed(&seeds, |seed| outcome(seed, how)));
-    let mut bad = Vec::new();
-    for found in all.iter().flatten() {
-        let [median, p95] = found.errors_px;
-        println!(
-            "seed {} ({:.1} mm), {:?}: lost {:.1} %, in doubt {:.1} %, median {median:.2}, \
-             p95 {p95:.2}, most where sure {:.1} px",
-            found.seed,
-            hidden_rope(found.seed).radius_m * 1e3,
-            found.filming,
-            100.0 * found.lost,
-            100.0 * found.doubted,
-            found.confident_px,
-        );
-        let good = found.lost <= 0.03 && median < 1.0 && p95 < 3.0 && found.confident_px < 20.0;
-        if !good {
-            bad.push((found.seed, found.filming));
-        }
-    }
+    let outcomes = [Filming::Quiet, Filming::Busy, Filming::Rolling]
+        .map(|filming| for_each_seed(&seeds, |seed| outcome(seed, filming)));
+    let bad: Vec<String> = outcomes
+        .into_iter()
+        .flatten()
+        .filter_map(Result::err)
+        .collect();
     assert!(bad.is_empty(), "{bad:?}");
 }
 
@@ -213,9 +182,8 @@ fn a_rope_that_is_not_there_for_a_while_is_lost_only_then() {
     let lost: Vec<usize> = (0..filmed.frames.len()).filter(lost).collect();
     assert_eq!(lost, hidden.clone().collect::<Vec<_>>());
     let seen = (0..filmed.frames.len()).filter(|i| !hidden.contains(i));
-    let mut errors_px: Vec<f64> = seen.flat_map(|i| filmed.errors_px(&found, i)).collect();
-    errors_px.sort_by(f64::total_cmp);
-    let p95_px = errors_px[errors_px.len() * 95 / 100];
+    let errors_px: Vec<f64> = seen.flat_map(|i| filmed.errors_px(&found, i)).collect();
+    let p95_px = quantile(&errors_px, 0.95);
     println!("95th percentile {p95_px:.2} px");
     assert!(p95_px < 3.0, "{p95_px:.2} px");
 }

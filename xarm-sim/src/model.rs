@@ -57,16 +57,6 @@ mod warning {
     pub(super) const UNKNOWN_COMMAND: u8 = 13;
 }
 
-/// What the controller allows, apart from errors and enabling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Phase {
-    Ready,
-    Paused,
-    Decelerating,
-    Stopped,
-    NeedsReset,
-}
-
 /// A velocity command.
 #[derive(Debug, Clone, Copy)]
 struct VelocityCommand {
@@ -92,7 +82,8 @@ pub struct ArmModel {
     moves: VecDeque<Move>,
     /// Tasks given out to moves so far.
     tasks: u16,
-    phase: Phase,
+    /// What the controller allows, apart from errors and enabling; never `Moving`.
+    phase: ArmState,
     pub(super) mode: Mode,
     pub(super) error: ErrorCode,
     pub(super) warning: u8,
@@ -135,7 +126,7 @@ impl ArmModel {
             velocity: Pacer::default(),
             moves: VecDeque::new(),
             tasks: 0,
-            phase: Phase::Stopped,
+            phase: ArmState::Stopped,
             mode: Mode::Position,
             error: ErrorCode::NONE,
             warning: 0,
@@ -250,12 +241,8 @@ impl ArmModel {
     #[must_use]
     pub fn state(&self) -> ArmState {
         match self.phase {
-            Phase::Ready if self.is_moving() => ArmState::Moving,
-            Phase::Ready => ArmState::Ready,
-            Phase::Paused => ArmState::Paused,
-            Phase::Decelerating => ArmState::Stopping,
-            Phase::Stopped => ArmState::Stopped,
-            Phase::NeedsReset => ArmState::NeedsReset,
+            ArmState::Ready if self.is_moving() => ArmState::Moving,
+            phase => phase,
         }
     }
 
@@ -271,7 +258,7 @@ impl ArmModel {
     }
 
     fn can_move(&self) -> bool {
-        self.phase == Phase::Ready && self.error.is_none() && self.enabled == ALL_JOINTS
+        self.phase == ArmState::Ready && self.error.is_none() && self.enabled == ALL_JOINTS
     }
 
     pub(super) fn status(&self) -> Status {
@@ -307,9 +294,9 @@ impl ArmModel {
     fn system_reset(&mut self) {
         self.drop_motion();
         self.phase = if self.error.is_none() {
-            Phase::NeedsReset
+            ArmState::NeedsReset
         } else {
-            Phase::Stopped
+            ArmState::Stopped
         };
     }
 

@@ -88,35 +88,3 @@ impl<T: Copy> Pacer<T> {
         self.due
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const MS: u64 = 1_000_000;
-
-    /// A stream of 4 ms against a grid 0.1 % slower: over 60 s it loses every
-    /// thousandth command and repeats none; against a faster grid the other
-    /// way round.
-    #[test]
-    fn two_clocks_apart_by_a_thousandth_slip_evenly() {
-        for (cycle_s, dropped, repeated) in [(0.004_004, 15, 0), (0.003_996, 0, 15)] {
-            let mut pacer = Pacer::default();
-            let mut taken = 0_u64;
-            for k in 0..15_000_u64 {
-                let at = MonotonicNs(MS * (1000 + 4 * k) + MS / 2);
-                // The arm looks every millisecond.
-                for ms in 0..4 {
-                    let now = at.plus_s(1e-3 * f64::from(ms));
-                    taken += u64::from(pacer.take(now, cycle_s, Intake::Clock).is_some());
-                    if ms == 0 {
-                        pacer.offer(at, k);
-                    }
-                }
-            }
-            assert!(pacer.dropped.abs_diff(dropped) <= 2, "{}", pacer.dropped);
-            assert!(pacer.repeated.abs_diff(repeated) <= 2, "{}", pacer.repeated);
-            assert!(taken + pacer.dropped >= 14_998);
-        }
-    }
-}

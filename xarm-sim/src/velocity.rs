@@ -84,42 +84,23 @@ mod tests {
 
     const DT_S: f64 = 1e-3;
 
-    #[derive(Default)]
-    struct Bench {
-        q: JointVector,
-        qd: JointVector,
-        qdd: JointVector,
-        time: MonotonicNs,
-    }
-
-    impl Bench {
-        fn ramp(&self, target: JointVector, until: Option<MonotonicNs>) -> VelocityRamp {
-            VelocityRamp::new(target, true, until, self.qd, self.qdd)
+    /// Runs from rest towards `target` until `done` with the speed; that speed, and the
+    /// time it took (s).
+    fn run(target: JointVector, done: impl Fn(&JointVector) -> bool) -> (JointVector, f64) {
+        let limits = Limits::default();
+        let [mut q, mut qd, mut qdd] = [JointVector::ZERO; 3];
+        let mut ramp = VelocityRamp::new(target, true, None, qd, qdd);
+        let mut took_s = 0.0;
+        while !done(&qd) {
+            assert!(took_s < 10.0, "never done");
+            took_s += DT_S;
+            let (now, before) = (MonotonicNs(0).plus_s(took_s), qdd);
+            ramp.advance(now, DT_S, &limits, [&mut q, &mut qd, &mut qdd]);
+            assert!(qdd.max_abs() <= 20.0 + 1e-9);
+            // Twice the jerk in the one step that lands on the target.
+            assert!((qdd - before).max_abs() <= 2.0 * JERK_RAD_S3 * DT_S);
         }
-
-        /// Runs until `done`; gives the time it took (s).
-        fn run(&mut self, ramp: &mut VelocityRamp, done: impl Fn(&Self, bool) -> bool) -> f64 {
-            let limits = Limits::default();
-            let mut took_s = 0.0;
-            loop {
-                let before = self.qdd;
-                self.time = self.time.plus_s(DT_S);
-                let rests = ramp.advance(
-                    self.time,
-                    DT_S,
-                    &limits,
-                    [&mut self.q, &mut self.qd, &mut self.qdd],
-                );
-                took_s += DT_S;
-                assert!(self.qdd.max_abs() <= 20.0 + 1e-9);
-                // Twice the jerk in the one step that lands on the target.
-                assert!((self.qdd - before).max_abs() <= 2.0 * JERK_RAD_S3 * DT_S);
-                if done(self, rests) {
-                    return took_s;
-                }
-                assert!(took_s < 10.0, "never done");
-            }
-        }
+        (qd, took_s)
     }
 
     /// From rest to `v` with jerk `J` below the acceleration limit takes
@@ -127,33 +108,18 @@ mod tests {
     #[test]
     fn ramps_take_the_time_of_a_jerk_limited_profile() {
         for (v, want_s) in [(0.5, 2.0 * (0.5_f64 / 500.0).sqrt()), (3.0, 0.15 + 0.04)] {
-            let mut bench = Bench::default();
-            let mut ramp = bench.ramp(JointVector::splat(v), None);
-            let took_s = bench.run(&mut ramp, |b, _| b.qd[0] == v);
+            let (_, took_s) = run(JointVector::splat(v), |qd| qd[0] == v);
             assert!((took_s - want_s).abs() < 0.005, "{v}: {took_s} s");
         }
     }
 
     #[test]
     fn synchronised_joints_arrive_together() {
-        let mut bench = Bench::default();
-        let mut target = JointVector::ZERO;
-        (target[0], target[3], target[6]) = (2.0, -0.7, 0.1);
-        let mut ramp = bench.ramp(target, None);
-        bench.run(&mut ramp, |b, _| (b.qd[0] - 1.0).abs() < 0.02);
-        let part = bench.qd[0] / target[0];
+        let target = JointVector([2.0, 0.0, 0.0, -0.7, 0.0, 0.0, 0.1]);
+        let (qd, _) = run(target, |qd| (qd[0] - 1.0).abs() < 0.02);
+        let part = qd[0] / target[0];
         for j in [3, 6] {
-            assert!((bench.qd[j] / target[j] - part).abs() < 0.01, "joint {j}");
+            assert!((qd[j] / target[j] - part).abs() < 0.01, "joint {j}");
         }
-    }
-
-    /// Without a new command the speed goes to zero by itself.
-    #[test]
-    fn the_speed_ends_with_its_time() {
-        let mut bench = Bench::default();
-        let mut ramp = bench.ramp(JointVector::splat(1.0), Some(MonotonicNs(500_000_000)));
-        let took_s = bench.run(&mut ramp, |_, rests| rests);
-        assert!((took_s - 0.59).abs() < 0.01, "{took_s}");
-        assert!((bench.q[0] - 0.5).abs() < 0.01, "{}", bench.q[0]);
     }
 }

@@ -87,18 +87,24 @@ pub struct RigLog {
     pub events: Vec<(u64, ControlEvent)>,
     /// What the arm got, from whom, and what happened to it.
     ///
-    /// The controller's setpoints are events of a client; see
-    /// [`setpoints`](Self::setpoints).
+    /// The controller's commands are events of a client; see
+    /// [`arrivals`](Self::arrivals).
     pub arm_events: Vec<TimedEvent>,
     /// True joint motion, 1 kHz.
     pub truth: Vec<JointSample>,
 }
 
 impl RigLog {
-    /// Setpoints that the arm got from the controller (rad).
-    pub fn setpoints(&self) -> impl Iterator<Item = (MonotonicNs, JointVector)> {
-        self.arm_events.iter().filter_map(|e| match e.event {
-            ArmEvent::Setpoint(q) if e.client != Some(u32::MAX) => Some((e.at, q)),
+    /// When the controller's commands reached the arm, and what they said: setpoints (rad)
+    /// or velocities (rad/s).
+    pub fn arrivals(&self) -> impl Iterator<Item = (MonotonicNs, JointVector)> {
+        let own = self
+            .arm_events
+            .iter()
+            .filter(|e| e.client != Some(u32::MAX));
+        own.filter_map(|e| match e.event {
+            ArmEvent::Setpoint(q) => Some((e.at, q)),
+            ArmEvent::Velocity { qd, .. } => Some((e.at, qd)),
             _ => None,
         })
     }

@@ -7,17 +7,7 @@ use rt_controller::xarm::{Command, Mode, Status, TcpPose};
 use xarm_sim::{ArmConfig, ConnectRefused, Obstacle, Service};
 
 #[test]
-fn errors_stops_and_drives_latch_as_on_the_real_arm() {
-    let mut b = Scenario::new(&entry("on = 'setpoint:20'", "raise_error, code = 60"));
-    b.bring_up(Mode::Servo);
-    b.stream(0.2, 0.2);
-    assert_eq!(b.errors(), [60]);
-    assert!(b.status().has_error());
-    b.bring_up(Mode::Servo);
-    b.q = b.arm.model().reference_motion().q;
-    b.stream(0.2, 0.1);
-    assert!(b.status().accepts_motion());
-
+fn stops_and_drives_latch_as_on_the_real_arm() {
     // A pressed button cannot be cleared away.
     let mut b = Scenario::new(&entry(
         "at_s = 0.1",
@@ -138,6 +128,7 @@ fn a_clock_off_by_a_thousandth_is_counted() {
         (b.arm.model().counters(), span_us)
     };
     let (slow, span_us) = run(-1000.0);
+    assert!(slow.executed + slow.dropped + 2 >= slow.motion_commands);
     assert!(span_us.abs_diff(19_990_000) < 30, "{span_us}");
     assert!(
         (4..=6).contains(&slow.dropped) && slow.repeated <= 1,

@@ -31,27 +31,24 @@ fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {
 
 #[test]
 fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
-    // A reset: the connection ends, a new one works.
-    let mut b = Scenario::new(&entry("on = 'setpoint:10'", "connection_reset"));
-    b.bring_up(Mode::Servo);
-    b.replies.clear();
-    b.stream(0.1, 0.1);
-    assert_eq!(b.replies.len(), 9);
-    assert_eq!(b.arm.closing(b.client), Some(Closing::Reset));
-    b.client = b.arm.connect(Service::Commands, b.now).unwrap();
-    b.send(&Command::GetState);
-    assert_eq!(b.replies.len(), 10);
-
-    // Half open: it stays, but nothing comes any more.
-    let mut b = Scenario::new(&entry("on = 'setpoint:10'", "half_open"));
-    b.bring_up(Mode::Servo);
-    b.replies.clear();
-    b.stream(0.1, 0.1);
-    assert_eq!((b.replies.len(), b.arm.closing(b.client)), (9, None));
-    assert!(!b.arm.receive(b.client, b.now, &[0; 3]));
-    b.client = b.arm.connect(Service::Commands, b.now).unwrap();
-    b.send(&Command::GetState);
-    assert_eq!(b.replies.len(), 10);
+    // A reset ends the connection, a half-open one stays but nothing comes any more; a
+    // new one works.
+    for (kind, closing) in [
+        ("connection_reset", Some(Closing::Reset)),
+        ("half_open", None),
+    ] {
+        let mut b = Scenario::new(&entry("on = 'setpoint:10'", kind));
+        b.bring_up(Mode::Servo);
+        b.replies.clear();
+        b.stream(0.1, 0.1);
+        let found = (b.replies.len(), b.arm.closing(b.client));
+        assert_eq!(found, (9, closing), "{kind}");
+        let listens = b.arm.receive(b.client, b.now, &[0; 3]);
+        assert_eq!(listens, kind != "half_open");
+        b.client = b.arm.connect(Service::Commands, b.now).unwrap();
+        b.send(&Command::GetState);
+        assert_eq!(b.replies.len(), 10, "{kind}");
+    }
 
     // A pulled cable: silence everywhere, no new connection, then a reset.
     let script = entry("on = 'setpoint:10'", "cable_pull, duration_s = 0.5");

@@ -94,6 +94,7 @@ fn firmware_decides_layouts_and_what_is_known() {
     let of = |realtime, rich| [realtime, Some(145), Some(rich), Some(135)];
     assert_eq!(sizes(Firmware(2, 7, 1)), of(Some(784), 574));
     assert_eq!(sizes(Firmware(2, 8, 2)), of(Some(804), 587));
+    assert_eq!(sizes(Firmware(2, 1, 0)), of(Some(784), 495));
     assert_eq!(sizes(Firmware(1, 12, 10)), of(None, 417));
 
     let factor = |firmware| {

@@ -33,7 +33,7 @@ const PAUSE_S: f64 = 0.1;
 fn assert_arrived(stage: &Stage, until: MonotonicNs, jitter_s: f64) {
     let limits = Limits::default();
     let mut differences: Option<Differences> = None;
-    for (at, q) in stage.arrivals().into_iter().filter(|(at, _)| *at < until) {
+    for (at, q) in stage.rig.log.arrivals().filter(|(at, _)| *at < until) {
         let anew = differences
             .as_ref()
             .is_none_or(|judge| at.since_s(judge.newest()) > PAUSE_S);
@@ -50,7 +50,7 @@ fn assert_arrived(stage: &Stage, until: MonotonicNs, jitter_s: f64) {
 fn assert_velocities(stage: &Stage, until: MonotonicNs, jitter_s: f64) {
     let limits = Limits::default();
     let mut before: Option<(MonotonicNs, JointVector)> = None;
-    for (at, qd) in stage.arrivals().into_iter().filter(|(at, _)| *at < until) {
+    for (at, qd) in stage.rig.log.arrivals().filter(|(at, _)| *at < until) {
         let (last_at, last) = before
             .filter(|(last_at, _)| at.since_s(*last_at) < PAUSE_S)
             .unwrap_or((at.plus_s(-0.004), JointVector::ZERO));

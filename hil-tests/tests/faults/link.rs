@@ -27,11 +27,8 @@ fn fault_01_a_stall_of_190_ms_ends_in_a_stop_and_not_in_a_burst() {
     assert_stopped_by(&script, stalled, [NOTICED_WITHIN_S, 0.0], |stage, _| {
         let began = stage.fault_began(1);
         let released = began.plus_s(0.19);
-        let held: Vec<_> = stage
-            .arrivals()
-            .into_iter()
-            .filter(|(at, _)| *at >= began)
-            .collect();
+        let arrivals = stage.rig.log.arrivals();
+        let held: Vec<_> = arrivals.filter(|(at, _)| *at >= began).collect();
         assert!(held.len() <= 3, "{}", held.len());
         assert!(held.iter().all(|(at, _)| at.since_s(released).abs() < 2e-3));
         let events = &stage.rig.log.arm_events;

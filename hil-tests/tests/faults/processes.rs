@@ -142,32 +142,20 @@ fn fault_29_a_guardian_that_falls_silent_slows_the_motion() {
     }
 }
 
+/// Shared memory that cannot be had leaves a controller that nobody beats for.
 #[test]
-fn fault_29_without_a_guardian_nothing_begins() {
+fn faults_29_and_32_without_a_guardian_or_anybody_nothing_begins() {
     for via in INTERFACES {
-        let mut stage = Stage::ready(via, "");
-        stage.rig.guardian_alive = false;
-        stage.rig.run_for(0.1);
-        stage.arm();
-        stage.start_nod();
-        stage.finish();
-        stage.assert_refused(FaultCode::GuardianLost);
-    }
-}
-
-/// Shared memory that cannot be had leaves a controller that nobody beats for:
-/// it moves nothing.
-#[test]
-fn fault_32_without_shared_memory_nobody_beats_and_nothing_moves() {
-    for via in INTERFACES {
-        let mut stage = Stage::ready(via, "");
-        stage.rig.operator_alive = false;
-        stage.rig.guardian_alive = false;
-        stage.rig.run_for(1.0);
-        stage.arm();
-        stage.start_nod();
-        stage.finish();
-        stage.assert_refused(FaultCode::GuardianLost);
+        for (operator_alive, silent_s) in [(true, 0.1), (false, 1.0)] {
+            let mut stage = Stage::ready(via, "");
+            stage.rig.operator_alive = operator_alive;
+            stage.rig.guardian_alive = false;
+            stage.rig.run_for(silent_s);
+            stage.arm();
+            stage.start_nod();
+            stage.finish();
+            stage.assert_refused(FaultCode::GuardianLost);
+        }
     }
 }
 

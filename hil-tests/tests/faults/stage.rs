@@ -169,20 +169,7 @@ impl Stage {
 
     /// Commands that the arm got from the controller: setpoints or velocities.
     pub(crate) fn commands(&self) -> usize {
-        self.arrivals().len()
-    }
-
-    /// When the controller's commands reached the arm, and what they said (rad or
-    /// rad/s).
-    pub(crate) fn arrivals(&self) -> Vec<(MonotonicNs, JointVector)> {
-        let events = self.rig.log.arm_events.iter();
-        let own = events.filter(|e| e.client != Some(u32::MAX));
-        own.filter_map(|e| match e.event {
-            ArmEvent::Setpoint(q) => Some((e.at, q)),
-            ArmEvent::Velocity { qd, .. } => Some((e.at, qd)),
-            _ => None,
-        })
-        .collect()
+        self.rig.log.arrivals().count()
     }
 
     /// Errors that the arm raised.

@@ -16,7 +16,7 @@ const SECOND_COMMANDER: u32 = u32::MAX;
 const FEEDBACK_CHECK: ArmEvent = ArmEvent::Request { register: 253 };
 
 /// Everything that is known about the time of a stand.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Flight {
     limits: Limits,
     interface: CommandInterface,
@@ -37,12 +37,7 @@ impl Flight {
         Self {
             limits,
             interface,
-            cycles: Vec::new(),
-            causes: Vec::new(),
-            arm: Vec::new(),
-            truth: Vec::new(),
-            expected: Vec::new(),
-            at_rest: Vec::new(),
+            ..Self::default()
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::child::{Process, Role};
 use super::stand::{Stand, arm_for};
+use shared_types::ipc::OperatorEnd;
 use shared_types::{FaultCode, OperatingMode};
 use std::time::Duration;
 
@@ -17,14 +18,14 @@ fn fault_36_a_dead_man_switch_let_go_brakes_and_holds_until_it_is_held_again() {
     let mut stand = Stand::ready("dead_man");
     let pending = stand.begin();
     stand.wait_for_speed();
-    stand.operator().let_go();
+    stand.operator.as_mut().unwrap().let_go();
     let fault = FaultCode::DeadManReleased;
     stand.stops(&pending, &[fault]);
     // Acknowledged, but not held: no arming.
     stand.make_ready();
     let arming = arm_for(OperatingMode::SetUp, true);
     assert_eq!(stand.refused(&arming).0, fault);
-    stand.operator().hold();
+    stand.operator.as_mut().unwrap().hold();
     recovers_from_a_brake(stand);
 }
 
@@ -33,13 +34,13 @@ fn a_killed_operator_is_missed_and_leaves_its_place_to_the_next() {
     let mut stand = Stand::ready_with("operator", |config| {
         config.thresholds.operator_timeout_ms = Some(500.0);
     });
-    stand.leave();
+    stand.operator = None;
     let mut other = Process::start(Role::Operator, "operator", &stand.config.domain);
     stand.rest(Duration::from_secs(1));
     let pending = stand.begin();
     stand.wait_for_speed();
     other.kill();
     stand.stops(&pending, &[FaultCode::OperatorLost]);
-    stand.take_the_operators_place();
+    stand.operator = Some(OperatorEnd::take(&stand.bus).unwrap());
     recovers_from_a_brake(stand);
 }

@@ -1,8 +1,8 @@
 //! Plans that must not run: from elsewhere, damaged, out of limits, too late.
 
 use super::stand::{Stand, execute, swing};
-use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
+use arm_model::{JointTrajectory, JointVector};
 use rt_controller::recording::RecordedCycle;
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
@@ -46,7 +46,7 @@ fn fault_22_a_plan_that_begins_elsewhere_is_refused_with_the_distance() {
 }
 
 #[test]
-fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
+fn faults_23_and_24_a_damaged_or_too_fast_plan_is_refused_and_the_controller_goes_on_serving() {
     let mut stand = Stand::ready("damaged");
     let plan = swing(START_POSE);
     let request = ControllerRequest::Execute {
@@ -56,10 +56,17 @@ fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
     assert_eq!(stand.refused(&request).0, FaultCode::PlanHashMismatch);
     let mut far = START_POSE;
     far[3] = 4.5;
-    let out_of_range = JointTrajectory::new(&[0.0, 3.0], &[START_POSE, far]).unwrap();
-    let (fault, message) = stand.refused(&execute(&out_of_range));
-    assert_eq!(fault, FaultCode::PlanOutOfLimits);
-    assert!(message.contains("joint 4"), "{message}");
+    // The arm turns about its base, 0.6 m away from the tool: too fast, by so much, then.
+    let mut turned = START_POSE;
+    turned[0] += 1.7;
+    let beyond: [(f64, JointVector, &[&str]); 2] =
+        [(3.0, far, &["joint 4"]), (1.0, turned, &["m/s", " s"])];
+    for (time_s, to, told) in beyond {
+        let plan = JointTrajectory::new(&[0.0, time_s], &[START_POSE, to]).unwrap();
+        let (fault, message) = stand.refused(&execute(&plan));
+        assert_eq!(fault, FaultCode::PlanOutOfLimits);
+        assert!(told.iter().all(|word| message.contains(word)), "{message}");
+    }
 
     // What no type of ours can hold: sent as bytes, it is not even a request.
     let bus = Bus::join(&stand.config.domain).unwrap();
@@ -91,22 +98,6 @@ fn fault_23_a_damaged_plan_is_refused_and_the_controller_goes_on_serving() {
     let on_path = |c: &&RecordedCycle| c.record.trajectory_s >= 0.0;
     let moved = flight.cycles.iter().filter(on_path).count();
     assert!(moved > 250, "the last throw only: {moved} cycles");
-}
-
-#[test]
-fn fault_24_a_plan_too_fast_for_the_tool_is_refused_with_time_and_margin() {
-    let mut stand = Stand::ready("too_fast");
-    // The arm turns about its base, 0.6 m away from the tool.
-    let mut turned = START_POSE;
-    turned[0] += 1.7;
-    let fast = JointTrajectory::new(&[0.0, 1.0], &[START_POSE, turned]).unwrap();
-    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
-    let (fault, message) = stand.refused(&execute(&fast));
-    println!("{message}");
-    assert_eq!(fault, FaultCode::PlanOutOfLimits);
-    let told = ["m/s", " s"].iter().all(|unit| message.contains(unit));
-    assert!(told, "{message}");
-    stand.recovers();
 }
 
 #[test]

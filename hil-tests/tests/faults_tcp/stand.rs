@@ -11,7 +11,7 @@ use rt_controller::guardian::GuardianSettings;
 use rt_controller::os::RealTimeSettings;
 use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
-use shared_types::ipc::rpc::{Pending, RpcClient};
+use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
 use shared_types::plan::trajectory_hash;
 use shared_types::{FaultCode, MonotonicNs, OperatingMode};
@@ -119,7 +119,8 @@ pub fn patient(name: &str, arm: &SimulatedArm) -> ControllerConfig {
 /// Arm, controller, guardian and operator.
 pub struct Stand {
     // The order of the fields is the order in which a failed test takes them down.
-    operator: Option<OperatorEnd>,
+    /// `None` while nobody, or somebody else, has the operator's place.
+    pub operator: Option<OperatorEnd>,
     client: RpcClient<ControllerRpc>,
     chunks: ChunkSubscriber,
     pub controller: Process,
@@ -208,19 +209,6 @@ impl Stand {
         self.flight.truth.extend(truth);
     }
 
-    pub fn operator(&mut self) -> &mut OperatorEnd {
-        self.operator.as_mut().unwrap()
-    }
-
-    /// Leaves the operator's place.
-    pub fn leave(&mut self) {
-        self.operator = None;
-    }
-
-    pub fn take_the_operators_place(&mut self) {
-        self.operator = Some(OperatorEnd::take(&self.bus).unwrap());
-    }
-
     /// Starts the controller anew in the same domain, after it was killed; the
     /// operator of the old one leaves.
     pub fn start_controller_again(&mut self) {
@@ -257,17 +245,15 @@ impl Stand {
 
     /// Waits for the last answer to a call.
     pub fn answer(&mut self, pending: &Pending<ControllerRpc>) -> ControllerEvent {
-        let began = Instant::now();
-        loop {
-            match pending.try_next() {
-                Ok(Some(ControllerEvent::Started { .. } | ControllerEvent::Step { .. }))
-                | Ok(None) => {}
-                Ok(Some(event)) => return event,
-                Err(error) => panic!("{error}:\n{}", self.controller.log()),
+        let mut last = None;
+        self.wait_until("the answer", |s| match pending.try_next() {
+            Ok(event) => {
+                last = event.filter(ControllerRpc::is_last);
+                last.is_some()
             }
-            assert!(began.elapsed() < PATIENCE, "{}", self.controller.log());
-            self.turn();
-        }
+            Err(error) => panic!("{error}:\n{}", s.controller.log()),
+        });
+        last.unwrap()
     }
 
     pub fn ask(&mut self, request: &ControllerRequest) -> ControllerEvent {

@@ -270,45 +270,27 @@ impl FaultKind {
             _ => Lasts::Open,
         }
     }
+}
 
-    /// Fields with bounds, both included: name, value, smallest and largest.
-    pub(super) fn bounded(&self) -> Vec<(&'static str, f64, [f64; 2])> {
-        let of_joint = |joint: u8| ("joint", f64::from(joint), [1.0, 7.0]);
-        let of_frames = |frames: u32| ("frames", f64::from(frames), [1.0, 1e6]);
-        let of_code = |code: u8, max: f64| ("code", f64::from(code), [1.0, max]);
-        match *self {
-            Self::RepliesDelayed { delay_s } => vec![("delay_s", delay_s, [0.0, 60.0])],
-            Self::RepliesLost { share } => vec![("share", share, [0.0, 1.0])],
-            Self::Warning { code } | Self::RaiseError { code } => vec![of_code(code, 255.0)],
-            Self::ServoError { joint, code } => vec![of_joint(joint), of_code(code, 255.0)],
-            Self::EmergencyStop { code } => vec![of_code(code, 3.0)],
-            Self::StateChanged { state } => vec![("state", state.into(), [3.0, 6.0])],
-            Self::ModeChanged { mode } => vec![("mode", mode.into(), [0.0, 11.0])],
-            Self::SecondCommander { rate_hz, .. } => vec![("rate_hz", rate_hz, [0.1, 1000.0])],
-            Self::ReportTimeJump { by_s } => vec![("by_s", by_s, [-1e6, 1e6])],
-            Self::ReportTimeDrift { ppm } | Self::ClockRate { ppm } => {
-                vec![("ppm", ppm, [-1e5, 1e5])]
-            }
-            Self::ReportTorn {
-                frames, keep_bytes, ..
-            } => vec![
-                of_frames(frames),
-                ("keep_bytes", keep_bytes.into(), [0.0, 86.0]),
-            ],
-            Self::ReportLength { frames, .. } | Self::ReportGarbage { frames, .. } => {
-                vec![of_frames(frames)]
-            }
-            Self::ReportNan { frames, joint, .. } | Self::ReportInfinity { frames, joint, .. } => {
-                vec![of_frames(frames), of_joint(joint)]
-            }
-            Self::TrackingLag { lag_s } => vec![("lag_s", lag_s, [0.0, 10.0])],
-            Self::JointStuck { joint } => vec![of_joint(joint)],
-            Self::EncoderJump { joint, by_rad } => {
-                vec![of_joint(joint), ("by_rad", by_rad, [-10.0, 10.0])]
-            }
-            _ => Vec::new(),
-        }
-    }
+/// Smallest and largest number that a field may hold, where it has bounds.
+pub(super) fn bounds(kind: &str, field: &str) -> Option<[f64; 2]> {
+    Some(match (kind, field) {
+        (_, "delay_s") => [0.0, 60.0],
+        (_, "share") => [0.0, 1.0],
+        ("emergency_stop", "code") => [1.0, 3.0],
+        (_, "code") => [1.0, 255.0],
+        (_, "joint") => [1.0, 7.0],
+        (_, "state") => [3.0, 6.0],
+        (_, "mode") => [0.0, 11.0],
+        (_, "rate_hz") => [0.1, 1000.0],
+        (_, "by_s") => [-1e6, 1e6],
+        (_, "ppm") => [-1e5, 1e5],
+        (_, "frames") => [1.0, 1e6],
+        (_, "keep_bytes") => [0.0, 86.0],
+        (_, "lag_s") => [0.0, 10.0],
+        (_, "by_rad") => [-10.0, 10.0],
+        _ => return None,
+    })
 }
 
 impl ReportPort {

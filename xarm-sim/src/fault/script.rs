@@ -1,6 +1,6 @@
 //! Scripts: which fault, when, and for how long; from TOML and back.
 
-use super::kind::{FaultKind, Lasts};
+use super::kind::{FaultKind, Lasts, bounds};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU32;
@@ -144,7 +144,7 @@ impl Fault {
         let name = take::<String>(&mut table, "kind")?.unwrap_or_default();
         let trigger = Trigger::take(&mut table)?;
         let duration_s = take_time(&mut table, "duration_s")?;
-        let kind = kind_of(name.clone(), table)?;
+        let kind = kind_of(&name, table)?;
         match (kind.lasts(), duration_s) {
             (Lasts::Moment, Some(_)) => Err(format!("`duration_s` means nothing for `{name}`")),
             (Lasts::Span, None) => Err(missing_time("duration_s")),
@@ -228,22 +228,25 @@ impl Trigger {
 }
 
 /// The kind of a name with its fields, each within its bounds.
-fn kind_of(name: String, fields: Table) -> Result<FaultKind, String> {
-    let alone = Value::from(name.as_str()).try_into();
+fn kind_of(name: &str, fields: Table) -> Result<FaultKind, String> {
+    let out_of_bounds = fields.iter().find_map(|(field, value)| {
+        let number = value
+            .as_float()
+            .or_else(|| value.as_integer().map(|i| i as f64))?;
+        let [min, max] = bounds(name, field)?;
+        let allowed = (min..=max).contains(&number);
+        (!allowed)
+            .then(|| format!("`{field}` is {number}; allowed is a number from {min} to {max}"))
+    });
+    let alone = Value::from(name).try_into();
     let kind: FaultKind = match (alone, fields.keys().next()) {
         (Ok(kind), None) => kind,
         (Ok(_), Some(field)) => return Err(format!("`{field}` means nothing for `{name}`")),
-        (Err(_), _) => Value::Table(Table::from_iter([(name, Value::Table(fields))]))
+        (Err(_), _) => Value::Table(Table::from_iter([(name.to_owned(), Value::Table(fields))]))
             .try_into()
             .map_err(|error| format!("`kind` and its fields: {}", one_line(&error)))?,
     };
-    let mut bounded = kind.bounded().into_iter();
-    match bounded.find(|(_, value, [min, max])| !(*min..=*max).contains(value)) {
-        Some((field, value, [min, max])) => Err(format!(
-            "`{field}` is {value}; allowed is a number from {min} to {max}"
-        )),
-        None => Ok(kind),
-    }
+    out_of_bounds.map_or(Ok(kind), Err)
 }
 
 /// Takes a field, if it is there.

@@ -1,6 +1,6 @@
 //! Ways to make the arm misbehave.
 
-use super::{ArmModel, CURRENT_SPIKE_S, Phase};
+use super::{ArmModel, CURRENT_SPIKE_S};
 use crate::event::ArmEvent;
 use crate::fault::FaultKind;
 use arm_model::JOINTS;
@@ -36,11 +36,9 @@ impl ArmModel {
             FaultKind::StateChanged { state } => {
                 self.drop_motion();
                 self.phase = match ArmState::from_code(state) {
-                    ArmState::Paused => Phase::Paused,
-                    ArmState::Stopping => Phase::Decelerating,
-                    ArmState::NeedsReset => Phase::NeedsReset,
-                    ArmState::Moving | ArmState::Ready => Phase::Ready,
-                    ArmState::Stopped | ArmState::Other(_) => Phase::Stopped,
+                    ArmState::Moving => ArmState::Ready,
+                    ArmState::Other(_) => ArmState::Stopped,
+                    phase => phase,
                 };
             }
             FaultKind::ModeChanged { mode } => {
@@ -49,7 +47,7 @@ impl ArmModel {
             }
             FaultKind::PowerCycle if begins => {
                 self.drop_motion();
-                self.phase = Phase::Stopped;
+                self.phase = ArmState::Stopped;
                 self.enabled = 0;
                 self.brakes_released = 0;
             }
@@ -88,7 +86,7 @@ impl ArmModel {
         self.error = error;
         self.log(ArmEvent::Error(error));
         self.drop_motion();
-        self.phase = Phase::Stopped;
+        self.phase = ArmState::Stopped;
         self.mode = Mode::Position;
     }
 

@@ -73,24 +73,24 @@ impl ArmModel {
             StateRequest::Ready => {
                 self.clear_error();
                 if self.error.is_none() {
-                    self.phase = Phase::Ready;
+                    self.phase = ArmState::Ready;
                 }
             }
             StateRequest::Pause => {
-                if self.phase == Phase::Ready {
+                if self.phase == ArmState::Ready {
                     self.servo.reset();
                     self.brake();
-                    self.phase = Phase::Paused;
+                    self.phase = ArmState::Paused;
                 }
             }
             StateRequest::Stop => {
                 self.drop_motion();
-                self.phase = Phase::Stopped;
+                self.phase = ArmState::Stopped;
             }
             StateRequest::DeceleratedStop => {
                 self.drop_motion();
-                if self.phase == Phase::Ready || self.phase == Phase::Paused {
-                    self.phase = Phase::Decelerating;
+                if self.phase == ArmState::Ready || self.phase == ArmState::Paused {
+                    self.phase = ArmState::Stopping;
                 }
             }
         }

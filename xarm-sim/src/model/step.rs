@@ -29,8 +29,8 @@ impl ArmModel {
             self.guard_reference(before);
             self.drive_joints(end);
         }
-        if self.phase == Phase::Decelerating && !self.is_moving() {
-            self.phase = Phase::Stopped;
+        if self.phase == ArmState::Stopping && !self.is_moving() {
+            self.phase = ArmState::Stopped;
         }
         for joint in &mut self.joints {
             joint.advance(self.time, end);
@@ -108,7 +108,7 @@ impl ArmModel {
     /// A move or velocity that leaves the joint range, meets the arm itself or
     /// the safety boundary stops before it does.
     fn guard_reference(&mut self, before: JointVector) {
-        if self.phase != Phase::Ready || self.mode == Mode::Servo {
+        if self.phase != ArmState::Ready || self.mode == Mode::Servo {
             return;
         }
         let outside = self.config.limits.position_violation(&self.reference.q);
