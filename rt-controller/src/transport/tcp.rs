@@ -78,9 +78,6 @@ impl ByteStream for TcpStream {
 
 impl TcpLink {
     /// Connects to `address`. Blocks up to `timeout`; not RT-safe.
-    ///
-    /// # Errors
-    /// What the operating system says.
     pub fn connect(
         address: SocketAddr,
         timeout: Duration,

@@ -28,9 +28,6 @@ pub const MAX_COMMANDS: usize = 2;
 pub trait ArmTransport {
     /// Sends the commands of a cycle, none to [`MAX_COMMANDS`], in one write at
     /// `now_ns` (CLOCK_MONOTONIC).
-    ///
-    /// # Errors
-    /// [`LinkGone`].
     fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone>;
 
     /// Takes in, in one read, the replies that have come until `now_ns`; `lost`
