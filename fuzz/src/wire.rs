@@ -4,9 +4,7 @@
 use arm_model::JointVector;
 use rt_controller::report_feed::arm_codes;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::report::{
-    ForceReport, NormalReport, RealtimeReport, RichReport,
-};
+use rt_controller::xarm::report::{ForceReport, NormalReport, RealtimeReport, RichReport};
 use rt_controller::xarm::{
     ArmVersion, Command, Firmware, FrameReader, JointQuery, Protocol, ReplyData, ReportReader,
     StateRequest, Status,
