@@ -4,9 +4,7 @@
 use arm_model::JointVector;
 use rt_controller::report_feed::arm_codes;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
-use rt_controller::xarm::report::{
-    BasicReport, ForceReport, NormalReport, RealtimeReport, RichReport,
-};
+use rt_controller::xarm::report::{ForceReport, NormalReport, RealtimeReport, RichReport};
 use rt_controller::xarm::{
     ArmVersion, Command, Firmware, FrameReader, JointQuery, Protocol, ReplyData, ReportReader,
     StateRequest, Status,
@@ -86,7 +84,6 @@ fn reports(bytes: &[u8]) {
 }
 
 fn report(frame: &[u8]) {
-    let _ = BasicReport::parse(frame);
     let _ = ForceReport::parse(frame);
     let _ = NormalReport::parse(frame);
     let _ = RichReport::parse(frame);

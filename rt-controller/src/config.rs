@@ -2,7 +2,6 @@
 
 use crate::control::settings::TRACKING_WINDOW_MAX_MS;
 use crate::control::{ControlSettings, Thresholds};
-use crate::guardian::GuardianSettings;
 use crate::os::RealTimeSettings;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::Limits;
@@ -92,6 +91,38 @@ impl Default for ControllerConfig {
     }
 }
 
+/// How the guardian watches; table `[guardian]` of the controller's file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GuardianSettings {
+    /// Silence of a moving controller after which the arm is stopped (ms); three
+    /// cycles at 250 Hz. A controller whose process ends is met at once.
+    pub silence_ms: f64,
+    /// `SCHED_FIFO` priority of the guardian, 1 to 99, above the control thread.
+    /// Absent: ordinary scheduling.
+    pub priority: Option<u8>,
+    /// Whether the controller moves only while a guardian watches.
+    pub required: bool,
+}
+
+impl Default for GuardianSettings {
+    fn default() -> Self {
+        Self {
+            silence_ms: 12.0,
+            priority: Some(85),
+            required: true,
+        }
+    }
+}
+
+impl GuardianSettings {
+    /// The silence (ns).
+    #[must_use]
+    pub const fn silence_ns(&self) -> u64 {
+        (self.silence_ms * 1e6) as u64
+    }
+}
+
 /// A set of thresholds that belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -136,9 +167,6 @@ pub struct ThresholdSettings {
 
 impl ThresholdSettings {
     /// Checked thresholds for the arm at `arm`.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn checked(&self, arm: IpAddr) -> Result<Thresholds, ConfigError> {
         let profile = self.profile.unwrap_or(if arm.is_loopback() {
             Profile::Relaxed
@@ -213,9 +241,6 @@ fn require(
 
 impl ControllerConfig {
     /// Reads a file; a relative `limits_file` is looked for beside it.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let mut config: Self = read_toml(path)?;
         if let (Some(file), Some(folder)) = (&config.limits_file, path.parent()) {
@@ -225,9 +250,6 @@ impl ControllerConfig {
     }
 
     /// The limits that this configuration names.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn resolve_limits(&self) -> Result<Limits, ConfigError> {
         let limits = match (&self.limits_file, &self.limits) {
             (Some(_), Some(_)) => {
@@ -244,9 +266,6 @@ impl ControllerConfig {
     }
 
     /// Settings of the control core.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn control_settings(&self) -> Result<ControlSettings, ConfigError> {
         Ok(ControlSettings {
             interface: self.command_interface,
@@ -257,9 +276,6 @@ impl ControllerConfig {
     }
 
     /// Checks what cannot be wrong by type alone.
-    ///
-    /// # Errors
-    /// [`ConfigError`].
     pub fn check(&self) -> Result<(), ConfigError> {
         self.thresholds.checked(self.arm)?;
         let (silence_ms, warm_up_us) = (self.guardian.silence_ms, self.real_time.warm_up_us);

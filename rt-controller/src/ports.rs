@@ -4,9 +4,10 @@
 use crate::control::{ArmCodes, ControlEvent, Motion};
 use crate::driver::CommandMsg;
 use crate::recording::{RecordedCycle, Snapshot};
-use crate::report_stream::BrokenReports;
 use rtrb::{Consumer, Producer, RingBuffer};
 use shared_types::ipc::{CycleRecord, InputRecord, JointReport};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU32;
 
 /// Cycle records kept while the bridge is busy: sixteen seconds at 250 Hz.
 const RECORDS: usize = 4096;
@@ -37,8 +38,8 @@ pub struct RtPorts<T> {
     pub reports: Consumer<JointReport>,
     /// The arm's codes in; the newest counts.
     pub codes: Consumer<ArmCodes>,
-    /// Count of reports that had to be dropped.
-    pub broken: BrokenReports,
+    /// Count of reports that had to be dropped, wrapping.
+    pub broken: Arc<AtomicU32>,
     /// Events out.
     pub events: Producer<ControlEvent>,
     /// The inputs of each cycle, out, before its record.
@@ -131,7 +132,7 @@ pub fn rings<T>() -> Rings<T> {
             commands,
             reports: newest,
             codes: newest_codes,
-            broken: BrokenReports::default(),
+            broken: Arc::default(),
             events,
             inputs,
             states,

@@ -191,7 +191,7 @@ pub(crate) fn start_loop<T: ArmTransport + Send + 'static>(
     body: impl FnOnce(RtLoop<T, MonotonicClock>) + Send + 'static,
 ) -> Result<(JoinHandle<()>, Vec<String>), ControllerError> {
     let (domain, settings) = (domain.to_owned(), settings.clone());
-    let (limits, interface) = (control.limits().clone(), control.interface());
+    let (limits, interface) = (control.limits().clone(), control.settings().interface);
     let warm_up = CacheWarmUp::new(limits, interface, settings.warm_up_us)?;
     let (ready, wait) = mpsc::channel();
     let thread = move || {

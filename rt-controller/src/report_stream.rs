@@ -25,22 +25,6 @@ const READ_TIMEOUT: Duration = Duration::from_millis(100);
 /// Pause before a new attempt where nothing listened.
 const RETRY: Duration = Duration::from_nanos(RETRY_NS);
 
-/// Reports that had to be dropped, counted across threads. Reading it is RT-safe.
-#[derive(Debug, Clone, Default)]
-pub struct BrokenReports(Arc<AtomicU32>);
-
-impl BrokenReports {
-    /// How many since the start, wrapping.
-    #[must_use]
-    pub fn count(&self) -> u32 {
-        self.0.load(Ordering::Relaxed)
-    }
-
-    fn add(&self, count: u32) {
-        self.0.fetch_add(count, Ordering::Relaxed);
-    }
-}
-
 /// Decodes the frames of one connection, given with their size field and when they
 /// arrived (CLOCK_MONOTONIC, ns); `None` for one that cannot be used.
 pub type Decoder<R> = Box<dyn FnMut(&[u8], u64) -> Option<R>>;
@@ -73,8 +57,8 @@ pub struct ReportStream<R> {
     pub decoder: fn(usize) -> Decoder<R>,
     /// To the control loop and to the bridge.
     pub rings: [Producer<R>; 2],
-    /// Where frames that cannot be used are counted.
-    pub broken: BrokenReports,
+    /// Where frames that cannot be used are counted, wrapping.
+    pub broken: Arc<AtomicU32>,
     /// Ends the stream when set.
     pub quit: Arc<AtomicBool>,
 }
@@ -148,7 +132,7 @@ impl<R: Copy + Send + 'static> ReportStream<R> {
                 }
                 report.is_some()
             });
-            self.broken.add(seen.broken);
+            self.broken.fetch_add(seen.broken, Ordering::Relaxed);
             lost_place = seen.lost_place;
         }
         match lost_place {
@@ -199,13 +183,13 @@ mod tests {
         drop(gone);
         let (to_loop, mut sizes) = RingBuffer::new(16);
         let (to_bridge, _nobody) = RingBuffer::new(16);
-        let (broken, quit) = (BrokenReports::default(), Arc::new(AtomicBool::new(false)));
+        let (broken, quit) = (Arc::<AtomicU32>::default(), Arc::<AtomicBool>::default());
         let stream = ReportStream {
             arm: address.ip(),
             ports: vec![refused, address.port()],
             decoder: size_of_frame,
             rings: [to_loop, to_bridge],
-            broken: broken.clone(),
+            broken: Arc::clone(&broken),
             quit: Arc::clone(&quit),
         };
         let listening = stream.spawn("reports", None).unwrap();
@@ -226,7 +210,7 @@ mod tests {
         let (mut again, _) = server.accept().unwrap();
         again.write_all(&frame(145, 1)).unwrap();
         assert_eq!(next(&mut sizes), Some(145));
-        assert_eq!(broken.count(), 3);
+        assert_eq!(broken.load(Ordering::Relaxed), 3);
 
         // Torn: filled up by the next one, whose rest is no report, at once ...
         let mut torn = frame(145, 1)[..60].to_vec();
@@ -243,7 +227,7 @@ mod tests {
         again.write_all(&frame(135, 2)).unwrap();
         assert_eq!(next(&mut sizes), Some(135));
         assert!(sizes.is_empty(), "the late one was dropped");
-        assert_eq!(broken.count(), 6);
+        assert_eq!(broken.load(Ordering::Relaxed), 6);
         quit.store(true, Ordering::Relaxed);
         listening.join().unwrap();
     }

@@ -63,7 +63,7 @@ impl<T: ArmTransport, C: Clock> RtLoop<T, C> {
         ports: RtPorts<T>,
     ) -> Self {
         let mut io = RtIo {
-            broken: ports.broken.count(),
+            broken: ports.broken.load(Ordering::Relaxed),
             clock,
             boards,
             ports,
@@ -155,7 +155,7 @@ impl<T, C: Clock> CycleIo<T> for RtIo<T, C> {
     }
 
     fn new_broken_reports(&mut self) -> u32 {
-        let broken = self.ports.broken.count();
+        let broken = self.ports.broken.load(Ordering::Relaxed);
         broken.wrapping_sub(core::mem::replace(&mut self.broken, broken))
     }
 

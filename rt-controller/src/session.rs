@@ -110,9 +110,6 @@ impl ArmSession {
     }
 
     /// State of the arm.
-    ///
-    /// # Errors
-    /// [`SessionError`].
     pub fn state(&mut self) -> Result<ArmState, SessionError> {
         match self.ask(&Command::GetState)? {
             ReplyData::State(state) => Ok(state),
@@ -121,9 +118,6 @@ impl ArmSession {
     }
 
     /// Error code of the arm.
-    ///
-    /// # Errors
-    /// [`SessionError`].
     pub fn error_code(&mut self) -> Result<ErrorCode, SessionError> {
         match self.ask(&Command::GetFault)? {
             ReplyData::Fault { error, .. } => Ok(ErrorCode(error)),
@@ -132,9 +126,6 @@ impl ArmSession {
     }
 
     /// Asks the arm to stop by itself.
-    ///
-    /// # Errors
-    /// [`SessionError`].
     pub fn stop_arm(&mut self) -> Result<(), SessionError> {
         self.ask(&Command::SetState(StateRequest::Stop)).map(drop)
     }

@@ -136,7 +136,7 @@ impl CacheWarmUp {
             },
             reports: Some(report(
                 self.q,
-                self.shadow.interface(),
+                self.shadow.settings().interface,
                 self.due_ns,
                 deadline_ns,
             ))

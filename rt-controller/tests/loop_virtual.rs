@@ -1,11 +1,6 @@
 //! The real loop in virtual time, on an ideal arm: pacing when the machine is
 //! late, and a link that stalls or goes away.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "tests may fail loudly"
-)]
+#![cfg(test)]
 
 use arm_model::Limits;
 use arm_model::joint::START_POSE;
@@ -87,7 +82,7 @@ fn run(
         quit: Arc::clone(&quit),
     };
     let control = ControlState::new(Limits::default(), thresholds);
-    let interface = control.interface();
+    let interface = control.settings().interface;
     let mut rt = RtLoop::new(control, clock, boards, rings.rt);
     rt.set_warm_up(CacheWarmUp::new(Limits::default(), interface, ahead_us).unwrap());
     rt.run(&quit);

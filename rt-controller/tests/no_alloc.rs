@@ -1,14 +1,7 @@
 //! The real-time thread touches the heap in no cycle: counted over the real
 //! loop body, through every mode and every fault it can meet.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    unsafe_code,
-    reason = "tests may fail loudly; a counting allocator is unsafe by nature"
-)]
+#![cfg(test)]
+#![allow(unsafe_code, reason = "a counting allocator is unsafe by nature")]
 
 mod gauntlet;
 

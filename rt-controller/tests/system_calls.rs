@@ -4,15 +4,8 @@
 //! Counted over the loop body through every mode and fault, and over the whole
 //! loop while an armed arm moves and readers come and are killed.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    unsafe_code,
-    reason = "tests may fail loudly; a seccomp filter is unsafe by nature"
-)]
+#![cfg(test)]
+#![allow(unsafe_code, reason = "a seccomp filter is unsafe by nature")]
 
 #[path = "system_calls/counter.rs"]
 mod counter;

@@ -106,17 +106,25 @@ fn fault_26_an_upload_that_hangs_is_refused_after_its_time() {
     let plan = swing(START_POSE);
     let sha256 = trajectory_hash(&plan);
     let announce = ControllerRequest::Announce { sha256 };
-    assert_eq!(stand.refused(&announce).0, FaultCode::UploadTimedOut);
     let late = ControllerRequest::ExecuteUploaded { sha256 };
-    assert_eq!(stand.refused(&late).0, FaultCode::WrongMode);
-    let upload = |sha256| ControllerRequest::Upload {
+    let upload = |plan, sha256| ControllerRequest::Upload {
         trajectory: Box::new(plan),
         sha256,
     };
-    let other = stand.refused(&upload([1; 32]));
-    assert_eq!(other.0, FaultCode::PlanHashMismatch);
+    // Neither a damaged plan nor another one is the one that was announced.
     let pending = stand.call(&announce);
-    assert_eq!(stand.ask(&upload(sha256)), ControllerEvent::Done);
+    let other = JointTrajectory::hold(START_POSE, 1.0).unwrap();
+    let damaged = stand.refused(&upload(other, sha256));
+    assert_eq!(damaged.0, FaultCode::PlanHashMismatch);
+    let uploaded = stand.ask(&upload(other, trajectory_hash(&other)));
+    assert_eq!(uploaded, ControllerEvent::Done);
+    match stand.answer(&pending) {
+        ControllerEvent::Refused { fault, .. } => assert_eq!(fault, FaultCode::UploadTimedOut),
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(stand.refused(&late).0, FaultCode::WrongMode);
+    let pending = stand.call(&announce);
+    assert_eq!(stand.ask(&upload(plan, sha256)), ControllerEvent::Done);
     assert_eq!(stand.answer(&pending), ControllerEvent::Done);
     assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     let pending = stand.call(&late);

@@ -187,7 +187,7 @@ impl<T: ArmTransport> CycleDriver<T> {
     /// Sends a cycle's command and request for a state, in this order and at once. Called
     /// every cycle: without a command a question of the link's own may go out.
     fn send(&mut self, command: Option<ArmCommand>, state: Option<StateRequest>, now_ns: u64) {
-        let interface = self.control.interface();
+        let interface = self.control.settings().interface;
         let Some(link) = self.link.as_mut() else {
             return;
         };

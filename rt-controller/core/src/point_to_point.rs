@@ -38,9 +38,6 @@ impl MoveError {
 
 /// Plans a move that rests at `from` and at `to` (rad), `speed_part` (0 to 1] as
 /// fast as the limits allow.
-///
-/// # Errors
-/// [`MoveError`].
 pub fn plan_move(
     from: &JointVector,
     to: &JointVector,

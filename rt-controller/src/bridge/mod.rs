@@ -103,9 +103,6 @@ impl Bridge {
     /// Opens all services of a controller with a checked configuration, the limits and
     /// thresholds that it names. `warnings` are the real-time properties that could
     /// not be had, in words.
-    ///
-    /// # Errors
-    /// [`ControllerError`].
     pub fn open(
         bus: &Bus,
         config: ControllerConfig,

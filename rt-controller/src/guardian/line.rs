@@ -21,12 +21,14 @@ const SILENCE_NS: u64 = 2_000_000_000;
 /// Unacknowledged data for this long mean a broken connection.
 const USER_TIMEOUT: Duration = Duration::from_millis(1000);
 
+#[derive(Debug)]
 enum Phase {
     Down { retry_ns: u64 },
     Opening { socket: Socket, since_ns: u64 },
     Up(Box<Open>),
 }
 
+#[derive(Debug)]
 struct Open {
     socket: Socket,
     reader: FrameReader,
@@ -40,18 +42,10 @@ struct Open {
 }
 
 /// A connection that comes back by itself.
+#[derive(Debug)]
 pub struct ArmLine {
     address: SocketAddr,
     phase: Phase,
-}
-
-impl core::fmt::Debug for ArmLine {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("ArmLine")
-            .field("address", &self.address)
-            .field("connected", &self.is_connected())
-            .finish_non_exhaustive()
-    }
 }
 
 impl ArmLine {

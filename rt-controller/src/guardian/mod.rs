@@ -16,10 +16,7 @@
 
 pub mod decision;
 pub mod line;
-mod settings;
 mod watched;
-
-pub use settings::GuardianSettings;
 
 use crate::config::ControllerConfig;
 use crate::error::ControllerError;

@@ -4,7 +4,7 @@
 use crate::control::LinkInput;
 use crate::os::now_ns;
 use crate::transport::tcp::TcpLink;
-use crate::transport::{ArmTransport, LinkGone, Sent};
+use crate::transport::{ArmTransport, LinkGone};
 use crate::xarm::frame::MAX_FRAME_LEN;
 use crate::xarm::{Command, FrameReader, ReplyData, Status};
 use rtrb::Producer;
@@ -26,7 +26,7 @@ impl TimedLink {
 }
 
 impl ArmTransport for TimedLink {
-    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone> {
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<(), LinkGone> {
         self.link.send(commands, now_ns)
     }
 

@@ -37,9 +37,6 @@ impl SideBySide {
     pub const PRIORITY: u8 = super::PRIORITY;
 
     /// Measures on one of `cores` until each has had its seconds; tells `say` how many it had.
-    ///
-    /// # Errors
-    /// [`LoopbackError`].
     pub fn measure(
         cpu: usize,
         cores: usize,

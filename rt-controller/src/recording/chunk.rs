@@ -57,10 +57,7 @@ pub enum Front<'a> {
 }
 
 /// Writes header and items of a chunk behind each other into `out`, which is
-/// emptied first.
-///
-/// # Panics
-/// Never; a payload too long for its field could not have been collected.
+/// emptied first. A payload too long for its field could not have been collected.
 pub fn write(out: &mut Vec<u8>, keyframe: bool, sequence: u32, items: u32, payload: &[u8]) {
     out.clear();
     out.extend_from_slice(&MAGIC);

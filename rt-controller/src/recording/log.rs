@@ -79,9 +79,6 @@ pub struct LogReader<'a> {
 
 impl<'a> LogReader<'a> {
     /// Looks at the first chunk.
-    ///
-    /// # Errors
-    /// [`LogError`].
     pub fn open(bytes: &'a [u8]) -> Result<Self, LogError> {
         match chunk::read(bytes) {
             _ if bytes.is_empty() => Err(LogError::Empty),

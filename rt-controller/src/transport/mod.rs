@@ -18,7 +18,7 @@ pub mod in_flight;
 pub mod sim;
 pub mod tcp;
 
-pub use control_core::transport::{ArmTransport, LinkGone, MAX_COMMANDS, Sent};
+pub use control_core::transport::{ArmTransport, LinkGone, MAX_COMMANDS};
 
 /// A connected stream of bytes that never makes its user wait: a socket, or a
 /// cable in virtual time.

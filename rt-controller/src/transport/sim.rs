@@ -1,7 +1,7 @@
 //! An ideal arm in memory: it takes every setpoint at once and answers it at
 //! the next poll. Faults are set by hand.
 
-use super::{ArmTransport, LinkGone, Sent};
+use super::{ArmTransport, LinkGone};
 use crate::control::LinkInput;
 use crate::xarm::{Command, Status};
 
@@ -17,14 +17,14 @@ pub struct IdealArm {
 }
 
 impl ArmTransport for IdealArm {
-    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone> {
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<(), LinkGone> {
         if self.gone {
             return Err(LinkGone);
         }
         if !commands.is_empty() {
             self.oldest_ns = self.oldest_ns.or(Some(now_ns));
         }
-        Ok(Sent::Whole)
+        Ok(())
     }
 
     fn poll(&mut self, now_ns: u64) -> LinkInput {

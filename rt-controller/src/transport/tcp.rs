@@ -7,7 +7,7 @@
 
 use super::heartbeat::{Heartbeat, Silence};
 use super::in_flight::{InFlight, Matched};
-use super::{ArmTransport, ByteStream, LinkGone, MAX_COMMANDS, Sent};
+use super::{ArmTransport, ByteStream, LinkGone, MAX_COMMANDS};
 use crate::control::LinkInput;
 use crate::os::receive::{receive, stamp_arrivals};
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
@@ -78,9 +78,6 @@ impl ByteStream for TcpStream {
 
 impl TcpLink {
     /// Connects to `address`. Blocks up to `timeout`; not RT-safe.
-    ///
-    /// # Errors
-    /// What the operating system says.
     pub fn connect(
         address: SocketAddr,
         timeout: Duration,
@@ -133,14 +130,13 @@ impl<W: ByteStream> TcpLink<W> {
     }
 
     /// Writes `rest` and the frames behind it, once; a frame of which nothing was
-    /// taken is left out. True when all were taken, at least in part.
-    fn write(&mut self, frames: &[Written], now_ns: u64) -> Result<bool, LinkGone> {
+    /// taken is left out.
+    fn write(&mut self, frames: &[Written], now_ns: u64) -> Result<(), LinkGone> {
         if self.rest.is_empty() {
-            return Ok(true);
+            return Ok(());
         }
         let written = write_once(&mut self.stream, &self.rest)?;
         let mut keep = frames.first().map_or(self.rest.len(), |first| first.begin);
-        let mut all = true;
         for frame in frames {
             if written > frame.begin {
                 keep = frame.end;
@@ -149,13 +145,12 @@ impl<W: ByteStream> TcpLink<W> {
                     self.setpoint_ns = Some(now_ns);
                 }
             } else {
-                all = false;
                 self.skip();
             }
         }
         let left = self.rest.get(written..keep).unwrap_or_default();
         self.rest = heapless::Vec::from_slice(left).unwrap_or_default();
-        Ok(all)
+        Ok(())
     }
 
     /// Whether a setpoint may go out now.
@@ -245,14 +240,13 @@ fn write_once(stream: &mut impl ByteStream, bytes: &[u8]) -> Result<usize, LinkG
 }
 
 impl<W: ByteStream> ArmTransport for TcpLink<W> {
-    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone> {
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<(), LinkGone> {
         let clear = self.rest.is_empty();
         let mut frames: heapless::Vec<Written, MAX_COMMANDS> = heapless::Vec::new();
         let mut id = self.in_flight.next_id();
         // Any command is a question, too.
         let asked = core::mem::take(&mut self.ask) && commands.is_empty();
         let question = asked.then_some(&Command::GetState);
-        let mut all = true;
         for command in commands.iter().chain(question) {
             let allowed = !command.is_setpoint() || (clear && self.has_room(now_ns));
             let appended = self
@@ -261,12 +255,10 @@ impl<W: ByteStream> ArmTransport for TcpLink<W> {
             if appended {
                 id = next_transaction(id);
             } else {
-                all = false;
                 self.skip();
             }
         }
-        all &= self.write(&frames, now_ns)?;
-        Ok(if all { Sent::Whole } else { Sent::Skipped })
+        self.write(&frames, now_ns)
     }
 
     fn poll(&mut self, now_ns: u64) -> LinkInput {

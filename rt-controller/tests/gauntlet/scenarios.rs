@@ -194,24 +194,12 @@ pub(crate) fn run(cycles: u64, watch: &mut dyn Watch) -> u64 {
     let (mut met, mut seen, mut ran) = (BTreeSet::new(), [0; 6], 0);
     // At 250 Hz the tool's speed limit comes before its largest step, at 100 Hz
     // after it.
-    let set_ups = [
-        (
-            CommandInterface::ServoPosition,
-            250.0,
-            FaultCode::SetpointStep,
-        ),
-        (
-            CommandInterface::JointVelocity,
-            250.0,
-            FaultCode::SetpointStep,
-        ),
-        (
-            CommandInterface::ServoPosition,
-            100.0,
-            FaultCode::SetpointTcpSpeed,
-        ),
-    ];
-    for (interface, rate_hz, hidden) in set_ups {
+    let (step, tool_speed) = (FaultCode::SetpointStep, FaultCode::SetpointTcpSpeed);
+    for (interface, rate_hz, hidden) in [
+        (CommandInterface::ServoPosition, 250.0, step),
+        (CommandInterface::JointVelocity, 250.0, step),
+        (CommandInterface::ServoPosition, 100.0, tool_speed),
+    ] {
         let mut bench = Bench::new(interface, rate_hz, watch);
         for _ in 0..5 {
             bench.cycle();

@@ -93,7 +93,11 @@ impl ControlState {
             stamp_ns: 0,
             motions_done: self.motions_done,
             q_c: self.commanded.q,
-            q: self.monitor.report().map_or(JointVector::ZERO, |r| r.q),
+            q: self
+                .monitor
+                .reports
+                .newest()
+                .map_or(JointVector::ZERO, |r| r.q),
             operating_mode: self.arming.raw_operating_mode(),
             interface: self.settings.interface as u8,
             reserved: [0; 2],
@@ -105,12 +109,6 @@ impl ControlState {
     #[must_use]
     pub const fn counts(&self) -> RunCounts {
         self.monitor.counts()
-    }
-
-    /// How commands reach the arm.
-    #[must_use]
-    pub const fn interface(&self) -> CommandInterface {
-        self.settings.interface
     }
 
     /// One cycle: observe, watch, handle the command, send a setpoint. RT-safe; returns for any input.
@@ -167,7 +165,8 @@ impl ControlState {
     fn record(&self, input: &CycleInput, trajectory_s: f64, out: &CycleOutput) -> CycleRecord {
         let (q, q_stamp_ns) = self
             .monitor
-            .report()
+            .reports
+            .newest()
             .map_or((JointVector::ZERO, 0), |r| (r.q, r.stamp_ns));
         CycleRecord {
             version: PAYLOAD_VERSION,
@@ -343,12 +342,12 @@ impl ControlState {
             .admit(&target.q, step_s, &self.limits, &allowed)?;
         self.commanded = target;
         self.sent_ns = deadline_ns;
-        self.monitor.sent(deadline_ns, target.q);
+        self.monitor.reports.sent(deadline_ns, target.q);
         out.command = Some(match self.settings.interface {
             CommandInterface::ServoPosition => ArmCommand::Position(target.q),
             CommandInterface::JointVelocity => self.velocity.command(
                 &target,
-                &self.monitor.deviation(),
+                &self.monitor.reports.deviation(),
                 step_s,
                 &self.limits,
                 self.tcp_speed_max_m_s,

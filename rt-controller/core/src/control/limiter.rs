@@ -131,9 +131,7 @@ impl Limiter {
         };
         Ok(())
     }
-}
 
-impl Limiter {
     /// After a pause the arm sets out from rest, however long the pause was: it
     /// must be able to get to the setpoint as if only the longest continuous
     /// interval had passed.

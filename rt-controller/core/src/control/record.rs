@@ -122,9 +122,6 @@ fn record_codes(codes: ArmCodes) -> ArmCodesRecord {
 
 /// The input of a recorded cycle; `motion_of` finds stored motions by number
 /// and fingerprint.
-///
-/// # Errors
-/// [`RestoreError`].
 pub fn restore_input(
     record: &InputRecord,
     motion_of: impl FnOnce(u64, u64) -> Option<Box<Motion>>,

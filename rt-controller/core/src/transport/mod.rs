@@ -10,16 +10,6 @@ use shared_types::CommandInterface;
 #[error("the connection to the arm is gone")]
 pub struct LinkGone;
 
-/// What became of the commands of a cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sent {
-    /// All were handed to the network.
-    Whole,
-    /// One or more were not sent: the network or the arm has not taken the ones
-    /// before. Nothing is queued, so nothing bursts out later.
-    Skipped,
-}
-
 /// Commands of one cycle at most: a setpoint and a request.
 pub const MAX_COMMANDS: usize = 2;
 
@@ -27,11 +17,10 @@ pub const MAX_COMMANDS: usize = 2;
 /// RT-safe: bounded, no allocation, no waiting, one system call at most.
 pub trait ArmTransport {
     /// Sends the commands of a cycle, none to [`MAX_COMMANDS`], in one write at
-    /// `now_ns` (CLOCK_MONOTONIC).
-    ///
-    /// # Errors
-    /// [`LinkGone`].
-    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<Sent, LinkGone>;
+    /// `now_ns` (CLOCK_MONOTONIC). Those that the network or the arm has no room for
+    /// are left out and counted by the next poll: nothing is queued, so nothing
+    /// bursts out later.
+    fn send(&mut self, commands: &[Command], now_ns: u64) -> Result<(), LinkGone>;
 
     /// Takes in, in one read, the replies that have come until `now_ns`; `lost`
     /// in the result says that the connection is gone.

@@ -59,7 +59,7 @@ pub const REPORT_PORTS: [u16; 4] = [30000, 30001, 30002, 30003];
 
 #[cfg(test)]
 mod tests {
-    use super::report::{BasicReport, ForceReport, NormalReport, RealtimeReport, RichReport};
+    use super::report::{ForceReport, NormalReport, RealtimeReport, RichReport};
     use super::*;
     use proptest::prelude::*;
 
@@ -84,7 +84,7 @@ mod tests {
             }
             // Reports and messages are shorter than that.
             let bytes = &bytes[..bytes.len() % 900];
-            let _ = (BasicReport::parse(bytes), ForceReport::parse(bytes), NormalReport::parse(bytes));
+            let _ = (ForceReport::parse(bytes), NormalReport::parse(bytes));
             let _ = (RichReport::parse(bytes), RealtimeReport::parse(bytes));
             let (parameters, data) = bytes.split_at(bytes.len() % 120);
             if let Ok(command) = Command::parse(register, parameters) {

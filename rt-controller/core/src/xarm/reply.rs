@@ -212,9 +212,6 @@ impl ReplyData {
 
     /// Writes the whole reply frame to the front of `out` and returns its
     /// length; [`MAX_FRAME_LEN`](super::frame::MAX_FRAME_LEN) bytes are always enough.
-    ///
-    /// # Errors
-    /// [`EmitError::BufferTooSmall`].
     pub fn emit(
         &self,
         out: &mut [u8],

@@ -151,9 +151,6 @@ impl ArmVersion {
     }
 
     /// Refuses an arm whose reports this controller cannot read.
-    ///
-    /// # Errors
-    /// [`VersionError`].
     pub fn check(&self) -> Result<(), VersionError> {
         let firmware = self.firmware;
         if (self.axes, self.kind) != (7, 7) {

@@ -15,7 +15,7 @@ use arm_model::{JointVector, Limits};
 use reports::ReportWatch;
 use serde::{Deserialize, Serialize};
 use shared_types::FaultCode;
-use shared_types::ipc::{ControllerMode, JointReport, RunCounts};
+use shared_types::ipc::{ControllerMode, RunCounts};
 
 /// Reports lag behind a change of mode by up to 0.2 s (field experience with
 /// the vendor's SDK), so state, mode and codes count only this long after
@@ -48,7 +48,7 @@ impl Heartbeat {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Monitor {
     settings: ControlSettings,
-    reports: ReportWatch,
+    pub(super) reports: ReportWatch,
     engaged_ns: u64,
     operator: Heartbeat,
     guardian: Heartbeat,
@@ -79,20 +79,9 @@ impl Monitor {
         self.reports.motion_begins();
     }
 
-    /// A setpoint was sent.
-    pub fn sent(&mut self, deadline_ns: u64, q: JointVector) {
-        self.reports.sent(deadline_ns, q);
-    }
-
     /// A setpoint was held back: too many wait for their reply.
     pub const fn held_back(&mut self) {
         self.counts.skipped = self.counts.skipped.saturating_add(1);
-    }
-
-    /// Newest joint report.
-    #[must_use]
-    pub const fn report(&self) -> Option<&JointReport> {
-        self.reports.newest()
     }
 
     /// What marked the run so far.
@@ -105,12 +94,6 @@ impl Monitor {
     #[must_use]
     pub const fn arm_codes(&self) -> (u8, u8) {
         (self.arm_error, self.arm_warning)
-    }
-
-    /// Commanded less measured joints at the time of the newest report (rad).
-    #[must_use]
-    pub fn deviation(&self) -> JointVector {
-        self.reports.deviation()
     }
 
     /// How far the arm stands from everything commanded lately (rad).
@@ -207,7 +190,7 @@ impl Monitor {
         if self.arm_error != 0 {
             return Some(Violation::plain(FaultCode::ArmError));
         }
-        let report = self.report()?;
+        let report = self.reports.newest()?;
         let settled = report.arrival_ns.saturating_sub(self.engaged_ns) > SETTLE_NS;
         // States 1 (moving) and 2 (ready) follow setpoints.
         let serving = report.arm_mode == self.settings.interface.arm_mode()

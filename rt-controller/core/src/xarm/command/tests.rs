@@ -43,31 +43,38 @@ proptest! {
     }
 }
 
-/// Ten floats of the SDK: seven angles, then 0.349, 8.727, 0, little-endian.
+/// The SDK's servo_j is ten floats: seven angles, then 0.349, 8.727, 0, little-endian. Its
+/// modes come with one byte or two.
 #[test]
-fn the_sdks_servo_j_is_understood() {
-    let mut parameters = Vec::new();
-    for value in [0.5_f32, -0.25, 0.0, 1.0, 0.0, 0.0, 2.0, 0.349, 8.727, 0.0] {
-        parameters.extend_from_slice(&value.to_le_bytes());
+fn requests_are_understood_or_refused_for_what_is_wrong_with_them() {
+    let floats = [0.5_f32, -0.25, 0.0, 1.0, 0.0, 0.0, 2.0, 0.349, 8.727, 0.0];
+    let servo_j = floats.map(f32::to_le_bytes).concat();
+    let mut not_finite = servo_j.clone();
+    not_finite[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let target = JointVector([0.5, -0.25, 0.0, 1.0, 0.0, 0.0, 2.0]);
+    let (register, given) = (Register::ServoJoint, 27);
+    let untyped = CommandError::Untyped(Register::GravityDirection);
+    let mode_2 = Ok(Command::SetMode(Mode::Other(2)));
+    for (code, parameters, expected) in [
+        (29, &servo_j[..], Ok(Command::ServoJoint(target))),
+        (
+            29,
+            &servo_j[..given],
+            Err(CommandError::TooShort { register, given }),
+        ),
+        (29, &not_finite[..], Err(CommandError::BadValue(register))),
+        (19, &[2][..], mode_2),
+        (19, &[2, 1][..], mode_2),
+        (0xEE, &[][..], Err(CommandError::UnknownRegister(0xEE))),
+        (0x33, &[0; 12][..], Err(untyped)),
+        (
+            12,
+            &[9][..],
+            Err(CommandError::BadValue(Register::SetState)),
+        ),
+    ] {
+        assert_eq!(Command::parse(code, parameters), expected, "{parameters:?}");
     }
-    assert_eq!(
-        Command::parse(29, &parameters),
-        Ok(Command::ServoJoint(JointVector([
-            0.5, -0.25, 0.0, 1.0, 0.0, 0.0, 2.0
-        ])))
-    );
-    assert_eq!(
-        Command::parse(29, &parameters[..27]),
-        Err(CommandError::TooShort {
-            register: Register::ServoJoint,
-            given: 27
-        })
-    );
-    parameters[..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert_eq!(
-        Command::parse(29, &parameters),
-        Err(CommandError::BadValue(Register::ServoJoint))
-    );
 }
 
 #[test]
@@ -79,30 +86,4 @@ fn lengths_are_millimetres_on_the_wire() {
     };
     emit_command(&mut out, 1, Protocol::Private, &Command::TcpOffset(offset)).unwrap();
     assert_eq!(out[15..19], 200.0_f32.to_le_bytes());
-}
-
-#[test]
-fn mode_takes_both_lengths() {
-    for parameters in [&[2_u8][..], &[2, 1]] {
-        assert_eq!(
-            Command::parse(19, parameters),
-            Ok(Command::SetMode(Mode::Other(2)))
-        );
-    }
-}
-
-#[test]
-fn unknown_and_untyped_registers_are_told_apart() {
-    assert_eq!(
-        Command::parse(0xEE, &[]),
-        Err(CommandError::UnknownRegister(0xEE))
-    );
-    assert_eq!(
-        Command::parse(0x33, &[0; 12]),
-        Err(CommandError::Untyped(Register::GravityDirection))
-    );
-    assert_eq!(
-        Command::parse(12, &[9]),
-        Err(CommandError::BadValue(Register::SetState))
-    );
 }

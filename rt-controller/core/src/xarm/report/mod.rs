@@ -16,9 +16,6 @@ macro_rules! both_directions {
     ($Report:ident, $least:expr) => {
         impl $Report {
             /// Writes the report to the front of `out` and returns its length.
-            ///
-            /// # Errors
-            /// [`EmitError::BufferTooSmall`].
             pub fn emit(&self, out: &mut [u8]) -> Result<usize, EmitError> {
                 let (mut report, mut wire) = (*self, ByteWriter::new(out));
                 report.fields(&mut wire);
@@ -26,9 +23,6 @@ macro_rules! both_directions {
             }
 
             /// Reads a frame; one of a later firmware may have more bytes. RT-safe.
-            ///
-            /// # Errors
-            /// [`ReportTooShort`].
             pub fn parse(frame: &[u8]) -> Result<Self, ReportTooShort> {
                 let (given, needed) = (frame.len(), $least);
                 if given < needed {

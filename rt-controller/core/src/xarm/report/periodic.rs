@@ -39,10 +39,6 @@ pub struct BasicReport {
 }
 
 impl BasicReport {
-    fn fields(&mut self, wire: &mut impl Fields) {
-        self.begin(wire, BASIC_LEN);
-    }
-
     /// The fields of a report of `size` bytes that begins with these.
     fn begin(&mut self, wire: &mut impl Fields, size: usize) {
         size_field(wire, size);
@@ -53,8 +49,6 @@ impl BasicReport {
         wire.joints(&mut self.torque_nm);
     }
 }
-
-both_directions!(BasicReport, BASIC_LEN);
 
 /// Report of port 30003, 100 Hz. It has no error code.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
