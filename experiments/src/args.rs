@@ -91,32 +91,35 @@ pub struct ResultArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Arguments of `experiments rooms`.
+/// Which films, and how many at once.
 #[derive(Debug, Args)]
-pub struct RoomsArgs {
+pub struct FilmArgs {
     /// How hard it is to see the rope.
     #[arg(long, value_enum, default_value_t = KindName::Ordinary)]
     pub kind: KindName,
     /// Seeds, one or from-to. Even seeds from 1000000 on are reserved for judging.
     #[arg(long, value_name = "A-B", value_parser = seeds)]
     pub seeds: RangeInclusive<u64>,
+    /// Threads; neither films nor results depend on them. Default: one a processor.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// Arguments of `experiments rooms`.
+#[derive(Debug, Args)]
+pub struct RoomsArgs {
+    #[command(flatten)]
+    pub which: FilmArgs,
     /// Folder for the films, each in a folder of its own named KIND-SEED.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Threads; the films do not depend on them. Default: one a processor.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
 }
 
 /// Arguments of `experiments track-rooms`.
 #[derive(Debug, Args)]
 pub struct TrackRoomsArgs {
-    /// How hard it is to see the rope.
-    #[arg(long, value_enum, default_value_t = KindName::Ordinary)]
-    pub kind: KindName,
-    /// Seeds, one or from-to. Even seeds from 1000000 on are reserved for judging.
-    #[arg(long, value_name = "A-B", value_parser = seeds)]
-    pub seeds: RangeInclusive<u64>,
+    #[command(flatten)]
+    pub which: FilmArgs,
     /// Folder of films, as `experiments rooms` writes them; missing ones are rendered into
     /// it. Left out, each film is rendered anew and removed.
     #[arg(long, value_name = "DIR")]
@@ -125,9 +128,6 @@ pub struct TrackRoomsArgs {
     /// new one for another tracker.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Threads; the results do not depend on them. Default: one a processor.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub threads: Option<u16>,
 }
 
 /// Kinds of room.

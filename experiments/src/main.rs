@@ -28,10 +28,10 @@ fn main() -> ExitCode {
     };
     cli_output::start(cli.json, cli.verbose);
     let outcome = match &cli.command {
-        args::Command::Bench(bench) => bench::run(bench, cli.json),
+        args::Command::Bench(bench) => bench::run(bench),
         args::Command::Rooms(args) => rooms::run(args),
-        args::Command::TrackRooms(args) => rooms::track::run(args, cli.json),
-        args::Command::Result(result) => results::run(result, cli.json),
+        args::Command::TrackRooms(args) => rooms::track::run(args),
+        args::Command::Result(result) => results::run(result),
     };
     cli_output::finish(outcome)
 }

@@ -1,6 +1,6 @@
 //! The network that reads rope parameters: the one inside this program, or a file.
 
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use experiments::trials::TrialRig;
 use planner::identify::Method;
 use planner::phi::PhiNet;
@@ -26,10 +26,10 @@ pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
 pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) -> Outcome {
     if !method.asks_network() {
         return match model {
-            Some(path) => Err(Failure::input(anyhow::anyhow!(
+            Some(path) => Err(bad_input!(
                 "--model {} is for --method nn and hybrid only",
                 path.display()
-            ))),
+            )),
             None => Ok(()),
         };
     }

@@ -2,15 +2,15 @@
 //! keypoints were made by another simulator (MuJoCo).
 #![cfg(test)]
 
-use arm_model::{JointTrajectory, Limits, Pole};
+use arm_model::{JointTrajectory, Pole};
 use experiments::trials::{TrialRig, mean, summarise};
 use planner::identify;
 use planner::identify::{IdentifyError, IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
 use planner::ropes::{outside_rope, random_rope, trial_rope};
 use planner::synthetic::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
-use planner::wiggle::{WiggleConfig, wiggle};
-use rope_sim::{AttachMotion, PlannedArm, PoseRow, PoseTrack};
+use planner::wiggle::WiggleConfig;
+use rope_sim::{AttachMotion, PlannedArm, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
@@ -32,10 +32,7 @@ fn observed<'a>(
 }
 
 fn wiggling_arm() -> PlannedArm {
-    PlannedArm::new(
-        wiggle(&WiggleConfig::default(), &Limits::default()).unwrap(),
-        Pole::default(),
-    )
+    planner::wiggle::wiggling_arm(&WiggleConfig::default()).unwrap()
 }
 
 fn quick(seed: u64, threads: usize) -> IdentifyOptions {
@@ -253,13 +250,7 @@ fn useless_films_are_refused_with_the_reason() {
 }
 
 fn pose_of(folder: &Path) -> PoseTrack {
-    let samples = run_log::files::read_pose(&folder.join("pose.csv")).unwrap();
-    let rows = samples.into_iter().map(|s| PoseRow {
-        t_s: s.t_s,
-        p_m: s.p_m,
-        q_wxyz: s.q_wxyz,
-    });
-    PoseTrack::new(&rows.collect::<Vec<PoseRow>>()).unwrap()
+    PoseTrack::new(&run_log::files::read_pose(&folder.join("pose.csv")).unwrap()).unwrap()
 }
 
 fn true_keypoints_of(folder: &Path) -> KeypointTrack {

@@ -81,7 +81,7 @@ fn film(bus: &Bus) -> Vec<(FrameHeader, Vec<u8>)> {
 
 /// Where both eyes see the lead: centroid of what has its hue, triangulated.
 fn lead_in(frame: &(FrameHeader, Vec<u8>), config: &RigConfig) -> Vector3<f64> {
-    let camera: StereoCamera = config.stereo_camera();
+    let camera: StereoCamera = config.camera.stereo_camera();
     let size = [camera.width_px as usize * 2, camera.height_px as usize];
     let frame = StereoFrame::from_yuyv(&frame.1, size, 0, 0).unwrap();
     let hue = camera_ingest::frame::ycc_from_rgb(config.appearance().lead_rgb);

@@ -8,7 +8,7 @@ use crate::room::{Kind, Room, RopeSurface};
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::{RopeParams, StereoCamera};
+use shared_types::RopeParams;
 use std::net::IpAddr;
 use xarm_sim::{ArmConfig, FaultScript, Firmware, Intake, JointLag, Obstacle};
 
@@ -137,12 +137,6 @@ impl RigConfig {
             .unwrap_or(own)
     }
 
-    /// The camera's exact calibration and place.
-    #[must_use]
-    pub fn stereo_camera(&self) -> StereoCamera {
-        self.camera.stereo_camera()
-    }
-
     /// Set-up of the arm alone.
     #[must_use]
     pub fn arm(&self) -> ArmConfig {
@@ -169,7 +163,7 @@ impl RigConfig {
 /// Refuses settings no thread could work with.
 ///
 /// # Errors
-/// [`RigError::Config`]: the first number that makes no rig, and its limits.
+/// [`RigError::Failed`]: the first number that makes no rig, and its limits.
 pub fn check(config: &RigConfig) -> Result<(), RigError> {
     let camera = &config.camera;
     // The last row is exposed before the next frame begins.
@@ -189,12 +183,9 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     let mut bounds = bounds.into_iter();
     match bounds.find(|(_, value, [min, max])| !(*min..=*max).contains(value)) {
         None => Ok(()),
-        Some((key, value, [min, max])) => Err(RigError::Config {
-            key: format!("camera.{key}"),
-            value,
-            min,
-            max,
-        }),
+        Some((key, value, [min, max])) => Err(RigError::Failed(format!(
+            "`camera.{key}` is {value}, but must lie between {min} and {max}"
+        ))),
     }
 }
 

@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// Films the record until `stop`.
 pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Result<(), RigError> {
     let bus = Bus::join(&config.domain)?;
-    let camera = config.stereo_camera();
+    let camera = config.camera.stereo_camera();
     let mut renderer = renderer(config, &camera);
     let publisher = bus.frame_publisher(renderer.frame_bytes())?;
     let mut shutter = Shutter {

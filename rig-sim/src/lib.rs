@@ -97,7 +97,11 @@ pub fn run_announced(
         };
         let parts = started.into_iter().try_for_each(|part| {
             let (name, handle) = part?;
-            handle.join().unwrap_or(Err(RigError::Panicked { name }))
+            handle.join().unwrap_or_else(|_| {
+                Err(RigError::Failed(format!(
+                    "the rig's thread `{name}` panicked; see the messages above"
+                )))
+            })
         });
         served.and(parts)
     });

@@ -72,7 +72,10 @@ impl Physics {
     fn follow(&mut self, next: &JointSample) -> Result<Moment, RigError> {
         let span_s = next.at.since_s(self.last.at);
         if span_s > GAP_S {
-            return Err(RigError::FellBehind { gap_s: span_s });
+            return Err(RigError::Failed(format!(
+                "the simulation lost {span_s:.2} s of the arm's motion; the machine is too busy, \
+                 stop other programs"
+            )));
         }
         let (from_s, to_s) = (
             self.last.at.since_s(self.start),
@@ -85,7 +88,10 @@ impl Physics {
         self.last = *next;
         let nodes = self.live.nodes().to_vec();
         if !nodes.iter().all(|p| p.sum().is_finite()) {
-            return Err(RigError::RopeDiverged);
+            return Err(RigError::Failed(
+                "the simulated rope diverged; choose a rope within the documented ranges"
+                    .to_owned(),
+            ));
         }
         let radii_m = [self.rope.radius_m, self.rope.lead_radius_m];
         Ok(Moment {
@@ -140,7 +146,7 @@ mod tests {
             moved_m = moved_m.max((got.x - 0.663).abs());
         }
         assert!(moved_m > 0.05, "the rope hardly moved: {moved_m}");
-        let far = physics.follow(&sample(1700));
-        assert!(matches!(far, Err(RigError::FellBehind { .. })));
+        let far = physics.follow(&sample(1700)).unwrap_err().to_string();
+        assert!(far.contains("lost 0.20 s of the arm's motion"), "{far}");
     }
 }

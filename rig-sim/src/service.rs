@@ -28,14 +28,14 @@ impl Service {
     /// Opens the service.
     ///
     /// # Errors
-    /// [`RigError::DomainInUse`] when another rig serves, [`RigError::Ipc`].
+    /// Another rig serves in the domain; [`RigError::Ipc`].
     pub(super) fn open(domain: &str) -> Result<Self, RigError> {
         let bus = Bus::join(domain)?;
         let server = RpcServer::<RigRpc>::open(&bus).map_err(|error| match error {
             IpcError::Open { ref reason, .. } if reason.contains(TOO_MANY_SERVERS) => {
-                RigError::DomainInUse {
-                    domain: domain.to_owned(),
-                }
+                RigError::Failed(format!(
+                    "domain `{domain}` is in use by another rig; end that one or name another domain"
+                ))
             }
             other => other.into(),
         })?;

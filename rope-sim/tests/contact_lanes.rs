@@ -10,13 +10,13 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    AirDrag, Candidate, Domino, Kernel, Obstacle, Outcome, Precision, Rollout, RopeExtras, Scene,
+    Candidate, Domino, Kernel, Obstacle, Outcome, Precision, Rollout, RopeExtras, Scene,
     SimOptions, roll_out_in_with,
 };
 use shared_types::RopeParams;
 use support::contact::{random_rope, random_whip, wall};
-use support::options;
 use support::pushed::Pushed;
+use support::{AIR, options};
 
 /// A wall with a floor beside it and a domino.
 fn crowded() -> Scene {
@@ -35,14 +35,8 @@ fn crowded() -> Scene {
 }
 
 fn extras(index: usize) -> RopeExtras {
-    let air_drag = (index % 3 == 1).then_some(AirDrag {
-        air_density_kg_m3: 1.2,
-        normal_coefficient: 1.1,
-        tangential_coefficient: 0.02,
-        lead_coefficient: 0.5,
-    });
     RopeExtras {
-        air_drag,
+        air_drag: (index % 3 == 1).then_some(AIR),
         rest_curvature_per_m: [0.0, if index % 4 == 2 { 1.5 } else { 0.0 }, 0.0],
         mass_slope: if index % 5 == 3 { 0.4 } else { 0.0 },
     }

@@ -11,7 +11,7 @@ use rope_sim::{
     SimOptions, roll_out,
 };
 use shared_types::RopeParams;
-use support::{G_M_S2, options, released, simulate, still, world};
+use support::{AIR, G_M_S2, options, released, simulate, still, world};
 
 /// One rigid link with a lead: a pendulum.
 fn pendulum() -> RopeParams {
@@ -27,13 +27,6 @@ fn pendulum() -> RopeParams {
         link_extra_scale: 0.05,
     }
 }
-
-const AIR: AirDrag = AirDrag {
-    air_density_kg_m3: 1.2,
-    normal_coefficient: 1.1,
-    tangential_coefficient: 0.02,
-    lead_coefficient: 0.5,
-};
 
 /// Constant velocity and acceleration.
 fn uniform(velocity_m_s: Vector3<f64>, acceleration_m_s2: Vector3<f64>) -> impl AttachMotion {

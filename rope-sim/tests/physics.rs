@@ -5,7 +5,7 @@
 mod support;
 
 use nalgebra::{Rotation3, Vector3};
-use rope_sim::{AttachMotion, FrameTimes, Precision, Scene, SimOptions, Start};
+use rope_sim::{AttachMotion, FrameTimes, Precision, Scene, SimOptions};
 use shared_types::RopeParams;
 use support::{
     assert_derivatives, options, pendulum, released, simulate, still, throw, tips, world,
@@ -24,9 +24,6 @@ fn one_link_swings_with_the_period_of_a_pendulum() {
     let slow = core::f64::consts::TAU * (inertia / moment).sqrt();
     let period_s = slow / a;
     let options = SimOptions {
-        start: Start::Straight {
-            joint0_rotvec: [0.0, amplitude, 0.0],
-        },
         frames: FrameTimes {
             first_s: 0.0,
             period_s: period_s / 4.0,
@@ -34,6 +31,7 @@ fn one_link_swings_with_the_period_of_a_pendulum() {
         },
         ..SimOptions::new(2.5e-4, Precision::F64, period_s)
     };
+    let options = released([0.0, amplitude, 0.0], options);
     let rollout = simulate(&Scene::EMPTY, &rope, &world, &options);
     // A quarter of the way it hangs straight down, after a whole period it is back.
     let down = rollout.nodes.position(1, 1);

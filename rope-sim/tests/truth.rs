@@ -38,13 +38,18 @@ fn bound_mm(id: &str, single: bool) -> Option<f64> {
     }
 }
 
-fn check_half_millisecond(kernel: Kernel) {
+#[test]
+fn half_a_millisecond_keeps_the_bounds_in_both_precisions() {
     let Some(folder) = truth_folder() else { return };
     let all = cases(&folder, |_| true);
     assert_eq!(all.len(), 24);
-    for case in all {
-        let rollout = simulate(&case, kernel, 5e-4);
-        let error = max_tip_error_mm(&case, &rollout);
+    let kernels = [Precision::F64, Precision::F32].map(Precision::fastest_kernel);
+    for (case, kernel) in all
+        .iter()
+        .flat_map(|case| kernels.map(|kernel| (case, kernel)))
+    {
+        let rollout = simulate(case, kernel, 5e-4);
+        let error = max_tip_error_mm(case, &rollout);
         if let Some(bound) = bound_mm(&case.id, kernel.is_single_precision()) {
             assert!(
                 error <= bound,
@@ -57,16 +62,6 @@ fn check_half_millisecond(kernel: Kernel) {
             assert!(error < 15.0, "{}: {error} mm", case.id);
         }
     }
-}
-
-#[test]
-fn half_a_millisecond_in_double_precision() {
-    check_half_millisecond(Precision::F64.fastest_kernel());
-}
-
-#[test]
-fn half_a_millisecond_in_single_precision() {
-    check_half_millisecond(Precision::F32.fastest_kernel());
 }
 
 /// At 25 us the error of the time steps is gone and that of the equations is left. Half of

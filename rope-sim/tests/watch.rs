@@ -5,11 +5,9 @@
 mod support;
 
 use nalgebra::{Rotation2, Vector2, Vector3};
-use rope_sim::{
-    AttachMotion, BoxRegion, FrameTimes, Precision, Rollout, Scene, SimOptions, Start, Watch,
-};
+use rope_sim::{AttachMotion, BoxRegion, FrameTimes, Precision, Rollout, Scene, SimOptions, Watch};
 use shared_types::RopeParams;
-use support::{pendulum, rope, throw, tips, world};
+use support::{pendulum, released, rope, throw, tips, world};
 
 const HORIZON_S: f64 = 0.9;
 /// Period of the dense recording (s).
@@ -189,27 +187,21 @@ fn a_pendulum_does_what_its_formulas_say() {
         }
     }
     let half_width = s * 0.3_f64.sin();
-    let rollout = simulate(
-        &rope,
-        &world,
-        &SimOptions {
-            start: Start::Straight {
-                joint0_rotvec: [0.0, start, 0.0],
-            },
-            frames: FrameTimes::NONE,
-            watch: Watch {
-                point_m: Some([0.0, 0.0, -s - 0.01]),
-                dwell_in: Some(BoxRegion {
-                    center_m: [0.0, 0.0, -s],
-                    half_m: [half_width, 1.0, 1.0],
-                    yaw_rad: 0.0,
-                }),
-                height: true,
-                ..Watch::NOTHING
-            },
-            ..options(2.5e-4, 1.0)
+    let options = SimOptions {
+        frames: FrameTimes::NONE,
+        watch: Watch {
+            point_m: Some([0.0, 0.0, -s - 0.01]),
+            dwell_in: Some(BoxRegion {
+                center_m: [0.0, 0.0, -s],
+                half_m: [half_width, 1.0, 1.0],
+                yaw_rad: 0.0,
+            }),
+            height: true,
+            ..Watch::NOTHING
         },
-    );
+        ..options(2.5e-4, 1.0)
+    };
+    let rollout = simulate(&rope, &world, &released([0.0, start, 0.0], options));
     let watched = rollout.watched;
     let highest_m = watched.highest_m.unwrap();
     assert!((highest_m + s * start.cos()).abs() < 1e-5 * s);
@@ -229,15 +221,12 @@ fn a_pendulum_does_what_its_formulas_say() {
 #[test]
 fn watching_changes_nothing_else() {
     let (rope, arm) = (rope(), throw(0.0));
-    let with = simulate(&rope, &arm, &options(5e-4, 0.01));
-    let without = simulate(
-        &rope,
-        &arm,
-        &SimOptions {
-            watch: Watch::point(POINT),
-            ..options(5e-4, 0.01)
-        },
-    );
+    let watching = options(5e-4, 0.01);
+    let only_point = SimOptions {
+        watch: Watch::point(POINT),
+        ..watching
+    };
+    let [with, without] = [watching, only_point].map(|o| simulate(&rope, &arm, &o));
     assert_eq!(with.nodes, without.nodes);
     assert_eq!(with.watched.to_point, without.watched.to_point);
     assert_eq!(without.watched.dwell, None);

@@ -68,7 +68,7 @@ fn measure(
     })
 }
 
-pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let config = crate::results::experiment::built_in().or_failed()?;
     let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
     with_network(&mut rig, Method::Hybrid, None)?;
@@ -105,7 +105,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
     stage.done("3 methods measured");
     let rows = [nn, hybrid, cmaes];
     let own = json!({ "methods": rows });
-    Ok(report((args, quiet), "bench identify", own, || {
+    Ok(report(args, "bench identify", own, || {
         println!("seed {}", args.seed);
         print_table(&rows, 1, TABLE);
     }))

@@ -15,11 +15,11 @@ use cli_output::Outcome;
 use serde_json::Value;
 
 /// Runs a benchmark. The value is what `--json` prints.
-pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     match args.name {
-        BenchName::Rope => rope::run(args, quiet),
-        BenchName::Identify => identify::run(args, quiet),
-        BenchName::Plan => plan::run(args, quiet),
-        BenchName::Track => track::run(args, quiet),
+        BenchName::Rope => rope::run(args),
+        BenchName::Identify => identify::run(args),
+        BenchName::Plan => plan::run(args),
+        BenchName::Track => track::run(args),
     }
 }

@@ -108,7 +108,7 @@ fn measure(
     })
 }
 
-pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let config = crate::results::experiment::built_in().or_failed()?;
     let stage = Stage::begin("bench");
     let rows = TASKS
@@ -117,7 +117,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         .collect::<Outcome<Vec<Row>>>()?;
     stage.done("one search per task");
     let own = json!({ "tasks": rows });
-    Ok(report((args, quiet), "bench plan", own, || {
+    Ok(report(args, "bench plan", own, || {
         println!("seed {}", args.seed);
         print_table(&rows, 1, TABLE);
     }))

@@ -5,19 +5,12 @@ use crate::report::joined;
 use cli_output::Machine;
 use serde_json::{Value, json};
 
-/// Prints the machine and the tables, unless `--json` is given, and returns what that
-/// prints: `own` fields in addition to those of every benchmark.
-pub fn report(
-    (args, quiet): (&BenchArgs, bool),
-    command: &str,
-    own: Value,
-    print: impl FnOnce(),
-) -> Option<Value> {
+/// Prints the machine and the tables, and returns what `--json` prints: `own` fields in
+/// addition to those of every benchmark.
+pub fn report(args: &BenchArgs, command: &str, own: Value, print: impl FnOnce()) -> Option<Value> {
     let machine = Machine::here();
-    if !quiet {
-        println!("{machine}");
-        print();
-    }
+    println!("{machine}");
+    print();
     let common = json!({
         "ok": true, "command": command, "machine": machine, "seed": args.seed,
         "quick": args.quick,

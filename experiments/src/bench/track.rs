@@ -4,14 +4,14 @@
 use super::report::report;
 use super::spent::{Spent, least};
 use crate::args::BenchArgs;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use arm_model::Pole;
 use camera_ingest::source::{FrameSource, StereoSource, read_film};
 use camera_ingest::{USUAL_KEYPOINTS, load_camera, open_video, track};
 use cli_output::table::numbers;
-use cli_output::{Failure, OrInput, Outcome, Stage};
-use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
-use run_log::files::{PoseSample, read_joints, read_pose};
+use cli_output::{OrInput, Outcome, Stage};
+use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
+use run_log::files::{read_joints, read_pose};
 use serde_json::{Map, Value, json};
 use shared_types::StereoCamera;
 use std::path::Path;
@@ -90,24 +90,18 @@ fn motion(folder: &Path) -> Outcome<Box<dyn AttachMotion>> {
         return Ok(Box::new(arm));
     }
     let path = folder.join("pose.csv");
-    let row = |sample: &PoseSample| PoseRow {
-        t_s: sample.t_s,
-        p_m: sample.p_m,
-        q_wxyz: sample.q_wxyz,
-    };
-    let poses: Vec<PoseRow> = read_pose(&path).or_input()?.iter().map(row).collect();
-    let track = PoseTrack::new(&poses)
+    let track = PoseTrack::new(&read_pose(&path).or_input()?)
         .with_context(|| format!("`{}`", path.display()))
         .or_input()?;
     Ok(Box::new(track))
 }
 
-pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let folder = args.video.as_ref().ok_or_else(|| {
-        Failure::input(anyhow!(
+        bad_input!(
             "`experiments bench track` needs a recorded wiggle: --video FOLDER with video.avi, \
              camera.toml and pose.csv or joints.csv"
-        ))
+        )
     })?;
     let (mut video, camera, motion) = recording(folder)?;
     let stage = Stage::begin("bench");
@@ -137,7 +131,7 @@ pub(super) fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         "stages_wall_ms": stages,
         "peak_memory_mb": peak_mb, "limit_mb": LIMIT_MB, "lost_fraction": least.lost_fraction,
     });
-    Ok(report((args, quiet), "bench track", own, || {
+    Ok(report(args, "bench track", own, || {
         println!("{frames} frames of `{}`", folder.display());
         let ms = |s: f64| format!("{:.2}", per_frame(s));
         let row = |name: &str, t: Spent| [name.to_owned(), ms(t.cpu_s), ms(t.wall_s)];

@@ -5,8 +5,7 @@ use super::picture::{Curve, Picture};
 use crate::args::ResultArgs;
 use crate::network::with_network;
 use crate::report::{Column, joined, print_table};
-use anyhow::anyhow;
-use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
+use cli_output::{OrInput, Outcome, Stage, interrupted};
 use experiments::trials::{Trial, TrialRig, run as identify_all};
 use planner::PlannerConfig;
 use planner::identify::{IdentifyOptions, Method};
@@ -35,7 +34,6 @@ pub(super) fn cm(m: f64) -> String {
 /// One run of a result.
 pub(super) struct Experiment<'a> {
     name: &'static str,
-    quiet: bool,
     stage: Stage,
     pub args: &'a ResultArgs,
     pub config: PlannerConfig,
@@ -59,7 +57,7 @@ pub(super) struct Sequence<T> {
 }
 
 impl<'a> Experiment<'a> {
-    pub fn begin(name: &'static str, args: &'a ResultArgs, quiet: bool) -> Outcome<Self> {
+    pub fn begin(name: &'static str, args: &'a ResultArgs) -> Outcome<Self> {
         let method: Method = args.method.into();
         let config = built_in().or_failed()?;
         let mut rig = TrialRig::new(&config.wiggle).or_failed()?;
@@ -67,7 +65,6 @@ impl<'a> Experiment<'a> {
         cli_output::watch_interrupts().or_failed()?;
         Ok(Self {
             name,
-            quiet,
             stage: Stage::begin(name),
             args,
             rig,
@@ -132,8 +129,7 @@ impl<'a> Experiment<'a> {
                     Some(_) => "; the same command resumes from there",
                     None => "; with --out FILE it could resume from there",
                 };
-                let reason = anyhow!("interrupted after {done} of {count} ropes{how}");
-                return Err(Failure::failed(reason));
+                return Err(failed!("interrupted after {done} of {count} ropes{how}"));
             }
         }
         Ok(checkpoint.trials)
@@ -194,8 +190,8 @@ impl<'a> Experiment<'a> {
         })
     }
 
-    /// Ends the run: prints its tables, unless `--json` is given, and returns what that
-    /// prints: `own` fields in addition to those of every result.
+    /// Ends the run: prints its tables and returns what `--json` prints:
+    /// `own` fields in addition to those of every result.
     pub fn finish(
         self,
         summary: &str,
@@ -204,9 +200,7 @@ impl<'a> Experiment<'a> {
         print: impl FnOnce(),
     ) -> Outcome<Option<Value>> {
         let seconds = self.stage.done(summary);
-        if !self.quiet {
-            print();
-        }
+        print();
         let common = json!({
             "ok": true, "command": self.name, "version": shared_types::VERSION,
             "seed": self.args.seed, "method": self.options.method, "seconds": seconds,

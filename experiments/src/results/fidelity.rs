@@ -9,9 +9,9 @@ use super::experiment::{Experiment, cm};
 use super::picture::Curve;
 use super::spectra::{Points, mean_distance_m, spectra_correlation};
 use crate::report::{Column, print_table};
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use arm_model::{JointTrajectory, Pole};
-use cli_output::{Failure, OrInput, Outcome, interrupted};
+use cli_output::{OrInput, Outcome, interrupted};
 use experiments::trials::{KEYPOINTS, TrialRig, mean};
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest};
@@ -253,7 +253,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let mut rows: Vec<FidelityRow> = Vec::new();
     for (index, rope) in (0_u64..).zip(&ropes) {
         if interrupted().load(Ordering::SeqCst) {
-            return Err(Failure::failed(anyhow!("interrupted")));
+            return Err(failed!("interrupted"));
         }
         let row = compare(&experiment, rope, &throw, index);
         let row = row.with_context(|| rope.name.clone()).or_failed()?;

@@ -106,7 +106,7 @@ fn trials(
 ) -> anyhow::Result<Vec<LobDrapeTrial>> {
     let seed = experiment.args.seed;
     let (rig, options) = (&experiment.rig, &experiment.options);
-    in_parallel(indices, options.threads, |index| {
+    in_parallel("trial", indices, options.threads, |index| {
         let at = usize::try_from(index).unwrap_or(usize::MAX) % ropes.len().max(1);
         let (name, truth) = &ropes[at];
         let filmed = rig.film(truth, seed, index)?;

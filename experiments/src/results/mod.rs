@@ -29,7 +29,7 @@ use serde_json::Value;
 type Study = fn(Experiment<'_>) -> Outcome<Option<Value>>;
 
 /// Makes a result. The value is what `--json` prints.
-pub fn run(command: &ResultCommand, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
     let (name, args, study): (_, &ResultArgs, Study) = match command {
         ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
         ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
@@ -41,5 +41,5 @@ pub fn run(command: &ResultCommand, quiet: bool) -> Outcome<Option<Value>> {
         ResultCommand::ParameterImportance(args) => ("parameter-importance", args, importance::run),
         ResultCommand::SensitivityMaps(args) => ("sensitivity-maps", args, sensitivity::run),
     };
-    study(Experiment::begin(name, args, quiet)?)
+    study(Experiment::begin(name, args)?)
 }

@@ -138,9 +138,7 @@ fn rows(trials: &[PipelineTrial]) -> (Vec<Row>, Vec<Curve>) {
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let figure = |t: &PipelineTrial| 100.0 * t.identified.error_m;
     let sequence = experiment.sequence(ROPES, 2, (figure, "ropes, cm identified"));
-    let trials = experiment.trials(sequence, |batch| {
-        strike_trials(&experiment, batch, PipelineTrial::of)
-    })?;
+    let trials = strike_trials(&experiment, sequence, PipelineTrial::of)?;
     let axis = "distance of tip and target (cm); dashed: the paper's median";
     experiment.finish_rows(trials.len(), rows(&trials), axis, TABLE)
 }

@@ -130,9 +130,7 @@ fn row(
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let figure = |t: &RobustTrial| 100.0 * t.robust.strike.error_m;
     let sequence = experiment.sequence(ROPES, 2, (figure, "ropes, cm robust"));
-    let trials = experiment.trials(sequence, |batch| {
-        strike_trials(&experiment, batch, RobustTrial::of)
-    })?;
+    let trials = strike_trials(&experiment, sequence, RobustTrial::of)?;
     let rows = [
         row(&trials, "for the identified rope", |t| t.plain),
         row(&trials, "for sixteen it might be", |t| t.robust),

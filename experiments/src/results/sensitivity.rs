@@ -9,8 +9,7 @@ use super::sensitivity_picture::svg;
 use crate::args::MethodName;
 use crate::network::network;
 use crate::report::{Column, print_table};
-use anyhow::anyhow;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use experiments::trials::in_parallel;
 use planner::ropes::trial_rope;
 use run_log::files;
@@ -111,9 +110,9 @@ fn mean(trials: &[SensitivityTrial]) -> Option<SensitivityMap> {
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let args = experiment.args;
     if !matches!(args.method, MethodName::Hybrid | MethodName::Nn) {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "these are maps of the network: leave out --method, or name nn"
-        )));
+        ));
     }
     let net = network(args.model.as_deref())?.for_camera().or_input()?;
     let weights = &net.metadata().graph_sha256;
@@ -124,15 +123,14 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     };
     let (rig, seed) = (&experiment.rig, args.seed);
     let trials = experiment.trials(sequence, |batch| {
-        in_parallel(batch, experiment.options.threads, |index| {
+        in_parallel("trial", batch, experiment.options.threads, |index| {
             let filmed = rig.film(&trial_rope(seed, index), seed, index)?;
             let features = net.see(&rig.observation(&filmed))?;
             let map = SensitivityMap::measure(&net, &features)?;
             Ok(SensitivityTrial { index, map })
         })
     })?;
-    let map = mean(&trials)
-        .ok_or_else(|| Failure::input(anyhow!("--ropes is 0, but must be 1 or more")))?;
+    let map = mean(&trials).ok_or_else(|| bad_input!("--ropes is 0, but must be 1 or more"))?;
     let moment_s = MOMENT_FRAMES as f64 / net.metadata().features.rate_hz;
     let rows = rows(&map, moment_s);
     let picture = args.out.as_deref().map(beside);

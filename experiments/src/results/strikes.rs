@@ -1,14 +1,16 @@
 //! Throws planned for one rope and thrown with another, and what every table of strikes
 //! begins with: a rope filmed, identified and given a target to strike.
 
-use super::experiment::Experiment;
+use super::experiment::{Experiment, Sequence};
 use arm_model::Cell;
+use cli_output::Outcome;
 use experiments::trials::{alone, in_parallel};
 use planner::plan::{
     PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, ThrowGoal, ThrowOutcome,
     ThrowSimulator, simulator_for,
 };
 use planner::ropes::{random_strike_target, trial_rope};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use shared_types::{Plan, RopeEstimate, RopeParams, Task};
 use std::ops::ControlFlow;
@@ -109,14 +111,14 @@ pub(super) struct StrikeCase {
     pub thrower: Thrower,
 }
 
-/// Makes a trial of each of these indices with `make`.
-pub(super) fn strike_trials<T: Send>(
+/// The trials of a sequence, each made with `make`.
+pub(super) fn strike_trials<T: Send + Serialize + DeserializeOwned>(
     experiment: &Experiment<'_>,
-    indices: &[u64],
+    sequence: Sequence<T>,
     make: impl Fn(&StrikeCase) -> Result<T, PlanError> + Sync,
-) -> anyhow::Result<Vec<T>> {
+) -> Outcome<Vec<T>> {
     let (seed, rig, options) = (experiment.args.seed, &experiment.rig, &experiment.options);
-    in_parallel(indices, options.threads, |index| {
+    let trial = |index| {
         let truth = trial_rope(seed, index);
         let target_m = random_strike_target((seed << 32) ^ index);
         let filmed = rig.film(&truth, seed, index)?;
@@ -128,5 +130,8 @@ pub(super) fn strike_trials<T: Send>(
             thrower: Thrower::new(experiment, index, (Task::Strike, target_m), truth),
         };
         Ok(make(&case)?)
+    };
+    experiment.trials(sequence, |batch| {
+        in_parallel("trial", batch, options.threads, trial)
     })
 }

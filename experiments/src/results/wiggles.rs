@@ -8,10 +8,9 @@ use super::ablated_wiggles::{AblatedWiggle, ablated_wiggles};
 use super::experiment::{Experiment, Sequence};
 use super::picture::Curve;
 use crate::args::MethodName;
-use anyhow::anyhow;
 use arm_model::Pole;
 use cli_output::table::numbers;
-use cli_output::{Failure, OrInput, Outcome};
+use cli_output::{OrInput, Outcome};
 use experiments::trials::{SysidSummary, Trial, TrialRig, mean, run as trials, summarise};
 use planner::ropes::trial_rope;
 use rope_sim::PlannedArm;
@@ -43,17 +42,15 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         ..
     } = &experiment;
     if args.method == MethodName::Nn || args.model.is_some() {
-        return Err(Failure::input(anyhow!(
+        return Err(bad_input!(
             "the network is trained on one wiggle only: use --method hybrid or cmaes, without --model"
-        )));
+        ));
     }
     let figure = |t: &Trial| t.residual_px;
     let asked = experiment.sequence(ROPES, 4, (figure, "ropes, residual px"));
     let ropes = asked.count;
     if ropes == 0 {
-        return Err(Failure::input(anyhow!(
-            "--ropes is 0, but must be 1 or more"
-        )));
+        return Err(bad_input!("--ropes is 0, but must be 1 or more"));
     }
     let wiggles = ablated_wiggles(&config.wiggle).or_failed()?;
     // The network is not taken along: it is trained on one wiggle only.

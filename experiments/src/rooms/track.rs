@@ -2,10 +2,9 @@
 
 use super::fate::{Fate, Tracked};
 use super::folder;
-use super::folder_of;
 use super::score::Score;
-use super::side_by_side::each;
 use super::summary::{Row, reliability, rows};
+use super::{each, folder_of};
 use crate::args::TrackRoomsArgs;
 use crate::report::{Column, print_table};
 use anyhow::{Context, ensure};
@@ -128,11 +127,10 @@ fn result(args: &TrackRoomsArgs, seed: u64, kind: Kind) -> anyhow::Result<Tracke
 }
 
 /// Tracks films. The value is what `--json` prints.
-pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
-    let kind = Kind::from(args.kind);
+pub fn run(args: &TrackRoomsArgs) -> Outcome<Option<Value>> {
+    let kind = Kind::from(args.which.kind);
     let stage = Stage::begin("track-rooms");
-    let seeds: Vec<u64> = args.seeds.clone().collect();
-    let all = each(&seeds, args.threads, |seed| {
+    let all = each(&args.which, |seed| {
         let tracked = result(args, seed, kind)?;
         stage.say(format!("seed {seed}"));
         Ok(tracked)
@@ -140,21 +138,19 @@ pub fn run(args: &TrackRoomsArgs, quiet: bool) -> Outcome<Option<Value>> {
     .or_input()?;
     let seconds = stage.done(&format!("{} films", all.len()));
     let rows = rows(&all);
-    if !quiet {
-        print_table(&rows, 0, TABLE);
+    print_table(&rows, 0, TABLE);
+    println!(
+        "in brackets: 95 % limits (Wilson); wrong: 5 frames or more with a trusted keypoint more than 10 px off"
+    );
+    for (from, n, near) in reliability(&all) {
         println!(
-            "in brackets: 95 % limits (Wilson); wrong: 5 frames or more with a trusted keypoint more than 10 px off"
+            "confidence {from:.1} to {:.1}: {n} keypoints, {:.1} % within 3 px",
+            from + 0.1,
+            100.0 * near
         );
-        for (from, n, near) in reliability(&all) {
-            println!(
-                "confidence {from:.1} to {:.1}: {n} keypoints, {:.1} % within 3 px",
-                from + 0.1,
-                100.0 * near
-            );
-        }
-        for film in all.iter().filter(|f| !f.is_followed()) {
-            println!("{}", film.said());
-        }
+    }
+    for film in all.iter().filter(|f| !f.is_followed()) {
+        println!("{}", film.said());
     }
     Ok(Some(json!({
         "ok": true, "command": "track-rooms", "kind": kind, "films": all,

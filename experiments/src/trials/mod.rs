@@ -14,9 +14,8 @@ use planner::ropes::TRIAL_SALT;
 use planner::synthetic::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
 
 use anyhow::Context;
-use arm_model::{Limits, Pole};
 use planner::identify::{IdentifyError, IdentifyOptions, Method};
-use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
+use planner::wiggle::{WiggleConfig, WiggleError, wiggling_arm};
 use planner::workers::map_in_order;
 use rope_sim::{PlannedArm, SimulateError};
 use serde::{Deserialize, Serialize};
@@ -24,6 +23,7 @@ use shared_types::rope::ROPE_PARAMETERS;
 use shared_types::{RopeEstimate, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Keypoints per frame.
 pub const KEYPOINTS: usize = 24;
@@ -75,7 +75,7 @@ impl TrialRig {
     /// If the arm may not execute it.
     pub fn new(config: &WiggleConfig) -> Result<Self, WiggleError> {
         Ok(Self {
-            motion: PlannedArm::new(wiggle(config, &Limits::default())?, Pole::default()),
+            motion: wiggling_arm(config)?,
             camera: side_camera(),
             randomisation: Randomisation::default(),
             points: ObservedPoints::ArcLength,
@@ -157,18 +157,28 @@ impl Trial {
     }
 }
 
-/// Makes the trials with these indices, in parallel; in their order, whatever the
-/// threads.
+/// Makes the trials (or what else `name` says) with these numbers, in parallel; in their
+/// order, whatever the threads. After a failure no further one is begun.
 ///
 /// # Errors
-/// The first trial that cannot be made.
+/// The first in that order that was begun and failed.
 pub fn in_parallel<T: Send>(
-    indices: &[u64],
+    name: &str,
+    numbers: &[u64],
     threads: usize,
     make: impl Fn(u64) -> anyhow::Result<T> + Sync,
 ) -> anyhow::Result<Vec<T>> {
-    let trial = |&index: &u64| make(index).with_context(|| format!("trial {index}"));
-    map_in_order(indices, threads, trial).into_iter().collect()
+    let failed = AtomicBool::new(false);
+    let results = map_in_order(numbers, threads, |&number| {
+        if failed.load(Ordering::Relaxed) {
+            return None;
+        }
+        let result = make(number).with_context(|| format!("{name} {number}"));
+        failed.fetch_or(result.is_err(), Ordering::Relaxed);
+        Some(result)
+    });
+    // What was not begun comes with a failure.
+    results.into_iter().flatten().collect()
 }
 
 /// Films and identifies the ropes with these indices.
@@ -181,7 +191,7 @@ pub fn run(
     indices: &[u64],
     options: &IdentifyOptions,
 ) -> anyhow::Result<Vec<Trial>> {
-    in_parallel(indices, options.threads, |index| {
+    in_parallel("trial", indices, options.threads, |index| {
         let truth = rope(index);
         let filmed = rig.film(&truth, options.seed, index)?;
         let found = rig.fit(&filmed, index, &alone(options))?;
@@ -195,5 +205,22 @@ pub fn alone(options: &IdentifyOptions) -> IdentifyOptions {
     IdentifyOptions {
         threads: 1,
         ..*options
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_and_a_failure_names_its_number() {
+        let seeds: Vec<u64> = (1..40).collect();
+        assert_eq!(in_parallel("seed", &seeds, 3, Ok).unwrap(), seeds);
+        let fails = |seed: u64| -> anyhow::Result<u64> {
+            anyhow::ensure!(seed != 7, "no");
+            Ok(seed)
+        };
+        let error = in_parallel("seed", &seeds, 2, fails).unwrap_err();
+        assert!(format!("{error:#}").contains("seed 7"));
     }
 }

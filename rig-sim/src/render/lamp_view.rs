@@ -2,6 +2,7 @@
 
 use super::solid::Solid;
 use crate::room::lamp::Lamp;
+use core::ops::Range;
 use nalgebra::Vector3;
 
 /// Texels along each side of a lamp's picture.
@@ -58,6 +59,11 @@ pub(crate) struct Cover {
 
 const NOTHING: [[usize; 2]; 2] = [[SIDE, 0], [SIDE, 0]];
 
+/// The texels of these columns and rows, row by row.
+fn spans([[low, high], [top, bottom]]: [[usize; 2]; 2]) -> impl Iterator<Item = Range<usize>> {
+    (top..bottom).map(move |row| row * SIDE + low..row * SIDE + high)
+}
+
 impl Cover {
     pub(crate) fn empty() -> Self {
         Self {
@@ -67,10 +73,7 @@ impl Cover {
     }
 
     pub(crate) fn clear(&mut self) {
-        let [[low, high], rows] = self.used;
-        for row in rows[0]..rows[1] {
-            self.texels[row * SIDE + low..row * SIDE + high].fill(0.0);
-        }
+        spans(self.used).for_each(|span| self.texels[span].fill(0.0));
         self.used = NOTHING;
     }
 
@@ -146,9 +149,7 @@ impl Cover {
     /// Becomes the same as another.
     pub(crate) fn copy(&mut self, other: &Self) {
         self.clear();
-        let [[low, high], rows] = other.used;
-        for row in rows[0]..rows[1] {
-            let span = row * SIDE + low..row * SIDE + high;
+        for span in spans(other.used) {
             self.texels[span.clone()].copy_from_slice(&other.texels[span]);
         }
         self.used = other.used;
@@ -159,9 +160,7 @@ impl Cover {
         for (used, moving) in self.used.iter_mut().zip(moving.used) {
             *used = [used[0].min(moving[0]), used[1].max(moving[1])];
         }
-        let [[low, high], rows] = moving.used;
-        for row in rows[0]..rows[1] {
-            let span = row * SIDE + low..row * SIDE + high;
+        for span in spans(moving.used) {
             let covers = still.texels[span.clone()]
                 .iter()
                 .zip(&moving.texels[span.clone()]);

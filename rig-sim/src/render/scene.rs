@@ -8,7 +8,7 @@ use super::lamp_view::LampView;
 use super::sensor::{Sensor, brighten};
 use super::shadows::Shadows;
 use super::shutter::RowTimes;
-use super::surroundings::{View, rope_look};
+use super::surroundings::View;
 use crate::room::bystander::Bystanders;
 use crate::room::{Picture, Room};
 use arm_model::Cell;
@@ -85,7 +85,7 @@ impl Renderer {
     pub fn in_room(
         camera: &StereoCamera,
         cell: &Cell,
-        rope: RopeShape,
+        shape: RopeShape,
         room: &Room,
         (target_rgb, frame_rate_hz): ([u8; 3], f64),
         seed: u64,
@@ -94,7 +94,12 @@ impl Renderer {
         let lamps: Vec<_> = lamps
             .map(|lamp| LampView::of(lamp, room.still.wall_y_m))
             .collect();
-        let (look, appearance) = (rope_look(room, rope), room.appearance(target_rgb));
+        let appearance = room.appearance(target_rgb);
+        let look = RopeLook {
+            shape,
+            cord: room.rope.cord,
+            lead: room.rope.lead,
+        };
         let views = lamps.clone();
         let view = |eye: &Eye| View::of(eye, room, &views);
         let noise = (room.picture.noise_levels, seed);

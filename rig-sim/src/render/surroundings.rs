@@ -2,7 +2,6 @@
 
 use super::appearance::Appearance;
 use super::backdrop::PlainRoom;
-use super::bodies::{RopeLook, RopeShape};
 use super::colour::{Ycc, ycc};
 use super::eye::{Eye, Vignette};
 use super::lamp_view::LampView;
@@ -147,13 +146,4 @@ fn veil(eye: &Eye, room: &Room) -> Vec<f32> {
         .flat_map(|v| (0..width).map(move |u| (u, v)))
         .map(|(u, v)| level(u, v))
         .collect()
-}
-
-/// The rope's look in a room.
-pub(super) fn rope_look(room: &Room, shape: RopeShape) -> RopeLook {
-    RopeLook {
-        shape,
-        cord: room.rope.cord,
-        lead: room.rope.lead,
-    }
 }

@@ -40,38 +40,28 @@ pub(crate) struct Look {
     pub(crate) shares: [f64; LAMPS],
 }
 
-/// A surface met, before it is lit.
-struct Met<'a> {
-    hit: Hit,
-    paint: &'a Paint,
-}
-
 impl Still {
     /// What a ray meets; `chance` (0 to 1 each) chooses the place on round lamps that a
     /// surface looks at.
     pub(crate) fn look(&self, origin: &Vector3<f64>, ray: &Vector3<f64>, chance: [f64; 2]) -> Look {
-        let Some(met) = self.meet(origin, ray) else {
+        let Some((hit, paint)) = self.meet(origin, ray) else {
             return Look {
                 rgb: Rgb::repeat(60.0 * self.gain),
                 at_m: origin + ray * 1e3,
                 shares: [0.0; LAMPS],
             };
         };
-        let at_m = origin + ray * met.hit.t;
-        let [s, t] = met.hit.place;
-        let own = met.paint.at(s, t);
-        if met.paint.glows(s, t) {
-            let shares = [0.0; LAMPS];
-            return Look {
-                rgb: own,
-                at_m,
-                shares,
-            };
-        }
+        let at_m = origin + ray * hit.t;
+        let [s, t] = hit.place;
+        let own = paint.at(s, t);
         let mut shares = [0.0; LAMPS];
-        let lifted = at_m + met.hit.normal * LIFT_M;
+        if paint.glows(s, t) {
+            let rgb = own;
+            return Look { rgb, at_m, shares };
+        }
+        let lifted = at_m + hit.normal * LIFT_M;
         for (share, lamp) in shares.iter_mut().zip(&self.lamps) {
-            let light = lamp.light(&at_m, &met.hit.normal);
+            let light = lamp.light(&at_m, &hit.normal);
             if light > 0.0 {
                 let free = (0..LOOKS).filter(|i| {
                     // Golden parts spread a few places well.
@@ -82,7 +72,7 @@ impl Still {
                 *share = light * free.count() as f64 / f64::from(LOOKS);
             }
         }
-        let ambient = self.ambient * self.openness(&at_m, &met.hit.normal);
+        let ambient = self.ambient * self.openness(&at_m, &hit.normal);
         let direct: f64 = shares.iter().sum();
         let all = ambient + direct;
         let tint = (self.tints[0] * ambient + self.tints[1] * direct) / all.max(1e-9);
@@ -111,21 +101,13 @@ impl Still {
         above * before
     }
 
-    fn meet(&self, origin: &Vector3<f64>, ray: &Vector3<f64>) -> Option<Met<'_>> {
-        let things = self.things.iter().filter_map(|thing| {
-            let hit = thing.shape.hit(origin, ray)?;
-            let paint = &thing.paint;
-            Some(Met { hit, paint })
-        });
+    /// Where a ray meets the nearest surface, and that surface.
+    fn meet(&self, origin: &Vector3<f64>, ray: &Vector3<f64>) -> Option<(Hit, &Paint)> {
+        let things = self.things.iter();
+        let things = things.filter_map(|t| Some((t.shape.hit(origin, ray)?, &t.paint)));
         let plane = |t: f64, normal: Vector3<f64>, paint, place: fn(&Vector3<f64>) -> [f64; 2]| {
-            (t > 0.0).then(|| Met {
-                hit: Hit {
-                    t,
-                    normal,
-                    place: place(&(origin + ray * t)),
-                },
-                paint,
-            })
+            let place = place(&(origin + ray * t));
+            (t > 0.0).then_some((Hit { t, normal, place }, paint))
         };
         let to_wall = (self.wall_y_m - origin.y) / ray.y;
         let to_floor = (self.floor_z_m - origin.z) / ray.z;
@@ -134,7 +116,7 @@ impl Still {
         things
             .chain(wall)
             .chain(floor)
-            .min_by(|a, b| a.hit.t.total_cmp(&b.hit.t))
+            .min_by(|a, b| a.0.t.total_cmp(&b.0.t))
     }
 
     fn is_between(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {

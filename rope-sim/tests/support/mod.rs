@@ -14,12 +14,19 @@ use arm_model::kinematics::FrameMotion;
 use arm_model::{JointTrajectory, JointVector, Pole};
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, Scene, SimOptions, Start,
-    roll_out_in,
+    AirDrag, AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, Scene,
+    SimOptions, Start, roll_out_in,
 };
 use shared_types::RopeParams;
 
 pub const G_M_S2: f64 = 9.81;
+
+pub const AIR: AirDrag = AirDrag {
+    air_density_kg_m3: 1.2,
+    normal_coefficient: 1.1,
+    tangential_coefficient: 0.02,
+    lead_coefficient: 0.5,
+};
 
 /// A soft rope whose links' inertia follows from the extra scale.
 pub fn rope() -> RopeParams {

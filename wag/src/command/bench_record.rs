@@ -110,7 +110,7 @@ fn measure(
         pipeline::move_to(session, &arm, motion.start(), MOVE_SPEED)?;
         let with = matches!(block % 4, 1 | 2);
         if with {
-            let camera = rig.stereo_camera();
+            let camera = rig.camera.stereo_camera();
             pipeline::start_recorder(session, folder, limits, Some(&camera), rig.target_m)?;
         }
         pipeline::arm_for(session, &arm, OperatingMode::Wiggle)?;

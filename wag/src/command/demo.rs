@@ -161,7 +161,7 @@ impl<'a> Demo<'a> {
         let stage = Stage::begin("start");
         let limits = config::here::<Limits>(None)?;
         // The calibration lies in the run folder as a lab's would.
-        let calibration = rig_config.stereo_camera();
+        let calibration = rig_config.camera.stereo_camera();
         let (conf, mode) = (Path::new("camera.conf"), VideoMode::Vga);
         write_factory_conf(&folder.path().join(conf), &calibration, mode)?;
         write_camera_toml(&folder.file("camera.toml"), &calibration, mode, conf)?;

@@ -1,6 +1,5 @@
 //! `wag sim`: rope simulation from files to files.
 
-use super::filmed::read_pose;
 use crate::cli::{SimRopeArgs, SimThrowArgs};
 use crate::config;
 use anyhow::{Context, ensure};
@@ -66,7 +65,7 @@ fn options(step_s: f64, start: Start, duration_s: f64, rate_hz: f64) -> SimOptio
 
 pub fn rope(args: &SimRopeArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
-    let rows = read_pose(&args.pose).or_input()?;
+    let rows = files::read_pose(&args.pose).or_input()?;
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
         return Err(bad_input!("`{}` is empty", args.pose.display()));
     };

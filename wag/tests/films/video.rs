@@ -3,10 +3,8 @@
 
 use super::support::{json_in, shared};
 use nalgebra::Vector3;
-use rope_sim::{
-    Candidate, FrameTimes, PoseRow, PoseTrack, Precision, SimOptions, Start, Watch, roll_out,
-};
-use run_log::files::{PoseSample, read_pose};
+use rope_sim::{Candidate, FrameTimes, PoseTrack, Precision, SimOptions, Start, Watch, roll_out};
+use run_log::files::read_pose;
 use serde_json::Value;
 use shared_types::RopeParams;
 use std::path::Path;
@@ -48,14 +46,8 @@ fn truth(folder: &Path) -> RopeParams {
 
 /// Path of the tip in the fling of the reference trajectories.
 fn fling(rope: &RopeParams) -> Vec<Vector3<f64>> {
-    let row = |s: PoseSample| PoseRow {
-        t_s: s.t_s,
-        p_m: s.p_m,
-        q_wxyz: s.q_wxyz,
-    };
     let path = shared("reference/rope-truth/pose-M3.csv").unwrap();
-    let rows: Vec<PoseRow> = read_pose(&path).unwrap().into_iter().map(row).collect();
-    let motion = PoseTrack::new(&rows).unwrap();
+    let motion = PoseTrack::new(&read_pose(&path).unwrap()).unwrap();
     let options = SimOptions {
         step_s: 5e-4,
         precision: Precision::F64,

@@ -44,7 +44,7 @@ struct Report {
     candidates: Vec<scaling::CandidateRow>,
 }
 
-pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
+pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let extent = Extent::of(args.quick);
     let workload = Workload::new(args.seed).or_failed()?;
     let stage = Stage::begin("kernels");
@@ -69,7 +69,7 @@ pub fn run(args: &BenchArgs, quiet: bool) -> Outcome<Option<Value>> {
         candidates,
     };
     let own = serde_json::to_value(&measured).or_failed()?;
-    Ok(report((args, quiet), "bench rope", own, || {
+    Ok(report(args, "bench rope", own, || {
         let rough = if args.quick {
             "; quick: few candidates, rough figures"
         } else {
