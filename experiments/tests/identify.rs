@@ -10,7 +10,7 @@ use planner::observation::{Appearance, Observation, ObservedPoints};
 use planner::ropes::{outside_rope, random_rope, trial_rope};
 use planner::synthetic::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
 use planner::wiggle::{WiggleConfig, wiggle};
-use rope_sim::{AttachMotion, PlannedArm, PoseRow, PoseTrack};
+use rope_sim::{AttachMotion, PlannedArm, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, RopeParams, StereoCamera};
 use std::ops::ControlFlow;
@@ -253,13 +253,8 @@ fn useless_films_are_refused_with_the_reason() {
 }
 
 fn pose_of(folder: &Path) -> PoseTrack {
-    let samples = run_log::files::read_pose(&folder.join("pose.csv")).unwrap();
-    let rows = samples.into_iter().map(|s| PoseRow {
-        t_s: s.t_s,
-        p_m: s.p_m,
-        q_wxyz: s.q_wxyz,
-    });
-    PoseTrack::new(&rows.collect::<Vec<PoseRow>>()).unwrap()
+    let rows = run_log::files::read_pose(&folder.join("pose.csv")).unwrap();
+    PoseTrack::new(&rows).unwrap()
 }
 
 fn true_keypoints_of(folder: &Path) -> KeypointTrack {

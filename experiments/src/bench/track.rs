@@ -10,8 +10,8 @@ use camera_ingest::source::{FrameSource, StereoSource, read_film};
 use camera_ingest::{USUAL_KEYPOINTS, load_camera, open_video, track};
 use cli_output::table::numbers;
 use cli_output::{Failure, OrInput, Outcome, Stage};
-use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
-use run_log::files::{PoseSample, read_joints, read_pose};
+use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
+use run_log::files::{read_joints, read_pose};
 use serde_json::{Map, Value, json};
 use shared_types::StereoCamera;
 use std::path::Path;
@@ -90,13 +90,7 @@ fn motion(folder: &Path) -> Outcome<Box<dyn AttachMotion>> {
         return Ok(Box::new(arm));
     }
     let path = folder.join("pose.csv");
-    let row = |sample: &PoseSample| PoseRow {
-        t_s: sample.t_s,
-        p_m: sample.p_m,
-        q_wxyz: sample.q_wxyz,
-    };
-    let poses: Vec<PoseRow> = read_pose(&path).or_input()?.iter().map(row).collect();
-    let track = PoseTrack::new(&poses)
+    let track = PoseTrack::new(&read_pose(&path).or_input()?)
         .with_context(|| format!("`{}`", path.display()))
         .or_input()?;
     Ok(Box::new(track))

@@ -3,6 +3,7 @@
 use super::text::cannot_read;
 use anyhow::{Context, Result, bail, ensure};
 use arm_model::{JOINTS, JointTrajectory, JointVector};
+use rope_sim::PoseRow;
 use std::path::Path;
 
 /// Joint samples: times (s) and positions (rad).
@@ -112,19 +113,8 @@ pub fn write_trajectory(path: &Path, trajectory: &JointTrajectory, period_s: f64
     write_joints(path, rows)
 }
 
-/// A pose of the attach frame in the world frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PoseSample {
-    /// Time (s).
-    pub t_s: f64,
-    /// Origin (m).
-    pub p_m: [f64; 3],
-    /// Unit quaternion w, x, y, z.
-    pub q_wxyz: [f64; 4],
-}
-
 /// Reads `t,x,y,z,qw,qx,qy,qz` (s, m, unit quaternion of the attach frame).
-pub fn read_pose(path: &Path) -> Result<Vec<PoseSample>> {
+pub fn read_pose(path: &Path) -> Result<Vec<PoseRow>> {
     let rows = read_table(path, &["t", "x", "y", "z", "qw", "qx", "qy", "qz"])?;
     for (i, r) in rows.iter().enumerate() {
         let norm = r[4..8].iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -137,7 +127,7 @@ pub fn read_pose(path: &Path) -> Result<Vec<PoseSample>> {
     }
     Ok(rows
         .iter()
-        .map(|r| PoseSample {
+        .map(|r| PoseRow {
             t_s: r[0],
             p_m: [r[1], r[2], r[3]],
             q_wxyz: [r[4], r[5], r[6], r[7]],

@@ -7,9 +7,9 @@ use arm_model::{Cell, Pole};
 use camera_ingest::source::{AnySource, BothEyes, run_file};
 use camera_ingest::{load_camera, open_video};
 use cli_output::{OrInput, Outcome};
-use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
+use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use run_log::Run;
-use run_log::files::{self, JointsCsv, PoseSample};
+use run_log::files::{self, JointsCsv};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 
@@ -60,22 +60,12 @@ impl ClampMotion {
             let arm = MeasuredArm::new(&times_s, &csv.q, self.pole).with_context(file)?;
             return Ok(Box::new(arm));
         }
-        let mut rows = read_pose(&self.path)?;
+        let mut rows = files::read_pose(&self.path)?;
         for row in &mut rows {
             row.t_s += self.late_s;
         }
         Ok(Box::new(PoseTrack::new(&rows).with_context(file)?))
     }
-}
-
-/// Poses of the attach frame, for the simulator.
-pub fn read_pose(path: &Path) -> anyhow::Result<Vec<PoseRow>> {
-    let row = |s: PoseSample| PoseRow {
-        t_s: s.t_s,
-        p_m: s.p_m,
-        q_wxyz: s.q_wxyz,
-    };
-    Ok(files::read_pose(path)?.into_iter().map(row).collect())
 }
 
 /// A film of a rope.
@@ -86,7 +76,6 @@ pub struct Filmed {
     pub path: PathBuf,
     /// What filmed it.
     pub camera: StereoCamera,
-    /// The clamp's motion.
     pub motion: ClampMotion,
     /// What is missing or damaged.
     pub warnings: Vec<String>,

@@ -11,8 +11,8 @@ use camera_ingest::{load_camera, open_video, track};
 use nalgebra::{Rotation3, Vector3};
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
-use rope_sim::{PoseRow, PoseTrack};
-use run_log::files::{PoseSample, read_pose};
+use rope_sim::PoseTrack;
+use run_log::files::read_pose;
 use shared_types::{KeypointTrack, StereoCamera};
 use std::fs;
 use std::path::Path;
@@ -67,13 +67,7 @@ fn excerpt(from: &Path) -> tempfile::TempDir {
 /// Keypoints of the beginning of a recording, by the library from the film.
 fn keypoints(from: &Path) -> KeypointTrack {
     let camera = load_camera(&from.join("camera.toml")).unwrap();
-    let row = |row: &PoseSample| PoseRow {
-        t_s: row.t_s,
-        p_m: row.p_m,
-        q_wxyz: row.q_wxyz,
-    };
-    let poses = read_pose(&from.join("pose.csv")).unwrap();
-    let motion = PoseTrack::new(&poses.iter().map(row).collect::<Vec<_>>()).unwrap();
+    let motion = PoseTrack::new(&read_pose(&from.join("pose.csv")).unwrap()).unwrap();
     let mut video = open_video(from, None).unwrap();
     let all: Vec<StereoFrame> = (0..FRAMES).map(|i| video.read(i).unwrap()).collect();
     let eyes = read_film(&mut { all }).unwrap();

@@ -3,10 +3,8 @@
 
 use super::support::{json_in, shared};
 use nalgebra::Vector3;
-use rope_sim::{
-    Candidate, FrameTimes, PoseRow, PoseTrack, Precision, SimOptions, Start, Watch, roll_out,
-};
-use run_log::files::{PoseSample, read_pose};
+use rope_sim::{Candidate, FrameTimes, PoseTrack, Precision, SimOptions, roll_out};
+use run_log::files::read_pose;
 use serde_json::Value;
 use shared_types::RopeParams;
 use std::path::Path;
@@ -48,26 +46,15 @@ fn truth(folder: &Path) -> RopeParams {
 
 /// Path of the tip in the fling of the reference trajectories.
 fn fling(rope: &RopeParams) -> Vec<Vector3<f64>> {
-    let row = |s: PoseSample| PoseRow {
-        t_s: s.t_s,
-        p_m: s.p_m,
-        q_wxyz: s.q_wxyz,
-    };
     let path = shared("reference/rope-truth/pose-M3.csv").unwrap();
-    let rows: Vec<PoseRow> = read_pose(&path).unwrap().into_iter().map(row).collect();
-    let motion = PoseTrack::new(&rows).unwrap();
+    let motion = PoseTrack::new(&read_pose(&path).unwrap()).unwrap();
     let options = SimOptions {
-        step_s: 5e-4,
-        precision: Precision::F64,
-        start: Start::Equilibrium,
         frames: FrameTimes {
             first_s: 0.0,
             period_s: 1.0 / RATE_HZ,
             count: 360,
         },
-        watch: Watch::NOTHING,
-        horizon_s: FLING_S,
-        threads: 1,
+        ..SimOptions::new(5e-4, Precision::F64, FLING_S)
     };
     let rollouts = roll_out(&[Candidate::new(rope, &motion)], &options).unwrap();
     let nodes = &rollouts[0].nodes;
