@@ -22,5 +22,7 @@ pub mod table;
 pub use anyhow::anyhow;
 pub use failure::{Failure, OrInput, Outcome};
 pub use machine::Machine;
-pub use program::{finish, interrupted, refuse_usage, seed, start, watch_interrupts};
+pub use program::{
+    finish, interrupted, is_interrupted, refuse_usage, seed, start, watch_interrupts,
+};
 pub use progress::Stage;

@@ -47,19 +47,21 @@ struct State {
     object: bool,
 }
 
-static STATE: Mutex<State> = Mutex::new(State {
-    json: false,
-    taken: false,
-    closed: false,
-    failed: None,
-    object: false,
-});
+static STATE: Mutex<State> = Mutex::new(State::NEW);
 
 fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl State {
+    const NEW: Self = Self {
+        json: false,
+        taken: false,
+        closed: false,
+        failed: None,
+        object: false,
+    };
+
     /// Writes while somebody reads; keeps the first failure.
     fn write(&mut self, to: &mut dyn Write, bytes: &[u8]) {
         if self.closed || self.failed.is_some() {
@@ -167,25 +169,15 @@ mod tests {
         }
     }
 
-    fn fresh() -> State {
-        State {
-            json: false,
-            taken: false,
-            closed: false,
-            failed: None,
-            object: false,
-        }
-    }
-
     #[test]
     fn a_reader_who_leaves_is_no_failure_and_a_full_disk_is() {
-        let mut state = fresh();
+        let mut state = State::NEW;
         state.write(&mut Ends(3, ErrorKind::BrokenPipe), b"four");
         assert!(state.closed && state.failed.is_none());
         let mut kept = Vec::new();
         state.write(&mut kept, b"more");
         assert!(kept.is_empty(), "nobody reads");
-        let mut state = fresh();
+        let mut state = State::NEW;
         state.write(&mut Ends(0, ErrorKind::StorageFull), b"four");
         state.write(&mut Ends(0, ErrorKind::Other), b"four");
         assert_eq!(

@@ -95,6 +95,11 @@ pub fn watch_interrupts() -> anyhow::Result<()> {
         .context("cannot watch for Ctrl-C")
 }
 
+/// Whether Ctrl-C or SIGTERM has come.
+pub fn is_interrupted() -> bool {
+    INTERRUPTED.load(Ordering::SeqCst)
+}
+
 /// The flag that Ctrl-C and SIGTERM set.
 pub fn interrupted() -> &'static AtomicBool {
     &INTERRUPTED

@@ -1,11 +1,10 @@
 //! What people see while they wait: one line per stage, on standard error, and
 //! only on a terminal does it move.
 
-use crate::{interrupted, output};
+use crate::{is_interrupted, output};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// One stage of a command.
@@ -66,7 +65,7 @@ impl Stage {
     /// [`Self::progress`], and whether to go on: until somebody interrupts the program.
     pub fn go_on(&self, p: &shared_types::ipc::message::Progress) -> ControlFlow<()> {
         self.progress(p);
-        if interrupted().load(Ordering::SeqCst) {
+        if is_interrupted() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())

@@ -37,7 +37,6 @@ impl Ask {
         }
     }
 
-    /// The one of this name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|ask| ask.name() == name)
     }
@@ -69,9 +68,7 @@ impl Ask {
 /// A wish on its way, with the place for its answer.
 #[derive(Debug)]
 pub(crate) struct Asked {
-    /// What.
     pub ask: Ask,
-    /// Where the answer goes.
     pub reply: mpsc::Sender<Answer>,
 }
 

@@ -39,7 +39,6 @@ impl Pulse {
     }
 }
 
-/// A running controller.
 #[derive(Debug)]
 pub(crate) struct Controller {
     state: StateReader,
@@ -54,7 +53,6 @@ pub(crate) struct Controller {
 /// What a controller shows at one moment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
-    /// Its state.
     pub state: ControllerState,
     /// Whether its cycles go on.
     pub alive: bool,
@@ -97,17 +95,14 @@ impl Controller {
 /// One domain. Fields are dropped in order: readers, connection, sweep.
 #[derive(Debug)]
 pub(crate) struct Attached {
-    /// The controller, while there is one.
     pub controller: Option<Controller>,
     /// Its cycles; `None` where too many listen already.
     pub cycles: Option<CycleSubscriber>,
     /// Joints as measured.
     pub joints: Option<JointSubscriber>,
-    /// The camera.
     pub film: Option<Film>,
     bus: Bus,
     _sweep: DomainSweep,
-    /// Its name.
     pub domain: String,
 }
 
@@ -133,7 +128,6 @@ impl Attached {
         })
     }
 
-    /// The connection itself.
     pub(crate) fn bus(&self) -> &Bus {
         &self.bus
     }

@@ -47,7 +47,6 @@ impl Facts {
         facts
     }
 
-    /// The folder.
     pub(crate) fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }

@@ -8,8 +8,8 @@
 //! Where a preview follows the rope as the frames come, the live picture is shown one
 //! picture later, with the keypoints that were found in it meanwhile.
 
+use super::heard::Heard;
 use super::picture::{Jpeg, encode, projected};
-use super::preview::Heard;
 use serde::Serialize;
 use shared_types::StereoCamera;
 use shared_types::ipc::{Bus, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
@@ -39,7 +39,6 @@ pub(crate) struct Picture {
 /// What is drawn over a picture.
 #[derive(Debug, Serialize)]
 struct Over {
-    /// What the picture is.
     caption: String,
     /// Pixels of the camera for one of the picture.
     scale: usize,

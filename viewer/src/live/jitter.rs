@@ -16,7 +16,6 @@ pub(crate) struct Jitter {
 }
 
 impl Jitter {
-    /// Takes in a cycle.
     pub(crate) fn add(&mut self, cycle: &CycleRecord) {
         if self.cycles.len() == CYCLES {
             self.cycles.pop_front();

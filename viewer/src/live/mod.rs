@@ -8,20 +8,20 @@ mod ask;
 mod attached;
 mod facts;
 mod film;
+mod heard;
 mod http;
 mod jitter;
 mod newest;
 mod page;
 mod picture;
-mod preview;
 mod rope;
 mod snapshot;
 mod token;
 
 pub use facts::domain_of_run;
-pub use preview::{PreviewChild, PreviewProcess};
 
 use crate::report::{arm_points, tenths_mm};
+use arm_model::Cell;
 use ask::{Ask, Asked, Open, hand_over};
 use attached::{Attached, Seen, newest_domain};
 use http::Site;
@@ -32,7 +32,7 @@ use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use snapshot::{ControllerView, Snapshot, StopView, note_stop};
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
@@ -54,6 +54,17 @@ pub enum Wanted {
     /// This domain, whether anything runs there yet or not; results are in the folder,
     /// if it is known.
     Domain(String, Option<PathBuf>),
+}
+
+/// What a preview of the rope looks at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreviewView {
+    /// Shared-memory domain of the camera.
+    pub domain: String,
+    /// Its calibration.
+    pub camera: PathBuf,
+    /// The cell that it looks at.
+    pub cell: Cell,
 }
 
 /// What is known of one controller.
@@ -81,8 +92,6 @@ pub struct Watcher {
     shown: Shown,
     /// What was seen last, while there is a controller.
     seen: Option<Seen>,
-    /// The preview of the rope, where it is wished for.
-    preview: Option<PreviewChild>,
     /// When the last turn was due.
     turned: Instant,
 }
@@ -96,7 +105,6 @@ impl Watcher {
         wanted: Wanted,
         bind: SocketAddr,
         here: CellHere,
-        preview: Option<PreviewChild>,
     ) -> anyhow::Result<(Self, String)> {
         let (sender, asks) = mpsc::channel();
         let attached = match &wanted {
@@ -114,7 +122,6 @@ impl Watcher {
             searched: None,
             shown: Shown::default(),
             seen: None,
-            preview,
             turned: Instant::now(),
         };
         Ok((watcher, url))
@@ -200,28 +207,30 @@ impl Watcher {
             self.attached = None;
             return self.snapshot(None);
         }
-        if search {
-            self.keep_preview();
-        }
         self.snapshot(seen)
     }
 
-    /// Lets the preview look at what is attached.
-    fn keep_preview(&mut self) {
-        let Some(preview) = &mut self.preview else {
-            return;
-        };
-        let attached = self.attached.as_mut();
-        let controller = attached.as_ref().and_then(|a| a.controller.as_ref());
-        let camera = controller.and_then(|c| c.facts.camera_file());
-        let cell = self.here.of_run(controller.and_then(|c| c.facts.cell));
-        let domain = attached.as_ref().map(|a| a.domain.as_str());
-        let film = attached.as_ref().and_then(|a| a.film.as_ref());
-        let there = film.is_some_and(|film| film.preview.is_there());
-        preview.keep(domain, camera.as_deref(), &cell, there);
-        if let Some(film) = attached.and_then(|a| a.film.as_mut()) {
-            film.lacks_calibration = preview.lacks_camera();
+    /// What a preview of the rope is to look at, through the calibration `named` or else that
+    /// of the run; the page tells where there is none.
+    pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewView> {
+        let attached = self.attached.as_mut()?;
+        let facts = attached.controller.as_ref().map(|c| &c.facts);
+        let camera = named.map(Path::to_owned);
+        let camera = camera.or_else(|| facts?.camera_file());
+        if let Some(film) = &mut attached.film {
+            film.lacks_calibration = camera.is_none();
         }
+        Some(PreviewView {
+            domain: attached.domain.clone(),
+            camera: camera?,
+            cell: self.here.of_run(facts.and_then(|f| f.cell)),
+        })
+    }
+
+    /// Whether a preview runs already, whoever started it.
+    pub fn has_preview(&self) -> bool {
+        let film = self.attached.as_ref().and_then(|a| a.film.as_ref());
+        film.is_some_and(|film| film.preview.is_there())
     }
 
     /// The controller ended; the next may run elsewhere.

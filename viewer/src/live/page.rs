@@ -3,18 +3,15 @@
 use crate::report::{PLOTS, STYLE, VIEW};
 use std::sync::LazyLock;
 
-/// The page itself.
 pub(crate) const HTML: &str = include_str!("../../assets/watch/page.html");
 const OWN_STYLE: &str = include_str!("../../assets/watch/watch.css");
 const OWN_SCRIPT: &str = include_str!("../../assets/watch/watch.js");
 
-/// Its whole script.
 pub(crate) fn script() -> &'static str {
     static WHOLE: LazyLock<String> = LazyLock::new(|| [VIEW, PLOTS, OWN_SCRIPT].join("\n"));
     &WHOLE
 }
 
-/// Its whole style.
 pub(crate) fn style() -> &'static str {
     static WHOLE: LazyLock<String> = LazyLock::new(|| [STYLE, OWN_STYLE].join("\n"));
     &WHOLE

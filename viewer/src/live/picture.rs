@@ -15,7 +15,6 @@ pub(crate) struct Jpeg {
     pub stamp_ns: u64,
     /// Pixels of the camera for one of the picture.
     pub scale: usize,
-    /// The JPEG.
     pub bytes: Arc<[u8]>,
 }
 

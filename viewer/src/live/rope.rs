@@ -43,7 +43,6 @@ impl FollowingRope {
         }
     }
 
-    /// Which rope it is.
     pub(crate) fn params(&self) -> &RopeParams {
         &self.params
     }
@@ -107,9 +106,7 @@ impl FollowingRope {
 mod tests {
     use super::*;
     use arm_model::joint::START_POSE;
-    use rope_sim::{
-        Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out,
-    };
+    use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, roll_out};
     use shared_types::rope::RANGES;
 
     fn rope() -> RopeParams {
@@ -135,17 +132,12 @@ mod tests {
         let q: Vec<JointVector> = times.iter().map(|t| joints(*t)).collect();
         let arm = MeasuredArm::new(&times, &q, Pole::default()).unwrap();
         let options = SimOptions {
-            step_s: 1e-3,
-            precision: Precision::F64,
-            start: Start::Equilibrium,
             frames: FrameTimes {
                 first_s: reached_s,
                 period_s: 1.0,
                 count: 1,
             },
-            watch: Watch::NOTHING,
-            horizon_s: reached_s,
-            threads: 1,
+            ..SimOptions::new(1e-3, Precision::F64, reached_s)
         };
         let rope = rope();
         let whole = roll_out(&[Candidate::new(&rope, &arm)], &options).unwrap();

@@ -14,7 +14,6 @@ pub(crate) struct Snapshot {
     pub title: String,
     /// What is missing or wrong, in words; empty when all is well.
     pub note: String,
-    /// The controller, while there is one.
     pub controller: Option<ControllerView>,
     /// Joints' origins from the base to the pole's end (0.1 mm); empty before any.
     pub arm: Vec<i32>,
@@ -24,9 +23,7 @@ pub(crate) struct Snapshot {
     pub rope_is: &'static str,
     /// Radius of the rope and of its lead (m).
     pub radii_m: [f64; 2],
-    /// The cell.
     pub cell: Cell,
-    /// Target (m).
     pub target_m: Option<[f64; 3]>,
     /// Histograms of the control loop, now and then; `None` in between.
     pub jitter: Option<Vec<Histogram>>,
@@ -47,7 +44,6 @@ pub(crate) struct ControllerView {
     pub operating_mode: Option<OperatingMode>,
     /// Whether its loop has real-time priority and locked memory.
     pub real_time: bool,
-    /// Cycle.
     pub cycle: u64,
     /// Whether its cycles go on.
     pub alive: bool,
@@ -60,7 +56,6 @@ pub(crate) struct ControllerView {
 /// A stop in words.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StopView {
-    /// Its code.
     pub code: FaultCode,
     /// What happened and what to do.
     pub words: &'static str,

@@ -8,7 +8,6 @@ use serde::Serialize;
 use serde_json::Value;
 use shared_types::MonotonicNs;
 
-/// Everything in a report.
 #[derive(Debug, Serialize)]
 pub(crate) struct ReportData {
     /// Version of the program that made the report.
@@ -57,7 +56,6 @@ pub(crate) struct Errors {
 pub(crate) struct RopeRow {
     /// Name for people.
     pub label: &'static str,
-    /// Unit.
     pub unit: &'static str,
     /// Identified value.
     pub value: f64,
@@ -110,7 +108,6 @@ pub(crate) struct Scene {
     pub planned_tip: Vec<i32>,
     /// Radius of the rope and of its lead (m).
     pub radii_m: [f64; 2],
-    /// Target (m).
     pub target_m: Option<[f64; 3]>,
     /// Joints over time.
     pub joints: Joints,
@@ -129,7 +126,6 @@ pub(crate) struct Joints {
     pub measured: [Vec<f64>; JOINTS],
 }
 
-/// A picture.
 #[derive(Debug, Serialize)]
 pub(crate) struct Picture {
     /// File it was made from.

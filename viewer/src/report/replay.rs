@@ -6,7 +6,7 @@ use arm_model::{Cell, JOINTS, JointVector, Pole, kinematics};
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome, PlannedArm, Precision, SimOptions,
-    Start, Watch, roll_out,
+    roll_out,
 };
 use run_log::Cycles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
@@ -39,7 +39,6 @@ pub(crate) fn motions(cycles: &[CycleRecord]) -> Vec<&[CycleRecord]> {
         .collect()
 }
 
-/// When a motion began.
 fn begin(motion: &[CycleRecord]) -> MonotonicNs {
     MonotonicNs(motion[0].deadline_ns).plus_s(-motion[0].trajectory_s)
 }
@@ -55,7 +54,6 @@ pub(crate) struct Known<'a> {
     pub rope: Option<&'a RopeParams>,
     /// The plan of the throw.
     pub plan: Option<&'a Plan>,
-    /// Target (m).
     pub target_m: Option<[f64; 3]>,
 }
 
@@ -71,7 +69,6 @@ fn name(index: usize, motion: &[CycleRecord], plan: Option<&Plan>, has_rope: boo
     }
 }
 
-/// The scene of one motion.
 pub(crate) fn scene(
     index: usize,
     motion: &[CycleRecord],
@@ -169,14 +166,10 @@ fn simulate(
     frames: FrameTimes,
     step_s: f64,
 ) -> anyhow::Result<Vec<Vec<i32>>> {
+    let end_s = frames.time_s(frames.count.saturating_sub(1));
     let options = SimOptions {
-        step_s,
-        precision: Precision::F64,
-        start: Start::Equilibrium,
         frames,
-        watch: Watch::NOTHING,
-        horizon_s: frames.time_s(frames.count.saturating_sub(1)),
-        threads: 1,
+        ..SimOptions::new(step_s, Precision::F64, end_s)
     };
     let rollouts = roll_out(&[Candidate::new(rope, motion)], &options)?;
     let Some(rollout) = rollouts.first().filter(|r| r.outcome != Outcome::Diverged) else {

@@ -103,9 +103,21 @@ pub struct ScoreArgs {
 #[derive(Debug, Subcommand)]
 pub enum CalibCommand {
     /// Estimate the camera's extrinsics and write them into a camera.toml.
-    Extrinsics(ExtrinsicsArgs),
+    Extrinsics {
+        #[command(flatten)]
+        shown: ShownArgs,
+        /// The camera's settings with the estimated extrinsics (TOML).
+        #[arg(long)]
+        out: PathBuf,
+    },
     /// Compare the extrinsics in camera.toml with what the camera sees.
-    Check(CalibCheckArgs),
+    Check {
+        #[command(flatten)]
+        shown: ShownArgs,
+        /// Largest residual that passes (px, RMS over both images).
+        #[arg(long, default_value_t = 2.0)]
+        limit_px: f64,
+    },
 }
 
 /// What the camera is shown.
@@ -122,22 +134,4 @@ pub struct ShownArgs {
     /// Colour of that lead, R,G,B from 0 to 255.
     #[arg(long)]
     pub lead_rgb: Option<Colour>,
-}
-
-#[derive(Debug, Args)]
-pub struct ExtrinsicsArgs {
-    #[command(flatten)]
-    pub shown: ShownArgs,
-    /// The camera's settings with the estimated extrinsics (TOML).
-    #[arg(long)]
-    pub out: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub struct CalibCheckArgs {
-    #[command(flatten)]
-    pub shown: ShownArgs,
-    /// Largest residual that passes (px, RMS over both images).
-    #[arg(long, default_value_t = 2.0)]
-    pub limit_px: f64,
 }

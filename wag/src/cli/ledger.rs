@@ -38,24 +38,18 @@ fn results() -> impl TypedValueParser<Value = RunResult> {
 #[derive(Debug, Subcommand)]
 pub enum LedgerCommand {
     /// Show the values in which two runs differ.
-    Compare(LedgerCompareArgs),
+    Compare {
+        /// Run folder.
+        first: PathBuf,
+        /// Run folder to compare with it.
+        second: PathBuf,
+    },
     /// Print the command line that reruns a run into a new folder.
-    Rerun(LedgerRerunArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct LedgerCompareArgs {
-    /// Run folder.
-    pub first: PathBuf,
-    /// Run folder to compare with it.
-    pub second: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub struct LedgerRerunArgs {
-    /// Run folder.
-    pub run: PathBuf,
-    /// Execute it. A real arm asks for confirmation again that its area is clear.
-    #[arg(long)]
-    pub go: bool,
+    Rerun {
+        /// Run folder.
+        run: PathBuf,
+        /// Execute it. A real arm asks for confirmation again that its area is clear.
+        #[arg(long)]
+        go: bool,
+    },
 }

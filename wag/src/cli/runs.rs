@@ -32,14 +32,11 @@ pub struct RecordArgs {
 pub enum RecordCommand {
     /// Repair a run.mcap whose recorder was killed: at most its last second is
     /// missing then. A complete file stays as it is.
-    Recover(RecoverArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct RecoverArgs {
-    /// The file.
-    #[arg(value_name = "FILE.mcap")]
-    pub file: PathBuf,
+    Recover {
+        /// The file.
+        #[arg(value_name = "FILE.mcap")]
+        file: PathBuf,
+    },
 }
 
 #[derive(Debug, Args)]
@@ -74,41 +71,14 @@ pub struct WatchArgs {
     pub seconds: Option<f64>,
 }
 
-#[derive(Debug, Args)]
-pub struct ReplayArgs {
-    /// Run folder, or its file run.mcap (cycles.bin of an older version).
-    pub run: PathBuf,
-    /// First cycle to compare; the core is stepped from the keyframe before.
-    #[arg(long, default_value_t = 0)]
-    pub from_cycle: u64,
-}
-
-#[derive(Debug, Args)]
-pub struct ExplainArgs {
-    /// Run folder, or its file run.mcap (cycles.bin of an older version).
-    pub run: PathBuf,
-}
-
 #[derive(Debug, Subcommand)]
 pub enum ExportCommand {
     /// Control cycles and measured joints as cycles.csv and joints.csv.
-    Csv(ExportCsvArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct ExportCsvArgs {
-    /// Run folder, or its file run.mcap (cycles.bin of an older version).
-    pub run: PathBuf,
-    /// Folder for the tables, which must exist. Default: the run folder.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-}
-
-#[derive(Debug, Args)]
-pub struct ReportArgs {
-    /// Run folder.
-    pub run: PathBuf,
-    /// The report; default: report.html in the run folder.
-    #[arg(long, value_name = "FILE.html")]
-    pub out: Option<PathBuf>,
+    Csv {
+        /// Run folder, or its file run.mcap (cycles.bin of an older version).
+        run: PathBuf,
+        /// Folder for the tables, which must exist. Default: the run folder.
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
 }

@@ -2,7 +2,7 @@
 //! the arm shows at known places.
 
 use super::score::not_scored;
-use crate::cli::{CalibCheckArgs, CalibCommand, ExtrinsicsArgs, ShownArgs};
+use crate::cli::{CalibCommand, ShownArgs};
 use anyhow::{Context, bail};
 use camera_ingest::calib::board::{Board, BoardError};
 use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
@@ -22,8 +22,8 @@ const FRAMES: usize = 12;
 
 pub fn run(command: &CalibCommand) -> Outcome<Option<Value>> {
     match command {
-        CalibCommand::Extrinsics(args) => extrinsics(args),
-        CalibCommand::Check(args) => check(args),
+        CalibCommand::Extrinsics { shown, out } => extrinsics(shown, out),
+        CalibCommand::Check { shown, limit_px } => check(shown, *limit_px),
     }
 }
 
@@ -78,14 +78,14 @@ fn told(residual: &Residual) -> String {
     )
 }
 
-fn extrinsics(args: &ExtrinsicsArgs) -> Outcome<Option<Value>> {
-    let camera = load_camera(&args.shown.film.camera).or_input()?;
+fn extrinsics(shown: &ShownArgs, out: &Path) -> Outcome<Option<Value>> {
+    let camera = load_camera(&shown.film.camera).or_input()?;
     let stage = Stage::begin("calib extrinsics");
-    let points = look(&args.shown, &camera, &stage)?;
+    let points = look(shown, &camera, &stage)?;
     let found = solve(&camera, &points).or_failed()?;
     let (r, p) = (&found.r_w_cam, &found.p_w_cam_m);
-    let text = placed_camera_toml(&args.out, &args.shown.film.camera, r, p).or_failed()?;
-    files::write_atomic(&args.out, text.as_bytes()).or_failed()?;
+    let text = placed_camera_toml(out, &shown.film.camera, r, p).or_failed()?;
+    files::write_atomic(out, text.as_bytes()).or_failed()?;
     stage.done(&told(&found.residual));
     println!(
         "left camera at ({:.4}, {:.4}, {:.4}) m, standard error {:.1} mm and {:.2} degrees",
@@ -95,10 +95,10 @@ fn extrinsics(args: &ExtrinsicsArgs) -> Outcome<Option<Value>> {
         1e3 * found.position_error_m,
         found.attitude_error_rad.to_degrees()
     );
-    println!("written to `{}`", args.out.display());
+    println!("written to `{}`", out.display());
     let rotation: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|k| r[(i, k)]));
     Ok(Some(json!({
-        "ok": true, "command": "calib extrinsics", "out": args.out,
+        "ok": true, "command": "calib extrinsics", "out": out,
         "position_m": [p.x, p.y, p.z],
         "rotation": rotation,
         "residual": found.residual, "position_error_m": found.position_error_m,
@@ -106,10 +106,10 @@ fn extrinsics(args: &ExtrinsicsArgs) -> Outcome<Option<Value>> {
     })))
 }
 
-fn check(args: &CalibCheckArgs) -> Outcome<Option<Value>> {
-    let camera = load_camera(&args.shown.film.camera).or_input()?;
+fn check(shown: &ShownArgs, limit_px: f64) -> Outcome<Option<Value>> {
+    let camera = load_camera(&shown.film.camera).or_input()?;
     let stage = Stage::begin("calib check");
-    let points = look(&args.shown, &camera, &stage)?;
+    let points = look(shown, &camera, &stage)?;
     let here = residual(&camera, &points);
     // The sign of the turn between the eyes is easily mistaken in a calibration.
     let turned = StereoCamera {
@@ -125,16 +125,15 @@ fn check(args: &CalibCheckArgs) -> Outcome<Option<Value>> {
             here.epipolar_px
         ));
     }
-    if here.rms_px > args.limit_px {
+    if here.rms_px > limit_px {
         return Err(failed!(
-            "what is seen is {:.2} px (RMS) from where it should be, more than {} px; \
+            "what is seen is {:.2} px (RMS) from where it should be, more than {limit_px} px; \
              estimate the extrinsics again with `wag calib extrinsics`",
-            here.rms_px,
-            args.limit_px
+            here.rms_px
         ));
     }
     Ok(Some(json!({
-        "ok": true, "command": "calib check", "residual": here, "limit_px": args.limit_px,
+        "ok": true, "command": "calib check", "residual": here, "limit_px": limit_px,
         "epipolar_turned_px": turned_px,
     })))
 }

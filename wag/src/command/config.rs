@@ -1,15 +1,16 @@
 //! `wag config`: which configuration holds here, and which file says so.
 
-use crate::cli::{ConfigCheckArgs, ConfigCommand, ConfigShowArgs};
+use crate::cli::ConfigCommand;
 use crate::config::{self, Kind, Layers};
 use clap::ValueEnum;
 use cli_output::{OrInput, Outcome, table};
 use serde_json::{Value, json};
+use std::path::Path;
 
 pub fn run(command: &ConfigCommand) -> Outcome<Option<Value>> {
     match command {
-        ConfigCommand::Show(args) => show(args),
-        ConfigCommand::Check(args) => check(args),
+        ConfigCommand::Show { kind, run, origin } => show(*kind, run.as_deref(), *origin),
+        ConfigCommand::Check { kind, run } => check(kind.as_ref(), run.as_deref()),
     }
 }
 
@@ -20,10 +21,10 @@ fn files_of(layers: &Layers) -> Vec<Value> {
         .collect()
 }
 
-fn show(args: &ConfigShowArgs) -> Outcome<Option<Value>> {
-    let layers = config::layers(args.kind, args.run.as_deref()).or_input()?;
+fn show(kind: Kind, run: Option<&Path>, origin: bool) -> Outcome<Option<Value>> {
+    let layers = config::layers(kind, run).or_input()?;
     let told = layers.told();
-    if args.origin {
+    if origin {
         let rows = told.iter().map(|t| {
             let file = t.layer.path.display().to_string();
             let (value, layer) = (t.value.to_string(), t.layer.name.to_owned());
@@ -39,16 +40,16 @@ fn show(args: &ConfigShowArgs) -> Outcome<Option<Value>> {
     );
     let values: Vec<Value> = values.collect();
     Ok(Some(json!({
-        "kind": args.kind.name(), "layers": files_of(&layers), "values": values,
+        "kind": kind.name(), "layers": files_of(&layers), "values": values,
     })))
 }
 
-fn check(args: &ConfigCheckArgs) -> Outcome<Option<Value>> {
+fn check(kind: Option<&Kind>, run: Option<&Path>) -> Outcome<Option<Value>> {
     let all = Kind::value_variants();
-    let kinds = args.kind.as_ref().map_or(all, std::slice::from_ref);
+    let kinds = kind.map_or(all, std::slice::from_ref);
     let (mut checked, mut wrong) = (Vec::new(), Vec::new());
     for kind in kinds {
-        let layers = match config::layers(*kind, args.run.as_deref()) {
+        let layers = match config::layers(*kind, run) {
             Ok(layers) => layers,
             Err(error) => {
                 wrong.push(format!("{error:#}"));

@@ -1,17 +1,18 @@
 //! `wag doctor`: whether this machine is fit to drive an arm.
 
 use super::network::network;
-use crate::cli::DoctorArgs;
+use crate::cli::ArmPorts;
 use crate::doctor::{Finding, Machine, Verdict, judge_line};
 use cli_output::{Outcome, output, table};
 use serde_json::{Value, json};
+use std::net::IpAddr;
 
-pub fn run(args: &DoctorArgs) -> Outcome<Option<Value>> {
+pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> {
     let mut findings = Machine::here().judge();
     findings.push(network_finding());
-    if let Some(ip) = args.address {
-        let ports = [args.ports.report_port, args.ports.status_port];
-        findings.extend(judge_line(ip, args.ports.command_port, &ports));
+    if let Some(ip) = address {
+        let reports = [ports.report_port, ports.status_port];
+        findings.extend(judge_line(ip, ports.command_port, &reports));
     }
     let is_failed = |f: &&Finding| f.verdict == Verdict::Fail;
     let failed = findings.iter().filter(is_failed).count();

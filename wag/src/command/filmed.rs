@@ -76,7 +76,6 @@ pub struct Filmed {
     pub path: PathBuf,
     /// What filmed it.
     pub camera: StereoCamera,
-    /// The clamp's motion.
     pub motion: ClampMotion,
     /// What is missing or damaged.
     pub warnings: Vec<String>,

@@ -103,7 +103,6 @@ fn classify(error: IdentifyError) -> Failure {
     Failure::of(error.is_input(), error)
 }
 
-/// Identified parameters as a table.
 fn parameter_table(estimate: &RopeEstimate) -> Table {
     let values = RANGES
         .iter()

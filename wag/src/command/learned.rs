@@ -35,7 +35,6 @@ impl Learned {
         })
     }
 
-    /// The tracker of points, if there is one.
     pub fn tracker(&mut self) -> Option<&mut OnnxTracker> {
         self.tracker.as_mut().map(|(_, model)| model)
     }

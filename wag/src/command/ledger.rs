@@ -1,6 +1,6 @@
 //! `wag ledger`: runs listed, compared, made again.
 
-use crate::cli::{LedgerArgs, LedgerCommand, LedgerCompareArgs, LedgerRerunArgs};
+use crate::cli::{LedgerArgs, LedgerCommand};
 use anyhow::{Context, anyhow};
 use cli_output::{Failure, OrInput, Outcome, output, table};
 use run_log::files;
@@ -13,8 +13,8 @@ use std::process::Command;
 
 pub fn run(args: &LedgerArgs) -> Outcome<Option<Value>> {
     match &args.instead {
-        Some(LedgerCommand::Compare(args)) => compare(args),
-        Some(LedgerCommand::Rerun(args)) => rerun(args),
+        Some(LedgerCommand::Compare { first, second }) => compare(first, second),
+        Some(LedgerCommand::Rerun { run, go }) => rerun(run, *go),
         None => list(args),
     }
 }
@@ -70,8 +70,8 @@ fn known(run: &Path) -> Outcome<Entry> {
     ))
 }
 
-fn compare(args: &LedgerCompareArgs) -> Outcome<Option<Value>> {
-    let (first, second) = (known(&args.first)?, known(&args.second)?);
+fn compare(first: &Path, second: &Path) -> Outcome<Option<Value>> {
+    let (first, second) = (known(first)?, known(second)?);
     let found = ledger::compare(&first, &second).or_failed()?;
     let rows = found.iter().map(|d| {
         let by =
@@ -93,18 +93,18 @@ fn compare(args: &LedgerCompareArgs) -> Outcome<Option<Value>> {
     })))
 }
 
-fn rerun(args: &LedgerRerunArgs) -> Outcome<Option<Value>> {
-    known(&args.run)?;
-    let command = Run::open(&args.run).and_then(|run| run.command());
+fn rerun(run: &Path, go: bool) -> Outcome<Option<Value>> {
+    known(run)?;
+    let command = Run::open(run).and_then(|run| run.command());
     let line = command.or_input()?.ok_or_else(|| {
         bad_input!(
             "`{}` does not say how it was made: it holds no {}",
-            args.run.display(),
+            run.display(),
             files::COMMAND
         )
     })?;
     let mut again = line.again();
-    if args.go {
+    if go {
         if output::is_json() && !again.iter().any(|word| word == "--json") {
             again.push("--json".to_owned());
         }
@@ -126,7 +126,7 @@ fn rerun(args: &LedgerRerunArgs) -> Outcome<Option<Value>> {
     let folder = line.working_directory.display().to_string();
     println!("cd {} && wag {}", quoted(&[folder]), quoted(&again));
     Ok(Some(json!({
-        "ok": true, "command": "ledger rerun", "run": args.run, "arguments": again,
+        "ok": true, "command": "ledger rerun", "run": run, "arguments": again,
         "working_directory": line.working_directory, "version": line.version,
     })))
 }

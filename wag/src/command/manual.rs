@@ -1,8 +1,9 @@
 //! `wag man` and `wag completions`: the command line, told to `man` and to shells.
 
-use crate::cli::{Cli, CompletionsArgs, ManArgs};
+use crate::cli::Cli;
 use anyhow::Context;
 use clap::CommandFactory;
+use clap_complete::Shell;
 use clap_mangen::Man;
 use cli_output::{OrInput, Outcome, output};
 use run_log::files;
@@ -10,19 +11,19 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// One page for `wag` and one for each of its commands, as `wag-sim-rope.1`.
-pub fn man(args: &ManArgs) -> Outcome<Option<Value>> {
+pub fn man(folder: &Path) -> Outcome<Option<Value>> {
     let mut wag = Cli::command().disable_help_subcommand(true);
     wag.build();
-    std::fs::create_dir_all(&args.folder)
-        .with_context(|| format!("cannot make folder `{}`", args.folder.display()))
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make folder `{}`", folder.display()))
         .or_input()?;
     let mut pages = Vec::new();
-    write_pages(&wag, &args.folder, &mut pages).or_input()?;
+    write_pages(&wag, folder, &mut pages).or_input()?;
     println!(
         "{} pages in `{}`; read one with `man -l {}`",
         pages.len(),
-        args.folder.display(),
-        args.folder.join("wag.1").display()
+        folder.display(),
+        folder.join("wag.1").display()
     );
     Ok(Some(
         json!({ "ok": true, "command": "man", "pages": pages }),
@@ -47,11 +48,11 @@ fn write_pages(
 }
 
 /// The script a shell completes `wag` by, on standard output.
-pub fn completions(args: &CompletionsArgs) -> Option<Value> {
+pub fn completions(shell: Shell) -> Option<Value> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "wag", &mut script);
+    clap_complete::generate(shell, &mut Cli::command(), "wag", &mut script);
     output::data(&script);
-    Some(json!({ "ok": true, "command": "completions", "shell": args.shell.to_string() }))
+    Some(json!({ "ok": true, "command": "completions", "shell": shell.to_string() }))
 }
 
 #[cfg(test)]
@@ -62,10 +63,7 @@ mod tests {
     fn every_command_has_a_page_and_what_is_hidden_has_none() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("new/man1");
-        let args = ManArgs {
-            folder: folder.clone(),
-        };
-        let said = man(&args).unwrap().unwrap();
+        let said = man(&folder).unwrap().unwrap();
         let pages = said["pages"].as_array().unwrap().len();
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), pages);
         let page = std::fs::read_to_string(folder.join("wag-sim-rope.1")).unwrap();

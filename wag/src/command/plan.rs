@@ -96,7 +96,6 @@ pub fn describe(plan: &Plan) -> String {
     )
 }
 
-/// Plans a throw of a task.
 pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let doubts = files::read_doubts(&args.rope).or_input()?;

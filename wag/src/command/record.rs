@@ -1,25 +1,25 @@
 //! `wag record`: attaches to a running controller and records its cycles.
 
-use crate::cli::{RecordArgs, RecordCommand, RecoverArgs};
+use crate::cli::{RecordArgs, RecordCommand};
 use crate::config;
 use crate::pipeline::RunFolder;
 use crate::session::remedy;
 use anyhow::Context;
 use arm_model::Limits;
-use cli_output::{OrInput, Outcome, interrupted, watch_interrupts};
+use cli_output::{OrInput, Outcome, is_interrupted, watch_interrupts};
 use run_log::files;
 use run_log::{Recorded, RecorderConfig, Run, RunFileThread};
 use serde_json::{Value, json};
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
-use std::sync::atomic::Ordering;
+use std::path::Path;
 use std::time::{Duration, Instant};
 use viewer::live::domain_of_run;
 use viewer::report::simulated_rope;
 
 /// `wag record recover`: a file without its end becomes a whole one.
-fn recover(args: &RecoverArgs) -> Outcome<Option<Value>> {
-    let found = run_log::recover(&args.file).or_input()?;
-    let file = args.file.display();
+fn recover(path: &Path) -> Outcome<Option<Value>> {
+    let found = run_log::recover(path).or_input()?;
+    let file = path.display();
     if found.was_whole {
         println!(
             "`{file}` is whole: {} messages, {} s",
@@ -32,13 +32,13 @@ fn recover(args: &RecoverArgs) -> Outcome<Option<Value>> {
         );
     }
     Ok(Some(json!({
-        "ok": true, "command": "record recover", "file": args.file, "recovered": found,
+        "ok": true, "command": "record recover", "file": path, "recovered": found,
     })))
 }
 
 pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
-    if let Some(RecordCommand::Recover(args)) = &args.instead {
-        return recover(args);
+    if let Some(RecordCommand::Recover { file }) = &args.instead {
+        return recover(file);
     }
     if let Some(out) = &args.out {
         RunFolder::refuse_existing(out)?;
@@ -67,7 +67,7 @@ pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
         args.seconds
             .is_some_and(|s| began.elapsed().as_secs_f64() >= s)
     };
-    while !interrupted().load(Ordering::SeqCst) && !over() && !recorder.has_died() {
+    while !is_interrupted() && !over() && !recorder.has_died() {
         std::thread::sleep(Duration::from_millis(20));
     }
     let recorded = recorder.stop();

@@ -3,13 +3,14 @@
 use crate::cli::RigArgs;
 use crate::config;
 use arm_model::Cell;
-use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
+use cli_output::{
+    Failure, OrInput, Outcome, interrupted, is_interrupted, output, watch_interrupts,
+};
 use rig_sim::{RigConfig, run_announced};
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::DomainSweep;
 use std::net::IpAddr;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use xarm_sim::{ArmConfig, ArmPorts, FaultScript, SimulatedArm};
 
@@ -91,7 +92,7 @@ fn arm_alone(
         ..ArmConfig::default()
     })?;
     announce(args.bind, arm.ports());
-    while !interrupted().load(Ordering::SeqCst) {
+    while !is_interrupted() {
         std::thread::sleep(Duration::from_millis(50));
     }
     arm.stop();

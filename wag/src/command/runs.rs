@@ -1,6 +1,6 @@
 //! What reads a recorded run: `wag replay`, `wag explain`, `wag export`, `wag report`.
 
-use crate::cli::{ExplainArgs, ExportCommand, ReplayArgs, ReportArgs};
+use crate::cli::ExportCommand;
 use crate::config;
 use anyhow::Context;
 use cli_output::{OrInput, Outcome, output};
@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// Steps the controller's core over a run again and compares every record, bit by bit.
-pub fn replay(args: &ReplayArgs) -> Outcome<Option<Value>> {
-    let recording = Run::open(&args.run).and_then(|run| run.recording());
+pub fn replay(run: &Path, from_cycle: u64) -> Outcome<Option<Value>> {
+    let recording = Run::open(run).and_then(|run| run.recording());
     let recording = recording.or_input()?;
-    let found = rt_controller::recording::replay(recording.bytes(), args.from_cycle)
-        .with_context(|| format!("`{}`", args.run.display()))
+    let found = rt_controller::recording::replay(recording.bytes(), from_cycle)
+        .with_context(|| format!("`{}`", run.display()))
         .or_input()?;
     // The end of a controller at rest is recorded as a stop, but is none.
     let stops = recording.log().map_or(found.causes, |log| {
@@ -27,7 +27,7 @@ pub fn replay(args: &ReplayArgs) -> Outcome<Option<Value>> {
         return Err(failed!(verdict(&found)));
     }
     Ok(Some(
-        json!({ "ok": true, "command": "replay", "run": args.run, "stops": stops, "replay": found }),
+        json!({ "ok": true, "command": "replay", "run": run, "stops": stops, "replay": found }),
     ))
 }
 
@@ -84,13 +84,13 @@ fn describe(gap: &Gap) -> String {
 }
 
 /// Why a run was stopped, or how close it came to its limits.
-pub fn explain(args: &ExplainArgs) -> Outcome<Option<Value>> {
-    let recording = Run::open(&args.run).and_then(|run| run.recording());
+pub fn explain(run: &Path) -> Outcome<Option<Value>> {
+    let recording = Run::open(run).and_then(|run| run.recording());
     let log = recording.and_then(|recording| recording.log()).or_input()?;
     let found = run_log::explain(&log);
     print!("{}", run_log::show(&found));
     Ok(Some(
-        json!({ "ok": true, "command": "explain", "run": args.run, "explanation": found }),
+        json!({ "ok": true, "command": "explain", "run": run, "explanation": found }),
     ))
 }
 
@@ -103,20 +103,17 @@ pub fn explain_stop(run: &Path) {
 }
 
 /// A recorded run in other formats.
-pub fn export(ExportCommand::Csv(args): &ExportCommand) -> Outcome<Option<Value>> {
-    let run = Run::open(&args.run).or_input()?;
+pub fn export(ExportCommand::Csv { run: path, out }: &ExportCommand) -> Outcome<Option<Value>> {
+    let run = Run::open(path).or_input()?;
     let recording = run.recording().or_input()?;
     let recorded = recording.cycles().or_input()?;
     let Some(first) = recorded.cycles.first() else {
-        return Err(bad_input!(
-            "`{}` holds no control cycle",
-            args.run.display()
-        ));
+        return Err(bad_input!("`{}` holds no control cycle", path.display()));
     };
     // Zero of the run's other files, if its summary has one.
     let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
     let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
-    let out = args.out.as_deref().unwrap_or(run.folder());
+    let out = out.as_deref().unwrap_or(run.folder());
     files::check_writable(&out.join(CYCLES_TABLE)).or_input()?;
     let [cycles, joints] = recorded.write_tables(out, epoch_ns).or_failed()?;
     println!(
@@ -124,22 +121,22 @@ pub fn export(ExportCommand::Csv(args): &ExportCommand) -> Outcome<Option<Value>
         out.display()
     );
     Ok(Some(json!({
-        "ok": true, "command": "export csv", "run": args.run, "epoch_ns": epoch_ns,
+        "ok": true, "command": "export csv", "run": path, "epoch_ns": epoch_ns,
         "cycles": cycles, "joints": joints, "folder": out,
     })))
 }
 
 /// A run as one HTML file.
-pub fn report(args: &ReportArgs) -> Outcome<Option<Value>> {
+pub fn report(run: &Path, out: Option<&Path>) -> Outcome<Option<Value>> {
     let here = config::cell_here().or_input()?;
-    let written = viewer::report::write(&args.run, args.out.as_deref(), &here).or_input()?;
+    let written = viewer::report::write(run, out, &here).or_input()?;
     let megabytes = written.bytes as f64 / 1e6;
     println!("{} ({megabytes:.1} MB)", written.path.display());
     for missing in &written.missing {
         output::remark(format_args!("not in this run: {missing}"));
     }
     Ok(Some(json!({
-        "ok": true, "command": "report", "run": args.run, "out": written.path,
+        "ok": true, "command": "report", "run": run, "out": written.path,
         "bytes": written.bytes, "missing": written.missing,
     })))
 }

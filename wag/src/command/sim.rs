@@ -7,7 +7,7 @@ use arm_model::unit_hint;
 use cli_output::{OrInput, Outcome};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome as SimOutcome, PoseTrack, Precision,
-    Rollout, SimOptions, Start, Watch, roll_out,
+    Rollout, SimOptions, Start, roll_out,
 };
 use run_log::files;
 use serde_json::{Value, json};
@@ -49,17 +49,13 @@ fn check_step(dt: f64) -> anyhow::Result<()> {
 )]
 fn options(step_s: f64, start: Start, duration_s: f64, rate_hz: f64) -> SimOptions {
     SimOptions {
-        step_s,
-        precision: Precision::F64,
         start,
         frames: FrameTimes {
             first_s: 0.0,
             period_s: 1.0 / rate_hz,
             count: (duration_s * rate_hz + 1e-6).floor() as usize + 1,
         },
-        watch: Watch::NOTHING,
-        horizon_s: duration_s,
-        threads: 1,
+        ..SimOptions::new(step_s, Precision::F64, duration_s)
     }
 }
 

@@ -4,27 +4,36 @@ use crate::cli::WatchArgs;
 use crate::config;
 use crate::session::{ProcessSpec, Supervisor};
 use anyhow::Context;
-use arm_model::Cell;
 use camera_ingest::load_camera;
 use camera_ingest::preview::PreviewConfig;
-use cli_output::{Failure, OrInput, Outcome, interrupted, output, watch_interrupts};
+use cli_output::{Failure, OrInput, Outcome, is_interrupted, output, watch_interrupts};
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::IpcError;
 use std::path::Path;
-use std::sync::atomic::Ordering;
-use std::time::Instant;
-use viewer::live::{PreviewChild, PreviewProcess, Wanted, Watcher, domain_of_run};
+use std::time::{Duration, Instant};
+use viewer::live::{PreviewView, Wanted, Watcher, domain_of_run};
 
 /// How much sooner everything else gets a processor than this program.
 const NICE: i32 = 10;
 
-/// `wag process preview` as a child.
+/// Time between two looks at the preview.
+const LOOK: Duration = Duration::from_millis(500);
+/// Time between two attempts to start it.
+const PAUSE: Duration = Duration::from_secs(2);
+
+/// `wag process preview` as a child: it runs while there is something to look at and at no
+/// other time, and what happens to it happens to nobody else.
 #[derive(Debug)]
 struct Preview {
     process: Supervisor,
     /// Its configuration and log.
     folder: tempfile::TempDir,
+    view: Option<PreviewView>,
+    looked: Option<Instant>,
+    /// When it was started last.
+    begun: Option<Instant>,
+    runs: bool,
 }
 
 impl Preview {
@@ -33,13 +42,45 @@ impl Preview {
         Ok(Self {
             process: Supervisor::default(),
             folder: folder.context("cannot make a folder for the preview's configuration")?,
+            view: None,
+            looked: None,
+            begun: None,
+            runs: false,
         })
     }
-}
 
-impl PreviewProcess for Preview {
-    fn start(&mut self, domain: &str, camera: &Path, cell: &Cell) -> anyhow::Result<()> {
-        let config = PreviewConfig::new(domain, camera.to_owned(), *cell);
+    /// Lets it look at what is watched, through the calibration `named` or else that of the
+    /// run; call it now and then. One that ended is started again, unless another is there.
+    fn keep(&mut self, watcher: &mut Watcher, named: Option<&Path>) {
+        if self.looked.is_some_and(|at| at.elapsed() < LOOK) {
+            return;
+        }
+        self.looked = Some(Instant::now());
+        let wanted = watcher.preview_view(named);
+        if wanted != self.view {
+            self.process.stop();
+            (self.view, self.begun, self.runs) = (wanted, None, false);
+        }
+        if let Err(reason) = self.process.check() {
+            tracing::warn!("the preview ended: {reason:#}");
+            self.process.stop();
+            self.runs = false;
+        }
+        let early = self.begun.is_some_and(|at| at.elapsed() < PAUSE);
+        if self.runs || early || watcher.has_preview() {
+            return;
+        }
+        if let Some(view) = self.view.clone() {
+            self.begun = Some(Instant::now());
+            match self.start(view) {
+                Ok(()) => self.runs = true,
+                Err(reason) => tracing::warn!("there is no preview: {reason:#}"),
+            }
+        }
+    }
+
+    fn start(&mut self, view: PreviewView) -> anyhow::Result<()> {
+        let config = PreviewConfig::new(&view.domain, view.camera, view.cell);
         let path = self.folder.path().join("preview.toml");
         let text = toml::to_string(&config).context("configuration of preview")?;
         files::write_atomic(&path, text.as_bytes())?;
@@ -49,14 +90,6 @@ impl PreviewProcess for Preview {
             holds_arm: false,
         };
         self.process.start(&spec, self.folder.path())
-    }
-
-    fn check(&mut self) -> anyhow::Result<()> {
-        self.process.check()
-    }
-
-    fn stop(&mut self) {
-        self.process.stop();
     }
 }
 
@@ -71,14 +104,14 @@ pub fn run(args: &WatchArgs) -> Outcome<Option<Value>> {
     }
     let here = config::cell_here().or_input()?;
     watch_interrupts().or_failed()?;
-    let process = args.preview.then(Preview::new).transpose().or_failed()?;
-    let preview = process.map(|p| PreviewChild::new(Box::new(p), args.camera.clone()));
-    let (mut watcher, url) = Watcher::start(wanted, args.bind, here, preview).map_err(|error| {
-        match error.downcast_ref::<IpcError>() {
-            Some(IpcError::Domain { .. }) => Failure::input(error),
-            _ => Failure::of_server(error),
-        }
-    })?;
+    let mut preview = args.preview.then(Preview::new).transpose().or_failed()?;
+    let (mut watcher, url) =
+        Watcher::start(wanted, args.bind, here).map_err(|error| {
+            match error.downcast_ref::<IpcError>() {
+                Some(IpcError::Domain { .. }) => Failure::input(error),
+                _ => Failure::of_server(error),
+            }
+        })?;
     // Whatever happens here may wait; what is watched may not.
     let _ = rustix::process::nice(NICE);
     let began = Instant::now();
@@ -95,8 +128,11 @@ pub fn run(args: &WatchArgs) -> Outcome<Option<Value>> {
         args.seconds
             .is_some_and(|s| began.elapsed().as_secs_f64() >= s)
     };
-    while !interrupted().load(Ordering::SeqCst) && !over() {
+    while !is_interrupted() && !over() {
         watcher.turn().or_failed()?;
+        if let Some(preview) = &mut preview {
+            preview.keep(&mut watcher, args.camera.as_deref());
+        }
     }
     Ok(None)
 }

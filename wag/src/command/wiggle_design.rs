@@ -4,7 +4,7 @@ use crate::cli::WiggleArgs;
 use crate::config;
 use arm_model::Limits;
 use cli_output::table::numbers;
-use cli_output::{Failure, OrInput, Outcome, Stage, interrupted};
+use cli_output::{Failure, OrInput, Outcome, Stage, is_interrupted};
 use planner::PlannerConfig;
 use planner::synthetic::side_camera;
 use planner::wiggle::{WiggleConfig, WiggleError, wiggle};
@@ -12,7 +12,6 @@ use planner::wiggle_design::{DesignError, JudgedWiggle, judge, optimise};
 use run_log::files;
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
-use std::sync::atomic::Ordering;
 
 /// The paper's wiggle: 25 degrees at 0.75 Hz.
 fn papers(config: &WiggleConfig) -> WiggleConfig {
@@ -70,7 +69,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
             threads,
             &mut |generation, value| {
                 stage.say(format!("generation {generation}, log volume {value:.3}"));
-                if interrupted().load(Ordering::SeqCst) {
+                if is_interrupted() {
                     ControlFlow::Break(())
                 } else {
                     ControlFlow::Continue(())

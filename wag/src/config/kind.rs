@@ -105,7 +105,6 @@ impl Kind {
         }
     }
 
-    /// Its name in messages.
     pub fn name(self) -> &'static str {
         self.built_in().name
     }

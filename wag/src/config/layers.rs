@@ -226,7 +226,6 @@ fn leaves(table: &Table) -> Vec<(String, Value)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use arm_model::Limits;
     use clap::ValueEnum;
     use planner::PlannerConfig;
 
@@ -236,9 +235,7 @@ mod tests {
         let folder = |name: &str, text: &str| {
             let folder = dir.path().join(name);
             std::fs::create_dir(&folder).unwrap();
-            if !text.is_empty() {
-                std::fs::write(folder.join("planner.toml"), text).unwrap();
-            }
+            std::fs::write(folder.join("planner.toml"), text).unwrap();
             Some(folder)
         };
         let folders = Folders {
@@ -280,28 +277,5 @@ mod tests {
         let planner = Layers::read(Kind::Planner, &Folders::NONE, None).unwrap();
         let config: PlannerConfig = planner.get().unwrap();
         assert_eq!(config, PlannerConfig::default());
-    }
-
-    #[test]
-    fn the_layer_that_breaks_a_limit_is_named_not_the_one_below() {
-        let (dir, folders) = folders("[search]\npopulation = 40\n", "");
-        let run = dir.path().join("run.toml");
-        std::fs::write(&run, "[search]\npopulation = \"many\"\n").unwrap();
-        let error = Layers::read(Kind::Planner, &folders, Some(&run)).unwrap_err();
-        assert!(format!("{error:#}").contains("run.toml"), "{error:#}");
-        let gone = dir.path().join("gone.toml");
-        assert!(Layers::read(Kind::Planner, &folders, Some(&gone)).is_err());
-    }
-
-    #[test]
-    fn one_limit_may_be_lowered_alone() {
-        let dir = tempfile::tempdir().unwrap();
-        let run = dir.path().join("slow.toml");
-        std::fs::write(&run, "tcp_speed_max_m_s = 0.5\n").unwrap();
-        let layers = Layers::read(Kind::Limits, &Folders::NONE, Some(&run)).unwrap();
-        let limits: Limits = layers.get().unwrap();
-        assert!((limits.tcp_speed_max_m_s - 0.5).abs() < 1e-12);
-        let built_in: Limits = super::super::built_in().unwrap();
-        assert_eq!(limits.velocity_max_rad_s, built_in.velocity_max_rad_s);
     }
 }

@@ -44,7 +44,6 @@ pub fn cell() -> anyhow::Result<Cell> {
     Ok(cell_here()?.cell)
 }
 
-/// The cell of a run.
 pub fn cell_of(run: &Run) -> anyhow::Result<Cell> {
     Ok(cell_here()?.of_run(run.cell()?))
 }

@@ -10,7 +10,6 @@ use shared_types::ipc::message::{
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::plan::trajectory_hash;
 
-/// A connection to the controller.
 pub type ArmLink = RpcClient<ControllerRpc>;
 
 /// When a motion ran (CLOCK_MONOTONIC, ns).

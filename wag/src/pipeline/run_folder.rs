@@ -6,7 +6,6 @@ use run_log::{CommandLine, files};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// An existing run folder.
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
@@ -64,7 +63,6 @@ impl RunFolder {
         self.path.join(name)
     }
 
-    /// Where processes log.
     pub fn log(&self) -> PathBuf {
         self.path.join("log")
     }

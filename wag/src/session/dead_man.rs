@@ -30,7 +30,6 @@ impl DeadMan {
         Ok(Self { let_go })
     }
 
-    /// Whether it was let go.
     pub fn is_let_go(&self) -> bool {
         self.let_go.load(Ordering::SeqCst)
     }

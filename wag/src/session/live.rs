@@ -3,11 +3,10 @@
 
 use super::{DeadMan, ProcessSpec, Received, RunFile, Supervisor};
 use anyhow::bail;
-use cli_output::interrupted;
+use cli_output::is_interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Processes, shared memory and records of one command.
@@ -32,7 +31,6 @@ pub struct Session {
 
 /// How long a process may take to come up (s).
 const STARTUP_S: f64 = 15.0;
-/// How often the operator's heartbeat is written.
 const BEAT_EVERY: Duration = Duration::from_millis(20);
 /// Two and a half periods of the reports that have the arm's codes (5 Hz).
 const CODES_WITHIN: Duration = Duration::from_millis(500);
@@ -100,7 +98,7 @@ impl Session {
         } else {
             self.supervisor.check()?;
         }
-        if interrupted().load(Ordering::SeqCst) {
+        if is_interrupted() {
             bail!("interrupted; the arm was commanded to stop and all processes were ended");
         }
         Ok(())

@@ -30,7 +30,6 @@ impl Received {
         })
     }
 
-    /// Takes in what has arrived.
     pub fn drain(&mut self) -> anyhow::Result<()> {
         let lost = "cannot receive records from shared memory";
         while let Some(sample) = self.joint_subscriber.receive().context(lost)? {

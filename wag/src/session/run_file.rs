@@ -19,7 +19,6 @@ pub fn remedy(file: &Path) -> String {
     )
 }
 
-/// A recording under way.
 #[derive(Debug)]
 pub struct RunFile {
     process: Supervisor,

@@ -18,7 +18,6 @@ const GRACE: Duration = Duration::from_millis(1500);
 /// The same for a child that may have to brake an arm first.
 const BRAKE_GRACE: Duration = Duration::from_millis(5000);
 
-/// One process to start.
 #[derive(Debug)]
 pub struct ProcessSpec {
     /// Name, as `wag process NAME` knows it.

@@ -129,6 +129,8 @@ pub(crate) const ROPES: &str = "
     check damaged.json => damaged.json
     score --video notvideo.avi --camera camera.toml --tip-rgb 1,2,300 --target-rgb 0,0,0 => 300
     identify --keypoints k.json --camera c.toml --pose p.csv --out r.toml --lead-mass -1 => --lead-mass | above 0
+    identify --keypoints k.json --camera c.toml --pose p.csv --out r.toml --lead-mass 0 => --lead-mass | above 0
+    identify --keypoints k.json --camera c.toml --pose p.csv --out r.toml --lead-mass heavy => --lead-mass | above 0
     identify --keypoints k.json --camera c.toml --pose p.csv --out r.toml --lead-mass nan => --lead-mass | above 0";
 
 /// Ropes and poses of `wag sim rope`.

@@ -59,6 +59,11 @@ fn a_wrong_file_is_named_by_check_and_stops_a_run_before_it_begins() {
     assert!(!dir.path().join("run").exists());
     fs::write(rig.join("planner.toml"), "[search]\npopulation = 40\n").unwrap();
     assert_eq!(wag(&rig, "config check").status.code(), Some(0));
+    // The layer that is wrong is named, not the one below.
+    let many = "[search]\npopulation = \"many\"\n";
+    fs::write(dir.path().join("mine.toml"), many).unwrap();
+    let over = said(&wag(&rig, "config check planner mine.toml"));
+    assert!(over.contains("mine.toml"), "{over}");
     let gone = wag(&dir.path().join("gone"), "config check");
     assert_eq!(gone.status.code(), Some(2), "{gone:?}");
 }

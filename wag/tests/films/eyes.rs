@@ -67,8 +67,7 @@ fn excerpt(from: &Path) -> tempfile::TempDir {
 /// Keypoints of the beginning of a recording, by the library from the film.
 fn keypoints(from: &Path) -> KeypointTrack {
     let camera = load_camera(&from.join("camera.toml")).unwrap();
-    let poses = read_pose(&from.join("pose.csv")).unwrap();
-    let motion = PoseTrack::new(&poses).unwrap();
+    let motion = PoseTrack::new(&read_pose(&from.join("pose.csv")).unwrap()).unwrap();
     let mut video = open_video(from, None).unwrap();
     let all: Vec<StereoFrame> = (0..FRAMES).map(|i| video.read(i).unwrap()).collect();
     let eyes = read_film(&mut { all }).unwrap();

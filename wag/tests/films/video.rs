@@ -3,7 +3,7 @@
 
 use super::support::{json_in, shared};
 use nalgebra::Vector3;
-use rope_sim::{Candidate, FrameTimes, PoseTrack, Precision, SimOptions, Start, Watch, roll_out};
+use rope_sim::{Candidate, FrameTimes, PoseTrack, Precision, SimOptions, roll_out};
 use run_log::files::read_pose;
 use serde_json::Value;
 use shared_types::RopeParams;
@@ -49,17 +49,12 @@ fn fling(rope: &RopeParams) -> Vec<Vector3<f64>> {
     let path = shared("reference/rope-truth/pose-M3.csv").unwrap();
     let motion = PoseTrack::new(&read_pose(&path).unwrap()).unwrap();
     let options = SimOptions {
-        step_s: 5e-4,
-        precision: Precision::F64,
-        start: Start::Equilibrium,
         frames: FrameTimes {
             first_s: 0.0,
             period_s: 1.0 / RATE_HZ,
             count: 360,
         },
-        watch: Watch::NOTHING,
-        horizon_s: FLING_S,
-        threads: 1,
+        ..SimOptions::new(5e-4, Precision::F64, FLING_S)
     };
     let rollouts = roll_out(&[Candidate::new(rope, &motion)], &options).unwrap();
     let nodes = &rollouts[0].nodes;

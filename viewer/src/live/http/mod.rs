@@ -23,7 +23,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
-/// Most connections at once.
 const CONNECTIONS_MAX: usize = 64;
 /// Most pages that follow the state at once; the rest of the connections are left for
 /// pictures and stops.
@@ -46,7 +45,6 @@ pub(crate) struct Site {
     bound: IpAddr,
     /// The newest state as JSON.
     pub state: Newest<String>,
-    /// The newest picture.
     pub pictures: Newest<Picture>,
     asks: Mutex<mpsc::Sender<Asked>>,
     picture_asked: Mutex<Option<Instant>>,

@@ -15,13 +15,11 @@ const COMMON: &str = "Cache-Control: no-store\r\n\
 /// An answer of known length.
 #[derive(Debug)]
 pub(crate) struct Reply {
-    /// Status.
     pub status: u16,
     /// Type of the body.
     pub kind: &'static str,
     /// Further header lines, each with its end.
     pub more: String,
-    /// Body.
     pub body: Vec<u8>,
 }
 
@@ -36,7 +34,6 @@ impl Reply {
         }
     }
 
-    /// A sentence with a status.
     pub(crate) fn said(status: u16, text: &str) -> Self {
         Self {
             status,
@@ -44,7 +41,6 @@ impl Reply {
         }
     }
 
-    /// Writes it.
     pub(crate) fn write(&self, mut to: &TcpStream, keep: bool) -> std::io::Result<()> {
         let head = format!(
             "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: {}\r\n{}{COMMON}\r\n",

@@ -4,9 +4,7 @@ use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Most bytes of a head.
 pub(crate) const HEAD_MAX_BYTES: usize = 8192;
-/// Most header lines.
 const HEADERS_MAX: usize = 64;
 /// How long a head may take from its first byte.
 const HEAD_PATIENCE: Duration = Duration::from_secs(3);
@@ -16,7 +14,6 @@ const IDLE_PATIENCE: Duration = Duration::from_secs(5);
 /// A request without a body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Request {
-    /// `GET`, `POST`, ...
     pub method: String,
     /// Path, without what follows a `?`.
     pub path: String,

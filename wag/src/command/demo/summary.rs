@@ -25,12 +25,10 @@ pub struct StageTimes {
     pub score_s: f64,
 }
 
-/// A filmed motion.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Film {
     /// Start of exposure of the first frame (CLOCK_MONOTONIC, ns).
     pub first_stamp_ns: u64,
-    /// Frames kept.
     pub frames: u32,
     /// Frames the camera dropped.
     pub dropped: u32,
@@ -39,7 +37,6 @@ pub struct Film {
     pub motion: MotionSpan,
 }
 
-/// What tracking found.
 #[derive(Debug, Clone, Serialize)]
 pub struct Tracked {
     /// Part of the frames in which the rope was lost (0 to 1).
@@ -54,7 +51,6 @@ pub struct Tracked {
     pub doubts: Vec<String>,
 }
 
-/// What the settling move did.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Settled {
     /// Simulated residual vibration of the tip after a plain move (m).
@@ -72,11 +68,9 @@ pub struct DemoRecord {
     pub ok: bool,
     command: &'static str,
     version: &'static str,
-    /// Seed of everything random.
     pub seed: u64,
     run: String,
     task: &'static str,
-    /// Target (m).
     pub target_m: [f64; 3],
     /// What went wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -92,21 +86,16 @@ pub struct DemoRecord {
     epoch_ns: u64,
     /// Wall time of the whole demo (s).
     pub wall_s: f64,
-    /// Wall time of the stages (s).
     pub stages: StageTimes,
     wiggle: Option<Film>,
-    /// What tracking found.
     pub track: Option<Tracked>,
-    /// The identified rope.
     pub identified: Option<RopeEstimate>,
     plan: Option<Value>,
-    /// What the settling move did.
     pub settle: Option<Settled>,
     /// How late the arm follows its setpoints, from the wiggle (s).
     pub arm_lag_s: Option<f64>,
     score: Option<ScoreResult>,
     score_failed: Option<String>,
-    /// The loop's latencies during the throw.
     pub latency: Option<LatencyReport>,
     /// What the real-time set-up could not get, and what is poor about the plan.
     pub warnings: Vec<String>,
@@ -116,7 +105,6 @@ pub struct DemoRecord {
 }
 
 impl DemoRecord {
-    /// An empty record.
     pub fn new(seed: u64, target_m: [f64; 3], folder: &RunFolder) -> Self {
         Self {
             command: "demo",
@@ -129,13 +117,11 @@ impl DemoRecord {
         }
     }
 
-    /// Keeps the wiggle's figures.
     pub fn set_wiggle(&mut self, film: Film) {
         self.epoch_ns = film.first_stamp_ns;
         self.wiggle = Some(film);
     }
 
-    /// Keeps the plan's figures.
     pub fn set_plan(&mut self, plan: &Plan) {
         self.planned_tip_target_distance_m = Some(plan.predicted_error_m);
         self.plan = Some(json!({
@@ -197,7 +183,6 @@ fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
     table::numbers(header, 1, rows)
 }
 
-/// Prints the summary of a demo.
 pub fn show(record: &DemoRecord) {
     if let (Some(estimate), Some(truth)) = (&record.identified, &record.true_rope) {
         println!("{}", rope_table(estimate, truth));

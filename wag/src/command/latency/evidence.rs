@@ -15,7 +15,6 @@ pub(super) const RESPONSE_FILE: &str = "arm-response.toml";
 pub(super) struct Evidence {
     /// Arm or run.
     pub source: String,
-    /// Run folder.
     pub folder: PathBuf,
     /// Control cycles and joint reports.
     pub run: Cycles,

@@ -37,7 +37,6 @@ fn with_interval(e: Estimate, scale: f64, decimals: usize) -> String {
     )
 }
 
-/// Everything that was found.
 pub(super) struct Findings<'a> {
     pub evidence: &'a Evidence,
     pub latencies: Latencies,

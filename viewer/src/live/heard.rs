@@ -14,7 +14,6 @@ const WINDOW_NS: u64 = 1_000_000_000;
 /// of a camera with 50 or more a second.
 const NEAR_NS: u64 = 20_000_000;
 
-/// A listener.
 #[derive(Debug)]
 pub(crate) struct Heard {
     port: PreviewSubscriber,
@@ -32,7 +31,6 @@ impl Heard {
         })
     }
 
-    /// Takes in what has come.
     pub(crate) fn listen(&mut self) -> anyhow::Result<()> {
         while let Some(told) = self.port.receive()? {
             self.put(*told, Instant::now());
