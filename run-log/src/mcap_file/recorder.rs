@@ -326,9 +326,6 @@ impl Recorded {
     }
 
     /// Finishes the file with the run's results, and the rope that `simulate` makes of them.
-    ///
-    /// # Errors
-    /// The disk takes nothing any more.
     pub fn finish(self, simulate: SimulateRope) -> Result<()> {
         let (mut recording, mut results) = (self.recording, self.results);
         results.look(&mut recording.file, recording.clock)?;
