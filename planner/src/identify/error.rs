@@ -32,7 +32,7 @@ pub enum IdentifyError {
     Simulate(#[from] SimulateError),
     /// Slopes of the simulation could not be taken.
     #[error(transparent)]
-    Slopes(SensitivityError),
+    Slopes(#[from] SensitivityError),
     /// The built-in network cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
