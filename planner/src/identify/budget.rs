@@ -28,9 +28,7 @@ impl Budget<'_> {
             label: "residual px".to_owned(),
         };
         if (self.progress)(report).is_break() {
-            return Err(IdentifyError::Cancelled {
-                generation: self.steps,
-            });
+            return Err(IdentifyError::Cancelled(self.steps));
         }
         Ok(())
     }

@@ -39,12 +39,9 @@ pub enum IdentifyError {
     /// The network gave no answer.
     #[error(transparent)]
     Network(#[from] PredictError),
-    /// The caller broke off.
-    #[error("identification was cancelled after generation {generation}")]
-    Cancelled {
-        /// Generations done.
-        generation: usize,
-    },
+    /// The caller broke off after so many generations.
+    #[error("identification was cancelled after generation {0}")]
+    Cancelled(usize),
 }
 
 impl IdentifyError {

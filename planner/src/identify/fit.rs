@@ -92,8 +92,7 @@ impl Fit<'_> {
     /// A fast search, refined.
     fn searched(&mut self) -> Result<Refined, IdentifyError> {
         let coordinates = self.film.coordinates(self.clock, Reach::Ranges);
-        let seed = self.film.options.seed;
-        let found = fast_search(&self.film, &coordinates, seed, &mut self.budget)?;
+        let found = fast_search(&self.film, &coordinates, &mut self.budget)?;
         self.refine(&coordinates, &found.x, found.at.distance_px)
     }
 

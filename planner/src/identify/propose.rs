@@ -38,10 +38,9 @@ const APART: f64 = 0.12;
 pub(super) fn fast_search(
     film: &Film<'_>,
     coordinates: &Coordinates,
-    seed: u64,
     budget: &mut Budget<'_>,
 ) -> Result<Iterate, IdentifyError> {
-    let bank = bank(coordinates, seed);
+    let bank = bank(coordinates, film.options.seed);
     let mut ranked = Comparer::new(film, coordinates).compare(&bank)?;
     ranked.sort_by(|a, b| a.distance_px.total_cmp(&b.distance_px));
     budget.step(bank.len(), ranked[0].distance_px)?;

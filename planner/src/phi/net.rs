@@ -3,7 +3,7 @@
 use super::encoder::{Encoder, RawOutputs};
 use super::metadata::{ModelError, PhiMetadata, in_units};
 use super::probe::{PARITY, difference, probe};
-use crate::features::{FeatureDefinition, ObserveError, ViewPlane, WiggleFeatures, observe};
+use crate::features::{ObserveError, ViewPlane, WiggleFeatures, observe};
 use crate::observation::{Observation, ObservedPoints};
 use crate::wiggle::wiggling_arm;
 use shared_types::rope::ROPE_PARAMETERS;
@@ -28,17 +28,10 @@ pub enum PredictError {
     /// The film is none that the network can judge.
     #[error(transparent)]
     Observe(#[from] ObserveError),
-    /// The features are not those the network was trained on.
-    #[error("the network was trained on {trained:?}, the observation has {given:?}")]
-    OtherFeatures {
-        /// The network's.
-        trained: FeatureDefinition,
-        /// The observation's.
-        given: FeatureDefinition,
-    },
-    /// Features so far off that the outputs are no numbers.
-    #[error("the network's outputs for this film are not finite")]
-    NotFinite,
+    /// The features are not those the network was trained on, or so far off that the outputs
+    /// are no numbers.
+    #[error("{0}")]
+    Features(String),
 }
 
 /// A loaded network.
@@ -163,16 +156,14 @@ impl PhiNet {
     /// The network's outputs as they are.
     pub fn run(&self, features: &WiggleFeatures) -> Result<RawOutputs, PredictError> {
         if features.definition != self.metadata.features {
-            return Err(PredictError::OtherFeatures {
-                trained: self.metadata.features,
-                given: features.definition,
-            });
+            return Err(PredictError::Features(format!(
+                "the network was trained on {:?}, the observation has {:?}",
+                self.metadata.features, features.definition
+            )));
         }
         let found = self.encoder.outputs(&features.motion, &features.widths);
-        if found.is_finite() {
-            Ok(found)
-        } else {
-            Err(PredictError::NotFinite)
-        }
+        found.is_finite().then_some(found).ok_or_else(|| {
+            PredictError::Features("the network's outputs for this film are not finite".to_owned())
+        })
     }
 }
