@@ -90,7 +90,7 @@ fn both_methods_find_planted_parameters_in_noise() {
             ..quick(seed, 2)
         };
         let found = identify(&observation, &options, None, &mut |p| {
-            last = p.generation;
+            last = p.done;
             ControlFlow::Continue(())
         })
         .unwrap();

@@ -1,7 +1,7 @@
 //! A recording as a row of samples: what a person wants to know of each cycle.
 
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
-use rt_controller::control::{ControlSettings, ControlState};
+use rt_controller::control::ControlSettings;
 use rt_controller::recording::{Item, LogError, LogReader, Read, RecordedCycle};
 use serde::Serialize;
 use shared_types::ipc::{CauseRecord, CommandKind, ControllerMode};
@@ -140,7 +140,8 @@ impl RunLog {
                     differentiator.operating_mode =
                         operating_mode.or(differentiator.operating_mode);
                     if !known {
-                        log.take_settings(&state);
+                        log.limits = state.limits().clone();
+                        log.settings = *state.settings();
                         known = true;
                     }
                 }
@@ -152,11 +153,6 @@ impl RunLog {
         } else {
             Err(LogError::Foreign)
         }
-    }
-
-    fn take_settings(&mut self, state: &ControlState) {
-        self.limits = state.limits().clone();
-        self.settings = *state.settings();
     }
 
     /// Seconds from the first cycle.

@@ -50,9 +50,6 @@ impl Cycles {
 
     /// Writes `cycles.csv` and, where the arm reported its joints, `joints.csv` into
     /// `folder`; times (s) count from `epoch_ns` (CLOCK_MONOTONIC). Returns the rows of both.
-    ///
-    /// # Errors
-    /// A table cannot be written.
     pub fn write_tables(&self, folder: &Path, epoch_ns: u64) -> Result<[usize; 2]> {
         let since = |ns: u64| MonotonicNs(ns).since_s(MonotonicNs(epoch_ns));
         let measured = self.joints_between(0, u64::MAX);

@@ -5,6 +5,7 @@ use super::explanation::{Explanation, Late, Row, Stop};
 use super::margins::Margin;
 use cli_output::table::{self, Column};
 use comfy_table::Table;
+use shared_types::FaultCode;
 use std::fmt::Write;
 
 /// Width of the names in front of each line.
@@ -38,53 +39,38 @@ pub fn show(found: &Explanation) -> String {
     page
 }
 
-fn line(page: &mut String, name: &str, text: &str) {
-    let _ = writeln!(page, "  {name:<NAME$} {text}");
-}
-
 fn show_stop(page: &mut String, stop: &Stop) {
     let _ = writeln!(
         page,
         "STOPPED: {:?} (code {}) in cycle {}, {:.3} s into the recording",
         stop.code, stop.number, stop.cycle, stop.time_s
     );
-    line(page, "what happened", &stop.what);
-    line(page, "by how much", &by_how_much(stop));
-    line(page, "where", &place(stop));
     let asked = if stop.arm_asked_to_stop {
         "; the arm was commanded to stop"
     } else {
         ""
     };
-    line(
-        page,
-        "reaction",
-        &format!(
-            "{}{asked}; at rest after {:.0} ms",
-            stop.met,
-            1e3 * stop.rest_after_s
-        ),
-    );
-    if let Some(second) = stop.second {
-        line(
-            page,
-            "while stopping",
-            &format!("{second:?}: {}", second.explain()),
-        );
+    let (met, rest_ms) = (stop.met, 1e3 * stop.rest_after_s);
+    let reaction = format!("{met}{asked}; at rest after {rest_ms:.0} ms");
+    let while_stopping = |code: FaultCode| format!("{code:?}: {}", code.explain());
+    let warned = (stop.arm_warning != 0).then(|| format!("W{}", stop.arm_warning));
+    let lines = [
+        ("what happened", Some(stop.what.clone())),
+        ("by how much", Some(by_how_much(stop))),
+        ("where", Some(place(stop))),
+        ("reaction", Some(reaction)),
+        ("while stopping", stop.second.map(while_stopping)),
+        ("the arm says", stop.arm_error_meaning.clone()),
+        ("arm's warning", warned),
+        ("until then", counts(stop)),
+        ("setpoints", stop.latest.as_ref().map(lateness)),
+        ("what to do", Some(stop.remedy.clone())),
+    ];
+    for (name, text) in lines {
+        if let Some(text) = text {
+            let _ = writeln!(page, "  {name:<NAME$} {text}");
+        }
     }
-    if let Some(meaning) = &stop.arm_error_meaning {
-        line(page, "the arm says", meaning);
-    }
-    if stop.arm_warning != 0 {
-        line(page, "arm's warning", &format!("W{}", stop.arm_warning));
-    }
-    if let Some(counts) = counts(stop) {
-        line(page, "until then", &counts);
-    }
-    if let Some(late) = &stop.latest {
-        line(page, "setpoints", &lateness(late));
-    }
-    line(page, "what to do", &stop.remedy);
     let _ = writeln!(page, "\n{}", around(&stop.around));
 }
 

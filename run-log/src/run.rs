@@ -45,7 +45,8 @@ impl CellHere {
 )]
 pub struct NoRecording(pub PathBuf);
 
-/// The exact recording of a run's control cycles.
+/// The exact recording of a run's control cycles; read, it fails where it holds nothing
+/// that this version knows.
 #[derive(Debug, Clone)]
 pub struct Recording {
     path: PathBuf,
@@ -54,10 +55,7 @@ pub struct Recording {
 
 impl Run {
     /// Opens a run folder, or a file `run.mcap` or `cycles.bin` (of a version that wrote
-    /// the cycles apart).
-    ///
-    /// # Errors
-    /// There is none.
+    /// the cycles apart). Fails where there is none.
     pub fn open(run: &Path) -> Result<Self> {
         ensure!(
             run.exists(),
@@ -85,10 +83,7 @@ impl Run {
         &self.folder
     }
 
-    /// The exact recording.
-    ///
-    /// # Errors
-    /// [`NoRecording`], or the file cannot be read.
+    /// The exact recording; [`NoRecording`] where there is none.
     pub fn recording(&self) -> Result<Recording> {
         let path = self.recorded.clone();
         let path = path.ok_or_else(|| NoRecording(self.folder.clone()))?;
@@ -105,9 +100,6 @@ impl Run {
     }
 
     /// The pictures, the camera and the measured joints in the run's file.
-    ///
-    /// # Errors
-    /// The file cannot be read, or is not as this program writes it.
     pub fn film(&self) -> Result<RunFilm> {
         RunFilm::read(&self.film)
     }
@@ -174,17 +166,11 @@ impl Recording {
     }
 
     /// What a person wants to know of each cycle, and every stop.
-    ///
-    /// # Errors
-    /// It holds nothing this version can read.
     pub fn log(&self) -> Result<RunLog> {
         RunLog::read(&self.bytes).with_context(|| format!("`{}`", self.path.display()))
     }
 
     /// Control cycles and joint reports, bit for bit.
-    ///
-    /// # Errors
-    /// It holds nothing this version can read.
     pub fn cycles(&self) -> Result<Cycles> {
         let items =
             LogReader::open(&self.bytes).with_context(|| format!("`{}`", self.path.display()))?;

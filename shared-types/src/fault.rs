@@ -2,16 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Every cause once: its number, what it means, what happened and what to do.
+/// Every cause once: its number, what happened and what to do.
 macro_rules! fault_codes {
-    ($($(#[$meta:meta])+ $name:ident = $number:literal: $explanation:literal;)+) => {
+    ($($(#[$meta:meta])? $name:ident = $number:literal: $explanation:literal;)+) => {
         /// Cause of a stop or a refusal. Plain numbers, no text, RT-safe to copy. The
         /// numbers are part of recorded runs and never change.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         #[repr(u16)]
         pub enum FaultCode {
-            $($(#[$meta])+ $name = $number,)+
+            $(#[doc = $explanation] $(#[$meta])? $name = $number,)+
         }
 
         impl FaultCode {
@@ -33,114 +33,75 @@ macro_rules! fault_codes {
 }
 
 fault_codes! {
-    /// No fault.
     #[default]
     None = 0: "no fault";
-    /// The operator asked for a stop.
     OperatorStop = 1: "the operator asked for a stop; to go on, run the command again";
-    /// The operator's heartbeat went silent while moving.
     OperatorLost = 2:
         "the operator's heartbeat went silent while the arm moved; run the command again, and keep its program running while the arm moves";
-    /// The guardian's heartbeat went silent.
     GuardianLost = 3:
         "the guardian that stops the arm when the controller dies went silent; restart it, then run the command again";
-    /// The operator let go of the dead-man switch while moving.
     DeadManReleased = 4:
         "the operator let go of the dead-man switch while the arm moved; hold it, then run the command again";
-    /// The arming was withdrawn while moving.
     Disarmed = 5:
         "the arming was withdrawn while the arm moved; arm again by running the command again";
-    /// A setpoint held a number that is not finite.
     SetpointNotFinite = 10:
         "a setpoint was not a finite number; this is a defect, keep the run folder and report it";
-    /// A setpoint left a joint's range.
     SetpointPosition = 11: "a setpoint left a joint's range; check the plan with `wag check`";
-    /// A setpoint broke a joint's speed limit.
     SetpointVelocity = 12:
         "a setpoint broke a joint's speed limit; check the plan with `wag check`";
-    /// A setpoint broke a joint's acceleration limit.
     SetpointAcceleration = 13:
         "a setpoint broke a joint's acceleration limit; check the plan with `wag check`";
-    /// A setpoint broke the tool's speed limit.
     SetpointTcpSpeed = 14:
         "a setpoint broke the tool's speed limit (the arm would stop with C60); check the plan with `wag check`";
-    /// A setpoint broke a joint's jerk limit.
     SetpointJerk = 15: "a setpoint broke a joint's jerk limit; check the plan with `wag check`";
-    /// A setpoint was too far from the one before.
     SetpointStep = 16:
         "a setpoint was farther from the one before than the arm may be sent at once; check the plan with `wag check`";
-    /// From a setpoint the arm could not stop within its limits.
     SetpointUnstoppable = 17:
         "from a setpoint the arm could not have stopped before the end of a joint's range; keep the plan farther from the ends";
-    /// Too many cycles were missed at once.
     DeadlineMissed = 20:
         "the control thread was held up for too many cycles; give it real-time priority and a core of its own";
-    /// The arm did not answer for too long.
     ReplyStalled = 21:
         "the arm did not answer in time; use a direct cable and nothing else on that network port";
-    /// The connection to the arm was lost.
     LinkLost = 22:
         "the connection to the arm was lost; check power and cable, then run the command again";
-    /// Joint reports stopped.
     ReportStale = 23:
         "joint reports stopped coming; check the arm's report ports, then run the command again";
-    /// The arm is not where it was told to be.
     TrackingError = 24:
         "the arm is not where it was told to be; look for an obstacle, then run the command again";
-    /// Some cycles were missed at once, few enough to slow down along the path.
     LateCycles = 25:
         "the control thread was late by more than two cycles and the motion was slowed to rest; give it real-time priority and a core of its own";
-    /// Joint reports kept the same values while the arm was told to move.
     ReportFrozen = 26:
         "joint reports come but their values stand still; restart the arm's controller, then run the command again";
-    /// The clock of the joint reports cannot be followed.
     ReportClock = 27:
         "the time stamps of the joint reports jump; restart the arm's controller, then run the command again";
-    /// Too many broken joint reports in a row.
     ReportBroken = 28:
         "joint reports come torn or hold nonsense; check cable and firmware, then run the command again";
-    /// The arm raised an error code (`arm_error` of the cause).
     ArmError = 30:
         "the arm raised an error of its own (its code is in the record); remove the cause, then run the command again";
-    /// The arm left servo mode or its ready state.
     ArmModeChanged = 31:
         "the arm left servo mode, probably by another program or its emergency stop; make sure there is one commander, then run the command again";
-    /// The arm answered a setpoint with "not able to move".
     ArmNotReady = 32:
         "the arm refused to move (stopped, in error or not enabled); clear its state, then run the command again";
-    /// A joint stood still although it was told to move.
     JointStuck = 33:
         "a joint does not follow; look for an obstacle or a failed drive before you run the command again";
-    /// A measured joint jumped farther than any joint can move.
     EncoderJump = 34:
         "a measured joint angle jumped; have its encoder checked before you run the command again";
-    /// The arm stands too far from the plan's start.
     StartPoseMismatch = 40:
         "the arm stands too far from the start of the plan; move it to the start pose first";
-    /// The plan breaks a limit.
     PlanOutOfLimits = 41: "the plan breaks a limit; check it with `wag check`";
-    /// The plan's hash does not match its content.
     PlanHashMismatch = 42: "the plan was damaged on its way; send it again";
-    /// The command does not fit the present mode.
     WrongMode = 43: "the command does not fit the controller's present mode";
-    /// The arm is not armed for this motion.
     NotArmed = 44: "the arm is not armed for this motion; arm it, for a throw with the area clear";
-    /// A motion was faster than its operating mode allows.
     OperatingModeExceeded = 45:
         "the motion is faster than its operating mode allows; slow it down or arm for a faster one";
-    /// The arming ran out before the motion began.
     ArmingExpired = 46:
         "the arming ran out before the motion began; look whether the area is still clear and arm again";
-    /// The upload of a plan did not end in time.
     UploadTimedOut = 47:
         "the upload of the plan did not end in time; see whether the planner still runs and send it again";
-    /// Somebody else commands the arm.
     SecondCommander = 50:
         "somebody else commands the arm; end the other program, then run the command again";
-    /// The arm's firmware cannot be driven.
     UnsupportedFirmware = 51:
         "the arm's firmware is too old or unknown; update it with the vendor's tool";
-    /// The arm is configured otherwise than the controller.
     ArmDiffers = 52:
         "the arm is configured otherwise than the controller; make its tool offset, speed limit and ranges agree with the limits file";
 }

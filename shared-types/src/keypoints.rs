@@ -122,10 +122,8 @@ impl KeypointTrack {
         })
     }
 
-    /// Checks sizes, numbers and order of time.
-    ///
-    /// # Errors
-    /// The first frame that breaks a rule.
+    /// Checks sizes, numbers and order of time; the error is about the first frame that
+    /// breaks a rule.
     pub fn validate(&self) -> Result<(), KeypointError> {
         let refused = |what: String| Err(KeypointError(what));
         let (expected, frames) = (self.keypoints, self.frames.len());

@@ -93,25 +93,18 @@ pub const RANGES: [ParameterRange; ROPE_PARAMETERS] = [
     range("link_extra_scale", "link extra scale", "", 0.5, 1.2),
 ];
 
-/// Why a rope description is refused.
+/// Why a rope description is refused: a value is NaN, infinite, or not physical.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum RopeError {
-    /// A value is NaN, infinite, or not physical.
-    #[error("rope parameter `{key}` is {value}, but must be a finite number from {min} to {max}{}", unit_hint(key, *value, *max))]
-    OutOfBounds {
-        /// Key in `rope.toml`.
-        key: &'static str,
-        /// Value found.
-        value: f64,
-        /// Smallest value the simulator accepts.
-        min: f64,
-        /// Largest value the simulator accepts.
-        max: f64,
-    },
+#[error("rope parameter `{key}` is {value}, but must be a finite number from {min} to {max}{}", unit_hint(key, *value, *max))]
+pub struct RopeError {
+    key: &'static str,
+    value: f64,
+    min: f64,
+    max: f64,
 }
 
 /// Most links a rope may have anywhere in the system.
-pub const MAX_LINKS: u32 = 200;
+const MAX_LINKS: u32 = 200;
 
 /// Physical bounds the simulator accepts, wider than [`RANGES`].
 const PHYSICAL: [(f64, f64); ROPE_PARAMETERS] = [
@@ -159,14 +152,11 @@ impl RopeParams {
         }
     }
 
-    /// Checks that every value is finite and physical.
-    ///
-    /// # Errors
-    /// The first parameter that is not, with its limits.
+    /// Refuses the first value that is not finite or not physical.
     pub fn validate(&self) -> Result<(), RopeError> {
         for ((value, (min, max)), range) in self.to_array().into_iter().zip(PHYSICAL).zip(RANGES) {
             if !(value >= min && value <= max) {
-                return Err(RopeError::OutOfBounds {
+                return Err(RopeError {
                     key: range.key,
                     value,
                     min,
@@ -244,7 +234,7 @@ pub struct RopePosterior {
 }
 
 /// Noise of the keypoints in one direction, as found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct KeypointNoise {
     /// Standard deviation (px).
     pub sigma_px: f64,
@@ -255,7 +245,7 @@ pub struct KeypointNoise {
 }
 
 /// What the fit says beside the rope.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FitCircumstances {
     /// Noise along the rope.
     pub noise_along: KeypointNoise,
@@ -332,8 +322,7 @@ mod tests {
                 let mut v = [23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0];
                 v[i] = bad;
                 let rope = RopeParams::from_array(v);
-                let RopeError::OutOfBounds { key, .. } = rope.validate().unwrap_err();
-                assert_eq!(key, range.key);
+                assert_eq!(rope.validate().unwrap_err().key, range.key);
             }
         }
     }

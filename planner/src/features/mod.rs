@@ -63,10 +63,6 @@ pub fn observe(
     })
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "single precision is plenty"
-)]
 fn widths(appearance: Appearance) -> [f32; WIDTHS] {
     let [rope, lead] = [appearance.rope_radius_m, appearance.lead_radius_m]
         .map(|seen| seen.map_or([0.0, 0.0], |radius_m| [radius_m as f32, 1.0]));

@@ -5,7 +5,7 @@
 //! same for all: how a pixel moves with the camera hardly depends on the rope.
 
 use super::camera_pose::CORRECTIONS;
-use super::coordinates::{CAMERA, CLOCK, Coordinates, LINKS, Point, link_range, simulated_rope};
+use super::coordinates::{CAMERA, CLOCK, Coordinates, Point, nearest_links, simulated_rope};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film, Instant, Sighting, is_finite, sample_s};
 use crate::workers::map_in_order;
@@ -28,20 +28,10 @@ type Slopes = SMatrix<f64, 2, CORRECTIONS>;
 /// A candidate compared.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Compared {
+    /// The candidate, the camera where it fits best.
+    pub(super) x: Point,
     /// Root mean square (Huber) distance (px).
     pub(super) distance_px: f64,
-    camera: [f64; CORRECTIONS],
-}
-
-impl Compared {
-    /// The candidate with the camera where it fits best.
-    pub(super) fn with_camera(&self, x: &Point) -> Point {
-        let mut x = *x;
-        for (i, c) in self.camera.iter().enumerate() {
-            x[CAMERA + i] = *c;
-        }
-        x
-    }
 }
 
 /// Compares candidates with one film.
@@ -89,24 +79,24 @@ impl<'a> Comparer<'a> {
     /// Compares candidates, each with its own link count, the nearest of the ranges.
     pub(super) fn compare(&self, points: &[Point]) -> Result<Vec<Compared>, IdentifyError> {
         // Lanes hold ropes of one count: few counts fill them.
-        let (fewest, most) = link_range();
-        let links = |x: &Point| (x[LINKS].round().max(1.0) as u32).clamp(fewest, most);
-        let ropes: Vec<RopeParams> = points.iter().map(|x| simulated_rope(x, links(x))).collect();
+        let rope = |x| simulated_rope(x, nearest_links(x));
+        let ropes: Vec<RopeParams> = points.iter().map(rope).collect();
         let rollouts = self.film.simulate(&ropes, Fidelity::Coarse)?;
         let jobs: Vec<_> = points.iter().zip(&rollouts).collect();
-        Ok(map_in_order(
-            &jobs,
-            self.film.options.threads,
-            |(x, rollout)| {
-                self.one(x, rollout).unwrap_or(Compared {
-                    distance_px: INVISIBLE_PX,
-                    camera: [0.0; CORRECTIONS],
-                })
-            },
-        ))
+        let threads = self.film.options.threads;
+        Ok(map_in_order(&jobs, threads, |(x, rollout)| {
+            let found = self.one(x, rollout);
+            let (distance_px, camera) = found.unwrap_or((INVISIBLE_PX, [0.0; CORRECTIONS]));
+            let mut x = **x;
+            for (i, c) in camera.into_iter().enumerate() {
+                x[CAMERA + i] = c;
+            }
+            Compared { x, distance_px }
+        }))
     }
 
-    fn one(&self, x: &Point, rollout: &Rollout) -> Option<Compared> {
+    /// The distance (px), and the camera's corrections there.
+    fn one(&self, x: &Point, rollout: &Rollout) -> Option<(f64, [f64; CORRECTIONS])> {
         if !is_finite(rollout) || self.sightings.is_empty() {
             return None;
         }
@@ -135,9 +125,8 @@ impl<'a> Comparer<'a> {
             weights += sighting.weight;
         }
         let distance_px = (sum / f64::max(weights, 1e-9)).sqrt();
-        distance_px.is_finite().then_some(Compared {
-            distance_px,
-            camera: correction.into(),
-        })
+        distance_px
+            .is_finite()
+            .then(|| (distance_px, correction.into()))
     }
 }

@@ -119,6 +119,12 @@ pub(super) fn link_range() -> (u32, u32) {
     (range.min as u32, range.max as u32)
 }
 
+/// The link count of the ranges nearest to a point's.
+pub(super) fn nearest_links(x: &Point) -> u32 {
+    let (low, high) = link_range();
+    (x[LINKS].round().max(1.0) as u32).clamp(low, high)
+}
+
 /// The link count a fit is linearised at.
 pub(super) fn middle_links() -> u32 {
     let (low, high) = link_range();

@@ -89,6 +89,12 @@ pub(super) fn go_on(
     Ok(iterates)
 }
 
+/// The first of iterates in the order of [`descend`].
+pub(super) fn best(iterates: Vec<Iterate>) -> Result<Iterate, IdentifyError> {
+    let best = iterates.into_iter().next();
+    best.ok_or(IdentifyError::NothingVisible)
+}
+
 fn best_px(iterates: &[Iterate]) -> f64 {
     let distances = iterates.iter().map(|w| w.at.distance_px);
     distances.fold(f64::INFINITY, f64::min)

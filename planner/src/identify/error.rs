@@ -32,19 +32,16 @@ pub enum IdentifyError {
     Simulate(#[from] SimulateError),
     /// Slopes of the simulation could not be taken.
     #[error(transparent)]
-    Slopes(SensitivityError),
+    Slopes(#[from] SensitivityError),
     /// The built-in network cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The network gave no answer.
     #[error(transparent)]
     Network(#[from] PredictError),
-    /// The caller broke off.
-    #[error("identification was cancelled after generation {generation}")]
-    Cancelled {
-        /// Generations done.
-        generation: usize,
-    },
+    /// The caller broke off after so many generations.
+    #[error("identification was cancelled after generation {0}")]
+    Cancelled(usize),
 }
 
 impl IdentifyError {

@@ -157,15 +157,8 @@ impl<'a> Film<'a> {
 
     /// The coordinates in which the film is fitted.
     pub(super) fn coordinates(&self, clock: ClockWindow, reach: Reach) -> Coordinates {
-        let pixel_m = self.viewer.pixel_m();
-        let camera_std = self.options.camera_std();
-        Coordinates::new(
-            self.observation.appearance,
-            pixel_m,
-            clock,
-            &camera_std,
-            reach,
-        )
+        let (seen, pixel_m) = (self.observation.appearance, self.viewer.pixel_m());
+        Coordinates::new(seen, pixel_m, clock, &self.options.camera_std(), reach)
     }
 
     /// How the filmed motion is simulated.

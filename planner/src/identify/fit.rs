@@ -1,9 +1,8 @@
 //! One identification by fitting: where it starts, how it is refined, and what comes of it.
 
-use super::budget::{Budget, FitProgress};
+use super::budget::Budget;
 use super::clock::ClockWindow;
-use super::coordinates::{CLOCK, Coordinates, Reach};
-use super::descent::Iterate;
+use super::coordinates::{CLOCK, Coordinates, Point, Reach};
 use super::error::IdentifyError;
 use super::film::Film;
 use super::linear;
@@ -14,6 +13,7 @@ use super::propose::{fast_search, from_proposal};
 use super::refine::{Refined, refine};
 use super::search::search;
 use crate::observation::Observation;
+use shared_types::ipc::message::Progress;
 use shared_types::rope::{FitCircumstances, OutOfDistribution};
 use shared_types::{RopeEstimate, RopeParams};
 use std::ops::ControlFlow;
@@ -44,7 +44,7 @@ pub(super) fn fit(
     observation: &Observation<'_>,
     options: &IdentifyOptions,
     start: &Start,
-    progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
     let film = Film::new(observation, options);
     let mut fit = Fit {
@@ -92,16 +92,15 @@ impl Fit<'_> {
     /// A fast search, refined.
     fn searched(&mut self) -> Result<Refined, IdentifyError> {
         let coordinates = self.film.coordinates(self.clock, Reach::Ranges);
-        let seed = self.film.options.seed;
-        let iterates = fast_search(&self.film, &coordinates, seed, &mut self.budget)?;
-        self.refine(&coordinates, &iterates)
+        let found = fast_search(&self.film, &coordinates, &mut self.budget)?;
+        self.refine(&coordinates, &found.x, found.at.distance_px)
     }
 
     /// A proposed rope, refined; a fast search if it ends where no rope of the ranges is.
     fn proposed(&mut self, rope: &RopeParams) -> Result<(Refined, &'static str), IdentifyError> {
         let coordinates = self.film.coordinates(self.clock, Reach::Ranges);
-        let iterates = from_proposal(&self.film, &coordinates, rope, &mut self.budget)?;
-        let near = self.refine(&coordinates, &iterates)?;
+        let found = from_proposal(&self.film, &coordinates, rope, &mut self.budget)?;
+        let near = self.refine(&coordinates, &found.x, found.at.distance_px)?;
         if !out_of_distribution(&near).is_outside() {
             return Ok((near, PROPOSED));
         }
@@ -113,14 +112,15 @@ impl Fit<'_> {
         })
     }
 
+    /// A start refined whose root mean square distance to the film is `distance_px`.
     fn refine(
         &mut self,
         coordinates: &Coordinates,
-        iterates: &[Iterate],
+        start: &Point,
+        distance_px: f64,
     ) -> Result<Refined, IdentifyError> {
-        let best = iterates.first().ok_or(IdentifyError::NothingVisible)?;
-        let noise_px = best.at.distance_px / 2.0_f64.sqrt();
-        refine(&self.film, coordinates, &best.x, noise_px, &mut self.budget)
+        let noise_px = distance_px / 2.0_f64.sqrt();
+        refine(&self.film, coordinates, start, noise_px, &mut self.budget)
     }
 
     /// The global search, refined.
@@ -132,14 +132,7 @@ impl Fit<'_> {
             Reach::Wide => 0,
         };
         let found = search(&self.film, &coordinates, repeats_max, &mut self.budget)?;
-        let noise_px = found.distance_px / 2.0_f64.sqrt();
-        refine(
-            &self.film,
-            &coordinates,
-            &found.x,
-            noise_px,
-            &mut self.budget,
-        )
+        self.refine(&coordinates, &found.x, found.distance_px)
     }
 
     fn estimate(
@@ -148,11 +141,7 @@ impl Fit<'_> {
         out_of_distribution: OutOfDistribution,
         label: &str,
     ) -> RopeEstimate {
-        let options = &self.film.options;
-        let appearance = self.film.observation.appearance;
-        let pixel_m = self.film.viewer.pixel_m();
-        let (params, posterior) =
-            posterior(fit, appearance, pixel_m, options.lead_mass_kg, options.seed);
+        let (params, posterior) = posterior(fit, &self.film);
         let (camera_position_m, camera_rotation_rad) =
             self.film.viewer.moved(&linear::corrections(&fit.x));
         let [noise_along, noise_across] = fit.noise.axes;
@@ -162,7 +151,7 @@ impl Fit<'_> {
             residual_px: fit.residual_px,
             method: label.try_into().unwrap_or_default(),
             simulations: u32::try_from(self.budget.simulations).unwrap_or(u32::MAX),
-            seed: options.seed,
+            seed: self.film.options.seed,
             time_offset_s: fit.x[CLOCK],
             posterior,
             circumstances: FitCircumstances {

@@ -51,9 +51,6 @@ pub struct WiggleInformation {
 
 /// Information of a motion about one rope; `None` where it cannot be simulated or
 /// leaves the camera's half space.
-///
-/// # Errors
-/// What the rope simulator refuses.
 pub fn information(
     rope: &RopeParams,
     motion: &dyn AttachMotion,

@@ -11,7 +11,7 @@ use super::film::{Fidelity, Film, Grid, Instant, Sighting, is_finite, sample_s};
 use super::noise::{Noise, RESIDUAL, Row, Rows};
 use crate::workers::map_in_order;
 use nalgebra::SMatrix;
-use rope_sim::sensitivity::{Family, Perturbation, Sensitivity, SensitivityError, sensitivities};
+use rope_sim::sensitivity::{Family, Perturbation, Sensitivity, sensitivities};
 use rope_sim::{Candidate, NodeTrack, Rollout};
 use shared_types::RopeParams;
 
@@ -85,7 +85,7 @@ pub(super) fn linearise(
         perturbations,
     });
     let families: Vec<Family<'_>> = families.collect();
-    let all = sensitivities(&families, &film.sim_options(fidelity)).map_err(unwrap_sensitivity)?;
+    let all = sensitivities(&families, &film.sim_options(fidelity))?;
     let simulations = all.iter().map(|s| 1 + s.neighbours.len()).sum();
     let (bases, others) = all.split_at(points.len());
     let out = points.iter().zip(bases).enumerate().map(|(i, (x, at))| {
@@ -118,14 +118,6 @@ pub(super) fn neighbour_counts(links: u32) -> [u32; 2] {
         (links + LINKS_STEP).min(high),
         links.saturating_sub(LINKS_STEP).max(low),
     ]
-}
-
-/// A sensitivity's error in the terms of a simulation.
-fn unwrap_sensitivity(error: SensitivityError) -> IdentifyError {
-    match error {
-        SensitivityError::Base(e) | SensitivityError::Neighbour { source: e, .. } => e.into(),
-        other => IdentifyError::Slopes(other),
-    }
 }
 
 fn perturbations(x: &Point, links: u32, fine: bool) -> Vec<Perturbation<'static>> {

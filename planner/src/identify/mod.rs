@@ -30,7 +30,6 @@ mod refine;
 pub mod scale;
 mod search;
 
-pub use budget::FitProgress;
 pub use error::IdentifyError;
 pub use fit::WIDE;
 pub use information::{WiggleInformation, information};
@@ -40,20 +39,19 @@ use crate::observation::Observation;
 use crate::phi::PhiNet;
 use fit::{Start, fit};
 use shared_types::RopeEstimate;
+use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
 
 /// Identifies the rope, the clock offset and the camera's place from an observation, by
 /// the method of the options. `network` is the one that [`Method::Network`] and
 /// [`Method::Hybrid`] ask; none means the built-in one. Deterministic for a seed, whatever
-/// the threads.
-///
-/// # Errors
-/// See [`IdentifyError`].
+/// the threads; `progress` is told after every generation or step, its value the mean
+/// (Huber) distance of the best candidate so far (px).
 pub fn identify(
     observation: &Observation<'_>,
     options: &IdentifyOptions,
     network: Option<&PhiNet>,
-    progress: &mut dyn FnMut(FitProgress) -> ControlFlow<()>,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<RopeEstimate, IdentifyError> {
     options::check(observation, options)?;
     let start = match options.method {

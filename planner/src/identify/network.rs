@@ -10,8 +10,8 @@ use super::posterior::{UNSEEN_FRACTION, prior_std};
 use crate::observation::Observation;
 use crate::phi::{PhiNet, PredictError, Prediction};
 use shared_types::rope::{
-    Ambiguity, FitCircumstances, KeypointNoise, LINK_COUNTS, OutOfDistribution, RANGES,
-    ROPE_PARAMETERS, RopePosterior,
+    Ambiguity, FitCircumstances, LINK_COUNTS, OutOfDistribution, RANGES, ROPE_PARAMETERS,
+    RopePosterior,
 };
 use shared_types::{RopeEstimate, RopeParams};
 
@@ -20,20 +20,6 @@ const NINETY: f64 = 1.645;
 /// Distance to the film of the simulated rope above which the network is not believed
 /// (px): twice the largest tracking error.
 const DISTANCE_MAX_PX: f64 = 6.0;
-/// What the network fits beside the rope: neither noise nor camera.
-const NOTHING_FITTED: FitCircumstances = {
-    let noise = KeypointNoise {
-        sigma_px: 0.0,
-        in_time: 0.0,
-        along_rope: 0.0,
-    };
-    FitCircumstances {
-        noise_along: noise,
-        noise_across: noise,
-        camera_position_m: [0.0; 3],
-        camera_rotation_rad: [0.0; 3],
-    }
-};
 
 /// The rope that the network proposes for a film; none if it cannot judge such a film or
 /// finds it out of its distribution.
@@ -103,7 +89,8 @@ pub(super) fn estimate(
             ambiguities: unseen.map(ambiguity).collect(),
             inflation: 1.0,
         },
-        circumstances: NOTHING_FITTED,
+        // It fits neither noise nor camera.
+        circumstances: FitCircumstances::default(),
         out_of_distribution: out_of_distribution(score, distance_px),
     })
 }

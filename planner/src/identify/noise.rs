@@ -35,8 +35,7 @@ impl Noise {
     pub(super) fn white(sigma_px: f64) -> Self {
         let axis = KeypointNoise {
             sigma_px: sigma_px.max(SIGMA_MIN_PX),
-            in_time: 0.0,
-            along_rope: 0.0,
+            ..KeypointNoise::default()
         };
         Self { axes: [axis; 2] }
     }

@@ -10,6 +10,7 @@
 use super::coordinates::{
     DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, STIFFNESS, link_range, parameter,
 };
+use super::film::Film;
 use super::refine::Refined;
 use super::scale;
 use crate::observation::Appearance;
@@ -43,14 +44,8 @@ struct Draw {
 }
 
 /// The parameters' posterior with its likeliest rope, from ropes drawn from a fit.
-pub(super) fn posterior(
-    fit: &Refined,
-    appearance: Appearance,
-    pixel_m: f64,
-    lead_mass_kg: Option<f64>,
-    seed: u64,
-) -> (RopeParams, RopePosterior) {
-    let mut draws = draw(fit, appearance, pixel_m, lead_mass_kg, seed);
+pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePosterior) {
+    let mut draws = draw(fit, film);
     let total: f64 = draws.iter().map(|d| d.weight).sum();
     let squares: f64 = draws.iter().map(|d| d.weight * d.weight).sum();
     let within_ranges = total > 0.0 && total * total / squares >= EFFECTIVE_MIN;
@@ -65,7 +60,8 @@ pub(super) fn posterior(
         d.weight /= total;
     }
     let posterior = summarise(&draws, fit);
-    (likeliest(&draws, &posterior, lead_mass_kg), posterior)
+    let params = likeliest(&draws, &posterior, film.options.lead_mass_kg);
+    (params, posterior)
 }
 
 /// Probability of each link count of the ranges where they are normally distributed.
@@ -82,15 +78,10 @@ fn count_probabilities(mean: f64, variance: f64) -> [f64; LINK_COUNTS] {
     weights.map(|w| w / total)
 }
 
-fn draw(
-    fit: &Refined,
-    appearance: Appearance,
-    pixel_m: f64,
-    lead_mass_kg: Option<f64>,
-    seed: u64,
-) -> Vec<Draw> {
+fn draw(fit: &Refined, film: &Film<'_>) -> Vec<Draw> {
     use parameter as p;
-    let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0x9057_e210);
+    let (appearance, pixel_m) = (film.observation.appearance, film.viewer.pixel_m());
+    let mut rng = ChaCha12Rng::seed_from_u64(film.options.seed ^ 0x9057_e210);
     let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| fit.covariance[(DRAWN[i], DRAWN[j])]);
     let with_links = Vector::from_fn(|i, _| fit.covariance[(DRAWN[i], LINKS)]);
     let variance = fit.covariance[(LINKS, LINKS)].max(1e-9);
@@ -120,7 +111,11 @@ fn draw(
                 + root * normal;
             let s = x[0].max(1e-3) / links;
             let ratios = [x[1].exp() / s, x[2].exp() / s, x[3].exp()];
-            let drawn = scale::draw(lead_mass_kg, ratios, rng.random_range(0.0..1.0));
+            let drawn = scale::draw(
+                film.options.lead_mass_kg,
+                ratios,
+                rng.random_range(0.0..1.0),
+            );
             let mu = drawn.mass_per_length;
             let radius_m = match appearance.rope_radius_m {
                 Some(seen) => {

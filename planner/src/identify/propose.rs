@@ -5,12 +5,12 @@
 //! ones are improved side by side by a few coarse Gauss-Newton steps.
 
 use super::budget::Budget;
-use super::coarse::Comparer;
+use super::coarse::{Compared, Comparer};
 use super::coordinates::{
     CLOCK, Coordinates, DAMPING, INERTIA, LEAD_MASS, LENGTH, LINKS, Point, STIFFNESS, middle_links,
     point_of,
 };
-use super::descent::{DescentRules, Iterate, descend, go_on};
+use super::descent::{DescentRules, Iterate, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::noise::Noise;
@@ -34,29 +34,18 @@ const NOISE_PX: f64 = 4.0;
 /// Two ropes of the bank closer than this, in parts of the box, start the same descent.
 const APART: f64 = 0.12;
 
-/// Points from which the fit may be refined, the likeliest first.
+/// Where the refinement may start: the likeliest rope of the ranges.
 pub(super) fn fast_search(
     film: &Film<'_>,
     coordinates: &Coordinates,
-    seed: u64,
     budget: &mut Budget<'_>,
-) -> Result<Vec<Iterate>, IdentifyError> {
-    let bank = bank(coordinates, seed);
-    let comparer = Comparer::new(film, coordinates);
-    let compared = comparer.compare(&bank)?;
-    let best = compared
-        .iter()
-        .fold(f64::INFINITY, |b, c| b.min(c.distance_px));
-    budget.step(bank.len(), best)?;
-    let mut order: Vec<usize> = (0..bank.len()).collect();
-    order.sort_by(|a, b| {
-        compared[*a]
-            .distance_px
-            .total_cmp(&compared[*b].distance_px)
-    });
+) -> Result<Iterate, IdentifyError> {
+    let bank = bank(coordinates, film.options.seed);
+    let mut ranked = Comparer::new(film, coordinates).compare(&bank)?;
+    ranked.sort_by(|a, b| a.distance_px.total_cmp(&b.distance_px));
+    budget.step(bank.len(), ranked[0].distance_px)?;
     let mut starts: Vec<Point> = Vec::new();
-    for i in order {
-        let start = compared[i].with_camera(&bank[i]);
+    for Compared { x: start, .. } in ranked {
         if starts.iter().all(|s| apart(coordinates, s, &start) > APART) {
             starts.push(start);
         }
@@ -73,10 +62,10 @@ pub(super) fn from_proposal(
     coordinates: &Coordinates,
     proposed: &RopeParams,
     budget: &mut Budget<'_>,
-) -> Result<Vec<Iterate>, IdentifyError> {
+) -> Result<Iterate, IdentifyError> {
     let x = searchable(coordinates, point_of(proposed));
     let compared = Comparer::new(film, coordinates).compare(&[x])?;
-    let starts: Vec<Point> = compared.iter().map(|c| c.with_camera(&x)).collect();
+    let starts: Vec<Point> = compared.iter().map(|c| c.x).collect();
     improve(film, coordinates, &starts, budget)
 }
 
@@ -88,13 +77,13 @@ fn searchable(coordinates: &Coordinates, mut x: Point) -> Point {
     coordinates.clamped(&x)
 }
 
-/// Coarse steps from some starts.
+/// Coarse steps from some starts; the best that they lead to.
 fn improve(
     film: &Film<'_>,
     coordinates: &Coordinates,
     starts: &[Point],
     budget: &mut Budget<'_>,
-) -> Result<Vec<Iterate>, IdentifyError> {
+) -> Result<Iterate, IdentifyError> {
     let rules = |iterations| DescentRules {
         fidelity: Fidelity::Coarse,
         links: middle_links(),
@@ -105,7 +94,8 @@ fn improve(
     let first = rules(FIRST_STEPS);
     let mut iterates = descend(film, coordinates, starts, &[], &first, budget)?;
     iterates.truncate(FINALISTS);
-    go_on(film, coordinates, iterates, &rules(LAST_STEPS), budget)
+    let last = rules(LAST_STEPS);
+    best(go_on(film, coordinates, iterates, &last, budget)?)
 }
 
 /// Ropes drawn from the ranges.

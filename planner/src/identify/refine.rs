@@ -5,8 +5,8 @@
 //! normal equations, widened where the parts of the film disagree by more than it says.
 
 use super::budget::Budget;
-use super::coordinates::{Coordinates, FREE, LINKS, Point, Square, link_range, middle_links};
-use super::descent::{DescentRules, Iterate, descend, go_on};
+use super::coordinates::{Coordinates, FREE, Point, Square, middle_links, nearest_links};
+use super::descent::{DescentRules, Iterate, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::linear::Normal;
@@ -52,13 +52,6 @@ pub(super) fn refine(
     let estimate = |w: &Iterate| {
         Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows).at_least(film.options.noise_min_px)
     };
-    let best = |iterates: Vec<Iterate>| {
-        iterates
-            .into_iter()
-            .next()
-            .ok_or(IdentifyError::NothingVisible)
-    };
-
     let middle = middle_links();
     let first = rules(middle, Noise::white(noise_px), FIRST_STEPS);
     let starts = [*start];
@@ -66,8 +59,7 @@ pub(super) fn refine(
     let second = rules(middle, estimate(&iterate), SECOND_STEPS);
     let again = Iterate::new(film, coordinates, &second, iterate.x, iterate.at);
     iterate = best(go_on(film, coordinates, vec![again], &second, budget)?)?;
-    let links = likeliest_links(&iterate.x);
-    let last = rules(links, estimate(&iterate), LAST_STEPS);
+    let last = rules(nearest_links(&iterate.x), estimate(&iterate), LAST_STEPS);
     let (starts, near) = ([iterate.x], [&iterate.at.rows]);
     iterate = best(descend(film, coordinates, &starts, &near, &last, budget)?)?;
     let noise = estimate(&iterate);
@@ -83,12 +75,6 @@ pub(super) fn refine(
         noise,
         inflation,
     })
-}
-
-/// The link count nearest to a point's, within the ranges.
-fn likeliest_links(x: &Point) -> u32 {
-    let (low, high) = link_range();
-    x[LINKS].round().clamp(f64::from(low), f64::from(high)) as u32
 }
 
 /// Spread of the gradient over the parts of the film, relative to what the normal

@@ -6,20 +6,12 @@
 //! makes the link inertia. The link count is searched as a real number and rounded.
 
 use super::budget::Budget;
-use super::coarse::{Comparer, INVISIBLE_PX};
+use super::coarse::{Compared, Comparer, INVISIBLE_PX};
 use super::coordinates::{CAMERA, Coordinates, Point};
 use super::error::IdentifyError;
 use super::film::Film;
 use super::options::IdentifyOptions;
 use cmaes::{CmaEs, CmaOptions, StopRules};
-
-/// Result of the search.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
-    pub(super) x: Point,
-    /// Robust distance with the camera where it fits best (px).
-    pub(super) distance_px: f64,
-}
 
 /// The global search; repeated from other random numbers, `repeats_max` times at most,
 /// where it was caught in a side minimum.
@@ -28,7 +20,7 @@ pub(super) fn search(
     coordinates: &Coordinates,
     repeats_max: usize,
     budget: &mut Budget<'_>,
-) -> Result<Found, IdentifyError> {
+) -> Result<Compared, IdentifyError> {
     let options = &film.options;
     let comparer = Comparer::new(film, coordinates);
     let mut found = once(&comparer, coordinates, options, options.seed, budget)?;
@@ -51,7 +43,7 @@ fn once(
     options: &IdentifyOptions,
     seed: u64,
     budget: &mut Budget<'_>,
-) -> Result<Found, IdentifyError> {
+) -> Result<Compared, IdentifyError> {
     let part = |x: &Point| x.as_slice()[..CAMERA].to_vec();
     let spread = (coordinates.upper - coordinates.lower) / 5.0;
     let mut strategy = CmaEs::new(CmaOptions {
@@ -67,7 +59,7 @@ fn once(
             ..StopRules::default()
         },
     })?;
-    let mut found: Option<Found> = None;
+    let mut found: Option<Compared> = None;
     let mut history = Vec::new();
     loop {
         let asked = strategy.ask(&mut |_| true)?;
@@ -78,12 +70,9 @@ fn once(
         let compared = comparer.compare(&points)?;
         let fitness: Vec<f64> = compared.iter().map(|c| c.distance_px).collect();
         strategy.tell(&fitness)?;
-        for (x, c) in points.iter().zip(&compared) {
+        for c in compared {
             if c.distance_px < found.map_or(INVISIBLE_PX, |f| f.distance_px) {
-                found = Some(Found {
-                    x: c.with_camera(x),
-                    distance_px: c.distance_px,
-                });
+                found = Some(c);
             }
         }
         let best = found.ok_or(IdentifyError::NothingVisible)?;

@@ -77,25 +77,17 @@ pub struct PhiMetadata {
     pub graph_sha256: String,
 }
 
-/// Why a file is not used as a model.
+/// Why a file is not used as a model: it cannot be read, is no model of this program or not
+/// for this version of it, or is damaged; and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum ModelError {
-    /// The file cannot be read.
-    #[error("model {path}: {source}")]
-    Unreadable {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// No model of this program, not for this version of it, or damaged.
-    #[error("model {name}: {reason}")]
-    Refused {
-        /// File or `embedded`.
-        name: String,
-        /// What is wrong, and what to do.
-        reason: String,
-    },
+#[error("model {0}")]
+pub struct ModelError(String);
+
+impl ModelError {
+    /// Of the file `name`, or `embedded`.
+    pub(super) fn new(name: &str, reason: impl core::fmt::Display) -> Self {
+        Self(format!("{name}: {reason}"))
+    }
 }
 
 /// Hash of a graph as it stands in a model file, with all its weights.

@@ -3,7 +3,7 @@
 use super::encoder::{Encoder, RawOutputs};
 use super::metadata::{ModelError, PhiMetadata, in_units};
 use super::probe::{PARITY, difference, probe};
-use crate::features::{FeatureDefinition, ObserveError, ViewPlane, WiggleFeatures, observe};
+use crate::features::{ObserveError, ViewPlane, WiggleFeatures, observe};
 use crate::observation::{Observation, ObservedPoints};
 use crate::wiggle::wiggling_arm;
 use shared_types::rope::ROPE_PARAMETERS;
@@ -28,20 +28,14 @@ pub enum PredictError {
     /// The film is none that the network can judge.
     #[error(transparent)]
     Observe(#[from] ObserveError),
-    /// The features are not those the network was trained on.
-    #[error("the network was trained on {trained:?}, the observation has {given:?}")]
-    OtherFeatures {
-        /// The network's.
-        trained: FeatureDefinition,
-        /// The observation's.
-        given: FeatureDefinition,
-    },
-    /// Features so far off that the outputs are no numbers.
-    #[error("the network's outputs for this film are not finite")]
-    NotFinite,
+    /// The features are not those the network was trained on, or so far off that the outputs
+    /// are no numbers.
+    #[error("{0}")]
+    Features(String),
 }
 
 /// A loaded network.
+#[derive(Debug)]
 pub struct PhiNet {
     metadata: PhiMetadata,
     plane: ViewPlane,
@@ -51,14 +45,6 @@ pub struct PhiNet {
 /// The network that comes with this version (`configs/models/README.md`).
 const EMBEDDED: &[u8] = include_bytes!("../../../configs/models/phi-nn.onnx");
 
-impl core::fmt::Debug for PhiNet {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("PhiNet")
-            .field("metadata", &self.metadata)
-            .finish_non_exhaustive()
-    }
-}
-
 /// The wiggle that the network was trained on, as the camera sees it.
 fn plane_of(metadata: &PhiMetadata) -> Result<ViewPlane, String> {
     let arm = wiggling_arm(&metadata.wiggle).map_err(|error| error.to_string())?;
@@ -66,36 +52,21 @@ fn plane_of(metadata: &PhiMetadata) -> Result<ViewPlane, String> {
 }
 
 impl PhiNet {
-    /// The network that comes with this version.
-    ///
-    /// # Errors
-    /// None that a released version has.
+    /// The network that comes with this version; no released version fails to read it.
     pub fn embedded() -> Result<Self, ModelError> {
         Self::from_bytes("embedded", EMBEDDED)
     }
 
     /// Loads a model file.
-    ///
-    /// # Errors
-    /// The reason why the file is not used.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| ModelError::Unreadable {
-            path: name.clone(),
-            source,
-        })?;
+        let bytes = std::fs::read(path).map_err(|error| ModelError::new(&name, error))?;
         Self::from_bytes(&name, &bytes)
     }
 
     /// Loads a model from memory; `name` is for messages.
-    ///
-    /// # Errors
-    /// The reason why these bytes are not used.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
-        Self::read(bytes).map_err(|reason| ModelError::Refused {
-            name: name.to_owned(),
-            reason,
-        })
+        Self::read(bytes).map_err(|reason| ModelError::new(name, reason))
     }
 
     fn read(bytes: &[u8]) -> Result<Self, String> {
@@ -154,9 +125,6 @@ impl PhiNet {
     }
 
     /// What the network sees of an observation of its wiggle.
-    ///
-    /// # Errors
-    /// See [`ObserveError`].
     pub fn see(&self, observation: &Observation<'_>) -> Result<WiggleFeatures, ObserveError> {
         self.reads(observation.points)?;
         observe(
@@ -169,17 +137,11 @@ impl PhiNet {
     }
 
     /// Rope parameters behind an observation of its wiggle.
-    ///
-    /// # Errors
-    /// A film that cannot be judged.
     pub fn look(&self, observation: &Observation<'_>) -> Result<Prediction, PredictError> {
         self.predict(&self.see(observation)?)
     }
 
     /// Rope parameters behind features.
-    ///
-    /// # Errors
-    /// Other features than it was trained on, or outputs that are not finite.
     pub fn predict(&self, features: &WiggleFeatures) -> Result<Prediction, PredictError> {
         let out = self.run(features)?;
         let scales = &self.metadata.parameters;
@@ -192,21 +154,16 @@ impl PhiNet {
     }
 
     /// The network's outputs as they are.
-    ///
-    /// # Errors
-    /// As [`PhiNet::predict`].
     pub fn run(&self, features: &WiggleFeatures) -> Result<RawOutputs, PredictError> {
         if features.definition != self.metadata.features {
-            return Err(PredictError::OtherFeatures {
-                trained: self.metadata.features,
-                given: features.definition,
-            });
+            return Err(PredictError::Features(format!(
+                "the network was trained on {:?}, the observation has {:?}",
+                self.metadata.features, features.definition
+            )));
         }
         let found = self.encoder.outputs(&features.motion, &features.widths);
-        if found.is_finite() {
-            Ok(found)
-        } else {
-            Err(PredictError::NotFinite)
-        }
+        found.is_finite().then_some(found).ok_or_else(|| {
+            PredictError::Features("the network's outputs for this film are not finite".to_owned())
+        })
     }
 }

@@ -58,8 +58,8 @@ struct Client<'a> {
 
 impl Client<'_> {
     /// Reports how far the work is; interrupts it when nobody listens.
-    fn report(&self, progress: impl Into<Progress>) -> ControlFlow<()> {
-        let progress = PlannerEvent::Progress(progress.into());
+    fn report(&self, progress: Progress) -> ControlFlow<()> {
+        let progress = PlannerEvent::Progress(progress);
         let received = self.call.send(&progress).is_ok() && self.call.is_wanted();
         if received && !self.stop.load(Ordering::Relaxed) {
             ControlFlow::Continue(())

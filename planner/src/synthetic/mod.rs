@@ -22,9 +22,6 @@ use shared_types::{RopeParams, StereoCamera};
 
 /// Films one rope, simulated finely. A number of keypoints means so many, uniform in arc
 /// length.
-///
-/// # Errors
-/// What the rope simulator refuses.
 pub fn film(
     rope: &RopeParams,
     motion: &dyn AttachMotion,

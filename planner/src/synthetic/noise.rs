@@ -86,10 +86,7 @@ impl Default for Randomisation {
 }
 
 impl Randomisation {
-    /// Checks that every value can be drawn from.
-    ///
-    /// # Errors
-    /// The first value out of range.
+    /// Refuses the first value that cannot be drawn from.
     pub fn check(&self) -> Result<(), OutOfRange> {
         const SMALL: &str = "0 to 0.5";
         const COUNT_ORDER: &str = "the smaller count first";

@@ -86,15 +86,4 @@ mod tests {
             assert!((42..=44).contains(&found), "{links}: {found}");
         }
     }
-
-    #[test]
-    fn held_out_ropes_are_other_ropes() {
-        let training = Hypercube::new(5, Share::Training, 10);
-        let held_out = Hypercube::new(5, Share::HeldOut, 10);
-        assert_ne!(training.rope(0), held_out.rope(0));
-        assert_eq!(
-            training.rope(4),
-            Hypercube::new(5, Share::Training, 10).rope(4)
-        );
-    }
 }

@@ -100,11 +100,7 @@ pub fn write_joints(path: &Path, samples: impl Iterator<Item = (f64, JointVector
 
 /// Writes a trajectory as joints at a rate, its last row at rest.
 pub fn write_trajectory(path: &Path, trajectory: &JointTrajectory, period_s: f64) -> Result<()> {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a trajectory lasts at most ten minutes"
-    )]
+    // A trajectory lasts at most ten minutes.
     let cycles = (trajectory.duration_s() / period_s).ceil() as u32;
     let rows = (0..=cycles).map(|i| {
         let t = f64::from(i) * period_s;

@@ -93,13 +93,7 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate, doubts: &[Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::rope::{Ambiguity, FitCircumstances, KeypointNoise, OutOfDistribution};
-
-    const NOISE: KeypointNoise = KeypointNoise {
-        sigma_px: 1.0,
-        in_time: 0.8,
-        along_rope: 0.1,
-    };
+    use shared_types::rope::{Ambiguity, FitCircumstances, OutOfDistribution};
 
     fn estimate() -> RopeEstimate {
         RopeEstimate {
@@ -123,12 +117,7 @@ mod tests {
                 }],
                 inflation: 1.0,
             },
-            circumstances: FitCircumstances {
-                noise_along: NOISE,
-                noise_across: NOISE,
-                camera_position_m: [0.0; 3],
-                camera_rotation_rad: [0.0; 3],
-            },
+            circumstances: FitCircumstances::default(),
             out_of_distribution: OutOfDistribution {
                 score: 0.5,
                 limit: 4.0,

@@ -19,9 +19,6 @@ pub struct Difference {
 }
 
 /// All differences of two runs but their folders and times.
-///
-/// # Errors
-/// A value is none that JSON knows.
 pub fn compare(first: &Entry, second: &Entry) -> Result<Vec<Difference>> {
     let (a, b) = (serde_json::to_value(first)?, serde_json::to_value(second)?);
     let mut found = Vec::new();

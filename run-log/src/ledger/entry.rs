@@ -84,10 +84,7 @@ fn part<T>(name: &str, damage: &mut Vec<String>, found: Result<Option<T>>) -> Op
     })
 }
 
-/// Reads a run; whatever is wrong with it is reported in it.
-///
-/// # Errors
-/// There is no such run.
+/// Reads a run that is there; whatever is wrong with it is reported in it.
 pub fn read(folder: &Path) -> Result<Entry> {
     let run = Run::open(folder)?;
     let mut damage = Vec::new();

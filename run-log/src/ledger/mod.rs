@@ -17,9 +17,6 @@ pub const RUNS: &str = "runs";
 
 /// The runs in `places`: each is a run folder, or a folder of run folders. In order
 /// of their names, which begin with the time.
-///
-/// # Errors
-/// A place cannot be read.
 pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {
     let mut found = Vec::new();
     for place in places {

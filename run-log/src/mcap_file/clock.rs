@@ -44,11 +44,6 @@ pub(super) struct Thinned {
 }
 
 impl Thinned {
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "saturating"
-    )]
     /// So many a second.
     pub(super) fn at(rate_hz: f64) -> Self {
         Self {

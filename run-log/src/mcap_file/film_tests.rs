@@ -11,6 +11,7 @@ use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{Frame, WiggleFilm, joints};
 use rope_sim::MeasuredArm;
 use shared_types::ipc::{CycleRecord, FrameHeader, JointReport, PIXEL_FORMAT_YUYV};
+use std::ops::Range;
 
 /// Monotonic time at which the wiggle begins (ns).
 const BEGIN_NS: u64 = 7_000_000_000;
@@ -29,26 +30,15 @@ fn frames(camera: &CameraConfig) -> Vec<Frame> {
     film.take(count).step_by(2).collect()
 }
 
-/// A run's file: still, the wiggle, still, a motion that no picture shows. `camera` is
-/// told only where it is wanted.
-fn write(path: &Path, camera: &CameraConfig, frames: &[Frame], tell_camera: bool) {
-    write_part(path, camera, frames, tell_camera, -100..900);
-}
+/// The control cycles of a whole file.
+const ALL: Range<i32> = -100..900;
 
-/// The same with some control cycles only.
-fn write_part(
-    path: &Path,
-    camera: &CameraConfig,
-    frames: &[Frame],
-    tell_camera: bool,
-    cycles: std::ops::Range<i32>,
-) {
+/// A run's file: still, the wiggle, still, a motion that no picture shows; of that `cycles`.
+fn write(path: &Path, camera: &CameraConfig, frames: &[Frame], cycles: Range<i32>) {
     let mut file = McapFile::create(path).unwrap();
     let sees = camera.stereo_camera();
-    if tell_camera {
-        let text = serde_json::to_string(&sees).unwrap();
-        file.metadata(CAMERA[0], &[(CAMERA[1], text)]).unwrap();
-    }
+    let text = serde_json::to_string(&sees).unwrap();
+    file.metadata(CAMERA[0], &[(CAMERA[1], text)]).unwrap();
     let clock = Clock::compare();
     for cycle in cycles {
         let t_s = f64::from(cycle) * 4e-3;
@@ -93,7 +83,7 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
     let path = folder.path().join("run.mcap");
     let config = CameraConfig::default();
     let filmed = frames(&config);
-    write(&path, &config, &filmed, true);
+    write(&path, &config, &filmed, ALL);
     let mut part = RunFilm::read(&path).unwrap().part(1).unwrap();
     let camera = part.camera.clone().unwrap().unwrap();
     assert_eq!(part.warnings, Vec::<String>::new());
@@ -136,7 +126,7 @@ fn what_a_file_does_not_hold_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let config = CameraConfig::default();
-    write(&path, &config, &[], false);
+    write(&path, &config, &[], ALL);
     let refused = |number| {
         let part = RunFilm::read(&path).unwrap().part(number);
         part.unwrap_err().to_string()
@@ -146,18 +136,13 @@ fn what_a_file_does_not_hold_is_said() {
     assert!(refused(1).contains("no picture"), "{}", refused(1));
     std::fs::remove_file(&path).unwrap();
     // The wiggle begins before anything was recorded.
-    write_part(&path, &config, &[], false, 100..900);
-    assert!(
-        refused(1).contains("beginning of motion 1"),
-        "{}",
-        refused(1)
-    );
+    write(&path, &config, &[], 100..900);
+    let said = refused(1);
+    assert!(said.contains("beginning of motion 1"), "{said}");
     std::fs::write(&path, b"words").unwrap();
     let error = format!("{:#}", RunFilm::read(&path).unwrap_err());
-    assert!(
-        error.contains("run.mcap") && error.contains("MCAP"),
-        "{error}"
-    );
+    let named = error.contains("run.mcap") && error.contains("MCAP");
+    assert!(named, "{error}");
 }
 
 #[test]
@@ -167,7 +152,7 @@ fn a_damaged_file_is_read_as_far_as_it_is_whole() {
     let config = CameraConfig::default();
     let mut film = WiggleFilm::new(&config, 7, None, -0.1).unwrap();
     let frames: Vec<Frame> = (0..12).filter_map(|_| film.next()).collect();
-    write(&path, &config, &frames, true);
+    write(&path, &config, &frames, ALL);
     let whole = std::fs::read(&path).unwrap();
     let pictures = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();

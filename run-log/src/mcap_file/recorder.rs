@@ -160,11 +160,8 @@ impl Recording {
         )?;
         let arm = urdf(&config.limits, &config.cell.pole);
         file.attach(at_ns, "robot.urdf", "application/xml", arm.as_bytes())?;
-        file.json(
-            Channel::Scene,
-            at_ns,
-            &room(at_ns, &config.cell.pole, config.target_m),
-        )?;
+        let room = room(at_ns, &config.cell.pole, config.target_m);
+        file.json(Channel::Scene, at_ns, &room)?;
         if let Some(camera) = &config.camera {
             let text = serde_json::to_string(camera)?;
             file.metadata(CAMERA[0], &[(CAMERA[1], text)])?;
@@ -285,23 +282,17 @@ impl Recording {
         if !self.pictures.takes(header.stamp_ns) {
             return Ok(false);
         }
-        let age_ns = self
-            .clock
-            .now_ns()
-            .saturating_sub(self.clock.wall_ns(header.stamp_ns));
-        if age_ns > PICTURE_LATE_NS {
+        let at_ns = self.clock.wall_ns(header.stamp_ns);
+        if self.clock.now_ns().saturating_sub(at_ns) > PICTURE_LATE_NS {
             self.pictures_late += 1;
             return Ok(false);
         }
         match left_jpeg(header, pixels, 1, QUALITY) {
             Ok(jpeg) => {
-                let at_ns = self.clock.wall_ns(header.stamp_ns);
-                self.file
-                    .json(Channel::Image, at_ns, &messages::image(at_ns, &jpeg))?;
+                let picture = messages::image(at_ns, &jpeg);
+                self.file.json(Channel::Image, at_ns, &picture)?;
             }
-            Err(reason) => {
-                tracing::warn!("a picture is not recorded: {reason:#}");
-            }
+            Err(reason) => tracing::warn!("a picture is not recorded: {reason:#}"),
         }
         Ok(true)
     }
@@ -326,23 +317,16 @@ impl Recorded {
     }
 
     /// Finishes the file with the run's results, and the rope that `simulate` makes of them.
-    ///
-    /// # Errors
-    /// The disk takes nothing any more.
     pub fn finish(self, simulate: SimulateRope) -> Result<()> {
         let (mut recording, mut results) = (self.recording, self.results);
         results.look(&mut recording.file, recording.clock)?;
         results.simulate(&mut recording.file, recording.clock, simulate)?;
-        let RecordingCounts {
-            chunks,
-            lost_chunks,
-            ..
-        } = recording.counts;
+        let counts = recording.counts;
         recording.file.metadata(
             "recorder",
             &[
-                ("chunks", chunks.to_string()),
-                ("chunks_lost", lost_chunks.to_string()),
+                ("chunks", counts.chunks.to_string()),
+                ("chunks_lost", counts.lost_chunks.to_string()),
                 ("cycles_lost", recording.cycles.lost.to_string()),
                 ("frames_lost", recording.frames.lost.to_string()),
                 ("pictures_left_out", recording.pictures_late.to_string()),

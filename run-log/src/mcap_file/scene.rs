@@ -103,32 +103,18 @@ pub(super) fn room(at_ns: u64, pole: &Pole, target_m: Option<[f64; 3]>) -> Value
     let mut entities = Vec::new();
     let origins = JOINT_ORIGIN_M.map(Vector3::from);
     for (i, to_m) in origins.iter().enumerate() {
-        let frame = if i == 0 {
-            BASE.to_owned()
-        } else {
-            link_name(i - 1)
-        };
+        let frame = i.checked_sub(1).map_or_else(|| BASE.to_owned(), link_name);
         let mut parts = vec![("spheres", ball(&Vector3::zeros(), ARM_DIAMETER_M, ARM))];
         if to_m.norm() > 0.0 {
-            parts.push((
-                "cylinders",
-                rod(&Vector3::zeros(), to_m, ARM_DIAMETER_M, ARM),
-            ));
+            let rod = rod(&Vector3::zeros(), to_m, ARM_DIAMETER_M, ARM);
+            parts.push(("cylinders", rod));
         }
         entities.push(entity(at_ns, &format!("arm{i}"), &frame, &parts));
     }
-    let stick = rod(
-        &pole.offset_m.into(),
-        &pole.end_m(),
-        2.0 * pole.radius_m,
-        POLE_RGBA,
-    );
-    entities.push(entity(
-        at_ns,
-        "pole",
-        &link_name(JOINTS - 1),
-        &[("cylinders", stick)],
-    ));
+    let (from_m, to_m) = (pole.offset_m.into(), pole.end_m());
+    let stick = rod(&from_m, &to_m, 2.0 * pole.radius_m, POLE_RGBA);
+    let last = link_name(JOINTS - 1);
+    entities.push(entity(at_ns, "pole", &last, &[("cylinders", stick)]));
     if let Some(target_m) = target_m {
         let target = ball(&Vector3::from(target_m), TARGET_DIAMETER_M, TARGET);
         entities.push(entity(at_ns, "target", BASE, &[("spheres", target)]));
@@ -170,12 +156,8 @@ pub(super) fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {
 
 /// Place of the camera in the world.
 pub(super) fn camera_place(at_ns: u64, camera: &StereoCamera) -> Value {
-    transform(
-        at_ns,
-        BASE,
-        CAMERA_FRAME,
-        placed(&camera.p_w_cam_m, &camera.r_w_cam),
-    )
+    let place = placed(&camera.p_w_cam_m, &camera.r_w_cam);
+    transform(at_ns, BASE, CAMERA_FRAME, place)
 }
 
 #[cfg(test)]

@@ -87,10 +87,7 @@ pub(super) fn open_error<E: Debug>(service: &'static str) -> impl Fn(E) -> IpcEr
 
 impl Bus {
     /// Joins `domain`. Files left by killed processes of the same user are
-    /// removed on the way.
-    ///
-    /// # Errors
-    /// [`IpcError::Domain`] for a bad name, [`IpcError::Join`] otherwise.
+    /// removed on the way. [`IpcError::Domain`] for a bad name.
     pub fn join(domain: &str) -> Result<Self, IpcError> {
         let config = config_of(domain)?;
         let root = root_folder()?;

@@ -16,10 +16,7 @@ fn folder_of(user: u32) -> PathBuf {
     PathBuf::from(format!("/tmp/wag-{user}"))
 }
 
-/// This user's folder, made when it is missing.
-///
-/// # Errors
-/// [`IpcError::Join`] when it cannot be made or belongs to somebody else.
+/// This user's folder, made when it is missing; refused when it belongs to somebody else.
 pub(super) fn root_folder() -> Result<PathBuf, IpcError> {
     let user = rustix::process::getuid().as_raw();
     let folder = folder_of(user);

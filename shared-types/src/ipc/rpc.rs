@@ -58,21 +58,17 @@ pub fn decode<T: DeserializeOwned>(service: &'static str, bytes: &[u8]) -> Resul
         service,
         reason: reason.to_owned(),
     };
-    let word = |at: usize| {
-        bytes
-            .get(at..at + 4)
-            .and_then(|b| <[u8; 4]>::try_from(b).ok())
-            .ok_or_else(|| fail("too short"))
-    };
-    if word(0)? != MAGIC {
+    let (header, body) = bytes
+        .split_first_chunk::<HEADER>()
+        .ok_or_else(|| fail("too short"))?;
+    let (words, _) = header.as_chunks::<4>();
+    if words[0] != MAGIC {
         return Err(fail("unknown magic number"));
     }
-    let length = u32::from_le_bytes(word(4)?) as usize;
-    let body = bytes
-        .get(HEADER..)
-        .filter(|b| b.len() == length)
-        .ok_or_else(|| fail("wrong length"))?;
-    if crc32fast::hash(body) != u32::from_le_bytes(word(8)?) {
+    if body.len() != u32::from_le_bytes(words[1]) as usize {
+        return Err(fail("wrong length"));
+    }
+    if crc32fast::hash(body) != u32::from_le_bytes(words[2]) {
         return Err(fail("wrong checksum"));
     }
     postcard::from_bytes(body).map_err(|e| fail(&e.to_string()))
@@ -95,10 +91,7 @@ fn open<R: Rpc>(bus: &Bus) -> Result<BytesService, IpcError> {
 
 /// The answering end.
 #[derive(Debug)]
-pub struct RpcServer<R: Rpc> {
-    server: Server<Transport, [u8], (), [u8], ()>,
-    service: PhantomData<R>,
-}
+pub struct RpcServer<R: Rpc>(Server<Transport, [u8], (), [u8], ()>, PhantomData<R>);
 
 impl<R: Rpc> RpcServer<R> {
     /// Opens the service. There is one server per domain.
@@ -113,25 +106,21 @@ impl<R: Rpc> RpcServer<R> {
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
             .create()
             .map_err(open_error(R::NAME))?;
-        Ok(Self {
-            server,
-            service: PhantomData,
-        })
+        Ok(Self(server, PhantomData))
     }
 
     /// The next request, if one waits.
     ///
     /// # Errors
-    /// [`IpcError::Transfer`]; [`IpcError::Message`] for one that cannot be
+    /// [`IpcError::Failed`]; [`IpcError::Message`] for one that cannot be
     /// understood (it is dropped, the caller sees its answer end).
     pub fn receive(&self) -> Result<Option<Call<R>>, IpcError> {
-        let active = self.server.receive().map_err(IpcError::transfer(R::NAME))?;
-        active
-            .map(|active| {
-                let request = decode(R::NAME, active.payload())?;
-                Ok(Call { request, active })
-            })
-            .transpose()
+        let active = self.0.receive().map_err(IpcError::transfer(R::NAME))?;
+        let Some(active) = active else {
+            return Ok(None);
+        };
+        let request = decode(R::NAME, active.payload())?;
+        Ok(Some(Call { request, active }))
     }
 }
 
@@ -145,20 +134,12 @@ pub struct Call<R: Rpc> {
 
 impl<R: Rpc> Call<R> {
     /// Sends one event.
-    ///
-    /// # Errors
-    /// [`IpcError::Transfer`] or [`IpcError::Message`].
     pub fn send(&self, event: &R::Event) -> Result<(), IpcError> {
         let bytes = encode(R::NAME, event)?;
-        let response = self
-            .active
-            .loan_slice_uninit(bytes.len())
-            .map_err(IpcError::transfer(R::NAME))?;
-        response
-            .write_from_slice(&bytes)
-            .send()
-            .map_err(IpcError::transfer(R::NAME))?;
-        Ok(())
+        let loan = self.active.loan_slice_uninit(bytes.len());
+        let loan = loan.map_err(IpcError::transfer(R::NAME))?;
+        let sent = loan.write_from_slice(&bytes).send();
+        sent.map_err(IpcError::transfer(R::NAME))
     }
 
     /// Whether the caller still listens.
@@ -170,16 +151,10 @@ impl<R: Rpc> Call<R> {
 
 /// The asking end.
 #[derive(Debug)]
-pub struct RpcClient<R: Rpc> {
-    client: Client<Transport, [u8], (), [u8], ()>,
-    service: PhantomData<R>,
-}
+pub struct RpcClient<R: Rpc>(Client<Transport, [u8], (), [u8], ()>, PhantomData<R>);
 
 impl<R: Rpc> RpcClient<R> {
     /// Opens the service; the server may come later.
-    ///
-    /// # Errors
-    /// [`IpcError::Open`].
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
         let client = open::<R>(bus)?
             .client_builder()
@@ -187,10 +162,7 @@ impl<R: Rpc> RpcClient<R> {
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .create()
             .map_err(open_error(R::NAME))?;
-        Ok(Self {
-            client,
-            service: PhantomData,
-        })
+        Ok(Self(client, PhantomData))
     }
 
     /// Sends a request.
@@ -199,30 +171,23 @@ impl<R: Rpc> RpcClient<R> {
     /// [`IpcError::Gone`] when nobody serves, else transfer errors.
     pub fn call(&self, request: &R::Request) -> Result<Pending<R>, IpcError> {
         let bytes = encode(R::NAME, request)?;
-        let loan = self
-            .client
-            .loan_slice_uninit(bytes.len())
-            .map_err(IpcError::transfer(R::NAME))?;
-        let pending = loan
-            .write_from_slice(&bytes)
-            .send()
-            .map_err(IpcError::transfer(R::NAME))?;
+        let loan = self.0.loan_slice_uninit(bytes.len());
+        let loan = loan.map_err(IpcError::transfer(R::NAME))?;
+        let pending = loan.write_from_slice(&bytes).send();
+        let pending = pending.map_err(IpcError::transfer(R::NAME))?;
         if pending.number_of_server_connections() == 0 {
             return Err(IpcError::Gone { service: R::NAME });
         }
-        Ok(Pending {
-            pending,
-            service: PhantomData,
-        })
+        Ok(Pending(pending, PhantomData))
     }
 }
 
 /// A request on its way; events come out.
 #[derive(Debug)]
-pub struct Pending<R: Rpc> {
-    pending: PendingResponse<Transport, [u8], (), [u8], ()>,
-    service: PhantomData<R>,
-}
+pub struct Pending<R: Rpc>(
+    PendingResponse<Transport, [u8], (), [u8], ()>,
+    PhantomData<R>,
+);
 
 impl<R: Rpc> Pending<R> {
     /// The next event, if one has come.
@@ -230,12 +195,8 @@ impl<R: Rpc> Pending<R> {
     /// # Errors
     /// [`IpcError::Gone`] when the server ended before its last event.
     pub fn try_next(&self) -> Result<Option<R::Event>, IpcError> {
-        let connected = self.pending.is_connected();
-        match self
-            .pending
-            .receive()
-            .map_err(IpcError::transfer(R::NAME))?
-        {
+        let connected = self.0.is_connected();
+        match self.0.receive().map_err(IpcError::transfer(R::NAME))? {
             Some(response) => decode(R::NAME, response.payload()).map(Some),
             None if !connected => Err(IpcError::Gone { service: R::NAME }),
             None => Ok(None),
@@ -246,7 +207,7 @@ impl<R: Rpc> Pending<R> {
     /// `keep_waiting` is asked every few milliseconds.
     ///
     /// # Errors
-    /// [`IpcError::TimedOut`], [`IpcError::Gone`], or what `keep_waiting` says.
+    /// [`IpcError::Failed`] when time is up, [`IpcError::Gone`], or what `keep_waiting` says.
     pub fn finish<E: From<IpcError>>(
         &self,
         timeout: Duration,
@@ -264,10 +225,11 @@ impl<R: Rpc> Pending<R> {
             }
             keep_waiting()?;
             if began.elapsed() > timeout {
-                return Err(IpcError::TimedOut {
-                    service: R::NAME,
-                    timeout_s: timeout.as_secs(),
-                }
+                return Err(IpcError::Failed(format!(
+                    "the process behind `{}` did not answer within {} s",
+                    R::NAME,
+                    timeout.as_secs()
+                ))
                 .into());
             }
             std::thread::sleep(Duration::from_millis(2));
@@ -319,22 +281,15 @@ mod tests {
         let name = domain("gone");
         let bus = Bus::join(&name).unwrap();
         let client = RpcClient::<Counting>::open(&bus).unwrap();
-        assert_eq!(
-            client.call(&(0, vec![])).err(),
-            Some(IpcError::Gone {
-                service: Counting::NAME
-            })
-        );
+        let gone = IpcError::Gone {
+            service: Counting::NAME,
+        };
+        assert_eq!(client.call(&(0, vec![])).err(), Some(gone.clone()));
         let server = RpcServer::<Counting>::open(&bus).unwrap();
         let pending = client.call(&(1, vec![])).unwrap();
         drop(server.receive().unwrap().unwrap());
         let end = pending.finish::<IpcError>(Duration::from_secs(1), || Ok(()), |_| ());
-        assert_eq!(
-            end,
-            Err(IpcError::Gone {
-                service: Counting::NAME
-            })
-        );
+        assert_eq!(end, Err(gone));
     }
 
     #[test]
@@ -343,10 +298,8 @@ mod tests {
         let client = RpcClient::<Counting>::open(&Bus::join(&domain("two")).unwrap()).unwrap();
         assert!(client.call(&(0, vec![])).is_err());
         assert!(server.receive().unwrap().is_none());
-        assert!(matches!(
-            Bus::join("no/slash"),
-            Err(IpcError::Domain { .. })
-        ));
+        let refused = Bus::join("no/slash");
+        assert!(matches!(refused, Err(IpcError::Domain { .. })));
     }
 
     proptest! {

@@ -180,7 +180,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
         ..config.identify
     };
     let estimate = planner::identify(&observation, &options, net.as_ref(), &mut |p| {
-        stage.go_on(&p.into())
+        stage.go_on(&p)
     })
     .map_err(classify)?;
     let seconds = stage.done(&format!(
