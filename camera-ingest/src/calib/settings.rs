@@ -10,7 +10,6 @@ use shared_types::{Shutter, StereoCamera};
 
 use super::error::{CalibError, read_text, write_text};
 use super::mode::{StereoGeometry, VideoMode};
-use super::models::ModelFiles;
 
 /// The file's fields.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -27,7 +26,7 @@ pub(super) struct CameraSettings {
     line_time_s: f64,
     extrinsics: Extrinsics,
     #[serde(default, skip_serializing_if = "ModelFiles::none")]
-    pub(super) models: ModelFiles,
+    models: ModelFiles,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -36,6 +35,29 @@ struct Extrinsics {
     position_m: [f64; 3],
     /// Rows of the rotation camera to world.
     rotation: [[f64; 3]; 3],
+}
+
+/// `[models]`, a learned model that stands in for a part of the tracker: ONNX files; what is
+/// not named is built in.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFiles {
+    /// For following points of the rope through the film.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracker: Option<PathBuf>,
+}
+
+impl ModelFiles {
+    fn none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// With the paths taken relative to a folder.
+    fn within(self, folder: &Path) -> Self {
+        Self {
+            tracker: self.tracker.map(|p| folder.join(p)),
+        }
+    }
 }
 
 pub(super) fn read(path: &Path) -> Result<CameraSettings, CalibError> {
