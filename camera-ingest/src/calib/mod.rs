@@ -33,15 +33,15 @@ pub fn load_camera(path: &Path) -> Result<StereoCamera, CalibError> {
     let settings = settings::read(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let calibration = folder.join(&settings.calibration);
-    if calibration
+    let is_yaml = calibration
         .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"))
-    {
+        .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
+    let eyes = if is_yaml {
         let right = settings.calibration_right.as_ref().map(|p| folder.join(p));
-        let eyes = yaml::read(&calibration, right.as_deref(), settings.mode)?;
-        return Ok(settings.camera(eyes));
-    }
-    let eyes = factory::read(&calibration, settings.mode)?;
+        yaml::read(&calibration, right.as_deref(), settings.mode)?
+    } else {
+        factory::read(&calibration, settings.mode)?
+    };
     Ok(settings.camera(eyes))
 }
 

@@ -72,19 +72,17 @@ impl LiveSettings {
         if !(1..=240).contains(&self.rate_hz) {
             return Err(format!("rate_hz is {}, it must be 1 to 240", self.rate_hz));
         }
-        let Some(exposure_raw) = self.exposure_raw else {
-            return match self.sensor_gain_raw {
-                None => Ok(None),
-                Some(_) => Err(
-                    "sensor_gain_raw needs exposure_raw beside it: automatic exposure would \
-                     change both"
-                        .to_owned(),
-                ),
-            };
-        };
-        let sensor = Sensor {
-            exposure_raw,
-            gain_raw: self.sensor_gain_raw,
+        let sensor = match (self.exposure_raw, self.sensor_gain_raw) {
+            (None, None) => return Ok(None),
+            (None, Some(_)) => {
+                let why = "sensor_gain_raw needs exposure_raw beside it: automatic exposure would \
+                           change both";
+                return Err(why.to_owned());
+            }
+            (Some(exposure_raw), gain_raw) => Sensor {
+                exposure_raw,
+                gain_raw,
+            },
         };
         sensor.check(self.rate_hz)?;
         Ok(Some(sensor))
