@@ -14,39 +14,26 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 /// Why bytes are no frame.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FrameError {
-    /// Number of bytes does not fit the size.
-    #[error("{found} bytes where {width_px}x{height_px} YUYV needs {expected}")]
-    Length {
-        /// Pixels per row, both images.
-        width_px: usize,
-        /// Rows.
-        height_px: usize,
-        /// Bytes needed.
-        expected: usize,
-        /// Bytes found.
-        found: usize,
-    },
-    /// The JPEG cannot be decoded.
-    #[error("JPEG does not decode: {0}")]
-    Jpeg(String),
-    /// The PNG cannot be decoded.
-    #[error("PNG does not decode: {0}")]
-    Png(String),
-    /// Another size than the frames before.
-    #[error(
-        "it is {}x{} px, the first one {}x{}", found[0], found[1], expected[0], expected[1]
-    )]
-    Size {
-        /// Width of both images and height of this frame.
-        found: [usize; 2],
-        /// Those of the first one.
-        expected: [usize; 2],
-    },
-    /// Not two images side by side.
-    #[error("a width of {0} px is not a side-by-side pair with 4:2:2 chroma (must divide by 4)")]
-    Width(usize),
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct FrameError(String);
+
+impl FrameError {
+    fn jpeg(reason: &str) -> Self {
+        Self(format!("JPEG does not decode: {reason}"))
+    }
+
+    fn png(reason: &str) -> Self {
+        Self(format!("PNG does not decode: {reason}"))
+    }
+
+    /// A frame of another width (both images) and height than the first one of a recording.
+    pub(crate) fn size(found: [usize; 2], expected: [usize; 2]) -> Self {
+        let [[width, height], [first_width, first_height]] = [found, expected];
+        Self(format!(
+            "it is {width}x{height} px, the first one {first_width}x{first_height}"
+        ))
+    }
 }
 
 /// Planes of one image: luma `width * height`, chroma `width / 2 * height`.
@@ -221,16 +208,12 @@ impl StereoFrame {
     /// # Errors
     /// The PNG is damaged or its width is no side-by-side pair.
     pub fn from_png(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        let fail = |e: png::DecodingError| FrameError::Png(e.to_string());
+        let fail = |e: png::DecodingError| FrameError::png(&e.to_string());
         let mut decoder = png::Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(png::Transformations::normalize_to_color8());
         let mut reader = decoder.read_info().map_err(fail)?;
-        let mut pixels = vec![
-            0;
-            reader
-                .output_buffer_size()
-                .ok_or_else(|| FrameError::Png("it is too large".to_owned()))?
-        ];
+        let too_large = || FrameError::png("it is too large");
+        let mut pixels = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
         let info = reader.next_frame(&mut pixels).map_err(fail)?;
         let size_px = [info.width as usize, info.height as usize];
         check_width(size_px[0])?;
@@ -260,19 +243,18 @@ fn decode(bytes: &[u8], packed: &mut Vec<u8>) -> Result<[usize; 2], FrameError> 
     // The decoder fills what is missing with grey; the end marker shows it.
     let end = bytes.iter().rposition(|&b| b != 0).unwrap_or(0);
     if end == 0 || bytes[end - 1..=end] != [0xff, 0xd9] {
-        return Err(FrameError::Jpeg(
-            "it has no end marker, so a part is missing".to_owned(),
-        ));
+        let reason = "it has no end marker, so a part is missing";
+        return Err(FrameError::jpeg(reason));
     }
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::Jpeg(format!("{e:?}"));
+    let jpeg = |e: zune_jpeg::errors::DecodeErrors| FrameError::jpeg(&format!("{e:?}"));
     decoder.decode_headers().map_err(jpeg)?;
-    let none = || FrameError::Jpeg("no dimensions".to_owned());
+    let none = || FrameError::jpeg("no dimensions");
     let (width_px, height_px) = decoder.dimensions().ok_or_else(none)?;
     check_width(width_px)?;
     packed.resize(decoder.output_buffer_size().ok_or_else(none)?, 0);
     if packed.len() != width_px * height_px * 3 {
-        return Err(FrameError::Jpeg("not a colour picture".to_owned()));
+        return Err(FrameError::jpeg("not a colour picture"));
     }
     decoder.decode_into(packed).map_err(jpeg)?;
     Ok([width_px, height_px])
@@ -320,7 +302,9 @@ fn check_width(width_px: usize) -> Result<(), FrameError> {
     if width_px.is_multiple_of(4) && width_px > 0 {
         Ok(())
     } else {
-        Err(FrameError::Width(width_px))
+        Err(FrameError(format!(
+            "a width of {width_px} px is not a side-by-side pair with 4:2:2 chroma (must divide by 4)"
+        )))
     }
 }
 
@@ -329,12 +313,10 @@ fn check_yuyv(bytes: &[u8], [width_px, height_px]: [usize; 2]) -> Result<(), Fra
     check_width(width_px)?;
     let expected = width_px * height_px * 2;
     if bytes.len() != expected || expected == 0 {
-        return Err(FrameError::Length {
-            width_px,
-            height_px,
-            expected,
-            found: bytes.len(),
-        });
+        return Err(FrameError(format!(
+            "{} bytes where {width_px}x{height_px} YUYV needs {expected}",
+            bytes.len()
+        )));
     }
     Ok(())
 }
@@ -396,22 +378,19 @@ mod tests {
 
     #[test]
     fn wrong_sizes_are_refused() {
-        assert!(matches!(
-            StereoFrame::from_yuyv(&[0; 15], [4, 2], 0, 0),
-            Err(FrameError::Length {
-                expected: 16,
-                found: 15,
-                ..
-            })
-        ));
+        let refused = |bytes: &[u8], size_px| {
+            let refused = StereoFrame::from_yuyv(bytes, size_px, 0, 0);
+            refused.unwrap_err().to_string()
+        };
         assert_eq!(
-            StereoFrame::from_yuyv(&[0; 24], [6, 2], 0, 0),
-            Err(FrameError::Width(6))
+            refused(&[0; 15], [4, 2]),
+            "15 bytes where 4x2 YUYV needs 16"
         );
-        assert!(matches!(
-            StereoFrame::from_jpeg(&[0xff, 0xd8, 0, 1, 0xff, 0xd9], 0, 0),
-            Err(FrameError::Jpeg(_))
-        ));
+        let width = refused(&[0; 24], [6, 2]);
+        assert!(width.starts_with("a width of 6 px"), "{width}");
+        let damaged = StereoFrame::from_jpeg(&[0xff, 0xd8, 0, 1, 0xff, 0xd9], 0, 0);
+        let damaged = damaged.unwrap_err().to_string();
+        assert!(damaged.starts_with("JPEG does not decode"), "{damaged}");
         for short in [&[][..], &[0], &[0xd9], &[0xff, 0xd8, 0xff, 0xe0]] {
             let error = StereoFrame::from_jpeg(short, 0, 0).unwrap_err();
             assert!(error.to_string().contains("end marker"), "{error}");

@@ -28,6 +28,6 @@ mod whole_file;
 
 pub use calib::{CalibError, load_camera};
 pub use frame::{EyeFrame, StereoFrame};
-pub use score::{Score, ScoreError, ScoreOptions, score};
+pub use score::{Score, ScoreError, score};
 pub use source::{FrameSource, SourceError, StereoSource, open_video};
 pub use track::{Film, RopeAppearance, TrackError, TrackResult, USUAL_KEYPOINTS, track};

@@ -5,7 +5,7 @@
 mod printed_board;
 
 use camera_ingest::calib::board::BoardError;
-use camera_ingest::calib::extrinsics::{ExtrinsicsError, residual, solve};
+use camera_ingest::calib::extrinsics::{residual, solve};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use printed_board::{board, camera, film};
 use shared_types::StereoCamera;
@@ -51,14 +51,15 @@ fn a_board_tells_where_the_camera_stands() {
     // A board of another size is noticed.
     let mut wrong = points.clone();
     wrong.iter_mut().for_each(|p| p.p_w_m *= 1.1);
-    assert!(matches!(
-        solve(&elsewhere, &wrong),
-        Err(ExtrinsicsError::Misfit { .. })
-    ));
-    let error = solve(&elsewhere, &points[..5]).unwrap_err();
-    assert_eq!(error, ExtrinsicsError::TooFew { found: 5 });
     let line = vec![points[0]; 8];
-    assert_eq!(solve(&elsewhere, &line), Err(ExtrinsicsError::Line));
+    for (points, said) in [
+        (&wrong[..], "px are left between seen and expected points"),
+        (&points[..5], "5 points are seen in both images"),
+        (&line, "on a line"),
+    ] {
+        let error = solve(&elsewhere, points).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
 }
 
 #[test]

@@ -5,8 +5,8 @@
 
 use camera_ingest::calib::CalibError;
 use camera_ingest::film::keypoint_film;
-use camera_ingest::source::{AviSource, FrameSource, StereoSource};
-use camera_ingest::{EyeFrame, load_camera};
+use camera_ingest::source::{FrameSource, StereoSource};
+use camera_ingest::{EyeFrame, load_camera, open_video};
 use nalgebra::Vector3;
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
@@ -124,7 +124,7 @@ fn a_film_reads_back_with_its_rate_and_the_rope_drawn_in() {
     let bytes = keypoint_film(&[grey(0), grey(1), grey(2)], &track).unwrap();
     let path = std::env::temp_dir().join(format!("film-{}.avi", std::process::id()));
     std::fs::write(&path, bytes).unwrap();
-    let film = AviSource::open(&path, None);
+    let film = open_video(&path, None);
     std::fs::remove_file(&path).unwrap();
     let mut film = film.unwrap();
     assert_eq!(film.len(), 3);

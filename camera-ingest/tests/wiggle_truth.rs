@@ -5,7 +5,7 @@
 mod recording;
 
 use camera_ingest::source::FrameSource;
-use camera_ingest::{ScoreOptions, load_camera, open_video, score};
+use camera_ingest::{load_camera, open_video, score};
 use recording::{folder, read_npy, truth_json};
 
 #[test]
@@ -22,7 +22,6 @@ fn scores_the_throw_within_six_millimetres() {
         &camera,
         colour("lead_rgb"),
         colour("target_rgb"),
-        &ScoreOptions::default(),
     )
     .unwrap();
     let number = |key: &str| truth["throw"][key].as_f64().unwrap();

@@ -1,7 +1,8 @@
 //! Films: the container and the pictures inside.
 
 use crate::folder;
-use camera_ingest::source::{AviSource, FrameSource, StereoSource};
+use camera_ingest::open_video;
+use camera_ingest::source::{FrameSource, StereoSource};
 
 /// Pictures looked at in one film.
 const PICTURES: usize = 3;
@@ -13,7 +14,7 @@ const PICTURES: usize = 3;
 pub fn run(data: &[u8]) {
     let path = folder().join("video.avi");
     std::fs::write(&path, data).expect("a film");
-    if let Ok(mut film) = AviSource::open(&path, None) {
+    if let Ok(mut film) = open_video(&path, None) {
         for index in 0..film.len().min(PICTURES) {
             let _ = film.read(index);
         }

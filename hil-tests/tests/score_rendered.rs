@@ -4,7 +4,7 @@
 
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
-use camera_ingest::{ScoreOptions, StereoFrame, score};
+use camera_ingest::{StereoFrame, score};
 use hil_tests::{for_each_seed, quantile};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -136,9 +136,8 @@ fn scores_of(seed: u64, config: &CameraConfig) -> Vec<Option<Scored>> {
         let throw = Throw::random(&mut rng, 1.0 / config.frame_rate_hz);
         let mut film = throw.film(&mut renderer, config, &camera);
         let truth_m = throw.closest_m(f64::from(FRAMES) / config.frame_rate_hz);
-        let options = ScoreOptions::default();
         let colours = (appearance.lead_rgb, appearance.target_rgb);
-        let found = score(&mut film, &camera, colours.0, colours.1, &options)
+        let found = score(&mut film, &camera, colours.0, colours.1)
             .inspect_err(|error| println!("seed {seed} throw {index}: {error}"))
             .ok()?;
         let holds = (found.interval_m[0]..=found.interval_m[1]).contains(&truth_m);

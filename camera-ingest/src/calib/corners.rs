@@ -38,15 +38,13 @@ impl CornerDetector {
             data: &eye.luma,
         };
         // A miss is no error: the other frames may show the board.
-        self.0.detect(&view).map_or_else(
-            |_miss| Vec::new(),
-            |found| {
-                let corners = found.corners.iter();
-                corners
-                    .map(|c| (c.id, [f64::from(c.position.x), f64::from(c.position.y)]))
-                    .collect()
-            },
-        )
+        let Ok(found) = self.0.detect(&view) else {
+            return Vec::new();
+        };
+        let corners = found.corners.iter();
+        corners
+            .map(|c| (c.id, [f64::from(c.position.x), f64::from(c.position.y)]))
+            .collect()
     }
 }
 

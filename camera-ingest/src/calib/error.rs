@@ -1,58 +1,34 @@
 //! Why a calibration cannot be used.
 
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::Path;
 
 use crate::whole_file::write_whole;
 
-/// Why a calibration cannot be used.
+/// Which calibration or `camera.toml` cannot be used, why, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum CalibError {
-    /// The file cannot be read or written.
-    #[error("calibration {path}: {source} (check the path and its permissions)")]
-    Io {
-        /// File concerned.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// `camera.toml` cannot be used.
-    #[error("camera settings {path}: {reason}")]
-    Settings {
-        /// File concerned.
-        path: PathBuf,
-        /// What is wrong, with the field.
-        reason: String,
-    },
-    /// The calibration that it names cannot be used.
-    #[error("calibration {path}: {reason}")]
-    Calibration {
-        /// File concerned.
-        path: PathBuf,
-        /// What is wrong, with the line or the key.
-        reason: String,
-    },
-}
+#[error("{0}")]
+pub struct CalibError(String);
 
 impl CalibError {
+    /// The system's reason at `path`.
     pub(super) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |source| Self::Io {
-            path: path.to_owned(),
-            source,
+        |source| {
+            Self::calibration(
+                path,
+                format!("{source} (check the path and its permissions)"),
+            )
         }
     }
 
-    pub(super) fn settings(path: &Path, reason: impl ToString) -> Self {
-        Self::Settings {
-            path: path.to_owned(),
-            reason: reason.to_string(),
-        }
+    /// `camera.toml` cannot be used; `reason` names the field.
+    pub(super) fn settings(path: &Path, reason: impl Display) -> Self {
+        Self(format!("camera settings {}: {reason}", path.display()))
     }
 
-    pub(super) fn calibration(path: &Path, reason: impl ToString) -> Self {
-        Self::Calibration {
-            path: path.to_owned(),
-            reason: reason.to_string(),
-        }
+    /// The calibration that it names cannot be used; `reason` names the line or the key.
+    pub(super) fn calibration(path: &Path, reason: impl Display) -> Self {
+        Self(format!("calibration {}: {reason}", path.display()))
     }
 }
 

@@ -46,30 +46,10 @@ pub struct Residual {
     pub epipolar_px: f64,
 }
 
-/// Why a pose cannot be found.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ExtrinsicsError {
-    /// Too few points.
-    #[error(
-        "camera pose: {found} points are seen in both images, at least {MIN_POINTS} are needed"
-    )]
-    TooFew {
-        /// Points given.
-        found: usize,
-    },
-    /// The points do not constrain a rotation about their line.
-    #[error("camera pose: the points lie on a line; show them spread over the picture")]
-    Line,
-    /// The points do not fit together.
-    #[error(
-        "camera pose: {rms_px:.1} px are left between seen and expected points (limit \
-         {MAX_RESIDUAL_PX} px); check the board's size and pose, and the camera's mode and calibration"
-    )]
-    Misfit {
-        /// Root mean square (px).
-        rms_px: f64,
-    },
-}
+/// Why a pose cannot be found, and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("camera pose: {0}")]
+pub struct ExtrinsicsError(String);
 
 /// Fewest points for a pose.
 const MIN_POINTS: usize = 6;
@@ -82,11 +62,13 @@ const MAX_RESIDUAL_PX: f64 = 1.5;
 /// Too few points, points on a line, or no pose that fits.
 pub fn solve(camera: &StereoCamera, points: &[Sighted]) -> Result<Extrinsics, ExtrinsicsError> {
     if points.len() < MIN_POINTS {
-        return Err(ExtrinsicsError::TooFew {
-            found: points.len(),
-        });
+        return Err(ExtrinsicsError(format!(
+            "{} points are seen in both images, at least {MIN_POINTS} are needed",
+            points.len()
+        )));
     }
-    let mut camera = lay_on(camera, points).ok_or(ExtrinsicsError::Line)?;
+    let line = "the points lie on a line; show them spread over the picture";
+    let mut camera = lay_on(camera, points).ok_or_else(|| ExtrinsicsError(line.to_owned()))?;
     let mut damping = 1e-3;
     let mut cost = square_sum(&camera, points);
     for _ in 0..50 {
@@ -112,9 +94,11 @@ pub fn solve(camera: &StereoCamera, points: &[Sighted]) -> Result<Extrinsics, Ex
     }
     let residual = residual(&camera, points);
     if residual.rms_px.is_nan() || residual.rms_px > MAX_RESIDUAL_PX {
-        return Err(ExtrinsicsError::Misfit {
-            rms_px: residual.rms_px,
-        });
+        return Err(ExtrinsicsError(format!(
+            "{:.1} px are left between seen and expected points (limit {MAX_RESIDUAL_PX} px); check the \
+             board's size and pose, and the camera's mode and calibration",
+            residual.rms_px
+        )));
     }
     let (normal, _) = normal_equations(&camera, points);
     let freedom = (4 * points.len() - 6) as f64;

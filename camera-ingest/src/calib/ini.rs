@@ -28,14 +28,12 @@ impl Ini {
                 let key = key.trim().to_ascii_lowercase();
                 values.insert((section.clone(), key), value.trim().to_owned());
             } else {
-                return Err(CalibError::calibration(
-                    path,
-                    format!(
-                        "line {}: expected `key=value` or `[section]`, found {raw:?}; is this a \
-                         factory SNxxxx.conf?",
-                        index + 1
-                    ),
-                ));
+                let reason = format!(
+                    "line {}: expected `key=value` or `[section]`, found {raw:?}; is this a factory \
+                     SNxxxx.conf?",
+                    index + 1
+                );
+                return Err(CalibError::calibration(path, reason));
             }
         }
         Ok(Self {
@@ -44,19 +42,22 @@ impl Ini {
         })
     }
 
+    fn text(&self, section: &str, key: &str) -> Option<&str> {
+        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
+        self.values.get(&at).map(String::as_str)
+    }
+
     /// A finite number, `None` if the key is absent.
     pub(super) fn number(&self, section: &str, key: &str) -> Result<Option<f64>, CalibError> {
-        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
-        let Some(text) = self.values.get(&at) else {
+        let Some(text) = self.text(section, key) else {
             return Ok(None);
         };
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(Some(value)),
-            _ => Err(self.bad(
-                section,
-                key,
-                "is not a finite number (use '.' as decimal point)",
-            )),
+            _ => {
+                let problem = "is not a finite number (use '.' as decimal point)";
+                Err(self.bad(section, key, problem))
+            }
         }
     }
 
@@ -76,11 +77,8 @@ impl Ini {
 
     /// Error about a value that is present.
     pub(super) fn bad(&self, section: &str, key: &str, problem: &str) -> CalibError {
-        let at = (section.to_ascii_lowercase(), key.to_ascii_lowercase());
-        let text = self.values.get(&at).map_or("", String::as_str);
-        CalibError::calibration(
-            &self.path,
-            format!("[{section}] {key} = {text:?} {problem}"),
-        )
+        let text = self.text(section, key).unwrap_or_default();
+        let reason = format!("[{section}] {key} = {text:?} {problem}");
+        CalibError::calibration(&self.path, reason)
     }
 }

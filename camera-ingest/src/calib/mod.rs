@@ -11,7 +11,6 @@ pub mod extrinsics;
 mod factory;
 mod ini;
 mod mode;
-mod models;
 mod settings;
 mod yaml;
 
@@ -20,8 +19,9 @@ use std::path::Path;
 pub use error::CalibError;
 pub use factory::write_factory_conf;
 pub use mode::VideoMode;
-pub use models::ModelFiles;
-pub use settings::{check_camera, load_model_files, placed_camera_toml, write_camera_toml};
+pub use settings::{
+    ModelFiles, check_camera, load_model_files, placed_camera_toml, write_camera_toml,
+};
 use shared_types::StereoCamera;
 
 /// Reads `camera.toml` and the calibration it names (relative to it).
@@ -33,15 +33,15 @@ pub fn load_camera(path: &Path) -> Result<StereoCamera, CalibError> {
     let settings = settings::read(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let calibration = folder.join(&settings.calibration);
-    if calibration
+    let is_yaml = calibration
         .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"))
-    {
+        .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
+    let eyes = if is_yaml {
         let right = settings.calibration_right.as_ref().map(|p| folder.join(p));
-        let eyes = yaml::read(&calibration, right.as_deref(), settings.mode)?;
-        return Ok(settings.camera(eyes));
-    }
-    let eyes = factory::read(&calibration, settings.mode)?;
+        yaml::read(&calibration, right.as_deref(), settings.mode)?
+    } else {
+        factory::read(&calibration, settings.mode)?
+    };
     Ok(settings.camera(eyes))
 }
 
@@ -85,44 +85,24 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let cases = [
+        type Case = ([&'static str; 2], [&'static str; 2]);
+        let cases: [Case; 7] = [
+            (["cx=332.1", ""], ["LEFT_CAM_VGA", "cx"]),
+            (["350.94", "350,94"], ["350,94", "decimal point"]),
+            (["k2=0.028", "garbage"], ["line 7", "garbage"]),
             (
-                CONF.replace("cx=332.1", ""),
-                SETTINGS.to_owned(),
-                ["LEFT_CAM_VGA", "cx"],
-            ),
-            (
-                CONF.replace("350.94", "350,94"),
-                SETTINGS.to_owned(),
-                ["350,94", "decimal point"],
-            ),
-            (
-                CONF.replace("k2=0.028", "garbage"),
-                SETTINGS.to_owned(),
-                ["line 7", "garbage"],
-            ),
-            (
-                CONF.to_owned(),
-                format!("{SETTINGS}\n[models]\nsegmentor = \"rope.onnx\"\n"),
+                [
+                    "[extrinsics]",
+                    "[models]\nsegmentor = \"rope.onnx\"\n[extrinsics]",
+                ],
                 ["segmentor", "camera.toml"],
             ),
-            (
-                CONF.to_owned(),
-                SETTINGS.replace("VGA", "HD"),
-                ["LEFT_CAM_HD", "mode"],
-            ),
-            (
-                CONF.to_owned(),
-                SETTINGS.replace("[1, 0, 0]", "[2, 0, 0]"),
-                ["rotation", "camera.toml"],
-            ),
-            (
-                CONF.to_owned(),
-                SETTINGS.replace("camera.conf", "left.yaml"),
-                ["left.yaml", "path"],
-            ),
+            (["\"VGA\"", "\"HD\""], ["LEFT_CAM_HD", "mode"]),
+            (["[1, 0, 0]", "[2, 0, 0]"], ["rotation", "camera.toml"]),
+            (["camera.conf", "left.yaml"], ["left.yaml", "path"]),
         ];
-        for (conf, settings, words) in cases {
+        for ([right, wrong], words) in cases {
+            let [conf, settings] = [CONF, SETTINGS].map(|text| text.replace(right, wrong));
             let said = load(&conf, &settings).unwrap_err().to_string();
             assert!(words.iter().all(|word| said.contains(word)), "{said}");
         }

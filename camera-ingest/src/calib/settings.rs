@@ -10,7 +10,6 @@ use shared_types::{Shutter, StereoCamera};
 
 use super::error::{CalibError, read_text, write_text};
 use super::mode::{StereoGeometry, VideoMode};
-use super::models::ModelFiles;
 
 /// The file's fields.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -27,7 +26,7 @@ pub(super) struct CameraSettings {
     line_time_s: f64,
     extrinsics: Extrinsics,
     #[serde(default, skip_serializing_if = "ModelFiles::none")]
-    pub(super) models: ModelFiles,
+    models: ModelFiles,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -38,11 +37,45 @@ struct Extrinsics {
     rotation: [[f64; 3]; 3],
 }
 
+impl Extrinsics {
+    fn new(r_w_cam: &Matrix3<f64>, p_w_cam_m: &Vector3<f64>) -> Self {
+        Self {
+            position_m: (*p_w_cam_m).into(),
+            rotation: r_w_cam.transpose().into(),
+        }
+    }
+}
+
+/// `[models]`, a learned model that stands in for a part of the tracker: ONNX files; what is
+/// not named is built in.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelFiles {
+    /// For following points of the rope through the film.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracker: Option<PathBuf>,
+}
+
+impl ModelFiles {
+    fn none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// With the paths taken relative to a folder.
+    fn within(self, folder: &Path) -> Self {
+        Self {
+            tracker: self.tracker.map(|p| folder.join(p)),
+        }
+    }
+}
+
 pub(super) fn read(path: &Path) -> Result<CameraSettings, CalibError> {
     let parsed: Result<CameraSettings, _> = toml::from_str(&read_text(path)?);
     let settings = parsed.map_err(|e| CalibError::settings(path, e))?;
-    let checked = settings.check();
-    checked.map_err(|reason| CalibError::settings(path, reason))?;
+    let times_s = [settings.exposure_s, settings.line_time_s];
+    let position_m = &settings.extrinsics.position_m;
+    check_place(times_s, &settings.rotation(), position_m)
+        .map_err(|reason| CalibError::settings(path, reason))?;
     Ok(settings)
 }
 
@@ -113,14 +146,6 @@ pub fn check_camera(camera: &StereoCamera) -> Result<(), String> {
 }
 
 impl CameraSettings {
-    fn check(&self) -> Result<(), String> {
-        check_place(
-            [self.exposure_s, self.line_time_s],
-            &self.rotation(),
-            &self.extrinsics.position_m,
-        )
-    }
-
     fn rotation(&self) -> Matrix3<f64> {
         Matrix3::from_fn(|row, column| self.extrinsics.rotation[row][column])
     }
@@ -156,7 +181,6 @@ pub fn write_camera_toml(
     mode: VideoMode,
     calibration: &Path,
 ) -> Result<(), CalibError> {
-    let r = &camera.r_w_cam;
     let settings = CameraSettings {
         calibration: calibration.to_owned(),
         calibration_right: None,
@@ -164,17 +188,10 @@ pub fn write_camera_toml(
         shutter: camera.shutter,
         exposure_s: camera.exposure_s,
         line_time_s: camera.line_time_s,
-        extrinsics: Extrinsics {
-            position_m: camera.p_w_cam_m.into(),
-            rotation: rows(r),
-        },
+        extrinsics: Extrinsics::new(&camera.r_w_cam, &camera.p_w_cam_m),
         models: ModelFiles::default(),
     };
     write_text(path, &text(path, &settings)?)
-}
-
-fn rows(r: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    core::array::from_fn(|row| core::array::from_fn(|col| r[(row, col)]))
 }
 
 fn text(path: &Path, settings: &CameraSettings) -> Result<String, CalibError> {
@@ -204,9 +221,6 @@ pub fn placed_camera_toml(
         settings.calibration_right = settings.calibration_right.map(|p| there.join(p));
         settings.models = settings.models.within(&there);
     }
-    settings.extrinsics = Extrinsics {
-        position_m: (*p_w_cam_m).into(),
-        rotation: rows(r_w_cam),
-    };
+    settings.extrinsics = Extrinsics::new(r_w_cam, p_w_cam_m);
     text(path, &settings)
 }

@@ -172,6 +172,12 @@ impl Buffer {
             ..Self::default()
         }
     }
+
+    /// Time stamp (ns).
+    pub(super) fn stamp_ns(&self) -> u64 {
+        let whole = |number: i64| u64::try_from(number).unwrap_or_default();
+        whole(self.seconds) * 1_000_000_000 + whole(self.microseconds) * 1_000
+    }
 }
 
 /// `v4l2_control`.

@@ -4,7 +4,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use super::abi;
-use super::device::{Device, Filled};
+use super::device::Device;
 use super::kernel::KernelDevice;
 use super::setup::{Setup, cannot_open};
 use super::{LiveError, LiveSettings, Losses};
@@ -41,7 +41,7 @@ impl LiveCamera {
     /// is asked.
     pub fn open(settings: LiveSettings) -> Result<Self, LiveError> {
         let device =
-            KernelDevice::open(&settings.device).map_err(|e| cannot_open(&settings.device, e))?;
+            KernelDevice::open(&settings.device).map_err(|e| cannot_open(&settings.device, &e))?;
         Self::start(settings, Box::new(device))
     }
 
@@ -98,10 +98,11 @@ impl LiveCamera {
                     self.wait(began, patience)?;
                     continue;
                 }
-                Err(e) => return Err(self.failed("taking a frame", e)),
+                Err(e) => return Err(self.failed("taking a frame", &e)),
             };
             if filled.index >= self.buffers {
-                return Err(self.failed("taking a frame", io::ErrorKind::InvalidData.into()));
+                let no_buffer = io::ErrorKind::InvalidData.into();
+                return Err(self.failed("taking a frame", &no_buffer));
             }
             let wanted = self.settings.frame_bytes();
             let Some(sequence) = self.count.take(&filled, wanted) else {
@@ -113,12 +114,9 @@ impl LiveCamera {
                 continue;
             };
             if filled.flags & abi::FLAG_CLOCK != abi::CLOCK_MONOTONIC {
-                return Err(LiveError::Setting {
-                    device: self.settings.device.clone(),
-                    reason: "its time stamps are of another clock than CLOCK_MONOTONIC, so its \
-                             frames cannot be laid beside the arm's motion"
-                        .to_owned(),
-                });
+                let reason = "its time stamps are of another clock than CLOCK_MONOTONIC, so its frames \
+                              cannot be laid beside the arm's motion";
+                return Err(LiveError::unfit(&self.settings.device, reason));
             }
             self.held = Some(filled.index);
             let bytes = self
@@ -128,7 +126,7 @@ impl LiveCamera {
                 .unwrap_or_default();
             return Ok(LiveFrame {
                 bytes,
-                stamp_ns: filled.stamp_ns,
+                stamp_ns: filled.stamp_ns(),
                 sequence,
             });
         }
@@ -142,32 +140,32 @@ impl LiveCamera {
         self.device
             .wait(left)
             .map(drop)
-            .map_err(|e| self.failed("waiting for a frame", e))
+            .map_err(|e| self.failed("waiting for a frame", &e))
     }
 
     fn queue(&mut self, index: u32) -> Result<(), LiveError> {
         self.device
             .queue(index)
-            .map_err(|e| self.failed("giving a buffer back", e))
+            .map_err(|e| self.failed("giving a buffer back", &e))
     }
 
     fn silent(&self, began: Instant) -> LiveError {
-        LiveError::Silent {
-            device: self.settings.device.clone(),
-            waited_ms: began.elapsed().as_millis(),
-            frames: self.count.good,
-            losses: self.count.losses,
-        }
+        let (waited_ms, good) = (began.elapsed().as_millis(), self.count.good);
+        let Losses {
+            missed,
+            damaged,
+            short,
+            unordered,
+        } = self.count.losses;
+        let reason = format!(
+            "no good frame for {waited_ms} ms (after {good} good ones; {missed} missed, {damaged} \
+             damaged, {short} short, {unordered} out of order); check cable and USB port"
+        );
+        LiveError::failed(&self.settings.device, reason)
     }
 
-    fn failed(&self, what: &'static str, source: io::Error) -> LiveError {
-        if source.raw_os_error() == Some(libc::ENODEV) {
-            return LiveError::Unplugged {
-                device: self.settings.device.clone(),
-                frames: self.count.good,
-            };
-        }
-        LiveError::system(&self.settings.device, what, source)
+    fn failed(&self, what: &str, source: &io::Error) -> LiveError {
+        LiveError::system(&self.settings.device, what, source, self.count.good)
     }
 }
 
@@ -183,7 +181,7 @@ struct Count {
 
 impl Count {
     /// Counts a buffer; the sequence of a good frame.
-    fn take(&mut self, filled: &Filled, frame_bytes: usize) -> Option<u64> {
+    fn take(&mut self, filled: &abi::Buffer, frame_bytes: usize) -> Option<u64> {
         let sequence = match self.sequence {
             None => u64::from(filled.sequence),
             Some(last) => {
@@ -198,7 +196,8 @@ impl Count {
             }
         };
         self.sequence = Some(sequence);
-        let later = self.stamp_ns.is_none_or(|last| filled.stamp_ns > last);
+        let stamp_ns = filled.stamp_ns();
+        let later = self.stamp_ns.is_none_or(|last| stamp_ns > last);
         let lost = if filled.flags & abi::FLAG_ERROR != 0 {
             &mut self.losses.damaged
         } else if filled.bytesused as usize != frame_bytes {
@@ -206,7 +205,7 @@ impl Count {
         } else if !later {
             &mut self.losses.unordered
         } else {
-            self.stamp_ns = Some(filled.stamp_ns);
+            self.stamp_ns = Some(stamp_ns);
             self.good += 1;
             return Some(sequence);
         };

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use std::io;
 use std::time::Duration;
 
-use super::abi::PixFormat;
+use super::abi::{Buffer, PixFormat};
 
 /// What a device is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,21 +16,6 @@ pub(super) struct Identity {
     pub(super) card: String,
     /// What it can do ([`super::abi::CAN_CAPTURE`] and so on).
     pub(super) capabilities: u32,
-}
-
-/// A buffer that the driver hands over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Filled {
-    /// Number of the buffer.
-    pub(super) index: u32,
-    /// Bytes written.
-    pub(super) bytesused: u32,
-    /// What is wrong with it, and its clock.
-    pub(super) flags: u32,
-    /// Time stamp (ns).
-    pub(super) stamp_ns: u64,
-    /// The driver's count of frames.
-    pub(super) sequence: u32,
 }
 
 /// A video device. Errors are the system's.
@@ -51,7 +36,7 @@ pub(super) trait Device: Debug {
     fn queue(&mut self, index: u32) -> io::Result<()>;
 
     /// Takes the oldest filled buffer; `WouldBlock` when there is none.
-    fn dequeue(&mut self) -> io::Result<Filled>;
+    fn dequeue(&mut self) -> io::Result<Buffer>;
 
     /// What lies in a buffer that was taken; empty for any other.
     fn bytes(&self, index: u32) -> &[u8];

@@ -6,7 +6,6 @@
 //! value at byte 17. The registers take raw numbers, whose unit the vendor does not
 //! document, so the exposure in seconds stays unknown.
 
-use std::io;
 use std::time::Duration;
 
 use super::abi::{GET_CURRENT, GET_LENGTH, SET_CURRENT};
@@ -44,21 +43,6 @@ pub(super) struct Sensor {
     pub(super) gain_raw: Option<u32>,
 }
 
-/// Why it is not set.
-#[derive(Debug)]
-pub(super) enum SensorError {
-    /// The unit refused a query.
-    Unit(io::Error),
-    /// The unit answers, but not as a ZED does.
-    Foreign(String),
-}
-
-impl From<io::Error> for SensorError {
-    fn from(error: io::Error) -> Self {
-        Self::Unit(error)
-    }
-}
-
 /// Largest raw exposure at a frame rate.
 fn max_exposure(rate_hz: u32) -> u32 {
     match rate_hz {
@@ -88,8 +72,9 @@ impl Sensor {
         }
     }
 
-    /// Ends automatic exposure, sets both images, and reads back whether they took it.
-    pub(super) fn apply(self, device: &mut dyn Device) -> Result<(), SensorError> {
+    /// Ends automatic exposure, sets both images, and reads back whether they took it; else
+    /// what stands against it.
+    pub(super) fn apply(self, device: &mut dyn Device) -> Result<(), String> {
         let mut unit = Unit::find(device)?;
         let e = self.exposure_raw;
         let exposure = [e >> 12, e >> 4, e << 4].map(|b| b.to_le_bytes()[0]);
@@ -113,16 +98,28 @@ struct Unit<'a> {
 }
 
 impl<'a> Unit<'a> {
-    fn find(device: &'a mut dyn Device) -> Result<Self, SensorError> {
+    fn find(device: &'a mut dyn Device) -> Result<Self, String> {
         let mut length = [0; 2];
-        device.extension(VENDOR_UNIT, GET_LENGTH, &mut length)?;
-        let bytes = usize::from(u16::from_le_bytes(length));
-        if !PACKET_BYTES.contains(&bytes) {
-            return Err(SensorError::Foreign(format!(
-                "its packets have {bytes} bytes, those of a ZED 64 or 384"
-            )));
+        let mut unit = Self { device, bytes: 0 };
+        unit.query(GET_LENGTH, &mut length)?;
+        unit.bytes = usize::from(u16::from_le_bytes(length));
+        if !PACKET_BYTES.contains(&unit.bytes) {
+            let reason = format!(
+                "its packets have {} bytes, those of a ZED 64 or 384",
+                unit.bytes
+            );
+            return Err(foreign(&reason));
         }
-        Ok(Self { device, bytes })
+        Ok(unit)
+    }
+
+    fn query(&mut self, query: u8, data: &mut [u8]) -> Result<(), String> {
+        let answered = self.device.extension(VENDOR_UNIT, query, data);
+        answered.map_err(|e| {
+            format!(
+                "the vendor's extension unit does not answer ({e}); leave out exposure_raw, or use a ZED"
+            )
+        })
     }
 
     fn packet(&self, task: u8, bus: u8, address: u32, value: u8) -> Vec<u8> {
@@ -143,41 +140,38 @@ impl<'a> Unit<'a> {
         packet
     }
 
-    fn set(&mut self, bus: u8, address: u32, value: u8) -> Result<(), SensorError> {
+    fn set(&mut self, bus: u8, address: u32, value: u8) -> Result<(), String> {
         let mut packet = self.packet(TASK_SET, bus, address, value);
-        self.device
-            .extension(VENDOR_UNIT, SET_CURRENT, &mut packet)?;
+        self.query(SET_CURRENT, &mut packet)?;
         std::thread::sleep(PAUSE);
         Ok(())
     }
 
-    fn get(&mut self, bus: u8, address: u32) -> Result<u8, SensorError> {
+    fn get(&mut self, bus: u8, address: u32) -> Result<u8, String> {
         let mut packet = self.packet(TASK_GET, bus, address, 0);
-        self.device
-            .extension(VENDOR_UNIT, SET_CURRENT, &mut packet)?;
+        self.query(SET_CURRENT, &mut packet)?;
         std::thread::sleep(PAUSE);
-        self.device
-            .extension(VENDOR_UNIT, GET_CURRENT, &mut packet)?;
+        self.query(GET_CURRENT, &mut packet)?;
         Ok(packet[17])
     }
 
-    fn set_checked(
-        &mut self,
-        bus: u8,
-        addresses: [u32; 3],
-        values: [u8; 3],
-    ) -> Result<(), SensorError> {
+    fn set_checked(&mut self, bus: u8, addresses: [u32; 3], values: [u8; 3]) -> Result<(), String> {
         for (address, value) in addresses.into_iter().zip(values) {
             self.set(bus, address, value)?;
         }
         for (address, value) in addresses.into_iter().zip(values) {
             let found = self.get(bus, address)?;
             if found != value {
-                return Err(SensorError::Foreign(format!(
+                return Err(foreign(&format!(
                     "register {address:#06x} reads {found:#04x} after {value:#04x} was written"
                 )));
             }
         }
         Ok(())
     }
+}
+
+/// That the unit answers, but not as a ZED does.
+fn foreign(reason: &str) -> String {
+    format!("its extension unit is not a ZED's: {reason}; leave out exposure_raw")
 }

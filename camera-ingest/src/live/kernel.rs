@@ -11,7 +11,7 @@ use std::ptr::NonNull;
 use std::time::Duration;
 
 use super::abi::{self, Request};
-use super::device::{Device, Filled, Identity};
+use super::device::{Device, Identity};
 
 /// A mapped buffer of the driver.
 #[derive(Debug)]
@@ -168,21 +168,13 @@ impl Device for KernelDevice {
         Ok(())
     }
 
-    fn dequeue(&mut self) -> io::Result<Filled> {
+    fn dequeue(&mut self) -> io::Result<abi::Buffer> {
         let mut buffer = abi::Buffer::numbered(0);
         self.ask(&abi::DEQUEUE, &mut buffer)?;
         if let Some(mapped) = self.buffers.get_mut(buffer.index as usize) {
             mapped.queued = false;
         }
-        let seconds = u64::try_from(buffer.seconds).unwrap_or_default();
-        let microseconds = u64::try_from(buffer.microseconds).unwrap_or_default();
-        Ok(Filled {
-            index: buffer.index,
-            bytesused: buffer.bytesused,
-            flags: buffer.flags,
-            stamp_ns: seconds * 1_000_000_000 + microseconds * 1_000,
-            sequence: buffer.sequence,
-        })
+        Ok(buffer)
     }
 
     fn bytes(&self, index: u32) -> &[u8] {

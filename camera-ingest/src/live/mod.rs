@@ -15,8 +15,10 @@ mod setup;
 #[cfg(test)]
 mod tests;
 
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 pub use camera::{LiveCamera, LiveFrame};
 pub use publish::{CameraConfig, PublishError, run};
@@ -25,6 +27,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::VideoMode;
 use exposure::Sensor;
+
+/// How long a camera may take for a frame.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// How a camera is to run. TOML form: keys as the fields.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,19 +72,17 @@ impl LiveSettings {
         if !(1..=240).contains(&self.rate_hz) {
             return Err(format!("rate_hz is {}, it must be 1 to 240", self.rate_hz));
         }
-        let Some(exposure_raw) = self.exposure_raw else {
-            return match self.sensor_gain_raw {
-                None => Ok(None),
-                Some(_) => Err(
-                    "sensor_gain_raw needs exposure_raw beside it: automatic exposure would \
-                     change both"
-                        .to_owned(),
-                ),
-            };
-        };
-        let sensor = Sensor {
-            exposure_raw,
-            gain_raw: self.sensor_gain_raw,
+        let sensor = match (self.exposure_raw, self.sensor_gain_raw) {
+            (None, None) => return Ok(None),
+            (None, Some(_)) => {
+                let why = "sensor_gain_raw needs exposure_raw beside it: automatic exposure would \
+                           change both";
+                return Err(why.to_owned());
+            }
+            (Some(exposure_raw), gain_raw) => Sensor {
+                exposure_raw,
+                gain_raw,
+            },
         };
         sensor.check(self.rate_hz)?;
         Ok(Some(sensor))
@@ -118,83 +121,35 @@ impl Losses {
     }
 }
 
-/// Why a camera gives no frames.
+/// Why a camera gives no frames: which one, what is wrong, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// It cannot be opened, or is no camera.
-    #[error("camera {device}: {reason}; {remedy}")]
-    Unfit {
-        /// Device concerned.
-        device: PathBuf,
-        /// What is wrong.
-        reason: String,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// The driver granted something else than was asked.
-    #[error("camera {device}: {what}: {asked} requested, {granted} granted; {remedy}")]
-    Granted {
-        /// Device concerned.
-        device: PathBuf,
-        /// What was asked for.
-        what: &'static str,
-        /// What was wanted.
-        asked: String,
-        /// What the driver gives.
-        granted: String,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// A setting is out of range or not to be had from this camera.
-    #[error("camera {device}: {reason}")]
-    Setting {
-        /// Device concerned.
-        device: PathBuf,
-        /// What is wrong, and what to do.
-        reason: String,
-    },
-    /// It is gone.
-    #[error("camera {device} was unplugged after {frames} frames; check plug, cable and power")]
-    Unplugged {
-        /// Device concerned.
-        device: PathBuf,
-        /// Good frames so far.
-        frames: u64,
-    },
-    /// No good frame for too long.
-    #[error(
-        "camera {device}: no good frame for {waited_ms} ms (after {frames} good ones; {} missed, {} \
-         damaged, {} short, {} out of order); check cable and USB port", losses.missed,
-        losses.damaged, losses.short, losses.unordered
-    )]
-    Silent {
-        /// Device concerned.
-        device: PathBuf,
-        /// How long was waited.
-        waited_ms: u128,
-        /// Good frames so far.
-        frames: u64,
-        /// What was lost so far.
-        losses: Losses,
-    },
-    /// The system refused something that should go.
-    #[error("camera {device}: {what} failed: {source}")]
-    System {
-        /// Device concerned.
-        device: PathBuf,
-        /// What was tried.
-        what: &'static str,
-        /// The system's reason.
-        source: io::Error,
-    },
+    /// It cannot be had as asked: it is no camera, another program uses it, or it does not
+    /// do what is asked of it.
+    #[error("{0}")]
+    Unfit(String),
+    /// It was unplugged or fell silent, or the system refused something that should go.
+    #[error("{0}")]
+    Failed(String),
 }
 
 impl LiveError {
-    fn system(device: &Path, what: &'static str, source: io::Error) -> Self {
-        Self::System {
-            device: device.to_owned(),
-            what,
-            source,
+    fn unfit(device: &Path, reason: impl Display) -> Self {
+        Self::Unfit(format!("camera {}: {reason}", device.display()))
+    }
+
+    fn failed(device: &Path, reason: impl Display) -> Self {
+        Self::Failed(format!("camera {}: {reason}", device.display()))
+    }
+
+    /// The system refused `what`; `frames` good ones came before.
+    fn system(device: &Path, what: &str, source: &io::Error, frames: u64) -> Self {
+        if source.raw_os_error() == Some(libc::ENODEV) {
+            return Self::Failed(format!(
+                "camera {} was unplugged after {frames} frames; check plug, cable and power",
+                device.display()
+            ));
         }
+        Self::failed(device, format!("{what} failed: {source}"))
     }
 }

@@ -1,17 +1,14 @@
 //! The camera process: frames from the driver's memory into shared memory.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{
     Bus, FRAME_SERVICE, FrameHeader, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
 
-use super::{LiveCamera, LiveError, LiveSettings};
+use super::{LiveCamera, LiveError, LiveSettings, PATIENCE};
 
-/// How long a camera may be silent.
-const PATIENCE: Duration = Duration::from_secs(2);
 /// Losses are logged at most every so many frames.
 const LOG_EVERY: u64 = 300;
 

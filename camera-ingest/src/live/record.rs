@@ -4,14 +4,10 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use crate::whole_file::write_whole;
 
-use super::{LiveCamera, LiveError, Losses};
-
-/// How long a camera may take for a frame.
-const PATIENCE: Duration = Duration::from_secs(2);
+use super::{LiveCamera, LiveError, Losses, PATIENCE};
 
 /// What was recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,13 +29,8 @@ pub enum RecordError {
     #[error(transparent)]
     Camera(#[from] LiveError),
     /// The file's.
-    #[error("film {path}: {source} (is there room, and permission?)")]
-    File {
-        /// File concerned.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("film {0}: {1} (is there room, and permission?)")]
+    File(PathBuf, io::Error),
     /// It was stopped.
     #[error("stopped after {0} frames; nothing was written")]
     Stopped(u64),
@@ -66,10 +57,7 @@ pub fn record(
     };
     let (film, times) = (with("yuyv"), with("csv"));
     let part = Unfinished(with("yuyv.part"));
-    let failed = |path: &Path, source: io::Error| RecordError::File {
-        path: path.to_owned(),
-        source,
-    };
+    let failed = |path: &Path, source| RecordError::File(path.to_owned(), source);
     let before = camera.losses();
     let mut csv = "frame,sequence,monotonic_ns\n".to_owned();
     let file = File::create(&part.0).map_err(|e| failed(&part.0, e))?;

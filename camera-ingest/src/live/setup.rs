@@ -1,11 +1,11 @@
 //! Opening a camera and settling with its driver how it is to run.
 
+use std::fmt::Display;
 use std::io;
 use std::path::Path;
 
 use super::abi;
 use super::device::Device;
-use super::exposure::{Sensor, SensorError};
 use super::{LiveError, LiveSettings};
 
 /// Buffers asked for: a reader may be late by five frames and loses none.
@@ -22,10 +22,7 @@ pub(super) struct Setup<'a> {
 impl Setup<'_> {
     /// Settles everything, starts the stream, and returns how many buffers there are.
     pub(super) fn run(mut self) -> Result<u32, LiveError> {
-        let sensor = self
-            .settings
-            .sensor()
-            .map_err(|reason| self.setting(reason))?;
+        let sensor = self.settings.sensor().map_err(|e| self.unfit(e))?;
         self.capture()?;
         self.format()?;
         self.rate()?;
@@ -33,33 +30,29 @@ impl Setup<'_> {
             self.gain(gain)?;
         }
         let buffers = self.buffers()?;
-        self.device
-            .stream(true)
-            .map_err(|e| self.refused("starting the stream", e))?;
+        let started = self.device.stream(true);
+        started.map_err(|e| self.refused("starting the stream", &e))?;
         if let Some(sensor) = sensor {
-            self.sensor(sensor)?;
+            let set = sensor.apply(self.device);
+            set.map_err(|e| self.unfit(format!("its exposure cannot be set, for {e}")))?;
         }
         Ok(buffers)
     }
 
     fn capture(&mut self) -> Result<(), LiveError> {
-        let unfit = |reason: String| LiveError::Unfit {
-            device: self.settings.device.clone(),
-            reason,
-            remedy: "name the camera's own /dev/videoN (`ls -l /dev/v4l/by-id`); its second one \
-                     holds metadata of frames, not frames",
-        };
+        const REMEDY: &str = "name the camera's own /dev/videoN (`ls -l /dev/v4l/by-id`); its second \
+                              one holds metadata of frames, not frames";
         let identity = match self.device.identity() {
             Ok(identity) => identity,
             Err(e) if e.raw_os_error() == Some(libc::ENOTTY) => {
-                return Err(unfit("it is not a video device".to_owned()));
+                return Err(self.unfit(format!("it is not a video device; {REMEDY}")));
             }
-            Err(e) => return Err(self.refused("asking what it is", e)),
+            Err(e) => return Err(self.refused("asking what it is", &e)),
         };
         let needed = abi::CAN_CAPTURE | abi::CAN_STREAM;
         if identity.capabilities & needed != needed {
-            return Err(unfit(format!(
-                "`{}` (driver {}) does not capture to mapped buffers",
+            return Err(self.unfit(format!(
+                "`{}` (driver {}) does not capture to mapped buffers; {REMEDY}",
                 identity.card, identity.driver
             )));
         }
@@ -75,10 +68,8 @@ impl Setup<'_> {
             field: abi::FIELD_NONE,
             ..abi::PixFormat::default()
         };
-        let granted = self
-            .device
-            .set_format(asked)
-            .map_err(|e| self.refused("setting the picture format", e))?;
+        let granted = self.device.set_format(asked);
+        let granted = granted.map_err(|e| self.refused("setting the picture format", &e))?;
         let name = |p: &abi::PixFormat| {
             let letters = p.pixelformat.to_le_bytes();
             format!(
@@ -101,151 +92,88 @@ impl Setup<'_> {
         if fits {
             return Ok(());
         }
-        Err(self.granted(
-            "picture",
+        Err(self.unfit(format!(
+            "picture: {} requested, {} granted; choose a mode that the camera has (at USB 2 only VGA), \
+             both images side by side",
             name(&wanted),
-            name(&granted),
-            "choose a mode that the camera has (at USB 2 only VGA), both images side by side",
-        ))
+            name(&granted)
+        )))
     }
 
     fn rate(&mut self) -> Result<(), LiveError> {
         let rate_hz = self.settings.rate_hz;
-        let granted = self
-            .device
-            .set_rate([1, rate_hz])
-            .map_err(|e| self.refused("setting the frame rate", e))?;
-        let name = granted.map_or_else(
-            || "one that cannot be chosen".to_owned(),
-            |[n, d]| format!("{d}/{n}"),
-        );
-        match granted {
+        let granted = self.device.set_rate([1, rate_hz]);
+        let granted = granted.map_err(|e| self.refused("setting the frame rate", &e))?;
+        let name = match granted {
             // Tenths of a per cent are rounding: 1/60 may be granted as 166666/9999960.
-            Some([n, d]) if n > 0 && d.abs_diff(n.saturating_mul(rate_hz)) <= d / 1000 => Ok(()),
-            _ => Err(self.granted(
-                "frames per second",
-                rate_hz.to_string(),
-                name,
-                "choose a rate that the camera has in this mode",
-            )),
-        }
+            Some([n, d]) if n > 0 && d.abs_diff(n.saturating_mul(rate_hz)) <= d / 1000 => {
+                return Ok(());
+            }
+            Some([n, d]) => format!("{d}/{n}"),
+            None => "one that cannot be chosen".to_owned(),
+        };
+        Err(self.unfit(format!(
+            "frames per second: {rate_hz} requested, {name} granted; choose a rate that the camera has \
+             in this mode"
+        )))
     }
 
     fn gain(&mut self, gain: i32) -> Result<(), LiveError> {
-        let granted = self
-            .device
-            .set_control(abi::CONTROL_GAIN, gain)
-            .map_err(|e| self.setting(format!("its gain cannot be set to {gain}: {e}")))?;
+        let granted = self.device.set_control(abi::CONTROL_GAIN, gain);
+        let granted =
+            granted.map_err(|e| self.unfit(format!("its gain cannot be set to {gain}: {e}")))?;
         if granted == gain {
             return Ok(());
         }
-        Err(self.granted(
-            "gain",
-            gain.to_string(),
-            granted.to_string(),
-            "see its range with `v4l2-ctl --list-ctrls`",
-        ))
+        Err(self.unfit(format!(
+            "gain: {gain} requested, {granted} granted; see its range with `v4l2-ctl --list-ctrls`"
+        )))
     }
 
     fn buffers(&mut self) -> Result<u32, LiveError> {
-        let granted = self
-            .device
-            .map_buffers(BUFFERS)
-            .map_err(|e| self.refused("mapping buffers", e))?;
+        let granted = self.device.map_buffers(BUFFERS);
+        let granted = granted.map_err(|e| self.refused("mapping buffers", &e))?;
         if granted < MIN_BUFFERS {
-            return Err(self.granted(
-                "buffers",
-                BUFFERS.to_string(),
-                granted.to_string(),
-                "fewer than four lose frames at every hiccup",
-            ));
+            return Err(self.unfit(format!(
+                "buffers: {BUFFERS} requested, {granted} granted; fewer than four lose frames at every \
+                 hiccup"
+            )));
         }
         for index in 0..granted {
-            self.device
-                .queue(index)
-                .map_err(|e| self.refused("giving a buffer to the driver", e))?;
+            let queued = self.device.queue(index);
+            queued.map_err(|e| self.refused("giving a buffer to the driver", &e))?;
         }
         Ok(granted)
     }
 
-    fn sensor(&mut self, sensor: Sensor) -> Result<(), LiveError> {
-        sensor.apply(self.device).map_err(|e| {
-            self.setting(match e {
-                SensorError::Unit(e) => format!(
-                    "its exposure cannot be set, for the vendor's extension unit does not answer \
-                     ({e}); leave out exposure_raw, or use a ZED"
-                ),
-                SensorError::Foreign(reason) => format!(
-                    "its exposure cannot be set, for its extension unit is not a ZED's: {reason}; \
-                     leave out exposure_raw"
-                ),
-            })
-        })
+    fn unfit(&self, reason: impl Display) -> LiveError {
+        LiveError::unfit(&self.settings.device, reason)
     }
 
-    fn setting(&self, reason: String) -> LiveError {
-        LiveError::Setting {
-            device: self.settings.device.clone(),
-            reason,
+    fn refused(&self, what: &str, source: &io::Error) -> LiveError {
+        if source.raw_os_error() == Some(libc::EBUSY) {
+            return self.unfit(IN_USE);
         }
-    }
-
-    fn granted(
-        &self,
-        what: &'static str,
-        asked: String,
-        granted: String,
-        remedy: &'static str,
-    ) -> LiveError {
-        LiveError::Granted {
-            device: self.settings.device.clone(),
-            what,
-            asked,
-            granted,
-            remedy,
-        }
-    }
-
-    fn refused(&self, what: &'static str, source: io::Error) -> LiveError {
-        let device = &self.settings.device;
-        match source.raw_os_error() {
-            Some(libc::EBUSY) => LiveError::Unfit {
-                device: device.clone(),
-                reason: "another program uses it".to_owned(),
-                remedy: "end that program (`fuser -v /dev/video*` names it)",
-            },
-            Some(libc::ENODEV) => LiveError::Unplugged {
-                device: device.clone(),
-                frames: 0,
-            },
-            _ => LiveError::system(device, what, source),
-        }
+        LiveError::system(&self.settings.device, what, source, 0)
     }
 }
 
-pub(super) fn cannot_open(device: &Path, source: io::Error) -> LiveError {
-    let (reason, remedy) = match source.kind() {
-        io::ErrorKind::NotFound => (
-            "there is no such device",
-            "plug it in, and see `ls -l /dev/v4l/by-id`",
-        ),
-        io::ErrorKind::PermissionDenied => (
-            "no permission to open it",
-            "join the group `video`, and install packaging/udev/60-wag-camera.rules",
-        ),
-        io::ErrorKind::ResourceBusy => (
-            "another program uses it",
-            "end that program (`fuser -v /dev/video*` names it)",
-        ),
-        _ if matches!(source.raw_os_error(), Some(libc::ENODEV | libc::ENXIO)) => (
-            "nothing is plugged in behind that name",
-            "plug it in, and see `ls -l /dev/v4l/by-id`",
-        ),
-        _ => return LiveError::system(device, "opening it", source),
+const IN_USE: &str = "another program uses it; end that program (`fuser -v /dev/video*` names it)";
+
+pub(super) fn cannot_open(device: &Path, source: &io::Error) -> LiveError {
+    let reason = match source.kind() {
+        io::ErrorKind::NotFound => {
+            "there is no such device; plug it in, and see `ls -l /dev/v4l/by-id`"
+        }
+        io::ErrorKind::PermissionDenied => {
+            "no permission to open it; join the group `video`, and install \
+             packaging/udev/60-wag-camera.rules"
+        }
+        io::ErrorKind::ResourceBusy => IN_USE,
+        _ if matches!(source.raw_os_error(), Some(libc::ENODEV | libc::ENXIO)) => {
+            "nothing is plugged in behind that name; plug it in, and see `ls -l /dev/v4l/by-id`"
+        }
+        _ => return LiveError::system(device, "opening it", source, 0),
     };
-    LiveError::Unfit {
-        device: device.to_owned(),
-        reason: reason.to_owned(),
-        remedy,
-    }
+    LiveError::unfit(device, reason)
 }

@@ -4,7 +4,7 @@ use crate::frame::{EyeFrame, StereoFrame};
 use crate::source::{BothEyes, FrameSource, SourceError, StereoSource};
 use crate::track::Film;
 use shared_types::ipc::message::CameraEvent;
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Most frames one recording may keep.
 const MAX_FRAMES: u32 = 3600;
@@ -131,11 +131,10 @@ impl StereoSource for Recording {
             Frames::Both(v) => v.get(index),
             Frames::Film(_) => None,
         };
-        frame.cloned().ok_or_else(|| SourceError::OutOfRange {
-            path: PathBuf::from("recording in memory"),
-            frame: index,
-            len: self.count(),
-        })
+        let path = Path::new("recording in memory");
+        frame
+            .cloned()
+            .ok_or_else(|| SourceError::out_of_range(path, index, self.count()))
     }
 }
 

@@ -8,7 +8,7 @@ mod answer;
 mod keep;
 mod work;
 
-use crate::frame::{EyeFrame, StereoFrame};
+use crate::frame::StereoFrame;
 use crate::still::StillDetector;
 use answer::{answer, failed};
 use keep::Recording;
@@ -71,7 +71,7 @@ pub fn run(config: &CameraConfig, stop: &AtomicBool) -> Result<(), IpcError> {
 #[derive(Debug)]
 enum Waiting {
     Still {
-        detector: Option<StillDetector>,
+        detector: StillDetector,
         until: Instant,
     },
     Record,
@@ -101,15 +101,15 @@ impl Process {
                 return answer(&call, &failed(busy));
             }
             CameraRequest::Track { .. } => {
-                let event = work::track(&self.recording, &call, &self.keypoints);
-                return answer(&call, &event);
+                let tracked = work::track(&self.recording, &call, &self.keypoints);
+                return answer(&call, &tracked.unwrap_or_else(failed));
             }
             CameraRequest::Score { .. } => {
-                let event = work::score(&mut self.recording, &call);
-                return answer(&call, &event);
+                let scored = work::score(&mut self.recording, &call);
+                return answer(&call, &scored.unwrap_or_else(failed));
             }
             CameraRequest::WaitStill { timeout_s } => Waiting::Still {
-                detector: None,
+                detector: StillDetector::new(STILL_LAG_FRAMES, STILL_FRAMES),
                 until: now + Duration::from_secs_f64(timeout_s.clamp(0.0, 600.0)),
             },
             CameraRequest::Record { frames, both_eyes } => {
@@ -140,12 +140,9 @@ impl Process {
         if let Some(job) = &self.job
             && job.last_frame.elapsed().as_secs_f64() > CAMERA_SILENT_S
         {
-            answer(
-                &job.call,
-                &failed(
-                    "no camera frame arrived for 2 s; check that the camera (or the rig) runs in this domain",
-                ),
-            );
+            let silent = "no camera frame arrived for 2 s; check that the camera (or the rig) runs in \
+                          this domain";
+            answer(&job.call, &failed(silent));
             self.job = None;
         }
         Ok(any)
@@ -163,15 +160,14 @@ impl Process {
             }
         };
         let done = match &mut job.waiting {
-            Waiting::Still { detector, until } => wait_still(detector, *until, frame.left()),
+            Waiting::Still { detector, until } => {
+                let still = detector.push(frame.left());
+                (still || Instant::now() >= *until).then_some(CameraEvent::Still { still })
+            }
             Waiting::Record => {
                 if self.recording.is_empty() {
-                    answer(
-                        &job.call,
-                        &CameraEvent::Recording {
-                            first_stamp_ns: header.stamp_ns,
-                        },
-                    );
+                    let first_stamp_ns = header.stamp_ns;
+                    answer(&job.call, &CameraEvent::Recording { first_stamp_ns });
                 }
                 let kept = self.recording.keep(frame);
                 if kept.is_multiple_of(30) {
@@ -207,15 +203,4 @@ fn decode(header: &FrameHeader, bytes: &[u8]) -> Result<StereoFrame, String> {
         header.sequence,
     )
     .map_err(|e| e.to_string())
-}
-
-fn wait_still(
-    detector: &mut Option<StillDetector>,
-    until: Instant,
-    left: EyeFrame,
-) -> Option<CameraEvent> {
-    let still = detector
-        .get_or_insert_with(|| StillDetector::new(STILL_LAG_FRAMES, STILL_FRAMES))
-        .push(left);
-    (still || Instant::now() >= until).then_some(CameraEvent::Still { still })
 }

@@ -1,21 +1,20 @@
 //! Work on a kept recording: tracking with publication, scoring.
 
-use super::answer::{answer, failed};
+use super::answer::answer;
 use super::keep::Recording;
 use crate::frame::EyeFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
-use crate::score::{ScoreOptions, score as score_frames};
 use crate::source::{FrameSource, StereoSource};
 use crate::track::TrackResult;
 use arm_model::{JointVector, Pole};
 use rope_sim::MeasuredArm;
+use shared_types::MonotonicNs;
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
 };
 use shared_types::ipc::rpc::Call;
 use shared_types::keypoints::KeypointFrame;
-use shared_types::{MonotonicNs, StereoCamera};
 use std::path::Path;
 use std::time::Instant;
 
@@ -28,14 +27,6 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Tracks the rope and publishes its keypoints.
 pub(super) fn track(
-    recording: &Recording,
-    call: &Call<CameraRpc>,
-    publisher: &KeypointPublisher,
-) -> CameraEvent {
-    try_track(recording, call, publisher).unwrap_or_else(failed)
-}
-
-fn try_track(
     recording: &Recording,
     call: &Call<CameraRpc>,
     publisher: &KeypointPublisher,
@@ -118,11 +109,10 @@ fn write_sheet(frames: &[EyeFrame], result: &TrackResult, path: &Path) -> Result
 }
 
 /// Measures the closest approach in a throw.
-pub(super) fn score(recording: &mut Recording, call: &Call<CameraRpc>) -> CameraEvent {
-    try_score(recording, call).unwrap_or_else(failed)
-}
-
-fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<CameraEvent, Failure> {
+pub(super) fn score(
+    recording: &mut Recording,
+    call: &Call<CameraRpc>,
+) -> Result<CameraEvent, Failure> {
     let CameraRequest::Score {
         camera,
         tip_rgb,
@@ -136,7 +126,7 @@ fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<Camera
         return Err("nothing is recorded for scoring; record first, both images".into());
     }
     // The picture is worth having even when the score fails.
-    let found = measure(recording, camera, *tip_rgb, *target_rgb);
+    let found = crate::score::score(recording, camera, *tip_rgb, *target_rgb);
     let drawn = picture.as_ref().map_or(Ok(()), |path| {
         let closest_s = found.as_ref().ok().map(|s| s.time_s);
         write_strobe(recording, closest_s, Path::new(path))
@@ -144,23 +134,12 @@ fn try_score(recording: &mut Recording, call: &Call<CameraRpc>) -> Result<Camera
     // The first error is reported; a picture is the lesser loss.
     let found = found?;
     drawn?;
-    Ok(CameraEvent::Scored(found))
-}
-
-fn measure(
-    recording: &mut Recording,
-    camera: &StereoCamera,
-    tip_rgb: [u8; 3],
-    target_rgb: [u8; 3],
-) -> Result<ScoreResult, Failure> {
-    let options = ScoreOptions::default();
-    let s = score_frames(recording, camera, tip_rgb, target_rgb, &options)?;
-    Ok(ScoreResult {
-        closest_m: s.closest_m,
-        interval_m: s.interval_m,
-        time_s: s.time_s,
-        target_m: s.target_m,
-    })
+    Ok(CameraEvent::Scored(ScoreResult {
+        closest_m: found.closest_m,
+        interval_m: found.interval_m,
+        time_s: found.time_s,
+        target_m: found.target_m,
+    }))
 }
 
 /// A multiple exposure of the throw up to a little after the closest approach,

@@ -6,7 +6,7 @@
 //! in continuous time.
 
 mod blob;
-mod options;
+mod error;
 mod path;
 mod scene;
 #[cfg(test)]
@@ -21,7 +21,7 @@ use shared_types::StereoCamera;
 
 use crate::calib::extrinsics::Sighted;
 use crate::source::StereoSource;
-pub use options::{ScoreError, ScoreOptions};
+pub use error::ScoreError;
 
 /// Result of one throw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -54,18 +54,16 @@ pub fn score(
     camera: &StereoCamera,
     tip_rgb: [u8; 3],
     target_rgb: [u8; 3],
-    options: &ScoreOptions,
 ) -> Result<Score, ScoreError> {
     let frames = source.len();
     if frames < MIN_SIGHTINGS {
-        return Err(ScoreError::TooShort {
-            found: frames,
-            least: MIN_SIGHTINGS,
-        });
+        return Err(ScoreError::Input(format!(
+            "the video has {frames} frames, at least {MIN_SIGHTINGS} are needed"
+        )));
     }
     check_colour("tip", tip_rgb)?;
     check_colour("target", target_rgb)?;
-    let scene = Scene::learn(source, camera, options)?;
+    let scene = Scene::learn(source, camera)?;
     let target = scene.target(target_rgb)?;
     let mut sightings = Vec::new();
     let (mut start_ns, mut end_s) = (0, 0.0);
@@ -94,10 +92,12 @@ pub fn score(
 }
 
 /// A colour that chroma can find.
-fn check_colour(what: &'static str, rgb: [u8; 3]) -> Result<(), ScoreError> {
+fn check_colour(what: &str, rgb: [u8; 3]) -> Result<(), ScoreError> {
     let [cb, cr] = chroma_of_rgb(rgb);
     if cb.hypot(cr) < MIN_CHROMA {
-        return Err(ScoreError::Grey { what, rgb });
+        return Err(ScoreError::Input(format!(
+            "the {what}'s colour {rgb:?} is nearly grey; give the colour of a saturated marker"
+        )));
     }
     Ok(())
 }
@@ -113,10 +113,9 @@ pub fn sight_lead(
     camera: &StereoCamera,
     rgb: [u8; 3],
     shown: &[(usize, Vector3<f64>)],
-    options: &ScoreOptions,
 ) -> Result<Vec<Sighted>, ScoreError> {
     check_colour("lead", rgb)?;
-    let scene = Scene::learn(source, camera, options)?;
+    let scene = Scene::learn(source, camera)?;
     let mut sighted = Vec::new();
     for &(frame, p_w_m) in shown {
         let both = read_sized(source, frame, camera)?;

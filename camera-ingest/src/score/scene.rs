@@ -4,15 +4,23 @@ use nalgebra::Vector3;
 use shared_types::StereoCamera;
 
 use super::blob::{Behind, Blob, BlobMap, Chroma, chroma_of_rgb};
-use super::options::{ScoreError, ScoreOptions};
+use super::error::ScoreError;
 use super::path::{PathError, Sighting};
 use crate::frame::{EyeFrame, StereoFrame};
 use crate::source::StereoSource;
 
+/// Frames for the median background.
+const BACKGROUND_FRAMES: usize = 31;
+/// Largest distance of the two images' rays, in pixels of the image.
+const MAX_EPIPOLAR_PX: f64 = 1.5;
+/// Largest ratio of a blob's areas in the two images.
+const MAX_AREA_RATIO: f64 = 1.33;
+/// Nearest and farthest depth looked at (m).
+const DEPTH_M: [f64; 2] = [0.25, 5.0];
+
 /// The still scene of both images.
 pub(super) struct Scene<'a> {
     camera: &'a StereoCamera,
-    options: &'a ScoreOptions,
     eyes: [EyeFrame; 2],
     /// What most of each image's scene looks like.
     middles: [Chroma; 2],
@@ -72,23 +80,20 @@ pub(super) fn read_sized(
     let found = [frame.0.width_px / 2, frame.0.height_px];
     let expected = [camera.width_px as usize, camera.height_px as usize];
     if found == expected {
-        Ok(frame)
-    } else {
-        Err(ScoreError::Size {
-            frame: index,
-            found,
-            expected,
-        })
+        return Ok(frame);
     }
+    Err(ScoreError::Input(format!(
+        "frame {index} is {found:?} px per image, the camera's mode gives {expected:?}; is the `mode` \
+         in camera.toml the one recorded?"
+    )))
 }
 
 impl<'a> Scene<'a> {
     pub(super) fn learn(
         source: &mut dyn StereoSource,
         camera: &'a StereoCamera,
-        options: &'a ScoreOptions,
     ) -> Result<Self, ScoreError> {
-        let chosen = crate::track::spread(source.len(), options.background_frames.max(3));
+        let chosen = crate::track::spread(source.len(), BACKGROUND_FRAMES);
         let (mut left, mut right) = (Vec::new(), Vec::new());
         for &index in &chosen {
             let frame = read_sized(source, index, camera)?;
@@ -98,7 +103,6 @@ impl<'a> Scene<'a> {
         let eyes = [left, right].map(|frames| crate::track::median_frame(&frames));
         Ok(Self {
             camera,
-            options,
             middles: [0, 1].map(|k: usize| middle_chroma(&eyes[k])),
             eyes,
         })
@@ -115,9 +119,9 @@ impl<'a> Scene<'a> {
                 };
                 let point_c = self.camera.to_left(&found.p_w_m);
                 let gap_px = found.gap_m * self.camera.left.fx / point_c.z.max(0.1);
-                if ratio <= self.options.area_ratio
-                    && gap_px <= self.options.epipolar_px
-                    && (self.options.depth_m[0]..=self.options.depth_m[1]).contains(&point_c.z)
+                if ratio <= MAX_AREA_RATIO
+                    && gap_px <= MAX_EPIPOLAR_PX
+                    && (DEPTH_M[0]..=DEPTH_M[1]).contains(&point_c.z)
                 {
                     pairs.push(Pair {
                         left: l,

@@ -80,9 +80,8 @@ fn throw(target: [f64; 3]) -> Vec<StereoFrame> {
 
 #[test]
 fn a_straight_flight_is_measured_between_frames() {
-    let options = ScoreOptions::default();
     let mut frames = throw(TARGET);
-    let score = score(&mut frames, &camera(), TIP_RGB, TARGET_RGB, &options).unwrap();
+    let score = score(&mut frames, &camera(), TIP_RGB, TARGET_RGB).unwrap();
     assert!(
         (score.closest_m - 0.05).abs() < 0.002,
         "{}",
@@ -114,8 +113,7 @@ fn a_thing_of_the_opposite_hue_that_goes_away_is_no_tip() {
             frame(i, &balls)
         })
         .collect();
-    let options = ScoreOptions::default();
-    let score = score(&mut frames, &camera, TIP_RGB, TARGET_RGB, &options).unwrap();
+    let score = score(&mut frames, &camera, TIP_RGB, TARGET_RGB).unwrap();
     assert!((score.closest_m - 0.05).abs() < 0.002, "{score:?}");
     assert!((score.time_s - 0.25).abs() < 0.003, "{score:?}");
 }
@@ -127,17 +125,15 @@ fn a_tip_lost_on_its_way_to_the_target_may_have_come_nearer() {
     for (index, hidden) in frames.iter_mut().enumerate().skip(seen) {
         *hidden = frame(index, &[(TARGET.into(), TARGET_RGB)]);
     }
-    let options = ScoreOptions::default();
-    let score = score(&mut frames, &camera(), TIP_RGB, TARGET_RGB, &options).unwrap();
+    let score = score(&mut frames, &camera(), TIP_RGB, TARGET_RGB).unwrap();
     assert!(score.closest_m > 0.06, "{score:?}");
     assert!(score.interval_m[0] < 0.05, "{score:?}");
 }
 
 #[test]
 fn what_cannot_be_scored_says_why() {
-    let options = ScoreOptions::default();
     let run = |frames: &mut Vec<StereoFrame>, tip, target| -> String {
-        let result = score(frames, &camera(), tip, target, &options);
+        let result = score(frames, &camera(), tip, target);
         result.unwrap_err().to_string()
     };
     let mut frames = throw(TARGET);

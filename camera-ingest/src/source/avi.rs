@@ -4,79 +4,34 @@
 //! `00dc` (or `00db`) chunk is one complete JPEG, chunks are padded to even
 //! length. The index at the end is not needed and not read.
 
-use std::borrow::Cow;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::error::SourceError;
-use super::stamps::{self, Stamp};
-use super::stored::{Coding, Stored};
+use super::stamps;
+use super::stored::{Pictures, Stored};
 
 const REMEDY: &str = "record side-by-side Motion-JPEG into an AVI, or convert to it";
 const TRUNCATED: &str = "the file is truncated: copy it again or record again";
 
-/// An AVI file held in memory in its compressed form.
-#[derive(Debug)]
-pub struct AviSource {
-    path: PathBuf,
-    bytes: Vec<u8>,
-    chunks: Vec<Range<usize>>,
-    stamps: Vec<Stamp>,
-    /// For decoding.
-    room: Vec<u8>,
-}
-
-impl AviSource {
-    /// Opens a file; times come from `timestamps` or else from the header's
-    /// frame rate.
-    ///
-    /// # Errors
-    /// No such file, no AVI, truncated, or timestamps that do not fit.
-    pub fn open(path: &Path, timestamps: Option<&Path>) -> Result<Self, SourceError> {
-        let bytes = std::fs::read(path).map_err(SourceError::io(path))?;
-        let (frame_us, chunks) = walk(path, &bytes)?;
-        let stamps = match timestamps {
-            Some(csv) => stamps::read(csv, chunks.len())?,
-            None => stamps::even(chunks.len(), f64::from(frame_us) * 1e3),
-        };
-        Ok(Self {
-            path: path.to_owned(),
-            bytes,
-            chunks,
-            stamps,
-            room: Vec::new(),
-        })
-    }
-
-    /// The same frames at another rate than the header's.
-    #[must_use]
-    pub fn at_rate(mut self, rate_hz: f64) -> Self {
-        self.stamps = stamps::even(self.chunks.len(), 1e9 / rate_hz);
-        self
-    }
-}
-
-impl Stored for AviSource {
-    fn path(&self) -> &Path {
-        &self.path
-    }
-
-    fn stamps(&self) -> &[Stamp] {
-        &self.stamps
-    }
-
-    fn picture(&self, index: usize) -> Result<(Coding, Cow<'_, [u8]>), SourceError> {
-        let jpeg = &self.bytes[self.chunks[index].clone()];
-        Ok((Coding::Jpeg, Cow::Borrowed(jpeg)))
-    }
-
-    fn room(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.room)
-    }
-
-    fn keep(&mut self, room: Vec<u8>) {
-        self.room = room;
-    }
+/// Opens a file, held in memory in its compressed form; times come from `csv`, or else from
+/// `rate_hz`, or else from the header's frame rate.
+///
+/// # Errors
+/// No such file, no AVI, truncated, or timestamps that do not fit.
+pub(super) fn open(
+    path: &Path,
+    csv: Option<&Path>,
+    rate_hz: Option<f64>,
+) -> Result<Stored, SourceError> {
+    let bytes = std::fs::read(path).map_err(SourceError::io(path))?;
+    let (frame_us, chunks) = walk(path, &bytes)?;
+    let stamps = match (csv, rate_hz) {
+        (Some(csv), _) => stamps::read(csv, chunks.len())?,
+        (None, Some(hz)) => stamps::even(chunks.len(), 1e9 / hz),
+        (None, None) => stamps::even(chunks.len(), f64::from(frame_us) * 1e3),
+    };
+    Ok(Stored::new(path, Pictures::Avi(bytes, chunks), stamps))
 }
 
 /// Header of the chunk at `at`: four-character code and its body's range.
@@ -89,13 +44,9 @@ fn chunk(bytes: &[u8], at: usize) -> Option<([u8; 4], Range<usize>)> {
 
 /// Frame time (us) and the ranges of the frames.
 fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceError> {
-    let fail = |reason: String, remedy| SourceError::Container {
-        path: path.to_owned(),
-        reason,
-        remedy,
-    };
+    let fail = |reason: &str, remedy| SourceError::video(path, format!("{reason}; {remedy}"));
     if bytes.get(..4) != Some(b"RIFF") || bytes.get(8..12) != Some(b"AVI ") {
-        return Err(fail("not a RIFF AVI file".to_owned(), REMEDY));
+        return Err(fail("not a RIFF AVI file", REMEDY));
     }
     let mut frame_us = None;
     let mut frames = Vec::new();
@@ -111,10 +62,8 @@ fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceErr
             continue;
         }
         if body.end > bytes.len() {
-            return Err(fail(
-                format!("frame {} ends beyond the file", frames.len()),
-                TRUNCATED,
-            ));
+            let reason = format!("frame {} ends beyond the file", frames.len());
+            return Err(fail(&reason, TRUNCATED));
         }
         match &code {
             b"avih" => {
@@ -132,12 +81,12 @@ fn walk(path: &Path, bytes: &[u8]) -> Result<(u32, Vec<Range<usize>>), SourceErr
             "it ends {missing} bytes early, before frame {}",
             frames.len()
         );
-        return Err(fail(reason, TRUNCATED));
+        return Err(fail(&reason, TRUNCATED));
     }
     match (frame_us, frames.is_empty()) {
         (Some(us), false) if us > 0 => Ok((us, frames)),
-        (_, true) => Err(fail("no video frames in it".to_owned(), REMEDY)),
-        _ => Err(fail("the header has no frame rate".to_owned(), REMEDY)),
+        (_, true) => Err(fail("no video frames in it", REMEDY)),
+        _ => Err(fail("the header has no frame rate", REMEDY)),
     }
 }
 
@@ -165,12 +114,12 @@ mod tests {
         chunk_bytes(b"RIFF", &[&b"AVI "[..], &hdrl, &movi].concat())
     }
 
-    fn open(bytes: &[u8], csv: Option<&str>) -> Result<AviSource, SourceError> {
+    fn open(bytes: &[u8], csv: Option<&str>) -> Result<Stored, SourceError> {
         let folder = tempfile::tempdir().unwrap();
         let (video, stamps) = (folder.path().join("a.avi"), folder.path().join("a.csv"));
         std::fs::write(&video, bytes).unwrap();
         let csv = csv.map(|csv| std::fs::write(&stamps, csv).unwrap());
-        AviSource::open(&video, csv.map(|()| stamps.as_path()))
+        super::open(&video, csv.map(|()| stamps.as_path()), None)
     }
 
     fn refusal(bytes: &[u8], csv: Option<&str>) -> String {
@@ -181,17 +130,18 @@ mod tests {
     fn frames_are_found_and_damage_is_named() {
         let mut source = open(&avi(&[b"abc", b"defg"]), None).unwrap();
         assert_eq!(source.len(), 2);
-        assert_eq!(&source.bytes[source.chunks[1].clone()], b"defg");
+        assert_eq!(&*source.picture(1).unwrap().1, b"defg");
         assert_eq!(source.stamps[1].stamp_ns, 16_667_000);
         let damaged = source.read(1).unwrap_err().to_string();
         assert!(
             damaged.contains("frame 1") && damaged.contains("record again"),
             "{damaged}"
         );
-        assert!(matches!(
-            source.read(2),
-            Err(SourceError::OutOfRange { len: 2, .. })
-        ));
+        let beyond = source.read(2).unwrap_err().to_string();
+        assert!(
+            beyond.contains("frame 2 requested, but it has 2"),
+            "{beyond}"
+        );
     }
 
     #[test]

@@ -1,80 +1,50 @@
 //! Why a recording cannot be read.
 
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::Path;
 
 use crate::frame::FrameError;
 
-/// Why a recording cannot be read.
+/// Which recording cannot be read, why, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum SourceError {
-    /// The file cannot be read.
-    #[error("video {path}: {source} (check the path and its permissions)")]
-    Io {
-        /// File concerned.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The container is not what it should be.
-    #[error("video {path}: {reason}; {remedy}")]
-    Container {
-        /// File concerned.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// One frame is damaged.
-    #[error(
-        "video {path}, frame {frame}: {source}; record again, or cut the video before this frame"
-    )]
-    Frame {
-        /// File concerned.
-        path: PathBuf,
-        /// Index of the frame, from 0.
-        frame: usize,
-        /// What is wrong with it.
-        source: FrameError,
-    },
-    /// No such frame.
-    #[error("video {path}: frame {frame} requested, but it has {len}")]
-    OutOfRange {
-        /// File concerned.
-        path: PathBuf,
-        /// Index asked for.
-        frame: usize,
-        /// Number of frames.
-        len: usize,
-    },
-    /// The frame times are unknown, or given twice.
-    #[error("video {path}: {reason}")]
-    Times {
-        /// File or folder concerned.
-        path: PathBuf,
-        /// What is wrong, and what to do.
-        reason: String,
-    },
-    /// `timestamps.csv` does not fit the video.
-    #[error(
-        "timestamps {path}, line {line}: {reason}; expected rows `frame,sequence,monotonic_ns`"
-    )]
-    Timestamps {
-        /// File concerned.
-        path: PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// What is wrong.
-        reason: String,
-    },
-}
+#[error("{0}")]
+pub struct SourceError(String);
 
 impl SourceError {
+    pub(super) fn video(path: &Path, reason: impl Display) -> Self {
+        Self(format!("video {}: {reason}", path.display()))
+    }
+
     /// The system's reason at `path`.
     pub(super) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |source| Self::Io {
-            path: path.to_owned(),
-            source,
+        |source| {
+            Self::video(
+                path,
+                format!("{source} (check the path and its permissions)"),
+            )
         }
+    }
+
+    /// A frame, counted from 0, is damaged.
+    #[must_use]
+    pub fn frame(path: &Path, frame: usize, source: &FrameError) -> Self {
+        Self(format!(
+            "video {}, frame {frame}: {source}; record again, or cut the video before this frame",
+            path.display()
+        ))
+    }
+
+    /// A recording of `len` frames has no such frame.
+    #[must_use]
+    pub fn out_of_range(path: &Path, frame: usize, len: usize) -> Self {
+        Self::video(path, format!("frame {frame} requested, but it has {len}"))
+    }
+
+    /// A line of `timestamps.csv`, counted from 1, does not fit the video.
+    pub(super) fn timestamps(path: &Path, line: usize, reason: impl Display) -> Self {
+        Self(format!(
+            "timestamps {}, line {line}: {reason}; expected rows `frame,sequence,monotonic_ns`",
+            path.display()
+        ))
     }
 }

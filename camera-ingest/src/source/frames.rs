@@ -1,6 +1,6 @@
 //! What a recording offers, and frames that are in memory already.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use super::error::SourceError;
 use crate::frame::{EyeFrame, StereoFrame};
@@ -47,11 +47,7 @@ impl StereoSource for Vec<StereoFrame> {
     fn read(&mut self, index: usize) -> Result<StereoFrame, SourceError> {
         self.get(index)
             .cloned()
-            .ok_or_else(|| SourceError::OutOfRange {
-                path: PathBuf::from("(memory)"),
-                frame: index,
-                len: Vec::len(self),
-            })
+            .ok_or_else(|| SourceError::out_of_range(Path::new("(memory)"), index, Vec::len(self)))
     }
 }
 
@@ -109,7 +105,9 @@ impl AnySource {
         match self {
             Self::Both(source) => read_film(&mut **source),
             Self::Left(source) => Ok(BothEyes {
-                left: read_left(&mut **source)?,
+                left: (0..source.len())
+                    .map(|index| source.read_left(index))
+                    .collect::<Result<_, _>>()?,
                 right: Vec::new(),
             }),
         }
@@ -133,12 +131,4 @@ pub fn read_film(source: &mut dyn StereoSource) -> Result<BothEyes, SourceError>
         }
     }
     Ok(BothEyes { left, right })
-}
-
-/// Decodes the left image of every frame.
-///
-/// # Errors
-/// A frame is damaged.
-pub fn read_left(source: &mut dyn FrameSource) -> Result<Vec<EyeFrame>, SourceError> {
-    (0..source.len()).map(|i| source.read_left(i)).collect()
 }

@@ -1,83 +1,27 @@
 //! A folder of side-by-side pictures, PNG or JPEG, one a frame, in the order of
 //! their names.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::error::SourceError;
 use super::frames::StereoSource;
-use super::stamps::{self, Stamp};
-use super::stored::{Coding, Stored};
-use crate::frame::FrameError;
+use super::stamps;
+use super::stored::{Coding, Pictures, Stored};
 
-const REMEDY: &str = "export the recording again, one picture a frame";
-
-/// A folder of pictures, each read when it is asked for.
-#[derive(Debug)]
-pub struct ImageSource {
-    folder: PathBuf,
-    files: Vec<PathBuf>,
-    stamps: Vec<Stamp>,
-    /// Both images together; `None` until the first picture was read.
-    size_px: Option<[usize; 2]>,
-}
-
-/// The coding of a picture by its file's ending.
-fn coding(path: &Path) -> Option<Coding> {
-    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-    match ending.as_str() {
-        "png" => Some(Coding::Png),
-        "jpg" | "jpeg" => Some(Coding::Jpeg),
-        _ => None,
-    }
-}
-
-impl ImageSource {
-    /// Opens a folder; times come from its `timestamps.csv` or else from `rate_hz`.
-    ///
-    /// # Errors
-    /// No pictures, pictures whose names' counters are out of order, no times, or a
-    /// first picture that does not decode.
-    pub fn open(folder: &Path, rate_hz: Option<f64>) -> Result<Self, SourceError> {
-        let files = pictures(folder)?;
-        let csv = folder.join("timestamps.csv");
-        let mut source = Self {
-            folder: folder.to_owned(),
-            stamps: stamps::beside(folder, &csv, rate_hz, files.len())?,
-            files,
-            size_px: None,
-        };
-        let first = source.read(0)?.0;
-        source.size_px = Some([first.width_px, first.height_px]);
-        Ok(source)
-    }
-}
-
-impl Stored for ImageSource {
-    fn path(&self) -> &Path {
-        &self.folder
-    }
-
-    fn file(&self, index: usize) -> &Path {
-        &self.files[index]
-    }
-
-    fn stamps(&self) -> &[Stamp] {
-        &self.stamps
-    }
-
-    fn picture(&self, index: usize) -> Result<(Coding, Cow<'_, [u8]>), SourceError> {
-        let path = &self.files[index];
-        let bytes = std::fs::read(path).map_err(SourceError::io(path))?;
-        Ok((coding(path).unwrap_or(Coding::Jpeg), Cow::Owned(bytes)))
-    }
-
-    fn check_size(&self, found: [usize; 2]) -> Result<(), FrameError> {
-        match self.size_px {
-            Some(expected) if found != expected => Err(FrameError::Size { found, expected }),
-            _ => Ok(()),
-        }
-    }
+/// Opens a folder, each picture of which is read when it is asked for; times come from its
+/// `timestamps.csv` or else from `rate_hz`.
+///
+/// # Errors
+/// No pictures, pictures whose names' counters are out of order, no times, or a first
+/// picture that does not decode.
+pub(super) fn open(folder: &Path, rate_hz: Option<f64>) -> Result<Stored, SourceError> {
+    let files = pictures(folder)?;
+    let csv = folder.join("timestamps.csv");
+    let stamps = stamps::beside(folder, &csv, rate_hz, files.len())?;
+    let mut source = Stored::new(folder, Pictures::Files(files), stamps);
+    let first = source.read(0)?.0;
+    source.size_px = Some([first.width_px, first.height_px]);
+    Ok(source)
 }
 
 /// The pictures of a folder in the order of their names.
@@ -86,21 +30,15 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(&io)? {
         let path = entry.map_err(&io)?.path();
-        if coding(&path).is_some() {
+        if Coding::of_file(&path).is_some() {
             files.push(path);
         }
     }
     files.sort();
-    let fail = |reason: String, remedy| SourceError::Container {
-        path: folder.to_owned(),
-        reason,
-        remedy,
-    };
     if files.is_empty() {
-        return Err(fail(
-            "neither video.avi nor PNG or JPEG pictures in it".to_owned(),
-            REMEDY,
-        ));
+        let reason = "neither video.avi nor PNG or JPEG pictures in it; export the recording again, \
+                      one picture a frame";
+        return Err(SourceError::video(folder, reason));
     }
     // `frame10` sorts before `frame9`: which is never intended.
     for pair in files.windows(2) {
@@ -108,14 +46,11 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
             && before >= after
         {
             let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
-            return Err(fail(
-                format!(
-                    "{} is followed by {}, sorted by name",
-                    name(&pair[0]),
-                    name(&pair[1])
-                ),
-                "number the pictures with leading zeros",
-            ));
+            let (one, next) = (name(&pair[0]), name(&pair[1]));
+            let reason = format!(
+                "{one} is followed by {next}, sorted by name; number the pictures with leading zeros"
+            );
+            return Err(SourceError::video(folder, reason));
         }
     }
     Ok(files)
@@ -162,7 +97,7 @@ mod tests {
     }
 
     fn refused(files: &[(&str, &[u8])]) -> String {
-        let read = ImageSource::open(folder(files).path(), Some(10.0))
+        let read = open(folder(files).path(), Some(10.0))
             .and_then(|mut source| (0..source.len()).try_for_each(|i| source.read(i).map(|_| ())));
         read.unwrap_err().to_string()
     }
@@ -171,7 +106,7 @@ mod tests {
     fn pictures_come_in_the_order_of_their_names() {
         let (a, b) = (png(8, 2, 60), png(8, 2, 61));
         let folder = folder(&[("f09.png", &a), ("f10.PNG", &b), ("x.txt", b"")]);
-        let mut source = ImageSource::open(folder.path(), Some(10.0)).unwrap();
+        let mut source = open(folder.path(), Some(10.0)).unwrap();
         let (first, second) = (source.read(0).unwrap(), source.read_left(1).unwrap());
         assert_eq!(source.len(), 2);
         assert_eq!((first.0.luma[0], second.luma[0]), (60, 61));

@@ -16,15 +16,12 @@ use std::io::Read;
 use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
-pub use avi::AviSource;
 pub use error::SourceError;
-pub use frames::{AnySource, BothEyes, FrameSource, StereoSource, read_film, read_left};
-pub use images::ImageSource;
-pub use yuyv::YuyvSource;
+pub use frames::{AnySource, BothEyes, FrameSource, StereoSource, read_film};
 
 /// Opens a recording by what it is: a folder with `video.avi` and perhaps
-/// `timestamps.csv`, a folder of pictures ([`ImageSource`]), a raw file
-/// `NAME_WIDTHxHEIGHT.yuyv` ([`YuyvSource`]), or else an AVI file.
+/// `timestamps.csv`, a folder of side-by-side pictures in the order of their names, a raw
+/// file `NAME_WIDTHxHEIGHT.yuyv`, or else an AVI file.
 ///
 /// `rate_hz` is the frame rate of a recording without times; of an AVI it takes the
 /// place of the header's. It must be positive.
@@ -35,49 +32,32 @@ pub use yuyv::YuyvSource;
 pub fn open_video(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSource>, SourceError> {
     let device = |m: std::fs::Metadata| m.file_type().is_char_device();
     if std::fs::metadata(path).is_ok_and(device) {
-        return Err(SourceError::Container {
-            path: path.to_owned(),
-            reason: "it is a device, not a recording".to_owned(),
-            remedy: "record a camera first, with `wag film`",
-        });
+        let reason = "it is a device, not a recording; record a camera first, with `wag film`";
+        return Err(SourceError::video(path, reason));
     }
     if let Some(path) = run_file(path) {
-        return Err(SourceError::Container {
-            path,
-            reason: "it is a run's file, which holds the left image only".to_owned(),
-            remedy: "use the recording of both images; `wag track` and `wag identify` take a \
-                     run's file",
-        });
-    }
-    if path.is_dir() {
-        let video = path.join("video.avi");
-        if !video.exists() {
-            return Ok(Box::new(ImageSource::open(path, rate_hz)?));
-        }
-        let csv = path.join("timestamps.csv");
-        if !csv.exists() {
-            return open_film(&video, rate_hz);
-        }
-        if let Some(hz) = rate_hz {
-            return Err(SourceError::Times {
-                path: video,
-                reason: stamps::twice(&csv, hz),
-            });
-        }
-        return Ok(Box::new(AviSource::open(&video, Some(&csv))?));
+        let reason = "it is a run's file, which holds the left image only; use the recording of \
+                      both images; `wag track` and `wag identify` take a run's file";
+        return Err(SourceError::video(&path, reason));
     }
     let raw = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("yuyv"));
-    if raw {
-        return Ok(Box::new(YuyvSource::open_named(path, rate_hz)?));
-    }
-    // Its times count as much when it is named itself as when its folder is.
-    let csv = path.with_file_name("timestamps.csv");
-    if rate_hz.is_none() && path.ends_with("video.avi") && csv.exists() {
-        return Ok(Box::new(AviSource::open(path, Some(&csv))?));
-    }
-    open_film(path, rate_hz)
+    Ok(Box::new(if path.is_dir() {
+        let (video, csv) = (path.join("video.avi"), path.join("timestamps.csv"));
+        match rate_hz {
+            _ if !video.exists() => images::open(path, rate_hz)?,
+            Some(hz) if csv.exists() => return Err(stamps::twice(&video, &csv, hz)),
+            _ => avi::open(&video, csv.exists().then_some(csv.as_path()), rate_hz)?,
+        }
+    } else if raw {
+        yuyv::open(path, rate_hz)?
+    } else {
+        // Its times count as much when it is named itself as when its folder is.
+        let csv = path.with_file_name("timestamps.csv");
+        let timed = rate_hz.is_none() && path.ends_with("video.avi") && csv.exists();
+        avi::open(path, timed.then_some(csv.as_path()), rate_hz)?
+    }))
 }
 
 /// The run's file (MCAP) that a path names, or that lies in a folder without any video.
@@ -97,12 +77,4 @@ pub fn run_file(path: &Path) -> Option<PathBuf> {
     let mut file = std::fs::File::open(&path).ok()?;
     file.read_exact(&mut front).ok()?;
     (front == *MAGIC).then_some(path)
-}
-
-fn open_film(path: &Path, rate_hz: Option<f64>) -> Result<Box<dyn StereoSource>, SourceError> {
-    let film = AviSource::open(path, None)?;
-    Ok(Box::new(match rate_hz {
-        Some(hz) => film.at_rate(hz),
-        None => film,
-    }))
 }

@@ -32,38 +32,33 @@ pub(super) fn beside(
     rate_hz: Option<f64>,
     frames: usize,
 ) -> Result<Vec<Stamp>, SourceError> {
-    let times = |reason: String| SourceError::Times {
-        path: recording.to_owned(),
-        reason,
-    };
     match (csv.exists(), rate_hz) {
         (true, None) => read(csv, frames),
         (false, Some(hz)) => Ok(even(frames, 1e9 / hz)),
-        (true, Some(hz)) => Err(times(twice(csv, hz))),
-        (false, None) => Err(times(format!(
-            "its frame times are unknown; give the frame rate, or put {} there with \
-             rows `frame,sequence,monotonic_ns`",
-            csv.display()
-        ))),
+        (true, Some(hz)) => Err(twice(recording, csv, hz)),
+        (false, None) => {
+            let reason = format!(
+                "its frame times are unknown; give the frame rate, or put {} there with rows \
+                 `frame,sequence,monotonic_ns`",
+                csv.display()
+            );
+            Err(SourceError::video(recording, reason))
+        }
     }
 }
 
-/// The frame rate is given twice.
-pub(super) fn twice(csv: &Path, rate_hz: f64) -> String {
-    format!(
-        "{} contains its frame times; leave out the frame rate of {rate_hz} per second",
-        csv.display()
-    )
+/// The times of a recording are given twice.
+pub(super) fn twice(recording: &Path, csv: &Path, rate_hz: f64) -> SourceError {
+    let csv = csv.display();
+    let reason =
+        format!("{csv} contains its frame times; leave out the frame rate of {rate_hz} per second");
+    SourceError::video(recording, reason)
 }
 
 /// Rows `frame,sequence,monotonic_ns`, one a frame.
 pub(super) fn read(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError> {
     let text = std::fs::read_to_string(path).map_err(SourceError::io(path))?;
-    let fail = |line: usize, reason: String| SourceError::Timestamps {
-        path: path.to_owned(),
-        line,
-        reason,
-    };
+    let fail = |line: usize, reason: String| SourceError::timestamps(path, line, reason);
     let mut stamps: Vec<Stamp> = Vec::new();
     for (index, row) in text.lines().enumerate().skip(1) {
         if row.trim().is_empty() {
@@ -73,20 +68,14 @@ pub(super) fn read(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError
             .split(',')
             .map(|c| c.trim().parse())
             .collect::<Result<_, _>>()
-            .map_err(|e| {
-                fail(
-                    index + 1,
-                    format!("{row:?} is not three whole numbers ({e})"),
-                )
-            })?;
+            .map_err(|e| format!("{row:?} is not three whole numbers ({e})"))
+            .map_err(|reason| fail(index + 1, reason))?;
         let [frame, sequence, stamp_ns] = numbers[..] else {
             return Err(fail(index + 1, format!("{} columns", numbers.len())));
         };
         if frame != stamps.len() as u64 {
-            return Err(fail(
-                index + 1,
-                format!("frame {frame} where {} is due", stamps.len()),
-            ));
+            let reason = format!("frame {frame} where {} is due", stamps.len());
+            return Err(fail(index + 1, reason));
         }
         if stamps.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
             return Err(fail(index + 1, "times do not increase".to_owned()));
@@ -96,9 +85,7 @@ pub(super) fn read(path: &Path, frames: usize) -> Result<Vec<Stamp>, SourceError
     if stamps.len() == frames {
         Ok(stamps)
     } else {
-        Err(fail(
-            stamps.len() + 1,
-            format!("{} rows, but the video has {frames} frames", stamps.len()),
-        ))
+        let reason = format!("{} rows, but the video has {frames} frames", stamps.len());
+        Err(fail(stamps.len() + 1, reason))
     }
 }

@@ -1,62 +1,26 @@
 //! Raw V4L2 `YUYV` frames one after the other, without any header.
 
-use std::borrow::Cow;
 use std::fs::File;
-use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::error::SourceError;
-use super::stamps::{self, Stamp};
-use super::stored::{Coding, Stored};
+use super::stamps;
+use super::stored::{Pictures, Stored};
 
-/// A raw file, read frame by frame: a minute of it does not fit into memory.
-#[derive(Debug)]
-pub struct YuyvSource {
-    path: PathBuf,
-    file: File,
-    size_px: [usize; 2],
-    stamps: Vec<Stamp>,
-}
-
-impl YuyvSource {
-    /// Opens a raw file of frames of `size_px` (`[width of both images, height]`)
-    /// taken every `frame_ns`.
-    ///
-    /// # Errors
-    /// No such file, or its length is no multiple of a frame.
-    pub fn open(path: &Path, size_px: [usize; 2], frame_ns: u64) -> Result<Self, SourceError> {
-        let (file, frames) = whole_frames(path, size_px)?;
-        let frame_ns = frame_ns as f64;
-        Ok(Self {
-            path: path.to_owned(),
-            file,
-            size_px,
-            stamps: stamps::even(frames, frame_ns),
-        })
-    }
-
-    /// Opens a raw file whose name contains its size, as `wiggle_1344x376.yuyv`. Its
-    /// times come from the CSV of the same name next to it (`wiggle_1344x376.csv`)
-    /// or else from `rate_hz`.
-    ///
-    /// # Errors
-    /// No size in the name, no times, no such file, or a length that does not fit.
-    pub fn open_named(path: &Path, rate_hz: Option<f64>) -> Result<Self, SourceError> {
-        let size_px = size_in_name(path).ok_or_else(|| SourceError::Container {
-            path: path.to_owned(),
-            reason: "its name does not end in the size of both images together, as in \
-                     `wiggle_1344x376.yuyv`"
-                .to_owned(),
-            remedy: "rename it",
-        })?;
-        let (file, frames) = whole_frames(path, size_px)?;
-        Ok(Self {
-            path: path.to_owned(),
-            file,
-            size_px,
-            stamps: stamps::beside(path, &path.with_extension("csv"), rate_hz, frames)?,
-        })
-    }
+/// Opens a raw file whose name contains its size, as `wiggle_1344x376.yuyv`. Its times come
+/// from the CSV of the same name next to it (`wiggle_1344x376.csv`) or else from `rate_hz`.
+///
+/// # Errors
+/// No size in the name, no times, no such file, or a length that does not fit.
+pub(super) fn open(path: &Path, rate_hz: Option<f64>) -> Result<Stored, SourceError> {
+    let size_px = size_in_name(path).ok_or_else(|| {
+        let reason = "its name does not end in the size of both images together, as in \
+                      `wiggle_1344x376.yuyv`; rename it";
+        SourceError::video(path, reason)
+    })?;
+    let (file, frames) = whole_frames(path, size_px)?;
+    let stamps = stamps::beside(path, &path.with_extension("csv"), rate_hz, frames)?;
+    Ok(Stored::new(path, Pictures::Yuyv(file, size_px), stamps))
 }
 
 /// `[1344, 376]` of `wiggle_1344x376.yuyv`.
@@ -80,32 +44,14 @@ fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), Sourc
     let frames = bytes.checked_div(frame).unwrap_or(0);
     match usize::try_from(frames) {
         Ok(count) if count > 0 && frames * frame == bytes => Ok((file, count)),
-        _ => Err(SourceError::Container {
-            path: path.to_owned(),
-            reason: format!(
-                "{bytes} bytes are not a whole number of {}x{} YUYV frames ({frame} bytes each)",
-                size_px[0], size_px[1]
-            ),
-            remedy: "give the size of both images together, or copy the file again",
-        }),
-    }
-}
-
-impl Stored for YuyvSource {
-    fn path(&self) -> &Path {
-        &self.path
-    }
-
-    fn stamps(&self) -> &[Stamp] {
-        &self.stamps
-    }
-
-    fn picture(&self, index: usize) -> Result<(Coding, Cow<'_, [u8]>), SourceError> {
-        let mut bytes = vec![0; self.size_px[0] * self.size_px[1] * 2];
-        let at = index as u64 * bytes.len() as u64;
-        let read = self.file.read_exact_at(&mut bytes, at);
-        read.map_err(SourceError::io(&self.path))?;
-        Ok((Coding::Yuyv(self.size_px), Cow::Owned(bytes)))
+        _ => {
+            let [width, height] = size_px;
+            let reason = format!(
+                "{bytes} bytes are not a whole number of {width}x{height} YUYV frames ({frame} bytes \
+                 each); give the size of both images together, or copy the file again"
+            );
+            Err(SourceError::video(path, reason))
+        }
     }
 }
 
@@ -130,17 +76,13 @@ mod tests {
         let at = |name| folder.path().join(name);
         let (raw, csv) = (at("r_8x2.yuyv"), at("r_8x2.csv"));
         std::fs::write(&raw, (0..64).collect::<Vec<u8>>()).unwrap();
-        let open = |rate_hz| YuyvSource::open_named(&raw, rate_hz);
+        let open = |rate_hz| super::open(&raw, rate_hz);
         let untimed = open(None).unwrap_err().to_string();
         assert!(untimed.contains("r_8x2.csv"), "{untimed}");
         let mut even = open(Some(50.0)).unwrap();
         assert_eq!(even.len(), 2);
         let second = even.read(1).unwrap().0;
         assert_eq!((second.stamp_ns, second.luma[0]), (20_000_000, 32));
-        assert!(matches!(
-            even.read(2),
-            Err(SourceError::OutOfRange { len: 2, .. })
-        ));
         std::fs::write(&csv, "frame,sequence,monotonic_ns\n0,5,100\n1,7,250\n").unwrap();
         let timed = open(None).unwrap().read(1).unwrap().0;
         assert_eq!((timed.stamp_ns, timed.sequence), (250, 7));

@@ -317,22 +317,12 @@ impl FrameSource for RunPart {
     }
 
     fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
-        let path = || self.path.clone();
         let picture = self
             .pictures
             .get(index)
-            .ok_or_else(|| SourceError::OutOfRange {
-                path: path(),
-                frame: index,
-                len: self.pictures.len(),
-            })?;
-        EyeFrame::from_jpeg(&picture.jpeg, picture.stamp_ns, index as u64).map_err(|source| {
-            SourceError::Frame {
-                path: path(),
-                frame: index,
-                source,
-            }
-        })
+            .ok_or_else(|| SourceError::out_of_range(&self.path, index, self.pictures.len()))?;
+        EyeFrame::from_jpeg(&picture.jpeg, picture.stamp_ns, index as u64)
+            .map_err(|source| SourceError::frame(&self.path, index, &source))
     }
 }
 

@@ -9,7 +9,7 @@ use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
 use camera_ingest::calib::placed_camera_toml;
 use camera_ingest::score::sight_lead;
 use camera_ingest::source::FrameSource;
-use camera_ingest::{ScoreOptions, load_camera, open_video};
+use camera_ingest::{load_camera, open_video};
 use cli_output::{OrInput, Outcome, Stage};
 use nalgebra::Vector3;
 use run_log::files;
@@ -61,8 +61,7 @@ fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<S
         }
         (None, Some(path), Some(rgb)) => {
             let shown = read_shown(path, video.len()).or_input()?;
-            let options = ScoreOptions::default();
-            sight_lead(&mut video, camera, rgb.0, &shown, &options)
+            sight_lead(&mut video, camera, rgb.0, &shown)
                 .map_err(|error| not_scored(error, &args.film.video))
         }
         _ => Err(bad_input!(

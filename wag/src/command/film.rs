@@ -7,12 +7,7 @@ use serde_json::{Value, json};
 
 /// A camera that cannot be had as asked is a wrong input; one that ends is a failure.
 fn failure(error: LiveError) -> Failure {
-    match error {
-        LiveError::Unplugged { .. } | LiveError::Silent { .. } | LiveError::System { .. } => {
-            Failure::failed(error)
-        }
-        other => Failure::input(other),
-    }
+    Failure::of(matches!(error, LiveError::Unfit(_)), error)
 }
 
 pub fn run(args: &FilmArgs) -> Outcome<Option<Value>> {

@@ -1,7 +1,7 @@
 //! `wag score`: closest approach of tip and target from stereo video.
 
 use crate::cli::ScoreArgs;
-use camera_ingest::{ScoreError, ScoreOptions, load_camera, open_video, score};
+use camera_ingest::{ScoreError, load_camera, open_video, score};
 use cli_output::{Failure, OrInput, Outcome, Stage};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -16,14 +16,8 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let camera = load_camera(&args.film.camera).or_input()?;
     let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
     let stage = Stage::begin("score");
-    let found = score(
-        &mut video,
-        &camera,
-        args.tip_rgb.0,
-        args.target_rgb.0,
-        &ScoreOptions::default(),
-    )
-    .map_err(|error| not_scored(error, &args.film.video))?;
+    let found = score(&mut video, &camera, args.tip_rgb.0, args.target_rgb.0)
+        .map_err(|error| not_scored(error, &args.film.video))?;
     let line = format!(
         "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s",
         1e3 * found.closest_m,
