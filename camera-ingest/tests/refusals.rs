@@ -6,10 +6,9 @@ mod recording;
 
 use std::path::PathBuf;
 
-use camera_ingest::overlay::still_scene;
 use camera_ingest::source::FrameSource;
 use camera_ingest::{EyeFrame, TrackError, open_video};
-use recording::{Wiggle, folder};
+use recording::{Wiggle, folder, median};
 
 const FRAMES: usize = 60;
 
@@ -19,7 +18,7 @@ fn refusal(wiggle: &Wiggle) -> TrackError {
 
 /// Takes the rope out of the frames from `first` on: only the scene is left.
 fn emptied(mut wiggle: Wiggle, first: usize) -> Wiggle {
-    let scene = still_scene(&wiggle.frames).unwrap();
+    let scene = median(&wiggle.frames);
     for frame in &mut wiggle.frames[first..] {
         *frame = EyeFrame {
             stamp_ns: frame.stamp_ns,

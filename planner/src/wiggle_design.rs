@@ -100,7 +100,7 @@ pub fn judge(
             links: over(|i| i.links),
             log_volume: over(|i| i.log_volume),
         },
-        gap_m: gaps.into_iter().fold(f64::INFINITY, f64::min),
+        gap_m: gaps.iter().map(|g| g.0).fold(f64::INFINITY, f64::min),
     })
 }
 

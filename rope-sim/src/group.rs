@@ -241,3 +241,69 @@ fn hanging_tip<V: Lanes>(links: &[Link<V>], link_length: V) -> Vec3<V> {
     }
     tip
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Kernel;
+    use crate::motion::PlannedArm;
+    use arm_model::{JointTrajectory, JointVector, Pole};
+
+    /// End of the simulation (s).
+    const HORIZON_S: f64 = 0.3;
+
+    fn run(kernel: Kernel, ropes: &[RopeParams], path: &BasePath) -> Vec<Rollout> {
+        let members = ropes.iter().map(|rope| Member {
+            rope,
+            path,
+            extras: RopeExtras::NONE,
+            links: vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize],
+        });
+        kernel.run(GroupTask::<true> {
+            scene: &Scene::EMPTY,
+            max_step_s: 1e-3,
+            members: &members.collect::<Vec<_>>(),
+            frames: FrameTimes {
+                first_s: 0.0,
+                period_s: 0.01,
+                count: 30,
+            },
+            watch: Watch::point([0.4, 0.0, 0.3]),
+            horizon_s: HORIZON_S,
+            single_precision: kernel.is_single_precision(),
+        })
+    }
+
+    /// The public interface refuses such a rope, so it is put into a group directly.
+    #[test]
+    fn nan_in_one_lane_changes_no_bit_of_the_others() {
+        const SICK: usize = 1;
+        let waypoints = [
+            JointVector([0.0, -0.6, 0.0, 0.9, 0.0, 1.5, 0.0]),
+            JointVector([0.1, -0.3, 0.1, 0.8, -0.1, 1.2, 0.2]),
+        ];
+        let throw = JointTrajectory::new(&[0.0, 0.2], &waypoints).unwrap();
+        let arm = PlannedArm::new(throw, Pole::default());
+        let path = BasePath::new_in(Vec::new(), &arm, 1e-3, HORIZON_S).unwrap();
+        let base = RopeParams::from_array([20.0, 0.55, 0.01, 0.2, 0.006, 0.06, 0.06, 0.03, 1.0]);
+        let kernels = Kernel::ALL.into_iter().filter(|k| k.is_available());
+        for kernel in kernels.filter(|k| k.lanes() > 1) {
+            let rope = |lane: usize| RopeParams {
+                length_m: 0.45 + 0.01 * lane as f64,
+                ..base
+            };
+            let mut ropes: Vec<RopeParams> = (0..kernel.lanes()).map(rope).collect();
+            let healthy = run(kernel, &ropes, &path);
+            assert!(healthy.iter().all(|r| r.outcome == Outcome::Clean));
+            ropes[SICK].joint_stiffness_nm_per_rad = f64::NAN;
+            let infected = run(kernel, &ropes, &path);
+            for (lane, (found, wanted)) in infected.iter().zip(&healthy).enumerate() {
+                if lane == SICK {
+                    assert_eq!(found.outcome, Outcome::Diverged, "{kernel:?}");
+                } else {
+                    assert_eq!(found, wanted, "{kernel:?}: lane {SICK} reached lane {lane}");
+                }
+            }
+        }
+    }
+}

@@ -147,6 +147,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
     let broken = Broken {
         ends_s: 0.05,
         nan_from_s: 0.03,
+        in_place: false,
     };
     let rope = |change: fn(&mut RopeParams)| {
         let mut rope = good;

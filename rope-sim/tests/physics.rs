@@ -5,10 +5,10 @@
 mod support;
 
 use nalgebra::{Rotation3, Vector3};
-use rope_sim::{AttachMotion, FrameTimes, Precision, Scene, SimOptions};
+use rope_sim::{AttachMotion, FrameTimes, Precision, Rollout, Scene, SimOptions, Start};
 use shared_types::RopeParams;
 use support::{
-    assert_derivatives, options, pendulum, released, simulate, still, throw, tips, world,
+    G_M_S2, assert_derivatives, options, pendulum, released, simulate, still, throw, tips, world,
 };
 
 /// One rigid link is a pendulum; its period at any amplitude is an arithmetic-geometric
@@ -40,6 +40,57 @@ fn one_link_swings_with_the_period_of_a_pendulum() {
     assert!(back.norm() < 1e-5 * s, "{back}");
     let fastest = (2.0 * moment * (1.0 - amplitude.cos()) / inertia).sqrt() * s;
     assert!((rollout.peak_tip_speed_m_s / fastest - 1.0).abs() < 1e-4);
+}
+
+/// The motion of all links about a fixed point conserves energy when nothing damps.
+#[test]
+fn undamped_energy_is_kept() {
+    let rope = RopeParams::from_array([22.0, 0.55, 0.0, 0.1, 0.008, 0.06, 0.06, 0.03, 1.2]);
+    let rate_hz = 4000.0;
+    // Two lever arms out of one plane: turned about an oblique axis, swinging.
+    let options = SimOptions {
+        step_s: 1.0 / rate_hz / 4.0,
+        ..released([0.05, 0.1, 0.0], options(Precision::F64, 0.6, rate_hz))
+    };
+    let rollout = simulate(&Scene::EMPTY, &rope, &world, &options);
+    let energy = |frame: usize| energy_j(&rope, &rollout, frame, rate_hz);
+    let drop_m = rollout.nodes.position(0, 22).z + rope.length_m;
+    let (start, scale) = (energy(1), rope.lead_mass_kg * G_M_S2 * drop_m);
+    for frame in (1..2399).step_by(37) {
+        let drift = (energy(frame) - start) / scale;
+        assert!(drift.abs() < 5e-3, "frame {frame}: {drift}");
+    }
+}
+
+/// Kinetic, gravity and spring energy from positions alone (velocities by central
+/// differences); the spin of links about their own axes is neglected.
+fn energy_j(rope: &RopeParams, rollout: &Rollout, frame: usize, rate_hz: f64) -> f64 {
+    let n = rope.links as usize;
+    let node = |frame: usize, i: usize| rollout.nodes.position(frame, i);
+    let velocity = |i: usize| (node(frame + 1, i) - node(frame - 1, i)) * (0.5 * rate_hz);
+    let s = rope.link_length_m();
+    let mut sum = 0.0;
+    let mut above = -Vector3::z();
+    for i in 0..n {
+        let direction = (node(frame, i + 1) - node(frame, i)) / s;
+        let centre_velocity = (velocity(i) + velocity(i + 1)) / 2.0;
+        let turning = (velocity(i + 1) - velocity(i)) / s;
+        let inertia = rope.link_inertia_kg_m2()
+            + if i + 1 == n {
+                rope.lead_inertia_kg_m2()
+            } else {
+                0.0
+            };
+        let height = (node(frame, i).z + node(frame, i + 1).z) / 2.0;
+        let angle = direction.cross(&above).norm().atan2(direction.dot(&above));
+        sum += 0.5 * rope.link_mass_kg() * centre_velocity.norm_squared()
+            + 0.5 * inertia * turning.norm_squared()
+            + rope.link_mass_kg() * G_M_S2 * height
+            + 0.5 * rope.joint_stiffness_nm_per_rad * angle * angle;
+        above = direction;
+    }
+    sum + 0.5 * rope.lead_mass_kg * velocity(n).norm_squared()
+        + rope.lead_mass_kg * G_M_S2 * node(frame, n).z
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Slopes against rigid motions, delays and separate rollouts; which are refused or flagged.
+//! Slopes against symmetries of the model, rigid motions, delays and separate rollouts; which are refused or flagged.
 #![cfg(test)]
 #![allow(clippy::float_cmp, missing_docs, reason = "a test")]
 
@@ -19,8 +19,10 @@ use support::{released, rope, throw, world};
 const LENGTH: usize = 1;
 const DAMPING: usize = 2;
 const STIFFNESS: usize = 3;
+const RADIUS: usize = 4;
 const MASS_PER_LENGTH: usize = 5;
 const LEAD_MASS: usize = 6;
+const EXTRA_SCALE: usize = 8;
 /// Where the lead is watched (m).
 const TARGET: [f64; 3] = [0.45, 0.1, 0.05];
 
@@ -77,7 +79,7 @@ fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Central differences of all nodes, per unit of each parameter, which is varied by
-/// `relative` of its value.
+/// `relative` of its value; the last is that of the distance to the target.
 fn central(indices: &[usize], relative: &[f64], options: &SimOptions) -> Vec<Vec<f64>> {
     let (rope, arm) = (rope(), throw(0.0));
     let values = rope.to_array();
@@ -92,12 +94,43 @@ fn central(indices: &[usize], relative: &[f64], options: &SimOptions) -> Vec<Vec
         }
     }
     let s = run(&rope, &arm, &neighbours, options).unwrap();
-    let rows: Option<Vec<Vec<f64>>> = s.slopes(|r| r.nodes.to_f64()).into_iter().collect();
+    let rows: Option<Vec<Vec<f64>>> = s.slopes(nodes_and_distance).into_iter().collect();
     let half = |pair: &[Vec<f64>]| {
         let both = pair[0].iter().zip(&pair[1]);
         both.map(|(a, b)| 0.5 * (a - b)).collect()
     };
     rows.unwrap().chunks(2).map(half).collect()
+}
+
+fn nodes_and_distance(rollout: &Rollout) -> Vec<f64> {
+    let mut numbers = rollout.nodes.to_f64();
+    numbers.push(rollout.watched.to_point.unwrap().distance_m);
+    numbers
+}
+
+/// Multiplying stiffness, damping and all masses by one factor changes no motion, so
+/// the logarithmic slopes cancel.
+#[test]
+fn slopes_of_the_scale_symmetry_cancel() {
+    let values = rope().to_array();
+    let scaled = [DAMPING, STIFFNESS, MASS_PER_LENGTH, LEAD_MASS];
+    let mut sum = vec![0.0; 13 * 23 * 3 + 1];
+    for (index, slopes) in scaled
+        .into_iter()
+        .zip(central(&scaled, &[1e-5; 4], &options()))
+    {
+        let nodes = &slopes[..slopes.len() - 1];
+        assert!(largest(nodes.iter().map(|x| x * values[index])) > 1e-3);
+        for (sum, slope) in sum.iter_mut().zip(slopes) {
+            *sum += slope * values[index];
+        }
+    }
+    let left = largest(sum);
+    assert!(left < 1e-6, "{left} m per unit of the logarithm");
+    // The extra scale rules R_I here: it does little, the radius nothing.
+    let [radius, scale] = [RADIUS, EXTRA_SCALE].map(|i| central(&[i], &[1e-5], &options()));
+    assert_eq!(largest(radius.concat()), 0.0);
+    assert!(largest(scale.concat()) > 0.0);
 }
 
 /// Single precision, which the search for settling moves takes its slopes in, wants larger
@@ -344,6 +377,7 @@ fn bad_input_is_named_with_base_and_neighbour() {
     let [short, nan] = [0.3, 9.0].map(|ends_s| Broken {
         ends_s,
         nan_from_s: 0.5,
+        in_place: true,
     });
     let first = Family {
         base: Candidate::new(&rope, &world),

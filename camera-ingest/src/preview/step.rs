@@ -63,7 +63,7 @@ pub struct Search {
 #[derive(Debug)]
 pub struct Answer {
     attempt: u32,
-    found: Result<Known, TrackError>,
+    found: Result<Known, (&'static str, TrackError)>,
 }
 
 impl Search {
@@ -180,9 +180,9 @@ impl Preview {
                     lost_ns: None,
                 }
             }
-            Err(reason) => {
+            Err((what, reason)) => {
                 tracing::info!(%reason, "no rope found");
-                self.begin_anew("no simulated rope explains the frames");
+                self.begin_anew(what);
             }
         }
     }

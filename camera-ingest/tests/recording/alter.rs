@@ -2,9 +2,9 @@
 #![allow(dead_code, reason = "not every test file uses everything")]
 
 use super::Wiggle;
+use super::recording::median;
 use camera_ingest::EyeFrame;
 use camera_ingest::frame::ycc_from_rgb;
-use camera_ingest::overlay::still_scene;
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -134,7 +134,7 @@ impl Wiggle {
     /// spread of the first.
     pub(crate) fn smeared(mut self) -> Self {
         const SAMPLES: usize = 9;
-        let mut scene = still_scene(&self.frames).unwrap();
+        let mut scene = median(&self.frames);
         let last = self.frames.len() - 1;
         for i in 0..=last {
             let (a, b) = (i.saturating_sub(1), (i + 1).min(last));

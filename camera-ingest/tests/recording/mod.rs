@@ -170,3 +170,23 @@ pub(crate) fn quantile(values: &[f64], q: f64) -> f64 {
     sorted.sort_by(f64::total_cmp);
     sorted[((sorted.len() - 1) as f64 * q) as usize]
 }
+
+/// Median over every seventh frame.
+pub(crate) fn median(frames: &[EyeFrame]) -> EyeFrame {
+    let chosen: Vec<&EyeFrame> = frames.iter().step_by(7).collect();
+    let plane = |pick: fn(&EyeFrame) -> &Vec<u8>| -> Vec<u8> {
+        (0..pick(chosen[0]).len())
+            .map(|at| {
+                let mut values: Vec<u8> = chosen.iter().map(|f| pick(f)[at]).collect();
+                values.sort_unstable();
+                values[values.len() / 2]
+            })
+            .collect()
+    };
+    EyeFrame {
+        luma: plane(|f| &f.luma),
+        cb: plane(|f| &f.cb),
+        cr: plane(|f| &f.cr),
+        ..frames[0].clone()
+    }
+}

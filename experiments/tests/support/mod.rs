@@ -21,10 +21,16 @@ pub fn report(line: &str) -> Value {
     serde_json::from_slice(&output.stdout).expect("standard output is JSON")
 }
 
-/// Asserts that a line is refused as bad input, in these words.
+/// Asserts that a line is refused as bad input, in these words: in the one JSON object of
+/// `--json`, else on standard error.
 pub fn assert_refused(line: &str, words: &[&str]) {
     let output = experiments(line);
-    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let said = if line.contains("--json") {
+        let told: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        told.to_string()
+    } else {
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
     assert_eq!(output.status.code(), Some(2), "{line}: {said}");
     for word in words {
         assert!(said.contains(word), "{line}: {said} lacks {word}");

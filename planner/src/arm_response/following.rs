@@ -37,11 +37,45 @@ pub enum FollowError {
 
 /// How each joint follows the staircase of setpoints of one controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "FollowingForm")]
 pub struct Following {
     joints: [Option<Lag>; JOINTS],
     source: String,
     /// Time from setpoint to setpoint (s).
     period_s: f64,
+}
+
+/// What is sent: the same, not yet checked.
+#[derive(Deserialize)]
+struct FollowingForm {
+    joints: [Option<Lag>; JOINTS],
+    source: String,
+    period_s: f64,
+}
+
+/// The ranges are those of [`ArmResponse`]'s file and of the rate in [`Limits`].
+impl TryFrom<FollowingForm> for Following {
+    type Error = FollowError;
+    fn try_from(sent: FollowingForm) -> Result<Self, FollowError> {
+        const HZ: f64 = core::f64::consts::TAU;
+        let within = OutOfRange::unless_within;
+        let (joints, source, period_s) = (sent.joints, sent.source, sent.period_s);
+        let period = [("period_s", period_s)];
+        within(1.0 / 250.0..=1.0 / 30.0, "from 1/250 to 1/30 s", &period)?;
+        for lag in joints.iter().flatten() {
+            let dead_time_s = [("dead_time_s", lag.dead_time_s)];
+            let frequency = [("natural_frequency_rad_s", lag.natural_frequency_rad_s)];
+            let damping_ratio = [("damping_ratio", lag.damping_ratio)];
+            within(0.0..=1.0, "from 0 to 1 s", &dead_time_s)?;
+            within(0.1 * HZ..=500.0 * HZ, "0.1 to 500 Hz", &frequency)?;
+            within(0.01..=10.0, "from 0.01 to 10", &damping_ratio)?;
+        }
+        Ok(Self {
+            joints,
+            source,
+            period_s,
+        })
+    }
 }
 
 impl Following {
@@ -60,24 +94,6 @@ impl Following {
             source: response.source.clone(),
             period_s: limits.period_s(),
         }
-    }
-
-    /// Refuses values of a response that was sent which are beyond the ranges of
-    /// [`ArmResponse`]'s file, or beyond those of the rate in [`Limits`].
-    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
-        const HZ: f64 = core::f64::consts::TAU;
-        let within = OutOfRange::unless_within;
-        let period_s = [("period_s", self.period_s)];
-        within(1.0 / 250.0..=1.0 / 30.0, "from 1/250 to 1/30 s", &period_s)?;
-        for lag in self.joints.iter().flatten() {
-            let dead_time_s = [("dead_time_s", lag.dead_time_s)];
-            let frequency = [("natural_frequency_rad_s", lag.natural_frequency_rad_s)];
-            let damping_ratio = [("damping_ratio", lag.damping_ratio)];
-            within(0.0..=1.0, "from 0 to 1 s", &dead_time_s)?;
-            within(0.1 * HZ..=500.0 * HZ, "0.1 to 500 Hz", &frequency)?;
-            within(0.01..=10.0, "from 0.01 to 10", &damping_ratio)?;
-        }
-        Ok(())
     }
 
     /// Arm or run the response was measured on.
@@ -199,7 +215,11 @@ mod tests {
             f.joints[3].as_mut().unwrap()
         }
         let good = Following::new(&response(3, 0.02, 12.0), &Limits::default());
-        assert_eq!(good.check(), Ok(()));
+        let sent = |following: &Following| {
+            let bytes = serde_json::to_vec(following).unwrap();
+            serde_json::from_slice::<Following>(&bytes)
+        };
+        assert_eq!(sent(&good).unwrap(), good);
         type Change = fn(&mut Following);
         let cases: [(&str, Change); 6] = [
             ("period_s", |f| f.period_s = 1e-12),
@@ -214,7 +234,8 @@ mod tests {
         for (key, change) in cases {
             let mut wrong = good.clone();
             change(&mut wrong);
-            assert_eq!(wrong.check().unwrap_err().key, key);
+            let error = sent(&wrong).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
         }
     }
 

@@ -123,7 +123,7 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
     let (found, min) = (o.track.frames.len(), options.frames_min);
     let film_s = o.track.frames.last().map_or(0.0, |f| f.t_s);
     let motion_s = o.motion.duration_s();
-    Err(IdentifyError::Film(if lost > most {
+    let reason = if lost > most {
         format!(
             "the rope was lost in {:.0} % of the frames, at most {:.0} % are allowed: film again with the whole rope in view",
             lost * 100.0,
@@ -137,7 +137,8 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
         )
     } else {
         return Ok(());
-    }))
+    };
+    Err(IdentifyError::Film(reason))
 }
 
 /// Refuses what cannot be searched with, never ends, or would pass any film.

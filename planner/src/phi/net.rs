@@ -111,17 +111,16 @@ impl PhiNet {
 
     fn reads(&self, shown: ObservedPoints) -> Result<(), ObserveError> {
         use ObservedPoints::{ArcLength, LinkCentres};
-        Err(ObserveError::new(
-            match (self.metadata.features.points, shown) {
-                (ArcLength, ArcLength) | (LinkCentres, LinkCentres) => return Ok(()),
-                (LinkCentres, ArcLength) => {
-                    "the network reads the centres of the rope's links, which only simulated films show (experiments sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
-                }
-                (ArcLength, LinkCentres) => {
-                    "the film shows link centres, but the network reads keypoints uniform in arc length: name one trained with `points = \"link-centres\"`"
-                }
-            },
-        ))
+        let reason = match (self.metadata.features.points, shown) {
+            (ArcLength, ArcLength) | (LinkCentres, LinkCentres) => return Ok(()),
+            (LinkCentres, ArcLength) => {
+                "the network reads the centres of the rope's links, which only simulated films show (experiments sysid): name a network of keypoints uniform in arc length, or none for the built-in one"
+            }
+            (ArcLength, LinkCentres) => {
+                "the film shows link centres, but the network reads keypoints uniform in arc length: name one trained with `points = \"link-centres\"`"
+            }
+        };
+        Err(ObserveError::new(reason))
     }
 
     /// What the network sees of an observation of its wiggle.

@@ -3,7 +3,6 @@
 use super::finalists::{Finalist, best_first};
 use super::setup::{Count, Setup};
 use super::{PlanError, PlanRequest, ThrowOutcome, ThrowTask, check_reach, clear_of_arm};
-use crate::arm_response::FollowError;
 use arm_model::JointTrajectory;
 use arm_model::limits::LimitKind;
 use shared_types::ipc::message::Progress;
@@ -37,9 +36,6 @@ pub fn plan_task(
     request.options.check()?;
     task.config().check()?;
     request.goal.check()?;
-    if let Some(following) = &request.following {
-        following.check().map_err(FollowError::from)?;
-    }
     check_reach(target_m, request.rope.length_m, &request.cell)?;
     clear_of_arm(target_m, &request.cell)?;
     let setup = Setup::new(task, request)?;

@@ -83,6 +83,8 @@ pub struct SettleMove {
 
 impl SettleConfig {
     pub(super) fn check(&self) -> Result<(), SettleError> {
+        const KNOT: &str = "from 0.1 s to a third of the shortest duration";
+        const COST: &str = "above 0 and below 10 m/rad";
         if self.durations_s.is_empty() {
             return Err(SettleError::NoDuration);
         }
@@ -97,19 +99,25 @@ impl SettleConfig {
             .map(|d| ("durations_s", *d))
             .collect();
         within(1.0..=30.0, "from 1 to 30 s", &durations_s)?;
-        let clearance = [("clearance_m", self.clearance_m)];
-        within(0.0..=1.0, "from 0 to 1 m", &clearance)?;
-        let cost = [("offset_cost_m_per_rad", self.offset_cost_m_per_rad)];
-        let range = f64::MIN_POSITIVE..=10.0;
-        within(range, "above 0 and at most 10 m/rad", &cost)?;
         let shortest_s = self
             .durations_s
             .iter()
             .copied()
             .fold(f64::INFINITY, f64::min);
-        let knot_s = [("knot_s", self.knot_s)];
-        let expected = "from 0.1 s to a third of the shortest duration";
-        Ok(within(0.1..=shortest_s / 3.0, expected, &knot_s)?)
+        let (knot_s, gap_m) = (self.knot_s, self.clearance_m);
+        let cost = self.offset_cost_m_per_rad;
+        let knots_fit = knot_s >= 0.1 && 3.0 * knot_s <= shortest_s;
+        let gap_fits = (0.0..1.0).contains(&gap_m);
+        Ok(OutOfRange::check([
+            ("knot_s", knot_s, knots_fit, KNOT),
+            (
+                "offset_cost_m_per_rad",
+                cost,
+                cost > 0.0 && cost < 10.0,
+                COST,
+            ),
+            ("clearance_m", gap_m, gap_fits, "from 0 to 1 m"),
+        ])?)
     }
 }
 

@@ -189,12 +189,14 @@ fn a_rope_that_would_come_too_near_is_refused() {
 fn a_wrong_start_is_refused_by_name() {
     let good = request(4);
     type Change = fn(&mut SettleRequest);
-    let cases: [(Change, &str); 8] = [
+    let cases: [(Change, &str); 10] = [
         (|r| r.start_s = 5.0, "would begin 5.000 s"),
         (|r| r.start_q[3] += 0.05, "joint 4 stands"),
         (|r| r.q[7][2] = f64::NAN, "measured joints: "),
         (|r| r.rope.length_m = -1.0, "`length_m`"),
         (|r| r.config.knot_s = 0.0, "`knot_s`"),
+        (|r| r.config.offset_cost_m_per_rad = 10.0, "below 10 m/rad"),
+        (|r| r.config.clearance_m = 1.0, "`clearance_m`"),
         (|r| r.start_s = 1e6, "`start_s`"),
         (|r| r.config.durations_s = vec![3.5; 1000], "`durations_s`"),
         (|r| r.config.iterations = usize::MAX, "`iterations`"),

@@ -151,12 +151,27 @@ impl TrainingConfig {
                 "0 to 1",
             ),
         ];
-        let channels = network
-            .channels
-            .map(|channels| count("network.channels", channels, 1..=1024, "1 to 1024 each"));
+        let wrong = |what| TrainingError::Input(format!("training configuration: {what}"));
         let masking = MaskPhase::rules(&training.masking);
-        OutOfRange::check(rules.into_iter().chain(channels).chain(masking))
-            .map_err(|error| TrainingError::Input(format!("training configuration: {error}")))
+        OutOfRange::check(rules.into_iter().chain(masking))
+            .map_err(|error| wrong(error.to_string()))?;
+        let channels = network.channels;
+        if !channels.iter().all(|c| (1..=1024).contains(c)) {
+            let expected = "three numbers from 1 to 1024";
+            return Err(wrong(format!(
+                "`network.channels` is {channels:?}, but must be {expected}"
+            )));
+        }
+        let mut phases = training.masking.iter();
+        phases.find(|phase| !phase.has_few_blocks()).map_or(
+            Ok(()),
+            |MaskPhase { blocks, .. }| {
+                let expected = "two numbers up to 100, the smaller first";
+                Err(wrong(format!(
+                    "`training.masking.blocks` is {blocks:?}, but must be {expected}"
+                )))
+            },
+        )
     }
 
     /// What the network sees.

@@ -253,9 +253,13 @@ impl Pool {
     ) -> core::result::Result<Self, &'static str> {
         const CUT: &str = "cut short or damaged";
         let body = unsealed(bytes).ok_or(CUT)?;
+        let header = recipe.header(shard);
+        if !body.starts_with(&header[..MAGIC.len() + 32]) {
+            return Err("made from another configuration");
+        }
         let body = body
-            .strip_prefix(&recipe.header(shard)[..])
-            .ok_or("made from another configuration, or another shard under this name")?;
+            .strip_prefix(&header[..])
+            .ok_or("another shard under this name")?;
         let (sizes, body) = body.split_first_chunk::<8>().ok_or(CUT)?;
         let [samples, keypoints] = [0, 4].map(|i| {
             let number = [sizes[i], sizes[i + 1], sizes[i + 2], sizes[i + 3]];

@@ -149,6 +149,37 @@ mod tests {
     }
 
     #[test]
+    fn torque_balances_at_every_joint() {
+        let rope = rope();
+        let tilt = 1.1;
+        let extras = RopeExtras {
+            mass_slope: 0.6,
+            ..RopeExtras::NONE
+        };
+        let psi = hanging_angles(&rope, &weights_nm(&rope, &extras), tilt);
+        let (s, m) = (rope.link_length_m(), rope.link_mass_kg());
+        let mut above = tilt;
+        for i in 0..psi.len() {
+            // Moment of everything beyond joint i about it, by its lever arms.
+            let mut x = 0.0;
+            let mut moment = 0.0;
+            for (link, p) in (0_u32..).zip(&psi).skip(i) {
+                let place = (f64::from(link) + 0.5) / f64::from(rope.links);
+                let m = m * (1.0 + 0.6 * (2.0 * place - 1.0));
+                moment += m * GRAVITY_M_S2 * (x + 0.5 * s * p.sin());
+                x += s * p.sin();
+            }
+            moment += rope.lead_mass_kg * GRAVITY_M_S2 * x;
+            let spring = rope.joint_stiffness_nm_per_rad * (above - psi[i]);
+            assert!(
+                (spring - moment).abs() < 1e-10,
+                "joint {i}: {spring} against {moment}"
+            );
+            above = psi[i];
+        }
+    }
+
+    #[test]
     fn links_start_from_the_attach_frame_and_bend_down() {
         let attach = nalgebra::Rotation3::from_euler_angles(0.4, 0.7, -1.0);
         let links = hanging_links(&rope(), &RopeExtras::NONE, attach.matrix());

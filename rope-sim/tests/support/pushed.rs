@@ -50,17 +50,20 @@ impl AttachMotion for Pushed {
     }
 }
 
-/// Ends early, and is not finite from some time on.
+/// Ends early, and is not finite from some time on: its place, or else its velocity.
 pub struct Broken {
     pub ends_s: f64,
     pub nan_from_s: f64,
+    pub in_place: bool,
 }
 
 impl AttachMotion for Broken {
     fn at(&self, t_s: f64) -> FrameMotion {
         let x = if t_s > self.nan_from_s { f64::NAN } else { 0.0 };
+        let (p, v) = if self.in_place { (x, 0.0) } else { (0.0, x) };
         FrameMotion {
-            v_m_s: Vector3::new(x, 0.0, 0.0),
+            p_m: Vector3::new(p, 0.0, 0.0),
+            v_m_s: Vector3::new(v, 0.0, 0.0),
             ..FrameMotion::world()
         }
     }

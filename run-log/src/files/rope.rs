@@ -1,7 +1,7 @@
 //! `rope.toml`: nine parameters, with their uncertainty when they were identified.
 
 use super::atomic::write_atomic;
-use super::text::read_toml;
+use super::text::{read_text, read_toml};
 use anyhow::{Context, Result};
 use shared_types::rope::{RANGES, RopeEstimate, RopeParams, RopePosterior};
 use std::fmt::Write;
@@ -30,11 +30,13 @@ pub fn read_rope(path: &Path) -> Result<RopeParams> {
 /// Reads what was left open when the rope was identified; `None` for a rope that was
 /// not.
 pub fn read_posterior(path: &Path) -> Result<Option<RopePosterior>> {
-    let posterior = read_table(path)?.remove("posterior");
+    let fail = || format!("rope file `{}`, table `posterior`", path.display());
+    let mut table: toml::Table = toml::from_str(&read_text(path)?).with_context(fail)?;
+    let posterior = table.remove("posterior");
     posterior
         .map(toml::Value::try_into)
         .transpose()
-        .with_context(|| format!("rope file `{}`, table `posterior`", path.display()))
+        .with_context(fail)
 }
 
 /// Reads why the track that the rope was identified from should not be relied on; empty
@@ -44,7 +46,10 @@ pub fn read_doubts(path: &Path) -> Result<Vec<String>> {
     let doubts = table.get("fit").and_then(|fit| fit.get("doubts")).cloned();
     doubts
         .map_or(Ok(Vec::new()), toml::Value::try_into)
-        .with_context(|| format!("rope file `{}`, `doubts` in `fit`", path.display()))
+        .with_context(|| {
+            let path = path.display();
+            format!("rope file `{path}`, `doubts` in its table `fit`")
+        })
 }
 
 /// Writes an identified rope, and why the track that it was identified from should not be

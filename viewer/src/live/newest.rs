@@ -22,7 +22,7 @@ impl<T> Newest<T> {
     /// A value with another number than `seen`, waited for at most `patience`.
     pub(crate) fn other_than(&self, seen: u64, patience: Duration) -> Option<(u64, Arc<T>)> {
         let slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = |slot: &mut (u64, Option<Arc<T>>)| slot.0 == seen;
+        let known = |slot: &mut (u64, Option<Arc<T>>)| slot.0 == seen || slot.1.is_none();
         let waited = self.changed.wait_timeout_while(slot, patience, known);
         let (slot, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let other = slot.1.as_ref().filter(|_| slot.0 != seen)?;
@@ -33,12 +33,17 @@ impl<T> Newest<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Instant;
 
     #[test]
     fn who_comes_late_gets_the_newest_only_and_each_once() {
         let place = Newest::default();
         let none = Duration::ZERO;
         assert!(place.other_than(0, none).is_none());
+        let patience = Duration::from_millis(50);
+        let begun = Instant::now();
+        assert!(place.other_than(7, patience).is_none());
+        assert!(begun.elapsed() >= patience, "an empty place is waited at");
         for value in 1..=5 {
             place.put(value);
         }

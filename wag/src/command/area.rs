@@ -13,6 +13,11 @@ fn undeclared(arm: &ArmArgs) -> Option<IpAddr> {
         .filter(|address| !address.is_loopback() && !arm.dry_run && !arm.yes)
 }
 
+/// Whether somebody is there to type the word.
+const fn can_ask(terminal: bool, json: bool) -> bool {
+    terminal && !json
+}
+
 /// Makes sure that the area around the arm is clear for a motion called `word`:
 /// by `--yes`, or by the operator who types the word.
 pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome {
@@ -24,7 +29,7 @@ pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome {
             "{address} is a real arm: clear the area, keep the emergency stop in reach, and {why}"
         ))
     };
-    if !stdin().is_terminal() || output::is_json() {
+    if !can_ask(stdin().is_terminal(), output::is_json()) {
         return refuse("add --yes");
     }
     print!(
@@ -61,5 +66,7 @@ mod tests {
             };
             assert_eq!(undeclared(&wiggle.arm).is_some(), is_needed, "{args}");
         }
+        assert!(can_ask(true, false) && !can_ask(false, false));
+        assert!(!can_ask(true, true), "standard output is for JSON alone");
     }
 }

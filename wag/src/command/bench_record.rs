@@ -4,6 +4,7 @@
 //! time with the recorder beside it (without, with, with, without, ...), while the
 //! simulated camera publishes. Both see the same machine and the same load.
 
+use super::bench_rt::percentiles;
 use crate::cli::BenchArgs;
 use crate::config;
 use crate::pipeline::{self, RunFolder};
@@ -14,12 +15,10 @@ use cli_output::{Machine, OrInput, Outcome, Stage, table, watch_interrupts};
 use planner::PlannerConfig;
 use planner::wiggle::wiggle;
 use rig_sim::RigConfig;
-use rt_controller::bridge::Latencies;
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
-use shared_types::ipc::ControllerMode;
-use shared_types::ipc::message::{LatencyReport, Percentiles};
+use shared_types::ipc::{ControllerMode, CycleRecord};
 
 /// Part of the arm's speed limits used between two wiggles.
 const MOVE_SPEED: f64 = 0.1;
@@ -44,9 +43,14 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let stage = Stage::begin("wiggles");
     let measured = measure(&mut session, &folder, &limits, &rig, &motion, pairs, &stage);
     session.end(measured.is_ok());
-    let ([without, with], file_bytes) = measured.or_failed()?;
+    let (cycles, file_bytes) = measured.or_failed()?;
     stage.done(&format!("{pairs} without and {pairs} with the recorder"));
-    let rows = rows(&without, &with);
+    let rows = rows(&cycles);
+    let missed = |cycles: &Vec<CycleRecord>| cycles.iter().map(|c| c.missed).sum::<u32>();
+    let (counts, missed) = (
+        cycles.each_ref().map(Vec::len),
+        cycles.each_ref().map(missed),
+    );
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let machine = Machine::here();
     println!("{machine}; load {}", load.trim());
@@ -63,10 +67,10 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     println!("{}", table::numbers(header, 0, shown));
     println!(
         "{} and {} cycles, {} and {} missed; the file grows by {:.2} MB a wiggle",
-        without.cycles,
-        with.cycles,
-        without.missed,
-        with.missed,
+        counts[0],
+        counts[1],
+        missed[0],
+        missed[1],
         file_bytes as f64 / 1e6 / f64::from(pairs)
     );
     let rows = rows.iter().map(|(what, part, [without_us, with_us, ratio])| json!({
@@ -75,8 +79,7 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     Ok(Some(json!({
         "ok": true, "command": "bench record", "seed": args.seed, "machine": machine,
         "load": load.trim(), "wiggles": pairs, "rows": rows.collect::<Vec<_>>(),
-        "missed": [without.missed, with.missed], "cycles": [without.cycles, with.cycles],
-        "file_bytes": file_bytes,
+        "missed": missed, "cycles": counts, "file_bytes": file_bytes,
     })))
 }
 
@@ -89,7 +92,7 @@ fn wiggles(seconds: f64, motion: &JointTrajectory) -> u32 {
     (seconds / motion.duration_s()).ceil().max(1.0) as u32
 }
 
-/// Latencies without and with the recorder, and what it wrote (bytes).
+/// Cycles of the wiggles without and with the recorder, and what it wrote (bytes).
 fn measure(
     session: &mut Session,
     folder: &RunFolder,
@@ -98,11 +101,11 @@ fn measure(
     motion: &JointTrajectory,
     pairs: u32,
     stage: &Stage,
-) -> anyhow::Result<([LatencyReport; 2], u64)> {
+) -> anyhow::Result<([Vec<CycleRecord>; 2], u64)> {
     let (_, address) = pipeline::start_rig(session, folder, rig)?;
     let arm = pipeline::start_controller(session, folder, limits, address)?;
     pipeline::acquire(session, &arm)?;
-    let mut latencies = [Latencies::new()?, Latencies::new()?];
+    let mut cycles = [Vec::new(), Vec::new()];
     let mut file_bytes = 0;
     for block in 0..2 * pairs {
         stage.say(format!("{} of {}", block + 1, 2 * pairs));
@@ -118,14 +121,10 @@ fn measure(
         session.received.cycles.cycles.clear();
         pipeline::execute(session, &arm, motion)?;
         session.received.drain()?;
-        let cycles = session.received.cycles.cycles.iter();
-        let streaming = ControllerMode::Streaming as u8;
-        let before = latencies[usize::from(with)].report().cycles;
-        for cycle in cycles.filter(|c| c.mode == streaming) {
-            latencies[usize::from(with)].record(cycle);
-        }
-        let seen = latencies[usize::from(with)].report().cycles - before;
-        ensure!(seen > 0, "no cycle of the wiggle was received");
+        let mut seen = session.received.cycles.cycles.clone();
+        seen.retain(|c| c.mode == ControllerMode::Streaming as u8);
+        ensure!(!seen.is_empty(), "no cycle of the wiggle was received");
+        cycles[usize::from(with)].extend(seen);
         if with {
             session.finish_run_file()?;
             let file = folder.file(files::RUN);
@@ -133,20 +132,21 @@ fn measure(
             std::fs::remove_file(&file)?;
         }
     }
-    Ok((latencies.each_ref().map(Latencies::report), file_bytes))
+    Ok((cycles, file_bytes))
 }
 
 /// What was measured without and with the recorder (µs), and with over without.
-fn rows(
-    without: &LatencyReport,
-    with: &LatencyReport,
-) -> Vec<(&'static str, &'static str, [f64; 3])> {
-    let figures = [
-        ("late wake-up", without.wake, with.wake),
-        ("compute", without.compute, with.compute),
-        ("wake-up to sent", without.send, with.send),
+fn rows(cycles: &[Vec<CycleRecord>; 2]) -> Vec<(&'static str, &'static str, [f64; 3])> {
+    type Figure = (&'static str, fn(&CycleRecord) -> u32);
+    const FIGURES: [Figure; 3] = [
+        ("late wake-up", |c| c.wake_late_ns),
+        ("compute", |c| c.compute_ns),
+        ("wake-up to sent", |c| c.send_ns),
     ];
-    let parts = |(what, without, with): (&'static str, Percentiles, Percentiles)| {
+    let parts = |(what, time_ns): Figure| {
+        let [without, with] = cycles
+            .each_ref()
+            .map(|cycles| percentiles(cycles.iter().map(|c| u64::from(time_ns(c)))));
         [
             ("p50", without.p50_us, with.p50_us),
             ("p99", without.p99_us, with.p99_us),
@@ -155,5 +155,5 @@ fn rows(
         ]
         .map(|(part, without, with)| (what, part, [without, with, with / without.max(1e-3)]))
     };
-    figures.into_iter().flat_map(parts).collect()
+    FIGURES.into_iter().flat_map(parts).collect()
 }

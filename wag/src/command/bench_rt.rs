@@ -123,7 +123,7 @@ fn verdict(held: bool) -> &'static str {
 }
 
 /// Percentiles of samples in nanoseconds, by nearest rank; zero without any.
-fn percentiles(samples_ns: impl IntoIterator<Item = u64>) -> Percentiles {
+pub(super) fn percentiles(samples_ns: impl IntoIterator<Item = u64>) -> Percentiles {
     let mut sorted: Vec<u64> = samples_ns.into_iter().collect();
     sorted.sort_unstable();
     let at_us = |per_mille: usize| {

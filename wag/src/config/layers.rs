@@ -185,6 +185,9 @@ impl Layers {
                 told.insert(key.clone(), Told { key, value, layer });
             }
         }
+        // A table that a value takes the place of, or the other way round, holds no more.
+        let held: BTreeMap<_, _> = leaves(&self.merged()).into_iter().collect();
+        told.retain(|key, _| held.contains_key(key));
         told.into_values().collect()
     }
 }

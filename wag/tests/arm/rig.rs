@@ -1,9 +1,8 @@
 //! `wag rig`: one in each domain, which leaves nothing; the vendor's own Python client
 //! against it, by the conformance check that lies beside the checkout.
 
-use super::support::{Rig, alone, refused_in, said, shared, shared_memory_of};
+use super::support::{Rig, alone, said, shared, shared_memory_of, wag};
 use rustix::process::Signal;
-use std::path::Path;
 use std::process::Command;
 
 #[test]
@@ -13,7 +12,10 @@ fn a_second_rig_in_a_domain_says_so_and_an_ended_one_leaves_nothing() {
     let mut first = Rig::start(&filming);
     assert_ne!(first.told["command_port"], 0);
     let line = format!("rig --command-port 0 --report-ports 0,0,0,0 {filming}");
-    let refusal = refused_in(Path::new("."), 1, &line);
+    let second = wag(&line);
+    let refusal = said(&second);
+    assert_eq!(second.status.code(), Some(1), "{refusal}");
+    assert!(second.stdout.is_empty(), "it never listened");
     assert!(refusal.contains(&domain), "{refusal}");
     assert!(refusal.contains("in use by another rig"), "{refusal}");
     assert_eq!(first.process.end(Signal::INT), (Some(0), String::new()));

@@ -1,5 +1,5 @@
 //! Wrong command lines: one a line, with the words that must be in its error behind `=>`.
-//! They run in the folder of `files.rs`; `LINKS` is a model.
+//! `|` stands between the words. They run in the folder of `files.rs`; `LINKS` is a model.
 
 /// Commands that start processes or move an arm, and the configuration.
 pub(crate) const MACHINES: &str = "
@@ -34,6 +34,7 @@ pub(crate) const MACHINES: &str = "
     config show planner none.toml => none.toml | cannot read
     config show camera => camera | planner
     config => Usage
+    throw doubted.json --accept-unconfirmed --arm 192.0.2.1 => warning: the track is in doubt | --yes
     throw damaged.json --arm 127.0.0.1 => damaged.json
     latency => --arm | --run
     latency --run none => none | does not exist
@@ -151,4 +152,5 @@ pub(crate) const SIM_ROPE: &str = "
 /// What is asked for correctly and cannot be done: exit code 1.
 pub(crate) const FAILED: &str = "
     demo --task lob => lob | not implemented
-    plan strike --rope doubted.toml --target 0.8,0,0.3 --out p.json => in doubt | end is not confirmed | --accept-unconfirmed";
+    plan strike --rope doubted.toml --target 0.8,0,0.3 --out p.json => in doubt | end is not confirmed | --accept-unconfirmed
+    throw doubted.json --arm 192.0.2.1 => in doubt | end is not confirmed | --accept-unconfirmed";

@@ -1,5 +1,9 @@
 //! The files that the cases name.
 
+use super::support::plan_json;
+use arm_model::JointTrajectory;
+use arm_model::joint::START_POSE;
+use shared_types::RopeParams;
 use std::fs;
 
 /// A network that reads what no camera shows.
@@ -40,6 +44,11 @@ pub(crate) fn prepare() -> tempfile::TempDir {
     put("unknown.toml", &format!("{ROPE}wibble = 3\n"));
     let doubts = "[fit]\ndoubts = [\"the rope's end is not confirmed\"]\n";
     put("doubted.toml", &format!("{ROPE}{doubts}"));
+    let (rope, here) = (toml::from_str::<RopeParams>(ROPE).unwrap(), START_POSE);
+    let still = JointTrajectory::new(&[0.0, 1.0], &[here, here]).unwrap();
+    let mut doubted = plan_json(&still, &rope);
+    doubted["doubts"] = ["the rope's end is not confirmed"].into();
+    put("doubted.json", &doubted.to_string());
     put("pose.csv", &pose_csv());
     for (name, row, wrong) in [
         ("nan.csv", "0.010,0,", "0.010,nan,"),

@@ -149,6 +149,8 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     }
     let (code, said) = said(child);
     assert_eq!(code, Some(0), "{said}");
+    let dead = planner.0.try_wait().unwrap().is_some();
+    assert_eq!(dead, murder, "killed while the arm moved, or never");
     drop((planned, filmed));
     let (cycles, causes) = recorded(&run);
     let during = causes.iter().filter(|c| c.motion_id != 0).count();

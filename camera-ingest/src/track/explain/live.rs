@@ -43,12 +43,15 @@ pub(crate) struct Known {
 
 impl Known {
     /// Looks for the rope in frames that begin with it hanging still, on one thread; `motion`
-    /// is the attach frame's, t = 0 at the first frame. Takes seconds.
+    /// is the attach frame's, t = 0 at the first frame. Takes seconds. An error comes with what
+    /// it means.
     pub(crate) fn find(
         frames: &[EyeFrame],
         camera: &StereoCamera,
         motion: &dyn AttachMotion,
-    ) -> Result<Self, TrackError> {
+    ) -> Result<Self, (&'static str, TrackError)> {
+        let unexplained = |reason| ("no simulated rope explains the frames", reason);
+        let unusable = "the rope that was found cannot be simulated";
         let zero = MonotonicNs(frames[0].stamp_ns);
         let since_zero = |f: &EyeFrame| MonotonicNs(f.stamp_ns).since_s(zero);
         let times_s: Vec<f64> = frames.iter().map(since_zero).collect();
@@ -58,17 +61,19 @@ impl Known {
         };
         let scene = Scene::of(frames);
         let explainer = Explainer::new(film, &times_s, (&scene, None), (camera, motion), 1);
-        let x = explainer.hypothesis()?;
+        let x = explainer.hypothesis().map_err(unexplained)?;
         let Explained {
             curves, reading, ..
-        } = explainer.read(&x, Fidelity::FINAL, 1)?;
+        } = explainer
+            .read(&x, Fidelity::FINAL, 1)
+            .map_err(unexplained)?;
         drop(explainer);
-        usual_evidence(&reading, USUAL_KEYPOINTS)?;
+        usual_evidence(&reading, USUAL_KEYPOINTS).map_err(unexplained)?;
         let length = mean(&curves.iter().map(|c| length(c)).collect::<Vec<_>>());
         let Fidelity { links, step_s, .. } = Fidelity::FINAL;
         let rope = LiveRope::new(&rope(&x, links), &motion.at(0.0), step_s);
         let mut known = Self {
-            rope: rope.map_err(TrackError::motion)?,
+            rope: rope.map_err(|reason| (unusable, TrackError::motion(reason)))?,
             camera: turned(&x, camera),
             clock_s: x[CLOCK],
             ends: [

@@ -193,11 +193,11 @@ impl Demo<'_> {
         let stage = Stage::begin("settle");
         let span = [film.motion.start_ns, film.motion.end_ns];
         let cycles = &self.session.received.cycles;
-        self.record.arm_lag_s = cycles.joint_lag_s(WIGGLE_JOINT, span);
+        let lag_s = cycles.joint_lag_s(WIGGLE_JOINT, span);
         let mut settled = None;
         for planning_s in SETTLING_S {
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
-            settled = self.settle_at(begin, (rope, film, wiggle, plan), &stage)?;
+            settled = self.settle_at((begin, lag_s), (rope, film, wiggle, plan), &stage)?;
             if settled.is_some() {
                 break;
             }
@@ -208,6 +208,7 @@ impl Demo<'_> {
             )
         })?;
         self.wait_still(&stage)?;
+        self.record.arm_lag_s = lag_s;
         self.record.settle = Some(settled);
         self.record.stages.settle_s = stage.done(&format!(
             "swing {:.1} cm -> {:.1} cm",
@@ -217,18 +218,18 @@ impl Demo<'_> {
         Ok(())
     }
 
-    /// Plans a settling move for the instant `begin` and makes it; `None` when the plan
-    /// came too late.
+    /// Plans a settling move for the instant `begin`, of an arm that follows late by `lag_s`,
+    /// and makes it; `None` when the plan came too late.
     fn settle_at(
         &mut self,
-        begin: MonotonicNs,
+        (begin, lag_s): (MonotonicNs, Option<f64>),
         (rope, film, wiggle, plan): (&RopeEstimate, &Film, &JointTrajectory, &Plan),
         stage: &Stage,
     ) -> anyhow::Result<Option<Settled>> {
         self.session.received.drain()?;
         let cycles = &self.session.received.cycles;
         let joints = cycles.joints_between(film.first_stamp_ns, u64::MAX);
-        let start = begin.plus_s(self.record.arm_lag_s.unwrap_or_default());
+        let start = begin.plus_s(lag_s.unwrap_or_default());
         // The rope hangs still at the first joint sample.
         let epoch = joints.first().map_or(start, |(ns, _)| MonotonicNs(*ns));
         let (times_s, q) = joints
