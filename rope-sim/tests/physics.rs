@@ -5,7 +5,7 @@
 mod support;
 
 use nalgebra::{Rotation3, Vector3};
-use rope_sim::{AttachMotion, FrameTimes, Precision, Rollout, Scene, SimOptions, Start};
+use rope_sim::{AttachMotion, FrameTimes, Precision, Rollout, Scene, SimOptions};
 use shared_types::RopeParams;
 use support::{
     G_M_S2, assert_derivatives, options, pendulum, released, simulate, still, throw, tips, world,
