@@ -23,23 +23,23 @@ fn main() -> Result<(), Box<dyn Error>> {
     let _sweep = DomainSweep::new(&domain);
     let bus = Bus::join(&domain)?;
     let previews = bus.preview_subscriber()?;
-    let (mut told, mut heard): (Vec<PreviewFrame>, _) = (Vec::new(), Instant::now());
-    while heard.elapsed() < SILENCE || told.is_empty() {
+    let (mut reported, mut received): (Vec<PreviewFrame>, _) = (Vec::new(), Instant::now());
+    while received.elapsed() < SILENCE || reported.is_empty() {
         while let Some(found) = previews.receive()? {
-            heard = Instant::now();
-            told.push(*found);
+            received = Instant::now();
+            reported.push(*found);
         }
         std::thread::sleep(Duration::from_millis(20));
     }
-    told.retain(|t| t.state() != PreviewState::NoCamera);
-    let (Some(first), Some(last)) = (told.first(), told.last()) else {
+    reported.retain(|t| t.state() != PreviewState::NoCamera);
+    let (Some(first), Some(last)) = (reported.first(), reported.last()) else {
         return Err("no frame was looked at".into());
     };
     let span_s = (last.rope.stamp_ns - first.rope.stamp_ns) as f64 * 1e-9;
     println!(
         "{span_s:.1} s: looked at {}, {:.1} a second, skipped {}, began anew {} times",
-        told.len(),
-        told.len() as f64 / span_s,
+        reported.len(),
+        reported.len() as f64 / span_s,
         last.skipped - first.skipped,
         last.restarts
     );
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         (PreviewState::Following, false),
         (PreviewState::Following, true),
     ] {
-        let those = told
+        let those = reported
             .iter()
             .filter(|t| t.state() == state && t.rope.is_lost() == lost);
         let mut took: Vec<u32> = those.map(|t| t.took_us).collect();
@@ -65,7 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     // Where it was lost, from the first frame looked at.
     let lost = |t: &PreviewFrame| t.rope.is_lost();
-    for span in told.chunk_by(|a, b| lost(a) == lost(b)) {
+    for span in reported.chunk_by(|a, b| lost(a) == lost(b)) {
         if let [begin, .., end] = span
             && lost(begin)
         {

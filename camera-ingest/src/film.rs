@@ -2,7 +2,7 @@
 
 use shared_types::KeypointTrack;
 
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::overlay::{OverlayError, drawn};
 
 /// JPEG quality: the lines stay sharp.
@@ -13,7 +13,10 @@ const QUALITY: u8 = 85;
 ///
 /// # Errors
 /// No frames, or frames too large for a JPEG.
-pub fn keypoint_film(frames: &[EyeFrame], track: &KeypointTrack) -> Result<Vec<u8>, OverlayError> {
+pub fn keypoint_film(
+    frames: &[ImageFrame],
+    track: &KeypointTrack,
+) -> Result<Vec<u8>, OverlayError> {
     let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
         return Err(OverlayError::Input("no frames for a film"));
     };

@@ -38,7 +38,7 @@ impl FrameError {
 
 /// Planes of one image: luma `width * height`, chroma `width / 2 * height`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct EyeFrame {
+pub struct ImageFrame {
     /// Start of exposure of row 0 (CLOCK_MONOTONIC, ns).
     pub stamp_ns: u64,
     /// The camera's sequence number.
@@ -57,9 +57,9 @@ pub struct EyeFrame {
 
 /// Both images side by side, the left image in the left half.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StereoFrame(pub EyeFrame);
+pub struct StereoFrame(pub ImageFrame);
 
-impl EyeFrame {
+impl ImageFrame {
     /// A picture of one grey level, stamp and sequence 0.
     #[must_use]
     pub fn grey([width_px, height_px]: [usize; 2], level: u8) -> Self {
@@ -167,13 +167,13 @@ impl EyeFrame {
 impl StereoFrame {
     /// Left image.
     #[must_use]
-    pub fn left(&self) -> EyeFrame {
+    pub fn left(&self) -> ImageFrame {
         self.0.columns(0, self.0.width_px / 2)
     }
 
     /// Right image.
     #[must_use]
-    pub fn right(&self) -> EyeFrame {
+    pub fn right(&self) -> ImageFrame {
         let half = self.0.width_px / 2;
         self.0.columns(half, half)
     }
@@ -199,7 +199,7 @@ impl StereoFrame {
     /// # Errors
     /// The JPEG is damaged or its width is no side-by-side pair.
     pub fn from_jpeg(bytes: &[u8], stamp_ns: u64, sequence: u64) -> Result<Self, FrameError> {
-        EyeFrame::from_jpeg(bytes, stamp_ns, sequence).map(Self)
+        ImageFrame::from_jpeg(bytes, stamp_ns, sequence).map(Self)
     }
 
     /// From a PNG, grey or colour; transparency is ignored. Chroma is kept as the
@@ -267,7 +267,7 @@ fn planes(
     columns: usize,
     stamp_ns: u64,
     sequence: u64,
-) -> EyeFrame {
+) -> ImageFrame {
     let mut frame = blank(columns, height_px, stamp_ns, sequence);
     let rows = packed.chunks_exact(width_px * 3);
     let half = columns / 2;
@@ -321,11 +321,11 @@ fn check_yuyv(bytes: &[u8], [width_px, height_px]: [usize; 2]) -> Result<(), Fra
     Ok(())
 }
 
-fn blank(width_px: usize, height_px: usize, stamp_ns: u64, sequence: u64) -> EyeFrame {
-    EyeFrame {
+fn blank(width_px: usize, height_px: usize, stamp_ns: u64, sequence: u64) -> ImageFrame {
+    ImageFrame {
         stamp_ns,
         sequence,
-        ..EyeFrame::grey([width_px, height_px], 0)
+        ..ImageFrame::grey([width_px, height_px], 0)
     }
 }
 
@@ -369,10 +369,10 @@ mod tests {
         );
         assert_eq!(frame.0.ycc(3, 1), [14, 13, 15]);
         assert_eq!(
-            EyeFrame::left_from_yuyv(&bytes, [4, 2], 7, 3),
+            ImageFrame::left_from_yuyv(&bytes, [4, 2], 7, 3),
             Ok(frame.left())
         );
-        assert!(EyeFrame::left_from_yuyv(&bytes[1..], [4, 2], 7, 3).is_err());
+        assert!(ImageFrame::left_from_yuyv(&bytes[1..], [4, 2], 7, 3).is_err());
         assert_eq!((frame.0.stamp_ns, frame.0.sequence), (7, 3));
     }
 

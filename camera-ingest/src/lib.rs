@@ -27,7 +27,7 @@ mod vectors;
 mod whole_file;
 
 pub use calib::{CalibError, load_camera};
-pub use frame::{EyeFrame, StereoFrame};
+pub use frame::{ImageFrame, StereoFrame};
 pub use score::{Score, ScoreError, score};
 pub use source::{FrameSource, SourceError, StereoSource, open_video};
 pub use track::{Film, RopeAppearance, TrackError, TrackResult, USUAL_KEYPOINTS, track};

@@ -6,10 +6,10 @@
 
 use std::collections::VecDeque;
 
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Pixels that changed between two frames of one size by more than noise explains.
-fn moved_px(a: &EyeFrame, b: &EyeFrame) -> usize {
+fn moved_px(a: &ImageFrame, b: &ImageFrame) -> usize {
     // Pairs of pixels: half the noise, and the chroma's own raster.
     let pairs = a.luma.chunks_exact(2).zip(b.luma.chunks_exact(2));
     let mean = |pair: &[u8]| (f32::from(pair[0]) + f32::from(pair[1])) / 2.0;
@@ -35,7 +35,7 @@ const STILL_PX: usize = 12;
 pub struct StillDetector {
     lag: usize,
     needed: usize,
-    recent: VecDeque<EyeFrame>,
+    recent: VecDeque<ImageFrame>,
     still_frames: usize,
 }
 
@@ -53,7 +53,7 @@ impl StillDetector {
     }
 
     /// Takes the next left-eye frame; `true` once the rope hangs still.
-    pub fn push(&mut self, frame: EyeFrame) -> bool {
+    pub fn push(&mut self, frame: ImageFrame) -> bool {
         if self.recent.len() >= self.lag
             && let Some(before) = self.recent.pop_front()
         {
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     /// Grey frame with deterministic noise and a bright bar at column `bar`.
-    fn frame(seed: usize, bar: usize) -> EyeFrame {
+    fn frame(seed: usize, bar: usize) -> ImageFrame {
         let (width_px, height_px) = (64, 48);
         let mut luma: Vec<u8> = (0..width_px * height_px)
             .map(|i| 100 + u8::try_from((i * 7919 + seed * 104_729) % 5).unwrap())
@@ -78,9 +78,9 @@ mod tests {
         for row in luma.chunks_exact_mut(width_px).take(40).skip(10) {
             row[bar..bar + 3].fill(200);
         }
-        EyeFrame {
+        ImageFrame {
             luma,
-            ..EyeFrame::grey([width_px, height_px], 0)
+            ..ImageFrame::grey([width_px, height_px], 0)
         }
     }
 

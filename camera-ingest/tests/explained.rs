@@ -26,12 +26,12 @@ fn off_px(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
 
 fn tracked(folder: &Path, both: bool) -> TrackResult {
     let mut video = open_video(folder, None).unwrap();
-    let mut eyes = read_film(&mut *video).unwrap();
+    let mut images = read_film(&mut *video).unwrap();
     if !both {
-        eyes.right.clear();
+        images.right.clear();
     }
     let camera = load_camera(&folder.join("camera.toml")).unwrap();
-    track(eyes.film(), &camera, &*motion(folder), USUAL_KEYPOINTS).unwrap()
+    track(images.film(), &camera, &*motion(folder), USUAL_KEYPOINTS).unwrap()
 }
 
 /// The bounds of `checks/track_scenes.py`: median, 95th percentile, the tip's 95th
@@ -50,12 +50,12 @@ fn assert_followed(name: &str, result: &TrackResult, truth: &[Vec<[f64; 2]>]) {
     let lost = frames.iter().filter(|f| f.lost).count();
     let [median, p95] = [0.5, 0.95].map(|q| quantile(&all, q));
     let tip = quantile(&tip, 0.95);
-    let told = format!(
+    let reported = format!(
         "{name}: median {median:.2}, p95 {p95:.2}, tip {tip:.2} px, {lost} lost, {wrong} wrong"
     );
-    println!("{told}");
-    assert!(median <= 0.6 && p95 <= 2.5 && tip <= 3.0, "{told}");
-    assert!(lost * 50 <= truth.len() && wrong == 0, "{told}");
+    println!("{reported}");
+    assert!(median <= 0.6 && p95 <= 2.5 && tip <= 3.0, "{reported}");
+    assert!(lost * 50 <= truth.len() && wrong == 0, "{reported}");
 }
 
 fn assert_scenes_followed(scenes: &[&str], both: bool) {
@@ -95,9 +95,9 @@ fn a_calibrated_camera_and_ropes_of_the_model() {
         assert_followed(name, &result, &wiggle.truth);
         let errors = wiggle.errors(&result).concat();
         let [median, p95, max] = [0.5, 0.95, 1.0].map(|q| quantile(&errors, q));
-        let told = format!("{name}, nodes: median {median:.2}, p95 {p95:.2}, max {max:.2} px");
-        println!("{told}");
-        assert!(median <= 1.2 && p95 <= 2.5 && max <= 8.0, "{told}");
+        let reported = format!("{name}, nodes: median {median:.2}, p95 {p95:.2}, max {max:.2} px");
+        println!("{reported}");
+        assert!(median <= 1.2 && p95 <= 2.5 && max <= 8.0, "{reported}");
         assert!(result.track.lost_fraction() < 1e-9);
 
         let truth = &truth_json(name)["rope"];

@@ -6,7 +6,7 @@
 use camera_ingest::calib::CalibError;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::source::{FrameSource, StereoSource};
-use camera_ingest::{EyeFrame, load_camera, open_video};
+use camera_ingest::{ImageFrame, load_camera, open_video};
 use nalgebra::Vector3;
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
@@ -105,10 +105,10 @@ fn a_stereo_calibration_of_opencv_is_read() {
 
 #[test]
 fn a_film_reads_back_with_its_rate_and_the_rope_drawn_in() {
-    let grey = |i: u64| EyeFrame {
+    let grey = |i: u64| ImageFrame {
         stamp_ns: 5 + i * 20_000_000,
         sequence: i,
-        ..EyeFrame::grey([64, 32], 90)
+        ..ImageFrame::grey([64, 32], 90)
     };
     let tracked = |lost: bool| TrackedFrame {
         t_s: 0.0,

@@ -7,7 +7,7 @@ mod recording;
 use std::path::PathBuf;
 
 use camera_ingest::source::FrameSource;
-use camera_ingest::{EyeFrame, TrackError, open_video};
+use camera_ingest::{ImageFrame, TrackError, open_video};
 use recording::{Wiggle, folder, median};
 
 const FRAMES: usize = 60;
@@ -20,7 +20,7 @@ fn refusal(wiggle: &Wiggle) -> TrackError {
 fn emptied(mut wiggle: Wiggle, first: usize) -> Wiggle {
     let scene = median(&wiggle.frames);
     for frame in &mut wiggle.frames[first..] {
-        *frame = EyeFrame {
+        *frame = ImageFrame {
             stamp_ns: frame.stamp_ns,
             sequence: frame.sequence,
             ..scene.clone()

@@ -79,11 +79,14 @@ fn outcome(wiggle: &Wiggle) -> Result<Outcome, TrackError> {
 /// confidence. At most so many frames may be given up.
 fn assert_kept(clean: &Clean, what: &str, most_lost: usize, after: &Outcome) {
     let (name, before) = (clean.name, &clean.outcome);
-    let told = format!("{name}, {what}: {before:.2?} -> {after:.2?}");
-    println!("{told}");
-    assert!(after.wrong.is_empty() && after.lost <= most_lost, "{told}");
+    let reported = format!("{name}, {what}: {before:.2?} -> {after:.2?}");
+    println!("{reported}");
+    assert!(
+        after.wrong.is_empty() && after.lost <= most_lost,
+        "{reported}"
+    );
     for (before, after) in before.error_px.iter().zip(after.error_px) {
-        assert!(after <= 2.0 * before, "{told}");
+        assert!(after <= 2.0 * before, "{reported}");
     }
 }
 

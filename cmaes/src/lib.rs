@@ -95,7 +95,7 @@ pub struct CmaEs {
     generation: usize,
     /// Steps `y = (x - m) / sigma` of the candidates asked last.
     steps: Vec<DVector<f64>>,
-    asked: Vec<Vec<f64>>,
+    requested: Vec<Vec<f64>>,
     best: Option<Best>,
     best_of_generations: Vec<f64>,
     last_spread: f64,
@@ -157,7 +157,7 @@ impl CmaEs {
             path_c: DVector::zeros(n),
             generation: 0,
             steps: Vec::new(),
-            asked: Vec::new(),
+            requested: Vec::new(),
             best: None,
             best_of_generations: Vec::new(),
             last_spread: f64::INFINITY,
@@ -179,14 +179,14 @@ impl CmaEs {
         feasible: &mut dyn FnMut(&[f64]) -> bool,
     ) -> Result<Vec<Vec<f64>>, CmaError> {
         self.steps.clear();
-        self.asked.clear();
+        self.requested.clear();
         self.draws = 0;
         for _ in 0..self.options.population {
             let (step, x) = self.draw_feasible(feasible)?;
             self.steps.push(step);
-            self.asked.push(x);
+            self.requested.push(x);
         }
-        Ok(self.asked.clone())
+        Ok(self.requested.clone())
     }
 
     fn draw_feasible(
@@ -234,11 +234,11 @@ impl CmaEs {
     /// # Errors
     /// Another number of values than candidates.
     pub fn tell(&mut self, fitness: &[f64]) -> Result<(), CmaError> {
-        if fitness.len() != self.asked.len() || fitness.is_empty() {
+        if fitness.len() != self.requested.len() || fitness.is_empty() {
             return Err(CmaError(format!(
                 "{} fitness values for {} candidates: tell each generation once",
                 fitness.len(),
-                self.asked.len()
+                self.requested.len()
             )));
         }
         let finite = |f: &f64| if f.is_finite() { *f } else { f64::MAX };
@@ -250,12 +250,12 @@ impl CmaEs {
         self.best_of_generations.push(first);
         if self.best.as_ref().is_none_or(|b| first < b.fitness) {
             self.best = Some(Best {
-                x: self.asked[order[0]].clone(),
+                x: self.requested[order[0]].clone(),
                 fitness: first,
             });
         }
         self.update(&order);
-        self.asked.clear();
+        self.requested.clear();
         self.generation += 1;
         Ok(())
     }

@@ -109,7 +109,7 @@ fn bench_plan_splits_the_time_of_every_task() {
     assert_eq!(tasks.len(), 3);
     for row in tasks {
         assert!(row["rollouts_per_s"].as_f64().unwrap() > 0.0);
-        let parts = ["rope_part", "contacts_part", "search_part"];
+        let parts = ["rope_fraction", "contacts_fraction", "search_fraction"];
         let whole: f64 = parts.iter().map(|p| row[p].as_f64().unwrap()).sum();
         assert!((whole - 1.0).abs() < 1e-9, "{row}");
     }

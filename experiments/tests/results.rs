@@ -78,11 +78,11 @@ fn every_wiggle_of_the_ablation_identifies_a_rope() {
 fn sensitivity_maps_are_drawn_for_every_parameter() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("maps.json");
-    let told = report(&format!(
+    let reported = report(&format!(
         "sensitivity-maps --ropes 1 --seed 5 --out {}",
         out.display()
     ));
-    let rows = told["rows"].as_array().unwrap();
+    let rows = reported["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 9);
     let mean = |i: usize| rows[i]["mean_per_m"].as_f64().unwrap();
     assert!(mean(1) > 4.0 * mean(8), "{rows:?}");
@@ -90,7 +90,10 @@ fn sensitivity_maps_are_drawn_for_every_parameter() {
         let peak_s = row["peak_s"].as_f64().unwrap();
         assert!((0.0..6.7).contains(&peak_s), "{row}");
     }
-    assert_eq!(told["map"]["values"][0].as_array().unwrap().len(), 50 * 12);
+    assert_eq!(
+        reported["map"]["values"][0].as_array().unwrap().len(),
+        50 * 12
+    );
     let drawn = std::fs::read_to_string(dir.path().join("maps.svg")).unwrap();
     assert_eq!(drawn.matches("class=\"map\"").count(), 9);
     assert!(drawn.contains("seed 5") && drawn.contains("lead mass"));

@@ -28,8 +28,8 @@ fn is_read(folder: &Path) {
     assert_eq!((truth.shape[0], truth.shape[2]), (400, 2));
     // The clamp, as truth and calibration see it: as far apart as a calibration is off.
     let clamp = arm_model::Pole::default().attach_pose(&joints.q[0]).0;
-    let told = camera.project_left(&clamp).unwrap();
-    let off_px = (told[0] - truth.values[0]).hypot(told[1] - truth.values[1]);
+    let reported = camera.project_left(&clamp).unwrap();
+    let off_px = (reported[0] - truth.values[0]).hypot(reported[1] - truth.values[1]);
     assert!(off_px > 0.05 && off_px < 15.0, "{off_px}");
 }
 

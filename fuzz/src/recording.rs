@@ -61,10 +61,10 @@ pub fn seeds() -> Vec<Vec<u8>> {
             deadline_ns: 1_000_000_000 + 4_000_000 * cycle,
             ..CycleInput::default()
         };
-        let told = record_input(&input, cycle);
+        let reported = record_input(&input, cycle);
         let record = control.step(input).record;
         let cycle = RecordedCycle {
-            input: told,
+            input: reported,
             record,
         };
         bytes.extend(writer.cycle(&cycle).unwrap_or_default());

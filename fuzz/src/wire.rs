@@ -11,7 +11,7 @@ use rt_controller::xarm::{
 };
 
 /// Commands whose replies carry something.
-fn asked() -> Vec<Command> {
+fn requested() -> Vec<Command> {
     vec![
         Command::Version,
         Command::SerialNumbers,
@@ -65,7 +65,7 @@ fn commands(bytes: &[u8]) {
             assert_eq!(format!("{back:?}"), format!("{command:?}"));
         }
         if let Some(reply) = frame.as_reply() {
-            for command in asked() {
+            for command in requested() {
                 let _ = ReplyData::parse(&command, &reply);
             }
         }
@@ -111,7 +111,7 @@ pub fn run(data: &[u8]) {
 /// Requests, replies, reports.
 pub fn seeds() -> Vec<Vec<u8>> {
     let mut all = Vec::new();
-    for command in asked() {
+    for command in requested() {
         let mut out = [0; MAX_FRAME_LEN];
         let len = emit_command(&mut out, 3, Protocol::PrivateHeartbeat, &command).unwrap();
         let mut seed = vec![5];

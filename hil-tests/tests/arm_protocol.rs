@@ -265,9 +265,9 @@ fn faults_of_the_wire_reach_the_sockets() {
     client.state();
     arm.inject(fault(FaultKind::Stall, Some(0.3)));
     wait_s(0.05);
-    let asked = clock::now();
+    let requested = clock::now();
     client.state();
-    let waited_s = clock::now().since_s(asked);
+    let waited_s = clock::now().since_s(requested);
     assert!(waited_s > 0.15, "{waited_s} s");
 
     let ports = PortSet::All;
@@ -298,10 +298,10 @@ fn reports_come_at_once_and_agree_with_the_commands() {
     let mut client = Client::new(&arm);
     client.bring_up(Mode::Servo);
     let [realtime, normal, rich, real] = arm.ports().reports;
-    let asked = clock::now();
+    let requested = clock::now();
     let (came, frame) = read_reports(rich, 1).remove(0);
     // Far less than the 200 ms between two of them.
-    assert!(came.since_s(asked) < 0.15);
+    assert!(came.since_s(requested) < 0.15);
     let rich = RichReport::parse(&frame).unwrap();
     assert_eq!(rich.normal.basic.mode, Mode::Servo);
     assert_eq!(

@@ -106,12 +106,12 @@ impl Stage {
         }
         let left = frame.left();
         let began = Instant::now();
-        let told = self.preview.see(left);
+        let reported = self.preview.see(left);
         let took_ms = began.elapsed().as_secs_f64() * 1e3;
-        (told, self.errors_px(&told, &poses), took_ms)
+        (reported, self.errors_px(&reported, &poses), took_ms)
     }
 
-    fn errors_px(&self, told: &PreviewFrame, poses: &[ScenePose]) -> Vec<f64> {
+    fn errors_px(&self, reported: &PreviewFrame, poses: &[ScenePose]) -> Vec<f64> {
         let frame_s = self.camera.frame_time_s();
         let seen = |node: usize| -> [f64; 2] {
             let at = |pose: &ScenePose| self.camera.project_left(&pose.nodes[node]).unwrap();
@@ -120,7 +120,7 @@ impl Stage {
             at(&poses[(place as usize).min(8)])
         };
         let line: Vec<[f64; 2]> = (0..poses[0].nodes.len()).map(seen).collect();
-        let points = told.rope.points().iter();
+        let points = reported.rope.points().iter();
         points.map(|p| off_px(p.map(f64::from), &line)).collect()
     }
 }
@@ -139,8 +139,8 @@ fn off_px(p: [f64; 2], line: &[[f64; 2]]) -> f64 {
 /// Films until a search is due and runs it; frames go on while it would.
 fn find(stage: &mut Stage) {
     let search = loop {
-        let (told, ..) = stage.step();
-        assert_eq!(told.state(), PreviewState::Looking);
+        let (reported, ..) = stage.step();
+        assert_eq!(reported.state(), PreviewState::Looking);
         if let Some(search) = stage.preview.search() {
             break search;
         }
@@ -161,9 +161,12 @@ fn find(stage: &mut Stage) {
 fn assert_follows(stage: &mut Stage, frames: usize) {
     let (mut errors, mut tip, mut times) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..frames {
-        let (told, off, took_ms) = stage.step();
-        assert_eq!(told.state(), PreviewState::Following);
-        assert_eq!((told.rope.count as usize, told.rope.lost), (KEYPOINTS, 0));
+        let (reported, off, took_ms) = stage.step();
+        assert_eq!(reported.state(), PreviewState::Following);
+        assert_eq!(
+            (reported.rope.count as usize, reported.rope.lost),
+            (KEYPOINTS, 0)
+        );
         tip.push(off[KEYPOINTS - 1]);
         errors.extend(off);
         times.push(took_ms);
@@ -171,13 +174,13 @@ fn assert_follows(stage: &mut Stage, frames: usize) {
     let [half, most] = [0.5, 0.95].map(|part| quantile(&errors, part));
     let tip = quantile(&tip, 0.95);
     let [usual_ms, most_ms] = [0.5, 0.99].map(|part| quantile(&times, part));
-    let told = format!(
+    let reported = format!(
         "median {half:.2}, p95 {most:.2}, tip's p95 {tip:.2} px; {usual_ms:.2} ms a frame, \
          p99 {most_ms:.2} ms, first {:.1} ms",
         times[0]
     );
-    println!("{told}");
-    assert!(half < 2.0 && most < 8.0, "{told}");
+    println!("{reported}");
+    assert!(half < 2.0 && most < 8.0, "{reported}");
 }
 
 #[test]
@@ -191,8 +194,11 @@ fn a_rope_is_looked_for_found_followed_and_looked_for_again() {
     elsewhere[0] += 1.0;
     stage.preview.report(stamp_ns, &elsewhere);
     stage.reports += 1;
-    let (told, ..) = stage.step();
-    assert_eq!((told.state(), told.restarts), (PreviewState::Looking, 1));
+    let (reported, ..) = stage.step();
+    assert_eq!(
+        (reported.state(), reported.restarts),
+        (PreviewState::Looking, 1)
+    );
 }
 
 #[test]
@@ -208,6 +214,9 @@ fn with_rolling_rows_it_is_followed_and_a_camera_that_restarts_ends_that() {
     let (mut frame, size) = (vec![90; stage.renderer.frame_bytes()], [1344, 376]);
     frame.fill(128);
     let again = StereoFrame::from_yuyv(&frame, size, stamp_ns, 0).unwrap();
-    let told = stage.preview.see(again.left());
-    assert_eq!((told.state(), told.restarts), (PreviewState::Looking, 1));
+    let reported = stage.preview.see(again.left());
+    assert_eq!(
+        (reported.state(), reported.restarts),
+        (PreviewState::Looking, 1)
+    );
 }

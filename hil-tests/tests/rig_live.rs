@@ -85,11 +85,11 @@ fn lead_in(frame: &(FrameHeader, Vec<u8>), config: &RigConfig) -> Vector3<f64> {
     let size = [camera.width_px as usize * 2, camera.height_px as usize];
     let frame = StereoFrame::from_yuyv(&frame.1, size, 0, 0).unwrap();
     let hue = camera_ingest::frame::ycc_from_rgb(config.appearance().lead_rgb);
-    let [left, right] = [frame.left(), frame.right()].map(|eye| {
+    let [left, right] = [frame.left(), frame.right()].map(|image| {
         let (mut n, mut sum) = (0.0, [0.0, 0.0]);
         for v in 0..size[1] {
             for u in 0..size[0] / 2 {
-                let seen = eye.ycc(u, v).map(f32::from);
+                let seen = image.ycc(u, v).map(f32::from);
                 let chroma = |c: [f32; 3]| (c[1] - 128.0, c[2] - 128.0);
                 let ((b, r), (wb, wr)) = (chroma(seen), chroma(hue));
                 // Along the lead's hue, and coloured at all.

@@ -4,7 +4,7 @@
 
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
-use camera_ingest::{EyeFrame, StereoFrame};
+use camera_ingest::{ImageFrame, StereoFrame};
 use nalgebra::Vector3;
 use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
@@ -47,7 +47,7 @@ fn without_rope() -> ScenePose {
 }
 
 /// What both eyes see.
-fn both(renderer: &mut Renderer, camera: &StereoCamera, poses: &[ScenePose]) -> [EyeFrame; 2] {
+fn both(renderer: &mut Renderer, camera: &StereoCamera, poses: &[ScenePose]) -> [ImageFrame; 2] {
     let mut bytes = vec![0; renderer.frame_bytes()];
     renderer.render(poses, 0, &mut bytes);
     let size = [camera.width_px as usize * 2, camera.height_px as usize];
@@ -55,13 +55,13 @@ fn both(renderer: &mut Renderer, camera: &StereoCamera, poses: &[ScenePose]) -> 
     [frame.left(), frame.right()]
 }
 
-fn ycc(eye: &EyeFrame, u: usize, v: usize) -> [f64; 3] {
-    eye.ycc(u, v).map(f64::from)
+fn ycc(image: &ImageFrame, u: usize, v: usize) -> [f64; 3] {
+    image.ycc(u, v).map(f64::from)
 }
 
 /// How much of a pixel something new covers: full from a difference on that every
 /// shaded side of the rope has against the wall.
-fn covered(full: &EyeFrame, empty: &EyeFrame, u: usize, v: usize) -> f64 {
+fn covered(full: &ImageFrame, empty: &ImageFrame, u: usize, v: usize) -> f64 {
     let (a, b) = (ycc(full, u, v), ycc(empty, u, v));
     let d: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
     (d.sqrt() / 60.0).min(1.0)
@@ -105,8 +105,8 @@ fn rope_and_lead_lie_where_the_camera_model_puts_them() {
 /// By how much row `v` of what is new is off the line from `a` to `b`, and how wide it is
 /// (px), within `reach` pixels.
 fn crossing(
-    full: &EyeFrame,
-    empty: &EyeFrame,
+    full: &ImageFrame,
+    empty: &ImageFrame,
     [a, b]: [[f64; 2]; 2],
     v: usize,
     reach: usize,
@@ -123,7 +123,7 @@ fn crossing(
 
 /// Centroid and area of what has turned blue within `reach` pixels: the lead,
 /// not the orange rope above it.
-fn blob(full: &EyeFrame, empty: &EyeFrame, near: [f64; 2], reach: usize) -> [f64; 3] {
+fn blob(full: &ImageFrame, empty: &ImageFrame, near: [f64; 2], reach: usize) -> [f64; 3] {
     let mut sums = [0.0; 3];
     let (u0, v0) = (near[0].round() as usize, near[1].round() as usize);
     for v in v0 - reach..=v0 + reach {

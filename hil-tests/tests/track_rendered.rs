@@ -7,7 +7,7 @@
 #[path = "track_rendered/film.rs"]
 mod film;
 
-use camera_ingest::EyeFrame;
+use camera_ingest::ImageFrame;
 use film::{Filmed, Take};
 use hil_tests::{for_each_seed, quantile};
 use rand::{RngExt, SeedableRng};
@@ -95,16 +95,16 @@ fn outcome(seed: u64, filming: Filming) -> Result<(), String> {
     // Over the frames not lost.
     let [median, p95] = [0.5, 0.95].map(|part| quantile(&errors_px, part));
     let lost = found.track.lost_fraction();
-    let told = format!(
+    let reported = format!(
         "seed {seed} ({:.1} mm), {filming:?}: lost {:.1} %, in doubt {:.1} %, \
          median {median:.2}, p95 {p95:.2}, most where sure {confident_px:.1} px",
         hidden_rope(seed).radius_m * 1e3,
         100.0 * lost,
         100.0 * f64::from(doubted) / found.track.frames.len() as f64,
     );
-    println!("{told}");
+    println!("{reported}");
     let good = lost <= 0.03 && median < 1.0 && p95 < 3.0 && confident_px < 20.0;
-    if good { Ok(()) } else { Err(told) }
+    if good { Ok(()) } else { Err(reported) }
 }
 
 /// Some thin ropes and one of usual thickness; many with `WAG_LONG_TESTS`.
@@ -171,7 +171,7 @@ fn a_rope_that_is_not_there_for_a_while_is_lost_only_then() {
     let hidden = 90..96;
     let empty = filmed.scene();
     for frame in &mut filmed.frames[hidden.clone()] {
-        *frame = EyeFrame {
+        *frame = ImageFrame {
             stamp_ns: frame.stamp_ns,
             sequence: frame.sequence,
             ..empty.clone()
@@ -204,7 +204,9 @@ fn rope_and_lead_look_as_thick_as_they_are() {
         let told_m = [seen.rope_radius_m, seen.lead_radius_m];
         let mut radii = told_m.into_iter().zip(radii_m);
         let long = (seen.length_m / filmed.length_m - 1.0).abs();
-        if !radii.all(|(told, truth)| (told - truth).abs() < 1.5e-3) || long > 0.02 || mean_px > 1.5
+        if !radii.all(|(reported, truth)| (reported - truth).abs() < 1.5e-3)
+            || long > 0.02
+            || mean_px > 1.5
         {
             bad.push(radii_m);
         }

@@ -144,9 +144,9 @@ pub fn optimise(
         ..*start
     };
     loop {
-        let asked: Vec<Vec<f64>> = strategy.ask(&mut |_| true)?;
-        let mut values = Vec::with_capacity(asked.len());
-        for x in &asked {
+        let requested: Vec<Vec<f64>> = strategy.ask(&mut |_| true)?;
+        let mut values = Vec::with_capacity(requested.len());
+        for x in &requested {
             let value = match judge(&at(x), limits, cell, camera, seed, false, threads) {
                 Ok(judged) if judged.gap_m >= GAP_MIN_M => judged.information.log_volume,
                 Ok(_) | Err(DesignError::Wiggle(_)) => FORBIDDEN,

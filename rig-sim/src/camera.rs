@@ -70,7 +70,7 @@ impl CameraConfig {
             Resolution::Vga => (672, 376, 1.0),
             Resolution::Hd => (1280, 720, 2.0),
         };
-        let eye = |du: f64, dv: f64, k1: f64| Intrinsics {
+        let image = |du: f64, dv: f64, k1: f64| Intrinsics {
             fx: 350.0 * scale,
             fy: 349.7 * scale,
             cx: f64::from(width_px) / 2.0 - 0.5 + du * scale,
@@ -82,8 +82,8 @@ impl CameraConfig {
         StereoCamera {
             width_px,
             height_px,
-            left: eye(2.3, -1.7, -0.170),
-            right: eye(-3.1, 0.9, -0.168),
+            left: image(2.3, -1.7, -0.170),
+            right: image(-3.1, 0.9, -0.168),
             r_right_left: *Rotation3::new(Vector3::new(-0.0009, 0.0045, 0.0007)).matrix(),
             t_right_left_m: Vector3::new(self.baseline_m, 1e-4, -2e-4),
             r_w_cam: tilt.matrix() * looking_along_y,

@@ -152,9 +152,10 @@ mod tests {
         };
         config.camera.enabled = false;
         let stop = AtomicBool::new(false);
-        let (told, ports) = std::sync::mpsc::channel();
+        let (reported, ports) = std::sync::mpsc::channel();
         thread::scope(|scope| {
-            let first = scope.spawn(|| run_announced(&config, &stop, |p| told.send(p).unwrap()));
+            let first =
+                scope.spawn(|| run_announced(&config, &stop, |p| reported.send(p).unwrap()));
             assert_ne!(ports.recv().unwrap().command, 0);
             let mut listened = false;
             let second = run_announced(&config, &AtomicBool::new(true), |_| listened = true);

@@ -162,7 +162,7 @@ mod tests {
             q_c: JointVector([0.5; 7]),
             ..CycleRecord::default()
         };
-        let told = Cycles {
+        let reported = Cycles {
             cycles: vec![cycle],
             joints: vec![
                 report(2_003_000_000, 0.2),
@@ -171,7 +171,7 @@ mod tests {
             ],
         };
         let folder = tempfile::tempdir().unwrap();
-        let rows = told.write_tables(folder.path(), 2_000_000_000).unwrap();
+        let rows = reported.write_tables(folder.path(), 2_000_000_000).unwrap();
         assert_eq!(rows, [1, 2]);
         let joints = files::read_joints(&folder.path().join(JOINTS_TABLE)).unwrap();
         assert_eq!(joints.times_s, [-0.001, 0.003]);
@@ -189,14 +189,14 @@ mod tests {
     fn a_planted_lag_is_found() {
         const BEGIN_NS: u64 = 1_000_000_000;
         let at = |t: f64| 0.3 * (5.0 * t).sin();
-        let mut told = Cycles::default();
+        let mut reported = Cycles::default();
         for i in 0..1500 {
             let mut cycle = CycleRecord {
                 deadline_ns: BEGIN_NS + i * 4_000_000,
                 ..CycleRecord::default()
             };
             cycle.q_c[5] = at(i as f64 * 4e-3);
-            told.cycles.push(cycle);
+            reported.cycles.push(cycle);
         }
         for i in 0..1400 {
             let t = i as f64 * 4.1e-3;
@@ -205,10 +205,10 @@ mod tests {
                 ..JointReport::default()
             };
             report.q[5] = at(t - 0.023);
-            told.joints.push(report);
+            reported.joints.push(report);
         }
         let span = [BEGIN_NS, u64::MAX];
-        assert_eq!(told.joint_lag_s(5, span), Some(0.023));
-        assert_eq!(told.joint_lag_s(2, span), None, "joint 3 did not move");
+        assert_eq!(reported.joint_lag_s(5, span), Some(0.023));
+        assert_eq!(reported.joint_lag_s(2, span), None, "joint 3 did not move");
     }
 }

@@ -45,13 +45,13 @@ fn show_stop(page: &mut String, stop: &Stop) {
         "STOPPED: {:?} (code {}) in cycle {}, {:.3} s into the recording",
         stop.code, stop.number, stop.cycle, stop.time_s
     );
-    let asked = if stop.arm_asked_to_stop {
+    let requested = if stop.arm_asked_to_stop {
         "; the arm was commanded to stop"
     } else {
         ""
     };
     let (met, rest_ms) = (stop.met, 1e3 * stop.rest_after_s);
-    let reaction = format!("{met}{asked}; at rest after {rest_ms:.0} ms");
+    let reaction = format!("{met}{requested}; at rest after {rest_ms:.0} ms");
     let while_stopping = |code: FaultCode| format!("{code:?}: {}", code.explain());
     let warned = (stop.arm_warning != 0).then(|| format!("W{}", stop.arm_warning));
     let lines = [

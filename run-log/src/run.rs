@@ -30,9 +30,9 @@ pub struct CellHere {
 }
 
 impl CellHere {
-    /// The cell of a run whose folder tells `told`.
-    pub fn of_run(&self, told: Option<Cell>) -> Cell {
-        told.filter(|_| !self.is_named).unwrap_or(self.cell)
+    /// The cell of a run whose folder tells `reported`.
+    pub fn of_run(&self, reported: Option<Cell>) -> Cell {
+        reported.filter(|_| !self.is_named).unwrap_or(self.cell)
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
     /// Cycles with a joint report in every second one.
     fn recording() -> (Vec<u8>, Cycles) {
         let (mut writer, mut bytes) = (ChunkWriter::default(), Vec::new());
-        let mut told = Cycles::default();
+        let mut reported = Cycles::default();
         for cycle in 1..=60 {
             let mut one = RecordedCycle::default();
             one.input.cycle = cycle;
@@ -212,29 +212,29 @@ mod tests {
                 report.q[6] = 0.1 * cycle as f64;
                 report.q_target[6] = 0.3 / cycle as f64;
                 one.input.reports.push(report);
-                told.joints.push(report);
+                reported.joints.push(report);
             }
-            told.cycles.push(one.record);
+            reported.cycles.push(one.record);
             bytes.extend(writer.cycle(&one).unwrap_or_default());
         }
         bytes.extend(writer.flush().unwrap_or_default());
-        (bytes, told)
+        (bytes, reported)
     }
 
     #[test]
     fn cycles_and_reports_come_back_bit_for_bit() {
-        let (bytes, told) = recording();
+        let (bytes, reported) = recording();
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(files::CYCLES), &bytes).unwrap();
         let found = Run::open(folder.path()).unwrap().recording().unwrap();
         assert_eq!(found.bytes(), bytes);
-        assert_eq!(found.cycles().unwrap(), told);
+        assert_eq!(found.cycles().unwrap(), reported);
     }
 
     /// A recording with bytes changed is read as far as it is whole, or refused.
     #[test]
     fn damage_costs_chunks_and_never_invents_cycles() {
-        let (bytes, told) = recording();
+        let (bytes, reported) = recording();
         for k in 0..200_usize {
             let mut bytes = bytes.clone();
             let at = (k * 2_654_435_761) % bytes.len();
@@ -243,8 +243,8 @@ mod tests {
             let Ok(found) = (Recording { path, bytes }).cycles() else {
                 continue;
             };
-            assert!(found.cycles.iter().all(|c| told.cycles.contains(c)));
-            assert!(found.joints.iter().all(|r| told.joints.contains(r)));
+            assert!(found.cycles.iter().all(|c| reported.cycles.contains(c)));
+            assert!(found.joints.iter().all(|r| reported.joints.contains(r)));
         }
     }
 }

@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     pub(crate) fn example() -> StereoCamera {
-        let eye = Intrinsics {
+        let image = Intrinsics {
             fx: 350.9,
             fy: 350.2,
             cx: 340.1,
@@ -209,8 +209,8 @@ mod tests {
         StereoCamera {
             width_px: 672,
             height_px: 376,
-            left: eye,
-            right: Intrinsics { cx: 333.0, ..eye },
+            left: image,
+            right: Intrinsics { cx: 333.0, ..image },
             r_right_left: *nalgebra::Rotation3::new(Vector3::new(-9e-4, 6e-3, 1e-3)).matrix(),
             t_right_left_m: Vector3::new(0.063, 1e-4, -2e-4),
             r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
@@ -223,11 +223,11 @@ mod tests {
 
     #[test]
     fn undistort_inverts_distort_to_the_corners() {
-        let eye = example().left;
+        let image = example().left;
         for u in (0..672).step_by(61) {
             for v in (0..376).step_by(47) {
-                let [x, y] = eye.undistort([f64::from(u), f64::from(v)]);
-                let back = eye.distort(x, y);
+                let [x, y] = image.undistort([f64::from(u), f64::from(v)]);
+                let back = image.distort(x, y);
                 assert!((back[0] - f64::from(u)).hypot(back[1] - f64::from(v)) < 1e-6);
             }
         }

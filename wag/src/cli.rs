@@ -2,7 +2,7 @@
 
 mod arm;
 mod config;
-mod eyes;
+mod images;
 mod ledger;
 mod plans;
 mod runs;
@@ -10,7 +10,7 @@ mod values;
 
 pub use arm::*;
 pub use config::*;
-pub use eyes::*;
+pub use images::*;
 pub use ledger::*;
 pub use plans::*;
 pub use runs::*;

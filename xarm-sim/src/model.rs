@@ -105,7 +105,7 @@ pub struct ArmModel {
     counters: ArmCounters,
     /// Client and transaction id of the request being executed.
     origin: Option<(u32, u16)>,
-    told: (ArmState, Mode),
+    reported: (ArmState, Mode),
     events: Vec<TimedEvent>,
     feedback: Vec<Feedback>,
 }
@@ -140,7 +140,7 @@ impl ArmModel {
             contact_m: 0.0,
             counters: ArmCounters::default(),
             origin: None,
-            told: (ArmState::Stopped, Mode::Position),
+            reported: (ArmState::Stopped, Mode::Position),
             events: Vec::new(),
             feedback: Vec::new(),
             config,

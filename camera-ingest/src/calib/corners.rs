@@ -2,7 +2,7 @@
 //! the detector is as much to build as the rest of this crate, and is needed when a camera
 //! is set up only.
 
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 #[cfg(feature = "calibration")]
 pub(super) struct CornerDetector(calib_targets_charuco::CharucoDetector);
@@ -31,11 +31,11 @@ impl CornerDetector {
     }
 
     /// Corners in one image's picture: id and raw pixel, integers at pixel centres.
-    pub(super) fn corners(&self, eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
+    pub(super) fn corners(&self, image: &ImageFrame) -> Vec<(u32, [f64; 2])> {
         let view = calib_targets_charuco::GrayImageView {
-            width: eye.width_px,
-            height: eye.height_px,
-            data: &eye.luma,
+            width: image.width_px,
+            height: image.height_px,
+            data: &image.luma,
         };
         // A miss is no error: the other frames may show the board.
         let Ok(found) = self.0.detect(&view) else {
@@ -72,7 +72,7 @@ impl CornerDetector {
     }
 
     /// Corners in one image's picture.
-    pub(super) fn corners(&self, _eye: &EyeFrame) -> Vec<(u32, [f64; 2])> {
+    pub(super) fn corners(&self, _eye: &ImageFrame) -> Vec<(u32, [f64; 2])> {
         match *self {}
     }
 }

@@ -123,9 +123,9 @@ pub fn residual(camera: &StereoCamera, points: &[Sighted]) -> Residual {
     let (mut worst_px, mut gaps) = (0.0_f64, 0.0);
     for point in points {
         let off = errors(camera, point);
-        for eye in off.chunks_exact(2) {
-            worst_px = worst_px.max(eye[0].hypot(eye[1]));
-            squares += eye[0] * eye[0] + eye[1] * eye[1];
+        for image in off.chunks_exact(2) {
+            worst_px = worst_px.max(image[0].hypot(image[1]));
+            squares += image[0] * image[0] + image[1] * image[1];
         }
         if let Some(found) = camera.triangulate(point.pixels[0], point.pixels[1]) {
             let depth_m = camera.to_left(&found.p_w_m).z.max(0.1);

@@ -40,8 +40,8 @@ pub(super) fn read(path: &Path, mode: VideoMode) -> Result<StereoGeometry, Calib
     })
 }
 
-fn intrinsics(ini: &Ini, eye: &str, mode: VideoMode) -> Result<Intrinsics, CalibError> {
-    let section = format!("{eye}_{}", mode.name());
+fn intrinsics(ini: &Ini, image: &str, mode: VideoMode) -> Result<Intrinsics, CalibError> {
+    let section = format!("{image}_{}", mode.name());
     let or_zero =
         |key: &str| -> Result<f64, CalibError> { Ok(ini.number(&section, key)?.unwrap_or(0.0)) };
     let focal = |key: &str| -> Result<f64, CalibError> {
@@ -80,11 +80,11 @@ pub fn write_factory_conf(
     let name = mode.name();
     let mut text = String::new();
     // Writing to a String cannot fail.
-    for (eye, k) in [("LEFT", &camera.left), ("RIGHT", &camera.right)] {
+    for (image, k) in [("LEFT", &camera.left), ("RIGHT", &camera.right)] {
         let [k1, k2, p1, p2, k3] = k.distortion;
         let _ = writeln!(
             text,
-            "[{eye}_CAM_{name}]\nfx={}\nfy={}\ncx={}\ncy={}\n\
+            "[{image}_CAM_{name}]\nfx={}\nfy={}\ncx={}\ncy={}\n\
              k1={k1}\nk2={k2}\np1={p1}\np2={p2}\nk3={k3}\n",
             k.fx, k.fy, k.cx, k.cy
         );

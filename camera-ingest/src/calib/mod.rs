@@ -36,13 +36,13 @@ pub fn load_camera(path: &Path) -> Result<StereoCamera, CalibError> {
     let is_yaml = calibration
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
-    let eyes = if is_yaml {
+    let images = if is_yaml {
         let right = settings.calibration_right.as_ref().map(|p| folder.join(p));
         yaml::read(&calibration, right.as_deref(), settings.mode)?
     } else {
         factory::read(&calibration, settings.mode)?
     };
-    Ok(settings.camera(eyes))
+    Ok(settings.camera(images))
 }
 
 #[cfg(test)]
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn what_is_written_reads_back() {
-        let eye = Intrinsics {
+        let image = Intrinsics {
             fx: 700.1,
             fy: 700.2,
             cx: 640.5,
@@ -122,8 +122,8 @@ mod tests {
         let camera = StereoCamera {
             width_px: 1280,
             height_px: 720,
-            left: eye,
-            right: Intrinsics { cx: 633.0, ..eye },
+            left: image,
+            right: Intrinsics { cx: 633.0, ..image },
             r_right_left: *Rotation3::new(Vector3::new(-9e-4, 6e-3, 1e-3)).matrix(),
             t_right_left_m: Vector3::new(0.063, 1e-4, -2e-4),
             r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),

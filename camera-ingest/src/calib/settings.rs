@@ -126,9 +126,9 @@ pub fn check_camera(camera: &StereoCamera) -> Result<(), String> {
     if sizes.iter().any(|px| !(16..=10_000).contains(px)) {
         return Err(format!("an image of {} x {} px", sizes[0], sizes[1]));
     }
-    for eye in [&camera.left, &camera.right] {
-        let focal = [eye.fx, eye.fy];
-        let rest = [eye.cx, eye.cy].into_iter().chain(eye.distortion);
+    for image in [&camera.left, &camera.right] {
+        let focal = [image.fx, image.fy];
+        let rest = [image.cx, image.cy].into_iter().chain(image.distortion);
         if !focal.iter().all(|f| f.is_finite() && *f > 1.0) || !rest.into_iter().all(f64::is_finite)
         {
             return Err(format!(
@@ -150,15 +150,15 @@ impl CameraSettings {
         Matrix3::from_fn(|row, column| self.extrinsics.rotation[row][column])
     }
 
-    pub(super) fn camera(&self, eyes: StereoGeometry) -> StereoCamera {
+    pub(super) fn camera(&self, images: StereoGeometry) -> StereoCamera {
         let (width_px, height_px) = self.mode.size_px();
         StereoCamera {
             width_px,
             height_px,
-            left: eyes.left,
-            right: eyes.right,
-            r_right_left: eyes.r_right_left,
-            t_right_left_m: eyes.t_right_left_m,
+            left: images.left,
+            right: images.right,
+            r_right_left: images.r_right_left,
+            t_right_left_m: images.t_right_left_m,
             r_w_cam: self.rotation(),
             p_w_cam_m: Vector3::from(self.extrinsics.position_m),
             shutter: self.shutter,

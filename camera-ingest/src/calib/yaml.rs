@@ -26,7 +26,7 @@ pub(super) fn read(
     mode: VideoMode,
 ) -> Result<StereoGeometry, CalibError> {
     let file = YamlFile::open(path)?;
-    let eyes = if file.has("M1") {
+    let images = if file.has("M1") {
         opencv(&file)?
     } else if file.has("image_width") {
         ros(&file, right, mode)?
@@ -36,7 +36,7 @@ pub(super) fn read(
              calibration (M1, D1, M2, D2, R, T)",
         ));
     };
-    let baseline_m = eyes.t_right_left_m.norm();
+    let baseline_m = images.t_right_left_m.norm();
     if !(BASELINE_M[0]..=BASELINE_M[1]).contains(&baseline_m) {
         return Err(file.bad(&format!(
             "the two images' optical centres are {baseline_m:.4} apart; {} to {} m are expected \
@@ -44,11 +44,11 @@ pub(super) fn read(
             BASELINE_M[0], BASELINE_M[1]
         )));
     }
-    let r = eyes.r_right_left;
+    let r = images.r_right_left;
     if (r * r.transpose() - Matrix3::identity()).norm() > 1e-3 {
         return Err(file.bad("the rotation between left and right is not a rotation matrix"));
     }
-    Ok(eyes)
+    Ok(images)
 }
 
 struct YamlFile {
@@ -166,27 +166,27 @@ fn ros(
         }
     };
     let other = YamlFile::open(&beside)?;
-    for eye in [file, &other] {
+    for image in [file, &other] {
         let (width, height) = mode.size_px();
-        let found = (eye.pixels("image_width")?, eye.pixels("image_height")?);
+        let found = (image.pixels("image_width")?, image.pixels("image_height")?);
         if found != (width, height) {
-            return Err(eye.bad(&format!(
+            return Err(image.bad(&format!(
                 "it is for {}x{} px, the mode `{}` has {width}x{height}",
                 found.0,
                 found.1,
                 mode.name()
             )));
         }
-        let model = eye.document["distortion_model"].as_str().unwrap_or("");
+        let model = image.document["distortion_model"].as_str().unwrap_or("");
         if !matches!(model, "" | "plumb_bob") {
-            return Err(eye.bad(&format!(
+            return Err(image.bad(&format!(
                 "distortion_model `{model}` is not read; calibrate with `plumb_bob`"
             )));
         }
     }
     let names = ["camera_matrix", "distortion_coefficients"];
-    let turn = |eye: &YamlFile| -> Result<Matrix3<f64>, CalibError> {
-        let r: [f64; 9] = eye.numbers("rectification_matrix")?;
+    let turn = |image: &YamlFile| -> Result<Matrix3<f64>, CalibError> {
+        let r: [f64; 9] = image.numbers("rectification_matrix")?;
         Ok(Matrix3::from_row_slice(&r))
     };
     let (r_left, r_right) = (turn(file)?, turn(&other)?);

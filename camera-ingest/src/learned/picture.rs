@@ -1,17 +1,17 @@
 //! Pictures as a network takes them: red, green and blue planes from 0 to 1.
 
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Width and height (px).
 pub(super) type Size = [usize; 2];
 
 /// Size of a frame.
-pub(super) fn size_of(frame: &EyeFrame) -> Size {
+pub(super) fn size_of(frame: &ImageFrame) -> Size {
     [frame.width_px, frame.height_px]
 }
 
 /// Appends the three planes of a frame, scaled to a size (bilinear).
-pub(super) fn append_planes(frame: &EyeFrame, size: Size, out: &mut Vec<f32>) {
+pub(super) fn append_planes(frame: &ImageFrame, size: Size, out: &mut Vec<f32>) {
     let rgb = frame.to_rgb();
     let from = size_of(frame);
     for channel in 0..3 {

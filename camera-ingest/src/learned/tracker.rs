@@ -9,7 +9,7 @@ use std::path::Path;
 use super::graph::Axis::{Is, Named};
 use super::graph::{Graph, Wanted};
 use super::picture::{append_planes, place_in, size_of};
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::track::{ModelError, PointTracker, SeenPoint};
 
 const FRAMES: Wanted = Wanted {
@@ -81,7 +81,7 @@ impl OnnxTracker {
     /// Follows points through the chunk of frames that begins at `start`.
     fn look(
         &mut self,
-        frames: &[EyeFrame],
+        frames: &[ImageFrame],
         start: usize,
         queries: &[Query],
     ) -> Result<Vec<Vec<SeenPoint>>, ModelError> {
@@ -93,7 +93,7 @@ impl OnnxTracker {
             // A film shorter than a chunk stands still at its end.
             append_planes(&frames[at.min(frames.len() - 1)], size, &mut pictures);
         }
-        let asked: Vec<f32> = queries
+        let requested: Vec<f32> = queries
             .iter()
             .flat_map(|(frame, pixel)| {
                 let [x, y] = place_in(*pixel, film, size);
@@ -106,7 +106,7 @@ impl OnnxTracker {
                 vec![1, length, 3, size[1], size[0]],
                 &pictures[..],
             ),
-            (QUERIES.name, vec![1, count, 3], &asked),
+            (QUERIES.name, vec![1, count, 3], &requested),
         ];
         let outputs = [
             (TRACKS.name, vec![1, length, count, 2]),
@@ -142,7 +142,7 @@ impl PointTracker for OnnxTracker {
 
     fn follow(
         &mut self,
-        frames: &[EyeFrame],
+        frames: &[ImageFrame],
         points: &[[f64; 2]],
     ) -> Result<Vec<Vec<SeenPoint>>, ModelError> {
         let mut queries: Vec<Query> = points.iter().map(|p| (0, *p)).collect();

@@ -78,13 +78,13 @@ impl Sensor {
         let mut unit = Unit::find(device)?;
         let e = self.exposure_raw;
         let exposure = [e >> 12, e >> 4, e << 4].map(|b| b.to_le_bytes()[0]);
-        for eye in 0..2 {
-            let control = unit.get(SYSTEM, CONTROL[eye])?;
-            unit.set(SYSTEM, CONTROL[eye], control & !AUTOMATIC)?;
-            unit.set_checked(SENSORS[eye], EXPOSURE, exposure)?;
+        for image in 0..2 {
+            let control = unit.get(SYSTEM, CONTROL[image])?;
+            unit.set(SYSTEM, CONTROL[image], control & !AUTOMATIC)?;
+            unit.set_checked(SENSORS[image], EXPOSURE, exposure)?;
             if let Some(g) = self.gain_raw {
                 let gain = [g >> 16, g >> 8, g].map(|b| b.to_le_bytes()[0]);
-                unit.set_checked(SENSORS[eye], GAIN, gain)?;
+                unit.set_checked(SENSORS[image], GAIN, gain)?;
             }
         }
         Ok(())

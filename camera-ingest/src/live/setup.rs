@@ -61,14 +61,14 @@ impl Setup<'_> {
 
     fn format(&mut self) -> Result<(), LiveError> {
         let [width, height] = self.settings.size_px();
-        let asked = abi::PixFormat {
+        let requested = abi::PixFormat {
             width,
             height,
             pixelformat: abi::YUYV,
             field: abi::FIELD_NONE,
             ..abi::PixFormat::default()
         };
-        let granted = self.device.set_format(asked);
+        let granted = self.device.set_format(requested);
         let granted = granted.map_err(|e| self.refused("setting the picture format", &e))?;
         let name = |p: &abi::PixFormat| {
             let letters = p.pixelformat.to_le_bytes();
@@ -82,7 +82,7 @@ impl Setup<'_> {
         };
         let wanted = abi::PixFormat {
             bytesperline: 2 * width,
-            ..asked
+            ..requested
         };
         let fits = granted.width == width
             && granted.height == height

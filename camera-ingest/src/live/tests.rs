@@ -50,7 +50,7 @@ struct Driver {
     unit_bytes: Option<u16>,
     registers: HashMap<(u8, u32), u8>,
     stuck: bool,
-    asked: Vec<u8>,
+    requested: Vec<u8>,
 }
 
 impl Default for Driver {
@@ -73,7 +73,7 @@ impl Default for Driver {
             unit_bytes: Some(384),
             registers: HashMap::new(),
             stuck: false,
-            asked: Vec::new(),
+            requested: Vec::new(),
         }
     }
 }
@@ -122,11 +122,11 @@ impl Driver {
         }
         assert_eq!(data.len(), usize::from(bytes));
         if query == abi::GET_CURRENT {
-            let (_, place) = Self::place(&self.asked);
+            let (_, place) = Self::place(&self.requested);
             data[17] = self.registers.get(&place).copied().unwrap_or(0xff);
             return Ok(());
         }
-        self.asked = data.to_vec();
+        self.requested = data.to_vec();
         let (set, place) = Self::place(data);
         if set && !self.stuck {
             self.registers.insert(place, data[16]);

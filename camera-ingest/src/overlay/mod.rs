@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use shared_types::KeypointTrack;
 use shared_types::keypoints::TrackedFrame;
 
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Why a picture cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +42,7 @@ pub struct Picture {
 impl Picture {
     /// Picture of one image.
     #[must_use]
-    pub fn of(frame: &EyeFrame) -> Self {
+    pub fn of(frame: &ImageFrame) -> Self {
         Self {
             width_px: frame.width_px,
             height_px: frame.height_px,
@@ -166,7 +166,7 @@ impl Picture {
 const SHEET_WIDTH_PX: usize = 340;
 
 /// A frame with its keypoints, red where the rope is lost.
-pub(crate) fn drawn(frame: &EyeFrame, tracked: &TrackedFrame) -> Picture {
+pub(crate) fn drawn(frame: &ImageFrame, tracked: &TrackedFrame) -> Picture {
     draw_rope(Picture::of(frame), tracked, 1)
 }
 
@@ -193,7 +193,7 @@ fn draw_rope(mut picture: Picture, tracked: &TrackedFrame, factor: usize) -> Pic
 /// # Errors
 /// No frame chosen.
 pub fn keypoint_sheet(
-    frames: &[EyeFrame],
+    frames: &[ImageFrame],
     track: &KeypointTrack,
     chosen: &[usize],
     columns: usize,
@@ -228,8 +228,8 @@ fn contact_sheet(pictures: &[Picture], columns: usize) -> Result<Picture, Overla
 mod tests {
     use super::*;
 
-    fn grey(level: u8) -> EyeFrame {
-        EyeFrame::grey([8, 4], level)
+    fn grey(level: u8) -> ImageFrame {
+        ImageFrame::grey([8, 4], level)
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The picture of a throw: many exposures over one still scene.
 
 use super::{OverlayError, Picture};
-use crate::frame::{EyeFrame, rgb_from_ycc};
+use crate::frame::{ImageFrame, rgb_from_ycc};
 use crate::track::uncovered_scene;
 
 /// Frames that the still scene is made from.
@@ -21,11 +21,11 @@ fn apart(a: [u8; 3], b: [u8; 3]) -> u32 {
 ///
 /// # Errors
 /// No frames, or sizes differ.
-pub fn still_scene(frames: &[EyeFrame]) -> Result<EyeFrame, OverlayError> {
+pub fn still_scene(frames: &[ImageFrame]) -> Result<ImageFrame, OverlayError> {
     let first = frames
         .first()
         .ok_or(OverlayError::Input("no frames for a still scene"))?;
-    let size = |f: &EyeFrame| (f.width_px, f.height_px);
+    let size = |f: &ImageFrame| (f.width_px, f.height_px);
     if frames.iter().any(|f| size(f) != size(first)) {
         return Err(OverlayError::Input("the frames differ in size"));
     }
@@ -37,7 +37,7 @@ pub fn still_scene(frames: &[EyeFrame]) -> Result<EyeFrame, OverlayError> {
 ///
 /// # Errors
 /// No frames, or sizes differ.
-pub fn strobe(background: &EyeFrame, frames: &[&EyeFrame]) -> Result<Picture, OverlayError> {
+pub fn strobe(background: &ImageFrame, frames: &[&ImageFrame]) -> Result<Picture, OverlayError> {
     if frames.is_empty() {
         return Err(OverlayError::Input("no frames for a strobe picture"));
     }
@@ -51,7 +51,7 @@ pub fn strobe(background: &EyeFrame, frames: &[&EyeFrame]) -> Result<Picture, Ov
     for v in 0..background.height_px {
         for u in 0..background.width_px {
             let empty = background.ycc(u, v);
-            let far = |f: &&&EyeFrame| apart(f.ycc(u, v), empty);
+            let far = |f: &&&ImageFrame| apart(f.ycc(u, v), empty);
             // A threshold keeps the noise of many frames out of still places.
             if let Some(best) = frames.iter().max_by_key(far)
                 && far(&best) > OTHER
@@ -70,8 +70,8 @@ mod tests {
     use super::*;
 
     /// A wall of grey 100, and on it a bar from column `from` on, `wide` columns wide.
-    fn bar(from: usize, wide: usize, level: u8) -> EyeFrame {
-        let mut frame = EyeFrame::grey([32, 8], 100);
+    fn bar(from: usize, wide: usize, level: u8) -> ImageFrame {
+        let mut frame = ImageFrame::grey([32, 8], 100);
         for row in frame.luma.chunks_mut(32) {
             row[from..(from + wide).min(32)].fill(level);
         }

@@ -23,7 +23,7 @@ use shared_types::ipc::{
 };
 
 use crate::calib::{CalibError, load_camera};
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::track::{TrackError, USUAL_KEYPOINTS};
 pub use step::{Answer, Preview, Search};
 
@@ -90,44 +90,44 @@ pub enum PreviewError {
 /// thread to look for the rope.
 pub fn run(config: &PreviewConfig, stop: &AtomicBool) -> Result<(), PreviewError> {
     let camera = load_camera(&config.camera)?;
-    let eye_px = [camera.width_px, camera.height_px];
+    let image_px = [camera.width_px, camera.height_px];
     let mut preview = Preview::new(camera, config.cell.pole, config.keypoints)?;
     let bus = Bus::join(&config.domain)?;
     let ports = Ports::open(&bus)?;
     tracing::info!(domain = config.domain, "preview is ready");
     let mut searcher = Searcher::default();
-    let (mut heard, mut state) = (Instant::now(), None);
+    let (mut received, mut state) = (Instant::now(), None);
     while !stop.load(Ordering::Relaxed) {
         searcher.look_after(&mut preview)?;
         let found = match ports.newest()? {
             Some(Ok(frame)) => {
-                heard = Instant::now();
+                received = Instant::now();
                 ports.take_joints(&mut preview)?;
                 preview.see(frame)
             }
             Some(Err(head)) => {
-                heard = Instant::now();
+                received = Instant::now();
                 preview.unfit(head.sequence, head.stamp_ns)
             }
             None => {
                 // Reports would pile up and be lost.
                 ports.take_joints(&mut preview)?;
-                if heard.elapsed() < SILENCE {
+                if received.elapsed() < SILENCE {
                     thread::sleep(TURN);
                     continue;
                 }
-                heard = Instant::now();
+                received = Instant::now();
                 preview.without_camera()
             }
         };
         if state != Some(found.state()) {
             state = Some(found.state());
-            tell(&found, eye_px);
+            tell(&found, image_px);
         }
         ports.publish(&PreviewFrame {
             took_us: match found.state() {
                 PreviewState::NoCamera => 0,
-                _ => u32::try_from(heard.elapsed().as_micros()).unwrap_or(u32::MAX),
+                _ => u32::try_from(received.elapsed().as_micros()).unwrap_or(u32::MAX),
             },
             ..found
         })?;
@@ -192,7 +192,7 @@ impl Ports {
 
     /// The left image of the newest frame, or the header of one that does not fit; all
     /// frames have gone back to the camera then.
-    fn newest(&self) -> Result<Option<Result<EyeFrame, FrameHeader>>, IpcError> {
+    fn newest(&self) -> Result<Option<Result<ImageFrame, FrameHeader>>, IpcError> {
         let failed = IpcError::transfer(FRAME_SERVICE);
         let mut newest = None;
         while let Some(sample) = self.frames.receive().map_err(&failed)? {
@@ -205,7 +205,7 @@ impl Ports {
                 return Err(head);
             }
             let yuyv = sample.payload();
-            EyeFrame::left_from_yuyv(yuyv, size, head.stamp_ns, head.sequence).map_err(|_e| head)
+            ImageFrame::left_from_yuyv(yuyv, size, head.stamp_ns, head.sequence).map_err(|_e| head)
         }))
     }
 

@@ -8,7 +8,7 @@ use shared_types::keypoints::{KeypointFrame, TrackedFrame};
 use shared_types::{MonotonicNs, StereoCamera};
 
 use super::arm::Arm;
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::track::{Known, TrackError, check_keypoints};
 
 /// A longer pause between two frames restarts it (ns).
@@ -39,7 +39,7 @@ struct Last {
 #[derive(Debug)]
 enum Stage {
     /// Takes frames: the newest one while the arm stands, then all of a motion.
-    Collecting(Vec<EyeFrame>),
+    Collecting(Vec<ImageFrame>),
     /// Somebody looks for the rope in them, the first of which began at `zero_ns`.
     Searching { zero_ns: u64 },
     /// There is one; `lost_ns` is the frame since which nothing of it is seen.
@@ -54,7 +54,7 @@ enum Stage {
 #[derive(Debug)]
 pub struct Search {
     attempt: u32,
-    frames: Vec<EyeFrame>,
+    frames: Vec<ImageFrame>,
     camera: StereoCamera,
     motion: MeasuredArm,
 }
@@ -119,24 +119,24 @@ impl Preview {
     }
 
     /// Looks at a frame. `sequence` is the camera's count: what it leaves out was skipped.
-    pub fn see(&mut self, frame: EyeFrame) -> PreviewFrame {
+    pub fn see(&mut self, frame: ImageFrame) -> PreviewFrame {
         let (sequence, stamp_ns) = (frame.sequence, frame.stamp_ns);
         self.count(sequence, stamp_ns);
         let (state, tracked) = self.track(frame);
-        self.told(state, sequence, stamp_ns, tracked.as_ref())
+        self.reported(state, sequence, stamp_ns, tracked.as_ref())
     }
 
     /// The message while no frame arrives.
     #[must_use]
     pub fn without_camera(&self) -> PreviewFrame {
-        self.told(PreviewState::NoCamera, 0, 0, None)
+        self.reported(PreviewState::NoCamera, 0, 0, None)
     }
 
     /// A frame came that is none, or none of this camera.
     pub fn unfit(&mut self, sequence: u64, stamp_ns: u64) -> PreviewFrame {
         self.count(sequence, stamp_ns);
         self.begin_anew("the camera's frames do not fit its calibration");
-        self.told(PreviewState::Unfit, sequence, stamp_ns, None)
+        self.reported(PreviewState::Unfit, sequence, stamp_ns, None)
     }
 
     /// The search that is due, once. Frames and reports may go on coming while it runs.
@@ -212,7 +212,7 @@ impl Preview {
         self.stage = Stage::Collecting(Vec::new());
     }
 
-    fn track(&mut self, frame: EyeFrame) -> (PreviewState, Option<TrackedFrame>) {
+    fn track(&mut self, frame: ImageFrame) -> (PreviewState, Option<TrackedFrame>) {
         let size = [frame.width_px, frame.height_px];
         if size != [self.camera.width_px, self.camera.height_px].map(|px| px as usize) {
             self.begin_anew("a frame has another size");
@@ -259,7 +259,7 @@ impl Preview {
         }
     }
 
-    fn told(
+    fn reported(
         &self,
         state: PreviewState,
         sequence: u64,
@@ -288,7 +288,7 @@ impl Preview {
 fn follow(
     known: &mut Known,
     zero_ns: u64,
-    frame: &EyeFrame,
+    frame: &ImageFrame,
     arm: &mut Arm,
     keypoints: usize,
 ) -> Option<TrackedFrame> {
@@ -304,7 +304,7 @@ fn follow(
 
 /// Takes in a frame while the rope is unknown: the newest one of a rest, then those of the
 /// motion that follows it.
-fn collect(frames: &mut Vec<EyeFrame>, arm: &mut Arm, frame: EyeFrame) {
+fn collect(frames: &mut Vec<ImageFrame>, arm: &mut Arm, frame: ImageFrame) {
     let stood = |since_ns, at_ns| {
         let stands = arm.stands_since_ns();
         stands.is_some_and(|stands_ns| stands_ns + since_ns <= at_ns)

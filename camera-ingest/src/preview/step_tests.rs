@@ -10,7 +10,7 @@ const SIZE: [usize; 2] = [64, 48];
 const FRAME_NS: u64 = 16_666_667;
 
 fn preview() -> Preview {
-    let eye = Intrinsics {
+    let image = Intrinsics {
         fx: 35.0,
         fy: 35.0,
         cx: 31.5,
@@ -20,8 +20,8 @@ fn preview() -> Preview {
     let camera = StereoCamera {
         width_px: SIZE[0] as u32,
         height_px: SIZE[1] as u32,
-        left: eye,
-        right: eye,
+        left: image,
+        right: image,
         r_right_left: Matrix3::identity(),
         t_right_left_m: Vector3::new(0.063, 0.0, 0.0),
         r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
@@ -34,11 +34,11 @@ fn preview() -> Preview {
 }
 
 /// The `index`-th frame of an empty wall.
-fn wall(index: u64) -> EyeFrame {
-    EyeFrame {
+fn wall(index: u64) -> ImageFrame {
+    ImageFrame {
         stamp_ns: 1_000_000_000 + index * FRAME_NS,
         sequence: index,
-        ..EyeFrame::grey(SIZE, 140)
+        ..ImageFrame::grey(SIZE, 140)
     }
 }
 
@@ -87,7 +87,7 @@ fn an_answer_counts_if_nothing_began_anew_since_and_no_rope_is_none() {
     let (index, search) = swing(&mut preview, 0.2, 600).unwrap();
     let answer = search.run();
     assert!(answer.found.is_err(), "there is no rope");
-    let restarted = preview.see(EyeFrame {
+    let restarted = preview.see(ImageFrame {
         sequence: 0,
         ..wall(index + 1)
     });
@@ -134,7 +134,7 @@ fn without_a_camera_or_an_arm_it_waits_and_says_so() {
 #[test]
 fn a_camera_that_begins_anew_or_pauses_and_an_arm_that_jumps_are_noticed() {
     let mut preview = looking(5);
-    let again = preview.see(EyeFrame {
+    let again = preview.see(ImageFrame {
         sequence: 0,
         ..wall(6)
     });

@@ -1,7 +1,7 @@
 //! Frames kept in memory for tracking or scoring.
 
-use crate::frame::{EyeFrame, StereoFrame};
-use crate::source::{BothEyes, FrameSource, SourceError, StereoSource};
+use crate::frame::{ImageFrame, StereoFrame};
+use crate::source::{BothImages, FrameSource, SourceError, StereoSource};
 use crate::track::Film;
 use shared_types::ipc::message::CameraEvent;
 use std::path::Path;
@@ -12,7 +12,7 @@ const MAX_FRAMES: u32 = 3600;
 #[derive(Debug)]
 enum Frames {
     /// What the tracker looks at: the right image of some frames only.
-    Film(BothEyes),
+    Film(BothImages),
     Both(Vec<StereoFrame>),
 }
 
@@ -33,13 +33,13 @@ impl Default for Recording {
 }
 
 impl Recording {
-    pub(super) fn begin(frames: u32, both_eyes: bool) -> Self {
+    pub(super) fn begin(frames: u32, both_images: bool) -> Self {
         Self {
             wanted: frames.min(MAX_FRAMES),
-            frames: if both_eyes {
+            frames: if both_images {
                 Frames::Both(Vec::new())
             } else {
-                Frames::Film(BothEyes::default())
+                Frames::Film(BothImages::default())
             },
             first_sequence: 0,
             last_sequence: 0,
@@ -120,7 +120,7 @@ impl FrameSource for Recording {
         self.count()
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> Result<ImageFrame, SourceError> {
         self.read(index).map(|frame| frame.left())
     }
 }

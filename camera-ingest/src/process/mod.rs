@@ -112,8 +112,11 @@ impl Process {
                 detector: StillDetector::new(STILL_LAG_FRAMES, STILL_FRAMES),
                 until: now + Duration::from_secs_f64(timeout_s.clamp(0.0, 600.0)),
             },
-            CameraRequest::Record { frames, both_eyes } => {
-                self.recording = Recording::begin(*frames, *both_eyes);
+            CameraRequest::Record {
+                frames,
+                both_images,
+            } => {
+                self.recording = Recording::begin(*frames, *both_images);
                 Waiting::Record
             }
         };

@@ -2,7 +2,7 @@
 
 use super::answer::answer;
 use super::keep::Recording;
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
 use crate::source::{FrameSource, StereoSource};
 use crate::track::TrackResult;
@@ -89,7 +89,7 @@ fn attach_motion(
 }
 
 fn publish(
-    frames: &[EyeFrame],
+    frames: &[ImageFrame],
     result: &TrackResult,
     publisher: &KeypointPublisher,
 ) -> Result<(), Failure> {
@@ -102,7 +102,11 @@ fn publish(
     Ok(())
 }
 
-fn write_sheet(frames: &[EyeFrame], result: &TrackResult, path: &Path) -> Result<(), OverlayError> {
+fn write_sheet(
+    frames: &[ImageFrame],
+    result: &TrackResult,
+    path: &Path,
+) -> Result<(), OverlayError> {
     let step = frames.len().div_ceil(SHEET.0).max(1);
     let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
     keypoint_sheet(frames, &result.track, &chosen, SHEET.1)?.write_png(path)
@@ -157,10 +161,10 @@ fn write_strobe(
     }
     // What comes after the strike shows what the arm covered before it.
     let scene = still_scene(&frames)?;
-    let until = |f: &&EyeFrame| MonotonicNs(f.stamp_ns).since_s(start) <= until_s;
-    let moving: Vec<&EyeFrame> = frames.iter().take_while(until).collect();
+    let until = |f: &&ImageFrame| MonotonicNs(f.stamp_ns).since_s(start) <= until_s;
+    let moving: Vec<&ImageFrame> = frames.iter().take_while(until).collect();
     let step = moving.len().div_ceil(STROBES).max(1);
-    let chosen: Vec<&EyeFrame> = moving.into_iter().rev().step_by(step).collect();
+    let chosen: Vec<&ImageFrame> = moving.into_iter().rev().step_by(step).collect();
     strobe(&scene, &chosen)?.write_png(path)?;
     Ok(())
 }

@@ -4,7 +4,7 @@
 //! under motion blur: a pixel covered to a part `a` has chroma `b + a (t - b)`
 //! with the background's `b` and the blob's `t`.
 
-use crate::frame::{EyeFrame, ycc_from_rgb};
+use crate::frame::{ImageFrame, ycc_from_rgb};
 
 /// Chroma `[Cb, Cr]` about zero.
 pub(super) type Chroma = [f64; 2];
@@ -28,7 +28,10 @@ pub(super) enum Behind<'a> {
     ///
     /// A change towards the colour is not enough: where something of the opposite hue
     /// goes away, plain plaster is such a change.
-    Scene { scene: &'a EyeFrame, middle: Chroma },
+    Scene {
+        scene: &'a ImageFrame,
+        middle: Chroma,
+    },
     /// One chroma everywhere (for what stands still).
     Flat(Chroma),
 }
@@ -67,7 +70,7 @@ impl Blob {
 }
 
 impl BlobMap {
-    pub(super) fn new(frame: &EyeFrame, wanted: Chroma, behind: Behind<'_>) -> Self {
+    pub(super) fn new(frame: &ImageFrame, wanted: Chroma, behind: Behind<'_>) -> Self {
         let sample = |cb: u8, cr: u8| [f64::from(cb) - 128.0, f64::from(cr) - 128.0];
         let values = (0..frame.cb.len())
             .map(|at| {
@@ -189,7 +192,7 @@ mod tests {
     fn a_half_covered_rim_gives_the_true_centre() {
         let wanted = chroma_of_rgb([255, 107, 13]);
         let (width_px, height_px) = (80, 40);
-        let mut frame = EyeFrame::grey([width_px, height_px], 90);
+        let mut frame = ImageFrame::grey([width_px, height_px], 90);
         let empty = frame.clone();
         let truth = [33.7, 18.2];
         for y in 0..height_px {

@@ -75,8 +75,8 @@ pub fn score(
         let since_s = frame.0.stamp_ns.saturating_sub(start_ns) as f64 * 1e-9;
         end_s = since_s;
         let near = sightings.last().copied();
-        let eyes = [&frame.left(), &frame.right()];
-        if let Some(tip) = scene.tip(eyes, tip_rgb, &target, near, since_s) {
+        let images = [&frame.left(), &frame.right()];
+        if let Some(tip) = scene.tip(images, tip_rgb, &target, near, since_s) {
             sightings.push(tip);
         }
     }

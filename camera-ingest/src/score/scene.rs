@@ -6,7 +6,7 @@ use shared_types::StereoCamera;
 use super::blob::{Behind, Blob, BlobMap, Chroma, chroma_of_rgb};
 use super::error::ScoreError;
 use super::path::{PathError, Sighting};
-use crate::frame::{EyeFrame, StereoFrame};
+use crate::frame::{ImageFrame, StereoFrame};
 use crate::source::StereoSource;
 
 /// Frames for the median background.
@@ -21,7 +21,7 @@ const DEPTH_M: [f64; 2] = [0.25, 5.0];
 /// The still scene of both images.
 pub(super) struct Scene<'a> {
     camera: &'a StereoCamera,
-    eyes: [EyeFrame; 2],
+    images: [ImageFrame; 2],
     /// What most of each image's scene looks like.
     middles: [Chroma; 2],
 }
@@ -100,11 +100,11 @@ impl<'a> Scene<'a> {
             left.push(frame.left());
             right.push(frame.right());
         }
-        let eyes = [left, right].map(|frames| crate::track::median_frame(&frames));
+        let images = [left, right].map(|frames| crate::track::median_frame(&frames));
         Ok(Self {
             camera,
-            middles: [0, 1].map(|k: usize| middle_chroma(&eyes[k])),
-            eyes,
+            middles: [0, 1].map(|k: usize| middle_chroma(&images[k])),
+            images,
         })
     }
 
@@ -138,7 +138,7 @@ impl<'a> Scene<'a> {
     pub(super) fn target(&self, rgb: [u8; 3]) -> Result<Target, ScoreError> {
         let blobs = |k: usize| -> Vec<Blob> {
             let behind = Behind::Flat(self.middles[k]);
-            let mut blobs = BlobMap::new(&self.eyes[k], chroma_of_rgb(rgb), behind).blobs();
+            let mut blobs = BlobMap::new(&self.images[k], chroma_of_rgb(rgb), behind).blobs();
             blobs.retain(|b| b.stretch < 1.5);
             blobs
         };
@@ -160,19 +160,19 @@ impl<'a> Scene<'a> {
     }
 
     /// Raw pixels of the largest blob of a colour that both images see.
-    pub(super) fn largest(&self, eyes: [&EyeFrame; 2], rgb: [u8; 3]) -> Option<[[f64; 2]; 2]> {
-        let pairs = self.pairs_in(eyes, rgb).into_iter();
+    pub(super) fn largest(&self, images: [&ImageFrame; 2], rgb: [u8; 3]) -> Option<[[f64; 2]; 2]> {
+        let pairs = self.pairs_in(images, rgb).into_iter();
         let largest = pairs.max_by(|a, b| a.left.area_px.total_cmp(&b.left.area_px))?;
         Some([largest.left.centre, largest.right.centre])
     }
 
-    fn pairs_in(&self, eyes: [&EyeFrame; 2], rgb: [u8; 3]) -> Vec<Pair> {
+    fn pairs_in(&self, images: [&ImageFrame; 2], rgb: [u8; 3]) -> Vec<Pair> {
         let blobs = |k: usize| {
             let behind = Behind::Scene {
-                scene: &self.eyes[k],
+                scene: &self.images[k],
                 middle: self.middles[k],
             };
-            BlobMap::new(eyes[k], chroma_of_rgb(rgb), behind).blobs()
+            BlobMap::new(images[k], chroma_of_rgb(rgb), behind).blobs()
         };
         self.pairs(&blobs(0), &blobs(1))
     }
@@ -180,13 +180,13 @@ impl<'a> Scene<'a> {
     /// The tip in one frame, nearest to where it was if there is a choice.
     pub(super) fn tip(
         &self,
-        eyes: [&EyeFrame; 2],
+        images: [&ImageFrame; 2],
         rgb: [u8; 3],
         target: &Target,
         before: Option<Sighting>,
         since_s: f64,
     ) -> Option<Sighting> {
-        let pairs = self.pairs_in(eyes, rgb);
+        let pairs = self.pairs_in(images, rgb);
         let away = |p: &Pair| match before {
             // Large and near: a stray pixel far off must not win.
             Some(b) => {
@@ -216,11 +216,11 @@ impl<'a> Scene<'a> {
 }
 
 /// Median chroma of an image: what most of the scene looks like.
-fn middle_chroma(eye: &EyeFrame) -> Chroma {
+fn middle_chroma(image: &ImageFrame) -> Chroma {
     let median = |plane: &[u8]| -> f64 {
         let mut values: Vec<u8> = plane.iter().step_by(31).copied().collect();
         let middle = values.len() / 2;
         f64::from(*values.select_nth_unstable(middle).1) - 128.0
     };
-    [median(&eye.cb), median(&eye.cr)]
+    [median(&image.cb), median(&image.cr)]
 }

@@ -11,7 +11,7 @@ const TARGET: [f64; 3] = [0.1, 0.0, 0.45];
 const FPS: f64 = 60.0;
 
 fn camera() -> StereoCamera {
-    let eye = Intrinsics {
+    let image = Intrinsics {
         fx: 350.0,
         fy: 350.0,
         cx: 160.0,
@@ -21,8 +21,8 @@ fn camera() -> StereoCamera {
     StereoCamera {
         width_px: 320,
         height_px: 240,
-        left: eye,
-        right: eye,
+        left: image,
+        right: image,
         r_right_left: Matrix3::identity(),
         t_right_left_m: Vector3::new(0.063, 0.0, 0.0),
         r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),
@@ -46,16 +46,16 @@ fn frame(index: usize, balls: &[(Vector3<f64>, [u8; 3])]) -> StereoFrame {
     for (p, rgb) in balls {
         let ycc = ycc_from_rgb(*rgb);
         let radius = 0.02 * 350.0 / camera.to_left(p).z;
-        let eyes = [
+        let images = [
             camera.project_left(p).unwrap(),
             camera.project_right(p).unwrap(),
         ];
-        for (eye, [u0, v0]) in eyes.into_iter().enumerate() {
+        for (image, [u0, v0]) in images.into_iter().enumerate() {
             for pair in 0..width / 4 {
                 for v in 0..height {
                     let away = (2.0 * pair as f64 + 0.5 - u0).hypot(v as f64 - v0);
                     let a = (radius + 0.5 - away).clamp(0.0, 1.0) as f32;
-                    let at = 4 * (v * width / 2 + eye * width / 4 + pair);
+                    let at = 4 * (v * width / 2 + image * width / 4 + pair);
                     for (k, c) in [(0, 0), (1, 1), (2, 0), (3, 2)] {
                         let old = f32::from(yuyv[at + k]);
                         yuyv[at + k] = (old + a * (ycc[c] - old)).round() as u8;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::error::SourceError;
-use crate::frame::{EyeFrame, StereoFrame};
+use crate::frame::{ImageFrame, StereoFrame};
 use crate::track::Film;
 
 /// A recording of the left image, and perhaps of the right one.
@@ -20,7 +20,7 @@ pub trait FrameSource: std::fmt::Debug {
     ///
     /// # Errors
     /// The frame does not exist or is damaged.
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError>;
+    fn read_left(&mut self, index: usize) -> Result<ImageFrame, SourceError>;
 }
 
 /// A recording of side-by-side frames.
@@ -38,7 +38,7 @@ impl FrameSource for Vec<StereoFrame> {
         Vec::len(self)
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> Result<ImageFrame, SourceError> {
         self.read(index).map(|frame| frame.left())
     }
 }
@@ -56,7 +56,7 @@ impl FrameSource for Box<dyn StereoSource> {
         (**self).len()
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> Result<ImageFrame, SourceError> {
         (**self).read_left(index)
     }
 }
@@ -69,14 +69,14 @@ impl StereoSource for Box<dyn StereoSource> {
 
 /// Frames of the left image, and of the right one those that [`Film::needs_right`].
 #[derive(Debug, Clone, Default)]
-pub struct BothEyes {
+pub struct BothImages {
     /// Left image, all frames.
-    pub left: Vec<EyeFrame>,
+    pub left: Vec<ImageFrame>,
     /// Right image; none where the recording has none.
-    pub right: Vec<EyeFrame>,
+    pub right: Vec<ImageFrame>,
 }
 
-impl BothEyes {
+impl BothImages {
     /// For the tracker.
     #[must_use]
     pub fn film(&self) -> Film<'_> {
@@ -101,10 +101,10 @@ impl AnySource {
     ///
     /// # Errors
     /// A frame is damaged.
-    pub fn read(&mut self) -> Result<BothEyes, SourceError> {
+    pub fn read(&mut self) -> Result<BothImages, SourceError> {
         match self {
             Self::Both(source) => read_film(&mut **source),
-            Self::Left(source) => Ok(BothEyes {
+            Self::Left(source) => Ok(BothImages {
                 left: (0..source.len())
                     .map(|index| source.read_left(index))
                     .collect::<Result<_, _>>()?,
@@ -118,7 +118,7 @@ impl AnySource {
 ///
 /// # Errors
 /// A frame is damaged.
-pub fn read_film(source: &mut dyn StereoSource) -> Result<BothEyes, SourceError> {
+pub fn read_film(source: &mut dyn StereoSource) -> Result<BothImages, SourceError> {
     let count = source.len();
     let (mut left, mut right) = (Vec::with_capacity(count), Vec::new());
     for index in 0..count {
@@ -130,5 +130,5 @@ pub fn read_film(source: &mut dyn StereoSource) -> Result<BothEyes, SourceError>
             left.push(source.read_left(index)?);
         }
     }
-    Ok(BothEyes { left, right })
+    Ok(BothImages { left, right })
 }

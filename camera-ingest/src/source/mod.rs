@@ -17,7 +17,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 
 pub use error::SourceError;
-pub use frames::{AnySource, BothEyes, FrameSource, StereoSource, read_film};
+pub use frames::{AnySource, BothImages, FrameSource, StereoSource, read_film};
 
 /// Opens a recording by what it is: a folder with `video.avi` and perhaps
 /// `timestamps.csv`, a folder of side-by-side pictures in the order of their names, a raw

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::error::SourceError;
 use super::frames::{FrameSource, StereoSource};
 use super::stamps::Stamp;
-use crate::frame::{EyeFrame, FrameError, StereoFrame};
+use crate::frame::{FrameError, ImageFrame, StereoFrame};
 
 /// How a side-by-side picture is coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,12 +40,17 @@ impl Coding {
         }
     }
 
-    fn left(self, bytes: &[u8], stamp: Stamp, room: &mut Vec<u8>) -> Result<EyeFrame, FrameError> {
+    fn left(
+        self,
+        bytes: &[u8],
+        stamp: Stamp,
+        room: &mut Vec<u8>,
+    ) -> Result<ImageFrame, FrameError> {
         let (stamp_ns, sequence) = (stamp.stamp_ns, stamp.sequence);
         match self {
-            Self::Jpeg => EyeFrame::left_from_jpeg(bytes, stamp_ns, sequence, room),
+            Self::Jpeg => ImageFrame::left_from_jpeg(bytes, stamp_ns, sequence, room),
             Self::Png => self.stereo(bytes, stamp).map(|frame| frame.left()),
-            Self::Yuyv(size_px) => EyeFrame::left_from_yuyv(bytes, size_px, stamp_ns, sequence),
+            Self::Yuyv(size_px) => ImageFrame::left_from_yuyv(bytes, size_px, stamp_ns, sequence),
         }
     }
 }
@@ -138,7 +143,7 @@ impl FrameSource for Stored {
         self.stamps.len()
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> Result<ImageFrame, SourceError> {
         let mut room = std::mem::take(&mut self.room);
         let left = |coding: Coding, bytes: &[u8], stamp| coding.left(bytes, stamp, &mut room);
         let frame = self.decode(index, left, |f| [2 * f.width_px, f.height_px]);

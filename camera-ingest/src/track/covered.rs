@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Colours further apart than this are of two things (grey levels, summed over channels).
 const OTHER: i32 = 40;
@@ -33,7 +33,7 @@ fn apart(a: Pair, b: Pair) -> i32 {
     (off(0) + off(1)) / 2 + off(2) + off(3)
 }
 
-fn pair(frame: &EyeFrame, at: usize) -> Pair {
+fn pair(frame: &ImageFrame, at: usize) -> Pair {
     [
         frame.luma[2 * at],
         frame.luma[2 * at + 1],
@@ -43,7 +43,7 @@ fn pair(frame: &EyeFrame, at: usize) -> Pair {
 }
 
 /// A frame and how bright it is relative to the scene.
-pub(super) type Lit<'a> = (&'a EyeFrame, f32);
+pub(super) type Lit<'a> = (&'a ImageFrame, f32);
 
 /// A place of a frame in the scene's light.
 fn lit_pair((frame, gain): Lit<'_>, at: usize) -> Pair {
@@ -53,7 +53,7 @@ fn lit_pair((frame, gain): Lit<'_>, at: usize) -> Pair {
     [luma(a), luma(b), chroma(cb), chroma(cr)]
 }
 
-fn put(frame: &mut EyeFrame, at: usize, [a, b, cb, cr]: Pair) {
+fn put(frame: &mut ImageFrame, at: usize, [a, b, cb, cr]: Pair) {
     (frame.luma[2 * at], frame.luma[2 * at + 1]) = (a, b);
     (frame.cb[at], frame.cr[at]) = (cb, cr);
 }
@@ -72,7 +72,7 @@ enum Place {
 }
 
 /// Takes out of `scene`, the median over `frames`, what covers it mostly.
-pub(super) fn uncover(scene: &mut EyeFrame, frames: &[Lit<'_>]) {
+pub(super) fn uncover(scene: &mut ImageFrame, frames: &[Lit<'_>]) {
     let width = scene.width_px / 2;
     let open = open_places(scene, frames);
     if !open.contains(&true) {
@@ -100,7 +100,7 @@ pub(super) fn uncover(scene: &mut EyeFrame, frames: &[Lit<'_>]) {
 }
 
 /// Places that are not of the median's colour in enough of the frames.
-fn open_places(scene: &EyeFrame, frames: &[Lit<'_>]) -> Vec<bool> {
+fn open_places(scene: &ImageFrame, frames: &[Lit<'_>]) -> Vec<bool> {
     let mut count = vec![0_u16; scene.cb.len()];
     for &frame in frames {
         for (at, count) in count.iter_mut().enumerate() {
@@ -155,7 +155,7 @@ fn beside(at: usize, width: usize, len: usize) -> impl Iterator<Item = usize> {
 /// What covers an open place and what is behind, if the scene is not what its median
 /// shows.
 fn uncovered(
-    scene: &EyeFrame,
+    scene: &ImageFrame,
     places: &[Place],
     at: usize,
     frames: &[Lit<'_>],
@@ -186,7 +186,7 @@ fn uncovered(
 
 /// Whether what was taken away at `from` goes on at a place that never or hardly ever
 /// showed the scene, and if so what is behind it there.
-fn continued(scene: &EyeFrame, there: Place, from: usize, at: usize) -> Option<(Pair, Pair)> {
+fn continued(scene: &ImageFrame, there: Place, from: usize, at: usize) -> Option<(Pair, Pair)> {
     let Place::Done(Some(covering)) = there else {
         return None;
     };
@@ -203,8 +203,8 @@ mod tests {
     const HEIGHT: usize = 128;
 
     /// A textured wall, a still post, and a shaded disc about a column.
-    fn frame(centre_u: f64) -> EyeFrame {
-        let mut frame = EyeFrame::grey([WIDTH, HEIGHT], 40);
+    fn frame(centre_u: f64) -> ImageFrame {
+        let mut frame = ImageFrame::grey([WIDTH, HEIGHT], 40);
         for i in 0..WIDTH * HEIGHT {
             let (u, v) = ((i % WIDTH) as f64, (i / WIDTH) as f64);
             let wall = 120 + ((u * 0.7).sin() * 6.0 + (v * 0.4).cos() * 6.0) as i16;
@@ -221,20 +221,20 @@ mod tests {
         frame
     }
 
-    fn lit(frames: &[EyeFrame]) -> Vec<Lit<'_>> {
+    fn lit(frames: &[ImageFrame]) -> Vec<Lit<'_>> {
         frames.iter().map(|frame| (frame, 1.0)).collect()
     }
 
-    fn scene_of(amplitude_px: f64) -> EyeFrame {
+    fn scene_of(amplitude_px: f64) -> ImageFrame {
         let swing = |i: usize| 40.0 + amplitude_px * (i as f64 * 0.37).sin();
-        let frames: Vec<EyeFrame> = (0..31).map(|i| frame(swing(i))).collect();
+        let frames: Vec<ImageFrame> = (0..31).map(|i| frame(swing(i))).collect();
         let mut scene = median_frame(&frames);
         uncover(&mut scene, &lit(&frames));
         scene
     }
 
     /// Places whose scene is another than without the disc.
-    fn wrong(scene: &EyeFrame) -> usize {
+    fn wrong(scene: &ImageFrame) -> usize {
         let empty = frame(-100.0);
         (0..scene.cb.len())
             .filter(|at| apart(pair(scene, *at), pair(&empty, *at)) > OTHER)

@@ -21,7 +21,7 @@ const LEAST_FACING: f64 = 0.35;
 /// Map from raw left-eye pixels to the plane (m).
 #[derive(Debug, Clone)]
 pub(super) struct RopePlane {
-    eye: Intrinsics,
+    image: Intrinsics,
     /// Origin and axes in the left optical frame.
     origin_c: Vector3<f64>,
     right_c: Vector3<f64>,
@@ -53,7 +53,7 @@ impl RopePlane {
         let to_camera = |v: Vector3<f64>| camera.r_w_cam.tr_mul(&v);
         let (right_c, down_c) = (to_camera(right_w), to_camera(-Vector3::z()));
         Some(Self {
-            eye: camera.left,
+            image: camera.left,
             normal_c: right_c.cross(&down_c),
             px_per_m: camera.left.fx.midpoint(camera.left.fy) / origin_c.z,
             origin_c,
@@ -64,7 +64,7 @@ impl RopePlane {
 
     /// Point of the plane seen at a raw pixel.
     pub(super) fn point_at(&self, pixel: [f64; 2]) -> Point {
-        let [x, y] = self.eye.undistort(pixel);
+        let [x, y] = self.image.undistort(pixel);
         let ray = Vector3::new(x, y, 1.0);
         let along = self.normal_c.dot(&ray);
         let depth = self.normal_c.dot(&self.origin_c) / along;

@@ -2,7 +2,7 @@
 //! follows points of the rope through the film.
 
 use super::{TrackError, TrackResult};
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use shared_types::keypoints::TrackedFrame;
 
 /// Why a learned model gives no answer.
@@ -41,7 +41,7 @@ pub trait PointTracker {
     /// No answer.
     fn follow(
         &mut self,
-        frames: &[EyeFrame],
+        frames: &[ImageFrame],
         points: &[[f64; 2]],
     ) -> Result<Vec<Vec<SeenPoint>>, ModelError>;
 }
@@ -60,7 +60,7 @@ impl TrackResult {
     /// The tracker gives no answer, or hardly sees the rope in most frames.
     pub fn by_points(
         mut self,
-        frames: &[EyeFrame],
+        frames: &[ImageFrame],
         tracker: &mut dyn PointTracker,
     ) -> Result<Self, TrackError> {
         let tracked = &mut self.track.frames;
@@ -70,8 +70,8 @@ impl TrackResult {
             visible: 1.0,
         };
         let first: Vec<SeenPoint> = tracked[0].points.iter().map(certain).collect();
-        let asked: Vec<[f64; 2]> = evenly(&first, count).iter().map(|s| s.pixel).collect();
-        let seen = tracker.follow(frames, &asked)?;
+        let requested: Vec<[f64; 2]> = evenly(&first, count).iter().map(|s| s.pixel).collect();
+        let seen = tracker.follow(frames, &requested)?;
         check_count("frames", seen.len(), tracked.len())?;
         for (frame, seen) in tracked.iter_mut().zip(&seen) {
             check_count("points of a frame", seen.len(), count)?;

@@ -7,7 +7,7 @@ use shared_types::StereoCamera;
 use shared_types::keypoints::MAX_KEYPOINTS;
 
 use super::ModelError;
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Fewer frames show no motion.
 const MIN_FRAMES: usize = 8;
@@ -88,7 +88,7 @@ fn unless(fine: bool, problem: impl FnOnce() -> String) -> Result<(), TrackError
 }
 
 pub(super) fn check(
-    frames: &[EyeFrame],
+    frames: &[ImageFrame],
     camera: &StereoCamera,
     motion: &dyn AttachMotion,
     keypoints: usize,

@@ -1,7 +1,7 @@
 //! The scene without the rope, and how noisy it is.
 
 use super::covered;
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::vectors::widest;
 
 /// Frames that the tracker's scene is made of; a median of fewer shows the rope.
@@ -16,7 +16,7 @@ const SPARSE: usize = 97;
 /// One eye's scene without what moves before it.
 #[derive(Debug)]
 pub(super) struct Scene {
-    pub(super) image: EyeFrame,
+    pub(super) image: ImageFrame,
     /// Typical distance of a still pixel from the median (root of the median
     /// square over the three channels).
     pub(super) noise: f32,
@@ -24,7 +24,7 @@ pub(super) struct Scene {
 
 impl Scene {
     /// Of a film: the median over frames in which much has moved.
-    pub(super) fn of(frames: &[EyeFrame]) -> Self {
+    pub(super) fn of(frames: &[ImageFrame]) -> Self {
         let chosen = frames_by_motion(frames, SCENE_FRAMES);
         let median = median(&chosen);
         Self {
@@ -34,25 +34,25 @@ impl Scene {
     }
 
     /// Brightness of a frame relative to the scene.
-    pub(super) fn gain(&self, frame: &EyeFrame) -> f32 {
+    pub(super) fn gain(&self, frame: &ImageFrame) -> f32 {
         gain(&self.image, frame)
     }
 }
 
 /// The scene behind what moves in some frames, of which `count` at most are looked at.
-pub(crate) fn uncovered_scene(frames: &[EyeFrame], count: usize) -> EyeFrame {
+pub(crate) fn uncovered_scene(frames: &[ImageFrame], count: usize) -> ImageFrame {
     let chosen = frames_by_motion(frames, count);
     uncovered(median(&chosen), &chosen)
 }
 
 /// Per-pixel median of some frames.
-pub(crate) fn median_frame(frames: &[EyeFrame]) -> EyeFrame {
+pub(crate) fn median_frame(frames: &[ImageFrame]) -> ImageFrame {
     median(&frames.iter().collect::<Vec<_>>())
 }
 
-fn median(frames: &[&EyeFrame]) -> EyeFrame {
+fn median(frames: &[&ImageFrame]) -> ImageFrame {
     let mut values = vec![0; frames.len()];
-    let mut plane = |pick: fn(&EyeFrame) -> &[u8]| -> Vec<u8> {
+    let mut plane = |pick: fn(&ImageFrame) -> &[u8]| -> Vec<u8> {
         let planes: Vec<&[u8]> = frames.iter().map(|f| pick(f)).collect();
         let mut middle = |at: usize| {
             for (value, plane) in values.iter_mut().zip(&planes) {
@@ -62,7 +62,7 @@ fn median(frames: &[&EyeFrame]) -> EyeFrame {
         };
         (0..planes[0].len()).map(&mut middle).collect()
     };
-    EyeFrame {
+    ImageFrame {
         luma: plane(|f| &f.luma),
         cb: plane(|f| &f.cb),
         cr: plane(|f| &f.cr),
@@ -71,7 +71,7 @@ fn median(frames: &[&EyeFrame]) -> EyeFrame {
 }
 
 /// The median over some frames without what covers the scene in most of them.
-fn uncovered(mut median: EyeFrame, frames: &[&EyeFrame]) -> EyeFrame {
+fn uncovered(mut median: ImageFrame, frames: &[&ImageFrame]) -> ImageFrame {
     let lit: Vec<_> = frames.iter().map(|f| (*f, gain(&median, f))).collect();
     covered::uncover(&mut median, &lit);
     median
@@ -79,7 +79,7 @@ fn uncovered(mut median: EyeFrame, frames: &[&EyeFrame]) -> EyeFrame {
 
 /// Brightness of a frame relative to the scene (automatic exposure drifts): median over a
 /// sparse grid, so that what moves does not count.
-fn gain(scene: &EyeFrame, frame: &EyeFrame) -> f32 {
+fn gain(scene: &ImageFrame, frame: &ImageFrame) -> f32 {
     let mut ratios: Vec<f32> = (0..frame.luma.len())
         .step_by(SPARSE)
         .filter(|&i| (40..220).contains(&scene.luma[i]))
@@ -95,7 +95,7 @@ fn gain(scene: &EyeFrame, frame: &EyeFrame) -> f32 {
 
 /// `count` frames equally spaced in how much has moved, not in time: while the
 /// rope stands still it must not become part of the median.
-fn frames_by_motion(frames: &[EyeFrame], count: usize) -> Vec<&EyeFrame> {
+fn frames_by_motion(frames: &[ImageFrame], count: usize) -> Vec<&ImageFrame> {
     /// Part of the frames spread over time whatever moves.
     const EVEN: f64 = 0.1;
     let mut moved = vec![0.0];
@@ -121,11 +121,11 @@ fn frames_by_motion(frames: &[EyeFrame], count: usize) -> Vec<&EyeFrame> {
 }
 
 /// Part of the pixels that changed by more than noise, on every fourth row.
-fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
+fn changed(a: &ImageFrame, b: &ImageFrame) -> f64 {
     /// Grey levels, for the sum of two pixels.
     const THRESHOLD: u16 = 40;
     let (mut count, mut all) = (0_u32, 0_u32);
-    let rows = |f: &EyeFrame| f.width_px * 4;
+    let rows = |f: &ImageFrame| f.width_px * 4;
     widest(
         #[inline(always)]
         || {
@@ -142,7 +142,7 @@ fn changed(a: &EyeFrame, b: &EyeFrame) -> f64 {
     f64::from(count) / f64::from(all.max(1))
 }
 
-fn noise_about(scene: &EyeFrame, frame: &EyeFrame) -> f32 {
+fn noise_about(scene: &ImageFrame, frame: &ImageFrame) -> f32 {
     let width = scene.width_px;
     let square = |i: usize| {
         let [a, b] = [scene, frame].map(|f| f.ycc(i % width, i / width).map(f32::from));

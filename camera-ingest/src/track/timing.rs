@@ -105,7 +105,7 @@ fn inverse_normal<'a>(rows: impl Iterator<Item = &'a Vector3<f64>>) -> Option<Ma
         .try_inverse()
 }
 
-/// Fits offset and place to the clamps seen at their times (s). `told` is the clamp's
+/// Fits offset and place to the clamps seen at their times (s). `reported` is the clamp's
 /// place on the plane by the arm for a frame that starts at a time, `pixel_m` how large
 /// a pixel is there.
 ///
@@ -113,9 +113,9 @@ fn inverse_normal<'a>(rows: impl Iterator<Item = &'a Vector3<f64>>) -> Option<Ma
 pub(super) fn fit(
     seen: &[(f64, SeenClamp)],
     pixel_m: f64,
-    told: impl Fn(f64) -> Point,
+    reported: impl Fn(f64) -> Point,
 ) -> Option<ClampFit> {
-    let [short, long] = [0, 1].map(|part| fit_part(seen, part, &told));
+    let [short, long] = [0, 1].map(|part| fit_part(seen, part, &reported));
     let (short, long) = (short?, long?);
     Some(ClampFit {
         time_std_s: long
@@ -133,7 +133,7 @@ pub(super) fn fit(
 fn fit_part(
     seen: &[(f64, SeenClamp)],
     part: usize,
-    told: &impl Fn(f64) -> Point,
+    reported: &impl Fn(f64) -> Point,
 ) -> Option<ClampFit> {
     let mut kept: Vec<(f64, SeenClamp)> = seen.to_vec();
     let mut x = Vector3::zeros();
@@ -144,7 +144,7 @@ fn fit_part(
         }
         let rows: Vec<(Vector3<f64>, f64)> = kept
             .iter()
-            .map(|(t, s)| row(*t, s, part, &x, told))
+            .map(|(t, s)| row(*t, s, part, &x, reported))
             .collect();
         let inverse = inverse_normal(rows.iter().map(|(j, _)| j))?;
         let step: Vector3<f64> = inverse * rows.iter().map(|(j, r)| j * *r).sum::<Vector3<f64>>();
@@ -159,7 +159,7 @@ fn fit_part(
         }
     }
     let covariance = found?;
-    if motion_m(&kept, told) < LEAST_MOTION_M {
+    if motion_m(&kept, reported) < LEAST_MOTION_M {
         return None;
     }
     Some(ClampFit {
@@ -177,10 +177,10 @@ fn row(
     seen: &SeenClamp,
     part: usize,
     x: &Vector3<f64>,
-    told: &impl Fn(f64) -> Point,
+    reported: &impl Fn(f64) -> Point,
 ) -> (Vector3<f64>, f64) {
     let across = |p: Point| p[0] * seen.across[0] + p[1] * seen.across[1];
-    let at = |shift_s: f64| across(told(t_s - x[0] + shift_s));
+    let at = |shift_s: f64| across(reported(t_s - x[0] + shift_s));
     let (before, here, after) = (at(-STEP_S), at(0.0), at(STEP_S));
     let speed = (after - before) / (2.0 * STEP_S);
     let acceleration = (after - 2.0 * here + before) / (STEP_S * STEP_S);
@@ -198,8 +198,8 @@ fn repeats(errors: &[f64]) -> f64 {
 }
 
 /// Root mean square of the clamp's way across the rope (m).
-fn motion_m(seen: &[(f64, SeenClamp)], told: &impl Fn(f64) -> Point) -> f64 {
-    let places: Vec<f64> = seen.iter().map(|(t, _)| told(*t)[0]).collect();
+fn motion_m(seen: &[(f64, SeenClamp)], reported: &impl Fn(f64) -> Point) -> f64 {
+    let places: Vec<f64> = seen.iter().map(|(t, _)| reported(*t)[0]).collect();
     let count = places.len() as f64;
     let mean = places.iter().sum::<f64>() / count;
     (places.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / count).sqrt()
@@ -209,7 +209,7 @@ fn motion_m(seen: &[(f64, SeenClamp)], told: &impl Fn(f64) -> Point) -> f64 {
 mod tests {
     use super::*;
 
-    fn told(t_s: f64) -> Point {
+    fn reported(t_s: f64) -> Point {
         [0.12 * (5.0 * t_s).sin() + 0.03 * (11.0 * t_s).sin(), 0.0]
     }
 
@@ -223,11 +223,11 @@ mod tests {
                 let chance = f64::from(i * 7919 % 1000) / 500.0 - 1.0;
                 error = 0.8 * error + noise_m * chance;
                 let bend = 1e-4
-                    * (told(t - late_s + 1e-3)[0] + told(t - late_s - 1e-3)[0]
-                        - 2.0 * told(t - late_s)[0])
+                    * (reported(t - late_s + 1e-3)[0] + reported(t - late_s - 1e-3)[0]
+                        - 2.0 * reported(t - late_s)[0])
                     / 1e-6;
                 let seen = SeenClamp {
-                    at: [[told(t - late_s)[0] + aside_m + bend + error, 0.3]; 2],
+                    at: [[reported(t - late_s)[0] + aside_m + bend + error, 0.3]; 2],
                     across: [1.0, 0.0],
                 };
                 (t, seen)
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn offset_and_place_are_found_within_what_is_said() {
         for (late_s, aside_m) in [(0.0, 0.0), (0.012, 0.003), (-0.035, -0.008)] {
-            let found = fit(&film(late_s, aside_m, 5e-4), 0.0, told).unwrap();
+            let found = fit(&film(late_s, aside_m, 5e-4), 0.0, reported).unwrap();
             assert!(
                 found.time_std_s < 1e-3 && found.aside_std_m < 1e-3,
                 "{found:?}"
@@ -260,11 +260,11 @@ mod tests {
             frame.1.at[0][0] += 0.1;
             frame.1.at[1][0] += 0.1;
         }
-        let found = fit(&seen, 0.0, told).unwrap();
+        let found = fit(&seen, 0.0, reported).unwrap();
         assert!((found.time_offset_s - 0.012).abs() < 1.5e-3, "{found:?}");
         assert_eq!(found.frames, 390);
         assert_eq!(fit(&film(0.0, 0.0, 5e-4), 0.0, |_| [0.1, 0.0]), None);
-        assert_eq!(fit(&seen[..20], 0.0, told), None);
+        assert_eq!(fit(&seen[..20], 0.0, reported), None);
     }
 
     #[test]

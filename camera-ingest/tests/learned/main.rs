@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use camera_ingest::learned::OnnxTracker;
 use camera_ingest::track::{ModelError, PointTracker, SeenPoint};
-use camera_ingest::{EyeFrame, TrackError};
+use camera_ingest::{ImageFrame, TrackError};
 use onnx::Axis::{Is, Open};
 use onnx::{Axis, DOUBLE, FLOAT, Graph, steady};
 use recording::{Wiggle, quantile};
@@ -35,17 +35,17 @@ fn file(bytes: &[u8]) -> File {
     }
 }
 
-fn grey(width_px: usize, height_px: usize, stamp_ns: u64) -> EyeFrame {
-    EyeFrame {
+fn grey(width_px: usize, height_px: usize, stamp_ns: u64) -> ImageFrame {
+    ImageFrame {
         stamp_ns,
         sequence: stamp_ns,
-        ..EyeFrame::grey([width_px, height_px], 90)
+        ..ImageFrame::grey([width_px, height_px], 90)
     }
 }
 
 #[test]
 fn chunks_join_where_the_points_are_seen_best() {
-    let frames: Vec<EyeFrame> = (1..14).map(|stamp| grey(32, 16, stamp)).collect();
+    let frames: Vec<ImageFrame> = (1..14).map(|stamp| grey(32, 16, stamp)).collect();
     let points = [[4.0, 5.0], [6.5, 3.0], [8.0, 4.0], [9.0, 9.0]];
     // A chunk of 8 shares 2 frames; its last one is seen worse than the one before.
     let visible = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.9, 0.3];
@@ -56,11 +56,11 @@ fn chunks_join_where_the_points_are_seen_best() {
     assert_eq!(seen.len(), 13);
     for (frame, seen) in seen.iter().enumerate() {
         // The last frames of both chunks; nothing is followed on from there.
-        let astray = f64::from(u8::from(frame == 7 || frame == 12));
+        let deviation = f64::from(u8::from(frame == 7 || frame == 12));
         for (point, seen) in points.iter().zip(seen) {
             // Half a pixel of half the size is a whole one.
             let wanted = [
-                point[0] + frame as f64 + 2.0 * astray,
+                point[0] + frame as f64 + 2.0 * deviation,
                 point[1] - 0.5 * frame as f64,
             ];
             for k in 0..2 {
@@ -75,7 +75,7 @@ fn chunks_join_where_the_points_are_seen_best() {
 }
 
 /// Knows where the rope is.
-struct Told<'a> {
+struct Reported<'a> {
     wiggle: &'a Wiggle,
     /// Frames in which it sees nothing.
     blind: std::ops::Range<usize>,
@@ -83,18 +83,18 @@ struct Told<'a> {
     kept: usize,
 }
 
-impl PointTracker for Told<'_> {
+impl PointTracker for Reported<'_> {
     fn points(&self) -> Option<usize> {
         Some(self.wiggle.nodes())
     }
 
     fn follow(
         &mut self,
-        frames: &[EyeFrame],
+        frames: &[ImageFrame],
         points: &[[f64; 2]],
     ) -> Result<Vec<Vec<SeenPoint>>, ModelError> {
-        for (asked, truth) in points.iter().zip(&self.wiggle.truth[0]) {
-            let off = (asked[0] - truth[0]).hypot(asked[1] - truth[1]);
+        for (requested, truth) in points.iter().zip(&self.wiggle.truth[0]) {
+            let off = (requested[0] - truth[0]).hypot(requested[1] - truth[1]);
             assert!(off < 5.0, "asked for a point {off} px off");
         }
         let point = |frame: usize, pixel: &[f64; 2]| SeenPoint {
@@ -120,15 +120,15 @@ fn followed_points_become_keypoints_and_lost_frames() {
         return;
     };
     let explained = wiggle.track().unwrap();
-    let told = |blind, kept| {
-        let mut told = Told {
+    let reported = |blind, kept| {
+        let mut reported = Reported {
             wiggle: &wiggle,
             blind,
             kept,
         };
-        explained.clone().by_points(&wiggle.frames, &mut told)
+        explained.clone().by_points(&wiggle.frames, &mut reported)
     };
-    let result = told(40..50, 0).unwrap();
+    let result = reported(40..50, 0).unwrap();
     result.track.validate().unwrap();
     assert_eq!(result.appearance, explained.appearance);
     for (index, frame) in result.track.frames.iter().enumerate() {
@@ -142,7 +142,7 @@ fn followed_points_become_keypoints_and_lost_frames() {
     println!("told: median {median:.2}, p95 {p95:.2} px");
     assert!(median < 0.5 && p95 < 1.5, "{median} {p95}");
 
-    let blind = told(10..70, 0).unwrap_err();
+    let blind = reported(10..70, 0).unwrap_err();
     assert_eq!(
         blind,
         TrackError::MostlyLost {
@@ -151,7 +151,7 @@ fn followed_points_become_keypoints_and_lost_frames() {
             first: 10
         }
     );
-    let short = told(0..0, 2).unwrap_err().to_string();
+    let short = reported(0..0, 2).unwrap_err().to_string();
     assert!(short.contains("gave 88 frames, it must give 90"), "{short}");
 }
 

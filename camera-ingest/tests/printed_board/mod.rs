@@ -3,7 +3,7 @@
 
 use calib_targets_charuco::resolve_dictionary;
 use camera_ingest::calib::board::{Board, BoardPose};
-use camera_ingest::{EyeFrame, StereoFrame};
+use camera_ingest::{ImageFrame, StereoFrame};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ const DICTIONARY: &str = "DICT_4X4_50";
 
 /// An HD camera with distortion, a little tilted.
 pub(crate) fn camera() -> StereoCamera {
-    let eye = Intrinsics {
+    let image = Intrinsics {
         fx: 700.9,
         fy: 701.2,
         cx: 637.8,
@@ -25,11 +25,11 @@ pub(crate) fn camera() -> StereoCamera {
     StereoCamera {
         width_px: 1280,
         height_px: 720,
-        left: eye,
+        left: image,
         right: Intrinsics {
             cx: 643.9,
             cy: 369.4,
-            ..eye
+            ..image
         },
         r_right_left: *Rotation3::new(Vector3::new(-1.4e-3, -4.3e-3, 9e-4)).matrix(),
         t_right_left_m: Vector3::new(0.0627, 2e-5, -6e-6),
@@ -99,13 +99,13 @@ fn ink(board: &Board, x: f64, y: f64) -> f64 {
 }
 
 /// One image's picture, four samples a pixel, with noise.
-fn eye(
+fn image(
     board: &Board,
     intrinsics: &Intrinsics,
     r_w_eye: &Matrix3<f64>,
     p_w_eye_m: &Vector3<f64>,
     seed: u64,
-) -> EyeFrame {
+) -> ImageFrame {
     let (width_px, height_px) = (1280, 720);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let noise = Normal::new(0.0, 2.0).unwrap();
@@ -127,21 +127,21 @@ fn eye(
             .round()
             .clamp(0.0, 255.0) as u8;
     }
-    EyeFrame {
+    ImageFrame {
         stamp_ns: seed * 16_666_667,
         sequence: seed,
         luma,
-        ..EyeFrame::grey([width_px, height_px], 0)
+        ..ImageFrame::grey([width_px, height_px], 0)
     }
 }
 
-fn side_by_side(left: &EyeFrame, right: &EyeFrame) -> StereoFrame {
+fn side_by_side(left: &ImageFrame, right: &ImageFrame) -> StereoFrame {
     let join = |a: &[u8], b: &[u8], width: usize| -> Vec<u8> {
         let rows = a.chunks_exact(width).zip(b.chunks_exact(width));
         rows.flat_map(|(a, b)| a.iter().chain(b).copied()).collect()
     };
     let w = left.width_px;
-    StereoFrame(EyeFrame {
+    StereoFrame(ImageFrame {
         width_px: 2 * w,
         luma: join(&left.luma, &right.luma, w),
         cb: join(&left.cb, &right.cb, w / 2),
@@ -156,14 +156,14 @@ pub(crate) fn film(board: &Board, camera: &StereoCamera, frames: u64) -> Vec<Ste
     let p_w_right_m = camera.p_w_cam_m + r_w_right * camera.t_right_left_m;
     (0..frames)
         .map(|seed| {
-            let left = eye(
+            let left = image(
                 board,
                 &camera.left,
                 &camera.r_w_cam,
                 &camera.p_w_cam_m,
                 2 * seed,
             );
-            let right = eye(board, &camera.right, &r_w_right, &p_w_right_m, 2 * seed + 1);
+            let right = image(board, &camera.right, &r_w_right, &p_w_right_m, 2 * seed + 1);
             side_by_side(&left, &right)
         })
         .collect()

@@ -3,7 +3,7 @@
 
 use super::Wiggle;
 use super::recording::median;
-use camera_ingest::EyeFrame;
+use camera_ingest::ImageFrame;
 use camera_ingest::frame::ycc_from_rgb;
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -16,7 +16,7 @@ fn byte(x: f64) -> u8 {
 }
 
 /// Luma and chroma planes, and how many pixels of a row a value stands for.
-fn planes(frame: &mut EyeFrame) -> [(&mut Vec<u8>, usize); 3] {
+fn planes(frame: &mut ImageFrame) -> [(&mut Vec<u8>, usize); 3] {
     [(&mut frame.luma, 1), (&mut frame.cb, 2), (&mut frame.cr, 2)]
 }
 
@@ -115,7 +115,7 @@ impl Wiggle {
                     ]
                 })
                 .collect();
-            let stroke = |frame: &mut EyeFrame, a: [f64; 2], b: [f64; 2], radius: f64, colour| {
+            let stroke = |frame: &mut ImageFrame, a: [f64; 2], b: [f64; 2], radius: f64, colour| {
                 let low = [0, 1].map(|k| a[k].min(b[k]) - radius - 1.0);
                 let high = [0, 1].map(|k| a[k].max(b[k]) + radius + 1.0);
                 let inside = |x, y| distance([x, y], a, b) < radius;
@@ -199,9 +199,9 @@ impl Wiggle {
             .iter_mut()
             .flatten()
             .for_each(|p| p[0] = last - p[0]);
-        let eye = &mut self.camera.left;
-        eye.cx = last - eye.cx;
-        eye.distortion[3] = -eye.distortion[3];
+        let image = &mut self.camera.left;
+        image.cx = last - image.cx;
+        image.distortion[3] = -image.distortion[3];
         let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
         self.camera.r_w_cam = mirror * self.camera.r_w_cam * mirror;
         self.camera.p_w_cam_m = mirror * self.camera.p_w_cam_m;
@@ -244,12 +244,12 @@ impl Wiggle {
         let camera = &mut self.camera;
         camera.r_w_cam *= turn.transpose();
         (camera.width_px, camera.height_px) = (camera.height_px, camera.width_px);
-        let eye = camera.left;
-        let [k1, k2, p1, p2, k3] = eye.distortion;
-        camera.left.fx = eye.fy;
-        camera.left.fy = eye.fx;
-        camera.left.cx = last - eye.cy;
-        camera.left.cy = eye.cx;
+        let image = camera.left;
+        let [k1, k2, p1, p2, k3] = image.distortion;
+        camera.left.fx = image.fy;
+        camera.left.fy = image.fx;
+        camera.left.cx = last - image.cy;
+        camera.left.cy = image.cx;
         camera.left.distortion = [k1, k2, p2, -p1, k3];
         self
     }
@@ -257,7 +257,7 @@ impl Wiggle {
 
 /// Paints within a box `[u0, v0, u1, v1]`.
 fn paint(
-    frame: &mut EyeFrame,
+    frame: &mut ImageFrame,
     [u0, v0, u1, v1]: [f64; 4],
     [y, cb, cr]: [f32; 3],
     inside: impl Fn(f64, f64) -> bool,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use arm_model::{JointVector, Pole};
 use camera_ingest::source::{FrameSource, read_film};
-use camera_ingest::{EyeFrame, Film, TrackError, TrackResult, load_camera, open_video, track};
+use camera_ingest::{Film, ImageFrame, TrackError, TrackResult, load_camera, open_video, track};
 use rope_sim::{AttachMotion, MeasuredArm, PoseRow, PoseTrack};
 use shared_types::StereoCamera;
 
@@ -93,9 +93,9 @@ pub(crate) fn motion(folder: &Path) -> Box<dyn AttachMotion> {
 /// A wiggle in memory: left image, camera, clamp and truth.
 #[derive(Clone)]
 pub(crate) struct Wiggle {
-    pub(crate) frames: Vec<EyeFrame>,
+    pub(crate) frames: Vec<ImageFrame>,
     /// Right images, where a test looks at them.
-    pub(crate) right: Vec<EyeFrame>,
+    pub(crate) right: Vec<ImageFrame>,
     pub(crate) camera: StereoCamera,
     /// Poses of the clamp.
     pub(crate) poses: Vec<PoseRow>,
@@ -172,9 +172,9 @@ pub(crate) fn quantile(values: &[f64], q: f64) -> f64 {
 }
 
 /// Median over every seventh frame.
-pub(crate) fn median(frames: &[EyeFrame]) -> EyeFrame {
-    let chosen: Vec<&EyeFrame> = frames.iter().step_by(7).collect();
-    let plane = |pick: fn(&EyeFrame) -> &Vec<u8>| -> Vec<u8> {
+pub(crate) fn median(frames: &[ImageFrame]) -> ImageFrame {
+    let chosen: Vec<&ImageFrame> = frames.iter().step_by(7).collect();
+    let plane = |pick: fn(&ImageFrame) -> &Vec<u8>| -> Vec<u8> {
         (0..pick(chosen[0]).len())
             .map(|at| {
                 let mut values: Vec<u8> = chosen.iter().map(|f| pick(f)[at]).collect();
@@ -183,7 +183,7 @@ pub(crate) fn median(frames: &[EyeFrame]) -> EyeFrame {
             })
             .collect()
     };
-    EyeFrame {
+    ImageFrame {
         luma: plane(|f| &f.luma),
         cb: plane(|f| &f.cb),
         cr: plane(|f| &f.cr),

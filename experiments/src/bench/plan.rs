@@ -34,9 +34,9 @@ struct Row {
     rollouts_per_s: f64,
     /// Fractions of the processor time: rope with its contacts, contacts with the arm, all
     /// else (drawing, screening, learning, what finalists are observed longer and finer).
-    rope_part: f64,
-    contacts_part: f64,
-    search_part: f64,
+    rope_fraction: f64,
+    contacts_fraction: f64,
+    search_fraction: f64,
     limit_wall_s: f64,
     within_limit: bool,
 }
@@ -47,9 +47,11 @@ const TABLE: [Column<Row>; 9] = [
     ("processor (s)", |row| format!("{:.2}", row.cpu_s)),
     ("simulations", |row| row.simulations.to_string()),
     ("rollouts per s", |row| format!("{:.0}", row.rollouts_per_s)),
-    ("rope", |row| percent(row.rope_part)),
-    ("contacts with the arm", |row| percent(row.contacts_part)),
-    ("search", |row| percent(row.search_part)),
+    ("rope", |row| percent(row.rope_fraction)),
+    ("contacts with the arm", |row| {
+        percent(row.contacts_fraction)
+    }),
+    ("search", |row| percent(row.search_fraction)),
     ("limit", |row| verdict(row.limit_wall_s, row.within_limit)),
 ];
 
@@ -91,18 +93,18 @@ fn measure(
     let (rope, _) = least(repeats, || blind.run(&throws)).or_failed()?;
     let simulations = f64::from(planned.simulations);
     let part = |cpu_s: f64| (cpu_s / BATCH as f64 * simulations / whole.cpu_s).clamp(0.0, 1.0);
-    let both_part = part(both.cpu_s);
+    let both_fraction = part(both.cpu_s);
     // Both are measured, and noise may turn their order.
-    let rope_part = part(rope.cpu_s).min(both_part);
+    let rope_fraction = part(rope.cpu_s).min(both_fraction);
     Ok(Row {
         task: kind.name(),
         wall_s: whole.wall_s,
         cpu_s: whole.cpu_s,
         simulations: planned.simulations,
         rollouts_per_s: simulations / whole.wall_s,
-        rope_part,
-        contacts_part: both_part - rope_part,
-        search_part: 1.0 - both_part,
+        rope_fraction,
+        contacts_fraction: both_fraction - rope_fraction,
+        search_fraction: 1.0 - both_fraction,
         limit_wall_s,
         within_limit: whole.wall_s < limit_wall_s,
     })

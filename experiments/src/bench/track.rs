@@ -46,8 +46,8 @@ impl Pass {
         camera: &StereoCamera,
         motion: &dyn AttachMotion,
     ) -> Outcome<Self> {
-        let (decoding, eyes) = least(1, || read_film(video)).or_input()?;
-        let follow = || track(eyes.film(), camera, motion, USUAL_KEYPOINTS);
+        let (decoding, images) = least(1, || read_film(video)).or_input()?;
+        let follow = || track(images.film(), camera, motion, USUAL_KEYPOINTS);
         let (tracking, result) = least(1, follow).or_failed()?;
         let times = result.times;
         Ok(Self {

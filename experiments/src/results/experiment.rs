@@ -142,10 +142,10 @@ impl<'a> Experiment<'a> {
         rope: impl Fn(u64) -> RopeParams + Sync,
     ) -> Outcome<Vec<Trial>> {
         let figure = |t: &Trial| t.residual_px;
-        let asked = self.sequence(IDENTIFIED, 8, (figure, "ropes, residual px"));
+        let requested = self.sequence(IDENTIFIED, 8, (figure, "ropes, residual px"));
         let sequence = Sequence {
-            count: factor * asked.count,
-            ..asked
+            count: factor * requested.count,
+            ..requested
         };
         self.trials(sequence, |batch| {
             identify_all(&self.rig, &rope, batch, &self.options)

@@ -192,10 +192,10 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let ropes = scene.ropes().context(damaged).or_failed()?;
     let all = ropes.len() as u64;
     let figure = |t: &LobDrapeTrial| t.drape.as_ref().map_or(f64::NAN, |d| 100.0 * d.error_m);
-    let asked = experiment.sequence(all, 1, (figure, "ropes, cm of the drape"));
+    let requested = experiment.sequence(all, 1, (figure, "ropes, cm of the drape"));
     let sequence = Sequence {
-        count: asked.count.min(all),
-        ..asked
+        count: requested.count.min(all),
+        ..requested
     };
     let trials = experiment.trials(sequence, |batch| trials(&experiment, &scene, &ropes, batch))?;
     let s = summarise(&trials);

@@ -47,8 +47,8 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         ));
     }
     let figure = |t: &Trial| t.residual_px;
-    let asked = experiment.sequence(ROPES, 4, (figure, "ropes, residual px"));
-    let ropes = asked.count;
+    let requested = experiment.sequence(ROPES, 4, (figure, "ropes, residual px"));
+    let ropes = requested.count;
     if ropes == 0 {
         return Err(bad_input!("--ropes is 0, but must be 1 or more"));
     }
@@ -61,9 +61,9 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     };
     let rigs: Vec<TrialRig> = wiggles.iter().map(wiggling).collect();
     let sequence = Sequence {
-        method: format!("{}, {ropes} ropes", asked.method),
+        method: format!("{}, {ropes} ropes", requested.method),
         count: ropes * wiggles.len() as u64,
-        ..asked
+        ..requested
     };
     // Wiggle by wiggle; a trial's own index is that of the rope.
     let all = experiment.trials(sequence, |batch| {

@@ -21,7 +21,7 @@ pub(super) struct Row {
     /// Films in which the tracker was sure of what is not so.
     pub(super) wrong: usize,
     /// Part followed, and its 95 % limits.
-    pub(super) followed_part: [f64; 3],
+    pub(super) followed_fraction: [f64; 3],
     /// Part wrong, and its 95 % limits.
     pub(super) wrong_part: [f64; 3],
 }
@@ -45,7 +45,7 @@ impl Row {
             refused,
             flagged,
             wrong,
-            followed_part: wilson(followed, n),
+            followed_fraction: wilson(followed, n),
             wrong_part: wilson(wrong, n),
         }
     }

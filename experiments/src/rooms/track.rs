@@ -27,7 +27,7 @@ const TABLE: [Column<Row>; 9] = [
     ("flagged", |row| row.flagged.to_string()),
     ("wrong", |row| row.wrong.to_string()),
     ("others", |row| row.others().to_string()),
-    ("followed (%)", |row| percent(row.followed_part)),
+    ("followed (%)", |row| percent(row.followed_fraction)),
     ("wrong (%)", |row| percent(row.wrong_part)),
 ];
 
@@ -43,8 +43,8 @@ fn follow(folder: &Path) -> anyhow::Result<Result<KeypointTrack, TrackError>> {
     let camera = load_camera(&folder.join("camera.toml"))?;
     let joints = files::read_joints(&folder.join("joints_measured.csv"))?;
     let arm = MeasuredArm::new(&joints.times_s, &joints.q, Pole::default())?;
-    let eyes = read_film(&mut video)?;
-    let tracked = track(eyes.film(), &camera, &arm, USUAL_KEYPOINTS);
+    let images = read_film(&mut video)?;
+    let tracked = track(images.film(), &camera, &arm, USUAL_KEYPOINTS);
     Ok(tracked.map(|result| result.track))
 }
 

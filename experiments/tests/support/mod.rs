@@ -26,8 +26,8 @@ pub fn report(line: &str) -> Value {
 pub fn assert_refused(line: &str, words: &[&str]) {
     let output = experiments(line);
     let said = if line.contains("--json") {
-        let told: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
-        told.to_string()
+        let reported: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        reported.to_string()
     } else {
         String::from_utf8_lossy(&output.stderr).into_owned()
     };

@@ -91,11 +91,11 @@ fn joints_lag_stick_and_lie() {
         let mut b = Scenario::new(&entry("at_s = 0.5", kind));
         b.bring_up(Mode::Servo);
         b.stream(0.5, 1.0);
-        let asked = b.q[6];
+        let requested = b.q[6];
         let model = b.arm.model();
         (
-            asked - model.true_motion().q[6],
-            asked - model.measured_motion().q[6],
+            requested - model.true_motion().q[6],
+            requested - model.measured_motion().q[6],
         )
     };
     // 0.5 rad/s behind by about 20 ms, or by 100 ms more.

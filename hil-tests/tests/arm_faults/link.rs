@@ -143,9 +143,9 @@ fn feedback_is_pushed_when_asked_for() {
         acceleration_rad_s2: 10.0,
         checked: None,
     });
-    let asked = b.transaction;
+    let requested = b.transaction;
     b.wait(1.0);
     let pushes: Vec<_> = b.replies.iter().filter(|r| r.register == 0xFF).collect();
     assert_eq!(pushes.len(), 2, "{:?}", b.replies);
-    assert!(pushes.iter().all(|p| p.transaction == asked));
+    assert!(pushes.iter().all(|p| p.transaction == requested));
 }

@@ -225,7 +225,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
     let mut real = RtLoop::new(control, clock, boards, all.rt);
     let throw = super::stage::fast_throw(START_POSE);
     let (begin, end) = (4200, 4200 + (throw.duration_s() * 250.0) as u64 + 20);
-    let (mut told, mut dropped) = (Vec::new(), 0);
+    let (mut reported, mut dropped) = (Vec::new(), 0);
     for cycle in 0..end {
         now_ns.set(now_ns.get() + PERIOD_NS);
         operator.beat();
@@ -262,7 +262,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
             while all.bridge.inputs.pop().is_ok() {}
         }
         if cycle >= begin {
-            told.push(reader.get().q_c);
+            reported.push(reader.get().q_c);
         }
     }
     if audience == Audience::Stalled {
@@ -274,7 +274,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
             .unwrap()
             .dropped;
     }
-    (told, dropped)
+    (reported, dropped)
 }
 
 #[test]

@@ -61,11 +61,14 @@ fn faults_23_and_24_a_damaged_or_too_fast_plan_is_refused_and_the_controller_goe
     turned[0] += 1.7;
     let beyond: [(f64, JointVector, &[&str]); 2] =
         [(3.0, far, &["joint 4"]), (1.0, turned, &["m/s", " s"])];
-    for (time_s, to, told) in beyond {
+    for (time_s, to, reported) in beyond {
         let plan = JointTrajectory::new(&[0.0, time_s], &[START_POSE, to]).unwrap();
         let (fault, message) = stand.refused(&execute(&plan));
         assert_eq!(fault, FaultCode::PlanOutOfLimits);
-        assert!(told.iter().all(|word| message.contains(word)), "{message}");
+        assert!(
+            reported.iter().all(|word| message.contains(word)),
+            "{message}"
+        );
     }
 
     // What no type of ours can hold: sent as bytes, it is not even a request.

@@ -15,7 +15,10 @@ fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
     let mut aside = START_POSE;
     aside[0] += 0.1;
     // Slow enough for setting up: 0.2 m/s at the pole's end.
-    let move_to = |q| ControllerRequest::MoveTo { q, speed_part: 0.1 };
+    let move_to = |q| ControllerRequest::MoveTo {
+        q,
+        speed_fraction: 0.1,
+    };
     for early in [move_to(aside), arm_for(OperatingMode::SetUp, false)] {
         assert_eq!(stand.refused(&early).0, FaultCode::WrongMode);
     }

@@ -370,7 +370,7 @@ impl Stand {
             arm_for(OperatingMode::Throw, true),
             ControllerRequest::MoveTo {
                 q: START_POSE,
-                speed_part: 0.1,
+                speed_fraction: 0.1,
             },
             execute(&swing(from)),
             ControllerRequest::Bringup,

@@ -1,7 +1,7 @@
 //! Films of the rig's wiggle in memory, with the arm's report and the truth.
 
 use arm_model::Pole;
-use camera_ingest::{EyeFrame, Film, StereoFrame, TrackError, TrackResult, track};
+use camera_ingest::{Film, ImageFrame, StereoFrame, TrackError, TrackResult, track};
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{WiggleFilm, joints};
 use rope_sim::MeasuredArm;
@@ -27,9 +27,9 @@ pub(crate) struct Take {
 /// A film as a tracker looks at it.
 pub(crate) struct Filmed {
     /// Left images.
-    pub(crate) frames: Vec<EyeFrame>,
+    pub(crate) frames: Vec<ImageFrame>,
     /// Right images of some of them.
-    right: Vec<EyeFrame>,
+    right: Vec<ImageFrame>,
     /// Pixels of the rope's nodes in each frame.
     pub(crate) truth: Vec<Vec<[f64; 2]>>,
     pub(crate) camera: StereoCamera,
@@ -82,8 +82,8 @@ impl Filmed {
         let count = (self.until_s / REPORT_S) as usize;
         let at_s: Vec<f64> = (0..count).map(|i| i as f64 * REPORT_S).collect();
         let q: Vec<_> = at_s.iter().map(|t| joints(t + self.first_s)).collect();
-        let told_s: Vec<f64> = at_s.iter().map(|t| t + late_s).collect();
-        MeasuredArm::new(&told_s, &q, Pole::default()).unwrap()
+        let reported_s: Vec<f64> = at_s.iter().map(|t| t + late_s).collect();
+        MeasuredArm::new(&reported_s, &q, Pole::default()).unwrap()
     }
 
     /// Tracks it with a keypoint for every node.
@@ -96,9 +96,9 @@ impl Filmed {
     }
 
     /// What is behind the rope, but for where it hardly moves: the median over the motion.
-    pub(crate) fn scene(&self) -> EyeFrame {
-        let moving: Vec<&EyeFrame> = self.frames.iter().skip(60).step_by(4).collect();
-        let plane = |pick: fn(&EyeFrame) -> &Vec<u8>| -> Vec<u8> {
+    pub(crate) fn scene(&self) -> ImageFrame {
+        let moving: Vec<&ImageFrame> = self.frames.iter().skip(60).step_by(4).collect();
+        let plane = |pick: fn(&ImageFrame) -> &Vec<u8>| -> Vec<u8> {
             let at = |at: usize| {
                 let mut values: Vec<u8> = moving.iter().map(|f| pick(f)[at]).collect();
                 values.sort_unstable();
@@ -106,7 +106,7 @@ impl Filmed {
             };
             (0..pick(moving[0]).len()).map(at).collect()
         };
-        EyeFrame {
+        ImageFrame {
             luma: plane(|f| &f.luma),
             cb: plane(|f| &f.cb),
             cr: plane(|f| &f.cr),

@@ -27,7 +27,7 @@ pub struct TargetDelay {
     /// period when these keep step with the setpoints.
     pub interval_s: [f64; 2],
     /// Part of the setpoints that agree.
-    pub agreed_part: f64,
+    pub agreed_fraction: f64,
     /// Setpoints seen as targets.
     pub seen: usize,
 }
@@ -41,11 +41,11 @@ pub fn command_to_target(recording: &Recording) -> Option<TargetDelay> {
         return None;
     }
     let ([low_s, high_s], agreed) = most_agreed(&brackets)?;
-    let agreed_part = agreed as f64 / brackets.len() as f64;
-    (agreed_part >= AGREED_MIN).then_some(TargetDelay {
+    let agreed_fraction = agreed as f64 / brackets.len() as f64;
+    (agreed_fraction >= AGREED_MIN).then_some(TargetDelay {
         // Nothing is taken before it is sent, whatever the clocks say.
         interval_s: [low_s.max(0.0), high_s.max(0.0)],
-        agreed_part,
+        agreed_fraction,
         seen: brackets.len(),
     })
 }
@@ -131,11 +131,11 @@ mod tests {
                 let taken = |(i, s): &(usize, &Setpoint)| {
                     s.sent_s + if i % 20 == 0 { 0.009 } else { 0.0023 } <= at_s
                 };
-                let told = setpoints.iter().enumerate().rfind(taken).unwrap().1;
+                let reported = setpoints.iter().enumerate().rfind(taken).unwrap().1;
                 let q_target = if smoothed {
                     at(at_s - 0.01)
                 } else {
-                    told.q.map(|q| f64::from(q as f32))
+                    reported.q.map(|q| f64::from(q as f32))
                 };
                 Sample {
                     at_s,
@@ -156,7 +156,10 @@ mod tests {
         let delay = command_to_target(&recording(false)).unwrap();
         let [low, high] = delay.interval_s;
         assert!(low <= 0.0023 && 0.0023 <= high, "{delay:?}");
-        assert!(high - low < 3e-4 && delay.agreed_part > 0.85, "{delay:?}");
+        assert!(
+            high - low < 3e-4 && delay.agreed_fraction > 0.85,
+            "{delay:?}"
+        );
     }
 
     #[test]

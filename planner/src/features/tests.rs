@@ -45,7 +45,7 @@ fn farthest(a: &[f32], b: &[f32]) -> f32 {
 
 /// Another camera: nearer, from the other side, turned, other lens, global shutter.
 fn other_camera() -> StereoCamera {
-    let eye = Intrinsics {
+    let image = Intrinsics {
         fx: 520.0,
         fy: 515.0,
         cx: 480.0,
@@ -57,8 +57,8 @@ fn other_camera() -> StereoCamera {
     StereoCamera {
         width_px: 960,
         height_px: 540,
-        left: eye,
-        right: eye,
+        left: image,
+        right: image,
         r_w_cam: Matrix3::from_columns(&[right, towards.cross(&right), towards]),
         p_w_cam_m: Vector3::new(0.6, 1.1, 0.1),
         shutter: Shutter::Global,

@@ -99,10 +99,11 @@ pub fn information(
     let covariance = (normal.information + coordinates.prior_information()).try_inverse();
     Ok(covariance.map(|c| {
         let deviation = |i: usize| c[(i, i)].max(0.0).sqrt();
-        let told = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS];
+        let reported = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS];
         let unit = [0.1, 1.0, 1.0, 1.0];
-        let block =
-            SMatrix::<f64, 4, 4>::from_fn(|i, j| c[(told[i], told[j])] / (unit[i] * unit[j]));
+        let block = SMatrix::<f64, 4, 4>::from_fn(|i, j| {
+            c[(reported[i], reported[j])] / (unit[i] * unit[j])
+        });
         WiggleInformation {
             length_m: deviation(LENGTH),
             bending_stiffness: deviation(STIFFNESS),

@@ -62,8 +62,8 @@ fn once(
     let mut found: Option<Compared> = None;
     let mut history = Vec::new();
     loop {
-        let asked = strategy.ask(&mut |_| true)?;
-        let points: Vec<Point> = asked
+        let requested = strategy.ask(&mut |_| true)?;
+        let points: Vec<Point> = requested
             .iter()
             .map(|x| Point::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0)))
             .collect();

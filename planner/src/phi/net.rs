@@ -82,8 +82,8 @@ impl PhiNet {
 
     /// Asks it for the answer it must know, so that weights in another order show now.
     fn try_out(&self) -> Result<(), String> {
-        let asked = probe(self.metadata.features);
-        let answer = self.encoder.outputs(&asked.motion, &asked.widths);
+        let requested = probe(self.metadata.features);
+        let answer = self.encoder.outputs(&requested.motion, &requested.widths);
         let expected = &self.metadata.probe;
         let off = difference(&expected.mean, &answer.mean)
             .max(difference(&expected.log_variance, &answer.log_variance));

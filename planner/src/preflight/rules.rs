@@ -21,7 +21,7 @@ const VELOCITY_STRAY_RAD: f64 = 0.004;
 const VELOCITY_GAP_M: f64 = 0.0015;
 const VELOCITY_STRAY_M: f64 = 0.004;
 /// What of the controller's largest tracking error a plan may use by velocities.
-const ASTRAY_PART: f64 = 0.92;
+const DEVIATION_FRACTION: f64 = 0.92;
 
 /// One cycle as it is judged.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,7 @@ pub(super) struct Step {
     /// Where the arm has its joints (rad).
     pub(super) q: JointVector,
     /// How far they are from what was asked of them, which the controller stops for (rad).
-    pub(super) astray_rad: f64,
+    pub(super) deviation_rad: f64,
 }
 
 impl Step {
@@ -43,7 +43,7 @@ impl Step {
             before: setpoint,
             setpoint,
             q: setpoint,
-            astray_rad: 0.0,
+            deviation_rad: 0.0,
         }
     }
 }
@@ -172,7 +172,7 @@ impl Rule {
             before,
             setpoint,
             q,
-            astray_rad,
+            deviation_rad,
         } = step;
         let way_m = || (tool(setpoint, limits) - tool(before, limits)).norm();
         match self {
@@ -195,7 +195,7 @@ impl Rule {
             Self::SafetyBoundary => arm
                 .fence
                 .map_or(f64::INFINITY, |f| f.inside_m(&tool(q, limits))),
-            Self::Tracking => *astray_rad,
+            Self::Tracking => *deviation_rad,
         }
     }
 }
@@ -276,7 +276,7 @@ impl JudgedArm {
         let margin = RuleMargin::new;
         let speed = 1.0 + SPEED_SLACK;
         let joint_speed = limits.velocity_max_rad_s[0] * speed;
-        let astray_rad = ASTRAY_PART * Thresholds::strict().tracking_error_max_rad;
+        let deviation_rad = DEVIATION_FRACTION * Thresholds::strict().tracking_error_max_rad;
         // The controller looks before the arm does.
         let mut out = vec![margin(Rule::StepLength, STEP_MAX_M)];
         let stray_m = match self.interface {
@@ -295,7 +295,7 @@ impl JudgedArm {
                 out.extend([
                     margin(Rule::JointRange, -VELOCITY_STRAY_RAD),
                     margin(Rule::SelfCollision, VELOCITY_GAP_M),
-                    margin(Rule::Tracking, astray_rad),
+                    margin(Rule::Tracking, deviation_rad),
                 ]);
                 VELOCITY_STRAY_M
             }

@@ -52,22 +52,22 @@ pub(super) fn steps(trajectory: &JointTrajectory, limits: &Limits) -> Vec<(f64, 
     let mut interface = VelocityInterface::default();
     // Newest last: what was planned, and what the firmware asked for.
     let mut planned = VecDeque::from(vec![start; window]);
-    let mut asked = VecDeque::from(vec![start; SHOWN_LATE]);
+    let mut requested = VecDeque::from(vec![start; SHOWN_LATE]);
     let mut off = VecDeque::from(vec![JointVector::ZERO; REPORTED_LATE]);
     let mut out = Vec::with_capacity(count as usize + 1);
     for k in 0..=count {
         let time_s = f64::from(k) * period_s;
         let target = trajectory.state_at(time_s);
-        let shown = asked.pop_front().unwrap_or(start);
+        let shown = requested.pop_front().unwrap_or(start);
         planned.push_back(target.q);
         let step = Step {
             q: arm.q,
-            astray_rad: outside_rad(&shown, &planned),
+            deviation_rad: outside_rad(&shown, &planned),
             ..Step::at(target.q)
         };
         out.push((time_s, step));
         planned.pop_front();
-        asked.push_back(arm.q);
+        requested.push_back(arm.q);
         off.push_back(target.q - shown);
         let reported = off.pop_front().unwrap_or_default();
         let speed_max = limits.tcp_speed_max_m_s;
@@ -116,7 +116,7 @@ mod tests {
         let off = |(_, step): &(f64, Step)| (step.setpoint - step.q).max_abs();
         let worst = |steps: &[(f64, Step)]| steps.iter().map(off).fold(0.0, f64::max);
         assert!(worst(&gentle) < 0.02, "{}", worst(&gentle));
-        assert!(gentle.iter().all(|(_, step)| step.astray_rad < 0.005));
+        assert!(gentle.iter().all(|(_, step)| step.deviation_rad < 0.005));
         assert!(off(gentle.last().unwrap()) < 0.005);
         let hard = steps(&swing(0.8, 0.5), &limits);
         assert!(worst(&hard) > 2.0 * worst(&gentle), "{}", worst(&hard));

@@ -7,7 +7,7 @@ use shared_types::{Intrinsics, Shutter, StereoCamera};
 /// its plane from 1 m.
 #[must_use]
 pub fn side_camera() -> StereoCamera {
-    let eye = Intrinsics {
+    let image = Intrinsics {
         fx: 350.0,
         fy: 350.0,
         cx: 335.5,
@@ -17,8 +17,8 @@ pub fn side_camera() -> StereoCamera {
     StereoCamera {
         width_px: 672,
         height_px: 376,
-        left: eye,
-        right: eye,
+        left: image,
+        right: image,
         r_right_left: Matrix3::identity(),
         t_right_left_m: Vector3::new(0.063, 0.0, 0.0),
         r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),

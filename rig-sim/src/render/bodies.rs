@@ -1,7 +1,7 @@
 //! The moving things as strokes: arm and pole, rope and lead, target ball.
 
 use super::appearance::Appearance;
-use super::eye::Eye;
+use super::image_view::ImageView;
 use super::lighting::Lighting;
 use super::solid::{Material, Solid};
 use super::stroke::Strokes;
@@ -70,11 +70,16 @@ pub(super) struct Cast<'a> {
 
 impl Cast<'_> {
     /// What one eye has to draw for the sub-frames `poses`, in order.
-    pub(super) fn spells(&self, eye: &Eye, light: &Lighting, poses: &[ScenePose]) -> Vec<Spell> {
+    pub(super) fn spells(
+        &self,
+        image: &ImageView,
+        light: &Lighting,
+        poses: &[ScenePose],
+    ) -> Vec<Spell> {
         // A pole's end out of view does not move in the picture.
         let pole_end = |pose: &ScenePose| {
             let end = self.cell.pole.attach_pose(&pose.q).0;
-            eye.project(&end).unwrap_or_default()
+            image.project(&end).unwrap_or_default()
         };
         let mut began = poses.first().map(pole_end).unwrap_or_default();
         let together = |_: &ScenePose, next: &ScenePose| {
@@ -94,11 +99,15 @@ impl Cast<'_> {
             .chunk_by(together)
             .map(|spell| Spell {
                 first: first_of(spell),
-                arm: Strokes::of(eye, light, arm_solids(self.cell, &spell[spell.len() / 2].q)),
-                others: Strokes::of(eye, light, self.others.iter().copied()),
+                arm: Strokes::of(
+                    image,
+                    light,
+                    arm_solids(self.cell, &spell[spell.len() / 2].q),
+                ),
+                others: Strokes::of(image, light, self.others.iter().copied()),
                 ropes: spell
                     .iter()
-                    .map(|pose| Strokes::of(eye, light, self.rope.solids(&pose.nodes)))
+                    .map(|pose| Strokes::of(image, light, self.rope.solids(&pose.nodes)))
                     .collect(),
             })
             .collect()

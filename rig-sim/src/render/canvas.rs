@@ -2,7 +2,7 @@
 
 use super::bodies::Spell;
 use super::colour::{Ycc, lit};
-use super::eye::Eye;
+use super::image_view::ImageView;
 use super::lamp_view::Cover;
 use super::layer::{RowLayer, composite};
 use super::sensor::pack_yuyv;
@@ -11,8 +11,8 @@ use crate::room::lamp::level;
 
 /// What one eye keeps between frames.
 #[derive(Debug)]
-pub(super) struct EyeCanvas {
-    pub(super) eye: Eye,
+pub(super) struct ImageCanvas {
+    pub(super) image: ImageView,
     pub(super) view: View,
     room_yuyv: Vec<u8>,
     arm: RowLayer,
@@ -25,21 +25,21 @@ pub(super) struct EyeCanvas {
     darker: Vec<f32>,
 }
 
-/// Steps of [`EyeCanvas::darker`].
+/// Steps of [`ImageCanvas::darker`].
 const LACKS: usize = 512;
 
-impl EyeCanvas {
-    pub(super) fn new(eye: Eye, view: View) -> Self {
+impl ImageCanvas {
+    pub(super) fn new(image: ImageView, view: View) -> Self {
         let mut seen = view.picture.clone();
         for (pixel, veil) in seen.iter_mut().zip(&view.veil) {
             pixel[0] += veil;
         }
         let mut room_yuyv = vec![0; seen.len() * 2];
         pack_yuyv(&seen, &mut room_yuyv);
-        let width = eye.size_px().0;
+        let width = image.size_px().0;
         let lack = |i: usize| i as f64 / (LACKS - 1) as f64;
         Self {
-            eye,
+            image,
             view,
             room_yuyv,
             arm: RowLayer::new(width),
@@ -62,7 +62,7 @@ impl EyeCanvas {
         weight_of: impl Fn(usize) -> f32,
         out: &mut [u8],
     ) -> usize {
-        let width = self.eye.size_px().0;
+        let width = self.image.size_px().0;
         out.copy_from_slice(&self.room_yuyv[v * width * 2..(v + 1) * width * 2]);
         let (mut from, mut to) = self.darken(v, covers);
         let mut total = 0.0;

@@ -2,8 +2,8 @@
 
 use super::appearance::Appearance;
 use super::bodies::{Cast, RopeLook, RopeShape, ScenePose, target_solids};
-use super::canvas::EyeCanvas;
-use super::eye::Eye;
+use super::canvas::ImageCanvas;
+use super::image_view::ImageView;
 use super::lamp_view::LampView;
 use super::sensor::{Sensor, brighten};
 use super::shadows::Shadows;
@@ -25,7 +25,7 @@ const BAND_ROWS: usize = 64;
 /// Draws frames of one camera looking at one rig.
 #[derive(Debug)]
 pub struct Renderer {
-    eyes: [EyeCanvas; 2],
+    images: [ImageCanvas; 2],
     cell: Cell,
     rope: RopeLook,
     appearance: Appearance,
@@ -66,7 +66,7 @@ impl Renderer {
         seed: u64,
     ) -> Self {
         let look = RopeLook::plain(rope, &appearance);
-        let view = |eye: &Eye| View::plain(eye, &appearance, cell);
+        let view = |image: &ImageView| View::plain(image, &appearance, cell);
         let lamps = Vec::new();
         Self::of(
             camera,
@@ -101,7 +101,7 @@ impl Renderer {
             lead: room.rope.lead,
         };
         let views = lamps.clone();
-        let view = |eye: &Eye| View::of(eye, room, &views);
+        let view = |image: &ImageView| View::of(image, room, &views);
         let noise = (room.picture.noise_levels, seed);
         let life = Life {
             bystanders: room.bystanders.clone(),
@@ -121,13 +121,13 @@ impl Renderer {
         appearance: Appearance,
         (noise_levels, seed): (f32, u64),
         lamps: Vec<LampView>,
-        view: impl Fn(&Eye) -> View,
+        view: impl Fn(&ImageView) -> View,
     ) -> Self {
-        let eyes =
-            [Eye::left(camera), Eye::right(camera)].map(|eye| EyeCanvas::new(eye, view(&eye)));
-        let size_px = eyes[0].eye.size_px();
+        let images = [ImageView::left(camera), ImageView::right(camera)]
+            .map(|image| ImageCanvas::new(image, view(&image)));
+        let size_px = images[0].image.size_px();
         Self {
-            eyes,
+            images,
             cell: *cell,
             rope,
             appearance,
@@ -164,9 +164,9 @@ impl Renderer {
     /// fastest node, at least one.
     #[must_use]
     pub fn sub_frames(&self, start: &ScenePose, end: &ScenePose) -> usize {
-        let eye = &self.eyes[0].eye;
+        let image = &self.images[0].image;
         let moved = start.nodes.iter().zip(&end.nodes).filter_map(|(a, b)| {
-            let (a, b) = (eye.project(a)?, eye.project(b)?);
+            let (a, b) = (image.project(a)?, image.project(b)?);
             Some((a[0] - b[0]).hypot(a[1] - b[1]))
         });
         let most_px = moved.fold(0.0, f64::max);
@@ -196,9 +196,9 @@ impl Renderer {
             others: &others,
         };
         let spells = self
-            .eyes
+            .images
             .each_ref()
-            .map(|canvas| cast.spells(&canvas.eye, &canvas.view.light, poses));
+            .map(|canvas| cast.spells(&canvas.image, &canvas.view.light, poses));
         let weight_of = |v: usize, i: usize| self.rows.weight(v, i, poses.len());
         // All rows of a global shutter share their shadows.
         let together = if self.rows.exposures() > 1.0 {
@@ -214,7 +214,7 @@ impl Renderer {
             self.shadows.cast(&cast, poses, |i| weight_of(middle, i));
             for (v, row) in (first..).zip(band.chunks_exact_mut(row_bytes)) {
                 let halves = row.chunks_exact_mut(width * 2);
-                for ((canvas, spells), half) in self.eyes.iter_mut().zip(&spells).zip(halves) {
+                for ((canvas, spells), half) in self.images.iter_mut().zip(&spells).zip(halves) {
                     let covers = self.shadows.covers();
                     self.drawn_px += canvas.draw_row(v, spells, covers, |i| weight_of(v, i), half);
                 }

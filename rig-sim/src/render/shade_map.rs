@@ -1,6 +1,6 @@
 //! Where the still things of one eye's picture take their light from, lamp by lamp.
 
-use super::eye::Eye;
+use super::image_view::ImageView;
 use super::lamp_view::{Cover, LampView};
 use nalgebra::Vector3;
 
@@ -21,11 +21,11 @@ impl ShadeMap {
     /// `seen` tells where each pixel's surface is, and which part of its light is the
     /// lamp's.
     pub(super) fn new(
-        eye: &Eye,
+        image: &ImageView,
         view: &LampView,
         seen: impl Iterator<Item = (Vector3<f64>, f32)>,
     ) -> Self {
-        let width = eye.size_px().0;
+        let width = image.size_px().0;
         let pixels: Vec<_> = seen
             .map(|(at_m, share)| match view.see(&at_m) {
                 Some((texel, _)) if share > 0.0 => (texel, share),

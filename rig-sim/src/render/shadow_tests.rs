@@ -1,6 +1,6 @@
 //! Shadows against the geometry they follow from.
 
-use super::eye::Eye;
+use super::image_view::ImageView;
 use super::lamp_view::{Cover, LampView};
 use super::shade_map::ShadeMap;
 use super::solid::{Material, Solid};
@@ -81,15 +81,15 @@ fn the_eye_sees_the_shadow_at_the_pixel_of_its_place_on_the_wall() {
     let mut cover = Cover::empty();
     cover.draw(&view, &[ball(at_m)]);
     let camera = CameraConfig::default().stereo_camera();
-    let eye = Eye::left(&camera);
-    let (width, height) = eye.size_px();
+    let image = ImageView::left(&camera);
+    let (width, height) = image.size_px();
     let wall = (0..height).flat_map(|v| (0..width).map(move |u| [u as f64, v as f64]));
     let wall = wall.map(|pixel| {
-        let (origin, ray) = eye.ray(pixel);
+        let (origin, ray) = image.ray(pixel);
         let p = origin + ray * ((WALL_Y_M - origin.y) / ray.y);
         (p, 0.25)
     });
-    let shade = ShadeMap::new(&eye, &view, wall);
+    let shade = ShadeMap::new(&image, &view, wall);
     let (mut sum, mut moment) = (0.0, [0.0; 2]);
     for v in 0..height {
         let mut lack = vec![0.0; width];
@@ -101,7 +101,7 @@ fn the_eye_sees_the_shadow_at_the_pixel_of_its_place_on_the_wall() {
             moment = [moment[0] + lack * u as f64, moment[1] + lack * v as f64];
         }
     }
-    let want = eye.project(&on_wall(&lamp, &at_m)).unwrap();
+    let want = image.project(&on_wall(&lamp, &at_m)).unwrap();
     let off = (moment[0] / sum - want[0]).hypot(moment[1] / sum - want[1]);
     assert!(off < 0.3, "{off} px");
 }

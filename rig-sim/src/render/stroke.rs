@@ -2,7 +2,7 @@
 //! rounded solid under one soft light.
 
 use super::colour::{Ycc, lit};
-use super::eye::Eye;
+use super::image_view::ImageView;
 use super::layer::{Cell, RowLayer};
 use super::lighting::Lighting;
 use super::solid::{Material, Solid};
@@ -43,8 +43,12 @@ impl Strokes {
     }
 
     /// What an eye sees of a body.
-    pub(super) fn of(eye: &Eye, light: &Lighting, solids: impl IntoIterator<Item = Solid>) -> Self {
-        let seen = solids.into_iter().filter_map(|s| Stroke::new(eye, &s));
+    pub(super) fn of(
+        image: &ImageView,
+        light: &Lighting,
+        solids: impl IntoIterator<Item = Solid>,
+    ) -> Self {
+        let seen = solids.into_iter().filter_map(|s| Stroke::new(image, &s));
         let all: Vec<_> = seen.collect();
         let rows = all.iter().fold((usize::MAX, 0), |(top, bottom), s| {
             (top.min(s.rows.0), bottom.max(s.rows.1))
@@ -59,8 +63,8 @@ impl Strokes {
 
 impl Stroke {
     /// The capsule in the picture, if in front of the eye.
-    fn new(eye: &Eye, solid: &Solid) -> Option<Self> {
-        let (a, b) = (eye.see(&solid.a_m)?, eye.see(&solid.b_m)?);
+    fn new(image: &ImageView, solid: &Solid) -> Option<Self> {
+        let (a, b) = (image.see(&solid.a_m)?, image.see(&solid.b_m)?);
         let along_px = [
             (b.pixel[0] - a.pixel[0]) as f32,
             (b.pixel[1] - a.pixel[1]) as f32,
@@ -77,7 +81,7 @@ impl Stroke {
             arc_m: solid.arc_m.map(|v| v as f32),
             rows: (0, 0),
         };
-        stroke.rows = stroke.find_rows(eye.size_px().1);
+        stroke.rows = stroke.find_rows(image.size_px().1);
         Some(stroke)
     }
 

@@ -3,7 +3,7 @@
 use super::appearance::Appearance;
 use super::backdrop::PlainRoom;
 use super::colour::{Ycc, ycc};
-use super::eye::{Eye, Vignette};
+use super::image_view::{ImageView, Vignette};
 use super::lamp_view::LampView;
 use super::lighting::Lighting;
 use super::shade_map::ShadeMap;
@@ -37,11 +37,11 @@ pub(super) struct View {
 
 /// Casts a picture: the mean of `look` over each pixel's rays, which are numbered.
 fn cast(
-    eye: &Eye,
+    image: &ImageView,
     vignette: &Vignette,
     mut look: impl FnMut(&Vector3<f64>, &Vector3<f64>, [u32; 3]) -> Rgb,
 ) -> Vec<Ycc> {
-    let (width, height) = eye.size_px();
+    let (width, height) = image.size_px();
     let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(RAYS) - 0.5;
     let mut picture = Vec::with_capacity(width * height);
     for v in 0..height {
@@ -49,7 +49,7 @@ fn cast(
             let mut sum = Rgb::zeros();
             for i in 0..RAYS * RAYS {
                 let pixel = [u as f64 + offset(i % RAYS), v as f64 + offset(i / RAYS)];
-                let (origin, ray) = eye.ray(pixel);
+                let (origin, ray) = image.ray(pixel);
                 sum += look(&origin, &ray, [u as u32, v as u32, i]);
             }
             let mean = sum / f64::from(RAYS * RAYS);
@@ -62,11 +62,11 @@ fn cast(
 
 impl View {
     /// The plain room of a cell.
-    pub(super) fn plain(eye: &Eye, appearance: &Appearance, cell: &Cell) -> Self {
-        let vignette = Vignette::of(eye, CORNER_LOSS);
+    pub(super) fn plain(image: &ImageView, appearance: &Appearance, cell: &Cell) -> Self {
+        let vignette = Vignette::of(image, CORNER_LOSS);
         let room = PlainRoom::new(appearance.wall_rgb, cell);
         Self {
-            picture: cast(eye, &vignette, |origin, ray, _| room.look(origin, ray)),
+            picture: cast(image, &vignette, |origin, ray, _| room.look(origin, ray)),
             light: Lighting::PLAIN,
             shades: Vec::new(),
             veil: Vec::new(),
@@ -75,12 +75,12 @@ impl View {
     }
 
     /// A drawn room.
-    pub(super) fn of(eye: &Eye, room: &Room, lamps: &[LampView]) -> Self {
-        let (width, height) = eye.size_px();
-        let vignette = Vignette::of(eye, room.picture.corner_loss);
+    pub(super) fn of(image: &ImageView, room: &Room, lamps: &[LampView]) -> Self {
+        let (width, height) = image.size_px();
+        let vignette = Vignette::of(image, room.picture.corner_loss);
         // What each pixel shows: the last of its rays says where, all say how much light.
         let mut seen: Vec<(Vector3<f64>, [f32; 2])> = vec![Default::default(); width * height];
-        let picture = cast(eye, &vignette, |origin, ray, [u, v, i]| {
+        let picture = cast(image, &vignette, |origin, ray, [u, v, i]| {
             let number = |k: u32| lattice(i64::from(u * 4 + i), i64::from(v * 2 + k), 77);
             // Each of a pixel's rays looks at its own quarter of a lamp.
             let turn = (f64::from(i) + 0.5 + 0.5 * number(0)) / f64::from(RAYS * RAYS);
@@ -94,12 +94,12 @@ impl View {
         });
         let shades = lamps.iter().enumerate().map(|(i, lamp)| {
             let seen = seen.iter().map(|(at_m, shares)| (*at_m, shares[i]));
-            ShadeMap::new(eye, lamp, seen)
+            ShadeMap::new(image, lamp, seen)
         });
         Self {
             shades: shades.collect(),
-            light: lighting(eye, room),
-            veil: veil(eye, room),
+            light: lighting(image, room),
+            veil: veil(image, room),
             picture,
             vignette,
         }
@@ -108,7 +108,7 @@ impl View {
 
 /// The light on moving things: the strongest lamp's direction, and the rest from
 /// everywhere.
-fn lighting(eye: &Eye, room: &Room) -> Lighting {
+fn lighting(image: &ImageView, room: &Room) -> Lighting {
     let light = |lamp: &crate::room::lamp::Lamp| {
         let way = (lamp.at_m - MIDDLE_M).normalize();
         lamp.light(&MIDDLE_M, &way)
@@ -119,7 +119,7 @@ fn lighting(eye: &Eye, room: &Room) -> Lighting {
     let shaded = strongest.map_or(all, |lamp| all - 0.9 * light(lamp));
     let (dark, bright) = (level(shaded), level(all));
     let at_m = strongest.map_or(MIDDLE_M + Vector3::z(), |lamp| lamp.at_m);
-    let way = eye.turned(&(at_m - MIDDLE_M).normalize());
+    let way = image.turned(&(at_m - MIDDLE_M).normalize());
     // Nothing white is blown out.
     let gain = room.still.gain.min(1.08 / bright);
     Lighting::from(
@@ -130,14 +130,14 @@ fn lighting(eye: &Eye, room: &Room) -> Lighting {
 }
 
 /// Light scattered in the lens around a bright place.
-fn veil(eye: &Eye, room: &Room) -> Vec<f32> {
+fn veil(image: &ImageView, room: &Room) -> Vec<f32> {
     let Some((at_m, levels, width_px)) = room.picture.glare else {
         return Vec::new();
     };
-    let Some(at) = eye.project(&at_m) else {
+    let Some(at) = image.project(&at_m) else {
         return Vec::new();
     };
-    let (width, height) = eye.size_px();
+    let (width, height) = image.size_px();
     let level = |u: usize, v: usize| {
         let (du, dv) = (u as f32 - at[0] as f32, v as f32 - at[1] as f32);
         levels / (1.0 + (du * du + dv * dv) / (width_px * width_px))

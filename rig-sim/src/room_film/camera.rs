@@ -35,7 +35,7 @@ pub(super) fn draw(rng: &mut impl Rng, points_m: &[Vector3<f64>]) -> StereoCamer
 
 /// One of the cameras there may be, further off the more have been tried.
 fn candidate(rng: &mut impl Rng, tried: f64) -> StereoCamera {
-    let mut eye = || Intrinsics {
+    let mut image = || Intrinsics {
         fx: rng.random_range(345.0..357.0),
         fy: rng.random_range(345.0..357.0),
         cx: 335.5 + rng.random_range(-8.0..8.0),
@@ -48,11 +48,11 @@ fn candidate(rng: &mut impl Rng, tried: f64) -> StereoCamera {
             rng.random_range(-0.002..0.001),
         ],
     };
-    let left = eye();
+    let left = image();
     let right = Intrinsics {
         fx: left.fx,
         fy: left.fy,
-        ..eye()
+        ..image()
     };
     let left = Intrinsics {
         fy: left.fx * 0.9995,
@@ -126,7 +126,7 @@ pub(super) fn calibrated(rng: &mut impl Rng, truth: &StereoCamera) -> StereoCame
     let mut vector = |std: f64| Vector3::new(normal(std), normal(std), normal(std));
     let (shift_m, turn_rad) = (vector(POSITION_STD_M), vector(ATTITUDE_STD_RAD));
     let focal = 1.0 + vector(FOCAL_STD).x;
-    let mut eye = |k: &Intrinsics| {
+    let mut image = |k: &Intrinsics| {
         let centre = vector(CENTRE_STD_PX);
         let [k1, k2, p1, p2, k3] = k.distortion;
         Intrinsics {
@@ -138,8 +138,8 @@ pub(super) fn calibrated(rng: &mut impl Rng, truth: &StereoCamera) -> StereoCame
         }
     };
     StereoCamera {
-        left: eye(&truth.left),
-        right: eye(&truth.right),
+        left: image(&truth.left),
+        right: image(&truth.right),
         r_w_cam: Rotation3::new(turn_rad).matrix() * truth.r_w_cam,
         p_w_cam_m: truth.p_w_cam_m + shift_m,
         ..truth.clone()

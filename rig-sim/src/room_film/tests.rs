@@ -67,8 +67,8 @@ fn the_camera_sees_the_swing_and_is_told_a_little_wrong() {
     let mut off_mm = Vec::new();
     for seed in 0..12 {
         let (setting, swing) = Setting::draw(seed, Kind::Ordinary).unwrap();
-        let (truth, told) = (&setting.camera, &setting.calibrated);
-        off_mm.push((truth.p_w_cam_m - told.p_w_cam_m).norm() * 1e3);
+        let (truth, reported) = (&setting.camera, &setting.calibrated);
+        off_mm.push((truth.p_w_cam_m - reported.p_w_cam_m).norm() * 1e3);
         assert!(setting.film_late_s.abs() <= 0.005);
         let swept: Vec<_> = (0..60).flat_map(|i| swing.at(0.1 * f64::from(i))).collect();
         assert!(camera::sees(truth, &swept), "seed {seed}: out of view");

@@ -36,16 +36,17 @@ impl MoveError {
     }
 }
 
-/// Plans a move that rests at `from` and at `to` (rad), `speed_part` (0 to 1] as
+/// Plans a move that rests at `from` and at `to` (rad), `speed_fraction` (0 to 1] as
 /// fast as the limits allow.
 pub fn plan_move(
     from: &JointVector,
     to: &JointVector,
-    speed_part: f64,
+    speed_fraction: f64,
     limits: &Limits,
 ) -> Result<Motion, MoveError> {
-    if !(speed_part > 0.0 && speed_part <= 1.0) {
-        let message = format!("`speed_part` is {speed_part}, it must be above 0 and at most 1");
+    if !(speed_fraction > 0.0 && speed_fraction <= 1.0) {
+        let message =
+            format!("`speed_fraction` is {speed_fraction}, it must be above 0 and at most 1");
         return Err(MoveError::new(FaultCode::PlanOutOfLimits, message));
     }
     if let Some(j) = limits.position_violation(to) {
@@ -53,7 +54,7 @@ pub fn plan_move(
         let message = format!("joint {joint} of the target, {q_rad:.4} rad, is outside its range");
         return Err(MoveError::new(FaultCode::SetpointPosition, message));
     }
-    let mut part = speed_part;
+    let mut part = speed_fraction;
     let mut broken = FaultCode::SetpointTcpSpeed;
     for _ in 0..ATTEMPTS {
         let motion = generate(from, to, part, limits)?;

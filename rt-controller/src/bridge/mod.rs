@@ -178,9 +178,9 @@ impl Bridge {
 
     /// Asks the arm itself to stop, when there is no loop any more.
     pub fn stop_arm(&mut self) {
-        let asked = ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
+        let requested = ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
             .and_then(|mut s| s.stop_arm());
-        if let Err(reason) = asked {
+        if let Err(reason) = requested {
             tracing::error!(%reason, "the arm could not be asked to stop");
         }
     }

@@ -45,7 +45,9 @@ impl Bridge {
                 ControllerMode::Faulted => self.set_up(call),
                 _ => self.wrong_mode(&call, "there is no fault to acknowledge"),
             },
-            ControllerRequest::MoveTo { q, speed_part } => self.serve_move(call, q, speed_part),
+            ControllerRequest::MoveTo { q, speed_fraction } => {
+                self.serve_move(call, q, speed_fraction)
+            }
             ControllerRequest::Arm {
                 operating_mode,
                 area_clear,
@@ -203,11 +205,11 @@ impl Bridge {
         false
     }
 
-    fn serve_move(&mut self, call: ControllerCall, q: JointVector, speed_part: f64) {
+    fn serve_move(&mut self, call: ControllerCall, q: JointVector, speed_fraction: f64) {
         if !self.may_move(&call) {
             return;
         }
-        match plan_move(&self.newest.q_c, &q, speed_part, &self.limits) {
+        match plan_move(&self.newest.q_c, &q, speed_fraction, &self.limits) {
             Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
             Err(error) => refuse(&call, error.fault, &error.to_string()),
         }

@@ -97,7 +97,7 @@ pub struct Guardian {
     silence_ns: u64,
     phase: GuardianPhase,
     since_ns: u64,
-    asked_ns: Option<u64>,
+    requested_ns: Option<u64>,
     lost_stamp_ns: u64,
     emergency: Emergency,
     /// Whether the arm moved when the controller was seen last.
@@ -112,7 +112,7 @@ impl Guardian {
             silence_ns,
             phase: GuardianPhase::Waiting,
             since_ns: 0,
-            asked_ns: None,
+            requested_ns: None,
             lost_stamp_ns: 0,
             emergency: Emergency::Lost,
             moved: false,
@@ -144,7 +144,7 @@ impl Guardian {
 
     /// The request of the last turn could not be sent: it is due at once.
     pub fn was_not_sent(&mut self) {
-        self.asked_ns = None;
+        self.requested_ns = None;
     }
 
     /// One turn.
@@ -213,7 +213,7 @@ impl Guardian {
         self.enter(GuardianPhase::Stopping, input.now_ns);
         self.emergency = emergency;
         self.lost_stamp_ns = pulse.stamp_ns;
-        self.asked_ns = None;
+        self.requested_ns = None;
         self.ask(input)
     }
 
@@ -230,7 +230,7 @@ impl Guardian {
             return GuardianOutput::default();
         }
         // A state read before the first request says nothing.
-        if self.asked_ns.is_some() && input.arm_state.is_some_and(stopped) {
+        if self.requested_ns.is_some() && input.arm_state.is_some_and(stopped) {
             self.phase = GuardianPhase::Stopped;
             return GuardianOutput::default();
         }
@@ -244,11 +244,11 @@ impl Guardian {
     /// Asks when it is time and there is a connection.
     fn ask(&mut self, input: &GuardianInput) -> GuardianOutput {
         let due = self
-            .asked_ns
+            .requested_ns
             .is_none_or(|at_ns| input.now_ns.saturating_sub(at_ns) >= ASK_EVERY_NS);
         let ask_stop = due && input.connected;
         if ask_stop {
-            self.asked_ns = Some(input.now_ns);
+            self.requested_ns = Some(input.now_ns);
         }
         GuardianOutput {
             ask_stop,

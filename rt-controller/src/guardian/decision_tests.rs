@@ -24,7 +24,7 @@ fn seen(now_ms: u64, stamp_ms: u64, moving: bool) -> GuardianInput {
 /// An arm whose state is 4 a while after it was asked for.
 #[derive(Default)]
 struct Scene {
-    asked_ns: Vec<u64>,
+    requested_ns: Vec<u64>,
     /// When the state reads 4; never if absent.
     stops_ns: Option<u64>,
     phases: Vec<GuardianPhase>,
@@ -47,7 +47,7 @@ impl Scene {
             };
             let out = guardian.step(&input);
             if out.ask_stop {
-                self.asked_ns.push(now_ns);
+                self.requested_ns.push(now_ns);
             }
             self.phases.extend(out.changed);
         }
@@ -64,7 +64,7 @@ fn a_controller_that_dies_at_any_moment_is_met_within_20_ms() {
         let begin_ns = 1_000 * MS + rng.random_range(0..PERIOD_NS);
         let dies_ns = begin_ns + rng.random_range(40 * MS..400 * MS);
         scene.play(&mut guardian, begin_ns, dies_ns, dies_ns + 50 * MS);
-        let reaction_ns = scene.asked_ns[0] - dies_ns;
+        let reaction_ns = scene.requested_ns[0] - dies_ns;
         assert!(reaction_ns <= 20 * MS, "{reaction_ns}");
         worst_ns = worst_ns.max(reaction_ns);
     }
@@ -89,8 +89,13 @@ fn the_stop_is_repeated_until_state_4_is_read_and_then_latched() {
         ..Scene::default()
     };
     scene.play(&mut guardian, 1000 * MS, 1100 * MS, 9000 * MS);
-    assert_eq!(scene.asked_ns.len(), 3);
-    assert!(scene.asked_ns.windows(2).all(|w| w[1] - w[0] == 100 * MS));
+    assert_eq!(scene.requested_ns.len(), 3);
+    assert!(
+        scene
+            .requested_ns
+            .windows(2)
+            .all(|w| w[1] - w[0] == 100 * MS)
+    );
     let phases = [
         GuardianPhase::Watching,
         GuardianPhase::Stopping,
@@ -109,7 +114,7 @@ fn an_arm_that_never_answers_is_asked_for_3_s_and_reported() {
     let mut guardian = Guardian::new(SILENCE_NS);
     let mut scene = Scene::default();
     scene.play(&mut guardian, 1000 * MS, 1100 * MS, 9000 * MS);
-    assert_eq!(scene.asked_ns.len(), 31);
+    assert_eq!(scene.requested_ns.len(), 31);
     assert_eq!(scene.phases.last(), Some(&GuardianPhase::StopUnconfirmed));
 }
 

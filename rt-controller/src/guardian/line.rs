@@ -35,7 +35,7 @@ struct Open {
     transaction: u16,
     /// Transaction of the newest question for the state.
     question: u16,
-    asked_ns: u64,
+    requested_ns: u64,
     received_ns: u64,
     /// When the newest stop was asked for.
     stop_ns: Option<u64>,
@@ -152,7 +152,7 @@ fn take(address: SocketAddr, now_ns: u64, socket: &Socket) -> Result<Phase> {
         reader: FrameReader::new(),
         transaction: 0,
         question: 0,
-        asked_ns: 0,
+        requested_ns: 0,
         received_ns: now_ns,
         stop_ns: None,
     })))
@@ -176,7 +176,7 @@ impl Open {
 
     fn ask_state(&mut self, now_ns: u64) -> Result<()> {
         self.question = self.send(&Command::GetState)?;
-        self.asked_ns = now_ns;
+        self.requested_ns = now_ns;
         Ok(())
     }
 
@@ -185,7 +185,7 @@ impl Open {
         if now_ns.saturating_sub(self.received_ns) > SILENCE_NS {
             return Err(ErrorKind::TimedOut.into());
         }
-        if now_ns.saturating_sub(self.asked_ns) >= ASK_EVERY_NS {
+        if now_ns.saturating_sub(self.requested_ns) >= ASK_EVERY_NS {
             self.ask_state(now_ns)?;
         }
         Ok(state)
@@ -229,14 +229,14 @@ mod tests {
 
     /// Answers questions for the state with 4 once a stop was asked for; tells
     /// the registers it is asked.
-    fn serve(mut stream: TcpStream, asked: &mpsc::Sender<u8>) {
+    fn serve(mut stream: TcpStream, requested: &mpsc::Sender<u8>) {
         let (mut reader, mut state) = (FrameReader::new(), ArmState::Moving);
         let mut out = [0; MAX_FRAME_LEN];
         while let Ok(n @ 1..) = stream.read(reader.space()) {
             reader.commit(n);
             while let Ok(Some(frame)) = reader.next_frame() {
                 let request = frame.as_request().unwrap();
-                asked.send(request.register).unwrap();
+                requested.send(request.register).unwrap();
                 let data = match Command::parse(request.register, request.parameters).unwrap() {
                     Command::SetState(StateRequest::Stop) => {
                         state = ArmState::Stopped;
@@ -271,7 +271,7 @@ mod tests {
         let mut now_ns = 1_000_000_000_000;
         assert!(!line.ask_stop(now_ns), "nobody to ask yet");
         until(&mut line, &mut now_ns, |line, _| line.is_connected());
-        let (sender, asked) = mpsc::channel();
+        let (sender, requested) = mpsc::channel();
         let (first, _) = listener.accept().unwrap();
         let server = std::thread::spawn(move || {
             let far = first.try_clone().unwrap();
@@ -281,7 +281,10 @@ mod tests {
         until(&mut line, &mut now_ns, |_, state| state == Some(1));
         assert!(line.ask_stop(now_ns));
         until(&mut line, &mut now_ns, |_, state| state == Some(4));
-        assert_eq!(asked.try_iter().take(3).collect::<Vec<_>>(), [13, 12, 13]);
+        assert_eq!(
+            requested.try_iter().take(3).collect::<Vec<_>>(),
+            [13, 12, 13]
+        );
 
         // Answered since: the same connection serves for the next stop.
         now_ns += 100 * MS;

@@ -25,7 +25,7 @@ pub enum Silence {
 pub struct Heartbeat {
     /// `None` before the first look, from which the silence counts.
     received_ns: Option<u64>,
-    asked_ns: u64,
+    requested_ns: u64,
 }
 
 impl Heartbeat {
@@ -40,11 +40,11 @@ impl Heartbeat {
         if silent_ns > GIVE_UP_AFTER_NS {
             return Silence::GiveUp;
         }
-        let rested = now_ns.saturating_sub(self.asked_ns) >= ASK_EVERY_NS;
+        let rested = now_ns.saturating_sub(self.requested_ns) >= ASK_EVERY_NS;
         if silent_ns < ASK_AFTER_NS || !rested {
             return Silence::Fine;
         }
-        self.asked_ns = now_ns;
+        self.requested_ns = now_ns;
         Silence::Ask
     }
 }
@@ -59,15 +59,15 @@ mod tests {
     fn a_silent_arm_is_asked_from_30_s_every_10_s_and_given_up_after_90_s() {
         let begin = 5 * S;
         let mut heartbeat = Heartbeat::default();
-        let mut asked = Vec::new();
+        let mut requested = Vec::new();
         let given_up = (0..1000).map(|k| k * S / 10).find(|t| {
             let due = heartbeat.due(begin + t);
             if due == Silence::Ask {
-                asked.push(t / S);
+                requested.push(t / S);
             }
             due == Silence::GiveUp
         });
-        assert_eq!(asked, [30, 40, 50, 60, 70, 80, 90]);
+        assert_eq!(requested, [30, 40, 50, 60, 70, 80, 90]);
         assert_eq!(given_up, Some(90 * S + S / 10));
     }
 

@@ -245,8 +245,8 @@ impl<W: ByteStream> ArmTransport for TcpLink<W> {
         let mut frames: heapless::Vec<Written, MAX_COMMANDS> = heapless::Vec::new();
         let mut id = self.in_flight.next_id();
         // Any command is a question, too.
-        let asked = core::mem::take(&mut self.ask) && commands.is_empty();
-        let question = asked.then_some(&Command::GetState);
+        let requested = core::mem::take(&mut self.ask) && commands.is_empty();
+        let question = requested.then_some(&Command::GetState);
         for command in commands.iter().chain(question) {
             let allowed = !command.is_setpoint() || (clear && self.has_room(now_ns));
             let appended = self

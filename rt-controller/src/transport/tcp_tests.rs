@@ -186,8 +186,8 @@ fn a_silent_arm_is_asked_for_a_sign_and_then_given_up() {
     assert!(!link.poll(later).lost);
     assert_eq!(link.in_flight.open(), 0);
     assert!(sends(&mut link, &[], later));
-    let asked = replies(&mut peer, 1, Status(0));
-    assert_eq!(asked[0][6], 13, "get state");
+    let requested = replies(&mut peer, 1, Status(0));
+    assert_eq!(requested[0][6], 13, "get state");
     assert!(link.poll(begin + 91_000_000_000).lost);
 }
 

@@ -171,12 +171,12 @@ impl<'w> Bench<'w> {
         self.newest = self.bridge.records.pop().unwrap();
         self.seen[usize::from(self.newest.mode)] += 1;
         while self.bridge.retired.pop().is_ok() {}
-        let mut asked = u64::from(self.newest.sent);
+        let mut requested = u64::from(self.newest.sent);
         while let Ok(event) = self.bridge.events.pop() {
             let code = match event {
                 ControlEvent::Latched(cause) => {
                     self.last_cause = cause.fault();
-                    asked += u64::from(cause.stop_arm);
+                    requested += u64::from(cause.stop_arm);
                     cause.fault()
                 }
                 ControlEvent::Refused { fault, .. } | ControlEvent::Disarmed { fault } => fault,
@@ -184,7 +184,7 @@ impl<'w> Bench<'w> {
             };
             self.met.insert(code as u16);
         }
-        self.arm.meet(asked);
+        self.arm.meet(requested);
     }
 
     fn report(&mut self) -> JointReport {

@@ -12,7 +12,7 @@ use arm_model::{JOINTS, JointVector};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use camera_ingest::calib::check_camera;
-use camera_ingest::{EyeFrame, FrameSource, SourceError};
+use camera_ingest::{FrameSource, ImageFrame, SourceError};
 use mcap::records::Record;
 use serde::Deserialize;
 use shared_types::ipc::ControllerMode;
@@ -185,8 +185,8 @@ impl RunFilm {
                 jpeg,
             });
         } else if topic == Channel::Measured.topic() {
-            let told: JointsMessage = serde_json::from_slice(data)?;
-            self.joints.extend(told.vector().map(|q| (at_ns, q)));
+            let reported: JointsMessage = serde_json::from_slice(data)?;
+            self.joints.extend(reported.vector().map(|q| (at_ns, q)));
         } else if topic == Channel::Cycles.topic() {
             let cycle: CycleMessage = serde_json::from_slice(data)?;
             self.cycle(at_ns, cycle.mode == mode_name(ControllerMode::Streaming));
@@ -316,12 +316,12 @@ impl FrameSource for RunPart {
         self.pictures.len()
     }
 
-    fn read_left(&mut self, index: usize) -> Result<EyeFrame, SourceError> {
+    fn read_left(&mut self, index: usize) -> Result<ImageFrame, SourceError> {
         let picture = self
             .pictures
             .get(index)
             .ok_or_else(|| SourceError::out_of_range(&self.path, index, self.pictures.len()))?;
-        EyeFrame::from_jpeg(&picture.jpeg, picture.stamp_ns, index as u64)
+        ImageFrame::from_jpeg(&picture.jpeg, picture.stamp_ns, index as u64)
             .map_err(|source| SourceError::frame(&self.path, index, &source))
     }
 }

@@ -53,14 +53,14 @@ fn write(path: &Path, camera: &CameraConfig, frames: &[Frame], cycles: Range<i32
             mode: mode as u8,
             ..CycleRecord::default()
         };
-        let told = messages::cycle(now_ns, &record);
-        file.json(Channel::Cycles, now_ns, &told).unwrap();
+        let reported = messages::cycle(now_ns, &record);
+        file.json(Channel::Cycles, now_ns, &reported).unwrap();
         let report = JointReport {
             q: joints(t_s),
             ..JointReport::default()
         };
-        let told = messages::measured(now_ns, &report);
-        file.json(Channel::Measured, now_ns, &told).unwrap();
+        let reported = messages::measured(now_ns, &report);
+        file.json(Channel::Measured, now_ns, &reported).unwrap();
     }
     for frame in frames {
         let header = FrameHeader {
@@ -71,8 +71,8 @@ fn write(path: &Path, camera: &CameraConfig, frames: &[Frame], cycles: Range<i32
         };
         let jpeg = left_jpeg(&header, &frame.yuyv, 1, 75).unwrap();
         let now_ns = clock.wall_ns(at_ns(frame.start_s));
-        let told = messages::image(now_ns, &jpeg);
-        file.json(Channel::Image, now_ns, &told).unwrap();
+        let reported = messages::image(now_ns, &jpeg);
+        file.json(Channel::Image, now_ns, &reported).unwrap();
     }
     file.finish().unwrap();
 }
@@ -99,7 +99,7 @@ fn the_wiggle_of_a_run_is_found_and_tracked() {
     assert!((-0.5..-0.35).contains(&first_s), "{first_s}");
 
     let arm = MeasuredArm::new(&part.joints.times_s, &part.joints.q, Pole::default()).unwrap();
-    let frames: Vec<EyeFrame> = (0..part.len())
+    let frames: Vec<ImageFrame> = (0..part.len())
         .map(|i| part.read_left(i).unwrap())
         .collect();
     let film = Film {

@@ -6,7 +6,7 @@ use shared_types::ipc::{FrameHeader, PIXEL_FORMAT_YUYV};
 
 /// The left half of packed 4:2:2 rows, whose colours a JPEG takes as they are: of every
 /// `scale` pixels and rows the first.
-struct LeftEye<'a> {
+struct LeftImage<'a> {
     yuyv: &'a [u8],
     /// Pixels of the eye in a row of the frame.
     columns: usize,
@@ -15,7 +15,7 @@ struct LeftEye<'a> {
     height: u16,
 }
 
-impl ImageBuffer for LeftEye<'_> {
+impl ImageBuffer for LeftImage<'_> {
     fn get_jpeg_color_type(&self) -> JpegColorType {
         JpegColorType::Ycbcr
     }
@@ -52,7 +52,7 @@ pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -
     );
     let side =
         |px: usize| u16::try_from(px.div_ceil(scale)).context("the frame is too large for a JPEG");
-    let eye = LeftEye {
+    let image = LeftImage {
         yuyv,
         columns: width / 2,
         scale,
@@ -62,7 +62,7 @@ pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -
     let mut jpeg = Vec::new();
     let mut encoder = Encoder::new(&mut jpeg, quality);
     encoder.set_sampling_factor(SamplingFactor::F_2_1);
-    encoder.encode_image(eye)?;
+    encoder.encode_image(image)?;
     Ok(jpeg)
 }
 
@@ -108,11 +108,11 @@ mod tests {
     #[test]
     fn the_left_eye_is_cut_out_pixel_by_pixel() {
         // Two rows of eight pixels: luma counts, chroma tells the eye.
-        let pair = |y: u8, eye: u8| [y, 100 + eye, y + 1, 200 + eye];
+        let pair = |y: u8, image: u8| [y, 100 + image, y + 1, 200 + image];
         let row = |y: u8| [pair(y, 0), pair(y + 2, 0), pair(y + 4, 1), pair(y + 6, 1)].concat();
         let frame = [row(0), row(10)].concat();
         for (scale, row, luma) in [(1, 1, &[10, 11, 12, 13][..]), (2, 0, &[0, 2])] {
-            let eye = LeftEye {
+            let image = LeftImage {
                 yuyv: &frame,
                 columns: 4,
                 scale,
@@ -120,7 +120,7 @@ mod tests {
                 height: 0,
             };
             let mut planes = [const { Vec::new() }; 4];
-            eye.fill_buffers(row, &mut planes);
+            image.fill_buffers(row, &mut planes);
             assert_eq!(planes[0], luma);
             assert!(planes[1].iter().all(|cb| *cb == 100) && planes[2].iter().all(|cr| *cr == 200));
         }

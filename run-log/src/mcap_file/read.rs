@@ -101,10 +101,10 @@ const UNCOMPRESSED_LEN: std::ops::Range<usize> = FRONT_LEN + 16..FRONT_LEN + 24;
 
 /// All records of a chunk record; `None` unless all of them are there and right.
 fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
-    let told = u64::from_le_bytes(*chunk.get(UNCOMPRESSED_LEN)?.first_chunk()?);
-    let told = usize::try_from(told).ok()?;
+    let reported = u64::from_le_bytes(*chunk.get(UNCOMPRESSED_LEN)?.first_chunk()?);
+    let reported = usize::try_from(reported).ok()?;
     // Nobody writes an empty one.
-    if told == 0 || told > LONGEST {
+    if reported == 0 || reported > LONGEST {
         return None;
     }
     let options = LinearReaderOptions::default()
@@ -126,7 +126,7 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
             LinearReadEvent::Record { data, opcode } => {
                 // A chunk without a checksum may hold more than it tells.
                 len += FRONT_LEN + data.len();
-                if len > told {
+                if len > reported {
                     return None;
                 }
                 records.push(mcap::parse_record(opcode, data).ok()?.into_owned());
@@ -139,7 +139,7 @@ fn inside(chunk: &[u8]) -> Option<Vec<Record<'static>>> {
             Record::Schema { .. } | Record::Channel(_) | Record::Message { .. }
         )
     };
-    (len == told && records.iter().all(allowed)).then_some(records)
+    (len == reported && records.iter().all(allowed)).then_some(records)
 }
 
 /// The exact recording of the control cycles in a file, from the first keyframe on; empty when
@@ -237,9 +237,9 @@ mod tests {
         while bytes[at] != op::CHUNK {
             at += front(&bytes[at..]).unwrap().2;
         }
-        let told = at + UNCOMPRESSED_LEN.start..at + UNCOMPRESSED_LEN.end;
+        let reported = at + UNCOMPRESSED_LEN.start..at + UNCOMPRESSED_LEN.end;
         for wrong in [1_u64 << 40, 100_000, 0] {
-            bytes[told.clone()].copy_from_slice(&wrong.to_le_bytes());
+            bytes[reported.clone()].copy_from_slice(&wrong.to_le_bytes());
             assert_eq!(read(&bytes), (0, 1), "{wrong}");
         }
     }

@@ -142,15 +142,15 @@ pub(super) fn rope(at_ns: u64, nodes: &[i32], [radius_m, lead_radius_m]: [f64; 2
 
 /// `foxglove.CameraCalibration` of the left eye.
 pub(super) fn calibration(at_ns: u64, camera: &StereoCamera) -> Value {
-    let eye = &camera.left;
-    let (cx, cy) = (eye.cx, eye.cy);
+    let image = &camera.left;
+    let (cx, cy) = (image.cx, image.cy);
     json!({
         "timestamp": time(at_ns), "frame_id": CAMERA_FRAME,
         "width": camera.width_px, "height": camera.height_px,
-        "distortion_model": "plumb_bob", "D": eye.distortion,
-        "K": [eye.fx, 0.0, cx, 0.0, eye.fy, cy, 0.0, 0.0, 1.0],
+        "distortion_model": "plumb_bob", "D": image.distortion,
+        "K": [image.fx, 0.0, cx, 0.0, image.fy, cy, 0.0, 0.0, 1.0],
         "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        "P": [eye.fx, 0.0, cx, 0.0, 0.0, eye.fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        "P": [image.fx, 0.0, cx, 0.0, 0.0, image.fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
     })
 }
 

@@ -66,7 +66,7 @@ pub enum CameraRequest {
         /// Number of frames.
         frames: u32,
         /// Keep the right eye too; tracking needs the left one only.
-        both_eyes: bool,
+        both_images: bool,
     },
     /// Track the rope through the kept frames and publish its keypoints.
     Track {
@@ -172,7 +172,7 @@ pub enum ControllerRequest {
         /// Pose (rad).
         q: JointVector,
         /// How fast, as a part of the fastest move the limits allow (0 to 1).
-        speed_part: f64,
+        speed_fraction: f64,
     },
     /// Check a trajectory and stream it. The arm must stand at its start.
     Execute {

@@ -67,7 +67,7 @@ impl Ask {
 
 /// A wish on its way, with the place for its answer.
 #[derive(Debug)]
-pub(crate) struct Asked {
+pub(crate) struct Requested {
     pub ask: Ask,
     pub reply: mpsc::Sender<Answer>,
 }
@@ -87,12 +87,16 @@ pub(crate) struct Open {
 
 /// Hands a wish to the controller; one that may not be asked for, or cannot be, is
 /// answered at once.
-pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: Option<&Seen>) -> Option<Open> {
-    let sent = match (asked.ask.objection(now), bus) {
+pub(crate) fn hand_over(
+    requested: Requested,
+    bus: Option<&Bus>,
+    now: Option<&Seen>,
+) -> Option<Open> {
+    let sent = match (requested.ask.objection(now), bus) {
         (Some(objection), _) => Err(anyhow::anyhow!(objection)),
         (None, None) => Err(anyhow::anyhow!("no controller runs")),
         (None, Some(bus)) => RpcClient::<ControllerRpc>::open(bus)
-            .and_then(|client| Ok((client.call(&asked.ask.request())?, client)))
+            .and_then(|client| Ok((client.call(&requested.ask.request())?, client)))
             .context("the controller cannot be reached; use the emergency stop"),
     };
     match sent {
@@ -100,10 +104,10 @@ pub(crate) fn hand_over(asked: Asked, bus: Option<&Bus>, now: Option<&Seen>) -> 
             pending,
             _client: client,
             since: Instant::now(),
-            reply: asked.reply,
+            reply: requested.reply,
         }),
         Err(error) => {
-            let _ = asked.reply.send(Err(format!("{error:#}")));
+            let _ = requested.reply.send(Err(format!("{error:#}")));
             None
         }
     }

@@ -107,7 +107,7 @@ pub(crate) struct Attached {
 }
 
 /// One that cannot be opened is told of and done without.
-fn told<T, E: Into<anyhow::Error>>(what: &str, opened: Result<T, E>) -> Option<T> {
+fn reported<T, E: Into<anyhow::Error>>(what: &str, opened: Result<T, E>) -> Option<T> {
     let said = |error: anyhow::Error| tracing::warn!("the page lacks {what}: {error:#}");
     opened.map_err(|e| said(e.into())).ok()
 }
@@ -119,9 +119,9 @@ impl Attached {
         let bus = Bus::join(domain)?;
         Ok(Self {
             controller: None,
-            cycles: told("jitter", bus.cycle_subscriber()),
-            joints: told("the rope", bus.joint_subscriber()),
-            film: told("the camera", Film::open(&bus)),
+            cycles: reported("jitter", bus.cycle_subscriber()),
+            joints: reported("the rope", bus.joint_subscriber()),
+            film: reported("the camera", Film::open(&bus)),
             bus,
             _sweep: sweep,
             domain: domain.to_owned(),

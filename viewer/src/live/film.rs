@@ -8,8 +8,8 @@
 //! Where a preview follows the rope as the frames come, the live picture is shown one
 //! picture later, with the keypoints that were found in it meanwhile.
 
-use super::heard::Heard;
 use super::picture::{Jpeg, encode, projected};
+use super::received::Received;
 use serde::Serialize;
 use shared_types::StereoCamera;
 use shared_types::ipc::{Bus, FrameSubscriber, KeypointSubscriber, PIXEL_FORMAT_YUYV};
@@ -67,7 +67,7 @@ pub(crate) struct Film {
     /// Tracked frames still to be shown.
     tracked: VecDeque<KeypointFrame>,
     /// What a preview tells.
-    pub preview: Heard,
+    pub preview: Received,
     /// The picture that waits for its keypoints.
     waits: Option<Live>,
     /// A preview is wished for, but there is no calibration for it.
@@ -86,7 +86,7 @@ impl Film {
             kept: VecDeque::new(),
             kept_bytes: 0,
             tracked: VecDeque::new(),
-            preview: Heard::open(bus)?,
+            preview: Received::open(bus)?,
             waits: None,
             lacks_calibration: false,
             last: None,
@@ -290,14 +290,14 @@ mod tests {
         let mut turn = |number: u64, found: Option<f32>| {
             let picture = stage.due(number);
             if let Some(u) = found {
-                let mut told = PreviewFrame {
+                let mut reported = PreviewFrame {
                     state: PreviewState::Following as u8,
                     ..PreviewFrame::default()
                 };
-                told.rope.count = 1;
-                told.rope.stamp_ns = number * 20_000_000;
-                told.rope.points_px[0][0] = u;
-                preview.send_copy(told).unwrap();
+                reported.rope.count = 1;
+                reported.rope.stamp_ns = number * 20_000_000;
+                reported.rope.points_px[0][0] = u;
+                preview.send_copy(reported).unwrap();
             }
             picture.map_or_else(String::new, |picture| picture.over)
         };

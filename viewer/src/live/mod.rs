@@ -8,12 +8,12 @@ mod ask;
 mod attached;
 mod facts;
 mod film;
-mod heard;
 mod http;
 mod jitter;
 mod newest;
 mod page;
 mod picture;
+mod received;
 mod rope;
 mod snapshot;
 mod token;
@@ -22,7 +22,7 @@ pub use facts::domain_of_run;
 
 use crate::report::{arm_points, tenths_mm};
 use arm_model::Cell;
-use ask::{Ask, Asked, Open, hand_over};
+use ask::{Ask, Open, Requested, hand_over};
 use attached::{Attached, Seen, newest_domain};
 use http::Site;
 use jitter::Jitter;
@@ -85,7 +85,7 @@ pub struct Watcher {
     /// Where a run does not tell its own.
     here: CellHere,
     site: Arc<Site>,
-    asks: mpsc::Receiver<Asked>,
+    asks: mpsc::Receiver<Requested>,
     open: Vec<Open>,
     attached: Option<Attached>,
     searched: Option<Instant>,
@@ -137,8 +137,8 @@ impl Watcher {
         let until = self.turned + turn;
         self.turned = Instant::now().max(until);
         loop {
-            while let Ok(asked) = self.asks.try_recv() {
-                self.pass_on(asked);
+            while let Ok(requested) = self.asks.try_recv() {
+                self.pass_on(requested);
             }
             self.open.retain(Open::is_open);
             let Some(left) = until.checked_duration_since(Instant::now()) else {
@@ -150,8 +150,8 @@ impl Watcher {
             } else {
                 left.min(ANSWERS)
             };
-            if let Ok(asked) = self.asks.recv_timeout(wait) {
-                self.pass_on(asked);
+            if let Ok(requested) = self.asks.recv_timeout(wait) {
+                self.pass_on(requested);
             }
         }
         let search = self.searched.is_none_or(|at| at.elapsed() >= SEARCH);
@@ -166,10 +166,11 @@ impl Watcher {
         Ok(())
     }
 
-    fn pass_on(&mut self, asked: Asked) {
-        tracing::info!(ask = asked.ask.name(), "requested by a page");
+    fn pass_on(&mut self, requested: Requested) {
+        tracing::info!(ask = requested.ask.name(), "requested by a page");
         let bus = self.attached.as_ref().map(Attached::bus);
-        self.open.extend(hand_over(asked, bus, self.seen.as_ref()));
+        self.open
+            .extend(hand_over(requested, bus, self.seen.as_ref()));
     }
 
     /// Looks at everything once.

@@ -70,7 +70,7 @@ fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<S
     }
 }
 
-fn told(residual: &Residual) -> String {
+fn reported(residual: &Residual) -> String {
     format!(
         "{} points in both images, {:.2} px RMS (max {:.2} px, epipolar {:.2} px)",
         residual.points, residual.rms_px, residual.worst_px, residual.epipolar_px
@@ -85,7 +85,7 @@ fn extrinsics(shown: &ShownArgs, out: &Path) -> Outcome<Option<Value>> {
     let (r, p) = (&found.r_w_cam, &found.p_w_cam_m);
     let text = placed_camera_toml(out, &shown.film.camera, r, p).or_failed()?;
     files::write_atomic(out, text.as_bytes()).or_failed()?;
-    stage.done(&told(&found.residual));
+    stage.done(&reported(&found.residual));
     println!(
         "left camera at ({:.4}, {:.4}, {:.4}) m, standard error {:.1} mm and {:.2} degrees",
         p.x,
@@ -116,7 +116,7 @@ fn check(shown: &ShownArgs, limit_px: f64) -> Outcome<Option<Value>> {
         ..camera.clone()
     };
     let turned_px = residual(&turned, &points).epipolar_px;
-    stage.done(&told(&here));
+    stage.done(&reported(&here));
     if turned_px < here.epipolar_px {
         return Err(failed!(
             "both images show the points {:.2} px apart, and {turned_px:.2} px with the turn \

@@ -255,7 +255,7 @@ impl<'a> Demo<'a> {
     ) -> anyhow::Result<Film> {
         let request = CameraRequest::Record {
             frames,
-            both_eyes: throw,
+            both_images: throw,
         };
         let recording = self.camera.call(&request)?;
         let first_stamp_ns = match answered(self.session.next(&recording, 5.0)?)? {

@@ -22,12 +22,12 @@ pub fn run(args: &FilmArgs) -> Outcome<Option<Value>> {
     };
     let mut camera = LiveCamera::open(settings).map_err(failure)?;
     let stage = Stage::begin("film");
-    let told = |frames: u64| {
+    let reported = |frames: u64| {
         if frames.is_multiple_of(30) {
             stage.say(format!("{frames} of {} frames", args.frames));
         }
     };
-    let made = record(&mut camera, args.frames, &args.out, interrupted(), told).or_failed()?;
+    let made = record(&mut camera, args.frames, &args.out, interrupted(), reported).or_failed()?;
     let lost = made.losses;
     let seconds = stage.done(&format!("{} frames, {} lost", made.frames, lost.total()));
     println!(

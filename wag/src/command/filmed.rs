@@ -4,7 +4,7 @@ use crate::cli::SceneArgs;
 use crate::config;
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::{Cell, Pole};
-use camera_ingest::source::{AnySource, BothEyes, run_file};
+use camera_ingest::source::{AnySource, BothImages, run_file};
 use camera_ingest::{load_camera, open_video};
 use cli_output::{OrInput, Outcome};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
@@ -180,7 +180,7 @@ impl Filmed {
     }
 
     /// Its frames, in memory.
-    pub fn frames(&mut self) -> Outcome<BothEyes> {
+    pub fn frames(&mut self) -> Outcome<BothImages> {
         self.source.read().or_input()
     }
 }

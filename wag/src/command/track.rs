@@ -6,7 +6,7 @@ use crate::cli::TrackArgs;
 use camera_ingest::film::keypoint_film;
 use camera_ingest::overlay::{OverlayError, keypoint_sheet};
 use camera_ingest::track::ClampFit;
-use camera_ingest::{EyeFrame, TrackResult, track};
+use camera_ingest::{ImageFrame, TrackResult, track};
 use cli_output::{OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
@@ -24,25 +24,25 @@ pub fn track_video(
     learned: &mut Learned,
     keypoints: usize,
     stage: &Stage,
-) -> Outcome<(Vec<EyeFrame>, TrackResult)> {
+) -> Outcome<(Vec<ImageFrame>, TrackResult)> {
     let motion = filmed.motion.attach().or_input()?;
     stage.say("reading frames");
-    let eyes = filmed.frames()?;
-    stage.say(format!("tracking through {} frames", eyes.left.len()));
-    let explained = track(eyes.film(), &filmed.camera, &*motion, keypoints);
+    let images = filmed.frames()?;
+    stage.say(format!("tracking through {} frames", images.left.len()));
+    let explained = track(images.film(), &filmed.camera, &*motion, keypoints);
     let result = explained
         .and_then(|result| match learned.tracker() {
-            Some(tracker) => result.by_points(&eyes.left, tracker),
+            Some(tracker) => result.by_points(&images.left, tracker),
             None => Ok(result),
         })
         .map_err(|error| classify(error, &filmed.path))?;
-    Ok((eyes.left, result))
+    Ok((images.left, result))
 }
 
 /// A film for a name that ends in `.avi`, else a contact sheet.
 pub fn overlay(
     path: &Path,
-    frames: &[EyeFrame],
+    frames: &[ImageFrame],
     track: &KeypointTrack,
 ) -> Result<Vec<u8>, OverlayError> {
     if path

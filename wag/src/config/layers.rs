@@ -69,7 +69,7 @@ pub struct Layers {
 
 /// One value that holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told<'a> {
+pub struct Reported<'a> {
     /// Tables and key, with dots.
     pub key: String,
     pub value: Value,
@@ -144,13 +144,13 @@ impl Layers {
     /// Refuses a file whose table `cell` says something else than the cell that holds
     /// `here`: runs write that table, but the cell has a file of its own.
     pub fn refuse_other_cell(&self, here: fn() -> anyhow::Result<Cell>) -> anyhow::Result<()> {
-        for (path, told) in &self.cells {
+        for (path, reported) in &self.cells {
             let file = || format!("{} file `{}`", self.kind.name(), path.display());
             let cell = here()?;
             let mut merged = Table::try_from(cell)?;
-            lay_over(&mut merged, told);
-            let told: Cell = merged.try_into().with_context(file)?;
-            if let Some(differs) = difference(&told, &cell)? {
+            lay_over(&mut merged, reported);
+            let reported: Cell = merged.try_into().with_context(file)?;
+            if let Some(differs) = difference(&reported, &cell)? {
                 return Err(anyhow!(
                     "`cell` has a file of its own, and {differs}; remove [cell], or pass that \
                      cell's file (a run's is RUN/config/cell.toml) with --cell"
@@ -178,27 +178,27 @@ impl Layers {
     }
 
     /// Every value that holds, with the layer it comes from.
-    pub fn told(&self) -> Vec<Told<'_>> {
-        let mut told: BTreeMap<String, Told<'_>> = BTreeMap::new();
+    pub fn reported(&self) -> Vec<Reported<'_>> {
+        let mut reported: BTreeMap<String, Reported<'_>> = BTreeMap::new();
         for layer in &self.layers {
             for (key, value) in leaves(&layer.table) {
-                told.insert(key.clone(), Told { key, value, layer });
+                reported.insert(key.clone(), Reported { key, value, layer });
             }
         }
         // A table that a value takes the place of, or the other way round, holds no more.
         let held: BTreeMap<_, _> = leaves(&self.merged()).into_iter().collect();
-        told.retain(|key, _| held.contains_key(key));
-        told.into_values().collect()
+        reported.retain(|key, _| held.contains_key(key));
+        reported.into_values().collect()
     }
 }
 
 /// The first value in which a cell differs from the one that holds, in words.
-pub fn difference(told: &Cell, here: &Cell) -> anyhow::Result<Option<String>> {
-    let [told, here] = [told, here].map(Table::try_from);
-    let pairs = leaves(&told?).into_iter().zip(leaves(&here?));
-    let mut differing = pairs.filter(|((_, told), (_, here))| told != here);
-    Ok(differing.next().map(|((key, told), (_, here))| {
-        format!("its {key} = {told} is not the {here} of the cell that holds here")
+pub fn difference(reported: &Cell, here: &Cell) -> anyhow::Result<Option<String>> {
+    let [reported, here] = [reported, here].map(Table::try_from);
+    let pairs = leaves(&reported?).into_iter().zip(leaves(&here?));
+    let mut differing = pairs.filter(|((_, reported), (_, here))| reported != here);
+    Ok(differing.next().map(|((key, reported), (_, here))| {
+        format!("its {key} = {reported} is not the {here} of the cell that holds here")
     }))
 }
 
@@ -264,8 +264,8 @@ mod tests {
         expected.lob.throw.tail_s = 1.25;
         assert_eq!(config, expected);
 
-        let told = layers.told();
-        let layer_of = |key: &str| told.iter().find(|t| t.key == key).unwrap().layer.name;
+        let reported = layers.reported();
+        let layer_of = |key: &str| reported.iter().find(|t| t.key == key).unwrap().layer.name;
         assert_eq!(layer_of("search.population"), "rig");
         assert_eq!(layer_of("search.searches"), "run");
         assert_eq!(layer_of("lob.throw.tail_s"), "rig");

@@ -102,9 +102,9 @@ pub fn move_to(
     session: &mut Session,
     arm: &ArmLink,
     q: JointVector,
-    speed_part: f64,
+    speed_fraction: f64,
 ) -> anyhow::Result<MotionSpan> {
-    let request = ControllerRequest::MoveTo { q, speed_part };
+    let request = ControllerRequest::MoveTo { q, speed_fraction };
     motion(session, arm, "the move to the start pose", &request, 60.0)
 }
 

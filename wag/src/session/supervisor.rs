@@ -146,12 +146,12 @@ fn end_together(mut children: Vec<Running>, grace: Duration) -> anyhow::Result<(
             let _ = kill_process(pid, Signal::TERM);
         }
     }
-    let asked = Instant::now();
+    let requested = Instant::now();
     let mut first_bad = Ok(());
     for mut running in children.into_iter().rev() {
         loop {
             match running.child.try_wait() {
-                Ok(None) if asked.elapsed() < grace => {
+                Ok(None) if requested.elapsed() < grace => {
                     std::thread::sleep(Duration::from_millis(5));
                 }
                 Ok(None) => {

@@ -74,8 +74,8 @@ fn a_whole_run_lies_in_one_file_that_replays_to_the_bit_and_others_may_join() {
     let found = replays_exactly(&named);
     assert!(found["first_cycle"].as_u64().unwrap() > 1, "{found}");
     assert!(found["cycles"].as_u64().unwrap() > 100, "{found}");
-    let told = json(&format!("record recover {named}/run.mcap"));
-    assert_eq!(told["recovered"]["was_whole"], true, "{told}");
+    let reported = json(&format!("record recover {named}/run.mcap"));
+    assert_eq!(reported["recovered"]["was_whole"], true, "{reported}");
     for name in ["late", "named"] {
         fs::remove_dir_all(folder.path().join(name)).unwrap();
     }
@@ -118,12 +118,12 @@ fn others_join(folder: &Path, pid: u32) {
     assert!(!late.exists(), "nothing recorded, nothing left");
     assert_eq!(shared_memory_of(&nobody), Vec::<String>::new());
 
-    let told = json(&format!(
+    let reported = json(&format!(
         "record {} --seconds 1.5 --out {out}",
         run.display()
     ));
-    assert_eq!(told["domain"], domain.as_str());
-    assert!(told["recording"]["chunks"].as_u64().unwrap() > 0);
+    assert_eq!(reported["domain"], domain.as_str());
+    assert!(reported["recording"]["chunks"].as_u64().unwrap() > 0);
     let named = folder.join("named").display().to_string();
     json(&format!(
         "record --domain {domain} --seconds 2 --out {named}"
@@ -156,8 +156,8 @@ fn its_file_is_whole(run: &Path) {
     }
     let shown = counts["/controller/cycles"];
     assert!(shown.abs_diff(exact) < 500, "{exact} cycles, {counts:?}");
-    let told = json(&format!("record recover {}", file.display()));
-    assert_eq!(told["recovered"]["was_whole"], true);
+    let reported = json(&format!("record recover {}", file.display()));
+    assert_eq!(reported["recovered"]["was_whole"], true);
     assert_eq!(fs::read(&file).unwrap(), bytes);
 }
 
@@ -168,9 +168,9 @@ fn ledger_knows(runs: &Path, run: &Path) {
     fs::create_dir(runs.join("no-run")).unwrap();
     fs::write(runs.join("broken/command.json"), "{").unwrap();
     let (csv, places) = (runs.join("runs.csv"), runs.display());
-    let told = json(&format!("ledger {places} --csv {}", csv.display()));
-    let listed = told["runs"].as_array().unwrap();
-    assert_eq!(listed.len(), 2, "{told:#}");
+    let reported = json(&format!("ledger {places} --csv {}", csv.display()));
+    let listed = reported["runs"].as_array().unwrap();
+    assert_eq!(listed.len(), 2, "{reported:#}");
     assert_eq!(listed[0]["result"], "broken");
     assert_eq!(listed[1]["result"], "ok");
     assert_eq!(listed[1]["arguments"][0], "wiggle");
@@ -236,9 +236,9 @@ fn a_changed_file_is_noticed(run: &Path) {
     let said = refused_in(Path::new("."), 1, &format!("replay {name}"));
     assert!(said.contains("damaged"), "{said}");
     fs::write(&file, &whole[..whole.len() * 2 / 3]).unwrap();
-    let told = json(&format!("replay {name}"));
-    assert_eq!(told["replay"]["differing_bytes"], 0);
-    assert_eq!(told["replay"]["gaps"].as_array().unwrap().len(), 1);
+    let reported = json(&format!("replay {name}"));
+    assert_eq!(reported["replay"]["differing_bytes"], 0);
+    assert_eq!(reported["replay"]["gaps"].as_array().unwrap().len(), 1);
 }
 
 #[test]
@@ -256,14 +256,15 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
     let output = wiggle.wait_with_output().unwrap();
     let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
-    let told = [
+    let reported = [
         "the run continues",
         "killed by signal 9",
         "wag record recover",
     ];
-    assert!(told.iter().all(|words| said.contains(words)), "{said}");
-    let told: Value = serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
-    assert_eq!(told["ok"], true, "the motion was finished");
+    assert!(reported.iter().all(|words| said.contains(words)), "{said}");
+    let reported: Value =
+        serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(reported["ok"], true, "the motion was finished");
 
     let file = run.join("run.mcap");
     let name = file.display().to_string();

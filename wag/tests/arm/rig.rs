@@ -10,7 +10,7 @@ fn a_second_rig_in_a_domain_says_so_and_an_ended_one_leaves_nothing() {
     let domain = format!("cam{}", std::process::id());
     let filming = format!("--rope random --camera {domain}");
     let mut first = Rig::start(&filming);
-    assert_ne!(first.told["command_port"], 0);
+    assert_ne!(first.reported["command_port"], 0);
     let line = format!("rig --command-port 0 --report-ports 0,0,0,0 {filming}");
     let second = wag(&line);
     let refusal = said(&second);

@@ -36,7 +36,7 @@ fn json_errors_are_json_and_no_runs_are_no_error() {
         "{said}"
     );
     let output = wag_in(dir.path(), "check none.json --json");
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["ok"], false);
-    assert!(told["error"].as_str().unwrap().contains("none.json"));
+    let reported: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(reported["ok"], false);
+    assert!(reported["error"].as_str().unwrap().contains("none.json"));
 }

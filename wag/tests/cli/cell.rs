@@ -191,10 +191,13 @@ fn a_plan_is_for_the_cell_that_it_was_made_for() {
     let slow = format!("velocity_max_rad_s = {:?}", [0.01; 7]);
     std::fs::write(dir.path().join("slow.toml"), slow).unwrap();
     let broken = wag_in(dir.path(), "check plan.json --limits slow.toml --json");
-    let told: Value = serde_json::from_slice(&broken.stdout).unwrap();
+    let reported: Value = serde_json::from_slice(&broken.stdout).unwrap();
     assert_eq!(
-        (&told["ok"], broken.status.code()),
+        (&reported["ok"], broken.status.code()),
         (&Value::Bool(false), Some(1))
     );
-    assert!(told["margins"].as_array().unwrap().len() > 4, "{told}");
+    assert!(
+        reported["margins"].as_array().unwrap().len() > 4,
+        "{reported}"
+    );
 }

@@ -93,8 +93,8 @@ fn a_wrong_command_line_is_json_where_json_was_asked_for() {
     ] {
         let output = wag_in(dir.path(), line);
         assert_eq!(output.status.code(), Some(2));
-        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(told["ok"], false);
+        let reported: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(reported["ok"], false);
         assert!(said(&output).starts_with("error: "), "{}", said(&output));
     }
 }
@@ -103,8 +103,8 @@ fn a_wrong_command_line_is_json_where_json_was_asked_for() {
 fn a_dry_run_needs_no_arm_and_connects_to_nothing() {
     let dir = tempfile::tempdir().unwrap();
     for command in ["wiggle", "latency"] {
-        let told = json_in(dir.path(), &format!("{command} --dry-run"));
-        assert_eq!(told["ok"], true, "{told}");
+        let reported = json_in(dir.path(), &format!("{command} --dry-run"));
+        assert_eq!(reported["ok"], true, "{reported}");
     }
     let output = wag_in(dir.path(), "wiggle --dry-run");
     let page = String::from_utf8_lossy(&output.stdout).into_owned();

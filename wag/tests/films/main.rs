@@ -1,8 +1,8 @@
 //! From films and keypoints to cameras, keypoints and ropes, by the commands.
 #![cfg(test)]
 
-mod eyes;
 mod identify;
+mod images;
 #[path = "../../../camera-ingest/tests/printed_board/mod.rs"]
 mod printed_board;
 #[path = "../support/mod.rs"]

@@ -48,7 +48,7 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
     let dir = tempfile::tempdir().unwrap();
     let run = dir.path().join("run");
     let [joints, _, status, _] = ports.reports;
-    let told = json_in(
+    let reported = json_in(
         dir.path(),
         &format!(
             "latency --arm 127.0.0.1 --command-port {} --report-port {joints} \
@@ -56,12 +56,12 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
             ports.command
         ),
     );
-    assert_eq!(told["command"], "latency");
-    assert_eq!(told["excitation"]["seed"], 3);
-    assert_eq!(told["joints"].as_array().unwrap().len(), JOINTS);
-    assert!(told["loop"]["cycles"].as_u64().unwrap() > 2000);
+    assert_eq!(reported["command"], "latency");
+    assert_eq!(reported["excitation"]["seed"], 3);
+    assert_eq!(reported["joints"].as_array().unwrap().len(), JOINTS);
+    assert!(reported["loop"]["cycles"].as_u64().unwrap() > 2000);
     for part in ["wake", "compute", "send", "reply"] {
-        let part = &told["loop"][part];
+        let part = &reported["loop"][part];
         let binned: u64 = part["bins"]
             .as_array()
             .unwrap()
@@ -70,7 +70,9 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
             .sum();
         assert_eq!(part["count"].as_u64().unwrap(), binned);
     }
-    let high = told["command_to_target"]["interval_s"][1].as_f64().unwrap();
+    let high = reported["command_to_target"]["interval_s"][1]
+        .as_f64()
+        .unwrap();
     assert!(high > 0.0 && high < 0.02, "{high}");
     let replayed = json_in(dir.path(), "replay run");
     assert_eq!(replayed["replay"]["differing_bytes"], 0);
@@ -80,9 +82,11 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
     );
 
     let again = dir.path().join("again.toml");
-    let told = json_in(dir.path(), "latency --run run --response again.toml");
-    let again_high = told["command_to_target"]["interval_s"][1].as_f64().unwrap();
+    let reported = json_in(dir.path(), "latency --run run --response again.toml");
+    let again_high = reported["command_to_target"]["interval_s"][1]
+        .as_f64()
+        .unwrap();
     assert!((again_high - high).abs() < 1e-3, "{again_high} {high}");
-    assert!(told["excitation"].is_null());
+    assert!(reported["excitation"].is_null());
     report("from the run", &check(&again, &secrets));
 }

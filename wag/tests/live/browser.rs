@@ -161,9 +161,9 @@ fn the_live_page_follows_a_run_and_stops_it() {
         most_mb = most_mb.max(watch.resident_mb());
     }
     let (last, span_s) = (counts(&mut page), began.elapsed().as_secs_f64());
-    let [told_hz, drawn_hz] = [0, 1].map(|i| (last[i] - first[i]) / span_s);
+    let [reported_hz, drawn_hz] = [0, 1].map(|i| (last[i] - first[i]) / span_s);
     eprintln!(
-        "told {told_hz:.1} times a second, drew {drawn_hz:.1} in {span_s:.0} s, at most {most_mb:.1} MB"
+        "told {reported_hz:.1} times a second, drew {drawn_hz:.1} in {span_s:.0} s, at most {most_mb:.1} MB"
     );
     assert!(
         before[0] > 3000.0 && before[1] > 50.0 && moved > 2.0,
@@ -173,7 +173,10 @@ fn the_live_page_follows_a_run_and_stops_it() {
     // How fast a busy processor tells and draws is no matter of the program; that it does
     // is. The long run is for a machine of its own.
     let [told_wanted_hz, drawn_wanted_hz] = if long { [10.0, 10.0] } else { [2.0, 1.0] };
-    assert!(told_hz >= told_wanted_hz, "{told_hz} states a second");
+    assert!(
+        reported_hz >= told_wanted_hz,
+        "{reported_hz} states a second"
+    );
     assert!(drawn_hz >= drawn_wanted_hz, "drew {drawn_hz} a second");
     assert_eq!(page.value("document.getElementById('picture').width"), 128);
     // Without an operator there is nothing but the stop, and the page says why.

@@ -34,7 +34,7 @@ pub(crate) struct Chromium {
     process: Child,
     to: File,
     from: Receiver<Value>,
-    asked: u64,
+    requested: u64,
     session: String,
     /// Errors the page's console showed.
     pub(crate) errors: Vec<String>,
@@ -84,7 +84,7 @@ impl Chromium {
             process,
             to,
             from: listen(from),
-            asked: 0,
+            requested: 0,
             session: String::new(),
             errors: Vec::new(),
             requests: Vec::new(),
@@ -122,8 +122,8 @@ impl Chromium {
 
     /// One method of the protocol; events that come meanwhile are noted.
     pub(crate) fn call(&mut self, method: &str, params: &Value) -> Value {
-        self.asked += 1;
-        let mut order = json!({ "id": self.asked, "method": method, "params": params });
+        self.requested += 1;
+        let mut order = json!({ "id": self.requested, "method": method, "params": params });
         if !self.session.is_empty() {
             order["sessionId"] = self.session.as_str().into();
         }
@@ -133,7 +133,7 @@ impl Chromium {
             let left = until.saturating_duration_since(Instant::now());
             let said = self.from.recv_timeout(left);
             let said = said.unwrap_or_else(|_| panic!("no answer to {method}"));
-            if said["id"] == self.asked {
+            if said["id"] == self.requested {
                 assert!(said["error"].is_null(), "{method}: {}", said["error"]);
                 return said["result"].clone();
             }

@@ -24,10 +24,10 @@ pub(crate) struct Answer {
 
 impl Watch {
     pub(crate) fn start(args: &str) -> Self {
-        let (process, told) = Running::start(&format!("watch {args}"));
+        let (process, reported) = Running::start(&format!("watch {args}"));
         Self {
             process,
-            url: told["url"].as_str().unwrap().to_owned(),
+            url: reported["url"].as_str().unwrap().to_owned(),
         }
     }
 

@@ -151,10 +151,10 @@ impl Stage {
         let began = Instant::now();
         while began.elapsed() < FRAME_PATIENCE {
             match self.previews.receive().unwrap() {
-                Some(told) if told.rope.sequence == self.sequence => {
-                    let off = told.rope.points().iter().map(|p| off_px(*p, &line));
+                Some(reported) if reported.rope.sequence == self.sequence => {
+                    let off = reported.rope.points().iter().map(|p| off_px(*p, &line));
                     self.errors_px.extend(off);
-                    return Some(*told);
+                    return Some(*reported);
                 }
                 Some(_) => (),
                 None => sleep(Duration::from_millis(1)),
@@ -164,7 +164,7 @@ impl Stage {
     }
 
     /// Shows frames until the preview tells something.
-    fn told(&mut self) -> PreviewFrame {
+    fn reported(&mut self) -> PreviewFrame {
         until("a word about a frame", || self.step())
     }
 }
@@ -183,36 +183,36 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
     let pid = || process_of(&page.pid().to_string(), "preview").unwrap();
     // A frame may come to it before the first joints do.
     until("a preview that looks for the rope", || {
-        (stage.told().state() == PreviewState::Looking).then_some(())
+        (stage.reported().state() == PreviewState::Looking).then_some(())
     });
     // Killed, it is started again by the page.
     let first = pid();
     send(first, Signal::KILL);
     until("another preview", || {
-        stage.step().filter(|told| told.seen <= 5)
+        stage.step().filter(|reported| reported.seen <= 5)
     });
     assert_ne!(pid(), first);
     // It finds the rope in a wiggle.
     stage.again();
     let looked = (RATE_HZ * 7.0) as u64;
     until("a rope that is followed", || {
-        let told = stage.told();
+        let reported = stage.reported();
         if stage.sequence - stage.before > looked {
             sleep(UNHURRIED);
         }
-        (told.state() == PreviewState::Following).then_some(())
+        (reported.state() == PreviewState::Following).then_some(())
     });
     // It follows it through the next one; what it tells is drawn.
     stage.again();
     stage.errors_px.clear();
     for _ in 0..(RATE_HZ * 3.0) as usize {
-        assert_eq!(stage.told().state(), PreviewState::Following);
+        assert_eq!(stage.reported().state(), PreviewState::Following);
     }
     let drawn = until("a picture with keypoints", || {
         let picture = over(&page);
         // The page shows a picture one picture later.
         for _ in 0..4 {
-            stage.told();
+            stage.reported();
             sleep(UNHURRIED);
         }
         let over = picture();
@@ -222,7 +222,7 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
     let caption = drawn["caption"].as_str().unwrap_or_default();
     assert!(caption.contains("the preview's keypoints"), "{drawn}");
     // Kept from running now and then, as on a busy machine, it leaves frames out.
-    let before = stage.told().skipped;
+    let before = stage.reported().skipped;
     for _ in 0..3 {
         send(pid(), Signal::STOP);
         for _ in 0..10 {
@@ -230,10 +230,10 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
         }
         send(pid(), Signal::CONT);
         for _ in 0..10 {
-            assert_eq!(stage.told().state(), PreviewState::Following);
+            assert_eq!(stage.reported().state(), PreviewState::Following);
         }
     }
-    let last = stage.told();
+    let last = stage.reported();
     assert!(last.skipped - before >= 20, "{last:?}");
     let [half, most] = [0.5, 0.95].map(|part| quantile(&mut stage.errors_px, part));
     println!(
@@ -263,8 +263,11 @@ fn a_preview_alone_says_what_it_waits_for_and_needs_a_calibration() {
     let previews = bus.preview_subscriber().unwrap();
     let mut preview = Running(process().spawn().unwrap());
     for _ in 0..2 {
-        let told = until("a sign of life", || previews.receive().unwrap().map(|t| *t));
-        assert_eq!((told.state(), told.seen), (PreviewState::NoCamera, 0));
+        let reported = until("a sign of life", || previews.receive().unwrap().map(|t| *t));
+        assert_eq!(
+            (reported.state(), reported.seen),
+            (PreviewState::NoCamera, 0)
+        );
     }
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", preview.0.id())).unwrap();
     let nice = stat.rsplit_once(')').unwrap().1.split_whitespace().nth(16);

@@ -136,7 +136,7 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     });
     let film = CameraRequest::Record {
         frames: 10_000,
-        both_eyes: true,
+        both_images: true,
     };
     let filmed = films.call(&film).unwrap();
     if murder {

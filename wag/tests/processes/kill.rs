@@ -54,8 +54,8 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
             "reported after {took:?}: {said}"
         );
         nothing_left(&run, Duration::from_millis(100));
-        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(told["ok"], false);
+        let reported: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(reported["ok"], false);
     }
 
     // The supervisor itself: its processes end themselves.
@@ -71,12 +71,12 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
     let run = folder.path().join("after");
     let output = demo(&run, 1).wait_with_output().unwrap();
     assert!(output.status.success(), "{}", said(&output));
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["ok"], true);
-    let distance_m = told["true_tip_target_distance_m"].as_f64().unwrap();
-    assert!(distance_m < 0.15, "{told:#}");
+    let reported: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(reported["ok"], true);
+    let distance_m = reported["true_tip_target_distance_m"].as_f64().unwrap();
+    assert!(distance_m < 0.15, "{reported:#}");
     for stage in "start bringup wiggle track identify plan throw score".split(' ') {
-        let time_s = told["stages"][format!("{stage}_s")].as_f64().unwrap();
+        let time_s = reported["stages"][format!("{stage}_s")].as_f64().unwrap();
         assert!(time_s > 0.0, "{stage}");
     }
     let files = "summary.json plan.json plan.csv params.toml keypoints.json run.mcap wiggle.png";

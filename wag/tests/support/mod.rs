@@ -243,20 +243,20 @@ impl Drop for Running {
 pub(crate) struct Rig {
     pub(crate) process: Running,
     /// What it printed as JSON, which is all it ever prints there.
-    pub(crate) told: Value,
+    pub(crate) reported: Value,
 }
 
 impl Rig {
     pub(crate) fn start(more: &str) -> Self {
         let line = format!("rig --command-port 0 --report-ports 0,0,0,0 {more}");
-        let (process, told) = Running::start(&line);
-        Self { process, told }
+        let (process, reported) = Running::start(&line);
+        Self { process, reported }
     }
 
     /// Command port, then those of the four reports.
     pub(crate) fn ports(&self) -> [String; 5] {
-        let report = |n: usize| self.told["report_ports"][n].to_string();
-        let command = self.told["command_port"].to_string();
+        let report = |n: usize| self.reported["report_ports"][n].to_string();
+        let command = self.reported["command_port"].to_string();
         [command, report(0), report(1), report(2), report(3)]
     }
 

@@ -145,8 +145,8 @@ impl ArmModel {
 
     pub(super) fn tell_state(&mut self) {
         let now = (self.state(), self.mode);
-        if now != self.told {
-            self.told = now;
+        if now != self.reported {
+            self.reported = now;
             let (state, mode) = now;
             self.log(ArmEvent::State { state, mode });
         }

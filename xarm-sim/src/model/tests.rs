@@ -135,7 +135,7 @@ fn an_error_stops_clears_the_mode_and_needs_the_whole_recovery() {
 fn a_stop_is_decelerated() {
     let mut arm = Bench::ready(Mode::Servo);
     arm.stream_joint7(0.5, 100);
-    let asked = arm.model.reference_motion().q[6];
+    let requested = arm.model.reference_motion().q[6];
     arm.send(&Command::SetState(StateRequest::Stop));
     assert_eq!(arm.model.state(), ArmState::Stopped);
     let mut slowest_step = f64::INFINITY;
@@ -148,9 +148,9 @@ fn a_stop_is_decelerated() {
     }
     assert!(slowest_step > -0.2, "{slowest_step} rad/s in a millisecond");
     assert!(
-        (arm.q7() - asked - 0.00625).abs() < 2e-3,
+        (arm.q7() - requested - 0.00625).abs() < 2e-3,
         "{}",
-        arm.q7() - asked
+        arm.q7() - requested
     );
     assert!(last.abs() < 1e-3);
 }

@@ -3,7 +3,7 @@
 
 use super::curve::Pixel;
 use super::statistics::median;
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Luma and both chromas about grey, in the scene's light; chroma weighs more than luma,
 /// since light changes it less.
@@ -22,7 +22,7 @@ pub(super) const SHADES: [f32; 5] = [0.7, 0.85, 1.0, 1.15, 1.3];
 const EDGE: [f32; 2] = [0.1, 0.3];
 
 /// A pixel's own colour, in the light of a scene that is darker by `gain`.
-pub(super) fn pixel_colour(frame: &EyeFrame, gain: f32, [u, v]: [usize; 2]) -> Colour {
+pub(super) fn pixel_colour(frame: &ImageFrame, gain: f32, [u, v]: [usize; 2]) -> Colour {
     let [y, cb, cr] = frame.ycc(u, v).map(f32::from);
     let chroma = |c: f32| CHROMA_WEIGHT * (c - 128.0) / gain;
     [y / gain, chroma(cb), chroma(cr)]
@@ -31,7 +31,7 @@ pub(super) fn pixel_colour(frame: &EyeFrame, gain: f32, [u, v]: [usize; 2]) -> C
 /// Colour of a frame at a place (px), divided by the frame's gain; luma interpolated
 /// between pixels, chroma between pairs. `None` outside.
 #[inline]
-pub(super) fn colour_at(frame: &EyeFrame, gain: f32, p: Pixel) -> Option<Colour> {
+pub(super) fn colour_at(frame: &ImageFrame, gain: f32, p: Pixel) -> Option<Colour> {
     let (u, v) = (p.x, p.y);
     let inside =
         u >= 0.0 && v >= 0.0 && u < frame.width_px as f64 - 1.0 && v < frame.height_px as f64 - 1.0;
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_place_between_pixels_is_interpolated() {
-        let mut frame = EyeFrame::grey([8, 4], 100);
+        let mut frame = ImageFrame::grey([8, 4], 100);
         frame.luma[8 + 3] = 200;
         let seen = colour_at(&frame, 1.0, Pixel::new(2.5, 1.0)).unwrap();
         assert_eq!(seen, [150.0, 0.0, 0.0]);

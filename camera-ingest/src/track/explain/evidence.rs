@@ -13,7 +13,7 @@ use super::colour::{
     CHROMA_WEIGHT, Colour, SHADES, colour_at, coverage, interpolated, pixel_colour, presence,
 };
 use super::curve::Pixel;
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use crate::vectors::widest;
 
 /// Weights of squared differences along the scene's colour.
@@ -40,7 +40,7 @@ impl Scene {
     #[inline]
     pub(super) fn colours(
         &self,
-        frame: &EyeFrame,
+        frame: &ImageFrame,
         gain: f32,
         p: Pixel,
     ) -> Option<(Colour, Colour)> {
@@ -77,7 +77,7 @@ fn distance(seen: Colour, behind: Colour) -> f32 {
 /// A frame in its scene's light.
 pub(super) struct Lit<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) frame: &'a EyeFrame,
+    pub(super) frame: &'a ImageFrame,
     /// Brightness relative to the scene.
     gain: f32,
     /// How far evidence counts, in cells of so many pixels a side.
@@ -87,7 +87,7 @@ pub(super) struct Lit<'a> {
 }
 
 impl<'a> Lit<'a> {
-    pub(super) fn of(frame: &'a EyeFrame, scene: &'a Scene) -> Self {
+    pub(super) fn of(frame: &'a ImageFrame, scene: &'a Scene) -> Self {
         let gain = scene.gain(frame);
         let cell_px = (frame.height_px / CELLS_HIGH).max(EVERY);
         let columns = frame.width_px.div_ceil(cell_px);
@@ -150,7 +150,7 @@ impl<'a> Lit<'a> {
             #[inline(always)]
             || {
                 for (i, out) in values.iter_mut().enumerate() {
-                    let colour = |frame: &EyeFrame, scale: f32| -> Colour {
+                    let colour = |frame: &ImageFrame, scale: f32| -> Colour {
                         let chroma = |c: u8| (f32::from(c) - 128.0) * (CHROMA_WEIGHT * scale);
                         let luma = f32::from(frame.luma[i]) * scale;
                         [luma, chroma(frame.cb[i / 2]), chroma(frame.cr[i / 2])]
@@ -256,12 +256,12 @@ fn blurred_and_turned(values: &[u8], width: usize, reach: usize) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    fn wall(stamp_ns: u64) -> EyeFrame {
-        EyeFrame {
+    fn wall(stamp_ns: u64) -> ImageFrame {
+        ImageFrame {
             cb: vec![120; 32],
             cr: vec![150; 32],
             stamp_ns,
-            ..EyeFrame::grey([8, 8], 160)
+            ..ImageFrame::grey([8, 8], 160)
         }
     }
 
@@ -279,9 +279,9 @@ mod tests {
 
     #[test]
     fn a_walker_counts_nothing_and_a_rope_in_full() {
-        let wall = |stamp_ns| EyeFrame {
+        let wall = |stamp_ns| ImageFrame {
             stamp_ns,
-            ..EyeFrame::grey([400, 376], 160)
+            ..ImageFrame::grey([400, 376], 160)
         };
         let scene = Scene::of(&[wall(1), wall(2), wall(3)]);
         let mut frame = wall(4);

@@ -163,9 +163,9 @@ impl<'a> Explainer<'a> {
     fn clamp_px(&self, curves: &[Vec<Pixel>], every: usize) -> f64 {
         let Setup { camera, motion, .. } = self.setup;
         let along = |(curve, t_s): (&Vec<Pixel>, &f64)| {
-            let told = camera.project_left(&motion.at(*t_s).p_m)?;
+            let predicted = camera.project_left(&motion.at(*t_s).p_m)?;
             let (t, _) = curve::tangent(curve, 0, 2);
-            Some((Pixel::from(told) - curve[0]).dot(&t))
+            Some((Pixel::from(predicted) - curve[0]).dot(&t))
         };
         let times_s = self.times_s.iter().step_by(every);
         quantile(curves.iter().zip(times_s).filter_map(along), 0.5)

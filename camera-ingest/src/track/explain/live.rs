@@ -14,7 +14,7 @@ use super::hypothesis::{CLOCK, Fidelity, rope, seen_curve, turned};
 use super::read::NODES;
 use super::result::usual_evidence;
 use super::statistics::{mean, quantile};
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// Evidence is looked for so far to either side of a keypoint (px).
 const BESIDE_PX: [f64; 5] = [0.0, -2.0, 2.0, -4.0, 4.0];
@@ -46,14 +46,14 @@ impl Known {
     /// is the attach frame's, t = 0 at the first frame. Takes seconds. An error comes with what
     /// it means.
     pub(crate) fn find(
-        frames: &[EyeFrame],
+        frames: &[ImageFrame],
         camera: &StereoCamera,
         motion: &dyn AttachMotion,
     ) -> Result<Self, (&'static str, TrackError)> {
         let unexplained = |reason| ("no simulated rope explains the frames", reason);
         let unusable = "the rope that was found cannot be simulated";
         let zero = MonotonicNs(frames[0].stamp_ns);
-        let since_zero = |f: &EyeFrame| MonotonicNs(f.stamp_ns).since_s(zero);
+        let since_zero = |f: &ImageFrame| MonotonicNs(f.stamp_ns).since_s(zero);
         let times_s: Vec<f64> = frames.iter().map(since_zero).collect();
         let film = Film {
             left: frames,
@@ -83,7 +83,7 @@ impl Known {
             usual: 0.0,
             scene,
         };
-        let evident = |(frame, curve): (&EyeFrame, &Vec<Pixel>)| {
+        let evident = |(frame, curve): (&ImageFrame, &Vec<Pixel>)| {
             mean(&known.evident(frame, &known.keypoints(curve, USUAL_KEYPOINTS)))
         };
         known.usual = quantile(frames.iter().zip(&curves).map(evident), 0.5);
@@ -100,7 +100,7 @@ impl Known {
     /// camera.
     pub(crate) fn see(
         &mut self,
-        frame: &EyeFrame,
+        frame: &ImageFrame,
         [t_s, reported_s]: [f64; 2],
         motion: &dyn AttachMotion,
         keypoints: usize,
@@ -143,7 +143,7 @@ impl Known {
     }
 
     /// How evident it is (0 to 1) that something other than the scene is at each place.
-    fn evident(&self, frame: &EyeFrame, points: &[Pixel]) -> Vec<f64> {
+    fn evident(&self, frame: &ImageFrame, points: &[Pixel]) -> Vec<f64> {
         let gain = self.scene.gain(frame);
         let at = |p: Pixel| {
             let (seen, behind) = self.scene.colours(frame, gain, p)?;

@@ -33,7 +33,7 @@ use shared_types::StereoCamera;
 
 use super::scene::{SCENE_FRAMES, Scene};
 use super::{TrackError, TrackResult, TrackTimes};
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 use explainer::Explainer;
 use hypothesis::Fidelity;
 pub(crate) use live::Known;
@@ -46,10 +46,10 @@ const BOTH: usize = 100;
 #[derive(Debug, Clone, Copy)]
 pub struct Film<'a> {
     /// Left image, all frames.
-    pub left: &'a [EyeFrame],
+    pub left: &'a [ImageFrame],
     /// Right image: frames with the stamps of left ones, those of which
     /// [`Film::needs_right`] is true; none for a film of one eye.
-    pub right: &'a [EyeFrame],
+    pub right: &'a [ImageFrame],
 }
 
 impl<'a> Film<'a> {
@@ -60,7 +60,7 @@ impl<'a> Film<'a> {
     }
 
     /// The right image of an instant, where there is one.
-    fn right_at(&self, stamp_ns: u64) -> Option<&'a EyeFrame> {
+    fn right_at(&self, stamp_ns: u64) -> Option<&'a ImageFrame> {
         let at = self.right.binary_search_by_key(&stamp_ns, |f| f.stamp_ns);
         at.ok().map(|at| &self.right[at])
     }
@@ -77,7 +77,7 @@ pub(super) fn explain(
     keypoints: usize,
 ) -> Result<TrackResult, TrackError> {
     let start = Instant::now();
-    let since_s = |f: &EyeFrame| (f.stamp_ns - film.left[0].stamp_ns) as f64 * 1e-9;
+    let since_s = |f: &ImageFrame| (f.stamp_ns - film.left[0].stamp_ns) as f64 * 1e-9;
     let times_s: Vec<f64> = film.left.iter().map(since_s).collect();
     let left = Scene::of(film.left);
     let right = (film.right.len() >= SCENE_FRAMES).then(|| Scene::of(film.right));

@@ -92,9 +92,9 @@ impl<'a> Reader<'a> {
         frames.map(|(lit, curve)| (*lit, curve.as_slice()))
     }
 
-    /// Reads all frames. `told_px` is where the arm says that the rope begins, from the
+    /// Reads all frames. `reported_px` is where the arm says that the rope begins, from the
     /// curves' beginning on.
-    pub(super) fn read(mut self, told_px: f64) -> Reading {
+    pub(super) fn read(mut self, reported_px: f64) -> Reading {
         // First, whatever the scene does not explain.
         let look = Look {
             reach: FIRST_REACH,
@@ -114,8 +114,10 @@ impl<'a> Reader<'a> {
         // the rope comes out of it, but for caps and knots, and counts less.
         let clamp_last = |curve: &[Pixel]| curve.iter().rev().copied().collect();
         let seen_px = self.picture(CLAMP_END, clamp_last).start_px();
-        let seen_px = seen_px.filter(|seen| (seen - told_px).abs() <= START_PX);
-        let start_px = seen_px.map_or(told_px, |seen| told_px + SEEN_PART * (seen - told_px));
+        let seen_px = seen_px.filter(|seen| (seen - reported_px).abs() <= START_PX);
+        let start_px = seen_px.map_or(reported_px, |seen| {
+            reported_px + SEEN_PART * (seen - reported_px)
+        });
         // Then what has the rope's colours.
         let look = Look {
             reach: SECOND_REACH,

@@ -199,7 +199,7 @@ mod tests {
 
     /// Looks along y at the clamp, from two metres off.
     fn camera() -> StereoCamera {
-        let eye = Intrinsics {
+        let image = Intrinsics {
             fx: 700.0,
             fy: 700.0,
             cx: 336.0,
@@ -209,8 +209,8 @@ mod tests {
         StereoCamera {
             width_px: 672,
             height_px: 376,
-            left: eye,
-            right: eye,
+            left: image,
+            right: image,
             r_right_left: Matrix3::identity(),
             t_right_left_m: Vector3::new(0.12, 0.0, 0.0),
             r_w_cam: Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0),

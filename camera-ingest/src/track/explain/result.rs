@@ -97,7 +97,7 @@ pub(super) fn result(
         let all = frames.iter_mut().flat_map(|f| &mut f.confidence);
         all.for_each(|c| *c *= DOUBT);
     }
-    let told = |t_s: f64| {
+    let predicted = |t_s: f64| {
         let seen = |t_s: f64| camera.project_left(&motion.at(t_s).p_m);
         let row = seen(t_s).map_or(0.0, |[_, v]| v);
         plane.point_at(seen(t_s + camera.row_time_s(row)).unwrap_or([f64::NAN; 2]))
@@ -119,7 +119,7 @@ pub(super) fn result(
             lead_rgb: rgb(&reading.tip),
         },
         confirmation,
-        clamp: timing::fit(&clamps, 1.0 / plane.px_per_m, told),
+        clamp: timing::fit(&clamps, 1.0 / plane.px_per_m, predicted),
         times: TrackTimes::default(),
     })
 }

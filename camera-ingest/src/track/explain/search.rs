@@ -113,9 +113,9 @@ impl Searcher<'_> {
         .map_err(TrackError::motion)?;
         let mut best = start;
         while strategy.stop().is_none() {
-            let asked = strategy.ask(&mut |_| true).map_err(TrackError::motion)?;
+            let requested = strategy.ask(&mut |_| true).map_err(TrackError::motion)?;
             let point = |x: &Vec<f64>| core::array::from_fn(|i| x[i]);
-            let all = self.scored(asked.iter().map(point).collect())?;
+            let all = self.scored(requested.iter().map(point).collect())?;
             let costs: Vec<f64> = all.iter().map(|f| -f.score).collect();
             strategy.tell(&costs).map_err(TrackError::motion)?;
             for found in all {

@@ -13,7 +13,7 @@ use super::field::{Look, Offset, offsets};
 use super::hypothesis::Side;
 use super::read::NODES;
 use super::statistics::{mean, median};
-use crate::frame::EyeFrame;
+use crate::frame::ImageFrame;
 
 /// The rope is looked for this far to either side of where it should be (px).
 const REACH_PX: usize = 8;
@@ -28,7 +28,7 @@ const LEAST: f64 = 0.3;
 struct Sight<'a> {
     /// Index of the first image's frame of the same time.
     index: usize,
-    frame: &'a EyeFrame,
+    frame: &'a ImageFrame,
     /// Where the rope should be.
     curve: Vec<Pixel>,
 }
@@ -52,13 +52,13 @@ impl Testimony {
         found: &Explained,
     ) -> Option<Self> {
         let sight = |frame| {
-            let stamp_ns = |f: &EyeFrame| f.stamp_ns;
+            let stamp_ns = |f: &ImageFrame| f.stamp_ns;
             let index = film.left.binary_search_by_key(&stamp_ns(frame), stamp_ns);
             let index = index.ok()?;
             let mut curve = found.seen.curve(times_s[index], Side::Right, NODES)?;
             let left = found.curves[index].iter().zip(&found.reading.curves[index]);
-            for (p, (told, read)) in curve.iter_mut().zip(left) {
-                *p = *p + read - told;
+            for (p, (predicted, read)) in curve.iter_mut().zip(left) {
+                *p = *p + read - predicted;
             }
             Some(Sight {
                 index,
@@ -111,10 +111,10 @@ impl Testimony {
 
     /// Part of all places in all frames that is confirmed.
     pub(super) fn confirmed(&self) -> f64 {
-        Self::mean_part(&self.frames)
+        Self::mean_fraction(&self.frames)
     }
 
-    fn mean_part(frames: &[(usize, f64)]) -> f64 {
+    fn mean_fraction(frames: &[(usize, f64)]) -> f64 {
         mean(&frames.iter().map(|(_, part)| *part).collect::<Vec<_>>())
     }
 
@@ -122,7 +122,7 @@ impl Testimony {
     pub(super) fn around(&self, index: usize) -> f64 {
         let after = self.frames.partition_point(|(i, _)| *i < index);
         let near = after.saturating_sub(1)..(after + 1).min(self.frames.len());
-        Self::mean_part(&self.frames[near])
+        Self::mean_fraction(&self.frames[near])
     }
 
     /// Part of the frames that confirm a part of the rope (0 at the clamp to 1).
@@ -136,10 +136,10 @@ impl Testimony {
 mod tests {
     use super::*;
 
-    fn drawn(stamp_ns: u64, rope_at: Option<usize>) -> EyeFrame {
-        let mut frame = EyeFrame {
+    fn drawn(stamp_ns: u64, rope_at: Option<usize>) -> ImageFrame {
+        let mut frame = ImageFrame {
             stamp_ns,
-            ..EyeFrame::grey([96, 128], 150)
+            ..ImageFrame::grey([96, 128], 150)
         };
         if let Some(u) = rope_at {
             for v in 0..128 {
@@ -153,7 +153,7 @@ mod tests {
     fn a_rope_at_another_depth_is_not_confirmed() {
         let scene = Scene::of(&[drawn(1, None), drawn(2, None), drawn(3, None)]);
         let confirmed = |rope_at: usize, frames: u64| {
-            let frames: Vec<EyeFrame> = (0..frames).map(|i| drawn(i, Some(rope_at))).collect();
+            let frames: Vec<ImageFrame> = (0..frames).map(|i| drawn(i, Some(rope_at))).collect();
             let place = |k| Pixel::new(47.5, 10.0 + k as f64 * 1.5);
             let sight = |(index, frame)| Sight {
                 index,

@@ -91,12 +91,12 @@ pub enum ReplyData {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReplyError {
     /// Another register than asked for.
-    #[error("reply is for register {got:#04x}, asked was {asked:#04x}")]
+    #[error("reply is for register {got:#04x}, asked was {requested:#04x}")]
     Register {
         /// Register in the reply.
         got: u8,
         /// Register of the request.
-        asked: u8,
+        requested: u8,
     },
     /// The controller says that the result for this register means nothing.
     #[error("the controller could not answer register {0:#04x}")]
@@ -117,21 +117,21 @@ impl ReplyData {
     /// # Errors
     /// [`ReplyError`]; never panics, whatever the bytes.
     pub fn parse(command: &Command, reply: &Reply<'_>) -> Result<Self, ReplyError> {
-        let asked = command.register().code();
-        if reply.register != asked {
+        let requested = command.register().code();
+        if reply.register != requested {
             return Err(ReplyError::Register {
                 got: reply.register,
-                asked,
+                requested,
             });
         }
         if reply.status.is_invalid() {
-            return Err(ReplyError::Invalid(asked));
+            return Err(ReplyError::Invalid(requested));
         }
         let mut data = Self::blank(command);
         let mut bytes = ByteReader::new(reply.data);
         data.fields(&mut bytes);
         let too_short = ReplyError::TooShort {
-            register: asked,
+            register: requested,
             given: reply.data.len(),
         };
         bytes.found_all().then_some(data).ok_or(too_short)

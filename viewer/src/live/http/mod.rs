@@ -8,7 +8,7 @@ mod guard;
 mod reply;
 mod request;
 
-use super::ask::{Ask, Asked};
+use super::ask::{Ask, Requested};
 use super::film::Picture;
 use super::newest::Newest;
 use super::page;
@@ -46,7 +46,7 @@ pub(crate) struct Site {
     /// The newest state as JSON.
     pub state: Newest<String>,
     pub pictures: Newest<Picture>,
-    asks: Mutex<mpsc::Sender<Asked>>,
+    asks: Mutex<mpsc::Sender<Requested>>,
     picture_asked: Mutex<Option<Instant>>,
     connections: AtomicUsize,
     followers: AtomicUsize,
@@ -60,8 +60,8 @@ impl Site {
 
     /// Whether somebody looks at the camera's pictures.
     pub(crate) fn wants_pictures(&self) -> bool {
-        let asked = self.picture_asked.lock();
-        asked
+        let requested = self.picture_asked.lock();
+        requested
             .unwrap_or_else(PoisonError::into_inner)
             .is_some_and(|at| at.elapsed() < PICTURE_WANTED)
     }
@@ -87,7 +87,7 @@ impl Drop for Place<'_> {
 /// come out of `asks`' other end.
 pub(crate) fn serve(
     bind: SocketAddr,
-    asks: mpsc::Sender<Asked>,
+    asks: mpsc::Sender<Requested>,
 ) -> anyhow::Result<(String, Arc<Site>)> {
     let listener = TcpListener::bind(bind).with_context(|| {
         format!("cannot listen on {bind}; name another address or port with --bind")
@@ -214,8 +214,8 @@ fn follow(mut stream: &TcpStream, site: &Site) -> std::io::Result<()> {
 /// The newest picture, if it is another than the page has; what is drawn over it stands
 /// in a header line.
 fn picture(site: &Site, query: &str) -> Reply {
-    let asked = site.picture_asked.lock();
-    *asked.unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
+    let requested = site.picture_asked.lock();
+    *requested.unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
     let seen = query.strip_prefix("after=");
     let seen = seen.and_then(|n| n.parse().ok()).unwrap_or(0);
     match site.pictures.other_than(seen, PICTURE_PATIENCE) {
@@ -234,7 +234,7 @@ fn picture(site: &Site, query: &str) -> Reply {
 fn wish(site: &Site, ask: Ask) -> Reply {
     let (reply, answers) = mpsc::channel();
     let asks = site.asks.lock().unwrap_or_else(PoisonError::into_inner);
-    let sent = asks.send(Asked { ask, reply });
+    let sent = asks.send(Requested { ask, reply });
     drop(asks);
     match sent
         .ok()

@@ -82,13 +82,13 @@ pub(super) fn measure(
             stage.done(&format!("{} joints swept", sweeps.len()));
             Ok(json!({}))
         },
-        |folder, cycles, mut told| {
+        |folder, cycles, mut reported| {
             let source = format!("arm {address}:{}", args.arm.ports.command_port);
             let mut found = conclude(&Evidence {
                 excitation: Some(excitation),
                 ..Evidence::of(source, folder, cycles)
             })?;
-            found["warnings"] = told["warnings"].take();
+            found["warnings"] = reported["warnings"].take();
             Ok(found)
         },
     )?;

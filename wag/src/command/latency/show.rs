@@ -100,7 +100,7 @@ impl Findings<'_> {
                 "From command to the arm's target: {:.1} to {:.1} ms, as {:.0} % of {} setpoints agree.",
                 1e3 * delay.interval_s[0],
                 1e3 * delay.interval_s[1],
-                1e2 * delay.agreed_part,
+                1e2 * delay.agreed_fraction,
                 delay.seen
             ),
             None if evidence.has_targets => println!(
@@ -168,7 +168,7 @@ impl Findings<'_> {
             "joints": joints.collect::<Vec<Value>>(),
             "joints_measured": self.joints().collect::<Vec<usize>>(),
             "command_to_target": self.target_delay.map(|d| json!({
-                "interval_s": d.interval_s, "agreed_part": d.agreed_part, "setpoints": d.seen,
+                "interval_s": d.interval_s, "agreed_fraction": d.agreed_fraction, "setpoints": d.seen,
             })),
             "camera_offset_s": self.evidence.camera_offset_s,
         })

@@ -15,13 +15,13 @@ const WINDOW_NS: u64 = 1_000_000_000;
 const NEAR_NS: u64 = 20_000_000;
 
 #[derive(Debug)]
-pub(crate) struct Heard {
+pub(crate) struct Received {
     port: PreviewSubscriber,
     kept: VecDeque<PreviewFrame>,
     last: Option<Instant>,
 }
 
-impl Heard {
+impl Received {
     /// Listens in a domain.
     pub(crate) fn open(bus: &Bus) -> Result<Self, IpcError> {
         Ok(Self {
@@ -32,15 +32,15 @@ impl Heard {
     }
 
     pub(crate) fn listen(&mut self) -> anyhow::Result<()> {
-        while let Some(told) = self.port.receive()? {
-            self.put(*told, Instant::now());
+        while let Some(reported) = self.port.receive()? {
+            self.put(*reported, Instant::now());
         }
         Ok(())
     }
 
-    fn put(&mut self, told: PreviewFrame, at: Instant) {
+    fn put(&mut self, reported: PreviewFrame, at: Instant) {
         self.last = Some(at);
-        self.kept.push_back(told);
+        self.kept.push_back(reported);
         if self.kept.len() > KEPT {
             self.kept.pop_front();
         }
@@ -55,8 +55,8 @@ impl Heard {
     pub(crate) fn near(&self, stamp_ns: u64) -> Option<&PreviewFrame> {
         self.kept
             .iter()
-            .filter(|told| told.rope.stamp_ns.abs_diff(stamp_ns) <= NEAR_NS)
-            .min_by_key(|told| told.rope.stamp_ns.abs_diff(stamp_ns))
+            .filter(|reported| reported.rope.stamp_ns.abs_diff(stamp_ns) <= NEAR_NS)
+            .min_by_key(|reported| reported.rope.stamp_ns.abs_diff(stamp_ns))
     }
 
     /// What it does, in words; `None` where there is none.
@@ -75,13 +75,14 @@ impl Heard {
 
     /// Frames looked at in the second up to this one.
     fn rate_hz(&self, until_ns: u64) -> usize {
-        let newer = |told: &&PreviewFrame| told.rope.stamp_ns.saturating_add(WINDOW_NS) > until_ns;
+        let newer =
+            |reported: &&PreviewFrame| reported.rope.stamp_ns.saturating_add(WINDOW_NS) > until_ns;
         self.kept.iter().filter(newer).count()
     }
 
     /// Median time spent on a frame (µs).
     fn usual_us(&self) -> u32 {
-        let mut took: Vec<u32> = self.kept.iter().map(|told| told.took_us).collect();
+        let mut took: Vec<u32> = self.kept.iter().map(|reported| reported.took_us).collect();
         took.sort_unstable();
         took.get(took.len() / 2).copied().unwrap_or(0)
     }
@@ -93,7 +94,7 @@ mod tests {
     use shared_types::KeypointFrame;
     use shared_types::ipc::DomainSweep;
 
-    fn told(state: PreviewState, sequence: u64) -> PreviewFrame {
+    fn reported(state: PreviewState, sequence: u64) -> PreviewFrame {
         PreviewFrame {
             state: state as u8,
             rope: KeypointFrame {
@@ -112,30 +113,36 @@ mod tests {
         let domain = format!("test_heard_{}", std::process::id());
         let _sweep = DomainSweep::new(&domain);
         let bus = Bus::join(&domain).unwrap();
-        let mut heard = Heard::open(&bus).unwrap();
-        assert!(!heard.is_there() && heard.words().is_none());
+        let mut received = Received::open(&bus).unwrap();
+        assert!(!received.is_there() && received.words().is_none());
         let preview = bus.preview_publisher().unwrap();
-        preview.send_copy(told(PreviewState::Looking, 1)).unwrap();
-        heard.listen().unwrap();
-        assert!(heard.words().unwrap().contains("must move to be found"));
+        preview
+            .send_copy(reported(PreviewState::Looking, 1))
+            .unwrap();
+        received.listen().unwrap();
+        assert!(received.words().unwrap().contains("must move to be found"));
         for sequence in [2, 3, 5] {
             preview
-                .send_copy(told(PreviewState::Following, sequence))
+                .send_copy(reported(PreviewState::Following, sequence))
                 .unwrap();
         }
-        heard.listen().unwrap();
-        let at = |sequence: u64| heard.near(sequence * 16_000_000).map(|t| t.rope.sequence);
+        received.listen().unwrap();
+        let at = |sequence: u64| {
+            received
+                .near(sequence * 16_000_000)
+                .map(|t| t.rope.sequence)
+        };
         assert_eq!((at(3), at(6), at(7)), (Some(3), Some(5), None));
-        let words = heard.words().unwrap();
+        let words = received.words().unwrap();
         assert!(words.contains("4 a second, 1.2 ms each"), "{words}");
-        let mut lost = told(PreviewState::Following, 6);
+        let mut lost = reported(PreviewState::Following, 6);
         lost.rope.lost = 1;
         preview.send_copy(lost).unwrap();
-        heard.listen().unwrap();
-        assert_eq!(heard.words().unwrap(), "the preview has lost the rope");
+        received.listen().unwrap();
+        assert_eq!(received.words().unwrap(), "the preview has lost the rope");
         for sequence in 10..1000 {
-            heard.put(told(PreviewState::Following, sequence), Instant::now());
+            received.put(reported(PreviewState::Following, sequence), Instant::now());
         }
-        assert_eq!(heard.kept.len(), KEPT);
+        assert_eq!(received.kept.len(), KEPT);
     }
 }

@@ -5,7 +5,7 @@ use shared_types::{Intrinsics, StereoCamera};
 
 /// One eye of a stereo camera at its place in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Eye {
+pub struct ImageView {
     intrinsics: Intrinsics,
     r_cam_w: Matrix3<f64>,
     t_cam_m: Vector3<f64>,
@@ -24,7 +24,7 @@ pub(super) struct Seen {
     pub(super) px_per_m: f64,
 }
 
-impl Eye {
+impl ImageView {
     /// Left eye.
     #[must_use]
     pub fn left(camera: &StereoCamera) -> Self {
@@ -110,8 +110,8 @@ pub(super) struct Vignette {
 
 impl Vignette {
     /// A lens that loses this part of the light in the corners.
-    pub(super) fn of(eye: &Eye, corner_loss: f32) -> Self {
-        let (w, h) = eye.size_px();
+    pub(super) fn of(image: &ImageView, corner_loss: f32) -> Self {
+        let (w, h) = image.size_px();
         let centre = [w as f32 / 2.0, h as f32 / 2.0];
         Self {
             centre,
@@ -136,13 +136,13 @@ mod tests {
         let camera = CameraConfig::default().stereo_camera();
         for p in [[0.6, 0.0, 0.2], [1.1, 0.2, 0.5], [0.2, -0.1, -0.3]] {
             let p = Vector3::from(p);
-            for (eye, want) in [
-                (Eye::left(&camera), camera.project_left(&p).unwrap()),
-                (Eye::right(&camera), camera.project_right(&p).unwrap()),
+            for (image, want) in [
+                (ImageView::left(&camera), camera.project_left(&p).unwrap()),
+                (ImageView::right(&camera), camera.project_right(&p).unwrap()),
             ] {
-                let got = eye.project(&p).unwrap();
+                let got = image.project(&p).unwrap();
                 assert!((got[0] - want[0]).hypot(got[1] - want[1]) < 1e-9);
-                let (o, d) = eye.ray(got);
+                let (o, d) = image.ray(got);
                 assert!((p - o).cross(&d.normalize()).norm() < 1e-9);
             }
         }

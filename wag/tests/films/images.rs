@@ -70,8 +70,8 @@ fn keypoints(from: &Path) -> KeypointTrack {
     let motion = PoseTrack::new(&read_pose(&from.join("pose.csv")).unwrap()).unwrap();
     let mut video = open_video(from, None).unwrap();
     let all: Vec<StereoFrame> = (0..FRAMES).map(|i| video.read(i).unwrap()).collect();
-    let eyes = read_film(&mut { all }).unwrap();
-    track(eyes.film(), &camera, &motion, 20).unwrap().track
+    let images = read_film(&mut { all }).unwrap();
+    track(images.film(), &camera, &motion, 20).unwrap().track
 }
 
 #[test]
