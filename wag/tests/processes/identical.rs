@@ -13,7 +13,7 @@ use planner::service::{PlannerRequest, PlannerRpc};
 use shared_types::ipc::message::{CameraRequest, CameraRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
 use shared_types::ipc::{Bus, ControllerMode, CycleRecord, DomainSweep, StateReader};
-use shared_types::{MonotonicNs, OperatingMode, Task};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode, Task};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
@@ -107,7 +107,8 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     std::fs::write(&file, plan_json(&plan(), &random_rope(1)).to_string()).unwrap();
     let (arm, run) = (arm(), folder.join("run"));
     let line = format!("throw {}", file.display());
-    let mut child = on_arm(&arm, &line, &run).spawn().unwrap();
+    let mut child = on_arm(&arm, &line, &run);
+    let mut child = child.env("WAG_LOG", "info").spawn().unwrap();
     let domain = format!("run-{}", child.id());
     let _sweep = DomainSweep::new(&domain);
     let bus = Bus::join(&domain).unwrap();
@@ -153,8 +154,11 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     assert_eq!(dead, murder, "killed while the arm moved, or never");
     drop((planned, filmed));
     let (cycles, causes) = recorded(&run);
-    let during = causes.iter().filter(|c| c.motion_id != 0).count();
-    assert_eq!(during, 0, "{causes:?}");
+    // Its end at rest is a stop, too.
+    let met: Vec<_> = causes.iter().map(|c| (c.fault(), c.motion_id)).collect();
+    assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
+    let guardian = std::fs::read_to_string(run.join("log/guardian.log")).unwrap();
+    assert!(guardian.contains("guarding the controller"), "{guardian}");
     let is_thrown = |r: &&CycleRecord| r.trajectory_s >= 0.0 && r.sent != 0;
     let throw = cycles.iter().rev().skip_while(|r| r.trajectory_s < 0.0);
     let throw = throw.take_while(|r| r.trajectory_s >= 0.0);
