@@ -2,6 +2,7 @@
 
 use crate::firmware::Firmware;
 use serde::{Deserialize, Serialize};
+use toml::Value;
 
 /// Which connections a fault of the wire concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -270,43 +271,56 @@ impl FaultKind {
             _ => Lasts::Open,
         }
     }
+}
 
-    /// Fields with bounds, both included: name, value, smallest and largest.
-    pub(super) fn bounded(&self) -> Vec<(&'static str, f64, [f64; 2])> {
-        let of_joint = |joint: u8| ("joint", f64::from(joint), [1.0, 7.0]);
-        let of_frames = |frames: u32| ("frames", f64::from(frames), [1.0, 1e6]);
-        let of_code = |code: u8, max: f64| ("code", f64::from(code), [1.0, max]);
-        match *self {
-            Self::RepliesDelayed { delay_s } => vec![("delay_s", delay_s, [0.0, 60.0])],
-            Self::RepliesLost { share } => vec![("share", share, [0.0, 1.0])],
-            Self::Warning { code } | Self::RaiseError { code } => vec![of_code(code, 255.0)],
-            Self::ServoError { joint, code } => vec![of_joint(joint), of_code(code, 255.0)],
-            Self::EmergencyStop { code } => vec![of_code(code, 3.0)],
-            Self::StateChanged { state } => vec![("state", state.into(), [3.0, 6.0])],
-            Self::ModeChanged { mode } => vec![("mode", mode.into(), [0.0, 11.0])],
-            Self::SecondCommander { rate_hz, .. } => vec![("rate_hz", rate_hz, [0.1, 1000.0])],
-            Self::ReportTimeJump { by_s } => vec![("by_s", by_s, [-1e6, 1e6])],
-            Self::ReportTimeDrift { ppm } | Self::ClockRate { ppm } => {
-                vec![("ppm", ppm, [-1e5, 1e5])]
-            }
-            Self::ReportTorn {
-                frames, keep_bytes, ..
-            } => vec![
-                of_frames(frames),
-                ("keep_bytes", keep_bytes.into(), [0.0, 86.0]),
-            ],
-            Self::ReportLength { frames, .. } | Self::ReportGarbage { frames, .. } => {
-                vec![of_frames(frames)]
-            }
-            Self::ReportNan { frames, joint, .. } | Self::ReportInfinity { frames, joint, .. } => {
-                vec![of_frames(frames), of_joint(joint)]
-            }
-            Self::TrackingLag { lag_s } => vec![("lag_s", lag_s, [0.0, 10.0])],
-            Self::JointStuck { joint } => vec![of_joint(joint)],
-            Self::EncoderJump { joint, by_rad } => {
-                vec![of_joint(joint), ("by_rad", by_rad, [-10.0, 10.0])]
-            }
-            _ => Vec::new(),
+/// Numbers that a field may have: from the first to the last.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Range {
+    Number(f64, f64),
+    Whole(i64, i64),
+}
+
+impl Range {
+    /// What field `field` of kind `kind` may have, if it is a number.
+    pub(super) fn of(kind: &str, field: &str) -> Option<Self> {
+        Some(match field {
+            "delay_s" => Self::Number(0.0, 60.0),
+            "share" => Self::Number(0.0, 1.0),
+            "code" if kind == "emergency_stop" => Self::Whole(1, 3),
+            "code" => Self::Whole(1, 255),
+            "state" => Self::Whole(3, 6),
+            "mode" => Self::Whole(0, 11),
+            "rate_hz" => Self::Number(0.1, 1000.0),
+            "by_s" => Self::Number(-1e6, 1e6),
+            "ppm" => Self::Number(-1e5, 1e5),
+            "frames" => Self::Whole(1, 1_000_000),
+            "keep_bytes" => Self::Whole(0, 86),
+            "claim_bytes" => Self::Whole(0, u32::MAX.into()),
+            "lag_s" => Self::Number(0.0, 10.0),
+            "joint" => Self::Whole(1, 7),
+            "by_rad" => Self::Number(-10.0, 10.0),
+            _ => return None,
+        })
+    }
+
+    /// The value of `field`, or what is allowed there.
+    pub(super) fn number(self, field: &str, found: &Value) -> Result<f64, String> {
+        let whole = found.as_integer().map(|n| n as f64);
+        let (value, min, max) = match self {
+            Self::Number(min, max) => (found.as_float().or(whole), min, max),
+            Self::Whole(min, max) => (whole, min as f64, max as f64),
+        };
+        value
+            .filter(|v| (min..=max).contains(v))
+            .ok_or_else(|| format!("`{field}` is {found}; allowed is {self}"))
+    }
+}
+
+impl core::fmt::Display for Range {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Number(min, max) => write!(f, "a number from {min} to {max}"),
+            Self::Whole(min, max) => write!(f, "a whole number from {min} to {max}"),
         }
     }
 }
