@@ -5,7 +5,7 @@
 
 use arm_model::{JOINTS, JointVector, Limits, kinematics};
 use shared_types::MonotonicNs;
-use shared_types::ipc::{CommandKind, CycleRecord, InputRecord};
+use shared_types::ipc::{CommandKind, ControllerMode, CycleRecord, InputRecord};
 
 /// Smallest time between two setpoints (s): 0.8 of a cycle.
 pub const GAP_MIN_S: f64 = 0.0032;
@@ -108,12 +108,16 @@ pub fn assert_computed<'a>(
     limits: &Limits,
     cycles: impl IntoIterator<Item = (&'a InputRecord, &'a CycleRecord)>,
 ) {
-    let mut judge = None;
+    let (mut judge, mut before) = (None, ControllerMode::Offline as u8);
     for (input, record) in cycles {
         let at = MonotonicNs(record.deadline_ns + u64::from(input.late_ns));
-        if input.command.kind == CommandKind::Engage as u8 {
+        let engages = input.command.kind == CommandKind::Engage as u8;
+        // Elsewhere an engagement is refused, and what moves goes on.
+        let stood = [ControllerMode::Offline, ControllerMode::Faulted].map(|mode| mode as u8);
+        if engages && stood.contains(&before) && record.mode == ControllerMode::Idle as u8 {
             judge = Some(Differences::at_rest(at, record.q_c, EXACT, 0.0));
         }
+        before = record.mode;
         if record.sent == 1 {
             assert!(judge.is_some(), "sent before an engagement");
             judge

@@ -35,6 +35,9 @@ pub enum ControllerError {
     /// The control loop ended by itself; the arm was asked to stop.
     #[error("the control loop ended unexpectedly; the arm was asked to stop. This is a defect")]
     LoopEnded,
+    /// The control loop ended before it was set up.
+    #[error("the control loop ended while it was set up; this is a defect")]
+    LoopNotSetUp,
     /// A histogram could not be made.
     #[error("cannot make a latency histogram: {0}")]
     Histogram(#[from] hdrhistogram::CreationError),

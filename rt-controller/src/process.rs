@@ -216,9 +216,9 @@ pub(crate) fn start_loop<T: ArmTransport + Send + 'static>(
         .name(CONTROL_THREAD.to_owned())
         .spawn(thread)
         .map_err(ControllerError::Thread)?;
-    let warnings = wait.recv().map_err(|_gone| {
-        ControllerError::Thread(std::io::Error::other("the control loop ended at once"))
-    })??;
+    let warnings = wait
+        .recv()
+        .map_err(|_gone| ControllerError::LoopNotSetUp)??;
     Ok((thread, warnings))
 }
 

@@ -16,31 +16,45 @@ const STOP_WITHIN_S: f64 = 1.5;
 
 /// What a stop is expected to be: for which fault, how, and whether the arm is asked to stop.
 #[derive(Clone, Copy)]
-pub(crate) struct Stop(FaultCode, StopCategory, bool);
+pub(crate) struct Stop {
+    fault: FaultCode,
+    path: StopCategory,
+    stop_arm: bool,
+}
+
+impl Stop {
+    const fn new(fault: FaultCode, path: StopCategory, stop_arm: bool) -> Self {
+        Self {
+            fault,
+            path,
+            stop_arm,
+        }
+    }
+}
 
 /// Slowed along the path.
 pub(crate) const fn slowed(fault: FaultCode) -> Stop {
-    Stop(fault, StopCategory::OnPath, false)
+    Stop::new(fault, StopCategory::OnPath, false)
 }
 
 /// Braked in joint space.
 pub(crate) const fn braked(fault: FaultCode) -> Stop {
-    Stop(fault, StopCategory::JointSpace, false)
+    Stop::new(fault, StopCategory::JointSpace, false)
 }
 
 /// Braked, then the arm asked to stop.
 pub(crate) const fn braked_and_stopped(fault: FaultCode) -> Stop {
-    Stop(fault, StopCategory::JointSpace, true)
+    Stop::new(fault, StopCategory::JointSpace, true)
 }
 
 /// No setpoints any more, the arm asked to stop.
 pub(crate) const fn stopped(fault: FaultCode) -> Stop {
-    Stop(fault, StopCategory::CutOff, true)
+    Stop::new(fault, StopCategory::CutOff, true)
 }
 
 /// No setpoints any more; the arm has stopped by itself or cannot hear.
 pub(crate) const fn silenced(fault: FaultCode) -> Stop {
-    Stop(fault, StopCategory::CutOff, false)
+    Stop::new(fault, StopCategory::CutOff, false)
 }
 
 /// A throw by each interface with a fault of a script: it stops as wanted, is noticed
@@ -78,13 +92,16 @@ impl Stage {
     pub(crate) fn assert_stop(&mut self, want: Stop) -> CauseRecord {
         let cause = self.assert_one_cause(want);
         // What a dead link delivers later is no setpoint any more.
-        let wire_until = match want.1 {
+        let wire_until = match want.path {
             StopCategory::CutOff => MonotonicNs(cause.stamp_ns),
             _ => EVER,
         };
         limits::assert_kept(self, wire_until, 0.0);
         self.assert_standstill(&cause);
         self.assert_nothing_moves_it();
+        let requests = self.state_requests_since(MonotonicNs(cause.stamp_ns));
+        // A dead link may carry none.
+        assert!(requests <= usize::from(want.stop_arm), "{requests}");
         assert_eq!(
             self.rig.log.causes,
             [cause],
@@ -93,7 +110,12 @@ impl Stage {
         cause
     }
 
-    fn assert_one_cause(&self, Stop(fault, path, stop_arm): Stop) -> CauseRecord {
+    fn assert_one_cause(&self, want: Stop) -> CauseRecord {
+        let Stop {
+            fault,
+            path,
+            stop_arm,
+        } = want;
         let causes = &self.rig.log.causes;
         let [cause] = causes[..] else {
             panic!("{:?} {fault:?}: {causes:?}", self.via);
@@ -102,6 +124,11 @@ impl Stage {
         let wanted = (fault, path as u8, stop_arm);
         assert_eq!(said, wanted, "{:?}: {cause:?}", self.via);
         assert!(cause.cycle <= cause.rest_cycle && cause.motion_id > 0);
+        // A brake that itself breaks a limit ends at once, too, and says by which.
+        let at_once = cause.cycle == cause.rest_cycle && cause.second_code == 0;
+        // Before the path begins there is nothing to brake.
+        let cut_off = at_once && cause.trajectory_s > 0.0;
+        assert_eq!(path == StopCategory::CutOff, cut_off, "{cause:?}");
         let (value, limit) = (cause.limit.value, cause.limit.limit);
         // Codes that are no excess: an error shows how near the speed limit was.
         let excess = !matches!(fault, FaultCode::ArmError | FaultCode::ArmModeChanged);
@@ -205,7 +232,7 @@ impl Stage {
     pub(crate) fn assert_one_motion(&self, jitter_s: f64) {
         self.assert_mode(ControllerMode::Idle);
         let found = (self.finished(), self.rig.log.causes.len());
-        assert_eq!(found, (1, 0), "{:?}", self.via);
+        assert_eq!(found, (1, 0), "{:?} {:?}", self.via, self.rig.log.causes);
         limits::assert_kept(self, EVER, jitter_s);
     }
 

@@ -70,6 +70,20 @@ fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
     }
 }
 
+/// A setpoint that does not go out counts as missed for the one behind it.
+#[test]
+fn fault_02_each_setpoint_that_grows_old_is_counted_once() {
+    let held_us = [0, 250, 300, 0, 0, 3500, 0, 150, 0];
+    for via in INTERFACES {
+        let held_ns = held_us.map(|us| us * 1000);
+        let stage = Stage::disturbed(via, 0.2, |rig| rig.hold_up(held_ns));
+        let records = stage.rig.log.records.iter();
+        let missed: Vec<u32> = records.map(|r| r.missed).filter(|m| *m > 0).collect();
+        assert_eq!(missed, [1, 2, 1], "{via:?}");
+        stage.assert_finished(0.2e-3);
+    }
+}
+
 /// Held up in every cycle, nothing would be sent any more: that is met as missed
 /// cycles are.
 #[test]

@@ -75,6 +75,10 @@ fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
     let first = *stage.rig.log.records.last().unwrap();
     assert_eq!(first.cycle, before + 1);
     assert_eq!((first.sent, first.mode), (1, ControllerMode::Braking as u8));
+    let planned = stage.throw.state_at(first.trajectory_s);
+    let off_rad = (first.q_c - planned.q).max_abs();
+    let moves = planned.qd.max_abs() > 0.1;
+    assert!(!moves || off_rad > 1e-12, "{how:?} at {part}: as planned");
     stage.rig.run_for(0.8);
     let [cause] = stage.rig.log.causes[..] else {
         panic!("{how:?} at {part}: {:?}", stage.rig.log.causes);

@@ -81,7 +81,7 @@ fn two_runs_are_equal_bit_for_bit() {
         entry("on = 'speed:0.3'", "replies_duplicated, duration_s = 0.5"),
     ]
     .concat();
-    let run = |interface, seed: u64| {
+    let run = |interface, seed: u64, script: &str| {
         let relaxed = ControlSettings {
             interface,
             ..Thresholds::relaxed().into()
@@ -100,8 +100,11 @@ fn two_runs_are_equal_bit_for_bit() {
         )
     };
     for interface in INTERFACES {
-        let (first, second) = (run(interface, 1), run(interface, 1));
+        let (first, second) = (run(interface, 1, &script), run(interface, 1, &script));
         assert!(first == second, "{interface:?}");
-        assert!(run(interface, 2) != first, "{interface:?}");
+        assert!(run(interface, 2, &script) != first, "{interface:?}");
+        // Also without a script, whose losses are drawn.
+        let [(_, one), (_, two)] = [1, 2].map(|seed| run(interface, seed, ""));
+        assert!(one != two, "{interface:?}");
     }
 }

@@ -4,7 +4,7 @@ use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::scenario::entry;
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, Motion, Thresholds};
-use rt_controller::xarm::ArmState;
+use rt_controller::xarm::{ArmState, Register};
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{Arming, CommandInterface, MonotonicNs, OperatingMode};
 use std::ops::Range;
@@ -170,6 +170,15 @@ impl Stage {
     /// Commands that the arm got from the controller: setpoints or velocities.
     pub(crate) fn commands(&self) -> usize {
         self.rig.log.arrivals().count()
+    }
+
+    /// Requests by the controller to change the arm's state.
+    pub(crate) fn state_requests_since(&self, since: MonotonicNs) -> usize {
+        let register = Register::SetState.code();
+        let events = self.rig.log.arm_events.iter();
+        let own = events.filter(|e| e.client != Some(u32::MAX) && e.at >= since);
+        own.filter(|e| e.event == ArmEvent::Request { register })
+            .count()
     }
 
     /// Errors that the arm raised.

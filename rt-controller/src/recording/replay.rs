@@ -160,7 +160,7 @@ impl Player {
         let input = match restore_input(&cycle.input, motion_of) {
             Ok(input) => input,
             Err(error @ RestoreError::Version(..)) => return Err(ReplayError::Restore(error)),
-            Err(error @ (RestoreError::Command { .. } | RestoreError::Motion(..))) => {
+            Err(error @ (RestoreError::Command { .. } | RestoreError::Motion { .. })) => {
                 self.state = None;
                 self.gap(error.to_string(), true);
                 self.found.skipped += 1;

@@ -6,9 +6,9 @@
 
 use crate::xarm::frame::next_transaction;
 
-/// Commands remembered: one second of setpoints. A power of two, so that the
-/// slot of an id never changes.
-const WINDOW: usize = 256;
+/// Commands remembered: one second of setpoints. It divides the number of ids, 1 to
+/// 65 535, so that the slots of a window differ also where ids wrap.
+const WINDOW: usize = 255;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Sent {
@@ -170,9 +170,18 @@ mod tests {
 
     #[test]
     fn silence_keeps_the_age_of_the_oldest_of_the_last_second() {
-        let f = with_sent(1000);
-        assert_eq!(usize::from(f.open()), WINDOW);
-        assert_eq!(f.oldest_ns(), Some(1000 * (1000 - WINDOW as u64)));
+        for next in [1, 65_400] {
+            let mut f = InFlight {
+                next,
+                ..InFlight::default()
+            };
+            for k in 0..1000 {
+                f.sent(k);
+                let open = WINDOW.min(k as usize + 1);
+                assert_eq!(usize::from(f.open()), open, "{next} {k}");
+                assert_eq!(f.oldest_ns(), Some(k + 1 - open as u64), "{next} {k}");
+            }
+        }
     }
 
     proptest! {

@@ -1,5 +1,6 @@
 //! What the live preview of the rope publishes, frame by frame.
 
+use super::PAYLOAD_VERSION;
 use crate::keypoints::KeypointFrame;
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -45,7 +46,7 @@ impl PreviewState {
 
 /// The rope in one camera frame, as far as it was known when the frame came. While there
 /// are no frames, a sign of life. RT-safe to copy.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
 #[repr(C)]
 pub struct PreviewFrame {
     /// [`super::PAYLOAD_VERSION`].
@@ -64,6 +65,21 @@ pub struct PreviewFrame {
     pub took_us: u32,
     /// The camera frame, and the keypoints in it; none unless the rope is followed.
     pub rope: KeypointFrame,
+}
+
+impl Default for PreviewFrame {
+    fn default() -> Self {
+        Self {
+            version: PAYLOAD_VERSION,
+            state: PreviewState::NoCamera as u8,
+            reserved: [0; 3],
+            seen: 0,
+            skipped: 0,
+            restarts: 0,
+            took_us: 0,
+            rope: KeypointFrame::default(),
+        }
+    }
 }
 
 impl PreviewFrame {

@@ -68,7 +68,8 @@ impl ArmEndpoint {
             FaultKind::ReportLength { claim_bytes, .. } => {
                 frame[..4].copy_from_slice(&claim_bytes.to_be_bytes());
             }
-            _ => self.rng.fill_bytes(&mut frame[4..]),
+            FaultKind::ReportGarbage { .. } => self.rng.fill_bytes(&mut frame[4..]),
+            _ => {}
         }
     }
 }

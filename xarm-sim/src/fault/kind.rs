@@ -2,6 +2,7 @@
 
 use crate::firmware::Firmware;
 use serde::{Deserialize, Serialize};
+use toml::Value;
 
 /// Which connections a fault of the wire concerns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -272,25 +273,56 @@ impl FaultKind {
     }
 }
 
-/// Smallest and largest number that a field may hold, where it has bounds.
-pub(super) fn bounds(kind: &str, field: &str) -> Option<[f64; 2]> {
-    Some(match (kind, field) {
-        (_, "delay_s") => [0.0, 60.0],
-        (_, "share") => [0.0, 1.0],
-        ("emergency_stop", "code") => [1.0, 3.0],
-        (_, "code") => [1.0, 255.0],
-        (_, "joint") => [1.0, 7.0],
-        (_, "state") => [3.0, 6.0],
-        (_, "mode") => [0.0, 11.0],
-        (_, "rate_hz") => [0.1, 1000.0],
-        (_, "by_s") => [-1e6, 1e6],
-        (_, "ppm") => [-1e5, 1e5],
-        (_, "frames") => [1.0, 1e6],
-        (_, "keep_bytes") => [0.0, 86.0],
-        (_, "lag_s") => [0.0, 10.0],
-        (_, "by_rad") => [-10.0, 10.0],
-        _ => return None,
-    })
+/// Numbers that a field may have: from the first to the last.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Range {
+    Number(f64, f64),
+    Whole(i64, i64),
+}
+
+impl Range {
+    /// What field `field` of kind `kind` may have, if it is a number.
+    pub(super) fn of(kind: &str, field: &str) -> Option<Self> {
+        Some(match field {
+            "delay_s" => Self::Number(0.0, 60.0),
+            "share" => Self::Number(0.0, 1.0),
+            "code" if kind == "emergency_stop" => Self::Whole(1, 3),
+            "code" => Self::Whole(1, 255),
+            "state" => Self::Whole(3, 6),
+            "mode" => Self::Whole(0, 11),
+            "rate_hz" => Self::Number(0.1, 1000.0),
+            "by_s" => Self::Number(-1e6, 1e6),
+            "ppm" => Self::Number(-1e5, 1e5),
+            "frames" => Self::Whole(1, 1_000_000),
+            "keep_bytes" => Self::Whole(0, 86),
+            "claim_bytes" => Self::Whole(0, u32::MAX.into()),
+            "lag_s" => Self::Number(0.0, 10.0),
+            "joint" => Self::Whole(1, 7),
+            "by_rad" => Self::Number(-10.0, 10.0),
+            _ => return None,
+        })
+    }
+
+    /// The value of `field`, or what is allowed there.
+    pub(super) fn number(self, field: &str, found: &Value) -> Result<f64, String> {
+        let whole = found.as_integer().map(|n| n as f64);
+        let (value, min, max) = match self {
+            Self::Number(min, max) => (found.as_float().or(whole), min, max),
+            Self::Whole(min, max) => (whole, min as f64, max as f64),
+        };
+        value
+            .filter(|v| (min..=max).contains(v))
+            .ok_or_else(|| format!("`{field}` is {found}; allowed is {self}"))
+    }
+}
+
+impl core::fmt::Display for Range {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Number(min, max) => write!(f, "a number from {min} to {max}"),
+            Self::Whole(min, max) => write!(f, "a whole number from {min} to {max}"),
+        }
+    }
 }
 
 impl ReportPort {

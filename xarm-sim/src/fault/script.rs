@@ -1,14 +1,14 @@
 //! Scripts: which fault, when, and for how long; from TOML and back.
 
-use super::kind::{FaultKind, Lasts, bounds};
-use serde::de::DeserializeOwned;
+use super::kind::{FaultKind, Lasts, Range};
 use serde::{Deserialize, Serialize};
-use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-/// Longest time in a script (s).
-const LONGEST_S: f64 = 1e6;
+/// Times in a script (s).
+const TIME: Range = Range::Number(0.0, 1e6);
+/// Motions in a script.
+const COUNT: Range = Range::Whole(1, u32::MAX as i64);
 const TRIGGERS: &str =
     "\"first_setpoint\", \"setpoint:N\", \"motion:PERCENT\", \"speed:RAD_PER_S\"";
 
@@ -141,13 +141,17 @@ impl From<FaultScript> for Vec<Table> {
 impl Fault {
     /// The fault of an entry, or what is wrong with the entry.
     fn from_table(mut table: Table) -> Result<Self, String> {
-        let name = take::<String>(&mut table, "kind")?.unwrap_or_default();
+        let name = match table.remove("kind") {
+            Some(Value::String(name)) => name,
+            Some(found) => return Err(format!("`kind` is {found}; allowed is {}", kinds())),
+            None => return Err(format!("`kind` is missing; give {}", kinds())),
+        };
         let trigger = Trigger::take(&mut table)?;
-        let duration_s = take_time(&mut table, "duration_s")?;
-        let kind = kind_of(&name, table)?;
+        let duration_s = take(&mut table, "duration_s", TIME)?;
+        let kind = kind_of(name.clone(), table)?;
         match (kind.lasts(), duration_s) {
             (Lasts::Moment, Some(_)) => Err(format!("`duration_s` means nothing for `{name}`")),
-            (Lasts::Span, None) => Err(missing_time("duration_s")),
+            (Lasts::Span, None) => Err(missing("duration_s", TIME)),
             _ => Ok(Self {
                 trigger,
                 duration_s,
@@ -193,7 +197,7 @@ impl Fault {
 impl Trigger {
     /// Takes the fields that say when a fault begins.
     fn take(table: &mut Table) -> Result<Self, String> {
-        match (take_time(table, "at_s")?, take::<String>(table, "on")?) {
+        match (take(table, "at_s", TIME)?, table.remove("on")) {
             (Some(at_s), None) => Ok(Self::At(at_s)),
             (None, Some(on)) => Self::of(&on, table),
             (None, None) => Err(format!(
@@ -204,8 +208,9 @@ impl Trigger {
     }
 
     /// The trigger that `on` means.
-    fn of(on: &str, table: &mut Table) -> Result<Self, String> {
-        let bad = || format!("`on` is \"{on}\"; allowed is one of {TRIGGERS}");
+    fn of(on: &Value, table: &mut Table) -> Result<Self, String> {
+        let bad = || format!("`on` is {on}; allowed is one of {TRIGGERS}");
+        let on = on.as_str().ok_or_else(bad)?;
         if on == "first_setpoint" {
             return Ok(Self::Setpoint(1));
         }
@@ -218,8 +223,9 @@ impl Trigger {
             },
             "motion" if (0.0..=100.0).contains(&number) => Ok(Self::Motion {
                 part: number / 100.0,
-                length_s: take_time(table, "motion_s")?.ok_or_else(|| missing_time("motion_s"))?,
-                number: take(table, "motion")?.map_or(1, NonZeroU32::get),
+                length_s: take(table, "motion_s", TIME)?
+                    .ok_or_else(|| missing("motion_s", TIME))?,
+                number: take(table, "motion", COUNT)?.map_or(1, |number| number as u32),
             }),
             "speed" if number > 0.0 && number.is_finite() => Ok(Self::Speed(number)),
             _ => Err(bad()),
@@ -227,48 +233,46 @@ impl Trigger {
     }
 }
 
-/// The kind of a name with its fields, each within its bounds.
-fn kind_of(name: &str, fields: Table) -> Result<FaultKind, String> {
-    let out_of_bounds = fields.iter().find_map(|(field, value)| {
-        let number = value
-            .as_float()
-            .or_else(|| value.as_integer().map(|i| i as f64))?;
-        let [min, max] = bounds(name, field)?;
-        let allowed = (min..=max).contains(&number);
-        (!allowed)
-            .then(|| format!("`{field}` is {number}; allowed is a number from {min} to {max}"))
-    });
-    let alone = Value::from(name).try_into();
-    let kind: FaultKind = match (alone, fields.keys().next()) {
-        (Ok(kind), None) => kind,
+/// The kind of a name with its fields, each within its range.
+fn kind_of(name: String, fields: Table) -> Result<FaultKind, String> {
+    let alone = Value::from(name.as_str()).try_into();
+    match (alone, fields.keys().next()) {
+        (Ok(kind), None) => return Ok(kind),
         (Ok(_), Some(field)) => return Err(format!("`{field}` means nothing for `{name}`")),
-        (Err(_), _) => Value::Table(Table::from_iter([(name.to_owned(), Value::Table(fields))]))
-            .try_into()
-            .map_err(|error| format!("`kind` and its fields: {}", one_line(&error)))?,
-    };
-    out_of_bounds.map_or(Ok(kind), Err)
-}
-
-/// Takes a field, if it is there.
-fn take<T: DeserializeOwned>(table: &mut Table, field: &str) -> Result<Option<T>, String> {
-    let found = table.remove(field).map(Value::try_into);
-    found
-        .transpose()
-        .map_err(|error| format!("`{field}`: {}", one_line(&error)))
-}
-
-/// Takes a time (s), if it is there.
-fn take_time(table: &mut Table, field: &str) -> Result<Option<f64>, String> {
-    match take(table, field)? {
-        Some(time_s) if !(0.0..=LONGEST_S).contains(&time_s) => Err(format!(
-            "`{field}` is {time_s}; allowed is a number from 0 to {LONGEST_S}"
-        )),
-        time_s => Ok(time_s),
+        (Err(_), _) => {}
     }
+    for (field, found) in &fields {
+        if let Some(range) = Range::of(&name, field) {
+            range.number(field, found)?;
+        }
+    }
+    let whole = Table::from_iter([(name.clone(), Value::Table(fields))]);
+    Value::Table(whole).try_into().map_err(|error| {
+        let said = one_line(&error);
+        let field = said
+            .split_once("missing field `")
+            .and_then(|(_, rest)| rest.split('`').next());
+        field
+            .and_then(|field| Some(missing(field, Range::of(&name, field)?)))
+            .unwrap_or_else(|| format!("`kind` and its fields: {said}"))
+    })
 }
 
-fn missing_time(field: &str) -> String {
-    format!("`{field}` is missing; give a number from 0 to {LONGEST_S}")
+/// The kinds that there are, as the parser lists them.
+fn kinds() -> String {
+    let unknown = Value::from("").try_into::<FaultKind>();
+    let said = unknown.map_or_else(|error| one_line(&error), |_| String::new());
+    said.replacen("unknown variant ``, expected ", "", 1)
+}
+
+/// Takes a number, if it is there.
+fn take(table: &mut Table, field: &str, range: Range) -> Result<Option<f64>, String> {
+    let found = table.remove(field);
+    found.map(|found| range.number(field, &found)).transpose()
+}
+
+fn missing(field: &str, range: Range) -> String {
+    format!("`{field}` is missing; give {range}")
 }
 
 fn one_line(error: &toml::de::Error) -> String {

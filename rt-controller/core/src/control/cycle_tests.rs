@@ -51,6 +51,26 @@ fn a_trajectory_is_streamed_at_its_planned_times_also_when_it_begins_late() {
     }
 }
 
+#[test]
+fn a_missed_cycle_costs_its_setpoint_and_no_time() {
+    let mut bench = Bench::holding();
+    let motion = swing();
+    bench.run(motion.clone());
+    let start_ns = bench.now_ns;
+    for missed in [0, 0, 2, 0, 5, 0, 1] {
+        let input = bench.input(missed);
+        bench.step(input);
+        let t_s = (bench.now_ns - start_ns) as f64 * 1e-9;
+        let off = bench.commanded[0] - motion.state_at(t_s).q;
+        assert!(off.max_abs() < 1e-9, "{missed}");
+    }
+    let last = bench.commanded[0];
+    let input = bench.input(6);
+    bench.step(input);
+    assert_eq!(bench.latched(), Some(FaultCode::DeadlineMissed));
+    assert_eq!((bench.commanded[0], bench.requests.len()), (last, 1));
+}
+
 /// Throws that use the limits fully, stopped at every eighth cycle: the brake
 /// itself stays within the limits, so the arm need not stop by itself.
 #[test]
@@ -124,24 +144,29 @@ fn a_guardian_that_is_not_required_may_never_come() {
     assert!(bench.events.iter().any(finished));
 }
 
-/// A stop on the way of a slowed motion makes it a brake, and the first cause stays
-/// the cause.
+/// A stop on the way of a slowed motion makes it a brake, which ends earlier, and the
+/// first cause stays the cause.
 #[test]
 fn a_slowed_motion_is_braked_when_something_worse_comes() {
-    let mut bench = Bench::holding();
-    bench.run(swing());
-    bench.cycles(61);
-    let report_ns = bench.now_ns;
-    for _ in 0..300 {
-        let mut input = bench.input(0);
-        input.reports = Reports::default();
-        input.operator.stop = u32::from(input.deadline_ns > report_ns + 120_000_000);
-        bench.step(input);
-    }
-    let cause = cause_in(&bench.events).unwrap();
-    assert_eq!(cause.fault(), FaultCode::ReportStale);
-    assert_eq!(cause.second_code, FaultCode::OperatorStop as u16);
-    assert_eq!(bench.requests.len(), 0);
+    let slowed = |second: FaultCode| {
+        let mut bench = Bench::holding();
+        bench.run(swing());
+        bench.cycles(61);
+        let stop_ns = bench.now_ns + 120_000_000;
+        for _ in 0..300 {
+            let mut input = bench.input(0);
+            input.reports = Reports::default();
+            let stops = second == FaultCode::OperatorStop && input.deadline_ns > stop_ns;
+            input.operator.stop = u32::from(stops);
+            bench.step(input);
+        }
+        let cause = cause_in(&bench.events).unwrap();
+        assert_eq!(cause.fault(), FaultCode::ReportStale);
+        assert_eq!(cause.second_code, second as u16);
+        assert_eq!(bench.requests.len(), 0);
+        cause.rest_cycle
+    };
+    assert!(slowed(FaultCode::OperatorStop) < slowed(FaultCode::None));
 }
 
 #[test]

@@ -106,13 +106,18 @@ impl Limiter {
             } else {
                 limits.jerk_max_rad_s3[j]
             };
-            let checks = [
-                (FaultCode::SetpointVelocity, qd[j], speed_max),
-                (FaultCode::SetpointAcceleration, qdd[j], acceleration_max),
-                (FaultCode::SetpointJerk, jerk[j], jerk_max),
-            ];
-            let [_, rounding @ ..] = ROUNDING;
-            for ((fault, value, limit), slack) in checks.into_iter().zip(rounding) {
+            let [_, of_speed, of_acceleration, of_jerk] = ROUNDING;
+            let (qdd_j, jerk_j) = (qdd[j], jerk[j]);
+            for (fault, value, limit, slack) in [
+                (FaultCode::SetpointVelocity, qd[j], speed_max, of_speed),
+                (
+                    FaultCode::SetpointAcceleration,
+                    qdd_j,
+                    acceleration_max,
+                    of_acceleration,
+                ),
+                (FaultCode::SetpointJerk, jerk_j, jerk_max, of_jerk),
+            ] {
                 if !within(value, limit, slack) {
                     return Err(Violation::of_joint(fault, j, value, limit));
                 }

@@ -242,6 +242,7 @@ fn settings(seed: u64) -> ControlSettings {
 
 #[derive(Debug, Default)]
 struct Tally {
+    setpoints: u64,
     stops: u64,
     codes: std::collections::BTreeSet<u16>,
     /// Largest part of a limit that was used.
@@ -300,6 +301,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
         assert_eq!(latches, i32::from(stopped), "{before:?} {:?}", out.events);
         chaos.sent(&out);
         if let Some(q) = out.setpoint() {
+            tally.setpoints += 1;
             let part = judge.take(deadline_ns, q, &limits);
             tally.worst = tally.worst.max(part);
             assert!(part <= 1.0 + 2e-9, "seed {seed}: {part} of a limit");

@@ -36,8 +36,15 @@ pub enum RestoreError {
         operating_mode: u8,
     },
     /// The motion of this number and fingerprint was not stored.
-    #[error("motion {1} (fingerprint {2:016x}) of cycle {0} was not recorded")]
-    Motion(u64, u64, u64),
+    #[error("motion {id} (fingerprint {hash:016x}) of cycle {cycle} was not recorded")]
+    Motion {
+        /// Cycle.
+        cycle: u64,
+        /// Number of the motion.
+        id: u64,
+        /// Its fingerprint.
+        hash: u64,
+    },
 }
 
 /// The inputs of cycle number `cycle`, as plain data. RT-safe.
@@ -176,7 +183,8 @@ fn restore_command(
             CommandKind::Engage => ControlCommand::Engage { hold: command.hold },
             CommandKind::Run => {
                 let (id, hash) = (command.motion_id, command.motion_hash);
-                let missing = RestoreError::Motion(record.cycle, id, hash);
+                let cycle = record.cycle;
+                let missing = RestoreError::Motion { cycle, id, hash };
                 let motion = motion_of(id, hash).ok_or(missing)?;
                 ControlCommand::Run { id, motion }
             }

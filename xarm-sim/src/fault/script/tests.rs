@@ -12,7 +12,7 @@ fn the_shipped_example_has_every_kind_and_comes_back() {
     let tables: Vec<Table> = script.clone().into();
     let listed = "[[fault]]\nat_s = 1".parse::<FaultScript>().unwrap_err();
     let listed = listed.to_string();
-    let (_, kinds) = listed.split_once("expected one of ").unwrap();
+    let (_, kinds) = listed.split_once("give one of ").unwrap();
     let kinds: Vec<&str> = kinds
         .split(", ")
         .map(|kind| kind.trim_matches('`'))
@@ -34,9 +34,13 @@ kind = "collision"; on = "later"                            | `on`           | m
 kind = "collision"; on = "motion:50"                        | `motion_s`     | a number
 at_s = 1; kind = "stall"                                    | `duration_s`   | a number from 0
 at_s = 1; kind = "joint_stuck"; joint = 8                   | `joint` is 8   | from 1 to 7
-at_s = nan; kind = "collision"                              | `at_s` is NaN  | a number
-at_s = 1; kind = "joint_stuck"                              | `joint`        | missing
-at_s = 1; kind = "joint_stuck"; joint = "4"                 | `joint`        | u8
+at_s = nan; kind = "collision"                              | `at_s` is nan  | a number
+at_s = 1; kind = "joint_stuck"                              | `joint`        | missing; give a whole number from 1 to 7
+at_s = 1; kind = "joint_stuck"; joint = "4"                 | `joint` is "4" | from 1 to 7
+at_s = "1"; kind = "collision"                              | `at_s` is "1"  | a number from 0
+at_s = 1; kind = 5                                          | `kind` is 5    | `stall`
+on = 5; kind = "collision"                                  | `on` is 5      | motion:PERCENT
+at_s = 1; kind = "emergency_stop"; code = 4                 | `code` is 4    | from 1 to 3
 at_s = 1; kind = "report_stop"; port = "30000"              | `port`         | `realtime`
 at_s = 1; kind = "report_stop"; ports = "all"               | `ports`        | `port`
 at_s = 1; kind = "collision"; joint = 1                     | `joint`        | collision

@@ -77,13 +77,122 @@ fn requests_are_understood_or_refused_for_what_is_wrong_with_them() {
     }
 }
 
+/// Parameters as the vendor's documents list them.
 #[test]
-fn lengths_are_millimetres_on_the_wire() {
-    let mut out = [0; MAX_FRAME_LEN];
-    let offset = TcpPose {
-        position_m: [0.0, 0.0, 0.2],
-        rpy_rad: [0.0; 3],
+fn requests_and_replies_have_the_vendors_layout() {
+    let floats =
+        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let angles = [0.5_f32, -0.25, 0.75, 1.0, -1.5, 2.0, -3.0];
+    let q = JointVector(angles.map(f64::from));
+    let velocity = |synchronised, duration_s| Command::JointVelocity {
+        velocity: q,
+        synchronised,
+        duration_s,
     };
-    emit_command(&mut out, 1, Protocol::Private, &Command::TcpOffset(offset)).unwrap();
-    assert_eq!(out[15..19], 200.0_f32.to_le_bytes());
+    let offset = TcpPose {
+        position_m: [0.0, -0.05, 0.2],
+        rpy_rad: [0.5, 0.25, -1.0],
+    };
+    let offset_mm_rad = floats(&[0.0, -50.0, 200.0, 0.5, 0.25, -1.0]);
+    let protocol = Protocol::Private;
+    let mut out = [0; MAX_FRAME_LEN];
+    for (command, register, parameters) in [
+        (Command::SetState(StateRequest::Stop), 12, vec![4]),
+        (
+            Command::ServoJoint(q),
+            29,
+            [floats(&angles), vec![0; 12]].concat(),
+        ),
+        (
+            velocity(true, None),
+            81,
+            [floats(&angles), vec![1]].concat(),
+        ),
+        (
+            velocity(false, Some(0.5)),
+            81,
+            [floats(&angles), vec![0], floats(&[0.5])].concat(),
+        ),
+        (Command::TcpOffset(offset), 35, offset_mm_rad),
+        (
+            Command::SetSpeedLimitFactor(1.25),
+            232,
+            [vec![1], floats(&[1.25])].concat(),
+        ),
+    ] {
+        let n = emit_command(&mut out, 0x0102, protocol, &command).unwrap();
+        let len = u8::try_from(parameters.len() + 1).unwrap();
+        let head = [1, 2, 0, 2, 0, len, register];
+        assert_eq!(out[..n], [&head[..], &parameters].concat(), "{command:?}");
+    }
+    let motion = ReplyData::JointMotion {
+        quantities: 2,
+        position: q,
+        velocity: q * 2.0,
+        effort: JointVector::ZERO,
+    };
+    let (error, warning) = (22, 11);
+    for (reply, register, data) in [
+        (ReplyData::Fault { error, warning }, 15, vec![22, 11]),
+        (
+            motion,
+            42,
+            [floats(&angles), floats(&angles.map(|v| v * 2.0))].concat(),
+        ),
+    ] {
+        let (transaction, parameters) = (0x0102, &[][..]);
+        let request = Request {
+            transaction,
+            protocol,
+            register,
+            parameters,
+        };
+        let n = reply.emit(&mut out, &request, Status(0x10)).unwrap();
+        let len = u8::try_from(data.len() + 2).unwrap();
+        let head = [1, 2, 0, 2, 0, len, register, 0x10];
+        assert_eq!(out[..n], [&head[..], &data].concat(), "{reply:?}");
+    }
+}
+
+#[test]
+fn these_registers_are_typed() {
+    use Register as R;
+    // A joint, a state, a level and a number of quantities; or a speed limit factor.
+    let parsed = |register: &R| {
+        let parse = |byte| Command::parse(register.code(), &[byte; 60]);
+        parse(3).or_else(|_| parse(1)).is_ok()
+    };
+    let typed: Vec<Register> = R::ALL.iter().copied().filter(parsed).collect();
+    let listed = [
+        R::Version,
+        R::SerialNumbers,
+        R::MotionEnable,
+        R::SetState,
+        R::GetState,
+        R::Buffered,
+        R::Fault,
+        R::CleanError,
+        R::CleanWarning,
+        R::Brake,
+        R::SetMode,
+        R::MoveJoint,
+        R::MoveHome,
+        R::ServoJoint,
+        R::JointJerk,
+        R::JointAcceleration,
+        R::TcpOffset,
+        R::TcpLoad,
+        R::CollisionSensitivity,
+        R::TeachSensitivity,
+        R::TcpPose,
+        R::JointPosition,
+        R::ForwardKinematics,
+        R::JointLimitTest,
+        R::JointVelocity,
+        R::SetParameter,
+        R::GetParameter,
+        R::FeedbackCheck,
+        R::FeedbackMask,
+    ];
+    assert_eq!(typed, listed);
 }
