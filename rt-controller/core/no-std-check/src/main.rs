@@ -99,7 +99,12 @@ fn panic(_info: &core::panic::PanicInfo) -> ! {
     loop {}
 }
 
-/// The ready-made `alloc` was compiled to unwind and names this; nothing here
-/// ever unwinds.
+/// The ready-made `alloc` was compiled to unwind and names this and the next; nothing
+/// here ever unwinds.
 #[unsafe(no_mangle)]
 extern "C" fn rust_eh_personality() {}
+
+#[unsafe(no_mangle)]
+extern "C" fn _Unwind_Resume() -> ! {
+    loop {}
+}
