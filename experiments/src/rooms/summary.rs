@@ -23,7 +23,7 @@ pub(super) struct Row {
     /// Part followed, and its 95 % limits.
     pub(super) followed_fraction: [f64; 3],
     /// Part wrong, and its 95 % limits.
-    pub(super) wrong_part: [f64; 3],
+    pub(super) wrong_fraction: [f64; 3],
 }
 
 impl Row {
@@ -46,7 +46,7 @@ impl Row {
             flagged,
             wrong,
             followed_fraction: wilson(followed, n),
-            wrong_part: wilson(wrong, n),
+            wrong_fraction: wilson(wrong, n),
         }
     }
 

@@ -28,7 +28,7 @@ const TABLE: [Column<Row>; 9] = [
     ("wrong", |row| row.wrong.to_string()),
     ("others", |row| row.others().to_string()),
     ("followed (%)", |row| percent(row.followed_fraction)),
-    ("wrong (%)", |row| percent(row.wrong_part)),
+    ("wrong (%)", |row| percent(row.wrong_fraction)),
 ];
 
 /// A part with its limits in brackets.

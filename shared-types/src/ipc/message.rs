@@ -65,7 +65,7 @@ pub enum CameraRequest {
     Record {
         /// Number of frames.
         frames: u32,
-        /// Keep the right eye too; tracking needs the left one only.
+        /// Keep the right image too; tracking needs the left one only.
         both_images: bool,
     },
     /// Track the rope through the kept frames and publish its keypoints.

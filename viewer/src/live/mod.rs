@@ -127,8 +127,9 @@ impl Watcher {
         Ok((watcher, url))
     }
 
-    /// One turn: waits for wishes until it is time, then looks and shows.
-    pub fn turn(&mut self) -> anyhow::Result<()> {
+    /// One turn: waits for requests until it is time, then looks and shows. Whether it looked
+    /// for all there is, and nothing has to be joined anew.
+    pub fn turn(&mut self) -> anyhow::Result<bool> {
         let turn = if self.site.is_followed() || self.site.wants_pictures() {
             TURN
         } else {
@@ -158,12 +159,12 @@ impl Watcher {
         if search {
             self.searched = Some(Instant::now());
         }
-        let snapshot = self.look(search);
+        let (snapshot, whole) = self.look(search);
         if self.site.is_followed() {
             self.site.state.put(serde_json::to_string(&snapshot)?);
         }
         self.shown.left = snapshot;
-        Ok(())
+        Ok(search && whole)
     }
 
     fn pass_on(&mut self, requested: Requested) {
@@ -173,8 +174,8 @@ impl Watcher {
             .extend(hand_over(requested, bus, self.seen.as_ref()));
     }
 
-    /// Looks at everything once.
-    fn look(&mut self, search: bool) -> Snapshot {
+    /// Looks at everything once; whether nothing has to be joined anew.
+    fn look(&mut self, search: bool) -> (Snapshot, bool) {
         if self.attached.is_none() && search {
             let domain = match &self.wanted {
                 Wanted::Newest => newest_domain(),
@@ -206,9 +207,9 @@ impl Watcher {
             tracing::warn!("reconnecting: {error:#}");
             self.end();
             self.attached = None;
-            return self.snapshot(None);
+            return (self.snapshot(None), false);
         }
-        self.snapshot(seen)
+        (self.snapshot(seen), true)
     }
 
     /// What a preview of the rope is to look at, through the calibration `named` or else that

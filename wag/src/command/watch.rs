@@ -17,8 +17,6 @@ use viewer::live::{PreviewView, Wanted, Watcher, domain_of_run};
 /// How much sooner everything else gets a processor than this program.
 const NICE: i32 = 10;
 
-/// Time between two looks at the preview.
-const LOOK: Duration = Duration::from_millis(500);
 /// Time between two attempts to start it.
 const PAUSE: Duration = Duration::from_secs(2);
 
@@ -30,7 +28,6 @@ struct Preview {
     /// Its configuration and log.
     folder: tempfile::TempDir,
     view: Option<PreviewView>,
-    looked: Option<Instant>,
     /// When it was started last.
     begun: Option<Instant>,
     runs: bool,
@@ -43,7 +40,6 @@ impl Preview {
             process: Supervisor::default(),
             folder: folder.context("cannot make a folder for the preview's configuration")?,
             view: None,
-            looked: None,
             begun: None,
             runs: false,
         })
@@ -52,10 +48,6 @@ impl Preview {
     /// Lets it look at what is watched, through the calibration `named` or else that of the
     /// run; call it now and then. One that ended is started again, unless another is there.
     fn keep(&mut self, watcher: &mut Watcher, named: Option<&Path>) {
-        if self.looked.is_some_and(|at| at.elapsed() < LOOK) {
-            return;
-        }
-        self.looked = Some(Instant::now());
         let wanted = watcher.preview_view(named);
         if wanted != self.view {
             self.process.stop();
@@ -129,8 +121,9 @@ pub fn run(args: &WatchArgs) -> Outcome<Option<Value>> {
             .is_some_and(|s| began.elapsed().as_secs_f64() >= s)
     };
     while !is_interrupted() && !over() {
-        watcher.turn().or_failed()?;
-        if let Some(preview) = &mut preview {
+        let searched = watcher.turn().or_failed()?;
+        // What is joined anew in the next turn is still what the preview looks at.
+        if let Some(preview) = preview.as_mut().filter(|_| searched) {
             preview.keep(&mut watcher, args.camera.as_deref());
         }
     }
