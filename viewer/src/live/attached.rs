@@ -106,8 +106,8 @@ pub(crate) struct Attached {
     pub domain: String,
 }
 
-/// One that cannot be opened is told of and done without.
-fn reported<T, E: Into<anyhow::Error>>(what: &str, opened: Result<T, E>) -> Option<T> {
+/// One that cannot be opened is warned of and done without.
+fn opened_or_warned<T, E: Into<anyhow::Error>>(what: &str, opened: Result<T, E>) -> Option<T> {
     let said = |error: anyhow::Error| tracing::warn!("the page lacks {what}: {error:#}");
     opened.map_err(|e| said(e.into())).ok()
 }
@@ -119,9 +119,9 @@ impl Attached {
         let bus = Bus::join(domain)?;
         Ok(Self {
             controller: None,
-            cycles: reported("jitter", bus.cycle_subscriber()),
-            joints: reported("the rope", bus.joint_subscriber()),
-            film: reported("the camera", Film::open(&bus)),
+            cycles: opened_or_warned("jitter", bus.cycle_subscriber()),
+            joints: opened_or_warned("the rope", bus.joint_subscriber()),
+            film: opened_or_warned("the camera", Film::open(&bus)),
             bus,
             _sweep: sweep,
             domain: domain.to_owned(),

@@ -23,9 +23,9 @@ fn files_of(layers: &Layers) -> Vec<Value> {
 
 fn show(kind: Kind, run: Option<&Path>, origin: bool) -> Outcome<Option<Value>> {
     let layers = config::layers(kind, run).or_input()?;
-    let reported = layers.reported();
+    let values = layers.effective_values();
     if origin {
-        let rows = reported.iter().map(|t| {
+        let rows = values.iter().map(|t| {
             let file = t.layer.path.display().to_string();
             let (value, layer) = (t.value.to_string(), t.layer.name.to_owned());
             [t.key.clone(), value, layer, file]
@@ -35,7 +35,7 @@ fn show(kind: Kind, run: Option<&Path>, origin: bool) -> Outcome<Option<Value>> 
     } else {
         print!("{}", toml::to_string(&layers.merged()).or_failed()?);
     }
-    let values = reported.iter().map(
+    let values = values.iter().map(
         |t| json!({ "key": t.key, "value": t.value, "layer": t.layer.name, "file": t.layer.path }),
     );
     let values: Vec<Value> = values.collect();

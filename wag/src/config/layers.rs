@@ -69,7 +69,7 @@ pub struct Layers {
 
 /// One value that holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reported<'a> {
+pub struct EffectiveValue<'a> {
     /// Tables and key, with dots.
     pub key: String,
     pub value: Value,
@@ -178,17 +178,17 @@ impl Layers {
     }
 
     /// Every value that holds, with the layer it comes from.
-    pub fn reported(&self) -> Vec<Reported<'_>> {
-        let mut reported: BTreeMap<String, Reported<'_>> = BTreeMap::new();
+    pub fn effective_values(&self) -> Vec<EffectiveValue<'_>> {
+        let mut values: BTreeMap<String, EffectiveValue<'_>> = BTreeMap::new();
         for layer in &self.layers {
             for (key, value) in leaves(&layer.table) {
-                reported.insert(key.clone(), Reported { key, value, layer });
+                values.insert(key.clone(), EffectiveValue { key, value, layer });
             }
         }
         // A table that a value takes the place of, or the other way round, holds no more.
         let held: BTreeMap<_, _> = leaves(&self.merged()).into_iter().collect();
-        reported.retain(|key, _| held.contains_key(key));
-        reported.into_values().collect()
+        values.retain(|key, _| held.contains_key(key));
+        values.into_values().collect()
     }
 }
 
@@ -264,8 +264,8 @@ mod tests {
         expected.lob.throw.tail_s = 1.25;
         assert_eq!(config, expected);
 
-        let reported = layers.reported();
-        let layer_of = |key: &str| reported.iter().find(|t| t.key == key).unwrap().layer.name;
+        let values = layers.effective_values();
+        let layer_of = |key: &str| values.iter().find(|t| t.key == key).unwrap().layer.name;
         assert_eq!(layer_of("search.population"), "rig");
         assert_eq!(layer_of("search.searches"), "run");
         assert_eq!(layer_of("lob.throw.tail_s"), "rig");
