@@ -212,13 +212,13 @@ mod tests {
         assert_eq!(next(&mut sizes), Some(145));
         assert_eq!(broken.load(Ordering::Relaxed), 3);
 
-        // Torn: filled up by the next one, whose rest is no report, at once ...
-        let mut torn = frame(145, 1)[..60].to_vec();
-        torn.extend(frame(145, 1));
-        again.write_all(&torn).unwrap();
+        // Truncated: filled up by the next one, whose rest is no report, at once ...
+        let mut truncated = frame(145, 1)[..60].to_vec();
+        truncated.extend(frame(145, 1));
+        again.write_all(&truncated).unwrap();
         let (mut again, _) = server.accept().unwrap();
         again.write_all(&frame(135, 1)).unwrap();
-        assert_eq!(next(&mut sizes), Some(135), "nothing of the torn one");
+        assert_eq!(next(&mut sizes), Some(135), "nothing of the truncated one");
         // ... or only when the next one comes.
         again.write_all(&frame(135, 1)[..60]).unwrap();
         std::thread::sleep(Duration::from_millis(20));

@@ -106,7 +106,7 @@ pub struct Late {
     pub cycle: u64,
     /// From its planned wake-up until it was sent (ms).
     pub late_ms: f64,
-    /// Motion covered by the setpoint after it (ms at full path rate).
+    /// Motion covered by the setpoint after it (ms at full speed override).
     pub next_covered_ms: Option<f64>,
     /// Time between the two on the wire (ms).
     pub next_came_after_ms: Option<f64>,

@@ -169,7 +169,9 @@ fn around(rows: &[Row]) -> Table {
     let columns: [Column<Row>; 12] = [
         ("until ms", |r| format!("{:.0}", r.until_ms)),
         ("motion s", |r| or_dash(r.figures.motion_s, 3)),
-        ("path rate", |r| format!("{:.2}", r.figures.speed_override)),
+        ("speed override", |r| {
+            format!("{:.2}", r.figures.speed_override)
+        }),
         ("joint speed", |r| percent(&r.figures.speed)),
         ("joint acc.", |r| percent(&r.figures.acceleration)),
         ("tool m/s", |r| format!("{:.3}", r.figures.tool_m_s)),

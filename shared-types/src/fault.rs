@@ -37,7 +37,7 @@ fault_codes! {
     None = 0: "no fault";
     OperatorStop = 1: "the operator asked for a stop; to go on, run the command again";
     OperatorLost = 2:
-        "the operator's heartbeat went silent while the arm moved; run the command again, and keep its program running while the arm moves";
+        "the operator's heartbeat went silent while the arm moved; its program ended, or the computer was too busy for it; end what else computes there, then run the command again";
     GuardianLost = 3:
         "the guardian that stops the arm when the controller dies went silent; restart it, then run the command again";
     DeadManReleased = 4:
@@ -75,7 +75,7 @@ fault_codes! {
     ReportClock = 27:
         "the time stamps of the joint reports jump; restart the arm's controller, then run the command again";
     ReportBroken = 28:
-        "joint reports come torn or hold nonsense; check cable and firmware, then run the command again";
+        "joint reports come truncated or hold nonsense; check cable and firmware, then run the command again";
     ArmError = 30:
         "the arm raised an error of its own (its code is in the record); remove the cause, then run the command again";
     ArmModeChanged = 31:

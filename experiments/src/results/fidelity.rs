@@ -2,8 +2,8 @@
 //! real one in a motion it was not identified from?
 //!
 //! Truth comes from outside the model class: more links than the ranges have, air drag,
-//! uneven mass, a rest curvature. As in the paper, a throw is compared by the correlation of
-//! Fourier spectra and by the mean distance of points of the rope per frame.
+//! uneven mass distribution, a rest curvature. As in the paper, a throw is compared by the
+//! correlation of Fourier spectra and by the mean distance of points of the rope per frame.
 
 use super::experiment::{Experiment, cm};
 use super::picture::Curve;

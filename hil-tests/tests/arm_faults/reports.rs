@@ -61,8 +61,8 @@ fn report_streams_stop_freeze_and_show_wrong_times() {
 fn spoiled_reports_are_torn_mislabelled_or_no_numbers() {
     let count =
         |kind: &str, is: fn(&[u8]) -> bool| reports(kind).iter().filter(|(_, f)| is(f)).count();
-    let torn = "report_torn, frames = 3, keep_bytes = 60";
-    assert_eq!(count(torn, |f| f.len() == 60), 3);
+    let truncated = "report_truncated, frames = 3, keep_bytes = 60";
+    assert_eq!(count(truncated, |f| f.len() == 60), 3);
     let length = "report_length, frames = 2, claim_bytes = 12";
     assert_eq!(count(length, |f| f[..4] == [0, 0, 0, 12]), 2);
     fn second(f: &[u8]) -> f64 {

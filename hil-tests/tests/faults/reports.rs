@@ -62,7 +62,7 @@ fn fault_16_a_report_clock_that_keeps_jumping_slows_the_motion() {
 /// What can be wrong with `frames` reports, in the middle of the throw.
 fn spoiled(frames: u32) -> [String; 5] {
     [
-        "report_torn, keep_bytes = 60",
+        "report_truncated, keep_bytes = 60",
         "report_length, claim_bytes = 40000",
         "report_nan, joint = 2",
         "report_infinity, joint = 4",

@@ -1,4 +1,4 @@
-//! The joint reports: silent, frozen, out of time, torn, no numbers; and arms
+//! The joint reports: silent, frozen, out of time, truncated, no numbers; and arms
 //! whose reports have another layout.
 
 use super::stand::Stand;
@@ -56,7 +56,7 @@ fn fault_17_broken_reports_are_dropped_and_too_many_in_a_row_slow_the_motion() {
     for kind in [
         "report_nan, frames = 2, joint = 2",
         "report_infinity, frames = 2, joint = 5",
-        "report_torn, frames = 1, keep_bytes = 60",
+        "report_truncated, frames = 1, keep_bytes = 60",
         "report_length, frames = 1, claim_bytes = 12",
     ] {
         stand.inject(kind);

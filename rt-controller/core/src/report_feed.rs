@@ -2,7 +2,7 @@
 //! it again. Connecting and reading are the caller's.
 //!
 //! A frame that cannot be used is dropped and counted; a stream that lost its
-//! place is opened anew. A torn report is filled up with the beginning of the
+//! place is opened anew. A truncated report is filled up with the beginning of the
 //! next one: such a frame may hold proper numbers in wrong places, so one that
 //! took long to arrive, or that is followed by what is no report, is dropped as
 //! well.
@@ -87,7 +87,7 @@ impl ReportFeed {
     /// Takes `len` bytes, written to [`space`](Self::space), that arrived at
     /// `arrival_ns`, and passes every whole frame to `take`, which says whether it
     /// can be used. The size of a connection's reports never changes, so one of
-    /// another size than the first good one is torn.
+    /// another size than the first good one is truncated.
     pub fn received(
         &mut self,
         len: usize,
@@ -102,10 +102,10 @@ impl ReportFeed {
             let begun_ns = self.begun_ns.take().unwrap_or(arrival_ns);
             match self.reader.next_report() {
                 Ok(Some(frame)) => {
-                    let torn = !followed_by_a_report
+                    let truncated = !followed_by_a_report
                         || arrival_ns.saturating_sub(begun_ns) > ARRIVES_WITHIN_NS;
                     let fits = self.size.is_none_or(|size| size == frame.len());
-                    if fits && !torn && take(frame) {
+                    if fits && !truncated && take(frame) {
                         self.size = Some(frame.len());
                     } else {
                         seen.broken = seen.broken.saturating_add(1);

@@ -40,7 +40,7 @@ pub struct RunCounts {
     /// Setpoints not sent because the arm or the network had not taken the ones
     /// before.
     pub skipped: u32,
-    /// Joint reports dropped as torn, of wrong length or not finite.
+    /// Joint reports dropped as truncated, of wrong length or not finite.
     pub broken_reports: u32,
     /// Times the arm's clock had to be followed anew.
     pub clock_resyncs: u32,

@@ -55,7 +55,7 @@ fn print_replay(found: &Replay, stops: u64) {
         bytes => format!("{bytes} bytes differ"),
     };
     println!(
-        "{verdict:<16} {} cycles ({} to {}), with {} whole states and {stops} stops",
+        "{verdict:<16} {} cycles ({} to {}), with {} keyframes and {stops} stops",
         found.cycles, found.first_cycle, found.last_cycle, found.states,
     );
     for gap in &found.gaps {

@@ -46,7 +46,7 @@ impl ArmEndpoint {
             FaultKind::PowerCycle if begins => every.for_each(Client::reset),
             FaultKind::Stall if !begins => self.release(at),
             FaultKind::SecondCommander { .. } if begins => self.foreign_due = at,
-            FaultKind::ReportTorn { port, frames, .. }
+            FaultKind::ReportTruncated { port, frames, .. }
             | FaultKind::ReportLength { port, frames, .. }
             | FaultKind::ReportNan { port, frames, .. }
             | FaultKind::ReportInfinity { port, frames, .. }

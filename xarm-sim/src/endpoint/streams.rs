@@ -64,7 +64,7 @@ impl ArmEndpoint {
         match damage {
             FaultKind::ReportNan { joint, .. } => put_angle(joint, f32::NAN),
             FaultKind::ReportInfinity { joint, .. } => put_angle(joint, f32::INFINITY),
-            FaultKind::ReportTorn { keep_bytes, .. } => frame.truncate(keep_bytes.into()),
+            FaultKind::ReportTruncated { keep_bytes, .. } => frame.truncate(keep_bytes.into()),
             FaultKind::ReportLength { claim_bytes, .. } => {
                 frame[..4].copy_from_slice(&claim_bytes.to_be_bytes());
             }

@@ -165,7 +165,7 @@ pub enum FaultKind {
         ppm: f64,
     },
     /// Reports end in the middle; the next one follows at once.
-    ReportTorn {
+    ReportTruncated {
         /// Which.
         #[serde(default)]
         port: ReportPort,
@@ -263,7 +263,7 @@ impl FaultKind {
             | Self::FirmwareChanged { .. }
             | Self::ReportTimeJump { .. }
             | Self::ReportTimeWrap
-            | Self::ReportTorn { .. }
+            | Self::ReportTruncated { .. }
             | Self::ReportLength { .. }
             | Self::ReportNan { .. }
             | Self::ReportInfinity { .. }

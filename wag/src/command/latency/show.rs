@@ -79,7 +79,7 @@ impl Findings<'_> {
             "natural frequency (Hz)",
             "damping",
             "-3 dB (Hz)",
-            "late when slow (ms)",
+            "delay at low speed (ms)",
             "residual (µrad)",
             "",
         ];
