@@ -153,6 +153,8 @@ impl Limits {
     /// # Errors
     /// A limit beyond what the arm is rated for.
     pub fn check_rating(&self) -> Result<(), LimitsError> {
+        let farther = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+        let farthest = |values: &[f64]| values.iter().fold(0.0, farther);
         let [range, speed, accel, jerk] = RATED;
         let spec = &self.0;
         let of_joints = [
@@ -169,11 +171,11 @@ impl Limits {
         let tcp_speed = spec.tcp_speed_max_m_s;
         let of_tool = [
             ("tcp_speed_max_m_s", tcp_speed, TOOL_SPEED_RATED_M_S),
-            ("tcp_offset_m", self.tcp_offset().amax(), TOOL_MAX_M),
+            ("tcp_offset_m", farthest(&spec.tcp_offset_m), TOOL_MAX_M),
         ];
-        let of_joints = of_joints.map(|(key, values, most)| (key, values.max_abs(), most));
+        let of_joints = of_joints.map(|(key, values, most)| (key, farthest(&values.0), most));
         let mut rules = of_joints.into_iter().chain(of_tool);
-        match rules.find(|(_, value, most)| value > most) {
+        match rules.find(|(_, value, most)| value.abs() > *most) {
             Some((key, value, most)) => Err(LimitsError(format!(
                 "`{key}` is {value}, but the arm reaches at most {most}{}",
                 unit_hint(key, value, most)
@@ -363,8 +365,11 @@ mod tests {
         let said = refused(|spec| spec.rate_hz = 1000.0);
         assert!(said.contains("`rate_hz`"), "{said}");
         let said = refused(|spec| spec.tcp_speed_max_m_s = 900.0);
-        assert!(said.contains("2.2") && said.contains("in mm?"), "{said}");
-        let said = refused(|spec| spec.velocity_max_rad_s[6] = 180.0);
-        assert!(said.contains("in degrees?"), "{said}");
+        assert!(said.contains("2.2") && said.contains("in mm/s?"), "{said}");
+        let said = refused(|spec| spec.position_min_rad[6] = -360.0);
+        assert!(
+            said.contains("-360") && said.contains("in degrees?"),
+            "{said}"
+        );
     }
 }

@@ -8,7 +8,9 @@ pub fn unit_hint(name: &str, value: f64, most: f64) -> &'static str {
     let ends = |unit| is_far && name.ends_with(unit);
     if is_far && name.contains("_rad") {
         "; is it in degrees?"
-    } else if ends("_m") || ends("_m_s") {
+    } else if ends("_m_s") {
+        "; is it in mm/s?"
+    } else if ends("_m") {
         "; is it in mm?"
     } else if ends("_kg") {
         "; is it in g?"

@@ -1,5 +1,6 @@
 //! How a command fails: its exit code and its one sentence.
 
+use crate::nearest::suggestion;
 use std::{fmt, io};
 
 /// A [`Failure`] for wrong usage or input: exit code 2.
@@ -68,6 +69,12 @@ impl fmt::Display for Failure {
                 }
                 said.push_str(&text);
             }
+        }
+        // Once: it may be made of failures that were told already.
+        if !said.contains("did you mean")
+            && let Some(suggestion) = suggestion(&said)
+        {
+            said = format!("{}; {suggestion}", said.trim_end());
         }
         f.write_str(&said)
     }

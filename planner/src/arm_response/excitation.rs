@@ -44,14 +44,18 @@ fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
         if !(low..=high).contains(&value) {
             let hint = unit_hint(key, value, high);
             return Err(ExcitationError(format!(
-                "excitation: `{key}` is {value}, but must be from {low:.3} to {high:.3}{hint}"
+                "`{key}` is {value}, but must be from {low:.3} to {high:.3}{hint}"
             )));
         }
     }
     match limits.position_violation(&e.pose_rad) {
-        Some(joint) => Err(ExcitationError(format!(
-            "excitation: joint {} of `pose_rad` is outside its range",
-            joint + 1
+        Some(j) => Err(ExcitationError(format!(
+            "joint {} of `pose_rad` is {}, but must be from {:.3} to {:.3}{}",
+            j + 1,
+            e.pose_rad[j],
+            limits.position_min_rad[j],
+            limits.position_max_rad[j],
+            unit_hint("pose_rad", e.pose_rad.max_abs(), core::f64::consts::TAU)
         ))),
         None => Ok(()),
     }

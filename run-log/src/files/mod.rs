@@ -13,7 +13,7 @@ pub use motion::{JointsCsv, read_joints, read_pose, write_joints, write_trajecto
 pub use rope::{read_doubts, read_posterior, read_rope, write_rope_estimate};
 pub(crate) use text::cannot_read;
 pub use text::{
-    read_arm_response, read_cell, read_excitation, read_json, read_plan, read_text,
+    located, read_arm_response, read_cell, read_excitation, read_json, read_plan, read_text,
     write_arm_response,
 };
 

@@ -1,7 +1,7 @@
 //! `rope.toml`: nine parameters, with their uncertainty when they were identified.
 
 use super::atomic::write_atomic;
-use super::text::{read_text, read_toml};
+use super::text::{located, read_text, read_toml};
 use anyhow::{Context, Result};
 use shared_types::rope::{RANGES, RopeEstimate, RopeParams, RopePosterior};
 use std::fmt::Write;
@@ -18,11 +18,15 @@ fn read_table(path: &Path) -> Result<toml::Table> {
 /// alone, any other unknown key is refused.
 pub fn read_rope(path: &Path) -> Result<RopeParams> {
     let fail = || format!("rope file `{}`", path.display());
-    let mut table = read_table(path)?;
+    let text = read_text(path)?;
+    let mut table: toml::Table = toml::from_str(&text).with_context(fail)?;
     for beside in BESIDE {
         table.remove(beside);
     }
-    let rope: RopeParams = table.try_into().with_context(fail)?;
+    let parameters = text.split("\n[").next().unwrap_or_default();
+    let rope = table.try_into::<RopeParams>();
+    let rope = rope.map_err(|refusal| located(refusal, toml::from_str::<RopeParams>(parameters)));
+    let rope = rope.with_context(fail)?;
     rope.validate().with_context(fail)?;
     Ok(rope)
 }

@@ -33,6 +33,14 @@ pub(super) fn read_toml<T: DeserializeOwned>(path: &Path, what: &str) -> Result<
     toml::from_str(&read_text(path)?).with_context(|| format!("{what} `{}`", path.display()))
 }
 
+/// A refusal of values; where their text alone is refused for the same reason, that refusal,
+/// which knows the line.
+pub fn located<T>(refusal: toml::de::Error, alone: Result<T, toml::de::Error>) -> toml::de::Error {
+    let alone = alone.err();
+    let located = alone.filter(|alone| alone.message() == refusal.message());
+    located.unwrap_or(refusal)
+}
+
 /// Reads a cell, as a run keeps it.
 pub fn read_cell(path: &Path) -> Result<Cell> {
     read_toml(path, "cell file")

@@ -3,7 +3,7 @@
 use crate::cli::ConfigCommand;
 use crate::config::{self, Kind, Layers};
 use clap::ValueEnum;
-use cli_output::{OrInput, Outcome, table};
+use cli_output::{Failure, OrInput, Outcome, table};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -52,7 +52,7 @@ fn check(kind: Option<&Kind>, run: Option<&Path>) -> Outcome<Option<Value>> {
         let layers = match config::layers(*kind, run) {
             Ok(layers) => layers,
             Err(error) => {
-                wrong.push(format!("{error:#}"));
+                wrong.push(Failure::input(error).to_string());
                 continue;
             }
         };

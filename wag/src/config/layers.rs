@@ -1,10 +1,9 @@
 //! Reading layers, laying one over the other, and telling which said what.
 
 use super::kind::{Configured, Kind};
-use super::nearest::suggestion;
 use anyhow::{Context, anyhow, bail};
 use arm_model::Cell;
-use run_log::files::read_text;
+use run_log::files::{located, read_text};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -126,16 +125,9 @@ impl Layers {
         let mut merged = self.merged();
         lay_over(&mut merged, &layer.table);
         if let Err(refusal) = self.kind.check(merged) {
-            // Alone it may lack what lower layers say; where it is refused for the same
-            // reason, that refusal knows the line.
+            // Alone it may lack what lower layers say.
             let alone = toml::Deserializer::parse(&text).and_then(|text| self.kind.check(text));
-            let located = alone
-                .err()
-                .filter(|alone| alone.message() == refusal.message());
-            let refusal = located.unwrap_or(refusal).to_string();
-            let suggestion = suggestion(&refusal).map(|name| format!("; {name}"));
-            let refusal = refusal.trim_end();
-            return Err(anyhow!("{refusal}{}", suggestion.unwrap_or_default()).context(file()));
+            return Err(anyhow!(located(refusal, alone)).context(file()));
         }
         self.layers.push(layer);
         Ok(())

@@ -3,7 +3,6 @@
 
 mod kind;
 mod layers;
-mod nearest;
 
 pub use kind::{Configured, Kind};
 pub use layers::Layers;

@@ -71,6 +71,7 @@ pub(crate) fn prepare() -> tempfile::TempDir {
     put("other.bin", &format!("WAGR\u{9}{}", "\0".repeat(40)));
     put("camera.toml", "calibration = \"none.conf\"\n");
     put("limits.toml", "rate_hz = -250\n");
+    put("degrees.toml", "pose_rad = [0, 0, 0, 90, 0, 60, 0]\n");
     put("mm.toml", "tcp_speed_max_m_s = 900\n");
     put("slip.toml", "tcp_sped_max_m_s = 0.5\n");
     let stuck = "[[fault]]\nat_s = 1\nkind = \"joint_stuck\"\njoint = 9\n";

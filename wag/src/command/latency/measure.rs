@@ -6,6 +6,7 @@ use crate::command::area::require_clear_area;
 use crate::command::on_arm::on_arm;
 use crate::config;
 use crate::pipeline;
+use anyhow::Context;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
@@ -33,9 +34,11 @@ fn intent(args: &LatencyArgs) -> Outcome<Intent> {
         named => named.iter().map(|j| usize::from(*j)).collect(),
     };
     let pole = config::cell().or_input()?.pole;
+    let named = args.excitation.as_deref().unwrap_or("built in".as_ref());
     let swept = |joint: usize| {
-        let swept = sweep(&excitation, &limits, &pole, joint - 1).or_input()?;
-        Ok((joint, swept))
+        let swept = sweep(&excitation, &limits, &pole, joint - 1)
+            .with_context(|| format!("excitation `{}`", named.display()));
+        Ok((joint, swept.or_input()?))
     };
     let sweeps = joints.into_iter().map(swept).collect::<Outcome<_>>()?;
     Ok((limits, excitation, sweeps))

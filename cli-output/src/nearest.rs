@@ -6,7 +6,7 @@ const SLIP: usize = 3;
 /// What a refusal of an unknown key should have said too, if a known one is near.
 ///
 /// The refusal names the key and the known ones in backticks, as serde does.
-pub fn suggestion(refusal: &str) -> Option<String> {
+pub(crate) fn suggestion(refusal: &str) -> Option<String> {
     let mut names = refusal
         .split_once("unknown field ")?
         .1
