@@ -7,7 +7,7 @@ use arm_model::JointVector;
 use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
 use shared_types::{FaultCode, MonotonicNs};
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Table of the control cycles of a run, as `wag export csv` writes it.
 pub const CYCLES_TABLE: &str = "cycles.csv";
@@ -49,13 +49,16 @@ impl Cycles {
     }
 
     /// Writes `cycles.csv` and, where the arm reported its joints, `joints.csv` into
-    /// `folder`; times (s) count from `epoch_ns` (CLOCK_MONOTONIC). Returns the rows of both.
-    pub fn write_tables(&self, folder: &Path, epoch_ns: u64) -> Result<[usize; 2]> {
+    /// `folder`; times (s) count from `epoch_ns` (CLOCK_MONOTONIC). Returns the files with
+    /// their rows.
+    pub fn write_tables(&self, folder: &Path, epoch_ns: u64) -> Result<Vec<(PathBuf, usize)>> {
         let since = |ns: u64| MonotonicNs(ns).since_s(MonotonicNs(epoch_ns));
         let measured = self.joints_between(0, u64::MAX);
+        let mut written = vec![(folder.join(CYCLES_TABLE), self.cycles.len())];
         if measured.len() >= 2 {
             let rows = measured.iter().map(|(t, q)| (since(*t), *q));
-            files::write_joints(&folder.join(JOINTS_TABLE), rows)?;
+            written.push((folder.join(JOINTS_TABLE), measured.len()));
+            files::write_joints(&written[1].0, rows)?;
         }
         let mut text = CYCLES_HEADER.to_owned();
         for c in &self.cycles {
@@ -80,8 +83,8 @@ impl Cycles {
             }
             text.push('\n');
         }
-        files::write_atomic(&folder.join(CYCLES_TABLE), text.as_bytes())?;
-        Ok([self.cycles.len(), measured.len()])
+        files::write_atomic(&written[0].0, text.as_bytes())?;
+        Ok(written)
     }
 
     /// How late `joint` (0-based) follows its setpoints in a motion between two instants
@@ -171,8 +174,8 @@ mod tests {
             ],
         };
         let folder = tempfile::tempdir().unwrap();
-        let rows = reported.write_tables(folder.path(), 2_000_000_000).unwrap();
-        assert_eq!(rows, [1, 2]);
+        let written = reported.write_tables(folder.path(), 2_000_000_000).unwrap();
+        assert_eq!([written[0].1, written[1].1], [1, 2]);
         let joints = files::read_joints(&folder.path().join(JOINTS_TABLE)).unwrap();
         assert_eq!(joints.times_s, [-0.001, 0.003]);
         assert_eq!([joints.q[0][0], joints.q[1][0]], [0.1, 0.2]);

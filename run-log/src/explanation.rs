@@ -39,7 +39,7 @@ pub struct Explanation {
 
 /// Which limit was broken and by how much.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Broken {
+pub struct LimitExceeded {
     /// Joint 1 to 7, if it is about one.
     pub joint: Option<u32>,
     /// What was found.
@@ -81,20 +81,20 @@ pub struct Stop {
     pub motion: Option<u64>,
     /// Time on it (s).
     pub motion_s: Option<f64>,
-    /// How it was met.
-    pub met: &'static str,
+    /// What the controller did.
+    pub reaction: &'static str,
     /// Whether the arm itself was asked to stop.
     pub arm_asked_to_stop: bool,
     /// Time from the cause to the end of setpoints (s).
     pub rest_after_s: f64,
     /// Which limit.
-    pub broken: Option<Broken>,
+    pub limit_exceeded: Option<LimitExceeded>,
     /// The setpoint that was sent latest in the second before.
-    pub latest: Option<Late>,
+    pub latest_setpoint: Option<Late>,
     /// What happened since the arm was engaged.
     pub counts: RunCounts,
     /// The second before and the second after.
-    pub around: Vec<Row>,
+    pub cycles_around: Vec<Row>,
 }
 
 /// A setpoint that was sent late, and what the arm made of it: it takes setpoints
@@ -169,13 +169,13 @@ fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
         operating_mode: OperatingMode::from_raw(cause.operating_mode).map(operating_mode_name),
         motion: Some(cause.motion_id).filter(|id| *id != 0),
         motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),
-        met: met(cause.path),
+        reaction: reaction(cause.path),
         arm_asked_to_stop: cause.stop_arm != 0,
         rest_after_s: log.time_s(rest_ns) - log.time_s(cause.stamp_ns),
-        broken: broken(cause),
-        latest: latest(log, cause.stamp_ns),
+        limit_exceeded: limit_exceeded(cause),
+        latest_setpoint: latest_setpoint(log, cause.stamp_ns),
         counts: cause.counts,
-        around: around(log, cause.stamp_ns),
+        cycles_around: cycles_around(log, cause.stamp_ns),
     }
 }
 
@@ -200,7 +200,7 @@ fn arm_error(log: &RunLog, cause: &CauseRecord) -> u8 {
         .unwrap_or(0)
 }
 
-const fn met(path: u8) -> &'static str {
+const fn reaction(path: u8) -> &'static str {
     match path {
         0 => "refused",
         1 => "slowed to rest along the path",
@@ -209,9 +209,9 @@ const fn met(path: u8) -> &'static str {
     }
 }
 
-fn broken(cause: &CauseRecord) -> Option<Broken> {
+fn limit_exceeded(cause: &CauseRecord) -> Option<LimitExceeded> {
     let found = &cause.limit;
-    (found.value != 0.0 || found.limit != 0.0).then(|| Broken {
+    (found.value != 0.0 || found.limit != 0.0).then(|| LimitExceeded {
         joint: Some(found.joint).filter(|j| *j != 0),
         value: found.value,
         limit: found.limit,
@@ -259,7 +259,7 @@ fn since_ms(sample: &CycleSample, stamp_ns: u64) -> f64 {
     between_ms(sample.deadline_ns, stamp_ns)
 }
 
-fn around(log: &RunLog, stamp_ns: u64) -> Vec<Row> {
+fn cycles_around(log: &RunLog, stamp_ns: u64) -> Vec<Row> {
     let mut from_ms = BEGIN_MS;
     let mut rows = Vec::new();
     for until_ms in ROWS_MS {
@@ -296,7 +296,7 @@ fn row(until_ms: f64, samples: &[&CycleSample]) -> Option<Row> {
 
 /// The setpoint of the second before the stop that was sent latest, and the one
 /// after it.
-fn latest(log: &RunLog, stamp_ns: u64) -> Option<Late> {
+fn latest_setpoint(log: &RunLog, stamp_ns: u64) -> Option<Late> {
     let sent: Vec<(&CycleSample, f64)> = log
         .samples
         .iter()
@@ -390,18 +390,22 @@ mod tests {
         let found = explain(&log(vec![cause()]));
         assert!(found.stopped && !found.ended_in_order);
         let stop = &found.stops[0];
-        let broken = stop.broken.as_ref().unwrap();
-        assert_eq!((broken.joint, broken.unit), (Some(4), "rad"));
+        let exceeded = stop.limit_exceeded.as_ref().unwrap();
+        assert_eq!((exceeded.joint, exceeded.unit), (Some(4), "rad"));
         assert_eq!(stop.arm_error, 31, "said 160 ms after the stop");
         assert!((stop.rest_after_s - 0.096).abs() < 1e-9);
         assert!((stop.time_s - 1.196).abs() < 1e-9);
         assert!(!stop.remedy.is_empty());
         // Every cycle from a second before to a second after is in one row.
-        let missed: u32 = stop.around.iter().map(|r| r.figures.missed).sum();
-        assert_eq!((stop.around.len(), missed), (ROWS_MS.len(), 1));
-        let before = stop.around.iter().find(|r| r.until_ms == -4.0).unwrap();
+        let missed: u32 = stop.cycles_around.iter().map(|r| r.figures.missed).sum();
+        assert_eq!((stop.cycles_around.len(), missed), (ROWS_MS.len(), 1));
+        let before = stop
+            .cycles_around
+            .iter()
+            .find(|r| r.until_ms == -4.0)
+            .unwrap();
         assert_eq!(before.figures.tool_m_s, 1.0);
-        let late = stop.latest.as_ref().unwrap();
+        let late = stop.latest_setpoint.as_ref().unwrap();
         assert_eq!((late.cycle, late.late_ms), (289, 3.4));
         assert!((late.next_came_after_ms.unwrap() - 0.8).abs() < 1e-9);
         let page = super::super::show(&found);

@@ -38,7 +38,7 @@ mod run;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::{CYCLES_TABLE, Cycles};
-pub use explanation::{Broken, Explanation, Late, Row, Stop, explain};
+pub use explanation::{Explanation, Late, LimitExceeded, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{
     Channel, McapFile, Recorded, RecorderConfig, RecordingCounts, Recovered, RopeMotion,

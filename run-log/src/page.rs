@@ -20,7 +20,9 @@ pub fn show(found: &Explanation) -> String {
         }
         show_stop(&mut page, stop);
     }
-    if found.stops.is_empty() {
+    if found.stops.is_empty() && found.cycles == 0 {
+        page.push_str("NO CYCLES: the controller never ran a cycle\n");
+    } else if found.stops.is_empty() {
         let end = if found.ended_in_order {
             "the controller was ended in order"
         } else {
@@ -50,8 +52,8 @@ fn show_stop(page: &mut String, stop: &Stop) {
     } else {
         ""
     };
-    let (met, rest_ms) = (stop.met, 1e3 * stop.rest_after_s);
-    let reaction = format!("{met}{requested}; at rest after {rest_ms:.0} ms");
+    let (reaction, rest_ms) = (stop.reaction, 1e3 * stop.rest_after_s);
+    let reaction = format!("{reaction}{requested}; at rest after {rest_ms:.0} ms");
     let while_stopping = |code: FaultCode| format!("{code:?}: {}", code.explain());
     let warned = (stop.arm_warning != 0).then(|| format!("W{}", stop.arm_warning));
     let lines = [
@@ -63,7 +65,7 @@ fn show_stop(page: &mut String, stop: &Stop) {
         ("the arm says", stop.arm_error_meaning.clone()),
         ("arm's warning", warned),
         ("until then", counts(stop)),
-        ("setpoints", stop.latest.as_ref().map(lateness)),
+        ("setpoints", stop.latest_setpoint.as_ref().map(lateness)),
         ("what to do", Some(stop.remedy.clone())),
     ];
     for (name, text) in lines {
@@ -71,27 +73,27 @@ fn show_stop(page: &mut String, stop: &Stop) {
             let _ = writeln!(page, "  {name:<NAME$} {text}");
         }
     }
-    let _ = writeln!(page, "\n{}", around(&stop.around));
+    let _ = writeln!(page, "\n{}", around(&stop.cycles_around));
 }
 
 fn by_how_much(stop: &Stop) -> String {
-    let Some(broken) = &stop.broken else {
+    let Some(exceeded) = &stop.limit_exceeded else {
         return "nothing to measure".to_owned();
     };
-    let joint = broken
+    let joint = exceeded
         .joint
         .map_or_else(String::new, |j| format!("joint {j}: "));
-    let over = if broken.limit.abs() > 0.0 {
-        let part = 100.0 * (broken.value.abs() / broken.limit.abs() - 1.0);
+    let over = if exceeded.limit.abs() > 0.0 {
+        let part = 100.0 * (exceeded.value.abs() / exceeded.limit.abs() - 1.0);
         format!(" ({part:+.1} %)")
     } else {
         String::new()
     };
-    let unit = broken.unit;
+    let unit = exceeded.unit;
     format!(
         "{joint}{} {unit}, allowed {} {unit}{over}",
-        short(broken.value),
-        short(broken.limit)
+        short(exceeded.value),
+        short(exceeded.limit)
     )
 }
 

@@ -40,7 +40,7 @@ impl CellHere {
 #[derive(Debug, thiserror::Error)]
 #[error(
     "`{}` is no run folder or file with recorded control cycles: {} (of older versions {}) \
-     is not there, or its recorder died before it wrote any",
+     is not there, or the run ended or its recorder died before the controller's first cycle",
     .0.display(), files::RUN, files::CYCLES
 )]
 pub struct NoRecording(pub PathBuf);

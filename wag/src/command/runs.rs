@@ -84,14 +84,21 @@ fn describe(gap: &Gap) -> String {
 }
 
 /// Why a run was stopped, or how close it came to its limits.
-pub fn explain(run: &Path) -> Outcome<Option<Value>> {
-    let recording = Run::open(run).and_then(|run| run.recording());
-    let log = recording.and_then(|recording| recording.log()).or_input()?;
-    let found = run_log::explain(&log);
+pub fn explain(path: &Path) -> Outcome<Option<Value>> {
+    let run = Run::open(path).or_input()?;
+    let summary = run.summary().ok().flatten().unwrap_or_default();
+    let log = run.recording().and_then(|recording| recording.log());
+    let found = log.map(|log| run_log::explain(&log));
+    if let Some(error) = summary["error"].as_str()
+        && !found.as_ref().is_ok_and(|found| found.stopped)
+    {
+        println!("FAILED: {error}\n");
+    }
+    let found = found.or_input()?;
     print!("{}", run_log::show(&found));
-    Ok(Some(
-        json!({ "ok": true, "command": "explain", "run": run, "explanation": found }),
-    ))
+    Ok(Some(json!({
+        "ok": true, "command": "explain", "run": path, "run_error": summary["error"], "explanation": found,
+    })))
 }
 
 /// Keeps the explanation of a run that was stopped and shows it to people.
@@ -115,14 +122,15 @@ pub fn export(ExportCommand::Csv { run: path, out }: &ExportCommand) -> Outcome<
     let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
     let out = out.as_deref().unwrap_or(run.folder());
     files::check_writable(&out.join(CYCLES_TABLE)).or_input()?;
-    let [cycles, joints] = recorded.write_tables(out, epoch_ns).or_failed()?;
-    println!(
-        "{cycles} cycles and {joints} joint reports in `{}`",
-        out.display()
-    );
+    let written = recorded.write_tables(out, epoch_ns).or_failed()?;
+    for (file, rows) in &written {
+        println!("{} ({rows} rows)", file.display());
+    }
+    let rows = |file: usize| written.get(file).map_or(0, |(_, rows)| *rows);
     Ok(Some(json!({
         "ok": true, "command": "export csv", "run": path, "epoch_ns": epoch_ns,
-        "cycles": cycles, "joints": joints, "folder": out,
+        "cycles": rows(0), "joints": rows(1), "folder": out,
+        "files": written.iter().map(|(file, _)| file).collect::<Vec<_>>(),
     })))
 }
 

@@ -217,7 +217,10 @@ fn a_stopped_run_is_explained_and_replays_to_the_bit() {
     assert_eq!(stops.len(), 1, "{found:#}");
     let stop = &stops[0];
     assert_eq!(stop["arm_error"], 31, "{stop:#}");
-    assert!(stop["around"].as_array().unwrap().len() >= 8, "{stop:#}");
+    assert!(
+        stop["cycles_around"].as_array().unwrap().len() >= 8,
+        "{stop:#}"
+    );
     let kept: Value = serde_json::from_slice(&fs::read(path.join("cause.json")).unwrap()).unwrap();
     assert_eq!(&kept, found);
     page_has(&run, &["what happened", "what to do", "until ms", "C31"]);
