@@ -22,7 +22,8 @@ const PICTURES: [(&str, &str); 2] = [
     ),
     (
         "throw.png",
-        "Throw: frames of the film laid over each other",
+        "Throw: arm and rope at several moments in one picture, the last just after the tip came \
+         closest to the target",
     ),
 ];
 

@@ -14,16 +14,16 @@ pub struct LedgerArgs {
     /// Run folders, or folders of them; default: runs.
     #[arg(value_name = "FOLDER")]
     pub places: Vec<PathBuf>,
-    /// Only runs with this outcome.
+    /// Only runs with this outcome, such as `failed`: a broken one lacks a file, or one is damaged.
     #[arg(long, value_parser = results())]
     pub result: Option<RunResult>,
-    /// Only runs of this command, such as `demo`.
+    /// Only runs of this command: the first word after `wag`, such as `demo`.
     #[arg(long, value_name = "NAME")]
     pub command: Option<String>,
-    /// Only runs of this seed.
+    /// Only runs with this seed in their summary or plan, such as 17.
     #[arg(long, global = true, alias = "seed-is", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
-    /// Only runs of the plan whose hash has this prefix.
+    /// Only runs whose plan's `trajectory_sha256` begins like this, such as 9cc7b663.
     #[arg(long, value_name = "HASH")]
     pub plan: Option<String>,
     /// Write the list as CSV too.

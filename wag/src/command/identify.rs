@@ -132,15 +132,15 @@ fn in_words(ambiguity: &Ambiguity) -> String {
         .map(|(range, part)| format!("{}{}", if part < 0.0 { "-" } else { "+" }, range.label))
         .collect();
     match parts.as_slice() {
-        [one] => format!("does not tell {}", &one[1..]),
-        _ => format!("cannot separate {}", parts.join(" ")),
+        [one] => format!("{} cannot be identified from this film", &one[1..]),
+        _ => format!("this film cannot separate {}", parts.join(" ")),
     }
 }
 
 /// What a person should know beside the numbers.
 fn print_remarks(estimate: &RopeEstimate) {
     for ambiguity in &estimate.posterior.ambiguities {
-        println!("the film {}", in_words(ambiguity));
+        println!("{}", in_words(ambiguity));
     }
     if estimate.out_of_distribution.is_outside() {
         println!(

@@ -3,6 +3,7 @@
 use crate::cli::{LedgerArgs, LedgerCommand};
 use anyhow::{Context, anyhow};
 use cli_output::{Failure, OrInput, Outcome, output, table};
+use comfy_table::ContentArrangement;
 use run_log::files;
 use run_log::ledger::{self, Entry, RUNS};
 use run_log::{Run, quoted};
@@ -83,10 +84,9 @@ fn compare(first: &Path, second: &Path) -> Outcome<Option<Value>> {
             by,
         ]
     });
-    println!(
-        "{}",
-        table::numbers(["value", "first", "second", "by"], 0, rows)
-    );
+    let mut shown = table::numbers(["value", "first", "second", "by"], 0, rows);
+    shown.set_content_arrangement(ContentArrangement::Dynamic);
+    println!("{}", shown.set_width(100));
     println!("{} differences", found.len());
     Ok(Some(json!({
         "ok": true, "command": "ledger compare", "first": first, "second": second, "differences": found,

@@ -5,7 +5,7 @@ use anyhow::Context;
 use clap::CommandFactory;
 use clap_complete::Shell;
 use clap_mangen::Man;
-use cli_output::{OrInput, Outcome, output};
+use cli_output::{OrInput, Outcome};
 use run_log::files;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -51,8 +51,11 @@ fn write_pages(
 pub fn completions(shell: Shell) -> Option<Value> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "wag", &mut script);
-    output::data(&script);
-    Some(json!({ "ok": true, "command": "completions", "shell": shell.to_string() }))
+    let script = String::from_utf8_lossy(&script);
+    print!("{script}");
+    Some(
+        json!({ "ok": true, "command": "completions", "shell": shell.to_string(), "script": script }),
+    )
 }
 
 #[cfg(test)]

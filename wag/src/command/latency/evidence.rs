@@ -43,11 +43,12 @@ impl Evidence {
     ///
     /// # Errors
     /// The run holds no recording, or a file of it is damaged.
-    pub(super) fn recorded(run: &Path) -> anyhow::Result<Self> {
-        let cycles = Run::open(run)?.recording()?.cycles()?;
+    pub(super) fn recorded(path: &Path) -> anyhow::Result<Self> {
+        let run = Run::open(path)?;
+        let cycles = run.recording()?.cycles()?;
         Ok(Self {
-            camera_offset_s: camera_offset_s(&run.join(files::ROPE))?,
-            ..Self::of(format!("run {}", run.display()), run, cycles)
+            camera_offset_s: camera_offset_s(&run.folder().join(files::ROPE))?,
+            ..Self::of(format!("run {}", path.display()), run.folder(), cycles)
         })
     }
 

@@ -115,7 +115,7 @@ impl Findings<'_> {
         let slow = (1_u32..).zip(&self.response.joints);
         let slow = slow.filter(|(_, j)| is_slow(j));
         let slow: Vec<String> = slow.map(|(joint, _)| joint.to_string()).collect();
-        if !slow.is_empty() {
+        if !slow.is_empty() && evidence.excitation.is_some() {
             println!(
                 "Joints {}: the tool speed allowed while setting up keeps them too slow to be measured. A pose with the tool nearer to their axes (`pose_rad` of --excitation FILE) lets them swing faster; measure them alone with --joints {}.",
                 slow.join(", "),
