@@ -95,9 +95,10 @@ impl Default for ControllerConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GuardianSettings {
-    /// Silence of a moving controller after which the arm is stopped (ms); three
-    /// cycles at 250 Hz. A controller whose process ends is met at once.
-    pub silence_ms: f64,
+    /// Silence of a moving controller after which the arm is stopped (ms). Absent: two
+    /// cycles more than the controller may miss (`thresholds.missed_cycles_max`), so that
+    /// what it meets itself is left to it. A controller whose process ends is met at once.
+    pub silence_ms: Option<f64>,
     /// `SCHED_FIFO` priority of the guardian, 1 to 99, above the control thread.
     /// Absent: ordinary scheduling.
     pub priority: Option<u8>,
@@ -108,18 +109,10 @@ pub struct GuardianSettings {
 impl Default for GuardianSettings {
     fn default() -> Self {
         Self {
-            silence_ms: 12.0,
+            silence_ms: None,
             priority: Some(85),
             required: true,
         }
-    }
-}
-
-impl GuardianSettings {
-    /// The silence (ns).
-    #[must_use]
-    pub const fn silence_ns(&self) -> u64 {
-        (self.silence_ms * 1e6) as u64
     }
 }
 
@@ -275,12 +268,27 @@ impl ControllerConfig {
         })
     }
 
+    /// Silence of a moving controller after which the guardian stops the arm (ns).
+    ///
+    /// # Errors
+    /// It is shorter than the longest gap that the controller meets itself, or no number.
+    pub fn guardian_silence_ns(&self) -> Result<u64, ConfigError> {
+        let missed = self.thresholds.checked(self.arm)?.missed_cycles_max;
+        let cycle_ms = 1e3 * self.resolve_limits()?.period_s();
+        let least_ms = cycle_ms * f64::from(missed.saturating_add(2));
+        let found_ms = self.guardian.silence_ms.unwrap_or(least_ms);
+        if (least_ms - 1e-9..=5000.0).contains(&found_ms) {
+            return Ok((found_ms * 1e6).round() as u64);
+        }
+        Err(ConfigError(format!(
+            "`guardian.silence_ms` is {found_ms}, it must be {least_ms:.0} (two cycles of {cycle_ms:.3} ms more than `thresholds.missed_cycles_max`) to 5000 ms"
+        )))
+    }
+
     /// Checks what cannot be wrong by type alone.
     pub fn check(&self) -> Result<(), ConfigError> {
-        self.thresholds.checked(self.arm)?;
-        let (silence_ms, warm_up_us) = (self.guardian.silence_ms, self.real_time.warm_up_us);
-        let holds = (8.0..=5000.0).contains(&silence_ms);
-        require(holds, "guardian.silence_ms", silence_ms, "8 to 5000 ms")?;
+        self.guardian_silence_ns()?;
+        let warm_up_us = self.real_time.warm_up_us;
         let holds = warm_up_us <= WARM_UP_MAX_US;
         require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;
         match self.real_time.priority {
@@ -324,7 +332,7 @@ mod tests {
             ("thresholds.tracking_window_ms = 251.0", "250"),
             ("thresholds.tracking_error_max_rad = nan", "1 rad"),
             ("thresholds.unanswered_max = 0", "at least 1"),
-            ("guardian.silence_ms = 5.0", "8 to 5000"),
+            ("guardian.silence_ms = 27.0", "28 (two"),
             ("real_time.priority = 5", "11 to 99"),
             ("real_time.warm_up_us = 1001", "1000"),
         ] {

@@ -20,9 +20,6 @@ use xarm_sim::{ArmEndpoint, ReportKind};
 /// Time the control core takes for a cycle (s).
 const COMPUTE_S: f64 = 20e-6;
 
-/// Phase of a guardian that watches.
-const GUARDIAN_WATCHING: u8 = 1;
-
 type Link = TcpLink<VirtualStream>;
 
 /// Everything that the control cycle hears and tells.
@@ -64,7 +61,7 @@ impl Surroundings {
             },
             guardian_beat: GuardianBeat {
                 version: PAYLOAD_VERSION,
-                phase: GUARDIAN_WATCHING,
+                phase: GuardianBeat::WATCHING,
                 connected: 1,
                 ..GuardianBeat::default()
             },

@@ -2,7 +2,8 @@
 
 use super::child::{Process, Role};
 use super::stand::{Stand, arm_for};
-use shared_types::ipc::OperatorEnd;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
+use shared_types::ipc::{ControllerMode, OperatorEnd};
 use shared_types::{FaultCode, OperatingMode};
 use std::time::Duration;
 
@@ -43,4 +44,20 @@ fn a_killed_operator_is_missed_and_leaves_its_place_to_the_next() {
     stand.stops(&pending, &[FaultCode::OperatorLost]);
     stand.operator = Some(OperatorEnd::take(&stand.bus).unwrap());
     recovers_from_a_brake(stand);
+}
+
+/// The newest record says "offline" until the set-up is over; the stop must not be taken for
+/// one of an arm that nobody holds.
+#[test]
+fn a_stop_during_the_bring_up_is_not_lost() {
+    for wait_ms in [0, 5, 20, 60, 100, 140] {
+        let mut stand = Stand::start(&format!("set_up_{wait_ms}"));
+        let set_up = stand.call(&ControllerRequest::Bringup);
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        assert_eq!(stand.ask(&ControllerRequest::Stop), ControllerEvent::Done);
+        stand.answer(&set_up);
+        assert_ne!(stand.mode(), ControllerMode::Idle, "after {wait_ms} ms");
+        let arming = arm_for(OperatingMode::Throw, true);
+        assert_eq!(stand.refused(&arming).0, FaultCode::WrongMode);
+    }
 }

@@ -15,8 +15,6 @@ const LOG_STEP_S: f64 = 2e-3;
 /// Kills, and rounds in which so many must come about.
 const KILLS: usize = 5;
 const ROUNDS_MAX: usize = 15;
-/// The three cycles a real arm is guarded with.
-const SILENCE_MS: f64 = 12.0;
 
 /// Kills the controller at speed and tells when that was; `None` if the
 /// guardian stopped the arm before, as it must when the machine itself stood
@@ -48,9 +46,7 @@ fn fault_28_a_killed_controller_is_met_by_the_guardian_within_20_ms() {
     alone();
     let mut reactions_ms = Vec::new();
     for round in 0..ROUNDS_MAX {
-        let mut stand = Stand::with(&format!("killed_{round}"), ArmConfig::default(), |config| {
-            config.guardian.silence_ms = SILENCE_MS
-        });
+        let mut stand = Stand::start(&format!("killed_{round}"));
         let Some(killed) = killed_at_speed(&mut stand) else {
             continue;
         };

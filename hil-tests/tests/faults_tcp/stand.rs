@@ -108,7 +108,7 @@ pub fn patient(name: &str, arm: &SimulatedArm) -> ControllerConfig {
             ..ThresholdSettings::default()
         },
         guardian: GuardianSettings {
-            silence_ms: 1000.0,
+            silence_ms: Some(1000.0),
             ..GuardianSettings::default()
         },
         ..ControllerConfig::default()

@@ -60,7 +60,7 @@ enum Awaited {
     },
     /// The controller is armed.
     Armed,
-    /// The arm is latched.
+    /// The arm is latched, or was not held.
     Stopped,
     /// The loop holds the arm, and joint reports come.
     Engaged { held: bool, until: Instant },
@@ -275,6 +275,11 @@ impl Bridge {
                 tracing::info!(?arming, "armed");
                 self.operating_mode = Some(arming.operating_mode);
                 for open in self.take(|awaits| matches!(awaits, Awaited::Armed)) {
+                    answer(&open.call, &ControllerEvent::Done);
+                }
+            }
+            ControlEvent::AtRest => {
+                for open in self.take(|awaits| matches!(awaits, Awaited::Stopped)) {
                     answer(&open.call, &ControllerEvent::Done);
                 }
             }

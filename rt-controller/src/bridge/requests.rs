@@ -34,7 +34,10 @@ impl Bridge {
                 let report = Box::new(self.latencies.take());
                 answer(&call, &ControllerEvent::Latency(report));
             }
-            ControllerRequest::Stop => self.serve_stop(call),
+            // Whatever the newest record says: an engagement may be on its way to the loop.
+            ControllerRequest::Stop => {
+                self.pass_on(call, ControlCommand::Stop, None, Awaited::Stopped);
+            }
             ControllerRequest::Bringup => match self.mode() {
                 ControllerMode::Idle => answer(&call, &ControllerEvent::Done),
                 ControllerMode::Offline => self.set_up(call),
@@ -114,20 +117,6 @@ impl Bridge {
             area_clear,
         };
         self.pass_on(call, ControlCommand::Arm(arming), None, Awaited::Armed);
-    }
-
-    fn serve_stop(&mut self, call: ControllerCall) {
-        match self.mode() {
-            ControllerMode::Offline | ControllerMode::Faulted => {
-                answer(&call, &ControllerEvent::Done);
-            }
-            ControllerMode::Idle
-            | ControllerMode::Moving
-            | ControllerMode::Streaming
-            | ControllerMode::Braking => {
-                self.pass_on(call, ControlCommand::Stop, None, Awaited::Stopped);
-            }
-        }
     }
 
     /// Hands a command to the loop; what it `awaits` will answer the call.

@@ -49,7 +49,8 @@ pub struct Pulse {
     pub moving: bool,
     /// Whether its control thread or its process has ended.
     pub ended: bool,
-    /// Whether it has latched because its link to the arm failed.
+    /// Whether it has latched and its link to the arm failed, so that a request for a stop of
+    /// its own may not have reached the arm.
     pub cut_off: bool,
 }
 

@@ -16,6 +16,8 @@ const CONNECT_WITHIN_NS: u64 = 1_000_000_000;
 /// noticed before it is needed (ns). Keeps the heartbeat rule of the protocol
 /// many times over.
 const ASK_EVERY_NS: u64 = 500_000_000;
+/// Age of the newest answer beyond which the arm does not count as reached (ns).
+const ANSWERED_WITHIN_NS: u64 = 1_000_000_000;
 /// Silence after which the connection is opened anew (ns).
 const SILENCE_NS: u64 = 2_000_000_000;
 /// Unacknowledged data for this long mean a broken connection.
@@ -37,6 +39,8 @@ struct Open {
     question: u16,
     requested_ns: u64,
     received_ns: u64,
+    /// Whether anything was received.
+    answered: bool,
     /// When the newest stop was asked for.
     stop_ns: Option<u64>,
 }
@@ -62,6 +66,15 @@ impl ArmLine {
     #[must_use]
     pub const fn is_connected(&self) -> bool {
         matches!(self.phase, Phase::Up(_))
+    }
+
+    /// Whether the arm answers: a connection alone proves nothing.
+    #[must_use]
+    pub fn is_answered(&self, now_ns: u64) -> bool {
+        let answered = |open: &Open| {
+            open.answered && now_ns.saturating_sub(open.received_ns) < ANSWERED_WITHIN_NS
+        };
+        matches!(&self.phase, Phase::Up(open) if answered(open))
     }
 
     /// One turn: goes on connecting, keeps the connection alive, and returns the
@@ -154,6 +167,7 @@ fn take(address: SocketAddr, now_ns: u64, socket: &Socket) -> Result<Phase> {
         question: 0,
         requested_ns: 0,
         received_ns: now_ns,
+        answered: false,
         stop_ns: None,
     })))
 }
@@ -196,7 +210,7 @@ impl Open {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(n) => {
                 self.reader.commit(n);
-                self.received_ns = now_ns;
+                (self.received_ns, self.answered) = (now_ns, true);
             }
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 return Ok(None);
@@ -271,6 +285,7 @@ mod tests {
         let mut now_ns = 1_000_000_000_000;
         assert!(!line.ask_stop(now_ns), "nobody to ask yet");
         until(&mut line, &mut now_ns, |line, _| line.is_connected());
+        assert!(!line.is_answered(now_ns), "nobody has answered yet");
         let (sender, requested) = mpsc::channel();
         let (first, _) = listener.accept().unwrap();
         let server = std::thread::spawn(move || {
@@ -279,6 +294,7 @@ mod tests {
             drop(far);
         });
         until(&mut line, &mut now_ns, |_, state| state == Some(1));
+        assert!(line.is_answered(now_ns) && !line.is_answered(now_ns + ANSWERED_WITHIN_NS));
         assert!(line.ask_stop(now_ns));
         until(&mut line, &mut now_ns, |_, state| state == Some(4));
         assert_eq!(

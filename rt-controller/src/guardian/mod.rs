@@ -6,8 +6,8 @@
 //! next. The guardian has a connection of its own, so it stops the arm also
 //! when the controller's process was killed, hangs, or lost its link. It reads
 //! the controller's newest state from a blackboard every 2 ms; a sign of life
-//! older than three cycles, or the end of its control thread, is a loss; so is a
-//! controller that stopped because its own link failed. What it does
+//! older than any gap that the controller rides out, or the end of its control thread,
+//! is a loss; so is a controller that stopped and whose own link failed. What it does
 //! about it is decided by [`decision`], pure and tested in virtual time; [`mod@line`]
 //! talks to the arm without ever waiting.
 //!
@@ -51,7 +51,7 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
     let bus = Bus::join(&config.domain)?;
     set_up_thread(config)?;
     let mut runner = Runner {
-        watchdog: Guardian::new(config.guardian.silence_ns()),
+        watchdog: Guardian::new(config.guardian_silence_ns()?),
         line: ArmLine::new(SocketAddr::new(config.arm, config.command_port)),
         watched: None,
         looked_ns: 0,
@@ -121,7 +121,7 @@ impl Runner {
         if let Some(watched) = &mut self.watched {
             watched.beat(GuardianBeat {
                 phase: self.watchdog.phase() as u8,
-                connected: u8::from(self.line.is_connected()),
+                connected: u8::from(self.line.is_answered(now_ns)),
                 stamp_ns: now_ns,
                 ..GuardianBeat::default()
             });

@@ -3,10 +3,7 @@
 use super::decision::Pulse;
 use crate::os::process::{ProcessWatch, thread_lives, thread_of};
 use crate::process::CONTROL_THREAD;
-use shared_types::FaultCode;
-use shared_types::ipc::{
-    Bus, ControllerMode, ControllerState, GuardianBeat, GuardianEnd, IpcError, StateReader,
-};
+use shared_types::ipc::{Bus, ControllerMode, GuardianBeat, GuardianEnd, IpcError, StateReader};
 
 /// A controller that was found, dead or alive.
 #[derive(Debug)]
@@ -41,11 +38,12 @@ impl Watched {
             self.process = ProcessWatch::new(state.pid).ok();
             self.thread = thread_of(state.pid, CONTROL_THREAD);
         }
+        let mode = ControllerMode::from_raw(state.mode);
         (state.stamp_ns > 0).then(|| Pulse {
             stamp_ns: state.stamp_ns,
-            moving: ControllerMode::from_raw(state.mode).is_moving(),
+            moving: mode.is_moving(),
             ended: self.has_ended(),
-            cut_off: is_cut_off(&state),
+            cut_off: mode == ControllerMode::Faulted && state.link_failed != 0,
         })
     }
 
@@ -61,12 +59,4 @@ impl Watched {
     pub(super) fn beat(&mut self, beat: GuardianBeat) {
         self.end.beat(beat);
     }
-}
-
-/// Whether the controller stopped because its link failed, so that its own
-/// request for a stop may not have reached the arm.
-fn is_cut_off(state: &ControllerState) -> bool {
-    let fault = FaultCode::from_raw(state.fault);
-    ControllerMode::from_raw(state.mode) == ControllerMode::Faulted
-        && matches!(fault, Some(FaultCode::LinkLost | FaultCode::ReplyStalled))
 }

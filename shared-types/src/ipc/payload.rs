@@ -95,8 +95,10 @@ pub struct ControllerState {
     pub operating_mode: u8,
     /// Raw [`crate::CommandInterface`].
     pub interface: u8,
+    /// 1 when the command link failed since the engagement, whatever stopped the arm first.
+    pub link_failed: u8,
     /// Zero.
-    pub reserved: [u8; 2],
+    pub reserved: u8,
     /// The controller's process.
     pub pid: u32,
 }
@@ -128,7 +130,7 @@ pub struct GuardianBeat {
     /// What it is doing: 0 waiting, 1 watching, 2 stopping, 3 stopped the arm,
     /// 4 could not see the arm stop.
     pub phase: u8,
-    /// 1 while it has a connection of its own to the arm.
+    /// 1 while the arm answers it, on a connection of its own.
     pub connected: u8,
     /// Zero.
     pub reserved: u16,
@@ -136,6 +138,17 @@ pub struct GuardianBeat {
     pub count: u64,
     /// When it was written (CLOCK_MONOTONIC, ns).
     pub stamp_ns: u64,
+}
+
+impl GuardianBeat {
+    /// The phase of a guardian that watches a controller.
+    pub const WATCHING: u8 = 1;
+
+    /// Whether it could stop the arm now: it watches, and the arm answers it. RT-safe.
+    #[must_use]
+    pub const fn guards(&self) -> bool {
+        self.phase == Self::WATCHING && self.connected != 0
+    }
 }
 
 /// One control cycle. Written by the real-time thread into a ring, published by

@@ -150,6 +150,8 @@ impl Session {
         within_s: f64,
         each: impl FnMut(&R::Event),
     ) -> anyhow::Result<R::Event> {
+        // A motion begins only under an operator who has just given a sign of life.
+        self.tick()?;
         let pending = client.call(request)?;
         self.finish(&pending, within_s, each)
     }

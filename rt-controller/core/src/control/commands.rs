@@ -5,7 +5,6 @@ use super::cycle::{ControlState, emit, give_back};
 use super::exchange::{ControlCommand, ControlEvent, CycleInput, CycleOutput};
 use super::limiter::Limiter;
 use super::mode::{ModeState, Running, Trigger, next_mode};
-use super::monitor::Monitor;
 use super::motion::Motion;
 use super::velocity_interface::VelocityInterface;
 use super::violation::Violation;
@@ -36,6 +35,11 @@ impl ControlState {
             ControlCommand::Engage { hold } => self.engage(hold, input),
             ControlCommand::Arm(arming) => self.arm(arming, input),
             ControlCommand::Run { id, motion } => return self.run(id, motion, input, out),
+            ControlCommand::Stop
+                if matches!(before, ControllerMode::Offline | ControllerMode::Faulted) =>
+            {
+                Ok(ControlEvent::AtRest)
+            }
             ControlCommand::Stop => {
                 return self.react(Violation::plain(FaultCode::OperatorStop), deadline_ns, out);
             }
@@ -85,7 +89,7 @@ impl ControlState {
         self.tcp_speed_max_m_s = self.limits.tcp_speed_max_m_s;
         self.velocity = VelocityInterface::default();
         self.sent_ns = MonotonicNs(deadline_ns).plus_s(-self.period_s()).0;
-        self.monitor = Monitor::new(self.settings, deadline_ns, hold);
+        self.monitor = self.monitor.engaged(deadline_ns, hold);
         self.monitor.observe(input, &self.limits);
         Ok(ControlEvent::Engaged)
     }
@@ -102,7 +106,7 @@ impl ControlState {
                 if self.settings.arming_required && shot {
                     self.arming = ArmingState::Spent;
                 }
-                self.monitor.motion_begins(start_ns);
+                self.monitor.motion_begins();
                 self.state = ModeState::Following(Running {
                     id,
                     start_ns,

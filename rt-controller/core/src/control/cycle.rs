@@ -100,7 +100,8 @@ impl ControlState {
                 .map_or(JointVector::ZERO, |r| r.q),
             operating_mode: self.arming.raw_operating_mode(),
             interface: self.settings.interface as u8,
-            reserved: [0; 2],
+            link_failed: u8::from(self.monitor.link_failed),
+            reserved: 0,
             pid: 0,
         }
     }
@@ -347,7 +348,7 @@ impl ControlState {
             CommandInterface::ServoPosition => ArmCommand::Position(target.q),
             CommandInterface::JointVelocity => self.velocity.command(
                 &target,
-                &self.monitor.reports.deviation(),
+                &self.monitor.deviation(deadline_ns),
                 step_s,
                 &self.limits,
                 self.tcp_speed_max_m_s,

@@ -21,6 +21,8 @@ pub(super) fn quiet_input(now_ns: u64, count: u64, q: JointVector) -> CycleInput
         },
         guardian: GuardianBeat {
             count,
+            phase: GuardianBeat::WATCHING,
+            connected: 1,
             ..GuardianBeat::default()
         },
         link: LinkInput {
@@ -59,7 +61,7 @@ impl Bench {
         Self::of(Thresholds::relaxed())
     }
 
-    fn of(settings: impl Into<ControlSettings>) -> Self {
+    pub(super) fn of(settings: impl Into<ControlSettings>) -> Self {
         let limits = Limits::default();
         Self {
             judge: Limiter::at_rest(START_POSE, &limits),

@@ -144,6 +144,127 @@ fn a_guardian_that_is_not_required_may_never_come() {
     assert!(bench.events.iter().any(finished));
 }
 
+/// A guardian that could not stop the arm is none, and whoever fell silent before an
+/// engagement is not taken to live after it.
+#[test]
+fn a_motion_needs_a_guardian_that_reaches_the_arm_and_an_operator() {
+    type Spoil = fn(&mut CycleInput);
+    let spoilt: [(Spoil, FaultCode); 4] = [
+        (|i| i.guardian.phase = 0, FaultCode::GuardianLost),
+        (|i| i.guardian.connected = 0, FaultCode::GuardianLost),
+        (|i| i.guardian.count = 100, FaultCode::GuardianLost),
+        (|i| i.operator.count = 100, FaultCode::OperatorLost),
+    ];
+    for (spoil, fault) in spoilt {
+        let settings = ControlSettings {
+            guardian_required: true,
+            ..Thresholds::relaxed().into()
+        };
+        let mut bench = Bench::holding_with(settings);
+        bench.command(ControlCommand::Stop);
+        let silence = |bench: &mut Bench, mut command: Option<ControlCommand>, count: usize| {
+            for _ in 0..count {
+                let mut input = bench.input(0);
+                spoil(&mut input);
+                input.command = command.take();
+                bench.step(input);
+            }
+        };
+        silence(&mut bench, None, 200);
+        silence(
+            &mut bench,
+            Some(ControlCommand::Engage { hold: START_POSE }),
+            5,
+        );
+        assert_eq!(bench.state.mode(), ControllerMode::Idle);
+        let run = |id| ControlCommand::Run {
+            id,
+            motion: Box::new(swing()),
+        };
+        silence(&mut bench, Some(run(8)), 1);
+        let id = Some(8);
+        assert_eq!(
+            bench.events.last(),
+            Some(&ControlEvent::Refused { id, fault })
+        );
+        bench.command(run(9));
+        assert_eq!(bench.state.mode(), ControllerMode::Streaming, "{fault:?}");
+        silence(&mut bench, None, 400);
+        assert_eq!(bench.state.summary().fault, fault as u16);
+    }
+}
+
+/// The guardian stops an arm that a brake cannot reach any more, whatever began the brake.
+#[test]
+fn a_link_that_fails_during_a_brake_is_published_beside_the_first_cause() {
+    let mut bench = Bench::holding();
+    bench.run(swing());
+    bench.cycles(61);
+    let mut released = bench.input(0);
+    released.operator.released = 1;
+    bench.step(released);
+    assert_eq!(bench.state.mode(), ControllerMode::Braking);
+    assert_eq!(bench.state.summary().link_failed, 0);
+    let mut lost = bench.input(0);
+    lost.link.lost = true;
+    bench.step(lost);
+    let state = bench.state.summary();
+    let found = (state.mode, state.fault, state.link_failed);
+    let fault = FaultCode::DeadManReleased as u16;
+    assert_eq!(found, (ControllerMode::Faulted as u8, fault, 1));
+    let mut engage = bench.input(0);
+    engage.command = Some(ControlCommand::Engage { hold: START_POSE });
+    bench.state.step(engage);
+    assert_eq!(bench.state.summary().link_failed, 0);
+}
+
+/// Velocities hold no pose by themselves: what was last reported must not drive the arm on.
+#[test]
+fn without_reports_joint_velocities_hold_nothing_and_the_controller_latches() {
+    let settings = ControlSettings {
+        interface: CommandInterface::JointVelocity,
+        ..Thresholds::relaxed().into()
+    };
+    let mut bench = Bench::of(settings);
+    bench.commanded = [START_POSE + JointVector([0.01; 7]); 3];
+    bench.command(ControlCommand::Engage { hold: START_POSE });
+    let velocity = |bench: &mut Bench, blind: bool| {
+        let mut input = bench.input(0);
+        input
+            .reports
+            .as_mut_slice()
+            .iter_mut()
+            .for_each(|r| r.arm_mode = 4);
+        if blind {
+            input.reports = Reports::default();
+        }
+        let out = bench.state.step(input);
+        bench.events.extend(out.events);
+        match out.command {
+            Some(ArmCommand::Velocity { qd, .. }) => Some(qd.max_abs()),
+            Some(ArmCommand::Position(_)) => panic!("a position"),
+            None => None,
+        }
+    };
+    let driven = (0..50).filter_map(|_| velocity(&mut bench, false)).last();
+    assert!(driven.is_some_and(|qd| qd > 0.03), "{driven:?}");
+    let blind: Vec<_> = (0..50).map(|_| velocity(&mut bench, true)).collect();
+    assert_eq!(bench.latched(), Some(FaultCode::ReportStale));
+    let sent = blind.iter().flatten().count();
+    assert!((20..=26).contains(&sent), "100 ms of reports: {sent}");
+}
+
+#[test]
+fn a_stop_without_a_held_arm_is_answered() {
+    let mut bench = Bench::offline();
+    bench.command(ControlCommand::Stop);
+    assert_eq!(bench.events, [ControlEvent::AtRest]);
+    // On the heels of an engagement it is met.
+    bench.command(ControlCommand::Engage { hold: START_POSE });
+    bench.command(ControlCommand::Stop);
+    assert_eq!(bench.latched(), Some(FaultCode::OperatorStop));
+}
+
 /// A stop on the way of a slowed motion makes it a brake, which ends earlier, and the
 /// first cause stays the cause.
 #[test]

@@ -116,6 +116,8 @@ pub enum ArmCommand {
 pub enum ControlEvent {
     /// The arm is held.
     Engaged,
+    /// A stop was commanded while no arm was held: nothing moves.
+    AtRest,
     /// The controller is armed.
     Armed(Arming),
     /// The controller is not armed any more; `fault` says why, `None` when it

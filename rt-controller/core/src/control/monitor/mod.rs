@@ -55,6 +55,10 @@ pub struct Monitor {
     counts: RunCounts,
     arm_error: u8,
     arm_warning: u8,
+    /// The link broke or stalled since the engagement. For the guardian only, so it is no
+    /// part of a recorded state.
+    #[serde(skip)]
+    pub(super) link_failed: bool,
 }
 
 impl Monitor {
@@ -70,13 +74,31 @@ impl Monitor {
             counts: RunCounts::default(),
             arm_error: 0,
             arm_warning: 0,
+            link_failed: false,
         }
     }
 
-    /// A motion begins: the operator's time-out starts anew.
-    pub const fn motion_begins(&mut self, deadline_ns: u64) {
-        self.operator.at_ns = deadline_ns;
+    /// The same for a new engagement: whose heart stopped before it is not taken to live.
+    #[must_use]
+    pub fn engaged(&self, now_ns: u64, q: JointVector) -> Self {
+        Self {
+            operator: self.operator,
+            guardian: self.guardian,
+            ..Self::new(self.settings, now_ns, q)
+        }
+    }
+
+    /// A motion begins: counts start anew.
+    pub const fn motion_begins(&mut self) {
         self.reports.motion_begins();
+    }
+
+    /// How far the arm is behind what was commanded (rad); zero where its reports are too old
+    /// to tell.
+    #[must_use]
+    pub fn deviation(&self, now_ns: u64) -> JointVector {
+        let stale = self.reports.stale(now_ns, &self.settings.thresholds);
+        stale.map_or_else(|| self.reports.deviation(), |_| JointVector::ZERO)
     }
 
     /// A setpoint was held back: too many wait for their reply.
@@ -107,8 +129,12 @@ impl Monitor {
     pub fn observe(&mut self, input: &CycleInput, limits: &Limits) {
         let now_ns = input.deadline_ns;
         self.operator.received(input.operator.count, now_ns);
-        self.guardian.received(input.guardian.count, now_ns);
+        if input.guardian.guards() {
+            self.guardian.received(input.guardian.count, now_ns);
+        }
         let (link, counts) = (&input.link, &mut self.counts);
+        self.link_failed |=
+            link.lost || link.unanswered_ns > self.settings.thresholds.reply_stall_ns;
         let add = |count: &mut u32, more: u32| *count = count.saturating_add(more);
         add(&mut counts.missed, input.missed);
         add(&mut counts.duplicates, link.duplicates.into());
@@ -141,6 +167,7 @@ impl Monitor {
         self.reports
             .stale(now_ns, &self.settings.thresholds)
             .or_else(|| self.guardian_silent(now_ns))
+            .or_else(|| self.operator_silent(now_ns))
             .map(|found| found.fault)
     }
 
@@ -168,7 +195,7 @@ impl Monitor {
             })
             .or_else(|| {
                 if !mode.is_moving() {
-                    return None;
+                    return pick(self.drifting(now_ns));
                 }
                 pick(skipped(
                     FaultCode::DeadlineMissed,
@@ -219,10 +246,22 @@ impl Monitor {
         if input.operator.released != 0 {
             return Some(Violation::plain(FaultCode::DeadManReleased));
         }
+        self.operator_silent(input.deadline_ns)
+    }
+
+    fn operator_silent(&self, now_ns: u64) -> Option<Violation> {
         let most_ns = self.settings.thresholds.operator_timeout_ns;
-        let silent_ns = self.operator.silent_ns(input.deadline_ns);
+        let silent_ns = self.operator.silent_ns(now_ns);
         (silent_ns > most_ns)
             .then(|| Violation::of_time(FaultCode::OperatorLost, silent_ns, most_ns))
+    }
+
+    /// At rest only joint velocities need reports, once they have come: without them nothing
+    /// holds the pose.
+    fn drifting(&self, now_ns: u64) -> Option<Violation> {
+        let holds = self.settings.interface == shared_types::CommandInterface::ServoPosition;
+        self.reports.newest().filter(|_| !holds)?;
+        self.reports.stale(now_ns, &self.settings.thresholds)
     }
 
     fn guardian_silent(&self, now_ns: u64) -> Option<Violation> {
