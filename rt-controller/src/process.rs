@@ -117,6 +117,7 @@ fn serve(bridge: &mut Bridge, threads: &Threads, stop: &AtomicBool) -> Result<()
         bridge.turn();
         if !threads.loop_lives() {
             bridge.stop_arm();
+            bridge.confirm_stop();
             bridge.end_recording();
             return Err(ControllerError::LoopEnded);
         }
@@ -131,6 +132,7 @@ fn serve(bridge: &mut Bridge, threads: &Threads, stop: &AtomicBool) -> Result<()
                 std::thread::sleep(TURN);
                 bridge.turn();
                 bridge.end_recording();
+                bridge.confirm_stop();
                 return Ok(());
             }
         }

@@ -5,6 +5,7 @@
 //! (the arm serves several clients), so that the control loop's link carries
 //! setpoints only.
 
+use crate::guardian::decision::{ASK_EVERY_NS, STOP_WITHIN_NS};
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
 use crate::xarm::{
     ArmState, BrokenStream, Command, ErrorCode, FrameReader, Protocol, ReplyData, ReplyError,
@@ -13,6 +14,9 @@ use crate::xarm::{
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
+
+/// Longest wait for the answer to a stop.
+const STOP_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// Why a question was not answered.
 #[derive(Debug, thiserror::Error)]
@@ -125,8 +129,58 @@ impl ArmSession {
         }
     }
 
-    /// Asks the arm to stop by itself.
-    pub fn stop_arm(&mut self) -> Result<(), SessionError> {
-        self.ask(&Command::SetState(StateRequest::Stop)).map(drop)
+    /// Asks the arm to stop by itself; whether it says that it has.
+    pub fn stop_arm(&mut self) -> Result<bool, SessionError> {
+        self.ask(&Command::SetState(StateRequest::Stop))?;
+        let state = self.state()?;
+        Ok(matches!(state, ArmState::Stopped | ArmState::NeedsReset))
+    }
+}
+
+/// Asks the arm to stop until it says that it has, on a new connection each time, as the
+/// vendor's own SDK repeats it; gives up after 3 s and says so.
+pub fn stop_until_confirmed(command_port: SocketAddr) {
+    let within = Duration::from_nanos(STOP_WITHIN_NS);
+    let began = Instant::now();
+    loop {
+        let stopped =
+            ArmSession::connect(command_port, STOP_TIMEOUT).and_then(|mut s| s.stop_arm());
+        match stopped {
+            Ok(true) => return tracing::info!("the arm says that it has stopped"),
+            _ if began.elapsed() < within => {
+                std::thread::sleep(Duration::from_nanos(ASK_EVERY_NS));
+            }
+            found => {
+                return tracing::error!(
+                    ?found,
+                    "the arm was asked to stop for 3 s but was not seen stopped: press its emergency stop"
+                );
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guardian::line::tests::serve;
+    use std::net::TcpListener;
+    use std::sync::mpsc;
+
+    #[test]
+    fn a_stop_is_repeated_until_the_arm_says_that_it_has_stopped() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let (sender, requested) = mpsc::channel();
+        let arm = std::thread::spawn(move || {
+            for after in [ArmState::Moving, ArmState::Moving, ArmState::Stopped] {
+                let (stream, _) = listener.accept().unwrap();
+                serve(stream, &sender, after);
+            }
+        });
+        stop_until_confirmed(address);
+        arm.join().unwrap();
+        // The stop, then the question for the state.
+        assert_eq!(requested.iter().collect::<Vec<_>>(), [12, 13].repeat(3));
     }
 }

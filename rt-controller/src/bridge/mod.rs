@@ -20,7 +20,7 @@ use crate::error::ControllerError;
 use crate::os::now_ns;
 use crate::ports::BridgePorts;
 use crate::recording::ChunkWriter;
-use crate::session::ArmSession;
+use crate::session::{ArmSession, stop_until_confirmed};
 use crate::transport::tcp::TcpLink;
 use crate::xarm::ErrorCode;
 use answers::{ControllerCall, answer, refuse, stopped};
@@ -35,6 +35,7 @@ use shared_types::ipc::{
 use shared_types::{FaultCode, OperatingMode};
 use std::collections::VecDeque;
 use std::net::SocketAddr;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use uploads::Uploads;
 
@@ -88,6 +89,8 @@ pub struct Bridge {
     uploads: Uploads,
     operating_mode: Option<OperatingMode>,
     last_id: u64,
+    /// Asks the arm to stop until it says that it has.
+    stopping: Option<JoinHandle<()>>,
 }
 
 impl core::fmt::Debug for Bridge {
@@ -130,6 +133,7 @@ impl Bridge {
             uploads: Uploads::default(),
             operating_mode: None,
             last_id: 0,
+            stopping: None,
         })
     }
 
@@ -176,12 +180,18 @@ impl Bridge {
         let _ = self.command(ControlCommand::Stop, None);
     }
 
-    /// Asks the arm itself to stop, when there is no loop any more.
+    /// Asks the arm itself to stop until it says that it has, in a thread that
+    /// [`confirm_stop`](Self::confirm_stop) waits for. The loop has asked once, if it could.
     pub fn stop_arm(&mut self) {
-        let requested = ArmSession::connect(self.command_port(), QUESTION_TIMEOUT)
-            .and_then(|mut s| s.stop_arm());
-        if let Err(reason) = requested {
-            tracing::error!(%reason, "the arm could not be asked to stop");
+        self.confirm_stop();
+        let arm = self.command_port();
+        self.stopping = Some(std::thread::spawn(move || stop_until_confirmed(arm)));
+    }
+
+    /// Waits until a stop was confirmed or given up: at most 3 s and a time-out.
+    pub fn confirm_stop(&mut self) {
+        if let Some(stopping) = self.stopping.take() {
+            let _ = stopping.join();
         }
     }
 
@@ -269,6 +279,9 @@ impl Bridge {
             }
             ControlEvent::Latched(cause) => {
                 self.recording.writer.cause(&cause);
+                if cause.stop_arm != 0 {
+                    self.stop_arm();
+                }
                 self.on_latched(cause.fault(), cause.cycle);
             }
             ControlEvent::Armed(arming) => {

@@ -151,6 +151,8 @@ impl Bridge {
         &mut self,
         call: &ControllerCall,
     ) -> Result<(JointVector, Box<TcpLink>), (FaultCode, String)> {
+        // A stop that is still asked for would undo it.
+        self.confirm_stop();
         let command = self.command_port();
         if self.commander.is_none() {
             let lock = CommanderLock::take(command)

@@ -21,11 +21,11 @@
 use crate::xarm::ArmState;
 
 /// The stop is asked for this often (ns).
-const ASK_EVERY_NS: u64 = 100_000_000;
+pub const ASK_EVERY_NS: u64 = 100_000_000;
 /// Silence at rest after which the controller is looked for anew (ns).
 const FORGET_AFTER_NS: u64 = 500_000_000;
 /// Time in which the arm must be seen stopped (ns).
-const STOP_WITHIN_NS: u64 = 3_000_000_000;
+pub const STOP_WITHIN_NS: u64 = 3_000_000_000;
 
 /// What the guardian knows in one turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -233,7 +233,7 @@ impl Open {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::xarm::{ArmState, Status};
     use std::net::{TcpListener, TcpStream};
@@ -241,9 +241,9 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// Answers questions for the state with 4 once a stop was asked for; tells
+    /// Answers questions for the state with `after` once a stop was asked for; tells
     /// the registers it is asked.
-    fn serve(mut stream: TcpStream, requested: &mpsc::Sender<u8>) {
+    pub(crate) fn serve(mut stream: TcpStream, requested: &mpsc::Sender<u8>, after: ArmState) {
         let (mut reader, mut state) = (FrameReader::new(), ArmState::Moving);
         let mut out = [0; MAX_FRAME_LEN];
         while let Ok(n @ 1..) = stream.read(reader.space()) {
@@ -253,7 +253,7 @@ mod tests {
                 requested.send(request.register).unwrap();
                 let data = match Command::parse(request.register, request.parameters).unwrap() {
                     Command::SetState(StateRequest::Stop) => {
-                        state = ArmState::Stopped;
+                        state = after;
                         ReplyData::None
                     }
                     _ => ReplyData::State(state),
@@ -290,7 +290,7 @@ mod tests {
         let (first, _) = listener.accept().unwrap();
         let server = std::thread::spawn(move || {
             let far = first.try_clone().unwrap();
-            serve(first, &sender);
+            serve(first, &sender, ArmState::Stopped);
             drop(far);
         });
         until(&mut line, &mut now_ns, |_, state| state == Some(1));
@@ -330,7 +330,7 @@ mod tests {
         until(&mut line, &mut now_ns, |line, _| line.is_connected());
         let (sender, _asked) = mpsc::channel();
         let (second, _) = listener.accept().unwrap();
-        std::thread::spawn(move || serve(second, &sender));
+        std::thread::spawn(move || serve(second, &sender, ArmState::Stopped));
         assert!(line.ask_stop(now_ns));
         until(&mut line, &mut now_ns, |_, state| state == Some(4));
     }
