@@ -210,6 +210,9 @@ impl ThresholdSettings {
         let key = "thresholds.tracking_error_max_rad";
         let allowed = "above 0 and at most 1 rad";
         require(error > 0.0 && error <= 1.0, key, error, allowed)?;
+        let key = "thresholds.missed_cycles_max";
+        let missed = checked.missed_cycles_max;
+        require(missed <= 100, key, missed, "at most 100")?;
         let key = "thresholds.unanswered_max";
         require(unanswered > 0, key, unanswered, "at least 1")?;
         Ok(checked)
@@ -281,7 +284,7 @@ impl ControllerConfig {
             return Ok((found_ms * 1e6).round() as u64);
         }
         Err(ConfigError(format!(
-            "`guardian.silence_ms` is {found_ms}, it must be {least_ms:.0} (two cycles of {cycle_ms:.3} ms more than `thresholds.missed_cycles_max`) to 5000 ms"
+            "`guardian.silence_ms` is {found_ms}, it must be {least_ms:.0} (two cycles of {cycle_ms:.3} ms more than `thresholds.missed_cycles_max`) to 5000 ms; left out, it is that"
         )))
     }
 

@@ -15,6 +15,8 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
+/// What is left when no stop gets through.
+const PRESS: &str = "press its emergency stop";
 /// Longest wait for the answer to a stop.
 const STOP_TIMEOUT: Duration = Duration::from_millis(200);
 
@@ -150,11 +152,13 @@ pub fn stop_until_confirmed(command_port: SocketAddr) {
             _ if began.elapsed() < within => {
                 std::thread::sleep(Duration::from_nanos(ASK_EVERY_NS));
             }
-            found => {
+            Ok(false) => {
                 return tracing::error!(
-                    ?found,
-                    "the arm was asked to stop for 3 s but was not seen stopped: press its emergency stop"
+                    "the arm was asked to stop for 3 s but still moves: {PRESS}"
                 );
+            }
+            Err(reason) => {
+                return tracing::error!(%reason, "no stop could be confirmed for 3 s: {PRESS}");
             }
         }
     }

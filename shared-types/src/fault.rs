@@ -37,9 +37,9 @@ fault_codes! {
     None = 0: "no fault";
     OperatorStop = 1: "the operator asked for a stop; to go on, run the command again";
     OperatorLost = 2:
-        "the operator's heartbeat went silent while the arm moved; its program ended, or the computer was too busy for it; end what else computes there, then run the command again";
+        "the operator's heartbeat is silent; its program ended, or the computer was too busy for it; end what else computes there, then run the command again";
     GuardianLost = 3:
-        "the guardian that stops the arm when the controller dies went silent; restart it, then run the command again";
+        "the guardian that stops the arm when the controller dies is silent, or the arm does not answer it; look into its log, restart it, then run the command again";
     DeadManReleased = 4:
         "the operator let go of the dead-man switch while the arm moved; hold it, then run the command again";
     Disarmed = 5:

@@ -159,11 +159,16 @@ fn faults_29_and_32_without_a_guardian_or_anybody_nothing_begins() {
     }
 }
 
-/// An operator who never beat does not get far: the motion is braked after the
-/// time-out that began with it.
+/// A silent operator begins nothing; one who falls silent with a motion loses the arm.
 #[test]
-fn fault_32_an_operator_who_never_beats_loses_the_arm() {
+fn fault_32_an_operator_who_is_silent_loses_the_arm() {
     for via in INTERFACES {
+        let mut stage = Stage::ready(via, "");
+        stage.rig.operator_alive = false;
+        stage.rig.run_for(1.0);
+        stage.begin();
+        stage.finish();
+        stage.assert_refused(FaultCode::OperatorLost);
         let mut stage = Stage::ready(via, "");
         stage.rig.operator_alive = false;
         stage.begin();

@@ -55,7 +55,7 @@ fn check(e: &Excitation, limits: &Limits) -> Result<(), ExcitationError> {
             e.pose_rad[j],
             limits.position_min_rad[j],
             limits.position_max_rad[j],
-            unit_hint("pose_rad", e.pose_rad.max_abs(), core::f64::consts::TAU)
+            unit_hint("pose_rad", e.pose_rad[j].abs(), core::f64::consts::TAU)
         ))),
         None => Ok(()),
     }

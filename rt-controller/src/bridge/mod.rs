@@ -43,7 +43,7 @@ use uploads::Uploads;
 const SET_UP_TIMEOUT: Duration = Duration::from_secs(2);
 /// The same for a question about an error, when callers wait.
 const QUESTION_TIMEOUT: Duration = Duration::from_millis(200);
-/// Longest wait of a bring-up for the first joint report.
+/// Longest wait of a bring-up for the first joint report and for the guardian.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
 
 /// A call that is answered later.
@@ -63,7 +63,7 @@ enum Awaited {
     Armed,
     /// The arm is latched, or was not held.
     Stopped,
-    /// The loop holds the arm, and joint reports come.
+    /// The loop holds the arm, joint reports come, and a guardian watches.
     Engaged { held: bool, until: Instant },
 }
 
@@ -82,6 +82,8 @@ pub struct Bridge {
     latencies: Latencies,
     newest: CycleRecord,
     newest_report: Option<JointReport>,
+    /// A guardian watches that could stop the arm.
+    guarded: bool,
     /// Error and warning that the arm reported last.
     arm_codes: (ErrorCode, u8),
     arm_error: ErrorCode,
@@ -127,6 +129,7 @@ impl Bridge {
             latencies: Latencies::new()?,
             newest: CycleRecord::default(),
             newest_report: None,
+            guarded: false,
             arm_codes: (ErrorCode::NONE, 0),
             arm_error: ErrorCode::NONE,
             open: Vec::new(),
@@ -183,9 +186,19 @@ impl Bridge {
     /// Asks the arm itself to stop until it says that it has, in a thread that
     /// [`confirm_stop`](Self::confirm_stop) waits for. The loop has asked once, if it could.
     pub fn stop_arm(&mut self) {
-        self.confirm_stop();
+        if self
+            .stopping
+            .as_ref()
+            .is_some_and(|asked| !asked.is_finished())
+        {
+            return;
+        }
         let arm = self.command_port();
-        self.stopping = Some(std::thread::spawn(move || stop_until_confirmed(arm)));
+        let asked = std::thread::Builder::new().name("stop".to_owned());
+        self.stopping = asked.spawn(move || stop_until_confirmed(arm)).ok();
+        if self.stopping.is_none() {
+            stop_until_confirmed(arm);
+        }
     }
 
     /// Waits until a stop was confirmed or given up: at most 3 s and a time-out.
@@ -205,6 +218,7 @@ impl Bridge {
                 self.recording.add(|writer| writer.keyframe(&state));
             }
             if let Some(cycle) = self.ports.recorded(record) {
+                self.guarded = cycle.input.guardian.guards();
                 self.recording.add(|writer| writer.cycle(&cycle));
             }
         }
@@ -292,8 +306,9 @@ impl Bridge {
                 }
             }
             ControlEvent::AtRest => {
-                for open in self.take(|awaits| matches!(awaits, Awaited::Stopped)) {
-                    answer(&open.call, &ControllerEvent::Done);
+                let stopped = |open: &Open| matches!(open.awaits, Awaited::Stopped);
+                if let Some(oldest) = self.open.iter().position(stopped) {
+                    answer(&self.open.remove(oldest).call, &ControllerEvent::Done);
                 }
             }
             ControlEvent::Disarmed { fault } => {
@@ -321,6 +336,17 @@ impl Bridge {
                 Some(motion) => self.begin(call, motion, next),
             }
         }
+    }
+
+    /// Whether a stop or an engagement is on its way, or the arm still asked to stop.
+    fn settles(&self) -> bool {
+        let awaited =
+            |open: &Open| matches!(open.awaits, Awaited::Stopped | Awaited::Engaged { .. });
+        let asked = self
+            .stopping
+            .as_ref()
+            .is_some_and(|asked| !asked.is_finished());
+        asked || self.open.iter().any(awaited)
     }
 
     /// Whether a motion is under way for a caller.
@@ -382,13 +408,19 @@ impl Bridge {
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
         let held = |a: &Awaited| matches!(a, Awaited::Engaged { held: true, .. });
-        for open in self.take(|awaits| held(awaits) && fresh) {
+        let guarded = self.guarded || !self.config.guardian.required;
+        for open in self.take(|awaits| held(awaits) && fresh && guarded) {
             answer(&open.call, &ControllerEvent::Done);
         }
         let now = Instant::now();
         let late = |a: &Awaited| matches!(a, Awaited::Engaged { until, .. } if now > *until);
         for open in self.take(late) {
-            refuse(&open.call, FaultCode::ReportStale, "");
+            let fault = if fresh {
+                FaultCode::GuardianLost
+            } else {
+                FaultCode::ReportStale
+            };
+            refuse(&open.call, fault, "");
         }
     }
 }

@@ -38,6 +38,10 @@ impl Bridge {
             ControllerRequest::Stop => {
                 self.pass_on(call, ControlCommand::Stop, None, Awaited::Stopped);
             }
+            // The mode is that of before: what is on its way to the loop may undo a stop.
+            ControllerRequest::Bringup | ControllerRequest::Acknowledge if self.settles() => {
+                self.wrong_mode(&call, "a stop or a bring-up is under way; ask again");
+            }
             ControllerRequest::Bringup => match self.mode() {
                 ControllerMode::Idle => answer(&call, &ControllerEvent::Done),
                 ControllerMode::Offline => self.set_up(call),
@@ -151,8 +155,6 @@ impl Bridge {
         &mut self,
         call: &ControllerCall,
     ) -> Result<(JointVector, Box<TcpLink>), (FaultCode, String)> {
-        // A stop that is still asked for would undo it.
-        self.confirm_stop();
         let command = self.command_port();
         if self.commander.is_none() {
             let lock = CommanderLock::take(command)

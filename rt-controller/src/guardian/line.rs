@@ -15,11 +15,12 @@ const CONNECT_WITHIN_NS: u64 = 1_000_000_000;
 /// How often the arm is asked for its state, so that a dead connection is
 /// noticed before it is needed (ns). Keeps the heartbeat rule of the protocol
 /// many times over.
-const ASK_EVERY_NS: u64 = 500_000_000;
-/// Age of the newest answer beyond which the arm does not count as reached (ns).
+const ASK_EVERY_NS: u64 = 200_000_000;
+/// Age of the newest answer beyond which the arm does not count as reached (ns); a silent
+/// connection is opened anew before.
 const ANSWERED_WITHIN_NS: u64 = 1_000_000_000;
 /// Silence after which the connection is opened anew (ns).
-const SILENCE_NS: u64 = 2_000_000_000;
+const SILENCE_NS: u64 = 600_000_000;
 /// Unacknowledged data for this long mean a broken connection.
 const USER_TIMEOUT: Duration = Duration::from_millis(1000);
 
@@ -39,8 +40,6 @@ struct Open {
     question: u16,
     requested_ns: u64,
     received_ns: u64,
-    /// Whether anything was received.
-    answered: bool,
     /// When the newest stop was asked for.
     stop_ns: Option<u64>,
 }
@@ -50,6 +49,8 @@ struct Open {
 pub struct ArmLine {
     address: SocketAddr,
     phase: Phase,
+    /// When the arm answered last, on whatever connection.
+    answered_ns: Option<u64>,
 }
 
 impl ArmLine {
@@ -59,6 +60,7 @@ impl ArmLine {
         Self {
             address,
             phase: Phase::Down { retry_ns: 0 },
+            answered_ns: None,
         }
     }
 
@@ -71,10 +73,8 @@ impl ArmLine {
     /// Whether the arm answers: a connection alone proves nothing.
     #[must_use]
     pub fn is_answered(&self, now_ns: u64) -> bool {
-        let answered = |open: &Open| {
-            open.answered && now_ns.saturating_sub(open.received_ns) < ANSWERED_WITHIN_NS
-        };
-        matches!(&self.phase, Phase::Up(open) if answered(open))
+        let within = |at_ns: u64| now_ns.saturating_sub(at_ns) < ANSWERED_WITHIN_NS;
+        self.answered_ns.is_some_and(within)
     }
 
     /// One turn: goes on connecting, keeps the connection alive, and returns the
@@ -90,7 +90,10 @@ impl ArmLine {
                 Err(reason) => Err(reason),
             },
             Phase::Up(open) => match open.turn(now_ns) {
-                Ok(state) => return state,
+                Ok(state) => {
+                    self.answered_ns = state.map(|_| now_ns).or(self.answered_ns);
+                    return state;
+                }
                 Err(reason) => Err(reason),
             },
         };
@@ -167,7 +170,6 @@ fn take(address: SocketAddr, now_ns: u64, socket: &Socket) -> Result<Phase> {
         question: 0,
         requested_ns: 0,
         received_ns: now_ns,
-        answered: false,
         stop_ns: None,
     })))
 }
@@ -210,7 +212,7 @@ impl Open {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(n) => {
                 self.reader.commit(n);
-                (self.received_ns, self.answered) = (now_ns, true);
+                self.received_ns = now_ns;
             }
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 return Ok(None);

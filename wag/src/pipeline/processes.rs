@@ -145,7 +145,6 @@ fn controller_config(
         config.thresholds.tracking_window_ms = Some(250.0);
         config.thresholds.missed_cycles_max = Some(50);
         config.thresholds.late_cycles_max = Some(50);
-        config.guardian.silence_ms = Some(500.0);
         // Nobody configured it, so nobody needs to look.
         config.on_difference = OnDifference::Set;
     } else {

@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 
 /// How long a child may take to end itself after it was asked.
 const GRACE: Duration = Duration::from_millis(1500);
-/// The same for a child that may have to brake an arm first.
-const BRAKE_GRACE: Duration = Duration::from_millis(5000);
+/// The same for a child that may have to brake an arm first, and to confirm its stop.
+const BRAKE_GRACE: Duration = Duration::from_millis(8000);
 
 #[derive(Debug)]
 pub struct ProcessSpec {

@@ -21,7 +21,7 @@ use shared_types::ipc::{ControllerMode, ControllerState, CycleRecord, PAYLOAD_VE
 use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 
 /// State of the control cycle. Sized once; stepping never allocates. An engagement
-/// makes it anew, apart from its counters.
+/// makes it anew, apart from its counters and the heartbeats.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct ControlState {
     pub(super) limits: Limits,
