@@ -166,7 +166,8 @@ fn fault_32_an_operator_who_is_silent_loses_the_arm() {
         let mut stage = Stage::ready(via, "");
         stage.rig.operator_alive = false;
         stage.rig.run_for(1.0);
-        stage.begin();
+        stage.arm();
+        stage.start_nod();
         stage.finish();
         stage.assert_refused(FaultCode::OperatorLost);
         let mut stage = Stage::ready(via, "");
