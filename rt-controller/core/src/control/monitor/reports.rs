@@ -135,10 +135,15 @@ impl ReportWatch {
         }
         self.jump = self.jump.or_else(|| jump(&before, report, limits));
         let from_ns = report.stamp_ns.saturating_sub(window_ns);
-        // Only the report with the arm's own clock names its target.
+        // Only the report with the arm's own clock names its target; the search costs as
+        // much as half of a cycle.
         let until_ns = report.stamp_ns.max(report.arrival_ns);
-        let (_, off_rad) = self.commanded.farthest(&report.q_target, from_ns, until_ns);
-        let foreign = report.arm_clock != 0 && off_rad > TARGET_RAD;
+        let off_rad = || {
+            self.commanded
+                .farthest(&report.q_target, from_ns, until_ns)
+                .1
+        };
+        let foreign = report.arm_clock != 0 && off_rad() > TARGET_RAD;
         // A report that repeats itself says nothing new.
         let repeats =
             report.q == before.q && report.qd == before.qd && report.q_target == before.q_target;
