@@ -186,11 +186,7 @@ impl Bridge {
     /// Asks the arm itself to stop until it says that it has, in a thread that
     /// [`confirm_stop`](Self::confirm_stop) waits for. The loop has asked once, if it could.
     pub fn stop_arm(&mut self) {
-        if self
-            .stopping
-            .as_ref()
-            .is_some_and(|asked| !asked.is_finished())
-        {
+        if self.stops_arm() {
             return;
         }
         let arm = self.command_port();
@@ -342,11 +338,13 @@ impl Bridge {
     fn settles(&self) -> bool {
         let awaited =
             |open: &Open| matches!(open.awaits, Awaited::Stopped | Awaited::Engaged { .. });
-        let asked = self
-            .stopping
-            .as_ref()
-            .is_some_and(|asked| !asked.is_finished());
-        asked || self.open.iter().any(awaited)
+        self.stops_arm() || self.open.iter().any(awaited)
+    }
+
+    /// Whether the arm is still asked to stop.
+    fn stops_arm(&self) -> bool {
+        let stopping = self.stopping.as_ref();
+        stopping.is_some_and(|thread| !thread.is_finished())
     }
 
     /// Whether a motion is under way for a caller.

@@ -135,8 +135,8 @@ impl ReportWatch {
         }
         self.jump = self.jump.or_else(|| jump(&before, report, limits));
         let from_ns = report.stamp_ns.saturating_sub(window_ns);
-        // Only the report with the arm's own clock names its target; the search costs as
-        // much as half of a cycle.
+        // Only the report with the arm's own clock names its target; others are spared
+        // the search.
         let until_ns = report.stamp_ns.max(report.arrival_ns);
         let off_rad = || {
             self.commanded
