@@ -99,8 +99,11 @@ impl Differences {
     }
 }
 
-/// Asserts every limit over the setpoints of all cycles, as they were computed. Where the
+/// Asserts every limit over the setpoints that went out, as they were computed. Where the
 /// controller engages the arm, it stands.
+///
+/// One that was held back, because its cycle was held up before the send, may lie close
+/// before the next; nothing follows it.
 ///
 /// # Panics
 /// When a setpoint does not keep a limit.
@@ -118,7 +121,9 @@ pub fn assert_computed<'a>(
             judge = Some(Differences::at_rest(at, record.q_c, EXACT, 0.0));
         }
         before = record.mode;
-        if record.sent == 1 {
+        // In virtual time even a send that nothing holds up takes no time.
+        let held_back = record.compute_ns > 0 && record.send_ns == 0;
+        if record.sent == 1 && !held_back {
             assert!(judge.is_some(), "sent before an engagement");
             judge
                 .iter_mut()

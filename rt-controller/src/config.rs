@@ -1,5 +1,6 @@
 //! Configuration of the controller process.
 
+use crate::arm_settings::ArmSettings;
 use crate::control::settings::TRACKING_WINDOW_MAX_MS;
 use crate::control::{ControlSettings, Thresholds};
 use crate::os::RealTimeSettings;
@@ -50,8 +51,10 @@ pub struct ControllerConfig {
     /// Ports with the arm's status (5 Hz), in the order in which they are tried.
     pub status_ports: [u16; 2],
     /// What to do when the arm's tool or its tool speed limit is not the one of
-    /// the limits.
+    /// the limits, or a setting not the one of `arm_settings`.
     pub on_difference: OnDifference,
+    /// What the arm must be set to.
+    pub arm_settings: ArmSettings,
     /// How setpoints reach the arm.
     pub command_interface: CommandInterface,
     /// Whether motions need an arming. Without, every motion runs as a throw
@@ -80,6 +83,7 @@ impl Default for ControllerConfig {
             fallback_report_port,
             status_ports: [rich, normal],
             on_difference: OnDifference::default(),
+            arm_settings: ArmSettings::default(),
             limits_file: None,
             limits: None,
             real_time: RealTimeSettings::default(),
@@ -220,7 +224,7 @@ impl ThresholdSettings {
 }
 
 /// Refuses the value found under a key unless it is allowed.
-fn require(
+pub(crate) fn require(
     holds: bool,
     key: &str,
     found: impl Into<f64>,
@@ -291,6 +295,7 @@ impl ControllerConfig {
     /// Checks what cannot be wrong by type alone.
     pub fn check(&self) -> Result<(), ConfigError> {
         self.guardian_silence_ns()?;
+        self.arm_settings.check()?;
         let warm_up_us = self.real_time.warm_up_us;
         let holds = warm_up_us <= WARM_UP_MAX_US;
         require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;

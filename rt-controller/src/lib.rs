@@ -21,6 +21,7 @@
 //! function; the emergency stop and the arm's own limits are.
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
+pub mod arm_settings;
 pub mod bridge;
 pub mod commander;
 pub mod config;

@@ -100,7 +100,6 @@ fn fill_in(bytes: &mut [u8], model: &ArmModel) {
         }
     };
     let reduced = &settings.reduced;
-    put(315, &[u8::from(settings.self_collision)]);
     for (j, current) in model.current_a().iter().enumerate() {
         put(355 + 4 * j, &(*current as f32).to_le_bytes());
     }
@@ -176,6 +175,9 @@ fn rich(model: &ArmModel, version: Firmware, counter: u32) -> RichReport {
         // The flag is the controller's own simulation mode, in which the SDK
         // leaves motion requests out; this arm stands in for a real one.
         simulated: false,
+        self_collision: settings.self_collision,
+        reduced: settings.reduced.on,
+        fence: settings.boundary.on,
     }
 }
 

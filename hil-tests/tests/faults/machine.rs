@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::control::record::restore_input;
 use rt_controller::control::{ControlSettings, ControlState, Motion, Thresholds};
-use shared_types::ipc::CauseRecord;
+use shared_types::ipc::{CauseRecord, CycleRecord};
 use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
 use xarm_sim::Intake;
 
@@ -65,6 +65,25 @@ fn fault_02_a_cycle_held_up_before_its_send_never_looks_too_fast_to_the_arm() {
             stage.assert_finished(0.2e-3);
             let missed = stage.rig.counts().missed;
             assert_eq!(missed > 0, held_us > 200, "{held_us} us: {missed} missed");
+            assert_on_time(&stage);
+        }
+    }
+}
+
+/// Woken late and held up as well: the setpoint that is held back lies close before the
+/// next, which goes out on time.
+#[test]
+fn fault_02_a_late_cycle_that_is_held_up_never_looks_too_fast_to_the_arm() {
+    for via in INTERFACES {
+        for late_us in [300, 1500, 2700, 3400] {
+            let times = |first_us: u64| (0..40).flat_map(move |_| [first_us * 1000, 0, 0, 0, 0]);
+            let stage = Stage::disturbed(via, 0.2, |rig| {
+                rig.oversleep(times(late_us));
+                rig.hold_up(times(300));
+            });
+            stage.assert_finished(0.2e-3);
+            let held = |r: &&CycleRecord| r.compute_ns > 0 && r.send_ns == 0;
+            assert!(stage.rig.log.records.iter().filter(held).count() >= 40);
             assert_on_time(&stage);
         }
     }

@@ -73,9 +73,9 @@ fn fault_17_broken_reports_are_dropped_and_too_many_in_a_row_slow_the_motion() {
 }
 
 /// The bring-up is refused with words that say why, and nothing is brought up.
-fn refuses_to_bring_up(mut stand: Stand, words: &[&str]) {
+fn refuses_to_bring_up(mut stand: Stand, expected: FaultCode, words: &[&str]) {
     let (fault, message) = stand.refused(&ControllerRequest::Bringup);
-    assert_eq!(fault, FaultCode::UnsupportedFirmware, "{message}");
+    assert_eq!(fault, expected, "{message}");
     assert!(words.iter().all(|w| message.contains(w)), "{message}");
     let refused = stand.refused(&ControllerRequest::Acknowledge);
     assert_eq!(refused.0, FaultCode::WrongMode, "nothing was brought up");
@@ -88,14 +88,12 @@ fn fault_18_a_firmware_without_the_reports_needed_is_refused() {
         firmware: Firmware(1, 12, 0),
         ..ArmConfig::default()
     };
-    refuses_to_bring_up(Stand::with("old", old, |_| ()), &["v1.12.0"]);
+    let stand = Stand::with("old", old, |_| ());
+    refuses_to_bring_up(stand, FaultCode::UnsupportedFirmware, &["v1.12.0"]);
 }
 
-/// A line between controller and arm that passes everything on but says that the
-/// firmware is v2.8.2. Its port.
-fn a_line_that_lies(arm_port: u16) -> u16 {
-    const TRUE: &[u8] = b"v2.7.1";
-    const SAID: &[u8] = b"v2.8.2";
+/// A line between controller and arm that passes everything on, with a `lie`. Its port.
+fn a_line_that_lies(arm_port: u16, lie: fn(&mut [u8])) -> u16 {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
     std::thread::spawn(move || {
@@ -110,9 +108,7 @@ fn a_line_that_lies(arm_port: u16) -> u16 {
                 std::thread::spawn(move || {
                     let mut bytes = [0; 2048];
                     while let Ok(n @ 1..) = from.read(&mut bytes) {
-                        if let Some(at) = bytes[..n].windows(TRUE.len()).position(|w| w == TRUE) {
-                            bytes[at..at + SAID.len()].copy_from_slice(SAID);
-                        }
+                        lie(&mut bytes[..n]);
                         if to.write_all(&bytes[..n]).is_err() {
                             break;
                         }
@@ -127,10 +123,19 @@ fn a_line_that_lies(arm_port: u16) -> u16 {
 
 #[test]
 fn fault_18_reports_of_another_layout_than_the_firmwares_are_refused() {
+    fn newer(bytes: &mut [u8]) {
+        if let Some(at) = bytes.windows(6).position(|w| w == b"v2.7.1") {
+            bytes[at..at + 6].copy_from_slice(b"v2.8.2");
+        }
+    }
     let stand = Stand::with("liar", ArmConfig::default(), |config| {
-        config.command_port = a_line_that_lies(config.command_port);
+        config.command_port = a_line_that_lies(config.command_port, newer);
     });
-    refuses_to_bring_up(stand, &["v2.8.2", "574", "587"]);
+    refuses_to_bring_up(
+        stand,
+        FaultCode::UnsupportedFirmware,
+        &["v2.8.2", "574", "587"],
+    );
 }
 
 #[test]
@@ -138,5 +143,30 @@ fn fault_18_another_report_on_the_port_of_the_joint_reports_is_refused() {
     let stand = Stand::with("ports", ArmConfig::default(), |config| {
         config.report_port = config.fallback_report_port;
     });
-    refuses_to_bring_up(stand, &["135", "784"]);
+    refuses_to_bring_up(stand, FaultCode::UnsupportedFirmware, &["135", "784"]);
+}
+
+/// The mode, the enabled joints and reduced mode, where the vendor's report table has them.
+#[test]
+fn an_arm_is_brought_up_by_what_it_reports_not_by_what_it_answered() {
+    type Lie = fn(&mut [u8]);
+    let lies: [(Lie, FaultCode, &[&str]); 3] = [
+        (
+            |b| b[4] &= 0x0F,
+            FaultCode::ArmNotReady,
+            &["Servo", "Position"],
+        ),
+        (
+            |b| b[88] &= 0x7B,
+            FaultCode::ArmNotReady,
+            &["joint 3", "enabled"],
+        ),
+        (|b| b[494] |= 1, FaultCode::ArmDiffers, &["reduced mode"]),
+    ];
+    for (lie, fault, words) in lies {
+        let stand = Stand::with("effect", ArmConfig::default(), |config| {
+            config.status_ports[0] = a_line_that_lies(config.status_ports[0], lie);
+        });
+        refuses_to_bring_up(stand, fault, words);
+    }
 }

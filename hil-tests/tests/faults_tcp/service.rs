@@ -1,12 +1,18 @@
 //! What the controller's service answers, mode by mode.
 
-use super::stand::{Stand, arm_for, execute, swing};
+use super::stand::{PATIENCE, Stand, arm_for, execute, swing};
 use arm_model::joint::START_POSE;
 use arm_model::{Limits, LimitsSpec};
 use rt_controller::commander::CommanderLock;
+use rt_controller::config::OnDifference;
+use rt_controller::session::ArmSession;
+use rt_controller::xarm::Command;
+use rt_controller::xarm::report::{NormalReport, RICH_REPORT_LEN};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::{FaultCode, OperatingMode};
+use std::io::Read;
+use std::net::TcpStream;
 use xarm_sim::ArmConfig;
 
 #[test]
@@ -94,5 +100,51 @@ fn another_commander_or_another_tool_speed_is_a_refusal_that_says_what() {
         message.contains("1.200") && message.contains("1.000"),
         "{message}"
     );
+    stand.finish();
+}
+
+/// Other programs and a reset change the arm's settings; nothing says so later.
+#[test]
+fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
+    let change = |stand: &Stand, command| {
+        let address = (stand.config.arm, stand.config.command_port).into();
+        let mut other = ArmSession::connect(address, PATIENCE).unwrap();
+        other.ask(&command).unwrap();
+    };
+    let load = |mass_kg| Command::TcpLoad {
+        mass_kg,
+        centre_m: [0.0, 0.0, 0.1],
+    };
+    let mut stand = Stand::with("settings", ArmConfig::default(), |config| {
+        config.arm_settings.load_centre_m = Some([0.0, 0.0, 0.1]);
+    });
+    for (command, words) in [
+        (Command::CollisionSensitivity(0), "sensitivity 0"),
+        (load(0.0), "no load"),
+    ] {
+        change(&stand, command);
+        let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+        assert_eq!(fault, FaultCode::ArmDiffers, "{message}");
+        assert!(message.contains(words), "{message}");
+        change(&stand, Command::CollisionSensitivity(3));
+    }
+    change(&stand, load(0.4));
+    stand.make_ready();
+    stand.finish();
+
+    let mut stand = Stand::with("settings_set", ArmConfig::default(), |config| {
+        config.on_difference = OnDifference::Set;
+        config.arm_settings.load_kg = Some(0.5);
+        config.arm_settings.load_centre_m = Some([0.0, 0.0, 0.08]);
+        config.arm_settings.collision_sensitivity = Some(4);
+    });
+    stand.make_ready();
+    let mut port = TcpStream::connect((stand.config.arm, stand.config.status_ports[0])).unwrap();
+    let mut report = [0; RICH_REPORT_LEN];
+    port.read_exact(&mut report).unwrap();
+    let found = NormalReport::parse(&report).unwrap();
+    assert_eq!(found.load_kg, 0.5);
+    assert!((found.load_centre_m[2] - 0.08).abs() < 1e-6, "{found:?}");
+    assert_eq!(found.collision_sensitivity, 4);
     stand.finish();
 }

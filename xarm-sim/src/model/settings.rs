@@ -8,6 +8,9 @@ use rt_controller::xarm::{Register, TcpPose};
 /// Bytes of the reply to register 53.
 const REDUCED_STATE_LEN: usize = 79;
 
+/// The payload that its owner has taught it with the tool: pole, holder and rope (kg).
+const TAUGHT_LOAD_KG: f64 = 0.3;
+
 /// Settings of the controller.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Settings {
@@ -45,7 +48,7 @@ pub(crate) struct Reduced {
 }
 
 impl Settings {
-    /// As delivered.
+    /// As its owner has set it up.
     pub(crate) fn factory(config: &ArmConfig) -> Self {
         let limits = &config.limits;
         Self {
@@ -53,8 +56,8 @@ impl Settings {
                 position_m: limits.tcp_offset_m,
                 rpy_rad: [0.0; 3],
             },
-            load_kg: 0.0,
-            load_centre_m: [0.0; 3],
+            load_kg: TAUGHT_LOAD_KG,
+            load_centre_m: limits.tcp_offset_m.map(|m| 0.5 * m),
             collision_sensitivity: 3,
             teach_sensitivity: 3,
             joint_jerk_rad_s3: 20.0,

@@ -18,8 +18,15 @@ pub const NORMAL_REPORT_LEN: usize = 145;
 /// Bytes of a report of port 30002, firmware 2.4 to 2.7.1.
 pub const RICH_REPORT_LEN: usize = 574;
 
-/// Offset of the mark of a simulated arm in the rich report (bytes).
+/// Offset of the marks of a simulated arm and of its self-collision check in the rich
+/// report (bytes).
 const SIMULATED: usize = 314;
+/// Offset of the bits that say which safety functions are on (bytes).
+const SAFETY_BITS: usize = 494;
+/// Bit of reduced mode.
+const REDUCED: u8 = 1;
+/// Bit of the safety boundary.
+const FENCE: u8 = 2;
 
 /// What every periodic report begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -156,6 +163,12 @@ pub struct RichReport {
     pub counter: u32,
     /// Whether the controller simulates its arm.
     pub simulated: bool,
+    /// Whether the arm stops before it touches itself.
+    pub self_collision: bool,
+    /// Whether reduced mode is on.
+    pub reduced: bool,
+    /// Whether the safety boundary is on.
+    pub fence: bool,
 }
 
 /// Rotation jerk and largest rotation acceleration (rad/s³, rad/s²), constants
@@ -194,6 +207,13 @@ impl RichReport {
         wire.u32_be(&mut self.counter);
         wire.skip_to(SIMULATED);
         wire.flag(&mut self.simulated);
+        wire.flag(&mut self.self_collision);
+        wire.skip_to(SAFETY_BITS);
+        let bit = |is_on: bool, bit: u8| if is_on { bit } else { 0 };
+        let mut bits = bit(self.reduced, REDUCED) | bit(self.fence, FENCE);
+        wire.u8(&mut bits);
+        self.reduced = bits & REDUCED != 0;
+        self.fence = bits & FENCE != 0;
         wire.skip_to(RICH_REPORT_LEN);
     }
 }

@@ -60,6 +60,9 @@ fn rich() -> RichReport {
         target_qd: joints(1.0),
         counter: 70_000,
         simulated: true,
+        self_collision: true,
+        reduced: false,
+        fence: true,
     }
 }
 
@@ -135,7 +138,8 @@ fn fields_sit_at_the_documented_offsets() {
     assert_eq!(f32_at(&out, 252), 250.0);
     assert_eq!(f32_at(&out, 256), 1.0);
     assert_eq!(out[284..288], 70_000_u32.to_be_bytes());
-    assert_eq!(out[314], 1);
+    assert_eq!(out[314..316], [1, 1]);
+    assert_eq!(out[494], 2);
 
     realtime().emit(&mut out).unwrap();
     assert_eq!(out[..4], 784_u32.to_be_bytes());

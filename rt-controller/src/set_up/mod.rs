@@ -1,24 +1,22 @@
 //! Bring-up and recovery: from whatever state the arm is in to one that follows
 //! setpoints, step by step, each with its result.
 //!
-//! Nothing of the arm is trusted: its firmware, report layouts, joint ranges, tool
-//! and speed limit are read and compared with what the controller is configured
-//! for. A difference is a refusal that names both, unless the configuration says that
-//! the arm shall be set. Order of the recovery as in the vendor's manual: clear
-//! error, enable, mode, state.
+//! Nothing of the arm is trusted: its firmware, report layouts, joint ranges, tool,
+//! speed limit and settings are read and compared with what the controller is configured
+//! for, and the mode that it was asked for is read back. A difference is a refusal that
+//! names both, unless the configuration says that the arm shall be set. Order of the
+//! recovery as in the vendor's manual: clear error, enable, mode, state.
 
+mod reports;
+
+use crate::arm_settings::summary;
 use crate::config::{ControllerConfig, OnDifference};
 use crate::session::{ArmSession, SessionError};
-use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport};
 use crate::xarm::{
-    ArmState, ArmVersion, Command, Firmware, JointQuery, Mode, ReplyData, ReportReader,
-    StateRequest, TcpPose,
+    ArmState, ArmVersion, Command, Firmware, JointQuery, Mode, ReplyData, StateRequest, TcpPose,
 };
-use arm_model::{JointVector, Limits};
-use core::ops::RangeInclusive;
+use arm_model::{JOINTS, JointVector, Limits};
 use shared_types::FaultCode;
-use std::io::Read;
-use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 /// The arm checks tool speed against this times its factor (m/s).
@@ -33,8 +31,8 @@ const STILL_INTERVAL: Duration = Duration::from_millis(30);
 const STILL_RAD: f64 = 1e-4;
 /// Longest wait for the arm to become ready and to stand still.
 const READY_TIMEOUT: Duration = Duration::from_secs(3);
-/// Longest wait for a status report; five come a second.
-const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time between two looks at the status report, which lags by up to 0.2 s.
+const STATUS_INTERVAL: Duration = Duration::from_millis(100);
 
 /// What to do about a difference that is refused.
 const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
@@ -95,7 +93,10 @@ impl SetUp<'_> {
             "tool speed",
             &self.match_tool_speed(session, version.firmware)?,
         );
+        reported("settings", &self.match_settings(session)?);
         let mode = Mode::from_code(self.config.command_interface.arm_mode());
+        let found = session.error_code()?;
+        reported("error before", &found.to_string());
         let enable = Command::MotionEnable {
             joint: Command::ALL_JOINTS,
             enable: true,
@@ -111,6 +112,8 @@ impl SetUp<'_> {
             reported(name, "taken");
         }
         reported("ready", &format!("{:?}", wait_ready(session)?));
+        self.wait_mode(mode)?;
+        reported("mode read back", &format!("{mode:?}, all joints enabled"));
         let q = wait_still(session)?;
         reported("still", "the arm stands");
         match self.limits.position_violation(&q) {
@@ -123,12 +126,6 @@ impl SetUp<'_> {
             }
             None => Ok(q),
         }
-    }
-
-    /// Port with normal or rich reports.
-    fn status(&self) -> SocketAddr {
-        let [status, _] = self.config.status_ports;
-        SocketAddr::new(self.config.arm, status)
     }
 
     /// Reads the version and refuses what cannot be driven.
@@ -157,46 +154,60 @@ impl SetUp<'_> {
         }
     }
 
-    /// Compares the size of the reports with what the firmware is known to send.
-    fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
-        // Fields may lie elsewhere in reports of another size.
-        let other_size = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
-            let (port, least, most) = (address.port(), sizes.start(), sizes.end());
-            let expected = if least == most {
-                least.to_string()
-            } else {
-                format!("{least} to {most}")
-            };
-            let message = format!(
-                "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
-            );
-            refuse(FaultCode::UnsupportedFirmware, message)
-        };
-        let status = read_report(self.status())?.len();
-        let sizes = firmware.rich_sizes();
-        // The normal report is the same everywhere.
-        if status != NORMAL_REPORT_LEN && !sizes.contains(&status) {
-            return other_size(self.status(), status, &sizes);
+    /// Compares what decides how the arm moves and when it stops by itself.
+    fn match_settings(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
+        let (normal, rich) = self.read_status()?;
+        let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
+        let mut result = summary(&normal, rich.as_ref());
+        for difference in wanted.differences(&normal, rich.as_ref(), tool_m) {
+            match (self.config.on_difference, difference.mend) {
+                (OnDifference::Set, Some(command)) => {
+                    session.ask(&command)?;
+                    result.push_str("; ");
+                    result.push_str(&difference.message);
+                    result.push_str(": set");
+                }
+                (OnDifference::Refuse, Some(_)) => {
+                    let message = format!("{}: {SET_ONE}", difference.message);
+                    return refuse(FaultCode::ArmDiffers, message);
+                }
+                (_, None) => return refuse(FaultCode::ArmDiffers, difference.message),
+            }
         }
-        let sizes = firmware.realtime_sizes();
-        let joints = SocketAddr::new(self.config.arm, self.config.report_port);
-        match read_report(joints) {
-            Ok(report) if sizes.contains(&report.len()) => Ok(format!(
-                "{} and {status} bytes, as of {firmware}",
-                report.len()
-            )),
-            Ok(report) => other_size(joints, report.len(), &sizes),
-            // As many clients as it takes are there: the 100 Hz report serves.
-            Err(reason) => Ok(format!(
-                "{status} bytes, as of {firmware}; no real-time report ({reason})"
-            )),
+        Ok(result)
+    }
+
+    /// Waits until the status report says that the arm is in `mode` with all joints enabled:
+    /// an arm that moves to setpoints in another mode makes its own motion of them.
+    fn wait_mode(&self, mode: Mode) -> Result<(), SetUpError> {
+        let began = Instant::now();
+        loop {
+            let (normal, _) = self.read_status()?;
+            let disabled = (0..JOINTS).find(|j| normal.enabled & (1 << j) == 0);
+            match disabled {
+                None if normal.basic.mode == mode => return Ok(()),
+                _ if began.elapsed() < READY_TIMEOUT => std::thread::sleep(STATUS_INTERVAL),
+                None => {
+                    let message = format!(
+                        "the arm was asked for mode {mode:?} but says {:?}: stop other programs that use it",
+                        normal.basic.mode
+                    );
+                    return refuse(FaultCode::ArmNotReady, message);
+                }
+                Some(j) => {
+                    let joint = j.saturating_add(1);
+                    let message = format!(
+                        "joint {joint} does not become enabled: use the vendor's tool to see why"
+                    );
+                    return refuse(FaultCode::ArmNotReady, message);
+                }
+            }
         }
     }
 
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
-        let status = read_report(self.status())?;
-        let report = NormalReport::parse(&status).or_else(|e| no_status(self.status(), e))?;
+        let (report, _) = self.read_status()?;
         let arm_m = report.tcp_offset.position_m;
         let apart_m = arm_m
             .iter()
@@ -252,40 +263,6 @@ impl SetUp<'_> {
         session.ask(&Command::SetSpeedLimitFactor(factor))?;
         Ok(format!("set from {arm_m_s:.3} to {configured_m_s:.3} m/s"))
     }
-}
-
-fn no_status<T>(address: SocketAddr, reason: impl core::fmt::Display) -> Result<T, SetUpError> {
-    let message =
-        format!("no status report from the arm at {address} ({reason}): check the report ports");
-    refuse(FaultCode::LinkLost, message)
-}
-
-/// The newest report of a port; one comes at once with every connection.
-fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
-    let connected = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).and_then(|stream| {
-        stream.set_read_timeout(Some(REPORT_TIMEOUT))?;
-        Ok(stream)
-    });
-    let mut stream = connected.or_else(|e| no_status(address, e))?;
-    let mut reader = ReportReader::new();
-    let mut received = 0;
-    while received <= MAX_REPORT_LEN {
-        if let Some(frame) = reader.next_report().or_else(|e| no_status(address, e))? {
-            return Ok(frame.to_vec());
-        }
-        let read = stream.read(reader.space());
-        match read.or_else(|e| no_status(address, e))? {
-            0 => break,
-            n => {
-                reader.commit(n);
-                received = received.saturating_add(n);
-            }
-        }
-    }
-    no_status(
-        address,
-        std::io::Error::from(std::io::ErrorKind::UnexpectedEof),
-    )
 }
 
 fn wait_ready(session: &mut ArmSession) -> Result<ArmState, SetUpError> {

@@ -1,0 +1,98 @@
+//! The arm's reports as the bring-up reads them: one at a time, on connections of its own.
+
+use super::{SetUp, SetUpError, refuse};
+use crate::xarm::report::{MAX_REPORT_LEN, NORMAL_REPORT_LEN, NormalReport, RichReport};
+use crate::xarm::{Firmware, ReportReader};
+use core::ops::RangeInclusive;
+use shared_types::FaultCode;
+use std::io::Read;
+use std::net::{SocketAddr, TcpStream};
+use std::time::Duration;
+
+/// Longest wait for a status report; five come a second.
+const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
+
+impl SetUp<'_> {
+    /// Port with normal or rich reports.
+    fn status(&self) -> SocketAddr {
+        let [status, _] = self.config.status_ports;
+        SocketAddr::new(self.config.arm, status)
+    }
+
+    /// Compares the size of the reports with what the firmware is known to send.
+    pub(super) fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
+        // Fields may lie elsewhere in reports of another size.
+        let other_size = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
+            let (port, least, most) = (address.port(), sizes.start(), sizes.end());
+            let expected = if least == most {
+                least.to_string()
+            } else {
+                format!("{least} to {most}")
+            };
+            let message = format!(
+                "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
+            );
+            refuse(FaultCode::UnsupportedFirmware, message)
+        };
+        let status = read_report(self.status())?.len();
+        let sizes = firmware.rich_sizes();
+        // The normal report is the same everywhere.
+        if status != NORMAL_REPORT_LEN && !sizes.contains(&status) {
+            return other_size(self.status(), status, &sizes);
+        }
+        let sizes = firmware.realtime_sizes();
+        let joints = SocketAddr::new(self.config.arm, self.config.report_port);
+        match read_report(joints) {
+            Ok(report) if sizes.contains(&report.len()) => Ok(format!(
+                "{} and {status} bytes, as of {firmware}",
+                report.len()
+            )),
+            Ok(report) => other_size(joints, report.len(), &sizes),
+            // As many clients as it takes are there: the 100 Hz report serves.
+            Err(reason) => Ok(format!(
+                "{status} bytes, as of {firmware}; no real-time report ({reason})"
+            )),
+        }
+    }
+
+    /// The newest status report; the rich one where the firmware has it whole.
+    pub(super) fn read_status(&self) -> Result<(NormalReport, Option<RichReport>), SetUpError> {
+        let status = read_report(self.status())?;
+        let normal = NormalReport::parse(&status).or_else(|e| no_status(self.status(), e))?;
+        Ok((normal, RichReport::parse(&status).ok()))
+    }
+}
+
+fn no_status<T>(address: SocketAddr, reason: impl core::fmt::Display) -> Result<T, SetUpError> {
+    let message =
+        format!("no status report from the arm at {address} ({reason}): check the report ports");
+    refuse(FaultCode::LinkLost, message)
+}
+
+/// The newest report of a port; one comes at once with every connection.
+fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
+    let connected = TcpStream::connect_timeout(&address, REPORT_TIMEOUT).and_then(|stream| {
+        stream.set_read_timeout(Some(REPORT_TIMEOUT))?;
+        Ok(stream)
+    });
+    let mut stream = connected.or_else(|e| no_status(address, e))?;
+    let mut reader = ReportReader::new();
+    let mut received = 0;
+    while received <= MAX_REPORT_LEN {
+        if let Some(frame) = reader.next_report().or_else(|e| no_status(address, e))? {
+            return Ok(frame.to_vec());
+        }
+        let read = stream.read(reader.space());
+        match read.or_else(|e| no_status(address, e))? {
+            0 => break,
+            n => {
+                reader.commit(n);
+                received = received.saturating_add(n);
+            }
+        }
+    }
+    no_status(
+        address,
+        std::io::Error::from(std::io::ErrorKind::UnexpectedEof),
+    )
+}
