@@ -9,6 +9,8 @@
 
 mod reports;
 
+pub use reports::read_status;
+
 use crate::arm_settings::summary;
 use crate::config::{ControllerConfig, OnDifference};
 use crate::session::{ArmSession, SessionError};
@@ -156,7 +158,7 @@ impl SetUp<'_> {
 
     /// Compares what decides how the arm moves and when it stops by itself.
     fn match_settings(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
-        let (normal, rich) = self.read_status()?;
+        let (normal, rich) = read_status(self.status())?;
         let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
         let mut result = summary(&normal, rich.as_ref());
         for difference in wanted.differences(&normal, rich.as_ref(), tool_m) {
@@ -182,7 +184,7 @@ impl SetUp<'_> {
     fn wait_mode(&self, mode: Mode) -> Result<(), SetUpError> {
         let began = Instant::now();
         loop {
-            let (normal, _) = self.read_status()?;
+            let (normal, _) = read_status(self.status())?;
             let disabled = (0..JOINTS).find(|j| normal.enabled & (1 << j) == 0);
             match disabled {
                 None if normal.basic.mode == mode => return Ok(()),
@@ -207,7 +209,7 @@ impl SetUp<'_> {
 
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
-        let (report, _) = self.read_status()?;
+        let (report, _) = read_status(self.status())?;
         let arm_m = report.tcp_offset.position_m;
         let apart_m = arm_m
             .iter()

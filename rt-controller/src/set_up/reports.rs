@@ -14,7 +14,7 @@ const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
 
 impl SetUp<'_> {
     /// Port with normal or rich reports.
-    fn status(&self) -> SocketAddr {
+    pub(super) fn status(&self) -> SocketAddr {
         let [status, _] = self.config.status_ports;
         SocketAddr::new(self.config.arm, status)
     }
@@ -54,13 +54,17 @@ impl SetUp<'_> {
             )),
         }
     }
+}
 
-    /// The newest status report; the rich one where the firmware has it whole.
-    pub(super) fn read_status(&self) -> Result<(NormalReport, Option<RichReport>), SetUpError> {
-        let status = read_report(self.status())?;
-        let normal = NormalReport::parse(&status).or_else(|e| no_status(self.status(), e))?;
-        Ok((normal, RichReport::parse(&status).ok()))
-    }
+/// What the arm reports of itself on a status port; the rich report where its firmware has
+/// it whole.
+///
+/// # Errors
+/// Nothing comes within 2 s, or no report.
+pub fn read_status(port: SocketAddr) -> Result<(NormalReport, Option<RichReport>), SetUpError> {
+    let status = read_report(port)?;
+    let normal = NormalReport::parse(&status).or_else(|e| no_status(port, e))?;
+    Ok((normal, RichReport::parse(&status).ok()))
 }
 
 fn no_status<T>(address: SocketAddr, reason: impl core::fmt::Display) -> Result<T, SetUpError> {

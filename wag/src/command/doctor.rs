@@ -2,17 +2,30 @@
 
 use super::network::network;
 use crate::cli::ArmPorts;
-use crate::doctor::{Finding, Machine, Verdict, judge_line};
-use cli_output::{Outcome, output, table};
+use crate::config;
+use crate::doctor::{Finding, Machine, Verdict, judge_line, settings};
+use arm_model::Limits;
+use cli_output::{OrInput, Outcome, output, table};
+use rt_controller::ControllerConfig;
 use serde_json::{Value, json};
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 
 pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> {
     let mut findings = Machine::here().judge();
     findings.push(network_finding());
     if let Some(ip) = address {
         let reports = [ports.report_port, ports.status_port];
-        findings.extend(judge_line(ip, ports.command_port, &reports));
+        let line = judge_line(ip, ports.command_port, &reports);
+        let answers = line.iter().all(|f| f.verdict != Verdict::Fail);
+        findings.extend(line);
+        if answers {
+            let wanted = config::here::<ControllerConfig>(None)
+                .or_input()?
+                .arm_settings;
+            let tool_m = config::here::<Limits>(None).or_input()?.tcp_offset_m;
+            let status = SocketAddr::new(ip, ports.status_port);
+            findings.push(settings(status, &wanted, tool_m));
+        }
     }
     let is_failed = |f: &&Finding| f.verdict == Verdict::Fail;
     let failed = findings.iter().filter(is_failed).count();

@@ -121,6 +121,9 @@ pub fn export(ExportCommand::Csv { run: path, out }: &ExportCommand) -> Outcome<
     let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
     let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
     let out = out.as_deref().unwrap_or(run.folder());
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("cannot make the folder `{}`", out.display()))
+        .or_input()?;
     files::check_writable(&out.join(CYCLES_TABLE)).or_input()?;
     let written = recorded.write_tables(out, epoch_ns).or_failed()?;
     for (file, rows) in &written {

@@ -1,7 +1,9 @@
 //! The line to an arm: who answers, how fast, and what that means.
 
 use super::{Finding, Verdict};
+use rt_controller::arm_settings::{ArmSettings, summary};
 use rt_controller::session::ArmSession;
+use rt_controller::set_up::read_status;
 use rt_controller::xarm::{ArmVersion, Command, ReplyData};
 use std::io::Read;
 use std::net::{IpAddr, SocketAddr, TcpStream};
@@ -73,6 +75,27 @@ fn report_port(address: SocketAddr) -> Finding {
     )
 }
 
+/// Compares the settings that an arm reports on its `status` port with those `wanted` of an
+/// arm whose tool centre point is `tool_m` from its flange.
+pub fn settings(status: SocketAddr, wanted: &ArmSettings, tool_m: [f64; 3]) -> Finding {
+    let name = "arm settings";
+    let (normal, rich) = match read_status(status) {
+        Ok(report) => report,
+        Err(reason) => {
+            let remedy = "see the row of the report port";
+            return Finding::new(name, Verdict::Fail, reason.to_string(), remedy);
+        }
+    };
+    let differ = wanted.differences(&normal, rich.as_ref(), tool_m);
+    let messages: Vec<_> = differ.into_iter().map(|d| d.message).collect();
+    Finding::new(
+        name,
+        Verdict::fail_unless(messages.is_empty()),
+        summary(&normal, rich.as_ref()),
+        &messages.join("; "),
+    )
+}
+
 /// Judges sorted round trips.
 fn round_trips(sorted_us: &[f64]) -> Option<Finding> {
     let max = sorted_us.last()?;
@@ -92,6 +115,34 @@ fn round_trips(sorted_us: &[f64]) -> Option<Finding> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use xarm_sim::{ArmConfig, SimulatedArm};
+
+    #[test]
+    fn an_arm_set_otherwise_than_wanted_fails_and_says_what() {
+        let arm = SimulatedArm::start(ArmConfig {
+            command_port: 0,
+            report_ports: [0; 4],
+            ..ArmConfig::default()
+        });
+        let arm = arm.unwrap();
+        let [_, normal, rich, _] = arm.ports().reports;
+        let at = |port| SocketAddr::from(([127, 0, 0, 1], port));
+        let any = ArmSettings::default();
+        for port in [normal, rich] {
+            let found = settings(at(port), &any, [0.0, 0.0, 0.2]);
+            assert_eq!(found.verdict, Verdict::Pass, "{found:?}");
+        }
+        let wanted = ArmSettings {
+            load_kg: Some(1.0),
+            self_collision: Some(true),
+            ..any
+        };
+        let found = settings(at(rich), &wanted, [0.0, 0.0, 0.2]);
+        assert_eq!(found.verdict, Verdict::Fail);
+        assert!(found.remedy.contains("1.000 kg"), "{found:?}");
+        assert!(found.remedy.contains("self-collision"), "{found:?}");
+        assert_eq!(settings(at(9), &any, [0.0; 3]).verdict, Verdict::Fail);
+    }
 
     #[test]
     fn a_slow_line_is_warned_of_and_a_silent_port_fails() {
