@@ -186,7 +186,7 @@ const fn on(is_on: bool) -> &'static str {
 }
 
 /// Whether all numbers differ by `most` at most; what is no number is near nothing.
-fn near(a: &[f64], b: &[f64], most: f64) -> bool {
+pub(crate) fn near(a: &[f64], b: &[f64], most: f64) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most)
 }
 

@@ -11,9 +11,10 @@ mod reports;
 
 pub use reports::read_status;
 
-use crate::arm_settings::summary;
+use crate::arm_settings::{near, summary};
 use crate::config::{ControllerConfig, OnDifference};
 use crate::session::{ArmSession, SessionError};
+use crate::xarm::report::{NormalReport, RichReport};
 use crate::xarm::{
     ArmState, ArmVersion, Command, Firmware, JointQuery, Mode, ReplyData, StateRequest, TcpPose,
 };
@@ -114,8 +115,9 @@ impl SetUp<'_> {
             reported(name, "taken");
         }
         reported("ready", &format!("{:?}", wait_ready(session)?));
-        self.wait_mode(mode)?;
-        reported("mode read back", &format!("{mode:?}, all joints enabled"));
+        self.wait_effect(mode)?;
+        let effect = format!("mode {mode:?}, all joints enabled, tool and settings as above");
+        reported("read back", &effect);
         let q = wait_still(session)?;
         reported("still", "the arm stands");
         match self.limits.position_violation(&q) {
@@ -179,45 +181,60 @@ impl SetUp<'_> {
         Ok(result)
     }
 
-    /// Waits until the status report says that the arm is in `mode` with all joints enabled:
-    /// an arm that moves to setpoints in another mode makes its own motion of them.
-    fn wait_mode(&self, mode: Mode) -> Result<(), SetUpError> {
+    /// Waits until the arm reports what it was set to. In another mode than `mode`, for one,
+    /// it would make a motion of its own of every setpoint.
+    fn wait_effect(&self, mode: Mode) -> Result<(), SetUpError> {
         let began = Instant::now();
         loop {
-            let (normal, _) = read_status(self.status())?;
-            let disabled = (0..JOINTS).find(|j| normal.enabled & (1 << j) == 0);
-            match disabled {
-                None if normal.basic.mode == mode => return Ok(()),
-                _ if began.elapsed() < READY_TIMEOUT => std::thread::sleep(STATUS_INTERVAL),
-                None => {
-                    let message = format!(
-                        "the arm was asked for mode {mode:?} but says {:?}: stop other programs that use it",
-                        normal.basic.mode
-                    );
-                    return refuse(FaultCode::ArmNotReady, message);
+            let (normal, rich) = read_status(self.status())?;
+            match self.without_effect(mode, &normal, rich.as_ref()) {
+                None => return Ok(()),
+                Some(_) if began.elapsed() < READY_TIMEOUT => {
+                    std::thread::sleep(STATUS_INTERVAL);
                 }
-                Some(j) => {
-                    let joint = j.saturating_add(1);
-                    let message = format!(
-                        "joint {joint} does not become enabled: use the vendor's tool to see why"
-                    );
-                    return refuse(FaultCode::ArmNotReady, message);
-                }
+                Some((fault, message)) => return refuse(fault, message),
             }
         }
+    }
+
+    /// What the arm was set to and does not report.
+    fn without_effect(
+        &self,
+        mode: Mode,
+        normal: &NormalReport,
+        rich: Option<&RichReport>,
+    ) -> Option<(FaultCode, String)> {
+        if normal.basic.mode != mode {
+            let message = format!(
+                "the arm was asked for mode {mode:?} but says {:?}: stop other programs that use it",
+                normal.basic.mode
+            );
+            return Some((FaultCode::ArmNotReady, message));
+        }
+        if let Some(j) = (0..JOINTS).find(|j| normal.enabled & (1 << j) == 0) {
+            let joint = j.saturating_add(1);
+            let message =
+                format!("joint {joint} does not become enabled: use the vendor's tool to see why");
+            return Some((FaultCode::ArmNotReady, message));
+        }
+        let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
+        let mut differ = wanted.differences(normal, rich, tool_m).into_iter();
+        let message = differ.next().map(|difference| difference.message);
+        let message = message.or_else(|| {
+            let arm_m = normal.tcp_offset.position_m;
+            let told =
+                format!("the arm has its tool centre point at {arm_m:?} m, not {tool_m:?} m");
+            (!near(&arm_m, &tool_m, OFFSET_EQUAL_M)).then_some(told)
+        })?;
+        let message = format!("{message}: it was set and has changed again, stop other programs");
+        Some((FaultCode::ArmDiffers, message))
     }
 
     fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
         let configured_m = self.limits.tcp_offset_m;
         let (report, _) = read_status(self.status())?;
         let arm_m = report.tcp_offset.position_m;
-        let apart_m = arm_m
-            .iter()
-            .zip(&configured_m)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        // A report that is not a number is no agreement either.
-        if apart_m <= OFFSET_EQUAL_M && arm_m.iter().all(|v| v.is_finite()) {
+        if near(&arm_m, &configured_m, OFFSET_EQUAL_M) {
             return Ok(format!("{configured_m:?} m as configured"));
         }
         match self.config.on_difference {
