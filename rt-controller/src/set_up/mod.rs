@@ -226,7 +226,9 @@ impl SetUp<'_> {
                 format!("the arm has its tool centre point at {arm_m:?} m, not {tool_m:?} m");
             (!near(&arm_m, &tool_m, OFFSET_EQUAL_M)).then_some(told)
         })?;
-        let message = format!("{message}: it was set and has changed again, stop other programs");
+        let message = format!(
+            "{message}, though it agreed or was set a moment ago: stop other programs that set the arm"
+        );
         Some((FaultCode::ArmDiffers, message))
     }
 
