@@ -116,11 +116,11 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
         centre_m: [0.0, 0.0, 0.1],
     };
     let mut stand = Stand::with("settings", ArmConfig::default(), |config| {
-        config.arm_settings.load_centre_m = Some([0.0, 0.0, 0.1]);
+        config.arm_settings.load_kg = Some(0.3);
     });
     for (command, words) in [
         (Command::CollisionSensitivity(0), "sensitivity 0"),
-        (load(0.0), "no load"),
+        (load(0.0), "a load of 0.000 kg"),
     ] {
         change(&stand, command);
         let (fault, message) = stand.refused(&ControllerRequest::Bringup);
@@ -128,7 +128,7 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
         assert!(message.contains(words), "{message}");
         change(&stand, Command::CollisionSensitivity(3));
     }
-    change(&stand, load(0.4));
+    change(&stand, load(0.3));
     stand.make_ready();
     stand.finish();
 
