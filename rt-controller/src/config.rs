@@ -224,7 +224,7 @@ impl ThresholdSettings {
 }
 
 /// Refuses the value found under a key unless it is allowed.
-pub(crate) fn require(
+fn require(
     holds: bool,
     key: &str,
     found: impl Into<f64>,
@@ -295,7 +295,9 @@ impl ControllerConfig {
     /// Checks what cannot be wrong by type alone.
     pub fn check(&self) -> Result<(), ConfigError> {
         self.guardian_silence_ns()?;
-        self.arm_settings.check()?;
+        if let Some((key, found, allowed)) = self.arm_settings.impossible() {
+            require(false, key, found, allowed)?;
+        }
         let warm_up_us = self.real_time.warm_up_us;
         let holds = warm_up_us <= WARM_UP_MAX_US;
         require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;
@@ -343,6 +345,7 @@ mod tests {
             ("guardian.silence_ms = 27.0", "28 (two"),
             ("real_time.priority = 5", "11 to 99"),
             ("real_time.warm_up_us = 1001", "1000"),
+            ("arm_settings.load_kg = 300.0", "3.5 kg"),
         ] {
             let said = parse(text).unwrap().check().unwrap_err().to_string();
             let (key, _) = text.split_once(' ').unwrap();
