@@ -103,15 +103,16 @@ impl Differences {
 /// controller engages the arm, it stands.
 ///
 /// One that was held back, because its cycle was held up before the send, may lie close
-/// before the next; nothing follows it.
+/// before the next; the arm never received it.
 ///
 /// # Panics
-/// When a setpoint does not keep a limit.
+/// When a setpoint does not keep a limit, or was held back without being counted.
 pub fn assert_computed<'a>(
     limits: &Limits,
     cycles: impl IntoIterator<Item = (&'a InputRecord, &'a CycleRecord)>,
 ) {
     let (mut judge, mut before) = (None, ControllerMode::Offline as u8);
+    let (mut held_back, mut missed) = (0, 0);
     for (input, record) in cycles {
         let at = MonotonicNs(record.deadline_ns + u64::from(input.late_ns));
         let engages = input.command.kind == CommandKind::Engage as u8;
@@ -121,13 +122,15 @@ pub fn assert_computed<'a>(
             judge = Some(Differences::at_rest(at, record.q_c, EXACT, 0.0));
         }
         before = record.mode;
-        // In virtual time even a send that nothing holds up takes no time.
-        let held_back = record.compute_ns > 0 && record.send_ns == 0;
-        if record.sent == 1 && !held_back {
+        held_back += u32::from(record.held_back());
+        missed += record.missed;
+        if record.sent == 1 && !record.held_back() {
             assert!(judge.is_some(), "sent before an engagement");
             judge
                 .iter_mut()
                 .for_each(|judge| judge.take(at, record.q_c, limits));
         }
     }
+    // The cycle after it counts it as missed; there may be none after the last.
+    assert!(held_back <= missed + 1, "{held_back} of {missed} missed");
 }

@@ -7,10 +7,11 @@
 
 use crate::xarm::Command;
 use crate::xarm::report::{NormalReport, RichReport};
+use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
-/// Largest load of an xArm 7 (kg), as its manual says.
-const LOAD_MAX_KG: f64 = 3.5;
+/// Loads of an xArm 7 (kg), as its manual says.
+const LOADS_KG: RangeInclusive<f64> = 0.0..=3.5;
 /// Loads closer than this are equal (kg).
 const LOAD_EQUAL_KG: f64 = 0.01;
 /// Centres of mass closer than this are equal (m).
@@ -20,16 +21,23 @@ const CENTRE_MAX_M: f64 = 0.5;
 /// The arm stands upright when gravity is closer to (0, 0, -1) than this: 1 degree.
 const UPRIGHT: f64 = 0.0175;
 
+/// What the arm compensates at its flange: pole, holder and rope.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Mass (kg).
+    pub mass_kg: f64,
+    /// Its centre in the flange frame (m).
+    pub centre_m: [f64; 3],
+}
+
 /// What the arm must be set to; table `[arm_settings]` of the controller's file. What is
 /// left out is read and reported, and refused only where no throw would be safe.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSettings {
-    /// Mass at the flange that the arm compensates: pole, holder, rope (kg). Absent: any
-    /// but none, where the limits have a tool.
-    pub load_kg: Option<f64>,
-    /// Its centre of mass in the flange frame (m).
-    pub load_centre_m: Option<[f64; 3]>,
+    /// Load. Absent: any but none, where the limits have a tool.
+    pub load: Option<Load>,
     /// Collision sensitivity, 0 (off) to 5. Absent: any but off.
     pub collision_sensitivity: Option<u8>,
     /// Whether the arm stops before it touches itself. Absent: either.
@@ -50,19 +58,19 @@ pub struct Difference {
 impl ArmSettings {
     /// The first value that no arm can be set to: its key, the value, what is allowed.
     pub(crate) fn impossible(&self) -> Option<(&'static str, f64, &'static str)> {
-        let load_kg = self
-            .load_kg
-            .filter(|kg| !(0.0..=LOAD_MAX_KG).contains(kg))
-            .map(|kg| ("arm_settings.load_kg", kg, "0 to 3.5 kg"));
-        let centre_m = self.load_centre_m.into_iter().flatten();
+        let mass_kg = self.load.map(|load| load.mass_kg);
+        let mass_kg = mass_kg
+            .filter(|kg| !LOADS_KG.contains(kg))
+            .map(|kg| ("arm_settings.load.mass_kg", kg, "0 to 3.5 kg"));
+        let centre_m = self.load.into_iter().flat_map(|load| load.centre_m);
         let allowed_m = "-0.5 to 0.5 m each (metres, not millimetres)";
-        let centre_m = centre_m
+        let mut centre_m = centre_m
             .filter(|m| !(-CENTRE_MAX_M..=CENTRE_MAX_M).contains(m))
-            .map(|m| ("arm_settings.load_centre_m", m, allowed_m));
+            .map(|m| ("arm_settings.load.centre_m", m, allowed_m));
         let key = "arm_settings.collision_sensitivity";
         let level = self.collision_sensitivity.filter(|level| *level > 5);
         let level = level.map(|level| (key, level.into(), "0 (off) to 5"));
-        load_kg.into_iter().chain(centre_m).chain(level).next()
+        mass_kg.or_else(|| centre_m.next()).or(level)
     }
 
     /// What is not as it must be in an arm whose tool centre point is `tool_m` from its
@@ -96,7 +104,8 @@ impl ArmSettings {
             _ => {}
         }
         let upright = [0.0, 0.0, -1.0];
-        if !near(&normal.gravity, &upright, UPRIGHT) {
+        let norm = normal.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        if !near(&normal.gravity.map(|g| g / norm), &upright, UPRIGHT) {
             let message = format!(
                 "the arm is set for gravity along {:.3?} in its base frame, throws are planned for an upright arm {upright:?}: set its mounting with the vendor's tool",
                 normal.gravity
@@ -104,10 +113,8 @@ impl ArmSettings {
             differ(message, None);
         }
         let Some(rich) = rich else {
-            if self.self_collision.is_some() || self.fence.is_some() {
-                let message = "the reports of this firmware do not say whether self collision and safety boundary are on: update it, or leave `arm_settings.self_collision` and `fence` out";
-                differ(message.to_owned(), None);
-            }
+            let message = "the arm's reports do not say whether reduced mode, self-collision check and safety boundary are on: use the rich report (port 30002) of firmware 2.4 or newer";
+            differ(message.to_owned(), None);
             return found;
         };
         for (what, key, wanted, is_on) in [
@@ -141,21 +148,30 @@ impl ArmSettings {
         tool_m: [f64; 3],
     ) -> Option<(String, Option<Command>)> {
         let (kg, centre_m) = (normal.load_kg, normal.load_centre_m);
-        let mass_kg = self.load_kg.unwrap_or(kg);
-        let wanted_m = self.load_centre_m.unwrap_or(centre_m);
-        if !near(&[kg], &[mass_kg], LOAD_EQUAL_KG) || !near(&centre_m, &wanted_m, CENTRE_EQUAL_M) {
+        let teach = "weigh pole, holder and rope, and teach the payload with the vendor's tool or give it as `arm_settings.load`";
+        if let Some(load) = self.load {
+            let (mass_kg, wanted_m) = (load.mass_kg, load.centre_m);
             let message = format!(
                 "the arm compensates a load of {kg:.3} kg at {centre_m:.3?} m, the configuration says {mass_kg:.3} kg at {wanted_m:.3?} m"
             );
+            let agrees = near(&[kg], &[mass_kg], LOAD_EQUAL_KG)
+                && near(&centre_m, &wanted_m, CENTRE_EQUAL_M);
             let centre_m = wanted_m;
-            return Some((message, Some(Command::TcpLoad { mass_kg, centre_m })));
+            return (!agrees).then_some((message, Some(Command::TcpLoad { mass_kg, centre_m })));
         }
+        let possible = LOADS_KG.contains(&kg) && centre_m.iter().all(|m| m.is_finite());
         let carries_a_tool = tool_m.iter().any(|m| *m != 0.0);
-        if self.load_kg.is_none() && carries_a_tool && kg.abs() < LOAD_EQUAL_KG {
-            let message = "the arm compensates no load, but its limits have a tool: weigh pole, holder and rope, and teach the payload with the vendor's tool or give it as `arm_settings.load_kg`";
-            return Some((message.to_owned(), None));
+        if !possible {
+            let message = format!(
+                "the arm says that it carries {kg:.3} kg at {centre_m:.3?} m, which no xArm 7 can: {teach}"
+            );
+            return Some((message, None));
         }
-        None
+        (carries_a_tool && kg < LOAD_EQUAL_KG).then(|| {
+            let message =
+                format!("the arm compensates no load, but its limits have a tool: {teach}");
+            (message, None)
+        })
     }
 }
 
@@ -222,7 +238,8 @@ mod tests {
         type Change = fn(&mut NormalReport, &mut RichReport);
         let any = ArmSettings::default();
         assert_eq!(found(any, |_, _| ()), []);
-        let harmless: [Change; 4] = [
+        let harmless: [Change; 5] = [
+            |n, _| n.gravity = [0.0, 0.0, -9.81],
             |n, _| n.load_kg = 1.2,
             |n, _| n.collision_sensitivity = 5,
             |_, r| r.self_collision = true,
@@ -231,9 +248,12 @@ mod tests {
         for change in harmless {
             assert_eq!(found(any, change), []);
         }
-        let unsafe_ones: [(Change, &str); 7] = [
+        let unsafe_ones: [(Change, &str); 10] = [
             (|n, _| n.load_kg = 0.0, "no load"),
             (|n, _| n.load_kg = f64::NAN, "NaN kg"),
+            (|n, _| n.load_kg = -0.3, "-0.300 kg"),
+            (|n, _| n.load_centre_m[1] = f64::NAN, "NaN, "),
+            (|n, _| n.gravity = [0.0; 3], "gravity"),
             (|n, _| n.collision_sensitivity = 0, "sensitivity 0"),
             (|n, _| n.gravity = [0.0, 0.0, 1.0], "gravity"),
             (|n, _| n.gravity[0] = 0.1, "gravity"),
@@ -245,22 +265,26 @@ mod tests {
             assert_eq!(found.len(), 1, "{words}: {found:?}");
             assert!(found[0].message.contains(words), "{found:?}");
             // Nothing says what it should be set to.
-            let is_nan = words == "NaN kg";
-            assert!(found[0].mend.is_none() || is_nan, "{found:?}");
+            assert_eq!(found[0].mend, None, "{found:?}");
         }
-        let (normal, _) = arm();
+        let (normal, rich) = arm();
         let bare = NormalReport {
             load_kg: 0.0,
             ..normal
         };
-        assert_eq!(any.differences(&bare, None, [0.0; 3]), [], "no tool");
+        let without_tool = any.differences(&bare, Some(&rich), [0.0; 3]);
+        assert_eq!(without_tool, []);
+        let unknown = any.differences(&normal, None, POLE_M);
+        assert!(unknown[0].message.contains("30002"), "{unknown:?}");
     }
 
     #[test]
     fn each_wish_is_compared_and_what_has_a_command_is_mended_by_it() {
         let wanted = ArmSettings {
-            load_kg: Some(0.3),
-            load_centre_m: Some([0.0, 0.0, 0.1]),
+            load: Some(Load {
+                mass_kg: 0.3,
+                centre_m: [0.0, 0.0, 0.1],
+            }),
             collision_sensitivity: Some(3),
             self_collision: Some(false),
             fence: Some(false),
@@ -286,24 +310,27 @@ mod tests {
             ..wanted
         };
         assert_eq!(found(off, |n, _| n.collision_sensitivity = 0), []);
-        let (normal, _) = arm();
-        let unknown = wanted.differences(&normal, None, POLE_M);
-        assert!(mend(unknown.clone()).is_none() && unknown[0].message.contains("update it"));
     }
 
     #[test]
     fn settings_no_arm_has_are_refused_by_key_and_limit() {
         let parse = toml::from_str::<ArmSettings>;
         for (text, words) in [
-            ("load_kg = 300.0", "3.5 kg"),
-            ("load_kg = nan", "3.5 kg"),
-            ("load_centre_m = [0.0, 0.0, 100.0]", "not millimetres"),
+            ("load = { mass_kg = 300.0, centre_m = [0, 0, 0] }", "3.5 kg"),
+            ("load = { mass_kg = nan, centre_m = [0, 0, 0] }", "3.5 kg"),
+            (
+                "load = { mass_kg = 0.3, centre_m = [0, 0, 100] }",
+                "not millimetres",
+            ),
             ("collision_sensitivity = 6", "0 (off) to 5"),
         ] {
             let (key, _, allowed) = parse(text).unwrap().impossible().unwrap();
             let (wanted, _) = text.split_once(' ').unwrap();
-            assert!(key.ends_with(wanted) && allowed.contains(words), "{key}");
+            assert!(key.contains(wanted) && allowed.contains(words), "{key}");
         }
-        assert!(parse("load = 1.0").is_err());
+        assert!(
+            parse("load = { mass_kg = 0.3 }").is_err(),
+            "without a centre"
+        );
     }
 }

@@ -51,7 +51,7 @@ pub struct ControllerConfig {
     /// Ports with the arm's status (5 Hz), in the order in which they are tried.
     pub status_ports: [u16; 2],
     /// What to do when the arm's tool or its tool speed limit is not the one of
-    /// the limits, or a setting not the one of `arm_settings`.
+    /// the limits, or load or collision sensitivity not those of `arm_settings`.
     pub on_difference: OnDifference,
     /// What the arm must be set to.
     pub arm_settings: ArmSettings,
@@ -345,7 +345,7 @@ mod tests {
             ("guardian.silence_ms = 27.0", "28 (two"),
             ("real_time.priority = 5", "11 to 99"),
             ("real_time.warm_up_us = 1001", "1000"),
-            ("arm_settings.load_kg = 300.0", "3.5 kg"),
+            ("arm_settings.collision_sensitivity = 6", "off"),
         ] {
             let said = parse(text).unwrap().check().unwrap_err().to_string();
             let (key, _) = text.split_once(' ').unwrap();

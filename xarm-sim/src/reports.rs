@@ -103,10 +103,7 @@ fn fill_in(bytes: &mut [u8], model: &ArmModel) {
     for (j, current) in model.current_a().iter().enumerate() {
         put(355 + 4 * j, &(*current as f32).to_le_bytes());
     }
-    let bits = u8::from(reduced.on)
-        | u8::from(settings.boundary.on) << 1
-        | u8::from(settings.reports_current) << 2;
-    put(494, &[bits, u8::from(reduced.on)]);
+    put(495, &[u8::from(reduced.on)]);
     put(496, &settings.boundary_i16());
     put(508, &reduced.tcp_speed_mm_s.to_le_bytes());
     put(512, &reduced.joint_speed_rad_s.to_le_bytes());
@@ -115,6 +112,9 @@ fn fill_in(bytes: &mut [u8], model: &ArmModel) {
     }
     let flags = [settings.boundary.on, settings.collision_rebound];
     put(572, &flags.map(u8::from));
+    if let Some(bits) = bytes.get_mut(494) {
+        *bits |= u8::from(settings.reports_current) << 2;
+    }
 }
 
 fn basic(model: &ArmModel) -> BasicReport {

@@ -56,9 +56,10 @@ impl Flight {
         self.cycles.iter().map(count).sum()
     }
 
-    /// Cycles that sent a setpoint.
+    /// Cycles whose setpoint went out.
     fn sent(&self) -> impl Iterator<Item = &RecordedCycle> {
-        self.cycles.iter().filter(|c| c.record.sent != 0)
+        let went_out = |r: &CycleRecord| r.sent != 0 && !r.held_back();
+        self.cycles.iter().filter(move |c| went_out(&c.record))
     }
 
     /// All that holds of every flight.

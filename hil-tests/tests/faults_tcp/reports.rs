@@ -1,8 +1,10 @@
 //! The joint reports: silent, frozen, out of time, truncated, no numbers; and arms
 //! whose reports have another layout.
 
-use super::stand::Stand;
+use super::stand::{PATIENCE, Stand};
 use rt_controller::ControllerConfig;
+use rt_controller::config::OnDifference;
+use rt_controller::session::ArmSession;
 use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerRequest;
 use std::io::{Read, Write};
@@ -73,12 +75,18 @@ fn fault_17_broken_reports_are_dropped_and_too_many_in_a_row_slow_the_motion() {
 }
 
 /// The bring-up is refused with words that say why, and nothing is brought up.
-fn refuses_to_bring_up(mut stand: Stand, expected: FaultCode, words: &[&str]) {
+fn refuses_to_bring_up(
+    mut stand: Stand,
+    expected: FaultCode,
+    words: &[&str],
+    then: impl FnOnce(&Stand),
+) {
     let (fault, message) = stand.refused(&ControllerRequest::Bringup);
     assert_eq!(fault, expected, "{message}");
     assert!(words.iter().all(|w| message.contains(w)), "{message}");
     let refused = stand.refused(&ControllerRequest::Acknowledge);
     assert_eq!(refused.0, FaultCode::WrongMode, "nothing was brought up");
+    then(&stand);
     stand.finish();
 }
 
@@ -89,7 +97,7 @@ fn fault_18_a_firmware_without_the_reports_needed_is_refused() {
         ..ArmConfig::default()
     };
     let stand = Stand::with("old", old, |_| ());
-    refuses_to_bring_up(stand, FaultCode::UnsupportedFirmware, &["v1.12.0"]);
+    refuses_to_bring_up(stand, FaultCode::UnsupportedFirmware, &["v1.12.0"], |_| ());
 }
 
 /// A line between controller and arm that passes everything on, with a `lie`. Its port.
@@ -135,6 +143,7 @@ fn fault_18_reports_of_another_layout_than_the_firmwares_are_refused() {
         stand,
         FaultCode::UnsupportedFirmware,
         &["v2.8.2", "574", "587"],
+        |_| (),
     );
 }
 
@@ -143,30 +152,66 @@ fn fault_18_another_report_on_the_port_of_the_joint_reports_is_refused() {
     let stand = Stand::with("ports", ArmConfig::default(), |config| {
         config.report_port = config.fallback_report_port;
     });
-    refuses_to_bring_up(stand, FaultCode::UnsupportedFirmware, &["135", "784"]);
+    refuses_to_bring_up(
+        stand,
+        FaultCode::UnsupportedFirmware,
+        &["135", "784"],
+        |_| (),
+    );
 }
 
-/// The mode, the enabled joints and reduced mode, where the vendor's report table has them.
+/// Changes the byte of a status report at `at`.
+fn change(bytes: &mut [u8], at: usize, to: impl Fn(u8) -> u8) {
+    if let Some(byte) = bytes.get_mut(at) {
+        *byte = to(*byte);
+    }
+}
+
+/// The lies are where the vendor's report table has the mode, the enabled joints, reduced
+/// mode, the collision sensitivity and the tool centre point.
 #[test]
-fn an_arm_is_brought_up_by_what_it_reports_not_by_what_it_answered() {
+fn an_arm_is_brought_up_by_what_it_reports_and_one_that_is_refused_is_not_left_ready() {
     type Lie = fn(&mut [u8]);
-    let lies: [(Lie, FaultCode, &[&str]); 3] = [
+    let lies: [(Lie, FaultCode, &[&str]); 5] = [
         (
-            |b| b[4] &= 0x0F,
+            |b| change(b, 4, |state| state & 0x0F),
             FaultCode::ArmNotReady,
             &["Servo", "Position"],
         ),
         (
-            |b| b[88] &= 0x7B,
+            |b| change(b, 88, |bits| bits & 0x7B),
             FaultCode::ArmNotReady,
             &["joint 3", "enabled"],
         ),
-        (|b| b[494] |= 1, FaultCode::ArmDiffers, &["reduced mode"]),
+        (
+            |b| change(b, 494, |bits| bits | 1),
+            FaultCode::ArmDiffers,
+            &["reduced mode"],
+        ),
+        // It was set to 4.
+        (
+            |b| change(b, 131, |_| 3),
+            FaultCode::ArmDiffers,
+            &["sensitivity is 3", "set a moment ago"],
+        ),
+        // The high byte of its x: far from where it was set to.
+        (
+            |b| change(b, 94, |_| 0x44),
+            FaultCode::ArmDiffers,
+            &["tool centre point", "set a moment ago"],
+        ),
     ];
     for (lie, fault, words) in lies {
         let stand = Stand::with("effect", ArmConfig::default(), |config| {
+            config.on_difference = OnDifference::Set;
+            config.arm_settings.collision_sensitivity = Some(4);
             config.status_ports[0] = a_line_that_lies(config.status_ports[0], lie);
         });
-        refuses_to_bring_up(stand, fault, words);
+        let arm = (stand.config.arm, stand.config.command_port).into();
+        let mut beside = ArmSession::connect(arm, PATIENCE).unwrap();
+        refuses_to_bring_up(stand, fault, words, |_| {
+            let state = beside.state().unwrap();
+            assert!(!state.can_move(), "{state:?} after {words:?}");
+        });
     }
 }

@@ -3,6 +3,7 @@
 use super::stand::{PATIENCE, Stand, arm_for, execute, swing};
 use arm_model::joint::START_POSE;
 use arm_model::{Limits, LimitsSpec};
+use rt_controller::arm_settings::Load;
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::OnDifference;
 use rt_controller::session::ArmSession;
@@ -116,8 +117,12 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
         centre_m: [0.0, 0.0, 0.1],
     };
     let mut stand = Stand::with("settings", ArmConfig::default(), |config| {
-        config.arm_settings.load_kg = Some(0.3);
+        config.arm_settings.load = Some(Load {
+            mass_kg: 0.3,
+            centre_m: [0.0, 0.0, 0.1],
+        });
     });
+    change(&stand, load(0.3));
     for (command, words) in [
         (Command::CollisionSensitivity(0), "sensitivity 0"),
         (load(0.0), "a load of 0.000 kg"),
@@ -134,12 +139,15 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
 
     let mut stand = Stand::with("settings_set", ArmConfig::default(), |config| {
         config.on_difference = OnDifference::Set;
-        config.arm_settings.load_kg = Some(0.5);
-        config.arm_settings.load_centre_m = Some([0.0, 0.0, 0.08]);
+        config.arm_settings.load = Some(Load {
+            mass_kg: 0.5,
+            centre_m: [0.0, 0.0, 0.08],
+        });
         config.arm_settings.collision_sensitivity = Some(4);
     });
     stand.make_ready();
     let mut port = TcpStream::connect((stand.config.arm, stand.config.status_ports[0])).unwrap();
+    port.set_read_timeout(Some(PATIENCE)).unwrap();
     let mut report = [0; RICH_REPORT_LEN];
     port.read_exact(&mut report).unwrap();
     let found = NormalReport::parse(&report).unwrap();

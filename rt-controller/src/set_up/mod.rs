@@ -7,39 +7,24 @@
 //! names both, unless the configuration says that the arm shall be set. Order of the
 //! recovery as in the vendor's manual: clear error, enable, mode, state.
 
+mod compare;
 mod reports;
 
 pub use reports::read_status;
 
-use crate::arm_settings::{near, summary};
-use crate::config::{ControllerConfig, OnDifference};
+use crate::config::ControllerConfig;
 use crate::session::{ArmSession, SessionError};
-use crate::xarm::report::{NormalReport, RichReport};
-use crate::xarm::{
-    ArmState, ArmVersion, Command, Firmware, JointQuery, Mode, ReplyData, StateRequest, TcpPose,
-};
-use arm_model::{JOINTS, JointVector, Limits};
+use crate::xarm::{ArmState, ArmVersion, Command, JointQuery, Mode, ReplyData, StateRequest};
+use arm_model::{JointVector, Limits};
 use shared_types::FaultCode;
 use std::time::{Duration, Instant};
 
-/// The arm checks tool speed against this times its factor (m/s).
-const SPEED_AT_FACTOR_ONE_M_S: f64 = 1.0;
-/// Speed limits closer than this are equal: they are f32 on the wire (m/s).
-const SPEED_EQUAL_M_S: f64 = 1e-4;
-/// Tool offsets closer than this are equal (m).
-const OFFSET_EQUAL_M: f64 = 1e-4;
 /// The arm stands when two poses read this far apart in time ...
 const STILL_INTERVAL: Duration = Duration::from_millis(30);
 /// ... differ less than this (rad).
 const STILL_RAD: f64 = 1e-4;
 /// Longest wait for the arm to become ready and to stand still.
 const READY_TIMEOUT: Duration = Duration::from_secs(3);
-/// Time between two looks at the status report, which lags by up to 0.2 s.
-const STATUS_INTERVAL: Duration = Duration::from_millis(100);
-
-/// What to do about a difference that is refused.
-const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
-
 /// Why the arm could not be set up: what was found, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
@@ -90,6 +75,7 @@ impl SetUp<'_> {
             "identify",
             &format!("xArm 7, firmware {}", version.firmware),
         );
+        reported("error before", &session.error_code()?.to_string());
         reported("reports", &self.match_layout(version.firmware)?);
         reported("tool", &self.match_tool(session)?);
         reported(
@@ -97,9 +83,23 @@ impl SetUp<'_> {
             &self.match_tool_speed(session, version.firmware)?,
         );
         reported("settings", &self.match_settings(session)?);
+        self.read_settings_back()?;
+        reported("settings read back", "tool and settings as above");
+        let enabled = self.enable(session, reported);
+        if enabled.is_err() {
+            // Nobody watches an arm that was refused: it must not stay ready.
+            let _ = session.stop_arm();
+        }
+        enabled
+    }
+
+    /// Enables the arm, which is set as it must be, until it stands ready in its mode.
+    fn enable(
+        &self,
+        session: &mut ArmSession,
+        reported: OnStep<'_>,
+    ) -> Result<JointVector, SetUpError> {
         let mode = Mode::from_code(self.config.command_interface.arm_mode());
-        let found = session.error_code()?;
-        reported("error before", &found.to_string());
         let enable = Command::MotionEnable {
             joint: Command::ALL_JOINTS,
             enable: true,
@@ -115,8 +115,8 @@ impl SetUp<'_> {
             reported(name, "taken");
         }
         reported("ready", &format!("{:?}", wait_ready(session)?));
-        self.wait_effect(mode)?;
-        let effect = format!("mode {mode:?}, all joints enabled, tool and settings as above");
+        self.read_all_back(mode)?;
+        let effect = format!("ready, mode {mode:?}, all joints enabled");
         reported("read back", &effect);
         let q = wait_still(session)?;
         reported("still", "the arm stands");
@@ -156,133 +156,6 @@ impl SetUp<'_> {
             }
             None => Ok(version),
         }
-    }
-
-    /// Compares what decides how the arm moves and when it stops by itself.
-    fn match_settings(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
-        let (normal, rich) = read_status(self.status())?;
-        let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
-        let mut result = summary(&normal, rich.as_ref());
-        for difference in wanted.differences(&normal, rich.as_ref(), tool_m) {
-            match (self.config.on_difference, difference.mend) {
-                (OnDifference::Set, Some(command)) => {
-                    session.ask(&command)?;
-                    result.push_str("; ");
-                    result.push_str(&difference.message);
-                    result.push_str(": set");
-                }
-                (OnDifference::Refuse, Some(_)) => {
-                    let message = format!("{}: {SET_ONE}", difference.message);
-                    return refuse(FaultCode::ArmDiffers, message);
-                }
-                (_, None) => return refuse(FaultCode::ArmDiffers, difference.message),
-            }
-        }
-        Ok(result)
-    }
-
-    /// Waits until the arm reports what it was set to. In another mode than `mode`, for one,
-    /// it would make a motion of its own of every setpoint.
-    fn wait_effect(&self, mode: Mode) -> Result<(), SetUpError> {
-        let began = Instant::now();
-        loop {
-            let (normal, rich) = read_status(self.status())?;
-            match self.without_effect(mode, &normal, rich.as_ref()) {
-                None => return Ok(()),
-                Some(_) if began.elapsed() < READY_TIMEOUT => {
-                    std::thread::sleep(STATUS_INTERVAL);
-                }
-                Some((fault, message)) => return refuse(fault, message),
-            }
-        }
-    }
-
-    /// What the arm was set to and does not report.
-    fn without_effect(
-        &self,
-        mode: Mode,
-        normal: &NormalReport,
-        rich: Option<&RichReport>,
-    ) -> Option<(FaultCode, String)> {
-        if normal.basic.mode != mode {
-            let message = format!(
-                "the arm was asked for mode {mode:?} but says {:?}: stop other programs that use it",
-                normal.basic.mode
-            );
-            return Some((FaultCode::ArmNotReady, message));
-        }
-        if let Some(j) = (0..JOINTS).find(|j| normal.enabled & (1 << j) == 0) {
-            let joint = j.saturating_add(1);
-            let message =
-                format!("joint {joint} does not become enabled: use the vendor's tool to see why");
-            return Some((FaultCode::ArmNotReady, message));
-        }
-        let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
-        let mut differ = wanted.differences(normal, rich, tool_m).into_iter();
-        let message = differ.next().map(|difference| difference.message);
-        let message = message.or_else(|| {
-            let arm_m = normal.tcp_offset.position_m;
-            let told =
-                format!("the arm has its tool centre point at {arm_m:?} m, not {tool_m:?} m");
-            (!near(&arm_m, &tool_m, OFFSET_EQUAL_M)).then_some(told)
-        })?;
-        let message = format!(
-            "{message}, though it agreed or was set a moment ago: stop other programs that set the arm"
-        );
-        Some((FaultCode::ArmDiffers, message))
-    }
-
-    fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
-        let configured_m = self.limits.tcp_offset_m;
-        let (report, _) = read_status(self.status())?;
-        let arm_m = report.tcp_offset.position_m;
-        if near(&arm_m, &configured_m, OFFSET_EQUAL_M) {
-            return Ok(format!("{configured_m:?} m as configured"));
-        }
-        match self.config.on_difference {
-            OnDifference::Refuse => {
-                let message = format!(
-                    "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: {SET_ONE}"
-                );
-                refuse(FaultCode::ArmDiffers, message)
-            }
-            OnDifference::Set => {
-                session.ask(&Command::TcpOffset(TcpPose {
-                    position_m: configured_m,
-                    rpy_rad: [0.0; 3],
-                }))?;
-                Ok(format!("set from {arm_m:?} to {configured_m:?} m"))
-            }
-        }
-    }
-
-    fn match_tool_speed(
-        &self,
-        session: &mut ArmSession,
-        firmware: Firmware,
-    ) -> Result<String, SetUpError> {
-        let configured_m_s = self.limits.tcp_speed_max_m_s;
-        let settable = firmware >= Firmware::SPEED_FACTOR;
-        let factor = match settable.then(|| session.ask(&Command::GetSpeedLimitFactor)) {
-            Some(reply) => match reply? {
-                ReplyData::SpeedLimitFactor(factor) => factor,
-                _ => f64::NAN,
-            },
-            None => 1.0,
-        };
-        let arm_m_s = factor * SPEED_AT_FACTOR_ONE_M_S;
-        if (arm_m_s - configured_m_s).abs() <= SPEED_EQUAL_M_S {
-            return Ok(format!("{configured_m_s:.3} m/s as configured"));
-        }
-        if self.config.on_difference == OnDifference::Refuse || !settable {
-            let message = format!(
-                "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
-            );
-            return refuse(FaultCode::ArmDiffers, message);
-        }
-        let factor = configured_m_s / SPEED_AT_FACTOR_ONE_M_S;
-        session.ask(&Command::SetSpeedLimitFactor(factor))?;
-        Ok(format!("set from {arm_m_s:.3} to {configured_m_s:.3} m/s"))
     }
 }
 

@@ -7,7 +7,7 @@ use core::ops::RangeInclusive;
 use shared_types::FaultCode;
 use std::io::Read;
 use std::net::{SocketAddr, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Longest wait for a status report; five come a second.
 const REPORT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -81,8 +81,8 @@ fn read_report(address: SocketAddr) -> Result<Vec<u8>, SetUpError> {
     });
     let mut stream = connected.or_else(|e| no_status(address, e))?;
     let mut reader = ReportReader::new();
-    let mut received = 0;
-    while received <= MAX_REPORT_LEN {
+    let (began, mut received) = (Instant::now(), 0);
+    while received <= MAX_REPORT_LEN && began.elapsed() < REPORT_TIMEOUT {
         if let Some(frame) = reader.next_report().or_else(|e| no_status(address, e))? {
             return Ok(frame.to_vec());
         }

@@ -161,7 +161,7 @@ pub struct CycleRecord {
     pub version: u32,
     /// Mode after the cycle, raw [`ControllerMode`].
     pub mode: u8,
-    /// 1 when a setpoint was commanded; it did not go out where `send_ns` is 0.
+    /// 1 when a setpoint was commanded; whether it went out says [`Self::held_back`].
     pub sent: u8,
     /// Fault latched, raw [`crate::FaultCode`].
     pub fault: u16,
@@ -193,6 +193,15 @@ pub struct CycleRecord {
     pub speed_override: f64,
     /// Joint velocity on the wire in joint-velocity mode (rad/s), else zero.
     pub qd_sent: JointVector,
+}
+
+impl CycleRecord {
+    /// Whether a setpoint was commanded that did not go out, because the cycle was held up
+    /// before the send. In virtual time a send takes no time, and nothing else does.
+    #[must_use]
+    pub const fn held_back(&self) -> bool {
+        self.sent != 0 && self.send_ns == 0 && self.compute_ns > 0
+    }
 }
 
 /// One joint report of the arm, as received. RT-safe to copy.

@@ -16,7 +16,7 @@ pub struct ArmPorts {
     /// Report port with joint states (250 Hz).
     #[arg(long, default_value_t = 30000)]
     pub report_port: u16,
-    /// Report port with the arm's status (5 Hz); both kinds will do.
+    /// Report port with the arm's status (5 Hz), the rich report.
     #[arg(long, default_value_t = 30002)]
     pub status_port: u16,
 }

@@ -7,6 +7,7 @@ use anyhow::bail;
 use arm_model::Limits;
 use rig_sim::RigConfig;
 use rt_controller::ControllerConfig;
+use rt_controller::arm_settings::ArmSettings;
 use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
 use shared_types::StereoCamera;
@@ -147,6 +148,8 @@ fn controller_config(
         config.thresholds.late_cycles_max = Some(50);
         // Nobody configured it, so nobody needs to look.
         config.on_difference = OnDifference::Set;
+        // What a laboratory wants of its own arm is not wanted of a simulated one.
+        config.arm_settings = ArmSettings::default();
     } else {
         config.real_time.require = true;
     }

@@ -146,8 +146,14 @@ fn its_file_is_whole(run: &Path) {
     assert_eq!(replayed["first_cycle"], 1, "{replayed}");
     let exact = replayed["cycles"].as_u64().unwrap();
     assert!(exact > 1000, "{replayed}");
-    // A folder that is not there.
-    refused_in(Path::new("."), 2, &format!("export csv {name} --out none"));
+    // No folder: a file, which is left as it is.
+    let said = refused_in(
+        Path::new("."),
+        2,
+        &format!("export csv {name} --out {}", file.display()),
+    );
+    assert!(said.contains("run.mcap"), "{said}");
+    assert_eq!(fs::read(&file).unwrap(), bytes);
     let tables = json(&format!("export csv {name}"));
     assert_eq!(tables["cycles"], exact);
     for table in ["cycles", "joints"] {

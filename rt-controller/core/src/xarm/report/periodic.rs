@@ -18,9 +18,9 @@ pub const NORMAL_REPORT_LEN: usize = 145;
 /// Bytes of a report of port 30002, firmware 2.4 to 2.7.1.
 pub const RICH_REPORT_LEN: usize = 574;
 
-/// Offset of the marks of a simulated arm and of its self-collision check in the rich
-/// report (bytes).
-const SIMULATED: usize = 314;
+/// Offset of the marks that the arm is simulated, and that it stops before it touches
+/// itself (bytes).
+const MARKS: usize = 314;
 /// Offset of the bits that say which safety functions are on (bytes).
 const SAFETY_BITS: usize = 494;
 /// Bit of reduced mode.
@@ -205,7 +205,7 @@ impl RichReport {
         wire.length(&mut self.target_tcp_speed_m_s);
         wire.joints(&mut self.target_qd);
         wire.u32_be(&mut self.counter);
-        wire.skip_to(SIMULATED);
+        wire.skip_to(MARKS);
         wire.flag(&mut self.simulated);
         wire.flag(&mut self.self_collision);
         wire.skip_to(SAFETY_BITS);

@@ -59,7 +59,7 @@ fn rich() -> RichReport {
         target_tcp_speed_m_s: 0.25,
         target_qd: joints(1.0),
         counter: 70_000,
-        simulated: true,
+        simulated: false,
         self_collision: true,
         reduced: false,
         fence: true,
@@ -138,8 +138,18 @@ fn fields_sit_at_the_documented_offsets() {
     assert_eq!(f32_at(&out, 252), 250.0);
     assert_eq!(f32_at(&out, 256), 1.0);
     assert_eq!(out[284..288], 70_000_u32.to_be_bytes());
-    assert_eq!(out[314..316], [1, 1]);
+    assert_eq!(out[314..316], [0, 1]);
     assert_eq!(out[494], 2);
+    let reduced = RichReport {
+        reduced: true,
+        fence: false,
+        simulated: true,
+        self_collision: false,
+        ..rich()
+    };
+    reduced.emit(&mut out).unwrap();
+    assert_eq!((&out[314..316], out[494]), (&[1, 0][..], 1));
+    assert_eq!(RichReport::parse(&out[..574]), Ok(reduced));
 
     realtime().emit(&mut out).unwrap();
     assert_eq!(out[..4], 784_u32.to_be_bytes());

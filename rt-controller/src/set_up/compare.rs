@@ -1,0 +1,188 @@
+//! What an arm is set to, compared with what it is driven for, and read back.
+
+use super::reports::read_status;
+use super::{READY_TIMEOUT, SetUp, SetUpError, refuse};
+use crate::arm_settings::{near, summary};
+use crate::config::OnDifference;
+use crate::session::{ArmSession, SessionError};
+use crate::xarm::report::{NormalReport, RichReport};
+use crate::xarm::{Command, Firmware, Mode, ReplyData, TcpPose};
+use arm_model::JOINTS;
+use shared_types::FaultCode;
+use std::time::{Duration, Instant};
+
+/// The arm checks tool speed against this times its factor (m/s).
+const SPEED_AT_FACTOR_ONE_M_S: f64 = 1.0;
+/// Speed limits closer than this are equal: they are f32 on the wire (m/s).
+const SPEED_EQUAL_M_S: f64 = 1e-4;
+/// Tool offsets closer than this are equal (m).
+const OFFSET_EQUAL_M: f64 = 1e-4;
+/// Status reports lag by so much at most; also the time between two looks at them.
+const REPORT_LAG: Duration = Duration::from_millis(200);
+/// What to do about a difference that is refused.
+const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
+
+impl SetUp<'_> {
+    pub(super) fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
+        let configured_m = self.limits.tcp_offset_m;
+        let (report, _) = read_status(self.status())?;
+        let arm_m = report.tcp_offset.position_m;
+        if near(&arm_m, &configured_m, OFFSET_EQUAL_M) {
+            return Ok(format!("{configured_m:?} m as configured"));
+        }
+        match self.config.on_difference {
+            OnDifference::Refuse => {
+                let message = format!(
+                    "the arm has its tool centre point at {arm_m:?} m, the limits say {configured_m:?} m: {SET_ONE}"
+                );
+                refuse(FaultCode::ArmDiffers, message)
+            }
+            OnDifference::Set => {
+                session.ask(&Command::TcpOffset(TcpPose {
+                    position_m: configured_m,
+                    rpy_rad: [0.0; 3],
+                }))?;
+                Ok(format!("set from {arm_m:?} to {configured_m:?} m"))
+            }
+        }
+    }
+
+    pub(super) fn match_tool_speed(
+        &self,
+        session: &mut ArmSession,
+        firmware: Firmware,
+    ) -> Result<String, SetUpError> {
+        let configured_m_s = self.limits.tcp_speed_max_m_s;
+        let settable = firmware >= Firmware::SPEED_FACTOR;
+        let read_m_s = |session: &mut ArmSession| -> Result<f64, SessionError> {
+            if !settable {
+                return Ok(SPEED_AT_FACTOR_ONE_M_S);
+            }
+            let factor = match session.ask(&Command::GetSpeedLimitFactor)? {
+                ReplyData::SpeedLimitFactor(factor) => factor,
+                _ => f64::NAN,
+            };
+            Ok(factor * SPEED_AT_FACTOR_ONE_M_S)
+        };
+        let equal = |arm_m_s: f64| (arm_m_s - configured_m_s).abs() <= SPEED_EQUAL_M_S;
+        let arm_m_s = read_m_s(session)?;
+        if equal(arm_m_s) {
+            return Ok(format!("{configured_m_s:.3} m/s as configured"));
+        }
+        if self.config.on_difference == OnDifference::Refuse || !settable {
+            let message = format!(
+                "the arm limits the tool's speed to {arm_m_s:.3} m/s, the limits say {configured_m_s:.3} m/s: {SET_ONE}"
+            );
+            return refuse(FaultCode::ArmDiffers, message);
+        }
+        let factor = configured_m_s / SPEED_AT_FACTOR_ONE_M_S;
+        session.ask(&Command::SetSpeedLimitFactor(factor))?;
+        let read_back_m_s = read_m_s(session)?;
+        if !equal(read_back_m_s) {
+            let message = format!(
+                "the arm was asked to limit the tool's speed to {configured_m_s:.3} m/s but says {read_back_m_s:.3} m/s: set it with the vendor's tool"
+            );
+            return refuse(FaultCode::ArmDiffers, message);
+        }
+        Ok(format!("set from {arm_m_s:.3} to {configured_m_s:.3} m/s"))
+    }
+
+    /// Compares what decides how the arm moves and when it stops by itself. Nothing is set
+    /// when something else would be refused.
+    pub(super) fn match_settings(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
+        let (normal, rich) = read_status(self.status())?;
+        let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
+        let differences = wanted.differences(&normal, rich.as_ref(), tool_m);
+        for difference in &differences {
+            let message = difference.message.clone();
+            if difference.mend.is_none() {
+                return refuse(FaultCode::ArmDiffers, message);
+            }
+            if self.config.on_difference == OnDifference::Refuse {
+                return refuse(FaultCode::ArmDiffers, format!("{message}: {SET_ONE}"));
+            }
+        }
+        let mut result = summary(&normal, rich.as_ref());
+        for difference in differences {
+            if let Some(command) = difference.mend {
+                session.ask(&command)?;
+                result = format!("{result}; {}: set", difference.message);
+            }
+        }
+        Ok(result)
+    }
+
+    /// Waits until the arm reports the tool and the settings that it must have.
+    pub(super) fn read_settings_back(&self) -> Result<(), SetUpError> {
+        wait_for_report(|| {
+            let (normal, rich) = read_status(self.status())?;
+            Ok(self.settings_without_effect(&normal, rich.as_ref()))
+        })
+    }
+
+    /// Waits until the arm reports that it is ready in `mode`, enabled, and still set as it
+    /// must be. In another mode it would make a motion of its own of every setpoint.
+    pub(super) fn read_all_back(&self, mode: Mode) -> Result<(), SetUpError> {
+        // A report that was made before the last command proves nothing.
+        std::thread::sleep(REPORT_LAG);
+        wait_for_report(|| {
+            let (normal, rich) = read_status(self.status())?;
+            let found = without_effect(mode, &normal);
+            Ok(found.or_else(|| self.settings_without_effect(&normal, rich.as_ref())))
+        })
+    }
+
+    fn settings_without_effect(
+        &self,
+        normal: &NormalReport,
+        rich: Option<&RichReport>,
+    ) -> Option<SetUpError> {
+        let (wanted, tool_m) = (&self.config.arm_settings, self.limits.tcp_offset_m);
+        let mut differ = wanted.differences(normal, rich, tool_m).into_iter();
+        let message = differ.next().map(|difference| difference.message);
+        let message = message.or_else(|| {
+            let arm_m = normal.tcp_offset.position_m;
+            let told =
+                format!("the arm has its tool centre point at {arm_m:?} m, not {tool_m:?} m");
+            (!near(&arm_m, &tool_m, OFFSET_EQUAL_M)).then_some(told)
+        })?;
+        let message = format!(
+            "{message}, though it agreed or was set a moment ago: stop other programs that set the arm"
+        );
+        let fault = FaultCode::ArmDiffers;
+        Some(SetUpError { fault, message })
+    }
+}
+
+/// Asks until nothing is `missing` any more; after 3 s that is the error.
+fn wait_for_report(
+    missing: impl Fn() -> Result<Option<SetUpError>, SetUpError>,
+) -> Result<(), SetUpError> {
+    let began = Instant::now();
+    while let Some(error) = missing()? {
+        if began.elapsed() > READY_TIMEOUT {
+            return Err(error);
+        }
+        std::thread::sleep(REPORT_LAG);
+    }
+    Ok(())
+}
+
+/// What keeps the arm from following setpoints in `mode`, by its report.
+fn without_effect(mode: Mode, report: &NormalReport) -> Option<SetUpError> {
+    let (state, error) = (report.basic.state, report.error);
+    let disabled = (0..JOINTS).find(|j| report.enabled & (1 << j) == 0);
+    let message = if !error.is_none() || !state.can_move() {
+        format!("the arm was ready and is so no more (state {state:?}, {error})")
+    } else if report.basic.mode != mode {
+        format!(
+            "the arm was asked for mode {mode:?} but says {:?}: stop other programs that use it",
+            report.basic.mode
+        )
+    } else {
+        let joint = disabled?.saturating_add(1);
+        format!("joint {joint} does not become enabled: use the vendor's tool to see why")
+    };
+    let fault = FaultCode::ArmNotReady;
+    Some(SetUpError { fault, message })
+}
