@@ -9,9 +9,7 @@
 //! about the rope.
 
 use super::super::scene::Scene;
-use super::colour::{
-    CHROMA_WEIGHT, Colour, SHADES, colour_at, coverage, interpolated, pixel_colour, presence,
-};
+use super::colour::{CHROMA_WEIGHT, Colour, Place, interpolated, pixel_colour, presence};
 use super::curve::Pixel;
 use crate::frame::ImageFrame;
 use crate::vectors::widest;
@@ -44,7 +42,9 @@ impl Scene {
         gain: f32,
         p: Pixel,
     ) -> Option<(Colour, Colour)> {
-        Some((colour_at(frame, gain, p)?, colour_at(&self.image, 1.0, p)?))
+        debug_assert_eq!(frame.luma.len(), self.image.luma.len());
+        let place = Place::of(p, frame)?;
+        Some((place.colour(frame, gain), place.colour(&self.image, 1.0)))
     }
 
     /// Distances from the scene (levels) at which evidence begins and is full.
@@ -132,11 +132,10 @@ impl<'a> Lit<'a> {
         Some((self.scene.unexplained(seen, behind) * count, seen))
     }
 
-    /// Evidence (0 to 1) that something of these colours is at a place.
+    /// Evidence (0 to 1) that something of these colours, each in all its shades, is at a place.
     pub(super) fn present(&self, colours: &[Colour], p: Pixel) -> f32 {
         self.colours(p).map_or(0.0, |(seen, behind)| {
-            let noise = self.scene.noise;
-            presence(coverage(seen, behind, colours, &SHADES, noise))
+            presence(seen, behind, colours, self.scene.noise)
         })
     }
 
@@ -268,7 +267,8 @@ mod tests {
     #[test]
     fn a_shadow_is_hardly_evidence_and_another_hue_is() {
         let scene = Scene::of(&[1, 2, 3].map(wall));
-        let behind = colour_at(&scene.image, 1.0, Pixel::new(3.0, 3.0)).unwrap();
+        let place = Place::of(Pixel::new(3.0, 3.0), &scene.image).unwrap();
+        let behind = place.colour(&scene.image, 1.0);
         let seen = |scale: f32| behind.map(|c| c * scale);
         assert!(scene.unexplained(seen(0.85), behind) < 0.6);
         assert!(scene.unexplained(seen(0.95), behind) < 0.01);

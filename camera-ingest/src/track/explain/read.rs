@@ -1,10 +1,10 @@
 //! Reads the film off along the hypothesis: curve, ends and tip weight in every frame.
 
-use super::colour::{Colour, SHADES, are_apart, coverage, groups};
+use super::colour::{Colour, SHADES, are_apart, coverage, groups, shaded};
 use super::curve::{Pixel, across, distance_px, from_end, normals, respaced};
 use super::disc::Disc;
 use super::end::{self, End};
-use super::ends::{EndPicture, Window};
+use super::ends::{END_REACH, EndPicture, Window, start_px};
 use super::evidence::Lit;
 use super::field::{Look, Offset, moved, offsets, smooth_field, smoothed};
 use super::reading::Reading;
@@ -24,21 +24,16 @@ const FIRST_STIFFNESS: [f64; 2] = [2.0, 1.0];
 const SECOND_STIFFNESS: [f64; 2] = [0.5, 0.5];
 /// Weight of what is seen where the tip weight hides the rope.
 const HIDDEN: f64 = 0.02;
-/// Around the free end, the tip weight found there, and the clamp.
+/// Around the free end, and the tip weight found there.
 const FREE_END: Window = Window {
     before: 45,
     beyond: 45,
-    reach: 24,
+    reach: END_REACH,
 };
 const TIP: Window = Window {
     before: 30,
     beyond: 30,
-    reach: 24,
-};
-const CLAMP_END: Window = Window {
-    before: 45,
-    beyond: 25,
-    reach: 10,
+    reach: END_REACH,
 };
 /// Colours and ends are learnt from about so many frames.
 const LEARNT: usize = 64;
@@ -60,8 +55,8 @@ const CYLINDER_WIDTH: f64 = 0.05;
 const START_PX: f64 = 4.0;
 /// How much of the difference counts.
 const SEEN_PART: f64 = 0.25;
-/// Shades in which its size is measured: in wider ones, by which its place is found better, a
-/// pixel half covered passes for a whole one.
+/// Shades in which its size is measured, if all frames are read. In wider ones, by which its
+/// place is found better, a pixel half covered passes for a whole one.
 const SIZED_SHADES: [f32; 3] = [0.85, 1.0, 1.15];
 /// Stiffness of its offsets over time, and their pull to the curve's end.
 const TIP_STIFFNESS: f64 = 0.3;
@@ -71,8 +66,8 @@ const TIP_PULL: f64 = 0.02;
 pub(super) struct Reader<'a> {
     frames: Vec<&'a Lit<'a>>,
     curves: Vec<Vec<Pixel>>,
-    /// Offsets in frames further apart in time have less to do with each other.
-    apart: f64,
+    /// Every which frame of the film they are.
+    every: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -81,7 +76,7 @@ impl<'a> Reader<'a> {
         Self {
             frames,
             curves,
-            apart: (every as f64).powi(3),
+            every,
         }
     }
 
@@ -105,15 +100,20 @@ impl<'a> Reader<'a> {
         let field = self.look(look, |lit, p| lit.unexplained(p).map_or(0.0, |(e, _)| e));
         self.follow(field.clone(), FIRST_STIFFNESS, None);
         let rope = groups(&self.rope_samples(), ROPE_COLOURS);
-        let picture = self.picture(FREE_END, <[Pixel]>::to_vec);
+        let frames = self.learnt();
+        let evident = frames.map(|(lit, curve)| (curve.to_vec(), |p| Some(lit.unexplained(p)?.0)));
+        let picture = EndPicture::of(FREE_END, evident);
         let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
         // A weight thicker than the look is wide draws it to one of its sides.
         self.curves = hypothesis;
         self.follow(field, FIRST_STIFFNESS, Some(&end));
         // The arm says where the clamp is, but for the camera's place; the picture shows where
         // the rope comes out of it, but for caps and knots, and counts less.
-        let clamp_last = |curve: &[Pixel]| curve.iter().rev().copied().collect();
-        let seen_px = self.picture(CLAMP_END, clamp_last).start_px();
+        let coloured = self.learnt().map(|(lit, curve)| {
+            let clamp_last = curve.iter().rev().copied().collect();
+            (clamp_last, |p| Some(lit.colours(p)?.0))
+        });
+        let seen_px = start_px(coloured);
         let seen_px = seen_px.filter(|seen| (seen - reported_px).abs() <= START_PX);
         let start_px = seen_px.map_or(reported_px, |seen| {
             reported_px + SEEN_PART * (seen - reported_px)
@@ -124,7 +124,8 @@ impl<'a> Reader<'a> {
             half_width_px: end.rope_half_px,
             jump: 0.05,
         };
-        let field = self.look(look, |lit, p| lit.present(&rope, p));
+        let shades = shaded(&rope, &SHADES);
+        let field = self.look(look, |lit, p| lit.present(&shades, p));
         let evident = field
             .iter()
             .map(|f| f.iter().map(|o| o.weight).collect())
@@ -146,8 +147,13 @@ impl<'a> Reader<'a> {
         let none = vec![[Offset::NONE; 2]; self.frames.len()];
         let (tip, tips) = self.tips(&end, &none, (&[], TIP_REACH_PX[0]));
         let both = [&rope[..], &tip].concat();
-        let disc = self.tip_disc(&still, &end, (&both, &SHADES), &tips);
-        let sized = self.tip_disc(&still, &end, (&both, &SIZED_SHADES), &tips);
+        let disc = self.tip_disc(&still, &end, &shaded(&both, &SHADES), &tips);
+        let radius_px = if self.every > 1 {
+            disc.radius_px
+        } else {
+            let shades = shaded(&both, &SIZED_SHADES);
+            self.tip_disc(&still, &end, &shades, &tips).radius_px
+        };
         let along_px = |tips: &[[Offset; 2]]| median(tips.iter().map(|[along, _]| along.px));
         end.centre_px += along_px(&tips) + disc.centre_px;
         end.radius_px = disc.radius_px;
@@ -161,7 +167,7 @@ impl<'a> Reader<'a> {
             start_px,
             end,
             tips,
-            radii_px: [rope_px, sized.radius_px.max(rope_px)],
+            radii_px: [rope_px, radius_px.max(rope_px)],
             rope,
             tip,
         }
@@ -189,7 +195,9 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        smooth_field(&mut field, over_time / self.apart, along);
+        // Offsets in frames further apart in time have less to do with each other.
+        let apart = (self.every as f64).powi(3);
+        smooth_field(&mut field, over_time / apart, along);
         for (curve, offsets) in self.curves.iter_mut().zip(&field) {
             *curve = respaced(&moved(curve, offsets.iter().map(|o| o.px)), curve);
         }
@@ -235,20 +243,13 @@ impl<'a> Reader<'a> {
         round::fit(&profile)
     }
 
-    /// Median picture around one end, which `turned` puts last.
-    fn picture(&self, window: Window, turned: impl Fn(&[Pixel]) -> Vec<Pixel>) -> EndPicture {
-        let frames = self.learnt();
-        let frames = frames.map(|(lit, curve)| (turned(curve), move |p| lit.unexplained(p)));
-        EndPicture::of(window, frames)
-    }
-
     /// Centre and radius of the tip weight in the median picture of some frames around where
     /// it was found.
     fn tip_disc(
         &self,
         still: &[usize],
         end: &End,
-        (colours, shades): (&[Colour], &[f32]),
+        shades: &[Colour],
         places: &[[Offset; 2]],
     ) -> End {
         let frames = still.iter().map(|&i| {
@@ -257,8 +258,7 @@ impl<'a> Reader<'a> {
             let axis = (0..5).map(|i| c - t * (10.0 * f64::from(4 - i))).collect();
             (axis, move |p| {
                 let (seen, behind) = lit.colours(p)?;
-                let covered = coverage(seen, behind, colours, shades, lit.scene.noise);
-                Some((covered, seen))
+                Some(coverage(seen, behind, shades, lit.scene.noise, 0.0))
             })
         });
         let picture = EndPicture::of(TIP, frames);
@@ -309,6 +309,7 @@ impl<'a> Reader<'a> {
         } else {
             own
         };
+        let looked_for = shaded(&looked_for, &SHADES);
         let frames = self.frames.iter().zip(&self.curves);
         let (along, aside): (Vec<Offset>, Vec<Offset>) = frames
             .map(|(lit, curve)| {

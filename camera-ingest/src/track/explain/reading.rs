@@ -18,7 +18,8 @@ pub(super) struct Reading {
     pub(super) end: End,
     /// The tip weight in each frame, along and across the curve from its usual place.
     pub(super) tips: Vec<[Offset; 2]>,
-    /// Half the rope's width, and the tip weight's radius (px).
+    /// Half the rope's width, and the tip weight's radius (px), which is rough unless all
+    /// frames are read.
     pub(super) radii_px: [f64; 2],
     pub(super) rope: Vec<Colour>,
     pub(super) tip: Vec<Colour>,

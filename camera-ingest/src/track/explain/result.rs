@@ -93,7 +93,7 @@ pub(super) fn result(
     };
     let doubts = confirmation.doubts(&frames);
     if !doubts.is_empty() {
-        // Nothing is certain in a track that is in doubt as a whole.
+        // Nothing is certain in a track that is unconfirmed as a whole.
         let all = frames.iter_mut().flat_map(|f| &mut f.confidence);
         all.for_each(|c| *c *= DOUBT);
     }

@@ -48,15 +48,18 @@ fn brightness(c: &Cylinder, profile: &Profile) -> [f64; SAMPLES] {
     const FINE: usize = 4;
     const COUNT: usize = (SAMPLES - 1) * FINE + 1;
     let step = STEP_PX / FINE as f64;
+    let (sin, cos) = c[4].sin_cos();
     let mut sharp = [0.0; COUNT];
     for (i, value) in sharp.iter_mut().enumerate() {
         let at = (i / FINE).min(SAMPLES - 2);
         let w = (i - at * FINE) as f64 / FINE as f64;
         let behind = profile.behind[at] * (1.0 - w) + profile.behind[at + 1] * w;
         let x = place_px(0) + i as f64 * step - c[0];
+        let aside = (x / c[1]).clamp(-1.0, 1.0);
         let inside = ((c[1] - x.abs()) / step + 0.5).clamp(0.0, 1.0);
-        let angle = (x / c[1]).clamp(-1.0, 1.0).asin();
-        let lit = c[2] + c[3] * (angle - c[4]).cos().max(0.0);
+        // By the cosine between the surface normal and the light.
+        let height = (1.0 - aside * aside).sqrt();
+        let lit = c[2] + c[3] * (height * cos + aside * sin).max(0.0);
         *value = behind * (1.0 - inside) + lit * inside;
     }
     let reach = (3.0 * c[5] / step).ceil() as usize;

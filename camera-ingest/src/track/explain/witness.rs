@@ -5,7 +5,7 @@
 
 use super::super::scene::Scene;
 use super::Film;
-use super::colour::Colour;
+use super::colour::{Colour, SHADES, shaded};
 use super::curve::Pixel;
 use super::evidence::Lit;
 use super::explainer::Explained;
@@ -86,9 +86,10 @@ impl Testimony {
             half_width_px,
             jump: 0.05,
         };
+        let rope = shaded(rope, &SHADES);
         let offsets = |sight: &Sight<'_>| {
             let lit = Lit::of(sight.frame, scene);
-            offsets(&sight.curve, look, |p| lit.present(rope, p))
+            offsets(&sight.curve, look, |p| lit.present(&rope, p))
         };
         let found: Vec<Vec<Offset>> = sights.iter().map(offsets).collect();
         let clear = found.iter().flatten().filter(|o| o.weight > LEAST);
