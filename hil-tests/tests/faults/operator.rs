@@ -98,26 +98,32 @@ fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
 
 #[test]
 fn fault_36_the_arm_is_braked_within_a_cycle_at_1000_random_moments_of_fast_throws() {
-    let mut rng = ChaCha8Rng::seed_from_u64(36);
-    let mut throws = [None; 2];
-    for k in 0..1000 {
-        let via = INTERFACES[k % 2];
-        let mut stage = Stage::ready(via, "");
-        // Ten moments of each throw.
-        if k % 20 < 2 {
-            let from = stage.rig.commanded();
-            throws[k % 2] = Some(random_throw(from, &limits_of(via), &mut rng));
+    let moments = |seed: u64, via| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut throw = None;
+        for k in 0..500 {
+            let mut stage = Stage::ready(via, "");
+            // Ten moments of each throw.
+            if k % 10 == 0 {
+                let from = stage.rig.commanded();
+                throw = Some(random_throw(from, &limits_of(via), &mut rng));
+            }
+            stage.throw = throw.unwrap();
+            stage.begin();
+            let how = if rng.random_bool(0.5) {
+                Withdrawal::LetsGo
+            } else {
+                Withdrawal::Disarms
+            };
+            let part = rng.random_range(0.0..0.97);
+            assert_braked_at(&mut stage, how, part);
         }
-        stage.throw = throws[k % 2].unwrap();
-        stage.begin();
-        let how = if rng.random_bool(0.5) {
-            Withdrawal::LetsGo
-        } else {
-            Withdrawal::Disarms
-        };
-        let part = rng.random_range(0.0..0.97);
-        assert_braked_at(&mut stage, how, part);
-    }
+    };
+    std::thread::scope(|scope| {
+        for (seed, via) in (36..).zip(INTERFACES) {
+            scope.spawn(move || moments(seed, via));
+        }
+    });
 }
 
 /// The whole judgement, for each withdrawal and each interface.

@@ -1,8 +1,8 @@
 //! Random inputs of every kind, for as many cycles as wanted: nothing panics, no
-//! setpoint breaks a limit, every stop has exactly one cause, and every cycle
-//! can be stepped again from its record.
+//! setpoint and no velocity breaks a limit, every stop has exactly one cause, and every
+//! cycle can be stepped again from its record.
 //!
-//! `WAG_LONG_TESTS=1` runs ten million cycles instead of 300 000.
+//! `WAG_LONG_TESTS=1` runs ten million cycles on each interface instead of 150 000.
 
 use super::bench::{PERIOD_NS, quiet_input};
 use super::*;
@@ -177,10 +177,8 @@ impl Chaos {
         }
     }
 
-    fn sent(&mut self, out: &CycleOutput) {
-        if let Some(q) = out.setpoint() {
-            self.commanded = [q, self.commanded[0], self.commanded[1]];
-        }
+    fn sent(&mut self, q: JointVector) {
+        self.commanded = [q, self.commanded[0], self.commanded[1]];
     }
 }
 
@@ -228,8 +226,37 @@ impl Judge {
     }
 }
 
+/// Judges velocities on the wire: by the joints' limits, and how fast they change.
+struct VelocityJudge {
+    last: (u64, JointVector),
+}
+
+impl VelocityJudge {
+    /// Largest part of a limit that was used by `qd`, sent in the pose `q`.
+    fn take(&mut self, at_ns: u64, (q, qd): (&JointVector, JointVector), limits: &Limits) -> f64 {
+        let (before_ns, before) = std::mem::replace(&mut self.last, (at_ns, qd));
+        let span_s = at_ns.wrapping_sub(before_ns) as f64 * 1e-9;
+        let tool = kinematics::tool_speed_m_s(q, &qd, &limits.tcp_offset());
+        // What was allowed a cycle ago may be a little faster in the pose of this one.
+        let mut worst = tool / (1.02 * limits.tcp_speed_max_m_s);
+        for j in 0..JOINTS {
+            let change = (qd[j] - before[j]).abs() - 1e-9;
+            worst = worst
+                .max(qd[j].abs() / limits.velocity_max_rad_s[j])
+                .max(change / (limits.acceleration_max_rad_s2[j] * span_s));
+            assert!(qd[j].is_finite());
+        }
+        worst
+    }
+}
+
 fn settings(seed: u64) -> ControlSettings {
     ControlSettings {
+        interface: if seed % 4 < 2 {
+            CommandInterface::ServoPosition
+        } else {
+            CommandInterface::JointVelocity
+        },
         arming_required: seed.is_multiple_of(2),
         guardian_required: seed.is_multiple_of(3),
         ..if seed.is_multiple_of(5) {
@@ -243,6 +270,7 @@ fn settings(seed: u64) -> ControlSettings {
 #[derive(Debug, Default)]
 struct Tally {
     setpoints: u64,
+    velocities: u64,
     stops: u64,
     codes: std::collections::BTreeSet<u16>,
     /// Largest part of a limit that was used.
@@ -260,6 +288,10 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
     };
     let mut again = anew(&state);
     let mut judge = Judge::holding(START_POSE, chaos.now_ns);
+    let still = |at_ns| VelocityJudge {
+        last: (at_ns, JointVector::ZERO),
+    };
+    let mut velocity_judge = still(chaos.now_ns);
     for _ in 0..cycles {
         let input = chaos.input(state.mode());
         let deadline_ns = input.deadline_ns.saturating_add(input.late_ns.into());
@@ -283,6 +315,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
                 ControlEvent::Engaged => {
                     let hold = state.summary().q_c;
                     judge = Judge::holding(hold, deadline_ns);
+                    velocity_judge = still(deadline_ns.wrapping_sub(PERIOD_NS));
                     chaos.commanded = [hold; 3];
                 }
                 ControlEvent::Latched(cause) => {
@@ -299,13 +332,21 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
             && before != ControllerMode::Offline
             && state.mode() == ControllerMode::Faulted;
         assert_eq!(latches, i32::from(stopped), "{before:?} {:?}", out.events);
-        chaos.sent(&out);
-        if let Some(q) = out.setpoint() {
-            tally.setpoints += 1;
-            let part = judge.take(deadline_ns, q, &limits);
-            tally.worst = tally.worst.max(part);
-            assert!(part <= 1.0 + 2e-9, "seed {seed}: {part} of a limit");
+        let Some(command) = out.command else {
+            continue;
+        };
+        let q = state.summary().q_c;
+        chaos.sent(q);
+        tally.setpoints += 1;
+        let mut part = judge.take(deadline_ns, q, &limits);
+        if let ArmCommand::Velocity { qd, .. } = command {
+            tally.velocities += 1;
+            part = part.max(velocity_judge.take(deadline_ns, (&q, qd), &limits));
+        } else {
+            assert_eq!(out.setpoint(), Some(q));
         }
+        tally.worst = tally.worst.max(part);
+        assert!(part <= 1.0 + 2e-9, "seed {seed}: {part} of a limit");
     }
 }
 
@@ -313,7 +354,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
 fn any_number_of_random_cycles_keep_every_limit() {
     let runs: u64 = match std::env::var("WAG_LONG_TESTS") {
         _ if cfg!(miri) => 1,
-        Ok(on) if on == "1" => 1000,
+        Ok(on) if on == "1" => 2000,
         _ => 30,
     };
     let mut tally = Tally::default();
@@ -323,6 +364,7 @@ fn any_number_of_random_cycles_keep_every_limit() {
     println!("{tally:?}");
     if !cfg!(miri) {
         assert!(tally.stops > 100 * runs / 30 && tally.codes.len() > 12);
+        assert!(3 * tally.velocities > tally.setpoints);
     }
 }
 
