@@ -96,7 +96,7 @@ fn outcome(seed: u64, filming: Filming) -> Result<(), String> {
     let [median, p95] = [0.5, 0.95].map(|part| quantile(&errors_px, part));
     let lost = found.track.lost_fraction();
     let reported = format!(
-        "seed {seed} ({:.1} mm), {filming:?}: lost {:.1} %, in doubt {:.1} %, \
+        "seed {seed} ({:.1} mm), {filming:?}: lost {:.1} %, unconfirmed {:.1} %, \
          median {median:.2}, p95 {p95:.2}, most where sure {confident_px:.1} px",
         hidden_rope(seed).radius_m * 1e3,
         100.0 * lost,

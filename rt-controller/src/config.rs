@@ -42,6 +42,9 @@ pub struct ControllerConfig {
     pub domain: String,
     /// Address of the arm.
     pub arm: IpAddr,
+    /// Whether it is the simulated arm, which must prove it. Any other arm is driven with
+    /// real-time properties, guardian and arming, or not at all.
+    pub simulated: bool,
     /// Command port of the arm.
     pub command_port: u16,
     /// Real-time report port of the arm (250 Hz).
@@ -50,7 +53,7 @@ pub struct ControllerConfig {
     pub fallback_report_port: u16,
     /// Ports with the arm's status (5 Hz), in the order in which they are tried.
     pub status_ports: [u16; 2],
-    /// What to do when the arm's tool or its tool speed limit is not the one of
+    /// What to do when the arm's tool or its tool speed limit does not fit
     /// the limits, or load or collision sensitivity not those of `arm_settings`.
     pub on_difference: OnDifference,
     /// What the arm must be set to.
@@ -78,6 +81,7 @@ impl Default for ControllerConfig {
         Self {
             domain: "wag".to_owned(),
             arm: IpAddr::V4(Ipv4Addr::LOCALHOST),
+            simulated: false,
             command_port: COMMAND_PORT,
             report_port,
             fallback_report_port,
@@ -131,8 +135,7 @@ pub enum Profile {
 }
 
 /// When the monitors give up. What is left out comes from the profile, and the
-/// profile, when left out, from the arm's address: relaxed for an arm on this
-/// machine, strict for any other.
+/// profile, when left out, is relaxed for the simulated arm and strict for any other.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ThresholdSettings {
@@ -163,9 +166,9 @@ pub struct ThresholdSettings {
 }
 
 impl ThresholdSettings {
-    /// Checked thresholds for the arm at `arm`.
-    pub fn checked(&self, arm: IpAddr) -> Result<Thresholds, ConfigError> {
-        let profile = self.profile.unwrap_or(if arm.is_loopback() {
+    /// Checked thresholds for an arm, `simulated` or not.
+    pub fn checked(&self, simulated: bool) -> Result<Thresholds, ConfigError> {
+        let profile = self.profile.unwrap_or(if simulated {
             Profile::Relaxed
         } else {
             Profile::Strict
@@ -265,13 +268,18 @@ impl ControllerConfig {
         Ok(limits)
     }
 
+    /// Whether real-time properties that cannot be had are a refusal.
+    pub(crate) const fn requires_real_time(&self) -> bool {
+        self.real_time.require || !self.simulated
+    }
+
     /// Settings of the control core.
     pub fn control_settings(&self) -> Result<ControlSettings, ConfigError> {
         Ok(ControlSettings {
             interface: self.command_interface,
             arming_required: self.arming_required,
             guardian_required: self.guardian.required,
-            ..ControlSettings::from(self.thresholds.checked(self.arm)?)
+            ..ControlSettings::from(self.thresholds.checked(self.simulated)?)
         })
     }
 
@@ -280,7 +288,7 @@ impl ControllerConfig {
     /// # Errors
     /// It is shorter than the longest gap that the controller meets itself, or no number.
     pub fn guardian_silence_ns(&self) -> Result<u64, ConfigError> {
-        let missed = self.thresholds.checked(self.arm)?.missed_cycles_max;
+        let missed = self.thresholds.checked(self.simulated)?.missed_cycles_max;
         let cycle_ms = 1e3 * self.resolve_limits()?.period_s();
         let least_ms = cycle_ms * f64::from(missed.saturating_add(2));
         let found_ms = self.guardian.silence_ms.unwrap_or(least_ms);
@@ -297,6 +305,23 @@ impl ControllerConfig {
         self.guardian_silence_ns()?;
         if let Some((key, found, allowed)) = self.arm_settings.impossible() {
             require(false, key, found, allowed)?;
+        }
+        for (key, holds) in [
+            ("arming_required", self.arming_required),
+            ("guardian.required", self.guardian.required),
+            ("guardian.priority", self.guardian.priority.is_some()),
+            ("real_time.lock_memory", self.real_time.lock_memory),
+            ("real_time.priority", self.real_time.priority.is_some()),
+            (
+                "thresholds.profile",
+                self.thresholds.profile != Some(Profile::Relaxed),
+            ),
+        ] {
+            if !holds && !self.simulated {
+                return Err(ConfigError(format!(
+                    "`{key}` is as only the simulated arm may be driven (`simulated = true`)"
+                )));
+            }
         }
         let warm_up_us = self.real_time.warm_up_us;
         let holds = warm_up_us <= WARM_UP_MAX_US;
@@ -361,19 +386,36 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_elsewhere_is_held_to_strict_thresholds() {
-        let local = ThresholdSettings::default();
-        let checked = |settings: ThresholdSettings, arm: [u8; 4]| settings.checked(arm.into());
-        let here = checked(local, [127, 0, 0, 1]).unwrap();
-        assert_eq!(here, Thresholds::relaxed());
-        let elsewhere = checked(local, [192, 168, 1, 203]).unwrap();
-        assert_eq!(elsewhere, Thresholds::strict());
+    fn only_the_simulated_arm_is_held_to_relaxed_thresholds_or_may_do_without_watch() {
+        let shipped = ThresholdSettings::default();
+        assert_eq!(shipped.checked(true).unwrap(), Thresholds::relaxed());
+        assert_eq!(shipped.checked(false).unwrap(), Thresholds::strict());
+        let parse = |text: &str| toml::from_str::<ControllerConfig>(text).unwrap();
+        for text in [
+            "arming_required = false",
+            "guardian.required = false",
+            "real_time.lock_memory = false",
+            "thresholds.profile = 'relaxed'",
+        ] {
+            let said = parse(text).check().unwrap_err().to_string();
+            let (key, _) = text.split_once(' ').unwrap();
+            assert!(said.contains(key) && said.contains("simulated"), "{said}");
+            let simulated = format!("simulated = true\n{text}");
+            parse(&simulated).check().unwrap();
+        }
+        for (text, required) in [
+            ("", true),
+            ("simulated = true", false),
+            ("simulated = true\nreal_time.require = true", true),
+        ] {
+            assert_eq!(parse(text).requires_real_time(), required, "{text}");
+        }
         let own = ThresholdSettings {
             profile: Some(Profile::Strict),
             reply_stall_ms: Some(20.0),
-            ..local
+            ..shipped
         };
-        let thresholds = checked(own, [127, 0, 0, 1]).unwrap();
+        let thresholds = own.checked(true).unwrap();
         assert_eq!(thresholds.reply_stall_ns, 20_000_000);
         assert_eq!(thresholds.late_cycles_max, 2);
     }

@@ -1,7 +1,6 @@
 //! Why the controller process ends.
 
 use crate::config::ConfigError;
-use crate::os::RealTimeSettings;
 use shared_types::ipc::IpcError;
 
 /// Why the controller cannot run, or could not go on.
@@ -27,7 +26,7 @@ pub enum ControllerError {
         needed_mb: u64,
     },
     /// Real-time properties are required but cannot be had.
-    #[error("real-time set-up is required but incomplete: {}", .0.join("; "))]
+    #[error("a real arm needs real-time properties that cannot be had: {} (`simulated = true` is for `wag rig`)", .0.join("; "))]
     NotRealTime(Vec<String>),
     /// The system has no more threads.
     #[error("cannot start a thread: {0}")]
@@ -45,18 +44,18 @@ pub enum ControllerError {
 
 impl ControllerError {
     /// Reports the real-time properties that could not be had; a refusal where they
-    /// are required.
+    /// are `required`.
     ///
     /// # Errors
     /// [`Self::NotRealTime`].
     pub(crate) fn unless_real_time(
-        settings: &RealTimeSettings,
+        required: bool,
         warnings: Vec<String>,
     ) -> Result<Vec<String>, Self> {
         for warning in &warnings {
             tracing::warn!("{warning}");
         }
-        if settings.require && !warnings.is_empty() {
+        if required && !warnings.is_empty() {
             return Err(Self::NotRealTime(warnings));
         }
         Ok(warnings)

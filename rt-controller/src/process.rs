@@ -66,7 +66,7 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     let real_time = &config.real_time;
     let (thread, warnings) = start_loop(&config.domain, real_time, control, rings.rt, body)?;
     threads.control_loop = Some(thread);
-    let warnings = ControllerError::unless_real_time(real_time, warnings)?;
+    let warnings = ControllerError::unless_real_time(config.requires_real_time(), warnings)?;
     let joints = ReportStream {
         arm: config.arm,
         ports: vec![config.report_port, config.fallback_report_port],
@@ -235,7 +235,6 @@ mod tests {
             ..ControllerConfig::default()
         };
         config.real_time.cpu = Some(1_000_000);
-        config.real_time.require = true;
         let error = run(config, &AtomicBool::new(false)).unwrap_err();
         assert!(error.to_string().contains("core 1000000"), "{error}");
     }

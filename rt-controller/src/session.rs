@@ -7,6 +7,7 @@
 
 use crate::guardian::decision::{ASK_EVERY_NS, STOP_WITHIN_NS};
 use crate::xarm::frame::{MAX_FRAME_LEN, emit_command, next_transaction};
+use crate::xarm::version::SIMULATED_SERIAL_NUMBER;
 use crate::xarm::{
     ArmState, BrokenStream, Command, ErrorCode, FrameReader, Protocol, ReplyData, ReplyError,
     StateRequest,
@@ -113,6 +114,14 @@ impl ArmSession {
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Whether the arm proves by its serial number that it is the simulated one.
+    pub fn proves_simulated(&mut self) -> Result<bool, SessionError> {
+        Ok(match self.ask(&Command::SerialNumbers)? {
+            ReplyData::Text(text) => text.as_str() == SIMULATED_SERIAL_NUMBER,
+            _ => false,
+        })
     }
 
     /// State of the arm.

@@ -172,7 +172,7 @@ pub struct DemoArgs {
     /// file. Domain, seed, ports and target are the demo's own.
     #[arg(long, value_name = "FILE")]
     pub rig_config: Option<PathBuf>,
-    /// Go on although the track of the rope is in doubt.
+    /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,
 }
@@ -310,7 +310,7 @@ pub struct IdentifyArgs {
     /// Seed of the search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
-    /// Go on although the track of the rope is in doubt.
+    /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,
     /// Rope parameters with their uncertainty (TOML).

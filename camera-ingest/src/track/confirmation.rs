@@ -2,9 +2,9 @@
 
 use shared_types::keypoints::TrackedFrame;
 
-/// Confidence below which a keypoint is in doubt.
+/// Confidence below which a keypoint is unconfirmed.
 pub(super) const DOUBT: f64 = 0.5;
-/// Part of a film's keypoints that may be in doubt.
+/// Part of a film's keypoints that may be unconfirmed.
 const MAX_DOUBTED: f64 = 0.25;
 /// How far the tip weight must stand out from what surrounds it, in the middle frame.
 const MIN_TIP: f64 = 0.25;
@@ -32,7 +32,7 @@ impl Confirmation {
         let mut doubts = Vec::new();
         if doubted > MAX_DOUBTED {
             doubts.push(format!(
-                "{} % of the keypoints are in doubt (at most {} % may be)",
+                "{} % of the keypoints have little evidence (at most {} % may)",
                 percent(doubted),
                 percent(MAX_DOUBTED)
             ));

@@ -51,7 +51,7 @@ impl Tracked {
                 s.frames,
                 self.doubts
                     .iter()
-                    .map(|d| format!("; in doubt: {d}"))
+                    .map(|d| format!("; unconfirmed: {d}"))
                     .collect::<String>()
             ),
         }

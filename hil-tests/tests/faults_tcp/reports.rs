@@ -147,6 +147,36 @@ fn fault_18_reports_of_another_layout_than_the_firmwares_are_refused() {
     );
 }
 
+/// The arm takes a new speed limit and then says that it has none.
+#[test]
+fn a_speed_limit_that_is_no_number_is_not_set() {
+    fn no_number(bytes: &mut [u8]) {
+        // Register 233, its status and its value.
+        if bytes.len() == 12 && bytes[6] == 233 {
+            bytes[8..].copy_from_slice(&f32::NAN.to_le_bytes());
+        }
+    }
+    let stand = Stand::with("nan", ArmConfig::default(), |config| {
+        config.on_difference = OnDifference::Set;
+        config.command_port = a_line_that_lies(config.command_port, no_number);
+    });
+    refuses_to_bring_up(stand, FaultCode::ArmDiffers, &["1.320", "NaN"], |_| ());
+}
+
+#[test]
+fn an_arm_that_does_not_prove_to_be_simulated_is_not_driven_as_one() {
+    fn real(bytes: &mut [u8]) {
+        if let Some(at) = bytes.windows(9).position(|w| w == b"SIMULATED") {
+            bytes[at..at + 9].copy_from_slice(b"XS1305000");
+        }
+    }
+    let stand = Stand::with("tunnel", ArmConfig::default(), |config| {
+        config.command_port = a_line_that_lies(config.command_port, real);
+    });
+    let words = ["does not prove", "simulated = true"];
+    refuses_to_bring_up(stand, FaultCode::ArmDiffers, &words, |_| ());
+}
+
 #[test]
 fn fault_18_another_report_on_the_port_of_the_joint_reports_is_refused() {
     let stand = Stand::with("ports", ArmConfig::default(), |config| {

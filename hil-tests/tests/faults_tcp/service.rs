@@ -7,8 +7,8 @@ use rt_controller::arm_settings::Load;
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::OnDifference;
 use rt_controller::session::ArmSession;
-use rt_controller::xarm::Command;
 use rt_controller::xarm::report::{NormalReport, RICH_REPORT_LEN};
+use rt_controller::xarm::{Command, ReplyData};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::{FaultCode, OperatingMode};
@@ -83,25 +83,56 @@ fn a_stop_is_served_while_a_trajectory_runs() {
 
 #[test]
 fn another_commander_or_another_tool_speed_is_a_refusal_that_says_what() {
-    let mut stand = Stand::with("refusals", ArmConfig::default(), |config| {
-        let mut spec = LimitsSpec::from(Limits::default());
-        spec.tcp_speed_max_m_s = 1.0;
-        config.limits = Some(spec.try_into().unwrap());
-    });
-    let arm = (stand.config.arm, stand.config.command_port).into();
-    let lock = CommanderLock::take(arm).unwrap();
-    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
-    assert_eq!(fault, FaultCode::SecondCommander);
-    let me = format!("process {}", std::process::id());
-    assert!(message.contains(&me), "{message}");
-    drop(lock);
-    let (fault, message) = stand.refused(&ControllerRequest::Bringup);
-    assert_eq!(fault, FaultCode::ArmDiffers);
-    assert!(
-        message.contains("1.200") && message.contains("1.000"),
-        "{message}"
-    );
-    stand.finish();
+    for (configured_m_s, expected) in [(0.7, "0.700 to 1.050"), (1.3, "1.300 to 1.950")] {
+        let mut stand = Stand::with("refusals", ArmConfig::default(), |config| {
+            let mut spec = LimitsSpec::from(Limits::default());
+            spec.tcp_speed_max_m_s = configured_m_s;
+            config.limits = Some(spec.try_into().unwrap());
+        });
+        let arm = (stand.config.arm, stand.config.command_port).into();
+        let lock = CommanderLock::take(arm).unwrap();
+        let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+        assert_eq!(fault, FaultCode::SecondCommander);
+        let me = format!("process {}", std::process::id());
+        assert!(message.contains(&me), "{message}");
+        drop(lock);
+        let (fault, message) = stand.refused(&ControllerRequest::Bringup);
+        assert_eq!(fault, FaultCode::ArmDiffers);
+        assert!(
+            message.contains("1.200") && message.contains(expected),
+            "{message}"
+        );
+        stand.finish();
+    }
+}
+
+/// A setpoint 0.2 ms late looks 5 % too fast, so the arm's limit is above that of the plans.
+#[test]
+fn the_arms_own_speed_limit_has_headroom_or_is_set() {
+    for (configured_m_s, on_difference, factor) in [
+        (1.0, OnDifference::Refuse, 1.2),
+        // Left as it is, with a warning.
+        (1.2, OnDifference::Refuse, 1.2),
+        (1.0, OnDifference::Set, 1.2),
+        (0.7, OnDifference::Set, 0.77),
+        (1.2, OnDifference::Set, 1.32),
+    ] {
+        let mut stand = Stand::with("headroom", ArmConfig::default(), |config| {
+            let mut spec = LimitsSpec::from(Limits::default());
+            spec.tcp_speed_max_m_s = configured_m_s;
+            config.limits = Some(spec.try_into().unwrap());
+            config.on_difference = on_difference;
+        });
+        stand.make_ready();
+        let address = (stand.config.arm, stand.config.command_port).into();
+        let mut other = ArmSession::connect(address, PATIENCE).unwrap();
+        let found = match other.ask(&Command::GetSpeedLimitFactor).unwrap() {
+            ReplyData::SpeedLimitFactor(found) => found,
+            other => panic!("{other:?}"),
+        };
+        assert!((found - factor).abs() < 1e-3, "{configured_m_s}: {found}");
+        stand.finish();
+    }
 }
 
 /// Other programs and a reset change the arm's settings; nothing says so later.

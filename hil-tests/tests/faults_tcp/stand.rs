@@ -87,6 +87,7 @@ pub fn patient(name: &str, arm: &SimulatedArm) -> ControllerConfig {
     let [realtime, normal, rich, real] = arm.ports().reports;
     ControllerConfig {
         domain: format!("faults_{name}_{}", std::process::id()),
+        simulated: true,
         command_port: arm.ports().command,
         report_port: realtime,
         fallback_report_port: real,

@@ -56,15 +56,9 @@ impl Scene {
 
 #[test]
 fn a_gap_that_the_controller_meets_itself_is_left_to_it() {
-    let shipped = crate::ControllerConfig {
-        arm: [192, 168, 1, 203].into(),
-        ..crate::ControllerConfig::default()
-    };
-    let missed_max = shipped
-        .thresholds
-        .checked(shipped.arm)
-        .unwrap()
-        .missed_cycles_max;
+    let shipped = crate::ControllerConfig::default();
+    let thresholds = shipped.thresholds.checked(shipped.simulated).unwrap();
+    let missed_max = thresholds.missed_cycles_max;
     assert_eq!(
         (missed_max, shipped.guardian_silence_ns().unwrap()),
         (5, SILENCE_NS)

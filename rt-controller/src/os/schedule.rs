@@ -15,7 +15,7 @@ pub struct RealTimeSettings {
     pub cpu: Option<usize>,
     /// Lock all memory, so that no page fault can delay a cycle.
     pub lock_memory: bool,
-    /// Refuse to start when any of these cannot be had. Set it on a real arm.
+    /// Refuse to start when any of these cannot be had, for the simulated arm too.
     pub require: bool,
     /// How long before each deadline the control thread wakes (us): it warms up
     /// the cycle and waits by looking at the clock. 0: it sleeps to the deadline.

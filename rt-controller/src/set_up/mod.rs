@@ -144,6 +144,13 @@ impl SetUp<'_> {
             let message = format!("the arm at {arm} says `{text}`: {reason}");
             refuse(FaultCode::UnsupportedFirmware, message)
         })?;
+        if self.config.simulated && !session.proves_simulated()? {
+            let arm = session.address();
+            let message = format!(
+                "the arm at {arm} does not prove that it is the simulated one, as `simulated = true` says: take that out for a real arm"
+            );
+            return refuse(FaultCode::ArmDiffers, message);
+        }
         // Every firmware that passes is new enough for protocol 3.
         session.keep_heartbeat();
         match version.wider_than_the_arm(self.limits) {

@@ -29,8 +29,8 @@ pub struct ArmArgs {
     pub address: Option<IpAddr>,
     #[command(flatten)]
     pub ports: ArmPorts,
-    /// The area is clear and the emergency stop is in reach. Asked for at any
-    /// address that is not this machine unless this is given.
+    /// The area is clear and the emergency stop is in reach. Asked for unless this is given
+    /// or the arm proves that it is simulated.
     #[arg(long, alias = "confirm")]
     pub yes: bool,
     /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
@@ -71,7 +71,7 @@ pub struct WiggleArgs {
 pub struct ThrowArgs {
     /// The plan.
     pub plan: PathBuf,
-    /// Go on although the track of the rope is in doubt.
+    /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,
     #[command(flatten)]

@@ -12,7 +12,7 @@ pub struct PlanArgs {
     /// Rope parameters.
     #[arg(long)]
     pub rope: PathBuf,
-    /// Go on although the track of the rope is in doubt.
+    /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,
     /// Target x,y,z in the arm's base frame (m).

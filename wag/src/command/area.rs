@@ -2,15 +2,37 @@
 //! clear.
 
 use crate::cli::ArmArgs;
+use crate::pipeline::ArmAddress;
 use cli_output::{OrInput, Outcome, output};
+use rt_controller::session::ArmSession;
 use std::io::{BufRead, IsTerminal, Write, stdin, stdout};
-use std::net::IpAddr;
+use std::time::Duration;
 
-/// The arm's address, where somebody has to declare that the area is clear: it is real and
-/// will move. A simulated arm is in nobody's way.
-fn undeclared(arm: &ArmArgs) -> Option<IpAddr> {
-    arm.address
-        .filter(|address| !address.is_loopback() && !arm.dry_run && !arm.yes)
+/// Longest wait for an arm that is asked whether it is simulated.
+const WAIT: Duration = Duration::from_secs(2);
+
+/// The arm that will move; `None` for a dry run. It is real unless it proves that it is
+/// simulated: its address may be a tunnel's.
+///
+/// # Errors
+/// Nobody is there.
+fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
+    let Some(ip) = arm.address.filter(|_| !arm.dry_run) else {
+        return Ok(None);
+    };
+    let ports = &arm.ports;
+    let mut session = ArmSession::connect((ip, ports.command_port).into(), WAIT).or_failed()?;
+    let simulated = session.proves_simulated().unwrap_or_else(|error| {
+        tracing::warn!(%error, "whether the arm is simulated is unknown");
+        false
+    });
+    Ok(Some(ArmAddress {
+        ip,
+        command: ports.command_port,
+        joints: ports.report_port,
+        status: [ports.status_port; 2],
+        simulated,
+    }))
 }
 
 /// Whether somebody is there to type the word.
@@ -19,14 +41,18 @@ const fn can_ask(terminal: bool, json: bool) -> bool {
 }
 
 /// Makes sure that the area around the arm is clear for a motion called `word`:
-/// by `--yes`, or by the operator who types the word.
-pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome {
-    let Some(address) = undeclared(arm) else {
-        return Ok(());
+/// by `--yes`, or by the operator who types the word. A simulated arm is in nobody's way.
+/// Returns the arm; `None` for a dry run.
+pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome<Option<ArmAddress>> {
+    let reached = reach(arm)?;
+    let Some(address) = reached.filter(|a| !a.simulated && !arm.yes) else {
+        return Ok(reached);
     };
     let refuse = |why: &str| {
         Err(bad_input!(
-            "{address} is a real arm: clear the area, keep the emergency stop in reach, and {why}"
+            "{}:{} does not prove that it is a simulated arm: clear the area, keep the emergency stop in reach, and {why}",
+            address.ip,
+            address.command
         ))
     };
     if !can_ask(stdin().is_terminal(), output::is_json()) {
@@ -42,30 +68,15 @@ pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome {
     if line.trim() != word {
         return refuse(&format!("type {word}; nothing has moved"));
     }
-    Ok(())
+    Ok(reached)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::{Cli, Command};
-    use clap::Parser;
 
     #[test]
-    fn only_a_real_arm_that_will_move_needs_a_declaration() {
-        for (args, is_needed) in [
-            ("", false),
-            ("--arm 127.0.0.1", false),
-            ("--arm 192.0.2.1 --dry-run", false),
-            ("--arm 192.0.2.1 --yes", false),
-            ("--arm 192.0.2.1", true),
-        ] {
-            let line = format!("wag wiggle {args}");
-            let Command::Wiggle(wiggle) = Cli::parse_from(line.split_whitespace()).command else {
-                panic!("another command");
-            };
-            assert_eq!(undeclared(&wiggle.arm).is_some(), is_needed, "{args}");
-        }
+    fn an_operator_is_asked_on_a_terminal_alone() {
         assert!(can_ask(true, false) && !can_ask(false, false));
         assert!(!can_ask(true, true), "standard output is for JSON alone");
     }

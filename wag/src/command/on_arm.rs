@@ -10,29 +10,26 @@ use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
-use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 /// Part of the arm's speed limits used for the move to the start pose.
 const MOVE_SPEED: f64 = 0.1;
 
-/// Moves an arm to `start` and lets `work` go on. When the processes have ended, `conclude`
+/// Moves the arm at `address` to `start` and lets `work` go on. When the processes have ended, `conclude`
 /// makes the run's summary from its folder, the received cycles and what `work` returned.
 /// Returns the folder and the summary.
 ///
 /// # Errors
-/// No arm is named; or what went wrong, which the run's summary says too.
+/// What went wrong, which the run's summary says too.
 pub fn on_arm(
     arm: &ArmArgs,
+    address: ArmAddress,
     limits: &Limits,
     start: JointVector,
     (out, name): (Option<&Path>, &str),
     work: impl FnOnce(&mut Session, &ArmLink) -> anyhow::Result<Value>,
     conclude: impl FnOnce(&Path, Cycles, Value) -> anyhow::Result<Value>,
 ) -> Outcome<(PathBuf, Value)> {
-    let Some(ip) = arm.address else {
-        return Err(bad_input!("name the arm with --arm ADDR"));
-    };
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
@@ -40,7 +37,7 @@ pub fn on_arm(
         session.hold_dead_man().or_failed()?;
     }
     let worked = |session: &mut Session| -> anyhow::Result<Value> {
-        let (link, warnings) = bring_up(session, &folder, arm, ip, limits, start)?;
+        let (link, warnings) = bring_up(session, &folder, address, limits, start)?;
         let mut value = work(session, &link)?;
         value["ok"] = true.into();
         value["run"] = json!(folder.path());
@@ -71,18 +68,11 @@ pub fn on_arm(
 fn bring_up(
     session: &mut Session,
     folder: &RunFolder,
-    arm: &ArmArgs,
-    ip: IpAddr,
+    address: ArmAddress,
     limits: &Limits,
     start: JointVector,
 ) -> anyhow::Result<(ArmLink, Vec<String>)> {
     let stage = Stage::begin("bring-up");
-    let address = ArmAddress {
-        ip,
-        command: arm.ports.command_port,
-        joints: arm.ports.report_port,
-        status: [arm.ports.status_port; 2],
-    };
     pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::start_controller(session, folder, limits, address)?;
     let warnings = pipeline::acquire(session, &link)?;
@@ -92,7 +82,7 @@ fn bring_up(
     stage.say("moving to the start pose");
     pipeline::arm_for(session, &link, OperatingMode::SetUp)?;
     pipeline::move_to(session, &link, start, MOVE_SPEED)?;
-    stage.done(if ip.is_loopback() {
+    stage.done(if address.simulated {
         "arm stands at the start; simulated, so it is armed without asking"
     } else {
         "arm stands at the start"

@@ -7,7 +7,7 @@ use super::plan::LOOK;
 use super::unconfirmed::confirm;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
-use crate::pipeline::{self, ArmLink};
+use crate::pipeline::{self, ArmAddress, ArmLink};
 use crate::session::Session;
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
@@ -17,9 +17,10 @@ use shared_types::OperatingMode;
 use std::path::Path;
 
 /// Moves to a trajectory's start and streams it, armed for `operating_mode`; returns what was
-/// measured.
+/// measured. Without an `address` it must be a dry run.
 pub fn drive(
     arm: &ArmArgs,
+    address: Option<ArmAddress>,
     limits: &Limits,
     trajectory: &JointTrajectory,
     out: Option<&Path>,
@@ -38,6 +39,9 @@ pub fn drive(
     if arm.dry_run {
         return dry_run::tell(arm, limits, trajectory, name).map(Some);
     }
+    let Some(address) = address else {
+        return Err(bad_input!("name the arm with --arm ADDR"));
+    };
     let start = trajectory.start();
     let work = |session: &mut Session, link: &ArmLink| {
         let stage = Stage::begin("stream");
@@ -52,7 +56,9 @@ pub fn drive(
         Ok(json!({ "start_ns": span.start_ns, "end_ns": span.end_ns, "latency": latency }))
     };
     let place = (out, name);
-    let (folder, value) = on_arm(arm, limits, start, place, work, |_, _, value| Ok(value))?;
+    let (folder, value) = on_arm(arm, address, limits, start, place, work, |_, _, value| {
+        Ok(value)
+    })?;
     println!("done; run folder: {}", folder.display());
     Ok(Some(value))
 }
@@ -61,10 +67,11 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
     confirm(&plan.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(&plan).or_input()?;
-    require_clear_area(&args.arm, "THROW")?;
+    let address = require_clear_area(&args.arm, "THROW")?;
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let run = drive(
         &args.arm,
+        address,
         &limits,
         &plan.trajectory,
         args.out.as_deref(),

@@ -101,7 +101,7 @@ pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
         "{count} frames, rope lost in {lost}, unconfirmed in {doubted}"
     ));
     for doubt in &result.track.doubts {
-        eprintln!("warning: in doubt: {doubt}");
+        eprintln!("warning: the track is unconfirmed: {doubt}");
     }
     if let Some(clamp) = result.clamp {
         println!("{}", said(&clamp));

@@ -1,19 +1,19 @@
-//! A track in doubt ends the work that would rest on it, unless that is accepted.
+//! An unconfirmed track ends the work that would rest on it, unless that is accepted.
 
 use anyhow::bail;
 
-/// Stops at what is in doubt; with `accepted` it is a warning only. `look` says where the
-/// doubt can be looked at.
+/// Stops at an unconfirmed track; with `accepted` it is a warning only. `look` says where it
+/// can be looked at.
 pub fn confirm(doubts: &[String], accepted: bool, look: &str) -> anyhow::Result<()> {
     if doubts.is_empty() {
         return Ok(());
     }
     let doubts = doubts.join("; ");
     if accepted {
-        eprintln!("warning: the track is in doubt: {doubts}");
+        eprintln!("warning: the track is unconfirmed: {doubts}");
         return Ok(());
     }
     bail!(
-        "the track of the rope is in doubt: {doubts}; {look}, then mend the film or its files, or go on with --accept-unconfirmed"
+        "the track of the rope is unconfirmed: {doubts}; {look}, then mend the film or its files, or go on with --accept-unconfirmed"
     )
 }

@@ -22,7 +22,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
             "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate reports its information"
         ));
     }
-    require_clear_area(&args.arm, "WIGGLE")?;
+    let address = require_clear_area(&args.arm, "WIGGLE")?;
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;
@@ -37,6 +37,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     let run = if args.arm.address.is_some() || args.arm.dry_run {
         drive(
             &args.arm,
+            address,
             &limits,
             &trajectory,
             args.out.as_deref(),

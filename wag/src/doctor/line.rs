@@ -27,8 +27,9 @@ pub fn judge_line(ip: IpAddr, command_port: u16, report_ports: &[u16]) -> Vec<Fi
         "arm",
         Verdict::fail_unless(version.is_ok()),
         match &version {
-            Ok(ArmVersion { axes, firmware, .. }) => {
-                format!("{address}: {axes} axes, firmware {firmware}")
+            Ok((ArmVersion { axes, firmware, .. }, simulated)) => {
+                let kind = if *simulated { "simulated, " } else { "" };
+                format!("{address}: {kind}{axes} axes, firmware {firmware}")
             }
             Err(reason) => format!("{address}: {reason}"),
         },
@@ -42,7 +43,8 @@ pub fn judge_line(ip: IpAddr, command_port: u16, report_ports: &[u16]) -> Vec<Fi
     findings
 }
 
-fn ask(address: SocketAddr, round_trips_us: &mut Vec<f64>) -> Result<ArmVersion, String> {
+/// Its version, and whether it is the simulated arm.
+fn ask(address: SocketAddr, round_trips_us: &mut Vec<f64>) -> Result<(ArmVersion, bool), String> {
     let mut session = ArmSession::connect(address, WAIT).map_err(|e| e.to_string())?;
     let mut version = Err("it answered with something that is no version".to_owned());
     for _ in 0..QUESTIONS {
@@ -55,7 +57,7 @@ fn ask(address: SocketAddr, round_trips_us: &mut Vec<f64>) -> Result<ArmVersion,
     }
     let version = version?;
     version.check().map_err(|e| e.to_string())?;
-    Ok(version)
+    Ok((version, session.proves_simulated().unwrap_or(false)))
 }
 
 /// Whether anything comes from a report port.

@@ -84,6 +84,7 @@ pub fn start_rig(
                 command,
                 joints,
                 status: [rich, normal],
+                simulated: true,
             };
             Ok((rig, address))
         }
@@ -101,6 +102,8 @@ pub struct ArmAddress {
     pub joints: u16,
     /// Ports with its status (5 Hz), in the order in which they are tried.
     pub status: [u16; 2],
+    /// Whether it is the simulated arm.
+    pub simulated: bool,
 }
 
 /// Starts the controller for an arm, and its guardian.
@@ -134,10 +137,11 @@ fn controller_config(
         command_port: arm.command,
         report_port: arm.joints,
         status_ports: arm.status,
+        simulated: arm.simulated,
         limits: Some(limits.clone()),
         ..shipped
     };
-    if arm.ip.is_loopback() {
+    if arm.simulated {
         // A simulated arm shares this machine with everything else: its silence
         // says more about the machine's load than about a cable.
         config.thresholds.reply_stall_ms = Some(500.0);
@@ -150,8 +154,6 @@ fn controller_config(
         config.on_difference = OnDifference::Set;
         // What a laboratory wants of its own arm is not wanted of a simulated one.
         config.arm_settings = ArmSettings::default();
-    } else {
-        config.real_time.require = true;
     }
     Ok(config)
 }

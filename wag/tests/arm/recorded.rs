@@ -3,7 +3,8 @@
 //! no motion.
 
 use super::support::{
-    Rig, alone, json, process_of, refused_in, said, send, shared_memory_of, until_recorded, wag,
+    Rig, alone, command, json, process_of, refused_in, said, send, shared_memory_of, until,
+    until_recorded, wag,
 };
 use mcap::{MessageStream, Summary};
 use rustix::process::Signal;
@@ -12,7 +13,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::time::UNIX_EPOCH;
+use std::time::{Duration, UNIX_EPOCH};
 
 /// Messages of each topic; all JSON must parse.
 fn topics(bytes: &[u8]) -> BTreeMap<String, u64> {
@@ -99,9 +100,8 @@ fn a_whole_run_lies_in_one_file_that_replays_to_the_bit_and_others_may_join() {
     assert!(part > 0.01 && part <= 1.0, "{speed}");
     assert!(!path.join("cause.json").exists());
     page_has(&run, &["NOT STOPPED"]);
-    drop(rig);
     its_file_is_whole(&path);
-    ledger_knows(folder.path(), &path);
+    ledger_knows(folder.path(), &path, rig);
 }
 
 /// A recorder finds the controller of a run under way in `folder` and names those that run.
@@ -169,7 +169,7 @@ fn its_file_is_whole(run: &Path) {
 
 /// The run is listed, told how it was made, a broken one beside it hides nothing, and a folder
 /// that is none is left out.
-fn ledger_knows(runs: &Path, run: &Path) {
+fn ledger_knows(runs: &Path, run: &Path, rig: Rig) {
     fs::create_dir_all(runs.join("broken/no-run")).unwrap();
     fs::create_dir(runs.join("no-run")).unwrap();
     fs::write(runs.join("broken/command.json"), "{").unwrap();
@@ -193,10 +193,20 @@ fn ledger_knows(runs: &Path, run: &Path) {
     );
     let same = json(&format!("ledger compare {run} {run}"));
     assert_eq!(same["differences"], Value::Array(Vec::new()));
-    // The arm is gone by now: making the run again fails as it would by hand.
-    refused_in(Path::new("."), 1, &format!("ledger rerun {run} --go"));
-    let made = fs::read_dir(runs.join("runs")).unwrap().count();
-    assert_eq!(made, 1, "where it was made");
+    let go = format!("ledger rerun {run} --go");
+    let again = command(&go).spawn().unwrap();
+    let made = || fs::read_dir(runs.join("runs")).map_or(0, Iterator::count);
+    until("where it was made", Duration::from_secs(20), || {
+        (made() == 1).then_some(())
+    });
+    send(again.id(), Signal::INT);
+    let output = again.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    drop(rig);
+    // The arm is gone by now: it fails as it would by hand.
+    let gone = refused_in(Path::new("."), 1, &go);
+    assert!(gone.contains("cannot connect"), "{gone}");
+    assert_eq!(made(), 1);
 }
 
 #[test]

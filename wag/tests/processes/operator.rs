@@ -1,9 +1,11 @@
 //! What the operator at the terminal can do: Ctrl-C, and the dead-man switch.
 
 use super::shell::{arm, on_arm, recorded, said};
-use crate::support::{send, until};
+use crate::support::{refused_in, send, until};
 use rustix::process::Signal;
 use shared_types::FaultCode;
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::Duration;
@@ -76,4 +78,34 @@ fn a_dead_man_switch_that_is_not_held_moves_nothing() {
         cycles.iter().all(|c| c.trajectory_s < 0.0),
         "no motion began"
     );
+}
+
+/// Through a tunnel an arm answers at this machine's address. With a serial number of the
+/// vendor's it is real, and nothing begins before somebody declares the area clear.
+#[test]
+fn an_arm_behind_a_tunnel_needs_a_clear_area() {
+    let arm = arm();
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let arm_port = arm.ports().command;
+    let tunnel = std::thread::spawn(move || {
+        let (mut near, _) = listener.accept().unwrap();
+        let mut far = TcpStream::connect((Ipv4Addr::LOCALHOST, arm_port)).unwrap();
+        let mut bytes = [0; 256];
+        let n = near.read(&mut bytes).unwrap();
+        far.write_all(&bytes[..n]).unwrap();
+        let n = far.read(&mut bytes).unwrap();
+        let at = bytes.windows(9).position(|w| w == b"SIMULATED").unwrap();
+        bytes[at..at + 9].copy_from_slice(b"XS1305000");
+        near.write_all(&bytes[..n]).unwrap();
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!("wiggle --arm 127.0.0.1 --command-port {port}");
+    let said = refused_in(folder.path(), 2, &line);
+    assert!(
+        said.contains("does not prove") && said.contains("--yes"),
+        "{said}"
+    );
+    tunnel.join().unwrap();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -3,12 +3,15 @@
 use super::*;
 use arm_model::kinematics::{self, JOINT_ORIGIN_M, JOINT_QUARTER_TURNS_X};
 use rt_controller::xarm::reply::Text;
+use rt_controller::xarm::version::SIMULATED_SERIAL_NUMBER;
 use rt_controller::xarm::{EmitError, JointQuery, Reply, Request};
 
 /// Version text of a real arm before its firmware: 7 axes, type 7, 1305 arm.
 const MODEL: &str = "7,7,XS1305,AC1304,v";
 /// Serial numbers of arm and control box, a NUL between them.
-const SERIAL_NUMBERS: &str = "XS130500000000\0AC130400000000";
+fn serial_numbers() -> String {
+    format!("{SIMULATED_SERIAL_NUMBER}\0AC130400000000")
+}
 
 /// Data of a reply.
 #[derive(Debug, Clone, PartialEq)]
@@ -198,7 +201,7 @@ impl ArmModel {
             Command::Version => {
                 ReplyData::Text(Text::new(&format!("{MODEL}{}", self.config.firmware)))
             }
-            Command::SerialNumbers => ReplyData::Text(Text::new(SERIAL_NUMBERS)),
+            Command::SerialNumbers => ReplyData::Text(Text::new(&serial_numbers())),
             Command::GetState => ReplyData::State(self.state()),
             Command::Buffered => ReplyData::Buffered(self.buffered()),
             Command::GetFault => ReplyData::Fault {

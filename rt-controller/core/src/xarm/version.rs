@@ -9,6 +9,10 @@ use arm_model::{JointVector, Limits};
 use core::fmt;
 use core::ops::RangeInclusive;
 
+/// Serial number of the simulated arm (register 2). No arm of the vendor has it, and an
+/// address proves nothing: a tunnel makes a real arm answer on this machine.
+pub const SIMULATED_SERIAL_NUMBER: &str = "SIMULATED00000";
+
 /// Number of a firmware release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Firmware {

@@ -13,7 +13,6 @@ use cli_output::{OrInput, Outcome, Stage};
 use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
-use std::net::IpAddr;
 use std::time::Duration;
 
 /// Rest before and after each sweep, so that every joint starts and ends at rest.
@@ -60,17 +59,19 @@ pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
 /// Moves the arm; what `conclude` finds in what it did is the run's summary.
 pub(super) fn measure(
     args: &LatencyArgs,
-    address: IpAddr,
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
     let (limits, excitation, sweeps) = intent(args)?;
-    require_clear_area(&args.arm, "MEASURE")?;
+    let Some(address) = require_clear_area(&args.arm, "MEASURE")? else {
+        return Err(bad_input!("name the arm with --arm ADDR"));
+    };
     let Some((_, first)) = sweeps.first() else {
         return Err(bad_input!("name a joint with --joints"));
     };
     let place = (args.out.as_deref(), "latency");
     let (_, found) = on_arm(
         &args.arm,
+        address,
         &limits,
         first.start(),
         place,
@@ -86,7 +87,7 @@ pub(super) fn measure(
             Ok(json!({}))
         },
         |folder, cycles, mut reported| {
-            let source = format!("arm {address}:{}", args.arm.ports.command_port);
+            let source = format!("arm {}:{}", address.ip, address.command);
             let mut found = conclude(&Evidence {
                 excitation: Some(excitation),
                 ..Evidence::of(source, folder, cycles)

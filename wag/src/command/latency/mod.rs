@@ -26,7 +26,7 @@ pub fn run(args: &LatencyArgs) -> Outcome<Option<Value>> {
     let conclude = |evidence: &Evidence| conclude(args, evidence);
     let value = match (&args.arm.address, &args.run) {
         (_, None) if args.arm.dry_run => return measure::dry_run(args).map(Some),
-        (Some(address), None) => measure::measure(args, *address, conclude)?,
+        (Some(_), None) => measure::measure(args, conclude)?,
         (None, Some(run)) => conclude(&Evidence::recorded(run).or_input()?).or_failed()?,
         _ => {
             return Err(bad_input!(
