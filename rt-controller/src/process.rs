@@ -93,7 +93,7 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     threads
         .receivers
         .push(receiver.map_err(ControllerError::Thread)?);
-    let held_to = (limits, settings.thresholds);
+    let held_to = (limits, settings);
     let mut bridge = Bridge::open(&bus, config, held_to, warnings, rings.bridge)?;
     serve(&mut bridge, &threads, stop)
 }

@@ -2,7 +2,7 @@
 
 use super::stand::{PATIENCE, Stand, arm_for, execute, swing};
 use arm_model::joint::START_POSE;
-use arm_model::{Limits, LimitsSpec};
+use arm_model::{JointTrajectory, Limits, LimitsSpec};
 use rt_controller::arm_settings::Load;
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::OnDifference;
@@ -104,6 +104,44 @@ fn another_commander_or_another_tool_speed_is_a_refusal_that_says_what() {
         );
         stand.finish();
     }
+}
+
+/// The loop would brake it on its way.
+#[test]
+fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
+    let mut stand = Stand::start("armed_speed");
+    stand.make_ready();
+    let mut aside = START_POSE;
+    aside[0] += 0.6;
+    let there_and_back = [START_POSE, aside, START_POSE];
+    let swung = execute(&JointTrajectory::new(&[0.0, 0.8, 1.6], &there_and_back).unwrap());
+    let moved = ControllerRequest::MoveTo {
+        q: aside,
+        speed_fraction: 0.5,
+    };
+    for (armed, request) in [
+        (OperatingMode::SetUp, &moved),
+        (OperatingMode::SetUp, &swung),
+        (OperatingMode::Wiggle, &swung),
+    ] {
+        assert_eq!(stand.ask(&arm_for(armed, true)), ControllerEvent::Done);
+        let (fault, message) = stand.refused(request);
+        assert_eq!(fault, FaultCode::OperatingModeExceeded, "{message}");
+        assert!(
+            message.contains(&format!("armed for {armed:?}")),
+            "{message}"
+        );
+        assert_eq!(stand.mode(), ControllerMode::Idle);
+    }
+    assert_eq!(
+        stand.ask(&arm_for(OperatingMode::Throw, true)),
+        ControllerEvent::Done
+    );
+    match stand.ask(&swung) {
+        ControllerEvent::Finished { .. } => {}
+        other => panic!("{other:?}"),
+    }
+    stand.finish();
 }
 
 /// A setpoint 0.2 ms late looks 5 % too fast, so the arm's limit is above that of the plans.

@@ -14,7 +14,7 @@ mod uploads;
 
 use crate::commander::CommanderLock;
 use crate::config::ControllerConfig;
-use crate::control::{ArmCodes, ControlCommand, ControlEvent, Motion, Thresholds};
+use crate::control::{ArmCodes, ControlCommand, ControlEvent, ControlSettings, Motion};
 use crate::driver::CommandMsg;
 use crate::error::ControllerError;
 use crate::os::now_ns;
@@ -71,7 +71,7 @@ enum Awaited {
 pub struct Bridge {
     config: ControllerConfig,
     limits: Limits,
-    thresholds: Thresholds,
+    settings: ControlSettings,
     commander: Option<CommanderLock>,
     warnings: Vec<String>,
     ports: BridgePorts<TcpLink>,
@@ -106,19 +106,19 @@ impl core::fmt::Debug for Bridge {
 
 impl Bridge {
     /// Opens all services of a controller with a checked configuration, the limits and
-    /// thresholds that it names. `warnings` are the real-time properties that could
+    /// settings that it names. `warnings` are the real-time properties that could
     /// not be had, in words.
     pub fn open(
         bus: &Bus,
         config: ControllerConfig,
-        (limits, thresholds): (Limits, Thresholds),
+        (limits, settings): (Limits, ControlSettings),
         warnings: Vec<String>,
         ports: BridgePorts<TcpLink>,
     ) -> Result<Self, ControllerError> {
         Ok(Self {
             config,
             limits,
-            thresholds,
+            settings,
             commander: None,
             warnings,
             ports,
@@ -401,7 +401,7 @@ impl Bridge {
 
     /// Answers bring-ups whose arm is held and reports its joints.
     fn settle_engagements(&mut self) {
-        let stale_ns = self.thresholds.report_stale_ns;
+        let stale_ns = self.settings.thresholds.report_stale_ns;
         let fresh = self
             .newest_report
             .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);

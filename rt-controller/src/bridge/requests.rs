@@ -9,6 +9,7 @@ use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
 use crate::transport::tcp::{LinkSettings, TcpLink};
+use arm_model::kinematics::tool_speed_m_s;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
@@ -23,6 +24,8 @@ const START_DISTANCE_MAX_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 const START_EQUAL_RAD: f64 = 1e-9;
 /// Longest time that an arming for setting up or wiggling lasts (ns): ten minutes.
 const ARMED_FOR_NS: u64 = 600_000_000_000;
+/// What the loop judges by, differences over a cycle, may be this part less than the speed.
+const SPEED_ROUNDING: f64 = 1e-3;
 /// Part of the limits used for that move.
 const TO_START_SPEED_PART: f64 = 0.05;
 
@@ -60,7 +63,11 @@ impl Bridge {
                 area_clear,
             } => self.serve_arming(call, operating_mode, area_clear),
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
-                Ok(()) => answer(&call, &ControllerEvent::Done),
+                Ok(()) => {
+                    // With its next cycle.
+                    self.operating_mode = None;
+                    answer(&call, &ControllerEvent::Done);
+                }
                 Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
             },
             ControllerRequest::Announce { sha256 } => {
@@ -166,7 +173,7 @@ impl Bridge {
             limits: &self.limits,
         };
         let period_ns = MonotonicNs(0).plus_s(self.limits.period_s()).0;
-        let link = LinkSettings::new(self.thresholds.unanswered_max, period_ns);
+        let link = LinkSettings::new(self.settings.thresholds.unanswered_max, period_ns);
         let mut step_done = |name: &'static str, result: &str| {
             tracing::info!(step = name, result, "setting up the arm");
             let step = ControllerEvent::Step {
@@ -202,9 +209,47 @@ impl Bridge {
         if !self.may_move(&call) {
             return;
         }
-        match plan_move(&self.newest.q_c, &q, speed_fraction, &self.limits) {
+        let planned = plan_move(&self.newest.q_c, &q, speed_fraction, &self.limits)
+            .map_err(|error| (error.fault, error.to_string()))
+            .and_then(|motion| self.keeps_armed_speed(&motion).map(|()| motion));
+        match planned {
             Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
-            Err(error) => refuse(&call, error.fault, &error.to_string()),
+            Err((fault, detail)) => refuse(&call, fault, &detail),
+        }
+    }
+
+    /// Refuses a motion whose tool is faster than it is armed for: the loop would brake it on
+    /// its way.
+    fn keeps_armed_speed(&self, motion: &Motion) -> Result<(), (FaultCode, String)> {
+        // What is not armed the loop refuses.
+        let Some(armed) = self
+            .operating_mode
+            .filter(|_| self.settings.arming_required)
+        else {
+            return Ok(());
+        };
+        let is_move = matches!(motion, Motion::Move { .. });
+        let limit_m_s = self.limits.tcp_speed_max_m_s;
+        let most_m_s = self.settings.tool_speed_max_m_s(is_move, armed, limit_m_s);
+        let period_s = self.limits.period_s();
+        let cycles = (motion.duration_s() / period_s).ceil() as u32;
+        let tool_m_s = |cycle: u32| {
+            let t_s = f64::from(cycle) * period_s;
+            let state = motion.state_at(t_s);
+            let speed_m_s = tool_speed_m_s(&state.q, &state.qd, &self.limits.tcp_offset());
+            (speed_m_s, t_s)
+        };
+        let fastest = (0..=cycles)
+            .map(tool_m_s)
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match fastest {
+            Some((top_m_s, at_s)) if top_m_s > most_m_s * (1.0 + SPEED_ROUNDING) => {
+                let detail = format!(
+                    "the tool would reach {top_m_s:.3} m/s after {at_s:.2} s, armed for {armed:?} it may move at {most_m_s:.3}: move more slowly, or arm for more"
+                );
+                Err((FaultCode::OperatingModeExceeded, detail))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -264,6 +309,7 @@ impl Bridge {
             .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
             motions.push_back(Box::new(to_start));
         }
+        self.keeps_armed_speed(&motion)?;
         motions.push_back(Box::new(motion));
         Ok(motions)
     }

@@ -100,7 +100,13 @@ impl ControlState {
                 // The planned instant, also of a late cycle: punctual setpoints then lie
                 // at whole periods of every motion, the same ones in every run.
                 let start_ns = input.deadline_ns.saturating_sub(input.late_ns.into());
-                self.tcp_speed_max_m_s = self.tool_speed_of(mode, operating_mode);
+                let (is_move, limit_m_s) = (
+                    mode == ControllerMode::Moving,
+                    self.limits.tcp_speed_max_m_s,
+                );
+                self.tcp_speed_max_m_s =
+                    self.settings
+                        .tool_speed_max_m_s(is_move, operating_mode, limit_m_s);
                 let shot =
                     mode == ControllerMode::Streaming && operating_mode == OperatingMode::Throw;
                 if self.settings.arming_required && shot {

@@ -18,7 +18,7 @@ use alloc::boxed::Box;
 use arm_model::{JointState, JointVector, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::ipc::{ControllerMode, ControllerState, CycleRecord, PAYLOAD_VERSION, RunCounts};
-use shared_types::{CommandInterface, FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{CommandInterface, FaultCode, MonotonicNs};
 
 /// State of the control cycle. Sized once; stepping never allocates. An engagement
 /// makes it anew, apart from its counters and the heartbeats.
@@ -355,20 +355,6 @@ impl ControlState {
             ),
         });
         Ok(())
-    }
-
-    /// Tool speed a motion of `mode` may show when armed for `armed` (m/s). Moves the
-    /// controller makes itself never go faster than a wiggle once arming is in
-    /// force, whatever is armed.
-    pub(super) fn tool_speed_of(&self, mode: ControllerMode, armed: OperatingMode) -> f64 {
-        let armed = if mode == ControllerMode::Moving && self.settings.arming_required {
-            armed.min(OperatingMode::Wiggle)
-        } else {
-            armed
-        };
-        self.settings
-            .speeds
-            .of(armed, self.limits.tcp_speed_max_m_s)
     }
 
     /// Changes to a mode without a motion; the one that ran goes back.

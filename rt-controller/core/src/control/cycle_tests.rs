@@ -8,6 +8,7 @@ use crate::control::exchange::ControlCommand;
 use arm_model::JointTrajectory;
 use arm_model::joint::START_POSE;
 use rand::{RngExt, SeedableRng};
+use shared_types::OperatingMode;
 use shared_types::ipc::{GuardianBeat, Reports};
 
 /// A motion that begins in a late cycle keeps to the deadlines all the same: its

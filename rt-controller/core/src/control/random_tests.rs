@@ -14,8 +14,8 @@ use arm_model::joint::START_POSE;
 use arm_model::{JOINTS, JointTrajectory, kinematics};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use shared_types::Arming;
 use shared_types::ipc::{InputRecord, JointReport, Reports};
+use shared_types::{Arming, OperatingMode};
 
 const PERIOD_S: f64 = 0.004;
 

@@ -128,6 +128,21 @@ pub struct ControlSettings {
     pub speeds: OperatingModeSpeeds,
 }
 
+impl ControlSettings {
+    /// Tool speed that a motion of the controller's own (`is_move`), or one that was given to
+    /// it, may show when armed for `armed` (m/s), `limit_m_s` at most. Its own motions never go
+    /// faster than a wiggle once arming is in force, whatever is armed. RT-safe.
+    #[must_use]
+    pub fn tool_speed_max_m_s(&self, is_move: bool, armed: OperatingMode, limit_m_s: f64) -> f64 {
+        let armed = if is_move && self.arming_required {
+            armed.min(OperatingMode::Wiggle)
+        } else {
+            armed
+        };
+        self.speeds.of(armed, limit_m_s)
+    }
+}
+
 impl From<Thresholds> for ControlSettings {
     /// Servo positions, neither arming nor guardian needed.
     fn from(thresholds: Thresholds) -> Self {
